@@ -1,0 +1,41 @@
+"""cgraph: computational graphs of equations, with forward and reverse automatic differentiation."""
+
+from .counts import Counts
+from .errors import GraphError
+from .forward import jvp
+from .graph import Graph
+from .jacobian import hessian, jacobian
+from .label import tag
+from .node import Edge, Node, constant, named, variable, variables
+from .ops import (
+    abs_ as abs,
+)
+from .ops import (
+    acos,
+    asin,
+    atan,
+    atan2,
+    cos,
+    cosh,
+    equal,
+    exp,
+    expm1,
+    hypot,
+    less,
+    less_equal,
+    log,
+    log1p,
+    maximum,
+    minimum,
+    not_equal,
+    pow,
+    sign,
+    sin,
+    sinh,
+    sqrt,
+    tan,
+    tanh,
+    where,
+)
+from .reverse import gradient, vjp
+from .simplify import simplify, specialize

@@ -1,0 +1,166 @@
+"""Folding and sharing: how derived nodes are built, without `* 1`, `+ 0` or a second copy of the same thing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from .label import Label
+from .node import CONSTANT, OPS, Node, Op, constant
+from .ops import cos, sin, sqrt
+
+# Rules see the arguments of the node to be and give a node that stands for it, or None. They take every operand for
+# finite, and a divisor for non-zero: 0 * x = 0, x - x = 0. Signed zeros are not told apart: x + 0 = x.
+Rule = Callable[..., Node | None]
+
+
+def _add(a: Node, b: Node) -> Node | None:
+    if a.value == 0.0:
+        return b
+    if b.value == 0.0:
+        return a
+    if b.op is NEG:
+        return a - b.args[0]
+    if a.op is NEG:
+        return b - a.args[0]
+    return None
+
+
+def _sub(a: Node, b: Node) -> Node | None:
+    if b.value == 0.0:
+        return a
+    if a.value == 0.0:
+        return -b
+    if a is b:
+        return constant(0.0)
+    if b.op is NEG:
+        return a + b.args[0]
+    if a.op is NEG:
+        return -(a.args[0] + b)
+    return None
+
+
+def _mul(a: Node, b: Node) -> Node | None:
+    if b.value is not None:
+        a, b = b, a
+    c = a.value
+    if c is not None:
+        if c == 0.0:
+            return constant(0.0) if b.value is None or math.isfinite(b.value) else None
+        if c == 1.0:
+            return b
+        if c == -1.0:
+            return -b
+        if b.op is NEG:
+            return constant(-c) * b.args[0]
+        if b.op is MUL and (inner := b.args[0].value) is not None and math.isfinite(c * inner) and c * inner:
+            return constant(c * inner) * b.args[1]
+        return None
+    if a.op is NEG:
+        return a.args[0] * b.args[0] if b.op is NEG else -(a.args[0] * b)
+    return -(a * b.args[0]) if b.op is NEG else None
+
+
+def _div(a: Node, b: Node) -> Node | None:
+    if b.value == 1.0:
+        return a
+    if b.value == -1.0:
+        return -a
+    if a.value == 0.0 and b.value != 0.0:
+        return constant(0.0)
+    if a is b:
+        return constant(1.0)
+    if a.op is NEG:
+        return a.args[0] / b.args[0] if b.op is NEG else -(a.args[0] / b)
+    return -(a / b.args[0]) if b.op is NEG else None
+
+
+def _neg(a: Node) -> Node | None:
+    if a.op is NEG:
+        return a.args[0]
+    if a.op is SUB:
+        return a.args[1] - a.args[0]
+    if a.op is MUL and a.args[0].value is not None:
+        return constant(-a.args[0].value) * a.args[1]
+    return None
+
+
+_POWERS: dict[float, Callable[[Node], Node]] = {
+    0.0: lambda a: constant(1.0),
+    1.0: lambda a: a,
+    2.0: lambda a: a * a,
+    0.5: lambda a: sqrt(a),
+    -1.0: lambda a: 1.0 / a,
+}
+
+
+def _pow(a: Node, b: Node) -> Node | None:
+    rule = _POWERS.get(b.value) if b.value is not None else None
+    return rule(a) if rule else None
+
+
+def _strong_mul(a: Node, b: Node) -> Node | None:
+    for c, other in ((a, b), (b, a)):
+        if c.value == 0.0:
+            return constant(0.0)
+        if c.value is not None and math.isfinite(c.value):
+            return c * other
+    return None
+
+
+def _where(c: Node, a: Node, b: Node) -> Node | None:
+    if c.value is not None:
+        return a if c.value != 0.0 else b
+    return a if a is b else None
+
+
+def _same(a: Node, b: Node) -> Node | None:
+    return a if a is b else None
+
+
+NEG, SUB, MUL = OPS["neg"], OPS["sub"], OPS["mul"]
+_RULES: dict[str, Rule] = {
+    "add": _add,
+    "sub": _sub,
+    "mul": _mul,
+    "div": _div,
+    "neg": _neg,
+    "pow": _pow,
+    "strong_mul": _strong_mul,
+    "where": _where,
+    "minimum": _same,
+    "maximum": _same,
+    "sin": lambda a: -sin(a.args[0]) if a.op is NEG else None,
+    "cos": lambda a: cos(a.args[0]) if a.op is NEG else None,
+    "abs": lambda a: abs(a.args[0]) if a.op is NEG else None,
+}
+
+
+class Builder:
+    """Builds nodes folded and shared: the same operation on the same arguments is made once.
+
+    Merging unites labels. Only nodes that this builder made are merged, so nobody else's node changes.
+    """
+
+    def __init__(self) -> None:
+        self._made: dict[tuple[object, ...], Node] = {}
+
+    def __call__(self, op: Op, args: tuple[Node, ...], label: Label, name: str | None = None) -> Node:
+        rule = _RULES.get(op.name)
+        if rule is not None and (node := rule(*args)) is not None:
+            return node
+        if all([arg.op is CONSTANT for arg in args]):
+            value = op.scalar(*[arg.value for arg in args])
+            if value == value:
+                return constant(value)
+        if op.commutative:
+            a, b = args
+            if (a.op is not CONSTANT and b.op is CONSTANT) or (op, id(b), id(a)) in self._made:
+                args = (b, a)  # one order for both a*b and b*a: a constant first, else as first met
+        key = (op, *map(id, args))
+        node = self._made.get(key)
+        if node is None:
+            node = self._made[key] = Node(op, args, label, name=name)
+        elif node.label is not label:
+            object.__setattr__(node, "label", node.label.union(label))
+        return node

@@ -1,0 +1,291 @@
+"""Nodes: constants, named variables, and operations on other nodes."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, NoReturn
+from weakref import WeakValueDictionary
+
+import numpy as np
+
+from .label import UNLABELLED, Label, current, label
+
+INPUT = label(roles=frozenset({"input"}))
+
+
+@dataclass(frozen=True, eq=False)
+class Op:
+    """One row of the operation table (`ops.py`): all that any part of the library knows of an operation."""
+
+    name: str
+    arity: int
+    scalar: Callable[..., float]  # value on floats, IEEE results where `math` would raise
+    array: Callable[..., Any]  # value on arrays
+    partials: Callable[..., tuple[Node | float, ...]]  # of (output, *arguments), one for each argument
+    python: str  # text in generated Python, over floats
+    numpy: str  # text in generated NumPy, over arrays
+    symbol: str  # text in a drawing
+    samples: tuple[tuple[float, ...], ...] = ()  # points inside the domain, away from kinks
+    commutative: bool = False
+    selects: bool = False  # an unused argument must not reach the result, not even as NaN
+
+    def __repr__(self) -> str:
+        return f"<op {self.name}>"
+
+
+def _no_partials(*_: Node) -> tuple[Node | float, ...]:
+    return ()
+
+
+def _leaf(name: str) -> Op:
+    return Op(name, 0, float, float, _no_partials, "", "", "")
+
+
+VARIABLE = _leaf("variable")
+CONSTANT = _leaf("constant")
+OPS: dict[str, Op] = {}  # filled by ops.py, one row an operation
+
+_set = object.__setattr__
+
+
+class Node:
+    """An immutable node of a computational graph: a constant, a named variable or an operation.
+
+    op: its row of the operation table; `VARIABLE` or `CONSTANT` for a leaf.
+    args: argument nodes.  value: a constant's number.  name: a variable's name, or one given by `named`.
+    tags, roles: what the node means, see `cg.tag`.
+
+    Nodes compare and hash by identity. Arithmetic with nodes and numbers makes new nodes, kept as written;
+    `<`, `<=`, `>`, `>=` make comparison nodes (1.0 or 0.0) for `cg.where`; `cg.equal` compares values.
+    """
+
+    __slots__ = ("__weakref__", "args", "label", "name", "op", "value")
+    op: Op
+    args: tuple[Node, ...]
+    value: float | None
+    name: str | None
+    label: Label
+
+    def __init__(
+        self,
+        op: Op,
+        args: tuple[Node, ...] = (),
+        label: Label = UNLABELLED,
+        *,
+        value: float | None = None,
+        name: str | None = None,
+    ) -> None:
+        _set(self, "op", op)
+        _set(self, "args", args)
+        _set(self, "label", label)
+        _set(self, "value", value)
+        _set(self, "name", name)
+
+    def __setattr__(self, key: str, value: object) -> NoReturn:
+        raise AttributeError(f"a Node is immutable: cannot set {key!r}")
+
+    __delattr__ = __setattr__  # type: ignore[assignment]
+
+    @property
+    def tags(self) -> frozenset[str]:
+        """Tags given by `cg.tag` where the node, or the node it derives from, was written."""
+        return self.label.tags
+
+    @property
+    def roles(self) -> frozenset[str]:
+        """Among "input", "primal", "adjoint", "tangent"; several after a merge or a second derivative."""
+        return self.label.roles
+
+    def __repr__(self) -> str:
+        if self.op is CONSTANT:
+            return f"<node {self.value!r}>"
+        inner = f" {self.name}" if self.name is not None else ""
+        return f"<node {self.op.name}{inner}>"
+
+    def __bool__(self) -> NoReturn:
+        raise TypeError("a Node has no truth value before it is evaluated; choose between nodes with cg.where")
+
+    def __float__(self) -> float:
+        if self.value is None:
+            raise TypeError(f"{self!r} has no value before it is evaluated; evaluate it in a cg.Graph")
+        return self.value
+
+    def __copy__(self) -> Node:
+        return self
+
+    def __deepcopy__(self, memo: object) -> Node:
+        return self
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("pickle a cg.Graph, not a Node: a node alone does not say which inputs it has")
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **kwargs: Any) -> Any:
+        """`np.sin(node)`, `np.float64(2) * node`, and element by element for arrays of nodes."""
+        op = _BY_UFUNC.get(ufunc)
+        if op is None or method != "__call__" or kwargs:
+            return NotImplemented
+        if any(isinstance(each, np.ndarray) and each.ndim for each in inputs):
+            return np.frompyfunc(lambda *args: apply(op, *args), op.arity, 1)(
+                *(np.asarray(each, dtype=object) for each in inputs)
+            )
+        return apply(op, *(each.item() if isinstance(each, np.ndarray) else each for each in inputs))
+
+    # Operators look the row up by name, so that the table stays the one place that knows operations.
+    def __add__(self, other: Scalar) -> Node:
+        return _binary("add", self, other)
+
+    def __radd__(self, other: Scalar) -> Node:
+        return _binary("add", other, self)
+
+    def __sub__(self, other: Scalar) -> Node:
+        return _binary("sub", self, other)
+
+    def __rsub__(self, other: Scalar) -> Node:
+        return _binary("sub", other, self)
+
+    def __mul__(self, other: Scalar) -> Node:
+        return _binary("mul", self, other)
+
+    def __rmul__(self, other: Scalar) -> Node:
+        return _binary("mul", other, self)
+
+    def __truediv__(self, other: Scalar) -> Node:
+        return _binary("div", self, other)
+
+    def __rtruediv__(self, other: Scalar) -> Node:
+        return _binary("div", other, self)
+
+    def __pow__(self, other: Scalar) -> Node:
+        return _binary("pow", self, other)
+
+    def __rpow__(self, other: Scalar) -> Node:
+        return _binary("pow", other, self)
+
+    def __lt__(self, other: Scalar) -> Node:
+        return _binary("less", self, other)
+
+    def __le__(self, other: Scalar) -> Node:
+        return _binary("less_equal", self, other)
+
+    def __gt__(self, other: Scalar) -> Node:
+        return _binary("less", other, self)
+
+    def __ge__(self, other: Scalar) -> Node:
+        return _binary("less_equal", other, self)
+
+    def __neg__(self) -> Node:
+        return apply(OPS["neg"], self)
+
+    def __pos__(self) -> Node:
+        return self
+
+    def __abs__(self) -> Node:
+        return apply(OPS["abs"], self)
+
+
+Scalar = Node | float
+_BY_UFUNC: dict[Any, Op] = {}
+
+
+def register(op: Op) -> None:
+    """Add a row to the operation table."""
+    if op.name in OPS:
+        raise ValueError(f"operation {op.name!r} is in the table already")
+    OPS[op.name] = op
+    if isinstance(op.array, np.ufunc):
+        _BY_UFUNC[op.array] = op
+
+
+class Edge(NamedTuple):
+    """One use of a node: `source` is argument number `slot` of `target`."""
+
+    source: Node
+    target: Node
+    slot: int
+
+    @property
+    def partial(self) -> Node:
+        """d target / d source through this slot alone, as a node."""
+        return as_node(self.target.op.partials(self.target, *self.target.args)[self.slot])
+
+
+_constants: WeakValueDictionary[tuple[float, float], Node] = WeakValueDictionary()
+_variables: WeakValueDictionary[str, Node] = WeakValueDictionary()
+
+
+def constant(value: float) -> Node:
+    """The node of a number; equal numbers share one node, and 0.0 and -0.0 stay apart.
+
+    Raises TypeError when value is not a real number, ValueError when it is NaN.
+    """
+    if type(value) is not float:
+        if isinstance(value, np.ndarray) and value.ndim == 0:
+            value = value.item()
+        if not isinstance(value, numbers.Real):
+            raise TypeError(f"expected a Node or a real number, got {type(value).__name__}: {value!r:.60}")
+        value = float(value)
+    if value != value:
+        raise ValueError("a constant must not be NaN")
+    key = (value, math.copysign(1.0, value))
+    node = _constants.get(key)
+    if node is None:
+        node = _constants[key] = Node(CONSTANT, value=value)
+    return node
+
+
+def variable(name: str) -> Node:
+    """The variable of that name; asking twice gives the same node.
+
+    Raises TypeError when name is not a string, ValueError when it is empty or holds white space.
+    """
+    if not isinstance(name, str):
+        raise TypeError(f"a variable's name must be a string, got {type(name).__name__}: {name!r:.60}")
+    if not name or name.split() != [name]:
+        raise ValueError(f"a variable's name must be non-empty and without white space, got {name!r}")
+    node = _variables.get(name)
+    if node is None:
+        node = _variables[name] = Node(VARIABLE, (), INPUT, name=name)
+    return node
+
+
+def variables(names: str | Sequence[str]) -> list[Node]:
+    """Several variables: `q0, q1 = cg.variables("q0 q1")`; commas may stand for spaces."""
+    split = names.replace(",", " ").split() if isinstance(names, str) else names
+    return [variable(name) for name in split]
+
+
+def as_node(value: Scalar) -> Node:
+    """The node itself, or the constant of a number."""
+    return value if isinstance(value, Node) else constant(value)
+
+
+def named(name: str, node: Node) -> Node:
+    """The same operation with a name of its own, for listings, drawings and explanations.
+
+    Leaves keep what they are: a variable has its name already, and a constant is shared.
+    """
+    node = as_node(node)
+    return Node(node.op, node.args, node.label, name=name) if node.args else node
+
+
+def apply(op: Op, *args: Scalar) -> Node:
+    """A new node of this operation, built as the current scope says."""
+    if len(args) != op.arity:
+        raise TypeError(f"{op.name} takes {op.arity} argument(s), got {len(args)}")
+    nodes = tuple([each if isinstance(each, Node) else constant(each) for each in args])
+    scope = current.get()
+    if scope.build is None:
+        return Node(op, nodes, scope.label)
+    return scope.build(op, nodes, scope.label)
+
+
+def _binary(name: str, a: Scalar, b: Scalar) -> Node:
+    for each in (a, b):
+        if not isinstance(each, (Node, numbers.Real, np.ndarray)):
+            return NotImplemented
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        return OPS[name].array(a, b)  # element by element, through __array_ufunc__
+    return apply(OPS[name], a, b)

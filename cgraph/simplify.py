@@ -1,0 +1,76 @@
+"""Simplification: folding, common subexpressions and algebra; and `specialize`, which binds inputs."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+from .errors import GraphError
+from .factor import factored
+from .fold import Builder
+from .graph import Graph
+from .label import building
+from .node import CONSTANT, Node, Scalar, constant
+from .order import rebuild
+
+
+def simplify(graph: Graph) -> Graph:
+    """The same function in fewer nodes: constants folded, equal nodes merged, sums of products factored.
+
+    Never grows: the result has at most as many nodes and, for as many nodes, no more edges.
+
+    Assumes finite operands and non-zero divisors: `0 * x = 0`, `x - x = 0`, `x / x = 1`, `x + 0 = x` also for -0.0.
+    Sums and products may be taken in another order, so values can differ by rounding.
+    """
+    best = _shared(graph)
+    if _size(best) > _size(graph):
+        best = graph
+    while True:
+        candidate = _shared(factored(best))
+        if _size(candidate) >= _size(best):
+            return best
+        best = candidate
+
+
+def _size(graph: Graph) -> tuple[int, int]:
+    return len(graph.nodes), sum([len(node.args) for node in graph.nodes])
+
+
+def _shared(graph: Graph) -> Graph:
+    """One pass of folding and sharing."""
+    return _rebuilt(graph, {})
+
+
+def _rebuilt(graph: Graph, replace: dict[Node, Node], inputs: Sequence[Node] | None = None) -> Graph:
+    build = Builder()
+    with building(build) as labelled:
+
+        def make(node: Node, args: tuple[Node, ...]) -> Node:
+            labelled(node.label)
+            return build(node.op, args, node.label, node.name)
+
+        new = rebuild(graph.outputs.values(), replace, make)
+    return Graph(graph.inputs if inputs is None else inputs, {k: new[node] for k, node in graph.outputs.items()})
+
+
+def specialize(
+    graph: Graph, values: Mapping[str, Scalar], outputs: Sequence[str] | None = None
+) -> Graph:
+    """The graph with inputs bound to numbers (or nodes over its other inputs), simplified; bound inputs are gone.
+
+    values: {input name: number}.  outputs: names of those to keep (default: all).
+    Raises GraphError for a name that the graph does not have, ValueError for NaN.
+    """
+    replace = {}
+    for name, value in values.items():
+        (node,) = graph.select_inputs(name)
+        try:
+            replace[node] = value if isinstance(value, Node) else constant(value)
+        except (TypeError, ValueError) as error:
+            raise type(error)(f"input {name!r}: {error}") from None
+    if outputs is not None:
+        if unknown := [name for name in outputs if name not in graph.outputs]:
+            raise GraphError(f"the graph has no output {', '.join(unknown)} (it has {', '.join(graph.outputs)})")
+        graph = Graph(graph.inputs, {name: graph.outputs[name] for name in outputs})
+    inputs = [node for node in graph.inputs if node not in replace]
+    return simplify(_rebuilt(graph, replace, inputs))
