@@ -1,5 +1,6 @@
 """cgraph: computational graphs of equations, with forward and reverse automatic differentiation."""
 
+from .codegen import Compiled, compile
 from .counts import Counts
 from .errors import GraphError
 from .forward import jvp

@@ -9,28 +9,37 @@ from .label import Label
 from .node import CONSTANT, OPS, Node, Op, constant
 from .ops import cos, sin, sqrt
 
-# Rules see the arguments of the node to be and give a node that stands for it, or None. They take every operand for
+# Rules see the arguments of the node to be, not all constant, and give a node that stands for it, or None. They take every operand for
 # finite, and a divisor for non-zero: 0 * x = 0, x - x = 0. Signed zeros are not told apart: x + 0 = x.
 Rule = Callable[..., Node | None]
 
 
 def _add(a: Node, b: Node) -> Node | None:
-    if a.value == 0.0:
-        return b
-    if b.value == 0.0:
-        return a
+    if b.value is not None:
+        a, b = b, a
+    if a.value is not None:
+        return b if a.value == 0.0 else _offset(a.value, b)
     if b.op is NEG:
         return a - b.args[0]
     if a.op is NEG:
         return b - a.args[0]
+    return 2.0 * a if a is b else None
+
+
+def _offset(c: float, b: Node) -> Node | None:
+    """c + b where b has a constant of its own to join with: c + (d + x), c + (d - x)."""
+    if b.op in (ADD, SUB) and (d := b.args[0].value) is not None and math.isfinite(c + d):
+        return constant(c + d) + b.args[1] if b.op is ADD else constant(c + d) - b.args[1]
     return None
 
 
 def _sub(a: Node, b: Node) -> Node | None:
-    if b.value == 0.0:
-        return a
     if a.value == 0.0:
         return -b
+    if b.value is not None:
+        return constant(-b.value) + a
+    if a.value is not None and b.op in (ADD, SUB) and (d := b.args[0].value) is not None and math.isfinite(a.value - d):
+        return constant(a.value - d) - b.args[1] if b.op is ADD else constant(a.value - d) + b.args[1]
     if a is b:
         return constant(0.0)
     if b.op is NEG:
@@ -46,7 +55,7 @@ def _mul(a: Node, b: Node) -> Node | None:
     c = a.value
     if c is not None:
         if c == 0.0:
-            return constant(0.0) if b.value is None or math.isfinite(b.value) else None
+            return constant(0.0)
         if c == 1.0:
             return b
         if c == -1.0:
@@ -66,7 +75,7 @@ def _div(a: Node, b: Node) -> Node | None:
         return a
     if b.value == -1.0:
         return -a
-    if a.value == 0.0 and b.value != 0.0:
+    if a.value == 0.0:
         return constant(0.0)
     if a is b:
         return constant(1.0)
@@ -118,7 +127,7 @@ def _same(a: Node, b: Node) -> Node | None:
     return a if a is b else None
 
 
-NEG, SUB, MUL = OPS["neg"], OPS["sub"], OPS["mul"]
+ADD, SUB, NEG, MUL = OPS["add"], OPS["sub"], OPS["neg"], OPS["mul"]
 _RULES: dict[str, Rule] = {
     "add": _add,
     "sub": _sub,
@@ -146,13 +155,14 @@ class Builder:
         self._made: dict[tuple[object, ...], Node] = {}
 
     def __call__(self, op: Op, args: tuple[Node, ...], label: Label, name: str | None = None) -> Node:
-        rule = _RULES.get(op.name)
-        if rule is not None and (node := rule(*args)) is not None:
-            return node
         if all([arg.op is CONSTANT for arg in args]):
             value = op.scalar(*[arg.value for arg in args])
             if value == value:
                 return constant(value)
+        else:
+            rule = _RULES.get(op.name)
+            if rule is not None and (node := rule(*args)) is not None:
+                return node
         if op.commutative:
             a, b = args
             if (a.op is not CONSTANT and b.op is CONSTANT) or (op, id(b), id(a)) in self._made:

@@ -12,7 +12,8 @@ from .errors import GraphError
 from .evaluate import Value, evaluate
 from .label import label
 from .listing import listing
-from .node import CONSTANT, OPS, VARIABLE, Edge, Node, Op, Scalar, as_node, variable
+from .node import CONSTANT, VARIABLE, Edge, Node, Op, Scalar, as_node, variable
+from .ops import OPS
 from .order import rebuild, topological
 
 if TYPE_CHECKING:

@@ -34,12 +34,14 @@ def cotangents(seeds: Mapping[Node, Node], wrt: Sequence[Node], build: Builder |
                 continue
             guard = node.op.selects or node in guarded
             labelled(node.label.derived(ADJOINT))
+            terms: dict[Node, Node] = {}  # by argument first, so that x * x gives 2 * (bar * x)
             for arg, partial in zip(node.args, node.op.partials(node, *node.args), strict=True):
-                if arg not in active:
-                    continue
+                if arg in active:
+                    term = strong_mul(bar, partial) if guard else bar * partial
+                    terms[arg] = terms[arg] + term if arg in terms else term
+            for arg, term in terms.items():
                 if guard:
                     guarded.add(arg)
-                term = strong_mul(bar, partial) if guard else bar * partial
                 if term.value != 0.0:
                     bars[arg] = bars[arg] + term if arg in bars else term
     zero = as_node(0.0)

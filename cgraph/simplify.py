@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from .errors import GraphError
-from .factor import factored
 from .fold import Builder
 from .graph import Graph
 from .label import building
@@ -15,18 +13,16 @@ from .order import rebuild
 
 
 def simplify(graph: Graph) -> Graph:
-    """The same function in fewer nodes: constants folded, equal nodes merged, sums of products factored.
+    """The same function in fewer nodes: constants folded and collected, equal nodes merged, `x + 0`, `1 * x` and the like gone.
 
     Never grows: the result has at most as many nodes and, for as many nodes, no more edges.
 
     Assumes finite operands and non-zero divisors: `0 * x = 0`, `x - x = 0`, `x / x = 1`, `x + 0 = x` also for -0.0.
     Sums and products may be taken in another order, so values can differ by rounding.
     """
-    best = _shared(graph)
-    if _size(best) > _size(graph):
-        best = graph
+    best = graph
     while True:
-        candidate = _shared(factored(best))
+        candidate = _shared(best)
         if _size(candidate) >= _size(best):
             return best
         best = candidate
