@@ -1,0 +1,14 @@
+"""dynamics: equations of motion on computational graphs, from Lagrangians and planar arms."""
+
+from .equations import (
+    SingularMassMatrixError,
+    bias,
+    energy,
+    forward_dynamics,
+    gravity_force,
+    mass_matrix,
+    momentum,
+)
+from .formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious
+from .planar_arm import Link, PlanarArm, planar_arm
+from .system import System, as_system

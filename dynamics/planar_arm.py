@@ -1,0 +1,121 @@
+"""Planar arms: serial chains of links that swing in a vertical plane."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Node
+
+from .system import System, per_coordinate
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+@dataclass(frozen=True)
+class Link:
+    """One link; the joint that carries it is at its upper end."""
+
+    mass: float  # kg
+    length: float  # m, joint to joint
+    center: float  # m, joint to centre of mass
+    inertia: float  # kg m^2, about the centre of mass
+
+
+@dataclass(frozen=True)
+class PlanarArm:
+    """A serial arm of revolute joints in a vertical plane, hanging from a fixed base.
+
+    Joint angles [rad] are relative to the parent link, zero hanging straight down, positive counter-clockwise.
+    `system` is its Lagrangian system; every function of `dynamics` takes the arm itself.
+    """
+
+    links: tuple[Link, ...]
+    damping: tuple[float, ...]  # N m s, each joint
+    gravity: float  # m/s^2, downwards
+
+    @cached_property
+    def system(self) -> System:
+        """The Lagrangian system, one partial Lagrangian L_i = K_i - P_i for each link, tagged with link and energy."""
+        names = [f"joint {i + 1}" for i in range(len(self.links))]
+        return System(lambda q, qd, t: self._partial_lagrangians(q, qd), names, damping=self.damping)
+
+    def _partial_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
+        # With the first moment m c and the inertia about the joint, m c^2 + I, in place of the velocity of the centre
+        # of mass, K_i = 1/2 m v.v + m c w (v . n) + 1/2 (m c^2 + I) w^2: fewer nodes. v is the joint's velocity, w the
+        # link's angular velocity, n = (cos, sin) of its angle the direction in which w moves it.
+        partials: list[Node] = []
+        angle: Node | float = 0.0
+        omega: Node | float = 0.0
+        velocity: tuple[Node, Node] | None = None  # of the joint, None while it is fixed
+        height: Node | None = None  # of the joint
+        for i, link in enumerate(self.links):
+            with cg.tag(f"link {i + 1}"):
+                angle = q[i] if i == 0 else angle + q[i]
+                omega = qd[i] if i == 0 else omega + qd[i]
+                s, c = cg.sin(angle), cg.cos(angle)
+                moment = link.mass * link.center
+                with cg.tag("kinetic"):
+                    kinetic = 0.5 * (moment * link.center + link.inertia) * (omega * omega)
+                    if velocity is not None:
+                        x, y = velocity
+                        kinetic = kinetic + 0.5 * link.mass * (x * x + y * y) + moment * (omega * (x * c + y * s))
+                with cg.tag("potential"):
+                    potential = -(moment * self.gravity) * c
+                    if height is not None:
+                        potential = link.mass * self.gravity * height + potential
+                partials.append(kinetic - potential)
+                if i + 1 < len(self.links):
+                    with cg.tag("kinetic"):
+                        speed = link.length * omega
+                        x, y = speed * c, speed * s
+                        velocity = (x, y) if velocity is None else (velocity[0] + x, velocity[1] + y)
+                    with cg.tag("potential"):
+                        drop = link.length * c
+                        height = -drop if height is None else height - drop
+        return partials
+
+    def joint_positions(self, q: Array) -> Array:
+        """Places of base, joints and tip [m], (T, n + 1, 2), x to the right and y up, for joint angles q, (T, n)."""
+        angle = np.cumsum(np.asarray(q, dtype=np.float64), axis=1)
+        length = np.array([link.length for link in self.links])
+        steps = np.stack([length * np.sin(angle), -length * np.cos(angle)], axis=-1)
+        return np.concatenate([np.zeros((len(angle), 1, 2)), np.cumsum(steps, axis=1)], axis=1)
+
+
+def planar_arm(
+    masses: Sequence[float],
+    lengths: Sequence[float],
+    damping: float | Sequence[float] = 0.0,
+    model: str = "rod",
+    gravity: float = 9.81,
+) -> PlanarArm:
+    """A planar arm, links from the base outwards.
+
+    masses [kg] and lengths [m]: positive, one for each link.  damping [N m s]: at least 0, for all joints or each.
+    model: "rod", a slender uniform rod with inertia m l^2 / 12; "point", the mass at the link's far end.
+    gravity [m/s^2].  Raises ValueError when a number is out of range or the counts differ.
+    """
+    if len(masses) != len(lengths) or not len(masses):
+        raise ValueError(f"an arm needs as many masses as lengths, at least one; got {len(masses)} and {len(lengths)}")
+    if model not in ("rod", "point"):
+        raise ValueError(f'model must be "rod" or "point", got {model!r}')
+    if not math.isfinite(gravity):
+        raise ValueError(f"gravity must be finite, got {gravity!r} m/s^2")
+    for i, (mass, length) in enumerate(zip(masses, lengths, strict=True)):
+        for what, value, unit in (("mass", mass, "kg"), ("length", length, "m")):
+            if not (math.isfinite(value) and value > 0.0):
+                raise ValueError(f"link {i + 1}: {what} must be positive and finite, got {value!r} {unit}")
+    links = [
+        Link(mass, length, length / 2, mass * length * length / 12)
+        if model == "rod"
+        else Link(mass, length, length, 0.0)
+        for mass, length in zip(map(float, masses), map(float, lengths), strict=True)
+    ]
+    return PlanarArm(tuple(links), per_coordinate("damping", damping, len(links), minimum=0.0), float(gravity))
