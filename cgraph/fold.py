@@ -67,7 +67,13 @@ def _mul(a: Node, b: Node) -> Node | None:
         return None
     if a.op is NEG:
         return a.args[0] * b.args[0] if b.op is NEG else -(a.args[0] * b)
-    return -(a * b.args[0]) if b.op is NEG else None
+    if b.op is NEG:
+        return -(a * b.args[0])
+    if a.op is MUL and b.op is MUL:  # (c x) (d y) = (c d) (x y)
+        (c, x), (d, y) = a.args, b.args
+        if c.value is not None and d.value is not None and math.isfinite(c.value * d.value) and c.value * d.value:
+            return constant(c.value * d.value) * (x * y)
+    return None
 
 
 def _div(a: Node, b: Node) -> Node | None:
