@@ -1,5 +1,6 @@
 """dynamics: equations of motion on computational graphs, from Lagrangians and planar arms."""
 
+from . import scenes
 from .equations import (
     SingularMassMatrixError,
     bias,
@@ -11,4 +12,6 @@ from .equations import (
 )
 from .formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious
 from .planar_arm import Link, PlanarArm, planar_arm
+from .scenes import Scene
+from .simulate import Stats, Trajectory, simulate
 from .system import System, as_system

@@ -1,0 +1,42 @@
+"""A progress line on the terminal for runs that take long."""
+
+from __future__ import annotations
+
+import sys
+import time
+from types import TracebackType
+
+QUIET = 1.0  # s: a run shorter than this prints nothing
+
+
+class Progress:
+    """`with Progress("simulate", total=10.0) as progress: progress(3.2)`; writes to standard error.
+
+    show: None writes only where standard error is a terminal; True and False say so.
+    """
+
+    def __init__(self, what: str, total: float, show: bool | None = None) -> None:
+        self.what, self.total = what, total
+        self.show = sys.stderr.isatty() if show is None else show
+        self.start = self.last = time.perf_counter()
+        self.written = False
+
+    def __call__(self, done: float) -> None:
+        """Say how far the run is, at most ten times a second."""
+        now = time.perf_counter()
+        if not self.show or now - self.start < QUIET or now - self.last < 0.1:
+            return
+        self.last, self.written = now, True
+        share = min(done / self.total, 1.0) if self.total else 1.0
+        bar = "#" * int(24 * share)
+        sys.stderr.write(f"\r{self.what} [{bar:24}] {share:4.0%}  {now - self.start:.0f} s")
+        sys.stderr.flush()
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self.written:
+            sys.stderr.write("\n")
