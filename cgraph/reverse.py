@@ -42,8 +42,13 @@ def cotangents(seeds: Mapping[Node, Node], wrt: Sequence[Node], build: Builder |
             for arg, term in terms.items():
                 if guard:
                     guarded.add(arg)
-                if term.value != 0.0:
-                    bars[arg] = bars[arg] + term if arg in bars else term
+                if term.value == 0.0:
+                    continue
+                if arg in bars:  # the sum over all uses of arg is about arg, not about this use
+                    labelled(arg.label.derived(ADJOINT))
+                    bars[arg] = bars[arg] + term
+                else:
+                    bars[arg] = term
     zero = as_node(0.0)
     return [bars.get(node, zero) for node in wrt]
 

@@ -16,6 +16,7 @@ from cgraph.reverse import cotangents
 from .system import System, as_system
 
 EULER = "euler"  # tag of the embedded relations q = qd dt + q_old and qd = qdd dt + qd_old
+COUPLING = "q of qd"  # tag of the product qd dt in the first of them, through which dL/dqd reaches dL/dq
 ONE, ZERO = cg.constant(1.0), cg.constant(0.0)
 
 
@@ -25,6 +26,7 @@ class Terms(NamedTuple):
     inputs: list[Node]
     q: list[Node]
     qd: list[Node]
+    momentum: list[Node]  # p = dL/dqd
     momentum_rate: list[Node]  # d/dt dL/dqd
     gradient: list[Node]  # dL/dq
 
@@ -37,7 +39,7 @@ def chain_rule(system: System) -> Terms:
     gradient, momentum = bars[:n], bars[n:]
     dots = tangents(_state_rate(system), momentum, build)
     rate = [dots.get(p, ZERO) for p in momentum]
-    return Terms([*system.q, *system.qd, *system.qdd], system.q, system.qd, rate, gradient)
+    return Terms([*system.q, *system.qd, *system.qdd], system.q, system.qd, momentum, rate, gradient)
 
 
 def chain_rule_literal(system: System) -> Terms:
@@ -54,7 +56,7 @@ def chain_rule_literal(system: System) -> Terms:
             for slope, dot in zip(slopes, x_dot.values(), strict=True):
                 total = total + slope * dot
         rate.append(total)
-    return Terms([*system.q, *system.qd, *system.qdd], system.q, system.qd, rate, gradient)
+    return Terms([*system.q, *system.qd, *system.qdd], system.q, system.qd, momentum, rate, gradient)
 
 
 def euler_embedded(system: System) -> Terms:
@@ -94,7 +96,7 @@ def inverse_dynamics(model: Any, formulation: str = "chain_rule", *, simplify: b
     """
     system = as_system(model)
     terms = _terms(system, formulation)
-    applied = terms_of_state(system, terms)
+    applied = _forces(system, terms)
     build = Builder()
     outputs = {}
     with building(build):
@@ -106,23 +108,26 @@ def inverse_dynamics(model: Any, formulation: str = "chain_rule", *, simplify: b
     return _finished(system.graph(outputs, terms.inputs), simplify)
 
 
-def momentum_rate(model: Any, formulation: str = "chain_rule", *, simplify: bool = True) -> Graph:
+def momentum_rate(
+    model: Any, formulation: str = "chain_rule", *, simplify: bool = True, keep_momentum: bool = False
+) -> Graph:
     """The inertial term d/dt dL/dqd alone, outputs p0_dot.. : the left side of Eq. (3) and of Figures 1 to 3.
 
-    Inputs, formulations and errors as for `inverse_dynamics`.
+    keep_momentum: the momenta p0.. = dL/dqd are outputs too. Inputs, formulations and errors as for `inverse_dynamics`.
     """
     system = as_system(model)
     terms = _terms(system, formulation)
-    outputs = {f"p{i}_dot": rate for i, rate in enumerate(terms.momentum_rate)}
+    outputs = {f"p{i}": p for i, p in enumerate(terms.momentum)} if keep_momentum else {}
+    outputs |= {f"p{i}_dot": rate for i, rate in enumerate(terms.momentum_rate)}
     return _finished(system.graph(outputs, terms.inputs), simplify)
 
 
 def spurious(graph: Graph) -> frozenset[Node]:
     """Nodes that are there only because a derivative was taken through the embedded Euler relation.
 
-    They are the adjoints that the relation q = qd dt + q_old passes on, and all that only these need.
+    They are the adjoints that the product qd dt of q = qd dt + q_old passes on, and all that only these need.
     """
-    coupling = {node for node in graph.nodes if EULER in node.tags and "adjoint" in node.roles}
+    coupling = {node for node in graph.nodes if COUPLING in node.tags and "adjoint" in node.roles}
     reached: set[Node] = set()
     stack = [node for node in graph.outputs.values() if node not in coupling]
     while stack:
@@ -139,7 +144,7 @@ def _terms(system: System, formulation: str) -> Terms:
     return FORMULATIONS[formulation](system)
 
 
-def terms_of_state(system: System, terms: Terms) -> list[Node]:
+def _forces(system: System, terms: Terms) -> list[Node]:
     """The system's forces at the state of the terms: itself, or the embedded one."""
     if terms.q is system.q:
         return list(system.forces)
@@ -170,9 +175,9 @@ class _Embedding:
                 cg.named(f"qd{i}", a * self.dt + old)
                 for i, (a, old) in enumerate(zip(system.qdd, qd_old, strict=True))
             ]
-            self.q = [
-                cg.named(f"q{i}", v * self.dt + old) for i, (v, old) in enumerate(zip(self.qd, q_old, strict=True))
-            ]
+            with cg.tag(COUPLING):
+                moved = [v * self.dt for v in self.qd]
+            self.q = [cg.named(f"q{i}", m + old) for i, (m, old) in enumerate(zip(moved, q_old, strict=True))]
 
     def of(self, *nodes: Node) -> list[Node]:
         """Nodes over (q, qd) as nodes over the embedded state."""
@@ -184,7 +189,8 @@ class _Embedding:
         """d/dt as the derivative with respect to dt, and to t if the Lagrangian has it."""
         seeds = {self.dt: ONE} | ({self.system.t: ONE} if self.system.t in self.system.extra_inputs else {})
         dots = tangents(seeds, momentum)
-        return Terms(self.inputs, self.q, self.qd, [dots.get(p, ZERO) for p in momentum], gradient)
+        rate = [dots.get(p, ZERO) for p in momentum]
+        return Terms(self.inputs, self.q, self.qd, list(momentum), rate, gradient)
 
 
 def _embedded(system: System, energy: Node) -> Terms:
