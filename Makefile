@@ -1,0 +1,48 @@
+# What a person does with this checkout. Needs Python >= 3.11 with venv, and make; the rest comes through pip.
+PYTHON ?= python3
+VENV ?= .venv
+OUT ?= paper
+WORKERS ?= 2
+
+BIN = $(VENV)/bin
+INSTALLED = $(VENV)/.installed-
+
+.DEFAULT_GOAL := help
+.NOTPARALLEL:  # two pips in one environment spoil it
+.PHONY: help venv paper test check docs bench clean
+
+help:  ## this list
+	@sed -n 's/^\([a-z]*\):.*## /\1	/p' Makefile | expand -t 8
+
+venv: $(INSTALLED)all,test,check  ## the virtual environment, with all that the library uses and what tests and checks need
+
+paper: $(INSTALLED)viz,mujoco  ## the paper's figures and tables, into OUT=paper
+	$(BIN)/cgraph paper --out "$(OUT)"
+
+test: $(INSTALLED)test  ## the tests, on WORKERS=2 processes; ARGS="-k name" or a path narrows them
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal $(ARGS)
+
+check: $(INSTALLED)test,check  ## lint, format and types
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+docs: $(INSTALLED)docs,viz,mujoco  ## the documentation, into docs/_build/html
+	$(BIN)/sphinx-build --fail-on-warning --keep-going -q docs docs/_build/html
+
+bench: $(INSTALLED)bench  ## the comparisons with other software
+	$(BIN)/python -m pytest tests/benchmarks -m "" -s $(ARGS)
+
+clean:  ## remove .venv, paper and all else that the targets above make where nothing else is said
+	rm -rf .venv paper docs/_build build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+
+# One stamp for each set of extras, so that a second run installs nothing. The environment is kept when
+# pyproject.toml changes; pip then brings it up to date.
+$(INSTALLED)%: pyproject.toml | $(VENV)/.created
+	@echo "Installing cgraph[$*] into $(VENV)"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[$*]"
+	@touch "$@"
+
+$(VENV)/.created:
+	$(PYTHON) -m venv "$(VENV)"
+	@touch "$@"

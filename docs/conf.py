@@ -1,0 +1,59 @@
+"""How Sphinx builds these pages; `make docs` runs it with warnings as errors."""
+
+import re
+from importlib.metadata import version as installed_version
+from textwrap import indent
+
+project = "cgraph"
+author = "the cgraph authors"
+copyright = "2026, the cgraph authors"
+version = release = installed_version("cgraph")
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.mathjax"]
+myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+exclude_patterns = ["_build"]
+
+html_theme = "furo"
+html_title = "cgraph"
+
+autodoc_member_order = "bysource"
+autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Matrix", "Scalar", "Value", "Vector")}
+python_maximum_signature_line_length = 100
+
+
+def docstring_to_rst(app, what, name, obj, options, lines):
+    """Docstrings here are plain text with `code` in single backticks; say that in reStructuredText.
+
+    An indented paragraph is code; one with indented lines below its first keeps its lines.
+    """
+    paragraphs = re.split(r"\n\s*\n", "\n".join(lines).strip("\n"))
+    lines[:] = "\n\n".join(map(_paragraph, paragraphs)).split("\n")
+
+
+def _paragraph(text):
+    if text.startswith((" ", ">>> ")):
+        return "::\n\n" + indent(text, "    ")
+    if "\n " in text:
+        return "\n".join("| " + re.match(" *", line)[0] + _prose(line.strip()) for line in text.split("\n"))
+    return _prose(text)
+
+
+def _prose(text):
+    parts = re.split(r"`+([^`]+)`+", text)
+    parts[::2] = [re.sub(r"([\\*|_])", r"\\\1", prose) for prose in parts[::2]]
+    parts[1::2] = [f"\\ ``{code}``\\ " for code in parts[1::2]]  # an escaped space ends markup and takes no room
+    return "".join(parts)
+
+
+def name_aliases(app, what, name, obj, options, signature, return_annotation):
+    """In a union autodoc writes the wrapper of a type's name instead of the name."""
+    if signature:
+        return re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", signature), return_annotation
+    return None
+
+
+def setup(app):
+    """Called by Sphinx."""
+    app.connect("autodoc-process-docstring", docstring_to_rst)
+    app.connect("autodoc-process-signature", name_aliases)
