@@ -49,7 +49,8 @@ def _prose(text):
 def name_aliases(app, what, name, obj, options, signature, return_annotation):
     """In a union autodoc writes the wrapper of a type's name instead of the name."""
     if signature:
-        return re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", signature), return_annotation
+        wrapper = re.compile(r"TypeAliasForwardRef\('(\w+)'\)")
+        return wrapper.sub(r"\1", signature), wrapper.sub(r"\1", return_annotation or "")
     return None
 
 

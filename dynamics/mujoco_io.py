@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import io
+import os
+import subprocess
+import sys
 from typing import Any
 
 import numpy as np
@@ -12,6 +16,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 # MuJoCo wants diagonal inertias that are positive and obey the triangle inequality; a planar arm feels only the one
 # about the hinge axis (y), so the other two are any that are allowed.
 _SMALLEST = 1e-12  # kg m^2, in place of the zero inertia of a point mass
+CAMERA = "side"  # looks along y at the arm's plane
 _COLORS = ("0.46 0.24 0.62 1", "0.16 0.38 0.78 1", "0.80 0.20 0.16 1")  # the paper's purple, blue and red
 
 
@@ -29,6 +34,7 @@ def to_mjcf(arm: PlanarArm, timestep: float = 1e-3) -> str:
 
     The arm's plane is x to the right, z up; a positive angle swings the hanging arm towards +x.
     """
+    reach = sum(link.length for link in arm.links)
     lines = [
         '<mujoco model="planar arm">',
         '  <compiler angle="radian" inertiafromgeom="false"/>',
@@ -42,6 +48,7 @@ def to_mjcf(arm: PlanarArm, timestep: float = 1e-3) -> str:
         "  </visual>",
         '  <asset><texture type="skybox" builtin="flat" rgb1="1 1 1" rgb2="1 1 1" width="8" height="8"/></asset>',
         "  <worldbody>",
+        f'    <camera name="{CAMERA}" pos="0 {-2.8 * reach!r} {-0.3 * reach!r}" xyaxes="1 0 0 0 0 1"/>',
     ]
     indent = "    "
     for i, link in enumerate(arm.links):
@@ -120,3 +127,47 @@ class MujocoTwin:
             if k < steps:
                 self.mujoco.mj_step(self.model, self.data)
         return states[:, :n], states[:, n:], places
+
+
+def frames(arm: PlanarArm, poses: Array, timeout: float = 60.0) -> list[np.ndarray] | None:
+    """Pictures by MuJoCo's own renderer at joint angles poses, (k, n); None on a machine without OpenGL.
+
+    Each picture is (height, width, 3), uint8. The renderer runs in a process of its own: where OpenGL is missing, the
+    attempt fails at import and can end the process.
+    """
+    for backend in ("egl", "osmesa"):
+        try:
+            done = subprocess.run(
+                [sys.executable, "-c", f"from {__name__} import _write_frames; _write_frames()"],
+                input=_packed(xml=np.array(to_mjcf(arm)), poses=np.asarray(poses, dtype=np.float64)),
+                capture_output=True,
+                timeout=timeout,
+                env=os.environ | {"MUJOCO_GL": backend, "PYTHONPATH": os.pathsep.join(sys.path)},
+            )
+        except subprocess.TimeoutExpired:
+            continue
+        if done.returncode == 0 and done.stdout:
+            return list(np.load(io.BytesIO(done.stdout))["frames"])
+    return None
+
+
+def _write_frames() -> None:
+    """The child's half of `frames`: a model and poses from standard input, pictures to standard output."""
+    module = mujoco()
+    given = np.load(io.BytesIO(sys.stdin.buffer.read()))
+    model = module.MjModel.from_xml_string(str(given["xml"]))
+    data = module.MjData(model)
+    pictures = []
+    with module.Renderer(model, 480, 480) as renderer:
+        for pose in given["poses"]:
+            data.qpos[:] = pose
+            module.mj_forward(model, data)
+            renderer.update_scene(data, CAMERA)
+            pictures.append(renderer.render().copy())
+    sys.stdout.buffer.write(_packed(frames=np.array(pictures)))
+
+
+def _packed(**arrays: np.ndarray) -> bytes:
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    return buffer.getvalue()

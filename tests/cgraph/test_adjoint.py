@@ -1,0 +1,133 @@
+"""Derivatives of random graphs: both modes agree with each other and with central differences at 50 digits."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from mpmath import mpf
+
+import cgraph as cg
+from cgraph.node import OPS, apply
+from tests import high_precision
+from tests.strategies import Case, cases, numbers
+
+ADJOINT_TOLERANCE = 1e-12  # relative to the sum of the absolute values of all terms
+DERIVATIVE_TOLERANCE = 1e-9  # relative to the same sum: partials are taken at arguments that were rounded
+KINK_DISTANCE = 1e-6
+
+weights = st.lists(numbers(), min_size=3, max_size=3)
+
+
+def test_random_graphs_use_every_operation_and_share_nodes():
+    """Test the tests: the properties below are tried on all that the table offers."""
+    seen: list[cg.Graph] = []
+
+    @settings(max_examples=200)
+    @given(cases())
+    def draw(case: Case) -> None:
+        seen.append(case.graph)
+
+    draw()
+    assert {node.op.name for graph in seen for node in graph.nodes} >= set(OPS)
+    assert sum(len({e.source for e in graph.edges if e.source.args}) < len(graph.edges) for graph in seen) > 100
+    assert sum(len(graph.nodes) > 20 for graph in seen) > 30
+
+
+def adjoint_defect(case: Case, x_dot: dict[str, float], y_bar: dict[str, float]) -> float:
+    """|<w, J v> - <J^T w, v>| relative to the sum over paths of the absolute values."""
+    pushed = cg.jvp(case.graph).evaluate(case.values | {f"{name}_dot": v for name, v in x_dot.items()})
+    pulled = cg.vjp(case.graph).evaluate(case.values | {f"{name}_bar": w for name, w in y_bar.items()})
+    left = math.fsum(w * pushed[f"{name}_dot"] for name, w in y_bar.items())
+    right = math.fsum(v * pulled[f"{name}_bar"] for name, v in x_dot.items())
+    paths = high_precision.path_size(case.graph, case.values, x_dot)
+    size = math.fsum(abs(w) * paths[name] for name, w in y_bar.items())
+    assert math.isfinite(left)
+    return abs(left - right) / max(size, 1e-300)
+
+
+@settings(max_examples=200)
+@given(cases(), weights, weights)
+def test_jvp_and_vjp_are_adjoint(case, v, w):
+    assume(high_precision.kink_distance(case.graph, case.values) > KINK_DISTANCE)  # for the size of terms alone
+    x_dot = dict(zip(case.graph.input_names, v, strict=False))
+    y_bar = dict(zip(case.graph.outputs, w, strict=False))
+    assert adjoint_defect(case, x_dot, y_bar) <= ADJOINT_TOLERANCE
+
+
+def derivative_error(case: Case, x_dot: dict[str, float]) -> float:
+    """Error of J v by both modes against central differences, relative to the sum over paths."""
+    graph = case.graph
+    pushed = cg.jvp(graph).evaluate(case.values | {f"{name}_dot": v for name, v in x_dot.items()})
+    rows = cg.jacobian(graph).evaluate(case.values)
+    exact = high_precision.directional(graph, case.values, x_dot)
+    paths = high_precision.path_size(graph, case.values, x_dot)
+    errors = [0.0]
+    for name in graph.outputs:
+        by_rows = math.fsum(v * rows[f"d{name}/d{x}"] for x, v in x_dot.items())
+        for found in (pushed[f"{name}_dot"], by_rows):
+            errors.append(float(abs(mpf(found) - exact[name])) / max(paths[name], 1e-3))
+    return max(errors)
+
+
+@settings(max_examples=200)
+@given(cases(), weights)
+def test_first_derivatives_are_central_differences(case, v):
+    assume(high_precision.kink_distance(case.graph, case.values) > KINK_DISTANCE)
+    assert derivative_error(case, dict(zip(case.graph.input_names, v, strict=False))) <= DERIVATIVE_TOLERANCE
+
+
+@settings(max_examples=200)
+@given(cases(max_operations=8, max_outputs=1), weights)
+def test_second_derivatives_are_central_differences_of_the_first(case, v):
+    """The graph of the gradient, itself a random graph, is differentiated once more by both modes."""
+    assume(high_precision.kink_distance(case.graph, case.values) > KINK_DISTANCE)
+    first = Case(cg.gradient(case.graph), case.values)
+    assume(high_precision.kink_distance(first.graph, case.values) > KINK_DISTANCE)
+    assert derivative_error(first, dict(zip(case.graph.input_names, v, strict=False))) <= DERIVATIVE_TOLERANCE
+
+
+@settings(max_examples=200)
+@given(cases(max_operations=8, max_outputs=1))
+def test_hessian_is_the_jacobian_of_the_gradient_by_central_differences(case):
+    assume(high_precision.kink_distance(case.graph, case.values) > KINK_DISTANCE)
+    gradient = cg.gradient(case.graph)
+    assume(high_precision.kink_distance(gradient, case.values) > KINK_DISTANCE)
+    hessian = cg.hessian(case.graph).evaluate(case.values)
+    for column in case.graph.input_names:
+        exact = high_precision.directional(gradient, case.values, {column: 1.0})
+        paths = high_precision.path_size(gradient, case.values, {column: 1.0})
+        for row in case.graph.input_names:
+            error = abs(mpf(hessian[f"d2f0/d{row}d{column}"]) - exact[f"df0/d{row}"])
+            assert error <= DERIVATIVE_TOLERANCE * max(1.0, paths[f"df0/d{row}"])
+
+
+@settings(max_examples=200)
+@given(cases(max_operations=12))
+def test_values_are_those_of_mpmath(case):
+    assume(high_precision.kink_distance(case.graph, case.values) > KINK_DISTANCE)
+    exact = high_precision.evaluate(case.graph, case.values)
+    size = high_precision.rounding_size(case.graph, case.values)
+    for name, found in case.graph.evaluate(case.values).items():
+        assert abs(mpf(found) - exact[name]) <= 4 * 2.0**-53 * size[name]
+
+
+def test_a_wrong_rule_inside_a_graph_is_seen():
+    """Test the tests: the sum over paths does not hide an error of one rule."""
+    x = cg.variable("x")
+    for op in (OPS["sin"], replace(OPS["sin"], partials=lambda y, a: (cg.cos(a) * (1.0 + 1e-7),))):
+        case = Case(cg.Graph([x], {"f0": cg.exp(apply(op, x * x)) * x}), {"x": 0.7})
+        seen = derivative_error(case, {"x": 1.0}) > DERIVATIVE_TOLERANCE
+        assert seen == (op is not OPS["sin"])
+
+
+def test_modes_that_disagree_are_seen(monkeypatch: pytest.MonkeyPatch):
+    """Test the tests: an adjoint that loses a use of a shared node breaks the identity."""
+    x = cg.variable("x")
+    case = Case(cg.Graph([x], {"f0": cg.sin(x) + cg.exp(x)}), {"x": 0.7})
+    assert adjoint_defect(case, {"x": 1.0}, {"f0": 1.0}) <= ADJOINT_TOLERANCE
+    forgetful = cg.Graph([x], {"f0": cg.sin(x) + math.exp(0.7)})
+    vjp = cg.vjp
+    monkeypatch.setattr(cg, "vjp", lambda graph: vjp(forgetful))
+    assert adjoint_defect(case, {"x": 1.0}, {"f0": 1.0}) > 0.1

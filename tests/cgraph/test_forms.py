@@ -1,0 +1,226 @@
+"""What a graph looks like from outside: counts, edges, listing, networkx, copies and pickles."""
+
+import copy
+import os
+import pickle
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+import cgraph as cg
+from cgraph.node import OPS
+from tests.strategies import cases
+
+x, y = cg.variables("x y")
+
+
+def pendulum() -> cg.Graph:
+    """K - P of a pendulum; 12 nodes, written by hand."""
+    with cg.tag("kinetic"):
+        kinetic = 0.5 * (y * y)
+    with cg.tag("potential"):
+        potential = cg.named("P", 9.81 * (1 - cg.cos(x)))
+    return cg.Graph([x, y], {"L": kinetic - potential, "P": potential})
+
+
+LISTING = """\
+inputs x y
+%1 = mul y y  # primal; kinetic
+%2 = mul 0.5 %1  # primal; kinetic
+%3 = cos x  # primal; potential
+%4 = sub 1.0 %3  # primal; potential
+%5 = mul 9.81 %4  (P)  # primal; potential
+%6 = sub %2 %5  # primal
+output L = %6
+output P = %5
+"""
+
+
+def test_the_listing_is_readable_text():
+    assert pendulum().listing() == LISTING
+
+
+SECOND_DERIVATIVES = """\
+import cgraph as cg
+names = "q0 q1 q2 q3"
+q = cg.variables(names)
+with cg.tag("a", "b", "c", "d"):
+    inner = sum(cg.sin(each) * cg.cos(other) for each in q for other in q)
+with cg.tag("e", "f"):
+    f = cg.Graph(q, {"f": cg.where(inner > 0, inner ** 2, cg.hypot(inner, q[0]))})
+for graph in (f, cg.hessian(f), cg.simplify(cg.vjp(cg.jvp(f)))):
+    print(graph.listing())
+    print(graph.counts())
+"""
+
+
+def test_the_listing_is_the_same_in_every_process():
+    def listing(seed: str) -> bytes:
+        env = os.environ | {"PYTHONHASHSEED": seed, "PYTHONPATH": str(Path(cg.__file__).parents[1])}
+        done = subprocess.run([sys.executable, "-c", SECOND_DERIVATIVES], env=env, capture_output=True, check=True)
+        return done.stdout
+
+    first = listing("1")
+    assert first.count(b"\n") > 100
+    assert listing("2") == first
+
+
+def test_counts_are_exact():
+    counts = pendulum().counts()
+    assert (counts.nodes, counts.edges) == (11, 11)
+    assert counts.depth == 4  # cos, sub, mul, sub
+    assert counts.width == 5  # x, y, 0.5, 9.81, 1.0
+    assert counts.by_operation == {"constant": 3, "mul": 3, "sub": 2, "variable": 2, "cos": 1}
+    assert counts.by_tag == {"potential": 3, "kinetic": 2}
+    assert counts.by_role == {"primal": 6, "input": 2}
+
+
+def test_counts_of_a_chain_a_fan_and_a_leaf():
+    chain = x
+    for _ in range(10):
+        chain = cg.sin(chain)
+    counts = cg.Graph([x], {"f": chain}).counts()
+    assert (counts.nodes, counts.edges, counts.depth, counts.width) == (11, 10, 10, 1)
+    fan = cg.Graph([x], {str(i): x * x for i in range(10)}).counts()
+    assert (fan.nodes, fan.edges, fan.depth, fan.width) == (11, 20, 1, 10)
+    leaf = cg.Graph([x, y], {"f": x}).counts()  # an unused input is no node of the graph
+    assert (leaf.nodes, leaf.edges, leaf.depth, leaf.width) == (1, 0, 0, 1)
+
+
+def test_operations_are_counted_from_the_largest_and_then_by_name():
+    counts = cg.Graph([x], {"f": cg.sin(x) + cg.cos(x) + cg.sin(x * 2)}).counts()
+    assert list(counts.by_operation.items()) == [
+        ("add", 2), ("sin", 2), ("constant", 1), ("cos", 1), ("mul", 1), ("variable", 1),
+    ]  # fmt: skip
+
+
+def test_counts_read_as_text():
+    assert str(pendulum().counts()) == (
+        "nodes 11, edges 11, depth 4, width 5\n"
+        "by operation constant 3, mul 3, sub 2, variable 2, cos 1\n"
+        "by tag       potential 3, kinetic 2\n"
+        "by role      primal 6, input 2"
+    )
+
+
+def test_edges_are_uses_with_their_slots():
+    difference = x - y
+    product = difference * difference
+    graph = cg.Graph([x, y], {"f": product})
+    assert graph.edges == (
+        (x, difference, 0),
+        (y, difference, 1),
+        (difference, product, 0),
+        (difference, product, 1),
+    )
+    assert len(graph.edges) == graph.counts().edges
+
+
+def test_the_partial_of_an_edge_is_that_of_its_slot_alone():
+    product = x * x
+    quotient = product / y
+    graph = cg.Graph([x, y], {"f": quotient})
+    partials = cg.Graph([x, y], {f"{e.target.op.name} {e.slot}": e.partial for e in graph.edges})
+    found = partials.evaluate({"x": 3.0, "y": 2.0})
+    # both slots of x * x are x, the other argument; (a / y)' = 1/y and -a/y^2
+    assert found == {"mul 0": 3.0, "mul 1": 3.0, "div 0": 0.5, "div 1": -9.0 / 4.0}
+
+
+def test_to_networkx_has_nodes_and_edges_with_their_attributes():
+    graph = pendulum()
+    found = graph.to_networkx()
+    assert (found.number_of_nodes(), found.number_of_edges()) == (11, 11)
+    number = {node: i for i, node in enumerate(graph.nodes)}
+    assert sorted(found.edges(keys=True)) == sorted((number[e.source], number[e.target], e.slot) for e in graph.edges)
+    assert found.nodes[number[graph.outputs["P"]]] == {
+        "op": "mul",
+        "name": "P",
+        "value": None,
+        "tags": ["potential"],
+        "roles": ["primal"],
+        "outputs": ["P"],
+    }
+    assert found.nodes[number[x]]["name"] == "x"
+    assert [data["value"] for _, data in found.nodes(data=True) if data["op"] == "constant"] == [0.5, 9.81, 1.0]
+
+
+def test_unused_inputs_are_nodes_in_networkx():
+    found = cg.Graph([x, y], {"f": cg.sin(x), "g": x}).to_networkx()
+    assert [found.nodes[i]["name"] for i in found] == ["x", None, "y"]
+    assert found.nodes[0]["outputs"] == ["g"]
+    assert found.degree(2) == 0
+
+
+@settings(max_examples=50)
+@given(cases())
+def test_degrees_in_networkx_add_up_to_the_edges(case):
+    import networkx
+
+    found = case.graph.to_networkx()
+    counts = case.graph.counts()
+    assert sum(degree for _, degree in found.in_degree()) == counts.edges
+    assert sum(degree for _, degree in found.out_degree()) == counts.edges
+    assert networkx.is_directed_acyclic_graph(found)
+    assert networkx.dag_longest_path_length(found) == counts.depth
+    in_degrees = dict(found.in_degree())
+    assert all(in_degrees[i] == node.op.arity for i, node in enumerate(case.graph.nodes))
+
+
+@settings(max_examples=100)
+@given(cases())
+def test_counts_are_those_of_the_listing(case):
+    counts = case.graph.counts()
+    lines = [line.split() for line in case.graph.listing().splitlines() if line.startswith("%")]
+    operations = Counter(words[2] for words in lines)
+    leaves = {"variable", "constant"}
+    assert operations == {name: n for name, n in counts.by_operation.items() if name not in leaves}
+    assert counts.nodes == sum(counts.by_operation.values())
+    assert counts.edges == sum(OPS[words[2]].arity for words in lines)
+
+
+@settings(max_examples=100)
+@given(cases())
+def test_a_pickle_and_a_copy_are_the_same_graph(case):
+    for graph in (case.graph, cg.jvp(case.graph)):
+        for again in (pickle.loads(pickle.dumps(graph)), copy.copy(graph), copy.deepcopy(graph)):
+            again.check()
+            assert again.listing() == graph.listing()
+            assert again.counts() == graph.counts()
+            assert again.input_names == graph.input_names
+    again = pickle.loads(pickle.dumps(case.graph))
+    np.testing.assert_equal(again.evaluate(case.values), case.graph.evaluate(case.values))
+
+
+def test_a_pickle_keeps_names_tags_unused_inputs_and_signed_zeros():
+    graph = cg.Graph([x, y], {"f": cg.named("P", x + -0.0), "g": -0.0})
+    again = pickle.loads(pickle.dumps(graph))
+    assert again.input_names == ("x", "y")
+    assert again.outputs["f"].name == "P"
+    assert again.listing() == graph.listing() == (
+        "inputs x y\n%1 = add x -0.0  (P)  # primal\noutput f = %1\noutput g = -0.0\n"
+    )
+    assert again.outputs["g"] is cg.constant(-0.0)
+
+
+def test_a_node_alone_is_not_pickled():
+    with pytest.raises(TypeError, match=r"pickle a cg\.Graph"):
+        pickle.dumps(cg.sin(x))
+
+
+def test_a_copy_of_a_node_is_the_node():
+    node = cg.sin(x)
+    assert copy.copy(node) is copy.deepcopy(node) is node
+
+
+def test_a_graph_and_a_node_have_a_short_repr():
+    assert repr(pendulum()) == "<Graph (x, y) -> (L, P): 11 nodes, 11 edges>"
+    many = cg.Graph(cg.variables([f"q{i}" for i in range(20)]), {"f": 1.0})
+    assert repr(many) == "<Graph (q0, q1, q2, ..., q19) -> (f): 1 nodes, 0 edges>"
+    assert (repr(x), repr(cg.constant(2)), repr(x * y), repr(cg.named("K", x * y))) == (
+        "<node variable x>", "<node 2.0>", "<node mul>", "<node mul K>",
+    )  # fmt: skip

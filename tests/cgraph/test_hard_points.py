@@ -1,0 +1,284 @@
+"""Derivatives at the points where others give NaN: branches not taken, losers, powers at zero, extreme sizes."""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import mpmath
+import pytest
+from mpmath import mp, mpf
+
+import cgraph as cg
+from tests import high_precision
+
+TOLERANCE = 1e-14  # a few roundings
+INF = math.inf
+
+
+def derivatives(function: Callable[..., cg.Node], *point: float) -> dict[str, list[float]]:
+    """First and second derivatives in the first argument, by every way to get there."""
+    inputs = cg.variables("x y z")[: len(point)]
+    values = dict(zip("xyz", point, strict=False))
+    graph = cg.Graph(inputs, {"f": function(*inputs)})
+
+    def at(transformed: cg.Graph, **more: float) -> float:
+        return next(iter(transformed.evaluate(values | more).values()))
+
+    jvp, vjp = cg.jvp(graph, "x"), cg.vjp(graph, "x")
+    return {
+        "first": [at(jvp, x_dot=1.0), at(vjp, f_bar=1.0), at(cg.gradient(graph, "x"))],
+        "second": [
+            at(cg.jvp(jvp, "x"), x_dot=1.0, x_dot2=1.0),
+            at(cg.jvp(vjp, "x"), f_bar=1.0, x_dot=1.0),
+            at(cg.vjp(jvp, "x"), x_dot=1.0, f_dot_bar=1.0),
+            at(cg.vjp(vjp, "x"), f_bar=1.0, x_bar_bar=1.0),
+            at(cg.hessian(graph, "x")),
+            at(cg.gradient(cg.gradient(graph, "x"), "x")),
+        ],
+        "third": [at(cg.jvp(cg.hessian(graph, "x"), "x"), x_dot=1.0), at(cg.gradient(cg.hessian(graph, "x"), "x"))],
+    }
+
+
+class Branch(NamedTuple):
+    """A function with a branch or operand that is not taken at x, and what is taken, in mpmath."""
+
+    name: str
+    function: Callable[[cg.Node], cg.Node]
+    taken: Callable[[mpf], mpf]
+    x: float
+
+
+BRANCHES = (
+    Branch("log of a negative number", lambda x: cg.where(x > 0, cg.log(x), x * x), lambda x: x * x, -1.0),
+    Branch("log of zero", lambda x: cg.where(x > 0, cg.log(x), 3 * x), lambda x: 3 * x, 0.0),
+    Branch("sqrt at zero", lambda x: cg.where(x > 0, cg.sqrt(x), 0 * x), lambda x: 0 * x, 0.0),
+    Branch("sinc", lambda x: cg.where(cg.equal(x, 0), 1.0, cg.sin(x) / x), lambda x: mpf(1), 0.0),
+    Branch(
+        "sinc by its series",
+        lambda x: cg.where(abs(x) < 1e-4, 1 - x * x / 6, cg.sin(x) / x),
+        lambda x: 1 - x * x / 6,
+        0.0,
+    ),
+    Branch("infinite operand", lambda x: cg.where(x < 1, x**3, 1 / (x - x)), lambda x: x**3, 0.5),
+    Branch(
+        "NaN far below the choice",
+        lambda x: cg.where(x > 0, cg.sin(cg.log(x)) * cg.exp(1 / x) + cg.sqrt(x) ** 3, cg.sin(x)),
+        mpmath.sin,
+        -0.7,
+    ),
+    Branch(
+        "overflow below the choice",
+        lambda x: cg.where(x < 10, x * x, cg.exp(cg.exp(x * 1e3))),
+        lambda x: x * x,
+        3.0,
+    ),
+    Branch(
+        "choice within a choice",
+        lambda x: cg.where(x > 0, cg.where(x > 1, cg.log(x - 1), x**3), cg.sqrt(x)),
+        lambda x: x**3,
+        0.5,
+    ),
+    Branch(
+        "choice within a branch not taken",
+        lambda x: cg.where(x > 0, cg.where(x > -1, cg.log(x), cg.sqrt(x)), cg.cos(x)),
+        mpmath.cos,
+        -0.5,
+    ),
+    Branch(
+        "choice used further",
+        lambda x: cg.exp(cg.where(x > 0, cg.log(x), 2 * x)) * x,
+        lambda x: mpmath.exp(2 * x) * x,
+        -1.0,
+    ),
+    Branch(
+        "node shared by both branches",
+        lambda x: (lambda s: cg.where(x > 0, cg.log(s), s * s))(cg.sin(x)),
+        lambda x: mpmath.sin(x) ** 2,
+        -1.0,
+    ),
+    Branch(
+        "node shared with the outside",
+        lambda x: (lambda r: cg.where(x > 0, cg.sqrt(r), x) + r * r)(x * x * x),
+        lambda x: x + x**6,
+        -1.0,
+    ),
+    Branch(
+        "safe argument chosen first",
+        lambda x: cg.where(x > 0, cg.log(cg.where(x > 0, x, 1.0)), x**2),
+        lambda x: x**2,
+        -2.0,
+    ),
+    Branch("minimum with infinity", lambda x: cg.minimum(x * x, INF), lambda x: x * x, 0.7),
+    Branch("maximum with minus infinity", lambda x: cg.maximum(cg.log(0 * x), x**3), lambda x: x**3, 0.7),
+    Branch(
+        "loser of minimum has a pole", lambda x: cg.minimum(x * x, 1 / ((x - 1) * (x - 1))), lambda x: x * x, 1.0
+    ),
+    Branch("loser of minimum is steep", lambda x: cg.minimum(x * x - 1, cg.sqrt(x)), lambda x: x * x - 1, 0.0),
+    Branch("loser of maximum is steep", lambda x: cg.maximum(cg.cos(x), cg.sqrt(x)), mpmath.cos, 0.0),
+    Branch(
+        "loser of maximum overflows", lambda x: cg.maximum(x**3, -cg.exp(cg.exp(x * 1e3))), lambda x: x**3, 2.0
+    ),
+    Branch(
+        "minimum within a maximum",
+        lambda x: cg.maximum(cg.minimum(x**3, 1 / (x - x)), cg.log(0 * x)),
+        lambda x: x**3,
+        2.0,
+    ),
+)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("branch", [pytest.param(branch, id=branch.name) for branch in BRANCHES])
+def test_what_is_not_taken_does_not_reach_a_derivative(branch, order):
+    found = derivatives(branch.function, branch.x)[("first", "second", "third")[order - 1]]
+    with mp.workdps(50):
+        expected = float(mpmath.diff(branch.taken, mpf(branch.x), order))
+    assert found == pytest.approx([expected] * len(found), rel=TOLERANCE, abs=TOLERANCE)
+
+
+def test_nan_in_an_operand_of_minimum_is_the_value_as_in_numpy():
+    x = cg.variable("x")
+    graph = cg.Graph([x], {"f": cg.minimum(x, cg.log(x)), "g": cg.maximum(cg.log(x), x)})
+    assert all(math.isnan(value) for value in graph.evaluate({"x": -1.0}).values())
+
+
+@pytest.mark.parametrize(
+    ("exponent", "first", "second"),
+    # of x**exponent at 0: exponent * 0**(exponent - 1), exponent * (exponent - 1) * 0**(exponent - 2)
+    [(0, 0, 0), (1, 1, 0), (2, 0, 2), (3, 0, 0), (4, 0, 0), (0.5, INF, -INF), (1.5, 0, INF), (2.5, 0, 0), (-1, -INF, INF)],
+)
+def test_powers_at_zero_have_their_one_sided_derivatives(exponent, first, second):
+    found = derivatives(lambda x: x**exponent, 0.0)
+    assert found["first"] == [first] * 3
+    assert found["second"] == [second] * 6
+    by_input = derivatives(lambda x, y: x**y, 0.0, float(exponent))
+    assert by_input["first"] == [first] * 3
+    assert by_input["second"] == [second] * 6
+
+
+@pytest.mark.parametrize("exponent", [0.5, 1.0, 2.0, 3.0])
+def test_the_exponents_derivative_at_base_zero_is_zero(exponent):
+    found = derivatives(lambda y, x: x**y, exponent, 0.0)  # 0**y is 0 for every y near
+    assert found["first"] == [0.0] * 3
+    assert found["second"] == [0.0] * 6
+
+
+def test_the_exponents_derivative_at_zero_to_the_zero_is_zero_by_convention():
+    assert derivatives(lambda y, x: x**y, 0.0, 0.0)["first"] == [0.0] * 3
+
+
+def test_the_mixed_second_derivative_of_a_power_at_zero_is_finite():
+    x, y = cg.variables("x y")
+    hessian = cg.hessian(cg.Graph([x, y], {"f": x**y})).evaluate({"x": 0.0, "y": 3.0})
+    assert hessian == {"d2f/dxdx": 0.0, "d2f/dxdy": 0.0, "d2f/dydx": 0.0, "d2f/dydy": 0.0}
+
+
+@pytest.mark.parametrize("base", [-2.0, -0.5])
+@pytest.mark.parametrize("exponent", [2.0, 3.0, -1.0, 5.0])
+def test_integer_powers_of_negative_numbers_have_derivatives(base, exponent):
+    found = derivatives(lambda x: x**exponent, base)
+    for order, name in enumerate(("first", "second"), 1):
+        expected = float(high_precision.partial(lambda x: x ** int(exponent), [base], [order]))
+        assert found[name] == pytest.approx([expected] * len(found[name]), rel=TOLERANCE)
+
+
+EXTREMES = (1e-200, -1e-200, 1e200, -1e200, 1e-310, 1.0)
+
+
+@pytest.mark.parametrize("b", EXTREMES)
+@pytest.mark.parametrize("a", EXTREMES)
+def test_partials_of_atan2_and_hypot_neither_overflow_nor_underflow_early(a, b):
+    x, y = cg.variables("x y")
+    graph = cg.Graph([x, y], {"angle": cg.atan2(x, y), "length": cg.hypot(x, y)})
+    found = cg.jacobian(graph).evaluate({"x": a, "y": b})
+    with mp.workdps(50):
+        s = mpf(a) ** 2 + mpf(b) ** 2
+        expected = {
+            "dangle/dx": mpf(b) / s,
+            "dangle/dy": -mpf(a) / s,
+            "dlength/dx": mpf(a) / mpmath.sqrt(s),
+            "dlength/dy": mpf(b) / mpmath.sqrt(s),
+        }
+    length = float(mpmath.sqrt(s))
+    denormal = 4 * 5e-324 / length  # what rounding the length to a denormal costs, relative
+    for name, value in expected.items():
+        assert found[name] == pytest.approx(float(value), rel=TOLERANCE + denormal, abs=5e-324), name
+
+
+@pytest.mark.parametrize("size", [1e-150, 1e-100, 1.0, 1e100, 1e150])
+def test_second_partials_of_atan2_and_hypot_keep_their_accuracy_at_any_size(size):
+    x, y = cg.variables("x y")
+    a, b = 3 * size, -4 * size
+    for function, exact in ((cg.atan2, mpmath.atan2), (cg.hypot, mpmath.hypot)):
+        found = cg.hessian(cg.Graph([x, y], {"f": function(x, y)})).evaluate({"x": a, "y": b})
+        with mp.workdps(50):  # homogeneous functions: the second derivatives scale
+            degree = 0 if function is cg.atan2 else 1
+            scaled = {
+                n: mpmath.diff(exact, (3, -4), orders) * mpf(size) ** (degree - 2)
+                for n, orders in {"d2f/dxdx": (2, 0), "d2f/dxdy": (1, 1), "d2f/dydy": (0, 2)}.items()
+            }
+        for name, value in scaled.items():
+            assert found[name] == pytest.approx(float(value), rel=1e-13, abs=5e-324), (function.__name__, name)
+
+
+def test_hypot_at_zero_has_the_derivative_zero_by_convention():
+    for point in ((0.0, 0.0), (-0.0, 0.0)):
+        found = derivatives(cg.hypot, *point)
+        assert found["first"] == [0.0] * 3
+    assert derivatives(cg.hypot, 3.0, 0.0)["first"] == [1.0] * 3
+    assert derivatives(cg.hypot, 0.0, 3.0)["first"] == [0.0] * 3
+    assert derivatives(cg.hypot, 0.0, 4.0)["second"] == [0.25] * 6  # 1/b
+
+
+def test_abs_at_zero_has_the_derivative_zero_by_convention():
+    found = derivatives(abs, 0.0)
+    assert found["first"] == [0.0] * 3
+    assert found["second"] == [0.0] * 6
+
+
+def test_sqrt_at_zero_has_the_limit_of_its_derivative():
+    found = derivatives(cg.sqrt, 0.0)
+    assert found["first"] == [INF] * 3
+    assert found["second"] == [-INF] * 6
+
+
+def test_atan2_at_the_origin_has_no_derivative():
+    assert all(map(math.isnan, derivatives(cg.atan2, 0.0, 0.0)["first"]))
+
+
+@pytest.mark.parametrize("function", [cg.minimum, cg.maximum])
+def test_a_tie_gives_one_half_to_each_argument(function):
+    assert derivatives(lambda x, y: function(x, y), 0.3, 0.3)["first"] == [0.5] * 3
+    assert derivatives(lambda x, y: function(y, x), 0.3, 0.3)["first"] == [0.5] * 3
+    assert derivatives(lambda x: function(x, x), 0.3)["first"] == [1.0] * 3
+    assert derivatives(lambda x: function(x * x, 2 * x - 1), 1.0)["first"] == [2.0] * 3  # both slopes are 2
+
+
+@pytest.mark.parametrize("point", [(0.0, 0.0, 0.0), (0.0, 2.0, 3.0), (0.0, 0.0, 3.0), (2.0, 0.0, 3.0)])
+def test_products_with_zeros_have_exact_derivatives(point):
+    x, y, z = point
+    product = derivatives(lambda x, y, z: x * y * z, *point)
+    assert product["first"] == [y * z] * 3
+    assert product["second"] == [0.0] * 6
+    square = derivatives(lambda x, y, z: x * y * x * z, *point)
+    assert square["first"] == [2 * x * y * z] * 3
+    assert square["second"] == [2 * y * z] * 6
+    quotient = derivatives(lambda x, y, z: x * y / (z + 1), *point)
+    assert quotient["first"] == [y / (z + 1)] * 3
+
+
+def test_a_zero_factor_as_written_follows_ieee():
+    x = cg.variable("x")
+    graph = cg.Graph([x], {"f": 0 * x})
+    assert math.isnan(graph.evaluate({"x": INF})["f"])
+    assert graph.evaluate({"x": 3.0}) == {"f": 0.0}
+    assert cg.gradient(graph).evaluate({"x": 3.0}) == {"df/dx": 0.0}
+
+
+@pytest.mark.parametrize("x", [-30.0, -1e-300, 1e-300, 1e-9, 8.0, 30.0])
+@pytest.mark.parametrize("name", ["tanh", "atan", "expm1", "exp", "sinh", "cosh", "tan", "sin", "cos"])
+def test_partials_are_accurate_far_out_and_near_zero(name, x):
+    """To a rounding of the larger of the derivative and 1: the slope of tanh is lost where tanh is 1."""
+    (found,) = set(derivatives(lambda node: getattr(cg, name)(node), x)["first"])
+    expected = high_precision.partial(high_precision.OPERATIONS[name], [x], [1])
+    assert abs(mpf(found) - expected) <= TOLERANCE * max(1, abs(expected))

@@ -1,0 +1,274 @@
+"""Every row of the operation table: values, derivatives of first and second order in every mode, and IEEE specials."""
+
+import itertools
+import math
+import random
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpmath import mpf
+
+import cgraph as cg
+from cgraph.node import OPS, Op, apply
+from tests import high_precision
+from tests.strategies import DOMAINS
+
+RELATIVE_ERROR = 1e-13  # of a derivative, relative to the larger of 1 and the size; a few dozen roundings
+ULPS = 4  # NumPy's own vector functions promise no more
+ROWS = [pytest.param(op, id=op.name) for op in OPS.values()]
+NAMES = ("a", "b", "c")
+
+
+def points(op: Op) -> list[tuple[float, ...]]:
+    """The samples of the row, and three random points of the domain."""
+    source = random.Random(op.name)
+    drawn = [tuple(source.uniform(*interval) for interval in DOMAINS[op.name]) for _ in range(3)]
+    return [*op.samples, *drawn]
+
+
+def graph_of(op: Op) -> cg.Graph:
+    inputs = cg.variables(NAMES[: op.arity])
+    return cg.Graph(inputs, {"y": apply(op, *inputs)})
+
+
+def at(graph: cg.Graph, *values: float) -> list[float]:
+    """The outputs with inputs given by position."""
+    return list(graph.evaluate(dict(zip(graph.input_names, values, strict=True))).values())
+
+
+def unit(n: int, i: int) -> tuple[float, ...]:
+    return tuple(float(i == j) for j in range(n))
+
+
+def exact(op: Op, point: Sequence[float], *slots: int) -> float:
+    """The partial derivative in these argument slots, by mpmath.diff; zero in an argument that is a step."""
+    if any((op.name, slot) in high_precision.STEPS for slot in slots):
+        return 0.0
+    orders = [slots.count(slot) for slot in range(op.arity)]
+    return float(high_precision.partial(high_precision.OPERATIONS[op.name], point, orders))
+
+
+def close(found: float, expected: float) -> bool:
+    return abs(found - expected) <= RELATIVE_ERROR * max(1.0, abs(expected))
+
+
+def first_derivatives(op: Op, point: Sequence[float]) -> dict[str, list[float]]:
+    """dy/d(argument i) for every i, by every way to get there."""
+    graph, n = graph_of(op), op.arity
+    return {
+        "jvp": [at(cg.jvp(graph), *point, *unit(n, i))[0] for i in range(n)],
+        "jvp, one input": [at(cg.jvp(graph, name), *point, 1.0)[0] for name in NAMES[:n]],
+        "vjp": at(cg.vjp(graph), *point, 1.0),
+        "gradient": at(cg.gradient(graph), *point),
+        "jacobian": at(cg.jacobian(graph), *point),
+        "edges": at(cg.Graph(graph.inputs, {str(e.slot): e.partial for e in graph.edges}), *point),
+    }
+
+
+def second_derivatives(op: Op, point: Sequence[float]) -> dict[str, list[float]]:
+    """d2y / d(argument i) d(argument j), row by row, by every way to get there."""
+    graph, n = graph_of(op), op.arity
+    primal = NAMES[:n]
+    pairs = list(itertools.product(range(n), repeat=2))
+    gradient = cg.gradient(graph)
+    return {
+        "hessian": at(cg.hessian(graph), *point),
+        "jvp of jvp": [
+            at(cg.jvp(cg.jvp(graph), primal), *point, *unit(n, i), *unit(n, j))[0] for i, j in pairs
+        ],
+        "jvp of vjp": [at(cg.jvp(cg.vjp(graph), primal), *point, 1.0, *unit(n, j))[i] for i, j in pairs],
+        "vjp of jvp": [at(cg.vjp(cg.jvp(graph), primal), *point, *unit(n, i), 1.0)[j] for i, j in pairs],
+        "vjp of vjp": [at(cg.vjp(cg.vjp(graph), primal), *point, 1.0, *unit(n, i))[j] for i, j in pairs],
+        "jacobian of gradient": at(cg.jacobian(gradient), *point),
+    }
+
+
+def wrong_derivatives(op: Op, point: Sequence[float]) -> list[str]:
+    """The ways to a first or second derivative that disagree with mpmath, each with what was found and expected."""
+    slots = range(op.arity)
+    expected = {1: [exact(op, point, i) for i in slots], 2: [exact(op, point, i, j) for i in slots for j in slots]}
+    found = {1: first_derivatives(op, point), 2: second_derivatives(op, point)}
+    return [
+        f"{op.name}{tuple(point)}: {way} gives {values}, mpmath {expected[order]}"
+        for order, ways in found.items()
+        for way, values in ways.items()
+        if len(values) != len(expected[order]) or not all(map(close, values, expected[order]))
+    ]
+
+
+def apart(found: float, expected: float, ulps: float = ULPS) -> bool:
+    """Whether two floats differ in kind (NaN, infinity), or by more than so many units in the last place."""
+    if math.isnan(found) or math.isnan(expected):
+        return math.isnan(found) != math.isnan(expected)
+    if math.isinf(found) or math.isinf(expected):
+        return found != expected
+    return abs(found - expected) > ulps * np.spacing(abs(expected))
+
+
+def test_every_row_is_known_to_the_independent_evaluator():
+    assert set(OPS) == set(high_precision.OPERATIONS) == set(DOMAINS) == set(NUMPY)
+
+
+@pytest.mark.parametrize("op", ROWS)
+def test_samples_have_as_many_numbers_as_the_operation_has_arguments(op):
+    assert op.samples
+    assert {len(sample) for sample in op.samples} == {op.arity} == {len(DOMAINS[op.name])}
+
+
+@pytest.mark.parametrize("op", ROWS)
+def test_there_is_one_partial_for_each_argument(op):
+    graph = graph_of(op)
+    (node,) = graph.outputs.values()
+    assert len(op.partials(node, *node.args)) == op.arity == len(graph.edges)
+
+
+@pytest.mark.parametrize("op", ROWS)
+def test_value_is_that_of_mpmath(op):
+    for point in points(op):
+        (found,) = at(graph_of(op), *point)
+        expected = float(high_precision.OPERATIONS[op.name](*map(mpf, point)))
+        assert not apart(found, expected, ulps=2), point
+
+
+@pytest.mark.parametrize("op", ROWS)
+def test_derivatives_are_those_of_mpmath_in_every_mode(op):
+    for point in points(op):
+        assert wrong_derivatives(op, point) == []
+
+
+@pytest.mark.parametrize("op", ROWS)
+def test_vjp_is_linear_in_its_cotangent_and_jvp_in_its_tangents(op):
+    graph, point = graph_of(op), op.samples[0]
+    one, many = at(cg.vjp(graph), *point, 1.0), at(cg.vjp(graph), *point, -2.5)
+    assert all(map(close, many, [-2.5 * bar for bar in one]))
+    weights = [1.5, -0.25, 3.0][: op.arity]
+    (together,) = at(cg.jvp(graph), *point, *weights)
+    assert close(together, sum(w * at(cg.jvp(graph), *point, *unit(op.arity, i))[0] for i, w in enumerate(weights)))
+
+
+@pytest.mark.parametrize("op", ROWS)
+def test_arrays_have_the_values_of_floats(op):
+    graph = graph_of(op)
+    rows = points(op)
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    (together,) = at(graph, *columns)
+    assert together.shape == (len(rows),)
+    assert together.dtype == np.float64
+    for found, point in zip(together, rows, strict=True):
+        assert not apart(found, at(graph, *point)[0]), point
+
+
+# IEEE specials: NumPy's functions by name, the reference that the table itself may not supply.
+NUMPY: dict[str, Callable[..., float]] = {
+    "add": np.add,
+    "sub": np.subtract,
+    "mul": np.multiply,
+    "div": np.divide,
+    "neg": np.negative,
+    "pow": lambda a, b: np.power(np.full(2, a), np.full(2, b))[0],  # of scalars, a**0.5 is the square root
+    "asin": np.arcsin,
+    "acos": np.arccos,
+    "atan": np.arctan,
+    "atan2": np.arctan2,
+    "less": lambda a, b: np.float64(np.less(a, b)),
+    "less_equal": lambda a, b: np.float64(np.less_equal(a, b)),
+    "equal": lambda a, b: np.float64(np.equal(a, b)),
+    "not_equal": lambda a, b: np.float64(np.not_equal(a, b)),
+    "where": lambda c, a, b: np.where(c, a, b)[()],
+    "strong_mul": lambda a, b: 0.0 if 0.0 in (a, b) else a * b,
+    **{
+        name: getattr(np, name)
+        for name in (
+            *("sqrt", "exp", "expm1", "log", "log1p", "sin", "cos", "tan", "sinh", "cosh", "tanh", "hypot"),
+            *("abs", "sign", "minimum", "maximum"),
+        )
+    },
+}
+POSITIVE_SPECIALS = (0.0, 5e-324, 1e-310, 2.2250738585072014e-308, 1e-20, 0.5, 1.0, 2.0, 3.0, 711.0, 1e20, 1e308, math.inf)
+SPECIALS = (math.nan, *POSITIVE_SPECIALS, *(-value for value in POSITIVE_SPECIALS))
+ZERO_SIGN_IS_OPEN = {"minimum", "maximum", "strong_mul"}  # IEEE 754 lets min(0, -0) be either
+
+
+def specials(op: Op) -> list[tuple[float, ...]]:
+    values = SPECIALS if op.arity < 3 else SPECIALS[::2]
+    return list(itertools.product(values, repeat=op.arity))
+
+
+def same_special(op: Op, found: float, expected: float) -> bool:
+    if apart(found, expected):
+        return False
+    signed = found == expected == 0.0 and op.name not in ZERO_SIGN_IS_OPEN
+    return not signed or math.copysign(1.0, found) == math.copysign(1.0, expected)
+
+
+@pytest.mark.parametrize("op", ROWS)
+def test_specials_are_those_of_numpy(op):
+    graph = graph_of(op)
+    with np.errstate(all="ignore"):
+        different = [
+            (point, found, expected)
+            for point in specials(op)
+            for found, expected in [(at(graph, *point)[0], float(NUMPY[op.name](*map(np.float64, point))))]
+            if type(found) is not float or not same_special(op, found, expected)
+        ]
+    assert different == []
+
+
+@pytest.mark.parametrize("op", ROWS)
+def test_specials_in_arrays_are_those_of_floats(op):
+    graph = graph_of(op)
+    rows = specials(op)
+    (together,) = at(graph, *(np.array(column) for column in zip(*rows, strict=True)))
+    different = [
+        (point, each, alone)
+        for point, each in zip(rows, together, strict=True)
+        for alone in at(graph, *point)
+        if not same_special(op, each, alone)
+    ]
+    assert different == []
+
+
+@pytest.mark.parametrize("exponent", [0.0, 0.5, 1.0, 2.0, -1.0, 3.0])
+def test_a_constant_exponent_gives_arrays_the_values_of_floats(exponent):
+    x = cg.variable("a")
+    graph = cg.Graph([x], {"y": x**exponent})
+    (together,) = at(graph, np.array(SPECIALS))
+    different = [
+        (value, each, alone)
+        for value, each in zip(SPECIALS, together, strict=True)
+        for alone in at(graph, value)
+        if not same_special(OPS["pow"], each, alone)
+    ]
+    assert different == []
+
+
+# Test the tests: a wrong rule is seen, whichever part of it is wrong.
+WRONG = {
+    "sign": replace(OPS["sin"], partials=lambda y, a: (-cg.cos(a),)),
+    "slightly off": replace(OPS["exp"], partials=lambda y, a: (y * (1.0 + 1e-11),)),
+    "swapped": replace(OPS["div"], partials=lambda y, a, b: (-(y / b), 1.0 / b)),
+    "a partial left out": replace(OPS["mul"], partials=lambda y, a, b: (b, 0.0)),
+    "right at the sample, but flat": replace(OPS["sin"], partials=lambda y, a: (math.cos(0.3),)),
+    "reads the value where it should read the argument": replace(OPS["cos"], partials=lambda y, a: (-cg.sin(y),)),
+}
+
+
+@pytest.mark.parametrize("op", [pytest.param(op, id=name) for name, op in WRONG.items()])
+def test_a_wrong_rule_is_seen(op):
+    right = OPS[op.name]
+    assert wrong_derivatives(right, right.samples[0]) == []
+    assert wrong_derivatives(op, op.samples[0]) != []
+
+
+def test_a_rule_that_is_wrong_in_the_second_order_alone_is_seen_there_alone():
+    found = " ".join(wrong_derivatives(WRONG["right at the sample, but flat"], (0.3,)))
+    assert "hessian" in found
+    assert "gradient gives" not in found.replace("jacobian of gradient gives", "")
+
+
+def test_a_wrong_value_is_seen():
+    wrong = replace(OPS["sin"], scalar=lambda a: math.sin(a) * (1.0 + 1e-15))
+    (found,) = at(graph_of(wrong), 0.3)
+    assert apart(found, float(high_precision.OPERATIONS["sin"](mpf(0.3))), ulps=2)

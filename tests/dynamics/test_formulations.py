@@ -1,0 +1,109 @@
+"""The five formulations beside one another: signatures, values where they should agree, and what is spurious."""
+
+import numpy as np
+from mpmath import mp, mpf
+from pytest import approx, mark
+
+import cgraph as cg
+import dynamics as dyn
+from cgraph.order import rebuild
+from dynamics.system import as_system
+from tests import high_precision
+from tests.dynamics.models import MODELS, at, before, error, named, random_arm, run, states
+
+ROUNDING = 1e-12  # two orders of summation of the same terms, which may cancel tenfold
+EMBEDDED = ("euler_embedded", "kinetic_only", "kinetic_only_exact")
+
+
+@mark.parametrize("name", MODELS)
+def test_literal_and_contracted_chain_rule_are_one_function(name: str) -> None:
+    model = MODELS[name]()
+    state = states(model, 50)
+    contracted, literal = (run(dyn.inverse_dynamics(model, f), state) for f in ("chain_rule", "chain_rule_literal"))
+    assert error(literal, contracted) < ROUNDING
+
+
+@mark.parametrize("formulation", dyn.FORMULATIONS)
+@mark.parametrize("name", MODELS)
+def test_simplification_keeps_the_value_and_never_grows(name: str, formulation: str) -> None:
+    model = MODELS[name]()
+    state = before(states(model, 50), dt=0.05)
+    for derive in (dyn.inverse_dynamics, dyn.momentum_rate):
+        derived, simplified = (derive(model, formulation, simplify=each) for each in (False, True))
+        assert simplified.input_names == derived.input_names
+        assert len(simplified.nodes) <= len(derived.nodes)
+        assert run(simplified, state) == approx(run(derived, state), rel=ROUNDING, abs=ROUNDING)
+
+
+@mark.parametrize("formulation", dyn.FORMULATIONS)
+def test_every_formulation_has_the_promised_inputs_and_outputs(formulation: str) -> None:
+    system = MODELS["driven pendulum"]()
+    state = ["q0_old", "qd0_old", "qdd0", "dt"] if formulation in EMBEDDED else ["q0", "qd0", "qdd0"]
+    graph = dyn.inverse_dynamics(system, formulation)
+    graph.check()
+    assert graph.input_names == (*state, "t", "a", "w")
+    assert list(graph.outputs) == ["tau0"]
+    assert list(dyn.momentum_rate(system, formulation).outputs) == ["p0_dot"]
+
+
+@mark.parametrize("formulation", dyn.FORMULATIONS)
+def test_torque_is_momentum_rate_minus_dl_dq_plus_damping_minus_forces(formulation: str) -> None:
+    """The difference of the two graphs holds nothing of the formulation but the state that it is taken at."""
+    system = MODELS["coupled springs"]()
+    state = before(states(system, 20), dt=0.05)
+    rest = run(dyn.inverse_dynamics(system, formulation), state) - run(dyn.momentum_rate(system, formulation), state)
+    right = run(dyn.inverse_dynamics(system), state) - run(dyn.momentum_rate(system), state)
+    assert rest == approx(right, rel=ROUNDING, abs=ROUNDING)
+
+
+@mark.parametrize("simplify", [False, True])
+@mark.parametrize("formulation", EMBEDDED)
+@mark.parametrize("n", [1, 2, 3])
+def test_without_its_spurious_nodes_a_flawed_graph_is_the_rate_of_the_right_momentum(
+    n: int, formulation: str, simplify: bool
+) -> None:
+    """Right: p = dL/dqd of the independent state, then along the Euler relation; differences in dt at 80 digits."""
+    arm, dt = random_arm(n), 0.05
+    state = before(at(states(arm, 1, seed=3), 0), dt)
+    graph = dyn.momentum_rate(arm, formulation, simplify=simplify)
+    gone = dict.fromkeys(dyn.spurious(graph), cg.constant(0.0))
+    kept = rebuild(graph.outputs.values(), gone, lambda node, args: cg.Node(node.op, args, name=node.name))
+    cut = cg.Graph(graph.inputs, {name: kept[node] for name, node in graph.outputs.items()})
+
+    momentum = dyn.momentum(arm)
+    with mp.workdps(80):
+        h = mpf(10) ** -20
+        x = {name: mpf(float(value)) for name, value in named(state).items()}
+
+        def p(at_dt: mpf) -> list[mpf]:
+            qd = [x[f"qdd{i}"] * at_dt + x[f"qd{i}_old"] for i in range(n)]
+            q = [qd[i] * at_dt + x[f"q{i}_old"] for i in range(n)]
+            point = {f"q{i}": q[i] for i in range(n)} | {f"qd{i}": qd[i] for i in range(n)}
+            return list(high_precision.evaluate(momentum, point, 80).values())
+
+        ahead, behind = p(x["dt"] + h), p(x["dt"] - h)
+        expected = np.array([float((a - b) / (2 * h)) for a, b in zip(ahead, behind, strict=True)])
+    assert run(cut, state) == approx(expected, rel=ROUNDING)
+    flawed = n > 1 or formulation == "euler_embedded"
+    assert bool(gone) == (flawed and formulation != "kinetic_only_exact")
+
+
+@mark.parametrize("name", MODELS)
+@mark.parametrize("formulation", ["chain_rule", "chain_rule_literal"])
+def test_nothing_is_spurious_by_the_chain_rule(name: str, formulation: str) -> None:
+    assert dyn.spurious(dyn.inverse_dynamics(MODELS[name](), formulation)) == frozenset()
+
+
+@mark.parametrize("n", [2, 3])
+@mark.parametrize("formulation", ["euler_embedded", "kinetic_only"])
+def test_spurious_nodes_change_the_torque_of_an_arm(n: int, formulation: str) -> None:
+    arm = random_arm(n)
+    graph = dyn.inverse_dynamics(arm, formulation)
+    assert dyn.spurious(graph)
+    state = before(states(arm, 20), dt=1e-6)
+    assert error(run(graph, state), run(dyn.inverse_dynamics(arm), state)) > 1e-3
+
+
+def test_links_and_energies_stay_known_in_the_torque() -> None:
+    tags = dyn.inverse_dynamics(as_system(random_arm(3))).counts().by_tag
+    assert {"link 1", "link 2", "link 3", "kinetic", "potential", "damping"} == set(tags)

@@ -1,0 +1,74 @@
+"""Pages: figures, tables and words on one self-contained HTML page."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from html import escape
+
+from . import theme
+
+_STYLE = f"""
+:root {{ color-scheme: light dark; --text: {theme.TEXT}; --back: #FFFFFF; --soft: #F4F4F2; --line: #D8D8D4; }}
+@media (prefers-color-scheme: dark) {{ :root {{ --text: #E8E8E4; --back: #17181A; --soft: #232529; --line: #3A3D42; }} }}
+body {{ margin: 0 auto; padding: 1.5rem; max-width: 62rem; color: var(--text); background: var(--back);
+  font: 17px/1.55 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }}
+h1 {{ font-size: 1.7rem; line-height: 1.25; }} h2 {{ margin-top: 2.6rem; border-top: 1px solid var(--line); padding-top: 1.2rem; }}
+nav a {{ margin-right: 1rem; white-space: nowrap; }} a {{ color: inherit; }}
+figure {{ margin: 1.2rem 0; }} figcaption {{ font-size: 0.95rem; margin-top: 0.5rem; }}
+figure img {{ display: block; max-width: 100%; height: auto; margin: 0 auto; background: #FFFFFF; border-radius: 4px; }}
+.scroll {{ overflow-x: auto; }}
+table {{ border-collapse: collapse; margin: 1rem 0; font-size: 0.95rem; font-variant-numeric: tabular-nums; }}
+th, td {{ padding: 0.35rem 0.8rem; border-bottom: 1px solid var(--line); text-align: right; }}
+th:first-child, td:first-child {{ text-align: left; }} thead th {{ border-bottom: 2px solid var(--text); }}
+caption {{ text-align: left; font-weight: 600; padding-bottom: 0.4rem; }}
+pre {{ background: var(--soft); padding: 0.8rem 1rem; overflow-x: auto; border-radius: 4px; }}
+.point {{ background: var(--soft); border-left: 5px solid {theme.SPURIOUS}; padding: 0.6rem 1rem; }}
+"""
+
+
+def page(title: str, introduction: str, sections: Sequence[tuple[str, str, str]]) -> str:
+    """A page of sections (anchor, heading, HTML), with a line of links to them. introduction is HTML."""
+    links = " ".join(f'<a href="#{anchor}">{escape(heading)}</a>' for anchor, heading, _ in sections)
+    body = "\n".join(
+        f'<section id="{anchor}">\n<h2>{escape(heading)}</h2>\n{content}\n</section>' for anchor, heading, content in sections
+    )
+    return (
+        f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<style>{_STYLE}</style>\n</head>\n<body>\n'
+        f"<h1>{escape(title)}</h1>\n{introduction}\n<nav>{links}</nav>\n{body}\n</body>\n</html>\n"
+    )
+
+
+def figure(svg: str, caption: str, width: str = "100%") -> str:
+    """An SVG picture inside the page, with its caption (text) below; the caption is its alternative text too."""
+    data = base64.b64encode(svg.encode()).decode()
+    return (
+        f'<figure><img src="data:image/svg+xml;base64,{data}" alt="{escape(caption)}" style="width:{width}">'
+        f"<figcaption>{escape(caption)}</figcaption></figure>"
+    )
+
+
+def table(caption: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table of texts; the first column is read to the left, the others to the right."""
+    head = "".join(f"<th>{escape(each)}</th>" for each in header)
+    body = "\n".join("<tr>" + "".join(f"<td>{escape(each)}</td>" for each in row) + "</tr>" for row in rows)
+    return (
+        f'<div class="scroll"><table><caption>{escape(caption)}</caption><thead><tr>{head}</tr></thead>'
+        f"<tbody>\n{body}\n</tbody></table></div>"
+    )
+
+
+def paragraph(text: str) -> str:
+    """A paragraph of text."""
+    return f"<p>{escape(text)}</p>"
+
+
+def point(text: str) -> str:
+    """The one thing to see in a section, set apart."""
+    return f'<p class="point">{escape(text)}</p>'
+
+
+def preformatted(text: str) -> str:
+    """Text in lines as they are."""
+    return f"<pre>{escape(text)}</pre>"

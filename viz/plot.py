@@ -1,0 +1,148 @@
+"""Plots: arrays to matplotlib figures. Nothing here computes physics."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import theme
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+STYLE = {
+    "font.family": theme.FONT,
+    "font.size": 10,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": theme.LINE,
+    "axes.labelcolor": theme.TEXT,
+    "svg.hashsalt": "cgraph",  # the same ids in every run
+}
+
+
+def _figure(width: float, height: float) -> Figure:
+    """An empty figure, size in inches, drawn without a display. Raises ImportError naming the extra."""
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise ImportError("plots need matplotlib: pip install 'cgraph[viz]'") from error
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def _style() -> Any:
+    from matplotlib import rc_context
+
+    return rc_context(STYLE)
+
+
+def to_svg(figure: Figure) -> str:
+    """The figure as SVG text, the same bytes in every run."""
+    buffer = io.BytesIO()
+    with _style():
+        figure.savefig(buffer, format="svg", metadata={"Date": None})
+    return buffer.getvalue().decode()
+
+
+def to_png(figure: Figure, dpi: int = 160) -> bytes:
+    """The figure as PNG."""
+    buffer = io.BytesIO()
+    with _style():
+        figure.savefig(buffer, format="png", dpi=dpi)
+    return buffer.getvalue()
+
+
+def snapshots(times: Array, positions: Array, instants: Sequence[float], traces: bool = True) -> Figure:
+    """Poses of an arm at `instants`, a panel each, with the way each joint has come.
+
+    times: (T,) [s].  positions: (T, n + 1, 2) [m], base, joints and tip.
+    """
+    with _style():
+        figure = _figure(9.0, 6.2)
+        axes = figure.subplots(2, -(-len(instants) // 2), sharex=True, sharey=True)
+        reach = 1.08 * np.abs(positions).max()
+        low, high = positions[..., 1].min(), positions[..., 1].max()
+        for letter, (axis, instant) in zip("abcdefghijkl", zip(axes.flat, instants, strict=False), strict=False):
+            row = int(np.abs(times - instant).argmin())
+            for joint in range(1, positions.shape[1]):
+                colour = theme.LINKS[(joint - 1) % len(theme.LINKS)]
+                if traces:
+                    axis.plot(*positions[: row + 1, joint].T, color=colour, linewidth=0.9, alpha=0.55)
+                axis.plot(*positions[row, joint - 1 : joint + 1].T, color=colour, linewidth=5, solid_capstyle="round")
+            axis.plot(*positions[row, :-1].T, "o", color="white", markeredgecolor=theme.TEXT, markersize=4.5)
+            axis.set_title(f"({letter})  t = {times[row]:.1f} s", fontsize=10, loc="left")
+            axis.set_aspect("equal")
+            axis.set_xlim(-reach, reach)
+            axis.set_ylim(low - 0.15 * reach, high + 0.15 * reach)
+            axis.grid(color="#E4E4E4", linewidth=0.6)
+        for axis in axes[-1]:
+            axis.set_xlabel("x [m]")
+        for axis in axes[:, 0]:
+            axis.set_ylabel("y [m]")
+    return figure
+
+
+def images(pictures: Sequence[Array], titles: Sequence[str]) -> Figure:
+    """Pictures, (height, width, 3) each, in two rows under their titles."""
+    with _style():
+        figure = _figure(9.0, 6.4)
+        for axis, picture, title in zip(
+            figure.subplots(2, -(-len(pictures) // 2)).flat, pictures, titles, strict=True
+        ):
+            axis.imshow(picture)
+            axis.set_title(title, fontsize=10, loc="left")
+            axis.set_axis_off()
+    return figure
+
+
+def bars(groups: Mapping[str, Mapping[str, tuple[float, float]]], unit: str) -> Figure:
+    """Means with standard deviations, {panel: {bar: (mean, deviation)}}, a panel with its own scale for each group."""
+    with _style():
+        figure = _figure(9.0, 3.6)
+        for axis, (title, values) in zip(
+            np.atleast_1d(figure.subplots(1, len(groups))).flat, groups.items(), strict=True
+        ):
+            means = [mean for mean, _ in values.values()]
+            drawn = axis.bar(
+                range(len(values)),
+                means,
+                yerr=[[min(mean, deviation) for mean, deviation in values.values()], [d for _, d in values.values()]],
+                color=[theme.SPURIOUS, theme.SERIES[1], theme.SERIES[0]][: len(values)],
+                error_kw={"elinewidth": 1, "capsize": 3, "ecolor": theme.TEXT},
+                width=0.62,
+            )
+            axis.bar_label(drawn, [f"{mean:.3g}" for mean in means], label_type="center", color="white")
+            axis.set_xticks(range(len(values)), list(values))
+            axis.set_title(title, fontsize=10, loc="left")
+            axis.set_ylim(bottom=0)
+            axis.set_ylabel(unit)
+    return figure
+
+
+def powers(panels: Mapping[str, Mapping[str, tuple[Sequence[float], Sequence[float]]]], x: str, y: Sequence[str]) -> Figure:
+    """Curves on logarithmic axes, {panel: {curve: (x, y)}}; zeros are left out. One legend serves all panels."""
+    with _style():
+        figure = _figure(9.0, 3.9)
+        axes = np.atleast_1d(figure.subplots(1, len(panels)))
+        labels: dict[str, Any] = {}
+        for axis, label, (title, curves) in zip(axes.flat, y, panels.items(), strict=True):
+            for number, (name, (at, values)) in enumerate(curves.items()):
+                kept = [(a, b) for a, b in zip(at, values, strict=True) if b > 0]
+                if kept:
+                    (labels[name],) = axis.loglog(
+                        *zip(*kept, strict=True),
+                        marker="osD^v"[number % 5],
+                        markersize=4,
+                        color=theme.SERIES[number % len(theme.SERIES)],
+                        label=name,
+                    )
+            axis.set_title(title, fontsize=10, loc="left")
+            axis.set_xlabel(x)
+            axis.set_ylabel(label)
+            axis.grid(color="#E4E4E4", linewidth=0.6)
+        figure.legend(labels.values(), labels.keys(), loc="outside lower center", ncols=min(4, len(labels)), frameon=False)
+    return figure

