@@ -10,8 +10,6 @@ from .label import tag
 from .node import Edge, Node, constant, named, variable, variables
 from .ops import (
     abs_ as abs,
-)
-from .ops import (
     acos,
     asin,
     atan,
@@ -40,3 +38,51 @@ from .ops import (
 )
 from .reverse import gradient, vjp
 from .simplify import simplify, specialize
+
+__all__ = [
+    "Compiled",
+    "Counts",
+    "Edge",
+    "Graph",
+    "GraphError",
+    "Node",
+    "abs",
+    "acos",
+    "asin",
+    "atan",
+    "atan2",
+    "compile",
+    "constant",
+    "cos",
+    "cosh",
+    "equal",
+    "exp",
+    "expm1",
+    "gradient",
+    "hessian",
+    "hypot",
+    "jacobian",
+    "jvp",
+    "less",
+    "less_equal",
+    "log",
+    "log1p",
+    "maximum",
+    "minimum",
+    "named",
+    "not_equal",
+    "pow",
+    "sign",
+    "simplify",
+    "sin",
+    "sinh",
+    "specialize",
+    "sqrt",
+    "tag",
+    "tan",
+    "tanh",
+    "variable",
+    "variables",
+    "vjp",
+    "where",
+]

@@ -53,9 +53,7 @@ def count(nodes: Iterable[Node]) -> Counts:
         tags.update(node.tags)
         roles.update(node.roles)
     width = max(Counter(level.values()).values(), default=0)
-    return Counts(
-        len(level), edges, max(level.values(), default=0), width, *map(_sorted, (operations, tags, roles))
-    )
+    return Counts(len(level), edges, max(level.values(), default=0), width, *map(_sorted, (operations, tags, roles)))
 
 
 def _sorted(counter: Counter[str]) -> dict[str, int]:

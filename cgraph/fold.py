@@ -9,8 +9,8 @@ from .label import Label
 from .node import CONSTANT, OPS, Node, Op, constant
 from .ops import cos, sin, sqrt
 
-# Rules see the arguments of the node to be, not all constant, and give a node that stands for it, or None. They take every operand for
-# finite, and a divisor for non-zero: 0 * x = 0, x - x = 0. Signed zeros are not told apart: x + 0 = x.
+# Rules see the arguments of the node to be, not all constant, and give a node that stands for it, or None. They take
+# every operand for finite and a divisor for non-zero: 0 * x = 0, x - x = 0. Zeros have no sign: x + 0 = x.
 Rule = Callable[..., Node | None]
 
 
@@ -69,10 +69,8 @@ def _mul(a: Node, b: Node) -> Node | None:
         return a.args[0] * b.args[0] if b.op is NEG else -(a.args[0] * b)
     if b.op is NEG:
         return -(a * b.args[0])
-    if a.op is MUL and b.op is MUL:  # (c x) (d y) = (c d) (x y)
-        (c, x), (d, y) = a.args, b.args
-        if c.value is not None and d.value is not None and math.isfinite(c.value * d.value) and c.value * d.value:
-            return constant(c.value * d.value) * (x * y)
+    if a.op is MUL and b.op is MUL and (c := a.args[0].value) is not None and (d := b.args[0].value) is not None:
+        return constant(c * d) * (a.args[1] * b.args[1]) if math.isfinite(c * d) and c * d else None
     return None
 
 
@@ -161,6 +159,7 @@ class Builder:
         self._made: dict[tuple[object, ...], Node] = {}
 
     def __call__(self, op: Op, args: tuple[Node, ...], label: Label, name: str | None = None) -> Node:
+        """The node of this operation on these arguments; a name is kept by a node made here for the first time."""
         if all([arg.op is CONSTANT for arg in args]):
             value = op.scalar(*[arg.value for arg in args])
             if value == value:

@@ -50,11 +50,11 @@ class Graph:
         if not outputs:
             raise GraphError("a graph needs at least one output")
         self.outputs = {}
-        for name, node in outputs.items():
+        for name, value in outputs.items():
             if not isinstance(name, str) or not name:
                 raise TypeError(f"an output's name must be a non-empty string, got {name!r:.60}")
             try:
-                self.outputs[name] = as_node(node)
+                self.outputs[name] = as_node(value)
             except TypeError as error:
                 raise TypeError(f"output {name!r}: {error}") from None
         self.nodes = tuple(topological(self.outputs.values()))
@@ -192,7 +192,7 @@ def _short(names: Sequence[str]) -> str:
 
 def _check_node(node: Node) -> None:
     if not isinstance(node, Node) or not isinstance(node.op, Op):
-        raise GraphError(f"{node!r} is not a node of an operation in the table")
+        raise GraphError(f"a {type(node).__name__} is not a node of an operation in the table")
     if node.op is CONSTANT:
         if type(node.value) is not float or node.value != node.value:
             raise GraphError(f"constant {node.value!r} is not a number")

@@ -26,11 +26,7 @@ def jacobian(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None)
         rows = {name: cotangents({y: one}, chosen, build) for name, y in graph.outputs.items()}
     return Graph(
         graph.inputs,
-        {
-            f"d{name}/d{node.name}": entry
-            for name, row in rows.items()
-            for node, entry in zip(chosen, row, strict=True)
-        },
+        {f"d{name}/d{node.name}": entry for name, row in rows.items() for node, entry in zip(chosen, row, strict=True)},
     )
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from .node import Node, Op
 
-PRIMAL, ADJOINT, TANGENT = "primal", "adjoint", "tangent"
+INPUT, PRIMAL, ADJOINT, TANGENT = "input", "primal", "adjoint", "tangent"
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ def label(tags: frozenset[str] = frozenset(), roles: frozenset[str] = frozenset(
 
 @cache
 def _derived(origin: Label, role: str) -> Label:
-    return label(origin.tags, (origin.roles - {PRIMAL}) | {role})
+    return label(origin.tags, (origin.roles - {INPUT, PRIMAL}) | {role})
 
 
 @cache

@@ -11,9 +11,9 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from .label import UNLABELLED, Label, current, label
+from .label import INPUT, UNLABELLED, Label, current, label
 
-INPUT = label(roles=frozenset({"input"}))
+_INPUT = label(roles=frozenset({INPUT}))
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,8 @@ class Node:
     def __setattr__(self, key: str, value: object) -> NoReturn:
         raise AttributeError(f"a Node is immutable: cannot set {key!r}")
 
-    __delattr__ = __setattr__  # type: ignore[assignment]
+    def __delattr__(self, key: str) -> NoReturn:
+        raise AttributeError(f"a Node is immutable: cannot delete {key!r}")
 
     @property
     def tags(self) -> frozenset[str]:
@@ -247,7 +248,7 @@ def variable(name: str) -> Node:
         raise ValueError(f"a variable's name must be non-empty and without white space, got {name!r}")
     node = _variables.get(name)
     if node is None:
-        node = _variables[name] = Node(VARIABLE, (), INPUT, name=name)
+        node = _variables[name] = Node(VARIABLE, (), _INPUT, name=name)
     return node
 
 
@@ -285,7 +286,8 @@ def apply(op: Op, *args: Scalar) -> Node:
 def _binary(name: str, a: Scalar, b: Scalar) -> Node:
     for each in (a, b):
         if not isinstance(each, (Node, numbers.Real, np.ndarray)):
-            return NotImplemented
+            return NotImplemented  # type: ignore[no-any-return]  # Python then asks the other operand, or raises
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
-        return OPS[name].array(a, b)  # element by element, through __array_ufunc__
+        result: Node = OPS[name].array(a, b)  # element by element, through __array_ufunc__
+        return result
     return apply(OPS[name], a, b)

@@ -8,7 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from .node import OPS, Node, Op, Scalar, apply, register
+from .node import (
+    OPS as OPS,  # noqa: PLC0414 (who needs the table imports it from here, filled)
+    Node,
+    Op,
+    Scalar,
+    apply,
+    register,
+)
 
 
 def _ieee(function: Callable[..., float], ufunc: Any) -> Callable[..., float]:
@@ -37,6 +44,25 @@ def _sign(a: float) -> float:
     return a if a != a else float((a > 0) - (a < 0))
 
 
+def _function(name: str, arity: int = 1) -> Callable[..., Node]:
+    def function(*args: Scalar) -> Node:
+        return apply(OPS[name], *args)
+
+    function.__name__ = function.__qualname__ = name
+    arguments = ", ".join(("c", "a", "b") if arity == 3 else ("a", "b")[:arity])
+    function.__doc__ = f"The node {name}({arguments}); arguments are nodes or numbers. Operation table: `ops.py`."
+    return function
+
+
+sqrt, exp, expm1, log, log1p = map(_function, ("sqrt", "exp", "expm1", "log", "log1p"))
+sin, cos, tan, asin, acos, atan = map(_function, ("sin", "cos", "tan", "asin", "acos", "atan"))
+sinh, cosh, tanh, abs_, sign = map(_function, ("sinh", "cosh", "tanh", "abs", "sign"))
+pow, atan2, hypot = (_function(name, 2) for name in ("pow", "atan2", "hypot"))
+minimum, maximum, strong_mul = (_function(name, 2) for name in ("minimum", "maximum", "strong_mul"))
+less, less_equal, equal, not_equal = (_function(name, 2) for name in ("less", "less_equal", "equal", "not_equal"))
+where = _function("where", 3)
+
+
 # Conventions where there is no derivative: abs'(0) = 0; a tie of minimum or maximum gives one half to each argument;
 # sqrt'(0) = +inf, its limit; hypot'(0, 0) = 0; d(x**y)/dy at x = y = 0 is 0; atan2 at the origin is NaN.
 def _pow_partials(y: Node, a: Node, b: Node) -> tuple[Node, Node]:
@@ -57,7 +83,8 @@ def _flat(y: Node, *args: Node) -> tuple[float, ...]:
     return (0.0,) * len(args)
 
 
-# fmt: off   (a table is read by columns)
+# A table is read by columns, so the formatter leaves it alone.
+# fmt: off
 _ROWS = (
     #  name      arity  on floats                      on arrays      partials of (output y, arguments)                 as Python, as NumPy                          symbol  samples
     Op("add",      2, lambda a, b: a + b,              np.add,        lambda y, a, b: (1.0, 1.0),                       "{} + {}", "{} + {}",                       "+",    ((0.3, -0.7),), commutative=True),
@@ -98,23 +125,3 @@ _ROWS = (
 
 for _row in _ROWS:
     register(_row)
-
-
-def _function(name: str) -> Callable[..., Node]:
-    op = OPS[name]
-
-    def function(*args: Scalar) -> Node:
-        return apply(op, *args)
-
-    function.__name__ = function.__qualname__ = name
-    arguments = ", ".join(("c", "a", "b") if name == "where" else ("a", "b")[: op.arity])
-    function.__doc__ = f"The node {name}({arguments}); arguments are nodes or numbers. Operation table: `ops.py`."
-    return function
-
-
-pow, sqrt, exp, expm1, log, log1p = map(_function, ("pow", "sqrt", "exp", "expm1", "log", "log1p"))
-sin, cos, tan, asin, acos, atan = map(_function, ("sin", "cos", "tan", "asin", "acos", "atan"))
-atan2, hypot, sinh, cosh, tanh = map(_function, ("atan2", "hypot", "sinh", "cosh", "tanh"))
-abs_, sign, minimum, maximum, where = map(_function, ("abs", "sign", "minimum", "maximum", "where"))
-less, less_equal, equal, not_equal = map(_function, ("less", "less_equal", "equal", "not_equal"))
-strong_mul = _function("strong_mul")

@@ -8,12 +8,12 @@ from .errors import GraphError
 from .fold import Builder
 from .graph import Graph
 from .label import building
-from .node import CONSTANT, Node, Scalar, constant
+from .node import Node, Scalar, constant
 from .order import rebuild
 
 
 def simplify(graph: Graph) -> Graph:
-    """The same function in fewer nodes: constants folded and collected, equal nodes merged, `x + 0`, `1 * x` and the like gone.
+    """The same function in fewer nodes: constants folded and collected, equal nodes merged, `1 * x` and the like gone.
 
     Never grows: the result has at most as many nodes and, for as many nodes, no more edges.
 
@@ -49,9 +49,7 @@ def _rebuilt(graph: Graph, replace: dict[Node, Node], inputs: Sequence[Node] | N
     return Graph(graph.inputs if inputs is None else inputs, {k: new[node] for k, node in graph.outputs.items()})
 
 
-def specialize(
-    graph: Graph, values: Mapping[str, Scalar], outputs: Sequence[str] | None = None
-) -> Graph:
+def specialize(graph: Graph, values: Mapping[str, Scalar], outputs: Sequence[str] | None = None) -> Graph:
     """The graph with inputs bound to numbers (or nodes over its other inputs), simplified; bound inputs are gone.
 
     values: {input name: number}.  outputs: names of those to keep (default: all).

@@ -15,3 +15,27 @@ from .planar_arm import Link, PlanarArm, planar_arm
 from .scenes import Scene
 from .simulate import Stats, Trajectory, simulate
 from .system import System, as_system
+
+__all__ = [
+    "FORMULATIONS",
+    "Link",
+    "PlanarArm",
+    "Scene",
+    "SingularMassMatrixError",
+    "Stats",
+    "System",
+    "Trajectory",
+    "as_system",
+    "bias",
+    "energy",
+    "forward_dynamics",
+    "gravity_force",
+    "inverse_dynamics",
+    "mass_matrix",
+    "momentum",
+    "momentum_rate",
+    "planar_arm",
+    "scenes",
+    "simulate",
+    "spurious",
+]

@@ -44,7 +44,10 @@ def bias(model: Any) -> Graph:
 
 
 def gravity_force(model: Any) -> Graph:
-    """The bias at rest: dP/dq, from gravity and springs. Inputs q0.., qd0.. and so on; outputs gravity0.. [N m or N]."""
+    """The bias at rest: dP/dq, from gravity and springs.
+
+    Inputs q0.., qd0.., t if needed, parameters; outputs gravity0.. [N m or N].
+    """
     system = as_system(model)
     at_rest = substituted(_bias(system, Builder()), dict.fromkeys(system.qd, ZERO))
     return cg.simplify(system.graph({f"gravity{i}": node for i, node in enumerate(at_rest)}, system.q, system.qd))

@@ -79,8 +79,7 @@ def kinetic_only_exact(system: System) -> Terms:
 
 
 FORMULATIONS: dict[str, Callable[[System], Terms]] = {
-    each.__name__: each
-    for each in (chain_rule, chain_rule_literal, euler_embedded, kinetic_only, kinetic_only_exact)
+    each.__name__: each for each in (chain_rule, chain_rule_literal, euler_embedded, kinetic_only, kinetic_only_exact)
 }
 
 
@@ -172,8 +171,7 @@ class _Embedding:
         self.inputs = [*q_old, *qd_old, *system.qdd, self.dt]
         with cg.tag(EULER):
             self.qd = [
-                cg.named(f"qd{i}", a * self.dt + old)
-                for i, (a, old) in enumerate(zip(system.qdd, qd_old, strict=True))
+                cg.named(f"qd{i}", a * self.dt + old) for i, (a, old) in enumerate(zip(system.qdd, qd_old, strict=True))
             ]
             with cg.tag(COUPLING):
                 moved = [v * self.dt for v in self.qd]
@@ -181,9 +179,7 @@ class _Embedding:
 
     def of(self, *nodes: Node) -> list[Node]:
         """Nodes over (q, qd) as nodes over the embedded state."""
-        return substituted(
-            nodes, dict(zip([*self.system.q, *self.system.qd], [*self.q, *self.qd], strict=True))
-        )
+        return substituted(nodes, dict(zip([*self.system.q, *self.system.qd], [*self.q, *self.qd], strict=True)))
 
     def terms(self, momentum: Sequence[Node], gradient: list[Node]) -> Terms:
         """d/dt as the derivative with respect to dt, and to t if the Lagrangian has it."""

@@ -53,14 +53,13 @@ def to_mjcf(arm: PlanarArm, timestep: float = 1e-3) -> str:
     indent = "    "
     for i, link in enumerate(arm.links):
         drop = arm.links[i - 1].length if i else 0.0
-        inertia = max(link.inertia, _SMALLEST)
+        diagonal = " ".join([repr(max(link.inertia, _SMALLEST))] * 3)
+        radius, colour = 0.04 * arm.links[0].length, _COLORS[i % len(_COLORS)]
         lines += [
             f'{indent}<body name="link{i + 1}" pos="0 0 {-drop!r}">',
             f'{indent}  <joint name="joint{i + 1}" type="hinge" axis="0 -1 0" damping="{arm.damping[i]!r}"/>',
-            f'{indent}  <inertial pos="0 0 {-link.center!r}" mass="{link.mass!r}"'
-            f' diaginertia="{inertia!r} {inertia!r} {inertia!r}"/>',
-            f'{indent}  <geom type="capsule" fromto="0 0 0 0 0 {-link.length!r}" size="{0.04 * arm.links[0].length!r}"'
-            f' rgba="{_COLORS[i % len(_COLORS)]}"/>',
+            f'{indent}  <inertial pos="0 0 {-link.center!r}" mass="{link.mass!r}" diaginertia="{diagonal}"/>',
+            f'{indent}  <geom type="capsule" fromto="0 0 0 0 0 {-link.length!r}" size="{radius!r}" rgba="{colour}"/>',
         ]
         indent += "  "
     for _ in arm.links:
@@ -141,6 +140,7 @@ def frames(arm: PlanarArm, poses: Array, timeout: float = 60.0) -> list[np.ndarr
                 [sys.executable, "-c", f"from {__name__} import _write_frames; _write_frames()"],
                 input=_packed(xml=np.array(to_mjcf(arm)), poses=np.asarray(poses, dtype=np.float64)),
                 capture_output=True,
+                check=False,
                 timeout=timeout,
                 env=os.environ | {"MUJOCO_GL": backend, "PYTHONPATH": os.pathsep.join(sys.path)},
             )
@@ -167,7 +167,7 @@ def _write_frames() -> None:
     sys.stdout.buffer.write(_packed(frames=np.array(pictures)))
 
 
-def _packed(**arrays: np.ndarray) -> bytes:
+def _packed(**arrays: Any) -> bytes:
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)
     return buffer.getvalue()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -34,7 +35,8 @@ def spring_mass() -> Scene:
         coordinates=["theta"],
         parameters={"I": 1.0, "k": 1.0},
     )
-    return Scene("spring_mass", "a rotor on a spring, L = I qd^2/2 - k q^2/2 (Figures 1 to 3)", system, (1.0,), (0.0,), 10.0)
+    about = "a rotor on a spring, L = I qd^2/2 - k q^2/2 (Figures 1 to 3)"
+    return Scene("spring_mass", about, system, (1.0,), (0.0,), 10.0)
 
 
 def triple_pendulum(model: str = "rod") -> Scene:
@@ -43,8 +45,8 @@ def triple_pendulum(model: str = "rod") -> Scene:
     It starts at rest, straight out to the right: q = (pi/2, 0, 0). model: "rod" or "point", as in `planar_arm`.
     """
     arm = planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7], damping=0.1, model=model)
-    start = (1.5707963267948966, 0.0, 0.0)
-    return Scene("triple_pendulum", "the three-link arm in free fall (Figures 4 to 6, Table 1)", arm, start, (0.0,) * 3, 3.0)
+    about = "the three-link arm in free fall (Figures 4 to 6, Table 1)"
+    return Scene("triple_pendulum", about, arm, (math.pi / 2, 0.0, 0.0), (0.0,) * 3, 3.0)
 
 
 def chain(n: int = 10) -> Scene:
@@ -52,7 +54,8 @@ def chain(n: int = 10) -> Scene:
     if n < 1:
         raise ValueError(f"a chain needs at least one link, got {n}")
     arm = planar_arm([1.0 / n] * n, [1.0 / n] * n)
-    return Scene("chain", f"a chain of {n} equal rods, let go at 45 degrees", arm, (0.7853981633974483,) + (0.0,) * (n - 1), (0.0,) * n, 3.0)
+    start = (math.pi / 4,) + (0.0,) * (n - 1)
+    return Scene("chain", f"a chain of {n} equal rods, let go at 45 degrees", arm, start, (0.0,) * n, 3.0)
 
 
 _SCENES: dict[str, Callable[..., Scene]] = {each.__name__: each for each in (spring_mass, triple_pendulum, chain)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 from collections.abc import Mapping, Sequence
@@ -88,7 +89,7 @@ def simulate(
     start = time.perf_counter()
     try:
         with Progress("simulate", t_end, progress) as report:
-            for begin, end in zip(instants[:-1], instants[1:], strict=True):
+            for begin, end in itertools.pairwise(instants):
                 count = max(1, math.ceil((end - begin) / dt * (1.0 - 1e-12)))
                 size = (end - begin) / count
                 for k in range(count):
@@ -136,7 +137,8 @@ class _Rate:
 def _energies(system: System, values: Mapping[str, float], times: Array, table: Array) -> Array:
     graph = cg.specialize(energy(system), values)
     rows = [*table.T] + ([times] if TIME in graph.input_names else [])
-    return cg.compile(graph).batch(np.array(rows))[0]
+    energies: Array = cg.compile(graph).batch(np.array(rows))[0]
+    return energies
 
 
 def _state(what: str, value: ArrayLike, system: System) -> Array:
@@ -155,7 +157,8 @@ def _instants(t_end: float, dt: float, t_eval: ArrayLike | None) -> list[float]:
     times = np.asarray(t_eval, dtype=np.float64)
     if times.ndim != 1 or not times.size or not (np.diff(times) > 0).all() or times[0] < 0 or times[-1] > t_end:
         raise ValueError(f"t_eval must be increasing times in [0, t_end = {t_end:g} s]")
-    return times.tolist() if times[0] == 0.0 else [0.0, *times.tolist()]
+    listed: list[float] = times.tolist()
+    return listed if listed[0] == 0.0 else [0.0, *listed]
 
 
 def _parameter_values(system: System, parameters: Mapping[str, float] | None) -> dict[str, float]:

@@ -53,7 +53,9 @@ def _parser() -> argparse.ArgumentParser:
     draw.add_argument("scene", help=f"one of {', '.join(scenes.names())}")
     draw.add_argument("--formulation", default="chain_rule", choices=sorted(FORMULATIONS), help="default: chain_rule")
     draw.add_argument("--out", type=Path, required=True, help="file to write: .svg, .png, .dot or .txt")
-    draw.add_argument("--collapse", action="append", default=[], metavar="TAG", help="draw all nodes of a tag as one box")
+    draw.add_argument(
+        "--collapse", action="append", default=[], metavar="TAG", help="draw all nodes of a tag as one box"
+    )
     draw.set_defaults(run=_draw)
     return parser
 

@@ -51,17 +51,18 @@ def to_dot(
     marked_label: what the legend calls them.
     clusters: frames around the nodes of a tag. True: by `main_tag`; tags: by these, a node with several of them in
         none; a function: the frame's title for a node, or None.
-    collapse: tags whose nodes become one box, "link 2 (34 nodes)"; an edge into or out of it says how many it stands for.
+    collapse: tags whose nodes become one box, "link 2 (34 nodes)"; an edge at it says how many it stands for.
         A node with several of these tags belongs to the first.
     caption: a line below the drawing; a second line then counts the graph's nodes and edges.
     rankdir: "BT" grows from the inputs at the bottom to the outputs at the top, "LR" from left to right.
 
     Ids are stable: node i of `graph.nodes` is `n<i>`, a constant's copy `n<i>-<use>-<slot>`, output j `o<j>`, collapsed
     box k `c<k>`; an edge is `e<source>-<target>-<slot>`. The same graph gives the same text in every run.
-    Up to some 500 nodes this draws well; above, collapse tags or use `engine="sfdp"`, which draws no clusters.
+    Up to some 500 nodes this draws well. Above, collapse tags, or draw with `legend=False` and render with
+    `engine="sfdp"`, which draws no clusters.
 
-    Raises ValueError for a collapsed tag that no node carries, a marked node that the graph does not have, or an unknown
-    direction; ImportError when the Python package graphviz is missing.
+    Raises ValueError for a collapsed tag that no node carries, a marked node that the graph does not have, or an
+    unknown direction; ImportError when the Python package graphviz is missing.
     """
     if rankdir not in DIRECTIONS:
         raise ValueError(f"rankdir must be one of {', '.join(DIRECTIONS)}, got {rankdir!r}")
@@ -175,10 +176,8 @@ def _plan(
         if node.value is None and node not in subject.part:
             plan.boxes.append(_node_box(subject, node, subject.id(node), cluster_of(node)))
     for edge in graph.edges:
-        if edge.source.value is None:
+        if edge.source.value is None or edge.target in subject.part:  # a number that a collapsed part uses is inside it
             continue
-        if edge.target in subject.part:
-            continue  # a number that a collapsed part uses is inside it
         copy = f"n{number[edge.source]}-{number[edge.target]}-{edge.slot}"
         plan.boxes.append(_node_box(subject, edge.source, copy, cluster_of(edge.target)))
     for i, (name, node) in enumerate(graph.outputs.items()):
@@ -206,22 +205,22 @@ def _parts(graph: Graph, collapse: Sequence[str]) -> dict[Node, str]:
 
 def _part_boxes(subject: _Subject, collapse: Sequence[str]) -> Iterator[_Box]:
     sizes = Counter(subject.part.values())
-    wrong = Counter(id for node, id in subject.part.items() if node in subject.marked)
+    wrong = Counter(part for node, part in subject.part.items() if node in subject.marked)
     for i, tag in enumerate(collapse):
-        id = f"c{i}"
-        if not sizes[id]:  # every node of this tag belongs to an earlier one
+        part = f"c{i}"
+        if not sizes[part]:  # every node of this tag belongs to an earlier one
             continue
-        words = f"{sizes[id]} node{'s' if sizes[id] > 1 else ''}"
-        if wrong[id]:
-            words += f", {wrong[id]} {subject.mark.words}"
-        kind = subject.mark if wrong[id] else theme.COLLAPSED
-        tooltip = f"{id}: all {sizes[id]} nodes tagged {tag}"
+        words = f"{sizes[part]} node{'s' if sizes[part] > 1 else ''}"
+        if wrong[part]:
+            words += f", {wrong[part]} {subject.mark.words}"
+        kind = subject.mark if wrong[part] else theme.COLLAPSED
+        tooltip = f"{part}: {words} tagged {tag}"
         yield _Box(
             id, kind, {**_PART, **_weight(kind is subject.mark), "label": f"{tag} ({words})", "tooltip": tooltip}
         )
 
 
-def _node_box(subject: _Subject, node: Node, id: str, cluster: str | None) -> _Box:
+def _node_box(subject: _Subject, node: Node, box_id: str, cluster: str | None) -> _Box:
     kind = subject.kind(node)
     name = subject.shown(node.name) if node.name else ""
     if node.value is not None:
@@ -231,12 +230,12 @@ def _node_box(subject: _Subject, node: Node, id: str, cluster: str | None) -> _B
     else:
         look, label = _OPERATION, f"{name}\n{node.op.symbol}" if name else node.op.symbol
     attributes = {**look, **_weight(node in subject.marked), "label": label, "tooltip": _about(subject, node)}
-    return _Box(id, kind, attributes, cluster)
+    return _Box(box_id, kind, attributes, cluster)
 
 
-def _output_box(subject: _Subject, name: str, id: str) -> _Box:
+def _output_box(subject: _Subject, name: str, box_id: str) -> _Box:
     about = f"output {name}, computed by {subject.id(subject.graph.outputs[name])}"
-    return _Box(id, theme.OUTPUT, {**_OUTPUT, "label": subject.shown(name), "tooltip": about})
+    return _Box(box_id, theme.OUTPUT, {**_OUTPUT, "label": subject.shown(name), "tooltip": about})
 
 
 def _weight(heavy: bool) -> Attributes:

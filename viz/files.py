@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import secrets
 from pathlib import Path
 
@@ -18,7 +17,7 @@ def write(path: str | Path, data: str | bytes) -> Path:
     try:
         try:
             temporary.write_bytes(data.encode() if isinstance(data, str) else data)
-            os.replace(temporary, target)
+            temporary.replace(target)
         finally:
             temporary.unlink(missing_ok=True)
     except OSError as error:

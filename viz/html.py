@@ -31,7 +31,8 @@ def page(title: str, introduction: str, sections: Sequence[tuple[str, str, str]]
     """A page of sections (anchor, heading, HTML), with a line of links to them. introduction is HTML."""
     links = " ".join(f'<a href="#{anchor}">{escape(heading)}</a>' for anchor, heading, _ in sections)
     body = "\n".join(
-        f'<section id="{anchor}">\n<h2>{escape(heading)}</h2>\n{content}\n</section>' for anchor, heading, content in sections
+        f'<section id="{anchor}">\n<h2>{escape(heading)}</h2>\n{content}\n</section>'
+        for anchor, heading, content in sections
     )
     return (
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cgraph import Graph
+from cgraph.expand import format_polynomial
 from dynamics import momentum_rate, scenes, spurious
 from dynamics.mujoco_io import frames
 from dynamics.progress import Progress
@@ -21,9 +22,7 @@ from dynamics.reports.law import law_of_arms
 from dynamics.reports.scaling import FITTED_FROM, scaling
 from dynamics.reports.speed import PAPER_MS, Row, table1
 
-from cgraph.expand import format_polynomial
-
-from . import html, plot
+from . import html, plot, theme
 from .dot import to_dot
 from .files import write
 from .render import render_png, render_svg
@@ -34,8 +33,17 @@ TITLES = {
     "chain_rule": "chain rule",
     "chain_rule_literal": "chain rule, literal",
 }
+COLOURS = dict(zip(TITLES.values(), (theme.SPURIOUS, theme.ORANGE, theme.BLUE, theme.PURPLE), strict=True))
 # The paper's letters: angular velocity, angular acceleration, torque.
-LETTERS = {"q0": "θ", "qd0": "ω", "qdd0": "α", "q0_old": "θ old", "qd0_old": "ω old", "p0": "p = ∂L/∂ω", "p0_dot": "τ = dp/dt"}
+LETTERS = {
+    "q0": "θ",
+    "qd0": "ω",
+    "qdd0": "α",
+    "q0_old": "θ old",
+    "qd0_old": "ω old",
+    "p0": "p = ∂L/∂ω",
+    "p0_dot": "τ = dp/dt",
+}
 SNAPSHOTS = 6
 
 
@@ -58,7 +66,9 @@ def write_paper(folder: Path, say: Callable[[str], None]) -> dict[str, Any]:
     makers = (equations, figure1, figure2, figure3, law, figures4_and_5, figure6, scaling_of_counts)
     parts = []
     for number, make in enumerate(makers, start=1):
-        say(f"[{number}/{len(makers)}] {make.__doc__.splitlines()[0].rstrip('.') if make.__doc__ else make.__name__} ...")
+        say(
+            f"[{number}/{len(makers)}] {make.__doc__.splitlines()[0].rstrip('.') if make.__doc__ else make.__name__} ..."
+        )
         part = make()
         for name, content in part.files.items():
             write(folder / name, content)
@@ -129,12 +139,15 @@ def figure3() -> Part:
 def law() -> Part:
     """The law of the embedding: torque error against dt."""
     found = law_of_arms()
-    panels: dict[str, dict[str, tuple[Sequence[float], Sequence[float]]]] = {"error of the torque": {}, "distance from its limit": {}}
+    panels: dict[str, dict[str, tuple[Sequence[float], Sequence[float]]]] = {
+        "error of the torque": {},
+        "distance from its limit": {},
+    }
     for each in found:
         name = f"{TITLES[each.formulation]}, n = {each.n}"
         panels["error of the torque"][name] = (each.dt.tolist(), each.error.tolist())
         panels["distance from its limit"][name] = (each.dt.tolist(), each.distance.tolist())
-    picture = plot.powers(panels, "dt [s]", ["largest |Δτ| [N m]"] * 2)
+    picture = plot.powers(panels, "dt [s]", ["largest |Δτ| [N m]"] * 2, kinds=2)
     header = ("formulation", "links", "slope", "largest entry of the limit [N m]", "error at dt = 1e-6 s [N m]")
     rows = [
         (
@@ -151,7 +164,9 @@ def law() -> Part:
         "(kinetic only) vanishes with slope 1. Random states of planar arms."
     )
     section = (
-        html.point("A smaller time step does not help: by definition the whole term ∂L/∂q is lost, kinetic only the part ∂K/∂q.")
+        html.point(
+            "A smaller time step does not help: by definition the whole term ∂L/∂q is lost, kinetic only the part ∂K/∂q."
+        )
         + html.figure(plot.to_svg(picture), caption)
         + html.table("The law of the embedding", header, rows)
         + html.paragraph(
@@ -160,8 +175,11 @@ def law() -> Part:
             "kinetic-only method accurate on three links; its program is not public, so which of the two it is is not known."
         )
     )
-    files = {"law.svg": plot.to_svg(picture), "law.png": plot.to_png(picture), "law.csv": _csv(header, rows)}
-    data = {f"{each.formulation} n={each.n}": {"slope": _finite(each.slope), "limit": float(np.abs(each.limit).max())} for each in found}
+    files: dict[str, str | bytes] = {"law.svg": plot.to_svg(picture), "law.png": plot.to_png(picture), "law.csv": _csv(header, rows)}
+    data = {
+        f"{each.formulation} n={each.n}": {"slope": _finite(each.slope), "limit": float(np.abs(each.limit).max())}
+        for each in found
+    }
     return Part("law", "How wrong, and why dt does not help", files, data, section)
 
 
@@ -222,7 +240,7 @@ def figure6() -> Part:
         for way in ways
     }
     groups["the paper [ms]"] = {TITLES[name]: value for name, value in PAPER_MS.items()}
-    picture = plot.bars(groups, "one evaluation")
+    picture = plot.bars(groups, COLOURS)
     header = (
         "formulation",
         *(f"{way}, ratio" for way in ways),
@@ -254,10 +272,12 @@ def figure6() -> Part:
         + html.figure(plot.to_svg(picture), caption)
         + html.paragraph(
             "Interpreted: node by node in Python. Compiled: one generated Python function. PyTorch eager, measured where torch "
-            "is installed, builds and differentiates its graph anew at every evaluation, as the paper's implementation does."
+            "is installed, builds and differentiates its graph anew at every evaluation, as the paper's implementation does. "
+            "Kinetic only has a few nodes more than by definition: it needs both ∂K/∂q and ∂L/∂q, where by definition needs "
+            "∂L/∂q alone."
         )
     )
-    files = {
+    files: dict[str, str | bytes] = {
         "fig6.svg": plot.to_svg(picture),
         "fig6.png": plot.to_png(picture),
         "table1.csv": _csv(header, table),
@@ -291,12 +311,19 @@ def scaling_of_counts() -> Part:
     """Scaling: nodes, edges and time over 1 to 40 links."""
     with Progress("scaling", 1.0) as progress:
         rows = scaling(report=progress)
-    panels = {
+    panels: dict[str, plot.Curves] = {
         "edges": {TITLES[row.formulation]: (row.n, [float(each) for each in row.edges]) for row in rows},
         "one compiled evaluation": {TITLES[row.formulation]: (row.n, row.microseconds) for row in rows},
     }
-    picture = plot.powers(panels, "links n", ["edges", "time [µs]"])
-    header = ("formulation", "nodes ~ n^p", "edges ~ n^p", "time ~ n^p", "edges at n = 3", f"edges at n = {rows[0].n[-1]}")
+    picture = plot.powers(panels, "links n", ["edges", "time [µs]"], colours=COLOURS)
+    header = (
+        "formulation",
+        "nodes ~ n^p",
+        "edges ~ n^p",
+        "time ~ n^p",
+        "edges at n = 3",
+        f"edges at n = {rows[0].n[-1]}",
+    )
     table = [
         (
             TITLES[row.formulation],
@@ -306,7 +333,9 @@ def scaling_of_counts() -> Part:
         )
         for row in rows
     ]
-    caption = f"Inverse dynamics of chains of n equal rods. Exponents are fitted over n = {FITTED_FROM} to {rows[0].n[-1]}."
+    caption = (
+        f"Inverse dynamics of chains of n equal rods. Exponents are fitted over n = {FITTED_FROM} to {rows[0].n[-1]}."
+    )
     section = (
         html.point(
             "The embedding is not what makes a graph grow quadratically: by definition and the contracted chain rule both grow "
@@ -320,12 +349,15 @@ def scaling_of_counts() -> Part:
         for row in rows
         for n, nodes, edges, time in zip(row.n, row.nodes, row.edges, row.microseconds, strict=True)
     ]
-    files = {
+    files: dict[str, str | bytes] = {
         "scaling.svg": plot.to_svg(picture),
         "scaling.png": plot.to_png(picture),
         "scaling.csv": _csv(("formulation", "n", "nodes", "edges", "microseconds"), long),
     }
-    data = {row.formulation: {"edges_exponent": row.fitted(row.edges), "nodes_exponent": row.fitted(row.nodes)} for row in rows}
+    data = {
+        row.formulation: {"edges_exponent": row.fitted(row.edges), "nodes_exponent": row.fitted(row.nodes)}
+        for row in rows
+    }
     return Part("scaling", "Scaling with the number of links", files, data, section)
 
 
@@ -340,7 +372,11 @@ def _drawn(name: str, heading: str, graph: Graph, caption: str, **figures: int) 
     caption = f"{caption} {counts.nodes} nodes, {counts.edges} edges."
     drawing = to_dot(graph, names=LETTERS, marked=spurious(graph), clusters=False, rankdir="LR")
     svg = render_svg(drawing)
-    files: dict[str, str | bytes] = {f"{name}.svg": svg, f"{name}.png": render_png(svg), f"{name}.dot": str(drawing.source)}
+    files: dict[str, str | bytes] = {
+        f"{name}.svg": svg,
+        f"{name}.png": render_png(svg),
+        f"{name}.dot": str(drawing.source),
+    }
     data = {"nodes": counts.nodes, "edges": counts.edges, "depth": counts.depth} | figures
     return Part(name, heading, files, data, html.figure(svg, caption, width="auto"))
 
@@ -351,7 +387,9 @@ def _page(parts: Sequence[Part]) -> str:
         "τ = d/dt ∂L/∂qd − ∂L/∂q: by definition with the Euler relation embedded (wrong), with the kinetic energy alone (right "
         "for one joint only), and by the chain rule (right). Every number on this page was measured when it was made."
     )
-    return html.page("The chain rule keeps q and qd apart", introduction, [(p.name, p.heading, p.section) for p in parts])
+    return html.page(
+        "The chain rule keeps q and qd apart", introduction, [(p.name, p.heading, p.section) for p in parts]
+    )
 
 
 def _csv(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

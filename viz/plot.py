@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
-STYLE = {
+STYLE: dict[Any, Any] = {
     "font.family": theme.FONT,
     "font.size": 10,
     "axes.spines.top": False,
@@ -62,10 +62,12 @@ def snapshots(times: Array, positions: Array, instants: Sequence[float], traces:
     times: (T,) [s].  positions: (T, n + 1, 2) [m], base, joints and tip.
     """
     with _style():
-        figure = _figure(9.0, 6.2)
-        axes = figure.subplots(2, -(-len(instants) // 2), sharex=True, sharey=True)
-        reach = 1.08 * np.abs(positions).max()
-        low, high = positions[..., 1].min(), positions[..., 1].max()
+        reach = 1.08 * np.abs(positions[..., 0]).max()
+        low, high = positions[..., 1].min() - 0.15 * reach, positions[..., 1].max() + 0.15 * reach
+        columns = -(-len(instants) // 2)
+        panel = 9.0 / columns  # inches; equal scales fix the height
+        figure = _figure(9.0, 2 * (0.86 * panel * (high - low) / (2 * reach) + 0.42) + 0.3)
+        axes = figure.subplots(2, columns, sharex=True, sharey=True)
         for letter, (axis, instant) in zip("abcdefghijkl", zip(axes.flat, instants, strict=False), strict=False):
             row = int(np.abs(times - instant).argmin())
             for joint in range(1, positions.shape[1]):
@@ -77,7 +79,7 @@ def snapshots(times: Array, positions: Array, instants: Sequence[float], traces:
             axis.set_title(f"({letter})  t = {times[row]:.1f} s", fontsize=10, loc="left")
             axis.set_aspect("equal")
             axis.set_xlim(-reach, reach)
-            axis.set_ylim(low - 0.15 * reach, high + 0.15 * reach)
+            axis.set_ylim(low, high)
             axis.grid(color="#E4E4E4", linewidth=0.6)
         for axis in axes[-1]:
             axis.set_xlabel("x [m]")
@@ -90,17 +92,18 @@ def images(pictures: Sequence[Array], titles: Sequence[str]) -> Figure:
     """Pictures, (height, width, 3) each, in two rows under their titles."""
     with _style():
         figure = _figure(9.0, 6.4)
-        for axis, picture, title in zip(
-            figure.subplots(2, -(-len(pictures) // 2)).flat, pictures, titles, strict=True
-        ):
+        for axis, picture, title in zip(figure.subplots(2, -(-len(pictures) // 2)).flat, pictures, titles, strict=True):
             axis.imshow(picture)
             axis.set_title(title, fontsize=10, loc="left")
             axis.set_axis_off()
     return figure
 
 
-def bars(groups: Mapping[str, Mapping[str, tuple[float, float]]], unit: str) -> Figure:
-    """Means with standard deviations, {panel: {bar: (mean, deviation)}}, a panel with its own scale for each group."""
+def bars(groups: Mapping[str, Mapping[str, tuple[float, float]]], colours: Mapping[str, str]) -> Figure:
+    """Means with standard deviations, {panel: {bar: (mean, deviation)}}, a panel with its own scale for each group.
+
+    colours: {bar: colour}.
+    """
     with _style():
         figure = _figure(9.0, 3.6)
         for axis, (title, values) in zip(
@@ -111,20 +114,29 @@ def bars(groups: Mapping[str, Mapping[str, tuple[float, float]]], unit: str) -> 
                 range(len(values)),
                 means,
                 yerr=[[min(mean, deviation) for mean, deviation in values.values()], [d for _, d in values.values()]],
-                color=[theme.SPURIOUS, theme.SERIES[1], theme.SERIES[0]][: len(values)],
+                color=[colours[name] for name in values],
                 error_kw={"elinewidth": 1, "capsize": 3, "ecolor": theme.TEXT},
                 width=0.62,
             )
-            axis.bar_label(drawn, [f"{mean:.3g}" for mean in means], label_type="center", color="white")
-            axis.set_xticks(range(len(values)), list(values))
+            for label in axis.bar_label(drawn, [f"{mean:.3g}" for mean in means], label_type="center"):
+                label.set_bbox({"facecolor": "white", "edgecolor": "none", "boxstyle": "round,pad=0.2"})
+            axis.set_xticks(range(len(values)), [name.replace(" ", "\n", 1) for name in values])
             axis.set_title(title, fontsize=10, loc="left")
             axis.set_ylim(bottom=0)
-            axis.set_ylabel(unit)
     return figure
 
 
-def powers(panels: Mapping[str, Mapping[str, tuple[Sequence[float], Sequence[float]]]], x: str, y: Sequence[str]) -> Figure:
-    """Curves on logarithmic axes, {panel: {curve: (x, y)}}; zeros are left out. One legend serves all panels."""
+Curves = Mapping[str, tuple[Sequence[float], Sequence[float]]]  # {name: (x, y)}
+
+
+def powers(
+    panels: Mapping[str, Curves], x: str, y: Sequence[str], kinds: int = 1, colours: Mapping[str, str] | None = None
+) -> Figure:
+    """Curves on logarithmic axes, {panel: curves}; zeros are left out. One legend serves all panels.
+
+    kinds: curves come in groups of so many, one colour a group and one line style a place in the group.
+    colours: {curve: colour} in place of a colour for each group.
+    """
     with _style():
         figure = _figure(9.0, 3.9)
         axes = np.atleast_1d(figure.subplots(1, len(panels)))
@@ -135,14 +147,17 @@ def powers(panels: Mapping[str, Mapping[str, tuple[Sequence[float], Sequence[flo
                 if kept:
                     (labels[name],) = axis.loglog(
                         *zip(*kept, strict=True),
-                        marker="osD^v"[number % 5],
+                        marker="osD^v"[number // kinds % 5],
                         markersize=4,
-                        color=theme.SERIES[number % len(theme.SERIES)],
+                        linestyle=("-", "--", ":")[number % kinds],
+                        color=colours[name] if colours else theme.SERIES[number // kinds % len(theme.SERIES)],
                         label=name,
                     )
             axis.set_title(title, fontsize=10, loc="left")
             axis.set_xlabel(x)
             axis.set_ylabel(label)
             axis.grid(color="#E4E4E4", linewidth=0.6)
-        figure.legend(labels.values(), labels.keys(), loc="outside lower center", ncols=min(4, len(labels)), frameon=False)
+        figure.legend(
+            labels.values(), labels.keys(), loc="outside lower center", ncols=min(4, len(labels)), frameon=False
+        )
     return figure

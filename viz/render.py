@@ -55,7 +55,8 @@ def render_svg(dot_source: str | Drawing, *, engine: str = "dot", timeout: float
         raise ValueError(f"timeout must be positive, got {timeout!r} s")
     source = dot_source if isinstance(dot_source, str) else dot_source.source
     try:
-        done = subprocess.run(_command(engine), input=source.encode(), capture_output=True, timeout=timeout)
+        command = _command(engine)
+        done = subprocess.run(command, input=source.encode(), capture_output=True, timeout=timeout, check=False)
     except subprocess.TimeoutExpired:
         raise RenderError(
             f"Graphviz engine {engine!r} took longer than {timeout:g} s; collapse tags, or use engine='sfdp'"

@@ -55,7 +55,7 @@ ROLES = {
 }
 OUTPUT = Paint("output", WHITE, BLACK)
 COLLAPSED = Paint("collapsed part", tint(GREY, 0.25), LINE)
-MARKED = _paint("spurious", SPURIOUS, 0.30)
+MARKED = _paint("spurious", SPURIOUS, 0.60)
 
 
 def role_of(node: Node) -> str:

@@ -66,5 +66,3 @@ def law_of_arms(counts: Sequence[int] = (1, 2, 3, 6), seed: int = 0) -> list[Law
         q, qd, qdd = rng.uniform(-1.0, 1.0, (3, n))
         found += [law(arm, q, qd, qdd, formulation) for formulation in ("euler_embedded", "kinetic_only")]
     return found
-
-

@@ -201,8 +201,10 @@ def test_a_pickle_keeps_names_tags_unused_inputs_and_signed_zeros():
     again = pickle.loads(pickle.dumps(graph))
     assert again.input_names == ("x", "y")
     assert again.outputs["f"].name == "P"
-    assert again.listing() == graph.listing() == (
-        "inputs x y\n%1 = add x -0.0  (P)  # primal\noutput f = %1\noutput g = -0.0\n"
+    assert (
+        again.listing()
+        == graph.listing()
+        == ("inputs x y\n%1 = add x -0.0  (P)  # primal\noutput f = %1\noutput g = -0.0\n")
     )
     assert again.outputs["g"] is cg.constant(-0.0)
 

@@ -146,7 +146,9 @@ def test_a_constant_must_be_real(wrong):
         cg.constant(wrong)
 
 
-@pytest.mark.parametrize(("wrong", "error"), [("", ValueError), ("a b", ValueError), (" a", ValueError), (1, TypeError)])
+@pytest.mark.parametrize(
+    ("wrong", "error"), [("", ValueError), ("a b", ValueError), (" a", ValueError), (1, TypeError)]
+)
 def test_a_variable_needs_a_name_without_white_space(wrong, error):
     with pytest.raises(error, match="name"):
         cg.variable(wrong)

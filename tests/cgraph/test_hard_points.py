@@ -110,14 +110,10 @@ BRANCHES = (
     ),
     Branch("minimum with infinity", lambda x: cg.minimum(x * x, INF), lambda x: x * x, 0.7),
     Branch("maximum with minus infinity", lambda x: cg.maximum(cg.log(0 * x), x**3), lambda x: x**3, 0.7),
-    Branch(
-        "loser of minimum has a pole", lambda x: cg.minimum(x * x, 1 / ((x - 1) * (x - 1))), lambda x: x * x, 1.0
-    ),
+    Branch("loser of minimum has a pole", lambda x: cg.minimum(x * x, 1 / ((x - 1) * (x - 1))), lambda x: x * x, 1.0),
     Branch("loser of minimum is steep", lambda x: cg.minimum(x * x - 1, cg.sqrt(x)), lambda x: x * x - 1, 0.0),
     Branch("loser of maximum is steep", lambda x: cg.maximum(cg.cos(x), cg.sqrt(x)), mpmath.cos, 0.0),
-    Branch(
-        "loser of maximum overflows", lambda x: cg.maximum(x**3, -cg.exp(cg.exp(x * 1e3))), lambda x: x**3, 2.0
-    ),
+    Branch("loser of maximum overflows", lambda x: cg.maximum(x**3, -cg.exp(cg.exp(x * 1e3))), lambda x: x**3, 2.0),
     Branch(
         "minimum within a maximum",
         lambda x: cg.maximum(cg.minimum(x**3, 1 / (x - x)), cg.log(0 * x)),
@@ -145,7 +141,17 @@ def test_nan_in_an_operand_of_minimum_is_the_value_as_in_numpy():
 @pytest.mark.parametrize(
     ("exponent", "first", "second"),
     # of x**exponent at 0: exponent * 0**(exponent - 1), exponent * (exponent - 1) * 0**(exponent - 2)
-    [(0, 0, 0), (1, 1, 0), (2, 0, 2), (3, 0, 0), (4, 0, 0), (0.5, INF, -INF), (1.5, 0, INF), (2.5, 0, 0), (-1, -INF, INF)],
+    [
+        (0, 0, 0),
+        (1, 1, 0),
+        (2, 0, 2),
+        (3, 0, 0),
+        (4, 0, 0),
+        (0.5, INF, -INF),
+        (1.5, 0, INF),
+        (2.5, 0, 0),
+        (-1, -INF, INF),
+    ],
 )
 def test_powers_at_zero_have_their_one_sided_derivatives(exponent, first, second):
     found = derivatives(lambda x: x**exponent, 0.0)

@@ -138,7 +138,6 @@ def test_arrays_of_nodes_combine_with_nodes_numbers_and_arrays():
         (nodes + nodes, [X + X, Y + Y]),
         (nodes * [2.0, 3.0], [X * 2, Y * 3]),
         (-nodes, [-X, -Y]),
-        (np.maximum(nodes, 0.5), [X, 0.5]),
     ):
         assert [value(node) for node in found] == expected
 

@@ -75,9 +75,7 @@ def second_derivatives(op: Op, point: Sequence[float]) -> dict[str, list[float]]
     gradient = cg.gradient(graph)
     return {
         "hessian": at(cg.hessian(graph), *point),
-        "jvp of jvp": [
-            at(cg.jvp(cg.jvp(graph), primal), *point, *unit(n, i), *unit(n, j))[0] for i, j in pairs
-        ],
+        "jvp of jvp": [at(cg.jvp(cg.jvp(graph), primal), *point, *unit(n, i), *unit(n, j))[0] for i, j in pairs],
         "jvp of vjp": [at(cg.jvp(cg.vjp(graph), primal), *point, 1.0, *unit(n, j))[i] for i, j in pairs],
         "vjp of jvp": [at(cg.vjp(cg.jvp(graph), primal), *point, *unit(n, i), 1.0)[j] for i, j in pairs],
         "vjp of vjp": [at(cg.vjp(cg.vjp(graph), primal), *point, 1.0, *unit(n, i))[j] for i, j in pairs],
@@ -186,7 +184,21 @@ NUMPY: dict[str, Callable[..., float]] = {
         )
     },
 }
-POSITIVE_SPECIALS = (0.0, 5e-324, 1e-310, 2.2250738585072014e-308, 1e-20, 0.5, 1.0, 2.0, 3.0, 711.0, 1e20, 1e308, math.inf)
+POSITIVE_SPECIALS = (
+    0.0,
+    5e-324,
+    1e-310,
+    2.2250738585072014e-308,
+    1e-20,
+    0.5,
+    1.0,
+    2.0,
+    3.0,
+    711.0,
+    1e20,
+    1e308,
+    math.inf,
+)
 SPECIALS = (math.nan, *POSITIVE_SPECIALS, *(-value for value in POSITIVE_SPECIALS))
 ZERO_SIGN_IS_OPEN = {"minimum", "maximum", "strong_mul"}  # IEEE 754 lets min(0, -0) be either
 

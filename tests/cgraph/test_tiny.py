@@ -47,10 +47,7 @@ def test_a_derivative_is_a_graph_that_can_be_counted_and_read():
         energy = cg.Graph([x], {"f": cg.sin(x) * 3})
     assert (energy.counts().nodes, energy.counts().edges) == (4, 3)
     assert cg.gradient(energy).listing() == (
-        "inputs x\n"
-        "%1 = cos x  # adjoint; oscillator\n"
-        "%2 = mul 3.0 %1  # adjoint; oscillator\n"
-        "output df/dx = %2\n"
+        "inputs x\n%1 = cos x  # adjoint; oscillator\n%2 = mul 3.0 %1  # adjoint; oscillator\noutput df/dx = %2\n"
     )
 
 

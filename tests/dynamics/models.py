@@ -41,7 +41,8 @@ def named(state: Mapping[str, Any]) -> dict[str, Any]:
     for name, value in state.items():
         if isinstance(value, np.ndarray):
             stem, old = name.removesuffix("_old"), "_old" if name.endswith("_old") else ""
-            result |= {f"{stem}{i}{old}": value[..., i] for i in range(value.shape[-1])}
+            columns = value.tolist() if value.ndim == 1 else value.T
+            result |= {f"{stem}{i}{old}": column for i, column in enumerate(columns)}
         else:
             result[name] = value
     return result

@@ -11,7 +11,6 @@ from mpmath import mp, mpf
 import cgraph as cg
 from dynamics.system import as_system
 from tests import high_precision
-
 from tests.dynamics.models import Array, named
 
 DIGITS = 80

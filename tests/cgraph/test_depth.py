@@ -1,0 +1,99 @@
+"""No recursion anywhere: chains far deeper than Python's stack."""
+
+import gc
+import math
+import pickle
+import sys
+
+import pytest
+
+import cgraph as cg
+
+DEEP = 100_000
+
+
+def chain(length: int) -> cg.Graph:
+    """sin(sin(... sin(x))), a fixed point iteration towards 0."""
+    x = node = cg.variable("x")
+    for _ in range(length):
+        node = cg.sin(node)
+    return cg.Graph([x], {"f": node})
+
+
+def by_hand(length: int, x: float) -> tuple[float, float]:
+    """Value and derivative of the chain, by a loop."""
+    slope = 1.0
+    for _ in range(length):
+        slope *= math.cos(x)
+        x = math.sin(x)
+    return x, slope
+
+
+@pytest.fixture(scope="module")
+def deep() -> cg.Graph:
+    assert sys.getrecursionlimit() < DEEP / 10
+    return chain(DEEP)
+
+
+def test_a_deep_graph_evaluates(deep):
+    assert deep.evaluate({"x": 1.0}) == {"f": by_hand(DEEP, 1.0)[0]}
+
+
+def test_a_deep_graph_has_derivatives_in_both_modes(deep):
+    expected = pytest.approx(by_hand(DEEP, 1.0)[1], rel=1e-10)  # 1e5 roundings
+    assert cg.jvp(deep).evaluate({"x": 1.0, "x_dot": 1.0})["f_dot"] == expected
+    assert cg.gradient(deep).evaluate({"x": 1.0})["df/dx"] == expected
+
+
+def test_a_deep_graph_is_counted_checked_and_listed(deep):
+    counts = deep.counts()
+    assert (counts.nodes, counts.edges, counts.depth, counts.width) == (DEEP + 1, DEEP, DEEP, 1)
+    deep.check()
+    assert deep.listing().count("\n") == DEEP + 2
+    assert len(deep.edges) == DEEP
+
+
+def test_a_deep_graph_survives_a_pickle(deep):
+    again = pickle.loads(pickle.dumps(deep))
+    assert again.listing() == deep.listing()
+
+
+def test_a_deep_graph_is_simplified_specialized_and_inlined(deep):
+    assert cg.simplify(deep).counts().nodes == DEEP + 1
+    constant = cg.specialize(deep, {"x": 1.0})
+    assert constant.listing() == f"inputs \noutput f = {by_hand(DEEP, 1.0)[0]!r}\n"
+    x = cg.variable("x")
+    assert cg.Graph([x], deep(2 * x)).counts().depth == DEEP + 1
+
+
+def test_a_deep_graph_is_let_go():
+    graph = chain(DEEP)
+    derivative = cg.gradient(graph)
+    del graph, derivative
+    gc.collect()
+    assert chain(10).counts().nodes == 11  # and the interpreter is still there
+
+
+def test_a_deep_graph_with_sharing_is_walked_once():
+    """x -> x * x repeated: 2**200 paths, 200 nodes."""
+    x = node = cg.variable("x")
+    for _ in range(200):
+        node = node * node
+    graph = cg.Graph([x], {"f": node})
+    assert graph.counts().nodes == 201
+    assert graph.evaluate({"x": 1.0}) == {"f": 1.0}
+    assert cg.gradient(graph).evaluate({"x": 1.0}) == {"df/dx": 2.0**200}
+    assert cg.simplify(graph).counts().nodes == 201
+
+
+@pytest.mark.slow
+def test_a_million_nodes():
+    length = 10**6
+    graph = chain(length)
+    value, slope = by_hand(length, 1.0)
+    assert graph.evaluate({"x": 1.0}) == {"f": value}
+    counts = graph.counts()
+    assert (counts.nodes, counts.depth) == (length + 1, length)
+    expected = pytest.approx(slope, rel=1e-9)  # 1e6 roundings
+    assert cg.jvp(graph).evaluate({"x": 1.0, "x_dot": 1.0})["f_dot"] == expected
+    assert cg.gradient(graph).evaluate({"x": 1.0})["df/dx"] == expected

@@ -1,0 +1,221 @@
+"""simplify and specialize: fewer nodes, the same function."""
+
+import math
+
+import pytest
+from hypothesis import assume, given, settings
+from mpmath import mpf
+
+import cgraph as cg
+from cgraph.errors import GraphError
+from tests import high_precision
+from tests.strategies import Case, cases
+
+x, y, z = cg.variables("x y z")
+ROUNDINGS = 4 * 2.0**-53  # relative error of one operation: 4 half ulps
+KINK_DISTANCE = 1e-6
+
+
+def size(graph: cg.Graph) -> tuple[int, int]:
+    """Nodes, then edges."""
+    counts = graph.counts()
+    return counts.nodes, counts.edges
+
+
+def assert_same_function(graph: cg.Graph, other: cg.Graph, values: dict[str, float]) -> None:
+    """The other graph, in floats and in 50 digits, is the graph in 50 digits within the rounding of its operations."""
+    other_values = {name: value for name, value in values.items() if name in other.input_names}
+    exact = high_precision.evaluate(graph, values)
+    before = high_precision.rounding_size(graph, values)
+    after = high_precision.rounding_size(other, other_values)
+    precise = high_precision.evaluate(other, other_values)
+    for name, found in other.evaluate(other_values).items():
+        assert abs(precise[name] - exact[name]) <= ROUNDINGS * before[name]  # constants were folded in floats
+        assert abs(mpf(found) - exact[name]) <= ROUNDINGS * (before[name] + after[name])
+
+
+@settings(max_examples=400)
+@given(cases())
+def test_simplify_never_grows_and_keeps_the_function(case):
+    simple = cg.simplify(case.graph)
+    simple.check()
+    assert size(simple) <= size(case.graph)
+    assert simple.input_names == case.graph.input_names
+    assert list(simple.outputs) == list(case.graph.outputs)
+    assume(high_precision.kink_distance(case.graph, case.values) > KINK_DISTANCE)
+    assert_same_function(case.graph, simple, case.values)
+
+
+@settings(max_examples=150)
+@given(cases(max_operations=10))
+def test_simplify_keeps_derivatives_and_never_grows_them(case):
+    jacobian = cg.jacobian(case.graph)
+    simple = cg.simplify(jacobian)
+    assert size(simple) <= size(jacobian)
+    assume(high_precision.kink_distance(jacobian, case.values) > KINK_DISTANCE)
+    assert_same_function(jacobian, simple, case.values)
+
+
+@settings(max_examples=150)
+@given(cases())
+def test_simplify_is_done_when_it_is_done(case):
+    simple = cg.simplify(case.graph)
+    assert cg.simplify(simple).listing() == simple.listing()
+
+
+@settings(max_examples=150)
+@given(cases())
+def test_specialize_binds_an_input_and_keeps_the_function(case):
+    bound = case.graph.input_names[0]
+    special = cg.specialize(case.graph, {bound: case.values[bound]})
+    special.check()
+    assert special.input_names == case.graph.input_names[1:]
+    assume(high_precision.kink_distance(case.graph, case.values) > KINK_DISTANCE)
+    assert_same_function(case.graph, special, case.values)
+
+
+@settings(max_examples=150)
+@given(cases())
+def test_specialize_never_grows(case):
+    bound = case.graph.input_names[0]
+    assert size(cg.specialize(case.graph, {bound: case.values[bound]})) <= size(case.graph)
+    assert size(cg.specialize(case.graph, {})) <= size(case.graph)
+
+
+def test_a_changed_function_is_seen():
+    """Test the tests: the tolerance does not hide an error of 1e-14."""
+    graph = cg.Graph([x], {"f": cg.sin(x) * 3.0})
+    case = Case(graph, {"x": 0.7})
+    assert_same_function(graph, cg.simplify(graph), case.values)
+    with pytest.raises(AssertionError):
+        assert_same_function(graph, cg.Graph([x], {"f": cg.sin(x) * (3.0 + 3e-14)}), case.values)
+
+
+def simple(node: cg.Node) -> str:
+    """The listing after simplification, without inputs, roles and the word output."""
+    lines = cg.simplify(cg.Graph([x, y, z], {"f": node})).listing().splitlines()[1:]
+    return "; ".join(line.split("  #")[0].removeprefix("output ") for line in lines)
+
+
+@pytest.mark.parametrize(
+    "node",
+    [
+        x + 0, 0 + x, x + -0.0, x - 0, 1 * x, x * 1, x / 1, x**1, -(-x), -1 * -x, (-x) / -1, x * 2 * 0.5,
+        3 + (x - 3), cg.where(1.0, x, y), cg.where(0.0, y, x), cg.where(y > 0, x, x), cg.minimum(x, x),
+        cg.maximum(x, x), x + (y - y), x * (y / y), x + 0 * y, x + y * 0, x + 0 / y, x * y**0, 1 / x**-1 * 0 + x,
+    ],
+)  # fmt: skip
+def test_what_is_x_becomes_x(node):
+    assert simple(node) == "f = x"
+
+
+@pytest.mark.parametrize("node", [0 * x, x * 0, x - x, 0 / x, 0 * x * y, (x + y) - (y + x), cg.sin(0 * x)])
+def test_what_is_zero_becomes_zero(node):
+    assert simple(node) in ("f = 0.0", "f = -0.0")
+
+
+@pytest.mark.parametrize(
+    ("node", "expected"),
+    [
+        (x**2, "%1 = mul x x; f = %1"),
+        (x**0.5, "%1 = sqrt x; f = %1"),
+        (x**0, "f = 1.0"),
+        (x / x, "f = 1.0"),
+        (2 * (3 * x), "%1 = mul 6.0 x; f = %1"),
+        ((x * 3) * 2, "%1 = mul 6.0 x; f = %1"),
+        (2 * -(3 * x), "%1 = mul -6.0 x; f = %1"),
+        (2 + (3 + x), "%1 = add 5.0 x; f = %1"),
+        (cg.sin(-x) + cg.sin(x), "f = 0.0"),
+        (cg.sin(-x) * cg.sin(-y), "%1 = sin x; %2 = sin y; %3 = mul %1 %2; f = %3"),
+        (cg.cos(-x), "%1 = cos x; f = %1"),
+        (abs(-x), "%1 = abs x; f = %1"),
+        (x + -y, "%1 = sub x y; f = %1"),
+        (x - -y, "%1 = add x y; f = %1"),
+        (-x * -y, "%1 = mul x y; f = %1"),
+        (-x / -y, "%1 = div x y; f = %1"),
+        (-(x - y), "%1 = sub y x; f = %1"),
+        (cg.sin(cg.constant(0.0)) + cg.exp(cg.constant(0.0)) * 2, "f = 2.0"),
+        ((x * y) / (y * x), "f = 1.0"),
+        (cg.sin(x * y) * cg.sin(y * x), "%1 = mul x y; %2 = sin %1; %3 = mul %2 %2; f = %3"),
+        (cg.minimum(x, y) - cg.minimum(y, x), "f = 0.0"),
+        (x - y + (x - y) * z - (y - x) * 0, "%1 = sub x y; %2 = mul %1 z; %3 = add %1 %2; f = %3"),
+    ],
+)
+def test_folds(node, expected):
+    assert simple(node) == expected
+
+
+@pytest.mark.parametrize("make", [lambda a, b: a - b, lambda a, b: a / b, cg.atan2, lambda a, b: a**b, cg.less])
+def test_what_does_not_commute_is_not_merged(make):
+    graph = cg.Graph([x, y], {"f": make(x, y), "g": make(y, x)})
+    assert size(cg.simplify(graph)) == (4, 4)
+
+
+@pytest.mark.parametrize("make", [lambda a, b: a + b, lambda a, b: a * b, cg.minimum, cg.maximum, cg.equal, cg.hypot])
+def test_what_commutes_is_merged(make):
+    graph = cg.Graph([x, y], {"f": make(x, y), "g": make(y, x)})
+    result = cg.simplify(graph)
+    assert result.outputs["f"] is result.outputs["g"]
+
+
+@pytest.mark.parametrize(
+    "node", [cg.log(cg.constant(-1.0)), cg.constant(math.inf) - math.inf, 0 * cg.constant(math.inf)]
+)
+def test_a_constant_expression_without_a_number_stays(node):
+    result = cg.simplify(cg.Graph([], {"f": node}))
+    assert math.isnan(result.evaluate({})["f"])
+
+
+def test_an_infinite_constant_is_folded():
+    assert simple(1 / cg.constant(0.0)) == "f = inf"
+    assert simple(cg.exp(cg.constant(-1000.0))) == "f = 0.0"
+
+
+def test_simplify_leaves_the_given_graph_alone():
+    graph = cg.Graph([x], {"f": (x + 0) * cg.sin(-x) + cg.sin(-x)})
+    before = graph.listing()
+    cg.simplify(graph)
+    assert graph.listing() == before
+
+
+def test_what_is_written_is_kept_as_written():
+    graph = cg.Graph([x], {"f": (x + 0) * 1 - x * 0})
+    assert [node.op.name for node in graph.nodes if node.args] == ["add", "mul", "mul", "sub"]
+
+
+def test_specialize_takes_several_inputs_numbers_of_any_kind_and_chosen_outputs():
+    graph = cg.Graph([x, y, z], {"f": x * y + z, "g": cg.sin(z)})
+    special = cg.specialize(graph, {"x": 2, "y": cg.constant(3.0)}, outputs=["f"])
+    assert special.listing().replace("  # primal", "") == "inputs z\n%1 = add 6.0 z\noutput f = %1\n"
+    assert list(cg.specialize(graph, {}, outputs=["g", "f"]).outputs) == ["g", "f"]
+
+
+def test_specialize_takes_nodes_over_the_other_inputs():
+    graph = cg.Graph([x, y], {"f": x * y})
+    special = cg.specialize(graph, {"y": cg.sin(x)})
+    assert special.input_names == ("x",)
+    assert special.evaluate({"x": 0.7}) == {"f": 0.7 * math.sin(0.7)}
+    with pytest.raises(GraphError, match="'z'"):
+        cg.specialize(graph, {"y": cg.sin(z)})
+
+
+def test_specialize_substitutes_all_at_once():
+    graph = cg.Graph([x, y, z], {"f": x - 2 * y + z})
+    special = cg.specialize(graph, {"x": cg.sin(z), "y": z * z})
+    assert special.evaluate({"z": 3.0}) == {"f": pytest.approx(math.sin(3.0) - 18.0 + 3.0, rel=1e-15)}
+    with pytest.raises(GraphError, match="'y'"):  # the y in the new x is not an input of the result
+        cg.specialize(graph, {"x": y + z, "y": 5.0})
+
+
+def test_specialize_names_what_is_wrong():
+    graph = cg.Graph([x, y], {"f": x * y})
+    with pytest.raises(GraphError, match=r"no input '?w"):
+        cg.specialize(graph, {"w": 1.0})
+    with pytest.raises(GraphError, match=r"no output '?g"):
+        cg.specialize(graph, {"x": 1.0}, outputs=["g"])
+    with pytest.raises(GraphError, match="at least one output"):
+        cg.specialize(graph, {"x": 1.0}, outputs=[])
+    with pytest.raises(ValueError, match="input 'x'.*NaN"):
+        cg.specialize(graph, {"x": math.nan})
+    with pytest.raises(TypeError, match="input 'x'.*real number"):
+        cg.specialize(graph, {"x": 1j})

@@ -1,0 +1,186 @@
+"""Transforms: the names they give, the inputs they take, and a graph used as a function."""
+
+import math
+
+import pytest
+
+import cgraph as cg
+from cgraph.errors import GraphError
+
+x, y, z = cg.variables("x y z")
+GRAPH = cg.Graph([x, y], {"f": cg.sin(x) * y, "g": y * y})
+ONE = cg.Graph([x, y], {"f": cg.sin(x) * y})
+
+
+def test_names_of_tangents_and_cotangents():
+    assert cg.jvp(GRAPH).input_names == ("x", "y", "x_dot", "y_dot")
+    assert list(cg.jvp(GRAPH).outputs) == ["f_dot", "g_dot"]
+    assert cg.vjp(GRAPH).input_names == ("x", "y", "f_bar", "g_bar")
+    assert list(cg.vjp(GRAPH).outputs) == ["x_bar", "y_bar"]
+
+
+def test_names_of_derivatives():
+    assert list(cg.gradient(ONE).outputs) == ["df/dx", "df/dy"]
+    assert list(cg.jacobian(GRAPH).outputs) == ["df/dx", "df/dy", "dg/dx", "dg/dy"]
+    assert list(cg.hessian(ONE).outputs) == ["d2f/dxdx", "d2f/dxdy", "d2f/dydx", "d2f/dydy"]
+    for transform in (cg.gradient, cg.jacobian, cg.hessian):
+        assert transform(ONE).input_names == ("x", "y")
+
+
+def test_a_transform_of_a_transform_has_distinct_names():
+    twice = cg.jvp(cg.jvp(ONE))
+    assert twice.input_names == ("x", "y", "x_dot", "y_dot", "x_dot2", "y_dot2", "x_dot_dot2", "y_dot_dot2")
+    assert list(twice.outputs) == ["f_dot_dot2"]
+    thrice = cg.jvp(cg.jvp(cg.jvp(ONE, "x"), "x"), "x")
+    assert thrice.input_names == ("x", "y", "x_dot", "x_dot2", "x_dot3")
+    pulled = cg.vjp(cg.vjp(ONE))
+    assert pulled.input_names == ("x", "y", "f_bar", "x_bar_bar", "y_bar_bar")
+    assert list(pulled.outputs) == ["x_bar", "y_bar", "f_bar_bar"]
+    for graph in (twice, thrice, pulled, cg.vjp(cg.vjp(cg.vjp(ONE)))):
+        assert len(set(graph.input_names)) == len(graph.input_names)
+        graph.check()
+
+
+def test_a_tangents_name_that_is_taken_is_numbered():
+    taken = cg.variable("x_dot")
+    pushed = cg.jvp(cg.Graph([x, taken], {"f": x * taken}), "x")
+    assert pushed.input_names == ("x", "x_dot", "x_dot2")
+    assert pushed.evaluate({"x": 2.0, "x_dot": 3.0, "x_dot2": 5.0}) == {"f_dot2": 15.0}
+    bar = cg.variable("f_bar")
+    pulled = cg.vjp(cg.Graph([x, bar], {"f": x * bar}))
+    assert pulled.input_names == ("x", "f_bar", "f_bar2")
+    assert pulled.evaluate({"x": 2.0, "f_bar": 3.0, "f_bar2": 5.0}) == {"x_bar2": 15.0, "f_bar_bar2": 10.0}
+
+
+@pytest.mark.parametrize("wrt", ["y", y, ["y"], (y,)])
+def test_wrt_is_a_name_a_variable_or_a_sequence_of_them(wrt):
+    assert cg.jvp(GRAPH, wrt).input_names == ("x", "y", "y_dot")
+    assert list(cg.vjp(GRAPH, wrt).outputs) == ["y_bar"]
+    assert list(cg.gradient(ONE, wrt).outputs) == ["df/dy"]
+    assert list(cg.jacobian(GRAPH, wrt).outputs) == ["df/dy", "dg/dy"]
+    assert list(cg.hessian(ONE, wrt).outputs) == ["d2f/dydy"]
+
+
+def test_wrt_gives_the_order():
+    assert list(cg.jacobian(ONE, ["y", x]).outputs) == ["df/dy", "df/dx"]
+    values = {"x": 0.3, "y": 2.0}
+    assert cg.jacobian(ONE, ["y", x]).evaluate(values) == cg.jacobian(ONE).evaluate(values)
+
+
+def test_with_respect_to_some_the_others_are_held():
+    values = {"x": 0.3, "y": 2.0}
+    assert cg.jvp(GRAPH, "x").evaluate(values | {"x_dot": 1.0}) == {"f_dot": 2.0 * math.cos(0.3), "g_dot": 0.0}
+    assert cg.gradient(ONE, "y").evaluate(values) == {"df/dy": math.sin(0.3)}
+
+
+@pytest.mark.parametrize("wrong", [3, 1.5, [3], object()])
+def test_wrt_of_the_wrong_type_is_a_type_error(wrong):
+    with pytest.raises(TypeError):
+        cg.gradient(ONE, wrong)
+
+
+def test_an_unused_input_has_the_derivative_zero():
+    graph = cg.Graph([x, z], {"f": x * x, "c": 2.0})
+    values = {"x": 3.0, "z": 7.0}
+    assert cg.jvp(graph).evaluate(values | {"x_dot": 0.0, "z_dot": 1.0}) == {"f_dot": 0.0, "c_dot": 0.0}
+    assert cg.vjp(graph).evaluate(values | {"f_bar": 1.0, "c_bar": 1.0}) == {"x_bar": 6.0, "z_bar": 0.0}
+    assert cg.jacobian(graph).evaluate(values) == {"df/dx": 6.0, "df/dz": 0.0, "dc/dx": 0.0, "dc/dz": 0.0}
+    one = cg.Graph([x, z], {"f": x * x})
+    assert cg.gradient(one).outputs["df/dz"] is cg.constant(0.0)
+    assert cg.hessian(one).evaluate(values) == {"d2f/dxdx": 2.0, "d2f/dxdz": 0.0, "d2f/dzdx": 0.0, "d2f/dzdz": 0.0}
+
+
+def test_an_output_that_is_an_input_has_the_derivative_one():
+    graph = cg.Graph([x, y], {"f": x, "g": x})
+    assert cg.jvp(graph).evaluate({"x": 3.0, "y": 0.0, "x_dot": 5.0, "y_dot": 0.0}) == {"f_dot": 5.0, "g_dot": 5.0}
+    assert cg.vjp(graph).evaluate({"x": 3.0, "y": 0.0, "f_bar": 5.0, "g_bar": 7.0}) == {"x_bar": 12.0, "y_bar": 0.0}
+    assert cg.gradient(cg.Graph([x], {"f": x})).evaluate({"x": 2.0}) == {"df/dx": 1.0}
+
+
+def test_an_output_that_another_output_uses_counts_both_ways():
+    s = cg.sin(x)
+    graph = cg.Graph([x], {"s": s, "f": s * s})
+    pulled = cg.vjp(graph).evaluate({"x": 0.3, "s_bar": 10.0, "f_bar": 1.0})
+    # d/dx (10 sin x + sin^2 x)
+    assert pulled["x_bar"] == pytest.approx((10 + 2 * math.sin(0.3)) * math.cos(0.3), rel=1e-15)
+
+
+def test_the_jacobian_is_the_same_in_both_modes():
+    """As many inputs as outputs go forward, more go in reverse: a wide and a tall graph meet in their common entries."""
+    w = cg.sin(x) * y + cg.exp(y) * z
+    wide = cg.jacobian(cg.Graph([x, y, z], {"w": w}))
+    tall = cg.jacobian(cg.Graph([x, y, z], {"w": w, "a": x, "b": y, "c": z}))
+    values = {"x": 0.3, "y": -0.7, "z": 1.1}
+    expected = {
+        "dw/dx": math.cos(0.3) * -0.7,
+        "dw/dy": math.sin(0.3) + math.exp(-0.7) * 1.1,
+        "dw/dz": math.exp(-0.7),
+    }
+    for graph in (wide, tall):
+        found = graph.evaluate(values)
+        assert {name: found[name] for name in expected} == pytest.approx(expected, rel=1e-15)
+
+
+def test_the_hessian_is_one_node_for_both_entries():
+    hessian = cg.hessian(ONE)
+    assert hessian.outputs["d2f/dxdy"] is hessian.outputs["d2f/dydx"]
+
+
+def test_a_transform_leaves_its_graph_alone():
+    before = GRAPH.listing()
+    for transform in (cg.jvp, cg.vjp, cg.jacobian, cg.simplify):
+        transform(GRAPH)
+    assert GRAPH.listing() == before
+
+
+def test_a_gradient_costs_a_fixed_multiple_of_its_graph():
+    """The cheap gradient principle, counted: as the number of inputs grows, nodes of the gradient stay in proportion."""
+    ratios = []
+    for n in (10, 100, 1000):
+        q = cg.variables([f"q{i}" for i in range(n)])
+        product = q[0]
+        for each in q[1:]:
+            product = cg.sin(product * each)
+        graph = cg.Graph(q, {"f": product})
+        ratios.append(cg.gradient(graph).counts().nodes / graph.counts().nodes)
+    assert max(ratios) < 4
+    assert ratios[2] == pytest.approx(ratios[1], rel=0.02)
+
+
+def test_a_graph_is_a_function_of_nodes():
+    by_position = cg.Graph([z], GRAPH(z, 2.0))
+    by_name = cg.Graph([z], GRAPH(y=2.0, x=z))
+    mixed = cg.Graph([z], GRAPH(z, y=2))
+    expected = {"f": math.sin(0.3) * 2.0, "g": 4.0}
+    for graph in (by_position, by_name, mixed):
+        assert graph.evaluate({"z": 0.3}) == expected
+
+
+def test_a_graph_used_inside_another_is_inlined_as_written():
+    inner = cg.Graph([x], {"f": (x + 0) * x})
+    outer = cg.Graph([x], {"h": inner(inner(x)["f"])["f"]})
+    assert outer.counts().by_operation == {"add": 2, "mul": 2, "constant": 1, "variable": 1}
+    assert outer.evaluate({"x": 3.0}) == {"h": 81.0}
+
+
+def test_inputs_may_be_swapped():
+    graph = cg.Graph([x, y], {"f": x - 2 * y})
+    swapped = cg.Graph([x, y], graph(y, x))
+    assert swapped.evaluate({"x": 10.0, "y": 1.0}) == {"f": -19.0}
+
+
+@pytest.mark.parametrize(
+    ("args", "named", "error", "message"),
+    [
+        ((x,), {}, TypeError, "no value for input '?y"),
+        ((), {}, TypeError, "no value for input '?x'?, '?y"),
+        ((x, y, z), {}, TypeError, "has 2 inputs, got 3"),
+        ((x, y), {"x": z}, TypeError, "'x' is given twice"),
+        ((x,), {"w": z}, GraphError, "no input '?w"),
+        ((x, "y"), {}, TypeError, "real number"),
+        ((x, math.nan), {}, ValueError, "NaN"),
+    ],
+)
+def test_calling_a_graph_wrongly_says_what_is_wrong(args, named, error, message):
+    with pytest.raises(error, match=message):
+        GRAPH(*args, **named)

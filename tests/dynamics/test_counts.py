@@ -1,0 +1,82 @@
+"""Exact counts of the formulations, and how they grow with the number of links."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from pytest import approx, fixture, mark
+
+import dynamics as dyn
+
+FROM_6_TO_40 = (6, 8, 10, 13, 17, 22, 30, 40)
+
+
+def equal_links(n: int) -> dyn.PlanarArm:
+    return dyn.planar_arm([0.9] * n, [0.7] * n)
+
+
+def edges(formulation: str, sizes: Sequence[int]) -> list[int]:
+    return [dyn.inverse_dynamics(equal_links(n), formulation).counts().edges for n in sizes]
+
+
+def exponent(formulation: str) -> float:
+    """The slope of log edges over log n."""
+    return float(np.polyfit(np.log(FROM_6_TO_40), np.log(edges(formulation, FROM_6_TO_40)), 1)[0])
+
+
+def test_inverse_dynamics_of_the_paper_s_arm_is_small() -> None:
+    arm = dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7])
+    counts = dyn.inverse_dynamics(arm).counts()
+    assert (counts.nodes, counts.edges) == (164, 284)
+    assert counts.nodes <= 190 and counts.edges <= 335  # the issue's bound, should the line above be moved
+
+
+def test_damping_adds_a_product_and_a_sum_for_each_joint_and_one_constant() -> None:
+    plain = dyn.inverse_dynamics(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7])).counts()
+    damped = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum")).counts()
+    assert (damped.nodes - plain.nodes, damped.edges - plain.edges) == (3 * 2 + 1, 3 * 4)
+
+
+@mark.parametrize("n", range(1, 13))
+def test_each_further_equal_link_adds_79_nodes(n: int) -> None:
+    assert dyn.inverse_dynamics(equal_links(n)).counts().nodes == 8 + 79 * (n - 1)
+
+
+@mark.parametrize("n", range(2, 13))
+def test_each_further_equal_link_adds_148_edges(n: int) -> None:
+    assert dyn.inverse_dynamics(equal_links(n)).counts().edges == 146 + 148 * (n - 2)
+
+
+@fixture(scope="module")
+def exponents() -> dict[str, float]:
+    return {name: exponent(name) for name in ("chain_rule", "chain_rule_literal", "euler_embedded")}
+
+
+def test_contracted_the_chain_rule_grows_linearly(exponents: dict[str, float], record_property) -> None:
+    record_property("exponent, contracted", exponents["chain_rule"])
+    assert 1.0 < exponents["chain_rule"] <= 1.10
+    assert exponents["chain_rule"] == approx(1.08, abs=0.005)
+
+
+def test_taken_literally_the_chain_rule_grows_quadratically(exponents: dict[str, float], record_property) -> None:
+    record_property("exponent, literal", exponents["chain_rule_literal"])
+    assert 1.9 <= exponents["chain_rule_literal"] <= 2.1
+
+
+def test_embedded_the_graph_grows_linearly_too(exponents: dict[str, float], record_property) -> None:
+    """The paper's O(n^2) is not the embedding's: it is the order of contraction."""
+    record_property("exponent, embedded", exponents["euler_embedded"])
+    assert 1.0 < exponents["euler_embedded"] <= 1.10
+
+
+@mark.parametrize("formulation", ["euler_embedded", "kinetic_only"])
+@mark.parametrize("n", [1, 3, 10])
+def test_the_chain_rule_is_smaller_than_the_embedded_formulations(n: int, formulation: str) -> None:
+    ours, theirs = (dyn.inverse_dynamics(equal_links(n), each).counts() for each in ("chain_rule", formulation))
+    assert ours.nodes < theirs.nodes and ours.edges < theirs.edges and ours.depth < theirs.depth
+
+
+def test_the_literal_form_costs_more_from_two_links_on() -> None:
+    sizes = range(1, 8)
+    ratios = [b / a for a, b in zip(edges("chain_rule", sizes), edges("chain_rule_literal", sizes), strict=True)]
+    assert ratios[0] == 1.0
+    assert (np.diff(ratios) > 0).all()

@@ -1,0 +1,101 @@
+"""Planar arms against MuJoCo, quantity by quantity, then motion."""
+
+import numpy as np
+from pytest import approx, fixture, mark
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.mujoco_io import MujocoTwin, to_mjcf
+from tests.dynamics.models import Array, at, error, random_arm, states
+
+STATES = 100
+AGREEMENT = 1e-11  # of the largest entry: float64 rounding times a condition number of M up to 3e4 at ten links
+SAME_STEPS = 1e-10  # rad, rad/s: rounding of two codes grown by the motion over a second of RK4 steps
+SIZES = range(1, 11)
+
+
+class Pair:
+    """An arm, its MuJoCo twin, and the states to compare them at."""
+
+    def __init__(self, n: int, model: str) -> None:
+        self.n, self.arm = n, random_arm(n, seed=1, model=model)
+        self.twin = MujocoTwin(self.arm)
+        self.states = [at(states(self.arm, STATES, seed=1), row) for row in range(STATES)]
+
+    def worst(self, graph: cg.Graph, *names: str, peer: str) -> float:
+        """The largest error against the method `peer` of the twin, at states given by `names`."""
+        function = cg.compile(graph)
+        given = [name for name in ("q", "qd", "qdd", "tau") if f"{name}0" in graph.input_names]
+        ours = [function(np.concatenate([state[name] for name in given])) for state in self.states]
+        theirs = [getattr(self.twin, peer)(*(state[name] for name in names)).ravel() for state in self.states]
+        return error(np.array(ours), np.array(theirs))
+
+
+@fixture(scope="module", params=[(n, model) for model in ("rod", "point") for n in SIZES], ids=lambda p: f"{p[0]} {p[1]}s")
+def pair(request) -> Pair:
+    return Pair(*request.param)
+
+
+def test_torques_agree(pair: Pair) -> None:
+    assert pair.worst(dyn.inverse_dynamics(pair.arm), "q", "qd", "qdd", peer="inverse") < AGREEMENT
+
+
+def test_accelerations_agree(pair: Pair) -> None:
+    assert pair.worst(dyn.forward_dynamics(pair.arm), "q", "qd", "tau", peer="accelerations") < AGREEMENT
+
+
+def test_mass_matrices_agree(pair: Pair) -> None:
+    assert pair.worst(dyn.mass_matrix(pair.arm), "q", peer="mass_matrix") < AGREEMENT
+
+
+def test_biases_agree(pair: Pair) -> None:
+    assert pair.worst(dyn.bias(pair.arm), "q", "qd", peer="bias") < AGREEMENT
+
+
+def test_the_flawed_torque_does_not_agree() -> None:
+    """So that the comparison is known to see an error."""
+    pair = Pair(3, "rod")
+    flawed, dt = dyn.inverse_dynamics(pair.arm, "euler_embedded"), 1e-6
+    function = cg.compile(flawed)
+    for state in pair.states:
+        q, qd, qdd = state["q"], state["qd"], state["qdd"]
+        ours = function([*(q - dt * qd), *(qd - dt * qdd), *qdd, dt])
+        assert error(ours, pair.twin.inverse(q, qd, qdd)) > 1e-3
+
+
+def motion(arm: dyn.PlanarArm, q: Array, t_end: float, dt: float) -> tuple[dyn.Trajectory, tuple[Array, Array, Array]]:
+    still = np.zeros(len(arm.links))
+    return dyn.simulate(arm, q, still, t_end, dt=dt), MujocoTwin(arm, dt).trajectory(q, still, round(t_end / dt))
+
+
+@mark.parametrize("model", ["rod", "point"])
+def test_the_triple_pendulum_moves_as_in_mujoco(model: str) -> None:
+    scene = dyn.scenes.load("triple_pendulum", model=model)
+    ours, (q, qd, places) = motion(scene.model, np.array(scene.q), t_end=1.0, dt=1e-3)
+    assert ours.q == approx(q, rel=0.0, abs=SAME_STEPS)
+    assert ours.qd == approx(qd, rel=0.0, abs=SAME_STEPS)
+    assert scene.model.joint_positions(ours.q) == approx(places, rel=0.0, abs=SAME_STEPS)
+    assert np.ptp(q, axis=0).min() > 0.5  # rad: every joint has moved
+
+
+def test_an_undamped_arm_of_five_moves_as_in_mujoco() -> None:
+    arm = random_arm(5, damped=False)
+    ours, (q, qd, _) = motion(arm, np.array([1.0, -0.5, 0.3, 0.2, -0.1]), t_end=0.5, dt=1e-3)
+    assert ours.q == approx(q, rel=0.0, abs=SAME_STEPS)
+    assert ours.qd == approx(qd, rel=0.0, abs=SAME_STEPS)
+
+
+def test_the_model_is_the_arm_number_by_number() -> None:
+    arm = random_arm(3)
+    model = MujocoTwin(arm, timestep=2e-3).model
+    assert model.body_mass[1:].tolist() == [link.mass for link in arm.links]
+    assert model.body_ipos[1:, 2].tolist() == [-link.center for link in arm.links]
+    assert model.body_inertia[1:, 1].tolist() == [link.inertia for link in arm.links]
+    assert model.body_pos[1:, 2].tolist() == [0.0, -arm.links[0].length, -arm.links[1].length]
+    assert model.dof_damping.tolist() == list(arm.damping)
+    assert (model.opt.timestep, model.opt.gravity.tolist()) == (2e-3, [0.0, 0.0, -9.81])
+
+
+def test_the_mjcf_text_is_the_same_every_time() -> None:
+    assert to_mjcf(random_arm(2)) == to_mjcf(random_arm(2))
+    assert to_mjcf(random_arm(2)).count("<inertial") == 2

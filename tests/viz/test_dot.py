@@ -1,0 +1,374 @@
+"""The drawing of a graph as DOT: what is drawn, under which ids, and with which words."""
+
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+import cgraph as cg
+from viz import render_svg, theme, to_dot
+from viz.dot import main_tag
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def spring() -> cg.Graph:
+    """L = I qd^2/2 - k q^2/2 with its two energies tagged."""
+    inertia, k, q, qd = cg.variables("I k q0 qd0")
+    with cg.tag("kinetic"):
+        kinetic = 0.5 * inertia * qd * qd
+    with cg.tag("potential"):
+        potential = 0.5 * k * q * q
+    return cg.Graph([inertia, k, q, qd], {"L": kinetic - potential})
+
+
+def chain() -> cg.Graph:
+    """Three links, each a few nodes, and one sum of all that no link owns."""
+    x = cg.variable("x")
+    terms, angle = [], x
+    for i in range(1, 4):
+        with cg.tag(f"link {i}"):
+            angle = cg.sin(angle) * 2.0
+            terms.append(angle * angle)
+    return cg.Graph([x], {"y": terms[0] + terms[1] + terms[2]})
+
+
+STATEMENT = re.compile(
+    r'^\s*(?P<tail>\w[\w-]*|"[\w-]+")( -> (?P<head>\w[\w-]*|"[\w-]+"))? \[(?P<attributes>.*?)\]$', re.M | re.S
+)
+ATTRIBUTE = re.compile(r'(\w+)=("(?:[^"\\]|\\.)*"|[^\s"]+)')
+
+
+def statements(source: str) -> Iterator[tuple[str, str | None, dict[str, str]]]:
+    """(tail, head or None, attributes) of each node and edge of a DOT text."""
+    for match in STATEMENT.finditer(source):
+        if match["tail"] not in {"graph", "node", "edge"}:
+            attributes = {key: value.strip('"') for key, value in ATTRIBUTE.findall(match["attributes"])}
+            yield match["tail"].strip('"'), match["head"] and match["head"].strip('"'), attributes
+
+
+def boxes(graph: cg.Graph, **options: Any) -> dict[str, dict[str, str]]:
+    found = statements(to_dot(graph, **options).source)
+    return {tail: attributes for tail, head, attributes in found if head is None}
+
+
+def arrows(graph: cg.Graph, **options: Any) -> dict[str, tuple[str, str, dict[str, str]]]:
+    found = statements(to_dot(graph, **options).source)
+    return {a["id"]: (tail, head, a) for tail, head, a in found if head is not None and "id" in a}
+
+
+def clusters(graph: cg.Graph, **options: Any) -> dict[str, set[str]]:
+    """{title: ids of the nodes inside}."""
+    source = to_dot(graph, legend=False, **options).source
+    parts = re.findall(r"subgraph cluster_\w+ \{(.*?)\n\t\}", source, re.S)
+    return {re.search(r'label="?(.*?)"? style', p)[1]: {tail for tail, _, _ in statements(p)} for p in parts}  # type: ignore[index]
+
+
+def test_every_node_and_edge_is_drawn_under_its_number() -> None:
+    graph = spring()
+    number = {node: i for i, node in enumerate(graph.nodes)}
+    assert {f"n{i}" for node, i in number.items() if node.value is None} <= set(boxes(graph))
+    expected = {f"e{number[e.source]}-{number[e.target]}-{e.slot}" for e in graph.edges}
+    assert set(arrows(graph)) == expected | {f"e{number[graph.outputs['L']]}-o0"}
+
+
+def test_an_edge_joins_the_nodes_of_its_id() -> None:
+    for identity, (tail, head, _) in arrows(spring()).items():
+        source, target = identity[1:].split("-")[:2]
+        assert tail == f"n{source}" or tail.startswith(f"n{source}-{target}-")
+        assert head in (f"n{target}", target)
+
+
+def test_an_operation_shows_its_symbol() -> None:
+    graph = spring()
+    drawn = boxes(graph)
+    for i, node in enumerate(graph.nodes):
+        if node.args:
+            assert drawn[f"n{i}"]["label"] == node.op.symbol
+
+
+@pytest.mark.parametrize("op", [op for op in cg.node.OPS.values() if op.symbol], ids=lambda op: op.name)
+def test_every_row_of_the_table_can_be_drawn(op: cg.node.Op) -> None:
+    inputs = cg.variables([f"x{i}" for i in range(op.arity)])
+    graph = cg.Graph(inputs, {"y": cg.node.apply(op, *inputs)})
+    assert boxes(graph)[f"n{len(graph.nodes) - 1}"]["label"] == op.symbol
+
+
+def test_a_constant_is_drawn_once_for_each_use() -> None:
+    x = cg.variable("x")
+    drawn = boxes(cg.Graph([x], {"y": (x * 0.123456) + cg.sin(x * 0.123456)}))
+    assert [attributes["label"] for attributes in drawn.values()].count("0.1235") == 2
+
+
+def test_a_constant_output_and_an_input_output_are_drawn() -> None:
+    x = cg.variable("x")
+    graph = cg.Graph([x], {"x": x, "two": 2.0})
+    drawn = arrows(graph)
+    assert {head for _, head, _ in drawn.values()} == {"o0", "o1"}
+    assert {tail for tail, _, _ in drawn.values()} <= set(boxes(graph))
+
+
+def test_two_outputs_of_one_node_are_two_boxes() -> None:
+    x = cg.variable("x")
+    y = cg.sin(x)
+    drawn = boxes(cg.Graph([x], {"a": y, "b": y}))
+    assert drawn["o0"]["label"] == "a"
+    assert drawn["o1"]["label"] == "b"
+
+
+def test_a_named_operation_shows_name_and_symbol() -> None:
+    x = cg.variable("x")
+    assert boxes(cg.Graph([x], {"y": cg.named("energy", x * x)}))["n1"]["label"] == "energy\n×"
+
+
+def test_given_names_win_over_prettified_ones() -> None:
+    drawn = boxes(spring(), names={"qd0": "ω", "L": "Lagrangian"})
+    labels = {attributes["label"] for attributes in drawn.values()}
+    assert {"ω", "Lagrangian", "q₀"} <= labels
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [
+        ("q0", "q₀"),
+        ("qd12", "q̇₁₂"),
+        ("qdd1", "q̈₁"),
+        ("tau2", "τ₂"),
+        ("theta", "θ"),
+        ("dL/dqd0", "dL/dq̇₀"),
+        ("q0_dot", "q₀_dot"),
+        ("dt", "dt"),
+        ("x", "x"),
+        ("2q", "2q"),
+    ],
+)
+def test_names_are_shown_in_mathematical_letters(name: str, shown: str) -> None:
+    assert theme.pretty(name) == shown
+
+
+def test_different_names_of_the_dynamics_stay_different() -> None:
+    names = [
+        f"{word}{i}{end}" for word in ("q", "qd", "qdd", "tau", "p") for i in range(12) for end in ("", "_dot", "_bar")
+    ]
+    assert len({theme.pretty(name) for name in names}) == len(names)
+
+
+def test_argument_order_is_written_where_it_matters() -> None:
+    a, b = cg.variables("a b")
+    marks = {
+        op: {x.get("headlabel") for _, h, x in arrows(g).values() if h == "n2"}
+        for op, g in {"sub": cg.Graph([a, b], {"y": a - b}), "add": cg.Graph([a, b], {"y": a + b})}.items()
+    }
+    assert marks == {"sub": {"1", "2"}, "add": {None}}
+
+
+def test_a_role_has_its_colour_and_its_line_in_the_legend() -> None:
+    graph = cg.jvp(cg.gradient(spring()))
+    drawn = boxes(graph)
+    for i, node in enumerate(graph.nodes):
+        if node.value is None:
+            assert drawn[f"n{i}"]["fillcolor"] == theme.ROLES[theme.role_of(node)].fill
+    entries = {attributes["label"] for identity, attributes in drawn.items() if identity.startswith("k")}
+    expected = {theme.ROLES[theme.role_of(node)].words for node in graph.nodes} | {theme.OUTPUT.words}
+    assert entries == expected
+
+
+def test_the_legend_can_be_left_out() -> None:
+    assert "legend" not in to_dot(spring(), legend=False).source
+
+
+def test_marked_nodes_and_the_edges_out_of_them_have_the_one_colour() -> None:
+    graph = spring()
+    marked = {node for node in graph.nodes if "potential" in node.tags}
+    number = {node: i for i, node in enumerate(graph.nodes)}
+    drawn, lines = boxes(graph, marked=marked), arrows(graph, marked=marked)
+    for node, i in number.items():
+        if node.value is None:
+            assert (drawn[f"n{i}"]["color"] == theme.SPURIOUS) == (node in marked)
+            assert ("penwidth" in drawn[f"n{i}"]) == (node in marked)
+    for edge in graph.edges:
+        line = lines[f"e{number[edge.source]}-{number[edge.target]}-{edge.slot}"][2]
+        assert (line.get("color") == theme.SPURIOUS) == (edge.source in marked)
+
+
+def test_the_legend_names_the_marked_only_when_there_are_some() -> None:
+    graph = spring()
+    assert "wrong term" in to_dot(graph, marked={graph.nodes[-1]}, marked_label="wrong term").source
+    assert "wrong term" not in to_dot(graph, marked_label="wrong term").source
+
+
+def test_no_role_and_no_tag_has_the_colour_of_the_spurious() -> None:
+    used = {paint.line for paint in theme.ROLES.values()} | {paint.fill for paint in theme.ROLES.values()}
+    assert theme.SPURIOUS not in used | set(theme.SERIES)
+
+
+def test_a_marked_node_of_another_graph_is_refused() -> None:
+    with pytest.raises(ValueError, match="1 of 1 marked nodes are not in the graph"):
+        to_dot(spring(), marked={chain().nodes[-1]})
+
+
+def test_numbered_tags_make_the_clusters() -> None:
+    graph = chain()
+    found = clusters(graph)
+    assert list(found) == ["link 1", "link 2", "link 3"]
+    for i, node in enumerate(graph.nodes):
+        if node.value is None:
+            assert {title for title, inside in found.items() if f"n{i}" in inside} == set(node.tags)
+
+
+def test_a_constant_is_in_the_cluster_of_its_user() -> None:
+    assert sum("-" in identity for identity in clusters(chain())["link 2"]) == 1
+
+
+def test_clusters_follow_the_given_tags_or_function() -> None:
+    graph = chain()
+    assert clusters(graph, clusters=False) == {}
+    assert list(clusters(graph, clusters=["link 3"])) == ["link 3"]
+    assert list(clusters(graph, clusters=lambda node: "sines" if node.op.name == "sin" else None)) == ["sines"]
+
+
+@pytest.mark.parametrize(
+    ("tags", "cluster"),
+    [
+        ((), None),
+        (("kinetic",), "kinetic"),
+        (("link 2", "kinetic"), "link 2"),
+        (("link 1", "link 2"), None),
+        (("a", "b"), None),
+    ],
+)
+def test_the_main_tag_is_the_one_with_a_number_or_the_only_one(tags: tuple[str, ...], cluster: str | None) -> None:
+    with cg.tag(*tags):
+        assert main_tag(cg.variable("x") * 2.0) == cluster
+
+
+def test_link_10_comes_after_link_9() -> None:
+    tags = [f"link {i}" for i in range(12)]
+    assert sorted(reversed(tags), key=theme.natural_order) == tags
+
+
+def test_tag_colours_depend_on_the_set_of_tags_alone() -> None:
+    assert theme.tag_colours(["b", "a", "c"]) == theme.tag_colours(["c", "b", "a", "a"])
+
+
+def test_a_collapsed_tag_is_one_box_that_counts_its_nodes() -> None:
+    graph = chain()
+    inside = [i for i, node in enumerate(graph.nodes) if "link 2" in node.tags]
+    drawn = boxes(graph, collapse=["link 2"])
+    assert drawn["c0"]["label"] == f"link 2 ({len(inside)} nodes)"
+    assert not set(drawn) & {f"n{i}" for i in inside}
+
+
+def test_merged_edges_say_how_many_they_are() -> None:
+    graph = chain()
+    drawn = arrows(graph, collapse=["link 1", "link 2"])
+    crossing = [e for e in graph.edges if "link 1" in e.source.tags and "link 2" in e.target.tags]
+    assert len(crossing) == 1
+    assert "label" not in drawn["ec0-c1"][2]
+    both = arrows(graph, collapse=["link 1", "link 2", "link 3"], clusters=False)
+    x = arrows(cg.Graph(graph.inputs, {"y": _doubled()}), collapse=["link 1"])
+    assert x["e0-c0"][2]["label"] == "×2"
+    assert all(tail != head for tail, head, _ in both.values())
+
+
+def _doubled() -> cg.Node:
+    x = cg.variable("x")
+    with cg.tag("link 1"):
+        return x * x
+
+
+def test_collapsing_loses_no_connection() -> None:
+    graph = chain()
+    number = {node: i for i, node in enumerate(graph.nodes)}
+    box = {
+        node: "c0" if "link 1" in node.tags else "c1" if "link 2" in node.tags else f"n{number[node]}"
+        for node in graph.nodes
+    }
+    expected = {(box[e.source], box[e.target]) for e in graph.edges if e.source.value is None}
+    drawn = {(t, h) for t, h, _ in arrows(graph, collapse=["link 1", "link 2"]).values() if "-" not in t and h != "o0"}
+    assert drawn == {(tail, head) for tail, head in expected if tail != head}
+
+
+def test_a_node_with_two_collapsed_tags_belongs_to_the_first() -> None:
+    x = cg.variable("x")
+    with cg.tag("a", "b"):
+        y = x * x
+    graph = cg.Graph([x], {"y": y})
+    assert [i for i in boxes(graph, collapse=["b", "a"]) if i.startswith("c")] == ["c0"]
+
+
+def test_a_collapsed_box_with_marked_nodes_says_so() -> None:
+    graph = chain()
+    marked = [node for node in graph.nodes if "link 3" in node.tags][:1]
+    box = boxes(graph, collapse=["link 3"], marked=marked)["c0"]
+    assert "1 spurious" in box["label"]
+    assert box["color"] == theme.SPURIOUS
+
+
+def test_an_unknown_collapsed_tag_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(ValueError, match=r"'link 9'.*link 1, link 2, link 3"):
+        to_dot(chain(), collapse=["link 9"])
+
+
+def test_an_unknown_direction_is_refused() -> None:
+    with pytest.raises(ValueError, match="rankdir must be one of BT"):
+        to_dot(chain(), rankdir="UP")  # type: ignore[arg-type]
+
+
+def test_a_caption_counts_nodes_and_edges() -> None:
+    graph = spring()
+    assert f"A spring\n{len(graph.nodes)} nodes, {len(graph.edges)} edges" in to_dot(graph, caption="A spring").source
+    assert "nodes," not in to_dot(graph).source
+
+
+def test_tooltips_tell_operation_roles_and_tags() -> None:
+    graph = spring()
+    i = next(i for i, node in enumerate(graph.nodes) if "kinetic" in node.tags)
+    assert boxes(graph)[f"n{i}"]["tooltip"] == f"n{i}: mul; primal; tags: kinetic"
+
+
+NASTY = ['a"b', r"back\slash", r"\N", "<b>bold</b>", "<html", 'quote\\"', "{record|x}", "a;b", "ω₀"]
+
+
+@pytest.mark.parametrize("name", NASTY)
+def test_any_name_and_tag_is_shown_letter_by_letter(name: str) -> None:
+    x = cg.variable(name)
+    with cg.tag(name):
+        graph = cg.Graph([x], {name: x * x})
+    tree = ElementTree.fromstring(render_svg(to_dot(graph, caption=name, legend=False)))
+    texts = ["".join(text.itertext()) for text in tree.iter(f"{SVG}text")]
+    assert texts.count(name) == 4  # input, output, cluster, caption
+
+
+def test_the_picture_carries_the_ids() -> None:
+    graph = chain()
+    tree = ElementTree.fromstring(render_svg(to_dot(graph)))
+    identities = {group.get("id") for group in tree.iter(f"{SVG}g")}
+    assert set(boxes(graph)) | set(arrows(graph)) <= identities
+
+
+def test_the_same_graph_gives_the_same_text_in_every_run() -> None:
+    program = (
+        "import cgraph as cg, json, viz\n"
+        "with cg.tag('link 2', 'kinetic', 'b', 'a'): y = cg.sin(cg.variable('x')) * 2.0\n"
+        "g = cg.gradient(cg.Graph([cg.variable('x')], {'y': y * y}))\n"
+        "print(json.dumps(viz.to_dot(g, marked=frozenset(g.nodes), clusters=['a', 'link 2']).source))"
+    )
+    texts = set()
+    for seed in ("1", "2", "3"):
+        command = [sys.executable, "-c", program]
+        environment = {"PYTHONPATH": ":".join(sys.path), "PYTHONHASHSEED": seed}
+        run = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+        texts.add(json.loads(run.stdout))
+    assert len(texts) == 1
+
+
+def test_without_graphviz_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "graphviz", None)
+    with pytest.raises(ImportError, match=r"pip install cgraph\[viz\]"):
+        to_dot(spring())

