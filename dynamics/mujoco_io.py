@@ -43,18 +43,18 @@ def to_mjcf(arm: PlanarArm, timestep: float = 1e-3) -> str:
         "  </option>",
         "  <visual>",
         '    <headlight ambient="0.5 0.5 0.5" diffuse="0.5 0.5 0.5"/>',
-        '    <global offwidth="480" offheight="480"/>',
+        '    <global offwidth="480" offheight="320"/>',
         '    <rgba haze="1 1 1 1"/>',
         "  </visual>",
         '  <asset><texture type="skybox" builtin="flat" rgb1="1 1 1" rgb2="1 1 1" width="8" height="8"/></asset>',
         "  <worldbody>",
-        f'    <camera name="{CAMERA}" pos="0 {-2.8 * reach!r} {-0.3 * reach!r}" xyaxes="1 0 0 0 0 1"/>',
+        f'    <camera name="{CAMERA}" pos="0 {-1.75 * reach!r} {-0.45 * reach!r}" xyaxes="1 0 0 0 0 1"/>',
     ]
     indent = "    "
     for i, link in enumerate(arm.links):
         drop = arm.links[i - 1].length if i else 0.0
         diagonal = " ".join([repr(max(link.inertia, _SMALLEST))] * 3)
-        radius, colour = 0.04 * arm.links[0].length, _COLORS[i % len(_COLORS)]
+        radius, colour = 0.05 * arm.links[0].length, _COLORS[i % len(_COLORS)]
         lines += [
             f'{indent}<body name="link{i + 1}" pos="0 0 {-drop!r}">',
             f'{indent}  <joint name="joint{i + 1}" type="hinge" axis="0 -1 0" damping="{arm.damping[i]!r}"/>',
@@ -158,7 +158,7 @@ def _write_frames() -> None:
     model = module.MjModel.from_xml_string(str(given["xml"]))
     data = module.MjData(model)
     pictures = []
-    with module.Renderer(model, 480, 480) as renderer:
+    with module.Renderer(model, 320, 480) as renderer:
         for pose in given["poses"]:
             data.qpos[:] = pose
             module.mj_forward(model, data)

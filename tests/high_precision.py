@@ -1,4 +1,4 @@
-"""An independent evaluator: values and derivatives of a graph in mpmath, by operation name, sharing nothing with cgraph."""
+"""An independent evaluator: values and derivatives of a graph in mpmath, by operation name."""
 
 from __future__ import annotations
 

@@ -216,7 +216,7 @@ def _part_boxes(subject: _Subject, collapse: Sequence[str]) -> Iterator[_Box]:
         kind = subject.mark if wrong[part] else theme.COLLAPSED
         tooltip = f"{part}: {words} tagged {tag}"
         yield _Box(
-            id, kind, {**_PART, **_weight(kind is subject.mark), "label": f"{tag} ({words})", "tooltip": tooltip}
+            part, kind, {**_PART, **_weight(kind is subject.mark), "label": f"{tag} ({words})", "tooltip": tooltip}
         )
 
 

@@ -91,7 +91,8 @@ def snapshots(times: Array, positions: Array, instants: Sequence[float], traces:
 def images(pictures: Sequence[Array], titles: Sequence[str]) -> Figure:
     """Pictures, (height, width, 3) each, in two rows under their titles."""
     with _style():
-        figure = _figure(9.0, 6.4)
+        shape = pictures[0].shape
+        figure = _figure(9.0, 2 * (9.0 / -(-len(pictures) // 2) * shape[0] / shape[1] + 0.3))
         for axis, picture, title in zip(figure.subplots(2, -(-len(pictures) // 2)).flat, pictures, titles, strict=True):
             axis.imshow(picture)
             axis.set_title(title, fontsize=10, loc="left")

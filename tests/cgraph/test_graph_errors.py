@@ -78,7 +78,7 @@ GRAPH = cg.Graph([x, y], {"f": x + y})
 
 
 def test_a_missing_value_is_named():
-    with pytest.raises(GraphError, match="no value for input '?y"):
+    with pytest.raises(GraphError, match=r"no value for input '?y"):
         GRAPH.evaluate({"x": 1.0})
 
 

@@ -48,6 +48,16 @@ class Branch(NamedTuple):
     x: float
 
 
+def shared_by_branches(x: cg.Node) -> cg.Node:
+    s = cg.sin(x)
+    return cg.where(x > 0, cg.log(s), s * s)
+
+
+def shared_with_outside(x: cg.Node) -> cg.Node:
+    cube = x * x * x
+    return cg.where(x > 0, cg.sqrt(cube), x) + cube * cube
+
+
 BRANCHES = (
     Branch("log of a negative number", lambda x: cg.where(x > 0, cg.log(x), x * x), lambda x: x * x, -1.0),
     Branch("log of zero", lambda x: cg.where(x > 0, cg.log(x), 3 * x), lambda x: 3 * x, 0.0),
@@ -92,13 +102,13 @@ BRANCHES = (
     ),
     Branch(
         "node shared by both branches",
-        lambda x: (lambda s: cg.where(x > 0, cg.log(s), s * s))(cg.sin(x)),
+        shared_by_branches,
         lambda x: mpmath.sin(x) ** 2,
         -1.0,
     ),
     Branch(
         "node shared with the outside",
-        lambda x: (lambda r: cg.where(x > 0, cg.sqrt(r), x) + r * r)(x * x * x),
+        shared_with_outside,
         lambda x: x + x**6,
         -1.0,
     ),

@@ -106,7 +106,7 @@ def test_an_output_that_another_output_uses_counts_both_ways():
 
 
 def test_the_jacobian_is_the_same_in_both_modes():
-    """As many inputs as outputs go forward, more go in reverse: a wide and a tall graph meet in their common entries."""
+    """A wide graph goes in reverse, a tall one forward; they meet in their common entries."""
     w = cg.sin(x) * y + cg.exp(y) * z
     wide = cg.jacobian(cg.Graph([x, y, z], {"w": w}))
     tall = cg.jacobian(cg.Graph([x, y, z], {"w": w, "a": x, "b": y, "c": z}))
@@ -134,7 +134,7 @@ def test_a_transform_leaves_its_graph_alone():
 
 
 def test_a_gradient_costs_a_fixed_multiple_of_its_graph():
-    """The cheap gradient principle, counted: as the number of inputs grows, nodes of the gradient stay in proportion."""
+    """The cheap gradient principle, counted: whatever the number of inputs, the nodes stay in proportion."""
     ratios = []
     for n in (10, 100, 1000):
         q = cg.variables([f"q{i}" for i in range(n)])

@@ -71,7 +71,7 @@ def test_engines_draw_every_node(engine: str) -> None:
 
 
 def test_an_unknown_engine_is_refused() -> None:
-    with pytest.raises(ValueError, match="engine must be one of dot, .* got 'magic'"):
+    with pytest.raises(ValueError, match=r"engine must be one of dot, .* got 'magic'"):
         render_svg("digraph {}", engine="magic")
 
 
@@ -83,7 +83,7 @@ def test_a_time_limit_must_be_positive(timeout: float) -> None:
 
 def test_bad_dot_is_an_error_and_the_next_drawing_is_good(no_binary: None) -> None:
     good = render_svg("digraph { a -> b }")
-    with pytest.raises(RenderError, match="Graphviz cannot draw this: .*[Pp]arse"):
+    with pytest.raises(RenderError, match=r"Graphviz cannot draw this: .*[Pp]arse"):
         render_svg("digraph { a -> ")
     assert render_svg("digraph { a -> b }") == good
 
@@ -100,7 +100,7 @@ def test_drawing_works_from_threads(no_binary: None) -> None:
 
 
 def test_a_drawing_that_takes_too_long_is_stopped(no_binary: None) -> None:
-    with pytest.raises(RenderError, match="took longer than 0.001 s"):
+    with pytest.raises(RenderError, match=r"took longer than 0\.001 s"):
         render_svg("digraph { a -> b }", timeout=0.001)
 
 
@@ -117,7 +117,7 @@ def test_what_the_binary_says_is_in_the_error(binary: Any) -> None:
 
 def test_a_binary_that_hangs_is_stopped(binary: Any) -> None:
     binary("import time\ntime.sleep(60)")
-    with pytest.raises(RenderError, match="took longer than 0.5 s"):
+    with pytest.raises(RenderError, match=r"took longer than 0\.5 s"):
         render_svg("digraph {}", timeout=0.5)
 
 
@@ -226,14 +226,14 @@ def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(Path, step, full)
-    with pytest.raises(OSError, match="cannot write .*a: No space left"):
+    with pytest.raises(OSError, match=r"cannot write .*a: No space left"):
         write(tmp_path / "a", "new")
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
     assert (tmp_path / "a").read_text() == "old"
 
 
 def test_write_names_the_folder_that_is_missing(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError, match="the folder .*nowhere does not exist"):
+    with pytest.raises(FileNotFoundError, match=r"the folder .*nowhere does not exist"):
         write(tmp_path / "nowhere" / "a", "x")
 
 
@@ -249,5 +249,5 @@ def test_write_says_that_a_folder_is_read_only(monkeypatch: pytest.MonkeyPatch, 
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
     monkeypatch.setattr(Path, "write_bytes", refused)  # the superuser may write anywhere, so no real folder refuses
-    with pytest.raises(PermissionError, match="cannot write .*a: Permission denied"):
+    with pytest.raises(PermissionError, match=r"cannot write .*a: Permission denied"):
         write(tmp_path / "a", "x")
