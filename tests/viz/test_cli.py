@@ -1,0 +1,85 @@
+"""The command line: what it prints, and one line for a user's mistake."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from viz import cli
+
+
+def run(*arguments: str, cwd=None) -> subprocess.CompletedProcess[str]:
+    """The command line in a process of its own, as a person starts it."""
+    return subprocess.run([sys.executable, "-m", "viz", *arguments], capture_output=True, text=True, cwd=cwd)
+
+
+def test_scenes_are_listed_with_the_sizes_of_their_graphs(capsys):
+    assert cli.main(["scenes", "--json"]) == 0
+    rows = {row["name"]: row for row in json.loads(capsys.readouterr().out)}
+    assert set(rows) == {"spring_mass", "triple_pendulum", "chain"}
+    assert rows["triple_pendulum"]["coordinates"] == 3
+    assert rows["triple_pendulum"]["inverse_nodes"] == 171
+    assert cli.main(["scenes"]) == 0
+    assert "triple_pendulum" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("suffix", [".dot", ".txt", ".svg", ".png"])
+def test_a_scene_is_drawn_or_listed(tmp_path, capsys, suffix):
+    target = tmp_path / f"graph{suffix}"
+    assert cli.main(["draw", "spring_mass", "--formulation", "euler_embedded", "--out", str(target)]) == 0
+    assert "nodes" in capsys.readouterr().out
+    start = {".dot": b"digraph", ".txt": b"inputs q0_old", ".svg": b"<svg", ".png": b"\x89PNG"}[suffix]
+    assert target.read_bytes().lstrip(b"/ \n").startswith(start) or start in target.read_bytes()[:400]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["draw", "quadruple_pendulum", "--out", "x.dot"], "there is no scene 'quadruple_pendulum'"),
+        (["draw", "spring_mass", "--out", "x.jpg"], "must end in .svg, .png, .dot or .txt"),
+        (["draw", "spring_mass", "--out", "missing/x.dot"], "does not exist"),
+        (["draw", "spring_mass", "--out", "x.dot", "--collapse", "link 9"], "link 9"),
+        (["paper", "--out", "a_file"], "a_file"),
+    ],
+)
+def test_a_mistake_gets_one_line_and_exit_status_1(tmp_path, arguments, said):
+    (tmp_path / "a_file").write_text("in the way")
+    done = run(*arguments, cwd=tmp_path)
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert done.stderr.startswith("cgraph: error: ")
+    assert said in done.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a_file"]
+
+
+@pytest.mark.parametrize("arguments", [[], ["paint"], ["draw"], ["draw", "chain", "--out", "x.dot", "--formulation", "f"]])
+def test_wrong_usage_gets_the_usage_and_exit_status_2(arguments):
+    done = run(*arguments)
+    assert done.returncode == 2
+    assert "usage: cgraph" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("command", [[], ["paper"], ["scenes"], ["draw"]])
+def test_every_command_has_help(command):
+    done = run(*command, "--help")
+    assert done.returncode == 0
+    assert "usage: cgraph" in done.stdout
+
+
+def test_ctrl_c_gives_one_line_and_exit_status_130(monkeypatch, capsys):
+    def interrupt(_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "_scenes", interrupt)
+    assert cli.main(["scenes"]) == 130
+    assert capsys.readouterr().err == "cgraph: interrupted\n"
+
+
+def test_scenes_loads_no_optional_package():
+    code = "import sys; from viz import cli; cli.main(['scenes']); print(sorted({'matplotlib', 'mujoco'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.endswith("[]\n")

@@ -1,0 +1,95 @@
+"""The paper's figures: one run of the whole command, and what its files say."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+
+from viz import theme
+from viz.paper import write_paper
+
+FIGURES = ("fig1", "fig2", "fig3", "fig4", "fig5", "fig6", "law", "scaling")
+
+
+@pytest.fixture(scope="module")
+def paper(tmp_path_factory):
+    """A folder filled by the command, and the figures it returned."""
+    folder = tmp_path_factory.mktemp("paper") / "out"
+    lines: list[str] = []
+    data = write_paper(folder, lines.append)
+    return folder, data, lines
+
+
+def test_every_figure_is_there_as_svg_and_png(paper):
+    folder, _, _ = paper
+    for name in FIGURES:
+        assert "<svg" in (folder / f"{name}.svg").read_text()[:2000]
+        assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    for name in ("fig1", "fig2", "fig3"):
+        assert "digraph" in (folder / f"{name}.dot").read_text()
+    for name in ("fig5", "table1", "law", "scaling"):
+        assert (folder / f"{name}.csv").read_text().count("\n") > 3
+    assert not [path for path in folder.iterdir() if path.name.startswith(".")]  # nothing half written
+
+
+def test_there_is_a_progress_line_for_each_part(paper):
+    _, _, lines = paper
+    assert [line[:5] for line in lines if line.startswith("[")] == [f"[{k}/8]" for k in range(1, 9)]
+
+
+def test_equation_3_is_read_off_the_graph(paper):
+    folder, data, _ = paper
+    assert data["equations"]["equal_to_paper"] is True
+    assert data["equations"]["euler_embedded"] == "I*qdd0 - k*q0_old - 2*dt*k*qd0 - dt^2*k*qdd0"
+    assert data["equations"]["chain_rule"] == data["equations"]["kinetic_only"] == "I*qdd0"
+    assert data["equations"]["euler_embedded"] in (folder / "equations.txt").read_text()
+
+
+def test_the_spurious_branch_is_half_of_figure_1_and_absent_elsewhere(paper):
+    folder, data, _ = paper
+    assert data["fig1"] == {"nodes": 20, "edges": 28, "depth": 7, "spurious_nodes": 10, "spurious_edges": 12}
+    assert data["fig2"] == {"nodes": 8, "edges": 8, "depth": 3}
+    assert data["fig3"] == {"nodes": 5, "edges": 4, "depth": 1}
+    painted = {name: theme.SPURIOUS.lower() in (folder / f"{name}.svg").read_text().lower() for name in FIGURES[:3]}
+    assert painted == {"fig1": True, "fig2": False, "fig3": False}
+
+
+def test_the_figures_show_the_letters_of_the_papers_captions(paper):
+    folder, _, _ = paper
+    shown = {name: set(re.findall(r">([^<]+)</text>", (folder / f"{name}.svg").read_text())) for name in FIGURES[:3]}
+    assert {"ω", "α", "I", "k", "dt"} <= shown["fig1"]
+    assert {"ω", "α", "I", "dt"} <= shown["fig2"]
+    assert "k" not in shown["fig2"]
+    assert {"ω", "α", "I"} <= shown["fig3"]
+    assert not {"k", "dt"} & shown["fig3"]
+
+
+def test_the_falls_agree_with_mujoco(paper):
+    _, data, _ = paper
+    assert data["fall"]["largest_difference"] < 1e-10  # rad in 3 s: rounding, grown by the motion
+
+
+def test_the_law_has_slope_one(paper):
+    _, data, _ = paper
+    for name, row in data["law"].items():
+        assert row["slope"] is None or row["slope"] == pytest.approx(1.0, abs=0.02), name
+    assert data["law"]["kinetic_only n=1"]["limit"] == 0.0
+    assert data["law"]["kinetic_only n=3"]["limit"] > 0.01
+
+
+def test_edges_grow_linearly_by_the_contracted_chain_rule_and_quadratically_by_the_literal_one(paper):
+    _, data, _ = paper
+    assert data["scaling"]["chain_rule"]["edges_exponent"] <= 1.10
+    assert 1.9 <= data["scaling"]["chain_rule_literal"]["edges_exponent"] <= 2.1
+
+
+def test_the_page_is_self_contained(paper):
+    folder, data, _ = paper
+    text = (folder / "index.html").read_text()
+    assert set(re.findall(r'src="(data:image/svg\+xml;base64,|[^"]*)', text)) == {"data:image/svg+xml;base64,"}
+    assert not re.search(r'(href|src|url)\s*[=(]\s*"?(https?:)?//', text)
+    assert text.count("<figure>") == len(FIGURES)
+    assert "<script" not in text
+    assert json.loads((folder / "figures.json").read_text()) == json.loads(json.dumps(data))
