@@ -370,7 +370,7 @@ def _drawn(name: str, heading: str, graph: Graph, caption: str, **figures: int) 
     """A drawing of a graph as SVG, PNG and DOT, its counts in the caption."""
     counts = graph.counts()
     caption = f"{caption} {counts.nodes} nodes, {counts.edges} edges."
-    drawing = to_dot(graph, names=LETTERS, marked=spurious(graph), clusters=False, rankdir="LR")
+    drawing = to_dot(graph, names=LETTERS, marked=spurious(graph), clusters=False)
     svg = render_svg(drawing)
     files: dict[str, str | bytes] = {
         f"{name}.svg": svg,

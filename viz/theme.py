@@ -51,7 +51,7 @@ ROLES = {
     "primal": _paint("primal: as written", SKY_BLUE, 0.40),
     "adjoint": _paint("adjoint: reverse mode", ORANGE, 0.45),
     "tangent": _paint("tangent: forward mode", GREEN, 0.35),
-    "several": _paint("several roles", PURPLE, 0.45),
+    "several": _paint("several of these roles", PURPLE, 0.45),
 }
 OUTPUT = Paint("output", WHITE, BLACK)
 COLLAPSED = Paint("collapsed part", tint(GREY, 0.25), LINE)
