@@ -5,6 +5,7 @@ from .counts import Counts
 from .errors import GraphError
 from .forward import jvp
 from .graph import Graph
+from .hessian_solve import hessian_solve
 from .jacobian import hessian, jacobian
 from .label import tag
 from .node import Edge, Node, constant, named, variable, variables
@@ -60,6 +61,7 @@ __all__ = [
     "expm1",
     "gradient",
     "hessian",
+    "hessian_solve",
     "hypot",
     "jacobian",
     "jvp",

@@ -152,7 +152,8 @@ _RULES: dict[str, Rule] = {
 class Builder:
     """Builds nodes folded and shared: the same operation on the same arguments is made once.
 
-    Merging unites labels. Only nodes that this builder made are merged, so nobody else's node changes.
+    Merging unites labels, and keeps the first name. Only nodes that this builder made are merged, so nobody else's
+    node changes.
     """
 
     def __init__(self) -> None:
@@ -176,6 +177,9 @@ class Builder:
         node = self._made.get(key)
         if node is None:
             node = self._made[key] = Node(op, args, label, name=name)
-        elif node.label is not label:
+            return node
+        if node.label is not label:
             object.__setattr__(node, "label", node.label.union(label))
+        if node.name is None and name is not None:
+            object.__setattr__(node, "name", name)
         return node

@@ -84,6 +84,8 @@ class Graph:
         chosen = []
         for each in (wrt,) if isinstance(wrt, (str, Node)) else wrt:
             node = variable(each) if isinstance(each, str) else each
+            if not isinstance(node, Node):
+                raise TypeError(f"wrt must name inputs by strings or variables, got {node!r:.60}")
             if node not in self.inputs:
                 raise GraphError(f"the graph has no input {node.name or node!r} (it has {', '.join(self.input_names)})")
             chosen.append(node)
@@ -125,11 +127,9 @@ class Graph:
 
     def check(self) -> None:
         """Raise GraphError unless every node is well formed and the order is topological."""
-        seen: set[Node] = set()
-        for node in topological(self.outputs.values()):
+        for node in self.nodes:
             _check_node(node)
-            seen.add(node)
-        if seen != set(self.nodes):
+        if set(topological(self.outputs.values())) != set(self.nodes):
             raise GraphError("the nodes are not those that the outputs reach")
         before: set[Node] = set()
         for node in self.nodes:

@@ -125,14 +125,12 @@ class Node:
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **kwargs: Any) -> Any:
         """`np.sin(node)`, `np.float64(2) * node`, and element by element for arrays of nodes."""
+        if ufunc in _TURNED:
+            ufunc, inputs = _TURNED[ufunc], inputs[::-1]
         op = _BY_UFUNC.get(ufunc)
         if op is None or method != "__call__" or kwargs:
             return NotImplemented
-        if any(isinstance(each, np.ndarray) and each.ndim for each in inputs):
-            return np.frompyfunc(lambda *args: apply(op, *args), op.arity, 1)(
-                *(np.asarray(each, dtype=object) for each in inputs)
-            )
-        return apply(op, *(each.item() if isinstance(each, np.ndarray) else each for each in inputs))
+        return _elementwise(op, *inputs)
 
     # Operators look the row up by name, so that the table stays the one place that knows operations.
     def __add__(self, other: Scalar) -> Node:
@@ -189,15 +187,16 @@ class Node:
 
 Scalar = Node | float
 _BY_UFUNC: dict[Any, Op] = {}
+_TURNED = {np.greater: np.less, np.greater_equal: np.less_equal}  # a > b is b < a
 
 
-def register(op: Op) -> None:
-    """Add a row to the operation table."""
+def register(op: Op, ufunc: Any = None) -> None:
+    """Add a row to the operation table; `ufunc` on nodes makes this operation (default: its function of arrays)."""
     if op.name in OPS:
         raise ValueError(f"operation {op.name!r} is in the table already")
     OPS[op.name] = op
-    if isinstance(op.array, np.ufunc):
-        _BY_UFUNC[op.array] = op
+    if isinstance(ufunc or op.array, np.ufunc):
+        _BY_UFUNC[ufunc or op.array] = op
 
 
 class Edge(NamedTuple):
@@ -287,7 +286,13 @@ def _binary(name: str, a: Scalar, b: Scalar) -> Node:
     for each in (a, b):
         if not isinstance(each, (Node, numbers.Real, np.ndarray)):
             return NotImplemented  # type: ignore[no-any-return]  # Python then asks the other operand, or raises
-    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
-        result: Node = OPS[name].array(a, b)  # element by element, through __array_ufunc__
-        return result
-    return apply(OPS[name], a, b)
+    node: Node = _elementwise(OPS[name], a, b)
+    return node
+
+
+def _elementwise(op: Op, *args: Any) -> Any:
+    """A node; or an array of nodes, when an argument is an array with dimensions."""
+    if any([isinstance(each, np.ndarray) and each.ndim for each in args]):
+        arrays = [np.asarray(each, dtype=object) for each in args]
+        return np.frompyfunc(lambda *each: apply(op, *each), op.arity, 1)(*arrays)
+    return apply(op, *[each.item() if isinstance(each, np.ndarray) else each for each in args])

@@ -40,6 +40,12 @@ def _strong_mul_arrays(a: Any, b: Any) -> Any:
     return np.where((a == 0) | (b == 0), 0.0, np.multiply(a, b))
 
 
+def _power_arrays(a: Any, b: Any) -> Any:
+    # With one exponent for all, np.power(a, 0.5) would be a square root: -0.0 at -0.0 and NaN at -inf.
+    base, exponent = np.broadcast_arrays(a, b)
+    return np.power(base, exponent.copy())
+
+
 def _sign(a: float) -> float:
     return a if a != a else float((a > 0) - (a < 0))
 
@@ -92,10 +98,10 @@ _ROWS = (
     Op("mul",      2, lambda a, b: a * b,              np.multiply,   lambda y, a, b: (b, a),                           "{} * {}", "{} * {}",                       "×",    ((0.3, -0.7), (0.0, 2.0)), commutative=True),
     Op("div",      2, _ieee(lambda a, b: a / b, np.divide), np.divide, lambda y, a, b: (1.0 / b, -(y / b)),             "{} / {}", "{} / {}",                       "÷",    ((0.3, -0.7),)),
     Op("neg",      1, lambda a: -a,                    np.negative,   lambda y, a: (-1.0,),                             "-{}", "-{}",                               "−",    ((0.3,),)),
-    Op("pow",      2, _ieee(math.pow, np.power),       np.power,      _pow_partials,                                    "pow({}, {})", "np.power({}, {})",          "xʸ",   ((0.6, -0.7), (1.7, 2.5))),
+    Op("pow",      2, _ieee(math.pow, np.power),       _power_arrays,  _pow_partials,                                    "pow({}, {})", "power({}, {})",             "xʸ",   ((0.6, -0.7), (1.7, 2.5))),
     Op("sqrt",     1, _ieee(math.sqrt, np.sqrt),       np.sqrt,       lambda y, a: (0.5 / y,),                          "sqrt({})", "np.sqrt({})",                  "√",    ((0.6,),)),
     Op("exp",      1, _ieee(math.exp, np.exp),         np.exp,        lambda y, a: (y,),                                "exp({})", "np.exp({})",                    "exp",  ((0.3,),)),
-    Op("expm1",    1, _ieee(math.expm1, np.expm1),     np.expm1,      lambda y, a: (y + 1.0,),                          "expm1({})", "np.expm1({})",                "expm1", ((0.3,),)),
+    Op("expm1",    1, _ieee(math.expm1, np.expm1),     np.expm1,      lambda y, a: (exp(a),),                           "expm1({})", "np.expm1({})",                "expm1", ((0.3,),)),
     Op("log",      1, _ieee(math.log, np.log),         np.log,        lambda y, a: (1.0 / a,),                          "log({})", "np.log({})",                    "log",  ((0.6,),)),
     Op("log1p",    1, _ieee(math.log1p, np.log1p),     np.log1p,      lambda y, a: (1.0 / (1.0 + a),),                  "log1p({})", "np.log1p({})",                "log1p", ((0.3,),)),
     Op("sin",      1, _ieee(math.sin, np.sin),         np.sin,        lambda y, a: (cos(a),),                           "sin({})", "np.sin({})",                    "sin",  ((0.3,), (-2.0,))),
@@ -108,7 +114,7 @@ _ROWS = (
     Op("hypot",    2, _ieee(math.hypot, np.hypot),     np.hypot,      lambda y, a, b: (where(y, a / y, 0.0), where(y, b / y, 0.0)), "hypot({}, {})", "np.hypot({}, {})", "hypot", ((0.3, -0.7),), commutative=True),
     Op("sinh",     1, _ieee(math.sinh, np.sinh),       np.sinh,       lambda y, a: (cosh(a),),                          "sinh({})", "np.sinh({})",                  "sinh", ((0.3,),)),
     Op("cosh",     1, _ieee(math.cosh, np.cosh),       np.cosh,       lambda y, a: (sinh(a),),                          "cosh({})", "np.cosh({})",                  "cosh", ((0.3,),)),
-    Op("tanh",     1, _ieee(math.tanh, np.tanh),       np.tanh,       lambda y, a: ((1.0 - y) * (1.0 + y),),            "tanh({})", "np.tanh({})",                  "tanh", ((0.3,),)),
+    Op("tanh",     1, _ieee(math.tanh, np.tanh),       np.tanh,       lambda y, a: (1.0 / (cosh(a) * cosh(a)),),        "tanh({})", "np.tanh({})",                  "tanh", ((0.3,),)),
     Op("abs",      1, abs,                             np.absolute,   lambda y, a: (sign(a),),                          "abs({})", "np.absolute({})",               "|x|",  ((0.3,), (-0.7,))),
     Op("sign",     1, _sign,                           np.sign,       _flat,                                            "sign({})", "np.sign({})",                  "sign", ((0.3,), (-0.7,))),
     Op("minimum",  2, lambda a, b: a if a <= b or a != a else b, np.minimum, lambda y, a, b: _less_partials(y, a, b, a < b, b < a), "minimum({}, {})", "np.minimum({}, {})", "min", ((0.3, -0.7), (-0.7, 0.3)), commutative=True, selects=True),
@@ -123,5 +129,6 @@ _ROWS = (
 )
 # fmt: on
 
+_UFUNCS = {"pow": np.power, "less": np.less, "less_equal": np.less_equal}  # where the row has a function of its own
 for _row in _ROWS:
-    register(_row)
+    register(_row, _UFUNCS.get(_row.name))

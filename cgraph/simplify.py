@@ -34,10 +34,6 @@ def _size(graph: Graph) -> tuple[int, int]:
 
 def _shared(graph: Graph) -> Graph:
     """One pass of folding and sharing."""
-    return _rebuilt(graph, {})
-
-
-def _rebuilt(graph: Graph, replace: dict[Node, Node], inputs: Sequence[Node] | None = None) -> Graph:
     build = Builder()
     with building(build) as labelled:
 
@@ -45,8 +41,8 @@ def _rebuilt(graph: Graph, replace: dict[Node, Node], inputs: Sequence[Node] | N
             labelled(node.label)
             return build(node.op, args, node.label, node.name)
 
-        new = rebuild(graph.outputs.values(), replace, make)
-    return Graph(graph.inputs if inputs is None else inputs, {k: new[node] for k, node in graph.outputs.items()})
+        new = rebuild(graph.outputs.values(), {}, make)
+    return Graph(graph.inputs, {name: new[node] for name, node in graph.outputs.items()})
 
 
 def specialize(graph: Graph, values: Mapping[str, Scalar], outputs: Sequence[str] | None = None) -> Graph:
@@ -67,4 +63,5 @@ def specialize(graph: Graph, values: Mapping[str, Scalar], outputs: Sequence[str
             raise GraphError(f"the graph has no output {', '.join(unknown)} (it has {', '.join(graph.outputs)})")
         graph = Graph(graph.inputs, {name: graph.outputs[name] for name in outputs})
     inputs = [node for node in graph.inputs if node not in replace]
-    return simplify(_rebuilt(graph, replace, inputs))
+    new = rebuild(graph.outputs.values(), replace, lambda n, args: Node(n.op, args, n.label, name=n.name))
+    return simplify(Graph(inputs, {name: new[node] for name, node in graph.outputs.items()}))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.fold import Builder
+from cgraph.hessian_solve import solve_nodes
 from cgraph.jacobian import hessian_nodes
 from cgraph.label import building
 from cgraph.ldl import SingularError, ldl_solve
@@ -76,16 +78,24 @@ def energy(model: Any) -> Graph:
     return cg.simplify(system.graph({"E": total}, system.q, system.qd))
 
 
-def forward_dynamics(model: Any) -> Graph:
-    """Accelerations: qdd = M^-1 (tau + forces - damping * qd - bias), with M factored as LDL^T on the graph.
+METHODS = ("auto", "recursive", "dense")
+SHORT = 6  # coordinates; beyond, the dense graph is larger on a tree of bodies, and takes long to build
+
+
+def forward_dynamics(model: Any, method: str = "auto") -> Graph:
+    """Accelerations: qdd = M^-1 (tau + forces - damping * qd - bias), from the Lagrangian alone.
 
     Inputs q0.., qd0.., tau0.., t if needed, parameters; outputs qdd0.. [rad/s^2 or m/s^2].
+    method: "recursive", elimination on the graph of L without forming M (`cg.hessian_solve`): for a tree of bodies the
+    number of nodes is linear in n. "dense", M factored as LDL^T: smaller for very short arms. "auto", the smaller of
+    the two up to 6 coordinates, else recursive.
     Raises SingularMassMatrixError, naming the coordinate, when M is singular by structure; where M is singular at one
-    state only, the result there is infinite or NaN.
+    state only, the result there is infinite or NaN. Raises ValueError for an unknown method.
     """
+    if method not in METHODS:
+        raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
     system = as_system(model)
     build = Builder()
-    lower = hessian_nodes(system.lagrangian, system.qd, build)
     known = _bias(system, build)
     with building(build):
         rhs = [
@@ -94,13 +104,21 @@ def forward_dynamics(model: Any) -> Graph:
                 system.tau, known, system.damping, system.qd, system.forces, strict=True
             )
         ]
+    graphs = []
     try:
-        solved = ldl_solve(lower, rhs, build)
+        if method != "dense":
+            graphs.append(_accelerations(system, solve_nodes(system.lagrangian, system.qd, rhs, build)))
+        if method == "dense" or (method == "auto" and system.n <= SHORT):
+            graphs.append(_accelerations(system, ldl_solve(hessian_nodes(system.lagrangian, system.qd), rhs)))
     except SingularError as error:
         name = system.coordinates[error.index]
         raise SingularMassMatrixError(
             f"the mass matrix is singular: coordinate {name!r} has no inertia of its own"
         ) from None
+    return min(graphs, key=lambda graph: len(graph.nodes))
+
+
+def _accelerations(system: System, solved: Sequence[Node]) -> Graph:
     outputs = {f"qdd{i}": node for i, node in enumerate(solved)}
     return cg.simplify(system.graph(outputs, system.q, system.qd, system.tau))
 

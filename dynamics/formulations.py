@@ -70,12 +70,17 @@ def kinetic_only(system: System) -> Terms:
 
 
 def kinetic_only_exact(system: System) -> Terms:
-    """Kinetic only, with the momentum dK/dqd taken at independent q and qd before the relation is embedded."""
+    """Kinetic only, exact: dK/dqd is taken at independent q and qd, and only then is the relation embedded.
+
+    d/dt goes through each embedded quantity at its own rate, qd of q and qdd of qd, not through dt, along which q would
+    move at qd + qdd dt.
+    """
     momentum = cotangents({system.kinetic: ONE}, system.qd)
     embedding = _Embedding(system)
     lagrangian, *embedded = embedding.of(system.lagrangian, *momentum)
     gradient = cotangents({lagrangian: ONE}, embedding.q)
-    return embedding.terms(embedded, gradient)
+    rates = dict(zip([*embedding.q, *embedding.qd], [*embedding.qd, *system.qdd], strict=True))
+    return embedding.terms(embedded, gradient, rates)
 
 
 FORMULATIONS: dict[str, Callable[[System], Terms]] = {
@@ -181,9 +186,9 @@ class _Embedding:
         """Nodes over (q, qd) as nodes over the embedded state."""
         return substituted(nodes, dict(zip([*self.system.q, *self.system.qd], [*self.q, *self.qd], strict=True)))
 
-    def terms(self, momentum: Sequence[Node], gradient: list[Node]) -> Terms:
-        """d/dt as the derivative with respect to dt, and to t if the Lagrangian has it."""
-        seeds = {self.dt: ONE} | ({self.system.t: ONE} if self.system.t in self.system.extra_inputs else {})
+    def terms(self, momentum: Sequence[Node], gradient: list[Node], rates: dict[Node, Node] | None = None) -> Terms:
+        """d/dt as the derivative with respect to dt, or along `rates`; and to t if the Lagrangian has it."""
+        seeds = (rates or {self.dt: ONE}) | ({self.system.t: ONE} if self.system.t in self.system.extra_inputs else {})
         dots = tangents(seeds, momentum)
         rate = [dots.get(p, ZERO) for p in momentum]
         return Terms(self.inputs, self.q, self.qd, list(momentum), rate, gradient)

@@ -15,7 +15,7 @@ from .planar_arm import PlanarArm
 Array = np.ndarray[Any, np.dtype[np.float64]]
 # MuJoCo wants diagonal inertias that are positive and obey the triangle inequality; a planar arm feels only the one
 # about the hinge axis (y), so the other two are any that are allowed.
-_SMALLEST = 1e-12  # kg m^2, in place of the zero inertia of a point mass
+_SMALLEST = 1e-14  # kg m^2, in place of the zero inertia of a point mass
 CAMERA = "side"  # looks along y at the arm's plane
 _COLORS = ("0.46 0.24 0.62 1", "0.16 0.38 0.78 1", "0.80 0.20 0.16 1")  # the paper's purple, blue and red
 
@@ -102,9 +102,10 @@ class MujocoTwin:
         """M(q), (n, n)."""
         self._set(q, np.zeros_like(q))
         self.mujoco.mj_forward(self.model, self.data)
-        full = np.zeros((self.model.nv, self.model.nv))
-        self.mujoco.mj_fullM(self.model, self.data, full)
-        return full
+        columns = np.empty((self.model.nv, self.model.nv))
+        for column, unit in zip(columns, np.eye(self.model.nv), strict=True):  # mj_fullM differs between versions
+            self.mujoco.mj_mulM(self.model, self.data, column, unit)
+        return columns
 
     def bias(self, q: Array, qd: Array) -> Array:
         """Coriolis, centrifugal and gravity force, (n,)."""

@@ -17,7 +17,7 @@ import cgraph as cg
 from .equations import energy, forward_dynamics
 from .integrators import METHODS, step
 from .progress import Progress
-from .system import TIME, System, as_system, per_coordinate
+from .system import TIME, System, as_system, parameter_value, per_coordinate
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -88,7 +88,7 @@ def simulate(
     steps, largest, status = 0, 0.0, ""
     start = time.perf_counter()
     try:
-        with Progress("simulate", t_end, progress) as report:
+        with np.errstate(all="ignore"), Progress("simulate", t_end, progress) as report:
             for begin, end in itertools.pairwise(instants):
                 count = max(1, math.ceil((end - begin) / dt * (1.0 - 1e-12)))
                 size = (end - begin) / count
@@ -100,7 +100,7 @@ def simulate(
                     steps += 1
                 if status:
                     break
-                largest = max(largest, size)
+                largest = max(largest, min(size, dt))
                 rows.append(state)
                 report(end)
     except KeyboardInterrupt:
@@ -155,7 +155,14 @@ def _instants(t_end: float, dt: float, t_eval: ArrayLike | None) -> list[float]:
         count = max(1, math.ceil(t_end / dt * (1.0 - 1e-12)))
         return [t_end * k / count for k in range(count)] + [float(t_end)]
     times = np.asarray(t_eval, dtype=np.float64)
-    if times.ndim != 1 or not times.size or not (np.diff(times) > 0).all() or times[0] < 0 or times[-1] > t_end:
+    if (
+        times.ndim != 1
+        or not times.size
+        or not np.isfinite(times).all()
+        or not (np.diff(times) > 0).all()
+        or times[0] < 0
+        or times[-1] > t_end
+    ):
         raise ValueError(f"t_eval must be increasing times in [0, t_end = {t_end:g} s]")
     listed: list[float] = times.tolist()
     return listed if listed[0] == 0.0 else [0.0, *listed]
@@ -167,7 +174,7 @@ def _parameter_values(system: System, parameters: Mapping[str, float] | None) ->
         raise ValueError(
             f"the system has no parameter {', '.join(unknown)} (it has {', '.join(system.parameters) or 'none'})"
         )
-    return system.parameters | given
+    return system.parameters | {name: parameter_value(name, value) for name, value in given.items()}
 
 
 def _stopped(system: System, t: float, state: Array) -> str:

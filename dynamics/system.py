@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
+import numbers
 import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
@@ -41,18 +42,18 @@ class System:
         damping: float | Sequence[float] = 0.0,
     ) -> None:
         self.coordinates = _coordinate_names(coordinates)
-        self.parameters = {name: _parameter(name, value) for name, value in (parameters or {}).items()}
+        self.parameters = {name: parameter_value(name, value) for name, value in (parameters or {}).items()}
         self.damping = per_coordinate("damping", damping, self.n, minimum=0.0)
         p = {name: cg.variable(name) for name in self.parameters}
         given = _call("lagrangian", lagrangian, self.q, self.qd, self.t, p)
-        partials = [given] if isinstance(given, (Node, int, float)) else list(given)
+        partials = [given] if isinstance(given, (Node, numbers.Real)) else _sequence("the lagrangian must give", given)
         if not partials:
             raise ValueError("the lagrangian gave no partial Lagrangians")
         self.partial_lagrangians = tuple([_as_node("the lagrangian", each) for each in partials])
         applied: Sequence[Node | float] = [0.0] * self.n
         if forces is not None:
             with cg.tag("force"):
-                applied = list(_call("forces", forces, self.q, self.qd, self.t, p))
+                applied = _sequence("forces must give", _call("forces", forces, self.q, self.qd, self.t, p))
             if len(applied) != self.n:
                 raise ValueError(f"forces must give {self.n} values, one for each coordinate, got {len(applied)}")
         self.forces = tuple([_as_node("forces", each) for each in applied])
@@ -154,7 +155,7 @@ def as_system(model: Any) -> System:
 
 def per_coordinate(what: str, value: float | Sequence[float], n: int, minimum: float = -math.inf) -> tuple[float, ...]:
     """One finite number for each coordinate, from one for all or a sequence. Raises ValueError otherwise."""
-    values = [value] * n if isinstance(value, (int, float)) else list(value)
+    values = [value] * n if isinstance(value, numbers.Real) else _sequence(f"{what} must be", value)
     if len(values) != n:
         raise ValueError(f"{what} needs one number for each of the {n} coordinates, got {len(values)}")
     for i, each in enumerate(values):
@@ -177,17 +178,22 @@ def _coordinate_names(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _parameter(name: str, value: float) -> float:
+def parameter_value(name: str, value: float) -> float:
+    """The value of a parameter, checked. Raises TypeError or ValueError naming it."""
+    if not isinstance(name, str):
+        raise TypeError(f"a parameter's name must be a string, got {name!r:.60}")
     if _RESERVED.fullmatch(name):
         raise ValueError(f"parameter {name!r} has the name of a coordinate, velocity, force or time; choose another")
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, numbers.Real) or not math.isfinite(value):
         raise ValueError(f"parameter {name!r} must be a finite number, got {value!r}")
     return float(value)
 
 
 def _call(what: str, function: Callable[..., Any], q: list[Node], qd: list[Node], t: Node, p: dict[str, Node]) -> Any:
+    if not callable(function):
+        raise TypeError(f"{what} must be a function of (q, qd, t) or (q, qd, t, p), got {function!r:.60}")
+    signature = inspect.signature(function)
     try:
-        signature = inspect.signature(function)
         signature.bind(q, qd, t, p)
     except TypeError:
         try:
@@ -196,6 +202,13 @@ def _call(what: str, function: Callable[..., Any], q: list[Node], qd: list[Node]
             raise TypeError(f"{what} must take (q, qd, t) or (q, qd, t, p), got {signature}") from None
         return function(q, qd, t)
     return function(q, qd, t, p)
+
+
+def _sequence(what: str, value: Any) -> list[Any]:
+    try:
+        return list(value)
+    except TypeError:
+        raise TypeError(f"{what} a sequence of nodes or numbers, got {type(value).__name__}: {value!r:.60}") from None
 
 
 def _as_node(what: str, value: Any) -> Node:

@@ -175,7 +175,11 @@ def law() -> Part:
             "kinetic-only method accurate on three links; its program is not public, so which of the two it is is not known."
         )
     )
-    files: dict[str, str | bytes] = {"law.svg": plot.to_svg(picture), "law.png": plot.to_png(picture), "law.csv": _csv(header, rows)}
+    files: dict[str, str | bytes] = {
+        "law.svg": plot.to_svg(picture),
+        "law.png": plot.to_png(picture),
+        "law.csv": _csv(header, rows),
+    }
     data = {
         f"{each.formulation} n={each.n}": {"slope": _finite(each.slope), "limit": float(np.abs(each.limit).max())}
         for each in found

@@ -19,10 +19,10 @@ from .source import source
 BACKENDS = ("auto", "python", "numpy")
 BLOCK = 4096  # states a NumPy sweep takes at once: its temporaries stay in the cache
 
-_PLAIN = ("abs", "float", "inf", "np")
+_PLAIN = ("abs", "float", "inf", "np", "power")
 # Names in generated Python: `math` functions, which are fast and raise outside their domain, else the table's own.
 _PYTHON = {name: getattr(math, name, op.scalar) for name, op in OPS.items()} | {"inf": math.inf, "abs": builtins.abs}
-_NUMPY = {"np": np, "inf": math.inf}
+_NUMPY = {"np": np, "inf": math.inf, "power": OPS["pow"].array}
 
 
 class Compiled:

@@ -119,6 +119,8 @@ def test_the_jacobian_is_the_same_in_both_modes():
     for graph in (wide, tall):
         found = graph.evaluate(values)
         assert {name: found[name] for name in expected} == pytest.approx(expected, rel=1e-15)
+    assert wide.counts().by_role.keys() & {"adjoint", "tangent"} == {"adjoint"}
+    assert tall.counts().by_role.keys() & {"adjoint", "tangent"} == {"tangent"}
 
 
 def test_the_hessian_is_one_node_for_both_entries():

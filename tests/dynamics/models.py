@@ -147,4 +147,3 @@ MODELS: dict[str, Callable[[], Any]] = {
     "magnetic": magnetic,
     "relativistic": relativistic,
 }
-

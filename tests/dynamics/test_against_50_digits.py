@@ -54,7 +54,9 @@ def test_torque_is_lagrange_s_equation(name: str) -> None:
 def test_momentum_is_dl_dqd(name: str) -> None:
     model = MODELS[name]()
     state = at(states(model, 1), 0)
-    assert run(dyn.momentum(model), state) == approx(floats(lagrange(model, state).momentum), rel=ROUNDING, abs=ROUNDING)
+    assert run(dyn.momentum(model), state) == approx(
+        floats(lagrange(model, state).momentum), rel=ROUNDING, abs=ROUNDING
+    )
 
 
 @mark.parametrize("name", MODELS)

@@ -27,7 +27,8 @@ def test_inverse_dynamics_of_the_paper_s_arm_is_small() -> None:
     arm = dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7])
     counts = dyn.inverse_dynamics(arm).counts()
     assert (counts.nodes, counts.edges) == (164, 284)
-    assert counts.nodes <= 190 and counts.edges <= 335  # the bound, should the line above be moved
+    assert counts.nodes <= 190
+    assert counts.edges <= 335
 
 
 def test_damping_adds_a_product_and_a_sum_for_each_joint_and_one_constant() -> None:
@@ -72,7 +73,9 @@ def test_embedded_the_graph_grows_linearly_too(exponents: dict[str, float], reco
 @mark.parametrize("n", [1, 3, 10])
 def test_the_chain_rule_is_smaller_than_the_embedded_formulations(n: int, formulation: str) -> None:
     ours, theirs = (dyn.inverse_dynamics(equal_links(n), each).counts() for each in ("chain_rule", formulation))
-    assert ours.nodes < theirs.nodes and ours.edges < theirs.edges and ours.depth < theirs.depth
+    assert ours.nodes < theirs.nodes
+    assert ours.edges < theirs.edges
+    assert ours.depth < theirs.depth
 
 
 def test_the_literal_form_costs_more_from_two_links_on() -> None:

@@ -4,7 +4,6 @@ import numpy as np
 from mpmath import mp, mpf
 from pytest import approx, mark
 
-import cgraph as cg
 import dynamics as dyn
 
 STATES = 200
@@ -29,7 +28,6 @@ def test_by_definition_the_inertial_term_gains_a_spring_force(simplify: bool) ->
     terms = STIFFNESS * np.array([QDD * DT**2, 2 * QD * DT, Q_OLD])
     largest = np.abs([*terms, INERTIA * QDD]).max(axis=0)
     gained = rate("euler_embedded", BEFORE, simplify=simplify) - INERTIA * QDD
-    assert np.abs(gained + terms.sum(axis=0)).max(initial=0, where=largest > 0) <= ROUNDING * largest.max()
     assert (np.abs(gained + terms.sum(axis=0)) / largest).max() < ROUNDING
 
 
@@ -119,4 +117,3 @@ def test_the_chain_rule_has_no_trace_of_the_euler_relation() -> None:
     graph = dyn.inverse_dynamics(SPRING_MASS)
     assert not {"dt", "q0_old", "qd0_old"} & set(graph.input_names)
     assert "euler" not in graph.counts().by_tag
-    assert isinstance(graph, cg.Graph)

@@ -31,7 +31,9 @@ class Pair:
         return error(np.array(ours), np.array(theirs))
 
 
-@fixture(scope="module", params=[(n, model) for model in ("rod", "point") for n in SIZES], ids=lambda p: f"{p[0]} {p[1]}s")
+@fixture(
+    scope="module", params=[(n, model) for model in ("rod", "point") for n in SIZES], ids=lambda p: f"{p[0]} {p[1]}s"
+)
 def pair(request) -> Pair:
     return Pair(*request.param)
 

@@ -1,7 +1,5 @@
 """Planar arms against Pinocchio, whose inertias may be zero: a second peer that shares nothing with MuJoCo."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from pytest import mark
@@ -11,23 +9,10 @@ import dynamics as dyn
 from tests.dynamics.models import at, error, random_arm, states
 
 pinocchio = pytest.importorskip("pinocchio", reason="the bench extra has it")
+from tests.dynamics.pinocchio_twin import pinocchio_model  # noqa: E402 (skipped above where it cannot be had)
 
 STATES = 100
 AGREEMENT = 1e-11  # of the largest entry: float64 rounding times a condition number of M up to 3e4 at ten links
-
-
-def pinocchio_model(arm: dyn.PlanarArm) -> Any:
-    """The arm joint by joint: hinges about -y, links along -z, so that a positive angle swings it towards +x."""
-    model = pinocchio.Model()
-    model.gravity.linear = np.array([0.0, 0.0, -arm.gravity])
-    joint, drop = 0, 0.0
-    for i, link in enumerate(arm.links):
-        axis = pinocchio.JointModelRevoluteUnaligned(np.array([0.0, -1.0, 0.0]))
-        joint = model.addJoint(joint, axis, pinocchio.SE3(np.eye(3), np.array([0.0, 0.0, -drop])), f"joint {i + 1}")
-        body = pinocchio.Inertia(link.mass, np.array([0.0, 0.0, -link.center]), link.inertia * np.eye(3))
-        model.appendBodyToJoint(joint, body, pinocchio.SE3.Identity())
-        drop = link.length
-    return model
 
 
 @mark.parametrize("model", ["rod", "point"])

@@ -1,0 +1,171 @@
+"""Solving with a Hessian without forming it: edge pushing with early elimination."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from .fold import Builder
+from .graph import Graph
+from .label import ADJOINT, TANGENT, building
+from .ldl import SingularError
+from .node import Node, Scalar, as_node
+from .order import topological
+from .second_order import second_partial
+
+ZERO, ONE = as_node(0.0), as_node(1.0)
+
+
+def hessian_solve(graph: Graph, wrt: str | Node | Sequence[str | Node], rhs: Sequence[Scalar]) -> list[Node]:
+    """Nodes x with (d2f/dw2) x = rhs, for the one output f of `graph` and the inputs w of `wrt`.
+
+    rhs: one node or number for each of `wrt`. The Hessian is not formed: for f summed along a chain or a tree, such as
+    the energy of its bodies, the result has a number of nodes proportional to that of f.
+
+    Raises GraphError for a graph with several outputs, ValueError for a wrong number of right-hand sides, and
+    SingularError, with the index of the variable, when a pivot is zero by structure. There is no pivoting: the Hessian
+    has to be definite.
+    """
+    chosen = graph.select_inputs(wrt)
+    if len(rhs) != len(chosen):
+        raise ValueError(f"rhs needs one entry for each of the {len(chosen)} variables, got {len(rhs)}")
+    return solve_nodes(graph.only_output(), chosen, [as_node(each) for each in rhs])
+
+
+def solve_nodes(output: Node, wrt: Sequence[Node], rhs: Sequence[Node], build: Builder | None = None) -> list[Node]:
+    """As `hessian_solve`, on nodes.
+
+    The tangents t of all nodes that depend on w make f's second differential stationary: W t = b, with W the symmetric
+    second-order adjoint and b = rhs at w. Walking the nodes from the output down, an operation hands its row of W and
+    its entry of b to its arguments through its partials p (t = sum p t_arg), and adds its adjoint times its second
+    partials; a variable, once all its uses are behind, is eliminated as by Gauss. One forward sweep then
+    gives the tangents, and those of w are x. For a tree of bodies this is the articulated-body algorithm.
+    """
+    build = build or Builder()
+    order = _dependent(output, wrt)
+    walk = _Walk(build, output, dict(zip(wrt, rhs, strict=True)), set(order))
+    with building(build) as labelled:
+        for node in reversed(order):
+            labelled(node.label.derived(ADJOINT))
+            if node in walk.position:
+                walk.eliminate(node)
+            else:
+                walk.hand_down(node)
+        dots: dict[Node, Node] = {}
+        for node in order:
+            labelled(node.label.derived(TANGENT))
+            if node in walk.position:
+                solved = walk.solved[node]
+                dot = solved.alone
+                for other, gain in solved.gains.items():
+                    dot = dot - gain * dots[other]
+            else:
+                dot = _total([p * dots[arg] for arg, p in walk.partials[node].items()])
+            dots[node] = dot
+    return [dots[node] for node in wrt]
+
+
+class _Solved(NamedTuple):
+    """x_i = alone - sum_j gain_j t_j, the row of a variable at its elimination."""
+
+    alone: Node
+    gains: dict[Node, Node]
+
+
+class _Walk:
+    """The state of the walk from the output down: adjoints, W and b of the live nodes, and what was eliminated."""
+
+    def __init__(self, build: Builder, output: Node, rhs: dict[Node, Node], depends: set[Node]) -> None:
+        self.build = build
+        self.depends = depends
+        self.position = {node: i for i, node in enumerate(rhs)}
+        self.bars: dict[Node, Node] = {output: ONE}
+        self.rhs = dict(rhs)
+        self.rows: dict[Node, dict[Node, Node]] = {}  # W, both halves
+        self.solved: dict[Node, _Solved] = {}
+        self.partials: dict[Node, dict[Node, Node]] = {}  # of each operation, by argument that depends on w
+
+    def _take(self, node: Node) -> tuple[Node, dict[Node, Node]]:
+        """W of a node with itself and with the others; the node leaves W."""
+        row = self.rows.pop(node, {})
+        pivot = row.pop(node, ZERO)
+        for other in row:
+            del self.rows[other][node]
+        return pivot, row
+
+    def _add(self, a: Node, b: Node, value: Node) -> None:
+        if value.value == 0.0:
+            return
+        row = self.rows.setdefault(a, {})
+        total = row[b] + value if b in row else value
+        row[b] = total
+        self.rows.setdefault(b, {})[a] = total
+
+    def eliminate(self, node: Node) -> None:
+        """A variable whose uses are all behind: its row of W t = b gives it in terms of the live nodes."""
+        pivot, row = self._take(node)
+        if pivot.value == 0.0:
+            raise SingularError(self.position[node])
+        rhs = self.rhs[node]
+        gains = {other: value / pivot for other, value in row.items()}
+        others = list(row)
+        for i, a in enumerate(others):
+            for b in others[: i + 1]:
+                self._add(a, b, -(gains[a] * row[b]))
+            self.rhs[a] = self.rhs.get(a, ZERO) - gains[a] * rhs
+        self.solved[node] = _Solved(rhs / pivot, gains)
+
+    def hand_down(self, node: Node) -> None:
+        """An operation: t = sum p t_arg takes it out of W t = b, and its curvature goes to its arguments."""
+        pivot, row = self._take(node)
+        bar, rhs = self.bars.pop(node, ZERO), self.rhs.pop(node, ZERO)
+        partials: dict[Node, Node] = {}
+        for arg, partial in zip(node.args, node.op.partials(node, *node.args), strict=True):
+            if arg in self.depends:
+                partials[arg] = partials[arg] + partial if arg in partials else as_node(partial)
+        self.partials[node] = partials
+        for arg, p in partials.items():
+            self.bars[arg] = self.bars.get(arg, ZERO) + bar * p
+            self.rhs[arg] = self.rhs.get(arg, ZERO) + p * rhs
+            for other, value in row.items():
+                self._add(arg, other, 2.0 * (p * value) if arg is other else p * value)
+        self._curve(partials, pivot)
+        if bar.value != 0.0:
+            self._bend(node, bar)
+
+    def _curve(self, partials: dict[Node, Node], pivot: Node) -> None:
+        """The node's own second-order adjoint, through its partials: p_j p_k W."""
+        if pivot.value != 0.0:
+            args = list(partials)
+            for i, a in enumerate(args):
+                scaled = pivot * partials[a]
+                for b in args[: i + 1]:
+                    self._add(a, b, scaled * partials[b])
+
+    def _bend(self, node: Node, bar: Node) -> None:
+        """The node's adjoint times its second partials; both orders of two slots that hold one argument count."""
+        for j, a in enumerate(node.args):
+            for k, b in enumerate(node.args[: j + 1]):
+                if a in self.depends and b in self.depends:
+                    second = second_partial(node, j, k, self.build)
+                    if second.value != 0.0:
+                        self._add(a, b, 2.0 * (bar * second) if a is b and j != k else bar * second)
+
+
+def _dependent(output: Node, wrt: Sequence[Node]) -> list[Node]:
+    """The nodes that depend on `wrt`, arguments first, each variable just before its first use."""
+    depends = set(wrt)
+    order = []
+    for node in topological([output]):
+        if node in depends or any([arg in depends for arg in node.args]):
+            depends.add(node)
+            order.append(node)
+    met = set(order)
+    return [node for node in wrt if node not in met] + order
+
+
+def _total(terms: list[Node]) -> Node:
+    total = terms[0]
+    for term in terms[1:]:
+        total = total + term
+    return total

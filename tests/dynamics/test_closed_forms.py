@@ -1,0 +1,192 @@
+"""Systems whose motion is known in closed form: any Lagrangian, explicit time, damping, forces, parameters."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from mpmath import mp
+from pytest import approx, mark
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.system import System
+from tests.dynamics.models import Array, oscillator
+
+TRUNCATION = 1e-10  # of RK4 at dt = 1 ms over 3 s: 3 (1e-3 w)^4 / 120 for w up to 3 rad/s, and rounding beside it
+T_END = 3.0  # s
+M, K, C, F, W = 2.0, 3.0, 0.7, 1.5, 2.5  # kg, N/m, N s/m, N, rad/s
+W0 = math.sqrt(K / M)
+
+
+def motion(system: System, q: list[float], qd: list[float], **options: Any) -> dyn.Trajectory:
+    result = dyn.simulate(system, q, qd, T_END, dt=1e-3, **options)
+    assert result.stats.complete
+    return result
+
+
+def check(result: dyn.Trajectory, *expected: Callable[[Array], Array]) -> None:
+    for i, closed_form in enumerate(expected):
+        assert result.q[:, i] == approx(closed_form(result.t), rel=0.0, abs=TRUNCATION)
+
+
+def test_harmonic_oscillator() -> None:
+    result = motion(oscillator(), [0.8], [0.5])
+    check(result, lambda t: 0.8 * np.cos(W0 * t) + 0.5 / W0 * np.sin(W0 * t))
+    velocity = -0.8 * W0 * np.sin(W0 * result.t) + 0.5 * np.cos(W0 * result.t)
+    assert result.qd[:, 0] == approx(velocity, rel=0.0, abs=TRUNCATION)
+    assert result.energy == approx(0.5 * M * 0.5**2 + 0.5 * K * 0.8**2, rel=TRUNCATION)
+
+
+def test_parameters_given_to_simulate_stand_in_for_the_system_s() -> None:
+    check(motion(oscillator(), [1.0], [0.0], parameters={"k": 8.0}), lambda t: np.cos(2.0 * t))
+
+
+def test_parameters_are_inputs_of_the_graphs() -> None:
+    system = oscillator()
+    assert dyn.forward_dynamics(system).input_names == ("q0", "qd0", "tau0", "m", "k")
+    values = {"q0": 0.4, "qd0": 0.0, "tau0": 1.0, "m": 4.0, "k": 5.0}
+    assert dyn.forward_dynamics(system).evaluate(values) == {"qdd0": approx((1.0 - 5.0 * 0.4) / 4.0, rel=1e-15)}
+
+
+def test_a_torque_s_sensitivity_to_a_parameter_is_a_graph_too() -> None:
+    slope = cg.gradient(dyn.inverse_dynamics(oscillator()), wrt="k")
+    assert slope.evaluate({"q0": 0.4, "qd0": 0.1, "qdd0": 0.2, "m": 4.0, "k": 5.0}) == {"dtau0/dk": 0.4}
+
+
+def damped(t: Array) -> Array:
+    rate, w = C / (2 * M), math.sqrt(K / M - (C / (2 * M)) ** 2)
+    return np.exp(-rate * t) * (np.cos(w * t) + rate / w * np.sin(w * t))
+
+
+def test_damped_oscillator() -> None:
+    check(motion(oscillator(damping=C), [1.0], [0.0]), damped)
+
+
+def test_damping_written_as_a_force_is_the_same() -> None:
+    check(motion(oscillator(forces=lambda q, qd, t: [-C * qd[0]]), [1.0], [0.0]), damped)
+    with_parameter = oscillator(forces=lambda q, qd, t, p: [-p["c"] * qd[0]], parameters={"c": C})
+    check(motion(with_parameter, [1.0], [0.0]), damped)
+
+
+def driven(t: Array) -> Array:
+    return F / M / (W0**2 - W**2) * (np.cos(W * t) - np.cos(W0 * t))
+
+
+def test_driven_oscillator_by_a_force() -> None:
+    check(motion(oscillator(forces=lambda q, qd, t: [F * cg.cos(W * t)]), [0.0], [0.0]), driven)
+
+
+def test_driven_oscillator_by_a_potential_with_time() -> None:
+    system = System(
+        lambda q, qd, t: 0.5 * M * qd[0] ** 2 - 0.5 * K * q[0] ** 2 + F * cg.cos(W * t) * q[0], coordinates=["x"]
+    )
+    check(motion(system, [0.0], [0.0]), driven)
+
+
+def test_oscillator_on_a_shaking_base() -> None:
+    """Time in the kinetic energy: dp/dt at fixed x counts. x'' + w0^2 x = a w^2 sin(w t) for a base a sin(w t)."""
+    a = 0.3
+    system = System(
+        lambda q, qd, t: 0.5 * M * (qd[0] + a * W * cg.cos(W * t)) ** 2 - 0.5 * K * q[0] ** 2, coordinates=["x"]
+    )
+    scale = a * W**2 / (W0**2 - W**2)
+    check(motion(system, [0.0], [0.0]), lambda t: scale * (np.sin(W * t) - W / W0 * np.sin(W0 * t)))
+
+
+def test_shrinking_mass() -> None:
+    """m(t) = exp(-t): p = m v is constant, so x = v0 (exp(t) - 1)."""
+    system = System(lambda q, qd, t: 0.5 * cg.exp(-t) * qd[0] ** 2, coordinates=["x"])
+    check(motion(system, [0.0], [0.2]), lambda t: 0.2 * np.expm1(t))
+
+
+def test_charged_particle_runs_in_a_circle() -> None:
+    """Terms linear in velocity: m x'' = B y', m y'' = -B x'."""
+    system = System(
+        lambda q, qd, t, p: 0.5 * p["m"] * (qd[0] ** 2 + qd[1] ** 2) + 0.5 * p["B"] * (q[0] * qd[1] - q[1] * qd[0]),
+        ["x", "y"],
+        {"m": 0.8, "B": 2.0},
+    )
+    result, w = motion(system, [0.0, 0.0], [1.5, 0.0]), 2.0 / 0.8
+    check(result, lambda t: 1.5 / w * np.sin(w * t), lambda t: 1.5 / w * (np.cos(w * t) - 1.0))
+    assert result.energy == approx(0.5 * 0.8 * 1.5**2, rel=TRUNCATION)  # the field does no work, and is no part of E
+
+
+def test_relativistic_particle_under_a_constant_force() -> None:
+    """L = -m c^2 sqrt(1 - v^2 / c^2) + F x: p = F t, so x = m c^2 / F (sqrt(1 + (F t / m c)^2) - 1)."""
+    c = 1.2
+    system = System(
+        lambda q, qd, t, p: -p["m"] * c**2 * cg.sqrt(1.0 - qd[0] ** 2 / c**2) + p["F"] * q[0],
+        ["x"],
+        {"m": M, "F": F},
+    )
+    result = motion(system, [0.0], [0.0])
+    check(result, lambda t: M * c**2 / F * (np.sqrt(1.0 + (F * t / (M * c)) ** 2) - 1.0))
+    assert result.qd[-1, 0] > 0.8 * c
+    assert result.energy == approx(M * c**2, rel=TRUNCATION)  # m c^2 gamma - F x
+
+
+def test_coupled_springs_move_in_their_normal_modes() -> None:
+    system = System(
+        lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2) - (q[0] ** 2 + q[1] ** 2) - 0.5 * K * (q[1] - q[0]) ** 2,
+        ["left", "right"],
+    )
+    together, against = math.sqrt(2.0), math.sqrt(2.0 + 2 * K)
+    check(
+        motion(system, [1.0, 0.0], [0.0, 0.0]),
+        lambda t: 0.5 * (np.cos(together * t) + np.cos(against * t)),
+        lambda t: 0.5 * (np.cos(together * t) - np.cos(against * t)),
+    )
+
+
+def test_constant_applied_force() -> None:
+    system = System(lambda q, qd, t: 0.5 * M * qd[0] ** 2 + 0.5 * qd[1] ** 2, ["x", "y"])
+    result = motion(system, [0.1, 0.0], [0.2, 0.0], tau=[F, 0.0])
+    check(result, lambda t: 0.1 + 0.2 * t + 0.5 * F / M * t**2, np.zeros_like)
+    check(motion(system, [0.0, 0.0], [0.0, 0.0], tau=F), lambda t: 0.5 * F / M * t**2, lambda t: 0.5 * F * t**2)
+
+
+@mark.parametrize("model", ["rod", "point"])
+def test_large_swings_of_a_pendulum_by_elliptic_functions(model: str) -> None:
+    """sin(q / 2) = k cd(w t, k^2), let go at rest from q0 with k = sin(q0 / 2)."""
+    start, length = 2.5, 0.7
+    w = math.sqrt((1.5 if model == "rod" else 1.0) * 9.81 / length)
+    k = math.sin(start / 2)
+    result = dyn.simulate(dyn.planar_arm([1.3], [length], model=model), [start], [0.0], T_END, dt=1e-3)
+    rows = range(0, len(result.t), 100)
+    expected = [2 * math.asin(k * float(mp.ellipfun("cd", w * result.t[row], m=k * k))) for row in rows]
+    fast = 1e-9  # w is 4.6 rad/s here: TRUNCATION grows with its fourth power
+    assert result.q[rows, 0] == approx(np.array(expected), rel=0.0, abs=fast)
+    assert min(expected) < -2.0
+    assert max(expected) > 2.0
+
+
+FINITE_STEP = 0.15  # of a fitted order: what the next order adds at these dt
+DTS = {"rk4": (4, (0.01, 0.005, 0.0025)), "euler": (1, (4e-4, 2e-4, 1e-4))}
+
+
+@mark.parametrize("method", DTS)
+def test_a_method_has_its_declared_order(method: str) -> None:
+    """On the nonlinear pendulum, against elliptic functions, by halving dt."""
+    order, dts = DTS[method]
+    assert dyn.integrators.METHODS[method].order == order
+    times, start = np.array([0.25, 0.5, 0.75, 1.0]), 2.0
+    k, w = math.sin(start / 2), math.sqrt(1.5 * 9.81)
+    exact = np.array([2 * math.asin(k * float(mp.ellipfun("cd", w * t, m=k * k))) for t in times])
+    arm, errors = dyn.planar_arm([1.0], [1.0]), []
+    for dt in dts:
+        result = dyn.simulate(arm, [start], [0.0], 1.0, method, dt=dt, t_eval=times)
+        errors.append(np.abs(result.q[:, 0] - exact).max())
+    assert np.polyfit(np.log(dts), np.log(errors), 1)[0] == approx(order, abs=FINITE_STEP)
+
+
+@mark.parametrize("method", DTS)
+def test_energy_of_an_undamped_arm_is_conserved_to_the_order_of_the_method(method: str) -> None:
+    order, dts = DTS[method]
+    arm, drifts = dyn.planar_arm([1.0, 0.8], [1.0, 0.8]), []
+    for dt in dts:
+        energy = dyn.simulate(arm, [1.5, 0.3], [0.0, 0.0], 1.0, method, dt=dt).energy
+        drifts.append(np.abs(energy - energy[0]).max())
+    fitted = np.polyfit(np.log(dts), np.log(drifts), 1)[0]
+    assert fitted == approx(order, abs=FINITE_STEP)
+    assert drifts[-1] > 1e-12  # J: it is not rounding that was fitted

@@ -1,0 +1,164 @@
+"""Errors: each says what was given and what was needed."""
+
+import math
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from pytest import mark, raises
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics import mujoco_io
+from dynamics.system import System
+
+
+def mass(q: Any, qd: Any, t: Any) -> cg.Node:
+    return 0.5 * qd[0] ** 2
+
+
+_ARMS: dict[str, tuple[dict[str, Any], str]] = {
+    "negative mass": ({"masses": [1.0, -0.8]}, "link 2: mass must be positive and finite, got -0.8 kg"),
+    "zero mass": ({"masses": [0.0, 1.0]}, "link 1: mass must be positive and finite, got 0.0 kg"),
+    "NaN mass": ({"masses": [math.nan, 1.0]}, "link 1: mass must be positive and finite, got nan kg"),
+    "infinite mass": ({"masses": [1.0, math.inf]}, "link 2: mass must be positive and finite, got inf kg"),
+    "negative length": ({"lengths": [-1.0, 1.0]}, "link 1: length must be positive and finite, got -1.0 m"),
+    "zero length": ({"lengths": [1.0, 0.0]}, "link 2: length must be positive and finite, got 0.0 m"),
+    "NaN length": ({"lengths": [1.0, math.nan]}, "link 2: length must be positive and finite, got nan m"),
+    "infinite length": ({"lengths": [math.inf, 1.0]}, "link 1: length must be positive and finite, got inf m"),
+    "counts differ": ({"lengths": [1.0]}, "as many masses as lengths, at least one; got 2 and 1"),
+    "no links": ({"masses": [], "lengths": []}, "as many masses as lengths, at least one; got 0 and 0"),
+    "model": ({"model": "beam"}, """model must be "rod" or "point", got 'beam'"""),
+    "gravity": ({"gravity": math.nan}, "gravity must be finite, got nan m/s"),
+    "negative damping": ({"damping": [0.1, -0.1]}, "damping must be finite and at least 0, got -0.1 for coordinate 1"),
+    "NaN damping": ({"damping": math.nan}, "damping must be finite and at least 0, got nan for coordinate 0"),
+    "dampings differ": ({"damping": [0.1] * 3}, "damping needs one number for each of the 2 coordinates, got 3"),
+}
+
+
+@mark.parametrize("case", _ARMS)
+def test_an_arm_that_cannot_be_is_refused(case: str) -> None:
+    changed, message = _ARMS[case]
+    with raises(ValueError, match=message):
+        dyn.planar_arm(**({"masses": [1.0, 1.0], "lengths": [1.0, 1.0]} | changed))
+
+
+_SYSTEMS: dict[str, tuple[dict[str, Any], type[Exception], str]] = {
+    "no coordinates": ({"coordinates": []}, ValueError, "needs at least one coordinate"),
+    "coordinate twice": ({"coordinates": ["x", "y", "x"]}, ValueError, "coordinate names must differ, got x, y, x"),
+    "coordinate empty": ({"coordinates": [""]}, TypeError, "name must be a non-empty string, got ''"),
+    "coordinate a number": ({"coordinates": [3]}, TypeError, "name must be a non-empty string, got 3"),
+    "parameter NaN": ({"parameters": {"k": math.nan}}, ValueError, "parameter 'k' must be a finite number, got nan"),
+    "parameter text": ({"parameters": {"k": "3"}}, ValueError, "parameter 'k' must be a finite number, got '3'"),
+    "damping negative": ({"damping": -1.0}, ValueError, "damping must be finite and at least 0, got -1.0"),
+    "dampings differ": ({"damping": [1.0, 2.0]}, ValueError, "damping needs one number for each of the 1 .* got 2"),
+    "forces too many": (
+        {"forces": lambda q, qd, t: [1.0, 2.0]},
+        ValueError,
+        "forces must give 1 values, one for each coordinate, got 2",
+    ),
+    "forces none": ({"forces": lambda q, qd, t: []}, ValueError, "forces must give 1 values, .* got 0"),
+    "forces text": ({"forces": lambda q, qd, t: ["a"]}, TypeError, "forces must give nodes or numbers: .*str: 'a'"),
+    "forces one node": ({"forces": lambda q, qd, t: q[0]}, TypeError, "forces must give .*Node"),
+    "forces nothing": ({"forces": lambda q, qd, t: None}, TypeError, "forces must give .*None"),
+    "forces of what": ({"forces": lambda q: [q[0]]}, TypeError, r"forces must take \(q, qd, t\).*, got \(q\)"),
+    "forces no function": ({"forces": 3.0}, TypeError, "forces must be .*, got .*3.0"),
+    "lagrangian text": ({"lagrangian": lambda q, qd, t: ["L"]}, TypeError, "the lagrangian must give nodes or numb"),
+    "lagrangian nothing": ({"lagrangian": lambda q, qd, t: None}, TypeError, "the lagrangian must give .*None"),
+    "lagrangian NaN": ({"lagrangian": lambda q, qd, t: math.nan}, ValueError, "the lagrangian must give .*NaN"),
+    "lagrangian empty": ({"lagrangian": lambda q, qd, t: []}, ValueError, "gave no partial Lagrangians"),
+    "lagrangian of what": ({"lagrangian": lambda q: q[0]}, TypeError, r"lagrangian must take \(q, qd, t\)"),
+    "lagrangian no function": ({"lagrangian": None}, TypeError, "lagrangian must be .*, got .*None"),
+    "foreign variable": (
+        {"lagrangian": lambda q, qd, t: mass(q, qd, t) - cg.variable("stray") * q[0]},
+        ValueError,
+        "the system uses 'stray', which is no coordinate, parameter or t",
+    ),
+    "foreign coordinate": (
+        {"lagrangian": lambda q, qd, t: 0.5 * cg.variable("qd1") ** 2},
+        ValueError,
+        "the system uses 'qd1', which is no coordinate",
+    ),
+    "foreign in forces": (
+        {"forces": lambda q, qd, t: [cg.variable("wind")]},
+        ValueError,
+        "the system uses 'wind', which is no coordinate",
+    ),
+}
+
+
+@mark.parametrize("case", _SYSTEMS)
+def test_a_system_that_cannot_be_is_refused(case: str) -> None:
+    changed, kind, message = _SYSTEMS[case]
+    with raises(kind, match=message):
+        System(**({"lagrangian": mass, "coordinates": ["x"]} | changed))
+
+
+@mark.parametrize("name", ["q0", "qd3", "qdd12", "tau1", "t", "dt", "q0_old", "qd1_old"])
+def test_names_of_the_graphs_own_inputs_are_reserved(name: str) -> None:
+    with raises(ValueError, match=f"parameter '{name}' has the name of a coordinate"):
+        System(mass, ["x"], {name: 1.0})
+
+
+@mark.parametrize("name", ["q", "tau", "time", "dt2", "k1", "qdot0", "T"])
+def test_other_names_are_free(name: str) -> None:
+    system = System(lambda q, qd, t, p: 0.5 * p[name] * qd[0] ** 2, ["x"], {name: 2.0})
+    assert dyn.inverse_dynamics(system).input_names == ("q0", "qd0", "qdd0", name)
+
+
+@mark.parametrize("value", [np.float32(2.0), np.int64(2), np.float64(2.0)])
+def test_numbers_of_numpy_are_numbers(value: Any) -> None:
+    assert System(mass, ["x"], {"k": value}, damping=value).damping == (2.0,)
+    assert System(mass, ["x"], {"k": value}).parameters == {"k": 2.0}
+
+
+@mark.parametrize("make", [dyn.inverse_dynamics, dyn.momentum_rate])
+def test_an_unknown_formulation_is_named_with_those_that_there_are(make) -> None:
+    names = "chain_rule, chain_rule_literal, euler_embedded, kinetic_only, kinetic_only_exact"
+    with raises(ValueError, match=f"formulation must be one of {names}, got 'lagrange'"):
+        make(System(mass, ["x"]), "lagrange")
+
+
+@mark.parametrize("make", [dyn.inverse_dynamics, dyn.mass_matrix, dyn.bias, dyn.energy, dyn.forward_dynamics])
+def test_what_is_no_model_is_refused(make) -> None:
+    with raises(TypeError, match="expected a System, an arm or a scene, got str: 'triple_pendulum'"):
+        make("triple_pendulum")
+
+
+def test_an_unknown_scene_is_named_with_those_that_there_are() -> None:
+    with raises(ValueError, match=f"there is no scene 'swing'; the scenes are {', '.join(dyn.scenes.names())}"):
+        dyn.scenes.load("swing")
+
+
+def test_a_chain_needs_a_link() -> None:
+    with raises(ValueError, match="a chain needs at least one link, got 0"):
+        dyn.scenes.load("chain", n=0)
+
+
+@mark.parametrize(
+    ("lagrangian", "name"),
+    [
+        (lambda q, qd, t: 0.5 * qd[0] ** 2 - q[1] ** 2, "slack"),  # no velocity of its own at all
+        (
+            lambda q, qd, t: 0.5 * (qd[0] + qd[1]) ** 2,
+            "stiff",
+        ),  # two coordinates, one motion: found at the second pivot
+        (lambda q, qd, t: qd[0] * q[1] - q[0] ** 2 + 0.5 * qd[1] ** 2, "stiff"),  # linear in velocity is no inertia
+    ],
+)
+def test_a_coordinate_without_inertia_is_named(lagrangian, name: str) -> None:
+    system = System(lagrangian, ["stiff", "slack"])
+    for make in (dyn.forward_dynamics, lambda s: dyn.simulate(s, [0.0, 0.0], [0.0, 0.0], 1.0)):
+        with raises(dyn.SingularMassMatrixError, match=f"mass matrix is singular: coordinate '{name}' has no inertia"):
+            make(system)
+    assert issubclass(dyn.SingularMassMatrixError, ValueError)
+    dyn.inverse_dynamics(system).check()  # which needs no inverse
+
+
+def test_without_mujoco_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    arm = dyn.planar_arm([1.0], [1.0])
+    assert "<mujoco" in mujoco_io.to_mjcf(arm)  # text needs no MuJoCo
+    with raises(ImportError, match=r"MuJoCo is not installed: pip install 'cgraph\[mujoco\]'"):
+        mujoco_io.MujocoTwin(arm)

@@ -1,0 +1,294 @@
+"""simulate: what is recorded, how a run stops, and its statistics."""
+
+import math
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from pytest import approx, mark, raises
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.integrators import METHODS
+from dynamics.progress import Progress
+from dynamics.system import System
+from tests.dynamics.models import oscillator, random_arm
+
+ROUNDING = 1e-14  # of a few sums of fractions
+MODULE = sys.modules["dynamics.simulate"]  # the name dynamics.simulate is the function
+
+
+def runaway() -> System:
+    """v' = v^2 on the second coordinate: v = 1 / (1 - t) leaves at t = 1."""
+    return System(
+        lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2), ["calm", "wild"], forces=lambda q, qd, t: [0.0, qd[1] ** 2]
+    )
+
+
+def test_every_step_is_recorded_by_default() -> None:
+    result = dyn.simulate(oscillator(), [1.0], [0.0], 1.0, dt=0.1)
+    assert result.t == approx(np.linspace(0.0, 1.0, 11), abs=1e-15)
+    assert (result.t.shape, result.q.shape, result.qd.shape, result.energy.shape) == ((11,), (11, 1), (11, 1), (11,))
+    assert (result.q[0, 0], result.qd[0, 0]) == (1.0, 0.0)
+
+
+@mark.parametrize("t_end", [1.0, 0.3, 0.05, 0.7000000000000001, 3.3333])
+def test_the_last_row_is_at_t_end_exactly_whether_or_not_dt_divides_it(t_end: float) -> None:
+    result = dyn.simulate(oscillator(), [1.0], [0.0], t_end, dt=0.1)
+    assert result.t[-1] == t_end
+    assert result.stats.steps == math.ceil(t_end / 0.1 - 1e-9)
+    assert np.diff(result.t).max() <= 0.1 * (1 + 1e-12)  # the differences are rounded
+    assert np.diff(result.t) == approx(t_end / result.stats.steps, rel=1e-12)
+
+
+def test_t_eval_chooses_the_rows() -> None:
+    times = [0.0, 0.05, 0.5, 0.51, 1.0]
+    result = dyn.simulate(oscillator(), [1.0], [0.0], 1.0, dt=0.01, t_eval=times)
+    assert result.t.tolist() == times
+    assert result.q[:, 0] == approx(np.cos(math.sqrt(1.5) * np.array(times)), abs=1e-8)  # RK4 at dt = 10 ms
+    assert len(result.energy) == len(result.qd) == len(times)
+
+
+def test_t_eval_without_the_start_leaves_it_out() -> None:
+    result = dyn.simulate(oscillator(), [1.0], [0.0], 1.0, dt=0.01, t_eval=[0.25, 0.75])
+    assert result.t.tolist() == [0.25, 0.75]
+    assert result.q[:, 0] == approx(np.cos(math.sqrt(1.5) * result.t), abs=1e-8)  # RK4 at dt = 10 ms
+    assert len(result.q) == len(result.energy) == 2
+    assert result.stats.steps == 75
+
+
+def test_t_eval_at_the_start_alone_is_the_start() -> None:
+    result = dyn.simulate(oscillator(), [1.0], [0.5], 1.0, t_eval=[0.0])
+    assert (result.t.tolist(), result.q.tolist(), result.qd.tolist()) == ([0.0], [[1.0]], [[0.5]])
+
+
+def test_t_eval_on_the_default_instants_changes_nothing() -> None:
+    plain = dyn.simulate(random_arm(2), [1.0, 0.2], [0.0, 0.0], 0.5, dt=0.125)
+    chosen = dyn.simulate(random_arm(2), [1.0, 0.2], [0.0, 0.0], 0.5, dt=0.125, t_eval=plain.t)
+    assert (chosen.q == plain.q).all()
+    assert (chosen.qd == plain.qd).all()
+    assert (chosen.energy == plain.energy).all()
+
+
+def test_energy_is_the_energy_graph_at_every_row() -> None:
+    system = oscillator()
+    result = dyn.simulate(system, [1.0], [0.3], 0.5, dt=0.1, parameters={"m": 0.5})
+    expected = 0.5 * 0.5 * result.qd[:, 0] ** 2 + 0.5 * 3.0 * result.q[:, 0] ** 2
+    assert result.energy == approx(expected, rel=1e-14)
+    driven = System(lambda q, qd, t: 0.5 * qd[0] ** 2 - q[0] * t, ["x"])
+    result = dyn.simulate(driven, [1.0], [0.0], 0.5, dt=0.1)
+    assert result.energy == approx(0.5 * result.qd[:, 0] ** 2 + result.q[:, 0] * result.t, rel=1e-14)
+
+
+@mark.parametrize("method", METHODS)
+def test_statistics_count_what_was_done(method: str) -> None:
+    stats = dyn.simulate(oscillator(), [1.0], [0.0], 1.0, method, dt=0.03).stats
+    assert (stats.method, stats.steps, stats.evaluations) == (method, 34, 34 * len(METHODS[method].b))
+    assert stats.dt == approx(1.0 / 34, rel=1e-12)
+    assert (stats.complete, stats.status) == (True, "reached t_end")
+    assert stats.seconds > 0.0
+
+
+def test_one_step_of_euler_is_euler_s_step() -> None:
+    result = dyn.simulate(oscillator(), [1.0], [0.4], 0.1, "euler", dt=0.1)
+    assert (result.q[-1, 0], result.qd[-1, 0]) == approx((1.0 + 0.1 * 0.4, 0.4 - 0.1 * 1.5), rel=1e-15)
+
+
+@mark.parametrize("name", METHODS)
+def test_a_tableau_meets_the_conditions_of_its_order(name: str) -> None:
+    """Hairer, Norsett and Wanner I, table II.2.1: up to order four, one condition for each rooted tree."""
+    method = METHODS[name]
+    s = len(method.b)
+    a, b, c = np.zeros((s, s)), np.array(method.b), np.array(method.c)
+    for i, row in enumerate(method.a):
+        a[i, : len(row)] = row
+    assert a.sum(axis=1) == approx(c, rel=ROUNDING)
+    conditions = {1: [(b.sum(), 1)], 2: [(b @ c, 1 / 2)], 3: [(b @ c**2, 1 / 3), (b @ a @ c, 1 / 6)]}
+    conditions[4] = [(b @ c**3, 1 / 4), ((b * c) @ a @ c, 1 / 8), (b @ a @ c**2, 1 / 12), (b @ a @ a @ c, 1 / 24)]
+    met = [all(found == approx(needed, rel=ROUNDING) for found, needed in conditions[order]) for order in conditions]
+    assert met == [order <= method.order for order in conditions]
+
+
+def test_a_run_that_leaves_the_numbers_keeps_its_rows_and_says_where() -> None:
+    result = dyn.simulate(runaway(), [0.0, 0.0], [0.0, 1.0], 2.0, dt=0.01)
+    assert not result.stats.complete
+    assert result.stats.status.startswith("stopped at t = 1.0")
+    assert "'wild'" in result.stats.status
+    assert "calm" not in result.stats.status
+    assert 0.9 < result.t[-1] < 1.1
+    assert len(result.t) == len(result.q) == len(result.energy) == result.stats.steps + 1
+    assert np.isfinite(result.q).all()
+    assert np.isfinite(result.qd).all()
+    assert result.qd[50, 1] == approx(2.0, rel=1e-7)  # 1 / (1 - 0.5)
+
+
+def test_a_run_that_stops_before_the_first_recorded_instant_has_no_rows() -> None:
+    result = dyn.simulate(runaway(), [0.0, 0.0], [0.0, 1.0], 2.0, dt=0.01, t_eval=[1.5, 2.0])
+    assert (result.stats.complete, result.t.shape, result.q.shape, result.energy.shape) == (False, (0,), (0, 2), (0,))
+    assert "stopped at t = 1.0" in result.stats.status
+
+
+@pytest.mark.filterwarnings("error")
+@mark.parametrize("parameters", [{"m": 0.0}, {"m": 1e-300}])
+def test_an_infinite_acceleration_stops_the_run_without_a_warning(parameters: dict[str, float]) -> None:
+    result = dyn.simulate(oscillator(), [1.0], [0.0], 1.0, dt=0.1, parameters=parameters)
+    assert (len(result.t), result.stats.complete, result.stats.steps) == (1, False, 0)
+    assert result.stats.status.startswith("stopped at t = 0.1 s: ")
+
+
+@pytest.mark.filterwarnings("error")
+def test_leaving_a_function_s_domain_stops_the_run() -> None:
+    """A particle on the potential -sqrt(q) that is thrown at q = 0, beyond which the root is no number."""
+    system = System(lambda q, qd, t: 0.5 * qd[0] ** 2 + cg.sqrt(q[0]), ["height"])
+    result = dyn.simulate(system, [1.0], [-3.0], 1.0, dt=0.01)
+    assert not result.stats.complete
+    assert "'height' is nan" in result.stats.status
+    assert 0.2 < result.t[-1] < 0.6
+    assert np.isfinite(result.q).all()
+
+
+def test_ctrl_c_keeps_the_rows(monkeypatch: pytest.MonkeyPatch) -> None:
+    real, calls = MODULE.step, []
+
+    def step(*args: Any) -> Any:
+        calls.append(None)
+        if len(calls) > 30:
+            raise KeyboardInterrupt
+        return real(*args)
+
+    monkeypatch.setattr(MODULE, "step", step)
+    result = dyn.simulate(oscillator(), [1.0], [0.0], 1.0, dt=0.01)
+    assert (len(result.t), result.stats.steps, result.stats.complete) == (31, 30, False)
+    assert result.stats.status == "interrupted after t = 0.3 s"
+    monkeypatch.undo()
+    whole = dyn.simulate(oscillator(), [1.0], [0.0], 1.0, dt=0.01)
+    assert (result.q == whole.q[:31]).all()
+    assert (result.energy == whole.energy[:31]).all()
+
+
+def test_a_run_is_the_same_every_time() -> None:
+    first, second = (dyn.simulate(random_arm(3), [1.0, 0.2, -0.3], [0.0] * 3, 0.2) for _ in range(2))
+    assert (first.q == second.q).all()
+    assert (first.energy == second.energy).all()
+
+
+def test_the_start_is_not_changed() -> None:
+    q, qd = np.array([1.0]), np.array([0.3])
+    dyn.simulate(oscillator(), q, qd, 0.1)
+    assert (q.tolist(), qd.tolist()) == ([1.0], [0.3])
+
+
+def test_a_scene_an_arm_and_a_system_are_all_models() -> None:
+    scene = dyn.scenes.load("triple_pendulum")
+    first, second, third = (
+        dyn.simulate(model, scene.q, scene.qd, 0.01).q for model in (scene, scene.model, scene.system)
+    )
+    assert (first == second).all()
+    assert (second == third).all()
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    plain = dyn.simulate(oscillator(), [1.0], [0.0], 0.1, dt=0.01, tau=2.0)
+    for number in (np.float64(2.0), np.float32(2.0), np.int64(2), np.array([2.0])):
+        assert (dyn.simulate(oscillator(), [1.0], [0.0], 0.1, dt=0.01, tau=number).q == plain.q).all()
+
+
+_ARGUMENTS: dict[str, tuple[dict[str, Any], str]] = {
+    "q too long": ({"q": [1.0, 2.0]}, r"q must have shape \(1,\).* got \(2,\)"),
+    "q a number": ({"q": 1.0}, r"q must have shape \(1,\).* got \(\)"),
+    "q nested": ({"q": [[1.0]]}, r"q must have shape \(1,\).* got \(1, 1\)"),
+    "q NaN": ({"q": [math.nan]}, "q must be finite, got .*nan"),
+    "qd infinite": ({"qd": [math.inf]}, "qd must be finite, got .*inf"),
+    "qd too long": ({"qd": [0.0, 0.0]}, r"qd must have shape \(1,\)"),
+    "dt negative": ({"dt": -0.1}, "dt must be positive and finite, got -0.1 s"),
+    "dt zero": ({"dt": 0.0}, "dt must be positive and finite, got 0.0 s"),
+    "dt NaN": ({"dt": math.nan}, "dt must be positive and finite, got nan s"),
+    "t_end negative": ({"t_end": -1.0}, "t_end must be positive and finite, got -1.0 s"),
+    "t_end infinite": ({"t_end": math.inf}, "t_end must be positive and finite, got inf s"),
+    "method": ({"method": "rk5"}, "method must be one of euler, rk4, got 'rk5'"),
+    "t_eval empty": ({"t_eval": []}, r"t_eval must be increasing times in \[0, t_end = 1 s\]"),
+    "t_eval falling": ({"t_eval": [0.5, 0.2]}, "t_eval must be increasing"),
+    "t_eval twice": ({"t_eval": [0.5, 0.5]}, "t_eval must be increasing"),
+    "t_eval before": ({"t_eval": [-0.1, 0.5]}, "t_eval must be increasing"),
+    "t_eval beyond": ({"t_eval": [0.5, 1.5]}, "t_eval must be increasing"),
+    "t_eval NaN": ({"t_eval": [math.nan]}, "t_eval must be increasing"),
+    "t_eval a number": ({"t_eval": 0.5}, "t_eval must be increasing"),
+    "tau too long": ({"tau": [1.0, 2.0]}, "tau needs one number for each of the 1 coordinates, got 2"),
+    "tau NaN": ({"tau": math.nan}, "tau must be finite, got nan for coordinate 0"),
+    "parameter unknown": ({"parameters": {"c": 1.0}}, r"the system has no parameter c \(it has m, k\)"),
+    "parameter NaN": ({"parameters": {"k": math.nan}}, "'k'.*nan|'k'.*NaN"),
+    "parameter infinite": ({"parameters": {"k": math.inf}}, "parameter 'k' must be .*finite.* got inf"),
+}
+
+
+@mark.parametrize("case", _ARGUMENTS)
+def test_arguments_out_of_range_are_refused(case: str) -> None:
+    changed, message = _ARGUMENTS[case]
+    arguments = {"q": [1.0], "qd": [0.0], "t_end": 1.0, "dt": 0.1} | changed
+    with raises(ValueError, match=message):
+        dyn.simulate(oscillator(), **arguments)
+
+
+class Clock:
+    """Stands in for the time module: each look at it takes `tick` seconds."""
+
+    def __init__(self, tick: float) -> None:
+        self.now, self.tick = 0.0, tick
+
+    def perf_counter(self) -> float:
+        self.now += self.tick
+        return self.now
+
+
+def printed(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tick: float, **options: Any) -> str:
+    """What a run of ten rows writes to standard error, on a clock of that tick."""
+    monkeypatch.setattr("dynamics.progress.time", Clock(tick))
+    dyn.simulate(oscillator(), [1.0], [0.0], 1.0, dt=0.1, **options)
+    out, err = capsys.readouterr()
+    assert out == ""
+    return err
+
+
+def test_a_long_run_writes_a_progress_line_on_request(capsys, monkeypatch) -> None:
+    err = printed(capsys, monkeypatch, tick=0.5, progress=True)
+    lines = err.rstrip("\n").split("\r")
+    assert err.endswith("\n")
+    assert err.count("\n") == 1
+    assert lines[-1] == "simulate [########################] 100%  5 s"
+    assert any("50%" in line and "[############            ]" in line for line in lines)
+
+
+def test_a_short_run_writes_nothing(capsys, monkeypatch) -> None:
+    assert printed(capsys, monkeypatch, tick=0.05, progress=True) == ""
+
+
+def test_progress_is_written_at_most_ten_times_a_second(capsys, monkeypatch) -> None:
+    monkeypatch.setattr("dynamics.progress.time", Clock(0.03))
+    with Progress("count", total=1000.0, show=True) as progress:
+        for i in range(1000):
+            progress(i)
+    lines = capsys.readouterr().err.count("\r")
+    assert 0.5 * 10 * 29 < lines <= 10 * 29 + 1  # a thousand looks of 0.03 s, less the first second
+
+
+def test_nothing_is_written_when_not_asked_for(capsys, monkeypatch) -> None:
+    assert printed(capsys, monkeypatch, tick=1.0, progress=False) == ""
+
+
+@mark.parametrize("terminal", [False, True])
+def test_by_default_progress_is_for_terminals(terminal: bool, capsys, monkeypatch) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal, raising=False)
+    assert bool(printed(capsys, monkeypatch, tick=1.0)) == terminal
+
+
+def test_an_interrupted_run_ends_its_progress_line(capsys, monkeypatch) -> None:
+    def interrupted() -> None:
+        with Progress("simulate", 1.0, show=True) as progress:
+            progress(0.5)
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("dynamics.progress.time", Clock(2.0))
+    with raises(KeyboardInterrupt):
+        interrupted()
+    assert capsys.readouterr().err.endswith(" 50%  2 s\n")

@@ -1,0 +1,91 @@
+"""The pages: their examples run and print what is shown, and what they name exists."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from pkgutil import resolve_name
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PAGES = {
+    path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
+    for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+}
+RUN = ("README.md", "docs/tutorial.md", "docs/howto.md")
+FENCE = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+MARK = "-- end of example --"
+SECONDS = 120  # for one page; each takes a few
+
+
+def examples(page: str) -> list[tuple[int, str, str]]:
+    """(line, code, output) of each ```python block; its output is the next block if that is ```text, else nothing."""
+    blocks = [(page.count("\n", 0, match.start(2)), match[1], match[2]) for match in FENCE.finditer(page)]
+    following = [*blocks[1:], (0, "", "")]
+    return [
+        (line, code, after if after_kind == "text" else "")
+        for (line, kind, code), (_, after_kind, after) in zip(blocks, following, strict=True)
+        if kind == "python"
+    ]
+
+
+def program(page: str) -> str:
+    """The examples of a page as one program, each on the line that it has there, with a mark printed after each."""
+    lines: list[str] = []
+    for line, code, _ in examples(page):
+        lines += [""] * (line - len(lines)) + code.splitlines() + [f"print({MARK!r})"]
+    return "\n".join(lines) + "\n"
+
+
+def test_an_example_has_the_output_that_follows_it() -> None:
+    page = "a\n```python\nx = 1\n```\n```python\nprint(x)\n```\nprints\n```text\n1\n```\n```sh\nls\n```\n"
+    assert examples(page) == [(2, "x = 1\n", ""), (5, "print(x)\n", "1\n")]
+    assert program(page).splitlines()[5] == "print(x)"
+
+
+@pytest.mark.parametrize("name", RUN)
+def test_examples_print_what_is_shown(name: str, tmp_path: Path) -> None:
+    """From top to bottom, in one namespace, in an empty folder."""
+    (tmp_path / "page.py").write_text(program(PAGES[name]), encoding="utf-8")
+    (tmp_path / "empty").mkdir()
+    run = subprocess.run(
+        [sys.executable, "-W", "error", "-X", "utf8", str(tmp_path / "page.py")],
+        cwd=tmp_path / "empty",
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        encoding="utf-8",
+        timeout=SECONDS,
+        check=False,
+    )
+    assert run.returncode == 0, run.stderr
+    printed = run.stdout.split(f"{MARK}\n")[:-1]
+    shown = [(line, output) for line, _, output in examples(PAGES[name])]
+    assert [(line, text) for (line, _), text in zip(shown, printed, strict=True)] == shown
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_linked_files_exist(name: str) -> None:
+    targets = re.findall(r"""(?:\]\(|src=")([^)#"\s]+)""", FENCE.sub("", PAGES[name]))
+    files = [target for target in targets if "://" not in target]
+    assert [file for file in files if not (ROOT / name).parent.joinpath(file).exists()] == []
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_named_functions_exist(name: str) -> None:
+    """`cgraph.jvp`: what is written with its package can be found there."""
+    for dotted in re.findall(r"`((?:cgraph|dynamics|viz)(?:\.\w+)+)", PAGES[name]):
+        if not dotted.endswith((".py", ".svg")):
+            resolve_name(dotted)
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_named_tests_exist(name: str) -> None:
+    for file, test in re.findall(r"`(tests/[\w/]+\.py)(?:::(\w+))?`", PAGES[name]):
+        text = (ROOT / file).read_text(encoding="utf-8")
+        assert not test or f"def {test}(" in text, f"{file}::{test}"
+
+
+def test_the_tests_of_the_paper_s_equations_are_named() -> None:
+    assert len(re.findall(r"`tests/[\w/]+\.py::\w+`", PAGES["docs/paper.md"])) >= 10
