@@ -155,16 +155,10 @@ def _instants(t_end: float, dt: float, t_eval: ArrayLike | None) -> list[float]:
         count = max(1, math.ceil(t_end / dt * (1.0 - 1e-12)))
         return [t_end * k / count for k in range(count)] + [float(t_end)]
     times = np.asarray(t_eval, dtype=np.float64)
-    if (
-        times.ndim != 1
-        or not times.size
-        or not np.isfinite(times).all()
-        or not (np.diff(times) > 0).all()
-        or times[0] < 0
-        or times[-1] > t_end
-    ):
+    listed: list[float] = times.ravel().tolist()
+    increasing = all(a < b for a, b in itertools.pairwise(listed))
+    if times.ndim != 1 or not listed or not increasing or not (listed[0] >= 0.0 and listed[-1] <= t_end):
         raise ValueError(f"t_eval must be increasing times in [0, t_end = {t_end:g} s]")
-    listed: list[float] = times.tolist()
     return listed if listed[0] == 0.0 else [0.0, *listed]
 
 
