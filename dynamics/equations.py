@@ -98,11 +98,11 @@ def forward_dynamics(model: Any, method: str = "auto") -> Graph:
     build = Builder()
     known = _bias(system, build)
     with building(build):
+        with cg.tag("damping"):
+            braking = [damping * qd for damping, qd in zip(system.damping, system.qd, strict=True)]
         rhs = [
-            tau - b - damping * qd + force
-            for tau, b, damping, qd, force in zip(
-                system.tau, known, system.damping, system.qd, system.forces, strict=True
-            )
+            tau - b - brake + force
+            for tau, b, brake, force in zip(system.tau, known, braking, system.forces, strict=True)
         ]
     graphs = []
     try:

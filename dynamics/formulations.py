@@ -32,7 +32,7 @@ class Terms(NamedTuple):
 
 
 def chain_rule(system: System) -> Terms:
-    """d/dt p = grad_x p . xdot for p = dL/dqd, x = (q, qd), contracted: one reverse sweep, then one forward (eq. 9)."""
+    """d/dt p = grad_x p . xdot for p = dL/dqd, x = (q, qd), contracted: one reverse sweep, then one forward."""
     build = Builder()
     n = system.n
     bars = cotangents({system.lagrangian: ONE}, [*system.q, *system.qd], build)

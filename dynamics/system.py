@@ -101,7 +101,7 @@ class System:
 
     @cached_property
     def lagrangian(self) -> Node:
-        """L, the sum of the partial Lagrangians (eq. 8)."""
+        """L, the sum of the partial Lagrangians (the paper, section 4.3)."""
         return _sum(self.partial_lagrangians)
 
     @cached_property
