@@ -19,7 +19,8 @@ figure {{ margin: 1.2rem 0; }} figcaption {{ font-size: 0.95rem; margin-top: 0.5
 figure img {{ display: block; max-width: 100%; height: auto; margin: 0 auto; background: #FFFFFF; border-radius: 4px; }}
 .scroll {{ overflow-x: auto; }}
 table {{ border-collapse: collapse; margin: 1rem 0; font-size: 0.95rem; font-variant-numeric: tabular-nums; }}
-th, td {{ padding: 0.35rem 0.8rem; border-bottom: 1px solid var(--line); text-align: right; white-space: nowrap; }}
+th, td {{ padding: 0.35rem 0.8rem; border-bottom: 1px solid var(--line); text-align: right; }} td {{ white-space: nowrap; }}
+th {{ vertical-align: bottom; }}
 th:first-child, td:first-child {{ text-align: left; }} thead th {{ border-bottom: 2px solid var(--text); }}
 caption {{ text-align: left; font-weight: 600; padding-bottom: 0.4rem; }}
 pre {{ background: var(--soft); padding: 0.8rem 1rem; overflow-x: auto; border-radius: 4px; }}
