@@ -11,6 +11,8 @@ from .equations import (
     momentum,
 )
 from .formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious
+from .mechanism import Body, Joint, Mechanism, MechanismError, serial_arm
+from .mjcf import to_mjcf
 from .planar_arm import Link, PlanarArm, planar_arm
 from .scenes import Scene
 from .simulate import Stats, Trajectory, simulate
@@ -18,7 +20,11 @@ from .system import System, as_system
 
 __all__ = [
     "FORMULATIONS",
+    "Body",
+    "Joint",
     "Link",
+    "Mechanism",
+    "MechanismError",
     "PlanarArm",
     "Scene",
     "SingularMassMatrixError",
@@ -36,6 +42,8 @@ __all__ = [
     "momentum_rate",
     "planar_arm",
     "scenes",
+    "serial_arm",
     "simulate",
     "spurious",
+    "to_mjcf",
 ]

@@ -10,14 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from .mechanism import Mechanism
+from .mjcf import CAMERA, to_mjcf
 from .planar_arm import PlanarArm
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
-# MuJoCo wants diagonal inertias that are positive and obey the triangle inequality; a planar arm feels only the one
-# about the hinge axis (y), so the other two are any that are allowed.
-_SMALLEST = 1e-14  # kg m^2, in place of the zero inertia of a point mass
-CAMERA = "side"  # looks along y at the arm's plane
-_COLORS = ("0.46 0.24 0.62 1", "0.16 0.38 0.78 1", "0.80 0.20 0.16 1")  # the paper's purple, blue and red
 
 
 def mujoco() -> Any:
@@ -29,55 +26,16 @@ def mujoco() -> Any:
     return module
 
 
-def to_mjcf(arm: PlanarArm, timestep: float = 1e-3) -> str:
-    """The arm as MJCF text: hinges about -y, masses and inertias explicit, RK4, contacts off.
-
-    The arm's plane is x to the right, z up; a positive angle swings the hanging arm towards +x.
-    """
-    reach = sum(link.length for link in arm.links)
-    lines = [
-        '<mujoco model="planar arm">',
-        '  <compiler angle="radian" inertiafromgeom="false"/>',
-        f'  <option timestep="{timestep!r}" integrator="RK4" gravity="0 0 {-arm.gravity!r}">',
-        '    <flag contact="disable"/>',
-        "  </option>",
-        "  <visual>",
-        '    <headlight ambient="0.5 0.5 0.5" diffuse="0.5 0.5 0.5"/>',
-        '    <global offwidth="480" offheight="320"/>',
-        '    <rgba haze="1 1 1 1"/>',
-        "  </visual>",
-        '  <asset><texture type="skybox" builtin="flat" rgb1="1 1 1" rgb2="1 1 1" width="8" height="8"/></asset>',
-        "  <worldbody>",
-        f'    <camera name="{CAMERA}" pos="0 {-1.75 * reach!r} {-0.45 * reach!r}" xyaxes="1 0 0 0 0 1"/>',
-    ]
-    indent = "    "
-    for i, link in enumerate(arm.links):
-        drop = arm.links[i - 1].length if i else 0.0
-        diagonal = " ".join([repr(max(link.inertia, _SMALLEST))] * 3)
-        radius, colour = 0.05 * arm.links[0].length, _COLORS[i % len(_COLORS)]
-        lines += [
-            f'{indent}<body name="link{i + 1}" pos="0 0 {-drop!r}">',
-            f'{indent}  <joint name="joint{i + 1}" type="hinge" axis="0 -1 0" damping="{arm.damping[i]!r}"/>',
-            f'{indent}  <inertial pos="0 0 {-link.center!r}" mass="{link.mass!r}" diaginertia="{diagonal}"/>',
-            f'{indent}  <geom type="capsule" fromto="0 0 0 0 0 {-link.length!r}" size="{radius!r}" rgba="{colour}"/>',
-        ]
-        indent += "  "
-    for _ in arm.links:
-        indent = indent[:-2]
-        lines.append(f"{indent}</body>")
-    return "\n".join([*lines, "  </worldbody>", "</mujoco>"]) + "\n"
-
-
 class MujocoTwin:
-    """MuJoCo's model of a planar arm, asked for the quantities that the graphs give.
+    """MuJoCo's model of a planar arm or a mechanism, asked for the quantities that the graphs give.
 
     Damping is in the accelerations and not in `bias`, as in `dynamics`. Raises ImportError without MuJoCo.
     """
 
-    def __init__(self, arm: PlanarArm, timestep: float = 1e-3) -> None:
+    def __init__(self, of: PlanarArm | Mechanism, timestep: float = 1e-3) -> None:
         self.mujoco = mujoco()
-        self.arm = arm
-        self.model = self.mujoco.MjModel.from_xml_string(to_mjcf(arm, timestep))
+        self.of = of
+        self.model = self.mujoco.MjModel.from_xml_string(to_mjcf(of, timestep))
         self.data = self.mujoco.MjData(self.model)
 
     def _set(self, q: Array, qd: Array) -> None:
@@ -113,20 +71,28 @@ class MujocoTwin:
         self.mujoco.mj_forward(self.model, self.data)
         return np.array(self.data.qfrc_bias)
 
-    def trajectory(self, q: Array, qd: Array, steps: int) -> tuple[Array, Array, Array]:
-        """q and qd, (steps + 1, n), and body frames' origins with the tip, (steps + 1, n + 1, 2), by MuJoCo's RK4."""
+    def trajectory(self, q: Array, qd: Array, steps: int) -> tuple[Array, Array]:
+        """q and qd, (steps + 1, n) each, from the start on, by MuJoCo's RK4."""
         self.mujoco.mj_resetData(self.model, self.data)
         self._set(q, qd)
         n = self.model.nv
-        states, places = np.empty((steps + 1, 2 * n)), np.empty((steps + 1, n + 1, 2))
+        states = np.empty((steps + 1, 2 * n))
         for k in range(steps + 1):
             states[k] = np.concatenate([self.data.qpos, self.data.qvel])
-            self.mujoco.mj_kinematics(self.model, self.data)
-            tip = self.data.xpos[-1] - self.arm.links[-1].length * self.data.xmat[-1].reshape(3, 3)[:, 2]
-            places[k] = np.vstack([self.data.xpos[1:], tip])[:, [0, 2]]
             if k < steps:
                 self.mujoco.mj_step(self.model, self.data)
-        return states[:, :n], states[:, n:], places
+        return states[:, :n], states[:, n:]
+
+    def arm_positions(self, q: Array) -> Array:
+        """Places of base, joints and tip [m] of a planar arm, (T, n + 1, 2), by MuJoCo's kinematics at q, (T, n)."""
+        assert isinstance(self.of, PlanarArm)
+        places = np.empty((len(q), len(self.of.links) + 1, 2))
+        for place, pose in zip(places, q, strict=True):
+            self.data.qpos[:] = pose
+            self.mujoco.mj_kinematics(self.model, self.data)
+            tip = self.data.xpos[-1] - self.of.links[-1].length * self.data.xmat[-1].reshape(3, 3)[:, 2]
+            place[:] = np.vstack([self.data.xpos[1:], tip])[:, [0, 2]]
+        return places
 
 
 def frames(arm: PlanarArm, poses: Array, timeout: float = 60.0) -> list[np.ndarray] | None:

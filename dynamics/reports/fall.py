@@ -42,8 +42,8 @@ def mujoco_fall(run: Fall) -> MujocoFall:
     """MuJoCo's RK4 on its twin of the arm, from the same start with the same step. Raises ImportError without it."""
     steps = len(run.trajectory.t) - 1
     twin = MujocoTwin(run.scene.model, run.scene.t_end / steps)
-    q, _, positions = twin.trajectory(np.array(run.scene.q), np.array(run.scene.qd), steps)
-    return MujocoFall(q, positions, str(twin.mujoco.__version__))
+    q, _ = twin.trajectory(np.array(run.scene.q), np.array(run.scene.qd), steps)
+    return MujocoFall(q, twin.arm_positions(q), str(twin.mujoco.__version__))
 
 
 def largest_differences(run: Fall, other: MujocoFall, windows: int = 6) -> list[tuple[float, float]]:

@@ -1,0 +1,98 @@
+"""Vectors and rotations of bodies: constants as arrays, moving quantities as triples of nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Node
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+Triple = tuple[Node, Node, Node]
+ZERO = cg.constant(0.0)
+STILL: Triple = (ZERO, ZERO, ZERO)
+SNAP = 1e-14  # an entry of a rotation this near to 0 or 1 is that: a quarter turn must not leave nodes behind
+
+
+def rotation(axis: Array, angle: float) -> Array:
+    """The matrix, (3, 3), that turns by `angle` [rad] about the unit vector `axis` (Rodrigues)."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return snapped(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross))
+
+
+def snapped(matrix: Array) -> Array:
+    """The array with entries within rounding of -1, 0 and 1 set to them."""
+    near = np.round(matrix)
+    return np.where(np.abs(matrix - near) <= SNAP, near, matrix) + 0.0
+
+
+def from_quaternion(quaternion: Sequence[float]) -> Array:
+    """The rotation matrix of a quaternion (w, x, y, z), normalised here."""
+    w, x, y, z = np.asarray(quaternion, dtype=np.float64) / np.linalg.norm(quaternion)
+    return snapped(
+        np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+    )
+
+
+def to_z(axis: Array) -> Array:
+    """A rotation whose third column is the unit vector `axis`: the nearest turn of the coordinate axes."""
+    seed = np.eye(3)[int(np.abs(axis).argmin())]
+    x = np.cross(seed, axis)
+    x /= np.linalg.norm(x)
+    return snapped(np.column_stack([x, np.cross(axis, x), axis]))
+
+
+def about(inertia: Array, mass: float, offset: Array) -> Array:
+    """Inertia about a point `offset` away from the centre of mass (parallel axes)."""
+    return inertia + mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
+
+
+def total(terms: Sequence[Node]) -> Node:
+    """The sum of nodes, 0 for none."""
+    result = ZERO
+    for term in terms:
+        result = result + term
+    return result
+
+
+def dot(a: Triple, b: Triple) -> Node:
+    """Scalar product."""
+    return total([x * y for x, y in zip(a, b, strict=True)])
+
+
+def cross(a: Triple, b: Triple) -> Triple:
+    """Vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def plus(a: Triple, b: Triple) -> Triple:
+    """Sum."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def constant(vector: Array) -> Triple:
+    """A constant vector as nodes."""
+    x, y, z = (cg.constant(float(each)) for each in vector)
+    return x, y, z
+
+
+def turned(matrix: Array, vector: Triple) -> Triple:
+    """matrix^T vector: what a parent's vector is in a child's axes, the columns of `matrix`."""
+    x, y, z = (total([float(matrix[i, j]) * vector[i] for i in range(3)]) for j in range(3))
+    return x, y, z
+
+
+def turned_about_z(c: Node, s: Node, vector: Triple) -> Triple:
+    """The vector in axes turned about z by the angle with cosine c and sine s."""
+    x, y, z = vector
+    return c * x + s * y, c * y - s * x, z
