@@ -162,9 +162,7 @@ def _energy(motion: _Motion, body: Body, q: Node, qd: Node, pull: float) -> Node
     omega, v = motion.omega, motion.velocity
     with cg.tag("kinetic"):
         terms = [0.5 * body.mass * spatial.dot(v, v)]
-        terms.append(
-            spatial.dot(spatial.cross(v, omega), moment)
-        )  # this order of the triple product costs fewest nodes
+        terms.append(spatial.dot(spatial.cross(v, omega), moment))  # of the orders, the one with fewest nodes
         terms.append(0.5 * spatial.total([float(inertia[i, i]) * (omega[i] * omega[i]) for i in range(3)]))
         terms += [float(inertia[i, j]) * (omega[i] * omega[j]) for i in range(3) for j in range(i)]
         terms.append(0.5 * body.joint.armature * (qd * qd))
