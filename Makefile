@@ -31,6 +31,7 @@ docs: $(INSTALLED)docs,viz,mujoco  ## the documentation, into docs/_build/html
 	$(BIN)/sphinx-build --fail-on-warning --keep-going -q docs docs/_build/html
 
 bench: $(INSTALLED)bench  ## the comparisons with other software
+	$(BIN)/cgraph bench
 	@for script in tests/benchmarks/*.py; do echo "== $$script"; $(BIN)/python "$$script" || exit 1; done
 	$(BIN)/python -m pytest tests/dynamics/test_pinocchio.py -q
 

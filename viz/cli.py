@@ -7,9 +7,11 @@ import json
 import os
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 from dynamics import FORMULATIONS, forward_dynamics, inverse_dynamics, scenes, spurious
+from dynamics.reports.bench import MODELS, bench
 
 from .dot import to_dot
 from .files import write
@@ -45,6 +47,13 @@ def _parser() -> argparse.ArgumentParser:
     paper.add_argument("--json", action="store_true", help="print the figures as JSON on standard output")
     paper.set_defaults(run=_paper)
 
+    timed = commands.add_parser(
+        "bench", help="forward dynamics, ours beside what is installed: MuJoCo, Pinocchio, CasADi"
+    )
+    timed.add_argument("models", nargs="*", help=f"among {', '.join(MODELS)} (default: all)")
+    timed.add_argument("--json", action="store_true", help="print as JSON")
+    timed.set_defaults(run=_bench)
+
     listed = commands.add_parser("scenes", help="the scenes, with the size of their graphs")
     listed.add_argument("--json", action="store_true", help="print as JSON")
     listed.set_defaults(run=_scenes)
@@ -66,6 +75,28 @@ def _paper(options: argparse.Namespace) -> None:
     data = write_paper(options.out, lambda line: print(line, file=sys.stderr, flush=True))
     if options.json:
         print(json.dumps(data, indent=1))
+
+
+def _bench(options: argparse.Namespace) -> None:
+    if unknown := [name for name in options.models if name not in MODELS]:
+        raise ValueError(f"there is no bench model {unknown[0]!r}; the models are {', '.join(MODELS)}")
+    rows = []
+    for name in options.models or MODELS:
+        print(f"{name} ...", file=sys.stderr, flush=True)
+        rows.append(bench(name))
+    if options.json:
+        print(json.dumps([asdict(row) for row in rows], indent=1))
+        return
+    print("Forward dynamics, one core. Times are medians of alternating repetitions; in brackets, times ours.")
+    for row in rows:
+        print(
+            f"{row.model:10} {row.nodes:6} nodes   build {row.build:.3f} s   compile {row.compile:.3f} s ({row.backend})\n"
+            f"{'':10} ours {row.ours:8.2f} us a call, {row.batch:.3f} us a state in batches"
+        )
+        for peer, micros in row.peers.items():
+            print(
+                f"{'':10} {peer:10} {micros:8.2f} us a call [{micros / row.ours:.2f}], differs {row.difference[peer]:.0e}"
+            )
 
 
 def _scenes(options: argparse.Namespace) -> None:

@@ -67,7 +67,7 @@ def test_wrong_usage_gets_the_usage_and_exit_status_2(arguments):
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("command", [[], ["paper"], ["scenes"], ["draw"]])
+@pytest.mark.parametrize("command", [[], ["paper"], ["bench"], ["scenes"], ["draw"]])
 def test_every_command_has_help(command):
     done = run(*command, "--help")
     assert done.returncode == 0
@@ -81,6 +81,17 @@ def test_ctrl_c_gives_one_line_and_exit_status_130(monkeypatch, capsys):
     monkeypatch.setattr(cli, "_scenes", interrupt)
     assert cli.main(["scenes"]) == 130
     assert capsys.readouterr().err == "cgraph: interrupted\n"
+
+
+def test_the_bench_sets_ours_beside_mujoco_and_they_agree(capsys):
+    assert cli.main(["bench", "planar 3", "arm 7", "--json"]) == 0
+    rows = {row["model"]: row for row in json.loads(capsys.readouterr().out)}
+    assert rows["planar 3"]["nodes"] == 230
+    for row in rows.values():
+        assert row["ours"] > 0
+        assert row["difference"]["MuJoCo"] < 1e-12
+    assert cli.main(["bench", "planar 4"]) == 1
+    assert "there is no bench model 'planar 4'" in capsys.readouterr().err
 
 
 def test_scenes_loads_no_optional_package():
