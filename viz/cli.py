@@ -89,14 +89,11 @@ def _bench(options: argparse.Namespace) -> None:
         return
     print("Forward dynamics, one core. Times are medians of alternating repetitions; in brackets, times ours.")
     for row in rows:
-        print(
-            f"{row.model:10} {row.nodes:6} nodes   build {row.build:.3f} s   compile {row.compile:.3f} s ({row.backend})\n"
-            f"{'':10} ours {row.ours:8.2f} us a call, {row.batch:.3f} us a state in batches"
-        )
+        print(f"{row.model:10} {row.nodes} nodes, build {row.build:.3f} s, compile {row.compile:.3f} s ({row.backend})")
+        print(f"{'':10} {'ours':10} {row.ours:8.2f} us a call, {row.batch:.3f} us a state in batches")
         for peer, micros in row.peers.items():
-            print(
-                f"{'':10} {peer:10} {micros:8.2f} us a call [{micros / row.ours:.2f}], differs {row.difference[peer]:.0e}"
-            )
+            ratio, difference = micros / row.ours, row.difference[peer]
+            print(f"{'':10} {peer:10} {micros:8.2f} us a call [{ratio:.2f}], differs by {difference:.0e}")
 
 
 def _scenes(options: argparse.Namespace) -> None:
