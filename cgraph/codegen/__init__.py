@@ -1,5 +1,6 @@
-"""Compilation: graphs to generated source that runs without walking nodes."""
+"""Compilation: graphs to generated source or machine code that runs without walking nodes."""
 
-from .compiled import Compiled, compile
+from .compile import compile
+from .compiled import Compiled
 
 __all__ = ["Compiled", "compile"]

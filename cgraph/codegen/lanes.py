@@ -1,0 +1,218 @@
+"""Vector functions as LLVM text: sine, cosine, exp and log by polynomials, every other function of libm lane by lane.
+
+Each polynomial serves where its range reduction is exact enough, with an error below 2 ulp. A vector with one lane
+outside (too large, NaN, infinite, for a logarithm not positive) goes to libm lane by lane.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Mapping, Sequence
+
+MAGIC = 6755399441055744.0  # 1.5 * 2**52: added to a small number, it leaves the nearest integer in the low bits
+LARGEST_ANGLE = 1e6
+
+# Polynomials and splittings of constants: fdlibm (k_sin.c, k_cos.c, e_rem_pio2.c, e_log.c; Sun Microsystems, 1993).
+SIN: tuple[float, ...] = (-1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04)
+SIN += (2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10)
+COS: tuple[float, ...] = (4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05)
+COS += (-2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11)
+LOG: tuple[float, ...] = (
+    6.666666666666735130e-01,
+    3.999999999940941908e-01,
+    2.857142874366239149e-01,
+    2.222219843214978396e-01,
+)
+LOG += (1.818357216161805012e-01, 1.531383769920937332e-01, 1.479819860511658591e-01)
+HALF_PI = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)  # 33 bits, 33 bits, rest
+LN2 = (6.93147180369123816490e-01, 1.90821492927058770002e-10)
+# exp(r) = 1 + r + r**2 * (1/2! + r/3! + ... + r**11/13!), with |r| <= ln(2) / 2
+EXP = tuple(1.0 / f for f in (2, 6, 24, 120, 720, 5040, 40320, 362880, 3628800, 39916800, 479001600, 6227020800))
+
+
+class Lines:
+    """Instructions on vectors, one named value after another. An argument is a value's name or a number for all lanes.
+
+    lanes: doubles in a vector.  flags: of the polynomials' own arithmetic; `exact` instructions have none.
+    """
+
+    def __init__(self, lanes: int, flags: str) -> None:
+        self.text: list[str] = []
+        self.d, self.i, self.b = (f"<{lanes} x {each}>" for each in ("double", "i64", "i1"))
+        self.lanes, self.flags, self._count = lanes, f"{flags} " if flags else "", 0
+
+    def add(self, instruction: str) -> str:
+        """One more value, and its name."""
+        self._count += 1
+        self.text.append(f"  %t{self._count} = {instruction}")
+        return f"%t{self._count}"
+
+    def f(self, op: str, a: str | float, b: str | float, exact: bool = False) -> str:
+        """Arithmetic on doubles."""
+        return self.add(f"{op} {'' if exact else self.flags}{self.d} {number(a)}, {number(b)}")
+
+    def n(self, op: str, a: str, b: int) -> str:
+        """Arithmetic on integers, with a constant."""
+        return self.add(f"{op} {self.i} {a}, splat (i64 {b})")
+
+    def bits(self, a: str) -> str:
+        """The bits of doubles."""
+        return self.add(f"bitcast {self.d} {a} to {self.i}")
+
+    def double(self, a: str) -> str:
+        """The doubles of these bits."""
+        return self.add(f"bitcast {self.i} {a} to {self.d}")
+
+    def polynomial(self, x: str, coefficients: Sequence[float]) -> str:
+        """c0 + c1 x + c2 x**2 + ..., by Horner's rule."""
+        value: str | float = coefficients[-1]
+        for c in coefficients[-2::-1]:
+            value = self.f("fadd", self.f("fmul", value, x), c)
+        assert isinstance(value, str)
+        return value
+
+    def all_between(self, x: str, low: float, high: float) -> str:
+        """Whether every lane lies in [low, high]; a NaN does not."""
+        above = self.add(f"fcmp oge {self.d} {x}, {number(low)}")
+        below = self.add(f"fcmp ole {self.d} {x}, {number(high)}")
+        both = self.add(f"and {self.b} {above}, {below}")
+        return self.add(f"call i1 @llvm.vector.reduce.and.v{self.lanes}i1({self.b} {both})")
+
+
+def helpers(functions: Mapping[str, int], lanes: int, flags: str) -> list[str]:
+    """Definitions of `lanes.name` for each function of libm that is named, with its number of arguments."""
+    text: list[str] = []
+    for name, arity in functions.items():
+        text += _lane_by_lane(name, arity, lanes)
+    trigonometric = {"sin", "cos"} & set(functions)
+    wanted = [[name] for name in sorted(trigonometric)] + ([["sin", "cos"]] if len(trigonometric) == 2 else [])
+    for names in wanted:
+        text += _guarded(names, lanes, flags, (-LARGEST_ANGLE, LARGEST_ANGLE))
+    if "exp" in functions:
+        text += _guarded(["exp"], lanes, flags, (-708.0, 709.0))
+    if "log" in functions:
+        text += _guarded(["log"], lanes, flags, (2.0**-1022, 1.7976931348623157e308))
+    return text
+
+
+POLYNOMIAL = ("sin", "cos", "exp", "log")
+
+
+def _lane_by_lane(name: str, arity: int, lanes: int) -> list[str]:
+    """The function of libm, called for each lane."""
+    vector = f"<{lanes} x double>"
+    inner = f"each.{name}" if name in POLYNOMIAL else f"lanes.{name}"
+    text = [
+        f"define internal {vector} @{inner}({', '.join(f'{vector} %a{k}' for k in range(arity))}) nounwind noinline {{"
+    ]
+    result = "poison"
+    for lane in range(lanes):
+        text += [f"  %a{k}.{lane} = extractelement {vector} %a{k}, i32 {lane}" for k in range(arity)]
+        args = ", ".join(f"double %a{k}.{lane}" for k in range(arity))
+        text.append(f"  %y{lane} = call double @{name}({args})")
+        text.append(f"  %r{lane} = insertelement {vector} {result}, double %y{lane}, i32 {lane}")
+        result = f"%r{lane}"
+    return [*text, f"  ret {vector} {result}", "}"]
+
+
+def _guarded(names: Sequence[str], lanes: int, flags: str, interval: tuple[float, float]) -> list[str]:
+    """The polynomial where all lanes lie in the interval, else libm. Two names give both results."""
+    to = Lines(lanes, flags)
+    inside = to.all_between("%x", *interval)
+    to.text += [f"  br i1 {inside}, label %fast, label %slow", "fast:"]
+    if names[0] in ("sin", "cos"):
+        results = _sine_cosine(to, "%x", names)
+    else:
+        results = [(_exp if names[0] == "exp" else _log)(to, "%x")]
+    to.text += _returned(to.d, results, "fast")
+    to.text.append("slow:")
+    to.text += _returned(to.d, [to.add(f"call {to.d} @each.{name}({to.d} %x)") for name in names], "slow")
+    kind = to.d if len(names) == 1 else f"{{{to.d}, {to.d}}}"
+    return [f"define internal {kind} @lanes.{''.join(names)}({to.d} %x) nounwind noinline {{", *to.text, "}"]
+
+
+def _returned(vector: str, results: Sequence[str], where: str) -> list[str]:
+    if len(results) == 1:
+        return [f"  ret {vector} {results[0]}"]
+    pair = f"{{{vector}, {vector}}}"
+    return [
+        f"  %{where}.1 = insertvalue {pair} poison, {vector} {results[0]}, 0",
+        f"  %{where}.2 = insertvalue {pair} %{where}.1, {vector} {results[1]}, 1",
+        f"  ret {pair} %{where}.2",
+    ]
+
+
+def _sine_cosine(to: Lines, x: str, names: Iterable[str]) -> list[str]:
+    """For |x| <= 1e6: x = k pi/2 + r. The products of k (20 bits) with the first two parts of pi/2 are exact."""
+    shifted = to.f("fadd", to.f("fmul", x, 0.63661977236758134308, exact=True), MAGIC, exact=True)
+    k = to.f("fsub", shifted, MAGIC, exact=True)
+    quadrant = to.bits(shifted)
+    first = to.f("fsub", x, to.f("fmul", k, HALF_PI[0], exact=True), exact=True)
+    taken = to.f("fmul", k, HALF_PI[1], exact=True)
+    second = to.f("fsub", first, taken, exact=True)
+    lost = to.f("fsub", to.f("fsub", first, second, exact=True), taken, exact=True)
+    rest = to.f("fsub", lost, to.f("fmul", k, HALF_PI[2], exact=True), exact=True)
+    r = to.f("fadd", second, rest, exact=True)
+    z = to.f("fmul", r, r, exact=True)
+
+    sine = to.f("fadd", to.f("fmul", to.f("fmul", r, z), to.polynomial(z, SIN)), r)
+    half = to.f("fmul", z, 0.5, exact=True)
+    most = to.f("fsub", 1.0, half, exact=True)
+    missing = to.f("fsub", to.f("fsub", 1.0, most, exact=True), half, exact=True)
+    tail = to.f("fadd", to.f("fmul", to.f("fmul", z, z), to.polynomial(z, COS)), missing)
+    cosine = to.f("fadd", most, tail, exact=True)
+
+    odd = to.add(f"trunc {to.i} {quadrant} to {to.b}")
+    results = []
+    for name in names:
+        one, other = (sine, cosine) if name == "sin" else (cosine, sine)
+        value = to.add(f"select {to.b} {odd}, {to.d} {other}, {to.d} {one}")
+        turns = quadrant if name == "sin" else to.n("add", quadrant, 1)
+        sign = to.n("and", to.n("shl", turns, 62), -(2**63))
+        value = to.double(to.add(f"xor {to.i} {to.bits(value)}, {sign}"))
+        if name == "sin":  # of -0.0 it is -0.0
+            zero = to.add(f"fcmp oeq {to.d} {x}, {number(0.0)}")
+            value = to.add(f"select {to.b} {zero}, {to.d} {x}, {to.d} {value}")
+        results.append(value)
+    return results
+
+
+def _exp(to: Lines, x: str) -> str:
+    """For -708 <= x <= 709: x = k ln 2 + r."""
+    shifted = to.f("fadd", to.f("fmul", x, 1.44269504088896338700, exact=True), MAGIC, exact=True)
+    k = to.f("fsub", shifted, MAGIC, exact=True)
+    high = to.f("fsub", x, to.f("fmul", k, LN2[0], exact=True), exact=True)
+    low = to.f("fmul", k, LN2[1], exact=True)
+    r = to.f("fsub", high, low, exact=True)
+    lost = to.f("fsub", to.f("fsub", high, r, exact=True), low, exact=True)
+    more = to.f("fadd", to.f("fmul", to.f("fmul", r, r), to.polynomial(r, EXP)), lost)
+    value = to.f("fadd", to.f("fadd", more, r, exact=True), 1.0, exact=True)
+    half = to.n("ashr", to.n("shl", to.bits(shifted), 32), 33)  # k / 2, rounded down; twice, as 2**1024 is no double
+    whole = to.n("ashr", to.n("shl", to.bits(shifted), 32), 32)
+    for power in (half, to.add(f"sub {to.i} {whole}, {half}")):
+        value = to.f("fmul", value, to.double(to.n("shl", to.n("add", power, 1023), 52)), exact=True)
+    return value
+
+
+def _log(to: Lines, x: str) -> str:
+    """For positive normal numbers: x = 2**k (1 + f), sqrt(1/2) <= 1 + f < sqrt(2), and s = f / (2 + f)."""
+    bits = to.bits(x)
+    root_half = 0x3FE6A09E667F3BCD
+    exponent = to.n("ashr", to.n("sub", bits, root_half), 52)
+    one_plus = to.double(to.add(f"sub {to.i} {bits}, {to.n('shl', exponent, 52)}"))
+    k = to.f("fsub", to.double(to.n("add", exponent, 0x4338000000000000)), MAGIC, exact=True)
+    f = to.f("fsub", one_plus, 1.0, exact=True)
+    s = to.f("fdiv", f, to.f("fadd", f, 2.0, exact=True), exact=True)
+    z = to.f("fmul", s, s)
+    remainder = to.f("fmul", to.polynomial(z, LOG), z)
+    half = to.f("fmul", to.f("fmul", f, 0.5, exact=True), f, exact=True)
+    small = to.f("fadd", to.f("fmul", s, to.f("fadd", half, remainder)), to.f("fmul", k, LN2[1]))
+    inner = to.f("fsub", to.f("fsub", half, small), f)
+    return to.f("fsub", to.f("fmul", k, LN2[0], exact=True), inner, exact=True)
+
+
+def number(value: str | float) -> str:
+    """A value's name as it is; a number as the constant of all lanes, to the last bit."""
+    if isinstance(value, str):
+        return value
+    return f"splat (double 0x{struct.unpack('>Q', struct.pack('>d', value))[0]:016X})"

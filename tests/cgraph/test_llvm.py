@@ -1,0 +1,306 @@
+"""Machine code: every operation to the last bit, the polynomials of batches in ulp, threads, pickles."""
+
+import itertools
+import math
+import pickle
+import random
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+
+import cgraph as cg
+from cgraph.node import OPS, apply
+from tests.strategies import DOMAINS, cases
+
+pytest.importorskip("llvmlite")
+
+POLYNOMIAL_ULPS = 2.0  # what the polynomials promise
+BATCH_ULPS = 4.0  # of a batch against one point at a time
+HYPOT_ULPS = 1.0  # Python has a hypot of its own, of another last bit in rare cases
+SPECIAL = (0.0, -0.0, 1.0, -1.0, 0.5, 2.0, -3.0, 5e-324, -2.5e-310, 1e300, -1e300, 800.0, math.inf, -math.inf, math.nan)
+NAMES = ("a", "b", "c")
+LANES = 8  # at most
+
+
+def graph_of(op):
+    inputs = cg.variables(NAMES[: op.arity])
+    return cg.Graph(inputs, {"y": apply(op, *inputs)})
+
+
+def chain():
+    """A graph with several outputs, one of them an input and one a constant, and an input that is not used."""
+    x, y, z = cg.variables("x y z")
+    u = cg.sin(x) * cg.cos(x) + cg.exp(y) + 4.0  # no cancellation, so that ulps can be counted
+    return cg.Graph(
+        [x, z, y], {"u": u, "v": cg.sqrt(u * u + 1.0) + y * y * u, "x": x, "c": cg.constant(2.5), "again": u}
+    )
+
+
+def evaluated(graph, point):
+    values = graph.evaluate(dict(zip(graph.input_names, map(float, point), strict=True)))
+    return np.array([float(value) for value in values.values()])
+
+
+def same(found, expected):
+    """Equal to the last bit and in the sign of a zero; any NaN equals another."""
+    found, expected = np.asarray(found), np.asarray(expected)
+    nan = np.isnan(expected)
+    return np.array_equal(np.isnan(found), nan) and np.array_equal(
+        found[~nan].view(np.int64), expected[~nan].view(np.int64)
+    )
+
+
+def ulps_apart(found, expected):
+    """The largest distance in units of the last place; infinite where the kinds differ."""
+    found, expected = np.asarray(found, float).ravel(), np.asarray(expected, float).ravel()
+    equal = (found == expected) | (np.isnan(found) & np.isnan(expected))
+    with np.errstate(all="ignore"):
+        distance = np.where(equal, 0.0, np.abs(found - expected) / np.spacing(np.abs(expected)))
+    return np.max(np.where(np.isnan(distance), np.inf, distance), initial=0.0)
+
+
+def points_of(op):
+    """Samples, points of the domain, and every combination of IEEE specials."""
+    source = random.Random(op.name)
+    drawn = [tuple(source.uniform(*interval) for interval in DOMAINS[op.name]) for _ in range(200)]
+    return [*op.samples, *drawn, *itertools.product(SPECIAL, repeat=op.arity)]
+
+
+@pytest.mark.parametrize("op", [pytest.param(op, id=op.name) for op in OPS.values()])
+@pytest.mark.parametrize("fma", [False, True])
+def test_an_operation_is_that_of_evaluate_to_the_last_bit(op, fma):
+    graph = graph_of(op)
+    function = cg.compile(graph, "llvm", fma=fma)
+    points = points_of(op)
+    found = np.concatenate([function(point) for point in points])
+    expected = np.concatenate([evaluated(graph, point) for point in points])
+    if op.name == "hypot":
+        assert ulps_apart(found, expected) <= HYPOT_ULPS
+    else:
+        assert same(found, expected)
+
+
+@pytest.mark.parametrize("op", [pytest.param(op, id=op.name) for op in OPS.values()])
+def test_an_operation_on_vectors_is_that_on_floats(op):
+    function = cg.compile(graph_of(op), "llvm")
+    points = points_of(op)
+    expected = np.array([function(point) for point in points]).T
+    one_special_each = np.array(points).T
+    assert ulps_apart(function.batch(one_special_each), expected) <= BATCH_ULPS
+    signs = np.signbit(function.batch(one_special_each)) == np.signbit(expected)
+    assert np.all(signs | np.isnan(expected))
+
+
+@given(case=cases())
+@settings(max_examples=60, deadline=None)
+def test_a_random_graph_agrees_with_evaluate_to_the_last_bit(case):
+    graph, values = case
+    assume(all(node.op.name != "hypot" for node in graph.nodes))  # see HYPOT_ULPS
+    function = cg.compile(graph, "llvm", fma=False)
+    point = [values[name] for name in graph.input_names]
+    assert same(function(point), evaluated(graph, point))
+    assert same(function.values(point), evaluated(graph, point))
+
+
+@given(case=cases(max_operations=8))
+@settings(max_examples=30, deadline=None)
+def test_a_random_graph_in_a_batch_agrees_in_every_lane_with_every_other(case):
+    graph, values = case
+    function = cg.compile(graph, "llvm")
+    columns = function.batch(np.repeat([[values[name]] for name in graph.input_names], 11, axis=1))
+    assert all(same(columns[:, k], columns[:, 0]) for k in range(11))
+
+
+def trigonometric_points():
+    source = np.random.default_rng(0)
+    spread = np.geomspace(1e-310, 1e6, 1500)
+    uniform = source.uniform(-1e6, 1e6, 3000)
+    small = source.uniform(-10.0, 10.0, 2000)
+    near = np.arange(1.0, 636000.0, 331.0) * (math.pi / 2)  # where the reduction cancels
+    worst = 6381956970095103.0 * 2.0 ** -np.arange(33.0, 60.0)  # digits of a famous neighbour of a multiple of pi/2
+    return np.concatenate([spread, -spread, uniform, small, near, -near, worst, np.pi / 2 * np.arange(-40.0, 41.0)])
+
+
+def error_in_ulps(found, name, points):
+    """Against mpmath at 60 digits."""
+    worst = 0.0
+    with mpmath.workdps(60):
+        exact = getattr(mpmath, name)
+        for value, x in zip(found.tolist(), points.tolist(), strict=True):
+            true = exact(mpmath.mpf(x))
+            worst = max(worst, float(abs(mpmath.mpf(value) - true)) / float(np.spacing(abs(float(true)))))
+    return worst
+
+
+POLYNOMIAL_POINTS = {
+    "sin": trigonometric_points,
+    "cos": trigonometric_points,
+    "exp": lambda: np.concatenate(
+        [np.random.default_rng(1).uniform(-708, 709, 3000), np.linspace(-2, 2, 1001), np.geomspace(1e-300, 1, 400)]
+    ),
+    "log": lambda: np.concatenate(
+        [np.geomspace(2.3e-308, 1.7e308, 3000), np.linspace(0.4, 2.5, 3001), 1.0 + np.geomspace(1e-15, 1e-2, 400)]
+    ),
+}
+
+
+@pytest.mark.parametrize("name", POLYNOMIAL_POINTS)
+@pytest.mark.parametrize("options", [{}, {"fma": False}, {"fast": True}], ids=str)
+def test_a_polynomial_keeps_its_promise(name, options):
+    points = POLYNOMIAL_POINTS[name]()
+    found = cg.compile(graph_of(OPS[name]), "llvm", **options).batch(points[None])[0]
+    assert error_in_ulps(found, name, points) <= POLYNOMIAL_ULPS
+
+
+def test_sine_and_cosine_of_one_angle_share_their_reduction():
+    x = cg.variable("x")
+    function = cg.compile(cg.Graph([x], {"s": cg.sin(x), "c": cg.cos(x)}), "llvm")
+    points = trigonometric_points()
+    alone = [cg.compile(graph_of(OPS[name]), "llvm").batch(points[None])[0] for name in ("sin", "cos")]
+    assert same(function.batch(points[None]), np.array(alone))
+
+
+@pytest.mark.parametrize("name", ["sin", "cos", "exp", "log"])
+@pytest.mark.parametrize("special", [1e6, np.nextafter(1e6, 2e6), -1e22, 1.7e308, *SPECIAL])
+@pytest.mark.parametrize("lane", [0, 5])
+def test_a_special_number_in_any_lane(name, special, lane):
+    points = np.linspace(0.1, 0.9, 2 * LANES)
+    points[lane] = special
+    graph = graph_of(OPS[name])
+    found = cg.compile(graph, "llvm").batch(points[None])[0]
+    expected = [evaluated(graph, [x])[0] for x in points]
+    assert ulps_apart(found, expected) <= POLYNOMIAL_ULPS
+    assert np.isnan(found[lane]) or math.copysign(1, found[lane]) == math.copysign(1, expected[lane])
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 7, 8, 9, 31, 100])
+def test_a_batch_of_any_size(count):
+    function = cg.compile(chain(), "llvm")
+    points = np.random.default_rng(count).uniform(-2, 2, (3, count))
+    found = function.batch(points)
+    assert found.shape == (5, count)
+    assert found.dtype == np.float64
+    for k in range(count):
+        assert ulps_apart(found[:, k], function(points[:, k])) <= BATCH_ULPS
+
+
+@pytest.mark.parametrize(
+    "view",
+    [
+        lambda X: X.T.copy().T,
+        lambda X: X[:, ::2],
+        lambda X: X[:, ::-1],
+        lambda X: X.astype(np.float32),
+        np.ndarray.tolist,
+    ],
+)
+def test_a_batch_that_is_not_contiguous_or_not_of_doubles(view):
+    function = cg.compile(chain(), "llvm")
+    points = view(np.random.default_rng(3).uniform(-2, 2, (3, 21)))
+    assert same(function.batch(points), function.batch(np.array(points, dtype=float, order="C")))
+
+
+def test_inputs_are_left_alone_and_results_are_fresh():
+    function = cg.compile(chain(), "llvm")
+    x = np.array([0.3, 0.1, -0.2])
+    first, kept = function(x), x.copy()
+    again = first.copy()
+    function(x + 1.0)
+    function.batch(np.ones((3, 5)))
+    assert same(x, kept)
+    assert same(first, again)
+    assert function([0, 0, 0]).shape == (5,)
+
+
+def test_a_graph_of_constants_has_no_inputs():
+    function = cg.compile(cg.Graph([], {"c": cg.constant(1.5), "s": apply(OPS["sin"], 1.0)}), "llvm")
+    assert same(function([]), [1.5, math.sin(1.0)])
+    assert function.values([]) == pytest.approx((1.5, math.sin(1.0)), rel=0)
+    assert function.batch(np.empty((0, 3))).shape == (2, 3)
+
+
+def test_a_graph_of_several_blocks():
+    x = node = cg.variable("x")
+    for k in range(2000):
+        node = node * 0.9995 + cg.sin(x) if k % 50 == 0 else node * 0.9995 + 0.01
+    graph = cg.Graph([x], {"y": node})
+    assert same(cg.compile(graph, "llvm", fma=False)([0.7]), evaluated(graph, [0.7]))
+    function = cg.compile(graph, "llvm")
+    assert abs(function.batch([[0.7] * 9])[0, 4] / function([0.7])[0] - 1) < 1e-12  # 2000 roundings
+
+
+def test_fast_arithmetic_keeps_infinities_and_nan():
+    x, y = cg.variables("x y")
+    graph = cg.Graph([x, y], {"w": cg.where(x < 0.0, 0.0, cg.log(x)), "s": apply(OPS["strong_mul"], x, y), "t": x * y})
+    function = cg.compile(graph, "llvm", fast=True)
+    for point in ([0.0, math.inf], [-1.0, math.nan], [2.0, math.inf]):
+        assert np.array_equal(function(point), evaluated(graph, point), equal_nan=True)
+        assert np.array_equal(function.batch(np.array([point] * 9).T)[:, 8], evaluated(graph, point), equal_nan=True)
+
+
+def test_threads_may_call_one_function_at_once():
+    function = cg.compile(chain(), "llvm")
+    points = np.random.default_rng(4).uniform(-1, 1, (400, 3))
+    expected, batch = [function(x) for x in points], cg.compile(chain(), "llvm").batch(points.T)
+
+    def task(seed):
+        order = np.random.default_rng(seed).permutation(400)
+        single = all(same(function(points[k]), expected[k]) for k in order)
+        listed = all(same(function.values(points[k].tolist()), expected[k]) for k in order)
+        return single and listed and same(function.batch(points.T), batch)
+
+    with ThreadPoolExecutor(8) as pool:
+        assert all(pool.map(task, range(16)))
+
+
+@pytest.mark.parametrize("options", [{}, {"fma": False}, {"fast": True}], ids=str)
+def test_a_pickle_is_rebuilt_with_its_options(options):
+    function = cg.compile(chain(), "llvm", **options)
+    restored = pickle.loads(pickle.dumps(function))
+    assert restored.source == function.source
+    assert restored.backend == "llvm"
+    assert same(restored([0.1, 0.2, 0.3]), function([0.1, 0.2, 0.3]))
+
+
+def test_the_source_is_the_text_of_llvm():
+    function = cg.compile(chain(), "llvm")
+    assert "define void @point" in function.source
+    assert "contract" in function.source
+    assert "contract" not in cg.compile(chain(), "llvm", fma=False).source
+    assert "define void @batch" in function.batch_source()
+    assert repr(function).startswith("<compiled <Graph (x, z, y)")
+
+
+@pytest.mark.parametrize("x", [[], [1.0], [1.0] * 4, [[1.0] * 3], 1.0])
+def test_a_point_of_another_shape_is_an_error(x):
+    with pytest.raises(cg.GraphError, match=r"x must have shape \(3,\)"):
+        cg.compile(chain(), "llvm")(x)
+
+
+@pytest.mark.parametrize("X", [[1.0] * 3, np.ones((2, 3)), np.ones((3, 1, 1))])
+def test_a_batch_of_another_shape_is_an_error(X):
+    with pytest.raises(cg.GraphError, match=r"X must have shape \(3, N\)"):
+        cg.compile(chain(), "llvm").batch(X)
+
+
+def test_auto_is_machine_code():
+    assert cg.compile(chain()).source == cg.compile(chain(), "llvm").source
+
+
+def test_without_llvmlite_auto_is_generated_python(monkeypatch):
+    monkeypatch.setitem(sys.modules, "llvmlite", None)
+    function = cg.compile(chain())
+    assert function.source == cg.compile(chain(), "python").source
+    assert same(function([0.1, 0.2, 0.3]), evaluated(chain(), [0.1, 0.2, 0.3]))
+    assert function.batch(np.ones((3, 4))).shape == (5, 4)
+    with pytest.raises(ImportError, match=r"pip install 'cgraph\[native\]'"):
+        cg.compile(chain(), "llvm")
+
+
+def test_an_unknown_backend_is_an_error():
+    with pytest.raises(ValueError, match="auto, python, numpy, llvm"):
+        cg.compile(chain(), "fortran")
