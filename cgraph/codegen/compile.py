@@ -15,14 +15,15 @@ def compile(graph: Graph, backend: str = "auto", *, fast: bool = False, fma: boo
     """The graph as a function: `fn(x)` at one point, `fn.batch(X)` at many, `fn.source` to read.
 
     backend: "llvm", machine code (`pip install 'cgraph[native]'`); "python", generated Python over floats; "numpy",
-    generated NumPy over arrays; "auto", machine code where llvmlite is installed and the graph has at most 100 000 nodes, else generated Python for `fn(x)` and
-    generated NumPy for `fn.batch(X)`. All agree with `graph.evaluate`, on floats and on arrays respectively.
+    generated NumPy over arrays; "auto", machine code where llvmlite is installed and the graph has at most 100 000
+    nodes, else generated Python for `fn(x)` and generated NumPy for `fn.batch(X)`. All agree with `graph.evaluate`, on
+    floats and on arrays respectively.
     fma: machine code may round a product and the sum it goes into once instead of twice; without, `fn(x)` agrees with
     `graph.evaluate` to the last bit (`hypot` to one unit of it: Python has its own, machine code the C library's).
     fast: it may also re-associate sums and products, multiply by reciprocals and mistake the sign of a zero; NaN and
     infinities keep their meaning. Both are for machine code alone.
 
-    Raises ValueError for an unknown backend, ImportError for "llvm" without llvmlite.
+    Raises TypeError for what is no Graph, ValueError for an unknown backend, ImportError for "llvm" without llvmlite.
     """
     if backend not in BACKENDS:
         raise ValueError(f"backend must be one of {', '.join(BACKENDS)}, got {backend!r}")

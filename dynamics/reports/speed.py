@@ -47,7 +47,7 @@ def table1(evaluations: int = 1000, seed: int = 0) -> list[Row]:
     graphs = {name: inverse_dynamics(scene, name) for name in PAPER_MS}
     runs: dict[str, dict[str, Callable[[np.ndarray], object]]] = {
         "interpreted": {name: _interpreted(graph) for name, graph in graphs.items()},
-        "compiled": {name: cg.compile(graph) for name, graph in graphs.items()},
+        "compiled": {name: cg.compile(graph, "python") for name, graph in graphs.items()},
     }
     if eager := eager_evaluations(scene.system, PAPER_MS):
         runs["PyTorch eager"] = eager
