@@ -13,10 +13,12 @@ from .equations import (
 from .formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious
 from .mechanism import Body, Joint, Mechanism, MechanismError, serial_arm
 from .mjcf import to_mjcf
+from .mujoco_load import load_mjcf, load_urdf
 from .planar_arm import Link, PlanarArm, planar_arm
 from .scenes import Scene
 from .simulate import Stats, Trajectory, simulate
 from .system import System, as_system
+from .urdf import to_urdf
 
 __all__ = [
     "FORMULATIONS",
@@ -37,6 +39,8 @@ __all__ = [
     "forward_dynamics",
     "gravity_force",
     "inverse_dynamics",
+    "load_mjcf",
+    "load_urdf",
     "mass_matrix",
     "momentum",
     "momentum_rate",
@@ -46,4 +50,5 @@ __all__ = [
     "simulate",
     "spurious",
     "to_mjcf",
+    "to_urdf",
 ]

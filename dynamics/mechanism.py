@@ -243,15 +243,15 @@ def _parents_first(bodies: Sequence[Body]) -> list[Body]:
     placed = {WORLD}
     order: list[Body] = []
     for body in bodies:
-        path = []
+        path: dict[str, Body] = {}
         at = body
         while at.name not in placed:
-            path.append(at)
+            path[at.name] = at
             placed.add(at.name)
-            if at.parent in {each.name for each in path}:
+            if at.parent in path:
                 raise MechanismError(f"body {at.name!r} is its own ancestor, by way of {at.parent!r}")
             at = by_name[at.parent] if at.parent != WORLD else at
-        order.extend(reversed(path))
+        order.extend(reversed(path.values()))
     return order
 
 
@@ -269,7 +269,7 @@ def _welded(bodies: Sequence[Body]) -> list[Body]:
             carrier[body.name] = (body.name, np.zeros(3), np.eye(3))
             continue
         carrier[body.name] = (name, position, orientation)
-        if name != WORLD and body.mass:
+        if name != WORLD and (body.mass or np.any(body.inertia)):
             center = position + orientation @ np.asarray(body.center)
             inertia = orientation @ np.asarray(body.inertia) @ orientation.T
             merged[name] = _joined(merged[name], body.mass, center, inertia)
@@ -279,7 +279,7 @@ def _welded(bodies: Sequence[Body]) -> list[Body]:
 def _joined(body: Body, mass: float, center: Array, inertia: Array) -> Body:
     """The body with another mass fixed to it, given in its frame."""
     both = body.mass + mass
-    middle = (body.mass * np.asarray(body.center) + mass * center) / both
+    middle = (body.mass * np.asarray(body.center) + mass * center) / both if both else np.asarray(body.center)
     own = spatial.about(np.asarray(body.inertia), body.mass, np.asarray(body.center) - middle)
     return replace(body, mass=both, center=middle, inertia=own + spatial.about(inertia, mass, center - middle))
 

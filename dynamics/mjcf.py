@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from xml.sax.saxutils import quoteattr
+
 import numpy as np
 from numpy.typing import ArrayLike
 
+from . import spatial
 from .mechanism import WORLD, Body, Mechanism
 from .planar_arm import PlanarArm
+from .spatial import Array
 
 # MuJoCo wants diagonal inertias that are positive and obey the triangle inequality; a planar arm feels only the one
 # about the hinge axis (y), so the other two are any that are allowed.
@@ -67,7 +71,7 @@ def _mechanism_to_mjcf(mechanism: Mechanism, timestep: float) -> str:
     lines = [
         '<mujoco model="mechanism">',
         '  <compiler angle="radian" inertiafromgeom="false"/>',
-        f'  <option timestep="{timestep!r}" integrator="RK4" gravity="{_numbers(mechanism.gravity)}">',
+        f'  <option timestep="{timestep!r}" integrator="RK4" gravity="{numbers(mechanism.gravity)}">',
         '    <flag contact="disable"/>',
         "  </option>",
         "  <worldbody>",
@@ -90,18 +94,29 @@ def _body_lines(body: Body) -> list[str]:
     joint = body.joint
     x, y, _ = np.asarray(joint.orientation).T
     kind = "hinge" if joint.kind == "revolute" else "slide"
-    inertia = np.asarray(body.inertia) + (0.0 if np.any(body.inertia) else _SMALLEST * np.eye(3))
-    (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia
     spring = f'stiffness="{joint.stiffness!r}" springref="{joint.rest!r}" armature="{joint.armature!r}"'
-    axis = f'axis="{_numbers(joint.axis)}" damping="{joint.damping!r}"'
+    axis = f'axis="{numbers(joint.axis)}" damping="{joint.damping!r}"'
     mass = max(body.mass, _SMALLEST)
-    full = _numbers([xx, yy, zz, xy, xz, yz])
+    name = quoteattr(body.name)
     return [
-        f'<body name="{body.name}" pos="{_numbers(joint.position)}" xyaxes="{_numbers(np.concatenate([x, y]))}">',
-        f'  <joint name="{body.name}" type="{kind}" {axis} {spring}/>',
-        f'  <inertial pos="{_numbers(body.center)}" mass="{mass!r}" fullinertia="{full}"/>',
+        f'<body name={name} pos="{numbers(joint.position)}" xyaxes="{numbers(np.concatenate([x, y]))}">',
+        f'  <joint name={name} type="{kind}" {axis} {spring}/>',
+        f'  <inertial pos="{numbers(body.center)}" mass="{mass!r}" {_principal(np.asarray(body.inertia))}/>',
     ]
 
 
-def _numbers(values: ArrayLike) -> str:
+def _principal(inertia: Array) -> str:
+    """The inertia by its principal moments, more exact than what MuJoCo's own iteration finds."""
+    moments, axes = np.diag(inertia), np.eye(3)
+    if np.any(inertia - np.diag(moments)):
+        moments, axes = np.linalg.eigh(inertia)
+        axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
+    moments = np.maximum(moments, _SMALLEST)
+    largest = moments.argmax()  # of a plate it is the sum of the others, and may not be more by rounding
+    moments[largest] = min(moments[largest], np.delete(moments, largest).sum() * (1.0 - 1e-15))
+    return f'diaginertia="{numbers(moments)}" quat="{numbers(spatial.to_quaternion(axes))}"'
+
+
+def numbers(values: ArrayLike) -> str:
+    """Numbers as XML attributes have them, each exact."""
     return " ".join([repr(float(value)) for value in np.asarray(values)])

@@ -44,6 +44,21 @@ def from_quaternion(quaternion: Sequence[float]) -> Array:
     )
 
 
+def to_quaternion(matrix: Array) -> Array:
+    """The quaternion (w, x, y, z), (4,), of a rotation matrix; of the two, the one whose largest entry is positive."""
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix
+    products = np.array(  # 4 q q^T
+        [
+            [1 + xx + yy + zz, zy - yz, xz - zx, yx - xy],
+            [zy - yz, 1 + xx - yy - zz, yx + xy, xz + zx],
+            [xz - zx, yx + xy, 1 - xx + yy - zz, zy + yz],
+            [yx - xy, xz + zx, zy + yz, 1 - xx - yy + zz],
+        ]
+    )
+    row: Array = products[products.diagonal().argmax()]
+    return row / np.linalg.norm(row)
+
+
 def to_z(axis: Array) -> Array:
     """A rotation whose third column is the unit vector `axis`: the nearest turn of the coordinate axes."""
     seed = np.eye(3)[int(np.abs(axis).argmin())]

@@ -1,0 +1,428 @@
+"""Mechanisms read from MJCF and URDF: MuJoCo's own accelerations, the frames and defaults, and what is left out."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pytest import approx, importorskip, mark, param, raises
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.mechanism import Body, Joint, Mechanism, MechanismError
+from dynamics.spatial import rotation
+from tests.dynamics.mechanisms import FAMILIES, turned_arm
+from tests.dynamics.models import error
+
+mujoco = importorskip("mujoco")
+
+AGREEMENT = 1e-10  # of the largest entry: rounding of two codes, times the condition number of M
+OLD = not hasattr(mujoco.mjtDisableBit, "mjDSBL_SPRING")
+recent = mark.skipif(
+    OLD, reason="before 3.3.5 MuJoCo diagonalises URDF's inertia to 1e-7, and has other flags and no mimic"
+)
+OFF = ("CONSTRAINT", "ACTUATION")  # what acts on a mechanism from outside
+
+
+def compiled(text: str) -> Any:
+    return mujoco.MjModel.from_xml_string(text)
+
+
+def alone(model: Any) -> Any:
+    """MuJoCo's model without what a mechanism cannot have, and without what acts on it from outside."""
+    for name in OFF:
+        model.opt.disableflags |= int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
+    model.opt.enableflags = 0
+    model.opt.density = model.opt.viscosity = 0.0
+    for what in ("stiffness", "damping"):
+        getattr(model, f"tendon_{what}")[:] = 0.0
+    return model
+
+
+def disagreement(model: Any, mechanism: Mechanism, count: int = 10) -> float:
+    """The largest error of accelerations and torques against `mj_forward` and `mj_inverse`, with qpos as q."""
+    n, data = mechanism.system.n, mujoco.MjData(model)
+    assert n == model.nv == model.nq
+    forward, inverse = cg.compile(dyn.forward_dynamics(mechanism)), cg.compile(dyn.inverse_dynamics(mechanism))
+    rng, worst = np.random.default_rng(n), 0.0
+    for _ in range(count):
+        q, qd, given = rng.uniform(-1.0, 1.0, (3, n))
+        data.qpos[:], data.qvel[:], data.qacc[:], data.qfrc_applied[:] = q, qd, given, 0.0
+        mujoco.mj_inverse(model, data)
+        worst = max(worst, error(inverse([*q, *qd, *given]), np.array(data.qfrc_inverse)))
+        data.qfrc_applied[:] = given
+        mujoco.mj_forward(model, data)
+        worst = max(worst, error(forward([*q, *qd, *given]), np.array(data.qacc)))
+    return worst
+
+
+def agrees(text: str) -> Mechanism:
+    """The mechanism of MJCF text, seen to agree with MuJoCo's model of it."""
+    mechanism = dyn.load_mjcf(text)
+    assert disagreement(compiled(text), mechanism) < 1e-12
+    return mechanism
+
+
+def mjcf(worldbody: str, rest: str = "") -> str:
+    return f"<mujoco>{rest}<worldbody>{worldbody}</worldbody></mujoco>"
+
+
+INERTIAL = '<inertial pos="0.1 0.2 -0.3" mass="1.3" fullinertia="0.3 0.4 0.5 0.01 0.02 -0.03"/>'
+HINGE = f'<body name="a"><joint name="j"/>{INERTIAL}</body>'
+
+# --- there and back
+
+
+@mark.parametrize("n", [1, 7, 15])
+@mark.parametrize("family", FAMILIES)
+def test_a_mechanism_comes_back_from_its_mjcf(family: str, n: int) -> None:
+    mechanism = FAMILIES[family](n)
+    text = dyn.to_mjcf(mechanism)
+    back = dyn.load_mjcf(text)
+    assert sorted(back.system.coordinates) == sorted(mechanism.system.coordinates)
+    assert disagreement(compiled(text), back) < AGREEMENT
+    order = [back.system.coordinates.index(name) for name in mechanism.system.coordinates]
+    x = np.random.default_rng(n).uniform(-1.0, 1.0, (3, mechanism.system.n))
+    theirs = np.empty_like(x)
+    theirs[:, order] = x
+    ours, again = (cg.compile(dyn.forward_dynamics(each)) for each in (mechanism, back))
+    assert error(again(theirs.ravel())[order], ours(x.ravel())) < AGREEMENT
+
+
+def test_any_name_comes_back() -> None:
+    names = ["a/b", 'say "hi"', "<&>"]
+    mechanism = Mechanism([Body(name, Joint("revolute", (0, 1, 0)), mass=1.0, center=(1, 0, 0)) for name in names])
+    assert [body.name for body in dyn.load_mjcf(dyn.to_mjcf(mechanism)).bodies] == names
+
+
+# --- frames and defaults
+
+
+def test_a_model_by_hand_agrees() -> None:
+    """Degrees, classes, euler angles, two joints and offset anchors on a body, references, springs, armature, welds."""
+    text = mjcf(
+        f"""
+        <frame pos="0 0 1" euler="10 20 30">
+          <body name="base" pos="0.1 0 0" quat="1 2 3 4">
+            <body name="upper" pos="0.3 0 0" euler="0 90 0" childclass="arm">
+              <joint name="yaw" axis="0 0 1" pos="0.1 0.2 0.3" ref="25" springref="40"/>
+              <joint name="pitch" axis="1 2 0" pos="-0.2 0 0.1" ref="-10"/>
+              <joint name="out" type="slide" axis="0 1 1" ref="0.3" springref="0.1" stiffness="3"/>
+              <inertial pos="0 0 0.4" mass="2" diaginertia="0.1 0.2 0.25"/>
+              <body name="tool" pos="0 0.1 0.5" axisangle="1 1 0 70"><geom type="box" size="0.1 0.2 0.05"/>
+                <body pos="0 0.2 0"><joint pos="0 0 0.1" axis="1 0 0"/>{INERTIAL}</body>
+              </body>
+            </body>
+          </body>
+        </frame>
+        <body name="cart"><joint type="slide" axis="1 0 0" damping="0.3"/><geom size="0.1"/></body>
+        """,
+        """<option gravity="1 2 -9"/><compiler angle="degree"/>
+        <default><default class="arm"><joint damping="0.2" armature="0.05" stiffness="1.5"/></default></default>""",
+    )
+    mechanism = agrees(text)
+    assert mechanism.system.coordinates == ("upper yaw", "upper pitch", "upper", "body 4", "cart")
+    assert np.asarray(mechanism.gravity).tolist() == [1.0, 2.0, -9.0]
+
+
+def test_q_is_qpos_also_with_a_reference() -> None:
+    """At q = 0 the hinge is 30 degrees before, and the slide 0.3 m short of, where the file places them."""
+    turn, slide = agrees(
+        mjcf(
+            f"""<body name="a"><joint axis="0 0 1" ref="30"/>{INERTIAL}
+            <body name="b"><joint type="slide" axis="0 1 0" ref="0.3"/>{INERTIAL}</body></body>"""
+        )
+    ).moving
+    c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
+    assert np.asarray(turn.joint.orientation) == approx(np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]))
+    assert np.asarray(slide.joint.position) == approx([0.0, -0.3, 0.0])
+
+
+def test_a_hinge_is_where_its_anchor_is() -> None:
+    (body,) = agrees(mjcf(f'<body pos="1 0 0"><joint pos="0 0 0.5"/>{INERTIAL}</body>')).moving
+    assert np.asarray(body.joint.position) == approx([1.0, 0.0, 0.5])
+    assert np.asarray(body.center) == approx([0.1, 0.2, -0.8])
+
+
+@recent
+@mark.parametrize(("flag", "joint"), [("gravity", ""), ("damper", 'damping="2"'), ("spring", 'stiffness="2"')])
+def test_what_the_options_switch_off_is_off(flag: str, joint: str) -> None:
+    body = f'<body><joint axis="0 1 0" {joint}/>{INERTIAL}</body>'
+    on, off = agrees(mjcf(body)), agrees(mjcf(body, f'<option><flag {flag}="disable"/></option>'))
+    assert len(dyn.inverse_dynamics(off).nodes) < len(dyn.inverse_dynamics(on).nodes)
+
+
+def test_names_are_mujoco_s_or_new_ones() -> None:
+    mechanism = dyn.load_mjcf(
+        mjcf(
+            f"""<body name="body 2"><joint/>{INERTIAL}</body><body><joint name="x"/><joint/>{INERTIAL}</body>
+            <body name="c"><joint/>{INERTIAL}</body>"""
+        )
+    )
+    assert mechanism.system.coordinates == ("body 2", "body 2' x", "body 2'", "c")
+
+
+# --- sources
+
+
+def test_a_path_a_text_and_a_model_are_the_same(tmp_path: Path) -> None:
+    file = tmp_path / "model.xml"
+    file.write_text(mjcf(HINGE), encoding="utf-8")
+    graphs = [
+        dyn.inverse_dynamics(dyn.load_mjcf(each)) for each in (file, str(file), mjcf(HINGE), compiled(mjcf(HINGE)))
+    ]
+    assert len({repr(graph.evaluate({"q0": 0.3, "qd0": 0.2, "qdd0": 0.1})) for graph in graphs}) == 1
+
+
+@mark.parametrize("load", [dyn.load_mjcf, dyn.load_urdf])
+def test_a_missing_file_is_named(load: Any, tmp_path: Path) -> None:
+    with raises(MechanismError, match=r"^there is no file '.*nowhere\.xml'$"):
+        load(tmp_path / "nowhere.xml")
+
+
+@mark.parametrize("load", [dyn.load_mjcf, dyn.load_urdf])
+def test_what_is_no_source_is_said(load: Any) -> None:
+    with raises(MechanismError, match=r"^a model is a path, XML text or an MjModel, got int$"):
+        load(3)
+
+
+@mark.parametrize(
+    "text", ["<mujoco><worldbody>", "<mujoco><nonsense/></mujoco>", mjcf('<body><joint axis="1"/></body>')]
+)
+def test_bad_mjcf_is_one_sentence(text: str, tmp_path: Path) -> None:
+    with raises(MechanismError, match=r"^MuJoCo cannot read the given text: \S.*\S$"):
+        dyn.load_mjcf(text)
+    file = tmp_path / "bad.xml"
+    file.write_text(text, encoding="utf-8")
+    with raises(MechanismError, match=r"^MuJoCo cannot read '.*bad\.xml': \S.*\S$"):
+        dyn.load_mjcf(file)
+
+
+# --- what is not modelled
+
+BALL = f'<body name="b"><joint name="ball" type="ball"/>{INERTIAL}</body>'
+FREE = f'<body name="f" pos="0 0 2"><freejoint name="root"/>{INERTIAL}{HINGE}</body>'
+TENDON = '<tendon><fixed name="string" stiffness="3"><joint joint="j" coef="1"/></fixed></tendon>'
+NOT_MODELLED = [
+    param(mjcf(HINGE + BALL), "free or ball joints (ball)", id="ball"),
+    param(mjcf(FREE), "free or ball joints (root)", id="free"),
+    param(
+        mjcf(HINGE).replace("</mujoco>", TENDON + "</mujoco>"),
+        "tendons with a spring, damper or mass (string)",
+        id="tendon",
+    ),
+    param(
+        mjcf(HINGE, '<equality><joint joint1="j" polycoef="0.1 0 0 0 0"/></equality>'),
+        "equality constraints (1)",
+        id="equality",
+    ),
+    param(mjcf(f'<body><joint frictionloss="0.1"/>{INERTIAL}</body>'), "friction loss", id="friction"),
+    param(mjcf(HINGE, '<option density="1.2"/>'), "a fluid (density or viscosity)", id="fluid"),
+    param(mjcf(f'<body gravcomp="1"><joint/>{INERTIAL}</body>'), "gravity compensation", id="gravcomp"),
+]
+
+
+@mark.parametrize(("text", "what"), NOT_MODELLED)
+def test_what_is_not_modelled_is_refused_by_name(text: str, what: str) -> None:
+    message = f"a mechanism cannot have {what} (ignore=True leaves them out)"
+    with raises(MechanismError, match=f"^{re.escape(message)}$"):
+        dyn.load_mjcf(text)
+
+
+@mark.parametrize(("text", "what"), NOT_MODELLED)
+def test_what_is_not_modelled_is_left_out_on_request(text: str, what: str) -> None:
+    left_out: list[str] = []
+    mechanism = dyn.load_mjcf(text, ignore=True, left_out=left_out)
+    assert left_out == [what]
+    assert len(mechanism.system.coordinates) == 1
+
+
+def test_a_free_joint_left_out_is_a_weld() -> None:
+    floating, fixed = (
+        dyn.load_mjcf(mjcf(FREE), ignore=True),
+        dyn.load_mjcf(mjcf(FREE.replace('<freejoint name="root"/>', ""))),
+    )
+    state = {"q0": 0.3, "qd0": 0.2, "qdd0": 0.1}
+    assert dyn.inverse_dynamics(floating).evaluate(state) == dyn.inverse_dynamics(fixed).evaluate(state)
+
+
+@mark.parametrize(
+    ("text", "flag"),
+    [
+        (mjcf(f'<body><joint frictionloss="0.1"/>{INERTIAL}</body>'), "frictionloss"),
+        (mjcf(f'<body><joint frictionloss="0.1"/>{INERTIAL}</body>'), "constraint"),
+        (mjcf(HINGE, '<equality><joint joint1="j" polycoef="0.1 0 0 0 0"/></equality>'), "equality"),
+        (mjcf(f'<body gravcomp="1"><joint/>{INERTIAL}</body>'), "gravity"),
+    ],
+)
+def test_what_the_options_switch_off_is_not_missed(text: str, flag: str) -> None:
+    left_out: list[str] = []
+    dyn.load_mjcf(text.replace("<mujoco>", f'<mujoco><option><flag {flag}="disable"/></option>'), left_out=left_out)
+    assert left_out == []
+
+
+def test_what_acts_from_outside_is_listed_and_no_error() -> None:
+    left_out: list[str] = []
+    dyn.load_mjcf(
+        mjcf(
+            '<geom type="plane" size="1 1 1"/>'
+            '<body><joint name="j" range="-30 30"/><geom size="0.1" pos="0.2 0 0"/></body>'
+        ).replace("</mujoco>", '<actuator><motor joint="j"/></actuator></mujoco>'),
+        left_out=left_out,
+    )
+    assert left_out == ["contacts", "joint limits (j)", "actuators (1)"]
+
+
+# --- URDF
+
+LINK = """<link name="{0}"><inertial><origin xyz="0.1 0 0.2" rpy="0.1 0.2 0.3"/><mass value="1.5"/>
+<inertia ixx="0.1" ixy="0.01" ixz="0" iyy="0.2" iyz="0" izz="0.15"/></inertial>
+<visual><geometry><mesh filename="package://nowhere/{0}.stl"/></geometry></visual>
+<collision><geometry><mesh filename="package://nowhere/{0}.dae"/></geometry></collision></link>"""
+JOINT = """<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/>
+<origin xyz="0.1 0.2 0.3" rpy="0.4 0.5 0.6"/><axis xyz="{4}"/><limit lower="-1" upper="1" effort="9" velocity="9"/>
+<dynamics damping="{5}"/></joint>"""
+URDF = f"""<?xml version="1.0"?><robot name="arm"><link name="base"/>{"".join(LINK.format(f"l{i}") for i in (1, 2, 3))}
+{JOINT.format("j1", "revolute", "base", "l1", "0 0 1", 0.1)}{JOINT.format("j2", "continuous", "l1", "l2", "0 1 0", 0.2)}
+{JOINT.format("j3", "prismatic", "l2", "l3", "1 0 0", 0.3)}</robot>"""
+
+
+def turned(roll: float, pitch: float, yaw: float) -> np.ndarray:
+    """The rotation of URDF's rpy: about fixed x, then y, then z."""
+    x, y, z = np.eye(3)
+    return rotation(z, yaw) @ rotation(y, pitch) @ rotation(x, roll)
+
+
+@recent
+def test_a_urdf_arm_is_what_it_says() -> None:
+    """Its numbers put in by hand; the meshes are nowhere."""
+    left_out: list[str] = []
+    loaded = dyn.load_urdf(URDF, left_out=left_out)
+    assert left_out == ["joint limits (j1, j3)"]
+    assert loaded.system.coordinates == ("l1", "l2", "l3")
+    principal = turned(0.1, 0.2, 0.3)
+    inertia = principal @ np.array([[0.1, 0.01, 0], [0.01, 0.2, 0], [0, 0, 0.15]]) @ principal.T
+    bodies = [
+        Body(
+            f"l{i}",
+            Joint(kind, axis, (0.1, 0.2, 0.3), turned(0.4, 0.5, 0.6), damping=0.1 * i),
+            f"l{i - 1}" if i > 1 else "world",
+            mass=1.5,
+            center=(0.1, 0.0, 0.2),
+            inertia=inertia,
+        )
+        for i, kind, axis in ((1, "revolute", (0, 0, 1)), (2, "revolute", (0, 1, 0)), (3, "prismatic", (1, 0, 0)))
+    ]
+    x = np.random.default_rng(3).uniform(-1.0, 1.0, 9)
+    ours, theirs = (cg.compile(dyn.inverse_dynamics(each))(x) for each in (loaded, Mechanism(bodies)))
+    assert error(ours, theirs) < 1e-12
+
+
+def test_a_urdf_file_is_its_text(tmp_path: Path) -> None:
+    file = tmp_path / "arm.urdf"
+    file.write_text("\ufeff\n" + URDF, encoding="utf-8")
+    assert dyn.load_urdf(file).system.coordinates == ("l1", "l2", "l3")
+
+
+@mark.parametrize(
+    ("text", "message"),
+    [
+        ("<robot>", "the given text is not XML: no element found: line 1, column 7"),
+        ("<mujoco/>", "a URDF's root element is <robot>, the given text has <mujoco>"),
+    ],
+)
+def test_bad_urdf_is_one_sentence(text: str, message: str) -> None:
+    with raises(MechanismError, match=f"^{re.escape(message)}$"):
+        dyn.load_urdf(text)
+
+
+@recent
+def test_a_urdf_joint_that_mimics_is_an_equality() -> None:
+    mimicking = URDF.replace(
+        '<joint name="j2" type="continuous">', '<joint name="j2" type="continuous"><mimic joint="j1"/>'
+    )
+    with raises(MechanismError, match="equality constraints"):
+        dyn.load_urdf(mimicking)
+
+
+def without_springs(mechanism: Mechanism) -> Mechanism:
+    bodies = [replace(b, joint=replace(b.joint, stiffness=0.0, armature=0.0)) for b in mechanism.bodies]
+    return Mechanism(bodies)
+
+
+@recent
+@mark.parametrize("family", FAMILIES)
+def test_a_mechanism_comes_back_from_its_urdf(family: str) -> None:
+    mechanism = without_springs(FAMILIES[family](10))
+    back = dyn.load_urdf(dyn.to_urdf(mechanism))
+    order = [back.system.coordinates.index(name) for name in mechanism.system.coordinates]
+    x = np.random.default_rng(4).uniform(-1.0, 1.0, (3, mechanism.system.n))
+    theirs = np.empty_like(x)
+    theirs[:, order] = x
+    ours, again = (cg.compile(dyn.forward_dynamics(each)) for each in (mechanism, back))
+    assert error(again(theirs.ravel())[order], ours(x.ravel())) < AGREEMENT
+
+
+def test_quarter_turns_come_back_from_text_as_quarter_turns() -> None:
+    """So that they cost no nodes."""
+    arm = turned_arm(7)
+    counts = {len(dyn.inverse_dynamics(each).nodes) for each in (arm, dyn.load_mjcf(dyn.to_mjcf(arm)))}
+    assert counts == {len(dyn.inverse_dynamics(dyn.load_urdf(dyn.to_urdf(arm))).nodes)}
+
+
+@mark.parametrize("pitch", [np.pi / 2, -np.pi / 2])
+def test_a_frame_that_looks_straight_up_comes_back(pitch: float) -> None:
+    orientation = turned(0.3, pitch, 0.4)
+    joint = Joint("revolute", (0.0, 1.0, 0.0), orientation=orientation)
+    (body,) = dyn.load_urdf(
+        dyn.to_urdf(Mechanism([Body("a", joint, mass=1.0, center=(1, 0, 0), inertia=(1, 1, 1))]))
+    ).moving
+    assert np.asarray(body.joint.orientation) == approx(orientation, abs=1e-12)
+
+
+@mark.parametrize("what", ["stiffness", "armature"])
+def test_what_urdf_has_not_is_said(what: str) -> None:
+    mechanism = Mechanism([Body("a", Joint("revolute", **{what: 0.5}), mass=1.0, center=(1, 0, 0))])
+    with raises(MechanismError, match=f"^URDF has no {what}, body 'a' has 0.5$"):
+        dyn.to_urdf(mechanism)
+
+
+# --- models nobody here wrote
+
+
+def files() -> Iterator[Path]:
+    """The XML files of gymnasium and dm_control, where they are installed."""
+    for package in ("gymnasium", "dm_control"):
+        spec = importlib.util.find_spec(package)
+        if spec and spec.submodule_search_locations:
+            yield from sorted(Path(spec.submodule_search_locations[0]).rglob("*.xml"))
+
+
+REAL = list(files())
+
+
+@pytest.mark.skipif(not REAL, reason="neither gymnasium nor dm_control is installed")
+def test_models_of_gymnasium_and_dm_control_agree(record_property, monkeypatch, tmp_path: Path) -> None:
+    """Every one that MuJoCo reads and that has hinges and slides only, and at least one."""
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings about them to a file beside us
+    wrong, seen = {}, 0
+    for file in REAL:
+        try:
+            model = mujoco.MjModel.from_xml_path(str(file))
+        except ValueError:
+            continue  # a fragment, or an asset that the wheel does not hold
+        if not model.njnt or not set(model.jnt_type.tolist()) <= {2, 3}:  # slide, hinge
+            continue
+        seen += 1
+        worst = disagreement(alone(model), dyn.load_mjcf(model), count=5)
+        if worst > AGREEMENT:
+            wrong[file.name] = worst
+    record_property("models", seen)
+    assert seen
+    assert wrong == {}

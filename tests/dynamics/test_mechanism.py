@@ -1,0 +1,380 @@
+"""Mechanisms: against MuJoCo, their counts, their tags, and what cannot be one."""
+
+from __future__ import annotations
+
+import re
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from pytest import approx, mark, param, raises
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.mechanism import Body, Joint, Mechanism, MechanismError
+from dynamics.mujoco_io import MujocoTwin
+from dynamics.spatial import from_quaternion, rotation, to_quaternion
+from tests.dynamics.mechanisms import (
+    FAMILIES,
+    in_space,
+    random_body,
+    random_inertia,
+    random_rotation,
+    turned_arm,
+    turned_tree,
+)
+from tests.dynamics.models import Array, at, error, random_arm, run, states
+
+AGREEMENT = 1e-10  # of the largest entry: rounding of two codes, times the condition number of M
+RETURN = 1e-9  # of the largest entry, there and back
+TURNED_30 = turned_arm(30)
+
+
+def nodes(model: Any, of: str = "forward") -> int:
+    return len((dyn.forward_dynamics(model, "recursive") if of == "forward" else dyn.inverse_dynamics(model)).nodes)
+
+
+def tags_of_lagrangian(mechanism: Mechanism) -> set[str]:
+    system = mechanism.system
+    graph = system.graph({"L": system.lagrangian}, system.q, system.qd)
+    return {tag for node in graph.nodes for tag in node.tags}
+
+
+def forward_and_inverse(model: Any, count: int = 5) -> tuple[Array, Array]:
+    """Accelerations and torques at some states, (count, n) each."""
+    given = states(model, count)
+    return run(dyn.forward_dynamics(model), given), run(dyn.inverse_dynamics(model), given)
+
+
+def agree(one: Any, other: Any, tolerance: float = 1e-12) -> None:
+    for ours, theirs in zip(forward_and_inverse(one), forward_and_inverse(other), strict=True):
+        assert error(ours, theirs) < tolerance
+
+
+def point(name: str, parent: str = "world", **given: Any) -> Body:
+    """A body of 1 kg, 0.5 m out along x from a joint about y, 0.5 m from the joint before."""
+    joint = given.pop("joint", Joint("revolute", (0.0, 1.0, 0.0), (0.5, 0.0, 0.0)))
+    return Body(name, joint, parent, **({"mass": 1.0, "center": (0.5, 0.0, 0.0)} | given))
+
+
+# --- agreement
+
+
+@mark.parametrize("n", [1, 2, 7, 20, 40])
+@mark.parametrize("family", FAMILIES)
+def test_random_mechanisms_agree_with_mujoco(family: str, n: int, record_property) -> None:
+    mechanism = FAMILIES[family](n)
+    twin, size = MujocoTwin(mechanism), mechanism.system.n
+    order = [twin.model.joint(body.name).id for body in mechanism.moving]  # MuJoCo's: depth first
+    forward, inverse = cg.compile(dyn.forward_dynamics(mechanism)), cg.compile(dyn.inverse_dynamics(mechanism))
+    worst = np.zeros(2)
+    for row in range(100):
+        state = at(states(mechanism, 100, seed=n), row)
+        theirs = {name: np.empty(size) for name in ("q", "qd", "qdd", "tau")}
+        for name, values in theirs.items():
+            values[order] = state[name]
+        qdd = twin.accelerations(theirs["q"], theirs["qd"], theirs["tau"])[order]
+        tau = twin.inverse(theirs["q"], theirs["qd"], theirs["qdd"])[order]
+        q_qd = [*state["q"], *state["qd"]]
+        worst = np.maximum(
+            worst, [error(forward([*q_qd, *state["tau"]]), qdd), error(inverse([*q_qd, *state["qdd"]]), tau)]
+        )
+    record_property("forward, inverse", worst.tolist())
+    assert worst.max() < AGREEMENT
+
+
+@mark.parametrize("n", [1, 3, 10, 30])
+@mark.parametrize("family", FAMILIES)
+def test_the_torque_of_a_torque_s_acceleration_is_that_torque(family: str, n: int) -> None:
+    mechanism = FAMILIES[family](n)
+    given = states(mechanism, 20)
+    given["qdd"] = run(dyn.forward_dynamics(mechanism), given)
+    assert error(run(dyn.inverse_dynamics(mechanism), given), given["tau"]) < RETURN
+
+
+@mark.parametrize("n", [1, 2, 5, 10])
+def test_a_planar_arm_spelled_in_space_is_that_arm(n: int) -> None:
+    arm = random_arm(n)
+    agree(in_space(arm), arm)
+    assert nodes(in_space(arm)) <= 1.25 * nodes(arm)
+
+
+def test_the_order_of_the_bodies_only_orders_the_coordinates() -> None:
+    mechanism = FAMILIES["branched"](6)
+    turned_round = Mechanism(mechanism.bodies[::-1], mechanism.gravity)
+    names = [body.name for body in mechanism.moving]
+    order = [names.index(name) for name in turned_round.system.coordinates]
+    given = states(mechanism, 3)
+    shuffled = {name: value[:, order] for name, value in given.items() if isinstance(value, np.ndarray)}
+    ours = run(dyn.forward_dynamics(mechanism), given)
+    assert run(dyn.forward_dynamics(turned_round), shuffled) == approx(ours[:, order], rel=1e-10)
+
+
+def test_the_length_of_an_axis_does_not_matter() -> None:
+    agree(
+        Mechanism([point("a", joint=Joint("revolute", (0.0, 3.0, 4.0)), inertia=(0.1, 0.1, 0.1))]),
+        Mechanism([point("a", joint=Joint("revolute", (0.0, 0.6, 0.8)), inertia=(0.1, 0.1, 0.1))]),
+    )
+
+
+# --- by hand
+
+
+def values(graph: cg.Graph, **inputs: float) -> list[float]:
+    return list(graph.evaluate(inputs).values())
+
+
+def test_a_slide_with_everything_by_hand() -> None:
+    joint = Joint("prismatic", (0.0, 0.0, 2.0), damping=0.7, stiffness=5.0, rest=0.3, armature=0.5)
+    mechanism = Mechanism([Body("a", joint, mass=2.0)], gravity=(0.0, 3.0, -4.0))
+    expected = 2.5 * 1.1 + 0.7 * 0.2 + 5.0 * (0.9 - 0.3) + 2.0 * 4.0
+    assert values(dyn.inverse_dynamics(mechanism), q0=0.9, qd0=0.2, qdd0=1.1) == approx([expected])
+
+
+def test_a_coordinate_without_mass_moves_its_armature() -> None:
+    mechanism = Mechanism([Body("rotor", Joint("revolute", armature=0.25))])
+    assert values(dyn.forward_dynamics(mechanism), q0=0.1, qd0=0.2, tau0=1.0) == approx([4.0])
+
+
+def test_a_body_without_mass_passes_on_what_it_carries() -> None:
+    """Two hinges at one point: a universal joint."""
+    cross = Body("cross", Joint("revolute", (1.0, 0.0, 0.0)))
+    mechanism = Mechanism(
+        [cross, point("rod", "cross", joint=Joint("revolute", (0.0, 1.0, 0.0)), inertia=(0.1, 0.1, 0.1))]
+    )
+    twin, given = MujocoTwin(mechanism), at(states(mechanism, 1), 0)
+    theirs = twin.inverse(given["q"], given["qd"], given["qdd"])
+    assert error(run(dyn.inverse_dynamics(mechanism), given), theirs) < 1e-12
+
+
+def test_without_gravity_there_is_no_potential() -> None:
+    arm = turned_arm(5)
+    weightless = Mechanism(arm.bodies, (0.0, 0.0, 0.0))
+    assert "potential" not in tags_of_lagrangian(weightless)
+    assert "potential" in tags_of_lagrangian(arm)
+    assert nodes(weightless) < nodes(arm)
+
+
+# --- tags
+
+
+def test_partial_lagrangians_are_tagged_with_their_body_and_energy() -> None:
+    system = FAMILIES["branched"](4).system
+    assert len(system.partial_lagrangians) == 4
+    for name, partial in zip(system.coordinates, system.partial_lagrangians, strict=True):
+        assert name in partial.tags
+    assert tags_of_lagrangian(FAMILIES["branched"](4)) >= {"b0", "b1", "b2", "b3", "kinetic", "potential"}
+
+
+# --- counts: as they are now; fewer is better, and changes the figure here
+
+
+def test_the_graphs_of_turned_arms_are_small() -> None:
+    assert nodes(turned_arm(7)) == COUNTS["arm of 7"] <= 2750
+    assert nodes(TURNED_30) == COUNTS["arm of 30"] <= 550 * 30
+
+
+def test_inverse_dynamics_of_turned_arms_is_small() -> None:
+    assert nodes(turned_arm(7), "inverse") == COUNTS["arm of 7, inverse"]
+    assert nodes(TURNED_30, "inverse") == COUNTS["arm of 30, inverse"]
+
+
+def test_a_tree_costs_a_body_what_a_chain_costs() -> None:
+    assert nodes(turned_tree(15)) <= 1.3 * nodes(turned_arm(15))
+
+
+def test_a_planar_chain_in_space_folds_to_little() -> None:
+    arm = dyn.planar_arm([0.9] * 20, [0.7] * 20)
+    assert nodes(arm) == COUNTS["planar chain of 20"] <= 160 * 20
+    assert nodes(in_space(arm)) == COUNTS["planar chain of 20, in space"] <= 170 * 20
+
+
+# --- welds
+
+
+def merged(one: Body, other: Body) -> Body:
+    """`one` with `other` welded to it, the sums written out point by point."""
+    turn, place = np.asarray(other.joint.orientation), np.asarray(other.joint.position)
+    center = place + turn @ np.asarray(other.center)
+    mass = one.mass + other.mass
+    middle = (one.mass * np.asarray(one.center) + other.mass * center) / mass
+    inertia = np.zeros((3, 3))
+    for m, c, own in (
+        (one.mass, np.asarray(one.center), np.asarray(one.inertia)),
+        (other.mass, center, turn @ np.asarray(other.inertia) @ turn.T),
+    ):
+        d = c - middle
+        inertia += own + m * (d @ d * np.eye(3) - np.outer(d, d))
+    return replace(one, mass=mass, center=middle, inertia=inertia)
+
+
+def test_a_weld_leaves_no_nodes() -> None:
+    rng = np.random.default_rng(5)
+    first, tool, last = (
+        random_body("a", "revolute", "world", rng),
+        random_body("tool", "fixed", "a", rng),
+        random_body("b", "revolute", "tool", rng),
+    )
+    turn, place = np.asarray(tool.joint.orientation), np.asarray(tool.joint.position)
+    moved = replace(
+        last.joint,
+        position=place + turn @ np.asarray(last.joint.position),
+        orientation=turn @ np.asarray(last.joint.orientation),
+    )
+    welded, by_hand = (
+        Mechanism([first, tool, last]),
+        Mechanism([merged(first, tool), replace(last, parent="a", joint=moved)]),
+    )
+    assert welded.system.coordinates == by_hand.system.coordinates
+    assert nodes(welded) == nodes(by_hand)
+    assert nodes(welded, "inverse") == nodes(by_hand, "inverse")
+    agree(welded, by_hand)
+
+
+def test_what_is_welded_to_the_world_only_places_what_it_carries() -> None:
+    rng = np.random.default_rng(6)
+    base = Body("base", Joint("fixed", position=(1.0, 2.0, 3.0)), mass=7.0, inertia=random_inertia(rng))
+    arm = point("a", "base", joint=Joint("revolute", (0.0, 1.0, 0.0)))
+    agree(Mechanism([base, arm]), Mechanism([replace(arm, parent="world")]))
+
+
+def test_a_weld_s_inertia_counts_without_mass() -> None:
+    """As of a flywheel whose mass is counted elsewhere; its carrier may have none either."""
+    shaft, wheel = Body("shaft", Joint("revolute")), Body("wheel", Joint("fixed"), "shaft", inertia=(0.1, 0.1, 0.2))
+    assert values(dyn.forward_dynamics(Mechanism([shaft, wheel])), q0=0.0, qd0=0.0, tau0=1.0) == approx([5.0])
+
+
+# --- what cannot be
+
+
+def hinge(**given: Any) -> Joint:
+    return Joint("revolute", **given)
+
+
+GOOD: dict[str, Any] = {"name": "a", "joint": hinge(), "mass": 1.0, "center": (0.1, 0.0, 0.0)}
+LEAF = [Body("a", hinge(), mass=1.0), Body("leaf", hinge(), "a")]
+SKEW = [[1.0, 0.2, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1.0]]
+BAD = [
+    param([Body("a", hinge(), "c", mass=1.0)], "body 'a' has the unknown parent 'c'", id="unknown parent"),
+    param([point("a", "b"), point("b", "a")], "body 'b' is its own ancestor, by way of 'a'", id="cycle"),
+    param([point("a", "a")], "body 'a' is its own ancestor, by way of 'a'", id="own parent"),
+    param([point("a"), point("b"), point("a")], "two bodies have the name 'a'", id="name twice"),
+    param([point("world")], "a body needs a name, and not 'world'; got 'world'", id="world"),
+    param([point("")], "a body needs a name, and not 'world'; got ''", id="no name"),
+    param(
+        [point("a", joint=Joint("ball"))],
+        "body 'a': joint must be one of revolute, prismatic, fixed, got 'ball'",
+        id="kind",
+    ),
+    param(
+        {"joint": hinge(orientation=2.0 * np.eye(3))}, "body 'a': orientation must be a rotation matrix", id="scaled"
+    ),
+    param({"joint": hinge(orientation=-np.eye(3))}, "body 'a': orientation must be a rotation matrix", id="mirror"),
+    param({"joint": hinge(axis=(0, 0, 0))}, "body 'a': axis must not be zero", id="no axis"),
+    param({"joint": hinge(axis=(0, 1))}, "body 'a': axis must be (3,) finite numbers, got [0, 1]", id="short axis"),
+    param({"joint": hinge(damping=-0.1)}, "body 'a': damping must be finite and at least 0, got -0.1", id="damping"),
+    param(
+        {"joint": hinge(stiffness=-1.0)}, "body 'a': stiffness must be finite and at least 0, got -1.0", id="stiffness"
+    ),
+    param({"joint": hinge(armature=-1.0)}, "body 'a': armature must be finite and at least 0, got -1.0", id="armature"),
+    param({"joint": hinge(rest=np.nan)}, "body 'a': rest must be finite", id="rest"),
+    param({"joint": hinge(position=(0, np.inf, 0))}, "body 'a': position must be (3,) finite numbers", id="position"),
+    param({"mass": -0.8}, "body 'a': mass must be finite and at least 0, got -0.8 kg", id="mass"),
+    param({"mass": np.nan}, "body 'a': mass must be finite and at least 0, got nan kg", id="mass nan"),
+    param(
+        {"center": (np.nan, 0.0, 0.0)}, "body 'a': center must be (3,) finite numbers, got [nan, 0.0, 0.0]", id="center"
+    ),
+    param({"inertia": (1.0, 1.0, np.nan)}, "body 'a': inertia must be (3, 3) finite numbers", id="inertia nan"),
+    param({"inertia": SKEW}, "body 'a': inertia must be symmetric", id="asymmetric"),
+    param(
+        {"inertia": (-1.0, 1.0, 1.0)},
+        "body 'a': inertia must not be negative, its principal moments are [-1.0",
+        id="negative",
+    ),
+    param(
+        {"inertia": (1.0, 2.0, 4.0)},
+        "body 'a': no body has principal moments [1.0, 2.0, 4.0]: the largest exceeds the sum of the others",
+        id="triangle",
+    ),
+    param(LEAF, "body 'leaf' has no mass, carries none, and its joint has no armature", id="leaf"),
+]
+
+
+@mark.parametrize(("bodies", "message"), BAD)
+def test_what_cannot_be_is_refused_by_name(bodies: Any, message: str) -> None:
+    with raises(MechanismError, match="^" + re.escape(message)):
+        Mechanism([Body(**(GOOD | bodies))] if isinstance(bodies, dict) else bodies)
+
+
+def test_gravity_is_a_finite_vector() -> None:
+    with raises(MechanismError, match=re.escape("gravity must be (3,) finite numbers, got 9.81")):
+        Mechanism([point("a")], gravity=9.81)
+
+
+@mark.parametrize("bodies", [[], [Body("a", Joint("fixed"), mass=1.0)]])
+def test_a_system_needs_a_joint_that_moves(bodies: list[Body]) -> None:
+    with raises(MechanismError, match="the mechanism has no joint that moves"):
+        _ = Mechanism(bodies).system
+
+
+def test_a_plate_and_a_rod_are_bodies_however_turned() -> None:
+    rng = np.random.default_rng(7)
+    for moments in ((1.0, 2.0, 3.0), (0.0, 1.0, 1.0), (0.0, 0.01, 0.01)):
+        turn = random_rotation(rng)
+        mechanism = Mechanism([point("a", inertia=turn @ np.diag(moments) @ turn.T)])
+        twin, given = MujocoTwin(mechanism), at(states(mechanism, 1), 0)
+        theirs = twin.inverse(given["q"], given["qd"], given["qdd"])
+        assert error(run(dyn.inverse_dynamics(mechanism), given), theirs) < 1e-12
+
+
+# --- size
+
+
+def test_reading_a_chain_takes_time_linear_in_its_length() -> None:
+    """Also leaf first, where each search for a placed ancestor walks the whole chain."""
+    names = [f"b{i}" for i in range(3000)]
+    bodies = [point(name, names[i - 1] if i else "world") for i, name in enumerate(names)]
+    start = time.perf_counter()
+    _ = Mechanism(bodies)
+    forwards = time.perf_counter() - start
+    _ = Mechanism(bodies[::-1])
+    backwards = time.perf_counter() - start - forwards
+    assert backwards < 3.0 * forwards + 0.5
+
+
+@mark.slow
+def test_a_chain_of_a_thousand_links_moves(record_property) -> None:
+    start = time.perf_counter()
+    mechanism = turned_arm(1000)
+    graph = dyn.forward_dynamics(mechanism, "recursive")
+    built = time.perf_counter() - start
+    given = at(states(mechanism, 1), 0)
+    given["qdd"] = run(graph, given)
+    evaluated = time.perf_counter() - start - built
+    print(f"1000 links: {len(graph.nodes)} nodes, {built:.1f} s to build, {evaluated:.1f} s to evaluate")  # noqa: T201
+    record_property("seconds", built)
+    assert len(graph.nodes) <= 550 * 1000
+    assert np.isfinite(given["qdd"]).all()
+
+
+def test_a_rotation_is_one() -> None:
+    turn = rotation(np.array([0.6, 0.0, 0.8]), 0.3)
+    assert turn @ turn.T == approx(np.eye(3), abs=1e-15)
+
+
+@mark.parametrize("angle", [0.0, 0.3, -1.2, np.pi, 3.0])
+@mark.parametrize("axis", [(0.6, 0.0, 0.8), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)])
+def test_a_rotation_comes_back_from_its_quaternion(axis: tuple[float, ...], angle: float) -> None:
+    turn = rotation(np.array(axis), angle)
+    assert from_quaternion(to_quaternion(turn)) == approx(turn, abs=1e-15)
+
+
+COUNTS = {
+    "arm of 7": 2657,
+    "arm of 30": 15253,
+    "arm of 7, inverse": 1426,
+    "arm of 30, inverse": 7731,
+    "planar chain of 20": 2601,
+    "planar chain of 20, in space": 3141,
+}
