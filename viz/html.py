@@ -11,7 +11,7 @@ from . import theme
 _STYLE = f"""
 :root {{ color-scheme: light dark; --text: {theme.TEXT}; --back: #FFFFFF; --soft: #F4F4F2; --line: #D8D8D4; }}
 @media (prefers-color-scheme: dark) {{ :root {{ --text: #E8E8E4; --back: #17181A; --soft: #232529; --line: #3A3D42; }} }}
-body {{ margin: 0 auto; padding: 1.5rem; max-width: 62rem; color: var(--text); background: var(--back);
+body {{ margin: 0 auto; padding: 1.5rem; max-width: 64rem; color: var(--text); background: var(--back);
   font: 17px/1.55 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }}
 h1 {{ font-size: 1.7rem; line-height: 1.25; }} h2 {{ margin-top: 2.6rem; border-top: 1px solid var(--line); padding-top: 1.2rem; }}
 nav a {{ margin-right: 1rem; white-space: nowrap; }} a {{ color: inherit; }}
@@ -19,7 +19,7 @@ figure {{ margin: 1.2rem 0; }} figcaption {{ font-size: 0.95rem; margin-top: 0.5
 figure img {{ display: block; max-width: 100%; height: auto; margin: 0 auto; background: #FFFFFF; border-radius: 4px; }}
 .scroll {{ overflow-x: auto; }}
 table {{ border-collapse: collapse; margin: 1rem 0; font-size: 0.95rem; font-variant-numeric: tabular-nums; }}
-th, td {{ padding: 0.35rem 0.8rem; border-bottom: 1px solid var(--line); text-align: right; }} td {{ white-space: nowrap; }}
+th, td {{ padding: 0.35rem 0.5rem; border-bottom: 1px solid var(--line); text-align: right; }} td {{ white-space: nowrap; }}
 th {{ vertical-align: bottom; }}
 th:first-child, td:first-child {{ text-align: left; }} thead th {{ border-bottom: 2px solid var(--text); }}
 caption {{ text-align: left; font-weight: 600; padding-bottom: 0.4rem; }}

@@ -278,7 +278,7 @@ def figure6() -> Part:
         + html.figure(plot.to_svg(picture), caption)
         + html.paragraph(
             "Interpreted: node by node in Python. Compiled: one generated Python function. PyTorch eager, measured where torch "
-            "is installed, builds and differentiates its graph anew at every evaluation, as the paper's implementation does. "
+            "is installed, builds and differentiates its graph anew at every evaluation. "
             "Kinetic only has a few nodes more than by definition: it needs both ∂K/∂q and ∂L/∂q, where by definition needs "
             "∂L/∂q alone."
         )

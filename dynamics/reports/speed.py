@@ -40,8 +40,7 @@ class Row:
 def table1(evaluations: int = 1000, seed: int = 0) -> list[Row]:
     """The three formulations, each evaluated at random states; formulations take turns, so that drift is shared.
 
-    PyTorch eager, which builds its graph anew at every evaluation as the paper's implementation does, is measured
-    beside ours where torch is installed.
+    PyTorch eager, which builds its graph anew at every evaluation, is measured beside ours where torch is installed.
     """
     scene = triple_pendulum()
     graphs = {name: inverse_dynamics(scene, name) for name in PAPER_MS}

@@ -1,4 +1,4 @@
-"""PyTorch eager: the paper's way of evaluating the formulations, for comparison where torch is installed."""
+"""PyTorch eager: the formulations by torch.autograd, for comparison where torch is installed."""
 
 from __future__ import annotations
 
