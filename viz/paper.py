@@ -7,7 +7,7 @@ import io
 import json
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -26,6 +26,9 @@ from . import html, plot, theme
 from .dot import to_dot
 from .files import write
 from .render import render_png, render_svg
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 TITLES = {
     "euler_embedded": "by definition",
@@ -148,6 +151,7 @@ def law() -> Part:
         panels["error of the torque"][name] = (each.dt.tolist(), each.error.tolist())
         panels["distance from its limit"][name] = (each.dt.tolist(), each.distance.tolist())
     picture = plot.powers(panels, "dt [s]", ["largest |Δτ| [N m]"] * 2, kinds=2)
+    drawn = _pictures("law", picture)
     header = ("formulation", "links", "slope", "largest entry of the limit [N m]", "error at dt = 1e-6 s [N m]")
     rows = [
         (
@@ -167,7 +171,7 @@ def law() -> Part:
         html.point(
             "A smaller time step does not help: by definition the whole term ∂L/∂q is lost, kinetic only the part ∂K/∂q."
         )
-        + html.figure(plot.to_svg(picture), caption)
+        + html.figure(drawn.svg, caption)
         + html.table("The law of the embedding", header, rows)
         + html.paragraph(
             "Kinetic only is exact for one joint, where K does not depend on q, and wrong for a real arm under this plain "
@@ -176,8 +180,7 @@ def law() -> Part:
         )
     )
     files: dict[str, str | bytes] = {
-        "law.svg": plot.to_svg(picture),
-        "law.png": plot.to_png(picture),
+        **drawn.files,
         "law.csv": _csv(header, rows),
     }
     data = {
@@ -198,8 +201,9 @@ def figures4_and_5() -> Part:
         "Figure 4. The three-link arm in free fall by RK4 on the equations of motion from its own graph, with the way of "
         f"each joint. Start at rest at q = ({start}) rad, dt = 1e-3 s."
     )
-    files: dict[str, str | bytes] = {"fig4.svg": plot.to_svg(ours), "fig4.png": plot.to_png(ours)}
-    section = html.figure(plot.to_svg(ours), caption4)
+    drawn4 = _pictures("fig4", ours)
+    files: dict[str, str | bytes] = dict(drawn4.files)
+    section = html.figure(drawn4.svg, caption4)
     data: dict[str, Any] = {"q_end": run.trajectory.q[-1].tolist()}
     try:
         other = mujoco_fall(run)
@@ -211,25 +215,26 @@ def figures4_and_5() -> Part:
     pictures = frames(scene.model, other.q[rows_at])
     if pictures is None:
         theirs = plot.snapshots(run.trajectory.t, other.positions, instants.tolist())
-        drawn = "drawn from MuJoCo's body positions, as its renderer found no OpenGL on this machine"
+        source = "drawn from MuJoCo's body positions, as its renderer found no OpenGL on this machine"
     else:
         titles = [f"({letter})  t = {instant:.1f} s" for letter, instant in zip("abcdef", instants, strict=True)]
         theirs = plot.images(pictures, titles)
-        drawn = "by MuJoCo's own renderer"
-    caption5 = f"Figure 5. The same arm in MuJoCo {other.version} (RK4, same step) at the same instants, {drawn}."
+        source = "by MuJoCo's own renderer"
+    caption5 = f"Figure 5. The same arm in MuJoCo {other.version} (RK4, same step) at the same instants, {source}."
     differences = largest_differences(run, other)
     header = ("up to t [s]", "largest |difference in q| [rad]")
     rows = [(f"{t:.2f}", f"{difference:.2e}") for t, difference in differences]
-    files |= {"fig5.svg": plot.to_svg(theirs), "fig5.png": plot.to_png(theirs), "fig5.csv": _csv(header, rows)}
+    drawn5 = _pictures("fig5", theirs)
+    files |= {**drawn5.files, "fig5.csv": _csv(header, rows)}
     section += (
-        html.figure(plot.to_svg(theirs), caption5)
+        html.figure(drawn5.svg, caption5)
         + html.table("Our trajectory and MuJoCo's", header, rows)
         + html.paragraph(
             "Both integrate by the classical Runge-Kutta method with the same step, so what differs is the equations of motion: "
             "ours from a Lagrangian by automatic differentiation, MuJoCo's from its composite-rigid-body algorithm."
         )
     )
-    data |= {"mujoco": other.version, "figure5": drawn, "largest_difference": differences[-1][1]}
+    data |= {"mujoco": other.version, "figure5": source, "largest_difference": differences[-1][1]}
     return Part("fall", "Figures 4 and 5: the fall", files, data, section)
 
 
@@ -245,6 +250,7 @@ def figure6() -> Part:
     }
     groups["the paper [ms]"] = {TITLES[name]: value for name, value in PAPER_MS.items()}
     picture = plot.bars(groups, COLOURS)
+    drawn = _pictures("fig6", picture)
     header = (
         "formulation",
         *(f"{way}, ratio" for way in ways),
@@ -275,7 +281,7 @@ def figure6() -> Part:
             "Table 1: ratios of medians to the chain rule's, sizes, and mean ± standard deviation", header, table
         )
         + html.point(_why(rows))
-        + html.figure(plot.to_svg(picture), caption)
+        + html.figure(drawn.svg, caption)
         + html.paragraph(
             "Interpreted: node by node in Python. Compiled: one generated Python function. PyTorch eager, measured where torch "
             "is installed, builds and differentiates its graph anew at every evaluation. "
@@ -284,8 +290,7 @@ def figure6() -> Part:
         )
     )
     files: dict[str, str | bytes] = {
-        "fig6.svg": plot.to_svg(picture),
-        "fig6.png": plot.to_png(picture),
+        **drawn.files,
         "table1.csv": _csv(header, table),
     }
     data = {
@@ -325,6 +330,7 @@ def scaling_of_counts() -> Part:
         "one compiled evaluation": {TITLES[row.formulation]: (row.n, row.microseconds) for row in rows},
     }
     picture = plot.powers(panels, "links n", ["edges", "time [µs]"], colours=COLOURS)
+    drawn = _pictures("scaling", picture)
     header = (
         "formulation",
         "nodes ~ n^p",
@@ -350,7 +356,7 @@ def scaling_of_counts() -> Part:
             "The embedding is not what makes a graph grow quadratically: by definition and the contracted chain rule both grow "
             "linearly. The chain rule taken literally, with the gradient of every momentum, is the quadratic one."
         )
-        + html.figure(plot.to_svg(picture), caption)
+        + html.figure(drawn.svg, caption)
         + html.table("Fitted exponents", header, table)
     )
     long = [
@@ -359,8 +365,7 @@ def scaling_of_counts() -> Part:
         for n, nodes, edges, time in zip(row.n, row.nodes, row.edges, row.microseconds, strict=True)
     ]
     files: dict[str, str | bytes] = {
-        "scaling.svg": plot.to_svg(picture),
-        "scaling.png": plot.to_png(picture),
+        **drawn.files,
         "scaling.csv": _csv(("formulation", "n", "nodes", "edges", "microseconds"), long),
     }
     data = {
@@ -373,6 +378,19 @@ def scaling_of_counts() -> Part:
 def _one_joint(formulation: str) -> Graph:
     """The inertial term of the rotor on a spring, with its momentum, as Figures 1 to 3 draw it."""
     return momentum_rate(scenes.load("spring_mass"), formulation, keep_momentum=True)
+
+
+class _Pictures(NamedTuple):
+    """A plot as the files of a part, and as the SVG that the page shows."""
+
+    svg: str
+    files: dict[str, str | bytes]
+
+
+def _pictures(name: str, picture: Figure) -> _Pictures:
+    """A plot rendered, once, as SVG and PNG."""
+    svg = plot.to_svg(picture)
+    return _Pictures(svg, {f"{name}.svg": svg, f"{name}.png": plot.to_png(picture)})
 
 
 def _drawn(name: str, heading: str, graph: Graph, caption: str, **figures: int) -> Part:

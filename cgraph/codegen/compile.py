@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import copyreg
+from functools import partial
+from typing import Any
+
 from ..graph import Graph
 from .compiled import Compiled
 from .generated import Generated
@@ -36,3 +40,13 @@ def compile(graph: Graph, backend: str = "auto", *, fast: bool = False, fma: boo
             if backend == "llvm":
                 raise
     return Generated(graph, backend)
+
+
+def _recipe(function: Any) -> Any:
+    """What pickling keeps: the graph and the choice. Machine code is made again where it is read."""
+    options = {"fast": function.fast, "fma": function.fma} if isinstance(function, Native) else {}
+    return partial(compile, **options), (function.graph, function.backend)
+
+
+copyreg.pickle(Generated, _recipe)
+copyreg.pickle(Native, _recipe)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -51,11 +50,6 @@ class Compiled(ABC):
         if point.shape != (self.n_in,):
             raise GraphError(f"x must have shape ({self.n_in},), one value for each input, got {point.shape}")
         return point
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        from .compile import compile
-
-        return compile, (self.graph, self.backend)
 
     def __repr__(self) -> str:
         return f"<compiled {self.graph!r}, backend {self.backend!r}>"

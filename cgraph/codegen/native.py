@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 from functools import partial
 from struct import Struct
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -106,12 +106,3 @@ class Native(Compiled):
                 self._batch_code = llvm.host().compile(self.batch_source(), libm_functions(self.graph))
                 self._batch_entry = _BATCH(self._batch_code.address("batch"))
         self._batch_entry(points.ctypes.data, result.ctypes.data, count, points.shape[1], result.shape[1])
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _restore, (self.graph, self.backend, self.fast, self.fma)
-
-
-def _restore(graph: Graph, backend: str, fast: bool, fma: bool) -> Compiled:
-    from .compile import compile
-
-    return compile(graph, backend, fast=fast, fma=fma)

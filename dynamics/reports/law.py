@@ -40,7 +40,6 @@ def law(model: Any, q: Array, qd: Array, qdd: Array, formulation: str, steps: Se
     """The law at the state (q, qd, qdd), each (n,), for "euler_embedded" or "kinetic_only"."""
     system = as_system(model)
     energy = {"euler_embedded": system.lagrangian, "kinetic_only": system.kinetic}[formulation]
-    n = system.n
     parameters = list(system.parameters.values())
     true = cg.compile(inverse_dynamics(system))(np.concatenate([q, qd, qdd, parameters]))
     slopes = cg.jacobian(system.graph({"E": energy}, system.q, system.qd), wrt=system.q)
@@ -48,13 +47,11 @@ def law(model: Any, q: Array, qd: Array, qdd: Array, formulation: str, steps: Se
     flawed = cg.compile(inverse_dynamics(system, formulation))
     error, distance = [], []
     for dt in steps:
-        velocity_old = qd - qdd * dt
-        tau = flawed(np.concatenate([q - qd * dt, velocity_old, qdd, [dt], parameters]))
+        tau = flawed(np.concatenate([q - qd * dt, qd - qdd * dt, qdd, [dt], parameters]))
         error.append(np.abs(tau - true).max())
         distance.append(np.abs(tau - true - limit).max())
     fitted = exponent(steps, distance) if min(distance) > 0 else float("nan")
-    assert len(limit) == n
-    return Law(formulation, n, np.array(steps), np.array(error), np.array(distance), limit, fitted)
+    return Law(formulation, system.n, np.array(steps), np.array(error), np.array(distance), limit, fitted)
 
 
 def law_of_arms(counts: Sequence[int] = (1, 2, 3, 6), seed: int = 0) -> list[Law]:
