@@ -44,7 +44,7 @@ def compile(graph: Graph, backend: str = "auto", *, fast: bool = False, fma: boo
 
 def _recipe(function: Any) -> Any:
     """What pickling keeps: the graph and the choice. Machine code is made again where it is read."""
-    options = {"fast": function.fast, "fma": function.fma} if isinstance(function, Native) else {}
+    options: dict[str, Any] = {"fast": function.fast, "fma": function.fma} if isinstance(function, Native) else {}
     return partial(compile, **options), (function.graph, function.backend)
 
 
