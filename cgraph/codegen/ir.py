@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from ..graph import Graph
@@ -57,6 +58,10 @@ INLINE = {
 }
 
 
+# Lines that compute, under a name, the address of row k of the inputs ("x") or outputs ("y"): (base, name, k) -> lines
+Address = Callable[[str, str, int], list[str]]
+
+
 class Arithmetic(NamedTuple):
     """What the instructions of a function may do, and on how many numbers at once."""
 
@@ -95,8 +100,12 @@ def libm_functions(graph: Graph) -> dict[str, int]:
 def scalar_ir(graph: Graph, flags: str = "") -> str:
     """A module with `void point(double *x, double *y)`: the outputs y at the inputs x."""
     lines = ["define void @point(ptr noalias %x, ptr noalias %y) nounwind {", "start:"]
-    lines += _body(graph, Arithmetic(flags))
-    return "\n".join([*_declarations(graph), *lines, "  ret void", "}", ""])
+    lines += body(graph, Arithmetic(flags), _element)
+    return "\n".join([*declarations(libm_functions(graph)), *lines, "  ret void", "}", ""])
+
+
+def _element(base: str, name: str, row: int) -> list[str]:
+    return [f"  {name} = getelementptr double, ptr %{base}, i64 {row}"]
 
 
 def batch_ir(graph: Graph, lanes: int, flags: str = "") -> str:
@@ -111,7 +120,7 @@ def batch_ir(graph: Graph, lanes: int, flags: str = "") -> str:
         "  br label %columns",
         "columns:",
         "  %i = phi i64 [ 0, %start ], [ %next, %last ]",
-        *_body(graph, arithmetic),
+        *body(graph, arithmetic, _row),
         "  br label %last",
         "last:",
         f"  %next = add i64 %i, {lanes}",
@@ -121,18 +130,28 @@ def batch_ir(graph: Graph, lanes: int, flags: str = "") -> str:
         "  ret void",
         "}",
     ]
-    return "\n".join([*_declarations(graph), *helpers(libm_functions(graph), lanes, flags), *lines, ""])
+    functions = libm_functions(graph)
+    return "\n".join([*declarations(functions), *helpers(functions, lanes, flags), *lines, ""])
 
 
-def _declarations(graph: Graph) -> list[str]:
-    # nobuiltin: LLVM would make pow(x, 2) into x * x, which differs in the last bit. Nobody reads errno.
+def _row(base: str, name: str, row: int) -> list[str]:
     return [
-        f"declare double @{name}({', '.join(['double'] * arity)}) nounwind willreturn memory(none) nobuiltin"
-        for name, arity in libm_functions(graph).items()
+        f"  {name}.row = mul i64 %d{base}, {row}",
+        f"  {name}.at = add i64 {name}.row, %i",
+        f"  {name} = getelementptr double, ptr %{base}, i64 {name}.at",
     ]
 
 
-def _body(graph: Graph, arithmetic: Arithmetic) -> list[str]:
+def declarations(functions: Mapping[str, int]) -> list[str]:
+    """The functions of the C library, {name: number of arguments}, as the module has to declare them."""
+    # nobuiltin: LLVM would make pow(x, 2) into x * x, which differs in the last bit. Nobody reads errno.
+    return [
+        f"declare double @{name}({', '.join(['double'] * arity)}) nounwind willreturn memory(none) nobuiltin"
+        for name, arity in functions.items()
+    ]
+
+
+def body(graph: Graph, arithmetic: Arithmetic, address: Address) -> list[str]:
     """Every node in order; an output is stored as soon as it is known, so that few values are alive at once."""
     words, t = arithmetic.words(), arithmetic.type
     stored: dict[Node, list[int]] = {}
@@ -142,15 +161,6 @@ def _body(graph: Graph, arithmetic: Arithmetic) -> list[str]:
     paired = _paired(graph) if arithmetic.lanes > 1 else set()
     pairs: dict[Node, str] = {}
     lines: list[str] = []
-
-    def address(base: str, name: str, row: int) -> str:
-        if arithmetic.lanes == 1:
-            lines.append(f"  {name} = getelementptr double, ptr %{base}, i64 {row}")
-        else:
-            lines.append(f"  {name}.row = mul i64 %d{base}, {row}")
-            lines.append(f"  {name}.at = add i64 {name}.row, %i")
-            lines.append(f"  {name} = getelementptr double, ptr %{base}, i64 {name}.at")
-        return name
 
     names: dict[Node, str] = {}
 
@@ -165,7 +175,8 @@ def _body(graph: Graph, arithmetic: Arithmetic) -> list[str]:
             names[node] = r
             args = [names[arg] for arg in node.args]
             if node.op is VARIABLE:
-                lines.append(f"  {r} = load {t}, ptr {address('x', f'%x{number}', rows[node])}, align 8")
+                lines += address("x", f"%x{number}", rows[node])
+                lines.append(f"  {r} = load {t}, ptr %x{number}, align 8")
             elif node.op.name in INLINE:
                 lines += [f"  {line.format(*args, r=r, **words)}" for line in INLINE[node.op.name]]
             elif node.args[0] in paired and node.op.name in ("sin", "cos"):
@@ -179,7 +190,8 @@ def _body(graph: Graph, arithmetic: Arithmetic) -> list[str]:
                 prefix = "lanes." if arithmetic.lanes > 1 else ""
                 lines.append(f"  {r} = call {t} @{prefix}{node.op.name}({', '.join(f'{t} {arg}' for arg in args)})")
         for row in stored.get(node, ()):
-            lines.append(f"  store {t} {names[node]}, ptr {address('y', f'%y{row}', row)}, align 8")
+            lines += address("y", f"%y{row}", row)
+            lines.append(f"  store {t} {names[node]}, ptr %y{row}, align 8")
     return lines
 
 
