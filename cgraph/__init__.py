@@ -37,6 +37,7 @@ from .ops import (
     tanh,
     where,
 )
+from .program import Loop, loop
 from .reverse import gradient, vjp
 from .simplify import simplify, specialize
 
@@ -46,6 +47,7 @@ __all__ = [
     "Edge",
     "Graph",
     "GraphError",
+    "Loop",
     "Node",
     "abs",
     "acos",
@@ -69,6 +71,7 @@ __all__ = [
     "less_equal",
     "log",
     "log1p",
+    "loop",
     "maximum",
     "minimum",
     "named",

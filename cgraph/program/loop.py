@@ -1,0 +1,71 @@
+"""Loop: one graph repeated on its own carry, such as a step of a fixed-step integrator."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import GraphError
+from ..evaluate import Array
+from ..graph import Graph
+from .program import Call, Program
+from .runner import runner
+
+
+class Loop:
+    """A graph that runs on its own results, see `loop`.  graph: one pass.  carry: {input: the output that follows}."""
+
+    def __init__(self, graph: Graph, carry: Mapping[str, str], backend: str, *, fast: bool, fma: bool) -> None:
+        for name in carry:
+            graph.select_inputs(name)
+        if missing := [name for name in carry.values() if name not in graph.outputs]:
+            raise GraphError(f"the graph has no output {', '.join(missing)} (it has {', '.join(graph.outputs)})")
+        if not carry:
+            raise GraphError("a loop needs at least one input that an output follows, {input: output}")
+        self.graph, self.carry = graph, dict(carry)
+        self._moving = [graph.input_names.index(name) for name in carry]
+        self._held = [k for k, name in enumerate(graph.input_names) if name not in carry]
+        inputs = [graph.inputs[k] for k in (*self._moving, *self._held)]
+        one_pass = Graph(inputs, {name: graph.outputs[carry[name]] for name in carry})
+        registers = {"carry": len(self._moving), "held": len(self._held)}
+        program = Program(registers, [Call(one_pass, ("carry", "held"), ("carry",))], record=["carry"])
+        self._runner = runner(program, backend, fast=fast, fma=fma)
+
+    def __call__(self, x: ArrayLike, passes: int, every: int = 1) -> Array:
+        """The carry after each `every`th pass, (passes // every, carried), from the inputs x (n_in,).
+
+        Raises GraphError for another shape of x, or `passes` or `every` out of range.
+        """
+        return self._runner.run(self._memory(x, 1), passes, every).rows
+
+    def batch(self, X: ArrayLike, passes: int, every: int = 1) -> Array:
+        """As a call, for N starts X (n_in, N) side by side: (passes // every, carried, N)."""
+        return self._runner.run_many(self._memory(X, 2), passes, every).rows
+
+    def _memory(self, x: ArrayLike, dimensions: int) -> Array:
+        given = np.asarray(x, dtype=np.float64)
+        count = len(self.graph.inputs)
+        if given.ndim != dimensions or given.shape[0] != count:
+            wanted = f"({count},)" if dimensions == 1 else f"({count}, N)"
+            raise GraphError(f"x must have shape {wanted}, one row for each input, got {given.shape}")
+        return np.concatenate([given[self._moving], given[self._held]])
+
+
+def loop(
+    graph: Graph, carry: Mapping[str, str], backend: str = "auto", *, fast: bool = False, fma: bool = True
+) -> Loop:
+    """A function that repeats the graph on its own carry without returning to Python.
+
+    carry: {input: output}: after each pass the input takes the output's value; other inputs hold theirs.
+    `loop(x, passes, every)` gives the carry after each `every`th pass. backend: "llvm", "python" or "auto" (machine
+    code where llvmlite is installed); fast, fma: see `compile`.
+
+    Raises GraphError for an input or output that the graph does not have.
+
+    >>> x, v, h = cg.variables("x v h")
+    >>> spring = cg.Graph([x, v, h], {"x_next": x + h * v, "v_next": v - h * (x + h * v)})
+    >>> turns = cg.loop(spring, {"x": "x_next", "v": "v_next"})([1.0, 0.0, 1e-3], passes=6283, every=100)
+    """
+    return Loop(graph, carry, backend, fast=fast, fma=fma)

@@ -1,0 +1,224 @@
+"""Programs and loops: machine code and Python do the same, and what they do is right."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+import cgraph as cg
+from cgraph.program import Call, Factor, If, Map, Program, Solve, Sum, While, runner
+
+BACKENDS = ["python", "llvm"]
+
+
+@pytest.fixture(params=BACKENDS)
+def backend(request: pytest.FixtureRequest) -> str:
+    if request.param == "llvm":
+        pytest.importorskip("llvmlite")
+    return str(request.param)
+
+
+def spring() -> cg.Graph:
+    x, v, h = cg.variables("x v h")
+    return cg.Graph([x, v, h], {"x_next": x + h * v, "v_next": v - h * (x + h * v)})
+
+
+def test_a_loop_is_the_graph_again_and_again(backend: str) -> None:
+    graph = spring()
+    state = {"x": 1.0, "v": 0.0, "h": 0.01}
+    rows = []
+    for _ in range(30):
+        after = graph.evaluate(state)
+        state |= {"x": after["x_next"], "v": after["v_next"]}
+        rows.append([state["x"], state["v"]])
+    run = cg.loop(graph, {"x": "x_next", "v": "v_next"}, backend, fma=False)
+    assert run([1.0, 0.0, 0.01], 30).tolist() == rows
+    assert run([1.0, 0.0, 0.01], 30, every=7).tolist() == rows[6::7]
+    assert run([1.0, 0.0, 0.01], 0).shape == (0, 2)
+
+
+def test_loops_side_by_side_are_the_loops_one_by_one(backend: str) -> None:
+    run = cg.loop(spring(), {"v": "v_next", "x": "x_next"}, backend, fma=False)
+    starts = np.random.default_rng(0).normal(size=(3, 21))
+    together = run.batch(starts, 12, every=5)
+    assert together.shape == (2, 2, 21)
+    for k, start in enumerate(starts.T):
+        assert together[:, :, k].tolist() == run(start, 12, every=5).tolist()
+
+
+def test_a_carry_that_trades_places(backend: str) -> None:
+    a, b = cg.variables("a b")
+    swap = cg.loop(cg.Graph([a, b], {"first": b, "second": a}), {"a": "first", "b": "second"}, backend)
+    assert swap([1.0, 2.0], 3).tolist() == [[2.0, 1.0], [1.0, 2.0], [2.0, 1.0]]
+
+
+def test_registers_that_are_read_and_written(backend: str) -> None:
+    a, b = cg.variables("a b")
+    swap = cg.Graph([a, b], {"p": b + 0.0, "q": a + 0.0})
+    program = Program({"x": 3, "y": 3}, [Map(swap, ("x", "y"), ("x", "y"))], record=["x", "y"])
+    run = runner(program, backend)
+    assert run.run(run.memory({"x": [1, 2, 3], "y": [4, 5, 6]}), 1).rows.tolist() == [[4, 5, 6, 1, 2, 3]]
+
+
+def test_sum_adds_from_the_first_to_the_last(backend: str) -> None:
+    a, s = cg.variables("a s")
+    program = Program({"a": 4, "s": 1, "o": 1}, [Sum(cg.Graph([a, s], {"o": a * s}), ("a", "s"), "o")], record=["o"])
+    values = [1e16, 1.0, -1e16, 3.0]
+    run = runner(program, backend, fma=False)
+    expected = (((0.0 + 1e16) + 1.0) - 1e16) + 3.0
+    assert run.run(run.memory({"a": values, "s": 1.0}), 1).rows.tolist() == [[expected]]
+    many = np.repeat(run.memory({"a": values, "s": 1.0})[:, None], 5, axis=1)
+    assert run.run_many(many, 1).rows.ravel().tolist() == [expected] * 5
+
+
+def test_while_and_if(backend: str) -> None:
+    """The greatest common divisor by subtraction."""
+    a, b = cg.variables("a b")
+    less = cg.Graph([a, b], {"on": cg.not_equal(a, b), "first": cg.less(b, a)})
+    subtract = cg.Graph([a, b], {"d": a - b})
+    body = (
+        If("first", (Call(subtract, ("a", "b"), ("a",)),), (Call(subtract, ("b", "a"), ("b",)),)),
+        Call(less, ("a", "b"), ("on", "first")),
+    )
+    program = Program(
+        {"a": 1, "b": 1, "on": 1, "first": 1},
+        [Call(less, ("a", "b"), ("on", "first")), While("on", body)],
+        record=["a"],
+    )
+    run = runner(program, backend)
+    for x, y in ((84, 36), (7, 13), (5, 5), (1, 9)):
+        assert run.run(run.memory({"a": x, "b": y}), 1).rows.tolist() == [[math.gcd(x, y)]]
+
+
+def test_a_nan_ends_a_while(backend: str) -> None:
+    a = cg.variable("a")
+    program = Program({"a": 1}, [While("a", (Call(cg.Graph([a], {"o": a + 1.0}), ("a",), ("a",)),))], record=["a"])
+    run = runner(program, backend)
+    assert math.isnan(run.run(run.memory({"a": math.nan}), 1).rows[0, 0])
+
+
+def test_record_if_and_stop(backend: str) -> None:
+    k = cg.variable("k")
+    count = cg.Graph([k], {"k": k + 1.0, "even": cg.equal(0.0, cg.sin(k + 1.0 - k - 1.0)), "done": (k + 1.0) >= 5.0})
+    registers = {"k": 1, "even": 1, "done": 1}
+    body = [Call(count, ("k",), ("k", "even", "done"))]
+    run = runner(Program(registers, body, record=["k"], record_if="even", stop="done"), backend)
+    memory = run.memory({})
+    rows, passes = run.run(memory, 100)
+    assert (rows.ravel().tolist(), passes) == ([1.0, 2.0, 3.0, 4.0, 5.0], 5)
+    assert run.read(memory, "k").tolist() == [5.0]
+    never = runner(Program(registers, body, record=["k"], record_if="done"), backend)
+    assert never.run(never.memory({}), 6).rows.ravel().tolist() == [5.0, 6.0]
+
+
+def test_a_run_goes_on_where_the_last_one_ended(backend: str) -> None:
+    graph = spring()
+    program = Program({"c": 2, "h": 1}, [Call(graph, ("c", "h"), ("c",))], record=["c"])
+    run = runner(program, backend)
+    whole = run.run(run.memory({"c": [1.0, 0.0], "h": 0.1}), 9).rows
+    memory = run.memory({"c": [1.0, 0.0], "h": 0.1})
+    parts = [run.run(memory, k).rows for k in (2, 0, 3, 4)]
+    assert np.concatenate(parts).tolist() == whole.tolist()
+
+
+@settings(max_examples=60, deadline=None)
+@given(n=st.integers(1, 9), seed=st.integers(0, 10_000))
+def test_factor_and_solve(n: int, seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    a = generator.normal(size=(n, n)) * 10.0 ** generator.integers(-6, 7, size=(n, 1))
+    x = generator.normal(size=n)
+    program = Program({"a": n * n, "p": n, "b": n}, [Factor("a", "p"), Solve("a", "p", "b")], record=["b", "a", "p"])
+    results = []
+    for kind in BACKENDS:
+        try:
+            run = runner(program, kind, fma=False)
+        except ImportError:
+            continue
+        results.append(run.run(run.memory({"a": a.ravel(), "b": a @ x}), 1).rows)
+        residual = a @ results[-1][0, :n] - a @ x
+        assert np.all(np.abs(residual) <= 1e-13 * (np.abs(a) @ np.abs(results[-1][0, :n])))
+    for one, other in itertools.pairwise(results):
+        assert one.tolist() == other.tolist()
+
+
+def test_the_pivot_is_the_largest(backend: str) -> None:
+    program = Program({"a": 4, "p": 2, "b": 2}, [Factor("a", "p"), Solve("a", "p", "b")], record=["b"])
+    run = runner(program, backend)
+    assert run.run(run.memory({"a": [0.0, 1.0, 1.0, 0.0], "b": [2.0, 3.0]}), 1).rows.tolist() == [[3.0, 2.0]]
+    tiny = run.run(run.memory({"a": [1e-20, 1.0, 1.0, 1.0], "b": [1.0, 2.0]}), 1).rows
+    assert tiny.tolist() == [[1.0, 1.0]]
+
+
+def test_a_singular_matrix_gives_no_number(backend: str) -> None:
+    program = Program({"a": 4, "p": 2, "b": 2}, [Factor("a", "p"), Solve("a", "p", "b")], record=["b"])
+    run = runner(program, backend)
+    assert not np.isfinite(run.run(run.memory({"a": [1.0, 2.0, 2.0, 4.0], "b": [1.0, 1.0]}), 1).rows).all()
+
+
+def test_machine_code_agrees_with_python_to_the_last_bit() -> None:
+    pytest.importorskip("llvmlite")
+    x, y, h = cg.variables("x y h")
+    rate = cg.Graph([x, y], {"x_dot": cg.sin(y) - 0.1 * x, "y_dot": cg.exp(-x * x) * cg.cos(x)})
+    a, b = cg.variables("a b")
+    ahead = cg.Graph([a, b, h], {"o": a + h * b})
+    registers = {"x": 2, "k": 2, "h": 1}
+    program = Program(registers, [Call(rate, ("x",), ("k",)), Map(ahead, ("x", "k", "h"), ("x",))], record=["x"])
+    rows = [(run := runner(program, kind, fma=False)).run(run.memory({"x": [0.3, 1.0], "h": 0.01}), 500).rows
+            for kind in BACKENDS]  # fmt: skip
+    assert rows[0].tolist() == rows[1].tolist()
+
+
+ONE = cg.Graph([cg.variable("a")], {"o": -cg.variable("a")})
+
+
+@pytest.mark.parametrize(
+    ("registers", "body", "message"),
+    [
+        ({"a": 2}, [Call(ONE, ("b",), ("a",))], "names register 'b', not among a"),
+        ({"a": 2, "b": 1}, [Call(ONE, ("a",), ("b",))], "needs 1 inputs, the registers a hold 2"),
+        ({"a": 1, "b": 2}, [Call(ONE, ("a",), ("b",))], "needs 1 outputs, the registers b hold 2"),
+        ({"a": 2, "b": 3}, [Map(ONE, ("a",), ("b",))], "register 'a' needs length 3 or 1, got 2"),
+        ({"a": 2, "b": 3}, [Map(ONE, ("a", "b"), ("b",))], "needs 1 registers, got 2: a, b"),
+        ({"a": 2, "b": 3}, [Sum(ONE, ("a",), "b")], "needs register 'b' to have length 1, got 3"),
+        ({"a": 2}, [While("a", ())], "While needs register 'a' to have length 1, got 2"),
+        ({"a": 2}, [If("a", ())], "If needs register 'a' to have length 1, got 2"),
+        ({"a": 3, "p": 2}, [Factor("a", "p")], "Factor needs register 'a' to have length 4, got 3"),
+        ({"a": 4, "p": 2, "b": 1}, [Solve("a", "p", "b")], "Solve needs register 'b' to have length 2, got 1"),
+        ({"a": -1}, [], "register 'a' needs a length, an integer not negative, got -1"),
+        ({"a": 1}, [While("a", (Call(ONE, ("z",), ("a",)),))], "names register 'z'"),
+    ],
+)
+def test_a_program_that_does_not_fit_is_refused(registers, body, message) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(cg.GraphError, match=message):
+        Program(registers, body, record=[])
+
+
+def test_wrong_use_of_a_runner(backend: str) -> None:
+    program = Program({"a": 1}, [While("a", (Call(ONE, ("a",), ("a",)),))], record=["a"])
+    run = runner(program, backend)
+    with pytest.raises(cg.GraphError, match="no register 'b'"):
+        run.memory({"b": 1.0})
+    with pytest.raises(cg.GraphError, match=r"register 'a' needs shape \(1,\), got \(2,\)"):
+        run.memory({"a": [1.0, 2.0]})
+    with pytest.raises(cg.GraphError, match=r"float64 of shape \(1,\), got float64 \(2,\)"):
+        run.run(np.zeros(2), 1)
+    with pytest.raises(cg.GraphError, match="passes must be at least 0 and every at least 1, got -1 and 1"):
+        run.run(np.zeros(1), -1)
+    with pytest.raises(cg.GraphError, match="runs side by side need the same course for all: no While"):
+        run.run_many(np.zeros((1, 3)), 1)
+
+
+def test_wrong_use_of_a_loop() -> None:
+    graph = spring()
+    with pytest.raises(cg.GraphError, match="no input 'z'"):
+        cg.loop(graph, {"z": "x_next"})
+    with pytest.raises(cg.GraphError, match="no output y"):
+        cg.loop(graph, {"x": "y"})
+    with pytest.raises(cg.GraphError, match="at least one input"):
+        cg.loop(graph, {})
+    with pytest.raises(ValueError, match="backend must be one of auto, python, llvm, got 'gpu'"):
+        cg.loop(graph, {"x": "x_next"}, "gpu")
+    with pytest.raises(cg.GraphError, match=r"x must have shape \(3,\)"):
+        cg.loop(graph, {"x": "x_next"})([1.0], 3)
