@@ -10,23 +10,31 @@ from .equations import (
     mass_matrix,
     momentum,
 )
+from .event import Event
 from .formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious
-from .mechanism import Body, Joint, Mechanism, MechanismError, serial_arm
+from .mechanism import Body, Force, Joint, Mechanism, MechanismError, serial_arm, tree
 from .mjcf import to_mjcf
 from .mujoco_load import load_mjcf, load_urdf
+from .ode_system import OdeSystem
 from .planar_arm import Link, PlanarArm, planar_arm
 from .scenes import Scene
-from .simulate import Stats, Trajectory, simulate
+from .simulate import simulate
+from .state_equation import state_equation
 from .system import System, as_system
+from .trajectory import Crossings, Stats, Trajectory
 from .urdf import to_urdf
 
 __all__ = [
     "FORMULATIONS",
     "Body",
+    "Crossings",
+    "Event",
+    "Force",
     "Joint",
     "Link",
     "Mechanism",
     "MechanismError",
+    "OdeSystem",
     "PlanarArm",
     "Scene",
     "SingularMassMatrixError",
@@ -49,6 +57,8 @@ __all__ = [
     "serial_arm",
     "simulate",
     "spurious",
+    "state_equation",
     "to_mjcf",
     "to_urdf",
+    "tree",
 ]

@@ -5,8 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,165 +13,257 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 
-from .equations import energy, forward_dynamics
-from .integrators import METHODS, step
+from .equations import energy
+from .event import Event, crossings, event_graph
+from .integrators import METHODS, Problem
 from .progress import Progress
-from .system import TIME, System, as_system, parameter_value, per_coordinate
+from .run import AdaptiveRun, FixedRun, Hermite, Piece, Run
+from .state_equation import state_inputs
+from .system import TIME, parameter_value, per_coordinate
+from .trajectory import Array, Crossings, Stats, Trajectory
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
-
-
-@dataclass(frozen=True)
-class Stats:
-    """How a run went. complete: it reached t_end; if not, `status` says where and why it stopped."""
-
-    method: str
-    steps: int
-    evaluations: int  # of the forward dynamics
-    dt: float  # s, the largest step taken
-    seconds: float  # run time of the steps, without building and compiling
-    complete: bool
-    status: str
-
-
-@dataclass(frozen=True)
-class Trajectory:
-    """The motion: t (T,) [s]; q and qd (T, n) [rad or m, per second]; energy (T,) [J]; and how the run went."""
-
-    t: Array
-    q: Array
-    qd: Array
-    energy: Array
-    stats: Stats
+DT = 1e-3  # s, the step of methods of equal steps
+BLOCK = 4096  # rows whose energy is taken at once
 
 
 def simulate(
     model: Any,
     q: ArrayLike,
-    qd: ArrayLike,
+    qd: ArrayLike | None,
     t_end: float,
     method: str = "rk4",
     *,
-    dt: float = 1e-3,
+    dt: float | None = None,
+    rtol: float = 1e-8,
+    atol: float = 1e-10,
     t_eval: ArrayLike | None = None,
+    events: Event | Iterable[Event] = (),
     tau: float | Sequence[float] = 0.0,
     parameters: Mapping[str, float] | None = None,
+    first_step: float | None = None,
+    max_steps: float = math.inf,
+    backend: str = "auto",
     progress: bool | None = None,
 ) -> Trajectory:
-    """The motion of a system from (q, qd) at t = 0 to t_end, by a fixed-step method.
+    """The motion of a system from (q, qd) at t = 0 to t_end.
 
-    q, qd: (n,), the start.  t_end [s].  method: "rk4" (order 4) or "euler" (order 1).
-    dt [s]: the largest step; between two recorded instants the steps are equal and at most dt, so that the last row is
-        at t_end exactly.
-    t_eval: increasing times in [0, t_end] to record; by default every step.  tau: constant applied force, for all
-        coordinates or for each.  parameters: values in place of the system's own.
+    q, qd: (n,), the start; of an OdeSystem q is the state, and qd None.  t_end [s].
+    method: of equal steps "euler", "rk4", and, symplectic, "symplectic_euler", "verlet", "midpoint", "gauss4",
+        "gauss6"; of steps chosen by error "dopri5", ... See `dynamics.integrators.METHODS`.
+    dt [s]: the largest step. With equal steps (1e-3 by default) the steps between two recorded instants are equal and
+        at most dt, so that the last row is at t_end exactly. Chosen steps have no limit by default.
+    rtol, atol: the error of a chosen step, relative to each component of the state, and absolute.
+    t_eval: increasing times in [0, t_end] to record; by default every step. Chosen steps are not changed by it.
+    events: instants to find on the way, see `Event`.
+    tau: constant applied force, for all coordinates or for each.  parameters: values in place of the system's own.
+    first_step [s]: in place of the one that the method chooses.  max_steps: after which the run stops.
+    backend: "llvm", "python", or "auto" for machine code where llvmlite is installed; the steps are the same.
     progress: a progress line on standard error; None shows it on a terminal, for runs over a second.
 
-    A step that gives a state that is not finite ends the run: the trajectory keeps what was computed before it and
-    `stats.status` names the time and the coordinate. Ctrl-C does the same.
+    A step that gives a state that is not finite, or has to be smaller than the resolution of t, ends the run: the
+    trajectory keeps what was computed before it and `stats.status` names the time and the coordinate. Ctrl-C does the
+    same.
     Raises ValueError for arguments out of range, SingularMassMatrixError for a coordinate without inertia.
     """
-    system = as_system(model)
     if method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
-    state = np.concatenate([_state("q", q, system), _state("qd", qd, system)])
-    for what, value in (("t_end", t_end), ("dt", dt)):
-        if not (math.isfinite(value) and value > 0.0):
-            raise ValueError(f"{what} must be positive and finite, got {value!r} s")
-    instants = _instants(t_end, dt, t_eval)
-    values = _parameter_values(system, parameters)
+    chosen = METHODS[method]
+    for what, value, unit in (("t_end", t_end, " s"), ("dt", dt, " s"), ("first_step", first_step, " s")):
+        if value is not None and not (math.isfinite(value) and value > 0.0):
+            raise ValueError(f"{what} must be positive and finite, got {value!r}{unit}")
+    if not (rtol >= 0.0 and atol >= 0.0 and 0.0 < rtol + atol < math.inf):
+        raise ValueError(f"rtol and atol must be finite, not negative and not both 0, got {rtol!r} and {atol!r}")
+    if not max_steps >= 1:
+        raise ValueError(f"max_steps must be at least 1, got {max_steps!r}")
+    inputs = state_inputs(model)
+    values = _parameter_values(inputs.parameters, parameters)
+    n = len(inputs.applied)
+    bound = {f"tau{i}": each for i, each in enumerate(per_coordinate("tau", tau, n))} if n else {}
+    problem = Problem(model, bound | values)
+    state = _start(problem, q, qd)
+    wanted = (events,) if isinstance(events, Event) else tuple(events)
+    asked = None if t_eval is None else _times(t_eval, t_end)
 
-    bound = {f"tau{i}": each for i, each in enumerate(per_coordinate("tau", tau, system.n))} | values
-    rate = _Rate(system, bound)
-    rows = [state]
-    steps, largest, status = 0, 0.0, ""
-    start = time.perf_counter()
+    run: Run
+    if chosen.adaptive:
+        run = AdaptiveRun(
+            problem, chosen, (), backend,
+            t_end=float(t_end), rtol=rtol, atol=atol, longest=math.inf if dt is None else dt,
+            first=first_step, most=max_steps, dense=bool(wanted) or asked is not None,
+        )  # fmt: skip
+    else:
+        instants = [0.0, float(t_end)] if asked is None else _from_start(asked)
+        run = FixedRun(
+            problem, chosen, (), backend,
+            instants=instants, dt=DT if dt is None else dt, each=asked is None or bool(wanted), most=max_steps,
+        )  # fmt: skip
+    rows = _Rows(state, asked)
+    watch = _Watch(problem, wanted)
+    begin = time.perf_counter()
     try:
         with np.errstate(all="ignore"), Progress("simulate", t_end, progress) as report:
-            for begin, end in itertools.pairwise(instants):
-                count = max(1, math.ceil((end - begin) / dt * (1.0 - 1e-12)))
-                size = (end - begin) / count
-                for k in range(count):
-                    state = step(METHODS[method], rate, begin + k * size, state, size)
-                    if not np.isfinite(state).all():
-                        status = _stopped(system, begin + (k + 1) * size, state)
-                        break
-                    steps += 1
-                if status:
+            for piece in run.pieces(state):
+                ended = watch(piece)
+                rows.add(piece if ended is None else _until(*ended))
+                if ended is not None:
+                    run.status = watch.status
                     break
-                largest = max(largest, min(size, dt))
-                rows.append(state)
-                report(end)
+                report(float(piece.t[-1]))
     except KeyboardInterrupt:
-        status = f"interrupted after t = {instants[len(rows) - 1]:.6g} s"
-    seconds = time.perf_counter() - start
+        run.status = f"interrupted after t = {rows.last:.6g} s"
+    seconds = time.perf_counter() - begin
 
-    table = np.array(rows)
-    times = np.array(instants[: len(rows)])
-    if t_eval is not None and np.asarray(t_eval).flat[0] > 0.0:  # the start is recorded only when asked for
-        table, times = table[1:], times[1:]
-    n = system.n
-    stats = Stats(method, steps, rate.calls, largest, seconds, not status, status or "reached t_end")
-    return Trajectory(times, table[:, :n], table[:, n:], _energies(system, values, times, table), stats)
-
-
-class _Rate:
-    """xdot = (qd, qdd) of the state x = (q, qd), from the compiled forward dynamics."""
-
-    def __init__(self, system: System, bound: Mapping[str, float]) -> None:
-        self.graph = cg.specialize(forward_dynamics(system), bound)
-        self.values = cg.compile(self.graph).values
-        self.n = system.n
-        self.timed = TIME in self.graph.input_names
-        self.calls = 0
-
-    def __call__(self, t: float, x: Array) -> Array:
-        self.calls += 1
-        arguments = x.tolist()
-        if self.timed:
-            arguments.append(t)
-        return np.concatenate([x[self.n :], self.values(arguments)])
+    times, table = rows.table()
+    stats = Stats(
+        method,
+        run.steps,
+        run.rejected,
+        run.evaluations,
+        run.largest,
+        seconds,
+        not run.status,
+        run.status or "reached t_end",
+    )
+    half = n or problem.size
+    return Trajectory(
+        times, table[:, :half], table[:, half:], _energies(problem, values, times, table), stats, watch.found(half)
+    )
 
 
-def _energies(system: System, values: Mapping[str, float], times: Array, table: Array) -> Array:
-    graph = cg.specialize(energy(system), values)
-    rows = [*table.T] + ([times] if TIME in graph.input_names else [])
-    energies: Array = cg.compile(graph).batch(np.array(rows))[0]
-    return energies
+class _Rows:
+    """The rows of the trajectory: every step, or the states at the times asked for."""
+
+    def __init__(self, state: Array, asked: Array | None) -> None:
+        self.asked = asked
+        self.last = 0.0
+        at_start = asked is None or asked[0] == 0.0
+        self._t = [np.zeros(1 if at_start else 0)]
+        self._x = [state[None] if at_start else state[None][:0]]
+        self._next = int(at_start)  # of the times asked for
+
+    def add(self, piece: Piece) -> None:
+        """The rows of these steps."""
+        if not len(piece.t):
+            return
+        self.last = float(piece.t[-1])
+        if self.asked is None:
+            self._t.append(piece.t)
+            self._x.append(piece.x)
+            return
+        last = int(np.searchsorted(self.asked, self.last, side="right"))
+        times = self.asked[self._next : last]
+        self._next = last
+        rows = np.searchsorted(piece.t, times)
+        exact = piece.t[rows] == times
+        states = piece.x[rows]
+        if not exact.all():
+            inside = rows[~exact]
+            states[~exact] = piece.at(inside, (times[~exact] - piece.t_old[inside]) / piece.h[inside])
+        self._t.append(times)
+        self._x.append(states)
+
+    def table(self) -> tuple[Array, Array]:
+        """Times and states."""
+        return np.concatenate(self._t), np.concatenate(self._x)
 
 
-def _state(what: str, value: ArrayLike, system: System) -> Array:
+class _Watch:
+    """The events of a run: where they happened so far, and whether one ends it."""
+
+    def __init__(self, problem: Problem, events: Sequence[Event]) -> None:
+        self.problem, self.events = problem, events
+        self.status = ""
+        self._found: list[tuple[int, float, Array]] = []
+        if events:
+            graph = event_graph(events, problem)
+            self._graph = graph
+
+    def __call__(self, piece: Piece) -> tuple[Piece, float, Array] | None:
+        """Note the events of these steps. The one that ends the run: the steps with dense output, time and state."""
+        if not self.events:
+            return None
+        if piece.dense is None:
+            piece = Hermite(self.problem, ()).of(piece)
+        for number, t, x in crossings(self._values, self.events, piece):
+            self._found.append((number, t, x))
+            if self.events[number].terminal:
+                self.status = f"event {self.events[number].name!r} at t = {t:.6g} s"
+                return piece, t, x
+        return None
+
+    def _values(self, t: Array, x: Array) -> Array:
+        given = dict(zip(self._graph.input_names, [*x.T, t], strict=True))
+        return np.array([np.broadcast_to(each, t.shape) for each in self._graph.evaluate(given).values()])
+
+    def found(self, half: int) -> dict[str, Crossings]:
+        """What is in the trajectory."""
+        result = {}
+        for number, event in enumerate(self.events):
+            mine = [(t, x) for k, t, x in self._found if k == number]
+            states = np.array([x for _, x in mine]).reshape(len(mine), self.problem.size)
+            result[event.name] = Crossings(np.array([t for t, _ in mine]), states[:, :half], states[:, half:])
+        return result
+
+
+def _until(piece: Piece, t: float, x: Array) -> Piece:
+    """The steps up to an instant inside one, which becomes the last."""
+    keep = int(np.searchsorted(piece.t, t)) + 1
+    cut = Piece(*[None if each is None else each[:keep].copy() for each in piece])  # type: ignore[arg-type]
+    cut.t[-1], cut.x[-1] = t, x
+    return cut
+
+
+def _energies(problem: Problem, values: Mapping[str, float], times: Array, table: Array) -> Array:
+    """The energy at each row; NaN for a system of first order."""
+    result = np.full(len(times), math.nan)
+    if problem.system is None:
+        return result
+    graph = cg.specialize(energy(problem.system), values)
+    for start in range(0, len(times), BLOCK):
+        part = slice(start, start + BLOCK)
+        given: dict[str, Any] = dict(zip(problem.states, table[part].T, strict=True))
+        if TIME in graph.input_names:
+            given[TIME] = times[part]
+        result[part] = graph.evaluate(given)["E"]
+    return result
+
+
+def _start(problem: Problem, q: ArrayLike, qd: ArrayLike | None) -> Array:
+    system = problem.system
+    if system is None:
+        if qd is not None:
+            raise ValueError("qd must be None for a system of first order; q holds its whole state")
+        return _state("q", q, problem.size, "state")
+    if qd is None:
+        raise ValueError(f"qd must have shape ({system.n},), one for each coordinate, got None")
+    return np.concatenate([_state("q", q, system.n, "coordinate"), _state("qd", qd, system.n, "coordinate")])
+
+
+def _state(what: str, value: ArrayLike, n: int, each: str) -> Array:
     array = np.asarray(value, dtype=np.float64)
-    if array.shape != (system.n,):
-        raise ValueError(f"{what} must have shape ({system.n},), one for each coordinate, got {array.shape}")
+    if array.shape != (n,):
+        raise ValueError(f"{what} must have shape ({n},), one for each {each}, got {array.shape}")
     if not np.isfinite(array).all():
         raise ValueError(f"{what} must be finite, got {array.tolist()}")
     return array
 
 
-def _instants(t_end: float, dt: float, t_eval: ArrayLike | None) -> list[float]:
-    if t_eval is None:
-        count = max(1, math.ceil(t_end / dt * (1.0 - 1e-12)))
-        return [t_end * k / count for k in range(count)] + [float(t_end)]
+def _times(t_eval: ArrayLike, t_end: float) -> Array:
     times = np.asarray(t_eval, dtype=np.float64)
     listed: list[float] = times.ravel().tolist()
     increasing = all(a < b for a, b in itertools.pairwise(listed))
     if times.ndim != 1 or not listed or not increasing or not (listed[0] >= 0.0 and listed[-1] <= t_end):
         raise ValueError(f"t_eval must be increasing times in [0, t_end = {t_end:g} s]")
+    return times
+
+
+def _from_start(times: Array) -> list[float]:
+    listed: list[float] = times.tolist()
     return listed if listed[0] == 0.0 else [0.0, *listed]
 
 
-def _parameter_values(system: System, parameters: Mapping[str, float] | None) -> dict[str, float]:
+def _parameter_values(own: Mapping[str, float], parameters: Mapping[str, float] | None) -> dict[str, float]:
     given = dict(parameters or {})
-    if unknown := [name for name in given if name not in system.parameters]:
-        raise ValueError(
-            f"the system has no parameter {', '.join(unknown)} (it has {', '.join(system.parameters) or 'none'})"
-        )
-    return system.parameters | {name: parameter_value(name, value) for name, value in given.items()}
-
-
-def _stopped(system: System, t: float, state: Array) -> str:
-    index = int(np.flatnonzero(~np.isfinite(state))[0])
-    name = system.coordinates[index % system.n]
-    what = "coordinate" if index < system.n else "velocity of"
-    return f"stopped at t = {t:.6g} s: {what} {name!r} is {state[index]} after the step"
+    if unknown := [name for name in given if name not in own]:
+        raise ValueError(f"the system has no parameter {', '.join(unknown)} (it has {', '.join(own) or 'none'})")
+    return dict(own) | {name: parameter_value(name, value) for name, value in given.items()}

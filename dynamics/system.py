@@ -45,7 +45,7 @@ class System:
         self.parameters = {name: parameter_value(name, value) for name, value in (parameters or {}).items()}
         self.damping = per_coordinate("damping", damping, self.n, minimum=0.0)
         p = {name: cg.variable(name) for name in self.parameters}
-        given = _call("lagrangian", lagrangian, self.q, self.qd, self.t, p)
+        given = called("lagrangian", lagrangian, self.q, self.qd, self.t, p)
         partials = [given] if isinstance(given, (Node, numbers.Real)) else _sequence("the lagrangian must give", given)
         if not partials:
             raise ValueError("the lagrangian gave no partial Lagrangians")
@@ -53,7 +53,7 @@ class System:
         applied: Sequence[Node | float] = [0.0] * self.n
         if forces is not None:
             with cg.tag("force"):
-                applied = _sequence("forces must give", _call("forces", forces, self.q, self.qd, self.t, p))
+                applied = _sequence("forces must give", called("forces", forces, self.q, self.qd, self.t, p))
             if len(applied) != self.n:
                 raise ValueError(f"forces must give {self.n} values, one for each coordinate, got {len(applied)}")
         self.forces = tuple([_as_node("forces", each) for each in applied])
@@ -189,19 +189,22 @@ def parameter_value(name: str, value: float) -> float:
     return float(value)
 
 
-def _call(what: str, function: Callable[..., Any], q: list[Node], qd: list[Node], t: Node, p: dict[str, Node]) -> Any:
+def called(what: str, function: Callable[..., Any], *arguments: Any) -> Any:
+    """function(*arguments), or without the last of them, the parameters, where it does not take them.
+
+    Raises TypeError, naming `what`, for what is no such function.
+    """
+    names = "(q, qd, t) or (q, qd, t, p)" if len(arguments) == 4 else "(x, t) or (x, t, p)"
     if not callable(function):
-        raise TypeError(f"{what} must be a function of (q, qd, t) or (q, qd, t, p), got {function!r:.60}")
+        raise TypeError(f"{what} must be a function of {names}, got {function!r:.60}")
     signature = inspect.signature(function)
-    try:
-        signature.bind(q, qd, t, p)
-    except TypeError:
+    for chosen in (arguments, arguments[:-1]):
         try:
-            signature.bind(q, qd, t)
+            signature.bind(*chosen)
         except TypeError:
-            raise TypeError(f"{what} must take (q, qd, t) or (q, qd, t, p), got {signature}") from None
-        return function(q, qd, t)
-    return function(q, qd, t, p)
+            continue
+        return function(*chosen)
+    raise TypeError(f"{what} must take {names}, got {signature}")
 
 
 def _sequence(what: str, value: Any) -> list[Any]:

@@ -1,5 +1,38 @@
-"""Integrators: Runge-Kutta tableaus as data, and the one loop that steps them."""
+"""Integrators: methods for xdot = f(x, t), as programs over the graphs of a model."""
 
-from .explicit import METHODS, Tableau, step
+from functools import partial
 
-__all__ = ["METHODS", "Tableau", "step"]
+from .adaptive import embedded
+from .dop853 import DOP853
+from .fixed import explicit
+from .method import Method
+from .problem import Problem
+from .symplectic import GAUSS4, GAUSS6, MIDPOINT, SYMPLECTIC_EULER, VERLET, Partitioned, partitioned
+from .tableau import DOPRI5, EULER, RK4, Tableau
+
+
+def _explicit(tableau: Tableau) -> Method:
+    return Method(tableau.order, lambda problem, _: explicit(tableau, problem), adaptive=False)
+
+
+def _embedded(tableau: Tableau) -> Method:
+    return Method(tableau.order, partial(embedded, tableau), adaptive=True, degree=len(tableau.dense[0]))
+
+
+def _partitioned(method: Partitioned) -> Method:
+    return Method(method.order, lambda problem, _: partitioned(method, problem), adaptive=False)
+
+
+METHODS: dict[str, Method] = {
+    "euler": _explicit(EULER),
+    "rk4": _explicit(RK4),
+    "dopri5": _embedded(DOPRI5),
+    "dop853": _embedded(DOP853),
+    "symplectic_euler": _partitioned(SYMPLECTIC_EULER),
+    "verlet": _partitioned(VERLET),
+    "midpoint": _partitioned(MIDPOINT),
+    "gauss4": _partitioned(GAUSS4),
+    "gauss6": _partitioned(GAUSS6),
+}
+
+__all__ = ["METHODS", "Method", "Problem"]

@@ -1,0 +1,38 @@
+"""Graphs of one element, which every component of a state goes through."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cgraph as cg
+from cgraph import Graph, Node
+
+
+def weighted(nodes: Sequence[Node], weights: Sequence[float]) -> Node:
+    """The sum of weight * node, without those of weight 0."""
+    total: Node | None = None
+    for weight, node in zip(weights, nodes, strict=True):
+        if weight:
+            term = node if weight == 1.0 else weight * node
+            total = term if total is None else total + term
+    return cg.constant(0.0) if total is None else total
+
+
+def ahead(weights: Sequence[float]) -> Graph:
+    """x + h * (sum of weight * slope); inputs x, h and the slopes."""
+    x, h, *slopes = cg.variables(["x", "h", *(f"s{k}" for k in range(len(weights)))])
+    return Graph([x, h, *slopes], {"y": x + h * weighted(slopes, weights)})
+
+
+def scaled(weights: Sequence[float]) -> Graph:
+    """h * (sum of weight * slope); inputs h and the slopes."""
+    h, *slopes = cg.variables(["h", *(f"s{k}" for k in range(len(weights)))])
+    return Graph([h, *slopes], {"y": h * weighted(slopes, weights)})
+
+
+def function(inputs: str, **outputs: float | Node) -> Graph:
+    """A graph over these inputs."""
+    return Graph(cg.variables(inputs), outputs)
+
+
+SAME = function("a", a=cg.variable("a"))

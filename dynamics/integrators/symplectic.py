@@ -1,0 +1,199 @@
+"""Symplectic methods: partitioned Runge-Kutta methods on the coordinates q and the momenta p = dL/dqd.
+
+Stages Q_i = q + h sum_j a_ij V_j and P_i = p + h sum_j b_ij F(Q_j, V_j), with the velocity V_i that belongs to P_i at
+Q_i; a step adds h sum_i w_i V_i to q and h sum_i w_i F_i to p (Hairer, Lubich and Wanner, sections II.2 and VI.4). The
+stages are found by iterating on the velocities until they no longer come nearer, each turn a Newton step of
+V_i -> P_i(V_i), so that nothing has to be explicit, separable or quadratic. Sums over many steps are compensated.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cgraph as cg
+from cgraph import Graph
+from cgraph.program import Call, Map, Program, Statement, Sum, While
+
+from .adaptive import count, first_pass
+from .elements import SAME, ahead, function, weighted
+from .fixed import advance, moment, registers
+from .problem import Problem
+
+TURNS = 60.0  # of the iteration for the stages, at most
+ENOUGH = 2.0**-53  # a change below this, relative, is rounding
+LOOSE = 1e-9  # one above this, when the turns are over, is no convergence: the step is too long
+REPEATS = 8  # Newton steps for the velocity of a momentum that is not linear in it
+
+
+@dataclass(frozen=True)
+class Partitioned:
+    """The numbers: q's a_ij, p's b_ij, weights w_i, and the times c_i of the stages. The same a and b: Gauss."""
+
+    order: int
+    a: tuple[tuple[float, ...], ...]
+    b: tuple[tuple[float, ...], ...]
+    w: tuple[float, ...]
+    c: tuple[float, ...]
+
+
+def _gauss(order: int, a: tuple[tuple[float, ...], ...], w: tuple[float, ...]) -> Partitioned:
+    return Partitioned(order, a, a, w, tuple([math.fsum(row) for row in a]))
+
+
+_R3, _R15 = math.sqrt(3.0), math.sqrt(15.0)
+SYMPLECTIC_EULER = Partitioned(1, a=((0.0,),), b=((1.0,),), w=(1.0,), c=(0.0,))
+VERLET = Partitioned(2, a=((0, 0), (1 / 2, 1 / 2)), b=((1 / 2, 0), (1 / 2, 0)), w=(1 / 2, 1 / 2), c=(0.0, 1.0))
+MIDPOINT = _gauss(2, ((1 / 2,),), (1.0,))
+GAUSS4 = _gauss(4, ((1 / 4, 1 / 4 - _R3 / 6), (1 / 4 + _R3 / 6, 1 / 4)), (1 / 2, 1 / 2))
+GAUSS6 = _gauss(
+    6,
+    (
+        (5 / 36, 2 / 9 - _R15 / 15, 5 / 36 - _R15 / 30),
+        (5 / 36 + _R15 / 24, 2 / 9, 5 / 36 - _R15 / 24),
+        (5 / 36 + _R15 / 30, 2 / 9 + _R15 / 15, 5 / 36),
+    ),
+    (5 / 18, 4 / 9, 5 / 18),
+)
+
+
+def partitioned(method: Partitioned, problem: Problem) -> Program:
+    """One step a pass, of a mechanical system; of one of first order where the method is one of Gauss's."""
+    return _of_momenta(method, problem) if problem.system is not None else _of_first_order(method, problem)
+
+
+def _of_momenta(method: Partitioned, problem: Problem) -> Program:
+    mechanics, n = problem.mechanics, problem.size // 2
+    stages = range(len(method.w))
+    own = {"q": n, "v": n, "momentum": n, "q_lost": n, "momentum_lost": n}
+    own |= {f"{name}{i}": n for name in ("Q", "V", "P", "F", "W") for i in stages}
+    read = Call(mechanics.momentum, ("x", "t", "p"), ("momentum",))
+    start = [_copied(problem.size, ("x",), ("q", "v")), read]
+    if problem.separable and method in (SYMPLECTIC_EULER, VERLET):
+        body = _explicit(method, problem)
+    else:
+        turn: list[Statement] = []
+        for i in stages:
+            turn += [_stage(method.a[i], "q", "V", f"Q{i}"), _force(problem, f"Q{i}", f"V{i}", f"time{i}", f"F{i}")]
+        for i in stages:
+            turn.append(_stage(method.b[i], "momentum", "F", f"P{i}"))
+            turn.append(_velocity(problem, f"Q{i}", f"V{i}", f"P{i}", f"time{i}", f"W{i}"))
+        body = _iterated(method, turn)
+        body += [_added("q", "q_lost", "V", method.w), _added("momentum", "momentum_lost", "F", method.w)]
+        body += [moment("later", 1.0), *_settled(problem)]
+    body += [_copied(problem.size, ("q", "v"), ("x",)), *advance(0)]
+    return _program(method, problem, own, [first_pass(*start, *_guess_at_rest(method, "v")), *body])
+
+
+def _of_first_order(method: Partitioned, problem: Problem) -> Program:
+    if method.a is not method.b:
+        raise ValueError("this method advances coordinates and momenta in turn; a system of first order has none")
+    m, stages = problem.size, range(len(method.w))
+    own = {"x_lost": m} | {f"{name}{i}": m for name in ("Q", "V", "W") for i in stages}
+    turn: list[Statement] = []
+    for i in stages:
+        turn.append(_stage(method.a[i], "x", "V", f"Q{i}"))
+        turn.append(Call(problem.rate, (f"Q{i}", f"time{i}", "p"), (f"W{i}",)))
+    body = [*_iterated(method, turn), _added("x", "x_lost", "V", method.w), *advance(0)]
+    rate = Call(problem.rate, ("x", "t", "p"), ("W0",))
+    return _program(method, problem, own, [first_pass(rate, *_guess_at_rest(method, "W0")), *body])
+
+
+def _program(method: Partitioned, problem: Problem, own: dict[str, int], body: list[Statement]) -> Program:
+    single = dict.fromkeys(("fresh", "failed", "going", "turns", "change", "speed", "change_old", "later"), 1)
+    single |= {f"{name}{i}": 1 for name in ("time", "change", "speed") for i in range(len(method.w))}
+    lost, failed = cg.variables("lost failed")
+    body = [*body, Call(Graph([lost, failed], {"lost": lost + failed}), ("lost", "failed"), ("lost",))]
+    return Program({**registers(problem), **own, **single}, body, record=["t", "x"], stop="lost")
+
+
+def _stage(weights: tuple[float, ...], base: str, slope: str, target: str) -> Map:
+    """target = base + h * (sum of weight * slope)."""
+    used = [k for k, weight in enumerate(weights) if weight]
+    slopes = [f"{slope}{k}" for k in used]
+    return Map(ahead([weights[k] for k in used]), (base, "h", *slopes), (target,))
+
+
+def _force(problem: Problem, q: str, v: str, t: str, target: str) -> Call:
+    return Call(problem.mechanics.force, (q, v, t, "p"), (target,))
+
+
+def _velocity(problem: Problem, q: str, v: str, momentum: str, t: str, target: str) -> Call:
+    return Call(problem.mechanics.velocity, (q, v, momentum, t, "p"), (target,))
+
+
+def _iterated(method: Partitioned, turn: list[Statement]) -> list[Statement]:
+    """Times and a first guess of the stages, and turns from V to W until W = V to rounding."""
+    stages = range(len(method.w))
+    body: list[Statement] = [moment(f"time{i}", method.c[i]) for i in stages]
+    begin = Graph([], {"going": 1.0, "turns": 0.0, "change_old": math.inf})
+    body.append(Call(begin, (), ("going", "turns", "change_old")))
+    difference = function("w v", change=(cg.variable("w") - cg.variable("v")) ** 2.0)
+    square = function("w", speed=cg.variable("w") * cg.variable("w"))
+    measured: list[Statement] = []
+    for i in stages:
+        measured += [Sum(difference, (f"W{i}", f"V{i}"), f"change{i}"), Sum(square, (f"W{i}",), f"speed{i}")]
+        measured.append(Map(SAME, (f"W{i}",), (f"V{i}",)))
+    body.append(While("going", (*turn, *measured, _judged(len(method.w)))))
+    return body
+
+
+def _judged(stages: int) -> Call:
+    """Whether to go on: not when V has settled, no longer comes nearer, or is no number."""
+    changes, speeds = ([f"{name}{i}" for i in range(stages)] for name in ("change", "speed"))
+    change, speed = (sum(cg.variables(names)[1:], cg.variable(names[0])) for names in (changes, speeds))
+    turns, old, done = cg.variables("turns change_old evaluations")
+    nearer = cg.maximum(change < old, turns < 2.0)
+    going = (change > ENOUGH * ENOUGH * speed) * nearer * (turns + 1.0 < TURNS)
+    settled = change <= LOOSE * LOOSE * speed + 2.0**-1000
+    outputs = {
+        "going": going,
+        "turns": turns + 1.0,
+        "change_old": change,
+        "failed": (1.0 - going) * (1.0 - settled),
+        "evaluations": done + float(stages),
+    }
+    inputs = (*changes, *speeds, "turns", "change_old", "evaluations")
+    return Call(Graph(cg.variables(inputs), outputs), inputs, tuple(outputs))
+
+
+def _guess_at_rest(method: Partitioned, velocity: str) -> list[Statement]:
+    return [Map(SAME, (velocity,), (f"V{i}",)) for i in range(len(method.w))]
+
+
+def _added(base: str, lost: str, slope: str, weights: tuple[float, ...]) -> Map:
+    """base += h * (sum of weight * slope), with what rounding took off kept for the next step (Kahan)."""
+    x, rest, h, *slopes = cg.variables(["x", "lost", "h", *(f"s{k}" for k in range(len(weights)))])
+    more = h * weighted(slopes, weights) + rest
+    total = x + more
+    graph = Graph([x, rest, h, *slopes], {"x": total, "lost": more - (total - x)})
+    return Map(graph, (base, lost, "h", *[f"{slope}{k}" for k in range(len(weights))]), (base, lost))
+
+
+def _settled(problem: Problem) -> list[Statement]:
+    """v, the velocity that belongs to the momenta at the end of the step."""
+    once = _velocity(problem, "q", "v", "momentum", "later", "v")
+    return [once] if problem.quadratic else [once] * REPEATS
+
+
+def _explicit(method: Partitioned, problem: Problem) -> list[Statement]:
+    """Kinetic energy of the velocities alone with a constant mass matrix, forces of the coordinates: no iteration."""
+    half = method is VERLET
+    kick = _stage((0.5,) if half else (1.0,), "momentum", "F", "momentum")
+    body: list[Statement] = [
+        _force(problem, "q", "v", "t", "F0"),
+        kick,
+        _velocity(problem, "q", "v", "momentum", "t", "v"),
+        _added("q", "q_lost", "V", (1.0,)),
+        moment("later", 1.0),
+    ]
+    body.insert(3, Map(SAME, ("v",), ("V0",)))
+    if half:
+        body += [_force(problem, "q", "v", "later", "F0"), kick, _velocity(problem, "q", "v", "momentum", "later", "v")]
+    return [*body, count(2 if half else 1)]
+
+
+def _copied(count: int, sources: tuple[str, ...], targets: tuple[str, ...]) -> Call:
+    """The numbers of some registers into others."""
+    nodes = cg.variables([f"c{k}" for k in range(count)])
+    return Call(Graph(nodes, {f"c{k}": node for k, node in enumerate(nodes)}), sources, targets)

@@ -1,0 +1,92 @@
+"""First-order systems: any state equation xdot = f(x, t) and its parameters, as nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph.order import topological
+
+from .system import TIME, _as_node, _sequence, called, parameter_value
+
+RESERVED = (TIME, "dt")
+
+
+class OdeSystem:
+    """A system of first-order differential equations, xdot = rate(x, t).
+
+    rate(x, t) or (x, t, p): gives one rate for each state, node or number.
+        x: sequence of nodes in the order of `states`; t: a node; p: {parameter name: node}.
+    states: their names, which are the inputs of the graphs, in this order.
+    parameters: {name: value}; each is an input of the graphs, and `simulate` binds it to the value.
+
+    Raises TypeError or ValueError, naming what was given and what was needed.
+    """
+
+    def __init__(
+        self,
+        rate: Callable[..., Sequence[Node | float]],
+        states: Sequence[str],
+        parameters: Mapping[str, float] | None = None,
+    ) -> None:
+        self.states = _state_names(states)
+        self.parameters = {name: parameter_value(name, value) for name, value in (parameters or {}).items()}
+        if shared := [name for name in self.states if name in self.parameters]:
+            raise ValueError(f"{shared[0]!r} is both a state and a parameter; choose another name for one of them")
+        p = {name: cg.variable(name) for name in self.parameters}
+        given = _sequence("rate must give", called("rate", rate, self.x, self.t, p))
+        if len(given) != self.n:
+            raise ValueError(f"rate must give {self.n} values, one for each state, got {len(given)}")
+        self.rates = tuple([_as_node("rate", each) for each in given])
+        known = {*self.x, self.t, *p.values()}
+        for node in topological(self.rates):
+            if node.op.name == "variable" and node not in known:
+                raise ValueError(f"the rate uses {node.name!r}, which is no state, parameter or t")
+
+    @property
+    def n(self) -> int:
+        """Number of states."""
+        return len(self.states)
+
+    @cached_property
+    def x(self) -> list[Node]:
+        """The states, variables of their names."""
+        return cg.variables(list(self.states))
+
+    @cached_property
+    def t(self) -> Node:
+        """Time."""
+        return cg.variable(TIME)
+
+    @cached_property
+    def extra_inputs(self) -> list[Node]:
+        """Inputs that the graph has after the states: t if a rate depends on it, and the parameters."""
+        time = [self.t] if self.t in topological(self.rates) else []
+        return [*time, *cg.variables(list(self.parameters))]
+
+    @cached_property
+    def graph(self) -> Graph:
+        """The state equation as written: inputs the states, t if needed, parameters; outputs `<state>_dot`."""
+        outputs = {f"{name}_dot": rate for name, rate in zip(self.states, self.rates, strict=True)}
+        return Graph([*self.x, *self.extra_inputs], outputs)
+
+    def __repr__(self) -> str:
+        parameters = f", parameters {', '.join(self.parameters)}" if self.parameters else ""
+        return f"<OdeSystem of {self.n} state(s) {', '.join(self.states[:6])}{parameters}>"
+
+
+def _state_names(names: Sequence[str]) -> tuple[str, ...]:
+    if isinstance(names, str):
+        names = names.split()
+    if not names:
+        raise ValueError("a system needs at least one state")
+    for name in names:
+        if not isinstance(name, str) or not name:
+            raise TypeError(f"a state's name must be a non-empty string, got {name!r}")
+        if name in RESERVED:
+            raise ValueError(f"a state cannot be called {name!r}, which is the name of time; choose another")
+    if len(set(names)) < len(names):
+        raise ValueError(f"state names must differ, got {', '.join(names)}")
+    return tuple(names)

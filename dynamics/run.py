@@ -1,0 +1,295 @@
+"""Runs: from a start to an end in pieces, by methods of equal steps and by those that choose their steps."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+import cgraph as cg
+from cgraph.program import Runner, runner
+
+from .integrators import Method, Problem
+from .integrators.adaptive import DONE, TOO_SMALL
+from .trajectory import Array
+
+PIECE = 0.1  # s of run time after which a run comes back to Python: for Ctrl-C, progress and events
+FIRST = 32  # passes of the first piece, before it is known how long one takes
+HUGE = 1e300  # a tolerance that anything meets
+
+
+class Piece(NamedTuple):
+    """Consecutive steps. With dense output: x(t_old + s h) = x_old + sum_k dense_k s^k for 0 <= s <= 1."""
+
+    t: Array  # (T,) ends of the steps
+    x: Array  # (T, m)
+    t_old: Array  # (T,)
+    h: Array  # (T,)
+    x_old: Array  # (T, m)
+    dense: Array | None  # (T, degree, m)
+
+    def at(self, rows: Array, s: Array) -> Array:
+        """States (k, m) at the shares s (k,) of the steps `rows` (k,)."""
+        assert self.dense is not None
+        total = np.zeros((len(rows), self.x.shape[1]))
+        for k in reversed(range(self.dense.shape[1])):
+            total = (total + self.dense[rows, k]) * s[:, None]
+        inside: Array = np.where((s == 1.0)[:, None], self.x[rows], self.x_old[rows] + total)
+        return inside
+
+
+class Run(ABC):
+    """One run. `pieces` makes the steps; the other attributes say how far it has come.
+
+    status: empty while all is well, else why it stopped before the end.
+    """
+
+    def __init__(
+        self, problem: Problem, method: Method, parameters: Sequence[float], backend: str, *, dense: bool
+    ) -> None:
+        self.problem, self.method, self.dense = problem, method, dense
+        self.runner: Runner = runner(method.program(problem, dense), backend)
+        self.parameters = list(parameters)
+        self.steps = self.rejected = self.evaluations = 0
+        self.largest = 0.0
+        self.status = ""
+        self._passes = FIRST
+
+    @abstractmethod
+    def pieces(self, x: Array) -> Iterator[Piece]:
+        """The steps from x (m,) on, a piece at a time."""
+
+    def _advance(self, memory: Array, most: int, whole: bool) -> tuple[Array, int]:
+        """Some passes, at most so many: their rows (the last alone, with `whole`), and how many."""
+        passes = min(self._passes, most)
+        begin = time.perf_counter()
+        rows, done = self.runner.run(memory, passes, passes if whole else 1)
+        spent = time.perf_counter() - begin
+        if passes == self._passes:
+            self._passes = max(1, int(passes * min(4.0, PIECE / max(spent, 1e-9))))
+        return rows, done
+
+    def _too_many(self, memory: Array, most: float) -> str:
+        return f"stopped at t = {self._number(memory, 't'):.6g} s after max_steps = {most:g} steps"
+
+    def _number(self, memory: Array, name: str) -> float:
+        return float(self.runner.read(memory, name)[0])
+
+    def _where(self, state: Array) -> str:
+        """The first component that is no number, in words; empty if all are."""
+        bad = np.flatnonzero(~np.isfinite(state))
+        return f"{self._component(int(bad[0]))} is {state[bad[0]]} after the step" if len(bad) else ""
+
+    def _component(self, index: int) -> str:
+        system = self.problem.system
+        if system is None:
+            return f"state {self.problem.states[index]!r}"
+        what = "coordinate" if index < system.n else "velocity of"
+        return f"{what} {system.coordinates[index % system.n]!r}"
+
+
+class FixedRun(Run):
+    """Equal steps between the instants, at most dt. Every step is a row with `each`, else only those at instants."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        method: Method,
+        parameters: Sequence[float],
+        backend: str,
+        *,
+        instants: Sequence[float],
+        dt: float,
+        each: bool,
+        most: float,
+    ) -> None:
+        super().__init__(problem, method, parameters, backend, dense=False)
+        self.instants, self.dt, self.each, self.most = instants, dt, each, most
+
+    def pieces(self, x: Array) -> Iterator[Piece]:
+        """See Run."""
+        start: dict[str, float | Array | list[float]] = {"x": x, "p": self.parameters}
+        if "fresh" in self.runner.program.registers:
+            start["fresh"] = 1.0
+        memory = self.runner.memory(start)
+        m = self.problem.size
+        for begin, end in itertools.pairwise(self.instants):
+            steps = max(1, math.ceil((end - begin) / self.dt * (1.0 - 1e-12)))
+            size = (end - begin) / steps
+            for name, value in (("start", begin), ("t", begin), ("count", 0.0), ("h", size)):
+                self.runner.write(memory, name, value)
+            left = steps
+            while left:
+                if self.steps >= self.most:
+                    self.status = self._too_many(memory, self.most)
+                    return
+                x_old = self.runner.read(memory, "x").copy()
+                rows, done = self._advance(memory, int(min(left, self.most - self.steps)), whole=not self.each)
+                left -= done
+                lost = self._number(memory, "lost") != 0.0
+                self.steps += done - lost
+                self.evaluations = int(self._number(memory, "evaluations"))
+                if self.each:
+                    rows = rows[: len(rows) - lost]
+                elif left or lost:
+                    rows = rows[:0]
+                if len(rows):
+                    self.largest = max(self.largest, min(size, self.dt))
+                    if not left and not lost:
+                        rows[-1, 0] = end
+                    t, states = rows[:, 0], rows[:, 1 : 1 + m]
+                    before = np.concatenate([x_old[None], states[:-1]])
+                    yield Piece(t, states, t - size, np.full(len(t), size), before, None)
+                if lost:
+                    self.status = self._lost(memory)
+                    return
+
+    def _lost(self, memory: Array) -> str:
+        t = self._number(memory, "t")
+        if where := self._where(self.runner.read(memory, "x")):
+            return f"stopped at t = {t:.6g} s: {where}"
+        return f"stopped at t = {t:.6g} s: the equations of the step did not converge; the step is too long"
+
+
+class AdaptiveRun(Run):
+    """Steps chosen by the method so that each one's error stays within rtol |x| + atol."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        method: Method,
+        parameters: Sequence[float],
+        backend: str,
+        *,
+        t_end: float,
+        rtol: float,
+        atol: float,
+        longest: float,
+        first: float | None,
+        most: float,
+        dense: bool,
+    ) -> None:
+        super().__init__(problem, method, parameters, backend, dense=dense)
+        self.t_end, self.rtol, self.atol = t_end, rtol, atol
+        self.longest, self.first, self.most = longest, first, most
+
+    def pieces(self, x: Array) -> Iterator[Piece]:
+        """See Run."""
+        slope = self._rate(0.0, x)
+        if self._where(slope):
+            first_bad = self._component(int(np.flatnonzero(~np.isfinite(slope))[0]))
+            self.status = f"stopped at t = 0 s: the rate of {first_bad} is not finite at the start"
+            return
+        first = self.first if self.first is not None else self._first_step(x, slope)
+        start: Mapping[str, float | Array | list[float]] = {
+            "x": x,
+            "p": self.parameters,
+            "end": self.t_end,
+            "rtol": self.rtol,
+            "atol": self.atol,
+            "next": first,
+            "longest": self.longest,
+            "fresh": 1.0,
+            "error_old": 1e-4,
+            "accepted": 1.0,
+        }
+        memory = self.runner.memory(start)
+        while True:
+            left = self.most - self.steps - self.rejected
+            if left <= 0:
+                self.status = self._too_many(memory, self.most)
+                return
+            rows, _ = self._advance(memory, int(min(left, 2**31)), whole=False)
+            status = self._number(memory, "status")
+            self.steps += len(rows)
+            self.rejected = int(self._number(memory, "rejected"))
+            self.evaluations = int(self._number(memory, "evaluations"))
+            if len(rows):
+                yield self._piece(rows)
+            if status == TOO_SMALL:
+                self.status = self._too_small(memory)
+            if status in (TOO_SMALL, DONE):
+                return
+
+    def _piece(self, rows: Array) -> Piece:
+        m = self.problem.size
+        t, h, x = rows[:, 0], rows[:, 1], rows[:, 2 : 2 + m]
+        self.largest = max(self.largest, float(h.max()))
+        if not self.dense:
+            return Piece(t, x, t - h, h, np.full_like(x, math.nan), None)
+        t_old, x_old, dense = rows[:, 2 + m], rows[:, 3 + m : 3 + 2 * m], rows[:, 3 + 2 * m :]
+        return Piece(t, x, t_old, h, x_old, dense.reshape(len(t), -1, m))
+
+    def _too_small(self, memory: Array) -> str:
+        t, h = self._number(memory, "t"), self._number(memory, "h")
+        text = f"stopped at t = {t:.6g} s: the step, {h:.3g} s, is below the resolution of the time"
+        if where := self._where(self.runner.read(memory, "x_new")):
+            return f"stopped at t = {t:.6g} s: {where}, however small"
+        x = self.runner.read(memory, "x")
+        speed = np.abs(self._rate(t, x)) / (self.atol + self.rtol * np.abs(x))
+        return f"{text}; fastest is {self._component(int(np.nanargmax(speed)))}"
+
+    def _rate(self, t: float, x: Array) -> Array:
+        names = self.problem.rate.input_names
+        values = dict(zip(names, [*x.tolist(), t, *self.parameters], strict=True))
+        return np.array(list(self.problem.rate.evaluate(values).values()), dtype=np.float64)
+
+    def _first_step(self, x: Array, slope: Array) -> float:
+        """Hairer, Norsett and Wanner I, section II.4, then halved until two half steps confirm the whole one.
+
+        The estimate of an embedded method can vanish by symmetry, such as at a start from rest; two half steps cannot.
+        """
+        order, scale = self.method.order, self.atol + self.rtol * np.abs(x)
+        most = min(self.t_end, self.longest)
+
+        def size(value: Array) -> float:
+            with np.errstate(all="ignore"):
+                return float(np.sqrt(np.mean((value / scale) ** 2)))
+
+        a, b = size(x), size(slope)
+        trial = min(1e-6 if a < 1e-5 or b < 1e-5 else 0.01 * a / b, most)
+        bend = size(self._rate(trial, x + trial * slope) - slope) / trial
+        steepest = max(b, bend)
+        wanted = max(1e-6, trial * 1e-3) if steepest <= 1e-15 else (0.01 / steepest) ** (1.0 / (order + 1))
+        h = min(100.0 * trial, wanted, most)
+        for _ in range(40):
+            whole, halves = self._forced(x, [h]), self._forced(x, [0.5 * h, 0.5 * h])
+            difference = size(whole - halves)
+            if difference <= 1.0:
+                break
+            factor = 0.9 * difference ** (-1.0 / (order + 1)) if math.isfinite(difference) else 0.1
+            h *= min(0.5, max(0.1, factor))
+        return h
+
+    def _forced(self, x: Array, steps: Sequence[float]) -> Array:
+        """The state after these steps, whatever their errors."""
+        start = {"x": x, "p": self.parameters, "rtol": HUGE, "atol": HUGE, "longest": math.inf, "fresh": 1.0}
+        memory = self.runner.memory({**start, "error_old": 1.0, "accepted": 1.0, "end": 10.0 * sum(steps)})
+        for h in steps:
+            self.runner.write(memory, "next", h)
+            self.runner.run(memory, 1)
+        return self.runner.read(memory, "x").copy()
+
+
+@dataclass(frozen=True)
+class Hermite:
+    """Dense output where a method has none: the cubic through states and rates at both ends of a step."""
+
+    problem: Problem
+    parameters: Sequence[float]
+
+    def of(self, piece: Piece) -> Piece:
+        """The piece, with dense output."""
+        f = cg.compile(self.problem.rate)
+        held = np.repeat(np.array(self.parameters, dtype=np.float64)[:, None], len(piece.t), axis=1)
+        first = f.batch(np.concatenate([piece.x_old.T, piece.t_old[None], held])).T
+        last = f.batch(np.concatenate([piece.x.T, piece.t[None], held])).T
+        h, change = piece.h[:, None], piece.x - piece.x_old
+        dense = np.stack([h * first, 3 * change - h * (2 * first + last), h * (first + last) - 2 * change], axis=1)
+        return piece._replace(dense=dense)

@@ -1,0 +1,48 @@
+"""Trajectory: what a simulation gives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+@dataclass(frozen=True)
+class Stats:
+    """How a run went. complete: it reached t_end; if not, `status` says where and why it stopped."""
+
+    method: str
+    steps: int  # accepted
+    rejected: int  # trials of a step that were not accepted
+    evaluations: int  # of the rate of the state
+    dt: float  # s, the largest step taken
+    seconds: float  # run time of the steps, without building and compiling
+    complete: bool
+    status: str
+
+
+class Crossings(NamedTuple):
+    """Where an event happened: t (k,), and the states there, q and qd (k, n)."""
+
+    t: Array
+    q: Array
+    qd: Array
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """The motion: t (T,) [s]; q and qd (T, n) [rad or m, per second]; energy (T,) [J]; and how the run went.
+
+    Of an OdeSystem q holds the states, qd has no columns, and the energy is NaN. events: {name: Crossings}.
+    """
+
+    t: Array
+    q: Array
+    qd: Array
+    energy: Array
+    stats: Stats
+    events: Mapping[str, Crossings] = field(default_factory=dict)
