@@ -1,6 +1,6 @@
 """cgraph: computational graphs of equations, with forward and reverse automatic differentiation."""
 
-from .codegen import Compiled, compile
+from .codegen import Compiled, clear_cache, compile
 from .counts import Counts
 from .errors import GraphError
 from .forward import jvp
@@ -54,6 +54,7 @@ __all__ = [
     "asin",
     "atan",
     "atan2",
+    "clear_cache",
     "compile",
     "constant",
     "cos",

@@ -8,7 +8,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from .integrators import Method, Problem
 from .integrators.adaptive import DONE, TOO_SMALL
 from .trajectory import Array
 
+Indices = np.ndarray[Any, np.dtype[np.intp]]
 PIECE = 0.1  # s of run time after which a run comes back to Python: for Ctrl-C, progress and events
 FIRST = 32  # passes of the first piece, before it is known how long one takes
 HUGE = 1e300  # a tolerance that anything meets
@@ -34,7 +35,7 @@ class Piece(NamedTuple):
     x_old: Array  # (T, m)
     dense: Array | None  # (T, degree, m)
 
-    def at(self, rows: Array, s: Array) -> Array:
+    def at(self, rows: Indices, s: Array) -> Array:
         """States (k, m) at the shares s (k,) of the steps `rows` (k,)."""
         assert self.dense is not None
         total = np.zeros((len(rows), self.x.shape[1]))
@@ -44,26 +45,66 @@ class Piece(NamedTuple):
         return inside
 
 
-class Run(ABC):
-    """One run. `pieces` makes the steps; the other attributes say how far it has come.
+class Clock:
+    """Whether enough run time has passed since the last time it said so."""
 
-    status: empty while all is well, else why it stopped before the end.
+    def __init__(self) -> None:
+        self._last = time.perf_counter()
+
+    def passed(self, seconds: float) -> bool:
+        """Whether it has."""
+        now = time.perf_counter()
+        if now - self._last < seconds:
+            return False
+        self._last = now
+        return True
+
+
+class Tally(ABC):
+    """One run. `pieces` makes the steps; the attributes say how far it has come.
+
+    status: empty while all is well, else why it stopped before the end.  largest: step [s].
     """
 
-    def __init__(
-        self, problem: Problem, method: Method, parameters: Sequence[float], backend: str, *, dense: bool
-    ) -> None:
-        self.problem, self.method, self.dense = problem, method, dense
-        self.runner: Runner = runner(method.program(problem, dense), backend)
-        self.parameters = list(parameters)
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
         self.steps = self.rejected = self.evaluations = 0
         self.largest = 0.0
         self.status = ""
-        self._passes = FIRST
 
     @abstractmethod
     def pieces(self, x: Array) -> Iterator[Piece]:
         """The steps from x (m,) on, a piece at a time."""
+
+    def where(self, state: Array) -> str:
+        """The first component that is no number, in words; empty if all are."""
+        bad = np.flatnonzero(~np.isfinite(state))
+        return f"{self.component(int(bad[0]))} is {state[bad[0]]} after the step" if len(bad) else ""
+
+    def component(self, index: int) -> str:
+        """A component of the state, in words."""
+        system = self.problem.system
+        if system is None:
+            return f"state {self.problem.states[index]!r}"
+        what = "coordinate" if index < system.n else "velocity of"
+        return f"{what} {system.coordinates[index % system.n]!r}"
+
+    def too_many(self, t: float, most: float) -> str:
+        """The status of a run that may not go on."""
+        return f"stopped at t = {t:.6g} s after max_steps = {most:g} steps"
+
+
+class Run(Tally):
+    """A run of one of our methods."""
+
+    def __init__(
+        self, problem: Problem, method: Method, parameters: Sequence[float], backend: str, *, dense: bool
+    ) -> None:
+        super().__init__(problem)
+        self.method, self.dense = method, dense
+        self.runner: Runner = runner(method.program(problem, dense), backend)
+        self.parameters = list(parameters)
+        self._passes = FIRST
 
     def _advance(self, memory: Array, most: int, whole: bool) -> tuple[Array, int]:
         """Some passes, at most so many: their rows (the last alone, with `whole`), and how many."""
@@ -75,23 +116,8 @@ class Run(ABC):
             self._passes = max(1, int(passes * min(4.0, PIECE / max(spent, 1e-9))))
         return rows, done
 
-    def _too_many(self, memory: Array, most: float) -> str:
-        return f"stopped at t = {self._number(memory, 't'):.6g} s after max_steps = {most:g} steps"
-
     def _number(self, memory: Array, name: str) -> float:
         return float(self.runner.read(memory, name)[0])
-
-    def _where(self, state: Array) -> str:
-        """The first component that is no number, in words; empty if all are."""
-        bad = np.flatnonzero(~np.isfinite(state))
-        return f"{self._component(int(bad[0]))} is {state[bad[0]]} after the step" if len(bad) else ""
-
-    def _component(self, index: int) -> str:
-        system = self.problem.system
-        if system is None:
-            return f"state {self.problem.states[index]!r}"
-        what = "coordinate" if index < system.n else "velocity of"
-        return f"{what} {system.coordinates[index % system.n]!r}"
 
 
 class FixedRun(Run):
@@ -113,7 +139,7 @@ class FixedRun(Run):
         self.instants, self.dt, self.each, self.most = instants, dt, each, most
 
     def pieces(self, x: Array) -> Iterator[Piece]:
-        """See Run."""
+        """See Tally."""
         start: dict[str, float | Array | list[float]] = {"x": x, "p": self.parameters}
         if "fresh" in self.runner.program.registers:
             start["fresh"] = 1.0
@@ -127,7 +153,7 @@ class FixedRun(Run):
             left = steps
             while left:
                 if self.steps >= self.most:
-                    self.status = self._too_many(memory, self.most)
+                    self.status = self.too_many(self._number(memory, "t"), self.most)
                     return
                 x_old = self.runner.read(memory, "x").copy()
                 rows, done = self._advance(memory, int(min(left, self.most - self.steps)), whole=not self.each)
@@ -152,7 +178,7 @@ class FixedRun(Run):
 
     def _lost(self, memory: Array) -> str:
         t = self._number(memory, "t")
-        if where := self._where(self.runner.read(memory, "x")):
+        if where := self.where(self.runner.read(memory, "x")):
             return f"stopped at t = {t:.6g} s: {where}"
         return f"stopped at t = {t:.6g} s: the equations of the step did not converge; the step is too long"
 
@@ -180,10 +206,10 @@ class AdaptiveRun(Run):
         self.longest, self.first, self.most = longest, first, most
 
     def pieces(self, x: Array) -> Iterator[Piece]:
-        """See Run."""
+        """See Tally."""
         slope = self._rate(0.0, x)
-        if self._where(slope):
-            first_bad = self._component(int(np.flatnonzero(~np.isfinite(slope))[0]))
+        if self.where(slope):
+            first_bad = self.component(int(np.flatnonzero(~np.isfinite(slope))[0]))
             self.status = f"stopped at t = 0 s: the rate of {first_bad} is not finite at the start"
             return
         first = self.first if self.first is not None else self._first_step(x, slope)
@@ -203,7 +229,7 @@ class AdaptiveRun(Run):
         while True:
             left = self.most - self.steps - self.rejected
             if left <= 0:
-                self.status = self._too_many(memory, self.most)
+                self.status = self.too_many(self._number(memory, "t"), self.most)
                 return
             rows, _ = self._advance(memory, int(min(left, 2**31)), whole=False)
             status = self._number(memory, "status")
@@ -229,11 +255,11 @@ class AdaptiveRun(Run):
     def _too_small(self, memory: Array) -> str:
         t, h = self._number(memory, "t"), self._number(memory, "h")
         text = f"stopped at t = {t:.6g} s: the step, {h:.3g} s, is below the resolution of the time"
-        if where := self._where(self.runner.read(memory, "x_new")):
+        if where := self.where(self.runner.read(memory, "x_new")):
             return f"stopped at t = {t:.6g} s: {where}, however small"
         x = self.runner.read(memory, "x")
         speed = np.abs(self._rate(t, x)) / (self.atol + self.rtol * np.abs(x))
-        return f"{text}; fastest is {self._component(int(np.nanargmax(speed)))}"
+        return f"{text}; fastest is {self.component(int(np.nanargmax(speed)))}"
 
     def _rate(self, t: float, x: Array) -> Array:
         names = self.problem.rate.input_names
@@ -269,8 +295,9 @@ class AdaptiveRun(Run):
 
     def _forced(self, x: Array, steps: Sequence[float]) -> Array:
         """The state after these steps, whatever their errors."""
-        start = {"x": x, "p": self.parameters, "rtol": HUGE, "atol": HUGE, "longest": math.inf, "fresh": 1.0}
-        memory = self.runner.memory({**start, "error_old": 1.0, "accepted": 1.0, "end": 10.0 * sum(steps)})
+        memory = self.runner.memory({"x": x, "p": self.parameters, "rtol": HUGE, "atol": HUGE, "longest": math.inf})
+        for name, value in (("fresh", 1.0), ("error_old", 1.0), ("accepted", 1.0), ("end", 10.0 * sum(steps))):
+            self.runner.write(memory, name, value)
         for h in steps:
             self.runner.write(memory, "next", h)
             self.runner.run(memory, 1)

@@ -17,7 +17,8 @@ from .equations import energy
 from .event import Event, crossings, event_graph
 from .integrators import METHODS, Problem
 from .progress import Progress
-from .run import AdaptiveRun, FixedRun, Hermite, Piece, Run
+from .run import AdaptiveRun, FixedRun, Hermite, Piece, Tally
+from .scipy_run import ScipyRun, solver_of
 from .state_equation import state_inputs
 from .system import TIME, parameter_value, per_coordinate
 from .trajectory import Array, Crossings, Stats, Trajectory
@@ -49,7 +50,8 @@ def simulate(
 
     q, qd: (n,), the start; of an OdeSystem q is the state, and qd None.  t_end [s].
     method: of equal steps "euler", "rk4", and, symplectic, "symplectic_euler", "verlet", "midpoint", "gauss4",
-        "gauss6"; of steps chosen by error "dopri5", ... See `dynamics.integrators.METHODS`.
+        "gauss6"; of steps chosen by error "dopri5" and "dop853", and for stiff systems "rodas" and "radau"; with SciPy
+        "scipy:Radau", "scipy:BDF", "scipy:LSODA", "scipy:DOP853", "scipy:RK45".
     dt [s]: the largest step. With equal steps (1e-3 by default) the steps between two recorded instants are equal and
         at most dt, so that the last row is at t_end exactly. Chosen steps have no limit by default.
     rtol, atol: the error of a chosen step, relative to each component of the state, and absolute.
@@ -65,9 +67,9 @@ def simulate(
     same.
     Raises ValueError for arguments out of range, SingularMassMatrixError for a coordinate without inertia.
     """
-    if method not in METHODS:
-        raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
-    chosen = METHODS[method]
+    solver = solver_of(method)
+    if solver is None and method not in METHODS:
+        raise ValueError(f"method must be one of {', '.join(METHODS)} or scipy:..., got {method!r}")
     for what, value, unit in (("t_end", t_end, " s"), ("dt", dt, " s"), ("first_step", first_step, " s")):
         if value is not None and not (math.isfinite(value) and value > 0.0):
             raise ValueError(f"{what} must be positive and finite, got {value!r}{unit}")
@@ -84,19 +86,25 @@ def simulate(
     wanted = (events,) if isinstance(events, Event) else tuple(events)
     asked = None if t_eval is None else _times(t_eval, t_end)
 
-    run: Run
-    if chosen.adaptive:
+    limits: dict[str, Any] = {
+        "rtol": rtol,
+        "atol": atol,
+        "longest": math.inf if dt is None else dt,
+        "first": first_step,
+    }
+    run: Tally
+    if solver is not None:
+        run = ScipyRun(problem, solver, backend, t_end=float(t_end), most=max_steps, asked=asked, **limits)
+    elif METHODS[method].adaptive:
+        dense = bool(wanted) or asked is not None
         run = AdaptiveRun(
-            problem, chosen, (), backend,
-            t_end=float(t_end), rtol=rtol, atol=atol, longest=math.inf if dt is None else dt,
-            first=first_step, most=max_steps, dense=bool(wanted) or asked is not None,
-        )  # fmt: skip
+            problem, METHODS[method], (), backend, t_end=float(t_end), most=max_steps, dense=dense, **limits
+        )
     else:
+        size = DT if dt is None else dt
         instants = [0.0, float(t_end)] if asked is None else _from_start(asked)
-        run = FixedRun(
-            problem, chosen, (), backend,
-            instants=instants, dt=DT if dt is None else dt, each=asked is None or bool(wanted), most=max_steps,
-        )  # fmt: skip
+        each = asked is None or bool(wanted)
+        run = FixedRun(problem, METHODS[method], (), backend, instants=instants, dt=size, each=each, most=max_steps)
     rows = _Rows(state, asked)
     watch = _Watch(problem, wanted)
     begin = time.perf_counter()

@@ -25,6 +25,7 @@ OPTIONAL = {
     "matplotlib": "matplotlib",
     "mujoco": "mujoco",
     "llvmlite": "llvmlite",
+    "scipy": "scipy",
     "pinocchio": "pin",
     "casadi": "casadi",
     "torch": None,  # measured when it is there, never asked for

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import copyreg
+import os
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from ..graph import Graph
@@ -15,7 +17,14 @@ BACKENDS = ("auto", "python", "numpy", "llvm")
 LARGE = 100_000  # nodes; beyond, making machine code takes longer than most callers gain
 
 
-def compile(graph: Graph, backend: str = "auto", *, fast: bool = False, fma: bool = True) -> Compiled:
+def compile(
+    graph: Graph,
+    backend: str = "auto",
+    *,
+    fast: bool = False,
+    fma: bool = True,
+    cache: bool | str | os.PathLike[str] = False,
+) -> Compiled:
     """The graph as a function: `fn(x)` at one point, `fn.batch(X)` at many, `fn.source` to read.
 
     backend: "llvm", machine code (`pip install 'cgraph[native]'`); "python", generated Python over floats; "numpy",
@@ -25,7 +34,12 @@ def compile(graph: Graph, backend: str = "auto", *, fast: bool = False, fma: boo
     fma: machine code may round a product and the sum it goes into once instead of twice; without, `fn(x)` agrees with
     `graph.evaluate` to the last bit (`hypot` to one unit of it: Python has its own, machine code the C library's).
     fast: it may also re-associate sums and products, multiply by reciprocals and mistake the sign of a zero; NaN and
-    infinities keep their meaning. Both are for machine code alone.
+    infinities keep their meaning.
+    cache: keep machine code on disk for the next process, and read it from there: True, in the platform's folder for
+    caches (`$XDG_CACHE_HOME/cgraph`, `~/.cache/cgraph`, ...), or the path of a folder that nobody else can write to.
+    An entry is found by the code's text, the processor and the version of LLVM; a damaged one is made anew. A folder
+    that cannot be written gives a RuntimeWarning. `clear_cache` empties it; nothing else does.
+    These three are for machine code alone.
 
     Raises TypeError for what is no Graph, ValueError for an unknown backend, ImportError for "llvm" without llvmlite.
     """
@@ -33,19 +47,28 @@ def compile(graph: Graph, backend: str = "auto", *, fast: bool = False, fma: boo
         raise ValueError(f"backend must be one of {', '.join(BACKENDS)}, got {backend!r}")
     if not isinstance(graph, Graph):
         raise TypeError(f"compile takes a Graph, got {type(graph).__name__}: {graph!r:.60}")
+    options = {"fast": fast, "fma": fma, "cache": _place(cache)}
     if backend == "llvm" or (backend == "auto" and len(graph.nodes) <= LARGE):
         try:
-            return Native(graph, backend, fast=fast, fma=fma)
+            return Native(graph, backend, options)
         except ImportError:
             if backend == "llvm":
                 raise
-    return Generated(graph, backend)
+    return Generated(graph, backend, options)
 
 
-def _recipe(function: Any) -> Any:
-    """What pickling keeps: the graph and the choice. Machine code is made again where it is read."""
-    options: dict[str, Any] = {"fast": function.fast, "fma": function.fma} if isinstance(function, Native) else {}
-    return partial(compile, **options), (function.graph, function.backend)
+def _place(cache: bool | str | os.PathLike[str]) -> bool | str:
+    """The choice of a cache in words that hold in another folder and another process."""
+    if isinstance(cache, bool):
+        return cache
+    if not isinstance(cache, (str, os.PathLike)) or not os.fspath(cache):
+        raise TypeError(f"cache must be True, False or the path of a folder, got {cache!r}")
+    return str(Path(cache).absolute())
+
+
+def _recipe(function: Compiled) -> Any:
+    """What pickling keeps: the graph and the choices. Machine code is made again where the pickle is read."""
+    return partial(compile, **function.options), (function.graph, function.backend)
 
 
 copyreg.pickle(Generated, _recipe)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,20 +12,21 @@ from numpy.typing import ArrayLike
 from ..errors import GraphError
 from ..evaluate import Array
 from ..graph import Graph
+from .threads import share, thread_count
 
 
 class Compiled(ABC):
     """A graph compiled by `cg.compile`. Inputs and outputs are in the order of the graph's.
 
     graph, backend: what was compiled, and how it was asked for.  n_in, n_out: their numbers.
-    source: the generated text: Python, NumPy or LLVM.
+    options: the keyword arguments of `compile`.  source: the generated text: Python, NumPy or LLVM.
     """
 
     source: str
 
-    def __init__(self, graph: Graph, backend: str) -> None:
+    def __init__(self, graph: Graph, backend: str, options: dict[str, Any]) -> None:
         self.graph = graph
-        self.backend = backend
+        self.backend, self.options = backend, options
         self.n_in, self.n_out = len(graph.inputs), len(graph.outputs)
 
     @abstractmethod
@@ -34,16 +37,55 @@ class Compiled(ABC):
     def values(self, x: list[float]) -> tuple[float, ...]:
         """The outputs as floats at a list of n_in floats: the fastest way in from lists; nothing is checked."""
 
-    def batch(self, X: ArrayLike) -> Array:
-        """Values of the outputs, (n_out, N), at N points X, (n_in, N). Raises GraphError for another shape."""
+    def batch(self, X: ArrayLike, threads: int | None = 1) -> Array:
+        """Values of the outputs, (n_out, N), at N points X, (n_in, N).
+
+        threads: how many may share the work; None: one for each core. A batch too small to gain by it takes fewer, and
+        generated Python (backend "python") takes one. They change nothing in the values.
+        Raises GraphError for another shape, ValueError for less than one thread.
+        """
+        count = thread_count(threads)
         points = np.asarray(X, dtype=np.float64)
         if points.ndim != 2 or points.shape[0] != self.n_in:
             raise GraphError(f"X must have shape ({self.n_in}, N), one row for each input, got {points.shape}")
-        return self._columns(points)
+        total = points.shape[1]
+        result = np.empty((self.n_out, total))
+        width, columns = self._columns()
+
+        def block(start: int) -> None:
+            stop = start + width
+            columns(points[:, start:stop], result[:, start:stop])
+
+        # Blocks begin where they begin whatever `threads` is, so that each column always has the same neighbours.
+        share(block, range(0, total, width), min(count, total // width))
+        return result
+
+    def bind(self, x: Array, y: Array) -> Callable[[], None]:
+        """A function of nothing that reads x, (n_in,), and writes y, (n_out,): the fastest call there is.
+
+        The arrays are checked here and never again; the function keeps them alive. One thread at a time may call it.
+        Raises GraphError unless both are contiguous arrays of float64 in these shapes, y can be written and they
+        share no memory.
+        """
+        for name, array, size in (("x", x, self.n_in), ("y", y, self.n_out)):
+            if not isinstance(array, np.ndarray) or array.dtype != np.float64 or array.shape != (size,):
+                given = f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
+                raise GraphError(f"{name} must be an array of float64 in shape ({size},), got {given}")
+            if not array.flags.c_contiguous or not array.flags.aligned:
+                raise GraphError(f"{name} must be contiguous and aligned, got strides {array.strides}")
+        if not y.flags.writeable:
+            raise GraphError("y must be an array that can be written, got one that is read-only")
+        if np.may_share_memory(x, y):
+            raise GraphError("x and y must not share memory")
+        return self._bound(x, y)
 
     @abstractmethod
-    def _columns(self, points: Array) -> Array:
-        """`batch`, after its checks."""
+    def _columns(self) -> tuple[int, Callable[[Array, Array], None]]:
+        """What writes the results, (n_out, k), of points, (n_in, k), and the k that is worth handing to a thread."""
+
+    @abstractmethod
+    def _bound(self, x: Array, y: Array) -> Callable[[], None]:
+        """`bind`, after its checks."""
 
     def _point(self, x: ArrayLike) -> Array:
         point = np.asarray(x, dtype=np.float64)

@@ -7,6 +7,8 @@ from .dop853 import DOP853
 from .fixed import explicit
 from .method import Method
 from .problem import Problem
+from .radau import ORDER as RADAU_ORDER, radau
+from .rodas import RODAS5P, rosenbrock
 from .symplectic import GAUSS4, GAUSS6, MIDPOINT, SYMPLECTIC_EULER, VERLET, Partitioned, partitioned
 from .tableau import DOPRI5, EULER, RK4, Tableau
 
@@ -28,6 +30,8 @@ METHODS: dict[str, Method] = {
     "rk4": _explicit(RK4),
     "dopri5": _embedded(DOPRI5),
     "dop853": _embedded(DOP853),
+    "rodas": Method(RODAS5P.order, partial(rosenbrock, RODAS5P), adaptive=True, degree=len(RODAS5P.dense) + 1),
+    "radau": Method(RADAU_ORDER, radau, adaptive=True, degree=3),
     "symplectic_euler": _partitioned(SYMPLECTIC_EULER),
     "verlet": _partitioned(VERLET),
     "midpoint": _partitioned(MIDPOINT),

@@ -116,6 +116,14 @@ def embedded(tableau: Tableau, problem: Problem, dense: bool) -> Program:
     return Program({**registers(problem), **own}, body, record, record_if="accepted", stop="status")
 
 
+def measured(error: str, m: int) -> list[Statement]:
+    """Register `error`: the root mean square over the state of the register's (error / scale)."""
+    x, x_new, rtol, atol, e = inputs = cg.variables("x x_new rtol atol e")
+    part = e / scale(x, x_new, rtol, atol)
+    total = Sum(Graph(inputs, {"y": part * part}), ("x", "x_new", "rtol", "atol", error), "sum")
+    return [total, Call(function("sum", y=cg.sqrt(cg.variable("sum") / m)), ("sum",), ("error",))]
+
+
 def _squared(weights: tuple[float, ...], slopes: tuple[str, ...], target: str) -> Sum:
     """Sum over the state of (h * (sum of weight * slope) / scale)^2."""
     used = [k for k, weight in enumerate(weights) if weight]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import cgraph as cg
 from cgraph import Graph, Node
+from cgraph.program import Call
 
 
 def weighted(nodes: Sequence[Node], weights: Sequence[float]) -> Node:
@@ -33,6 +34,12 @@ def scaled(weights: Sequence[float]) -> Graph:
 def function(inputs: str, **outputs: float | Node) -> Graph:
     """A graph over these inputs."""
     return Graph(cg.variables(inputs), outputs)
+
+
+def identity(m: int) -> Call:
+    """Register `unit` = the identity matrix, row by row."""
+    values = [1.0 if row == column else 0.0 for row in range(m) for column in range(m)]
+    return Call(Graph([], {f"{k}": value for k, value in enumerate(values)}), (), ("unit",))
 
 
 SAME = function("a", a=cg.variable("a"))

@@ -80,6 +80,11 @@ class Problem:
         return self.bind(self.states, state_equation(self.model))
 
     @cached_property
+    def timed(self) -> bool:
+        """Whether f depends on t."""
+        return _reaches(self.rate.outputs.values(), [cg.variable(TIME)])
+
+    @cached_property
     def jacobian(self) -> Graph:
         """df/dx, row by row: inputs the states, t, parameters."""
         return cg.simplify(cg.jacobian(self.rate, list(self.states)))

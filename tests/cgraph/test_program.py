@@ -1,5 +1,6 @@
 """Programs and loops: machine code and Python do the same, and what they do is right."""
 
+import gc
 import itertools
 import math
 
@@ -222,3 +223,13 @@ def test_wrong_use_of_a_loop() -> None:
         cg.loop(graph, {"x": "x_next"}, "gpu")
     with pytest.raises(cg.GraphError, match=r"x must have shape \(3,\)"):
         cg.loop(graph, {"x": "x_next"})([1.0], 3)
+
+
+def test_code_in_a_cycle_of_garbage_is_let_go_in_order() -> None:
+    """Python ends the objects of a cycle in any order; LLVM's context must outlive what was made in it."""
+    pytest.importorskip("llvmlite")
+    for _ in range(20):
+        held: list[object] = [cg.compile(ONE, "llvm"), cg.loop(spring(), {"x": "x_next"}, "llvm")]
+        held.append(held)
+        del held
+        gc.collect()

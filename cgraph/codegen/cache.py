@@ -1,0 +1,121 @@
+"""Machine code kept on disk: what was compiled once on a machine is read there instead of compiled again."""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
+from hashlib import sha256
+from pathlib import Path
+
+FORMAT = "cgraph machine code, 1"  # part of every name: entries of another format are other entries
+SUFFIX, UNFINISHED = ".code", ".unfinished"
+
+
+class Cache:
+    """A folder with an entry for each thing compiled: the checksum of what follows, and what follows.
+
+    The folder is made at the first entry, for its owner alone. Any number of threads and processes may use it at once:
+    an entry appears whole or not at all. One that is damaged, or that another user could have written, is made anew.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def fetch(self, recipe: str, make: Callable[[], bytes]) -> bytes:
+        """The bytes kept for a recipe, the text of all that they depend on; else `make()`, kept from now on.
+
+        Warns (RuntimeWarning) when they cannot be kept: the result is right, but the time that was to be saved is not.
+        """
+        name = sha256(f"{FORMAT}\n{recipe}".encode()).hexdigest()
+        path = self.folder / f"{name}{SUFFIX}"
+        content = _read(path)
+        if content is None:
+            content = make()
+            try:
+                _write(path, content)
+            except OSError as error:
+                if _read(path) is None:  # Windows replaces no file that another process has just written and reads
+                    _warn(f" in {self.folder}: {error.strerror or error}")
+        return content
+
+
+def open_cache(choice: bool | str) -> Cache | None:
+    """The cache in a folder; True: in the platform's folder for caches; False: none."""
+    if choice is False:
+        return None
+    try:
+        return Cache(default_folder() if choice is True else Path(choice))
+    except RuntimeError as error:  # this user has no home
+        _warn(f": {error}")
+        return None
+
+
+def clear_cache(folder: str | os.PathLike[str] | None = None) -> int:
+    """Remove the machine code that `compile(..., cache=True)` has kept, or `cache=folder`; give the number of entries.
+
+    Nothing else in the folder is touched. Raises OSError for an entry that cannot be removed.
+    """
+    place = default_folder() if folder is None else Path(folder)
+    name = "[0-9a-f]" * 64
+    entries = list(place.glob(f"{name}{SUFFIX}"))
+    unfinished = place.glob(f"{name}.*{UNFINISHED}")  # left by a process that was killed
+    for path in (*entries, *unfinished):
+        path.unlink(missing_ok=True)
+    return len(entries)
+
+
+def default_folder() -> Path:
+    """Where the platform keeps caches: $XDG_CACHE_HOME, or ~/.cache, ~/Library/Caches, %LOCALAPPDATA%; there, `cgraph`.
+
+    Raises RuntimeError for a user without a home.
+    """
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "cgraph"
+    chosen = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    if chosen.is_absolute():  # the XDG specification: any other is to be ignored
+        return chosen / "cgraph"
+    return Path.home() / ("Library/Caches" if sys.platform == "darwin" else ".cache") / "cgraph"
+
+
+def _read(path: Path) -> bytes | None:
+    """What an entry keeps; None if there is none to trust: whoever writes an entry decides what this process runs."""
+    try:
+        with path.open("rb") as file:
+            if not _ours(os.fstat(file.fileno())):
+                return None
+            checksum, content = file.read(32), file.read()
+    except OSError:
+        return None
+    return content if checksum == _checksum(path, content) else None
+
+
+def _write(path: Path, content: bytes) -> None:
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    unfinished = path.with_suffix(f".{os.urandom(8).hex()}{UNFINISHED}")
+    try:
+        with open(unfinished, "xb", opener=lambda name, flags: os.open(name, flags, 0o600)) as file:
+            file.write(_checksum(path, content) + content)
+        unfinished.replace(path)
+    except BaseException:
+        with suppress(OSError):
+            unfinished.unlink(missing_ok=True)
+        raise
+
+
+def _checksum(path: Path, content: bytes) -> bytes:
+    """With the entry's name: one that was renamed is another's."""
+    return sha256(path.stem.encode() + content).digest()
+
+
+def _ours(status: os.stat_result) -> bool:
+    """Whether nobody but this user and the administrator could have written the file."""
+    if sys.platform == "win32":  # there, the folder of a user's caches is closed to others
+        return True
+    return status.st_uid in (0, os.geteuid()) and not status.st_mode & 0o022
+
+
+def _warn(why: str) -> None:
+    warnings.warn(f"machine code is not kept{why}", RuntimeWarning, stacklevel=3)

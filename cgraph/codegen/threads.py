@@ -1,0 +1,48 @@
+"""Work shared out among threads."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+
+def thread_count(threads: int | None) -> int:
+    """The number of threads asked for; None: one for each core that this process may use."""
+    if threads is None:
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    if not isinstance(threads, (int, np.integer)) or threads < 1:
+        raise ValueError(f"threads must be a whole number from 1, or None for one on each core, got {threads!r}")
+    return int(threads)
+
+
+def share(work: Callable[[int], None], items: Iterable[int], threads: int) -> None:
+    """`work(item)` for every item, each by whichever thread is free; the caller's is one of them.
+
+    After an exception, Ctrl-C among them, nobody begins another item; it is raised once all have stopped.
+    """
+    waiting = deque(items)
+
+    def run() -> None:
+        try:
+            while waiting:
+                try:
+                    item = waiting.popleft()
+                except IndexError:  # another thread was faster
+                    return
+                work(item)
+        except BaseException:
+            waiting.clear()
+            raise
+
+    if threads <= 1:
+        run()
+        return
+    with ThreadPoolExecutor(threads - 1) as pool:  # not kept: threads do not survive a fork
+        others = [pool.submit(run) for _ in range(threads - 1)]
+        run()
+        for each in others:
+            each.result()

@@ -1,0 +1,232 @@
+"""Radau IIA of order 5: three implicit stages, solved by simplified Newton with the exact Jacobian, for stiff systems.
+
+Hairer and Wanner, Solving Ordinary Differential Equations II, section IV.8. The stages' increments Z are the rows of
+Z = T W; in W the Newton equations fall apart into one real system of the size of the state, (r/h - J), and a complex
+one, (c/h - J), here as a real one of twice the size.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph.program import Call, Factor, If, Map, Program, Solve, Statement, Sum, While
+
+from .adaptive import commit, control, count, first_pass, measured, recorded, registers, scale, trial
+from .elements import SAME, identity, weighted
+from .fixed import moment
+from .problem import Problem
+from .tableau import Row
+
+_R6 = math.sqrt(6.0)
+_C = ((4.0 - _R6) / 10.0, (4.0 + _R6) / 10.0, 1.0)
+_A = np.array(
+    [
+        [(88 - 7 * _R6) / 360, (296 - 169 * _R6) / 1800, (-2 + 3 * _R6) / 225],
+        [(296 + 169 * _R6) / 1800, (88 + 7 * _R6) / 360, (-2 - 3 * _R6) / 225],
+        [(16 - _R6) / 36, (16 + _R6) / 36, 1 / 9],
+    ]
+)
+_REAL = 3.0 + 3.0 ** (2 / 3) - 3.0 ** (1 / 3)  # eigenvalues of the inverse of A
+_COMPLEX = complex(3.0 + 0.5 * (3.0 ** (1 / 3) - 3.0 ** (2 / 3)), 0.5 * (3.0 ** (5 / 6) + 3.0 ** (7 / 6)))
+_ERROR = ((-13 - 7 * _R6) / 3, (-13 + 7 * _R6) / 3, -1 / 3)  # weights of Z / h in the estimate
+HALVES = (0.9 / 0.5) ** 4  # the error at which a step of estimate h^4 is halved
+TURNS = 8  # of Newton's iteration, at most
+ORDER = 5
+
+
+def _transformation() -> tuple[list[Row], list[Row]]:
+    """T and its inverse: columns the real eigenvector of A^-1, and the real and imaginary part of the complex one."""
+    inverse = np.linalg.inv(_A)
+    columns = []
+    for value in (_REAL, _COMPLEX):
+        shifted = inverse - value * np.eye(3)
+        vector = np.linalg.svd(shifted)[2][-1].conj()  # of the smallest singular value, which is 0
+        columns += [vector.real] if value == _REAL else [vector.real, vector.imag]
+    t = np.array(columns).T
+    return [tuple(row) for row in t.tolist()], [tuple(row) for row in np.linalg.inv(t).tolist()]
+
+
+_T, _T_INVERSE = _transformation()
+# Z(s) / s at the nodes c is a quadratic in s: its coefficients, row k of weights of the Z in the power s^(k+1).
+_POWERS = [tuple(row) for row in (np.linalg.inv(np.vander(_C, 3, increasing=True)) / np.array(_C)).tolist()]
+
+
+def radau(problem: Problem, dense: bool) -> Program:
+    """A trial of one step."""
+    m = problem.size
+    z, w, f = (tuple([f"{name}{k}" for k in range(3)]) for name in ("Z", "W", "F"))
+    powers = tuple([f"dense{k + 1}" for k in range(3)])
+
+    def evaluated(graph: Graph, target: str) -> Call:
+        return Call(graph, ("x", "t", "p"), (target,))
+
+    body: list[Statement] = [
+        first_pass(identity(m), *[Call(Graph([], {f"{k}": 0.0 for k in range(m)}), (), (name,)) for name in powers]),
+        If("accepted", (evaluated(problem.jacobian, "jacobian"), evaluated(problem.rate, "rate"), count(1))),
+        trial(),
+        *_matrices(m),
+        *[moment(f"time{k}", _C[k]) for k in range(3)],
+        *_guess(z, powers),
+        *_combined(_T_INVERSE, z, w),
+        _begin(),
+        While("going", tuple(_turn(problem, z, w, f))),
+        _sum_of("x", z[2:], (1.0,), "x_new"),
+        *_estimate(problem, z),
+        control(4, 0),
+        commit(*_dense(z, powers), Call(SAME, ("h",), ("h_old",))),
+    ]
+    own = {"unit": m * m, "jacobian": m * m, "real": m * m, "complex": 4 * m * m, "pivots": m, "pivots2": 2 * m}
+    own |= dict.fromkeys((*z, *w, *f, *powers, "rate", "at", "right0", "error_vector"), m) | {"right12": 2 * m}
+    single = "going turns change change_old newton sum converged h_old again time0 time1 time2"
+    own |= dict.fromkeys(single.split(), 1)
+    return Program({**registers(problem), **own}, body, recorded(dense, 3), record_if="accepted", stop="status")
+
+
+def _matrices(m: int) -> list[Statement]:
+    """Both systems of Newton's iteration, factored."""
+    unit, h, slope = cg.variables("unit h slope")
+    real = Map(Graph([unit, h, slope], {"w": _REAL / h * unit - slope}), ("unit", "h", "jacobian"), ("real",))
+    jacobian = [cg.variables([f"j{row}_{column}" for column in range(m)]) for row in range(m)]
+    a, b = _COMPLEX.real / h, _COMPLEX.imag / h
+
+    def diagonal(value: Node, row: int) -> list[Node | float]:
+        return [value if column == row else 0.0 for column in range(m)]
+
+    rows: list[list[Node | float]] = []
+    for row in range(m):
+        same = [a - each if column == row else -each for column, each in enumerate(jacobian[row])]
+        rows.append([*same, *diagonal(b, row)])
+    for row in range(m):
+        same = [a - each if column == row else -each for column, each in enumerate(jacobian[row])]
+        rows.append([*diagonal(-b, row), *same])
+    entries: dict[str, Node | float] = {f"{k}": entry for k, entry in enumerate(entry for row in rows for entry in row)}
+    both = Graph([*(each for row in jacobian for each in row), h], entries)
+    return [real, Factor("real", "pivots"), Call(both, ("jacobian", "h"), ("complex",)), Factor("complex", "pivots2")]
+
+
+def _guess(z: tuple[str, ...], powers: tuple[str, ...]) -> list[Statement]:
+    """Z from the polynomial of the step before, carried on."""
+    h, old, *coefficients = inputs = cg.variables(["h", "h_old", *powers])
+    body: list[Statement] = []
+    for k, c in enumerate(_C):
+        ratio = cg.where(old, h / old, 0.0)
+        s = 1.0 + c * ratio
+        ahead = [power * (s ** float(j + 1) - 1.0) for j, power in enumerate(coefficients)]
+        graph = Graph(inputs, {"z": ahead[0] + ahead[1] + ahead[2]})
+        body.append(Map(graph, ("h", "h_old", *powers), (z[k],)))
+    return body
+
+
+def _combined(rows: list[Row], sources: tuple[str, ...], targets: tuple[str, ...]) -> list[Statement]:
+    nodes = cg.variables(list(sources))
+    graph = Graph(nodes, {f"{k}": weighted(nodes, row) for k, row in enumerate(rows)})
+    return [Map(graph, sources, targets)]
+
+
+def _begin() -> Call:
+    """Newton's iteration starts; it ends where a change is small beside the tolerance of the step."""
+    rtol = cg.variable("rtol")
+    newton = cg.maximum(10.0 * 2.0**-52 / rtol, cg.minimum(0.03, cg.sqrt(rtol)))
+    outputs: dict[str, Node | float] = {
+        "going": 1.0,
+        "turns": 0.0,
+        "change_old": math.inf,
+        "converged": 0.0,
+        "newton": newton,
+    }
+    return Call(Graph([rtol], outputs), ("rtol",), tuple(outputs))
+
+
+def _turn(problem: Problem, z: tuple[str, ...], w: tuple[str, ...], f: tuple[str, ...]) -> list[Statement]:
+    """W += (systems)^-1 (T^-1 F(Z) - eigenvalues / h * W)."""
+    m = problem.size
+    body: list[Statement] = []
+    for k in range(3):
+        body += [_sum_of("x", (z[k],), (1.0,), "at"), Call(problem.rate, ("at", f"time{k}", "p"), (f[k],))]
+    h, *nodes = inputs = cg.variables(["h", *w, *f])
+    ws, fs = nodes[:3], nodes[3:]
+    parts = [weighted(fs, row) for row in _T_INVERSE]
+    a, b = _COMPLEX.real / h, _COMPLEX.imag / h
+    outputs: dict[str, Node | float] = {
+        "0": parts[0] - _REAL / h * ws[0],
+        "1": parts[1] - (a * ws[1] + b * ws[2]),
+        "2": parts[2] - (a * ws[2] - b * ws[1]),
+    }
+    rights = Map(Graph(inputs, outputs), ("h", *w, *f), ("right0", "F1", "F2"))
+    lanes = cg.variables([f"c{k}" for k in range(2 * m)])
+    joined = Call(Graph(lanes, {f"{k}": node for k, node in enumerate(lanes)}), ("F1", "F2"), ("right12",))
+    parted = Call(joined.graph, ("right12",), ("F1", "F2"))
+    body += [rights, Solve("real", "pivots", "right0"), joined, Solve("complex", "pivots2", "right12"), parted]
+    steps = ("right0", "F1", "F2")
+    x, rtol, atol, *changes = cg.variables(["x", "rtol", "atol", "d0", "d1", "d2"])
+    size = scale(x, x, rtol, atol)
+    squares = [(change / size) * (change / size) for change in changes]
+    graph = Graph([x, rtol, atol, *changes], {"y": squares[0] + squares[1] + squares[2]})
+    body += [Sum(graph, ("x", "rtol", "atol", *steps), "change"), _judged(3 * m)]
+    before, after = cg.variables("before after")
+    add = Graph([before, after], {"w": before + after})
+    body += [Map(add, (name, step), (name,)) for name, step in zip(w, steps, strict=True)]
+    return [*body, *_combined(_T, w, z)]
+
+
+def _judged(numbers: int) -> Call:
+    """Whether Newton's iteration goes on, and whether it has converged."""
+    names = ("change", "change_old", "turns", "newton", "evaluations")
+    total, old, turns, newton, done = inputs = cg.variables(names)
+    change = cg.sqrt(total / numbers)
+    rate = change / old  # 0 in the first turn
+    left = rate / (1.0 - rate) * change
+    hopeful = (rate < 1.0) * (rate ** (TURNS - 1.0 - turns) / (1.0 - rate) * change <= newton)
+    first = cg.equal(turns, 0.0)
+    settled = cg.maximum(cg.equal(change, 0.0), (1.0 - first) * (rate < 1.0) * (left < newton))
+    finite = change < math.inf
+    going = finite * (1.0 - settled) * cg.maximum(first, hopeful) * (turns + 1.0 < TURNS)
+    outputs = {
+        "going": going,
+        "converged": settled,
+        "turns": turns + 1.0,
+        "change_old": change,
+        "evaluations": done + 3.0,
+    }
+    return Call(Graph(inputs, outputs), names, tuple(outputs))
+
+
+def _sum_of(base: str, parts: tuple[str, ...], weights: Row, target: str) -> Map:
+    x, *nodes = cg.variables(["x", *(f"z{k}" for k in range(len(parts)))])
+    return Map(Graph([x, *nodes], {"y": x + weighted(nodes, weights)}), (base, *parts), (target,))
+
+
+def _estimate(problem: Problem, z: tuple[str, ...]) -> list[Statement]:
+    """The error as the real system filters it; filtered twice when the first says no (section IV.8, eq. 8.19 and 8.20).
+
+    Where Newton's iteration did not converge, an error that halves the step.
+    """
+    m = problem.size
+    rate, h, *nodes = inputs = cg.variables(["rate", "h", *z])
+    right = Map(Graph(inputs, {"e": rate + weighted(nodes, _ERROR) / h}), ("rate", "h", *z), ("error_vector",))
+    once: list[Statement] = [right, Solve("real", "pivots", "error_vector"), *measured("error_vector", m)]
+    error, before, old, converged = cg.variables("error accepted h_old converged")
+    doubt = Graph([error, before, old], {"again": (error > 1.0) * cg.maximum(1.0 - before, cg.equal(old, 0.0))})
+    twice = (
+        _sum_of("x", ("error_vector",), (1.0,), "at"),
+        Call(problem.rate, ("at", "t", "p"), ("F0",)),
+        Map(Graph(inputs, {"e": rate + weighted(nodes, _ERROR) / h}), ("F0", "h", *z), ("error_vector",)),
+        Solve("real", "pivots", "error_vector"),
+        *measured("error_vector", m),
+    )
+    halved = Graph([error, converged], {"error": cg.where(converged, error, HALVES)})
+    return [
+        *once,
+        Call(doubt, ("error", "accepted", "h_old"), ("again",)),
+        If("again", twice),
+        Call(halved, ("error", "converged"), ("error",)),
+    ]
+
+
+def _dense(z: tuple[str, ...], powers: tuple[str, ...]) -> list[Statement]:
+    """The collocation polynomial through x and the stages, for dense output and the next guess."""
+    return _combined(_POWERS, z, powers)
