@@ -1,5 +1,6 @@
 """cgraph: computational graphs of equations, with forward and reverse automatic differentiation."""
 
+from .c import CSource
 from .codegen import Compiled, clear_cache, compile
 from .counts import Counts
 from .errors import GraphError
@@ -42,6 +43,7 @@ from .reverse import gradient, vjp
 from .simplify import simplify, specialize
 
 __all__ = [
+    "CSource",
     "Compiled",
     "Counts",
     "Edge",

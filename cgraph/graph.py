@@ -7,6 +7,7 @@ from functools import cached_property
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any
 
+from .c import CSource, c_source
 from .counts import Counts, count
 from .errors import GraphError
 from .evaluate import Value, evaluate
@@ -136,6 +137,19 @@ class Graph:
             if not before.issuperset(node.args):
                 raise GraphError(f"{node!r} comes before one of its arguments")
             before.add(node)
+
+    def to_c(self, name: str = "function", *, fma: bool = False) -> CSource:
+        """C99 source and header of `void name(const double *x, double *y)`; `.write(folder)` makes the two files.
+
+        It needs the C library alone: no heap, no globals, no recursion. The header names the places of inputs in x and
+        of outputs in y, for name "arm" as in `x[ARM_IN_q0]`, `y[ARM_OUT_tau0]`, and their numbers ARM_N_IN, ARM_N_OUT.
+        Values are those of `evaluate` to the last bit where both use the same C library (`hypot` to one unit of it),
+        unless compiler options such as -ffast-math give that up.
+        fma: let the compiler round a product and the sum that it goes into once.
+
+        Raises ValueError for a name that is no identifier of C, or a word of C, C++ or their library.
+        """
+        return c_source(self.inputs, self.nodes, self.outputs, name, fma)
 
     def to_networkx(self) -> networkx.MultiDiGraph:
         """A networkx.MultiDiGraph from arguments to uses.

@@ -2,66 +2,29 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
+from numbers import Integral
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 import cgraph as cg
-from cgraph import Node
+from cgraph import Graph, Node
 from cgraph.fold import Builder
 from cgraph.label import building
+from cgraph.order import topological
 
 from . import spatial
+from .body import WORLD, Body, Joint, MechanismError, checked, shape_of, vector
+from .force import Force, Reach, check, generalized, reach
+from .kinematic_tree import Carrier, parents_first, welded, with_mass_to_move
 from .spatial import STILL, ZERO, Array, Triple
-from .system import System
+from .system import System, parameter_value
 
-KINDS = ("revolute", "prismatic", "fixed")
-WORLD = "world"
-
-
-class MechanismError(ValueError):
-    """A mechanism that cannot be: which body, what was given, and what was needed."""
-
-
-@dataclass(frozen=True, eq=False)
-class Joint:
-    """How a body hangs on its parent.
-
-    kind: "revolute" (turns about `axis`), "prismatic" (slides along it) or "fixed" (welded).
-    axis: (3,) in the body's axes; need not have length 1.
-    position: (3,) [m], orientation: (3, 3): the body's frame in its parent's at q = 0; the joint is at its origin.
-    damping [N m s or N s/m], stiffness [N m/rad or N/m] towards `rest` [rad or m], armature [kg m^2 or kg]: >= 0.
-    """
-
-    kind: str
-    axis: ArrayLike = (0.0, 0.0, 1.0)
-    position: ArrayLike = (0.0, 0.0, 0.0)
-    orientation: ArrayLike = field(default_factory=lambda: np.eye(3))
-    damping: float = 0.0
-    stiffness: float = 0.0
-    rest: float = 0.0
-    armature: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class Body:
-    """A rigid body and the joint that carries it.
-
-    parent: another body's name, or "world".  mass [kg].  center: (3,) [m], centre of mass in the body's frame.
-    inertia: (3, 3) or (3,) diagonal [kg m^2], about the centre of mass, in the body's axes.
-    """
-
-    name: str
-    joint: Joint
-    parent: str = WORLD
-    mass: float = 0.0
-    center: ArrayLike = (0.0, 0.0, 0.0)
-    inertia: ArrayLike = (0.0, 0.0, 0.0)
+__all__ = ["WORLD", "Body", "Force", "Joint", "Mechanism", "MechanismError", "serial_arm", "tree"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,37 +32,104 @@ class Mechanism:
     """A tree of bodies under gravity. Coordinates are its moving joints, parents first, named by their bodies.
 
     bodies: in any order.  gravity: (3,) [m/s^2] in the world's axes.
+    forces: on bodies from outside, beside the joint forces tau; they enter the equations as J^T f.
+    parameters: values of the parameters that forces name, {name: value}; one without a value is 0. As of any system,
+        parameters are inputs of the graphs, and `simulate` binds them.
 
     Raises MechanismError for an unknown parent, a cycle, a repeated name, numbers that are not finite or out of range,
-    an inertia that no body can have, and a coordinate that moves no mass and has no armature.
+    an inertia that no body can have, a coordinate that moves no mass and has no armature, a force on an unknown body,
+    and a parameter that no force uses.
     """
 
     bodies: Sequence[Body]
     gravity: ArrayLike = (0.0, 0.0, -9.81)
+    forces: Sequence[Force] = ()
+    parameters: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        _vector("gravity", self.gravity)
-        _ = self.moving
+        vector("gravity", self.gravity)
+        for what, kind in (("bodies", Body), ("forces", Force)):  # kept, so that an iterator is read once
+            object.__setattr__(self, what, _listed(what, kind, getattr(self, what)))
+        bodies = set(self._carriers) - {WORLD}
+        for force in self.forces:
+            check(force, bodies)
+        used = {*self._named, *(str(node.name) for node in topological(self._nodes_of_forces) if node.name)}
+        for name in self.parameters:
+            if name not in used:
+                raise MechanismError(f"the mechanism has no force that uses the parameter {name!r}")
+        for name, value in self._values.items():
+            parameter_value(name, value)
 
-    @cached_property
+    @property
     def moving(self) -> tuple[Body, ...]:
         """The bodies that move, parents first, with all that is welded to them merged into their inertia."""
-        checked = [_checked(body) for body in self.bodies]
-        return _with_mass_to_move(_welded(_parents_first(checked)))
+        return self._merged[0]
+
+    @property
+    def _carriers(self) -> dict[str, Carrier]:
+        return self._merged[1]
+
+    @cached_property
+    def _merged(self) -> tuple[tuple[Body, ...], dict[str, Carrier]]:
+        bodies = [checked(body) for body in self.bodies]
+        moving, carriers = welded(parents_first(bodies))
+        return with_mass_to_move(moving), carriers
+
+    @property
+    def _named(self) -> list[str]:
+        return [each for force in self.forces for each in force.components if isinstance(each, str)]
+
+    @property
+    def _nodes_of_forces(self) -> list[Node]:
+        return [each for force in self.forces for each in force.components if isinstance(each, Node)]
+
+    @property
+    def _values(self) -> dict[str, float]:
+        return dict.fromkeys(self._named, 0.0) | dict(self.parameters)
 
     @cached_property
     def system(self) -> System:
-        """The Lagrangian system: one partial Lagrangian for each body, tagged with its name and energy."""
+        """The Lagrangian system: one partial Lagrangian for each body, tagged with its name and energy.
+
+        Of forces it has the generalized forces, tagged with "force" and the body.
+        """
         if not self.moving:
             raise MechanismError("the mechanism has no joint that moves")
         return System(
             lambda q, qd, t: self._partial_lagrangians(q, qd),
             [body.name for body in self.moving],
+            self._values,
+            forces=self._generalized_forces if self.forces else None,
             damping=[body.joint.damping for body in self.moving],
         )
 
+    def position(self, body: str, at: ArrayLike = (0.0, 0.0, 0.0)) -> Graph:
+        """Where a point of a body is in the world. Inputs q0.., outputs x, y, z [m].
+
+        at: (3,) [m], the point, in the body's frame. Raises MechanismError for an unknown body.
+        """
+        if not isinstance(body, str) or body not in self._carriers:
+            raise MechanismError(f"there is no body {body!r:.80} in the mechanism")
+        system = self.system
+        point = vector(f"position on body {body!r}: at", at)
+        with building(Builder()), cg.tag(body):
+            x, y, z = self._reach(body, system.q, system.qd).motion(point).position
+        return cg.simplify(Graph(system.q, {"x": x, "y": y, "z": z}))
+
+    def _reach(self, body: str, q: Sequence[Node], qd: Sequence[Node]) -> Reach:
+        names = [each.name for each in self.moving]
+        return reach(
+            self._carriers[body],
+            dict(zip(names, self.moving, strict=True)),
+            dict(zip(names, q, strict=True)),
+            dict(zip(names, qd, strict=True)),
+        )
+
+    def _generalized_forces(self, q: list[Node], qd: list[Node], t: Node, p: dict[str, Node]) -> list[Node]:
+        return generalized([(force, self._reach(force.body, q, qd)) for force in self.forces], qd, p)
+
     def _partial_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
-        gravity = _vector("gravity", self.gravity)
+        gravity = vector("gravity", self.gravity)
         pull = float(np.linalg.norm(gravity))
         up = spatial.constant(spatial.snapped(-gravity / pull)) if pull else STILL
         ground = _Motion(STILL, STILL, up, ZERO, np.eye(3))
@@ -128,8 +158,7 @@ def _carried(parent: _Motion, body: Body, q: Node, qd: Node) -> _Motion:
     """The motion of a body from that of its parent."""
     joint = body.joint
     axes = spatial.to_z(np.asarray(joint.axis))
-    turn = spatial.snapped(parent.axes.T @ np.asarray(joint.orientation) @ axes)  # our axes in the parent's, at q = 0
-    place = spatial.constant(spatial.snapped(parent.axes.T @ np.asarray(joint.position)))
+    turn, place = spatial.hung(parent.axes, joint.orientation, joint.position, axes)
     if joint.kind == "prismatic":
         slide = spatial.constant(turn[:, 2])
         place = spatial.plus(place, (slide[0] * q, slide[1] * q, slide[2] * q))
@@ -174,132 +203,55 @@ def _energy(motion: _Motion, body: Body, q: Node, qd: Node, pull: float) -> Node
     return kinetic - potential
 
 
-def _vector(what: str, value: ArrayLike, shape: tuple[int, ...] = (3,)) -> Array:
-    array = np.asarray(value, dtype=np.float64)
-    if array.shape != shape or not np.isfinite(array).all():
-        raise MechanismError(f"{what} must be {shape} finite numbers, got {np.asarray(value).tolist()!r:.80}")
-    return array
-
-
-def _checked(body: Body) -> Body:
-    """The body with its numbers as arrays, its axis of length 1, each checked."""
-    where, joint = f"body {body.name!r}", body.joint
-    if not isinstance(body.name, str) or not body.name or body.name == WORLD:
-        raise MechanismError(f"a body needs a name, and not {WORLD!r}; got {body.name!r}")
-    if joint.kind not in KINDS:
-        raise MechanismError(f"{where}: joint must be one of {', '.join(KINDS)}, got {joint.kind!r}")
-    for what in ("damping", "stiffness", "armature", "rest"):
-        value = getattr(joint, what)
-        if not math.isfinite(value) or (value < 0 and what != "rest"):
-            raise MechanismError(f"{where}: {what} must be finite and at least 0, got {value!r}")
-    axis = _vector(f"{where}: axis", joint.axis)
-    length = float(np.linalg.norm(axis))
-    if not length:
-        raise MechanismError(f"{where}: axis must not be zero")
-    orientation = _vector(f"{where}: orientation", joint.orientation, (3, 3))
-    if np.abs(orientation.T @ orientation - np.eye(3)).max() > 1e-9 or np.linalg.det(orientation) < 0:
-        raise MechanismError(f"{where}: orientation must be a rotation matrix")
-    if not (math.isfinite(body.mass) and body.mass >= 0.0):
-        raise MechanismError(f"{where}: mass must be finite and at least 0, got {body.mass!r} kg")
-    inertia = np.asarray(body.inertia, dtype=np.float64)
-    inertia = _vector(f"{where}: inertia", np.diag(inertia) if inertia.shape == (3,) else inertia, (3, 3))
-    _check_inertia(where, inertia)
-    return replace(
-        body,
-        mass=float(body.mass),
-        center=_vector(f"{where}: center", body.center),
-        inertia=inertia,
-        joint=replace(
-            joint,
-            axis=spatial.snapped(axis / length),
-            position=_vector(f"{where}: position", joint.position),
-            orientation=spatial.snapped(orientation),
-        ),
-    )
-
-
-def _check_inertia(where: str, inertia: Array) -> None:
-    """Symmetric, and with principal moments that are not negative and obey the triangle inequality."""
-    scale = np.abs(inertia).max()
-    if np.abs(inertia - inertia.T).max() > 1e-9 * scale:
-        raise MechanismError(f"{where}: inertia must be symmetric")
-    moments = np.linalg.eigvalsh(inertia)
-    if moments[0] < -1e-9 * scale:
-        raise MechanismError(f"{where}: inertia must not be negative, its principal moments are {moments.tolist()}")
-    if moments[2] > moments[0] + moments[1] + 1e-9 * scale:
-        raise MechanismError(
-            f"{where}: no body has principal moments {moments.tolist()}: the largest exceeds the sum of the others"
-        )
-
-
-def _parents_first(bodies: Sequence[Body]) -> list[Body]:
-    by_name = {body.name: body for body in bodies}
-    if len(by_name) < len(bodies):
-        twice = next(b.name for b in bodies if sum(b.name == other.name for other in bodies) > 1)
-        raise MechanismError(f"two bodies have the name {twice!r}")
-    for body in bodies:
-        if body.parent != WORLD and body.parent not in by_name:
-            raise MechanismError(f"body {body.name!r} has the unknown parent {body.parent!r}")
-    placed = {WORLD}
-    order: list[Body] = []
-    for body in bodies:
-        path: dict[str, Body] = {}
-        at = body
-        while at.name not in placed:
-            path[at.name] = at
-            placed.add(at.name)
-            if at.parent in path:
-                raise MechanismError(f"body {at.name!r} is its own ancestor, by way of {at.parent!r}")
-            at = by_name[at.parent] if at.parent != WORLD else at
-        order.extend(reversed(path.values()))
-    return order
-
-
-def _welded(bodies: Sequence[Body]) -> list[Body]:
-    """The bodies without welds: a welded body's mass is its carrier's, and its children hang on the carrier."""
-    carrier: dict[str, tuple[str, Array, Array]] = {WORLD: (WORLD, np.zeros(3), np.eye(3))}  # name, place, orientation
-    merged: dict[str, Body] = {}
-    for body in bodies:
-        name, place, turn = carrier[body.parent]
-        position = place + turn @ np.asarray(body.joint.position)
-        orientation = spatial.snapped(turn @ np.asarray(body.joint.orientation))
-        if body.joint.kind != "fixed":
-            joint = replace(body.joint, position=position, orientation=orientation)
-            merged[body.name] = replace(body, parent=name, joint=joint)
-            carrier[body.name] = (body.name, np.zeros(3), np.eye(3))
-            continue
-        carrier[body.name] = (name, position, orientation)
-        if name != WORLD and (body.mass or np.any(body.inertia)):
-            center = position + orientation @ np.asarray(body.center)
-            inertia = orientation @ np.asarray(body.inertia) @ orientation.T
-            merged[name] = _joined(merged[name], body.mass, center, inertia)
-    return list(merged.values())
-
-
-def _joined(body: Body, mass: float, center: Array, inertia: Array) -> Body:
-    """The body with another mass fixed to it, given in its frame."""
-    both = body.mass + mass
-    middle = (body.mass * np.asarray(body.center) + mass * center) / both if both else np.asarray(body.center)
-    own = spatial.about(np.asarray(body.inertia), body.mass, np.asarray(body.center) - middle)
-    return replace(body, mass=both, center=middle, inertia=own + spatial.about(inertia, mass, center - middle))
-
-
-def _with_mass_to_move(bodies: Sequence[Body]) -> tuple[Body, ...]:
-    """The bodies, once each is seen to have inertia along its coordinate, its own or further out."""
-    heavy: set[str] = set()
-    for body in reversed(bodies):
-        if body.mass or np.any(body.inertia):
-            heavy.add(body.name)
-        if body.name in heavy:
-            heavy.add(body.parent)
-        elif not body.joint.armature:
-            raise MechanismError(f"body {body.name!r} has no mass, carries none, and its joint has no armature")
-    return tuple(bodies)
+def _listed(what: str, kind: type, given: Any) -> tuple[Any, ...]:
+    if not isinstance(given, Iterable):
+        raise MechanismError(f"{what} must be a sequence of {kind.__name__}, got {type(given).__name__}: {given!r:.60}")
+    return tuple(given)
 
 
 def serial_arm(links: Sequence[dict[str, Any]], gravity: ArrayLike = (0.0, 0.0, -9.81)) -> Mechanism:
-    """A chain of bodies, each on the one before. links: keyword arguments of `Body` without `name` and `parent`."""
-    names = [f"link {i + 1}" for i in range(len(links))]
-    parents = [WORLD, *names]
-    bodies = [Body(name, parent=parent, **link) for name, parent, link in zip(names, parents, links, strict=False)]
+    """A chain of bodies "link 1", "link 2", ..., each on the one before: `tree` without branches."""
+    return tree(range(-1, len(links) - 1), links, gravity=gravity)
+
+
+def tree(
+    parents: Sequence[int],
+    links: Sequence[dict[str, Any]] | None = None,
+    *,
+    axes: ArrayLike = (0.0, 1.0, 0.0),
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+) -> Mechanism:
+    """A tree of bodies "link 1", "link 2", ...: `tree([(i - 1) // 2 for i in range(15)])` is a binary one.
+
+    parents: for each body the index of the one that carries it, counted from 0, -1 for the world.
+    links: keyword arguments of `Body` without `name` and `parent`, for each body. By default each is a slender rod of
+        1 kg and 1 m along -z, turning about its upper end, its children at its lower end.
+    axes: of the default's hinges, (3,) for all or (n, 3).
+
+    Raises MechanismError where the counts differ, for an index out of range, and as `Mechanism` does.
+    """
+    n = len(parents)
+    for i, parent in enumerate(parents):
+        if not isinstance(parent, Integral) or not -1 <= parent < n:
+            raise MechanismError(f"parents must be indices from -1 to {n - 1}, got {parent!r:.60} for link {i + 1}")
+    given = (
+        [_rod(axis, parent) for axis, parent in zip(_axes(axes, n), parents, strict=True)] if links is None else links
+    )
+    if len(given) != n:
+        raise MechanismError(f"a tree needs a link for each of its {n} parents, got {len(given)}")
+    names = [f"link {i + 1}" for i in range(n)]
+    bodies = [
+        Body(name, parent=WORLD if parent < 0 else names[parent], **link)
+        for name, parent, link in zip(names, parents, given, strict=True)
+    ]
     return Mechanism(bodies, gravity)
+
+
+def _rod(axis: Array, parent: int) -> dict[str, Any]:
+    joint = Joint("revolute", axis, (0.0, 0.0, 0.0 if parent < 0 else -1.0))
+    return {"joint": joint, "mass": 1.0, "center": (0.0, 0.0, -0.5), "inertia": (1.0 / 12.0, 1.0 / 12.0, 0.0)}
+
+
+def _axes(given: ArrayLike, n: int) -> Array:
+    each = shape_of(given) == (n, 3)
+    return vector("axes", given, (n, 3)) if each else np.tile(vector("axes", given), (n, 1))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import spatial
-from .mechanism import WORLD, Body, Mechanism
+from .mechanism import WORLD, Body, Mechanism, MechanismError
 from .planar_arm import PlanarArm
 from .spatial import Array
 
@@ -20,7 +20,10 @@ _COLORS = ("0.46 0.24 0.62 1", "0.16 0.38 0.78 1", "0.80 0.20 0.16 1")  # the pa
 
 
 def to_mjcf(model: PlanarArm | Mechanism, timestep: float = 1e-3) -> str:
-    """The model as MJCF text: masses and inertias explicit, RK4, contacts off."""
+    """The model as MJCF text: masses and inertias explicit, RK4, contacts off.
+
+    Raises MechanismError for forces on bodies: in MuJoCo they are state, `xfrc_applied`, and not the model's.
+    """
     return _arm_to_mjcf(model, timestep) if isinstance(model, PlanarArm) else _mechanism_to_mjcf(model, timestep)
 
 
@@ -65,6 +68,8 @@ def _arm_to_mjcf(arm: PlanarArm, timestep: float) -> str:
 
 def _mechanism_to_mjcf(mechanism: Mechanism, timestep: float) -> str:
     """The moving bodies, those welded to them merged in."""
+    if mechanism.forces:
+        raise MechanismError(f"MJCF has no forces, there is one on body {mechanism.forces[0].body!r}")
     children: dict[str, list[Body]] = {}
     for body in mechanism.moving:
         children.setdefault(body.parent, []).append(body)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -39,7 +40,7 @@ def load_mjcf(source: Any, *, ignore: bool = False, left_out: list[str] | None =
     model = source if isinstance(source, mujoco().MjModel) else _compiled(source)
     serious, outside = _not_modelled(model), _acting_from_outside(model)
     if serious and not ignore:
-        raise MechanismError(f"a mechanism cannot have {'; '.join(serious)} (ignore=True leaves them out)")
+        raise MechanismError(f"a mechanism cannot have {'; '.join(serious)} (the option ignore leaves this out)")
     if left_out is not None:
         left_out += [*serious, *outside]
     names = _names(model)
@@ -69,6 +70,22 @@ def load_urdf(source: Any, *, ignore: bool = False, left_out: list[str] | None =
         for shape in [each for each in link if each.tag in ("visual", "collision")]:
             link.remove(shape)
     return load_mjcf(ElementTree.tostring(robot, encoding="unicode"), ignore=ignore, left_out=left_out)
+
+
+def load_model(source: Any, *, ignore: bool = False, left_out: list[str] | None = None) -> Mechanism:
+    """As `load_urdf` for XML whose root element is <robot>, else as `load_mjcf`."""
+    load = load_urdf if _root(source) == "robot" else load_mjcf
+    return load(source, ignore=ignore, left_out=left_out)
+
+
+def _root(source: Any) -> str:
+    """The name of the root element; "" where there is none to be found."""
+    try:
+        text = _text(source).encode() if _is_text(source) else _path(source).read_bytes()
+        _, root = next(ElementTree.iterparse(io.BytesIO(text.lstrip()), ["start"]))  # noqa: S314 - MuJoCo reads it next
+    except (ElementTree.ParseError, StopIteration):
+        return ""
+    return str(root.tag)
 
 
 def _is_text(source: Any) -> bool:

@@ -22,6 +22,8 @@ from .trajectory import Array
 Indices = np.ndarray[Any, np.dtype[np.intp]]
 PIECE = 0.1  # s of run time after which a run comes back to Python: for Ctrl-C, progress and events
 FIRST = 32  # passes of the first piece, before it is known how long one takes
+LEAP = 1e-2  # of the whole run: the first step that is tried
+TRIALS = 60  # of a first step
 HUGE = 1e300  # a tolerance that anything meets
 
 
@@ -207,19 +209,13 @@ class AdaptiveRun(Run):
 
     def pieces(self, x: Array) -> Iterator[Piece]:
         """See Tally."""
-        slope = self._rate(0.0, x)
-        if self.where(slope):
-            first_bad = self.component(int(np.flatnonzero(~np.isfinite(slope))[0]))
-            self.status = f"stopped at t = 0 s: the rate of {first_bad} is not finite at the start"
-            return
-        first = self.first if self.first is not None else self._first_step(x, slope)
         start: Mapping[str, float | Array | list[float]] = {
             "x": x,
             "p": self.parameters,
             "end": self.t_end,
             "rtol": self.rtol,
             "atol": self.atol,
-            "next": first,
+            "next": self._first_step(x) if self.first is None else self.first,
             "longest": self.longest,
             "fresh": 1.0,
             "error_old": 1e-4,
@@ -254,6 +250,9 @@ class AdaptiveRun(Run):
 
     def _too_small(self, memory: Array) -> str:
         t, h = self._number(memory, "t"), self._number(memory, "h")
+        if t == 0.0 and not np.isfinite(rate := self._rate(t, self.runner.read(memory, "x"))).all():
+            first = self.component(int(np.flatnonzero(~np.isfinite(rate))[0]))
+            return f"stopped at t = 0 s: the rate of {first} is not finite at the start"
         text = f"stopped at t = {t:.6g} s: the step, {h:.3g} s, is below the resolution of the time"
         if where := self.where(self.runner.read(memory, "x_new")):
             return f"stopped at t = {t:.6g} s: {where}, however small"
@@ -266,42 +265,33 @@ class AdaptiveRun(Run):
         values = dict(zip(names, [*x.tolist(), t, *self.parameters], strict=True))
         return np.array(list(self.problem.rate.evaluate(values).values()), dtype=np.float64)
 
-    def _first_step(self, x: Array, slope: Array) -> float:
-        """Hairer, Norsett and Wanner I, section II.4, then halved until two half steps confirm the whole one.
+    def _first_step(self, x: Array) -> float:
+        """A step that two half steps confirm: their difference is within the tolerance.
 
-        The estimate of an embedded method can vanish by symmetry, such as at a start from rest; two half steps cannot.
+        The estimate of an embedded method can vanish by symmetry, such as at a start from rest, and a guess from the
+        first derivatives can be far off; halving cannot be fooled by either.
         """
         order, scale = self.method.order, self.atol + self.rtol * np.abs(x)
-        most = min(self.t_end, self.longest)
-
-        def size(value: Array) -> float:
+        anything = {"rtol": HUGE, "atol": HUGE, "longest": math.inf, "end": math.inf, "fresh": 1.0, "accepted": 1.0}
+        memory = self.runner.memory({"x": x, "p": self.parameters, "error_old": 1.0, **anything})
+        h = min(self.t_end, self.longest) * LEAP
+        for _ in range(TRIALS):
             with np.errstate(all="ignore"):
-                return float(np.sqrt(np.mean((value / scale) ** 2)))
-
-        a, b = size(x), size(slope)
-        trial = min(1e-6 if a < 1e-5 or b < 1e-5 else 0.01 * a / b, most)
-        bend = size(self._rate(trial, x + trial * slope) - slope) / trial
-        steepest = max(b, bend)
-        wanted = max(1e-6, trial * 1e-3) if steepest <= 1e-15 else (0.01 / steepest) ** (1.0 / (order + 1))
-        h = min(100.0 * trial, wanted, most)
-        for _ in range(40):
-            whole, halves = self._forced(x, [h]), self._forced(x, [0.5 * h, 0.5 * h])
-            difference = size(whole - halves)
+                change = (self._forced(memory, [h]) - self._forced(memory, [0.5 * h, 0.5 * h])) / scale
+                difference = float(np.sqrt(np.mean(change * change)))
             if difference <= 1.0:
                 break
-            factor = 0.9 * difference ** (-1.0 / (order + 1)) if math.isfinite(difference) else 0.1
-            h *= min(0.5, max(0.1, factor))
+            factor = 0.9 * difference ** (-1.0 / (order + 1)) if math.isfinite(difference) else 0.0
+            h *= min(0.5, max(1e-3, factor))
         return h
 
-    def _forced(self, x: Array, steps: Sequence[float]) -> Array:
-        """The state after these steps, whatever their errors."""
-        memory = self.runner.memory({"x": x, "p": self.parameters, "rtol": HUGE, "atol": HUGE, "longest": math.inf})
-        for name, value in (("fresh", 1.0), ("error_old", 1.0), ("accepted", 1.0), ("end", 10.0 * sum(steps))):
-            self.runner.write(memory, name, value)
+    def _forced(self, memory: Array, steps: Sequence[float]) -> Array:
+        """The state after these steps from a memory, which is left as it is."""
+        memory = memory.copy()
         for h in steps:
             self.runner.write(memory, "next", h)
             self.runner.run(memory, 1)
-        return self.runner.read(memory, "x").copy()
+        return self.runner.read(memory, "x")
 
 
 @dataclass(frozen=True)

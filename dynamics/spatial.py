@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
@@ -65,6 +66,12 @@ def to_z(axis: Array) -> Array:
     x = np.cross(seed, axis)
     x /= np.linalg.norm(x)
     return snapped(np.column_stack([x, np.cross(axis, x), axis]))
+
+
+def hung(outer: Array, orientation: ArrayLike, position: ArrayLike, axes: Array) -> tuple[Array, Triple]:
+    """A joint in its parent's frame: its `axes` as columns, and its origin, both in the parent's axes `outer`."""
+    turn = snapped(outer.T @ np.asarray(orientation) @ axes)
+    return turn, constant(snapped(outer.T @ np.asarray(position)))
 
 
 def about(inertia: Array, mass: float, offset: Array) -> Array:

@@ -18,8 +18,11 @@ _FAR = 1e9  # m, N, m/s: URDF asks each slide for its limits
 def to_urdf(mechanism: Mechanism) -> str:
     """The moving bodies as URDF text, those welded to them merged in; the root link is "world".
 
-    URDF has no gravity: who reads it chooses. Raises MechanismError for a spring or an armature, which it has not.
+    URDF has no gravity: who reads it chooses. Raises MechanismError for what it has not either: a spring, an
+    armature, a force.
     """
+    if mechanism.forces:
+        raise MechanismError(f"URDF has no forces, there is one on body {mechanism.forces[0].body!r}")
     lines = ['<?xml version="1.0"?>', '<robot name="mechanism">', '  <link name="world"/>']
     for body in mechanism.moving:
         lines += [*_link_lines(body), *_joint_lines(body)]

@@ -10,11 +10,12 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
+from cgraph.files import write
 from dynamics import FORMULATIONS, forward_dynamics, inverse_dynamics, scenes, spurious
-from dynamics.reports.bench import MODELS, bench
+from dynamics.reports.bench import MODES, PEERS, QUICK, SCENES, TASKS, Row, bench
+from dynamics.reports.bench_table import machine, tables
 
 from .dot import to_dot
-from .files import write
 from .render import render_png, render_svg
 
 
@@ -48,9 +49,21 @@ def _parser() -> argparse.ArgumentParser:
     paper.set_defaults(run=_paper)
 
     timed = commands.add_parser(
-        "bench", help="forward dynamics, ours beside what is installed: MuJoCo, Pinocchio, CasADi"
+        "bench", help="our speed beside what is installed: CasADi, Pinocchio, MuJoCo, heyoka, JAX, SymPy, PyTorch"
     )
-    timed.add_argument("models", nargs="*", help=f"among {', '.join(MODELS)} (default: all)")
+    timed.add_argument(
+        "scenes",
+        nargs="*",
+        metavar="SCENE",
+        help=f"one of {', '.join(SCENES)} (default: all of these), a name that `cgraph scenes` lists, or a model file",
+    )
+    _may_ignore(timed)
+    for what, known in (("tasks", TASKS), ("modes", MODES), ("peers", PEERS)):
+        timed.add_argument(f"--{what}", metavar="A,B", help=f"only these of {', '.join(known)}")
+    timed.add_argument("--quick", action="store_true", help=f"fewer turns and, unless named, {', '.join(QUICK)} alone")
+    timed.add_argument(
+        "--budget", type=float, metavar="S", help="seconds a peer may take to make one task (default: 60; quick: 20)"
+    )
     timed.add_argument("--json", action="store_true", help="print as JSON")
     timed.set_defaults(run=_bench)
 
@@ -59,7 +72,7 @@ def _parser() -> argparse.ArgumentParser:
     listed.set_defaults(run=_scenes)
 
     draw = commands.add_parser("draw", help="draw the graph of a scene's equations (SVG, PNG or DOT) or list it (TXT)")
-    draw.add_argument("scene", help=f"one of {', '.join(scenes.names())}")
+    _takes_a_scene(draw)
     draw.add_argument("--formulation", default="chain_rule", choices=sorted(FORMULATIONS), help="default: chain_rule")
     draw.add_argument("--out", type=Path, required=True, help="file to write: .svg, .png, .dot or .txt")
     draw.add_argument(
@@ -67,6 +80,24 @@ def _parser() -> argparse.ArgumentParser:
     )
     draw.set_defaults(run=_draw)
     return parser
+
+
+def _takes_a_scene(command: argparse.ArgumentParser) -> None:
+    """The arguments that `_scene` reads."""
+    command.add_argument("scene", help=f"{', '.join(scenes.names())}, or a model file, MJCF or URDF")
+    _may_ignore(command)
+
+
+def _may_ignore(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--ignore", action="store_true", help="leave out what of a model file cannot be modelled")
+
+
+def _scene(options: argparse.Namespace) -> scenes.Scene:
+    """The scene that the arguments name; what of a file is left out goes to standard error, a line each."""
+    scene = scenes.load(options.scene, **({"ignore": True} if options.ignore else {}))
+    for what in scene.left_out:
+        print(f"cgraph: {scene.name}: left out {what}", file=sys.stderr)
+    return scene
 
 
 def _paper(options: argparse.Namespace) -> None:
@@ -78,22 +109,26 @@ def _paper(options: argparse.Namespace) -> None:
 
 
 def _bench(options: argparse.Namespace) -> None:
-    if unknown := [name for name in options.models if name not in MODELS]:
-        raise ValueError(f"there is no bench model {unknown[0]!r}; the models are {', '.join(MODELS)}")
-    rows = []
-    for name in options.models or MODELS:
-        print(f"{name} ...", file=sys.stderr, flush=True)
-        rows.append(bench(name))
-    if options.json:
-        print(json.dumps([asdict(row) for row in rows], indent=1))
-        return
-    print("Forward dynamics, one core. Times are medians of alternating repetitions; in brackets, times ours.")
-    for row in rows:
-        print(f"{row.model:10} {row.nodes} nodes, build {row.build:.3f} s, compile {row.compile:.3f} s ({row.backend})")
-        print(f"{'':10} {'ours':10} {row.ours:8.2f} us a call, {row.batch:.3f} us a state in batches")
-        for peer, micros in row.peers.items():
-            ratio, difference = micros / row.ours, row.difference[peer]
-            print(f"{'':10} {peer:10} {micros:8.2f} us a call [{ratio:.2f}], differs by {difference:.0e}")
+    chosen = [
+        tuple(given.split(",")) if given else tuple(known)
+        for given, known in ((options.tasks, TASKS), (options.modes, MODES), (options.peers, PEERS))
+    ]
+    rows: list[Row] = []
+    measured = bench(
+        options.scenes or (QUICK if options.quick else tuple(SCENES)),
+        *chosen,
+        repeats=5 if options.quick else 15,
+        budget=(20.0 if options.quick else 60.0) if options.budget is None else options.budget,
+        ignore=options.ignore,
+        say=lambda line: print(f"cgraph: {line}", file=sys.stderr, flush=True),
+    )
+    try:
+        rows.extend(measured)
+    finally:  # of a run that is interrupted, what has been measured
+        if options.json and rows:
+            print(json.dumps({"machine": machine(), "rows": [asdict(row) for row in rows]}, indent=1))
+        elif rows:
+            print(f"{machine()}\n\n{tables(rows)}")
 
 
 def _scenes(options: argparse.Namespace) -> None:
@@ -121,13 +156,14 @@ def _scenes(options: argparse.Namespace) -> None:
 
 
 def _draw(options: argparse.Namespace) -> None:
-    graph = inverse_dynamics(scenes.load(options.scene), options.formulation)
+    scene = _scene(options)
+    graph = inverse_dynamics(scene, options.formulation)
     counts = graph.counts()
     kind = options.out.suffix
     if kind == ".txt":
         write(options.out, graph.listing())
     elif kind in (".dot", ".svg", ".png"):
-        caption = f"{options.scene}: inverse dynamics, {options.formulation.replace('_', ' ')}"
+        caption = f"{scene.name}: inverse dynamics, {options.formulation.replace('_', ' ')}"
         drawing = to_dot(graph, marked=spurious(graph), collapse=options.collapse, caption=caption)
         if kind == ".dot":
             write(options.out, str(drawing.source))

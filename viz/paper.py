@@ -13,6 +13,7 @@ import numpy as np
 
 from cgraph import Graph
 from cgraph.expand import format_polynomial
+from cgraph.files import write
 from dynamics import momentum_rate, scenes, spurious
 from dynamics.mujoco_io import frames
 from dynamics.progress import Progress
@@ -24,7 +25,6 @@ from dynamics.reports.speed import PAPER_MS, Row, table1
 
 from . import html, plot, theme
 from .dot import to_dot
-from .files import write
 from .render import render_png, render_svg
 
 if TYPE_CHECKING:

@@ -50,7 +50,8 @@ class Loop:
         if given.ndim != dimensions or given.shape[0] != count:
             wanted = f"({count},)" if dimensions == 1 else f"({count}, N)"
             raise GraphError(f"x must have shape {wanted}, one row for each input, got {given.shape}")
-        return np.concatenate([given[self._moving], given[self._held]])
+        registers = {"carry": given[self._moving], "held": given[self._held]}
+        return self._runner.memory(registers, None if dimensions == 1 else given.shape[1])
 
 
 def loop(

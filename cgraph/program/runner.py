@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import itertools
 import operator
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -22,7 +21,7 @@ from ..evaluate import Array
 from ..graph import Graph
 from . import lu
 from .program import Call, Factor, If, Map, Program, Solve, Statement, Sum, While
-from .text import program_functions, program_ir
+from .text import offsets, program_functions, program_ir
 
 BACKENDS = ("auto", "python", "llvm")
 _RUN = ctypes.CFUNCTYPE(
@@ -40,19 +39,18 @@ class Record(NamedTuple):
 class Runner(ABC):
     """A program ready to run.  program: what it runs.  size: numbers in a memory."""
 
-    def __init__(self, program: Program) -> None:
-        self.program = program
-        ends = list(itertools.accumulate(program.registers.values()))
-        starts = [0, *ends[:-1]]
-        self._slices = {name: slice(a, b) for name, a, b in zip(program.registers, starts, ends, strict=True)}
-        self.size = ends[-1] if ends else 0
+    def __init__(self, program: Program, width: int = 1) -> None:
+        self.program, self.width = program, width
+        places = offsets(program, width)
+        self._slices = {name: slice(places[name], places[name] + n) for name, n in program.registers.items()}
+        self.size = places[""]
 
-    def memory(self, values: Mapping[str, ArrayLike]) -> Array:
-        """A memory (size,) with these values of registers, 0 elsewhere.
+    def memory(self, values: Mapping[str, ArrayLike], count: int | None = None) -> Array:
+        """A memory (size,), or (size, count) of runs side by side, with these values of registers, 0 elsewhere.
 
         Raises GraphError for an unknown register or a value of another length.
         """
-        memory = np.zeros(self.size)
+        memory = np.zeros(self.size if count is None else (self.size, count))
         for name, value in values.items():
             self.write(memory, name, value)
         return memory
@@ -127,9 +125,10 @@ class NativeRunner(Runner):
     """A program as machine code. Any number of threads may run it at once, each on its own memory."""
 
     def __init__(self, program: Program, flags: str) -> None:
-        super().__init__(program)
-        self._flags, self._host = flags, llvm.host()
-        self.source = program_ir(program, flags)
+        host = llvm.host()
+        super().__init__(program, host.lanes)
+        self._flags, self._host = flags, host
+        self.source = program_ir(program, flags, width=host.lanes)
         self._code = self._host.compile(self.source, program_functions(program))
         self._entry = _RUN(self._code.address("run"))
         self._many: tuple[llvm.Code, Any] | None = None
@@ -143,7 +142,9 @@ class NativeRunner(Runner):
     def _run_many(self, memories: Array, passes: int, every: int) -> Record:
         lanes = self._host.lanes
         if self._many is None:
-            code = self._host.compile(program_ir(self.program, self._flags, lanes), program_functions(self.program))
+            code = self._host.compile(
+                program_ir(self.program, self._flags, lanes, self.width), program_functions(self.program)
+            )
             self._many = code, _RUN(code.address("run"))
         entry, total = self._many[1], memories.shape[1]
         rows = np.empty((passes // every, self.program.width, total))

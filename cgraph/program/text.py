@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from ..codegen.ir import Arithmetic, body, declarations, libm_functions
-from ..codegen.lanes import helpers
+from ..codegen.ir import Arithmetic, body, libm_functions, point_arithmetic, preamble
 from ..graph import Graph
 from .lu import factor_text, solve_text
 from .program import Call, Factor, If, Map, Program, Solve, Statement, Sum, While
@@ -22,22 +21,34 @@ def program_functions(program: Program) -> dict[str, int]:
     return dict(sorted(found.items()))
 
 
-def program_ir(program: Program, flags: str = "", lanes: int = 1) -> str:
+def offsets(program: Program, width: int) -> dict[str, int]:
+    """Where each register begins in the memory, and, under "", the size of it all.
+
+    A register of more than one number fills up to a multiple of `width`, so that whole vectors can be read and written.
+    """
+    at, places = 0, {}
+    for name, length in program.registers.items():
+        places[name] = at
+        at += length if length < 2 else -(-length // width) * width
+    places[""] = at
+    return places
+
+
+def program_ir(program: Program, flags: str = "", lanes: int = 1, width: int = 1) -> str:
     """A module with `int64_t run(double *memory, double *records, int64_t passes, int64_t every, int64_t *done)`.
 
-    The registers lie in `memory` end to end, each number a vector of `lanes`. A row is written to `records` after
-    every `every`th pass; the result is how many; the number of passes that were run goes to `done`.
+    The registers lie in `memory` as `offsets` says, each number a vector of `lanes`. A row is written to `records`
+    after every `every`th pass; the result is how many; the number of passes that were run goes to `done`.
+    width: of the vectors in which `Map` goes through its elements.
     """
-    functions = program_functions(program)
-    text = _Text(program, Arithmetic(flags, lanes))
+    text = _Text(program, point_arithmetic(flags) if lanes == 1 else Arithmetic(flags, lanes), width)
     main = text.main()
-    vector = helpers(functions, lanes, flags) if lanes > 1 else []
-    return "\n".join([*declarations(functions), *vector, *text.definitions, *main, ""])
+    return "\n".join([*preamble(program.graphs(), text.arithmetic), *text.definitions, *main, ""])
 
 
 class _Text:
-    def __init__(self, program: Program, arithmetic: Arithmetic) -> None:
-        self.program, self.arithmetic = program, arithmetic
+    def __init__(self, program: Program, arithmetic: Arithmetic, width: int) -> None:
+        self.program, self.arithmetic, self.width = program, arithmetic, width
         self.type, self.size = arithmetic.type, 8 * arithmetic.lanes
         self.definitions: list[str] = []
         self._named: dict[tuple[object, ...], str] = {}
@@ -47,11 +58,11 @@ class _Text:
 
     def main(self) -> list[str]:
         """The function that runs the passes; the definitions that it calls are made on the way."""
-        program, at = self.program, 0
-        registers = []
-        for number, length in enumerate(program.registers.values()):
-            registers.append(f"  %r{number} = getelementptr {self.type}, ptr %memory, i64 {at}")
-            at += length
+        program, places = self.program, offsets(self.program, self.width)
+        registers = [
+            f"  %r{number} = getelementptr {self.type}, ptr %memory, i64 {places[name]}"
+            for number, name in enumerate(program.registers)
+        ]
         self._numbers = {name: f"%r{number}" for number, name in enumerate(program.registers)}
         self._run(program.body)
         return [
@@ -179,7 +190,7 @@ class _Text:
             target, length = self._numbers[output], self.program.registers[output]
             if output in inputs:
                 beside = f"%beside{self._count}.{k}"
-                self._scratch.append(f"  {beside} = alloca {self.type}, i64 {max(1, length)}, align 64")
+                self._scratch.append(f"  {beside} = alloca {self.type}, i64 {length + self.width}, align 64")
                 copies.append(_copied(target, beside, length * self.size))
                 target = beside
             targets.append(target)
@@ -223,7 +234,35 @@ class _Text:
             head = f"define internal void @{name}({_arguments(len(inputs), len(graph.outputs))}) nounwind {{"
             return [head, "start:", *_each(body(graph, self.arithmetic, address), [], count), "  ret void", "}"]
 
-        return self._define(("map", id(graph), inputs, count), make, f"map{len(self._named)}")
+        vectors = self.arithmetic.lanes == 1 and self.width > 1 and count > 1 and not libm_functions(graph)
+        chosen = self._mapped_by_vectors(graph, inputs, count) if vectors else make
+        return self._define(("map", id(graph), inputs, count), chosen, f"map{len(self._named)}")
+
+    def _mapped_by_vectors(self, graph: Graph, inputs: _Layout, count: int) -> Callable[[str], list[str]]:
+        """As `_mapped`, a vector of elements at a time; what is computed beyond the last stays in the filling."""
+        arithmetic = Arithmetic(self.arithmetic.flags, self.width)
+        t, same = arithmetic.type, [k for k, length in enumerate(inputs) if length != count]
+
+        def address(base: str, name: str, row: int) -> list[str]:
+            if base == "x" and row in same:
+                return [f"  {name} = getelementptr {t}, ptr %same{row}, i64 0"]
+            return [f"  {name} = getelementptr {t}, ptr %{_ARGUMENT[base]}{row}, i64 %i"]
+
+        def make(name: str) -> list[str]:
+            spread = []
+            for k in same:
+                spread += [
+                    f"  %same{k} = alloca {t}, align 64",
+                    f"  %one{k} = load double, ptr %in{k}, align 8",
+                    f"  %first{k} = insertelement {t} poison, double %one{k}, i32 0",
+                    f"  %all{k} = shufflevector {t} %first{k}, {t} poison, <{self.width} x i32> zeroinitializer",
+                    f"  store {t} %all{k}, ptr %same{k}, align 64",
+                ]
+            head = f"define internal void @{name}({_arguments(len(inputs), len(graph.outputs))}) nounwind {{"
+            lines = _each(body(graph, arithmetic, address), [], -(-count // self.width))
+            return [head, "start:", *spread, *lines, "  ret void", "}"]
+
+        return make
 
     def _summed(self, graph: Graph, inputs: _Layout, count: int) -> str:
         """The graph's values at all elements, added up."""

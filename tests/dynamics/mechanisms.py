@@ -57,24 +57,24 @@ FAMILIES: dict[str, Callable[[int], Mechanism]] = {
 }
 
 
-def turned_body(i: int, parent: str, rng: np.random.Generator) -> Body:
-    """The i-th body of an arm whose frames are turned by quarter turns, with a full inertia."""
+def turned_link(i: int, rng: np.random.Generator) -> dict[str, Any]:
+    """The i-th link of an arm whose frames are turned by quarter turns, with a full inertia."""
     turn = rotation(np.array([1.0, 0.0, 0.0]), (0.0, math.pi / 2, -math.pi / 2)[i % 3])
     joint = Joint("revolute", position=(0.1, 0.0, 0.3) if i else (0.0, 0.0, 0.0), orientation=turn)
     center = 0.1 * rng.normal(size=3)
-    return Body(f"b{i}", joint, parent, mass=rng.uniform(1.0, 2.0), center=center, inertia=random_inertia(rng))
+    return {"joint": joint, "mass": rng.uniform(1.0, 2.0), "center": center, "inertia": random_inertia(rng)}
 
 
 def turned_arm(n: int) -> Mechanism:
     """n revolute joints one after the other."""
     rng = np.random.default_rng(n)
-    return Mechanism([turned_body(i, f"b{i - 1}" if i else WORLD, rng) for i in range(n)])
+    return dyn.serial_arm([turned_link(i, rng) for i in range(n)])
 
 
 def turned_tree(n: int) -> Mechanism:
     """n revolute joints, two on each until there are n."""
     rng = np.random.default_rng(n)
-    return Mechanism([turned_body(i, f"b{(i - 1) // 2}" if i else WORLD, rng) for i in range(n)])
+    return dyn.tree([(i - 1) // 2 for i in range(n)], [turned_link(i, rng) for i in range(n)])
 
 
 def in_space(arm: dyn.PlanarArm) -> Mechanism:

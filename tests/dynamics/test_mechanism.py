@@ -97,7 +97,7 @@ def test_the_torque_of_a_torque_s_acceleration_is_that_torque(family: str, n: in
 def test_a_planar_arm_spelled_in_space_is_that_arm(n: int) -> None:
     arm = random_arm(n)
     agree(in_space(arm), arm)
-    assert nodes(in_space(arm)) <= 1.25 * nodes(arm)
+    assert nodes(in_space(arm)) <= 1.35 * nodes(arm)
 
 
 def test_the_order_of_the_bodies_only_orders_the_coordinates() -> None:
@@ -254,6 +254,7 @@ def hinge(**given: Any) -> Joint:
 
 GOOD: dict[str, Any] = {"name": "a", "joint": hinge(), "mass": 1.0, "center": (0.1, 0.0, 0.0)}
 LEAF = [Body("a", hinge(), mass=1.0), Body("leaf", hinge(), "a")]
+AND_NO_MORE = "carries no mass, and its joint has no armature"
 SKEW = [[1.0, 0.2, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1.0]]
 BAD = [
     param([Body("a", hinge(), "c", mass=1.0)], "body 'a' has the unknown parent 'c'", id="unknown parent"),
@@ -272,7 +273,7 @@ BAD = [
     ),
     param({"joint": hinge(orientation=-np.eye(3))}, "body 'a': orientation must be a rotation matrix", id="mirror"),
     param({"joint": hinge(axis=(0, 0, 0))}, "body 'a': axis must not be zero", id="no axis"),
-    param({"joint": hinge(axis=(0, 1))}, "body 'a': axis must be (3,) finite numbers, got [0, 1]", id="short axis"),
+    param({"joint": hinge(axis=(0, 1))}, "body 'a': axis must be (3,) finite numbers, got (0, 1)", id="short axis"),
     param({"joint": hinge(damping=-0.1)}, "body 'a': damping must be finite and at least 0, got -0.1", id="damping"),
     param(
         {"joint": hinge(stiffness=-1.0)}, "body 'a': stiffness must be finite and at least 0, got -1.0", id="stiffness"
@@ -283,9 +284,10 @@ BAD = [
     param({"mass": -0.8}, "body 'a': mass must be finite and at least 0, got -0.8 kg", id="mass"),
     param({"mass": np.nan}, "body 'a': mass must be finite and at least 0, got nan kg", id="mass nan"),
     param(
-        {"center": (np.nan, 0.0, 0.0)}, "body 'a': center must be (3,) finite numbers, got [nan, 0.0, 0.0]", id="center"
+        {"center": (np.nan, 0.0, 0.0)}, "body 'a': center must be (3,) finite numbers, got (nan, 0.0, 0.0)", id="center"
     ),
-    param({"inertia": (1.0, 1.0, np.nan)}, "body 'a': inertia must be (3, 3) finite numbers", id="inertia nan"),
+    param({"inertia": (1.0, 1.0, np.nan)}, "body 'a': inertia must be (3,) finite numbers", id="inertia nan"),
+    param({"inertia": [[1.0], [2.0, 3.0]]}, "body 'a': inertia must be (3, 3) finite numbers", id="inertia ragged"),
     param({"inertia": SKEW}, "body 'a': inertia must be symmetric", id="asymmetric"),
     param(
         {"inertia": (-1.0, 1.0, 1.0)},
@@ -297,14 +299,45 @@ BAD = [
         "body 'a': no body has principal moments [1.0, 2.0, 4.0]: the largest exceeds the sum of the others",
         id="triangle",
     ),
-    param(LEAF, "body 'leaf' has no mass, carries none, and its joint has no armature", id="leaf"),
+    param({"name": 7}, "a body needs a name, and not 'world'; got 7", id="name a number"),
+    param({"parent": None}, "body 'a': parent must be the name of a body or 'world', got None", id="no parent"),
+    param({"joint": "revolute"}, "body 'a': joint must be of the type Joint, got str: 'revolute'", id="joint text"),
+    param([GOOD], "bodies must be of the type Body, got dict: {'name': 'a'", id="body a dict"),
+    param(Body("a", hinge()), "bodies must be a sequence of Body, got Body: Body(name='a'", id="one body"),
+    param({"mass": "heavy"}, "body 'a': mass must be finite and at least 0, got 'heavy' kg", id="mass text"),
+    param({"mass": np.inf}, "body 'a': mass must be finite and at least 0, got inf kg", id="mass infinite"),
+    param({"center": "middle"}, "body 'a': center must be (3,) finite numbers, got 'middle'", id="center text"),
+    param({"inertia": 0.1}, "body 'a': inertia must be (3, 3) finite numbers, got 0.1", id="inertia a number"),
+    param({"joint": hinge(damping=np.nan)}, "body 'a': damping must be finite and at least 0, got nan", id="damp nan"),
+    param(
+        {"joint": hinge(stiffness=np.inf)}, "body 'a': stiffness must be finite and at least 0, got inf", id="stiff inf"
+    ),
+    param({"joint": hinge(axis=(0, np.nan, 1))}, "body 'a': axis must be (3,) finite numbers", id="axis nan"),
+    param(
+        {"joint": hinge(orientation=np.full((3, 3), np.nan))},
+        "body 'a': orientation must be (3, 3) finite numbers",
+        id="orientation nan",
+    ),
+    param(LEAF, f"body 'leaf' has no mass, {AND_NO_MORE}", id="leaf without mass"),
+    param({"center": (0.0, 0.0, 0.5)}, f"body 'a' has no inertia about its axis, {AND_NO_MORE}", id="mass on the axis"),
+    param(
+        {"joint": hinge(axis=(1, 2, -2)), "center": (-0.1, -0.2, 0.2)},
+        f"body 'a' has no inertia about its axis, {AND_NO_MORE}",
+        id="mass on a slanting axis",
+    ),
+    param(
+        {"joint": Joint("prismatic"), "mass": 0.0, "inertia": (1.0, 1.0, 1.0)},
+        f"body 'a' has no mass, {AND_NO_MORE}",
+        id="a slide without mass",
+    ),
 ]
 
 
 @mark.parametrize(("bodies", "message"), BAD)
 def test_what_cannot_be_is_refused_by_name(bodies: Any, message: str) -> None:
-    with raises(MechanismError, match="^" + re.escape(message)):
+    with raises(MechanismError, match="^" + re.escape(message)) as caught:
         Mechanism([Body(**(GOOD | bodies))] if isinstance(bodies, dict) else bodies)
+    assert "\n" not in str(caught.value)
 
 
 def test_gravity_is_a_finite_vector() -> None:
@@ -316,6 +349,61 @@ def test_gravity_is_a_finite_vector() -> None:
 def test_a_system_needs_a_joint_that_moves(bodies: list[Body]) -> None:
     with raises(MechanismError, match="the mechanism has no joint that moves"):
         _ = Mechanism(bodies).system
+
+
+# --- trees
+
+
+def test_a_tree_by_its_parents_is_the_tree_spelled_out() -> None:
+    parents = [-1, 0, 0, 2]
+    axes = [(0, 1, 0), (1, 0, 0), (0, 0, 1), (1, 1, 0)]
+    names = ["world", "link 1", "link 1", "link 3"]
+    spelled = [
+        Body(
+            f"link {i + 1}",
+            Joint("revolute", axes[i], (0.0, 0.0, -1.0 if i else 0.0)),
+            names[i],
+            mass=1.0,
+            center=(0.0, 0.0, -0.5),
+            inertia=(1 / 12, 1 / 12, 0.0),
+        )
+        for i in range(4)
+    ]
+    agree(dyn.tree(parents, axes=axes), Mechanism(spelled))
+
+
+def test_a_binary_tree_is_one_line() -> None:
+    tree = dyn.tree([(i - 1) // 2 for i in range(15)])
+    assert [body.parent for body in tree.bodies][:6] == ["world", *["link 1"] * 2, *["link 2"] * 2, "link 3"]
+    assert tree.system.n == 15
+    assert nodes(tree) <= 160 * 15
+
+
+def test_a_chain_of_default_rods_is_the_planar_arm() -> None:
+    """About -y, so that angles count alike."""
+    agree(dyn.tree(range(-1, 4), axes=(0.0, -1.0, 0.0)), dyn.planar_arm([1.0] * 5, [1.0] * 5))
+
+
+def test_a_serial_arm_is_a_tree_without_branches() -> None:
+    arm = turned_arm(4)
+    assert [body.parent for body in arm.bodies] == ["world", "link 1", "link 2", "link 3"]
+
+
+@mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"parents": [-1, 2]}, "parents must be indices from -1 to 1, got 2 for link 2"),
+        ({"parents": [-2]}, "parents must be indices from -1 to 0, got -2 for link 1"),
+        ({"parents": ["world"]}, "parents must be indices from -1 to 0, got 'world' for link 1"),
+        ({"parents": [-1, 1]}, "body 'link 2' is its own ancestor, by way of 'link 2'"),
+        ({"parents": [-1], "links": []}, "a tree needs a link for each of its 1 parents, got 0"),
+        ({"parents": [-1, 0], "axes": [(0, 1, 0)] * 3}, "axes must be (3,) finite numbers, got [(0, 1, 0)"),
+        ({"parents": [-1], "axes": (0, 0, 0)}, "body 'link 1': axis must not be zero"),
+    ],
+)
+def test_a_tree_that_cannot_be_is_refused(arguments: dict[str, Any], message: str) -> None:
+    with raises(MechanismError, match="^" + re.escape(message)):
+        dyn.tree(**arguments)
 
 
 def test_a_plate_and_a_rod_are_bodies_however_turned() -> None:

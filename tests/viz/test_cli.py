@@ -36,10 +36,37 @@ def test_a_scene_is_drawn_or_listed(tmp_path, capsys, suffix):
     assert target.read_bytes().lstrip(b"/ \n").startswith(start) or start in target.read_bytes()[:400]
 
 
+MODEL = """<mujoco><worldbody><body name="a"><joint name="j" axis="0 1 0" range="-30 30" frictionloss="0.1"/>
+<geom size="0.1" pos="0.2 0 0" contype="0"/></body></worldbody></mujoco>"""
+URDF = """<robot name="arm"><link name="base"/><link name="a"><inertial><mass value="1"/>
+<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+<joint name="j" type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 1 0"/></joint></robot>"""
+
+
+def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
+    pytest.importorskip("mujoco")
+    model, arm, target = tmp_path / "model.xml", tmp_path / "arm.urdf", tmp_path / "graph.dot"
+    arm.write_text(URDF)
+    assert cli.main(["draw", str(arm), "--out", str(target)]) == 0
+    assert "arm: inverse dynamics, chain rule" in target.read_text()
+    assert capsys.readouterr().err == ""
+    model.write_text(MODEL)
+    assert cli.main(["draw", str(model), "--out", str(target)]) == 1
+    said = "cgraph: error: a mechanism cannot have friction loss (the option ignore leaves this out)\n"
+    assert capsys.readouterr().err == said
+    assert cli.main(["draw", str(model), "--ignore", "--out", str(target)]) == 0
+    said = ["cgraph: model: left out friction loss", "cgraph: model: left out joint limits (j)"]
+    assert capsys.readouterr().err.splitlines() == said
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
         (["draw", "quadruple_pendulum", "--out", "x.dot"], "there is no scene 'quadruple_pendulum'"),
+        (["draw", "nowhere.xml", "--out", "x.dot"], "there is no file 'nowhere.xml'"),
+        (["draw", "nowhere.urdf", "--out", "x.dot"], "there is no file 'nowhere.urdf'"),
+        (["draw", "a_file", "--out", "x.dot"], "MuJoCo cannot read 'a_file'"),
+        (["draw", "chain", "--ignore", "--out", "x.dot"], "scene 'chain' has no option 'ignore'"),
         (["draw", "spring_mass", "--out", "x.jpg"], "must end in .svg, .png, .dot or .txt"),
         (["draw", "spring_mass", "--out", "missing/x.dot"], "does not exist"),
         (["draw", "spring_mass", "--out", "x.dot", "--collapse", "link 9"], "link 9"),
@@ -81,17 +108,6 @@ def test_ctrl_c_gives_one_line_and_exit_status_130(monkeypatch, capsys):
     monkeypatch.setattr(cli, "_scenes", interrupt)
     assert cli.main(["scenes"]) == 130
     assert capsys.readouterr().err == "cgraph: interrupted\n"
-
-
-def test_the_bench_sets_ours_beside_mujoco_and_they_agree(capsys):
-    assert cli.main(["bench", "planar 3", "arm 7", "--json"]) == 0
-    rows = {row["model"]: row for row in json.loads(capsys.readouterr().out)}
-    assert rows["planar 3"]["nodes"] == 230
-    for row in rows.values():
-        assert row["ours"] > 0
-        assert row["difference"]["MuJoCo"] < 1e-12
-    assert cli.main(["bench", "planar 4"]) == 1
-    assert "there is no bench model 'planar 4'" in capsys.readouterr().err
 
 
 def test_scenes_loads_no_optional_package():

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import cgraph as cg
+from cgraph.files import write
 from viz import graph_svg, render_png, render_svg, theme, to_dot
-from viz.files import write
 from viz.render import LARGE, RenderError
 
 

@@ -1,0 +1,146 @@
+"""Bodies and the joints that carry them, checked."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import spatial
+from .spatial import Array
+
+KINDS = ("revolute", "prismatic", "fixed")
+WORLD = "world"
+_ROUNDING = 1e-9  # of the largest entry: what is left of an inertia or a rotation that came through text
+
+
+class MechanismError(ValueError):
+    """A mechanism that cannot be: which body, what was given, and what was needed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """How a body hangs on its parent.
+
+    kind: "revolute" (turns about `axis`), "prismatic" (slides along it) or "fixed" (welded).
+    axis: (3,) in the body's axes; need not have length 1.
+    position: (3,) [m], orientation: (3, 3): the body's frame in its parent's at q = 0; the joint is at its origin.
+    damping [N m s or N s/m], stiffness [N m/rad or N/m] towards `rest` [rad or m], armature [kg m^2 or kg]: >= 0.
+    """
+
+    kind: str
+    axis: ArrayLike = (0.0, 0.0, 1.0)
+    position: ArrayLike = (0.0, 0.0, 0.0)
+    orientation: ArrayLike = field(default_factory=lambda: np.eye(3))
+    damping: float = 0.0
+    stiffness: float = 0.0
+    rest: float = 0.0
+    armature: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A rigid body and the joint that carries it.
+
+    parent: another body's name, or "world".  mass [kg].  center: (3,) [m], centre of mass in the body's frame.
+    inertia: (3, 3) or (3,) diagonal [kg m^2], about the centre of mass, in the body's axes.
+    """
+
+    name: str
+    joint: Joint
+    parent: str = WORLD
+    mass: float = 0.0
+    center: ArrayLike = (0.0, 0.0, 0.0)
+    inertia: ArrayLike = (0.0, 0.0, 0.0)
+
+
+def vector(what: str, value: Any, shape: tuple[int, ...] = (3,)) -> Array:
+    """The value as an array of that shape. Raises MechanismError, naming `what`, unless it is finite numbers."""
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    if array.shape != shape or not np.isfinite(array).all():
+        given = value.tolist() if isinstance(value, np.ndarray) else value
+        raise MechanismError(f"{what} must be {shape} finite numbers, got {given!r:.80}")
+    return array
+
+
+def shape_of(value: Any) -> tuple[int, ...]:
+    """The shape of an array or of nested sequences; () for rows of unlike length."""
+    try:
+        return np.shape(value)
+    except ValueError:
+        return ()
+
+
+def _number(what: str, value: Any, unit: str = "", minimum: float = 0.0) -> float:
+    if isinstance(value, numbers.Real) and math.isfinite(value) and float(value) >= minimum:
+        return float(value)
+    bound = " and at least 0" if minimum == 0.0 else ""
+    raise MechanismError(f"{what} must be finite{bound}, got {value!r:.80}{unit}")
+
+
+def checked(body: Body) -> Body:
+    """The body with its numbers as arrays and floats, its axis of length 1. Raises MechanismError for what is wrong."""
+    if not isinstance(body, Body):
+        raise MechanismError(f"bodies must be of the type Body, got {type(body).__name__}: {body!r:.60}")
+    if not isinstance(body.name, str) or not body.name or body.name == WORLD:
+        raise MechanismError(f"a body needs a name, and not {WORLD!r}; got {body.name!r}")
+    where, joint = f"body {body.name!r}", body.joint
+    if not isinstance(body.parent, str):
+        raise MechanismError(f"{where}: parent must be the name of a body or {WORLD!r}, got {body.parent!r:.80}")
+    inertia = _inertia(where, body.inertia)
+    return replace(
+        body,
+        mass=_number(f"{where}: mass", body.mass, " kg"),
+        center=vector(f"{where}: center", body.center),
+        inertia=inertia,
+        joint=_checked_joint(where, joint),
+    )
+
+
+def _checked_joint(where: str, joint: Joint) -> Joint:
+    if not isinstance(joint, Joint):
+        raise MechanismError(f"{where}: joint must be of the type Joint, got {type(joint).__name__}: {joint!r:.60}")
+    if joint.kind not in KINDS:
+        raise MechanismError(f"{where}: joint must be one of {', '.join(KINDS)}, got {joint.kind!r}")
+    axis = vector(f"{where}: axis", joint.axis)
+    length = float(np.linalg.norm(axis))
+    if not length:
+        raise MechanismError(f"{where}: axis must not be zero")
+    orientation = vector(f"{where}: orientation", joint.orientation, (3, 3))
+    if np.abs(orientation.T @ orientation - np.eye(3)).max() > _ROUNDING or np.linalg.det(orientation) < 0:
+        raise MechanismError(f"{where}: orientation must be a rotation matrix")
+    return Joint(
+        joint.kind,
+        axis=spatial.snapped(axis / length),
+        position=vector(f"{where}: position", joint.position),
+        orientation=spatial.snapped(orientation),
+        damping=_number(f"{where}: damping", joint.damping),
+        stiffness=_number(f"{where}: stiffness", joint.stiffness),
+        rest=_number(f"{where}: rest", joint.rest, minimum=-math.inf),
+        armature=_number(f"{where}: armature", joint.armature),
+    )
+
+
+def _inertia(where: str, given: ArrayLike) -> Array:
+    """Symmetric, and with principal moments that are not negative and obey the triangle inequality."""
+    diagonal = shape_of(given) == (3,)
+    inertia = vector(f"{where}: inertia", given, (3,) if diagonal else (3, 3))
+    inertia = np.diag(inertia) if diagonal else inertia
+    scale = np.abs(inertia).max()
+    if np.abs(inertia - inertia.T).max() > _ROUNDING * scale:
+        raise MechanismError(f"{where}: inertia must be symmetric")
+    moments = np.linalg.eigvalsh(inertia)
+    if moments[0] < -_ROUNDING * scale:
+        raise MechanismError(f"{where}: inertia must not be negative, its principal moments are {moments.tolist()}")
+    if moments[2] > moments[0] + moments[1] + _ROUNDING * scale:
+        raise MechanismError(
+            f"{where}: no body has principal moments {moments.tolist()}: the largest exceeds the sum of the others"
+        )
+    return inertia

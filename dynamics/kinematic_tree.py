@@ -1,0 +1,103 @@
+"""Trees of bodies put in order: parents first, welds merged, each coordinate seen to move something."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from . import spatial
+from .body import WORLD, Body, MechanismError
+from .spatial import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Carrier:
+    """Where a body's frame is in that of the moving body that carries it, which is itself if it moves."""
+
+    name: str  # of the moving body, or "world"
+    position: Array  # (3,) [m]
+    orientation: Array  # (3, 3)
+
+
+_OWN = (np.zeros(3), np.eye(3))
+
+
+def parents_first(bodies: Sequence[Body]) -> list[Body]:
+    """The bodies in an order in which each follows its parent. Raises MechanismError where there is none."""
+    by_name = {body.name: body for body in bodies}
+    if len(by_name) < len(bodies):
+        twice = next(b.name for b in bodies if sum(b.name == other.name for other in bodies) > 1)
+        raise MechanismError(f"two bodies have the name {twice!r}")
+    for body in bodies:
+        if body.parent != WORLD and body.parent not in by_name:
+            raise MechanismError(f"body {body.name!r} has the unknown parent {body.parent!r}")
+    placed = {WORLD}
+    order: list[Body] = []
+    for body in bodies:
+        path: dict[str, Body] = {}
+        at = body
+        while at.name not in placed:
+            path[at.name] = at
+            placed.add(at.name)
+            if at.parent in path:
+                raise MechanismError(f"body {at.name!r} is its own ancestor, by way of {at.parent!r}")
+            at = by_name[at.parent] if at.parent != WORLD else at
+        order.extend(reversed(path.values()))
+    return order
+
+
+def welded(bodies: Sequence[Body]) -> tuple[list[Body], dict[str, Carrier]]:
+    """The bodies that move and what carries each body of all: a welded body's mass and children are its carrier's."""
+    carriers = {WORLD: Carrier(WORLD, *_OWN)}
+    merged: dict[str, Body] = {}
+    for body in bodies:
+        parent = carriers[body.parent]
+        position = parent.position + parent.orientation @ np.asarray(body.joint.position)
+        orientation = spatial.snapped(parent.orientation @ np.asarray(body.joint.orientation))
+        if body.joint.kind != "fixed":
+            joint = replace(body.joint, position=position, orientation=orientation)
+            merged[body.name] = replace(body, parent=parent.name, joint=joint)
+            carriers[body.name] = Carrier(body.name, *_OWN)
+            continue
+        carriers[body.name] = Carrier(parent.name, position, orientation)
+        if parent.name != WORLD and (body.mass or np.any(body.inertia)):
+            center = position + orientation @ np.asarray(body.center)
+            inertia = orientation @ np.asarray(body.inertia) @ orientation.T
+            merged[parent.name] = _joined(merged[parent.name], body.mass, center, inertia)
+    return list(merged.values()), carriers
+
+
+def _joined(body: Body, mass: float, center: Array, inertia: Array) -> Body:
+    """The body with another mass fixed to it, given in its frame."""
+    both = body.mass + mass
+    middle = (body.mass * np.asarray(body.center) + mass * center) / both if both else np.asarray(body.center)
+    own = spatial.about(np.asarray(body.inertia), body.mass, np.asarray(body.center) - middle)
+    return replace(body, mass=both, center=middle, inertia=own + spatial.about(inertia, mass, center - middle))
+
+
+def with_mass_to_move(bodies: Sequence[Body]) -> tuple[Body, ...]:
+    """The bodies, once each is seen to have inertia along its coordinate: its own, its armature's, or further out.
+
+    Masses further out are taken to move; where they lie on an axis in some state, M is singular there.
+    """
+    carries: set[str] = set()
+    for body in reversed(bodies):
+        if not (body.name in carries or body.joint.armature or _resists(body)):
+            lacks = "no mass" if not body.mass else "no inertia about its axis"
+            raise MechanismError(f"body {body.name!r} has {lacks}, carries no mass, and its joint has no armature")
+        if body.name in carries or body.mass or np.any(body.inertia):
+            carries.add(body.parent)
+    return tuple(bodies)
+
+
+def _resists(body: Body) -> bool:
+    """Whether the body alone has inertia along its coordinate."""
+    if body.joint.kind == "prismatic":
+        return body.mass > 0.0
+    axis, inertia = (
+        np.asarray(body.joint.axis),
+        spatial.about(np.asarray(body.inertia), body.mass, np.asarray(body.center)),
+    )
+    return float(axis @ inertia @ axis) > spatial.SNAP * float(np.abs(inertia).max())

@@ -1,0 +1,37 @@
+"""Mechanisms in space against Pinocchio, which gets the bodies one by one and shares no code with MuJoCo's compiler."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pytest import mark
+
+import dynamics as dyn
+from tests.dynamics.mechanisms import FAMILIES
+from tests.dynamics.models import at, error, run, states
+
+pytest.importorskip("pinocchio", reason="the bench extra has it")
+from tests.dynamics.pinocchio_twin import PinocchioTwin
+
+STATES = 100
+AGREEMENT = 1e-10  # of the largest entry: rounding of two codes, times the condition number of M
+
+
+@mark.parametrize("n", [1, 2, 7, 20, 40])
+@mark.parametrize("family", FAMILIES)
+def test_random_mechanisms_agree_with_pinocchio(family: str, n: int, record_property) -> None:
+    """aba, rnea and crba: hinges and slides about any axis, branches, welds, springs, damping and armature."""
+    mechanism = FAMILIES[family](n)
+    peer, given = PinocchioTwin(mechanism), states(mechanism, STATES, seed=n)
+    rows = [at(given, row) for row in range(STATES)]
+    theirs = {
+        "aba": [peer.aba(row["q"], row["qd"], row["tau"]) for row in rows],
+        "rnea": [peer.rnea(row["q"], row["qd"], row["qdd"]) for row in rows],
+        "crba": [peer.crba(row["q"]).ravel() for row in rows],
+    }
+    ours = {"aba": dyn.forward_dynamics, "rnea": dyn.inverse_dynamics, "crba": dyn.mass_matrix}
+    errors = {name: error(run(make(mechanism), given), np.array(theirs[name])) for name, make in ours.items()}
+    for name, worst in errors.items():
+        record_property(name, worst)
+    print(f"{family} {n}:", *(f"{name} {worst:.0e}" for name, worst in errors.items()))  # noqa: T201
+    assert max(errors.values()) < AGREEMENT

@@ -1,0 +1,159 @@
+"""Scenes: by name, by file, and what neither can be."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pytest import mark, raises
+
+import dynamics as dyn
+from dynamics import scenes
+from dynamics.mechanism import MechanismError
+
+INERTIAL = '<inertial pos="0.1 0.2 -0.3" mass="1.3" diaginertia="0.3 0.4 0.5"/>'
+MJCF = f"""<?xml version="1.0"?><!-- a hinge and a slide --><mujoco><worldbody>
+<body name="a"><joint axis="0 1 0"/>{INERTIAL}
+<body name="b"><joint type="slide"/>{INERTIAL}</body></body></worldbody></mujoco>"""
+RUBBING = MJCF.replace('axis="0 1 0"', 'axis="0 1 0" frictionloss="0.1" range="-30 30"')
+URDF = """<?xml version="1.0" encoding="utf-8"?><robot name="arm"><link name="base"/><link name="a"><inertial>
+<origin xyz="0.1 0 0.2"/><mass value="1.5"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.2" iyz="0" izz="0.15"/></inertial>
+<visual><geometry><mesh filename="package://nowhere/a.stl"/></geometry></visual></link>
+<joint name="j" type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 1 0"/></joint></robot>"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Any:
+    """Writes a text to a file of a name."""
+
+    def write(text: str, name: str = "model.xml") -> Path:
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def loaded(*arguments: Any, **options: Any) -> scenes.Scene:
+    pytest.importorskip("mujoco")
+    return scenes.load(*arguments, **options)
+
+
+# --- by name
+
+
+@mark.parametrize("name", scenes.names())
+def test_a_scene_is_called_by_its_name_and_starts_in_a_state_of_its_model(name: str) -> None:
+    scene = scenes.load(name)
+    assert scene.name == name
+    assert len(scene.q) == len(scene.qd) == scene.system.n
+    assert scene.left_out == ()
+    assert np.isfinite(dyn.simulate(scene, scene.q, scene.qd, 0.01).q).all()
+
+
+def test_options_go_to_the_scene_s_function() -> None:
+    assert scenes.load("chain", n=4).system.n == 4
+    assert scenes.load("triple_pendulum", model="point").model.links[0].inertia == 0.0
+
+
+@mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("chain", {"links": 4}, "scene 'chain' has no option 'links'; its options are n"),
+        ("chain", {"name": "x"}, "scene 'chain' has no option 'name'; its options are n"),
+        ("spring_mass", {"k": 2.0}, "scene 'spring_mass' has no option 'k'; it has none"),
+        ("robot.xml", {"n": 4}, "scene 'robot.xml' has no option 'n'; its options are ignore"),
+        ("robot.xml", {"path": "x"}, "scene 'robot.xml' has no option 'path'; its options are ignore"),
+    ],
+)
+def test_an_unknown_option_is_named_with_those_that_there_are(name: str, options: Any, message: str) -> None:
+    with raises(TypeError, match=f"^{re.escape(message)}$"):
+        scenes.load(name, **options)
+
+
+@mark.parametrize("n", [0, -1, 2.5, "3"])
+def test_a_chain_has_a_whole_number_of_links(n: Any) -> None:
+    with raises(ValueError, match=f"^a chain needs at least one link, got {n!r}$"):
+        scenes.load("chain", n=n)
+
+
+@mark.parametrize("name", ["swing", "", 3, None, ["chain"]])
+def test_what_is_neither_a_name_nor_a_file_is_named_with_the_scenes(name: Any) -> None:
+    message = f"there is no scene {name!r}; the scenes are spring_mass, triple_pendulum, chain, and any file that ends"
+    with raises(ValueError, match="^" + re.escape(message)):
+        scenes.load(name)
+
+
+# --- by file
+
+
+@mark.parametrize("as_given", [str, Path])
+def test_a_model_file_is_a_scene_at_rest(file: Any, as_given: type) -> None:
+    path = file(MJCF, "crane.xml")
+    scene = loaded(as_given(path))
+    assert scene.name == "crane"
+    assert scene.about == f"2 moving bodies of {path}"
+    assert scene.system.coordinates == ("a", "b")
+    assert scene.q == scene.qd == (0.0, 0.0)
+    assert np.isfinite(dyn.simulate(scene, scene.q, scene.qd, 0.01).q).all()
+
+
+@mark.parametrize("name", ["arm.urdf", "arm.xml", "arm"])
+def test_urdf_is_known_by_its_root_element(file: Any, name: str) -> None:
+    """And read without its meshes, which MuJoCo's own reader would look for."""
+    assert loaded(file(URDF, name)).system.coordinates == ("a",)
+
+
+def test_mjcf_may_end_in_anything(file: Any) -> None:
+    assert loaded(file(MJCF, "model.mjcf")).system.n == 2
+
+
+def test_a_file_s_name_does_not_hide_a_scene(file: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = file(MJCF, "chain")
+    monkeypatch.chdir(path.parent)
+    assert scenes.load("chain").system.n == 10
+    assert loaded("./chain").system.n == 2
+
+
+def test_what_acts_from_outside_is_left_out_and_said(file: Any) -> None:
+    path = file(RUBBING)
+    with raises(MechanismError, match=r"^a mechanism cannot have friction loss \(the option ignore leaves this out\)$"):
+        loaded(path)
+    scene = loaded(path, ignore=True)
+    assert [each.partition(" (")[0] for each in scene.left_out] == ["friction loss", "joint limits"]
+    assert scene.system.n == 2
+
+
+@mark.parametrize(
+    ("text", "message"),
+    [
+        (None, "there is no file "),
+        ("", "MuJoCo cannot read "),
+        ("<mujoco><worldbody>", "MuJoCo cannot read "),
+        ("not XML", "MuJoCo cannot read "),
+        ("<robot><link/></robot>", "MuJoCo cannot read "),
+        ("<mujoco/>", "the mechanism has no joint that moves"),
+    ],
+)
+def test_a_file_that_is_no_model_is_one_sentence(file: Any, tmp_path: Path, text: str | None, message: str) -> None:
+    path = tmp_path / "nowhere.xml" if text is None else file(text)
+    with raises(MechanismError, match="^" + re.escape(message)) as caught:
+        loaded(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_folder_is_no_file(tmp_path: Path) -> None:
+    folder = tmp_path / "robots.xml"
+    folder.mkdir()
+    with raises(MechanismError, match=r"^there is no file '.*robots\.xml'$"):
+        loaded(folder)
+
+
+def test_bytes_that_are_no_text_are_one_sentence(tmp_path: Path) -> None:
+    path = tmp_path / "model.xml"
+    path.write_bytes(bytes(range(256)))
+    with raises(MechanismError, match=r"^MuJoCo cannot read "):
+        loaded(path)
