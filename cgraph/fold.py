@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
-from .label import Label
+from .label import Label, building
 from .node import CONSTANT, OPS, Node, Op, constant
 from .ops import cos, sin, sqrt
+from .order import rebuild
 
 # Rules see the arguments of the node to be, not all constant, and give a node that stands for it, or None. They take
 # every operand for finite and a divisor for non-zero: 0 * x = 0, x - x = 0. Zeros have no sign: x + 0 = x.
@@ -64,13 +65,21 @@ def _mul(a: Node, b: Node) -> Node | None:
             return constant(-c) * b.args[0]
         if b.op is MUL and (inner := b.args[0].value) is not None and math.isfinite(c * inner) and c * inner:
             return constant(c * inner) * b.args[1]
-        return None
+        return _cancelled(c, b) if b.op is MUL else None
     if a.op is NEG:
         return a.args[0] * b.args[0] if b.op is NEG else -(a.args[0] * b)
     if b.op is NEG:
         return -(a * b.args[0])
     if a.op is MUL and b.op is MUL and (c := a.args[0].value) is not None and (d := b.args[0].value) is not None:
         return constant(c * d) * (a.args[1] * b.args[1]) if math.isfinite(c * d) and c * d else None
+    return None
+
+
+def _cancelled(c: float, b: Node) -> Node | None:
+    """c * b for a product b with a factor d * x whose d is 1 / c or -1 / c: 2 * ((0.5 * x) * y) = x * y."""
+    for factor, other in (b.args, b.args[::-1]):
+        if factor.op is MUL and (d := factor.args[0].value) is not None and abs(c * d) == 1.0:
+            return constant(c * d) * (factor.args[1] * other)
     return None
 
 
@@ -132,20 +141,20 @@ def _same(a: Node, b: Node) -> Node | None:
 
 
 ADD, SUB, NEG, MUL = OPS["add"], OPS["sub"], OPS["neg"], OPS["mul"]
-_RULES: dict[str, Rule] = {
-    "add": _add,
-    "sub": _sub,
-    "mul": _mul,
-    "div": _div,
-    "neg": _neg,
-    "pow": _pow,
-    "strong_mul": _strong_mul,
-    "where": _where,
-    "minimum": _same,
-    "maximum": _same,
-    "sin": lambda a: -sin(a.args[0]) if a.op is NEG else None,
-    "cos": lambda a: cos(a.args[0]) if a.op is NEG else None,
-    "abs": lambda a: abs(a.args[0]) if a.op is NEG else None,
+_RULES: dict[Op, Rule] = {
+    ADD: _add,
+    SUB: _sub,
+    MUL: _mul,
+    NEG: _neg,
+    OPS["div"]: _div,
+    OPS["pow"]: _pow,
+    OPS["strong_mul"]: _strong_mul,
+    OPS["where"]: _where,
+    OPS["minimum"]: _same,
+    OPS["maximum"]: _same,
+    OPS["sin"]: lambda a: -sin(a.args[0]) if a.op is NEG else None,
+    OPS["cos"]: lambda a: cos(a.args[0]) if a.op is NEG else None,
+    OPS["abs"]: lambda a: abs(a.args[0]) if a.op is NEG else None,
 }
 
 
@@ -153,29 +162,35 @@ class Builder:
     """Builds nodes folded and shared: the same operation on the same arguments is made once.
 
     Merging unites labels, and keeps the first name. Only nodes that this builder made are merged, so nobody else's
-    node changes.
+    node changes. A node that comes without tags, as a sum at a variable does, takes those of its arguments.
     """
 
     def __init__(self) -> None:
-        self._made: dict[tuple[object, ...], Node] = {}
+        self._made: dict[tuple[str | int, ...], Node] = {}
 
     def __call__(self, op: Op, args: tuple[Node, ...], label: Label, name: str | None = None) -> Node:
         """The node of this operation on these arguments; a name is kept by a node made here for the first time."""
-        if all([arg.op is CONSTANT for arg in args]):
+        for arg in args:
+            if arg.op is not CONSTANT:
+                rule = _RULES.get(op)
+                if rule is not None and (node := rule(*args)) is not None:
+                    return node
+                break
+        else:
             value = op.scalar(*[arg.value for arg in args])
             if value == value:
                 return constant(value)
-        else:
-            rule = _RULES.get(op.name)
-            if rule is not None and (node := rule(*args)) is not None:
-                return node
-        if op.commutative:
-            a, b = args
-            if (a.op is not CONSTANT and b.op is CONSTANT) or (op, id(b), id(a)) in self._made:
-                args = (b, a)  # one order for both a*b and b*a: a constant first, else as first met
-        key = (op, *map(id, args))
+        # One order for both a*b and b*a: a constant first, else as first met.
+        if op.commutative and args[1].op is CONSTANT and args[0].op is not CONSTANT:
+            args = args[::-1]
+        key: tuple[str | int, ...] = (op.name, *map(id, args))  # no objects, which the garbage collector would follow
         node = self._made.get(key)
+        if node is None and op.commutative:
+            node = self._made.get((op.name, key[2], key[1]))
         if node is None:
+            if not label.tags:
+                for arg in args:
+                    label = label.with_tags_of(arg.label)
             node = self._made[key] = Node(op, args, label, name=name)
             return node
         if node.label is not label:
@@ -183,3 +198,18 @@ class Builder:
         if node.name is None and name is not None:
             object.__setattr__(node, "name", name)
         return node
+
+
+def folded(nodes: Collection[Node], build: Builder) -> list[Node]:
+    """Copies of nodes, and of all that they reach, made by `build`.
+
+    Once is enough: a rule sees the very arguments that the copy keeps, so a copy of the copy would come out alike.
+    """
+    with building(build) as labelled:
+
+        def make(node: Node, args: tuple[Node, ...]) -> Node:
+            labelled(node.label)
+            return build(node.op, args, node.label, node.name)
+
+        new = rebuild(nodes, {}, make)
+    return [new[node] for node in nodes]

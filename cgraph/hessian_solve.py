@@ -2,38 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from .fold import Builder
 from .graph import Graph
 from .label import ADJOINT, TANGENT, building
-from .ldl import SingularError
+from .ldl import SingularError, first_not_positive
 from .node import Node, Scalar, as_node
 from .order import topological
-from .second_order import second_partial
+from .second_order import second_partials
 
 ZERO, ONE = as_node(0.0), as_node(1.0)
 
 
-def hessian_solve(graph: Graph, wrt: str | Node | Sequence[str | Node], rhs: Sequence[Scalar]) -> list[Node]:
+def hessian_solve(
+    graph: Graph, wrt: str | Node | Sequence[str | Node], rhs: Sequence[Scalar], *, positive: bool = False
+) -> list[Node]:
     """Nodes x with (d2f/dw2) x = rhs, for the one output f of `graph` and the inputs w of `wrt`.
 
     rhs: one node or number for each of `wrt`. The Hessian is not formed: for f summed along a chain or a tree, such as
     the energy of its bodies, the result has a number of nodes proportional to that of f.
 
+    There is no pivoting: the Hessian has to be definite. With `positive`, one more node follows x: 0 where the Hessian
+    is positive definite, else 1 + the index of a variable whose pivot is zero, negative or NaN, the first to be met;
+    x means nothing there. It costs two operations and a constant for each variable. A pivot that should be zero and by
+    rounding is a little more counts as positive; then x is huge.
+
     Raises GraphError for a graph with several outputs, ValueError for a wrong number of right-hand sides, and
-    SingularError, with the index of the variable, when a pivot is zero by structure. There is no pivoting: the Hessian
-    has to be definite.
+    SingularError, with the index of the variable, when a pivot is the constant zero, or with `positive` a negative one.
     """
     chosen = graph.select_inputs(wrt)
     if len(rhs) != len(chosen):
         raise ValueError(f"rhs needs one entry for each of the {len(chosen)} variables, got {len(rhs)}")
-    return solve_nodes(graph.only_output(), chosen, [as_node(each) for each in rhs])
+    return solve_nodes(graph.only_output(), chosen, [as_node(each) for each in rhs], positive=positive)
 
 
-def solve_nodes(output: Node, wrt: Sequence[Node], rhs: Sequence[Node], build: Builder | None = None) -> list[Node]:
+def solve_nodes(
+    output: Node,
+    wrt: Sequence[Node],
+    rhs: Sequence[Node],
+    build: Builder | None = None,
+    *,
+    at: Mapping[Node, Node] | None = None,
+    positive: bool = False,
+) -> list[Node]:
     """As `hessian_solve`, on nodes.
+
+    at: {node z under output: b_z}, right-hand sides at inner nodes, which stand for (dz/dw)^T b_z more at w, but are
+    carried to w by the elimination itself: fewer nodes, and no large sums at w that it then has to undo.
 
     The tangents t of all nodes that depend on w make f's second differential stationary: W t = b, with W the symmetric
     second-order adjoint and b = rhs at w. Walking the nodes from the output down, an operation hands its row of W and
@@ -43,8 +60,8 @@ def solve_nodes(output: Node, wrt: Sequence[Node], rhs: Sequence[Node], build: B
     """
     build = build or Builder()
     order = _dependent(output, wrt)
-    walk = _Walk(build, output, dict(zip(wrt, rhs, strict=True)), set(order))
     with building(build) as labelled:
+        walk = _Walk(build, output, dict(zip(wrt, rhs, strict=True)), at or {}, set(order))
         for node in reversed(order):
             labelled(node.label.derived(ADJOINT))
             if node in walk.position:
@@ -62,12 +79,17 @@ def solve_nodes(output: Node, wrt: Sequence[Node], rhs: Sequence[Node], build: B
             else:
                 dot = _total([p * dots[arg] for arg, p in walk.partials[node].items()])
             dots[node] = dot
-    return [dots[node] for node in wrt]
+        x = [dots[node] for node in wrt]
+        if positive:
+            labelled(output.label.derived(ADJOINT))
+            x.append(first_not_positive({walk.position[node]: solved.pivot for node, solved in walk.solved.items()}))
+    return x
 
 
 class _Solved(NamedTuple):
-    """x_i = alone - sum_j gain_j t_j, the row of a variable at its elimination."""
+    """x_i = alone - sum_j gain_j t_j, the row of a variable at its elimination, and the pivot that divided it."""
 
+    pivot: Node
     alone: Node
     gains: dict[Node, Node]
 
@@ -75,12 +97,16 @@ class _Solved(NamedTuple):
 class _Walk:
     """The state of the walk from the output down: adjoints, W and b of the live nodes, and what was eliminated."""
 
-    def __init__(self, build: Builder, output: Node, rhs: dict[Node, Node], depends: set[Node]) -> None:
+    def __init__(
+        self, build: Builder, output: Node, rhs: dict[Node, Node], at: Mapping[Node, Node], depends: set[Node]
+    ) -> None:
         self.build = build
         self.depends = depends
         self.position = {node: i for i, node in enumerate(rhs)}
         self.bars: dict[Node, Node] = {output: ONE}
         self.rhs = dict(rhs)
+        for node, inner in at.items():
+            self.rhs[node] = self.rhs.get(node, ZERO) + inner
         self.rows: dict[Node, dict[Node, Node]] = {}  # W, both halves
         self.solved: dict[Node, _Solved] = {}
         self.partials: dict[Node, dict[Node, Node]] = {}  # of each operation, by argument that depends on w
@@ -113,7 +139,7 @@ class _Walk:
             for b in others[: i + 1]:
                 self._add(a, b, -(gains[a] * row[b]))
             self.rhs[a] = self.rhs.get(a, ZERO) - gains[a] * rhs
-        self.solved[node] = _Solved(rhs / pivot, gains)
+        self.solved[node] = _Solved(pivot, rhs / pivot, gains)
 
     def hand_down(self, node: Node) -> None:
         """An operation: t = sum p t_arg takes it out of W t = b, and its curvature goes to its arguments."""
@@ -144,12 +170,10 @@ class _Walk:
 
     def _bend(self, node: Node, bar: Node) -> None:
         """The node's adjoint times its second partials; both orders of two slots that hold one argument count."""
-        for j, a in enumerate(node.args):
-            for k, b in enumerate(node.args[: j + 1]):
-                if a in self.depends and b in self.depends:
-                    second = second_partial(node, j, k, self.build)
-                    if second.value != 0.0:
-                        self._add(a, b, 2.0 * (bar * second) if a is b and j != k else bar * second)
+        for j, k, second in second_partials(node, self.build):
+            a, b = node.args[j], node.args[k]
+            if a in self.depends and b in self.depends:
+                self._add(a, b, 2.0 * (bar * second) if a is b and j != k else bar * second)
 
 
 def _dependent(output: Node, wrt: Sequence[Node]) -> list[Node]:

@@ -283,6 +283,8 @@ def apply(op: Op, *args: Scalar) -> Node:
 
 
 def _binary(name: str, a: Scalar, b: Scalar) -> Node:
+    if isinstance(a, Node) and isinstance(b, Node):
+        return apply(OPS[name], a, b)
     for each in (a, b):
         if not isinstance(each, (Node, numbers.Real, np.ndarray)):
             return NotImplemented  # type: ignore[no-any-return]  # Python then asks the other operand, or raises

@@ -14,29 +14,24 @@ def topological(outputs: Iterable[Node]) -> list[Node]:
     Raises GraphError when the nodes form a cycle (impossible through the public interface).
     """
     order: list[Node] = []
-    done: set[Node] = set()
+    closed: dict[Node, bool] = {}  # False while the arguments of the node are being walked
     for output in outputs:
-        if output in done:
-            continue
-        stack = [(output, iter(output.args))]
-        open_nodes = {output}
+        stack = [] if output in closed else [output]
         while stack:
-            node, arguments = stack[-1]
-            for arg in arguments:
-                if arg in done:
-                    continue
-                if arg.args:
-                    if arg in open_nodes:
-                        raise GraphError(f"the graph has a cycle through {arg!r}")
-                    stack.append((arg, iter(arg.args)))
-                    open_nodes.add(arg)
-                    break
-                done.add(arg)
-                order.append(arg)
+            node = stack[-1]
+            for arg in node.args:
+                if arg not in closed:
+                    if arg.args:
+                        closed[node] = False
+                        stack.append(arg)
+                        break
+                    closed[arg] = True
+                    order.append(arg)
+                elif not closed[arg]:
+                    raise GraphError(f"the graph has a cycle through {arg!r}")
             else:
                 stack.pop()
-                open_nodes.discard(node)
-                done.add(node)
+                closed[node] = True
                 order.append(node)
     return order
 

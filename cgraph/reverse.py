@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from .fold import Builder
 from .forward import free_suffix
 from .graph import Graph
-from .label import ADJOINT, building
+from .label import ADJOINT, UNLABELLED, Label, building
 from .node import Node, as_node, variable
 from .ops import strong_mul
 from .order import topological
 
 
-def cotangents(seeds: Mapping[Node, Node], wrt: Sequence[Node], build: Builder | None = None) -> list[Node]:
+def cotangents(
+    seeds: Mapping[Node, Node], wrt: Sequence[Node], build: Builder | None = None, *, fixed: Collection[Node] = ()
+) -> list[Node]:
     """Cotangents of the nodes `wrt`: sum over seeds y of y_bar dy/d(node), zero where nothing depends on it.
 
     seeds: {y: y_bar}.  wrt: leaves or inner nodes; an inner node's cotangent counts every use of it, and flows on to
     what it is made from, so that several nodes of `wrt` may depend on one another.
+    fixed: inner nodes that are taken as independent of what they are made from: nothing flows on from there.
     """
     order = topological(seeds)
     active = set(wrt)
@@ -27,13 +30,15 @@ def cotangents(seeds: Mapping[Node, Node], wrt: Sequence[Node], build: Builder |
     bars = dict(seeds)
     # Behind an argument that a selecting operation may leave out, a zero cotangent must win over an infinite partial.
     guarded: set[Node] = set()
+    # A cotangent that is a constant carries no tags: what is made of it at an argument takes them from the use itself.
+    bare: dict[Node, Label] = {}
     with building(build or Builder()) as labelled:
         for node in reversed(order):
             bar = bars.get(node)
-            if bar is None or node not in active or not node.args:
+            if bar is None or node not in active or not node.args or node in fixed:
                 continue
             guard = node.op.selects or node in guarded
-            labelled(node.label.derived(ADJOINT))
+            labelled(_label(node, bare))
             terms: dict[Node, Node] = {}  # by argument first, so that x * x gives 2 * (bar * x)
             for arg, partial in zip(node.args, node.op.partials(node, *node.args), strict=True):
                 if arg in active:
@@ -44,13 +49,20 @@ def cotangents(seeds: Mapping[Node, Node], wrt: Sequence[Node], build: Builder |
                     guarded.add(arg)
                 if term.value == 0.0:
                     continue
+                if term.value is not None:
+                    bare[arg] = bare.get(arg, UNLABELLED).with_tags_of(node.label)
                 if arg in bars:  # the sum over all uses of arg is about arg, not about this use
-                    labelled(arg.label.derived(ADJOINT))
+                    labelled(_label(arg, bare))
                     bars[arg] = bars[arg] + term
                 else:
                     bars[arg] = term
     zero = as_node(0.0)
     return [bars.get(node, zero) for node in wrt]
+
+
+def _label(node: Node, bare: Mapping[Node, Label]) -> Label:
+    own = node.label.derived(ADJOINT)
+    return own.with_tags_of(bare[node]) if node in bare else own
 
 
 def vjp(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Graph:

@@ -3,33 +3,55 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import NamedTuple
 
 from .fold import Builder
 from .forward import tangents
 from .label import building
 from .node import Node, Op, as_node, variable
-from .order import rebuild
+from .order import topological
 
 
-def second_partial(node: Node, j: int, k: int, build: Builder) -> Node:
-    """d2 node / d args[j] d args[k], the arguments taken as independent, as a node made by `build`."""
-    output, arguments, partials = _partials_of(node.op)
-    replace = {output: node} | dict(zip(arguments, node.args, strict=True))
-    root = partials[min(j, k), max(j, k)]
-    return rebuild([root], replace, lambda n, args: build(n.op, args, node.label))[root]
+class _Second(NamedTuple):
+    """A second partial that is not zero, over placeholders: its nodes, arguments first; the last of them is it."""
+
+    j: int
+    k: int
+    nodes: list[Node]
+
+
+def second_partials(node: Node, build: Builder) -> list[tuple[int, int, Node]]:
+    """(j, k, d2 node / d args[j] d args[k]) for j >= k where it is not zero, the arguments taken as independent.
+
+    The derivatives are nodes made by `build`.
+    """
+    output, arguments, seconds = _seconds_of(node.op)
+    found = []
+    for j, k, nodes in seconds:
+        new = dict(zip(arguments, node.args, strict=True))
+        new[output] = node
+        for each in nodes:
+            if each not in new:
+                args = tuple([new[arg] for arg in each.args])
+                new[each] = build(each.op, args, node.label) if args else each
+        if new[nodes[-1]].value != 0.0:
+            found.append((j, k, new[nodes[-1]]))
+    return found
 
 
 @cache
-def _partials_of(op: Op) -> tuple[Node, list[Node], dict[tuple[int, int], Node]]:
+def _seconds_of(op: Op) -> tuple[Node, list[Node], list[_Second]]:
     """Placeholders for the output and the arguments of an operation, and its second partials over them."""
     output = variable("output#")
     arguments = [variable(f"argument{i}#") for i in range(op.arity)]
     build = Builder()
     with building(build):
         first = [as_node(partial) for partial in op.partials(output, *arguments)]
-    zero, one = as_node(0.0), as_node(1.0)
-    found = {}
-    for k, argument in enumerate(arguments):
-        dots = tangents({argument: one, output: first[k]}, first, build)
-        found.update({(j, k): dots.get(first[j], zero) for j in range(k + 1)})
+    one = as_node(1.0)
+    found = []
+    for j in range(op.arity):
+        for k in range(j + 1):
+            dots = tangents({arguments[j]: one, output: first[j]}, first, build)
+            if first[k] in dots:
+                found.append(_Second(j, k, topological([dots[first[k]]])))
     return output, arguments, found

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from .errors import GraphError
-from .fold import Builder
+from .fold import Builder, folded
 from .graph import Graph
-from .label import building
 from .node import Node, Scalar, constant
 from .order import rebuild
 
@@ -20,29 +19,13 @@ def simplify(graph: Graph) -> Graph:
     Assumes finite operands and non-zero divisors: `0 * x = 0`, `x - x = 0`, `x / x = 1`, `x + 0 = x` also for -0.0.
     Sums and products may be taken in another order, so values can differ by rounding.
     """
-    best = graph
-    while True:
-        candidate = _shared(best)
-        if _size(candidate) >= _size(best):
-            return best
-        best = candidate
+    nodes = folded(graph.outputs.values(), Builder())
+    candidate = Graph(graph.inputs, dict(zip(graph.outputs, nodes, strict=True)))
+    return candidate if _size(candidate) < _size(graph) else graph
 
 
 def _size(graph: Graph) -> tuple[int, int]:
     return len(graph.nodes), sum([len(node.args) for node in graph.nodes])
-
-
-def _shared(graph: Graph) -> Graph:
-    """One pass of folding and sharing."""
-    build = Builder()
-    with building(build) as labelled:
-
-        def make(node: Node, args: tuple[Node, ...]) -> Node:
-            labelled(node.label)
-            return build(node.op, args, node.label, node.name)
-
-        new = rebuild(graph.outputs.values(), {}, make)
-    return Graph(graph.inputs, {name: new[node] for name, node in graph.outputs.items()})
 
 
 def specialize(graph: Graph, values: Mapping[str, Scalar], outputs: Sequence[str] | None = None) -> Graph:

@@ -1,9 +1,10 @@
 """dynamics: equations of motion on computational graphs, from Lagrangians and planar arms."""
 
-from . import scenes
+from . import cases, scenes
 from .equations import (
     SingularMassMatrixError,
     bias,
+    check_pivot,
     energy,
     forward_dynamics,
     gravity_force,
@@ -15,11 +16,14 @@ from .formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spuriou
 from .mechanism import Body, Force, Joint, Mechanism, MechanismError, serial_arm, tree
 from .mjcf import to_mjcf
 from .mujoco_load import load_mjcf, load_urdf
+from .multiprecision import Reference, reference
 from .ode_system import OdeSystem
 from .planar_arm import Link, PlanarArm, planar_arm
+from .recursive import RecursiveInverseDynamics
 from .scenes import Scene
 from .simulate import simulate
 from .state_equation import state_equation
+from .subtree import Subtree
 from .system import System, as_system
 from .trajectory import Crossings, Stats, Trajectory
 from .urdf import to_urdf
@@ -36,13 +40,18 @@ __all__ = [
     "MechanismError",
     "OdeSystem",
     "PlanarArm",
+    "RecursiveInverseDynamics",
+    "Reference",
     "Scene",
     "SingularMassMatrixError",
     "Stats",
+    "Subtree",
     "System",
     "Trajectory",
     "as_system",
     "bias",
+    "cases",
+    "check_pivot",
     "energy",
     "forward_dynamics",
     "gravity_force",
@@ -53,6 +62,7 @@ __all__ = [
     "momentum",
     "momentum_rate",
     "planar_arm",
+    "reference",
     "scenes",
     "serial_arm",
     "simulate",

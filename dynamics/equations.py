@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.fold import Builder
+from cgraph.fold import Builder, folded
+from cgraph.forward import tangents
 from cgraph.hessian_solve import solve_nodes
 from cgraph.jacobian import hessian_nodes
 from cgraph.label import building
 from cgraph.ldl import SingularError, ldl_solve
 from cgraph.reverse import cotangents
 
-from .formulations import ONE, ZERO, chain_rule, substituted
+from .formulations import ONE, ZERO, substituted
+from .rates import rates
 from .system import System, as_system
 
 
@@ -41,7 +45,7 @@ def bias(model: Any) -> Graph:
     Inputs q0.., qd0.., t if needed, parameters; outputs bias0.. [N m or N].
     """
     system = as_system(model)
-    outputs = {f"bias{i}": node for i, node in enumerate(_bias(system, Builder()))}
+    outputs = {f"bias{i}": node for i, node in enumerate(_bias(system))}
     return cg.simplify(system.graph(outputs, system.q, system.qd))
 
 
@@ -51,7 +55,7 @@ def gravity_force(model: Any) -> Graph:
     Inputs q0.., qd0.., t if needed, parameters; outputs gravity0.. [N m or N].
     """
     system = as_system(model)
-    at_rest = substituted(_bias(system, Builder()), dict.fromkeys(system.qd, ZERO))
+    at_rest = substituted(_bias(system), dict.fromkeys(system.qd, ZERO))
     return cg.simplify(system.graph({f"gravity{i}": node for i, node in enumerate(at_rest)}, system.q, system.qd))
 
 
@@ -82,50 +86,99 @@ METHODS = ("auto", "recursive", "dense")
 SHORT = 6  # coordinates; beyond, the dense graph is larger on a tree of bodies, and takes long to build
 
 
-def forward_dynamics(model: Any, method: str = "auto") -> Graph:
+def forward_dynamics(model: Any, method: str = "auto", *, positive: bool = False) -> Graph:
     """Accelerations: qdd = M^-1 (tau + forces - damping * qd - bias), from the Lagrangian alone.
 
     Inputs q0.., qd0.., tau0.., t if needed, parameters; outputs qdd0.. [rad/s^2 or m/s^2].
     method: "recursive", elimination on the graph of L without forming M (`cg.hessian_solve`): for a tree of bodies the
     number of nodes is linear in n. "dense", M factored as LDL^T: smaller for very short arms. "auto", the smaller of
     the two up to 6 coordinates, else recursive.
-    Raises SingularMassMatrixError, naming the coordinate, when M is singular by structure; where M is singular at one
-    state only, the result there is infinite or NaN. Raises ValueError for an unknown method.
+    positive: one more output, `pivot`: 0 where M is positive definite, else 1 + the index of the coordinate that was
+    found to have no inertia left, or a negative one; the accelerations mean nothing there. `check_pivot` raises on it.
+    Three nodes a coordinate. Without, the result where M is singular is infinite, NaN or meaningless.
+
+    Raises SingularMassMatrixError, naming the coordinate, when M is singular at every state; ValueError for an unknown
+    method.
     """
     if method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
     system = as_system(model)
-    build = Builder()
-    known = _bias(system, build)
-    with building(build):
-        with cg.tag("damping"):
-            braking = [damping * qd for damping, qd in zip(system.damping, system.qd, strict=True)]
-        rhs = [
-            tau - b - brake + force
-            for tau, b, brake, force in zip(system.tau, known, braking, system.forces, strict=True)
-        ]
-    graphs = []
+    methods = [method] if method != "auto" else ["recursive", "dense"] if system.n <= SHORT else ["recursive"]
+    known = _terms(system)
     try:
-        if method != "dense":
-            graphs.append(_accelerations(system, solve_nodes(system.lagrangian, system.qd, rhs, build)))
-        if method == "dense" or (method == "auto" and system.n <= SHORT):
-            graphs.append(_accelerations(system, ldl_solve(hessian_nodes(system.lagrangian, system.qd), rhs)))
+        graphs = [_accelerations(system, known, each, positive) for each in methods]
     except SingularError as error:
         name = system.coordinates[error.index]
+        problem = "not positive definite" if error.pivot else "singular"
         raise SingularMassMatrixError(
-            f"the mass matrix is singular: coordinate {name!r} has no inertia of its own"
+            f"the mass matrix is {problem}: coordinate {name!r} has no inertia of its own"
         ) from None
     return min(graphs, key=lambda graph: len(graph.nodes))
 
 
-def _accelerations(system: System, solved: Sequence[Node]) -> Graph:
-    outputs = {f"qdd{i}": node for i, node in enumerate(solved)}
+def check_pivot(model: Any, pivot: ArrayLike) -> None:
+    """Raise SingularMassMatrixError, naming the coordinate, unless the output `pivot` of `forward_dynamics` is 0.
+
+    pivot: a number, or an array of any shape; the first entry that is not 0 is reported, with its index.
+    """
+    values = np.asarray(pivot)
+    failed = np.argwhere(values != 0.0)
+    if len(failed):
+        at = tuple(failed[0].tolist())
+        name = as_system(model).coordinates[int(values[at]) - 1]
+        where = f" at state {', '.join(map(str, at))}" if at else ""
+        raise SingularMassMatrixError(
+            f"the mass matrix is not positive definite{where}: coordinate {name!r} has an inertia that is not positive"
+        )
+
+
+def _accelerations(system: System, known: _Terms, method: str, positive: bool) -> Graph:
+    build = Builder()
+    with building(build):
+        slopes = known.gradient if method == "recursive" else [-bias for bias in known.bias(system, build)]
+        with cg.tag("damping"):
+            braking = [damping * qd for damping, qd in zip(system.damping, system.qd, strict=True)]
+        rhs = [
+            tau + slope - brake + force
+            for tau, slope, brake, force in zip(system.tau, slopes, braking, known.forces, strict=True)
+        ]
+        inertial = {velocity: -rate for velocity, rate in known.inertial.items()}
+    if method == "recursive":  # carries the inertial terms to the coordinates on its way
+        solved = solve_nodes(known.lagrangian, system.qd, rhs, build, at=inertial, positive=positive)
+    else:
+        solved = ldl_solve(hessian_nodes(known.lagrangian, system.qd, build), rhs, build, positive=positive)
+    names = [f"qdd{i}" for i in range(system.n)] + ["pivot"] * positive
+    outputs = dict(zip(names, solved, strict=True))
     return cg.simplify(system.graph(outputs, system.q, system.qd, system.tau))
 
 
-def _bias(system: System, build: Builder) -> list[Node]:
-    terms = chain_rule(system)
-    with building(build):
-        tau = [rate - slope for rate, slope in zip(terms.momentum_rate, terms.gradient, strict=True)]
-    still = cg.Graph([*terms.inputs, *system.extra_inputs], {f"tau{i}": node for i, node in enumerate(tau)})
-    return list(cg.specialize(still, dict.fromkeys([str(node.name) for node in system.qdd], 0.0)).outputs.values())
+class _Terms(NamedTuple):
+    """Lagrange's equation at qdd = 0 by its rates z: d/dt dL/dqd - dL/dq = (sum of inertial_z dz/dqd) - gradient."""
+
+    lagrangian: Node  # folded and shared
+    forces: list[Node]  # applied ones, the same
+    inertial: dict[Node, Node]  # d/dt dL/dz
+    gradient: list[Node]  # dL/dq at fixed z
+
+    def bias(self, system: System, build: Builder) -> list[Node]:
+        """The terms at the coordinates."""
+        inertial = cotangents(self.inertial, system.qd, build)
+        with building(build):
+            return [rate - slope for rate, slope in zip(inertial, self.gradient, strict=True)]
+
+
+def _terms(system: System) -> _Terms:
+    # Two builders: a term of L must not get the tags of an equal term that derives from it, and hand them on.
+    written, build = Builder(), Builder()
+    lagrangian, *forces = folded([system.lagrangian, *system.forces], written)
+    velocities = rates(lagrangian, system.q, system.qd, system.t, written)
+    bars = cotangents({lagrangian: ONE}, [*system.q, *velocities], build, fixed=set(velocities))
+    gradient, momenta = bars[: system.n], bars[system.n :]
+    x_dot = dict(zip(system.q, system.qd, strict=True)) | ({system.t: ONE} if system.t in system.extra_inputs else {})
+    dots = tangents(x_dot, momenta, build)
+    inertial = {velocity: dots[p] for velocity, p in zip(velocities, momenta, strict=True) if p in dots}
+    return _Terms(lagrangian, forces, inertial, gradient)
+
+
+def _bias(system: System) -> list[Node]:
+    return _terms(system).bias(system, Builder())

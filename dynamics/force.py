@@ -15,6 +15,7 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.fold import Builder
 from cgraph.label import building
+from cgraph.order import topological
 from cgraph.reverse import cotangents
 
 from . import spatial
@@ -46,6 +47,13 @@ class Force:
     def components(self) -> tuple[Component, ...]:
         """The six components, force first."""
         return (*self.value, *self.torque)
+
+    @property
+    def names(self) -> set[str]:
+        """Names of the parameters and variables that it uses."""
+        variables = topological([each for each in self.components if isinstance(each, Node)])
+        named = {str(node.name) for node in variables if node.name}
+        return named | {each for each in self.components if isinstance(each, str)}
 
 
 def check(force: Force, bodies: Container[str]) -> None:
@@ -98,7 +106,7 @@ class Reach:
 
     def direction(self, given: Triple) -> Triple:
         """A vector in the body's axes, in the world's."""
-        given = spatial.turned(self.orientation.T, given)
+        given = spatial.turned(self.orientation.T.tolist(), given)
         for step in self.steps:
             given = _passed_on(step, given)
         return given
@@ -122,7 +130,7 @@ def _passed_on(step: Step, given: Triple) -> Triple:
     """A vector in the axes of a step, in those of the next."""
     if step.kind == "revolute":
         given = spatial.turned_about_z(cg.cos(step.q), -cg.sin(step.q), given)
-    return spatial.turned(step.turn.T, given)
+    return spatial.turned(step.turn.T.tolist(), given)
 
 
 def reach(carrier: Carrier, moving: Mapping[str, Body], q: Mapping[str, Node], qd: Mapping[str, Node]) -> Reach:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+import numbers
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from . import spatial
-from .body import WORLD, Body, MechanismError
+from .body import WORLD, Body, Joint, MechanismError
 from .spatial import Array
 
 
@@ -46,6 +48,32 @@ def parents_first(bodies: Sequence[Body]) -> list[Body]:
             at = by_name[at.parent] if at.parent != WORLD else at
         order.extend(reversed(path.values()))
     return order
+
+
+def locked(bodies: Sequence[Body], at: Mapping[str, float]) -> list[Body]:
+    """The bodies, with the joints named in `at` welded where they stand at that coordinate [rad or m].
+
+    Raises MechanismError for a body that is not there or has no joint to lock, and a coordinate that is not finite.
+    """
+    by_name = {body.name: body for body in bodies}
+    for name, value in at.items():
+        if name not in by_name:
+            raise MechanismError(f"there is no body {name!r:.80} to lock in the mechanism")
+        if by_name[name].joint.kind == "fixed":
+            raise MechanismError(f"body {name!r} is welded on and has no joint to lock")
+        if not isinstance(value, numbers.Real) or not math.isfinite(value):
+            raise MechanismError(f"joint of body {name!r}: it can be locked at a finite number, got {value!r:.80}")
+    return [
+        replace(body, joint=_standing(body.joint, float(at[body.name]))) if body.name in at else body for body in bodies
+    ]
+
+
+def _standing(joint: Joint, at: float) -> Joint:
+    """The weld that holds a joint's body where the joint has it at that coordinate."""
+    turn, axis, position = (np.asarray(each) for each in (joint.orientation, joint.axis, joint.position))
+    if joint.kind == "revolute":
+        return Joint("fixed", position=position, orientation=turn @ spatial.rotation(axis, at))
+    return Joint("fixed", position=position + turn @ axis * at, orientation=turn)
 
 
 def welded(bodies: Sequence[Body]) -> tuple[list[Body], dict[str, Carrier]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from numbers import Integral
 from typing import Any
@@ -15,13 +15,13 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.fold import Builder
 from cgraph.label import building
-from cgraph.order import topological
 
-from . import spatial
 from .body import WORLD, Body, Joint, MechanismError, checked, shape_of, vector
 from .force import Force, Reach, check, generalized, reach
-from .kinematic_tree import Carrier, parents_first, welded, with_mass_to_move
-from .spatial import STILL, ZERO, Array, Triple
+from .kinematic_tree import Carrier, locked, parents_first, welded, with_mass_to_move
+from .link import Motion, axes_of, carried, energy, ground, link, link_numbers
+from .spatial import Array
+from .subtree import Subtree, as_subtree, below, inserted
 from .system import System, parameter_value
 
 __all__ = ["WORLD", "Body", "Force", "Joint", "Mechanism", "MechanismError", "serial_arm", "tree"]
@@ -35,6 +35,7 @@ class Mechanism:
     forces: on bodies from outside, beside the joint forces tau; they enter the equations as J^T f.
     parameters: values of the parameters that forces name, {name: value}; one without a value is 0. As of any system,
         parameters are inputs of the graphs, and `simulate` binds them.
+    locked: {body: coordinate [rad or m]} of joints that stand still: their bodies are welded on, see `lock`.
 
     Raises MechanismError for an unknown parent, a cycle, a repeated name, numbers that are not finite or out of range,
     an inertia that no body can have, a coordinate that moves no mass and has no armature, a force on an unknown body,
@@ -45,6 +46,7 @@ class Mechanism:
     gravity: ArrayLike = (0.0, 0.0, -9.81)
     forces: Sequence[Force] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
+    locked: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         vector("gravity", self.gravity)
@@ -53,7 +55,7 @@ class Mechanism:
         bodies = set(self._carriers) - {WORLD}
         for force in self.forces:
             check(force, bodies)
-        used = {*self._named, *(str(node.name) for node in topological(self._nodes_of_forces) if node.name)}
+        used = {name for force in self.forces for name in force.names}
         for name in self.parameters:
             if name not in used:
                 raise MechanismError(f"the mechanism has no force that uses the parameter {name!r}")
@@ -72,16 +74,12 @@ class Mechanism:
     @cached_property
     def _merged(self) -> tuple[tuple[Body, ...], dict[str, Carrier]]:
         bodies = [checked(body) for body in self.bodies]
-        moving, carriers = welded(parents_first(bodies))
+        moving, carriers = welded(parents_first(locked(bodies, self.locked)))
         return with_mass_to_move(moving), carriers
 
     @property
     def _named(self) -> list[str]:
         return [each for force in self.forces for each in force.components if isinstance(each, str)]
-
-    @property
-    def _nodes_of_forces(self) -> list[Node]:
-        return [each for force in self.forces for each in force.components if isinstance(each, Node)]
 
     @property
     def _values(self) -> dict[str, float]:
@@ -129,78 +127,107 @@ class Mechanism:
         return generalized([(force, self._reach(force.body, q, qd)) for force in self.forces], qd, p)
 
     def _partial_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
-        gravity = vector("gravity", self.gravity)
-        pull = float(np.linalg.norm(gravity))
-        up = spatial.constant(spatial.snapped(-gravity / pull)) if pull else STILL
-        ground = _Motion(STILL, STILL, up, ZERO, np.eye(3))
-        motions: dict[str, _Motion] = {WORLD: ground}
+        rest = ground(self.gravity)
+        rest = self._made.setdefault(("ground", *[each.value for each in rest.up]), (rest, rest, cg.constant(0.0)))[0]
+        motions, axes = {WORLD: rest}, {WORLD: np.eye(3)}
         partials = []
         with building(Builder()):
             for body, angle, rate in zip(self.moving, q, qd, strict=True):
-                with cg.tag(body.name):
-                    motion = motions[body.name] = _carried(motions[body.parent], body, angle, rate)
-                    partials.append(_energy(motion, body, angle, rate, pull))
+                parent, kind = motions[body.parent], body.joint.kind
+                made_of = link(body, axes[body.parent])
+                axes[body.name] = axes_of(body)
+                key = (id(parent), body.name, kind, angle.name, *link_numbers(made_of))
+                if key not in self._made:
+                    with cg.tag(body.name):
+                        motion = carried(parent, made_of, kind, angle, rate)
+                        self._made[key] = parent, motion, energy(motion, made_of, angle, rate)
+                _, motions[body.name], partial = self._made[key]
+                partials.append(partial)
         return partials
 
+    @cached_property
+    def _made(self) -> dict[tuple[Any, ...], tuple[Motion, Motion, Node]]:
+        """Motions and partial Lagrangians of bodies, which mechanisms that come of this one by a change share."""
+        return {}
 
-@dataclass(frozen=True, eq=False)
-class _Motion:
-    """How a body's frame moves, in axes of its own whose z is the joint's axis."""
+    def _changed(self, **changes: Any) -> Mechanism:
+        new = replace(self, **changes)
+        new.__dict__["_made"] = self._made
+        return new
 
-    omega: Triple  # angular velocity
-    velocity: Triple  # of the origin
-    up: Triple  # the direction against gravity
-    height: Node  # of the origin along it
-    axes: Array  # these axes in the body's, as columns
+    def lock(self, body: str, at: float = 0.0) -> Mechanism:
+        """The mechanism with the joint of a body standing still at a coordinate [rad or m].
 
+        The body and all that is welded to it become one inertia with its parent. Raises MechanismError for an unknown
+        body or one without a joint, and a coordinate that is not finite.
+        """
+        return self._changed(locked={**self.locked, body: at})
 
-def _carried(parent: _Motion, body: Body, q: Node, qd: Node) -> _Motion:
-    """The motion of a body from that of its parent."""
-    joint = body.joint
-    axes = spatial.to_z(np.asarray(joint.axis))
-    turn, place = spatial.hung(parent.axes, joint.orientation, joint.position, axes)
-    if joint.kind == "prismatic":
-        slide = spatial.constant(turn[:, 2])
-        place = spatial.plus(place, (slide[0] * q, slide[1] * q, slide[2] * q))
-    with cg.tag("kinetic"):
-        omega = spatial.turned(turn, parent.omega)
-        velocity = spatial.turned(turn, spatial.plus(parent.velocity, spatial.cross(parent.omega, place)))
-    with cg.tag("potential"):
-        up = spatial.turned(turn, parent.up)
-        height = parent.height + spatial.dot(parent.up, place)
-    if joint.kind == "prismatic":
-        return _Motion(omega, (velocity[0], velocity[1], velocity[2] + qd), up, height, axes)
-    c, s = cg.cos(q), cg.sin(q)
-    with cg.tag("kinetic"):
-        x, y, z = spatial.turned_about_z(c, s, omega)
-        velocity = spatial.turned_about_z(c, s, velocity)
-    with cg.tag("potential"):
-        up = spatial.turned_about_z(c, s, up)
-    return _Motion((x, y, z + qd), velocity, up, height, axes)
+    def unlock(self, body: str) -> Mechanism:
+        """The mechanism with a locked joint free again. Raises MechanismError for one that is not locked."""
+        if body not in self.locked:
+            raise MechanismError(f"the joint of body {body!r:.80} is not locked")
+        return self._changed(locked={name: at for name, at in self.locked.items() if name != body})
 
+    def subtree(self, body: str) -> Subtree:
+        """A body and all that it carries, as `attach` takes it. Raises MechanismError for an unknown body."""
+        names = below(self.bodies, body)
+        bodies = {each.name: (place, each) for place, each in enumerate(self.bodies) if each.name in names}
+        order = [body, *(name for name in bodies if name != body)]
+        forces = tuple([force for force in self.forces if force.body in names])
+        used = {name for force in forces for name in force.names}
+        return Subtree(
+            tuple([bodies[name][1] for name in order]),
+            bodies[body][1].parent,
+            tuple([bodies[name][0] for name in order]),
+            forces,
+            {name: value for name, value in self.parameters.items() if name in used},
+            {name: at for name, at in self.locked.items() if name in names},
+        )
 
-def _energy(motion: _Motion, body: Body, q: Node, qd: Node, pull: float) -> Node:
-    """L_i = K_i - P_i with the first moment m c and the inertia J about the joint, without the centre's velocity.
+    def detach(self, body: str) -> Mechanism:
+        """The mechanism without a body and all that it carries. Raises MechanismError for an unknown body."""
+        names = below(self.bodies, body)
+        forces = tuple([force for force in self.forces if force.body not in names])
+        used = {name for force in forces for name in force.names}
+        return self._changed(
+            bodies=tuple([each for each in self.bodies if each.name not in names]),
+            forces=forces,
+            parameters={name: value for name, value in self.parameters.items() if name in used},
+            locked={name: at for name, at in self.locked.items() if name not in names},
+        )
 
-    K = m v.v / 2 + m c . (v x w) + w . J w / 2,  P = g (m h + u . m c) + spring.
-    """
-    center = motion.axes.T @ np.asarray(body.center)
-    moment = spatial.constant(spatial.snapped(body.mass * center))
-    inertia = spatial.about(motion.axes.T @ np.asarray(body.inertia) @ motion.axes, body.mass, center)
-    inertia = np.where(np.abs(inertia) <= spatial.SNAP * np.abs(inertia).max(initial=0.0), 0.0, inertia)
-    omega, v = motion.omega, motion.velocity
-    with cg.tag("kinetic"):
-        terms = [0.5 * body.mass * spatial.dot(v, v)]
-        terms.append(spatial.dot(spatial.cross(v, omega), moment))  # of the orders, the one with fewest nodes
-        terms.append(0.5 * spatial.total([float(inertia[i, i]) * (omega[i] * omega[i]) for i in range(3)]))
-        terms += [float(inertia[i, j]) * (omega[i] * omega[j]) for i in range(3) for j in range(i)]
-        terms.append(0.5 * body.joint.armature * (qd * qd))
-        kinetic = spatial.total(terms)
-    with cg.tag("potential"):
-        stretch = q - body.joint.rest
-        potential = pull * (body.mass * motion.height + spatial.dot(motion.up, moment))
-        potential = potential + 0.5 * body.joint.stiffness * (stretch * stretch)
-    return kinetic - potential
+    def attach(self, subtree: Subtree | Body | Iterable[Body], to: str | None = None) -> Mechanism:
+        """The mechanism with a subtree, a body, or several of which the first carries the others, hung on a body.
+
+        to: a body's name or "world"; by default what the first names as its parent. A subtree that goes back where it
+        was taken off gives the same mechanism again. Raises MechanismError as a Mechanism does.
+        """
+        given = as_subtree(subtree)
+        back = to is None or to == given.parent
+        bodies = given.hung_on(given.parent if to is None else to)
+        return self._changed(
+            bodies=tuple(inserted(tuple(self.bodies), bodies, given.places if back else ())),
+            forces=(*self.forces, *given.forces),
+            parameters={**self.parameters, **given.parameters},
+            locked={**self.locked, **given.locked},
+        )
+
+    def state_of(self, other: Mechanism, q: ArrayLike, qd: ArrayLike) -> tuple[Array, Array]:
+        """The state (q, qd) of another mechanism as one of this: joints of the same name keep theirs.
+
+        A joint that was locked stands where it was locked, one that is new at 0, both still. Raises ValueError for
+        states of another shape.
+        """
+        rows = [np.asarray(each, dtype=np.float64) for each in (q, qd)]
+        theirs = [body.name for body in other.moving]
+        for name, row in zip(("q", "qd"), rows, strict=True):
+            if row.shape != (len(theirs),):
+                raise ValueError(f"{name} must have shape ({len(theirs)},), one for each joint, got {row.shape}")
+        positions = {**other.locked, **dict(zip(theirs, rows[0].tolist(), strict=True))}
+        rates = dict(zip(theirs, rows[1].tolist(), strict=True))
+        names = [body.name for body in self.moving]
+        return np.array([positions.get(n, 0.0) for n in names]), np.array([rates.get(n, 0.0) for n in names])
 
 
 def _listed(what: str, kind: type, given: Any) -> tuple[Any, ...]:

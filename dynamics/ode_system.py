@@ -9,7 +9,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.order import topological
 
-from .system import TIME, _as_node, _sequence, called, parameter_value
+from .system import TIME, as_node, sequence, called, parameter_value
 
 RESERVED = (TIME, "dt")
 
@@ -36,10 +36,10 @@ class OdeSystem:
         if shared := [name for name in self.states if name in self.parameters]:
             raise ValueError(f"{shared[0]!r} is both a state and a parameter; choose another name for one of them")
         p = {name: cg.variable(name) for name in self.parameters}
-        given = _sequence("rate must give", called("rate", rate, self.x, self.t, p))
+        given = sequence("rate must give", called("rate", rate, self.x, self.t, p))
         if len(given) != self.n:
             raise ValueError(f"rate must give {self.n} values, one for each state, got {len(given)}")
-        self.rates = tuple([_as_node("rate", each) for each in given])
+        self.rates = tuple([as_node("rate", each) for each in given])
         known = {*self.x, self.t, *p.values()}
         for node in topological(self.rates):
             if node.op.name == "variable" and node not in known:

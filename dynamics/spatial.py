@@ -13,6 +13,7 @@ from cgraph import Node
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Triple = tuple[Node, Node, Node]
+Matrix = Sequence[Sequence[float | Node]]  # (3, 3)
 ZERO = cg.constant(0.0)
 STILL: Triple = (ZERO, ZERO, ZERO)
 SNAP = 1e-14  # an entry of a rotation this near to 0 or 1 is that: a quarter turn must not leave nodes behind
@@ -108,9 +109,9 @@ def constant(vector: Array) -> Triple:
     return x, y, z
 
 
-def turned(matrix: Array, vector: Triple) -> Triple:
+def turned(matrix: Matrix, vector: Triple) -> Triple:
     """matrix^T vector: what a parent's vector is in a child's axes, the columns of `matrix`."""
-    x, y, z = (total([float(matrix[i, j]) * vector[i] for i in range(3)]) for j in range(3))
+    x, y, z = (total([matrix[i][j] * vector[i] for i in range(3)]) for j in range(3))
     return x, y, z
 
 

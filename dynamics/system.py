@@ -46,17 +46,17 @@ class System:
         self.damping = per_coordinate("damping", damping, self.n, minimum=0.0)
         p = {name: cg.variable(name) for name in self.parameters}
         given = called("lagrangian", lagrangian, self.q, self.qd, self.t, p)
-        partials = [given] if isinstance(given, (Node, numbers.Real)) else _sequence("the lagrangian must give", given)
+        partials = [given] if isinstance(given, (Node, numbers.Real)) else sequence("the lagrangian must give", given)
         if not partials:
             raise ValueError("the lagrangian gave no partial Lagrangians")
-        self.partial_lagrangians = tuple([_as_node("the lagrangian", each) for each in partials])
+        self.partial_lagrangians = tuple([as_node("the lagrangian", each) for each in partials])
         applied: Sequence[Node | float] = [0.0] * self.n
         if forces is not None:
             with cg.tag("force"):
-                applied = _sequence("forces must give", called("forces", forces, self.q, self.qd, self.t, p))
+                applied = sequence("forces must give", called("forces", forces, self.q, self.qd, self.t, p))
             if len(applied) != self.n:
                 raise ValueError(f"forces must give {self.n} values, one for each coordinate, got {len(applied)}")
-        self.forces = tuple([_as_node("forces", each) for each in applied])
+        self.forces = tuple([as_node("forces", each) for each in applied])
         known = {*self.q, *self.qd, self.t, *p.values()}
         for node in topological((*self.partial_lagrangians, *self.forces)):
             if node.op.name == "variable" and node not in known:
@@ -155,7 +155,7 @@ def as_system(model: Any) -> System:
 
 def per_coordinate(what: str, value: float | Sequence[float], n: int, minimum: float = -math.inf) -> tuple[float, ...]:
     """One finite number for each coordinate, from one for all or a sequence. Raises ValueError otherwise."""
-    values = [value] * n if isinstance(value, numbers.Real) else _sequence(f"{what} must be", value)
+    values = [value] * n if isinstance(value, numbers.Real) else sequence(f"{what} must be", value)
     if len(values) != n:
         raise ValueError(f"{what} needs one number for each of the {n} coordinates, got {len(values)}")
     for i, each in enumerate(values):
@@ -207,14 +207,16 @@ def called(what: str, function: Callable[..., Any], *arguments: Any) -> Any:
     raise TypeError(f"{what} must take {names}, got {signature}")
 
 
-def _sequence(what: str, value: Any) -> list[Any]:
+def sequence(what: str, value: Any) -> list[Any]:
+    """The values as a list. Raises TypeError, "<what> a sequence ...", for what is none."""
     try:
         return list(value)
     except TypeError:
         raise TypeError(f"{what} a sequence of nodes or numbers, got {type(value).__name__}: {value!r:.60}") from None
 
 
-def _as_node(what: str, value: Any) -> Node:
+def as_node(what: str, value: Any) -> Node:
+    """The node, or the constant of a number. Raises TypeError or ValueError, naming `what`, for anything else."""
     try:
         return value if isinstance(value, Node) else cg.constant(value)
     except (TypeError, ValueError) as error:

@@ -26,8 +26,13 @@ OPTIONAL = {
     "mujoco": "mujoco",
     "llvmlite": "llvmlite",
     "scipy": "scipy",
+    "flint": "python-flint",
+    "mpmath": "mpmath",
     "pinocchio": "pin",
     "casadi": "casadi",
+    "heyoka": "heyoka",
+    "jax": "jax",
+    "sympy": "sympy",
     "torch": None,  # measured when it is there, never asked for
 }
 TYPES = "TYPE_CHECKING"

@@ -12,8 +12,11 @@ from pathlib import Path
 
 from cgraph.files import write
 from dynamics import FORMULATIONS, forward_dynamics, inverse_dynamics, scenes, spurious
+from dynamics.integrators import METHODS
+from dynamics.reports import trajectory_scenes, work_precision
 from dynamics.reports.bench import MODES, PEERS, QUICK, SCENES, TASKS, Row, bench
 from dynamics.reports.bench_table import machine, tables
+from dynamics.reports.cold_start import STARTS
 
 from .dot import to_dot
 from .render import render_png, render_svg
@@ -67,6 +70,8 @@ def _parser() -> argparse.ArgumentParser:
     timed.add_argument("--json", action="store_true", help="print as JSON")
     timed.set_defaults(run=_bench)
 
+    _add_report(commands)
+
     listed = commands.add_parser("scenes", help="the scenes, with the size of their graphs")
     listed.add_argument("--json", action="store_true", help="print as JSON")
     listed.set_defaults(run=_scenes)
@@ -80,6 +85,28 @@ def _parser() -> argparse.ArgumentParser:
     )
     draw.set_defaults(run=_draw)
     return parser
+
+
+def _add_report(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    report = commands.add_parser("report", help="error beside run time of every integrator, ours and others', as pages")
+    report.add_argument(
+        "scenes",
+        nargs="+",
+        metavar="SCENE",
+        help=f"{', '.join([*scenes.names(), *trajectory_scenes.names()])}, a model file, MJCF or URDF, or a case",
+    )
+    _may_ignore(report)
+    report.add_argument("--out", type=Path, default=Path("report"), help="folder to fill (default: report)")
+    report.add_argument("--t-end", type=float, metavar="S", help="how long, instead of the scene's own time")
+    report.add_argument("--start", metavar="A,B", help="q and then qd, instead of the scene's own start")
+    report.add_argument("--methods", metavar="A,B", help=f"only these of {', '.join(METHODS)}")
+    report.add_argument("--peers", metavar="A,B", help=f"only these of {', '.join(work_precision.PEERS)}; '' for none")
+    report.add_argument("--quick", action="store_true", help="fewer turns, shorter runs, and no cold starts")
+    report.add_argument(
+        "--budget", type=float, default=60.0, metavar="S", help="seconds that a cold start may take (default: 60)"
+    )
+    report.add_argument("--json", action="store_true", help="print as JSON")
+    report.set_defaults(run=_report)
 
 
 def _takes_a_scene(command: argparse.ArgumentParser) -> None:
@@ -128,7 +155,38 @@ def _bench(options: argparse.Namespace) -> None:
         if options.json and rows:
             print(json.dumps({"machine": machine(), "rows": [asdict(row) for row in rows]}, indent=1))
         elif rows:
-            print(f"{machine()}\n\n{tables(rows)}")
+            print(tables(rows, machine()))
+
+
+def _report(options: argparse.Namespace) -> None:
+    from .report_files import write_report  # matplotlib loads for this command alone
+
+    named = {trajectory_scenes.load(name, ignore=options.ignore).name for name in options.scenes}
+    if len(named) < len(options.scenes):
+        raise ValueError(f"each scene needs a name of its own for its files, got {', '.join(options.scenes)}")
+    chosen = {"t_end": options.t_end, "ignore": options.ignore}
+    chosen["start"] = [float(each) for each in options.start.split(",")] if options.start else None
+    peers = work_precision.PEERS if options.peers is None else tuple(filter(None, options.peers.split(",")))
+    found = []
+    for name in options.scenes:
+        report = work_precision.work_precision(
+            name,
+            methods=options.methods.split(",") if options.methods else tuple(METHODS),
+            peers=peers,
+            turns=3 if options.quick else 9,
+            limit=0.03 if options.quick else work_precision.LIMIT,
+            cold=() if options.quick else tuple(STARTS),
+            budget=options.budget,
+            folder=options.out / "exact",
+            options=chosen,
+            say=lambda line: print(f"cgraph: {line}", file=sys.stderr, flush=True),
+        )
+        found.append(report.content())
+        page = write_report(options.out, found[-1], work_precision.to_csv(report))
+        if not options.json:
+            print(f"{page}: {len(report.curves)} integrators, {sum(len(each.points) for each in report.curves)} points")
+    if options.json:
+        print(json.dumps(found, indent=1))
 
 
 def _scenes(options: argparse.Namespace) -> None:

@@ -23,6 +23,7 @@ th, td {{ padding: 0.35rem 0.5rem; border-bottom: 1px solid var(--line); text-al
 th {{ vertical-align: bottom; }}
 th:first-child, td:first-child {{ text-align: left; }} thead th {{ border-bottom: 2px solid var(--text); }}
 caption {{ text-align: left; font-weight: 600; padding-bottom: 0.4rem; }}
+summary {{ cursor: pointer; font-weight: 600; }} details caption {{ display: none; }}
 pre {{ background: var(--soft); padding: 0.8rem 1rem; overflow-x: auto; border-radius: 4px; }}
 .point {{ background: var(--soft); border-left: 5px solid {theme.SPURIOUS}; padding: 0.6rem 1rem; }}
 """
@@ -42,11 +43,15 @@ def page(title: str, introduction: str, sections: Sequence[tuple[str, str, str]]
     )
 
 
-def figure(svg: str, caption: str, width: str = "100%") -> str:
-    """An SVG picture inside the page, with its caption (text) below; the caption is its alternative text too."""
+def figure(svg: str, caption: str, width: str = "100%", *, adapts: bool = False) -> str:
+    """An SVG picture inside the page, with its caption (text) below; the caption is its alternative text too.
+
+    adapts: the picture has no background, and ink for light and dark pages.
+    """
     data = base64.b64encode(svg.encode()).decode()
+    style = f"width:{width};background:none" if adapts else f"width:{width}"
     return (
-        f'<figure><img src="data:image/svg+xml;base64,{data}" alt="{escape(caption)}" style="width:{width}">'
+        f'<figure><img src="data:image/svg+xml;base64,{data}" alt="{escape(caption)}" style="{style}">'
         f"<figcaption>{escape(caption)}</figcaption></figure>"
     )
 
@@ -59,6 +64,11 @@ def table(caption: str, header: Sequence[str], rows: Sequence[Sequence[str]]) ->
         f'<div class="scroll"><table><caption>{escape(caption)}</caption><thead><tr>{head}</tr></thead>'
         f"<tbody>\n{body}\n</tbody></table></div>"
     )
+
+
+def folded(summary: str, content: str) -> str:
+    """Content (HTML) that is shown when its summary (text) is clicked."""
+    return f"<details><summary>{escape(summary)}</summary>\n{content}\n</details>"
 
 
 def paragraph(text: str) -> str:

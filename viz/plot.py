@@ -48,6 +48,19 @@ def to_svg(figure: Figure) -> str:
     return buffer.getvalue().decode()
 
 
+def to_adaptive_svg(figure: Figure) -> str:
+    """As `to_svg`, without a background and with ink for light and dark pages, as the reader's system asks."""
+    buffer = io.BytesIO()
+    with _style():
+        figure.savefig(buffer, format="svg", metadata={"Date": None}, transparent=True)
+    svg = buffer.getvalue().decode()
+    for ink in (theme.TEXT, theme.LINE, theme.BLACK):
+        svg = svg.replace(ink.lower(), "currentColor")
+    head, rest = svg.split("<defs>", 1)
+    dark = f"@media (prefers-color-scheme: dark) {{ svg {{ color: {theme.DARK_TEXT}; }} }}"
+    return f"{head}<style>svg {{ color: {theme.TEXT}; }} {dark}</style>\n <defs>{rest}"
+
+
 def to_png(figure: Figure, dpi: int = 160) -> bytes:
     """The figure as PNG."""
     buffer = io.BytesIO()

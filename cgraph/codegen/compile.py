@@ -31,8 +31,9 @@ def compile(
     generated NumPy over arrays; "auto", machine code where llvmlite is installed and the graph has at most 100 000
     nodes, else generated Python for `fn(x)` and generated NumPy for `fn.batch(X)`. All agree with `graph.evaluate`, on
     floats and on arrays respectively.
-    fma: machine code may round a product and the sum it goes into once instead of twice; without, `fn(x)` agrees with
-    `graph.evaluate` to the last bit (`hypot` to one unit of it: Python has its own, machine code the C library's).
+    fma: machine code may round a product and the sum it goes into once instead of twice, and take sines, cosines,
+    exponentials and logarithms from polynomials (within 2 ulp); without, `fn(x)` agrees with `graph.evaluate` to the
+    last bit.
     fast: it may also re-associate sums and products, multiply by reciprocals and mistake the sign of a zero; NaN and
     infinities keep their meaning.
     cache: keep machine code on disk for the next process, and read it from there: True, in the platform's folder for

@@ -24,6 +24,7 @@ _Function = Callable[[Any], tuple[Any, ...]]
 _PLAIN = ("abs", "float", "inf", "np", "power")
 # Names in generated Python: `math` functions, which are fast and raise outside their domain, else the table's own.
 _PYTHON = {name: getattr(math, name, op.scalar) for name, op in OPS.items()} | {"inf": math.inf, "abs": builtins.abs}
+_PYTHON["hypot"] = OPS["hypot"].scalar  # see the table
 _NUMPY = {"np": np, "inf": math.inf, "power": OPS["pow"].array}
 
 

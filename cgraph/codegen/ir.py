@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
 from ..graph import Graph
 from ..node import CONSTANT, VARIABLE, Node
 from .lanes import helpers
+from .schedule import Joined, joined_calls, schedule
 
 BLOCK = 1024  # nodes in a basic block: some of LLVM's passes cost more than proportionally in the length of one
+TOGETHER = 4  # arguments in a joined call at one point: a vector of them is one register or two on every processor
 
 # An instruction or a few for each operation that needs no library: {r} result, {0} {1} {2} arguments, {t} type, {b}
 # type of a comparison, {f} flags, {s} suffix of an intrinsic, {zero} {one} {minus} constants.
@@ -67,6 +69,7 @@ class Arithmetic(NamedTuple):
 
     flags: str = ""  # fast-math flags of add, sub, mul and div: none is strict IEEE
     lanes: int = 1  # doubles in a vector
+    together: int = 1  # at most so many arguments go into one call of a vector function, where lanes is 1
 
     @property
     def type(self) -> str:
@@ -97,11 +100,17 @@ def libm_functions(graph: Graph) -> dict[str, int]:
     return {name: arity for name, arity in sorted(calls.items()) if name not in INLINE}
 
 
+def point_arithmetic(flags: str) -> Arithmetic:
+    """One point at a time. Strict IEEE takes its functions from the C library, as `evaluate` does, one by one."""
+    return Arithmetic(flags, together=TOGETHER if flags else 1)
+
+
 def scalar_ir(graph: Graph, flags: str = "") -> str:
     """A module with `void point(double *x, double *y)`: the outputs y at the inputs x."""
+    arithmetic = point_arithmetic(flags)
     lines = ["define void @point(ptr noalias %x, ptr noalias %y) nounwind {", "start:"]
-    lines += body(graph, Arithmetic(flags), _element)
-    return "\n".join([*declarations(libm_functions(graph)), *lines, "  ret void", "}", ""])
+    lines += body(graph, arithmetic, _element)
+    return "\n".join([*preamble([graph], arithmetic), *lines, "  ret void", "}", ""])
 
 
 def _element(base: str, name: str, row: int) -> list[str]:
@@ -130,8 +139,7 @@ def batch_ir(graph: Graph, lanes: int, flags: str = "") -> str:
         "  ret void",
         "}",
     ]
-    functions = libm_functions(graph)
-    return "\n".join([*declarations(functions), *helpers(functions, lanes, flags), *lines, ""])
+    return "\n".join([*preamble([graph], arithmetic), *lines, ""])
 
 
 def _row(base: str, name: str, row: int) -> list[str]:
@@ -140,6 +148,24 @@ def _row(base: str, name: str, row: int) -> list[str]:
         f"  {name}.at = add i64 {name}.row, %i",
         f"  {name} = getelementptr double, ptr %{base}, i64 {name}.at",
     ]
+
+
+def preamble(graphs: Iterable[Graph], arithmetic: Arithmetic) -> list[str]:
+    """What a module needs before the bodies of these graphs: functions of the C library, and those on vectors."""
+    libm: dict[str, int] = {}
+    called: dict[str, int] = {}
+    for graph in graphs:
+        libm |= libm_functions(graph)
+        calls = _joined_calls(graph, arithmetic)
+        called |= {"".join(call.names): 1 for call in calls.values()}
+        if arithmetic.lanes > 1:
+            alone = {node.op.name for node in graph.nodes if node not in calls}
+            called |= {name: arity for name, arity in libm_functions(graph).items() if name in alone}
+    return [*declarations(libm), *helpers(called, _vector(arithmetic).lanes, arithmetic.flags)]
+
+
+def _joined_calls(graph: Graph, arithmetic: Arithmetic) -> dict[Node, Joined]:
+    return joined_calls(graph, arithmetic.together) if _vector(arithmetic).lanes > 1 else {}
 
 
 def declarations(functions: Mapping[str, int]) -> list[str]:
@@ -152,53 +178,69 @@ def declarations(functions: Mapping[str, int]) -> list[str]:
 
 
 def body(graph: Graph, arithmetic: Arithmetic, address: Address) -> list[str]:
-    """Every node in order; an output is stored as soon as it is known, so that few values are alive at once."""
+    """Every node in the order of `schedule`; an output is stored as soon as it is known."""
     words, t = arithmetic.words(), arithmetic.type
     stored: dict[Node, list[int]] = {}
     for row, node in enumerate(graph.outputs.values()):
         stored.setdefault(node, []).append(row)
     rows = {node: row for row, node in enumerate(graph.inputs)}
-    paired = _paired(graph) if arithmetic.lanes > 1 else set()
-    pairs: dict[Node, str] = {}
+    calls = _joined_calls(graph, arithmetic)
+    prefix = f"lanes{arithmetic.lanes}." if arithmetic.lanes > 1 else ""
+    names: dict[Node | Joined, str] = {}
     lines: list[str] = []
 
-    names: dict[Node, str] = {}
-
-    for number, node in enumerate(graph.nodes):
-        r = f"%v{number}"
+    for number, step in enumerate(schedule(graph, calls, libm_functions(graph))):
+        r = names[step] = f"%v{number}"
         if number and number % BLOCK == 0:
             lines += [f"  br label %block{number}", f"block{number}:"]
+        if isinstance(step, Joined):
+            lines += _call(step, r, [names[arg] for arg in step.arguments], arithmetic)
+            continue
+        node, args = step, [names[arg] for arg in step.args]
         if node.op is CONSTANT:
             assert node.value is not None
             names[node] = arithmetic.number(node.value)
+        elif node.op is VARIABLE:
+            lines += address("x", f"%x{number}", rows[node])
+            lines.append(f"  {r} = load {t}, ptr %x{number}, align 8")
+        elif node.op.name in INLINE:
+            lines += [f"  {line.format(*args, r=r, **words)}" for line in INLINE[node.op.name]]
+        elif node in calls:
+            names[node], more = _result(node, calls[node], r, names[calls[node]], arithmetic)
+            lines += more
         else:
-            names[node] = r
-            args = [names[arg] for arg in node.args]
-            if node.op is VARIABLE:
-                lines += address("x", f"%x{number}", rows[node])
-                lines.append(f"  {r} = load {t}, ptr %x{number}, align 8")
-            elif node.op.name in INLINE:
-                lines += [f"  {line.format(*args, r=r, **words)}" for line in INLINE[node.op.name]]
-            elif node.args[0] in paired and node.op.name in ("sin", "cos"):
-                angle = node.args[0]  # both are needed: one reduction of the angle serves them
-                if angle not in pairs:
-                    pairs[angle] = f"{r}.both"
-                    lines.append(f"  {r}.both = call {{{t}, {t}}} @lanes.sincos({t} {args[0]})")
-                slot = 0 if node.op.name == "sin" else 1
-                lines.append(f"  {r} = extractvalue {{{t}, {t}}} {pairs[angle]}, {slot}")
-            else:
-                prefix = "lanes." if arithmetic.lanes > 1 else ""
-                lines.append(f"  {r} = call {t} @{prefix}{node.op.name}({', '.join(f'{t} {arg}' for arg in args)})")
+            lines.append(f"  {r} = call {t} @{prefix}{node.op.name}({', '.join(f'{t} {arg}' for arg in args)})")
         for row in stored.get(node, ()):
             lines += address("y", f"%y{row}", row)
             lines.append(f"  store {t} {names[node]}, ptr %y{row}, align 8")
     return lines
 
 
-def _paired(graph: Graph) -> set[Node]:
-    """Nodes of which the graph takes the sine and the cosine."""
-    taken: dict[str, set[Node]] = {"sin": set(), "cos": set()}
-    for node in graph.nodes:
-        if node.op.name in taken:
-            taken[node.op.name].add(node.args[0])
-    return taken["sin"] & taken["cos"]
+def _vector(arithmetic: Arithmetic) -> Arithmetic:
+    """Of a joined call: the lanes there are, or a vector filled with arguments."""
+    return arithmetic._replace(lanes=max(arithmetic.lanes, arithmetic.together))
+
+
+def _call(call: Joined, r: str, args: list[str], arithmetic: Arithmetic) -> list[str]:
+    """The call. Single numbers are gathered in a vector for it; a lane left over holds 1, which suits every one."""
+    vector = _vector(arithmetic)
+    t, lines, argument = vector.type, [], args[0]
+    if arithmetic.lanes == 1:
+        argument = vector.number(1.0)
+        for lane, arg in enumerate(args):
+            lines.append(f"  {r}.in{lane} = insertelement {t} {argument}, double {arg}, i32 {lane}")
+            argument = f"{r}.in{lane}"
+    kind = t if len(call.names) == 1 else f"{{{t}, {t}}}"
+    return [*lines, f"  {r} = call {kind} @lanes{vector.lanes}.{''.join(call.names)}({t} {argument})"]
+
+
+def _result(node: Node, call: Joined, r: str, called: str, arithmetic: Arithmetic) -> tuple[str, list[str]]:
+    """One node out of the results of its call: the value's name, and the lines that make it."""
+    t, lines = _vector(arithmetic).type, []
+    if len(call.names) > 1:
+        lines.append(f"  {r}.all = extractvalue {{{t}, {t}}} {called}, {call.names.index(node.op.name)}")
+        called = f"{r}.all"
+    if arithmetic.lanes == 1:
+        lines.append(f"  {r} = extractelement {t} {called}, i32 {call.arguments.index(node.args[0])}")
+        called = r
+    return called, lines

@@ -1,7 +1,8 @@
 """Vector functions as LLVM text: sine, cosine, exp and log by polynomials, every other function of libm lane by lane.
 
 Each polynomial serves where its range reduction is exact enough, with an error below 2 ulp. A vector with one lane
-outside (too large, NaN, infinite, for a logarithm not positive) goes to libm lane by lane.
+outside (too large, NaN, infinite, for a logarithm not positive) goes to libm lane by lane. Others have no polynomial:
+equations of motion of mechanisms take sines and cosines of joint angles and hardly anything else.
 """
 
 from __future__ import annotations
@@ -33,13 +34,15 @@ EXP = tuple(1.0 / f for f in (2, 6, 24, 120, 720, 5040, 40320, 362880, 3628800, 
 class Lines:
     """Instructions on vectors, one named value after another. An argument is a value's name or a number for all lanes.
 
-    lanes: doubles in a vector.  flags: of the polynomials' own arithmetic; `exact` instructions have none.
+    lanes: doubles in a vector.  flags: of the polynomials' own arithmetic; of them, `exact` instructions keep only the
+    leave to round a product and its sum once.
     """
 
     def __init__(self, lanes: int, flags: str) -> None:
         self.text: list[str] = []
         self.d, self.i, self.b = (f"<{lanes} x {each}>" for each in ("double", "i64", "i1"))
-        self.lanes, self.flags, self._count = lanes, f"{flags} " if flags else "", 0
+        self.lanes, self._count = lanes, 0
+        self.flags, self.exact = f"{flags} " if flags else "", "contract " if "contract" in flags.split() else ""
 
     def add(self, instruction: str) -> str:
         """One more value, and its name."""
@@ -49,7 +52,7 @@ class Lines:
 
     def f(self, op: str, a: str | float, b: str | float, exact: bool = False) -> str:
         """Arithmetic on doubles."""
-        return self.add(f"{op} {'' if exact else self.flags}{self.d} {number(a)}, {number(b)}")
+        return self.add(f"{op} {self.exact if exact else self.flags}{self.d} {number(a)}, {number(b)}")
 
     def n(self, op: str, a: str, b: int) -> str:
         """Arithmetic on integers, with a constant."""
@@ -64,12 +67,15 @@ class Lines:
         return self.add(f"bitcast {self.i} {a} to {self.d}")
 
     def polynomial(self, x: str, coefficients: Sequence[float]) -> str:
-        """c0 + c1 x + c2 x**2 + ..., by Horner's rule."""
-        value: str | float = coefficients[-1]
-        for c in coefficients[-2::-1]:
-            value = self.f("fadd", self.f("fmul", value, x), c)
-        assert isinstance(value, str)
-        return value
+        """c0 + c1 x + c2 x**2 + ..., by Estrin's scheme: (c0 + c1 x) + (c2 + c3 x) x**2 + ..., few steps deep."""
+        terms: list[str | float] = list(coefficients)
+        while len(terms) > 1:
+            pairs = zip(terms[::2], terms[1::2], strict=False)
+            last = terms[-1:] if len(terms) % 2 else []
+            terms = [*[self.f("fadd", self.f("fmul", b, x), a) for a, b in pairs], *last]
+            x = self.f("fmul", x, x) if len(terms) > 1 else x
+        assert isinstance(terms[0], str)
+        return terms[0]
 
     def all_between(self, x: str, low: float, high: float) -> str:
         """Whether every lane lies in [low, high]; a NaN does not."""
@@ -79,29 +85,36 @@ class Lines:
         return self.add(f"call i1 @llvm.vector.reduce.and.v{self.lanes}i1({self.b} {both})")
 
 
-def helpers(functions: Mapping[str, int], lanes: int, flags: str) -> list[str]:
-    """Definitions of `lanes.name` for each function of libm that is named, with its number of arguments."""
-    text: list[str] = []
-    for name, arity in functions.items():
-        text += _lane_by_lane(name, arity, lanes)
-    trigonometric = {"sin", "cos"} & set(functions)
-    wanted = [[name] for name in sorted(trigonometric)] + ([["sin", "cos"]] if len(trigonometric) == 2 else [])
-    for names in wanted:
-        text += _guarded(names, lanes, flags, (-LARGEST_ANGLE, LARGEST_ANGLE))
-    if "exp" in functions:
-        text += _guarded(["exp"], lanes, flags, (-708.0, 709.0))
-    if "log" in functions:
-        text += _guarded(["log"], lanes, flags, (2.0**-1022, 1.7976931348623157e308))
-    return text
-
-
 POLYNOMIAL = ("sin", "cos", "exp", "log")
+INTERVALS = {  # of the arguments that the polynomials serve
+    "sin": (-LARGEST_ANGLE, LARGEST_ANGLE),
+    "cos": (-LARGEST_ANGLE, LARGEST_ANGLE),
+    "exp": (-708.0, 709.0),
+    "log": (2.0**-1022, 1.7976931348623157e308),
+}
+JOINED = {"sincos": ("sin", "cos")}  # a function that gives the results of two
+
+
+def helpers(functions: Mapping[str, int], lanes: int, flags: str) -> list[str]:
+    """Definitions of `lanesN.name`, N lanes wide, for each function that is named, with its number of arguments.
+
+    They are functions of the C library and "sincos", which gives {sine, cosine}.
+    """
+    of_libm = {part: arity for name, arity in functions.items() for part in JOINED.get(name, (name,))}
+    text: list[str] = []
+    for name, arity in of_libm.items():
+        text += _lane_by_lane(name, arity, lanes)
+    for name in functions:
+        parts = JOINED.get(name, (name,))
+        if parts[0] in POLYNOMIAL:
+            text += _guarded(parts, lanes, flags)
+    return text
 
 
 def _lane_by_lane(name: str, arity: int, lanes: int) -> list[str]:
     """The function of libm, called for each lane."""
     vector = f"<{lanes} x double>"
-    inner = f"each.{name}" if name in POLYNOMIAL else f"lanes.{name}"
+    inner = f"each{lanes}.{name}" if name in POLYNOMIAL else f"lanes{lanes}.{name}"
     text = [
         f"define internal {vector} @{inner}({', '.join(f'{vector} %a{k}' for k in range(arity))}) nounwind noinline {{"
     ]
@@ -115,10 +128,10 @@ def _lane_by_lane(name: str, arity: int, lanes: int) -> list[str]:
     return [*text, f"  ret {vector} {result}", "}"]
 
 
-def _guarded(names: Sequence[str], lanes: int, flags: str, interval: tuple[float, float]) -> list[str]:
+def _guarded(names: Sequence[str], lanes: int, flags: str) -> list[str]:
     """The polynomial where all lanes lie in the interval, else libm. Two names give both results."""
     to = Lines(lanes, flags)
-    inside = to.all_between("%x", *interval)
+    inside = to.all_between("%x", *INTERVALS[names[0]])
     to.text += [f"  br i1 {inside}, label %fast, label %slow", "fast:"]
     if names[0] in ("sin", "cos"):
         results = _sine_cosine(to, "%x", names)
@@ -126,9 +139,9 @@ def _guarded(names: Sequence[str], lanes: int, flags: str, interval: tuple[float
         results = [(_exp if names[0] == "exp" else _log)(to, "%x")]
     to.text += _returned(to.d, results, "fast")
     to.text.append("slow:")
-    to.text += _returned(to.d, [to.add(f"call {to.d} @each.{name}({to.d} %x)") for name in names], "slow")
+    to.text += _returned(to.d, [to.add(f"call {to.d} @each{lanes}.{name}({to.d} %x)") for name in names], "slow")
     kind = to.d if len(names) == 1 else f"{{{to.d}, {to.d}}}"
-    return [f"define internal {kind} @lanes.{''.join(names)}({to.d} %x) nounwind noinline {{", *to.text, "}"]
+    return [f"define internal {kind} @lanes{lanes}.{''.join(names)}({to.d} %x) nounwind noinline {{", *to.text, "}"]
 
 
 def _returned(vector: str, results: Sequence[str], where: str) -> list[str]:

@@ -1,132 +1,181 @@
-"""The bench: forward dynamics of a few models by our compiled graph and by its peers, in turns in one run."""
+"""The bench: tasks of mechanics on a few models by our compiled graph and by its peers, in turns in one run."""
 
 from __future__ import annotations
 
-import math
-import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from functools import partial
 
 import numpy as np
 
-import cgraph as cg
+from .bench_scenes import QUICK, SCENES, model
+from .peers import PEERS, Case
+from .peers.case import TASKS, Array
+from .peers.contender import MODES
+from .worker import Load, Prepared, Worker
 
-from ..equations import forward_dynamics
-from ..mechanism import WORLD, Body, Joint, Mechanism
-from ..planar_arm import planar_arm
-from ..spatial import rotation
-from ..system import as_system
-from .peers import Model, peers
+OURS = "ours"
+AGREES = 1e-8  # largest relative difference that passes without a flag: rounding on a long chain, and no more
+FEWEST, LONG = 3, 5.0  # turns of a peer that takes longer than so many seconds for all of its turns
+CONTAINS = {"rk4": "forward"}  # who is late with the second is not asked for the first
 
-BATCH = 4096  # states
-CHUNK = 2e-3  # s, at least, of calls that are timed together
+
+@dataclass(frozen=True)
+class Cell:
+    """One peer on one task of one scene in one mode.
+
+    micros: median time of an evaluation [us].  low, high: quartiles.  made: from the model to the first result [s].
+    difference: largest, from ours, over the largest entry of ours; of a step or a loop, that of the motion.
+    size: nodes or instructions, where they can be counted.
+    """
+
+    micros: float
+    low: float
+    high: float
+    made: float
+    difference: float
+    size: int | None
 
 
 @dataclass(frozen=True)
 class Row:
-    """One model. Times are medians of alternating repetitions, in microseconds."""
+    """One scene, task and mode.  skipped: {peer: reason}, of peers that are installed and have such a function."""
 
-    model: str
-    nodes: int
-    build: float  # s, Lagrangian to simplified graph
-    compile: float  # s, graph to the first result
-    backend: str
-    ours: float  # us a call
-    batch: float  # us a state, in a batch of 4096
-    peers: dict[str, float] = field(default_factory=dict)  # us a call
-    difference: dict[str, float] = field(default_factory=dict)  # largest, relative to the largest entry
+    scene: str
+    task: str
+    mode: str
+    coordinates: int
+    cells: dict[str, Cell] = field(default_factory=dict)
+    skipped: dict[str, str] = field(default_factory=dict)
 
 
-def turned_arm(n: int) -> Mechanism:
-    """A 3D arm of n revolute joints, full inertias, frames turned by quarter turns."""
-    rng = np.random.default_rng(n)
-    return Mechanism([_body(i, WORLD if i == 0 else f"link{i}", rng) for i in range(n)])
+def bench(
+    scenes: Sequence[str] = tuple(SCENES),
+    tasks: Sequence[str] = tuple(TASKS),
+    modes: Sequence[str] = tuple(MODES),
+    peers: Sequence[str] = tuple(PEERS),
+    *,
+    repeats: int = 15,
+    budget: float = 60.0,
+    ignore: bool = False,
+    say: Callable[[str], None] = lambda line: None,
+) -> Iterator[Row]:
+    """Rows, scene by scene, as they are measured. Ours is among the peers in any case.
+
+    scenes: names among `SCENES`, of `dynamics.scenes`, or paths of model files.  repeats: turns of each peer.
+    budget: seconds that a peer may take to make one task in one mode.  ignore: leave out what a file's mechanism cannot
+    have.  say: takes lines of progress.
+    Raises ValueError for an unknown name or a budget that is not positive, RuntimeError when ours is not ready in time.
+    """
+    for what, given, known in (("task", tasks, TASKS), ("mode", modes, MODES), ("peer", peers, PEERS)):
+        if unknown := [name for name in given if name not in known]:
+            raise ValueError(f"there is no {what} {unknown[0]!r}; the {what}s are {', '.join(known)}")
+    if not budget > 0.0:
+        raise ValueError(f"the budget must be positive, got {budget!r} s")
+    loads: dict[str, Load] = {name: partial(model, name, ignore) for name in scenes}
+    cases = {}
+    for name, load in loads.items():  # a wrong name is told before anything is measured
+        found, left_out = load()
+        cases[name] = Case(name, found)
+        for what in left_out:
+            say(f"{name}: left out {what}")
+    wanted = [name for name, kind in PEERS.items() if name == OURS or (name in peers and kind.installed)]
+    asked = {task: [mode for mode in MODES if mode in modes] for task in TASKS if task in tasks}
+    return _rows(cases, loads, asked, wanted, repeats, budget, say)
 
 
-def binary_tree(n: int) -> Mechanism:
-    """A tree of n revolute bodies, each with two children until there are n."""
-    rng = np.random.default_rng(n)
-    return Mechanism([_body(i, WORLD if i == 0 else f"link{(i - 1) // 2 + 1}", rng) for i in range(n)])
+def _rows(
+    cases: dict[str, Case],
+    loads: dict[str, Load],
+    asked: dict[str, list[str]],
+    peers: list[str],
+    repeats: int,
+    budget: float,
+    say: Callable[[str], None],
+) -> Iterator[Row]:
+    for scene, case in cases.items():
+        late: dict[str, dict[str, str]] = {}
+        for task, modes in asked.items():
+            late[task] = dict(late.get(CONTAINS.get(task, ""), {}))
+            crew = Crew(loads[scene], peers, budget, late[task])
+            try:
+                for mode in modes:
+                    say(f"{scene}, {task}, {mode}")
+                    yield _row(case, task, mode, crew, repeats)
+            finally:
+                crew.end()
 
 
-def _body(i: int, parent: str, rng: np.random.Generator) -> Body:
-    mixed = rng.normal(size=(3, 3))
-    second = 0.05 * mixed @ mixed.T + 0.01 * np.eye(3)  # of mass; any such matrix is a body's
-    turn = rotation(np.array([1.0, 0.0, 0.0]), (0.0, math.pi / 2, -math.pi / 2)[i % 3])
-    return Body(
-        f"link{i + 1}",
-        Joint("revolute", position=(0.1, 0.0, 0.3) if i else (0.0, 0.0, 0.0), orientation=turn, damping=0.1),
-        parent,
-        mass=float(rng.uniform(1.0, 2.0)),
-        center=0.1 * rng.normal(size=3),
-        inertia=np.trace(second) * np.eye(3) - second,
-    )
+def _row(case: Case, task: str, mode: str, crew: Crew, repeats: int) -> Row:
+    row = Row(case.name, task, mode, case.n)
+    ready = crew.prepared(task, mode, row.skipped)
+    samples: dict[str, list[float]] = {peer: [] for peer in ready}
+    used = dict.fromkeys(ready, 0.0)
+    for turn in range(repeats):  # in turns, so that all share the machine's moods
+        for peer in [each for each in ready if turn < FEWEST or used[each] < LONG]:
+            begin = time.perf_counter()
+            try:
+                samples[peer].append(1e6 * crew.workers[peer].turn(task, mode))
+            except RuntimeError as error:
+                row.skipped[peer] = str(error)
+                del ready[peer]
+            used[peer] += time.perf_counter() - begin
+    if OURS not in ready:
+        raise RuntimeError(f"{case.name}, {task}, {mode}: no figures of ours to compare with: {row.skipped[OURS]}")
+    start = _start(case, task, mode)
+    expected = ready[OURS].values - start
+    for peer, made in ready.items():
+        low, middle, high = np.percentile(samples[peer], (25, 50, 75)).tolist()
+        difference = float(np.abs(made.values - start - expected).max() / np.abs(expected).max())
+        row.cells[peer] = Cell(middle, low, high, made.seconds, difference, made.size)
+    return row
 
 
-MODELS: dict[str, Callable[[], Model]] = {
-    "planar 3": lambda: planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7], damping=0.1),
-    "planar 7": lambda: planar_arm([0.5] * 7, [0.5] * 7, damping=0.1),
-    "planar 20": lambda: planar_arm([0.2] * 20, [0.2] * 20, damping=0.1),
-    "planar 50": lambda: planar_arm([0.1] * 50, [0.1] * 50, damping=0.1),
-    "arm 7": lambda: turned_arm(7),
-    "arm 30": lambda: turned_arm(30),
-    "tree 15": lambda: binary_tree(15),
-}
+def _start(case: Case, task: str, mode: str) -> Array:
+    """What the values of a step or a loop are measured from: they move little, and it is the motion that counts."""
+    if mode == "loop":
+        return case.point(task)
+    if task == "rk4":
+        return case.points(task) if mode == "batch" else case.point(task)
+    return np.zeros(1)
 
 
-def bench(name: str, repeats: int = 15) -> Row:
-    """One row, for a name among `MODELS`."""
-    model = MODELS[name]()
-    system = as_system(model)
-    start = time.perf_counter()
-    graph = forward_dynamics(model)
-    built = time.perf_counter() - start
-    x = np.random.default_rng(0).normal(size=len(graph.inputs))
-    start = time.perf_counter()
-    function = cg.compile(graph)
-    expected = function(x)
-    compiled = time.perf_counter() - start
-    contenders: dict[str, Callable[[Any], Any]] = {"ours": function} | peers(model, system)
-    difference = {
-        peer: float(np.abs(contenders[peer](x) - expected).max() / np.abs(expected).max())
-        for peer in contenders
-        if peer != "ours"
-    }
-    times = _alternating(contenders, x, repeats)
-    states = np.random.default_rng(1).normal(size=(len(x), BATCH))
-    function.batch(states)
-    batch = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        function.batch(states)
-        batch.append((time.perf_counter() - start) / BATCH)
-    return Row(
-        name,
-        len(graph.nodes),
-        built,
-        compiled,
-        function.backend,
-        times.pop("ours"),
-        1e6 * statistics.median(batch),
-        times,
-        difference,
-    )
+class Crew:
+    """A worker for each peer on one task of one scene.  late: {peer: why it is not asked any more}."""
+
+    def __init__(self, load: Load, peers: Sequence[str], budget: float, late: dict[str, str]) -> None:
+        self.load, self.peers, self.budget, self.late = load, peers, budget, late
+        self.workers: dict[str, Worker] = {}
+
+    def prepared(self, task: str, mode: str, skipped: dict[str, str]) -> dict[str, Prepared]:
+        """The peers that are ready; why others are not goes to `skipped`."""
+        ready = {}
+        for peer in self.peers:
+            if (task, mode) not in PEERS[peer].offers:
+                continue
+            if peer in self.late:
+                skipped[peer] = self.late[peer]
+                continue
+            worker = self._worker(peer)
+            answer = worker.prepare(task, mode, self.budget)
+            if isinstance(answer, Prepared):
+                ready[peer] = answer
+            else:
+                skipped[peer] = answer.reason
+                if not worker.alive:
+                    self.late[peer] = answer.reason
+        return ready
+
+    def _worker(self, peer: str) -> Worker:
+        if peer not in self.workers or not self.workers[peer].alive:
+            self.workers[peer] = Worker(self.load, peer)
+        return self.workers[peer]
+
+    def end(self) -> None:
+        """End all processes."""
+        for worker in self.workers.values():
+            worker.end()
 
 
-def _alternating(contenders: dict[str, Callable[[Any], Any]], x: np.ndarray, repeats: int) -> dict[str, float]:
-    """Median time of a call [us] of each, the contenders taking turns so that they share the machine's moods."""
-    loops = {}
-    for name, function in contenders.items():
-        start = time.perf_counter()
-        function(x)
-        loops[name] = max(5, math.ceil(CHUNK / (time.perf_counter() - start)))
-    samples: dict[str, list[float]] = {name: [] for name in contenders}
-    for _ in range(repeats):
-        for name, function in contenders.items():
-            start = time.perf_counter()
-            for _ in range(loops[name]):
-                function(x)
-            samples[name].append((time.perf_counter() - start) / loops[name])
-    return {name: 1e6 * statistics.median(values) for name, values in samples.items()}
+__all__ = ["AGREES", "MODES", "OURS", "PEERS", "QUICK", "SCENES", "TASKS", "Cell", "Row", "bench"]

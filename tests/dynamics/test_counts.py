@@ -47,6 +47,11 @@ def test_each_further_equal_link_adds_148_edges(n: int) -> None:
     assert dyn.inverse_dynamics(equal_links(n)).counts().edges == 146 + 148 * (n - 2)
 
 
+@mark.parametrize("n", range(3, 13))
+def test_each_further_equal_link_adds_117_nodes_to_forward_dynamics(n: int) -> None:
+    assert len(dyn.forward_dynamics(equal_links(n), "recursive").nodes) == 203 + 117 * (n - 3)
+
+
 @fixture(scope="module")
 def exponents() -> dict[str, float]:
     return {name: exponent(name) for name in ("chain_rule", "chain_rule_literal", "euler_embedded")}
@@ -76,6 +81,15 @@ def test_the_chain_rule_is_smaller_than_the_embedded_formulations(n: int, formul
     assert ours.nodes < theirs.nodes
     assert ours.edges < theirs.edges
     assert ours.depth < theirs.depth
+
+
+def test_a_parameter_with_a_half_before_it_leaves_no_halves_behind() -> None:
+    """L = m qd^2 / 2 - k q^2 / 2, squares written as products: m qdd + k q."""
+    system = dyn.System(
+        lambda q, qd, t, p: 0.5 * p["m"] * (qd[0] * qd[0]) - 0.5 * p["k"] * (q[0] * q[0]), ["x"], {"m": 1.0, "k": 1.0}
+    )
+    names = [node.op.name for node in dyn.inverse_dynamics(system).nodes if node.args]
+    assert sorted(names) == ["add", "mul", "mul"]
 
 
 def test_the_literal_form_costs_more_from_two_links_on() -> None:

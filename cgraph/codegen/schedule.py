@@ -1,0 +1,86 @@
+"""The order in which machine code computes a graph's nodes, and the calls of functions that it makes as one."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Mapping
+from typing import NamedTuple
+
+from ..graph import Graph
+from ..node import Node
+from .lanes import POLYNOMIAL
+
+
+class Joined(NamedTuple):
+    """One call in place of several: each of the functions named, at each of the arguments."""
+
+    names: tuple[str, ...]
+    arguments: tuple[Node, ...]
+
+
+def schedule(graph: Graph, calls: Mapping[Node, Joined], library: Container[str]) -> list[Node | Joined]:
+    """Every node once, arguments first, and before the results of a joined call the call.
+
+    library: names of the operations that are calls. These come as early as they can, since a call empties the
+    registers and at first there is little in them. Else the order is depth first from the outputs, and of a node's
+    arguments the one that needs the most registers comes first: what is computed first must be kept while the other is
+    (Sethi and Ullman 1970; the fewest registers, where nothing is shared).
+    """
+    registers = _registers(graph)
+    early = [calls.get(node, node) for node in graph.nodes if node.op.name in library]
+    order: list[Node | Joined] = []
+    done: set[Node | Joined] = set()
+    stack: list[Node | Joined] = [*reversed(graph.outputs.values()), *reversed(early)]
+    while stack:
+        step = stack[-1]
+        missing = [each for each in reversed(_needed(step, calls)) if each not in done]
+        if missing and step not in done:
+            stack += sorted(missing, key=registers.__getitem__) if len(missing) > 1 else missing
+            continue
+        stack.pop()
+        if step not in done:
+            done.add(step)
+            order.append(step)
+    return order
+
+
+def _needed(step: Node | Joined, calls: Mapping[Node, Joined]) -> tuple[Node | Joined, ...]:
+    if isinstance(step, Joined):
+        return step.arguments
+    return (calls[step],) if step in calls else step.args
+
+
+def _registers(graph: Graph) -> dict[Node | Joined, int]:
+    """Registers to compute a node with, were it a tree; a constant needs none."""
+    registers: dict[Node | Joined, int] = {}
+    for node in graph.nodes:
+        below = sorted([registers[arg] for arg in dict.fromkeys(node.args)], reverse=True)
+        alone = 1 if node.value is None else 0
+        registers[node] = max([alone, *[count + kept for kept, count in enumerate(below)]])
+    return registers
+
+
+def joined_calls(graph: Graph, together: int) -> dict[Node, Joined]:
+    """{node: the call that gives it} for sines, cosines, exponentials and logarithms that do not need each other.
+
+    together: at most so many arguments in one call. With 1, only sine and cosine of the same angle are joined. A node
+    with nothing to join stays out.
+    """
+    level: dict[Node, int] = {}  # how many of these functions lie one behind another on the way to a node
+    groups: dict[tuple[int, str], dict[Node, list[Node]]] = {}  # (level, kind) -> argument -> its calls
+    for node in graph.nodes:
+        level[node] = max([level[arg] for arg in node.args], default=0)
+        if node.op.name in POLYNOMIAL:
+            level[node] += 1
+            kind = "angle" if node.op.name in ("sin", "cos") else node.op.name
+            groups.setdefault((level[node], kind), {}).setdefault(node.args[0], []).append(node)
+    calls: dict[Node, Joined] = {}
+    for group in groups.values():
+        arguments = tuple(group)
+        for start in range(0, len(arguments), together):
+            chosen = arguments[start : start + together]
+            nodes = [node for argument in chosen for node in group[argument]]
+            if len(nodes) > 1:
+                names = {node.op.name for node in nodes}
+                call = Joined(tuple([name for name in POLYNOMIAL if name in names]), chosen)
+                calls.update(dict.fromkeys(nodes, call))
+    return calls

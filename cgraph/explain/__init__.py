@@ -1,0 +1,9 @@
+"""Explanations of a graph: what of it is not as declared, why outputs depend on inputs, how two differ."""
+
+from .diff import Diff, Together, diff
+from .finding import Finding
+from .lint import Lint, lint
+from .why import Path, Why, why
+from .why_not import WhyNot, why_not
+
+__all__ = ["Diff", "Finding", "Lint", "Path", "Together", "Why", "WhyNot", "diff", "lint", "why", "why_not"]

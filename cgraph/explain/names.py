@@ -1,0 +1,148 @@
+"""Names in both directions: the nodes that a name means, and a node in a person's words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from ..errors import GraphError
+from ..graph import Graph
+from ..node import CONSTANT, Node
+
+Name = str | Node
+LENGTH = 32  # characters up to which a node is written out; a longer one refers to its parts by their %numbers
+DEPTH = 4  # operations that such a text holds within one another at most
+
+# Symbol between two arguments, and how strongly it binds; all other operations are written as functions.
+_INFIX = {
+    "less": ("<", 0),
+    "less_equal": ("<=", 0),
+    "equal": ("==", 0),
+    "not_equal": ("!=", 0),
+    "add": ("+", 1),
+    "sub": ("-", 1),
+    "mul": ("*", 2),
+    "strong_mul": ("*", 2),
+    "div": ("/", 2),
+}
+_NEGATION, _WHOLE = 1, 9  # how strongly a leading minus binds, and a name or a function
+
+
+class Names:
+    """The names of a graph's nodes; %numbers are those of `graph.listing()`."""
+
+    def __init__(self, graph: Graph) -> None:
+        self.graph = graph
+        self.number: dict[Node, int] = {}
+        self.called: dict[str, list[Node]] = {}
+        for node in graph.nodes:
+            if node.args:
+                self.number[node] = len(self.number) + 1
+        self.known = dict.fromkeys((*graph.inputs, *graph.nodes))
+        for node in self.known:
+            if node.name is not None:
+                self.called.setdefault(node.name, []).append(node)
+
+    # From a name to nodes.
+
+    def all(self, who: Name) -> list[Node]:
+        """Every node that a name means: input, named nodes, output. Raises GraphError when there is none."""
+        if isinstance(who, Node):
+            if who not in self.known:
+                raise GraphError(f"{who!r} is not a node of the graph")
+            return [who]
+        if not isinstance(who, str):
+            raise TypeError(f"a node is given by its name or itself, got {type(who).__name__}: {who!r:.60}")
+        found = self.called.get(who, []) + ([self.graph.outputs[who]] if who in self.graph.outputs else [])
+        if not found:
+            raise GraphError(f"nothing in the graph is called {who!r} ({self._known()})")
+        return list(dict.fromkeys(found))
+
+    def group(self, who: Name | Sequence[Name]) -> list[Node]:
+        """The nodes of a group: a name or several in one string, a node, or a sequence of these."""
+        if isinstance(who, str) and who not in self.called and who not in self.graph.outputs:
+            who = who.replace(",", " ").split()
+        if not isinstance(who, (str, Node, Iterable)):
+            raise TypeError(f"a group is a name or several, or nodes; got {type(who).__name__}: {who!r:.60}")
+        members = [who] if isinstance(who, (str, Node)) else list(who)
+        if not members:
+            raise ValueError("a group needs at least one name")
+        return list(dict.fromkeys([node for each in members for node in self.all(each)]))
+
+    def one(self, who: Name) -> Node:
+        """The one node of that name. Raises GraphError when there is none, or more than one."""
+        found = self.all(who)
+        if len(found) > 1:
+            raise GraphError(f"{len(found)} nodes are called {who!r}; give the node itself")
+        return found[0]
+
+    def output(self, who: Name) -> Node:
+        """The output of that name, else the one node of it."""
+        return self.graph.outputs[who] if isinstance(who, str) and who in self.graph.outputs else self.one(who)
+
+    def _known(self) -> str:
+        named = [name for name, nodes in self.called.items() if any(node.args for node in nodes)]
+        parts = (("inputs", self.graph.input_names), ("named nodes", named), ("outputs", tuple(self.graph.outputs)))
+        return "; ".join(f"{what} {_listed(names)}" for what, names in parts if names)
+
+    # From a node to words.
+
+    def short(self, node: Node) -> str:
+        """A name, a number, or the %number of the listing; a question mark for an operation of no such line."""
+        if node.op is CONSTANT:
+            return f"{node.value:.6g}"
+        return node.name or (f"%{self.number[node]}" if node in self.number else "?")
+
+    def text(self, node: Node, length: int = LENGTH) -> str:
+        """A name, or what the node computes, such as `qd0 * dt`: written out as far as `length` characters allow."""
+        if node.name or not node.args:
+            return self.short(node)
+        for depth in range(DEPTH, 1, -1):
+            text = self._written(node, depth)[0]
+            if len(text) <= length:
+                return text
+        return self._written(node, 1)[0]
+
+    def line(self, node: Node) -> str:
+        """The node as in the listing, with its tags: `%7 = qd0 * dt  [euler]`."""
+        tags = f"  [{', '.join(sorted(node.tags))}]" if node.tags else ""
+        if not node.args:
+            return self.short(node) + tags
+        name = f"  ({node.name})" if node.name else ""
+        return f"%{self.number[node]} = {self.made(node)}{name}{tags}"
+
+    def made(self, node: Node) -> str:
+        """What an operation computes from its arguments, these by name or %number."""
+        return self._written(node, 1)[0]
+
+    def _written(self, node: Node, depth: int) -> tuple[str, int]:
+        """Text of an operation with `depth` operations in it at most, and how strongly its last one binds."""
+        parts = [
+            self._written(arg, depth - 1) if depth > 1 and arg.args and not arg.name else (self.short(arg), _WHOLE)
+            for arg in node.args
+        ]
+        if node.op.name in _INFIX:
+            symbol, strength = _INFIX[node.op.name]
+            (a, left), (b, right) = parts
+            a = f"({a})" if left < strength else a
+            b = f"({b})" if right <= strength or b.startswith("-") else b
+            return f"{a} {symbol} {b}", strength
+        if node.op.name == "neg":
+            text, strength = parts[0]
+            return (f"-({text})" if strength <= _NEGATION or text.startswith("-") else f"-{text}"), _NEGATION
+        return f"{node.op.name}({', '.join([text for text, _ in parts])})", _WHOLE
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names if len(names) <= 12 else [*names[:10], "...", names[-1]])
+
+
+def joined(words: Sequence[str], most: int = 6) -> str:
+    """`a, b and c`; of many words the first and the number of the rest."""
+    if len(words) > most:
+        words = [*words[: most - 1], f"{len(words) - most + 1} more"]
+    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)
+
+
+def many(number: int, noun: str) -> str:
+    """`1 path`, `3 paths`."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"

@@ -1,0 +1,71 @@
+"""Paths through a graph: how many there are, and the k best, without walking them one by one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from operator import itemgetter
+
+from ..node import Edge, Node
+
+
+def path_count(nodes: Sequence[Node], edges: Sequence[Edge], source: Node, sink: Node) -> int:
+    """How many ways lead from source to sink, through x * x two; exact, however many.
+
+    nodes, edges: those between the two, in topological order.
+    """
+    uses = dict.fromkeys(nodes, 0)
+    for edge in edges:
+        uses[edge.source] += 1
+    counts: dict[Node, int] = {source: 1}
+    incoming = by_target(edges)
+    for node in nodes:
+        for edge in incoming.get(node, ()):
+            counts[node] = counts.get(node, 0) + counts[edge.source]
+            uses[edge.source] -= 1
+            if not uses[edge.source] and edge.source is not sink:  # so that huge numbers do not pile up
+                del counts[edge.source]
+    return counts.get(sink, 0)
+
+
+def by_target(edges: Sequence[Edge]) -> dict[Node, list[Edge]]:
+    """The edges into each node."""
+    incoming: dict[Node, list[Edge]] = {}
+    for edge in edges:
+        incoming.setdefault(edge.target, []).append(edge)
+    return incoming
+
+
+_Step = tuple[float, Edge | None, int]  # one of the best ways to a node: cost, last edge, rank among those before it
+
+
+def best_paths(
+    nodes: Sequence[Node], edges: Sequence[Edge], source: Node, sink: Node, k: int, cost: Callable[[Edge], float]
+) -> list[tuple[Edge, ...]]:
+    """The k paths of least cost, the sum over their edges, best first: each node keeps the k best ways to it.
+
+    nodes, edges: those between the two, in topological order. A path whose cost is infinite is left out.
+    """
+    incoming = by_target(edges)
+    start: list[_Step] = [(0.0, None, 0)]
+    best = {source: start[:k]}
+    for node in nodes:
+        if node is not source:
+            ways: list[_Step] = []
+            for edge in incoming.get(node, ()):
+                if math.isfinite(more := cost(edge)):
+                    ways += [(step[0] + more, edge, rank) for rank, step in enumerate(best[edge.source])]
+            ways.sort(key=_cost)  # sorted runs, so this is a merge; stable, so that ties fall the same way in every run
+            best[node] = ways[:k]
+    return [_traced(best, step) for step in best.get(sink, ())]
+
+
+_cost = itemgetter(0)
+
+
+def _traced(best: dict[Node, list[_Step]], step: _Step) -> tuple[Edge, ...]:
+    edges: list[Edge] = []
+    while (edge := step[1]) is not None:
+        edges.append(edge)
+        step = best[edge.source][step[2]]
+    return tuple(reversed(edges))

@@ -1,0 +1,235 @@
+"""Why an output depends on an input: how many paths, the heaviest of them, and what they add up to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..errors import GraphError
+from ..graph import Graph
+from ..node import Edge, Node
+from .names import Name, Names, many
+from .paths import best_paths, by_target, path_count
+from .reach import between
+from .slopes import Point, edge_slopes
+
+EXACT = 10**15  # up to here a number of paths is printed digit by digit
+LENGTH = 90  # characters up to which a path is written out; a longer one is told by the tags that it passes
+STEPS = 12  # neighbours in tags that such a path names; of more, the first and the last
+SUMS = ("add", "sub", "neg")  # a path's text passes these over: they hand the value on, at most with its sign turned
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """One way from an input to an output.
+
+    edges: in order; empty when the output is the input.  value: product of the local partials, None without a point.
+    text: its products and functions by name and tag; sums are passed over.
+    """
+
+    edges: tuple[Edge, ...]
+    value: float | None
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Why:
+    """How an output depends on an input; see `why`. `str` of it is the explanation.
+
+    count: number of paths.  paths: the heaviest, or the shortest where no point was given.
+    With a point: `derivative` is d output / d input, `weight` the sum of |product| over all paths.
+    """
+
+    graph: Graph
+    output: str
+    input: str
+    count: int
+    paths: tuple[Path, ...]
+    derivative: float | None = None
+    weight: float | None = None
+
+    @property
+    def share(self) -> float | None:
+        """The part of `weight` that the listed paths carry, 0 to 1; None without a point or a weight."""
+        if not self.weight or not math.isfinite(self.weight):
+            return None
+        return min(1.0, sum([abs(path.value or 0.0) for path in self.paths]) / self.weight)
+
+    @property
+    def nodes(self) -> frozenset[Node]:
+        """Nodes of the listed paths, to be marked in a drawing."""
+        return frozenset([node for path in self.paths for edge in path.edges for node in (edge.source, edge.target)])
+
+    @property
+    def edges(self) -> frozenset[Edge]:
+        """Edges of the listed paths, to be marked in a drawing."""
+        return frozenset([edge for path in self.paths for edge in path.edges])
+
+    def __str__(self) -> str:
+        if not self.count:
+            return f"{self.output} does not depend on {self.input}; cg.why_not tells where it stops."
+        lines = [f"{self.output} depends on {self.input} along {count_text(self.count)}."]
+        if self.derivative is not None:
+            lines.append(f"d {self.output} / d {self.input} = {self.derivative:.6g}, the sum over all of them.")
+        values = [f"{path.value:+.4g}" if path.value is not None else "" for path in self.paths]
+        width = max(map(len, values), default=0)
+        lines += [f"  {value:>{width}}  {path.text}" for value, path in zip(values, self.paths, strict=True)]
+        if self.derivative is None:
+            if len(self.paths) < self.count:
+                lines.append(
+                    f"These are the shortest {len(self.paths)}; with a point, at={{...}}, the heaviest are listed."
+                )
+        else:
+            lines.append(self._balance())
+        return "\n".join(lines)
+
+    def _balance(self) -> str:
+        if self.weight == 0.0:
+            return "At this point each of them has a partial that is zero."
+        if len(self.paths) == self.count:
+            return "These are all."
+        listed = sum([path.value or 0.0 for path in self.paths])
+        share = f" and carry {self.share:.1%} of the weight of all" if self.share is not None else ""
+        return f"The {len(self.paths)} heaviest add up to {listed:.6g}{share}."
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same for JSON; nodes are numbered as in `graph.nodes`, an edge is (source, target, argument slot)."""
+        number = {node: i for i, node in enumerate(self.graph.nodes)}
+        return {
+            "output": self.output,
+            "input": self.input,
+            "paths": self.count if self.count <= EXACT else digits_of(self.count),
+            "derivative": _json(self.derivative),
+            "weight": _json(self.weight),
+            "share": self.share,
+            "listed": [
+                {
+                    "value": _json(path.value),
+                    "text": path.text,
+                    "edges": [[number[edge.source], number[edge.target], edge.slot] for edge in path.edges],
+                }
+                for path in self.paths
+            ],
+        }
+
+
+def why(graph: Graph, output: Name, input: Name, at: Point | None = None, k: int = 10) -> Why:  # noqa: A002 (its name)
+    """Why `output` depends on `input`: the number of paths, and the k heaviest at the point `at`.
+
+    A path's weight is the product of the local partials along it; over all paths these add up to the derivative. All
+    numbers come from sweeps over the nodes: no list of paths is ever made, so 10^20 of them are no matter.
+    output, input: names of an output and an input, or of a node named by `cg.named`, or a node.
+    at: {input: number} for all inputs. Without it, the k shortest paths are listed.
+
+    Raises GraphError for a name that the graph does not have or that several nodes have, and where the derivative is
+    not finite; ValueError for a value in `at` that is no finite number, or a negative k.
+    """
+    names = Names(graph)
+    if not isinstance(k, int) or isinstance(k, bool) or k < 0:
+        raise ValueError(f"k must be a whole number of paths, at least 0, got {k!r}")
+    source, sink = names.one(input), names.output(output)
+    to, origin = _said(names, output), _said(names, input)
+    nodes = between(graph.nodes, [source], [sink])
+    inside = set(nodes)
+    edges = [Edge(arg, node, slot) for node in nodes for slot, arg in enumerate(node.args) if arg in inside]
+    if source in inside:  # nothing on the way to the source lies between the two
+        edges = [edge for edge in edges if edge.target is not source]
+    count = path_count(nodes, edges, source, sink) if nodes else 0
+    if at is None:
+        found = best_paths(nodes, edges, source, sink, k, lambda edge: 1.0) if count else []
+        return Why(graph, to, origin, count, tuple([_path(names, to, each, None) for each in found]))
+    slopes = dict(zip(edges, edge_slopes(graph, edges, at), strict=True))
+    edges = _alive(names, nodes, edges, slopes, sink)
+    derivative, weight = _sums(nodes, edges, slopes, source, sink)
+    found = best_paths(nodes, edges, source, sink, k, lambda edge: -math.log(abs(slopes[edge]))) if count else []
+    paths = [_path(names, to, each, math.prod([slopes[edge] for edge in each])) for each in found]
+    return Why(graph, to, origin, count, tuple(paths), derivative, weight)
+
+
+def _alive(
+    names: Names, nodes: Sequence[Node], edges: Sequence[Edge], slopes: dict[Edge, float], sink: Node
+) -> list[Edge]:
+    """The edges that matter: with a partial other than zero, and before nothing but such edges on some way.
+
+    What lies behind a zero, such as the branch that `where` leaves out, may have no derivative: zero wins.
+    """
+    alive = {sink}
+    kept = []
+    incoming = by_target(edges)
+    for node in reversed(nodes):
+        for edge in incoming.get(node, ()) if node in alive else ():
+            slope = slopes[edge]
+            if slope == 0.0:
+                continue
+            if not math.isfinite(slope):
+                raise GraphError(f"the derivative of {names.line(node)} by {names.text(edge.source)} is {slope} here")
+            alive.add(edge.source)
+            kept.append(edge)
+    chosen = set(kept)
+    return [edge for edge in edges if edge in chosen]
+
+
+def _sums(
+    nodes: Sequence[Node], edges: Sequence[Edge], slopes: dict[Edge, float], source: Node, sink: Node
+) -> tuple[float, float]:
+    """The sum over all paths of the product of slopes, and of its absolute value: forward accumulation."""
+    sums = dict.fromkeys(nodes, 0.0)
+    weights = dict.fromkeys(nodes, 0.0)
+    sums[source] = weights[source] = 1.0
+    for edge in edges:
+        sums[edge.target] += slopes[edge] * sums[edge.source]
+        weights[edge.target] += abs(slopes[edge]) * weights[edge.source]
+    return sums.get(sink, 0.0), weights.get(sink, 0.0)
+
+
+def _said(names: Names, who: Name) -> str:
+    return who if isinstance(who, str) else names.text(who)
+
+
+def _path(names: Names, output: str, edges: tuple[Edge, ...], value: float | None) -> Path:
+    if not edges:
+        return Path(edges, value, output)
+    inner = [edge.target for edge in edges if edge.target.name or edge.target.op.name not in SUMS]
+    start, end = names.text(edges[0].source), [] if inner and names.text(inner[-1]) == output else [output]
+    text = " -> ".join([start, *[names.text(node) for node in inner], *end])
+    if len(text) > LENGTH:
+        return Path(edges, value, " -> ".join([start, *_route(inner), *end]))
+    tags = sorted({tag for node in inner for tag in node.tags})
+    return Path(edges, value, f"{text}  [{', '.join(tags)}]" if tags else text)
+
+
+def _route(nodes: Sequence[Node]) -> list[str]:
+    """A long path by names, tags and operations: neighbours with the same tags are told as one."""
+    steps: list[tuple[str, list[str]]] = []
+    for node in nodes:
+        if node.name:
+            steps.append((node.name, []))
+        else:
+            tags = f"[{', '.join(sorted(node.tags))}]"
+            if not steps or steps[-1][0] != tags:
+                steps.append((tags, []))
+            steps[-1][1].append(node.op.name)
+    if len(steps) > STEPS:
+        steps = [*steps[: STEPS // 2], ("...", []), *steps[-(STEPS // 2) :]]
+    return [" ".join([*(made if len(made) <= 3 else [many(len(made), "operation")]), name]) for name, made in steps]
+
+
+def digits_of(count: int) -> str:
+    """A whole number of any size as text: all digits up to 10^15, then such as `3.21e+41`."""
+    if count <= EXACT:
+        return str(count)
+    shift = max(0, count.bit_length() - 64)
+    log = math.log10(count >> shift) + shift * math.log10(2.0)
+    mantissa = 10.0 ** (log % 1.0)
+    return f"{mantissa:.3g}e+{math.floor(log)}"
+
+
+def count_text(count: int) -> str:
+    """`1 path`, `12 paths`, `3.21e+41 paths`."""
+    return many(count, "path") if count <= EXACT else f"{digits_of(count)} paths"
+
+
+def _json(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None

@@ -1,0 +1,99 @@
+"""Why an output does not depend on an input: how far the input reaches, and what the output is made from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ..errors import GraphError
+from ..graph import Graph
+from ..node import Node
+from .names import Name, Names, joined, many
+from .reach import makers, users
+
+
+@dataclass(frozen=True, eq=False)
+class WhyNot:
+    """Where the chain from an input stops that does not reach an output; see `why_not`. `str` of it is the explanation.
+
+    reached: what depends on the input.  made_from: what the output is made from; the two have no node in common.
+    meetings: nodes that the input reaches and that use what the output is made from, too: there the two are nearest.
+    outputs: names of outputs that depend on the input.  inputs: names of inputs that the output depends on.
+    """
+
+    graph: Graph
+    output: str
+    input: str
+    reached: frozenset[Node]
+    made_from: frozenset[Node]
+    meetings: tuple[Node, ...]
+    outputs: tuple[str, ...]
+    inputs: tuple[str, ...]
+
+    def __str__(self) -> str:
+        names = Names(self.graph)
+        number = len(self.reached) - 1
+        lines = [f"{self.output} does not depend on {self.input}."]
+        if number:
+            lines.append(
+                f"{self.input} reaches {many(number, 'other node')}, and of the outputs {joined(self.outputs)}."
+            )
+        elif self.outputs:
+            lines.append(f"{self.input} is the output {joined(self.outputs)}; no operation uses it.")
+        else:
+            lines.append(f"Nothing uses {self.input}.")
+        lines.append(f"{self.output} is made from {joined(self.inputs, 12) or 'constants'}.")
+        if self.meetings:
+            shown = "; ".join([names.line(node) for node in self.meetings[:3]])
+            lines.append(f"The two meet where {self.output} does not look: {shown}.")
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same for JSON; nodes are numbered as in `graph.nodes`."""
+        nodes = self.graph.nodes
+        return {
+            "output": self.output,
+            "input": self.input,
+            "reached_outputs": list(self.outputs),
+            "made_from_inputs": list(self.inputs),
+            "reached": [i for i, node in enumerate(nodes) if node in self.reached],
+            "made_from": [i for i, node in enumerate(nodes) if node in self.made_from],
+            "meetings": [i for i, node in enumerate(nodes) if node in set(self.meetings)],
+        }
+
+
+def why_not(graph: Graph, output: Name, input: Name) -> WhyNot:  # noqa: A002 (its name)
+    """Why `output` does not depend on `input`; both are given as for `why`.
+
+    Raises GraphError when it does, or for a name that the graph does not have or that several nodes have.
+    """
+    names = Names(graph)
+    source, sink = names.one(input), names.output(output)
+    reached, made_from = users(graph.nodes, [source]), makers([sink])
+    to, origin = (who if isinstance(who, str) else names.text(who) for who in (output, input))
+    if sink in reached:
+        raise GraphError(f"{to} depends on {origin}; cg.why lists the paths")
+    return WhyNot(
+        graph,
+        to,
+        origin,
+        reached=frozenset(reached),
+        made_from=frozenset(made_from),
+        meetings=_first_meetings(graph, reached, made_from),
+        outputs=tuple([name for name, node in graph.outputs.items() if node in reached]),
+        inputs=tuple([str(node.name) for node in graph.inputs if node in made_from]),
+    )
+
+
+def _first_meetings(graph: Graph, reached: set[Node], made_from: set[Node]) -> tuple[Node, ...]:
+    """Nodes of `reached` with an argument (no mere number) in `made_from`, and none of them behind another."""
+    met: set[Node] = set()
+    first = []
+    for node in graph.nodes:
+        if node in reached:
+            if any([arg in met for arg in node.args]):
+                met.add(node)
+            elif any([arg in made_from and arg.value is None for arg in node.args]):
+                met.add(node)
+                first.append(node)
+    return tuple(first)

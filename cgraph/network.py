@@ -1,0 +1,34 @@
+"""Graph queries by networkx: the one place that knows it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Sequence
+
+from .node import Edge, Node
+
+
+def minimum_cut(edges: Sequence[Edge], sources: Collection[Node], sinks: Collection[Node]) -> list[Edge]:
+    """The fewest edges without which no path leads from `sources` to `sinks`, in the order of `edges`.
+
+    Of several such sets it is the one nearest to the sinks. edges: those on such paths; no node is source and sink.
+    """
+    import networkx
+
+    network = networkx.DiGraph()
+    start, end = object(), object()
+    network.add_edges_from([(start, node) for node in sources])  # without a capacity: these are not to be cut
+    network.add_edges_from([(node, end) for node in sinks])
+    for (source, target), uses in Counter([(edge.source, edge.target) for edge in edges]).items():
+        network.add_edge(source, target, capacity=uses)
+    residual = networkx.algorithms.flow.shortest_augmenting_path(network, start, end)
+    behind: set[object] = {end}  # what could still send flow to the sinks lies behind the cut nearest to them
+    stack = [end]
+    while stack:
+        node = stack.pop()
+        for before in residual.pred[node]:
+            pipe = residual[before][node]
+            if before not in behind and pipe["flow"] < pipe["capacity"]:
+                behind.add(before)
+                stack.append(before)
+    return [edge for edge in edges if edge.source not in behind and edge.target in behind]

@@ -1,0 +1,41 @@
+"""Ensemble: what a simulation of many trajectories gives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .trajectory import Array
+
+Counts = np.ndarray[Any, np.dtype[np.int64]]
+
+
+@dataclass(frozen=True)
+class EnsembleStats:
+    """How N runs went: `Stats`, with an entry for each trajectory where they differ."""
+
+    method: str
+    steps: Counts  # (N,), accepted
+    rejected: Counts  # (N,), trials of a step that were not accepted
+    evaluations: Counts  # (N,), of the rate of the state
+    dt: Array  # (N,) s, the largest step taken
+    seconds: float  # run time of all of them together, making the machine code included
+    complete: np.ndarray[Any, np.dtype[np.bool_]]  # (N,), it reached t_end
+    status: tuple[str, ...]  # N sentences: "reached t_end", or where and why it stopped
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """Many motions of one model: t (T,) [s]; q and qd (N, T, n) [rad or m, per second]; and how the runs went.
+
+    q[k] is what trajectory k alone would have, (T, n), in one piece of memory; so lie the results of MuJoCo's rollout
+    and of a vmap. From where a trajectory left the numbers on its rows are NaN. Of an OdeSystem q holds the states,
+    and qd has no columns.
+    """
+
+    t: Array
+    q: Array
+    qd: Array
+    stats: EnsembleStats

@@ -1,0 +1,129 @@
+"""Inverse dynamics body by body: one compiled kernel for each kind of joint, for trees whose structure changes.
+
+The kernels come from the same energy as every other graph, by the same differentiation, of one body instead of all:
+forwards s = F(s_parent, q, qd) with its tangent, backwards the cotangents of the parent's motion and of (q, qd) with
+theirs, so that tau = d/dt (dL/dqd) - dL/dq. What a body is made of is an input: to hang a tool on an arm, or to lock
+one of its joints, makes no new graph and no new code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import cgraph as cg
+from cgraph import Compiled, Graph, Node
+from cgraph.fold import Builder
+from cgraph.forward import tangents
+from cgraph.label import building
+from cgraph.reverse import cotangents
+
+from .body import WORLD
+from .link import Link, Motion, axes_of, carried, energy, ground, link, link_numbers
+from .mechanism import Mechanism
+from .spatial import Array
+
+ONE = cg.constant(1.0)
+MOTION = 10  # numbers in a Motion
+
+
+class RecursiveInverseDynamics:
+    """tau of the motion of a mechanism, (q, qd, qdd) -> tau, ready at once.
+
+    Compared with the compiled graph of `inverse_dynamics`, which knows the numbers of every body, an evaluation takes
+    longer; nothing has to be built before the first. Raises ValueError for a mechanism with external forces.
+    """
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        if mechanism.forces:
+            raise ValueError("inverse dynamics body by body does not take external forces; use inverse_dynamics")
+        self.mechanism = mechanism
+        moving = mechanism.moving
+        numbers = {body.name: i for i, body in enumerate(moving)}
+        axes = {body.name: axes_of(body) for body in moving} | {WORLD: np.eye(3)}
+        rest = ground(mechanism.gravity)
+        self.n = len(moving)
+        self._parents = [numbers.get(body.parent, -1) for body in moving]
+        self._links = [link_numbers(link(body, axes[body.parent])) for body in moving]
+        self._kernels = [_kernels(body.joint.kind) for body in moving]
+        self._ground = [float(each) for each in (*rest.omega, *rest.velocity, *rest.up, rest.height)] + [0.0] * MOTION
+
+    def __call__(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+        """tau (n,) [N m or N] at q, qd, qdd (n,). Raises ValueError for another shape."""
+        rows = [np.asarray(each, dtype=np.float64) for each in (q, qd, qdd)]
+        for name, row in zip(("q", "qd", "qdd"), rows, strict=True):
+            if row.shape != (self.n,):
+                raise ValueError(f"{name} must have shape ({self.n},), one for each coordinate, got {row.shape}")
+        states = [list(each) for each in zip(*(row.tolist() for row in rows), strict=True)]
+        motions: list[list[float]] = []
+        for parent, made_of, kernel, state in zip(self._parents, self._links, self._kernels, states, strict=True):
+            carrier = motions[parent] if parent >= 0 else self._ground
+            motions.append(list(kernel.forwards.values([*carrier, *state, *made_of])))
+        bars = [[0.0] * (2 * MOTION) for _ in range(self.n)]
+        tau = np.empty(self.n)
+        for i in reversed(range(self.n)):
+            parent = self._parents[i]
+            carrier = motions[parent] if parent >= 0 else self._ground
+            *bar, tau[i] = self._kernels[i].backwards.values([*carrier, *states[i], *self._links[i], *bars[i]])
+            if parent >= 0:
+                bars[parent] = [a + b for a, b in zip(bars[parent], bar, strict=True)]
+        return tau
+
+
+class _Kernels(NamedTuple):
+    forwards: Compiled  # parent's motion and its rate, q, qd, qdd, link -> motion and its rate
+    backwards: Compiled  # the same, cotangents of the motion and their rates -> those of the parent's motion; tau
+
+
+@cache
+def _kernels(kind: str) -> _Kernels:
+    """What a link with that kind of joint needs, whatever its numbers are."""
+    parent, rates, bars, bar_rates = (_variables(name, MOTION) for name in ("s", "s_dot", "bar", "bar_dot"))
+    q, qd, qdd = cg.variables("q qd qdd")
+    made_of, numbers = _link_of_nodes()
+    build = Builder()
+    with building(build):
+        motion = carried(_motion(parent), made_of, kind, q, qd)
+        after = [*motion.omega, *motion.velocity, *motion.up, motion.height]
+        lagrangian = energy(motion, made_of, q, qd)
+    along = dict(zip(parent, rates, strict=True)) | {q: qd, qd: qdd}
+    dots = tangents(along, after, build)
+    seeds = dict(zip(after, bars, strict=True)) | {lagrangian: ONE}
+    back = cotangents(seeds, [*parent, q, qd], build)
+    back_dots = tangents(along | dict(zip(bars, bar_rates, strict=True)), back, build)
+    zero = cg.constant(0.0)
+    with building(build):
+        tau = back_dots.get(back[-1], zero) - back[-2] + made_of.damping * qd
+    inputs = [*parent, *rates, q, qd, qdd, *numbers]
+    forwards = [*after, *(dots.get(node, zero) for node in after)]
+    backwards = [*back[:MOTION], *(back_dots.get(node, zero) for node in back[:MOTION]), tau]
+    return _Kernels(_compiled(inputs, forwards), _compiled([*inputs, *bars, *bar_rates], backwards))
+
+
+def _compiled(inputs: Sequence[Node], outputs: Sequence[Node]) -> Compiled:
+    return cg.compile(cg.simplify(Graph(inputs, {f"{k}": node for k, node in enumerate(outputs)})))
+
+
+def _variables(name: str, count: int) -> list[Node]:
+    return cg.variables([f"{name}{k}" for k in range(count)])
+
+
+def _motion(nodes: Sequence[Node]) -> Motion:
+    omega, velocity, up = ((nodes[k], nodes[k + 1], nodes[k + 2]) for k in (0, 3, 6))
+    return Motion(omega, velocity, up, nodes[9])
+
+
+def _link_of_nodes() -> tuple[Link, list[Node]]:
+    """A link of variables, and these in the order of `link_numbers`."""
+    turn, place, moment, inertia = (_variables(*each) for each in (("R", 9), ("r", 3), ("h", 3), ("J", 6)))
+    mass, damping, stiffness, rest, armature = cg.variables("mass damping stiffness rest armature")
+    rows = [turn[k : k + 3] for k in (0, 3, 6)]
+    lower = [[inertia[0]], inertia[1:3], inertia[3:6]]
+    numbers = [*turn, *place, mass, *moment, *inertia, damping, stiffness, rest, armature]
+    x, y, z = place
+    a, b, c = moment
+    return Link(rows, (x, y, z), mass, (a, b, c), lower, damping, stiffness, rest, armature), numbers

@@ -1,0 +1,127 @@
+"""CasADi: its own derivatives of the same Lagrangian, or our finished graph; in its virtual machine or through gcc."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import tempfile
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .case import BATCH, NUDGE, PASSES, Array, Case, rk4_step
+from .contender import Contender, Peer, UnavailableError
+from .ours import task_graph
+from .translate import lagrangian, translated
+
+FLAGS = ("-O3", "-march=native", "-shared", "-fPIC")
+_NAMES = {"abs": "fabs", "minimum": "fmin", "maximum": "fmax", "where": "if_else"}
+
+
+class CasadiPeer(Peer):
+    """CasADi.  native: C code of it, compiled; else its virtual machine.  own_graph: its derivatives; else our graph.
+
+    Its forward dynamics is an LDL^T of the mass matrix followed by its `cse`: fewer instructions than `casadi.solve`.
+    """
+
+    def __init__(self, case: Case, native: bool = False, own_graph: bool = True) -> None:
+        super().__init__(case)
+        import casadi
+
+        self.casadi, self.native = casadi, native
+        self.compiler = os.environ.get("CC") or shutil.which("gcc") or shutil.which("cc")
+        self.function = cache(self._lagrange if own_graph else self._ours)
+
+    def _lagrange(self, task: str) -> Any:
+        """The task from the Lagrangian, x -> y."""
+        ca, n = self.casadi, self.case.n
+        if task == "rk4":
+            return self._step(self.function("forward"))
+        q, qd, last = (ca.SX.sym(name, n) for name in ("q", "qd", "last"))
+        energy, forces = lagrangian(self.case, ca.vertsplit(q), ca.vertsplit(qd), ca, _NAMES, ca.SX)
+        p, slope = ca.gradient(energy, qd), ca.gradient(energy, q)
+        known = ca.vertcat(*forces) - ca.DM(list(self.case.system.damping)) * qd + slope
+        if task == "inverse":
+            rate = ca.jtimes(p, ca.vertcat(q, qd), ca.vertcat(qd, last))
+            y = rate - known
+        else:
+            diagonal, factor, order = ca.ldl(ca.jacobian(p, qd), False)
+            y = ca.ldl_solve(last + known - ca.jtimes(p, q, qd), diagonal, factor, order)
+        return ca.Function(task, [ca.vertcat(q, qd, last)], [ca.cse(y)])
+
+    def _ours(self, task: str) -> Any:
+        """Our graph of the task, node for node."""
+        ca = self.casadi
+        if task == "rk4":
+            return self._step(self.function("forward"))
+        graph = task_graph(self.case, task)
+        x = ca.SX.sym("x", len(graph.inputs))
+        values = translated(graph.nodes, dict(zip(graph.inputs, ca.vertsplit(x), strict=True)), ca, _NAMES, ca.SX)
+        return ca.Function(task, [x], [ca.vertcat(*[values[node] for node in graph.outputs.values()])])
+
+    def _step(self, forward: Any) -> Any:
+        """One RK4 step that calls the forward dynamics four times."""
+        ca, n = self.casadi, self.case.n
+        state = ca.MX.sym("x", 2 * n)
+        after = rk4_step(lambda x: ca.vertcat(x[n:], forward(ca.vertcat(x, ca.MX.zeros(n)))), state)
+        step = ca.Function("rk4", [state], [after])
+        return step if self.native else step.expand()  # the virtual machine is faster on scalars; gcc inlines by itself
+
+    def _pass(self, task: str) -> Any:
+        """One pass of a loop: the carry to the carry."""
+        function = self.function(task)
+        if task == "rk4":
+            return function
+        x = self.casadi.MX.sym("x", 3 * self.case.n)
+        moved = x + NUDGE * self.casadi.repmat(function(x), 3, 1)
+        return self.casadi.Function("moved", [x], [moved])
+
+    def prepare(self, task: str, mode: str) -> Contender:
+        """See Peer."""
+        if self.native and self.compiler is None:
+            raise UnavailableError("found no C compiler")
+        function = self.function(task)
+        size = function.n_instructions() if function.is_a("SXFunction") else None
+        if mode == "call":
+            return self._contender(function, self.case.point(task), 1, size)
+        if mode == "loop":
+            return self._contender(self._pass(task).fold(PASSES), self.case.point(task), PASSES, size)
+        many = function.map(BATCH, "serial")
+        return self._contender(many, np.ascontiguousarray(self.case.points(task).T), BATCH, size)
+
+    def _contender(self, function: Any, x: Array, evaluations: int, size: int | None) -> Contender:
+        """Through CasADi's buffers, which call on fixed memory."""
+        if self.native:
+            function = self._through_c(function)
+        buffer, evaluate = function.buffer()
+        y = np.empty(function.numel_out(0))
+        buffer.set_arg(0, x.data)
+        buffer.set_res(0, y.data)
+
+        def result(_: Any) -> Array:
+            return y.reshape(-1, function.size1_out(0)).T.copy() if evaluations == BATCH else y.copy()
+
+        held = (x, buffer)  # the buffer holds bare pointers
+
+        def run() -> None:
+            evaluate()
+            _ = held
+
+        return Contender(run, result, evaluations, size)
+
+    def _through_c(self, function: Any) -> Any:
+        """The function compiled by the C compiler and loaded again. Raises UnavailableError when that fails."""
+        assert self.compiler is not None
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:  # Windows keeps what is loaded
+            code, library = Path(folder) / "code.c", Path(folder) / "code.so"
+            generator = self.casadi.CodeGenerator(code.name)
+            generator.add(function)
+            generator.generate(f"{folder}{os.sep}")
+            command = [self.compiler, *FLAGS, "-o", str(library), str(code), "-lm"]
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            if done.returncode:
+                raise UnavailableError(f"the C compiler failed: {done.stderr.strip()[-200:]}")
+            return self.casadi.external(function.name(), str(library))

@@ -1,0 +1,78 @@
+"""JAX on the CPU: its own derivatives of the same Lagrangian, jitted, in double precision."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from .case import BATCH, NUDGE, PASSES, Array, Case, rk4_step
+from .contender import Contender, Peer, ldl_solve
+from .translate import lagrangian
+
+SHORT = 10  # coordinates; beyond, a solve written out takes longer to compile than it gains on LAPACK's Cholesky
+_NAMES = {f"a{name}": f"arc{name}" for name in ("sin", "cos", "tan")} | {"atan2": "arctan2"}
+
+
+class JaxPeer(Peer):
+    """JAX: `jit`, `vmap` for batches, `lax.scan` for loops."""
+
+    def __init__(self, case: Case) -> None:
+        super().__init__(case)
+        import jax
+
+        jax.config.update("jax_platforms", "cpu")
+        jax.config.update("jax_enable_x64", True)
+        jax.config.update("jax_cpu_enable_async_dispatch", False)  # a queue and a thread more than one core needs
+        self.jax, self.np = jax, jax.numpy
+
+    def _energy(self, q: Any, qd: Any) -> Any:
+        return lagrangian(self.case, q, qd, self.np, _NAMES)[0]
+
+    def _known(self, q: Any, qd: Any) -> Any:
+        """dL/dq, applied forces and damping."""
+        forces = self.np.stack([self.np.asarray(f) for f in lagrangian(self.case, q, qd, self.np, _NAMES)[1]])
+        damping = self.np.array(self.case.system.damping) * qd
+        return self.jax.grad(self._energy, 0)(q, qd) + forces - damping
+
+    def _inverse(self, x: Any) -> Any:
+        q, qd, qdd = self.np.split(x, 3)
+        _, rate = self.jax.jvp(self.jax.grad(self._energy, 1), (q, qd), (qd, qdd))
+        return rate - self._known(q, qd)
+
+    def _forward(self, x: Any) -> Any:
+        q, qd, tau = self.np.split(x, 3)
+        momentum = self.jax.grad(self._energy, 1)
+        _, moved = self.jax.jvp(lambda q: momentum(q, qd), (q,), (qd,))
+        mass, rhs = self.jax.jacfwd(momentum, 1)(q, qd), tau + self._known(q, qd) - moved
+        if self.case.n <= SHORT:
+            return self.np.stack(ldl_solve(mass, rhs))
+        return self.jax.scipy.linalg.solve(mass, rhs, assume_a="pos")
+
+    def _step(self, x: Any) -> Any:
+        n, join = self.case.n, self.np.concatenate
+        return rk4_step(lambda x: join([x[n:], self._forward(join([x, self.np.zeros(n)]))]), x)
+
+    def prepare(self, task: str, mode: str) -> Contender:
+        """See Peer."""
+        function: Callable[[Any], Any] = {"inverse": self._inverse, "forward": self._forward, "rk4": self._step}[task]
+        x = self.np.asarray(self.case.point(task))
+        if mode == "call":
+            return _contender(self.jax.jit(function), x, 1)
+        if mode == "batch":
+            points = self.np.asarray(np.ascontiguousarray(self.case.points(task).T))
+            return _contender(self.jax.jit(self.jax.vmap(function)), points, BATCH)
+
+        def one_pass(carry: Any, _: None) -> tuple[Any, None]:
+            return (function(carry) if task == "rk4" else carry + NUDGE * self.np.tile(function(carry), 3)), None
+
+        return _contender(self.jax.jit(lambda x: self.jax.lax.scan(one_pass, x, None, PASSES)[0]), x, PASSES)
+
+
+def _contender(function: Callable[[Any], Any], x: Any, evaluations: int) -> Contender:
+    def result(y: Any) -> Array:
+        values: Array = np.asarray(y)
+        return values.T if evaluations == BATCH else values
+
+    return Contender(lambda: function(x).block_until_ready(), result, evaluations)

@@ -1,0 +1,64 @@
+"""SymPy: its own derivatives of the same Lagrangian, written out by lambdify with cse; NumPy solves with M."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .case import BATCH, Array, Case
+from .contender import Contender, Peer
+from .translate import lagrangian
+
+_NAMES = {"abs": "Abs", "minimum": "Min", "maximum": "Max"}
+
+
+class SympyPeer(Peer):
+    """SymPy, as PyDy uses it: M and the right-hand side by lambdify, `numpy.linalg.solve`."""
+
+    def __init__(self, case: Case) -> None:
+        super().__init__(case)
+        import sympy
+
+        self.sympy = sympy
+        self.functions: dict[str, Any] = {}
+
+    def prepare(self, task: str, mode: str) -> Contender:
+        """See Peer."""
+        if task not in self.functions:
+            self.functions[task] = self._lambdified(task)
+        function, many = self.functions[task], mode == "batch"
+        x = self.case.points(task) if many else self.case.point(task)
+        return Contender(lambda: self._solved(task, function(*x), many), _array, BATCH if many else 1)
+
+    def _lambdified(self, task: str) -> Any:
+        sp, n = self.sympy, self.case.n
+        inputs = sp.symbols([f"{block}_{i}" for block in ("q", "qd", "last") for i in range(n)])
+        q, qd, last = inputs[:n], inputs[n : 2 * n], inputs[2 * n :]
+        energy, forces = lagrangian(self.case, q, qd, sp, _NAMES, sp.Float)
+        p = [sp.diff(energy, each) for each in qd]
+        damping = self.case.system.damping
+        known = [sp.diff(energy, q[i]) + forces[i] - damping[i] * qd[i] for i in range(n)]
+        moved = [sum(sp.diff(p[i], q[k]) * qd[k] for k in range(n)) for i in range(n)]
+        if task == "inverse":
+            inertia = [sum(sp.diff(p[i], qd[k]) * last[k] for k in range(n)) for i in range(n)]
+            outputs = [inertia[i] + moved[i] - known[i] for i in range(n)]
+        else:
+            outputs = [last[i] + known[i] - moved[i] for i in range(n)]
+            outputs += [sp.diff(p[i], qd[k]) for i in range(n) for k in range(n)]
+        return sp.lambdify(inputs, outputs, modules="numpy", cse=True)
+
+    def _solved(self, task: str, values: Any, many: bool) -> Any:
+        if task == "inverse":
+            return values
+        n = self.case.n
+        if not many:
+            return np.linalg.solve(np.array(values[n:]).reshape(n, n), np.array(values[:n]))
+        columns = np.array([np.broadcast_to(value, BATCH) for value in values])  # a constant entry is one number
+        mass = np.moveaxis(columns[n:].reshape(n, n, BATCH), 2, 0)
+        return np.linalg.solve(mass, columns[:n].T[:, :, None])[:, :, 0].T
+
+
+def _array(values: Any) -> Array:
+    array: Array = np.array(values)
+    return array

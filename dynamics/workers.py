@@ -1,0 +1,84 @@
+"""Workers: what shares chunks out, among threads of this process or by any map."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Generator, Iterable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import closing, suppress
+from queue import Empty, SimpleQueue
+
+import numpy as np
+
+from cgraph.codegen.threads import thread_count
+
+from .chunk import Chunk, Part
+from .task import Task
+from .trajectory import Array
+
+Map = Callable[[Callable[[Chunk], Part], Sequence[Chunk]], Iterable[Part]]
+Workers = int | Map | None
+LOOK = 0.1  # s: not every system interrupts a wait without an end for Ctrl-C
+
+
+def checked(workers: Workers) -> int | Map:
+    """The number of threads, or the map. Raises ValueError for what is neither."""
+    if callable(workers):
+        return workers
+    if workers is not None and (not isinstance(workers, (int, np.integer)) or workers < 1):
+        raise ValueError(
+            f"workers must be a whole number from 1, None for one on each core, or a function like map, got {workers!r}"
+        )
+    return thread_count(workers)
+
+
+def finished(task: Task, chunks: Sequence[Chunk], workers: int | Map, table: Array) -> Generator[Part, None, None]:
+    """The parts as they come, in any order; closing it, or an exception, ends the threads.
+
+    table: (N, T, m), in which this process makes the rows. Those of a map's parts lie elsewhere.
+
+    Raises TypeError for a map that gives something else than results.
+    """
+    if callable(workers):
+        yield from _by_map(task, chunks, workers)
+    elif workers == 1 or len(chunks) == 1:
+        for chunk in chunks:
+            yield task.run(chunk, _rows(table, chunk), lambda: False)
+    else:
+        with closing(_by_threads(task, chunks, min(workers, len(chunks)), table)) as parts:
+            yield from parts
+
+
+def _by_map(task: Task, chunks: Sequence[Chunk], workers: Map) -> Generator[Part, None, None]:
+    for part in workers(task, chunks):
+        if not isinstance(part, Part):
+            raise TypeError(
+                f"workers must give the results of the function, as map does, got {type(part).__name__}: {part!r:.60}"
+            )
+        yield part
+
+
+def _by_threads(task: Task, chunks: Sequence[Chunk], threads: int, table: Array) -> Generator[Part, None, None]:
+    stop, ended = threading.Event(), SimpleQueue[Future[Part]]()
+    with ThreadPoolExecutor(threads) as pool:
+        futures = [pool.submit(task.run, chunk, _rows(table, chunk), stop.is_set) for chunk in chunks]
+        try:
+            for future in futures:
+                future.add_done_callback(ended.put)
+            for _ in futures:
+                yield _next(ended).result()
+        except BaseException:  # Ctrl-C, an error in a thread, or nobody wants the rest
+            stop.set()
+            for future in futures:
+                future.cancel()
+            raise
+
+
+def _next(ended: SimpleQueue[Future[Part]]) -> Future[Part]:
+    while True:
+        with suppress(Empty):
+            return ended.get(timeout=LOOK)
+
+
+def _rows(table: Array, chunk: Chunk) -> Array:
+    return table[chunk.first : chunk.first + len(chunk.x)]

@@ -1,0 +1,142 @@
+"""The difference of two graphs: nothing is lost or counted twice, and it is the same in every run."""
+
+import json
+import os
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+
+import cgraph as cg
+import dynamics as dyn
+from cgraph.explain import diff
+from tests.strategies import Case, cases
+
+x, y, z = cg.variables("x y z")
+
+
+def spelled(node: cg.Node) -> str:
+    """The expression of a node in full, arguments that commute sorted: what a digest stands for. Small graphs only."""
+    if not node.args:
+        return node.name or float(node).hex()
+    args = [spelled(arg) for arg in node.args]
+    return f"{node.op.name}({', '.join(sorted(args) if node.op.commutative else args)})"
+
+
+@settings(max_examples=100)
+@given(cases(max_operations=10), cases(max_operations=10))
+def test_every_node_is_counted_once_and_pairs_are_alike(one: Case, other: Case):
+    for left, right in ((one.graph, other.graph), (one.graph, one.graph), (one.graph, cg.simplify(one.graph))):
+        found = diff(left, right)
+        assert {a for a, _ in found.common} | set(found.only_left) == set(left.nodes)
+        assert {b for _, b in found.common} | set(found.only_right) == set(right.nodes)
+        assert len(found.common) + len(found.only_left) == len(left.nodes)
+        assert len(found.common) + len(found.only_right) == len(right.nodes)
+        assert all(spelled(a) == spelled(b) for a, b in found.common)
+        lefts, rights = (Counter(map(spelled, graph.nodes)) for graph in (left, right))
+        assert len(found.common) == sum((lefts & rights).values())
+        for side, only in (("left", found.only_left), ("right", found.only_right)):
+            assert sum(found.classes(side).values()) == len(only)
+
+
+@settings(max_examples=60)
+@given(cases(max_operations=12), cases(max_operations=12))
+def test_both_graphs_are_in_the_one_of_both(one: Case, other: Case):
+    found = diff(one.graph, other.graph)
+    both = found.together()
+    both.graph.check()
+    values = {name: (one.values | other.values)[name] for name in both.graph.input_names}
+    together = both.graph.evaluate(values)
+    for side, graph in (("left", one.graph), ("right", other.graph)):
+        for name, value in graph.evaluate({each: values[each] for each in graph.input_names}).items():
+            again = together[name if name in found.same_outputs else f"{side} {name}"]
+            assert again == value or (again != again and value != value)
+    assert not both.only_left & both.only_right
+    assert both.only_left | both.only_right <= set(both.graph.nodes)
+    kept = len(both.graph.nodes) - len(both.only_left | both.only_right)
+    assert kept == len(found.common)
+
+
+def test_the_summary():
+    with cg.tag("spring"):
+        left = cg.Graph([x, y], {"f": cg.sin(x) + y, "g": x * y})
+    right = cg.Graph([x, y], {"f": cg.sin(x) - y, "g": y * x})
+    assert str(diff(left, right)) == (
+        "5 nodes left, 5 right: 4 in both, 1 only left, 1 only right.\n"
+        "Computed alike: g.\n"
+        "Computed otherwise: f.\n"
+        "Only left:\n"
+        "      1  primal; spring\n"
+        "Only right:\n"
+        "      1  primal"
+    )
+
+
+def test_copies_are_paired_once_each():
+    left = cg.Graph([x], {"f": cg.sin(x) * cg.sin(x), "g": cg.sin(x)})
+    right = cg.Graph([x], {"f": cg.sin(x) * cg.sin(x)})
+    found = diff(left, right)
+    assert (len(found.common), len(found.only_left), len(found.only_right)) == (4, 1, 0)
+
+
+def formulation_classes(graph: cg.Graph):
+    wrong = dyn.spurious(graph)
+
+    def name(node: cg.Node) -> str:
+        if node in wrong:
+            return "spurious"
+        return "Euler edge" if "euler" in node.tags and "adjoint" not in node.roles else "needed"
+
+    return name
+
+
+def test_the_chain_rule_and_by_definition_differ_by_the_embedding():
+    arm = dyn.planar_arm([1.0] * 3, [1.0] * 3)
+    chain, embedded = dyn.inverse_dynamics(arm), dyn.inverse_dynamics(arm, "euler_embedded")
+    atoms = "q0 q1 q2 qd0 qd1 qd2"
+    found = diff(chain, embedded, atoms=atoms, classify=formulation_classes)
+    assert found.classes("right")["spurious"] == len(dyn.spurious(embedded))
+    assert set(found.classes("left")) == {"needed"}
+    assert len(found.common) > 2 * len(diff(chain, embedded).common)  # without atoms, q is never the same
+    both = found.together()
+    assert {"right q0", "right qd2", "left tau0", "right tau0"} <= set(both.graph.outputs)
+    text = json.dumps(found.to_dict(), allow_nan=False)
+    assert '"class": "spurious"' in text
+
+
+def test_two_runs_are_byte_for_byte_the_same():
+    program = (
+        "import json, dynamics as dyn; from cgraph.explain import diff; arm = dyn.planar_arm([1.0] * 2, [1.0] * 2);"
+        "d = diff(dyn.inverse_dynamics(arm), dyn.inverse_dynamics(arm, 'kinetic_only'), atoms='q0 q1 qd0 qd1');"
+        "print(d, json.dumps(d.to_dict()), d.together().graph.listing())"
+    )
+    runs = {
+        subprocess.run(
+            [sys.executable, "-c", program],
+            env=os.environ | {"PYTHONHASHSEED": seed, "PYTHONPATH": str(Path(cg.__file__).parents[1])},
+            capture_output=True,
+            check=True,
+        ).stdout
+        for seed in ("1", "2")
+    }
+    assert len(runs) == 1
+
+
+def test_an_unknown_atom_is_refused():
+    graph = cg.Graph([x], {"f": x})
+    with pytest.raises(cg.GraphError, match="neither graph has a node called w"):
+        diff(graph, graph, atoms="x w")
+
+
+def test_a_graph_does_not_differ_from_itself_however_deep():
+    node = x
+    for _ in range(20_000):
+        node = cg.sin(node)
+    graph = cg.Graph([x], {"f": node})
+    found = diff(graph, cg.Graph([x], graph(x)))
+    assert len(found.common) == len(graph.nodes)
+    assert str(found).splitlines()[-1] == "Computed alike: f."
+    assert len(found.together().graph.nodes) == len(graph.nodes)

@@ -1,0 +1,366 @@
+"""Lint: independence and its blame, dependence, singular points in a box, cancellation at a point."""
+
+import json
+import math
+from itertools import combinations
+
+import mpmath
+import pytest
+from hypothesis import assume, given, settings, strategies as st
+
+import cgraph as cg
+import dynamics as dyn
+from cgraph.explain import lint
+from cgraph.explain.cancellation import rounded
+from cgraph.explain.interval import ROWS
+from cgraph.explain.names import Names
+from cgraph.explain.singular import intervals
+from cgraph.node import OPS, apply
+from tests import high_precision
+from tests.strategies import DOMAINS, Case, cases
+
+x, y, z = cg.variables("x y z")
+
+
+def arm(n: int) -> dyn.PlanarArm:
+    return dyn.planar_arm([1.0] * n, [1.0] * n)
+
+
+def state(n: int) -> tuple[str, str]:
+    return " ".join(f"q{i}" for i in range(n)), " ".join(f"qd{i}" for i in range(n))
+
+
+# Independence.
+
+
+@pytest.mark.parametrize("simplify", [True, False])
+@pytest.mark.parametrize("n", range(1, 11))
+def test_by_definition_the_blame_is_one_edge_for_each_joint(n, simplify):
+    graph = dyn.inverse_dynamics(arm(n), "euler_embedded", simplify=simplify)
+    found = lint(graph, independent=state(n), function="L")
+    (finding,) = found.findings
+    assert not found.ok
+    assert [each["text"] for each in finding.data["cut"]] == [f"qd{i} * dt -> q{i}" for i in range(n)]
+    assert [edge.target.name for edge in finding.edges] == [f"q{i}" for i in range(n)]
+    assert finding.data["paths"] == [f"qd{i} -> qd{i} * dt -> q{i}" for i in range(n)]
+    assert finding.data["corrupted"] == [{"derivative": f"dL/dqd{i}", "gains": f"dt * dL/dq{i}"} for i in range(n)]
+    assert found.nodes == dyn.spurious(graph)
+    assert found.edges == set(finding.edges) <= set(graph.edges)
+
+
+@pytest.mark.parametrize("formulation", ["chain_rule", "chain_rule_literal"])
+@pytest.mark.parametrize("n", [1, 3, 6])
+def test_by_the_chain_rule_there_is_a_proof(n, formulation):
+    found = lint(dyn.inverse_dynamics(arm(n), formulation), independent=state(n))
+    assert found.ok
+    assert len(found.proofs) == 2
+    assert all("no path leads" in proof for proof in found.proofs)
+
+
+def test_the_report_on_one_joint():
+    found = lint(dyn.inverse_dynamics(arm(1), "euler_embedded"), independent=("q0", "qd0"), function="L")
+    assert str(found) == (
+        "q0 depends on qd0. Without this edge there is no path:\n"
+        "  qd0 * dt -> q0  through it dL/dqd0 gains dt * dL/dq0\n"
+        "tau0 contains what was gained; 6 nodes of 21 serve nothing else.\n"
+        "Holds: no path leads from q0 to qd0, made from qd0_old, qdd0 and dt alone."
+    )
+    assert str(lint(dyn.inverse_dynamics(arm(1)), independent=("q0", "qd0"))) == (
+        "Holds: no path leads from qd0 to q0: q0 is an input.\n"
+        "Holds: no path leads from q0 to qd0: qd0 is an input.\n"
+        "Note: Nothing uses the input qd0."
+    )
+
+
+def test_the_gain_is_what_the_derivative_has_too_much():
+    """dL/dqd taken through the embedding, by differences, is p + dt dL/dq, as the report says."""
+
+    def energy(q: cg.Node, qd: cg.Node) -> cg.Node:
+        return 0.5 * qd * qd * cg.cos(q) - q * q
+
+    old, v, dt = cg.variables("old v dt")
+    q = cg.named("q", v * dt + old)
+    graph = cg.Graph([old, v, dt], {"L": energy(q, v)})
+    (finding,) = lint(graph, independent=("q", "v"), function="L").findings
+    assert finding.data["corrupted"] == [{"derivative": "dL/dv", "gains": "dt * dL/dq"}]
+    at = {"old": 0.3, "v": 1.1, "dt": 0.05}
+    through = high_precision.directional(graph, at, {"v": 1.0})["L"]
+    apart = cg.Graph([x, y], {"L": energy(x, y)})
+    point = {"x": 1.1 * 0.05 + 0.3, "y": 1.1}
+    p, g = (high_precision.directional(apart, point, {name: 1.0})["L"] for name in ("y", "x"))
+    assert float(through) == pytest.approx(float(p + 0.05 * g), rel=1e-12)
+    assert "No derivative" not in str(finding)  # no tag tells, so nothing is claimed
+    assert "would" not in str(finding)
+
+
+def test_a_relation_that_no_derivative_went_through_is_said_to_be_harmless():
+    graph = dyn.inverse_dynamics(arm(2), "kinetic_only_exact")
+    (finding,) = lint(graph, independent=state(2)).findings
+    assert "dqd0 would gain dt * df/dq0" in str(finding)
+    assert str(finding).endswith("No derivative in this graph was taken that way.")
+    assert finding.data["derivatives_through"] == 0
+
+
+def reaches(edges: set[cg.Edge], sources: set[cg.Node], sinks: set[cg.Node]) -> bool:
+    seen = set(sources)
+    while new := {edge.target for edge in edges if edge.source in seen} - seen:
+        seen |= new
+    return bool(seen & sinks)
+
+
+@settings(max_examples=1200)
+@given(cases(max_operations=9), st.data())
+def test_the_cut_is_one_of_the_smallest(case: Case, data):
+    """Against all sets of edges, tried one by one."""
+    inner = [node for node in case.graph.nodes if node.args]
+    assume(inner)
+    sink = data.draw(st.sampled_from(inner))
+    source = data.draw(st.sampled_from([node for node in case.graph.nodes if node is not sink]))
+    found = lint(case.graph, independent=[(sink, source)])
+    findings = [finding for finding in found.findings if finding.kind == "dependence"]
+    edges = set(case.graph.edges)
+    connected = [(a, b) for a, b in ((source, sink), (sink, source)) if reaches(edges, {a}, {b})]
+    assert len(findings) == len(connected) == 2 - len(found.proofs)
+    for finding, (a, b) in zip(findings, connected, strict=True):
+        assert not reaches(edges - set(finding.edges), {a}, {b})
+        for smaller in combinations(edges, min(len(finding.edges) - 1, 2)):
+            assert reaches(edges - set(smaller), {a}, {b})
+
+
+def test_of_cuts_of_one_size_the_one_nearest_to_the_dependent_is_blamed():
+    graph = cg.Graph([x], {"f": cg.exp(cg.cos(cg.sin(x)))})
+    (finding,) = lint(graph, independent=("f", "x")).findings
+    assert finding.data["cut"][0]["text"] == "cos(sin(x)) -> exp(cos(sin(x)))"
+    assert finding.data["paths"] == ["x -> sin(x) -> cos(sin(x)) -> exp(cos(sin(x)))"]
+
+
+def test_two_uses_are_two_edges():
+    a = cg.named("a", cg.sin(x) * cg.sin(x) + y)
+    assert len(lint(cg.Graph([x, y], {"f": a}), independent=("a", "x")).edges) == 1  # one behind the product
+    a = cg.named("a", x * x)
+    assert len(lint(cg.Graph([x], {"f": a}), independent=("a", "x")).edges) == 2
+    once = cg.sin(x)
+    (finding,) = lint(cg.Graph([x], {"f": once * once}), independent=("f", "x")).findings
+    assert [each["text"] for each in finding.data["cut"]] == ["x -> sin(x)"]
+
+
+def test_groups_may_be_given_in_many_ways():
+    graph = cg.Graph([x, y, z], {"f": cg.named("two words", x * y) + z})
+    for pairs in (("x y", "z"), [("x, y", "z")], [(["x", "y"], "z")], [((x, "y"), z)], [("x", "z"), ("y", "z")]):
+        assert lint(graph, independent=pairs).ok
+    assert not lint(graph, independent=("two words", "x")).ok
+    for pairs, error, words in (
+        ("x y", TypeError, "expected pairs of groups"),
+        (["x", "y", "z"], ValueError, "each entry must be a pair of groups, got 'x'"),
+        ([("x", "y", "z")], ValueError, "each entry must be a pair"),
+        ([("x y", "y z")], cg.GraphError, "y is in both groups"),
+        ([("x", "w")], cg.GraphError, "nothing in the graph is called 'w'"),
+        ([("x", "")], ValueError, "a group needs at least one name"),
+        ([(3, "x")], TypeError, "a group is a name or several, or nodes; got int: 3"),
+    ):
+        with pytest.raises(error, match=words):
+            lint(graph, independent=pairs)
+
+
+def test_a_report_is_json():
+    graph = dyn.inverse_dynamics(arm(3), "euler_embedded")
+    found = lint(
+        graph,
+        independent=state(3),
+        depends={"tau0": "q0_old"},
+        box={"dt": (0.0, math.inf)},
+        at=dict.fromkeys(graph.input_names, 0.5),
+    )
+    again = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert again["ok"] is False
+    assert [each["kind"] for each in again["findings"]] == [finding.kind for finding in found.findings]
+    edge = again["findings"][0]["cut"][0]["edge"]
+    assert graph.nodes[edge[0]] in graph.nodes[edge[1]].args
+
+
+# Dependence.
+
+
+def test_missing_dependence_and_unused_inputs_are_named():
+    graph = cg.Graph([x, y, z], {"f": x + 1.0, "g": x * y})
+    found = lint(graph, depends={"f": "x y", "g": ["x", y]})
+    assert [str(finding) for finding in found.findings] == ["f does not depend on y; it is made from x."]
+    assert [str(note) for note in found.notes] == ["Nothing uses the input z."]
+    assert lint(graph).ok
+    assert lint(graph, depends={"g": "x y"}).ok
+    with pytest.raises(cg.GraphError, match="'h'"):
+        lint(graph, depends={"h": "x"})
+
+
+# A box.
+
+
+def test_every_operation_has_an_interval_row():
+    assert set(ROWS) == set(OPS)
+
+
+@st.composite
+def boxes(draw: st.DrawFn, domains: tuple[tuple[float, float], ...]) -> list[tuple[float, float]]:
+    """An interval for each argument, at times a point, at times beyond the operation's domain."""
+    result = []
+    for low, high in domains:
+        width = (high - low) * draw(st.sampled_from((0.0, 1e-9, 0.1, 1.0)))
+        start = draw(st.floats(low - 1.0, high) | st.sampled_from((0.0, -0.0, low, 1.0)))
+        result.append((start, start + width))
+    return result
+
+
+@pytest.mark.parametrize("name", sorted(OPS))
+@settings(max_examples=1200)
+@given(data=st.data())
+def test_a_value_lies_within_its_bounds(name, data):
+    """In floats, and at 50 digits, which is where the outward rounding is needed."""
+    op = OPS[name]
+    box = data.draw(boxes(DOMAINS[name]))
+    arguments = [data.draw(st.floats(low, high)) for low, high in box]
+    low, high = ROWS[name].value(*box)
+    value = op.scalar(*arguments)
+    if math.isfinite(value):
+        assert low <= value <= high
+        exact = high_precision.evaluate(
+            cg.Graph(nodes := cg.variables(list("abc"[: op.arity])), {"f": apply(op, *nodes)}),
+            dict(zip("abc", arguments, strict=False)),
+            digits=350,  # 1 + a must keep the smallest a that a float has
+        )["f"]
+        assert mpmath.mpf(low) <= exact <= mpmath.mpf(high)
+
+
+@settings(max_examples=1200)
+@given(cases(), st.data())
+def test_every_value_of_a_graph_in_a_box_lies_within_its_bounds_and_no_slope_is_infinite_without_a_finding(case, data):
+    graph = case.graph
+    box = {}
+    at = {}
+    for name, value in case.values.items():
+        below, above = (data.draw(st.sampled_from((0.0, 0.1, 0.5, 3.0))) for _ in range(2))
+        box[name] = (value - below, value + above)
+        at[name] = data.draw(st.floats(*box[name]))
+    bounds = intervals(graph, box)
+    outputs = {str(i): node for i, node in enumerate(graph.nodes)}
+    values = cg.Graph(graph.inputs, outputs).evaluate(at)
+    for name, node in outputs.items():
+        low, high = bounds[node]
+        assert math.isnan(values[name]) or low <= values[name] <= high
+    if lint(graph, box=box).ok:
+        assert all(math.isfinite(value) for value in values.values())
+        slopes = cg.Graph(graph.inputs, {str(i): edge.partial for i, edge in enumerate(graph.edges)} | {"one": 1.0})
+        assert all(math.isfinite(slope) for slope in slopes.evaluate(at).values())
+
+
+@pytest.mark.parametrize(
+    ("node", "box", "reason"),
+    [
+        (cg.sqrt(x), (0.0, 1.0), "the slope is infinite at 0"),
+        (cg.sqrt(x), (-1.0, 1.0), "there is no value below 0"),
+        (cg.sqrt(x), (1e-300, 1.0), None),
+        (cg.sqrt(x * x + y * y), (-1.0, 1.0), "the slope is infinite at 0"),
+        (cg.sqrt(x * x + 1.0), (-1.0, 1.0), None),
+        (1.0 / x, (-1.0, 2.0), "the divisor can be 0"),
+        (1.0 / x, (0.5, 2.0), None),
+        (1.0 / (2.0 + cg.cos(x)), (-100.0, 100.0), None),
+        (cg.log(x), (0.0, 1.0), "value and slope are infinite at 0"),
+        (cg.log(cg.exp(x)), (-5.0, 5.0), None),
+        (cg.log1p(x), (-1.0, 1.0), "value and slope are infinite at -1"),
+        (cg.tan(x), (1.5, 1.6), "infinite at odd multiples of pi/2"),
+        (cg.tan(x), (-1.5, 1.5), None),
+        (cg.asin(x), (0.0, 1.0), "the slope is infinite at -1 and 1"),
+        (cg.acos(x), (0.0, 2.0), "there is no value beyond -1 and 1"),
+        (cg.asin(x), (-0.9, 0.9), None),
+        (cg.atan2(y, x), (-1.0, 1.0), "the slope is unbounded where both arguments are 0"),
+        (cg.atan2(y + 2.0, x), (-1.0, 1.0), None),
+        (cg.hypot(x, y), (-1.0, 1.0), "there is no slope where both arguments are 0"),
+        (cg.hypot(x, y + 2.0), (-1.0, 1.0), None),
+        (x**2, (-1.0, 1.0), None),
+        (x**-2, (-1.0, 1.0), "the base can be 0 under a negative power"),
+        (x**-2, (0.1, 1.0), None),
+        (x**0.5, (0.0, 1.0), "the slope is infinite where the base is 0"),
+        (x**1.5, (0.0, 1.0), None),
+        (x**1.5, (-1.0, 1.0), "there is no value at a negative base"),
+    ],
+)
+def test_singular_points_in_a_box_are_found_and_others_are_not(node, box, reason):
+    graph = cg.Graph([x, y], {"f": node})
+    found = lint(graph, box={"x": box, "y": box})
+    assert found.ok is (reason is None)
+    if reason is not None:
+        (finding,) = found.findings
+        assert reason in str(finding)
+        assert finding.nodes == (node,)
+
+
+def test_a_finding_in_a_box_tells_the_arguments_and_the_tags():
+    with cg.tag("link 2"):
+        graph = cg.Graph([x, y], {"f": 1.0 / (x - y)})
+    assert str(lint(graph, box={"x": (-1.0, 2.0)})) == (
+        "%2 = 1 / %1  [link 2]: the divisor can be 0; x - y is within [-inf, inf]."
+    )
+    assert (
+        str(lint(graph, box={"x": (1.0, 2.0), "y": 0.5})) == "Holds: no slope is unbounded in the box, of 2 operations."
+    )
+
+
+@pytest.mark.parametrize(
+    "box", [{"x": (1.0, 0.0)}, {"x": (math.nan, 1.0)}, {"x": (0.0,)}, {"x": "01"}, {"x": None}, {"x": (True, 2)}]
+)
+def test_what_is_no_interval_is_refused(box):
+    with pytest.raises(ValueError, match="box: input 'x' needs"):
+        lint(cg.Graph([x], {"f": x}), box=box)
+    with pytest.raises(cg.GraphError, match="box: the graph has no input y"):
+        lint(cg.Graph([x], {"f": x}), box={"y": (0.0, 1.0)})
+
+
+# A point.
+
+
+@settings(max_examples=1200)
+@given(cases(max_operations=15))
+def test_the_error_bound_holds_at_50_digits(case: Case):
+    """Of inputs moved by half a unit in the last place, one of the points that the bound allows for."""
+    assume(high_precision.kink_distance(case.graph, case.values) > 1e-6)
+    found = rounded(Names(case.graph), case.values)
+    moved = {name: mpmath.mpf(value) * (1 + mpmath.mpf(2) ** -53) for name, value in case.values.items()}
+    exact = high_precision.node_values(case.graph, moved)
+    for node in case.graph.nodes:
+        assert abs(mpmath.mpf(found.values[node]) - exact[node]) <= found.errors[node] * 1.0001 + 1e-300
+
+
+def test_cancellation_is_found_where_it_happens():
+    with cg.tag("sag"):
+        small = 1.0 - cg.cos(x)
+    graph = cg.Graph([x], {"f": small / (x * x) + 3.0})
+    (finding,) = lint(graph, at={"x": 1e-6}).findings
+    assert finding.nodes == (small,)
+    assert str(finding) == ("%2 = 1 - %1  [sag]: 1 - 0.9999999999995 leaves 5e-13; 12 digits are lost here, 3 remain.")
+    better = cg.Graph([x], {"f": 2.0 * (cg.sin(0.5 * x) / x) ** 2 + 3.0})
+    assert lint(better, at={"x": 1e-6}).ok
+    assert lint(graph, at={"x": 1.0}).ok
+    assert lint(graph, at={"x": 1e-6}, digits=13.0).ok
+
+
+def test_what_is_exact_cancels_without_loss():
+    graph = cg.Graph([x], {"f": (cg.constant(3.0) - 3.0) + x, "g": x - x})
+    assert [finding.nodes for finding in lint(graph, at={"x": 0.1}).findings] == [(graph.outputs["g"],)]
+    assert "leaves 0; 16 digits are lost here, 0 remain" in str(lint(graph, at={"x": 0.1}))
+
+
+@pytest.mark.parametrize("digits", [0.0, -1.0, math.nan, "4"])
+def test_digits_must_be_a_positive_number(digits):
+    with pytest.raises(ValueError, match="digits must be a positive number"):
+        lint(cg.Graph([x], {"f": x}), at={"x": 1.0}, digits=digits)
+
+
+def test_deep_graphs_need_no_recursion():
+    node = x
+    for _ in range(5_000):
+        node = cg.sin(node) + y
+    graph = cg.Graph([x, y, z], {"f": node})
+    found = lint(
+        graph, independent=("f", "x"), depends={"f": "x"}, box={"x": (0.0, 1.0)}, at={"x": 0.5, "y": 0.1, "z": 0}
+    )
+    assert [finding.kind for finding in found.findings] == ["dependence"]
+    assert len(str(found.findings[0])) < 10**6

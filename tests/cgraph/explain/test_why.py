@@ -1,0 +1,230 @@
+"""Why an output depends on an input: against every path walked one by one, and derivatives at 50 digits."""
+
+import json
+import math
+
+import pytest
+from hypothesis import assume, given, settings
+
+import cgraph as cg
+import dynamics as dyn
+from cgraph.explain import why, why_not
+from tests import high_precision
+from tests.strategies import Case, cases
+
+x, y, z = cg.variables("x y z")
+TOLERANCE = 1e-9  # relative to the sum of |product| over all paths: partials are taken at rounded arguments
+KINK_DISTANCE = 1e-6
+JUMPS = ("less", "less_equal", "equal", "not_equal")  # of a node and itself: each argument's difference meets a jump
+
+
+def walked(source: cg.Node, sink: cg.Node) -> list[list[cg.Edge]]:
+    """Every path, by walking it: for small graphs only."""
+    if sink is source:
+        return [[]]
+    return [[*path, cg.Edge(arg, sink, slot)] for slot, arg in enumerate(sink.args) for path in walked(source, arg)]
+
+
+def product(graph: cg.Graph, path: list[cg.Edge], values: dict[str, float]) -> float:
+    partials = cg.Graph(graph.inputs, {str(i): edge.partial for i, edge in enumerate(path)} | {"one": 1.0})
+    slopes = partials.evaluate(values)
+    result = 1.0
+    for slope in slopes.values():
+        result = 0.0 if slope == 0.0 or result == 0.0 else result * slope  # behind a zero there may be infinity
+    return result
+
+
+@settings(max_examples=150)
+@given(cases(max_operations=10, max_outputs=1))
+def test_every_path_is_counted_weighed_and_listed_in_order(case: Case):
+    (output,) = case.graph.outputs.values()
+    for node in case.graph.inputs:
+        paths = walked(node, output)
+        assume(len(paths) < 300)
+        found = why(case.graph, "f0", str(node.name), case.values, k=len(paths))
+        assert found.count == len(paths)
+        values = [product(case.graph, path, case.values) for path in paths]
+        heaviest = sorted((abs(value) for value in values if value), reverse=True)
+        assert [abs(path.value) for path in found.paths] == pytest.approx(heaviest, rel=1e-9)
+        assert {path.edges for path in found.paths} == {
+            tuple(path) for path, value in zip(paths, values, strict=True) if value
+        }
+        assert found.weight == pytest.approx(math.fsum(heaviest), rel=1e-9)
+        assert found.derivative == pytest.approx(math.fsum(values), rel=1e-9, abs=1e-12 * (1.0 + found.weight))
+        few = why(case.graph, "f0", str(node.name), case.values, k=2)
+        assert [abs(path.value) for path in few.paths] == pytest.approx(heaviest[:2], rel=1e-9)
+        shortest = why(case.graph, "f0", str(node.name), k=len(paths))
+        assert [len(path.edges) for path in shortest.paths] == sorted(map(len, paths))
+
+
+@settings(max_examples=60)
+@given(cases(max_outputs=1))
+def test_the_derivative_and_the_weight_are_those_at_50_digits(case: Case):
+    assume(high_precision.kink_distance(case.graph, case.values) > KINK_DISTANCE)
+    for name in case.graph.input_names:
+        found = why(case.graph, "f0", name, case.values)
+        size = high_precision.path_size(case.graph, case.values, {name: 1.0})["f0"]
+        slope = float(high_precision.directional(case.graph, case.values, {name: 1.0})["f0"])
+        assert found.derivative == pytest.approx(slope, rel=TOLERANCE, abs=TOLERANCE * (size + 1e-9))
+        if not any(node.op.name in JUMPS and node.args[0] is node.args[1] for node in case.graph.nodes):
+            assert found.weight == pytest.approx(size, rel=TOLERANCE, abs=1e-9)
+
+
+def test_paths_are_told_by_names_and_tags():
+    with cg.tag("spring"):
+        force = cg.named("force", 3.0 * x)
+    graph = cg.Graph([x, y], {"power": force * y + cg.sin(x)})
+    assert str(why(graph, "power", "x", {"x": 0.0, "y": 0.25})) == (
+        "power depends on x along 2 paths.\n"
+        "d power / d x = 1.75, the sum over all of them.\n"
+        "     +1  x -> sin(x) -> power\n"
+        "  +0.75  x -> force -> force * y -> power  [spring]\n"
+        "These are all."
+    )
+    assert str(why(graph, "power", "x", {"x": 0.0, "y": 0.25}, k=1)).endswith("carry 57.1% of the weight of all.")
+
+
+def test_a_square_is_two_paths_and_an_output_may_be_its_input():
+    graph = cg.Graph([x], {"f": x * x, "g": x})
+    assert [path.value for path in why(graph, "f", "x", {"x": 3.0}).paths] == [3.0, 3.0]
+    itself = why(graph, "g", "x", {"x": 3.0})
+    assert (itself.count, itself.derivative, [path.edges for path in itself.paths]) == (1, 1.0, [()])
+
+
+def test_numbers_of_paths_are_exact_however_large():
+    node = x
+    for _ in range(100):
+        node = node + node
+    found = why(cg.Graph([x], {"f": node}), "f", "x", {"x": 1.0}, k=3)
+    assert found.count == 2**100
+    assert found.derivative == found.weight == 2.0**100
+    assert found.share == 3 / 2.0**100
+    assert str(found).startswith("f depends on x along 1.27e+30 paths.")
+    json.dumps(found.to_dict(), allow_nan=False)
+
+
+def test_deep_graphs_need_no_recursion_and_may_have_more_paths_than_a_float_can_tell():
+    node = x
+    for _ in range(10_000):
+        node = node + node
+    found = why(cg.Graph([x], {"f": node}), "f", "x", {"x": 1.0}, k=2)
+    assert found.count == 2**10_000
+    assert found.derivative == math.inf
+    assert found.share is None
+    assert "2e+3010 paths" in str(found)
+    json.dumps(found.to_dict(), allow_nan=False)
+
+
+def test_a_named_node_inside_is_an_input_or_an_output_too():
+    radius = cg.named("radius", cg.hypot(x, y))
+    graph = cg.Graph([x, y], {"f": radius * radius, "g": cg.exp(radius)})
+    assert why(graph, "f", "radius", {"x": 3.0, "y": 4.0}).derivative == 10.0
+    assert why(graph, radius, "x", {"x": 3.0, "y": 4.0}).derivative == pytest.approx(0.6)
+    assert why(graph, "radius", x, {"x": 3.0, "y": 4.0}).derivative == pytest.approx(0.6)
+
+
+def test_the_branch_not_taken_weighs_nothing():
+    graph = cg.Graph([x], {"f": cg.where(x > 0.0, cg.sqrt(x), -x)})
+    for at in (-1.0, 0.0):
+        found = why(graph, "f", "x", {"x": at})
+        assert (found.count, found.derivative, len(found.paths)) == (3, -1.0, 1)
+    with pytest.raises(cg.GraphError, match=r"derivative of %1 = sqrt\(x\) by x is inf here"):
+        why(cg.Graph([x], {"f": cg.sqrt(x)}), "f", "x", {"x": 0.0})
+
+
+def test_of_40_links_the_paths_to_a_torque_are_told_apart():
+    graph = dyn.inverse_dynamics(dyn.planar_arm([1.0] * 40, [1.0] * 40))
+    at = {name: math.sin(3.0 * i) for i, name in enumerate(graph.input_names)}
+    found = why(graph, "tau0", "q2", at)
+    assert found.count > 10**5
+    assert len(found.paths) == 10
+    step = 1e-20j  # complex step, through a graph that has no operation but + - * sin cos
+    env: dict[cg.Node, complex] = {}
+    rules = {
+        "add": lambda a, b: a + b,
+        "sub": lambda a, b: a - b,
+        "mul": lambda a, b: a * b,
+        "neg": lambda a: -a,
+        "sin": lambda a: complex(math.sin(a.real), math.cos(a.real) * a.imag),
+        "cos": lambda a: complex(math.cos(a.real), -math.sin(a.real) * a.imag),
+    }
+    for node in graph.nodes:
+        if node.args:
+            env[node] = rules[node.op.name](*(env[arg] for arg in node.args))
+        else:
+            value = node.value if node.name is None else at[node.name]
+            env[node] = complex(value) + (step if node.name == "q2" else 0.0)
+    assert found.derivative == pytest.approx(env[graph.outputs["tau0"]].imag / step.imag, rel=1e-10)
+
+
+def test_marks_are_nodes_and_edges_of_the_graph():
+    graph = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"))
+    found = why(graph, "tau0", "q2", k=3)
+    assert found.edges <= set(graph.edges)
+    assert found.nodes <= set(graph.nodes)
+    assert {graph.outputs["tau0"], cg.variable("q2")} <= found.nodes
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "words"),
+    [
+        (("h", "x"), cg.GraphError, r"nothing in the graph is called 'h' \(inputs x, y, z; outputs f, g\)"),
+        (("f", "w"), cg.GraphError, "nothing in the graph is called 'w'"),
+        (("f", 3), TypeError, "a node is given by its name or itself, got int: 3"),
+        (("f", cg.variable("strange")), cg.GraphError, "<node variable strange> is not a node of the graph"),
+        (("f", "x", {"x": 1.0}), cg.GraphError, "at: no value for input y, z"),
+        (("f", "x", {"x": math.nan, "y": 0.0, "z": 0.0}), ValueError, "input 'x' must be a finite number, got nan"),
+        (("f", "x", {"x": "1", "y": 0.0, "z": 0.0}), ValueError, "input 'x' must be a finite number, got '1'"),
+        (("f", "x", dict.fromkeys("xyzw", 1.0)), cg.GraphError, "at: the graph has no input w"),
+        (("f", "x", None, -1), ValueError, "k must be a whole number of paths, at least 0, got -1"),
+        (("f", "x", None, 2.0), ValueError, "k must be a whole number"),
+    ],
+)
+def test_wrong_arguments_are_named(arguments, error, words):
+    graph = cg.Graph([x, y, z], {"f": x * y, "g": y + 1.0})
+    with pytest.raises(error, match=words):
+        why(graph, *arguments)
+
+
+def test_a_name_of_two_nodes_is_no_answer():
+    graph = cg.Graph([x], {"f": cg.named("a", cg.sin(x)) + cg.named("a", cg.cos(x))})
+    with pytest.raises(cg.GraphError, match="2 nodes are called 'a'; give the node itself"):
+        why(graph, "f", "a")
+
+
+def test_why_not_tells_how_far_the_input_reaches_and_where_the_two_meet():
+    graph = cg.Graph([x, y, z], {"f": cg.sin(x) * y, "g": cg.cos(y) + 2.0})
+    found = why_not(graph, "g", "x")
+    assert str(found) == (
+        "g does not depend on x.\n"
+        "x reaches 2 other nodes, and of the outputs f.\n"
+        "g is made from y.\n"
+        "The two meet where g does not look: %2 = %1 * y."
+    )
+    assert found.outputs == ("f",)
+    assert found.inputs == ("y",)
+    assert found.meetings == (graph.outputs["f"],)
+    assert found.reached == {x, graph.outputs["f"], graph.outputs["f"].args[0]}
+    assert not found.reached & found.made_from
+    json.dumps(found.to_dict(), allow_nan=False)
+    first = x * y
+    later = cg.Graph([x, y], {"f": first + y + y, "g": y + 0.0})
+    assert why_not(later, "g", "x").meetings == (first,)  # and none of those behind it
+    assert "Nothing uses z." in str(why_not(graph, "f", "z"))
+    assert "x is the output f; no operation uses it." in str(why_not(cg.Graph([x], {"f": x, "g": 1.0}), "g", "x"))
+    with pytest.raises(cg.GraphError, match=r"f depends on x; cg\.why lists the paths"):
+        why_not(graph, "f", "x")
+    assert "f does not depend on z" in str(why(graph, "f", "z", dict.fromkeys("xyz", 1.0)))
+
+
+@settings(max_examples=100)
+@given(cases(max_operations=12))
+def test_exactly_one_of_why_and_why_not_has_an_answer(case: Case):
+    for output, node in case.graph.outputs.items():
+        for name in case.graph.input_names:
+            connected = bool(walked(cg.variable(name), node))
+            assert bool(why(case.graph, output, name, k=0).count) is connected
+            if not connected:
+                found = why_not(case.graph, output, name)
+                assert not found.reached & found.made_from
+                assert all(found.made_from & set(each.args) for each in found.meetings)

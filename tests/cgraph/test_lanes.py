@@ -1,0 +1,279 @@
+"""Functions on vectors: their promise in ulps at every width, and the calls that machine code joins at one point."""
+
+import ctypes
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+import cgraph as cg
+from cgraph.codegen import llvm
+from cgraph.codegen.ir import TOGETHER, batch_ir, libm_functions
+from cgraph.codegen.schedule import Joined, joined_calls, schedule
+from cgraph.node import OPS, apply
+from tests.strategies import cases
+from tests.ulps import exact, same, ulps_apart
+
+binding = pytest.importorskip("llvmlite.binding")
+
+ULPS = 2.0  # what the polynomials promise
+SPECIAL = (0.0, -0.0, 1.0, -1.0, 0.5, 2.0, -3.0, 5e-324, -2.5e-310, 1e300, -1e300, 800.0, math.inf, -math.inf, math.nan)
+EDGES = (1e6, -1e6, np.nextafter(1e6, 2e6), -1e22, 1.7e308, -708.0, 709.0, 709.7, -745.0, 2.0**-1022, 2.0**-1040)
+EDGES += tuple(math.pi / 2 * k for k in (2.0**20 + 1, 2.0**23 + 1, 2.0**26 - 2, 2.0**31 + 5))  # where an angle cancels
+FUNCTIONS = ("sin", "cos", "exp", "log")  # by polynomials
+OPTIONS = ({}, {"fma": False}, {"fast": True})
+
+
+def angles():
+    source = np.random.default_rng(0)
+    spread = np.geomspace(1e-310, 1e6, 1500)
+    uniform = source.uniform(-1e6, 1e6, 3000)
+    small = source.uniform(-10.0, 10.0, 2000)
+    near = np.arange(1.0, 636000.0, 331.0) * (math.pi / 2)  # where the reduction cancels
+    worst = 6381956970095103.0 * 2.0 ** -np.arange(33.0, 60.0)  # digits of a famous neighbour of a multiple of pi/2
+    return np.concatenate([spread, -spread, uniform, small, near, -near, worst, np.pi / 2 * np.arange(-40.0, 41.0)])
+
+
+def exponents():
+    uniform = np.random.default_rng(1).uniform(-708, 709, 3000)
+    return np.concatenate([uniform, np.linspace(-2, 2, 1001), np.geomspace(1e-300, 1, 400)])
+
+
+def positive():
+    near_one = np.concatenate([np.linspace(0.4, 2.5, 3001), 1.0 + np.geomspace(1e-15, 1e-2, 400)])
+    return np.concatenate([np.geomspace(2.3e-308, 1.7e308, 3000), near_one])
+
+
+POINTS = {"sin": angles(), "cos": angles(), "exp": exponents(), "log": positive()}
+
+
+def one(name):
+    x = cg.variable("x")
+    return cg.Graph([x], {"y": apply(OPS[name], x)})
+
+
+def side_by_side(*names, width=1):
+    """Each function of `width` inputs; the result of function f at input k is output f * width + k."""
+    x = cg.variables([f"x{k}" for k in range(width)])
+    return cg.Graph(x, {f"{name} {each.name}": apply(OPS[name], each) for name in names for each in x})
+
+
+def evaluated(name, points):
+    return np.array([one(name).evaluate({"x": float(x)})["y"] for x in points])
+
+
+# Widths and processors: what one machine runs, another machine has to get right, too.
+
+
+PROCESSORS = {  # features switched off -> a register that its code must not name
+    "this": ("", None),
+    "without AVX-512": ("avx512f", "zmm"),
+    "without AVX and fused multiply-add": ("avx", "ymm"),
+}
+
+
+def compiled(graph, lanes, processor, flags="contract"):
+    """A function of X (n_in, N) through `batch_ir` at any width, for this processor or one with less."""
+    llvm.host()
+    features = binding.get_host_cpu_features()
+    off, register = PROCESSORS[processor]
+    if off and not features.get(off):
+        pytest.skip(f"this processor has no {off}")
+    machine = binding.Target.from_default_triple().create_target_machine(
+        cpu=binding.get_host_cpu_name(),
+        features=features.flatten() + (f",-{off}" if off else ""),
+        opt=llvm.LEVEL,
+        jit=True,
+    )
+    llvm.host().compile("", libm_functions(graph))  # finds the functions
+    module = binding.parse_assembly(batch_ir(graph, lanes, flags), binding.create_context())
+    if register:
+        assert register not in machine.emit_assembly(module)
+    engine = binding.create_mcjit_compiler(module, machine)
+    engine.finalize_object()
+    entry = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 2, *[ctypes.c_int64] * 3)(engine.get_function_address("batch"))
+
+    def function(points):
+        count = points.shape[1]
+        columns = -(-count // lanes) * lanes
+        filled = np.ones((len(graph.inputs), columns))
+        filled[:, :count] = points
+        result = np.full((len(graph.outputs), columns), math.nan)
+        entry(filled.ctypes.data, result.ctypes.data, columns, columns, columns)
+        return result[:, :count]
+
+    function.engine = engine  # which owns the code
+    return function
+
+
+@pytest.mark.parametrize("lanes", [2, 4, 8])
+@pytest.mark.parametrize("processor", PROCESSORS)
+def test_a_polynomial_keeps_its_promise_at_any_width(lanes, processor):
+    for flags in ("contract", ""):
+        function = compiled(side_by_side(*FUNCTIONS), lanes, processor, flags)
+        for row, name in enumerate(FUNCTIONS):
+            points = POINTS[name]
+            assert exact(name, points).error_of(function(points[None])[row]) <= ULPS, (name, flags)
+
+
+@pytest.mark.parametrize("lanes", [2, 4, 8])
+@pytest.mark.parametrize("processor", PROCESSORS)
+def test_a_special_number_in_any_lane_of_any_width(lanes, processor):
+    function = compiled(side_by_side(*FUNCTIONS, "tan", "sqrt"), lanes, processor)
+    good = np.linspace(0.1, 0.9, lanes)
+    for lane, special in itertools.product(range(lanes), (*SPECIAL, *EDGES)):
+        points = good.copy()
+        points[lane] = special
+        found = function(points[None])
+        for row, name in enumerate((*FUNCTIONS, "tan", "sqrt")):
+            expected = evaluated(name, points)
+            assert ulps_apart(found[row], expected) <= ULPS, (name, special)
+            assert np.all((np.signbit(found[row]) == np.signbit(expected)) | np.isnan(expected)), (name, special)
+
+
+@pytest.mark.parametrize("lanes", [2, 4, 8])
+def test_all_operations_at_any_width_are_those_of_evaluate(lanes):
+    a, b, c = inputs = cg.variables("a b c")
+    graph = cg.Graph(inputs, {name: apply(op, *(a, b, c)[: op.arity]) for name, op in OPS.items()})
+    points = np.array(list(itertools.product(SPECIAL, SPECIAL, (0.0, 1.5, math.nan)))).T
+    found = compiled(graph, lanes, "this", "")(points)
+    for column, point in enumerate(points.T.tolist()):
+        expected = list(graph.evaluate(dict(zip("abc", point, strict=True))).values())
+        assert ulps_apart(found[:, column], expected) <= ULPS, point
+
+
+# Batches and points, as `compile` makes them.
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+@pytest.mark.parametrize("options", OPTIONS, ids=str)
+def test_a_polynomial_keeps_its_promise_in_a_batch(name, options):
+    found = cg.compile(one(name), "llvm", **options).batch(POINTS[name][None])[0]
+    assert exact(name, POINTS[name]).error_of(found) <= ULPS
+
+
+@pytest.mark.parametrize("names", [("sin",), ("cos",), ("sin", "cos"), ("exp",), ("log",)], ids=str)
+@pytest.mark.parametrize("options", OPTIONS, ids=str)
+def test_a_joined_call_keeps_the_promise(names, options):
+    """With three inputs, one lane of a joined call is left over; strict arithmetic joins nothing."""
+    function = cg.compile(side_by_side(*names, width=3), "llvm", **options)
+    assert ("@lanes" in function.source) == (options != {"fma": False})
+    points = POINTS[names[0]][::4]
+    points = points[: len(points) // 3 * 3]
+    found = np.array([function(row) for row in points.reshape(-1, 3)]).reshape(-1, len(names), 3)
+    for k, name in enumerate(names):
+        assert exact(name, points).error_of(found[:, k].ravel()) <= ULPS
+
+
+@pytest.mark.parametrize("width", [2, 3, 4, 5])
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_a_special_number_in_any_place_of_a_joined_call(name, width):
+    function = cg.compile(side_by_side(name, width=width), "llvm")
+    assert "@lanes" in function.source
+    for place, special in itertools.product(range(width), (*SPECIAL, *EDGES)):
+        points = np.linspace(0.1, 0.9, width)
+        points[place] = special
+        found, expected = function(points), evaluated(name, points)
+        assert ulps_apart(found, expected) <= ULPS, special
+        assert np.all((np.signbit(found) == np.signbit(expected)) | np.isnan(expected)), special
+
+
+def test_sine_and_cosine_share_a_call_and_are_what_they_are_alone():
+    both = cg.compile(side_by_side("sin", "cos"), "llvm").batch(angles()[None])
+    alone = [cg.compile(one(name), "llvm").batch(angles()[None])[0] for name in ("sin", "cos")]
+    assert same(both, np.array(alone))
+
+
+def test_a_point_is_a_batch_of_one_where_calls_are_joined():
+    function = cg.compile(side_by_side("sin", "cos", "exp", width=4), "llvm")
+    points = np.random.default_rng(2).uniform(-9.0, 9.0, (4, 200))
+    assert same(np.array([function(point) for point in points.T]).T, function.batch(points))
+
+
+def test_a_call_with_nothing_to_join_goes_to_the_c_library():
+    function = cg.compile(one("sin"), "llvm")
+    assert "call double @sin" in function.source
+    assert same([function([x])[0] for x in angles()[::50]], evaluated("sin", angles()[::50]))
+
+
+@pytest.mark.parametrize("constant", ["3FF921FB54400000", "3FE62E42FEE00000"])  # of pi / 2, of ln 2
+def test_fast_arithmetic_leaves_the_reduction_of_an_argument_alone(constant):
+    source = cg.compile(side_by_side("sin", "exp"), "llvm", fast=True).batch_source()
+    assert "reassoc" in source
+    assert [line.split()[3] for line in source.splitlines() if constant in line] == ["contract"]
+
+
+# The schedule.
+
+
+def test_calls_are_joined_that_do_not_need_each_other():
+    x, y, z = cg.variables("x y z")
+    first = [cg.sin(x), cg.cos(x), cg.cos(y * z)]
+    second = [cg.sin(first[0] + y), cg.cos(first[2])]
+    graph = cg.Graph([x, y, z], {f"f{k}": node for k, node in enumerate((*first, *second, cg.exp(x), cg.exp(y)))})
+    calls = joined_calls(graph, 4)
+    assert len({id(calls[node]) for node in first}) == 1
+    assert len({id(calls[node]) for node in second}) == 1
+    assert set(calls[first[0]].arguments) == {x, first[2].args[0]}
+    assert len(set(calls.values())) == 3
+    assert {calls[node] for node in graph.nodes if node.op.name == "exp"} == {Joined(("exp",), (x, y))}
+
+
+@pytest.mark.parametrize(("count", "together", "expected"), [(9, 4, [4, 4]), (10, 4, [4, 4, 2]), (3, 8, [3])])
+def test_a_joined_call_has_at_most_so_many_arguments_and_one_left_over_stays_alone(count, together, expected):
+    calls = joined_calls(side_by_side("log", width=count), together)
+    assert [len(call.arguments) for call in dict.fromkeys(calls.values())] == expected
+
+
+def test_one_at_a_time_only_sine_and_cosine_of_one_angle_are_joined():
+    calls = joined_calls(side_by_side("sin", "cos", "exp", width=3), 1)
+    assert {call.names for call in calls.values()} == {("sin", "cos")}
+    assert all(len(call.arguments) == 1 for call in calls.values())
+
+
+def assert_complete_and_in_order(graph, together):
+    calls = joined_calls(graph, together)
+    order = schedule(graph, calls, FUNCTIONS)
+    place = {step: k for k, step in enumerate(order)}
+    assert len(place) == len(order)
+    assert {step for step in order if not isinstance(step, Joined)} == set(graph.nodes)
+    assert {step for step in order if isinstance(step, Joined)} == set(calls.values())
+    for step in order:
+        needed = step.arguments if isinstance(step, Joined) else [calls[step]] if step in calls else step.args
+        assert all(place[each] < place[step] for each in needed)
+
+
+@given(case=cases(max_operations=30))
+@settings(max_examples=80, deadline=None)
+def test_a_schedule_has_every_node_once_and_after_what_it_needs(case):
+    for together in (1, TOGETHER):
+        assert_complete_and_in_order(case.graph, together)
+
+
+def test_a_call_waits_for_the_calls_that_its_arguments_need():
+    x, y, z = cg.variables("x y z")
+    first, then = cg.sin(cg.sin(x)), cg.cos(cg.log(y) + cg.log(z))  # joined; the logarithms are met after `first`
+    graph = cg.Graph([x, y, z], {"a": first, "b": then})
+    calls = joined_calls(graph, TOGETHER)
+    assert calls[first] is calls[then]
+    assert_complete_and_in_order(graph, TOGETHER)
+    expected = graph.evaluate({"x": 0.3, "y": 1.2, "z": 0.7})
+    assert cg.compile(graph, "llvm")([0.3, 1.2, 0.7]) == pytest.approx(list(expected.values()), rel=1e-14)
+
+
+def test_the_argument_that_needs_more_registers_is_computed_first():
+    a, b, c, d, e = cg.variables("a b c d e")
+    wide = (a * b) / (c * d)
+    for graph in (cg.Graph([a, b, c, d, e], {"y": -e + wide}), cg.Graph([a, b, c, d, e], {"y": wide + -e})):
+        order = schedule(graph, {}, ())
+        assert order.index(wide) < order.index(e)
+
+
+def test_a_schedule_of_a_deep_graph_needs_no_recursion_and_no_square_of_its_size():
+    x = node = cg.variable("x")
+    for _ in range(30_000):
+        node = cg.sin(node) * cg.cos(node)
+    graph = cg.Graph([x], {"y": node})
+    assert len(schedule(graph, joined_calls(graph, TOGETHER), FUNCTIONS)) == len(graph.nodes) + 30_000

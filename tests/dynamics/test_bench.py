@@ -1,0 +1,292 @@
+"""The bench: every peer that is installed does every task it offers, and its figures are told as they are."""
+
+from __future__ import annotations
+
+import json
+import time
+from functools import partial
+
+import numpy as np
+import pytest
+
+import dynamics as dyn
+from dynamics.mujoco_io import MujocoTwin
+from dynamics.reports import bench as module
+from dynamics.reports.bench import MODES, PEERS, TASKS, Cell, Crew, Row, bench
+from dynamics.reports.bench_scenes import SCENES, model
+from dynamics.reports.bench_table import digits, machine, tables
+from dynamics.reports.peers import Case, UnavailableError
+from dynamics.reports.peers.case import BATCH, DT, NUDGE, PASSES
+from dynamics.reports.peers.contender import ldl_solve
+from dynamics.reports.worker import Prepared, Refused, Worker
+from viz import cli
+
+ROUNDING = 1e-10  # of a loop: the motion is that much larger than the last bit of the state it is taken from
+
+
+def tree() -> dyn.Mechanism:
+    """A branched mechanism with springs, armature and a slide, in an order that MuJoCo does not keep."""
+    parents = ("world", "a", "a", "b", "b")
+    bodies = [
+        dyn.Body(
+            name,
+            dyn.Joint(
+                "prismatic" if name == "d" else "revolute",
+                axis=(0.0, 1.0, 0.5),
+                position=(0.1, 0.2, -0.3),
+                damping=0.2,
+                stiffness=1.5,
+                rest=0.3,
+                armature=0.05,
+            ),
+            parent,
+            mass=1.2,
+            center=(0.05, 0.02, -0.1),
+            inertia=(0.02, 0.03, 0.025),
+        )
+        for name, parent in zip("abcde", parents, strict=True)
+    ]
+    return dyn.Mechanism(bodies)
+
+
+class Reference:
+    """MuJoCo asked at single states, with steps and loops written out here."""
+
+    def __init__(self, case: Case) -> None:
+        pytest.importorskip("mujoco")
+        self.n, self.twin = case.n, MujocoTwin(case.model)
+        names = [body.name for body in getattr(case.model, "moving", ())] or [f"joint{i + 1}" for i in range(self.n)]
+        self.order = np.array([self.twin.model.joint(name).id for name in names])
+
+    def value(self, task, x):
+        at = np.argsort(self.order)
+        if task != "rk4":
+            blocks = [block[at] for block in np.split(x, 3)]
+            return (self.twin.inverse if task == "inverse" else self.twin.accelerations)(*blocks)[self.order]
+
+        def rate(x):
+            return np.concatenate([x[self.n :], self.value("forward", np.concatenate([x, np.zeros(self.n)]))])
+
+        a = rate(x)
+        b = rate(x + DT / 2 * a)
+        c = rate(x + DT / 2 * b)
+        d = rate(x + DT * c)
+        return x + DT / 6 * (a + 2 * b + 2 * c + d)
+
+    def after_loop(self, task, x):
+        for _ in range(PASSES):
+            x = self.value(task, x) if task == "rk4" else x + NUDGE * np.tile(self.value(task, x), 3)
+        return x
+
+
+def difference(found, expected, start=0.0):
+    return np.abs(found - expected).max() / np.abs(expected - start).max()
+
+
+def prepared(name, case, task, mode):
+    pytest.importorskip(PEERS[name].package)
+    contender = PEERS[name].make(case).prepare(task, mode)
+    return contender, contender.result(contender.run())
+
+
+OFFERED = [
+    pytest.param(name, task, mode, marks=[pytest.mark.slow] if (name, task) == ("jax", "rk4") else [])
+    for name, kind in PEERS.items()
+    for task in TASKS
+    for mode in MODES
+    if (task, mode) in kind.offers
+]
+
+
+@pytest.mark.parametrize(("name", "task", "mode"), OFFERED)
+def test_a_peer_finds_what_mujoco_finds(name, task, mode):
+    case = Case("planar 3", model("planar 3")[0])
+    reference, x = Reference(case), case.point(task)
+    contender, found = prepared(name, case, task, mode)
+    if mode == "batch":
+        points = case.points(task)
+        assert found.shape == (2 * case.n if task == "rk4" else case.n, BATCH)
+        for column in (0, 1, BATCH - 1):
+            start = points[:, column] if task == "rk4" else 0.0
+            assert difference(found[:, column], reference.value(task, points[:, column]), start) < ROUNDING
+    elif mode == "loop":
+        assert difference(found, reference.after_loop(task, x), x) < ROUNDING
+    else:
+        assert difference(found, reference.value(task, x), x if task == "rk4" else 0.0) < ROUNDING
+    assert contender.evaluations == {"call": 1, "loop": PASSES, "batch": BATCH}[mode]
+
+
+@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("name", ["ours", "casadi", "pinocchio", "mujoco"])
+def test_a_peer_knows_springs_armature_slides_and_the_order_of_joints(name, task):
+    case = Case("tree", tree())
+    _, found = prepared(name, case, task, "call")
+    x = case.point(task)
+    assert difference(found, Reference(case).value(task, x), x if task == "rk4" else 0.0) < ROUNDING
+
+
+@pytest.mark.parametrize("name", [name for name in PEERS if name != "torch"])
+def test_a_peer_takes_parameters_and_applied_forces(name):
+    system = dyn.System(
+        lambda q, qd, t, p: 0.5 * p["I"] * qd[0] ** 2 - 0.5 * p["k"] * q[0] ** 2,
+        coordinates=["theta"],
+        parameters={"I": 2.0, "k": 3.0},
+        forces=lambda q, qd, t, p: [p["k"] * qd[0] ** 2],
+        damping=0.5,
+    )
+    case = Case("rotor", system)
+    mode = "batch" if name == "ours-numpy" else "call"
+    if name in ("pinocchio", "mujoco"):
+        with pytest.raises(UnavailableError, match="rigid bodies"):
+            prepared(name, case, "forward", mode)
+        return
+    _, found = prepared(name, case, "forward", mode)
+    q, qd, tau = case.points("forward") if mode == "batch" else case.point("forward")
+    assert np.ravel(found) == pytest.approx(np.ravel((tau + 3.0 * qd**2 - 0.5 * qd - 3.0 * q) / 2.0), rel=1e-12)
+
+
+def test_a_system_that_depends_on_time_is_refused():
+    driven = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 + t * q[0], coordinates=["x"])
+    with pytest.raises(ValueError, match="depends on time"):
+        Case("driven", driven)
+
+
+def test_ldl_solves_what_numpy_solves():
+    rng = np.random.default_rng(0)
+    a = rng.normal(size=(6, 6))
+    a = a @ a.T + np.eye(6)
+    b = rng.normal(size=6)
+    assert np.array(ldl_solve(a, b)) == pytest.approx(np.linalg.solve(a, b), rel=1e-10)
+
+
+def test_a_worker_answers_and_is_timed():
+    worker = Worker(partial(model, "planar 3"), "ours")
+    try:
+        answer = worker.prepare("forward", "call", budget=60.0)
+        assert isinstance(answer, Prepared)
+        assert answer.values.shape == (3,)
+        assert worker.turn("forward", "call") > 0.0
+    finally:
+        worker.end()
+    assert not worker.alive
+
+
+def test_a_worker_that_is_late_is_ended_and_not_asked_for_what_contains_the_same():
+    late: dict[str, str] = {}
+    crew, skipped = Crew(partial(model, "planar 3"), ["ours"], 1e-3, late), {}
+    begin = time.perf_counter()
+    assert crew.prepared("forward", "call", skipped) == {}
+    assert time.perf_counter() - begin < 30.0
+    assert skipped == late == {"ours": "not ready within 0.001 s"}
+    assert not crew.workers["ours"].alive
+    assert Crew(partial(model, "planar 3"), ["ours"], 60.0, late).prepared("rk4", "call", again := {}) == {}
+    assert again == skipped
+
+
+def test_a_worker_that_dies_is_told():
+    worker = Worker(partial(model, "planar 3"), "ours")
+    assert isinstance(worker.prepare("forward", "call", budget=60.0), Prepared)
+    worker._process.kill()
+    with pytest.raises(RuntimeError, match="its process ended with status -"):
+        worker.turn("forward", "call")
+    worker.end()
+
+
+def test_what_a_peer_s_own_code_raises_is_a_reason():
+    worker = Worker(partial(model, "spring_mass"), "mujoco")
+    pytest.importorskip("mujoco")
+    try:
+        assert worker.prepare("forward", "call", 60.0) == Refused("takes rigid bodies, not a Lagrangian")
+    finally:
+        worker.end()
+
+
+@pytest.mark.parametrize(
+    ("choice", "said"),
+    [
+        ({"scenes": ["planar 4"]}, "there is no scene 'planar 4'"),
+        ({"scenes": ["missing.xml"]}, "missing.xml"),
+        ({"tasks": ["statics"]}, "there is no task 'statics'"),
+        ({"modes": ["gpu"]}, "there is no mode 'gpu'"),
+        ({"peers": ["matlab"]}, "there is no peer 'matlab'"),
+        ({"budget": 0.0}, "the budget must be positive, got 0.0 s"),
+    ],
+)
+def test_a_wrong_choice_is_told_before_anything_is_measured(choice, said):
+    with pytest.raises(ValueError, match=said):
+        bench(**choice)
+
+
+def cell(micros, difference=1e-15):
+    return Cell(micros, 0.9 * micros, 1.2 * micros, 0.25, difference, 230)
+
+
+def row(scene, skipped=None, **cells):
+    cells = {name.replace("_", "-"): each for name, each in cells.items()}
+    return Row(scene, "forward", "call", 3, cells, skipped or {})
+
+
+def test_the_fastest_is_marked_and_ratios_are_of_ours():
+    lines = tables([row("planar 3", ours=cell(0.2, 0.0), casadi_gcc=cell(0.1), mujoco=cell(3.0))]).splitlines()
+    (line,) = [line for line in lines if line.startswith("planar 3  0")][:1]
+    assert line.split() == ["planar", "3", "0.200", "0.100", "[0.50]*", "3.00", "[15]"]
+
+
+@pytest.mark.parametrize("bad", [1.1e-8, float("nan"), float("inf")])
+def test_a_peer_that_disagrees_is_flagged_wherever_it_stands(bad):
+    text = tables([row("planar 3", ours=cell(0.2, 0.0), casadi=cell(0.4, bad), mujoco=cell(3.0))])
+    assert "0.400 [2.0]!" in text
+    assert text.split("Largest difference")[1].count("!") == 1
+    assert "!" not in tables([row("planar 3", ours=cell(0.2, 0.0), casadi=cell(0.4, 1e-9))]).split("\n\n", 2)[2]
+
+
+def test_what_was_not_measured_has_its_reason_below():
+    late = {"jax": "not ready within 60 s", "sympy": "not ready within 60 s", "heyoka": "broken"}
+    text = tables([row("arm 7", late, ours=cell(0.4, 0.0)), row("planar 3", ours=cell(0.2, 0.0), jax=cell(5.0))])
+    (line,) = [line for line in text.splitlines() if line.startswith("arm 7     0.400")]
+    assert line.split() == ["arm", "7", "0.400", "*", "-", "a"]
+    assert "a: not ready within 60 s" in text
+    assert "without sympy: not ready within 60 s" in text
+    assert "without heyoka: broken" in text
+
+
+def test_tables_fit_a_terminal_of_120_columns():
+    cells = {name.replace("-", "_"): cell(12345.678) for name in PEERS}
+    text = tables([row(scene, **cells) for scene in SCENES], machine())
+    assert max(map(len, text.splitlines())) <= 120
+    assert all(name in text for name in PEERS)
+    assert text.startswith(machine()[:30])
+
+
+@pytest.mark.parametrize(
+    ("value", "count", "said"),
+    [(0.006244, 3, "0.00624"), (1343.9, 3, "1344"), (2.46, 2, "2.5"), (0.999, 2, "1.00"), (0.0, 2, "0.0")],
+)
+def test_numbers_have_their_digits_and_no_exponent(value, count, said):
+    assert digits(value, count) == said
+
+
+def test_the_bench_sets_ours_beside_its_peers(capsys):
+    pytest.importorskip("mujoco")
+    command = ["bench", "planar 3", "--tasks", "forward", "--modes", "call,batch", "--peers", "mujoco,ours-numpy"]
+    assert cli.main([*command, "--quick", "--json"]) == 0
+    call, batch = json.loads(capsys.readouterr().out)["rows"]
+    assert (call["scene"], call["task"], call["mode"], call["coordinates"]) == ("planar 3", "forward", "call", 3)
+    assert set(call["cells"]) == {"ours", "mujoco"}
+    assert set(batch["cells"]) == {"ours", "ours-numpy"}
+    for one in (*call["cells"].values(), *batch["cells"].values()):
+        assert one["low"] <= one["micros"] <= one["high"]
+        assert one["made"] > 0.0
+        assert one["difference"] <= module.AGREES
+    nodes = len(dyn.forward_dynamics(SCENES["planar 3"]()).nodes)
+    assert call["cells"]["ours"]["size"] == nodes
+
+
+def test_a_run_that_is_interrupted_prints_what_it_has(capsys, monkeypatch):
+    def rows(*_, **__):
+        yield row("planar 3", ours=cell(0.2, 0.0))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "bench", rows)
+    assert cli.main(["bench"]) == 130
+    assert "planar 3  0.200" in capsys.readouterr().out

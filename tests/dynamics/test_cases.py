@@ -1,0 +1,372 @@
+"""The cases of the stability table: equations against a form written by hand, invariants, and solutions."""
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from mpmath import mp
+from pytest import approx, mark, param, raises
+
+from dynamics import cases
+from dynamics.cases import chains, rotation, sensitivity, stiff
+from dynamics.cases.case import Case
+from dynamics.multiprecision import reference
+from dynamics.state_equation import state_equation, state_inputs
+from tests import high_precision
+from tests.dynamics.models import Array
+
+Rate = Callable[[Array, float], Any]  # of the state and t, written without the library
+
+STATES = 4
+ROUNDING = 1e-12  # of the largest term
+LARGE = 200  # states; a larger model is measured in the benchmarks, and its family is tested at a hundred links
+
+
+def spring_pendulum(k: float, c: float) -> Rate:
+    def rate(x: Array, t: float) -> list[float]:
+        s, a, u, w = x
+        return [u, w, (1 + s) * w * w + 9.81 * math.cos(a) - k * s - c * u,
+                -(2 * u * w + 9.81 * math.sin(a)) / (1 + s)]  # fmt: skip
+
+    return rate
+
+
+def van_der_pol(mu: float) -> Rate:
+    return lambda x, t: [x[1], mu**2 * ((1 - x[0] ** 2) * x[1] - x[0])]
+
+
+def robertson(x: Array, t: float) -> list[float]:
+    slow, fast, middle = 0.04 * x[0], 3e7 * x[1] ** 2, 1e4 * x[1] * x[2]
+    return [middle - slow, slow - middle - fast, fast]
+
+
+def bodies(
+    masses: Sequence[float],
+    lengths: Sequence[float],
+    gravity: float = 9.81,
+    center: Sequence[float] | None = None,
+    inertia: Sequence[float] | None = None,
+    armature: float = 0.0,
+) -> Rate:
+    """A planar chain in absolute angles: A_ij = a_ij cos(phi_i - phi_j) with constants a, the textbook's form.
+
+    a_ij is what all bodies from the outer of the two on carry. Rods unless centre and inertia are given.
+    """
+    n = len(masses)
+    with mp.workdps(40):
+        m, length = [mp.mpf(each) for each in masses], [mp.mpf(each) for each in lengths]
+        c = [each / 2 for each in length] if center is None else [mp.mpf(each) for each in center]
+        moment = [a * b * b / 12 for a, b in zip(m, length, strict=True)] if inertia is None else list(inertia)
+        beyond = [mp.fsum(m[i + 1 :]) for i in range(n)]  # the mass that hangs on a body's far end
+        first = [m[i] * c[i] + beyond[i] * length[i] for i in range(n)]
+
+    def a(i: int, j: int) -> mp.mpf:
+        if i == j:
+            return moment[i] + m[i] * c[i] ** 2 + beyond[i] * length[i] ** 2
+        return first[max(i, j)] * length[min(i, j)]
+
+    def rate(x: Array, t: float) -> list[float]:
+        with mp.workdps(40):
+            q, qd = [mp.mpf(each) for each in x[:n]], [mp.mpf(each) for each in x[n:]]
+            phi, omega = [mp.fsum(q[: i + 1]) for i in range(n)], [mp.fsum(qd[: i + 1]) for i in range(n)]
+            matrix, force = mp.matrix(n), mp.matrix(n, 1)
+            for i in range(n):
+                turning = mp.fsum(a(i, j) * mp.sin(phi[i] - phi[j]) * omega[j] ** 2 for j in range(n))
+                force[i] = -turning - gravity * first[i] * mp.sin(phi[i])
+                for j in range(n):
+                    matrix[i, j] = a(i, j) * mp.cos(phi[i] - phi[j])
+                # a rotor on each joint: armature (phi_i - phi_(i-1))'' on body i, and its reaction on the one before
+                matrix[i, i] += armature * (2 if i + 1 < n else 1)
+                if i:
+                    matrix[i, i - 1] -= armature
+                    matrix[i - 1, i] -= armature
+            bend = mp.lu_solve(matrix, force)
+            return [*x[n:], *[float(bend[i] - (bend[i - 1] if i else 0)) for i in range(n)]]
+
+    return rate
+
+
+def kepler(x: Array, t: float) -> list[float]:
+    cube = (x[0] ** 2 + x[1] ** 2) ** 1.5
+    return [x[2], x[3], -x[0] / cube, -x[1] / cube]
+
+
+def euler(w: Array, t: float) -> Array:
+    inertia = np.array(rotation.INERTIA)
+    return np.cross(inertia * w, w) / inertia
+
+
+def pendulum(x: Array, t: float) -> list[float]:
+    return [x[1], -9.81 * math.sin(x[0])]
+
+
+def kapitza(x: Array, t: float) -> list[float]:
+    lift = -0.05 * 150.0**2 * math.cos(150.0 * t)  # the pivot's acceleration upwards
+    return [x[1], -(9.81 + lift) * math.sin(x[0])]
+
+
+PENDULA = (
+    "at the upright",
+    "next to the upright",
+    "angle of 1e+08 rad",
+    "angle of 1e+15 rad",
+    "velocity of 10000 rad/s",
+    "velocity of 1e+08 rad/s",
+    "smallest velocity, hanging",
+)
+BY_HAND: dict[str, Rate] = {
+    **{f"spring pendulum, k = {k:g}": spring_pendulum(k, 0.0) for k in (1e2, 1e4, 1e6, 1e8, 1e10, 1e12)},
+    **{
+        f"damped spring pendulum, k = {k:g}": spring_pendulum(k, 20.0 * math.sqrt(k))
+        for k in (1e2, 1e4, 1e6, 1e8, 1e10, 1e12)
+    },
+    "Van der Pol, mu = 1000": van_der_pol(1e3),
+    "Van der Pol, mu = 1e+06": van_der_pol(1e6),
+    "Robertson, to 1e11": robertson,
+    "Prothero-Robinson, rate 1e+06": lambda x, t: [-1e6 * (x[0] - math.cos(t)) - math.sin(t)],
+    **{
+        f"mass ratio {r:g}": bodies([1.0, r], [1.0, 1.0], center=[1.0, 1.0], inertia=[0.0, 0.0])
+        for r in (1e-12, 1e-8, 1e-4, 1e4, 1e8, 1e12)
+    },
+    **{f"length ratio {r:g}": bodies([1.0, 1.0], [1.0, r]) for r in (1e-6, 1e6)},
+    **{
+        f"mass matrix of condition {4 / s:.0e}": lambda x, t: [x[2], x[3], -4 * (x[0] + x[1]) + x[1], -x[1]]
+        for s in (1e-4, 1e-8, 1e-12)
+    },
+    "massless links with armature": bodies(
+        [0.0, 0.0, 1.0], [0.5, 0.5, 0.5], center=[0.0, 0.0, 0.25], inertia=[0.0, 0.0, 0.02], armature=1e-3
+    ),
+    "100 links": bodies([0.01] * 100, [0.01] * 100),
+    "zero gravity": bodies([1.0, 0.8, 0.7], [1.0, 0.8, 0.7], gravity=0.0),
+    **{f"Kepler, e = {e:g}": kepler for e in (0.9, 0.99, 0.999)},
+    "free body about its middle axis, Euler's equations": euler,
+    "charge in a magnetic field": lambda x, t: [x[2], x[3], 10.0 * x[3], -10.0 * x[2]],
+    "relativistic oscillator": lambda x, t: [x[1], -x[0] * (1 - x[1] ** 2) ** 1.5],
+    "Kapitza's pendulum": kapitza,
+    "damping by a growing mass": lambda x, t: [x[1], -0.5 * x[1] - 4.0 * x[0]],
+    "exponential growth": lambda x, t: [x[0]],
+    "exponential decay": lambda x, t: [-x[0]],
+    **dict.fromkeys(PENDULA, pendulum),
+    "smallest velocity": lambda x, t: [x[1], 0.0],
+}
+BY_TORQUE = {  # Euler angles: tested by the angular momentum they give
+    "free body about its middle axis, Euler angles": (rotation.INERTIA, 0.0),
+    "heavy top": (rotation.HEAVY, rotation.PULL),
+}
+TOO_LARGE = {"1000 links"}  # the same builder as of 100
+
+
+def test_every_case_is_checked_by_hand() -> None:
+    assert set(cases.names()) == {*BY_HAND, *BY_TORQUE, *TOO_LARGE}
+
+
+def around(case: Case, seed: int = 0) -> list[Array]:
+    """The start, and states near it by a part of their sizes."""
+    rng = np.random.default_rng(seed)
+    start, size = np.array(case.start), np.array(case.size or [max(abs(x), 0.3) for x in case.start])
+    return [start, *[start + 0.1 * size * rng.uniform(-1.0, 1.0, len(start)) for _ in range(STATES)]]
+
+
+def values(case: Case, state: Array, t: float) -> dict[str, float]:
+    given = state_inputs(case.build())
+    result = dict(zip(given.states, state.tolist(), strict=True)) | given.parameters | dict.fromkeys(given.applied, 0.0)
+    return result | ({"t": t} if given.timed else {})
+
+
+@mark.parametrize("name", [param(name, marks=mark.slow if name == "100 links" else ()) for name in BY_HAND])
+def test_equations_are_those_written_by_hand(name: str) -> None:
+    case = cases.load(name)
+    graph = state_equation(case.build())
+    lost = condition(name)
+    for row, state in enumerate(around(case)[: 2 if len(case.start) == LARGE else None]):
+        found = np.array(list(graph.evaluate(values(case, state, 0.3 * row)).values()))
+        expected = np.array(BY_HAND[name](state, 0.3 * row))
+        size = terms(name, state, expected)
+        assert np.max(np.abs(found - expected) / size) < ROUNDING * lost, row
+
+
+def test_equations_of_a_chain_are_those_written_by_hand() -> None:
+    """Ten links by the builder of the hundred, which take a while by hand."""
+    case, by_hand = chains.long_chain(10, 1.0), bodies([0.1] * 10, [0.1] * 10)
+    for state in around(case)[:2]:
+        found = np.array(list(state_equation(case.build()).evaluate(values(case, state, 0.0)).values()))
+        expected = np.array(by_hand(state, 0.0))
+        assert np.max(np.abs(found - expected)) < ROUNDING * np.max(np.abs(expected))
+
+
+def condition(name: str) -> float:
+    """How often the rounding of the mass matrix counts."""
+    number = float(re.sub(r".*?([\d.e+-]+)$", r"\1", name)) if name[-1].isdigit() else 1.0
+    if name.startswith("mass matrix of condition"):
+        return number
+    if name.startswith("length ratio"):
+        return max(number, 1.0) ** 2
+    if name.startswith("mass ratio"):
+        return 10.0 * max(number, 1.0)
+    return {"100 links": 100.0}.get(name, 1.0)
+
+
+def terms(name: str, state: Array, expected: Array) -> Array:
+    """The size of the terms that the rates are made of: where they cancel, rounding is relative to them."""
+    size = np.maximum(np.abs(expected), 1e-300)
+    if "spring pendulum" in name:
+        k = float(name.rsplit(" ", 1)[1])
+        size[2] += 9.81 + k * abs(state[0]) + 20.0 * math.sqrt(k) * abs(state[2])
+    if name.startswith(("Van der Pol", "Prothero")):
+        size += float(name.rsplit(" ", 1)[1]) ** 2
+    if name.startswith(("mass ratio", "length ratio")) or name.endswith("links"):
+        size[:] = np.max(np.abs(expected))
+    if name.startswith("mass matrix"):
+        size += 1.0
+    if name == "angle of 1e+15 rad":
+        size += 9.81
+    return size
+
+
+def momentum_rate(inertia: Sequence[float], state: Array, accelerations: Array) -> tuple[Array, Array]:
+    """Angular velocity in the body's axes and its rate, by a complex step along the motion."""
+
+    def omega(q: Any, qd: Any) -> Any:
+        z, x = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
+
+        def about(axis: int, angle: Any) -> Any:
+            c, s = np.cos(angle), np.sin(angle)
+            turn = np.eye(3, dtype=complex)
+            i, j = [(1, 2), (2, 0), (0, 1)][axis]
+            turn[i, i] = turn[j, j] = c
+            turn[i, j], turn[j, i] = -s, s
+            return turn
+
+        spin, tilt = about(2, q[2]).T, about(0, q[1]).T
+        return spin @ (tilt @ (qd[0] * z)) + spin @ (qd[1] * x) + qd[2] * z
+
+    q, qd = state[:3], state[3:]
+    moved = omega(q + 1e-30j * qd, qd + 1e-30j * accelerations)
+    return moved.real, moved.imag / 1e-30
+
+
+@mark.parametrize("name", BY_TORQUE)
+def test_bodies_in_euler_angles_obey_eulers_equations(name: str) -> None:
+    """d/dt L + omega x L = torque, in the body's axes; weight pulls at a point on the third axis."""
+    inertia, pull = np.array(BY_TORQUE[name][0]), BY_TORQUE[name][1]
+    case = cases.load(name)
+    graph = state_equation(case.build())
+    for state in around(case):
+        rates = np.array(list(graph.evaluate(values(case, state, 0.0)).values()))
+        omega, omega_rate = momentum_rate(inertia, state, rates[3:])
+        up = np.array(
+            [math.sin(state[1]) * math.sin(state[2]), math.sin(state[1]) * math.cos(state[2]), math.cos(state[1])]
+        )
+        torque = pull * np.cross([0.0, 0.0, 1.0], -up)
+        size = np.max(np.abs(inertia * omega)) * np.max(np.abs(omega)) + pull
+        assert inertia * omega_rate + np.cross(omega, inertia * omega) == approx(torque, rel=0.0, abs=1e-12 * size)
+
+
+def test_the_free_body_starts_with_its_momentum_along_the_vertical() -> None:
+    state = np.array(cases.load("free body about its middle axis, Euler angles").start)
+    omega, _ = momentum_rate(rotation.INERTIA, state, np.zeros(3))
+    assert omega == approx(np.array(rotation.OMEGA), abs=1e-15)
+    up = np.array(
+        [math.sin(state[1]) * math.sin(state[2]), math.sin(state[1]) * math.cos(state[2]), math.cos(state[1])]
+    )
+    momentum = np.array(rotation.INERTIA) * omega
+    assert momentum / np.linalg.norm(momentum) == approx(up, abs=1e-15)
+
+
+WITH_INVARIANTS = [name for name, case in cases.TABLE.items() if case.invariants and len(case.start) < LARGE]
+
+
+@mark.parametrize("name", WITH_INVARIANTS)
+def test_invariants_do_not_change_along_the_motion(name: str) -> None:
+    """Their derivative along the rates, by differences in fifty digits."""
+    case = cases.load(name)
+    assert case.invariants is not None
+    model = case.build()
+    graph, rates = case.invariants(model), state_equation(model)
+    for state in around(case, seed=1)[:3]:
+        point = values(case, state, 0.0)
+        speed = high_precision.evaluate(rates, point, 80)
+        direction = {key.removesuffix("_dot"): value for key, value in speed.items()}
+        inside = {key: value for key, value in point.items() if key in graph.input_names}
+        change = high_precision.directional(graph, inside, {k: v for k, v in direction.items() if k in inside})
+        size = high_precision.path_size(graph, inside, {k: v for k, v in direction.items() if k in inside})
+        for key in graph.outputs:
+            assert abs(float(change[key])) <= 1e-12 * size[key], key  # constants of both graphs are rounded
+
+
+@mark.parametrize("name", cases.names())
+def test_what_is_watched_can_be_measured(name: str) -> None:
+    case = cases.load(name)
+    invariants = (
+        set(case.invariants(case.build()).outputs) if case.invariants and len(case.start) <= LARGE else {"energy"}
+    )
+    assert case.watch
+    for watch in case.watch:
+        what, *states = watch.quantity.split()
+        assert 0.0 <= watch.bound < 1.0 or watch.quantity == "energy", watch
+        assert watch.scale > 0.0
+        assert watch.why
+        if what == "error":
+            assert case.exact or case.method
+            assert all(int(each) < len(case.start) for each in states)
+        else:
+            assert watch.quantity in invariants
+    given = state_inputs(case.build())
+    assert len(given.states) == len(case.start) == len(case.size or case.start)
+
+
+LIMITS = [name for name, case in cases.TABLE.items() if case.exact is not None and case.method is None]
+CLOSED = [name for name, case in cases.TABLE.items() if case.exact is not None and case.method is not None]
+
+
+@mark.parametrize("name", CLOSED)
+def test_closed_form_is_the_motion_of_the_model(name: str) -> None:
+    """To a time by which the motion has moved; the rest is marked slow. Constants of the graph may be rounded."""
+    compare(cases.load(name), min(cases.load(name).t_end, 1.0))
+
+
+@mark.slow
+@mark.parametrize("name", CLOSED)
+def test_closed_form_is_the_motion_of_the_model_to_the_end(name: str) -> None:
+    compare(cases.load(name), cases.load(name).t_end)
+
+
+def compare(case: Case, t_end: float) -> None:
+    assert case.exact is not None
+    exact = case.exact([t_end])
+    found = reference(case.build(), case.start, [t_end], digits=16, method=case.method or "")
+    rounded = 1e-15 if "mass matrix" not in case.name else 1e-15 * float(case.name.rsplit(" ", 1)[1])
+    growth = case.growth or 1e9
+    assert np.max(np.abs(found.deviation(exact.x)[0]) / np.array(case.sizes())) <= rounded * max(growth, 100.0)
+
+
+MEASURED = [name for name, case in cases.TABLE.items() if case.growth is not None and case.method is not None]
+QUICK = {"next to the upright", "at the upright", "mass matrix of condition 4e+08", "damping by a growing mass"}
+TO_BE_LARGE = 1e-4  # below it errors die out, and how far says nothing about a method
+
+
+@mark.parametrize("name", [param(name, marks=() if name in QUICK else mark.slow) for name in MEASURED])
+def test_growth_is_what_reference_solutions_give(name: str) -> None:
+    case = cases.load(name)
+    assert case.growth is not None
+    assert case.growth == approx(sensitivity.growth(case), rel=0.1, abs=TO_BE_LARGE)
+
+
+def test_the_stiffer_the_spring_the_nearer_the_rigid_rod() -> None:
+    """The distance from the limit falls as 1/k, within the bound of the cases that are watched by it."""
+    distances = []
+    for k in (1e2, 1e4):
+        case = cases.load(f"spring pendulum, k = {k:g}")
+        limit = stiff.rigid([2.0])
+        found = reference(case.build(), case.start, [2.0], digits=12)
+        distances.append(np.max(np.abs(found.x - limit.x)[0, [1, 3]]))
+        assert distances[-1] < 100.0 * 9.81 / k
+    assert distances[1] / distances[0] == approx(1e-2, rel=0.5)
+    assert all(name.startswith("spring pendulum") for name in LIMITS)
+
+
+def test_a_name_that_is_none_is_refused() -> None:
+    with raises(ValueError, match="there is no case 'x'; the cases are"):
+        cases.load("x")

@@ -1,0 +1,93 @@
+"""First-order systems and the state equation: what they give, and what they say about wrong input."""
+
+import numpy as np
+from pytest import approx, mark, raises
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.ode_system import OdeSystem
+from dynamics.state_equation import state_equation, state_inputs
+from tests.dynamics.models import MODELS, at, inputs, states
+
+
+def lotka_volterra() -> OdeSystem:
+    return OdeSystem(lambda x, t, p: [p["a"] * x[0] - x[0] * x[1], x[0] * x[1] - x[1]], ["hares", "lynxes"], {"a": 1.5})
+
+
+def test_graph_has_the_states_as_inputs_and_their_rates_as_outputs() -> None:
+    graph = lotka_volterra().graph
+    graph.check()
+    assert graph.input_names == ("hares", "lynxes", "a")
+    assert list(graph.outputs) == ["hares_dot", "lynxes_dot"]
+    assert graph.evaluate({"hares": 2.0, "lynxes": 0.5, "a": 1.5}) == {"hares_dot": 2.0, "lynxes_dot": 0.5}
+
+
+def test_time_is_an_input_when_a_rate_depends_on_it() -> None:
+    driven = OdeSystem(lambda x, t: [cg.cos(t), 1.0], "x y")
+    assert driven.graph.input_names == ("x", "y", "t")
+    assert driven.graph.evaluate({"x": 0.0, "y": 0.0, "t": 0.0}) == {"x_dot": 1.0, "y_dot": 1.0}
+    assert state_inputs(driven).timed
+    assert not state_inputs(lotka_volterra()).timed
+
+
+def test_a_rate_may_be_a_number_or_come_from_arrays() -> None:
+    matrix = np.array([[0.0, 1.0], [-4.0, 0.0]])
+    linear = OdeSystem(lambda x, t: matrix @ np.array(x), "x v")
+    assert linear.graph.evaluate({"x": 1.0, "v": 3.0}) == {"x_dot": 3.0, "v_dot": -4.0}
+
+
+def test_its_state_equation_is_its_own() -> None:
+    system = lotka_volterra()
+    assert state_equation(system) is system.graph
+    assert state_inputs(system) == (("hares", "lynxes"), (), False, {"a": 1.5})
+
+
+@mark.parametrize("name", MODELS)
+def test_state_equation_of_a_mechanical_model_is_velocities_and_accelerations(name: str) -> None:
+    model = MODELS[name]()
+    graph, accelerations = state_equation(model), dyn.forward_dynamics(model)
+    given = state_inputs(model)
+    n = len(given.applied)
+    assert list(graph.outputs) == [f"{each}_dot" for each in given.states]
+    assert graph.input_names == accelerations.input_names
+    assert graph.input_names == (*given.states, *given.applied, *(["t"] if given.timed else []), *given.parameters)
+    values = inputs(graph, at(states(model, 1), 0))
+    rates = graph.evaluate(values)
+    assert [rates[f"q{i}_dot"] for i in range(n)] == [values[f"qd{i}"] for i in range(n)]
+    assert [rates[f"qd{i}_dot"] for i in range(n)] == list(accelerations.evaluate(values).values())
+
+
+def test_a_second_order_system_is_the_same_either_way() -> None:
+    pendulum = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 + 9.81 * cg.cos(q[0]), ["angle"], damping=0.3)
+    spelled = OdeSystem(lambda x, t: [x[1], -9.81 * cg.sin(x[0]) - 0.3 * x[1]], "q0 qd0")
+    point = {"q0": 0.7, "qd0": -1.2}
+    one = state_equation(pendulum).evaluate({**point, "tau0": 0.0})
+    assert list(spelled.graph.evaluate(point).values()) == approx(list(one.values()), rel=1e-15)
+
+
+@mark.parametrize(
+    ("rate", "names", "parameters", "error", "words"),
+    [
+        (lambda x, t: [x[0]], "x y", {}, ValueError, "must give 2 values, one for each state, got 1"),
+        (lambda x, t: x[0], "x", {}, TypeError, "rate must give a sequence"),
+        (lambda x, t: ["1"], "x", {}, TypeError, "rate must give nodes or numbers"),
+        (lambda x, t: [float("nan")], "x", {}, ValueError, "rate must give nodes or numbers"),
+        (lambda x: [x[0]], "x", {}, TypeError, r"must take \(x, t\) or \(x, t, p\)"),
+        (None, "x", {}, TypeError, "must be a function"),
+        (lambda x, t: [cg.variable("z")], "x", {}, ValueError, "'z', which is no state"),
+        (lambda x, t: [x[0]], "", {}, ValueError, "at least one state"),
+        (lambda x, t: [x[0]], [1], {}, TypeError, "non-empty string, got 1"),
+        (lambda x, t: [x[0]], "x x", {}, ValueError, "must differ"),
+        (lambda x, t: [x[0]], "t", {}, ValueError, "name of time"),
+        (lambda x, t, p: [x[0]], "x", {"x": 1.0}, ValueError, "both a state and a parameter"),
+        (lambda x, t, p: [x[0]], "x", {"k": "1"}, ValueError, "parameter 'k' must be a finite number"),
+    ],
+)
+def test_wrong_input_is_named(rate: object, names: object, parameters: dict, error: type, words: str) -> None:
+    with raises(error, match=words):
+        OdeSystem(rate, names, parameters)  # type: ignore[arg-type]
+
+
+def test_what_is_no_model_has_no_state_equation() -> None:
+    with raises(TypeError, match="expected a System"):
+        state_equation(3)

@@ -1,0 +1,129 @@
+"""Rates among the nodes of a Lagrangian: which are found, that they are rates, and that the bias is what it was."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import cgraph as cg
+import dynamics as dyn
+from cgraph.fold import Builder, folded
+from cgraph.order import topological
+from dynamics.equations import bias
+from dynamics.rates import rates
+from tests import high_precision
+
+N = 3
+q, qd, qdd = ([cg.variable(f"{name}{i}") for i in range(N)] for name in ("q", "qd", "qdd"))
+t, k = cg.variables("t k")
+angle, omega = q[0] + q[1], qd[0] + qd[1]
+swing = k * cg.cos(q[0]) * qd[0] + 0.7 * cg.cos(angle) * omega
+
+RATES = {
+    "velocity": qd[1],
+    "sum": omega,
+    "difference": qd[0] - 2.0 * qd[2],
+    "negative": -omega,
+    "times a constant": 2.0 * omega,
+    "times a parameter": k * qd[0],
+    "divided by a parameter": omega / (1.0 + k * k),
+    "a function of its own position": cg.exp(q[0]) * cg.sin(q[0]) * qd[0],
+    "divided by a function of its own position": qd[0] / (2.0 + cg.sin(q[0])),
+    "a function of a sum": cg.cos(angle) * omega,
+    "a function of a multiple": cg.cos(angle) * (k * omega),
+    "a function of a function": cg.sin(cg.exp(angle)) * (cg.cos(angle) * omega),
+    "the tip of two links": swing,
+    "and of a third": swing + (angle + q[2]) * (angle + q[2]) * (omega + qd[2]),
+}
+OTHERS = {
+    "a function of another position": cg.cos(q[1]) * qd[0],
+    "a function of one of two": cg.cos(q[0]) * omega,
+    "a function of two": cg.cos(q[0]) * cg.cos(angle) * omega,
+    "a function of time": cg.cos(t) * qd[0],
+    "a function of its position and of time": cg.cos(q[0] + t) * qd[0],
+    "a square": omega * omega,
+    "a function of a velocity": cg.sin(qd[0]),
+    "a product with a sum of rates": cg.cos(q[0]) * swing,
+    "one over a rate": 1.0 / omega,
+}
+
+
+def found(node: cg.Node) -> tuple[cg.Node, list[cg.Node]]:
+    """The node, folded, and the rates that it is made from."""
+    build = Builder()
+    (copy,) = folded([node], build)
+    return copy, rates(copy, q, qd, t, build)
+
+
+def euler_lagrange(node: cg.Node) -> list[float]:
+    """d/dt dz/dqd - dz/dq in 50 digits, at a state with accelerations, by the literal chain rule."""
+    system = dyn.System(lambda *_: node, list("abc"), {"k": 1.3})
+    graph = dyn.inverse_dynamics(system, "chain_rule_literal", simplify=False)
+    rng = np.random.default_rng(5)
+    values = {
+        name: float(x) for name, x in zip(graph.input_names, rng.uniform(0.3, 1.0, len(graph.inputs)), strict=True)
+    }
+    return [abs(float(x)) for x in high_precision.evaluate(graph, values).values()]
+
+
+@pytest.mark.parametrize("name", RATES)
+def test_a_rate_is_found_and_lagrange_s_equation_makes_nothing_of_it(name):
+    node, velocities = found(RATES[name])
+    assert velocities == [node]
+    assert max(euler_lagrange(RATES[name])) < 1e-45
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_what_is_no_rate_is_not_taken_for_one(name):
+    node, velocities = found(OTHERS[name])
+    assert node not in velocities
+    assert max(euler_lagrange(OTHERS[name])) > 1e-3
+
+
+def test_every_node_that_is_taken_for_a_rate_is_one():
+    node, velocities = found(
+        sum([a * b for a in RATES.values() for b in (*RATES.values(), *OTHERS.values())], cg.constant(0.0))
+    )
+    assert len(velocities) >= len(RATES)
+    for each in velocities:
+        assert max(euler_lagrange(each)) < 1e-45
+    assert set(velocities) < set(topological([node]))
+
+
+LAGRANGIANS = {
+    "products of rates": lambda: swing * swing + omega * qd[2] * cg.cos(q[2]) + qd[2] * qd[2],
+    "a rate alone": lambda: swing,
+    "a velocity alone": lambda: qd[0],
+    "no velocity": lambda: cg.cos(q[0]) * q[1],
+    "rates and others": lambda: (
+        swing * swing * cg.cos(q[1]) + OTHERS["a function of one of two"] * swing + qd[2] * qd[2]
+    ),
+    "a rate within a rate and without": lambda: omega * omega + swing * omega + (swing + omega) * (swing + omega),
+    "explicit time": lambda: (
+        (swing + cg.sin(t)) * (swing * cg.cos(t)) + OTHERS["a function of its position and of time"]
+    ),
+    "not quadratic": lambda: cg.exp(swing) + cg.sqrt(1.0 + omega * omega) * cg.cos(angle),
+    "all": lambda: sum([a * a for a in (*RATES.values(), *OTHERS.values())], cg.constant(0.0)),
+}
+
+
+@pytest.mark.parametrize("name", LAGRANGIANS)
+def test_the_bias_is_what_the_chain_rule_gives_without_accelerations(name):
+    system = dyn.System(lambda *_: LAGRANGIANS[name](), list("abc"), {"k": 1.3})
+    expected = dyn.inverse_dynamics(system, "chain_rule", simplify=False)
+    graph = bias(system)
+    rng = np.random.default_rng(1)
+    for _ in range(3):
+        values = {str(node.name): float(rng.uniform(0.3, 1.0)) for node in expected.inputs}
+        values |= dict.fromkeys([str(node.name) for node in qdd], 0.0)
+        truth = high_precision.evaluate(expected, values)
+        result = high_precision.evaluate(graph, {each: values[each] for each in graph.input_names})
+        scale = 1.0 + max(abs(x) for x in truth.values())
+        for a, b in zip(truth.values(), result.values(), strict=True):
+            assert abs(a - b) < 1e-14 * scale  # constants are folded in floats
+
+
+def test_a_chain_s_bias_needs_fewer_nodes_than_its_inverse_dynamics_at_rest():
+    arm = dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7])
+    by_chain_rule = cg.specialize(dyn.inverse_dynamics(arm), {"qdd0": 0.0, "qdd1": 0.0, "qdd2": 0.0})
+    assert len(bias(arm).nodes) < 0.8 * len(by_chain_rule.nodes)

@@ -1,0 +1,208 @@
+"""Structure that changes: joints locked and freed, bodies hung on and taken off, and what carries over."""
+
+import math
+
+import numpy as np
+from pytest import approx, mark, raises
+
+import dynamics as dyn
+from cgraph.structure_hash import structure_hash
+from dynamics.body import WORLD
+from tests.dynamics.mechanisms import random_mechanism
+
+TOOL = dyn.Body("tool", dyn.Joint("fixed", position=(0.1, 0.0, -0.2)), mass=0.4, center=(0.0, 0.05, 0.0),
+                inertia=(2e-3, 3e-3, 4e-3))  # fmt: skip
+
+
+def arm(n: int, seed: int = 0) -> dyn.Mechanism:
+    generator = np.random.default_rng(seed)
+    links = []
+    for i in range(n):
+        mixed = generator.normal(size=(3, 3))
+        second = 0.05 * mixed @ mixed.T + 0.01 * np.eye(3)
+        joint = dyn.Joint("revolute", generator.normal(size=3), (0.1, 0.0, 0.3) if i else (0.0, 0.0, 0.0), damping=0.1)
+        links.append({"joint": joint, "mass": 1.0 + 0.1 * i, "center": 0.1 * generator.normal(size=3),
+                      "inertia": np.trace(second) * np.eye(3) - second})  # fmt: skip
+    return dyn.serial_arm(links)
+
+
+def torque(mechanism: dyn.Mechanism, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
+    graph = dyn.inverse_dynamics(mechanism)
+    values = dict(zip(graph.input_names, [*q, *qd, *qdd], strict=True))
+    return np.array(list(graph.evaluate(values).values()))
+
+
+@mark.parametrize("joint", [0, 2, 4])
+def test_a_locked_joint_is_the_limit_of_one_held_by_force(joint: int) -> None:
+    """The torques of the others are those of the free arm with the joint at rest where it is locked."""
+    free = arm(5)
+    q, qd, qdd = np.random.default_rng(1).normal(size=(3, 5))
+    qd[joint] = qdd[joint] = 0.0
+    others = [i for i in range(5) if i != joint]
+    held = free.lock(f"link {joint + 1}", at=float(q[joint]))
+    assert [body.name for body in held.moving] == [f"link {i + 1}" for i in others]
+    assert torque(held, q[others], qd[others], qdd[others]) == approx(torque(free, q, qd, qdd)[others], rel=1e-11)
+
+
+def test_a_locked_slide_stands_where_it_was() -> None:
+    rail = dyn.Body("rail", dyn.Joint("prismatic", (1.0, 1.0, 0.0), orientation=np.diag([1.0, -1.0, -1.0])), mass=1.0)
+    swing = dyn.Body("swing", dyn.Joint("revolute", (0.0, 1.0, 0.0)), "rail", 0.5, (0.0, 0.0, -0.3), (0.01, 0.01, 0.01))
+    free = dyn.Mechanism([rail, swing])
+    held = free.lock("rail", 0.7)
+    at = free.position("swing", (0.1, 0.2, 0.3)).evaluate({"q0": 0.7, "q1": 0.4})
+    assert held.position("swing", (0.1, 0.2, 0.3)).evaluate({"q0": 0.4}) == approx(at, abs=1e-14)
+
+
+def test_a_locked_last_joint_leaves_no_more_nodes_than_a_shorter_arm_has() -> None:
+    """Of ten links: the nine-link arm whose last body is the two welded by hand."""
+    ten = arm(10)
+    held = ten.lock("link 10", at=0.3)
+    merged = list(ten.bodies[:9])
+    tip = ten.bodies[9]
+    assert len(held.moving) == 9
+    welded = dyn.Joint("fixed", position=tip.joint.position,
+                       orientation=_turn(np.asarray(tip.joint.axis) / np.linalg.norm(tip.joint.axis), 0.3))  # fmt: skip
+    by_hand = dyn.Mechanism([*merged, dyn.Body("link 10", welded, "link 9", tip.mass, tip.center, tip.inertia)])
+    for make in (dyn.inverse_dynamics, dyn.forward_dynamics):
+        assert len(make(held).nodes) <= 1.02 * len(make(by_hand).nodes)
+        assert len(make(held).nodes) < len(make(ten).nodes)
+    middle = dyn.inverse_dynamics(ten.lock("link 5", at=-0.4))
+    assert len(middle.nodes) <= 1.02 * len(dyn.inverse_dynamics(arm(9)).nodes)
+
+
+def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
+    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+
+
+def test_unlock_gives_the_free_mechanism_back() -> None:
+    free = arm(4)
+    again = free.lock("link 2", 0.4).lock("link 3", 0.1).unlock("link 2").unlock("link 3")
+    assert structure_hash(dyn.inverse_dynamics(again)) == structure_hash(dyn.inverse_dynamics(free))
+
+
+@mark.parametrize("seed", range(6))
+def test_detach_then_attach_gives_the_same_graph(seed: int) -> None:
+    whole = random_mechanism(9, ("revolute", "prismatic"), 3, seed)
+    rng = np.random.default_rng(seed)
+    for _ in range(3):
+        name = whole.bodies[int(rng.integers(1, len(whole.bodies)))].name
+        try:
+            without = whole.detach(name)
+            assert without.moving
+        except (dyn.MechanismError, AssertionError):
+            continue  # what is left would move no mass
+        again = without.attach(whole.subtree(name))
+        assert [body.name for body in again.bodies] == [body.name for body in whole.bodies]
+        for make in (dyn.inverse_dynamics, dyn.mass_matrix):
+            assert structure_hash(make(again)) == structure_hash(make(whole))
+
+
+def test_untouched_partial_lagrangians_are_shared() -> None:
+    old = arm(6)
+    before = old.system.partial_lagrangians
+    for new in (old.attach(TOOL, to="link 6"), old.detach("link 5"), old.lock("link 6", 0.2)):
+        after = new.system.partial_lagrangians
+        shared = [a is b for a, b in zip(before, after, strict=False)]
+        assert sum(shared) >= 4
+        assert all(shared[:4])
+    other = arm(6)
+    assert not any(a is b for a, b in zip(before, other.system.partial_lagrangians, strict=True))
+
+
+def test_a_tool_in_hand_weighs() -> None:
+    bare = arm(3)
+    holding = bare.attach(TOOL, to="link 3")
+    q, qd, qdd = np.random.default_rng(3).normal(size=(3, 3))
+    tool = dyn.Body("tool", TOOL.joint, "link 3", TOOL.mass, TOOL.center, TOOL.inertia)
+    by_hand = dyn.Mechanism([*bare.bodies, tool])
+    assert torque(holding, q, qd, qdd) == approx(torque(by_hand, q, qd, qdd), rel=1e-13)
+    assert np.abs(torque(holding, q, qd, qdd) - torque(bare, q, qd, qdd)).max() > 0.1
+    assert structure_hash(dyn.inverse_dynamics(holding.detach("tool"))) == structure_hash(dyn.inverse_dynamics(bare))
+
+
+def test_a_subtree_can_hang_elsewhere() -> None:
+    whole = arm(6)
+    moved = whole.detach("link 4").attach(whole.subtree("link 4"), to="link 1")
+    assert [(body.name, body.parent) for body in moved.moving][-3:] == [
+        ("link 4", "link 1"), ("link 5", "link 4"), ("link 6", "link 5")]  # fmt: skip
+
+
+def test_forces_parameters_and_locks_go_with_their_bodies() -> None:
+    push = dyn.Force("link 3", ("push", 0.0, 0.0))
+    pull = dyn.Force("link 1", (0.0, "pull", 0.0))
+    links = arm(3)
+    whole = dyn.Mechanism(links.bodies, forces=[push, pull], parameters={"push": 2.0, "pull": 3.0}).lock("link 3", 0.1)
+    without = whole.detach("link 3")
+    assert (dict(without.parameters), without.forces, dict(without.locked)) == ({"pull": 3.0}, (pull,), {})
+    again = without.attach(whole.subtree("link 3"))
+    assert (dict(again.parameters), set(again.forces)) == ({"push": 2.0, "pull": 3.0}, {push, pull})
+    assert dict(again.locked) == {"link 3": 0.1}
+
+
+def test_the_state_of_untouched_joints_carries_over() -> None:
+    old = arm(4)
+    q, qd = np.array([0.1, 0.2, 0.3, 0.4]), np.array([1.0, 2.0, 3.0, 4.0])
+    held = old.lock("link 2", at=0.2)
+    q_held, qd_held = held.state_of(old, q, qd)
+    assert (q_held.tolist(), qd_held.tolist()) == ([0.1, 0.3, 0.4], [1.0, 3.0, 4.0])
+    q_free, qd_free = held.unlock("link 2").state_of(held, q_held, qd_held)
+    assert (q_free.tolist(), qd_free.tolist()) == ([0.1, 0.2, 0.3, 0.4], [1.0, 0.0, 3.0, 4.0])
+    with raises(ValueError, match=r"qd must have shape \(4,\)"):
+        held.state_of(old, q, [0.0])
+
+
+@mark.parametrize("seed", range(8))
+def test_torques_body_by_body_are_those_of_the_graph(seed: int) -> None:
+    mechanism = random_mechanism(3 + 2 * seed, ("revolute", "prismatic"), 3, seed)
+    n = len(mechanism.moving)
+    run = dyn.RecursiveInverseDynamics(mechanism)
+    for state in np.random.default_rng(seed).normal(size=(5, 3, n)):
+        expected = torque(mechanism, *state)
+        assert run(*state) == approx(expected, abs=1e-12 * max(1.0, np.abs(expected).max()))
+
+
+def test_torques_body_by_body_of_a_pendulum_are_the_closed_form() -> None:
+    mass, length, inertia, damping = 1.3, 0.7, 0.02, 0.3
+    joint = dyn.Joint("revolute", (0.0, 1.0, 0.0), damping=damping, stiffness=2.0, rest=0.1, armature=0.05)
+    bob = dyn.Body("bob", joint, mass=mass, center=(0.0, 0.0, -length), inertia=(inertia, inertia, inertia))
+    run = dyn.RecursiveInverseDynamics(dyn.Mechanism([bob]))
+    q, qd, qdd = 0.4, 1.1, -0.6
+    expected = (mass * length**2 + inertia + 0.05) * qdd + damping * qd + 2.0 * (q - 0.1)
+    expected += mass * 9.81 * length * math.sin(q)
+    assert run([q], [qd], [qdd])[0] == approx(expected, rel=1e-14)
+
+
+@mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda m: m.lock("nobody"), "there is no body 'nobody' to lock"),
+        (lambda m: m.attach(TOOL, to="link 3").lock("tool"), "body 'tool' is welded on and has no joint to lock"),
+        (lambda m: m.lock("link 1", math.nan), "locked at a finite number, got nan"),
+        (lambda m: m.unlock("link 1"), "the joint of body 'link 1' is not locked"),
+        (lambda m: m.detach("nobody"), "there is no body 'nobody' in the mechanism"),
+        (lambda m: m.subtree("nobody"), "there is no body 'nobody' in the mechanism"),
+        (lambda m: m.attach(TOOL, to="nobody"), "body 'tool' has the unknown parent 'nobody'"),
+        (lambda m: m.attach(m.bodies[0], to="link 3"), "two bodies have the name 'link 1'"),
+        (lambda m: m.attach([], to="link 3"), r"a subtree is a body, or several .* got \[\]"),
+        (lambda m: m.attach(3.0), "a subtree is a body, or several .* got 3.0"),
+    ],
+)
+def test_a_change_that_cannot_be_is_refused(change, message) -> None:  # type: ignore[no-untyped-def]
+    with raises(dyn.MechanismError, match=message):
+        change(arm(3))
+
+
+def test_wrong_use_of_torques_body_by_body() -> None:
+    run = dyn.RecursiveInverseDynamics(arm(3))
+    with raises(ValueError, match=r"qd must have shape \(3,\), one for each coordinate, got \(2,\)"):
+        run([0.0] * 3, [0.0] * 2, [0.0] * 3)
+    with raises(ValueError, match="does not take external forces"):
+        dyn.RecursiveInverseDynamics(dyn.Mechanism(arm(2).bodies, forces=[dyn.Force("link 1", (1.0, 0.0, 0.0))]))
+
+
+def test_a_mechanism_is_not_changed_by_its_changes() -> None:
+    old = arm(3)
+    first = structure_hash(dyn.inverse_dynamics(old))
+    old.lock("link 1").attach(TOOL, to=WORLD).detach("link 3")
+    assert structure_hash(dyn.inverse_dynamics(old)) == first

@@ -1,0 +1,112 @@
+"""Documents: headings, words, tables and pictures, as one HTML page or as Markdown beside picture files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from . import html
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """Words.  point: the one thing to see in a section, set apart."""
+
+    text: str
+    point: bool = False
+
+
+@dataclass(frozen=True)
+class Table:
+    """Texts in rows; the first column is read to the left, the others to the right.  folded: shown when asked for."""
+
+    caption: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    folded: bool = False
+
+
+@dataclass(frozen=True)
+class Picture:
+    """SVG whose ink takes the page's colours, see `plot.to_adaptive_svg`.  name: of its file, without suffix."""
+
+    name: str
+    svg: str
+    caption: str
+
+
+Block = Paragraph | Table | Picture
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a document.  anchor: where links lead."""
+
+    anchor: str
+    heading: str
+    blocks: Sequence[Block]
+
+
+@dataclass(frozen=True)
+class Document:
+    """A title, what comes before the first heading, and sections."""
+
+    title: str
+    introduction: Sequence[Block]
+    sections: Sequence[Section] = field(default_factory=tuple)
+
+    def pictures(self) -> list[Picture]:
+        """All pictures, in order."""
+        blocks = [*self.introduction, *(block for section in self.sections for block in section.blocks)]
+        return [block for block in blocks if isinstance(block, Picture)]
+
+
+def to_html(document: Document) -> str:
+    """The document as a page that needs no other file."""
+    sections = [(each.anchor, each.heading, _html(each.blocks)) for each in document.sections]
+    return html.page(document.title, _html(document.introduction), sections)
+
+
+def _html(blocks: Sequence[Block]) -> str:
+    parts = []
+    for block in blocks:
+        match block:
+            case Paragraph(text, point):
+                parts.append(html.point(text) if point else html.paragraph(text))
+            case Table(caption, header, rows, folded):
+                table = html.table(caption, header, rows)
+                parts.append(html.folded(caption, table) if folded else table)
+            case Picture(_, svg, caption):
+                parts.append(html.figure(svg, caption, adapts=True))
+    return "\n".join(parts)
+
+
+def to_markdown(document: Document, folder: str = "") -> str:
+    """The document as Markdown.  folder: where its pictures are, `<name>.svg` each, relative to the text."""
+    lines = [f"# {document.title}", "", *_markdown(document.introduction, folder)]
+    for section in document.sections:
+        lines += [f"## {section.heading}", "", *_markdown(section.blocks, folder)]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _markdown(blocks: Sequence[Block], folder: str) -> list[str]:
+    lines: list[str] = []
+    for block in blocks:
+        match block:
+            case Paragraph(text, point):
+                lines += [f"> {text}" if point else text, ""]
+            case Table(caption, header, rows, _):
+                lines += [
+                    f"**{caption}**",
+                    "",
+                    _row(header),
+                    "|" + "|".join([":--", *["--:"] * (len(header) - 1)]) + "|",
+                ]
+                lines += [*map(_row, rows), ""]
+            case Picture(name, _, caption):
+                lines += [f"![{caption}]({folder}{name}.svg)", ""]
+    return lines
+
+
+def _row(cells: Sequence[str]) -> str:
+    return "| " + " | ".join([cell.replace("|", "\\|") for cell in cells]) + " |"

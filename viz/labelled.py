@@ -1,0 +1,196 @@
+"""Log-log plots whose curves carry their names at their ends: no legend, and colours that need not tell them apart."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from . import theme
+from .plot import Array as Points, _figure, _style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLOURS = (theme.BLUE, theme.ORANGE, theme.GREEN, theme.PURPLE, theme.SKY_BLUE)  # seen on white and on black
+GRID = {"color": "#808080", "alpha": 0.25, "linewidth": 0.6}
+LABEL = 8.0  # points
+APART = 1.1  # of a label's height, from one to the next
+GAP = 6.0  # points between the end of a curve and its label
+LETTER = 0.58  # of a label's size, the width of a letter
+REACH = 14  # half heights that a label may be moved up or down
+ROOM = 0.2  # of the axis, for the names
+
+
+@dataclass(frozen=True)
+class Line:
+    """A curve.  colour: a number, the same for what belongs together; None: a thin guide in the colour of the text."""
+
+    name: str
+    x: Sequence[float]
+    y: Sequence[float]
+    colour: int | None = 0
+    dashed: bool = False
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Curves under a title."""
+
+    title: str
+    lines: Sequence[Line]
+
+
+def labelled(
+    panels: Sequence[Panel], x: Sequence[str], y: Sequence[str], *, columns: int = 2, shared: bool = True
+) -> Figure:
+    """Panels with logarithmic axes, x from large on the left to small on the right.
+
+    x, y: the axes' names, one for each panel.  shared: all panels have the same scales.
+    """
+    with _style():
+        rows = -(-len(panels) // columns)
+        figure = _figure(10.0, 4.4 * rows)
+        axes = figure.subplots(rows, columns, sharex=shared, sharey=shared, squeeze=False)
+        for axis in axes.flat[len(panels) :]:
+            axis.set_axis_off()
+        for number, (axis, panel) in enumerate(zip(axes.flat, panels, strict=False)):
+            axis.set_xscale("log")
+            axis.set_yscale("log")
+            for each in panel.lines:
+                _draw(axis, each)
+            axis.set_title(panel.title, fontsize=10, loc="left")
+            axis.set_xlabel(x[number])
+            axis.set_ylabel(y[number])
+            axis.tick_params(labelbottom=True, labelleft=True)
+            axis.grid(**GRID)
+        for axis in axes.flat[:1] if shared else axes.flat[: len(panels)]:
+            low, high = axis.get_xlim()
+            axis.set_xlim(high, low * (low / high) ** ROOM)
+            axis.set_xticks(_decades(low, high))
+            axis.xaxis.minorticks_off()
+        figure.draw_without_rendering()
+        for axis, panel in zip(axes.flat, panels, strict=False):
+            _name(axis, panel.lines)
+    return figure
+
+
+def _decades(low: float, high: float) -> list[float]:
+    """Powers of ten between two numbers, seven at most."""
+    first, last = math.ceil(math.log10(low)), math.floor(math.log10(high))
+    every = max(1, -(-(last - first + 1) // 7))
+    return [10.0**k for k in range(last, first - 1, -every)]
+
+
+def _draw(axis: Axes, line: Line) -> None:
+    if line.colour is None:
+        axis.plot(line.x, line.y, color=theme.LINE, linewidth=0.8, linestyle=(0, (1, 2)))
+        return
+    axis.plot(
+        line.x,
+        line.y,
+        color=COLOURS[line.colour % len(COLOURS)],
+        marker="osD^v"[line.colour // len(COLOURS) % 5],
+        markersize=3.2,
+        linewidth=1.4,
+        linestyle="--" if line.dashed else "-",
+    )
+
+
+def _name(axis: Axes, lines: Sequence[Line]) -> None:
+    """The names to the right of the ends, moved where they would lie on another name or, if it can be, on a curve."""
+    scale = axis.figure.dpi / 72.0  # type: ignore[union-attr]
+    paths = [axis.transData.transform(np.column_stack([line.x, line.y])) for line in lines if len(line.x)]
+    inked = np.vstack([_dense(path) for path in paths]) if paths else np.empty((0, 2))
+    frame = axis.get_window_extent()
+    height, letter = APART * LABEL * scale, LETTER * LABEL * scale
+    placed: list[Box] = []
+    named = [line for line in lines if len(line.x)]
+    for line, path in sorted(zip(named, paths, strict=True), key=lambda each: -each[1][-1, 1]):
+        end = path[-1]
+        width = letter * len(line.name)
+        left = min(end[0] + GAP * scale, frame.x1 - width)
+        choices = [
+            Box(left + dx * letter, left + dx * letter + width, end[1] + dy * 0.5 * height, height)
+            for dx in (0, 2, 4, 7, 10)
+            for dy in range(-REACH, REACH + 1)
+            if left + dx * letter + width <= frame.x1 + 1.0
+        ]
+        inside = [
+            each for each in choices if frame.y0 < each.middle - height / 2 and each.middle + height / 2 < frame.y1
+        ]
+        best = min(inside or choices, key=lambda each: each.cost(end, placed, inked, letter))
+        placed.append(best)
+        moved = abs(best.middle - end[1]) > 0.6 * height or best.left - end[0] > 2.5 * GAP * scale
+        arrow: dict[str, Any] = {"arrowstyle": "-", "color": theme.LINE, "linewidth": 0.5, "shrinkA": 1, "shrinkB": 2}
+        axis.annotate(
+            line.name,
+            (line.x[-1], line.y[-1]),
+            xytext=((best.left - end[0]) / scale, (best.middle - end[1]) / scale),
+            textcoords="offset points",
+            fontsize=LABEL,
+            color=theme.TEXT,
+            va="center",
+            annotation_clip=False,
+            arrowprops=arrow if moved else None,
+        )
+
+
+class Box(NamedTuple):
+    """Where a name could be, in pixels."""
+
+    left: float
+    right: float
+    middle: float
+    height: float
+
+    def cost(self, end: Points, placed: Sequence[Box], inked: Points, letter: float) -> float:
+        """How bad it is there: on another name is worst, then on curves, then far from the end."""
+        names = sum(
+            each.left - 2 * letter < self.right
+            and self.left - 2 * letter < each.right
+            and abs(each.middle - self.middle) < self.height
+            for each in placed
+        )
+        on = (
+            (inked[:, 0] > self.left - 2)
+            & (inked[:, 0] < self.right)
+            & (abs(inked[:, 1] - self.middle) < self.height / 2)
+        )
+        away = abs(self.middle - end[1]) / self.height + 0.5 * (self.left - end[0]) / self.height
+        return 1000.0 * names + 0.7 * float(np.count_nonzero(on)) + away
+
+
+def _dense(path: Points) -> Points:
+    """Points along a curve, a few pixels apart."""
+    parts = [path[-1:]]
+    for a, b in itertools.pairwise(path):
+        count = max(1, int(np.hypot(*(b - a)) / 4.0))
+        parts.append(a + (b - a) * np.linspace(0.0, 1.0, count, endpoint=False)[:, None])
+    return np.vstack(parts)
+
+
+def bars(names: Sequence[str], values: Sequence[float], x: str) -> Figure:
+    """Points on a logarithmic axis, a row each, with their values beside them."""
+    with _style():
+        figure = _figure(10.0, 0.9 + 0.34 * len(names))
+        axis = figure.subplots()
+        rows = range(len(names))
+        axis.set_xscale("log")
+        axis.hlines(rows, min(values) / 2.0, values, color=theme.BLUE, linewidth=1.4)
+        axis.plot(values, rows, "o", color=theme.BLUE, markersize=6)
+        for row, value in zip(rows, values, strict=True):
+            axis.annotate(
+                f"{value:.3g}", (value, row), xytext=(8, 0), textcoords="offset points", va="center", fontsize=9
+            )
+        axis.set_yticks(rows, names)
+        axis.set_xlim(min(values) / 2.0, max(values) * 2.0)
+        axis.set_ylim(len(names) - 0.5, -0.5)
+        axis.set_xlabel(x)
+        axis.grid(axis="x", **GRID)
+    return figure
