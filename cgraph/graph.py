@@ -13,6 +13,7 @@ from .errors import GraphError
 from .evaluate import Value, evaluate
 from .label import label
 from .listing import listing
+from .network import to_networkx
 from .node import CONSTANT, VARIABLE, Edge, Node, Op, Scalar, as_node, variable
 from .ops import OPS
 from .order import rebuild, topological
@@ -157,25 +158,7 @@ class Graph:
         Nodes are numbered as in `nodes` (unused inputs follow), with op, name, value, tags, roles and outputs (names)
         as attributes; the key of an edge is the argument's slot.
         """
-        import networkx
-
-        result = networkx.MultiDiGraph()
-        used = set(self.nodes)
-        number: dict[Node, int] = {}
-        for node in (*self.nodes, *(each for each in self.inputs if each not in used)):
-            number[node] = len(number)
-            result.add_node(
-                number[node],
-                op=node.op.name,
-                name=node.name,
-                value=node.value,
-                tags=sorted(node.tags),
-                roles=sorted(node.roles),
-                outputs=[name for name, output in self.outputs.items() if output is node],
-            )
-        for edge in self.edges:
-            result.add_edge(number[edge.source], number[edge.target], key=edge.slot)
-        return result
+        return to_networkx(self.nodes, self.inputs, self.outputs)
 
     def __repr__(self) -> str:
         return (

@@ -3,9 +3,36 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from .node import Edge, Node
+
+if TYPE_CHECKING:
+    import networkx
+
+
+def to_networkx(nodes: Sequence[Node], inputs: Sequence[Node], outputs: Mapping[str, Node]) -> networkx.MultiDiGraph:
+    """See `Graph.to_networkx`."""
+    import networkx
+
+    result = networkx.MultiDiGraph()
+    number: dict[Node, int] = {}
+    for node in dict.fromkeys((*nodes, *inputs)):
+        number[node] = len(number)
+        result.add_node(
+            number[node],
+            op=node.op.name,
+            name=node.name,
+            value=node.value,
+            tags=sorted(node.tags),
+            roles=sorted(node.roles),
+            outputs=[name for name, output in outputs.items() if output is node],
+        )
+    for node in nodes:
+        for slot, arg in enumerate(node.args):
+            result.add_edge(number[arg], number[node], key=slot)
+    return result
 
 
 def minimum_cut(edges: Sequence[Edge], sources: Collection[Node], sinks: Collection[Node]) -> list[Edge]:

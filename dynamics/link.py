@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -154,3 +155,40 @@ def energy(motion: Motion, link: Link, q: Node, qd: Node) -> Node:
         potential = link.mass * motion.height + spatial.dot(own.up, link.moment)
         potential = potential + 0.5 * link.stiffness * (stretch * stretch)
     return kinetic - potential
+
+
+def regrouped(links: Sequence[Link], bodies: Sequence[Body]) -> list[Link]:
+    """The links, parents first, with all inertia that does not feel a link's own joint given to its parent.
+
+    The sum of their energies is the same but for a constant. Of a link on a hinge its mass, what of its first moment
+    lies along the axis, and what of its inertia is alike about all axes across; of a link on a slide, its inertia.
+    """
+    place = {body.name: i for i, body in enumerate(bodies)}
+    result = list(links)
+    for i in reversed(range(len(links))):
+        body, each = bodies[i], result[i]
+        turn, at = np.array(each.turn), np.array([x.value for x in each.place])
+        moment, inertia = np.array([x.value for x in each.moment]), symmetric(each.inertia)
+        if body.joint.kind == "revolute":
+            mass, across = each.mass, float(inertia[1, 1])
+            given_moment = np.array([0.0, 0.0, moment[2]])
+            given_inertia = across * np.diag([1.0, 1.0, 0.0])
+            kept = each._replace(mass=0.0, moment=spatial.constant(moment - given_moment), inertia=(inertia - given_inertia).tolist())
+        else:
+            mass, given_moment, given_inertia = 0.0, np.zeros(3), inertia
+            kept = each._replace(inertia=np.zeros((3, 3)).tolist())
+        result[i] = kept
+        if body.parent not in place:
+            continue
+        k = place[body.parent]
+        parent = result[k]
+        given_moment, given_inertia = turn @ given_moment, turn @ given_inertia @ turn.T
+        shift = given_inertia + spatial.about(np.zeros((3, 3)), mass, at) + 2 * (at @ given_moment) * np.eye(3) - np.outer(at, given_moment) - np.outer(given_moment, at)
+        total = np.array([x.value for x in parent.moment]) + given_moment + mass * at
+        result[k] = parent._replace(mass=parent.mass + mass, moment=spatial.constant(total), inertia=(symmetric(parent.inertia) + shift).tolist())
+    return result
+
+
+def symmetric(inertia):
+    full = np.array(inertia, dtype=float)
+    return np.tril(full) + np.tril(full, -1).T

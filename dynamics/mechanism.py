@@ -19,8 +19,8 @@ from cgraph.label import building
 from .body import WORLD, Body, Joint, MechanismError, checked, shape_of, vector
 from .force import Force, Reach, check, generalized, reach
 from .kinematic_tree import Carrier, locked, parents_first, welded, with_mass_to_move
-from .link import Motion, axes_of, carried, energy, ground, link, link_numbers
-from .spatial import Array
+from .link import Link, Motion, axes_of, carried, energy, ground, link, link_numbers, regrouped
+from .spatial import ZERO, Array
 from .subtree import Subtree, as_subtree, below, inserted
 from .system import System, parameter_value
 
@@ -47,6 +47,7 @@ class Mechanism:
     forces: Sequence[Force] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     locked: Mapping[str, float] = field(default_factory=dict)
+    regroup: bool = False
 
     def __post_init__(self) -> None:
         vector("gravity", self.gravity)
@@ -128,14 +129,12 @@ class Mechanism:
 
     def _partial_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
         rest = ground(self.gravity)
-        rest = self._made.setdefault(("ground", *[each.value for each in rest.up]), (rest, rest, cg.constant(0.0)))[0]
-        motions, axes = {WORLD: rest}, {WORLD: np.eye(3)}
+        rest = self._made.setdefault(("ground", *[each.value for each in rest.up]), (rest, rest, ZERO))[0]
+        motions = {WORLD: rest}
         partials = []
         with building(Builder()):
-            for body, angle, rate in zip(self.moving, q, qd, strict=True):
+            for body, made_of, angle, rate in zip(self.moving, self.links, q, qd, strict=True):
                 parent, kind = motions[body.parent], body.joint.kind
-                made_of = link(body, axes[body.parent])
-                axes[body.name] = axes_of(body)
                 key = (id(parent), body.name, kind, angle.name, *link_numbers(made_of))
                 if key not in self._made:
                     with cg.tag(body.name):
@@ -144,6 +143,13 @@ class Mechanism:
                 _, motions[body.name], partial = self._made[key]
                 partials.append(partial)
         return partials
+
+    @cached_property
+    def links(self) -> list[Link]:
+        """What the motion and energy of each of the moving bodies is made of."""
+        axes = {body.name: axes_of(body) for body in self.moving} | {WORLD: np.eye(3)}
+        links = [link(body, axes[body.parent]) for body in self.moving]
+        return regrouped(links, self.moving) if self.regroup else links
 
     @cached_property
     def _made(self) -> dict[tuple[Any, ...], tuple[Motion, Motion, Node]]:

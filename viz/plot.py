@@ -58,7 +58,7 @@ def to_adaptive_svg(figure: Figure) -> str:
         svg = svg.replace(ink.lower(), "currentColor")
     head, rest = svg.split("<defs>", 1)
     dark = f"@media (prefers-color-scheme: dark) {{ svg {{ color: {theme.DARK_TEXT}; }} }}"
-    return f"{head}<style>svg {{ color: {theme.TEXT}; }} {dark}</style>\n <defs>{rest}"
+    return f"{head}<style>svg {{ color: {theme.TEXT}; fill: currentColor; }} {dark}</style>\n <defs>{rest}"
 
 
 def to_png(figure: Figure, dpi: int = 160) -> bytes:

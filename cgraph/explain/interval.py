@@ -128,7 +128,7 @@ def _magnitude(a: Interval) -> Interval:
 
 def _meet(a: Interval, low: float, high: float) -> Interval | None:
     """The part of `a` in a domain, None if there is none."""
-    kept = max(a[0], low), min(a[1], high)
+    kept = max(a[0], low) + 0.0, min(a[1], high) + 0.0  # -0.0 becomes 0.0, of which powers have the sign of the domain
     return kept if kept[0] <= kept[1] else None
 
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import import_module
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -201,7 +202,8 @@ def heyoka_equations(hy: Any, problem: Problem) -> list[tuple[Any, Any]]:
     """Our rate as heyoka's pairs of variable and expression. Raises UnavailableError for an operation it has not."""
     graph = problem.rate
     env = {node: hy.time if node.name == TIME else hy.make_vars(f"x_{node.name}") for node in graph.inputs}
-    values = translated(graph.nodes, env, hy, number=hy.expression)
+    functions = SimpleNamespace(**vars(hy), hypot=lambda a, b: hy.sqrt(a * a + b * b))
+    values = translated(graph.nodes, env, functions, number=hy.expression)
     states = [env[node] for node in graph.inputs[: problem.size]]
     return list(zip(states, [hy.expression(values[rate]) for rate in graph.outputs.values()], strict=True))
 

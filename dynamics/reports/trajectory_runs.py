@@ -44,7 +44,7 @@ class Contender(ABC):
     order: int | None = None
     kind = CHOSEN
     ours = False
-    tolerances: Sequence[float] = tuple([10.0**-k for k in range(3, 14)])
+    tolerances: Sequence[float] = tuple([10.0**-k for k in range(3, 16)])
 
     def __init__(self, name: str, about: str, setting: Setting, smallest: float) -> None:
         self.name, self.about, self.setting, self.smallest = name, about, setting, smallest
@@ -151,6 +151,8 @@ class Ours(Contender):
 
 class Scipy(Contender):
     """One of SciPy's solvers on our compiled rate and Jacobian. Raises ImportError without SciPy."""
+
+    tolerances = tuple([10.0**-k for k in range(3, 14)])  # it takes none smaller than 2e-14
 
     def __init__(self, solver: str, setting: Setting, smallest: float, problem: Problem, backend: str = "auto") -> None:
         super().__init__(PREFIX + solver, "SciPy's solver on our compiled rate", setting, smallest)

@@ -54,7 +54,7 @@ class Verdict:
     @property
     def words(self) -> str:
         """The verdict."""
-        return "meets" if self.meets else "limit" if self.reason else "limit, unexplained"
+        return "meets" if self.meets else "limit" if self.reason else "unexplained"
 
     @property
     def worst(self) -> Figure:

@@ -108,7 +108,7 @@ def reaches(edges: set[cg.Edge], sources: set[cg.Node], sinks: set[cg.Node]) -> 
     return bool(seen & sinks)
 
 
-@settings(max_examples=1200)
+@settings(max_examples=4000)
 @given(cases(max_operations=9), st.data())
 def test_the_cut_is_one_of_the_smallest(case: Case, data):
     """Against all sets of edges, tried one by one."""
@@ -211,7 +211,7 @@ def boxes(draw: st.DrawFn, domains: tuple[tuple[float, float], ...]) -> list[tup
 
 
 @pytest.mark.parametrize("name", sorted(OPS))
-@settings(max_examples=1200)
+@settings(max_examples=4000)
 @given(data=st.data())
 def test_a_value_lies_within_its_bounds(name, data):
     """In floats, and at 50 digits, which is where the outward rounding is needed."""
@@ -230,7 +230,14 @@ def test_a_value_lies_within_its_bounds(name, data):
         assert mpmath.mpf(low) <= exact <= mpmath.mpf(high)
 
 
-@settings(max_examples=1200)
+def test_a_zero_of_either_sign_bounds_a_domain():
+    for zero in (0.0, -0.0):
+        low, high = ROWS["pow"].value((zero, 2e-9), (-1.0, 5.0))
+        assert 0.0 <= low <= 1e-40
+        assert high == math.inf
+
+
+@settings(max_examples=4000)
 @given(cases(), st.data())
 def test_every_value_of_a_graph_in_a_box_lies_within_its_bounds_and_no_slope_is_infinite_without_a_finding(case, data):
     graph = case.graph
@@ -317,7 +324,7 @@ def test_what_is_no_interval_is_refused(box):
 # A point.
 
 
-@settings(max_examples=1200)
+@settings(max_examples=4000)
 @given(cases(max_operations=15))
 def test_the_error_bound_holds_at_50_digits(case: Case):
     """Of inputs moved by half a unit in the last place, one of the points that the bound allows for."""
