@@ -1,6 +1,7 @@
 """dynamics: equations of motion on computational graphs, from Lagrangians and planar arms."""
 
 from . import cases, scenes
+from .ensembles import Ensemble, EnsembleStats, simulate_many
 from .equations import (
     SingularMassMatrixError,
     bias,
@@ -32,6 +33,8 @@ __all__ = [
     "FORMULATIONS",
     "Body",
     "Crossings",
+    "Ensemble",
+    "EnsembleStats",
     "Event",
     "Force",
     "Joint",
@@ -66,6 +69,7 @@ __all__ = [
     "scenes",
     "serial_arm",
     "simulate",
+    "simulate_many",
     "spurious",
     "state_equation",
     "to_mjcf",

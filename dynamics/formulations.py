@@ -9,7 +9,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.fold import Builder
 from cgraph.forward import tangents
-from cgraph.label import building
+from cgraph.label import TANGENT, building
 from cgraph.order import topological
 from cgraph.reverse import cotangents
 
@@ -51,7 +51,8 @@ def chain_rule_literal(system: System) -> Terms:
     rate = []
     for p in momentum:
         slopes = cotangents({p: ONE}, list(x_dot))
-        with building(Builder()):
+        with building(Builder()) as labelled:
+            labelled(p.label.derived(TANGENT))
             total = ZERO
             for slope, dot in zip(slopes, x_dot.values(), strict=True):
                 total = total + slope * dot

@@ -82,6 +82,10 @@ def welded(bodies: Sequence[Body]) -> tuple[list[Body], dict[str, Carrier]]:
     merged: dict[str, Body] = {}
     for body in bodies:
         parent = carriers[body.parent]
+        if parent.name == body.parent and body.joint.kind != "fixed":
+            merged[body.name] = body
+            carriers[body.name] = Carrier(body.name, *_OWN)
+            continue
         position = parent.position + parent.orientation @ np.asarray(body.joint.position)
         orientation = spatial.snapped(parent.orientation @ np.asarray(body.joint.orientation))
         if body.joint.kind != "fixed":

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -38,7 +39,8 @@ class Motion(NamedTuple):
     turned: Turned | None = None
 
 
-class Link(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Link:
     """A body in the axes of its motion: numbers, or nodes that stand for them.
 
     turn, place: its axes as columns, and its origin at q = 0, in the parent's axes.  moment: m c.  inertia: about the
@@ -54,6 +56,14 @@ class Link(NamedTuple):
     stiffness: float | Node
     rest: float | Node
     armature: float | Node
+
+    @cached_property
+    def numbers(self) -> list[float]:
+        """Turn, place, mass, moment, inertia (lower triangle), damping, stiffness, rest, armature."""
+        turn = [each for row in self.turn for each in row]
+        lower = [self.inertia[i][j] for i in range(3) for j in range(i + 1)]
+        others = (self.damping, self.stiffness, self.rest, self.armature)
+        return [float(each) for each in (*turn, *self.place, self.mass, *self.moment, *lower, *others)]
 
 
 def ground(gravity: ArrayLike) -> Motion:
@@ -81,14 +91,6 @@ def link(body: Body, outer: Array) -> Link:
     return Link(turn.tolist(), place, body.mass, moment, inertia.tolist(), *numbers)
 
 
-def link_numbers(link: Link) -> list[float]:
-    """Its numbers: turn, place, mass, moment, inertia (lower triangle), damping, stiffness, rest, armature."""
-    turn = [each for row in link.turn for each in row]
-    lower = [link.inertia[i][j] for i in range(3) for j in range(i + 1)]
-    others = (link.damping, link.stiffness, link.rest, link.armature)
-    return [float(each) for each in (*turn, *link.place, link.mass, *link.moment, *lower, *others)]
-
-
 def carried(parent: Motion, link: Link, kind: str, q: Node, qd: Node) -> Motion:
     """The motion of a link, "revolute" or "prismatic", from that of its parent."""
     along = link.turn[2][2]  # the joint's axis on the parent's
@@ -111,10 +113,12 @@ def carried(parent: Motion, link: Link, kind: str, q: Node, qd: Node) -> Motion:
         return Motion(omega, (velocity[0], velocity[1], velocity[2] + qd), up, height, turned)
     if parent.turned or all(each.value == 0.0 for each in omega):
         angle = along * parent.turned.angle + q if parent.turned else q
-        c, s = cg.cos(angle), cg.sin(angle)
+        if not parent.turned and all(each.value == 0.0 for each in (*velocity, up[0], up[1])):
+            angle = ZERO  # all is alike about the axis, so the plane may as well turn with the first body
         with cg.tag("kinetic"):
             spin = omega[2] + qd
-        return Motion((ZERO, ZERO, spin), velocity, up, height, Turned(angle, c, s))
+        turned = Turned(angle, cg.cos(angle), cg.sin(angle))
+        return Motion((ZERO, ZERO, spin), velocity, up, height, turned)
     c, s = cg.cos(q), cg.sin(q)
     with cg.tag("kinetic"):
         x, y, z = spatial.turned_about_z(c, s, omega)
@@ -155,40 +159,3 @@ def energy(motion: Motion, link: Link, q: Node, qd: Node) -> Node:
         potential = link.mass * motion.height + spatial.dot(own.up, link.moment)
         potential = potential + 0.5 * link.stiffness * (stretch * stretch)
     return kinetic - potential
-
-
-def regrouped(links: Sequence[Link], bodies: Sequence[Body]) -> list[Link]:
-    """The links, parents first, with all inertia that does not feel a link's own joint given to its parent.
-
-    The sum of their energies is the same but for a constant. Of a link on a hinge its mass, what of its first moment
-    lies along the axis, and what of its inertia is alike about all axes across; of a link on a slide, its inertia.
-    """
-    place = {body.name: i for i, body in enumerate(bodies)}
-    result = list(links)
-    for i in reversed(range(len(links))):
-        body, each = bodies[i], result[i]
-        turn, at = np.array(each.turn), np.array([x.value for x in each.place])
-        moment, inertia = np.array([x.value for x in each.moment]), symmetric(each.inertia)
-        if body.joint.kind == "revolute":
-            mass, across = each.mass, float(inertia[1, 1])
-            given_moment = np.array([0.0, 0.0, moment[2]])
-            given_inertia = across * np.diag([1.0, 1.0, 0.0])
-            kept = each._replace(mass=0.0, moment=spatial.constant(moment - given_moment), inertia=(inertia - given_inertia).tolist())
-        else:
-            mass, given_moment, given_inertia = 0.0, np.zeros(3), inertia
-            kept = each._replace(inertia=np.zeros((3, 3)).tolist())
-        result[i] = kept
-        if body.parent not in place:
-            continue
-        k = place[body.parent]
-        parent = result[k]
-        given_moment, given_inertia = turn @ given_moment, turn @ given_inertia @ turn.T
-        shift = given_inertia + spatial.about(np.zeros((3, 3)), mass, at) + 2 * (at @ given_moment) * np.eye(3) - np.outer(at, given_moment) - np.outer(given_moment, at)
-        total = np.array([x.value for x in parent.moment]) + given_moment + mass * at
-        result[k] = parent._replace(mass=parent.mass + mass, moment=spatial.constant(total), inertia=(symmetric(parent.inertia) + shift).tolist())
-    return result
-
-
-def symmetric(inertia):
-    full = np.array(inertia, dtype=float)
-    return np.tril(full) + np.tril(full, -1).T

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from numbers import Integral
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,15 +17,29 @@ from cgraph import Graph, Node
 from cgraph.fold import Builder
 from cgraph.label import building
 
+from . import spatial
+from .base_parameters import regrouped
 from .body import WORLD, Body, Joint, MechanismError, checked, shape_of, vector
 from .force import Force, Reach, check, generalized, reach
 from .kinematic_tree import Carrier, locked, parents_first, welded, with_mass_to_move
-from .link import Link, Motion, axes_of, carried, energy, ground, link, link_numbers, regrouped
+from .link import Link, Motion, axes_of, carried, energy, ground, link
 from .spatial import ZERO, Array
 from .subtree import Subtree, as_subtree, below, inserted
 from .system import System, parameter_value
 
 __all__ = ["WORLD", "Body", "Force", "Joint", "Mechanism", "MechanismError", "serial_arm", "tree"]
+
+
+class _Made:
+    """What mechanisms that come of one another by a change share, each made once; bodies are not to be altered."""
+
+    def __init__(self) -> None:
+        self.bodies: WeakKeyDictionary[Body, Body] = WeakKeyDictionary()  # checked
+        self.links: WeakKeyDictionary[Body, tuple[Body | None, Link]] = WeakKeyDictionary()  # with the parent
+        self.partials: dict[tuple[Any, ...], tuple[Motion, Motion, Node]] = {}  # partial Lagrangians, with both motions
+
+    def __reduce__(self) -> tuple[type[_Made], tuple[()]]:
+        return _Made, ()  # a copy in another process makes its own
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +51,8 @@ class Mechanism:
     parameters: values of the parameters that forces name, {name: value}; one without a value is 0. As of any system,
         parameters are inputs of the graphs, and `simulate` binds them.
     locked: {body: coordinate [rad or m]} of joints that stand still: their bodies are welded on, see `lock`.
+    regrouped: written with the fewest inertial numbers (`base_parameters.py`). Smaller graphs of the same motion; but
+        a partial Lagrangian is then not the energy of its body.
 
     Raises MechanismError for an unknown parent, a cycle, a repeated name, numbers that are not finite or out of range,
     an inertia that no body can have, a coordinate that moves no mass and has no armature, a force on an unknown body,
@@ -47,7 +64,8 @@ class Mechanism:
     forces: Sequence[Force] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     locked: Mapping[str, float] = field(default_factory=dict)
-    regroup: bool = False
+    regrouped: bool = False
+    _made: _Made = field(default_factory=_Made, repr=False, kw_only=True)
 
     def __post_init__(self) -> None:
         vector("gravity", self.gravity)
@@ -74,7 +92,8 @@ class Mechanism:
 
     @cached_property
     def _merged(self) -> tuple[tuple[Body, ...], dict[str, Carrier]]:
-        bodies = [checked(body) for body in self.bodies]
+        known = self._made.bodies
+        bodies = [known.get(body) or known.setdefault(body, checked(body)) for body in self.bodies]
         moving, carriers = welded(parents_first(locked(bodies, self.locked)))
         return with_mass_to_move(moving), carriers
 
@@ -107,13 +126,29 @@ class Mechanism:
 
         at: (3,) [m], the point, in the body's frame. Raises MechanismError for an unknown body.
         """
+        moves = self.motion(body, at)
+        return Graph(self.system.q, {name: moves.outputs[name] for name in ("x", "y", "z")})
+
+    def motion(self, body: str, at: ArrayLike = (0.0, 0.0, 0.0)) -> Graph:
+        """How a body moves in the world: inputs q0.., qd0.., outputs in the world's axes.
+
+        x, y, z [m] and vx, vy, vz [m/s] of a point; wx, wy, wz [rad/s], the body's angular velocity; R_0_0, R_0_1, ..
+        row by row, its axes as columns.
+        at: (3,) [m], the point, in the body's frame. Raises MechanismError for an unknown body.
+        """
         if not isinstance(body, str) or body not in self._carriers:
             raise MechanismError(f"there is no body {body!r:.80} in the mechanism")
         system = self.system
         point = vector(f"position on body {body!r}: at", at)
         with building(Builder()), cg.tag(body):
-            x, y, z = self._reach(body, system.q, system.qd).motion(point).position
-        return cg.simplify(Graph(system.q, {"x": x, "y": y, "z": z}))
+            way = self._reach(body, system.q, system.qd)
+            moves = way.motion(point)
+            columns = [way.direction(spatial.constant(each)) for each in np.eye(3)]
+        outputs = dict(zip(("x", "y", "z"), moves.position, strict=True))
+        outputs |= dict(zip(("vx", "vy", "vz"), moves.velocity, strict=True))
+        outputs |= dict(zip(("wx", "wy", "wz"), moves.omega, strict=True))
+        outputs |= {f"R_{i}_{j}": columns[j][i] for i in range(3) for j in range(3)}
+        return cg.simplify(Graph([*system.q, *system.qd], outputs))
 
     def _reach(self, body: str, q: Sequence[Node], qd: Sequence[Node]) -> Reach:
         names = [each.name for each in self.moving]
@@ -129,37 +164,50 @@ class Mechanism:
 
     def _partial_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
         rest = ground(self.gravity)
-        rest = self._made.setdefault(("ground", *[each.value for each in rest.up]), (rest, rest, ZERO))[0]
+        made = self._made.partials
+        rest = made.setdefault(("ground", *[each.value for each in rest.up]), (rest, rest, ZERO))[0]
         motions = {WORLD: rest}
         partials = []
         with building(Builder()):
             for body, made_of, angle, rate in zip(self.moving, self.links, q, qd, strict=True):
                 parent, kind = motions[body.parent], body.joint.kind
-                key = (id(parent), body.name, kind, angle.name, *link_numbers(made_of))
-                if key not in self._made:
+                key = (id(parent), body.name, kind, angle.name, *made_of.numbers)
+                if key not in made:
                     with cg.tag(body.name):
                         motion = carried(parent, made_of, kind, angle, rate)
-                        self._made[key] = parent, motion, energy(motion, made_of, angle, rate)
-                _, motions[body.name], partial = self._made[key]
+                        made[key] = parent, motion, energy(motion, made_of, angle, rate)
+                _, motions[body.name], partial = made[key]
                 partials.append(partial)
+            if self.regrouped:
+                with cg.tag("potential"):
+                    partials[0] = partials[0] - spatial.dot(rest.up, spatial.constant(self._links[1]))
         return partials
 
-    @cached_property
+    @property
     def links(self) -> list[Link]:
         """What the motion and energy of each of the moving bodies is made of."""
-        axes = {body.name: axes_of(body) for body in self.moving} | {WORLD: np.eye(3)}
-        links = [link(body, axes[body.parent]) for body in self.moving]
-        return regrouped(links, self.moving) if self.regroup else links
+        return self._links[0]
 
     @cached_property
-    def _made(self) -> dict[tuple[Any, ...], tuple[Motion, Motion, Node]]:
-        """Motions and partial Lagrangians of bodies, which mechanisms that come of this one by a change share."""
-        return {}
+    def _links(self) -> tuple[list[Link], Array]:
+        """The links, and the first moment of what of their inertia is the world's."""
+        by_name: dict[str, Body | None] = {body.name: body for body in self.moving} | {WORLD: None}
+        links = [self._link(body, by_name[body.parent]) for body in self.moving]
+        if self.regrouped:
+            return regrouped(links, [body.joint.kind for body in self.moving], self.parents)
+        return links, np.zeros(3)
 
-    def _changed(self, **changes: Any) -> Mechanism:
-        new = replace(self, **changes)
-        new.__dict__["_made"] = self._made
-        return new
+    def _link(self, body: Body, parent: Body | None) -> Link:
+        known = self._made.links.get(body)
+        if known is None or known[0] is not parent:
+            known = self._made.links[body] = parent, link(body, axes_of(parent) if parent else np.eye(3))
+        return known[1]
+
+    @property
+    def parents(self) -> list[int]:
+        """For each of the moving bodies the index of the one that carries it, -1 for the world."""
+        index = {body.name: i for i, body in enumerate(self.moving)}
+        return [index.get(body.parent, -1) for body in self.moving]
 
     def lock(self, body: str, at: float = 0.0) -> Mechanism:
         """The mechanism with the joint of a body standing still at a coordinate [rad or m].
@@ -167,13 +215,13 @@ class Mechanism:
         The body and all that is welded to it become one inertia with its parent. Raises MechanismError for an unknown
         body or one without a joint, and a coordinate that is not finite.
         """
-        return self._changed(locked={**self.locked, body: at})
+        return replace(self, locked={**self.locked, body: at})
 
     def unlock(self, body: str) -> Mechanism:
         """The mechanism with a locked joint free again. Raises MechanismError for one that is not locked."""
         if body not in self.locked:
             raise MechanismError(f"the joint of body {body!r:.80} is not locked")
-        return self._changed(locked={name: at for name, at in self.locked.items() if name != body})
+        return replace(self, locked={name: at for name, at in self.locked.items() if name != body})
 
     def subtree(self, body: str) -> Subtree:
         """A body and all that it carries, as `attach` takes it. Raises MechanismError for an unknown body."""
@@ -196,7 +244,8 @@ class Mechanism:
         names = below(self.bodies, body)
         forces = tuple([force for force in self.forces if force.body not in names])
         used = {name for force in forces for name in force.names}
-        return self._changed(
+        return replace(
+            self,
             bodies=tuple([each for each in self.bodies if each.name not in names]),
             forces=forces,
             parameters={name: value for name, value in self.parameters.items() if name in used},
@@ -212,7 +261,8 @@ class Mechanism:
         given = as_subtree(subtree)
         back = to is None or to == given.parent
         bodies = given.hung_on(given.parent if to is None else to)
-        return self._changed(
+        return replace(
+            self,
             bodies=tuple(inserted(tuple(self.bodies), bodies, given.places if back else ())),
             forces=(*self.forces, *given.forces),
             parameters={**self.parameters, **given.parameters},

@@ -9,7 +9,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.order import topological
 
-from .system import TIME, as_node, sequence, called, parameter_value
+from .system import TIME, as_node, called, parameter_value, sequence
 
 RESERVED = (TIME, "dt")
 

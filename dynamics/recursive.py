@@ -22,8 +22,7 @@ from cgraph.forward import tangents
 from cgraph.label import building
 from cgraph.reverse import cotangents
 
-from .body import WORLD
-from .link import Link, Motion, axes_of, carried, energy, ground, link, link_numbers
+from .link import Link, Motion, carried, energy, ground
 from .mechanism import Mechanism
 from .spatial import Array
 
@@ -42,14 +41,11 @@ class RecursiveInverseDynamics:
         if mechanism.forces:
             raise ValueError("inverse dynamics body by body does not take external forces; use inverse_dynamics")
         self.mechanism = mechanism
-        moving = mechanism.moving
-        numbers = {body.name: i for i, body in enumerate(moving)}
-        axes = {body.name: axes_of(body) for body in moving} | {WORLD: np.eye(3)}
         rest = ground(mechanism.gravity)
-        self.n = len(moving)
-        self._parents = [numbers.get(body.parent, -1) for body in moving]
-        self._links = [link_numbers(link(body, axes[body.parent])) for body in moving]
-        self._kernels = [_kernels(body.joint.kind) for body in moving]
+        self.n = len(mechanism.moving)
+        self._parents = mechanism.parents
+        self._links = [each.numbers for each in mechanism.links]
+        self._kernels = [_kernels(body.joint.kind) for body in mechanism.moving]
         self._ground = [float(each) for each in (*rest.omega, *rest.velocity, *rest.up, rest.height)] + [0.0] * MOTION
 
     def __call__(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
@@ -118,7 +114,7 @@ def _motion(nodes: Sequence[Node]) -> Motion:
 
 
 def _link_of_nodes() -> tuple[Link, list[Node]]:
-    """A link of variables, and these in the order of `link_numbers`."""
+    """A link of variables, and these in the order of its `numbers`."""
     turn, place, moment, inertia = (_variables(*each) for each in (("R", 9), ("r", 3), ("h", 3), ("J", 6)))
     mass, damping, stiffness, rest, armature = cg.variables("mass damping stiffness rest armature")
     rows = [turn[k : k + 3] for k in (0, 3, 6)]

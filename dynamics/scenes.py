@@ -5,12 +5,15 @@ from __future__ import annotations
 import inspect
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from numbers import Integral
 from pathlib import Path
 from typing import Any
+
+import cgraph as cg
+from cgraph import Node
 
 from .mujoco_load import load_model
 from .planar_arm import planar_arm
@@ -37,11 +40,15 @@ class Scene:
 
 def spring_mass() -> Scene:
     """A rotor of inertia I held by a spring of stiffness k, the one-joint system of Figures 1 to 3."""
-    system = System(
-        lambda q, qd, t, p: 0.5 * p["I"] * qd[0] ** 2 - 0.5 * p["k"] * q[0] ** 2,
-        coordinates=["theta"],
-        parameters={"I": 1.0, "k": 1.0},
-    )
+
+    def lagrangian(q: Sequence[Node], qd: Sequence[Node], t: Node, p: Mapping[str, Node]) -> Node:
+        with cg.tag("kinetic"):
+            kinetic = 0.5 * p["I"] * qd[0] ** 2
+        with cg.tag("potential"):
+            potential = 0.5 * p["k"] * q[0] ** 2
+        return kinetic - potential
+
+    system = System(lagrangian, coordinates=["theta"], parameters={"I": 1.0, "k": 1.0})
     about = "a rotor on a spring, L = I qd^2/2 - k q^2/2 (Figures 1 to 3)"
     return Scene("spring_mass", about, system, (1.0,), (0.0,), 10.0)
 

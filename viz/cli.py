@@ -6,6 +6,7 @@ import argparse
 import json
 import os
 import sys
+import time
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -13,7 +14,7 @@ from pathlib import Path
 from cgraph.files import write
 from dynamics import FORMULATIONS, forward_dynamics, inverse_dynamics, scenes, spurious
 from dynamics.integrators import METHODS
-from dynamics.reports import trajectory_scenes, work_precision
+from dynamics.reports import stability, stability_table, trajectory_scenes, work_precision
 from dynamics.reports.bench import MODES, PEERS, QUICK, SCENES, TASKS, Row, bench
 from dynamics.reports.bench_table import machine, tables
 from dynamics.reports.cold_start import STARTS
@@ -91,9 +92,12 @@ def _add_report(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -
     report = commands.add_parser("report", help="error beside run time of every integrator, ours and others', as pages")
     report.add_argument(
         "scenes",
-        nargs="+",
+        nargs="*",
         metavar="SCENE",
         help=f"{', '.join([*scenes.names(), *trajectory_scenes.names()])}, a model file, MJCF or URDF, or a case",
+    )
+    report.add_argument(
+        "--stability", action="store_true", help="the table of stiff and extreme cases; status 1 for an unexplained row"
     )
     _may_ignore(report)
     report.add_argument("--out", type=Path, default=Path("report"), help="folder to fill (default: report)")
@@ -161,6 +165,12 @@ def _bench(options: argparse.Namespace) -> None:
 def _report(options: argparse.Namespace) -> None:
     from .report_files import write_report  # matplotlib loads for this command alone
 
+    if not options.scenes and not options.stability:
+        raise ValueError("a report needs a scene, or --stability for the table of stiff and extreme cases")
+    if options.stability:
+        _stability(options)
+    if not options.scenes:
+        return
     named = {trajectory_scenes.load(name, ignore=options.ignore).name for name in options.scenes}
     if len(named) < len(options.scenes):
         raise ValueError(f"each scene needs a name of its own for its files, got {', '.join(options.scenes)}")
@@ -187,6 +197,18 @@ def _report(options: argparse.Namespace) -> None:
             print(f"{page}: {len(report.curves)} integrators, {sum(len(each.points) for each in report.curves)} points")
     if options.json:
         print(json.dumps(found, indent=1))
+
+
+def _stability(options: argparse.Namespace) -> None:
+    from .stability import write as write_stability  # matplotlib loads for this command alone
+
+    begin = time.perf_counter()
+    found = stability.run(options.quick, lambda line: print(f"cgraph: {line}", file=sys.stderr, flush=True))
+    content = stability.content(found, time.perf_counter() - begin, options.quick)
+    page = write_stability(options.out, content, stability.to_csv(found))
+    print(json.dumps(content, indent=1) if options.json else f"{stability_table.table(found)}\n{page}")
+    if unexplained := [f"{each.case} by {each.method}" for each in found if not each.explained]:
+        raise RuntimeError(f"beyond its bound without a known reason: {', '.join(unexplained)}")
 
 
 def _scenes(options: argparse.Namespace) -> None:

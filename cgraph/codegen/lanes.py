@@ -1,8 +1,8 @@
 """Vector functions as LLVM text: sine, cosine, exp and log by polynomials, every other function of libm lane by lane.
 
-Each polynomial serves where its range reduction is exact enough, with an error below 2 ulp. A vector with one lane
-outside (too large, NaN, infinite, for a logarithm not positive) goes to libm lane by lane. Others have no polynomial:
-equations of motion of mechanisms take sines and cosines of joint angles and hardly anything else.
+Each polynomial serves where its range reduction is exact enough, with an error below 2 ulp. Lanes outside (too large,
+NaN, infinite, for a logarithm not positive) have their value from libm, so that none depends on its neighbours. Other
+functions have no polynomial: equations of motion take sines and cosines of joint angles and hardly anything else.
 """
 
 from __future__ import annotations
@@ -77,12 +77,11 @@ class Lines:
         assert isinstance(terms[0], str)
         return terms[0]
 
-    def all_between(self, x: str, low: float, high: float) -> str:
-        """Whether every lane lies in [low, high]; a NaN does not."""
+    def between(self, x: str, low: float, high: float) -> str:
+        """Which lanes lie in [low, high]; a NaN does not."""
         above = self.add(f"fcmp oge {self.d} {x}, {number(low)}")
         below = self.add(f"fcmp ole {self.d} {x}, {number(high)}")
-        both = self.add(f"and {self.b} {above}, {below}")
-        return self.add(f"call i1 @llvm.vector.reduce.and.v{self.lanes}i1({self.b} {both})")
+        return self.add(f"and {self.b} {above}, {below}")
 
 
 POLYNOMIAL = ("sin", "cos", "exp", "log")
@@ -129,17 +128,22 @@ def _lane_by_lane(name: str, arity: int, lanes: int) -> list[str]:
 
 
 def _guarded(names: Sequence[str], lanes: int, flags: str) -> list[str]:
-    """The polynomial where all lanes lie in the interval, else libm. Two names give both results."""
+    """The polynomial in the lanes that lie in the interval, libm in the others. Two names give both results."""
     to = Lines(lanes, flags)
-    inside = to.all_between("%x", *INTERVALS[names[0]])
-    to.text += [f"  br i1 {inside}, label %fast, label %slow", "fast:"]
+    inside = to.between("%x", *INTERVALS[names[0]])
     if names[0] in ("sin", "cos"):
         results = _sine_cosine(to, "%x", names)
     else:
         results = [(_exp if names[0] == "exp" else _log)(to, "%x")]
+    everywhere = to.add(f"call i1 @llvm.vector.reduce.and.v{lanes}i1({to.b} {inside})")
+    to.text += [f"  br i1 {everywhere}, label %fast, label %slow", "fast:"]
     to.text += _returned(to.d, results, "fast")
     to.text.append("slow:")
-    to.text += _returned(to.d, [to.add(f"call {to.d} @each{lanes}.{name}({to.d} %x)") for name in names], "slow")
+    mixed = []
+    for name, result in zip(names, results, strict=True):
+        of_libm = to.add(f"call {to.d} @each{lanes}.{name}({to.d} %x)")
+        mixed.append(to.add(f"select {to.b} {inside}, {to.d} {result}, {to.d} {of_libm}"))
+    to.text += _returned(to.d, mixed, "slow")
     kind = to.d if len(names) == 1 else f"{{{to.d}, {to.d}}}"
     return [f"define internal {kind} @lanes{lanes}.{''.join(names)}({to.d} %x) nounwind noinline {{", *to.text, "}"]
 

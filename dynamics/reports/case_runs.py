@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-
 from .. import cases
 from ..cases import RTOL, Case, Watch
 from ..multiprecision import Reference
@@ -69,7 +68,7 @@ def verdict(case: Case, method: str) -> Verdict:
         run.stats.rejected,
         run.stats.seconds,
         "" if run.stats.complete else run.stats.status,
-        reason(SECTION, case.name, method),
+        reason(SECTION, case.name, method, figures),
     )
 
 
@@ -99,7 +98,7 @@ def sizes(case: Case, solution: Reference | None) -> list[float]:
 
 
 def errors(case: Case, run: Trajectory, solution: Reference) -> dict[str, float]:
-    """The error at t_end by the quantity's name: "error" of all states, "error 0 1" of some, relative to their sizes."""
+    """The error at t_end by the quantity's name: "error" of all states, "error 0 1" of some, each over its size."""
     end = np.concatenate([run.q[-1], run.qd[-1]])
     relative = np.abs(solution.deviation(end[None])[0]) / np.array(sizes(case, solution))
     found = {}
@@ -138,5 +137,3 @@ def figure(watch: Watch, found: dict[str, float]) -> Figure:
     unit = "of size" if watch.quantity.startswith("error") else "of scale"
     value = found.get(watch.quantity, math.nan)
     return Figure(watch.quantity, value if unit == "of size" else value / watch.scale, watch.bound, unit, watch.why)
-
-

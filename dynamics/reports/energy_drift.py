@@ -99,5 +99,5 @@ def verdict(model: Model, method: str, steps: int) -> Verdict:
         0,
         run.stats.seconds,
         "" if run.stats.complete else run.stats.status,
-        reason(SECTION, model.name, method),
+        reason(SECTION, model.name, method, figures),
     )

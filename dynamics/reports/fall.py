@@ -9,7 +9,8 @@ import numpy as np
 
 from ..mujoco_io import MujocoTwin
 from ..scenes import Scene
-from ..simulate import Trajectory, simulate
+from ..simulate import simulate
+from ..trajectory import Trajectory
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from .verdict import Figure, Verdict
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-SECTION = "Sine and cosine"
+SECTION, CASE = "Sine and cosine", "sine and cosine"
 BOUND = 2.0  # ulp, what cgraph promises of its polynomials; a correctly rounded value is within half of one
 COUNT, QUICK = 4000, 500  # angles of each range
 DIGITS = 360  # more than the largest angle has before its point
@@ -38,19 +38,30 @@ def verdicts(count: int = COUNT, backends: Sequence[str] | None = None) -> Itera
     known = {name: exact(each) for name, each in points.items()}
     for backend in backends or available():
         function = cg.compile(graph, backend)
-        ways: dict[str, Callable[[Array], Array]] = {
-            backend: lambda at, f=function: np.array([f([each]) for each in at.tolist()]).T,
-            f"{backend}, batch": lambda at, f=function: f.batch(at[None]),
-        }
-        for way, evaluate in ways.items():
+        for way, evaluate in ((backend, _one_by_one), (f"{backend}, batch", _in_a_batch)):
             figures = tuple(
                 [
-                    Figure(f"{name} rad", ulps(evaluate(points[name]), known[name]), BOUND, "ulp", "of the exact value")
+                    Figure(
+                        f"{name} rad",
+                        ulps(evaluate(function, points[name]), known[name]),
+                        BOUND,
+                        "ulp",
+                        "of the exact value",
+                    )
                     for name in RANGES
                 ]
             )
             about = f"{count} random angles of each range, both signs"
-            yield Verdict(SECTION, "sine and cosine", about, way, figures, reason=reason(SECTION, "", way))
+            known_limit = reason(SECTION, CASE, way, figures)
+            yield Verdict(SECTION, CASE, about, way, figures, reason=known_limit)
+
+
+def _one_by_one(function: cg.Compiled, points: Array) -> Array:
+    return np.array([function([each]) for each in points.tolist()]).T
+
+
+def _in_a_batch(function: cg.Compiled, points: Array) -> Array:
+    return function.batch(points[None])
 
 
 def angles(low: float, high: float, count: int) -> Array:

@@ -85,7 +85,8 @@ def verdicts(links: Sequence[int] = LINKS, backends: Sequence[str] | None = None
         for family in FAMILIES:
             figures = tuple([figure(task, family, condition, chosen) for condition in conditions])
             name = f"{task}, {family.name}"
-            yield Verdict(SECTION, name, family.about, "+".join(chosen), figures, reason=reason(SECTION, name, ""))
+            known = reason(SECTION, name, "", figures)
+            yield Verdict(SECTION, name, family.about, "+".join(chosen), figures, reason=known)
 
 
 def available() -> tuple[str, ...]:

@@ -32,16 +32,16 @@ QUICK = (  # cases of a quick run: one of each kind, none that takes a while to 
 )
 
 ABOUT = {
-    case_runs.SECTION: "Runs with a relative tolerance of 1e-9 and an absolute one of 1e-12 in SI units. An error is that "
-    "of the state at the end against a closed form or a solution in multiprecision, of each state relative to its "
+    case_runs.SECTION: "Runs with a relative tolerance of 1e-9 and an absolute one of 1e-12 in SI units. An error is "
+    "that of the state at the end against a closed form or a solution in multiprecision, of each state relative to its "
     "natural size; an invariant's is its largest change during the run, relative to its natural scale.",
-    energy_drift.SECTION: "Equal steps. The drift is the slope of the energy over the run, by least squares through the "
-    "Hann-weighted means of 16 blocks, times the length of the run; the band is the largest less the smallest energy. "
-    "Both relative to the energy at the start.",
+    energy_drift.SECTION: "Equal steps. The drift is the slope of the energy over the run, by least squares through "
+    "the Hann-weighted means of 16 blocks, times the length of the run; the band is the largest less the smallest "
+    "energy. Both relative to the energy at the start.",
     single_evaluations.SECTION: "The largest error of torques or accelerations, in units of 2^-52 of the largest "
     "component's size, where a size is |y_i| + sum_j |dy_i/dx_j| |x_j| over all inputs and parameters: the "
-    "componentwise condition. 1 is what rounding the data once would do. Exact values from closed formulas with a dense "
-    "solve in multiprecision; the worst of five random states, backends, single points and batches.",
+    "componentwise condition. 1 is what rounding the data once would do. Exact values from closed formulas with a "
+    "dense solve in multiprecision; the worst of five random states, backends, single points and batches.",
     huge_angles.SECTION: "The largest error over random angles, in units of the last place of the exact value.",
 }
 
@@ -92,7 +92,8 @@ def _load() -> float | None:
 def to_csv(found: Sequence[Verdict]) -> str:
     """A line for each figure."""
     text = io.StringIO()
-    columns = "section case method verdict quantity value bound unit meets steps rejected seconds stopped reason".split()
+    columns = "section case method verdict quantity value bound unit meets".split()
+    columns += "steps rejected seconds stopped reason".split()
     writer = csv.DictWriter(text, columns, lineterminator="\n")
     writer.writeheader()
     for verdict in found:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import textwrap
 from collections import Counter
@@ -36,23 +37,28 @@ def _section(rows: Sequence[Verdict]) -> list[str]:
     names = min(NAMES, max(len(each.case) for each in rows))
     methods = max(len(each.method) for each in rows)
     steps = max([len(_steps(each)) for each in rows] + [len("steps")]) if runs else 0
-    figures = WIDTH - sum(each + len(GAP) for each in (11, names, methods)) - ((steps + 8 + 2 * len(GAP)) if runs else 0)
+    taken = [11, names, methods, *([steps, 8] if runs else [])]
+    figures = WIDTH - sum(taken) - len(taken) * len(GAP)
     head = ["verdict".ljust(11), "case".ljust(names), "method".ljust(methods)]
     head += ["steps".rjust(steps), "time".rjust(8)] if runs else []
     lines = [GAP.join([*head, "figures, and in brackets their bounds"])]
-    for row in rows:
+    for row, after in itertools.zip_longest(rows, rows[1:]):
         left = textwrap.wrap(row.case, names)
         right = _packed([_figure(each) for each in row.figures], figures)
         for k in range(max(len(left), len(right))):
             cells = [row.words if k == 0 else "", left[k] if k < len(left) else "", row.method if k == 0 else ""]
             parts = [cells[0].ljust(11), cells[1].ljust(names), cells[2].ljust(methods)]
             if runs:
-                parts += [_steps(row).rjust(steps), f"{row.seconds:.2f} s".rjust(8)] if k == 0 else [" " * steps, " " * 8]
+                counted = (_steps(row), f"{row.seconds:.2f} s") if k == 0 else ("", "")
+                parts += [counted[0].rjust(steps), counted[1].rjust(8)]
             lines.append(GAP.join([*parts, right[k] if k < len(right) else ""]).rstrip())
-        if not row.meets:
-            why = ": ".join(filter(None, [row.stopped, row.reason or "no reason is known"]))
-            lines += textwrap.wrap(why, WIDTH, initial_indent=" " * 13, subsequent_indent=" " * 13)
+        if not row.meets and (after is None or after.meets or _why(after) != _why(row)):  # once for rows that share it
+            lines += textwrap.wrap(_why(row), WIDTH, initial_indent=" " * 13, subsequent_indent=" " * 13)
     return lines
+
+
+def _why(row: Verdict) -> str:
+    return ": ".join(filter(None, [row.stopped, row.reason or "no reason is known"]))
 
 
 def _steps(row: Verdict) -> str:

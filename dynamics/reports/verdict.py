@@ -67,7 +67,7 @@ class Verdict:
             {
                 "quantity": each.quantity,
                 "value": _number(each.value),
-                "bound": each.bound,
+                "bound": _number(each.bound),
                 "unit": each.unit,
                 "why": each.why,
                 "meets": each.meets,

@@ -36,7 +36,7 @@ from .trajectory_scenes import INTERVALS, Setting, load
 DIGITS = 30
 LIMIT = 0.3  # s; no finer knob is tried after a run of this length
 CHUNK = 5e-3  # s, of runs that are timed in one turn
-WORST, FLOOR = 1e-1, 2e-11  # errors between which an order is fitted: above is no order yet, below is rounding
+WORST, FLOOR = 1e-1, 5e-12  # errors between which an order is fitted: above is no order yet, below is rounding
 FITTED = 3  # points of equal steps, the finest between those bounds: the coarser are no order yet
 ENOUGH = 0.5  # s of timed runs of a knob, after which three runs are enough
 STALLED = 2  # knobs in a row without a smaller error, after which no finer one is tried

@@ -8,10 +8,10 @@ import numpy as np
 
 from cgraph.program import Runner
 
+from ..trajectory import Array
 from .chunk import Chunk, Part
 from .portable import Portable
 from .stretch import Stretch
-from .trajectory import Array
 
 WORK = 2**21  # nodes computed in a piece: half a millisecond for each vector
 NUMBERS = 2**22  # in the rows of a piece

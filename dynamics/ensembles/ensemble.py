@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .trajectory import Array
+from ..trajectory import Array
 
 Counts = np.ndarray[Any, np.dtype[np.int64]]
 

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .state_equation import as_ode, state_inputs
-from .system import parameter_value, per_coordinate
-from .trajectory import Array
+from ..state_equation import as_ode, state_inputs
+from ..system import parameter_value, per_coordinate
+from ..trajectory import Array
 
 
 class Starts(NamedTuple):

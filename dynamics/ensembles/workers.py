@@ -12,9 +12,9 @@ import numpy as np
 
 from cgraph.codegen.threads import thread_count
 
+from ..trajectory import Array
 from .chunk import Chunk, Part
 from .task import Task
-from .trajectory import Array
 
 Map = Callable[[Callable[[Chunk], Part], Sequence[Chunk]], Iterable[Part]]
 Workers = int | Map | None

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..trajectory import Array
 from .ensemble import Counts
-from .trajectory import Array
 
 
 @dataclass(frozen=True)

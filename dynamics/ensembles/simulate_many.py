@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..integrators import METHODS, Problem
+from ..progress import Progress
+from ..simulate import DT, _from_start, _times
 from .chunk import Chunk, Part
 from .ensemble import Ensemble, EnsembleStats
-from .integrators import METHODS, Problem
 from .portable import portable
-from .progress import Progress
-from .simulate import DT, _from_start, _times
 from .starts import starts
 from .stretch import Stretch, step_count, stretches
 from .task import Task

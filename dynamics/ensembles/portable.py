@@ -8,7 +8,7 @@ from typing import NamedTuple
 from cgraph import Graph
 from cgraph.program import Factor, If, Program, Solve, While
 
-from .integrators import Method, Problem
+from ..integrators import Method, Problem
 
 
 class Coordinates(NamedTuple):

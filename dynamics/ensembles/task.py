@@ -15,13 +15,13 @@ import numpy as np
 from cgraph.program import Runner, runner
 from cgraph.program.runner import Record
 
+from ..run import AdaptiveRun, FixedRun
+from ..simulate import _Rows
+from ..trajectory import Array
 from .chunk import Chunk, Part, empty
 from .portable import Portable
-from .run import AdaptiveRun, FixedRun
 from .side_by_side import SideBySide, Together
-from .simulate import _Rows
 from .stretch import Stretch
-from .trajectory import Array
 
 KEPT = 8  # programs that a process keeps ready
 

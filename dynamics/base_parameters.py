@@ -1,0 +1,72 @@
+"""Base parameters: the inertial numbers of links that their motion can show, in as few of them as there can be.
+
+Of a link on a hinge three things move with its parent whatever the hinge does: its mass, taken at the joint, the part
+of its first moment along the axis, and the part of its inertia that is alike about every axis across. Of a link on a
+slide so does its inertia. Given to the parent, they leave the sum of all energies as it was, and the link with seven
+numbers in place of ten. What is given to the world shows in no motion and is gone.
+(H. Mayeda, K. Yoshida, K. Osuka, "Base parameters of manipulator dynamic models", IEEE Trans. Robotics and Automation
+6(3), 1990; M. Gautier, W. Khalil, "Direct calculation of minimum set of inertial parameters of serial robots", 1990.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from . import spatial
+from .link import Link
+from .spatial import SNAP, Array, Triple
+
+
+def regrouped(links: Sequence[Link], kinds: Sequence[str], parents: Sequence[int]) -> tuple[list[Link], Array]:
+    """The links, parents first, with all that moves with the parent given to it; and the world's first moment [kg m].
+
+    kinds: of their joints.  parents: index of each one's parent, -1 for the world.
+    The sum of the links' energies is the same but for the potential energy of what the world is given, a constant;
+    each one's own is another. The links may be such as no body can be: without mass, with a negative inertia.
+    """
+    result = list(links)
+    world = np.zeros(3)
+    for i in reversed(range(len(links))):
+        mass, moment, inertia = _numbers(result[i])
+        if kinds[i] == "prismatic":
+            given = (0.0, np.zeros(3), inertia)
+        else:
+            given = (mass, moment * (0.0, 0.0, 1.0), inertia[1, 1] * np.diag([1.0, 1.0, 0.0]))
+        result[i] = _with(result[i], mass - given[0], moment - given[1], inertia - given[2])
+        seen = _seen_by_parent(links[i], *given)
+        if parents[i] >= 0:
+            carrier = result[parents[i]]
+            parts = zip(_numbers(carrier), seen, strict=True)
+            result[parents[i]] = _with(carrier, *(own + more for own, more in parts))
+        else:
+            world += seen[1]
+    return result, world
+
+
+def _seen_by_parent(link: Link, mass: float, moment: Array, inertia: Array) -> tuple[float, Array, Array]:
+    """Mass, first moment and inertia at the link's joint, about the parent's origin and in its axes."""
+    turn, place = np.array(link.turn, dtype=np.float64), _array(link.place)
+    moment, inertia = turn @ moment, turn @ inertia @ turn.T
+    crossed = np.outer(place, moment)
+    inertia = inertia + 2.0 * (place @ moment) * np.eye(3) - crossed - crossed.T
+    return mass, moment + mass * place, spatial.about(inertia, mass, place)
+
+
+def _numbers(link: Link) -> tuple[float, Array, Array]:
+    lower = np.tril(np.array(link.inertia, dtype=np.float64))
+    return float(link.mass), _array(link.moment), lower + np.tril(lower, -1).T  # type: ignore[arg-type]
+
+
+def _with(link: Link, mass: Any, moment: Any, inertia: Any) -> Link:
+    """The link with these; what is left of an entry by rounding is none."""
+    moment, inertia = (np.where(np.abs(each) <= SNAP * np.abs(each).max(initial=0.0), 0.0, each)
+                       for each in (moment, inertia))  # fmt: skip
+    return replace(link, mass=float(mass), moment=spatial.constant(moment), inertia=inertia.tolist())
+
+
+def _array(triple: Triple) -> Array:
+    return np.array([each.value for each in triple])

@@ -1,0 +1,1 @@
+"""Tables taken from one graph: matrices, torque by link and by motion, linearisation, regressor, certificate."""

@@ -1,0 +1,87 @@
+"""The inspector as one HTML file: style, script and data inside, nothing loaded from anywhere."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Mapping, Sequence
+from html import escape
+from importlib.resources import files
+from typing import Any
+
+from cgraph import Graph, Node
+
+from .. import html, theme
+from .content import Motion, Table, Version
+from .record import record
+
+SCRIPTS = ("values.js", "paths.js", "formula.js", "picture.js", "arm.js", "app.js")
+FRAME_HEIGHT = 720  # pixels in a notebook
+# Nothing may be fetched, not even by mistake.
+_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
+
+
+class Page(str):
+    """The HTML text of a page; a notebook shows it in a frame."""
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe srcdoc="{escape(self)}" sandbox="allow-scripts" title="cgraph inspector" '
+            f'style="width:100%;height:{FRAME_HEIGHT}px;border:0"></iframe>'
+        )
+
+
+def page(
+    graph: Graph | Sequence[Version],
+    *,
+    title: str = "Computational graph",
+    about: str = "",
+    at: Mapping[str, Any] | None = None,
+    marked: Collection[Node] = frozenset(),
+    motion: Motion | None = None,
+    tables: Sequence[Table] = (),
+) -> Page:
+    """The page on which a graph is looked at: it folds by tags, and shows values, paths, sweeps and equations.
+
+    graph: one graph, or versions to switch among; nodes that compute the same in two versions keep their place.
+    about: what to see.  at, marked: of one graph, as in `Version`.  motion: points that move beside it.
+
+    Raises ValueError for no version, two of one name, at or marked beside versions, and as `Version` and `Motion` do.
+    """
+    if isinstance(graph, Graph):
+        versions: Sequence[Version] = [Version("graph", graph, about, marked, at or {})]
+    else:
+        versions = list(graph)
+        if at is not None or marked:
+            raise ValueError("with versions, give each its own at and marked")
+    names = [version.name for version in versions]
+    if not names or len(set(names)) < len(names):
+        raise ValueError(f"a page needs versions with names of their own, got {names}")
+    if motion is not None:
+        motion.check()
+    data = {"title": title, "introduction": "" if isinstance(graph, Graph) else about, **record(versions, motion)}
+    script = "\n".join(_asset(name) for name in SCRIPTS)
+    # "<" in the data could end the element that holds it
+    held = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
+    shown = "".join(html.table(each.caption, each.header, each.rows) for each in tables)
+    body = _asset("page.html").replace("{title}", escape(title)).replace("{tables}", shown)
+    return Page(
+        f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
+        f"<style>{_colours()}{_asset('page.css')}</style>\n</head>\n<body>\n{body}\n"
+        f'<script id="data" type="application/json">{held}</script>\n<script>"use strict";\n{script}\nstart();</script>\n'
+        "</body>\n</html>\n"
+    )
+
+
+def _asset(name: str) -> str:
+    return files(__package__).joinpath(name).read_text(encoding="utf-8")
+
+
+def _colours() -> str:
+    """The theme's colours as the style sheet names them."""
+    roles = {role: paint.line for role, paint in theme.ROLES.items()} | {"input": theme.YELLOW}
+    names = roles | {"wrong": theme.SPURIOUS, "up": theme.BLUE, "down": theme.GREEN, "path": theme.PURPLE}
+    return ":root{" + "".join(f"--{name}:{colour};" for name, colour in names.items()) + "}\n"

@@ -1,0 +1,176 @@
+"""The page of the stability table: verdicts, figures beside bounds, and reasons, from the plain data of a report."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cgraph.files import write as write_file
+
+from . import theme
+from .document import Block, Document, Paragraph, Picture, Section, Table, to_html, to_markdown
+from .plot import _figure, _style, to_adaptive_svg
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Content = Mapping[str, Any]  # what `content()` of the report gives, or its JSON file
+Row = Mapping[str, Any]
+FROM, TO = 1e-12, 1e13  # shares of a bound that are drawn; what is outside is drawn at the border
+WIDTH, LINE, FRAME = 10.0, 0.17, 1.0  # inches: of a picture, of each case, and for the axis
+NAME = "stability"  # of the files
+
+
+def write(folder: Path, content: Content, figures: str) -> Path:
+    """Write stability.html, .md with its pictures, .csv and .json into a folder; returns the page. figures: as CSV."""
+    folder.mkdir(parents=True, exist_ok=True)
+    page = document(content)
+    for picture in page.pictures():
+        write_file(folder / f"{NAME}-{picture.name}.svg", picture.svg)
+    write_file(folder / f"{NAME}.json", json.dumps(content, indent=1))
+    write_file(folder / f"{NAME}.csv", figures)
+    write_file(folder / f"{NAME}.md", to_markdown(page, f"{NAME}-"))
+    return write_file(folder / f"{NAME}.html", to_html(page))
+
+
+def document(content: Content) -> Document:
+    """The document of one report."""
+    sections = [_limits(content), *[_section(each) for each in content["sections"] if each["rows"]]]
+    return Document("Stiff and extreme cases", _introduction(content), sections)
+
+
+def _rows(content: Content) -> list[Row]:
+    return [row for section in content["sections"] for row in section["rows"]]
+
+
+def _introduction(content: Content) -> list[Block]:
+    counts = Counter(row["verdict"] for row in _rows(content))
+    verdict = f"{counts['meets']} of {len(_rows(content))} rows meet their bounds"
+    if counts["limit"]:
+        verdict += f"; {counts['limit']} do not, for a reason that is known and given below"
+    if counts["unexplained"]:
+        verdict += f"; {counts['unexplained']} do not and should"
+    quick = " A quick run: some of the cases, shorter runs, shorter arms." if content["quick"] else ""
+    load = "" if content["load"] is None else f" The load of the machine was {content['load']:.1f} at the end."
+    return [
+        Paragraph(f"{verdict}.", point=True),
+        Paragraph(
+            "Every row is a case that is hard for arithmetic or for an integrator: what was measured, the bound that "
+            f"was set beforehand, and whether the one is within the other.{quick}"
+        ),
+        Paragraph(
+            f"{content['date']}, {content['seconds']:.0f} s in all. {' '.join(str(content['machine']).split())}.{load}"
+        ),
+    ]
+
+
+def _limits(content: Content) -> Section:
+    """The reasons, each once, with the rows that it is of."""
+    groups: dict[str, list[Row]] = {}
+    for row in _rows(content):
+        if row["verdict"] != "meets":
+            groups.setdefault(row["reason"] or row["stopped"] or "No reason is known.", []).append(row)
+    if not groups:
+        return Section("limits", "Limits", [Paragraph("All rows meet their bounds.")])
+    blocks: list[Block] = []
+    for reason, rows in groups.items():
+        blocks.append(Paragraph(reason if rows[0]["reason"] else f"Unexplained. {reason}"))
+        cells = [cell for row in rows for cell in _lines(row, missed=True)]
+        blocks.append(Table("Beyond their bounds", _HEADER[:2] + _HEADER[3:6], [c[:2] + c[3:6] for c in cells]))
+    return Section("limits", "Limits", blocks)
+
+
+_HEADER = ["case", "method", "verdict", "figure", "value", "bound", "steps", "time [s]"]
+
+
+def _section(section: Mapping[str, Any]) -> Section:
+    name, rows = section["name"], section["rows"]
+    anchor = re.sub(r"[^a-z]+", "-", name.lower())
+    svg = to_adaptive_svg(shares(rows))
+    shown = len(_HEADER) if any(row["steps"] or row["rejected"] for row in rows) else 6
+    lines = [line[:shown] for row in rows for line in _lines(row)]
+    hard = dict.fromkeys([f"{row['case']}: {row['about']}" for row in rows])
+    figures = [each for row in rows for each in row["figures"]]
+    bounds = dict.fromkeys([f"{each['quantity']}: {each['why']}" for each in figures])
+    return Section(
+        anchor,
+        name,
+        [
+            Paragraph(section["about"]),
+            Picture(anchor, svg, "Figures over their bounds: to the right of the line, a bound is not met."),
+            Table("Verdicts", _HEADER[:shown], lines),
+            Table("What is hard", ["case"], [[each] for each in hard], folded=True),
+            Table("Why these bounds", ["figure"], [[each] for each in bounds], folded=True),
+        ],
+    )
+
+
+def _lines(row: Row, missed: bool = False) -> list[list[str]]:
+    """A line of cells for each figure, or for each that is beyond its bound; what they share stands in the first."""
+    lines: list[list[str]] = []
+    for each in row["figures"]:
+        if missed and each["meets"]:
+            continue
+        first = not lines
+        shared = [row["case"], row["method"], row["verdict"]] if first else ["", "", ""]
+        bound = "" if each["bound"] == "inf" else _number(each["bound"])
+        own = [each["quantity"] + _unit(each), _number(each["value"]) + ("" if each["meets"] else " ✗"), bound]
+        lines.append([*shared, *own, *(_run(row) if first else ["", ""])])
+    return lines or [[row["case"], row["method"], row["verdict"], row["stopped"], "", "", *_run(row)]]
+
+
+def _unit(figure: Mapping[str, Any]) -> str:
+    """The unit, in brackets; none for a share of what the section names."""
+    return "" if str(figure["unit"]).startswith("of ") else f" [{figure['unit']}]"
+
+
+def _run(row: Row) -> list[str]:
+    rejected = f" + {row['rejected']}" if row["rejected"] else ""
+    return [f"{row['steps']}{rejected}", f"{row['seconds']:.2f}"]
+
+
+def _number(value: float | str) -> str:
+    """Two digits; NaN and infinities are texts in the data."""
+    if isinstance(value, str):
+        return value
+    return f"{value:.1e}" if value and not 0.01 <= abs(value) < 1000.0 else f"{value:.2g}"
+
+
+def shares(rows: Sequence[Row]) -> Figure:
+    """Every figure over its bound, a line for each case, on one logarithmic axis; those beyond 1 in another colour."""
+    names = list(dict.fromkeys(row["case"] for row in rows))
+    points = [
+        (_share(each), names.index(row["case"]), each["meets"])
+        for row in rows
+        for each in row["figures"]
+        if each["bound"] != "inf"
+    ]
+    with _style():
+        figure = _figure(WIDTH, FRAME + LINE * len(names))
+        axis = figure.subplots()
+        axis.set_xscale("log")
+        axis.axvline(1.0, color=theme.LINE, linewidth=1.0)
+        axis.hlines(range(len(names)), FROM, TO, color=theme.GREY, linewidth=0.3)
+        for meets, colour, marker in ((True, theme.BLUE, "o"), (False, theme.SPURIOUS, "X")):
+            chosen = [(x, y) for x, y, met in points if met is meets]
+            x, y = ([point[k] for point in chosen] for k in (0, 1))
+            axis.plot(x, y, marker, color=colour, markersize=4.5, clip_on=False)
+        axis.set_yticks(range(len(names)), names, fontsize=8)
+        axis.tick_params(axis="y", length=0)
+        axis.set_xlim(FROM, TO)
+        axis.set_ylim(len(names) - 0.5, -0.5)
+        axis.set_xlabel("figure over its bound")
+    return figure
+
+
+def _share(figure: Mapping[str, Any]) -> float:
+    """The figure over its bound, within what is drawn; what is no number at the far end."""
+    value, bound = float(figure["value"]), float(figure["bound"])
+    if value != value:
+        return TO
+    share = value / bound if bound else (TO if value else FROM)
+    return min(max(share, FROM), TO)
