@@ -4,6 +4,7 @@ from .c import CSource
 from .codegen import Compiled, clear_cache, compile
 from .counts import Counts
 from .errors import GraphError
+from .explain import Diff, Lint, Why, WhyNot, diff, lint, why, why_not
 from .forward import jvp
 from .graph import Graph
 from .hessian_solve import hessian_solve
@@ -41,16 +42,21 @@ from .ops import (
 from .program import Loop, loop
 from .reverse import gradient, vjp
 from .simplify import simplify, specialize
+from .structure_hash import structure_hash
 
 __all__ = [
     "CSource",
     "Compiled",
     "Counts",
+    "Diff",
     "Edge",
     "Graph",
     "GraphError",
+    "Lint",
     "Loop",
     "Node",
+    "Why",
+    "WhyNot",
     "abs",
     "acos",
     "asin",
@@ -61,6 +67,7 @@ __all__ = [
     "constant",
     "cos",
     "cosh",
+    "diff",
     "equal",
     "exp",
     "expm1",
@@ -72,6 +79,7 @@ __all__ = [
     "jvp",
     "less",
     "less_equal",
+    "lint",
     "log",
     "log1p",
     "loop",
@@ -86,6 +94,7 @@ __all__ = [
     "sinh",
     "specialize",
     "sqrt",
+    "structure_hash",
     "tag",
     "tan",
     "tanh",
@@ -93,4 +102,6 @@ __all__ = [
     "variables",
     "vjp",
     "where",
+    "why",
+    "why_not",
 ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import time
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,6 +16,7 @@ from .equations import energy
 from .event import Event, crossings, event_graph
 from .integrators import METHODS, Problem
 from .progress import Progress
+from .rows import Rows, from_start, recorded_times
 from .run import AdaptiveRun, FixedRun, Hermite, Piece, Tally
 from .scipy_run import ScipyRun, solver_of
 from .state_equation import state_inputs
@@ -84,7 +84,7 @@ def simulate(
     problem = Problem(model, bound | values)
     state = _start(problem, q, qd)
     wanted = (events,) if isinstance(events, Event) else tuple(events)
-    asked = None if t_eval is None else _times(t_eval, t_end)
+    asked = None if t_eval is None else recorded_times(t_eval, t_end)
 
     limits: dict[str, Any] = {
         "rtol": rtol,
@@ -102,10 +102,10 @@ def simulate(
         )
     else:
         size = DT if dt is None else dt
-        instants = [0.0, float(t_end)] if asked is None else _from_start(asked)
+        instants = [0.0, float(t_end)] if asked is None else from_start(asked)
         each = asked is None or bool(wanted)
         run = FixedRun(problem, METHODS[method], (), backend, instants=instants, dt=size, each=each, most=max_steps)
-    rows = _Rows(state, asked)
+    rows = Rows(state, asked)
     watch = _Watch(problem, wanted)
     begin = time.perf_counter()
     try:
@@ -136,43 +136,6 @@ def simulate(
     return Trajectory(
         times, table[:, :half], table[:, half:], _energies(problem, values, times, table), stats, watch.found(half)
     )
-
-
-class _Rows:
-    """The rows of the trajectory: every step, or the states at the times asked for."""
-
-    def __init__(self, state: Array, asked: Array | None) -> None:
-        self.asked = asked
-        self.last = 0.0
-        at_start = asked is None or asked[0] == 0.0
-        self._t = [np.zeros(1 if at_start else 0)]
-        self._x = [state[None] if at_start else state[None][:0]]
-        self._next = int(at_start)  # of the times asked for
-
-    def add(self, piece: Piece) -> None:
-        """The rows of these steps."""
-        if not len(piece.t):
-            return
-        self.last = float(piece.t[-1])
-        if self.asked is None:
-            self._t.append(piece.t)
-            self._x.append(piece.x)
-            return
-        last = int(np.searchsorted(self.asked, self.last, side="right"))
-        times = self.asked[self._next : last]
-        self._next = last
-        rows = np.searchsorted(piece.t, times)
-        exact = piece.t[rows] == times
-        states = piece.x[rows]
-        if not exact.all():
-            inside = rows[~exact]
-            states[~exact] = piece.at(inside, (times[~exact] - piece.t_old[inside]) / piece.h[inside])
-        self._t.append(times)
-        self._x.append(states)
-
-    def table(self) -> tuple[Array, Array]:
-        """Times and states."""
-        return np.concatenate(self._t), np.concatenate(self._x)
 
 
 class _Watch:
@@ -254,20 +217,6 @@ def _state(what: str, value: ArrayLike, n: int, each: str) -> Array:
     if not np.isfinite(array).all():
         raise ValueError(f"{what} must be finite, got {array.tolist()}")
     return array
-
-
-def _times(t_eval: ArrayLike, t_end: float) -> Array:
-    times = np.asarray(t_eval, dtype=np.float64)
-    listed: list[float] = times.ravel().tolist()
-    increasing = all(a < b for a, b in itertools.pairwise(listed))
-    if times.ndim != 1 or not listed or not increasing or not (listed[0] >= 0.0 and listed[-1] <= t_end):
-        raise ValueError(f"t_eval must be increasing times in [0, t_end = {t_end:g} s]")
-    return times
-
-
-def _from_start(times: Array) -> list[float]:
-    listed: list[float] = times.tolist()
-    return listed if listed[0] == 0.0 else [0.0, *listed]
 
 
 def _parameter_values(own: Mapping[str, float], parameters: Mapping[str, float] | None) -> dict[str, float]:

@@ -34,6 +34,7 @@ def to_dot(
     names: Mapping[str, str] | None = None,
     marked: Collection[Node] = frozenset(),
     marked_label: str = theme.MARKED.words,
+    marked_edges: Collection[Edge] = frozenset(),
     clusters: bool | Sequence[str] | ClusterRule = True,
     collapse: Sequence[str] = (),
     caption: str | None = None,
@@ -49,6 +50,7 @@ def to_dot(
     names: {name of an input, an output or a node: text to show}; other names are shown by `theme.pretty`, q0 as q₀.
     marked: nodes to draw thick in the one colour of what is wrong, with the edges out of them.
     marked_label: what the legend calls them.
+    marked_edges: edges to draw in that colour, too, such as those of a path or a cut.
     clusters: frames around the nodes of a tag. True: by `main_tag`; tags: by these, a node with several of them in
         none; a function: the frame's title for a node, or None.
     collapse: tags whose nodes become one box, "link 2 (34 nodes)"; an edge at it says how many it stands for.
@@ -66,7 +68,15 @@ def to_dot(
     """
     if rankdir not in DIRECTIONS:
         raise ValueError(f"rankdir must be one of {', '.join(DIRECTIONS)}, got {rankdir!r}")
-    plan = _plan(graph, names or {}, frozenset(marked), marked_label, _cluster_rule(clusters), tuple(collapse))
+    plan = _plan(
+        graph,
+        names or {},
+        frozenset(marked),
+        frozenset(marked_edges),
+        marked_label,
+        _cluster_rule(clusters),
+        tuple(collapse),
+    )
     drawing = _digraph(rankdir)
     if caption is not None:
         counts = f"{len(graph.nodes)} nodes, {len(graph.edges)} edges"
@@ -142,6 +152,7 @@ class _Subject:
     graph: Graph
     names: Mapping[str, str]
     marked: frozenset[Node]
+    marked_edges: frozenset[Edge]
     mark: Paint
     number: dict[Node, int]
     part: dict[Node, str]  # id of the collapsed box that a node is in
@@ -160,6 +171,7 @@ def _plan(
     graph: Graph,
     names: Mapping[str, str],
     marked: frozenset[Node],
+    marked_edges: frozenset[Edge],
     marked_label: str,
     cluster_of: ClusterRule,
     collapse: tuple[str, ...],
@@ -169,7 +181,7 @@ def _plan(
     if strange:
         raise ValueError(f"{len(strange)} of {len(marked)} marked nodes are not in the graph, such as {strange[0]!r}")
     mark = Paint(marked_label, theme.MARKED.fill, theme.MARKED.line)
-    subject = _Subject(graph, names, marked, mark, number, _parts(graph, collapse))
+    subject = _Subject(graph, names, marked, marked_edges, mark, number, _parts(graph, collapse))
     plan = _Plan()
     plan.boxes.extend(_part_boxes(subject, collapse))
     for node in graph.nodes:
@@ -265,7 +277,7 @@ def _arrows(subject: _Subject) -> Iterator[_Arrow]:
         else:
             yield _node_arrow(subject, edge)
     for (tail, head), edges in merged.items():
-        wrong = any(edge.source in subject.marked for edge in edges)
+        wrong = any(edge.source in subject.marked or edge in subject.marked_edges for edge in edges)
         about = f"{len(edges)} edge{'s' if len(edges) > 1 else ''} from {tail} to {head}"
         attributes = {"id": f"e{tail.removeprefix('n')}-{head.removeprefix('n')}", "edgetooltip": about}
         if len(edges) > 1:
@@ -284,7 +296,11 @@ def _node_arrow(subject: _Subject, edge: Edge) -> _Arrow:
     attributes = {"id": f"e{source}-{target}-{slot}", "edgetooltip": f"argument {slot + 1} of n{target}: {op.name}"}
     if op.arity > 1 and not op.commutative:
         attributes["headlabel"] = str(slot + 1)
-    return _Arrow(tail, f"n{target}", {**attributes, **_line(subject, edge.source in subject.marked)})
+    return _Arrow(
+        tail,
+        f"n{target}",
+        {**attributes, **_line(subject, edge.source in subject.marked or edge in subject.marked_edges)},
+    )
 
 
 def _line(subject: _Subject, wrong: bool) -> Attributes:

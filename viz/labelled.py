@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLOURS = (theme.BLUE, theme.ORANGE, theme.GREEN, theme.PURPLE, theme.SKY_BLUE)  # seen on white and on black
-GRID = {"color": "#808080", "alpha": 0.25, "linewidth": 0.6}
+GRID: dict[str, Any] = {"color": "#808080", "alpha": 0.25, "linewidth": 0.6}
 LABEL = 8.0  # points
 APART = 1.1  # of a label's height, from one to the next
 GAP = 6.0  # points between the end of a curve and its label
@@ -104,7 +104,7 @@ def _draw(axis: Axes, line: Line) -> None:
 
 def _name(axis: Axes, lines: Sequence[Line]) -> None:
     """The names to the right of the ends, moved where they would lie on another name or, if it can be, on a curve."""
-    scale = axis.figure.dpi / 72.0  # type: ignore[union-attr]
+    scale = axis.figure.dpi / 72.0
     paths = [axis.transData.transform(np.column_stack([line.x, line.y])) for line in lines if len(line.x)]
     inked = np.vstack([_dense(path) for path in paths]) if paths else np.empty((0, 2))
     frame = axis.get_window_extent()
@@ -163,7 +163,7 @@ class Box(NamedTuple):
             & (abs(inked[:, 1] - self.middle) < self.height / 2)
         )
         away = abs(self.middle - end[1]) / self.height + 0.5 * (self.left - end[0]) / self.height
-        return 1000.0 * names + 0.7 * float(np.count_nonzero(on)) + away
+        return 1000.0 * float(names) + 0.7 * float(np.count_nonzero(on)) + away
 
 
 def _dense(path: Points) -> Points:

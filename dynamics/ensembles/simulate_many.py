@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike
 
 from ..integrators import METHODS, Problem
 from ..progress import Progress
-from ..simulate import DT, _from_start, _times
+from ..rows import from_start, recorded_times
+from ..simulate import DT
 from .chunk import Chunk, Part
 from .ensemble import Ensemble, EnsembleStats
 from .portable import portable
@@ -87,7 +88,7 @@ def simulate_many(
     if adaptive and t_eval is None:
         raise ValueError(f"{method!r} chooses the steps of each trajectory: t_eval must say which times to record")
     x, same, own = starts(model, q, qd, tau, parameters)
-    asked = None if t_eval is None else _times(t_eval, t_end)
+    asked = None if t_eval is None else recorded_times(t_eval, t_end)
     size = DT if dt is None else float(dt)
     steps = step_count(t_end, size)
     rows = steps + 1 if asked is None else len(asked)
@@ -102,7 +103,7 @@ def simulate_many(
         plan = {"t_end": float(t_end), "rtol": rtol, "atol": atol, "longest": math.inf if dt is None else size}
         plan |= {"first": first_step, "most": max_steps}
     else:
-        instants = [0.0, float(t_end)] if asked is None else _from_start(asked)
+        instants = [0.0, float(t_end)] if asked is None else from_start(asked)
         plan = {"instants": instants, "dt": size, "each": asked is None, "most": max_steps}
         course = stretches(instants, size) if asked is not None else [Stretch(0.0, t_end / steps, 1, steps)]
         if sent.straight() is None or sum(each.each * each.rows for each in course) > max_steps:

@@ -15,8 +15,8 @@ import numpy as np
 from cgraph.program import Runner, runner
 from cgraph.program.runner import Record
 
+from ..rows import Rows
 from ..run import AdaptiveRun, FixedRun
-from ..simulate import _Rows
 from ..trajectory import Array
 from .chunk import Chunk, Part, empty
 from .portable import Portable
@@ -89,7 +89,7 @@ class Task:
             run = copy.copy(template)  # with the same machine code
             watched = _Watched(template.runner, stopped)
             vars(run).update(self.plan, parameters=chunk.p[k].tolist(), runner=watched)
-            rows = _Rows(x, self.asked)
+            rows = Rows(x, self.asked)
             for piece in run.pieces(x):
                 rows.add(piece)
             found = rows.table()[1]

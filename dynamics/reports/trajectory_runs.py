@@ -15,7 +15,7 @@ import numpy as np
 from ..integrators import METHODS, Problem
 from ..run import AdaptiveRun, FixedRun, Tally
 from ..scipy_run import PREFIX, ScipyRun
-from ..simulate import _Rows
+from ..rows import Rows
 from ..state_equation import state_inputs
 from ..trajectory import Array
 from .trajectory_scenes import Setting
@@ -88,7 +88,7 @@ def finished(run: Tally, start: Array) -> Outcome:
 
 def recorded(run: Tally, start: Array, times: Sequence[float]) -> Array:
     """The states of a run at some times, (T, m)."""
-    rows = _Rows(start, np.array(times))
+    rows = Rows(start, np.array(times))
     begin = time.perf_counter()
     with np.errstate(all="ignore"):
         for piece in run.pieces(start):

@@ -1,0 +1,64 @@
+"""Rows: what of a run becomes a row of its trajectory, every step or the states at the times asked for."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .run import Piece
+from .trajectory import Array
+
+
+class Rows:
+    """The rows of the trajectory: every step, or the states at the times asked for."""
+
+    def __init__(self, state: Array, asked: Array | None) -> None:
+        self.asked = asked
+        self.last = 0.0
+        at_start = asked is None or asked[0] == 0.0
+        self._t = [np.zeros(1 if at_start else 0)]
+        self._x = [state[None] if at_start else state[None][:0]]
+        self._next = int(at_start)  # of the times asked for
+
+    def add(self, piece: Piece) -> None:
+        """The rows of these steps."""
+        if not len(piece.t):
+            return
+        self.last = float(piece.t[-1])
+        if self.asked is None:
+            self._t.append(piece.t)
+            self._x.append(piece.x)
+            return
+        last = int(np.searchsorted(self.asked, self.last, side="right"))
+        times = self.asked[self._next : last]
+        self._next = last
+        rows = np.searchsorted(piece.t, times)
+        exact = piece.t[rows] == times
+        states = piece.x[rows]
+        if not exact.all():
+            inside = rows[~exact]
+            states[~exact] = piece.at(inside, (times[~exact] - piece.t_old[inside]) / piece.h[inside])
+        self._t.append(times)
+        self._x.append(states)
+
+    def table(self) -> tuple[Array, Array]:
+        """Times and states."""
+        return np.concatenate(self._t), np.concatenate(self._x)
+
+
+def recorded_times(t_eval: ArrayLike, t_end: float) -> Array:
+    """The times asked for, (T,). Raises ValueError unless they increase and lie in [0, t_end]."""
+    times = np.asarray(t_eval, dtype=np.float64)
+    listed: list[float] = times.ravel().tolist()
+    increasing = all(a < b for a, b in itertools.pairwise(listed))
+    if times.ndim != 1 or not listed or not increasing or not (listed[0] >= 0.0 and listed[-1] <= t_end):
+        raise ValueError(f"t_eval must be increasing times in [0, t_end = {t_end:g} s]")
+    return times
+
+
+def from_start(times: Array) -> list[float]:
+    """The times, with 0 before them."""
+    listed: list[float] = times.tolist()
+    return listed if listed[0] == 0.0 else [0.0, *listed]

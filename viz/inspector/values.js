@@ -1,0 +1,72 @@
+// Values of nodes, slopes of edges and adjoints of a version at a point.
+
+const signOf = (a) => (a !== a ? a : (a > 0) - (a < 0));
+const VALUE = {
+  add: (a, b) => a + b, sub: (a, b) => a - b, mul: (a, b) => a * b, div: (a, b) => a / b, neg: (a) => -a,
+  // as in C: 1 to any power and anything to the power 0 are 1, NaN or not
+  pow: (a, b) => (a === 1 || b === 0 || (a === -1 && (b === Infinity || b === -Infinity)) ? 1 : a ** b),
+  sqrt: Math.sqrt, exp: Math.exp, expm1: Math.expm1, log: Math.log, log1p: Math.log1p,
+  sin: Math.sin, cos: Math.cos, tan: Math.tan, asin: Math.asin, acos: Math.acos, atan: Math.atan,
+  atan2: Math.atan2, hypot: Math.hypot, sinh: Math.sinh, cosh: Math.cosh, tanh: Math.tanh,
+  abs: Math.abs, sign: signOf,
+  minimum: (a, b) => (a <= b || a !== a ? a : b), maximum: (a, b) => (a >= b || a !== a ? a : b),
+  less: (a, b) => +(a < b), less_equal: (a, b) => +(a <= b), equal: (a, b) => +(a === b),
+  not_equal: (a, b) => +(a !== b), where: (c, a, b) => (c !== 0 ? a : b),
+  strong_mul: (a, b) => (a !== 0 && b !== 0 ? a * b : 0),
+};
+
+/** A version made ready: constants as numbers, uses of each node, edges in the order of evaluation. */
+function prepare(version) {
+  const constants = new Map();
+  const args = version.args.map((each, i) => {
+    if (Array.isArray(each)) return each;
+    constants.set(i, Number(each));
+    return [];
+  });
+  const users = args.map(() => []);
+  const edges = [];
+  args.forEach((own, target) => own.forEach((source, slot) => {
+    users[source].push(target);
+    edges.push([source, target, slot]);
+  }));
+  return { ...version, args, constants, users, edges, marked: new Set(version.marked) };
+}
+
+/** The value of every node, inputs in the order of the version's. */
+function evaluate(version, row) {
+  const found = new Float64Array(version.ops.length);
+  version.inputs.forEach(([, node], i) => { if (node >= 0) found[node] = row[i]; });
+  version.constants.forEach((value, node) => { found[node] = value; });
+  for (let i = 0; i < found.length; i++) {
+    const a = version.args[i];
+    if (a.length === 1) found[i] = VALUE[version.ops[i]](found[a[0]]);
+    else if (a.length === 2) found[i] = VALUE[version.ops[i]](found[a[0]], found[a[1]]);
+    else if (a.length === 3) found[i] = VALUE[version.ops[i]](found[a[0]], found[a[1]], found[a[2]]);
+  }
+  return found;
+}
+
+/** The local partials of every node, by the programs of the operation table. */
+function slopesAt(version, programs, values) {
+  return version.args.map((args, node) => {
+    if (!args.length) return [];
+    const { code, out } = programs[version.ops[node]];
+    const work = [values[node], ...args.map((arg) => values[arg])];
+    for (const line of code) {
+      work.push(typeof line === "number" ? line : VALUE[line[0]](...line.slice(1).map((i) => work[i])));
+    }
+    return out.map((i) => work[i]);
+  });
+}
+
+/** d output / d node for every node, after the reverse sweep has passed `steps` nodes from the end; zero wins. */
+function adjoints(version, slopes, output, steps = version.ops.length) {
+  const bars = new Float64Array(version.ops.length);
+  bars[output] = 1;
+  const last = version.ops.length - 1;
+  for (let node = last; node > last - steps; node--) {
+    if (bars[node] === 0) continue;
+    version.args[node].forEach((arg, slot) => { bars[arg] += VALUE.strong_mul(bars[node], slopes[node][slot]); });
+  }
+  return bars;
+}
