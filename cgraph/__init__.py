@@ -42,6 +42,7 @@ from .ops import (
 from .program import Loop, loop
 from .reverse import gradient, vjp
 from .simplify import simplify, specialize
+from .source_lines import recording_lines
 from .structure_hash import structure_hash
 
 __all__ = [
@@ -88,6 +89,7 @@ __all__ = [
     "named",
     "not_equal",
     "pow",
+    "recording_lines",
     "sign",
     "simplify",
     "sin",

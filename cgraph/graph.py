@@ -209,19 +209,19 @@ def _records(nodes: Sequence[Node]) -> Iterator[tuple[Any, ...]]:
     """One flat record a node, so that pickling a deep graph needs no recursion."""
     number = {node: i for i, node in enumerate(nodes)}
     for node in nodes:
-        tags, roles = tuple(sorted(node.tags)), tuple(sorted(node.roles))
-        yield node.op.name, tuple([number[arg] for arg in node.args]), node.value, node.name, tags, roles
+        sets = tuple([tuple(sorted(each)) for each in (node.tags, node.roles, node.lines)])
+        yield node.op.name, tuple([number[arg] for arg in node.args]), node.value, node.name, sets
 
 
 def _restore(inputs: tuple[str, ...], records: tuple[tuple[Any, ...], ...], outputs: dict[str, int]) -> Graph:
     from_record: list[Node] = []
-    for op, args, value, name, tags, roles in records:
+    for op, args, value, name, sets in records:
         if op == CONSTANT.name:
             node = as_node(value)
         elif op == VARIABLE.name:
             node = variable(name)
         else:
-            kept = label(frozenset(tags), frozenset(roles))
+            kept = label(*map(frozenset, sets))
             node = Node(OPS[op], tuple([from_record[i] for i in args]), kept, name=name)
         from_record.append(node)
     return Graph([variable(name) for name in inputs], {name: from_record[i] for name, i in outputs.items()})

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from .node import Node, Op
@@ -16,52 +16,80 @@ if TYPE_CHECKING:
 INPUT, PRIMAL, ADJOINT, TANGENT = "input", "primal", "adjoint", "tangent"
 
 
+class SourceLine(NamedTuple):
+    """A line of a file that somebody wrote."""
+
+    file: str
+    number: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.number}"
+
+
 @dataclass(frozen=True, eq=False)
 class Label:
     """What a node means: `tags` given by the person who wrote it, `roles` given by differentiation.
+
+    lines: where it was written, if that was recorded (see `source_lines.py`).
 
     Labels are interned, so two equal labels are one object and comparing them is a pointer comparison.
     """
 
     tags: frozenset[str]
     roles: frozenset[str]
+    lines: frozenset[SourceLine] = frozenset()
 
     def derived(self, role: str) -> Label:
-        """The label of a derivative node: the tags of its origin and its own role."""
+        """The label of a derivative node: the tags and lines of its origin and its own role."""
         return _derived(self, role)
 
     def tagged(self, tags: frozenset[str]) -> Label:
         """This label with more tags."""
-        return label(self.tags | tags, self.roles)
+        return label(self.tags | tags, self.roles, self.lines)
+
+    def at(self, line: SourceLine) -> Label:
+        """This label with a line more."""
+        return _at(self, line)
 
     def with_tags_of(self, other: Label) -> Label:
-        """This label with the tags of another as well."""
-        return _with_tags_of(self, other) if other.tags else self
+        """This label with the tags of another as well, and with its lines where it has none of its own."""
+        return _with_tags_of(self, other) if other.tags or other.lines else self
 
     def union(self, other: Label) -> Label:
         """The label of two nodes merged into one."""
         return self if self is other else _union(self, other)
 
 
+def label(
+    tags: frozenset[str] = frozenset(),
+    roles: frozenset[str] = frozenset(),
+    lines: frozenset[SourceLine] = frozenset(),
+) -> Label:
+    """The one label with these tags, roles and lines."""
+    return _interned(tags, roles, lines)
+
+
+_interned = cache(Label)
+
+
 @cache
-def label(tags: frozenset[str] = frozenset(), roles: frozenset[str] = frozenset()) -> Label:
-    """The one label with these tags and roles."""
-    return Label(tags, roles)
+def _at(own: Label, line: SourceLine) -> Label:
+    return label(own.tags, own.roles, own.lines | {line})
 
 
 @cache
 def _derived(origin: Label, role: str) -> Label:
-    return label(origin.tags, (origin.roles - {INPUT, PRIMAL}) | {role})
+    return label(origin.tags, (origin.roles - {INPUT, PRIMAL}) | {role}, origin.lines)
 
 
 @cache
 def _with_tags_of(own: Label, other: Label) -> Label:
-    return own.tagged(other.tags)
+    return label(own.tags | other.tags, own.roles, own.lines or other.lines)
 
 
 @cache
 def _union(a: Label, b: Label) -> Label:
-    return label(a.tags | b.tags, a.roles | b.roles)
+    return label(a.tags | b.tags, a.roles | b.roles, a.lines | b.lines)
 
 
 UNLABELLED = label()

@@ -11,7 +11,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from .label import INPUT, UNLABELLED, Label, current, label
+from .label import INPUT, UNLABELLED, Label, SourceLine, current, label
 
 _INPUT = label(roles=frozenset({INPUT}))
 
@@ -56,7 +56,7 @@ class Node:
 
     op: its row of the operation table; `VARIABLE` or `CONSTANT` for a leaf.
     args: argument nodes.  value: a constant's number.  name: a variable's name, or one given by `named`.
-    tags, roles: what the node means, see `cg.tag`.
+    tags, roles: what the node means, see `cg.tag`.  lines: where it was written, see `cg.recording_lines`.
 
     Nodes compare and hash by identity. Arithmetic with nodes and numbers makes new nodes, kept as written;
     `<`, `<=`, `>`, `>=` make comparison nodes (1.0 or 0.0) for `cg.where`; `cg.equal` compares values.
@@ -99,6 +99,11 @@ class Node:
     def roles(self) -> frozenset[str]:
         """Among "input", "primal", "adjoint", "tangent"; several after a merge or a second derivative."""
         return self.label.roles
+
+    @property
+    def lines(self) -> frozenset[SourceLine]:
+        """Where the node, or the node it derives from, was written; empty unless `cg.recording_lines` was on."""
+        return self.label.lines
 
     def __repr__(self) -> str:
         if self.op is CONSTANT:

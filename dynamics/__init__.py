@@ -14,12 +14,14 @@ from .equations import (
 )
 from .event import Event
 from .formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious
+from .handover import Dropped, FreeBody, PickedUp, dropped, picked_up
 from .mechanism import Body, Force, Joint, Mechanism, MechanismError, serial_arm, tree
 from .mjcf import to_mjcf
 from .mujoco_load import load_mjcf, load_urdf
 from .multiprecision import Reference, reference
 from .ode_system import OdeSystem
 from .planar_arm import Link, PlanarArm, planar_arm
+from .pruning import EFFECTS, LeftOut, Pruned, prune
 from .recursive import RecursiveInverseDynamics
 from .scenes import Scene
 from .simulate import simulate
@@ -30,19 +32,25 @@ from .trajectory import Crossings, Stats, Trajectory
 from .urdf import to_urdf
 
 __all__ = [
+    "EFFECTS",
     "FORMULATIONS",
     "Body",
     "Crossings",
+    "Dropped",
     "Ensemble",
     "EnsembleStats",
     "Event",
     "Force",
+    "FreeBody",
     "Joint",
+    "LeftOut",
     "Link",
     "Mechanism",
     "MechanismError",
     "OdeSystem",
+    "PickedUp",
     "PlanarArm",
+    "Pruned",
     "RecursiveInverseDynamics",
     "Reference",
     "Scene",
@@ -55,6 +63,7 @@ __all__ = [
     "bias",
     "cases",
     "check_pivot",
+    "dropped",
     "energy",
     "forward_dynamics",
     "gravity_force",
@@ -64,7 +73,9 @@ __all__ = [
     "mass_matrix",
     "momentum",
     "momentum_rate",
+    "picked_up",
     "planar_arm",
+    "prune",
     "reference",
     "scenes",
     "serial_arm",

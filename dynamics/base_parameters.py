@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -40,8 +39,8 @@ def regrouped(links: Sequence[Link], kinds: Sequence[str], parents: Sequence[int
         seen = _seen_by_parent(links[i], *given)
         if parents[i] >= 0:
             carrier = result[parents[i]]
-            parts = zip(_numbers(carrier), seen, strict=True)
-            result[parents[i]] = _with(carrier, *(own + more for own, more in parts))
+            mass, moment, inertia = _numbers(carrier)
+            result[parents[i]] = _with(carrier, mass + seen[0], moment + seen[1], inertia + seen[2])
         else:
             world += seen[1]
     return result, world
@@ -58,14 +57,19 @@ def _seen_by_parent(link: Link, mass: float, moment: Array, inertia: Array) -> t
 
 def _numbers(link: Link) -> tuple[float, Array, Array]:
     lower = np.tril(np.array(link.inertia, dtype=np.float64))
-    return float(link.mass), _array(link.moment), lower + np.tril(lower, -1).T  # type: ignore[arg-type]
+    return float(link.mass), _array(link.moment), lower + np.tril(lower, -1).T
 
 
-def _with(link: Link, mass: Any, moment: Any, inertia: Any) -> Link:
+def _with(link: Link, mass: float, moment: Array, inertia: Array) -> Link:
     """The link with these; what is left of an entry by rounding is none."""
-    moment, inertia = (np.where(np.abs(each) <= SNAP * np.abs(each).max(initial=0.0), 0.0, each)
-                       for each in (moment, inertia))  # fmt: skip
-    return replace(link, mass=float(mass), moment=spatial.constant(moment), inertia=inertia.tolist())
+    _, old_moment, old_inertia = _numbers(link)
+    moment, inertia = _cleaned(moment, old_moment), _cleaned(inertia, old_inertia)
+    return replace(link, mass=mass, moment=spatial.constant(moment), inertia=inertia.tolist())
+
+
+def _cleaned(new: Array, old: Array) -> Array:
+    scale = max(np.abs(new).max(), np.abs(old).max())
+    return np.where(np.abs(new) <= SNAP * scale, 0.0, new)
 
 
 def _array(triple: Triple) -> Array:

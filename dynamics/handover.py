@@ -13,6 +13,8 @@ from .equations import forward_dynamics, momentum
 from .mechanism import Mechanism
 from .spatial import Array
 
+_COMPONENTS = ("x y z", "vx vy vz", "wx wy wz")
+
 
 class FreeBody(NamedTuple):
     """A rigid body that moves on its own, in the world's axes."""
@@ -97,14 +99,10 @@ def _motion(mechanism: Mechanism, body: Body, q: Array, qd: Array) -> tuple[Free
     graph = mechanism.motion(body.name, body.center)
     rates = np.vstack([qd, np.eye(len(qd))])  # the state's own, then each coordinate alone
     found = graph.evaluate(_named(q=q, qd=rates.T))
-    velocity, omega = (_rows(found, names, len(rates)) for names in (("vx", "vy", "vz"), ("wx", "wy", "wz")))
-    position = _rows(found, ("x", "y", "z"), 1)[:, 0]
-    turn = _rows(found, [f"R_{i}_{j}" for i in range(3) for j in range(3)], 1).reshape(3, 3)
-    return FreeBody(position, velocity[:, 0], omega[:, 0], turn), velocity[:, 1:], omega[:, 1:]
-
-
-def _rows(found: dict[str, Any], names: Any, length: int) -> Array:
-    return np.array([np.broadcast_to(found[name], length) for name in names])
+    of = {name: np.broadcast_to(value, len(rates)) for name, value in found.items()}
+    position, velocity, omega = (np.array([of[name] for name in names.split()]) for names in _COMPONENTS)
+    turn = np.array([[of[f"R_{i}_{j}"][0] for j in range(3)] for i in range(3)])
+    return FreeBody(position[:, 0], velocity[:, 0], omega[:, 0], turn), velocity[:, 1:], omega[:, 1:]
 
 
 def _momentum(mechanism: Mechanism, q: Array, qd: Array) -> Array:

@@ -92,10 +92,16 @@ class Mechanism:
 
     @cached_property
     def _merged(self) -> tuple[tuple[Body, ...], dict[str, Carrier]]:
-        known = self._made.bodies
-        bodies = [known.get(body) or known.setdefault(body, checked(body)) for body in self.bodies]
+        bodies = [self._checked(body) for body in self.bodies]
         moving, carriers = welded(parents_first(locked(bodies, self.locked)))
         return with_mass_to_move(moving), carriers
+
+    def _checked(self, body: Body) -> Body:
+        known = self._made.bodies.get(body) if isinstance(body, Body) else None
+        if known is None:
+            known = checked(body)
+            self._made.bodies[body] = known
+        return known
 
     @property
     def _named(self) -> list[str]:

@@ -226,10 +226,11 @@ def _without(model: Any, effect: str) -> Any:
 def _with(model: Mechanism, effect: str, number: float) -> Mechanism:
     """The mechanism with that damping, stiffness or armature at every joint that moves and has it, or has it not."""
     name = _JOINT[effect]
+    change: dict[str, Any] = {name: number}
 
     def changed(body: Body) -> Body:
         moves = body.joint.kind != "fixed" and (not number or not getattr(body.joint, name))
-        return replace(body, joint=replace(body.joint, **{name: number})) if moves else body
+        return replace(body, joint=replace(body.joint, **change)) if moves else body
 
     return replace(model, bodies=tuple([changed(body) for body in model.bodies]))
 

@@ -1,6 +1,7 @@
 """The structure of the project: which way imports point, what an import loads, what is declared."""
 
 import ast
+import os
 import re
 import subprocess
 import sys
@@ -36,7 +37,7 @@ OPTIONAL = {
     "torch": None,  # measured when it is there, never asked for
 }
 TYPES = "TYPE_CHECKING"
-DYNAMICS_IN_VIZ = re.compile(r"viz/(paper\w*(/\w+)*|cli|__main__)\.py")
+DYNAMICS_IN_VIZ = re.compile(r"viz/(paper\w*(/\w+)*|commands/\w+|cli|__main__)\.py")
 
 
 def imports(text: str, package: str = "", for_types: bool = True) -> set[str]:
@@ -98,6 +99,23 @@ def test_importing_a_package_loads_numpy_and_the_standard_library(package: str) 
     run = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
     loaded = {name.partition(".")[0] for name in run.stdout.split()}
     assert loaded <= {*sys.stdlib_module_names, "numpy", *allowed(f"{package}/__init__.py")}
+
+
+@pytest.mark.parametrize("command", ["scenes", "draw --help", "draw chain --out a.dot", "report --help", "--help"])
+def test_a_command_loads_no_optional_dependency_that_it_does_not_use(command: str, tmp_path: Path) -> None:
+    program = (
+        "import atexit, sys, numpy.random; old = set(sys.modules)\n"
+        "atexit.register(lambda: print(*set(sys.modules) - old, file=sys.stderr))\n"
+        f"import viz.cli; viz.cli.main({command.split()})"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True,
+        text=True, check=True
+    )  # fmt: skip
+    loaded = {name.partition(".")[0] for name in run.stderr.split()} - {"__mp_main__"}
+    assert "viz" in loaded
+    needed = {"graphviz"} if ".dot" in command else set()
+    assert loaded <= {*sys.stdlib_module_names, "numpy", *PACKAGES, *needed}
 
 
 @pytest.mark.parametrize("package", PACKAGES)

@@ -12,22 +12,31 @@ from dataclasses import asdict
 from pathlib import Path
 
 from cgraph.files import write
-from dynamics import FORMULATIONS, forward_dynamics, inverse_dynamics, scenes, spurious
+from dynamics import EFFECTS, FORMULATIONS, forward_dynamics, inverse_dynamics, scenes, spurious
+from dynamics.inspection import inspection
 from dynamics.integrators import METHODS
-from dynamics.reports import stability, stability_table, trajectory_scenes, work_precision
+from dynamics.reports import pruning as pruning_report, stability, stability_table, trajectory_scenes, work_precision
 from dynamics.reports.bench import MODES, PEERS, QUICK, SCENES, TASKS, Row, bench
 from dynamics.reports.bench_table import machine, tables
 from dynamics.reports.cold_start import STARTS
+from dynamics.tables.certificate import certify
 
+from . import pruning
+from .commands import diff, lesson, lint, why
+from .commands.scene import may_ignore, scene_of, takes_a_scene
 from .dot import to_dot
+from .inspector import Motion, Table, Version, page
 from .render import render_png, render_svg
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit status: 0, 1 for an error (one line on standard error), 2 for wrong usage."""
+    """Run one command; returns the exit status.
+
+    0, or what the command returns; 1 for an error (one line on standard error), 2 for wrong usage.
+    """
     options = _parser().parse_args(arguments)
     try:
-        options.run(options)
+        status: int | None = options.run(options)
         sys.stdout.flush()
     except KeyboardInterrupt:
         print("cgraph: interrupted", file=sys.stderr)
@@ -38,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (ValueError, TypeError, OSError, ImportError, RuntimeError) as error:
         print(f"cgraph: error: {' '.join(str(error).split())}", file=sys.stderr)
         return 1
-    return 0
+    return status or 0
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -61,7 +70,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="SCENE",
         help=f"one of {', '.join(SCENES)} (default: all of these), a name that `cgraph scenes` lists, or a model file",
     )
-    _may_ignore(timed)
+    may_ignore(timed)
     for what, known in (("tasks", TASKS), ("modes", MODES), ("peers", PEERS)):
         timed.add_argument(f"--{what}", metavar="A,B", help=f"only these of {', '.join(known)}")
     timed.add_argument("--quick", action="store_true", help=f"fewer turns and, unless named, {', '.join(QUICK)} alone")
@@ -78,13 +87,33 @@ def _parser() -> argparse.ArgumentParser:
     listed.set_defaults(run=_scenes)
 
     draw = commands.add_parser("draw", help="draw the graph of a scene's equations (SVG, PNG or DOT) or list it (TXT)")
-    _takes_a_scene(draw)
+    takes_a_scene(draw)
     draw.add_argument("--formulation", default="chain_rule", choices=sorted(FORMULATIONS), help="default: chain_rule")
     draw.add_argument("--out", type=Path, required=True, help="file to write: .svg, .png, .dot or .txt")
     draw.add_argument(
         "--collapse", action="append", default=[], metavar="TAG", help="draw all nodes of a tag as one box"
     )
     draw.set_defaults(run=_draw)
+
+    checked = commands.add_parser(
+        "certify", help="equations that a scene's graphs must fulfil, at random states, and agreement with peers"
+    )
+    takes_a_scene(checked)
+    checked.add_argument("--states", type=int, default=20, metavar="N", help="random states (default: 20)")
+    checked.add_argument("--seed", type=int, default=0, metavar="S", help="of the random states (default: 0)")
+    checked.add_argument("--json", action="store_true", help="print as JSON")
+    checked.set_defaults(run=_certify)
+
+    inspect = commands.add_parser("inspect", help="one page on which a scene's equations unfold, move and answer")
+    takes_a_scene(inspect)
+    inspect.add_argument("--out", type=Path, required=True, help="file to write: .html")
+    inspect.add_argument("--forward", action="store_true", help="forward dynamics, in place of the three formulations")
+    inspect.add_argument("--t-end", type=float, metavar="S", help="how long it moves, instead of the scene's own time")
+    inspect.add_argument("--json", action="store_true", help="print the sizes as JSON")
+    inspect.set_defaults(run=_inspect)
+
+    for command in (lint, why, diff, lesson):
+        command.add(commands)
     return parser
 
 
@@ -99,7 +128,7 @@ def _add_report(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -
     report.add_argument(
         "--stability", action="store_true", help="the table of stiff and extreme cases; status 1 for an unexplained row"
     )
-    _may_ignore(report)
+    may_ignore(report)
     report.add_argument("--out", type=Path, default=Path("report"), help="folder to fill (default: report)")
     report.add_argument("--t-end", type=float, metavar="S", help="how long, instead of the scene's own time")
     report.add_argument("--start", metavar="A,B", help="q and then qd, instead of the scene's own start")
@@ -110,25 +139,12 @@ def _add_report(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -
         "--budget", type=float, default=60.0, metavar="S", help="seconds that a cold start may take (default: 60)"
     )
     report.add_argument("--json", action="store_true", help="print as JSON")
+    report.add_argument("--pruning", action="store_true", help="instead: what the scene's graphs hold and leave out")
+    report.add_argument("--without", default="", metavar="A,B", help=f"with --pruning: leave out {', '.join(EFFECTS)}")
+    report.add_argument(
+        "--lock", action="append", default=[], metavar="BODY=AT", help="with --pruning: lock a joint there [rad or m]"
+    )
     report.set_defaults(run=_report)
-
-
-def _takes_a_scene(command: argparse.ArgumentParser) -> None:
-    """The arguments that `_scene` reads."""
-    command.add_argument("scene", help=f"{', '.join(scenes.names())}, or a model file, MJCF or URDF")
-    _may_ignore(command)
-
-
-def _may_ignore(command: argparse.ArgumentParser) -> None:
-    command.add_argument("--ignore", action="store_true", help="leave out what of a model file cannot be modelled")
-
-
-def _scene(options: argparse.Namespace) -> scenes.Scene:
-    """The scene that the arguments name; what of a file is left out goes to standard error, a line each."""
-    scene = scenes.load(options.scene, **({"ignore": True} if options.ignore else {}))
-    for what in scene.left_out:
-        print(f"cgraph: {scene.name}: left out {what}", file=sys.stderr)
-    return scene
 
 
 def _paper(options: argparse.Namespace) -> None:
@@ -163,13 +179,15 @@ def _bench(options: argparse.Namespace) -> None:
 
 
 def _report(options: argparse.Namespace) -> None:
+    if options.pruning:
+        _pruning(options)
+        return
     from .report_files import write_report  # matplotlib loads for this command alone
 
-    if not options.scenes and not options.stability:
-        raise ValueError("a report needs a scene, or --stability for the table of stiff and extreme cases")
+    if bool(options.scenes) == options.stability:
+        raise ValueError("a report needs a scene, or --stability and none")
     if options.stability:
         _stability(options)
-    if not options.scenes:
         return
     named = {trajectory_scenes.load(name, ignore=options.ignore).name for name in options.scenes}
     if len(named) < len(options.scenes):
@@ -211,6 +229,26 @@ def _stability(options: argparse.Namespace) -> None:
         raise RuntimeError(f"beyond its bound without a known reason: {', '.join(unexplained)}")
 
 
+def _pruning(options: argparse.Namespace) -> None:
+    without = [each for each in options.without.split(",") if each]
+    if unknown := [each for each in without if each not in EFFECTS]:
+        raise ValueError(f"effects are {', '.join(EFFECTS)}, got {unknown[0]!r}")
+    if wrong := [each for each in options.lock if "=" not in each]:
+        raise ValueError(f"--lock must be a body and a coordinate, BODY=AT, got {wrong[0]!r}")
+    lock = {body: float(at) for body, _, at in (each.rpartition("=") for each in options.lock)}
+    found = []
+    for name in options.scenes:
+        scene = scenes.load(name, **({"ignore": True} if options.ignore else {}))
+        found.append(pruning_report.report(scene, effects=[each for each in EFFECTS if each not in without], lock=lock))
+        page = pruning.write(options.out, found[-1])
+        if not options.json:
+            sizes = [f"{each['equations']} {each['full']['nodes']} to {each['pruned']['nodes']} nodes"
+                     for each in found[-1]["graphs"]]  # fmt: skip
+            print(f"{page}: {', '.join(sizes)}")
+    if options.json:
+        print(json.dumps(found, indent=1))
+
+
 def _scenes(options: argparse.Namespace) -> None:
     rows = []
     for name in scenes.names():
@@ -236,7 +274,7 @@ def _scenes(options: argparse.Namespace) -> None:
 
 
 def _draw(options: argparse.Namespace) -> None:
-    scene = _scene(options)
+    scene = scene_of(options)
     graph = inverse_dynamics(scene, options.formulation)
     counts = graph.counts()
     kind = options.out.suffix
@@ -253,3 +291,43 @@ def _draw(options: argparse.Namespace) -> None:
     else:
         raise ValueError(f"--out must end in .svg, .png, .dot or .txt, got {options.out}")
     print(f"{options.out}: {counts.nodes} nodes, {counts.edges} edges")
+
+
+def _inspect(options: argparse.Namespace) -> None:
+    if options.out.suffix != ".html":
+        raise ValueError(f"--out must end in .html, got {options.out}")
+    scene = scene_of(options)
+    found = inspection(scene, forward=options.forward, t_end=options.t_end)
+    bones = found.skeleton
+    head = ["part", *(f"τ{i} [N m]" for i in range(scene.system.n))]
+    rows = [[part, *(f"{value:.4g}" for value in torques)] for part, torques in found.shares.items()]
+    text = page(
+        [Version(each.name.replace("_", " "), *each[1:]) for each in found.versions],
+        title=f"{scene.name}: {'forward' if options.forward else 'inverse'} dynamics",
+        motion=Motion(found.t, bones.points, bones.parents) if bones else Motion(found.t, None, ()),
+        tables=[Table("Torques that each part takes at t = 0", head, rows)] if rows else [],
+    )
+    write(options.out, text)
+    sizes = {
+        each.name: {"nodes": len(each.graph.nodes), "edges": len(each.graph.edges), "spurious": len(each.marked)}
+        for each in found.versions
+    }
+    size = len(text.encode())
+    if options.json:
+        print(json.dumps({"scene": scene.name, "bytes": size, "versions": sizes}, indent=1))
+    else:
+        counts = ", ".join(f"{name} {each['nodes']} nodes" for name, each in sizes.items())
+        print(f"{options.out}: {counts}; {size / 1e6:.2f} MB")
+
+
+def _certify(options: argparse.Namespace) -> None:
+    scene = scene_of(options)
+    twin = None if options.scene in scenes.names() else Path(options.scene)
+    certificate = certify(scene, options.states, options.seed, twin=twin)
+    if options.json:
+        print(json.dumps({"scene": scene.name} | certificate.as_dict(), indent=1))
+    else:
+        print(certificate.text(), end="")
+    if not certificate.passed:
+        failed = [each.equation for each in certificate.residuals if not each.passed]
+        raise RuntimeError(f"{scene.name}: {len(failed)} residual(s) exceed their bound: {'; '.join(failed)}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 from cgraph import Edge, Graph, Node
@@ -32,7 +32,7 @@ def to_dot(
     graph: Graph,
     *,
     names: Mapping[str, str] | None = None,
-    marked: Collection[Node] = frozenset(),
+    marked: Collection[Node] | Mapping[str, Collection[Node]] = frozenset(),
     marked_label: str = theme.MARKED.words,
     marked_edges: Collection[Edge] = frozenset(),
     clusters: bool | Sequence[str] | ClusterRule = True,
@@ -48,9 +48,10 @@ def to_dot(
     it. The order of arguments is written at an edge where it matters. An input that no output needs is not drawn.
 
     names: {name of an input, an output or a node: text to show}; other names are shown by `theme.pretty`, q0 as q₀.
-    marked: nodes to draw thick in the one colour of what is wrong, with the edges out of them.
-    marked_label: what the legend calls them.
-    marked_edges: edges to draw in that colour, too, such as those of a path or a cut.
+    marked: nodes to draw thick in the one colour of what is wrong, with the edges out of them; or
+        {what the legend calls them: nodes} for two groups, the second in a colour of its own.
+    marked_label: what the legend calls them where there is one group.
+    marked_edges: edges to draw in the first colour, too, such as those of a path or a cut.
     clusters: frames around the nodes of a tag. True: by `main_tag`; tags: by these, a node with several of them in
         none; a function: the frame's title for a node, or None.
     collapse: tags whose nodes become one box, "link 2 (34 nodes)"; an edge at it says how many it stands for.
@@ -63,17 +64,16 @@ def to_dot(
     Up to some 500 nodes this draws well. Above, collapse tags, or draw with `legend=False` and render with
     `engine="sfdp"`, which draws no clusters.
 
-    Raises ValueError for a collapsed tag that no node carries, a marked node that the graph does not have, or an
-    unknown direction; ImportError when the Python package graphviz is missing.
+    Raises ValueError for a collapsed tag that no node carries, a marked node that the graph does not have or that is in
+    both groups, a third group, or an unknown direction; ImportError when the Python package graphviz is missing.
     """
     if rankdir not in DIRECTIONS:
         raise ValueError(f"rankdir must be one of {', '.join(DIRECTIONS)}, got {rankdir!r}")
     plan = _plan(
         graph,
         names or {},
-        frozenset(marked),
+        _marks(marked, marked_label),
         frozenset(marked_edges),
-        marked_label,
         _cluster_rule(clusters),
         tuple(collapse),
     )
@@ -87,6 +87,19 @@ def to_dot(
     for arrow in plan.arrows:
         drawing.edge(arrow.tail, arrow.head, **_escaped(arrow.attributes))
     return drawing
+
+
+def _marks(marked: Collection[Node] | Mapping[str, Collection[Node]], words: str) -> dict[Node, Paint]:
+    """How each marked node is painted."""
+    groups = marked if isinstance(marked, Mapping) else {words: marked}
+    if len(groups) > len(theme.MARKS):
+        raise ValueError(f"marked nodes come in at most {len(theme.MARKS)} groups, got {len(groups)}")
+    marks: dict[Node, Paint] = {}
+    for paint, (group, nodes) in zip(theme.MARKS, groups.items(), strict=False):
+        if both := [node for node in nodes if node in marks]:
+            raise ValueError(f"{len(both)} marked nodes are in both groups, such as {both[0]!r}")
+        marks |= dict.fromkeys(nodes, replace(paint, words=group))
+    return marks
 
 
 def main_tag(node: Node) -> str | None:
@@ -151,9 +164,8 @@ class _Subject:
 
     graph: Graph
     names: Mapping[str, str]
-    marked: frozenset[Node]
+    marks: Mapping[Node, Paint]
     marked_edges: frozenset[Edge]
-    mark: Paint
     number: dict[Node, int]
     part: dict[Node, str]  # id of the collapsed box that a node is in
 
@@ -164,24 +176,25 @@ class _Subject:
         return self.names[name] if name in self.names else theme.pretty(name)
 
     def kind(self, node: Node) -> Paint:
-        return self.mark if node in self.marked else theme.ROLES[theme.role_of(node)]
+        return self.marks.get(node) or theme.ROLES[theme.role_of(node)]
+
+    def mark_of(self, edge: Edge) -> Paint | None:
+        return self.marks.get(edge.source) or (theme.MARKS[0] if edge in self.marked_edges else None)
 
 
 def _plan(
     graph: Graph,
     names: Mapping[str, str],
-    marked: frozenset[Node],
+    marks: Mapping[Node, Paint],
     marked_edges: frozenset[Edge],
-    marked_label: str,
     cluster_of: ClusterRule,
     collapse: tuple[str, ...],
 ) -> _Plan:
     number = {node: i for i, node in enumerate(graph.nodes)}
-    strange = [node for node in marked if node not in number]
+    strange = [node for node in marks if node not in number]
     if strange:
-        raise ValueError(f"{len(strange)} of {len(marked)} marked nodes are not in the graph, such as {strange[0]!r}")
-    mark = Paint(marked_label, theme.MARKED.fill, theme.MARKED.line)
-    subject = _Subject(graph, names, marked, marked_edges, mark, number, _parts(graph, collapse))
+        raise ValueError(f"{len(strange)} of {len(marks)} marked nodes are not in the graph, such as {strange[0]!r}")
+    subject = _Subject(graph, names, marks, marked_edges, number, _parts(graph, collapse))
     plan = _Plan()
     plan.boxes.extend(_part_boxes(subject, collapse))
     for node in graph.nodes:
@@ -217,19 +230,17 @@ def _parts(graph: Graph, collapse: Sequence[str]) -> dict[Node, str]:
 
 def _part_boxes(subject: _Subject, collapse: Sequence[str]) -> Iterator[_Box]:
     sizes = Counter(subject.part.values())
-    wrong = Counter(part for node, part in subject.part.items() if node in subject.marked)
+    marked = Counter((part, subject.marks[node]) for node, part in subject.part.items() if node in subject.marks)
     for i, tag in enumerate(collapse):
         part = f"c{i}"
         if not sizes[part]:  # every node of this tag belongs to an earlier one
             continue
         words = f"{sizes[part]} node{'s' if sizes[part] > 1 else ''}"
-        if wrong[part]:
-            words += f", {wrong[part]} {subject.mark.words}"
-        kind = subject.mark if wrong[part] else theme.COLLAPSED
+        marks = {paint: count for (box, paint), count in marked.items() if box == part}
+        words += "".join([f", {count} {paint.words}" for paint, count in marks.items()])
+        kind = next(iter(marks), theme.COLLAPSED)
         tooltip = f"{part}: {words} tagged {tag}"
-        yield _Box(
-            part, kind, {**_PART, **_weight(kind is subject.mark), "label": f"{tag} ({words})", "tooltip": tooltip}
-        )
+        yield _Box(part, kind, {**_PART, **_weight(bool(marks)), "label": f"{tag} ({words})", "tooltip": tooltip})
 
 
 def _node_box(subject: _Subject, node: Node, box_id: str, cluster: str | None) -> _Box:
@@ -241,7 +252,7 @@ def _node_box(subject: _Subject, node: Node, box_id: str, cluster: str | None) -
         look, label = _BOX, name
     else:
         look, label = _OPERATION, f"{name}\n{node.op.symbol}" if name else node.op.symbol
-    attributes = {**look, **_weight(node in subject.marked), "label": label, "tooltip": _about(subject, node)}
+    attributes = {**look, **_weight(node in subject.marks), "label": label, "tooltip": _about(subject, node)}
     return _Box(box_id, kind, attributes, cluster)
 
 
@@ -262,8 +273,8 @@ def _about(subject: _Subject, node: Node) -> str:
         lines.append(", ".join(sorted(node.roles)))
     if node.tags:
         lines.append("tags: " + ", ".join(sorted(node.tags, key=theme.natural_order)))
-    if node in subject.marked:
-        lines.append(subject.mark.words)
+    if node in subject.marks:
+        lines.append(subject.marks[node].words)
     return "; ".join(lines)
 
 
@@ -277,16 +288,16 @@ def _arrows(subject: _Subject) -> Iterator[_Arrow]:
         else:
             yield _node_arrow(subject, edge)
     for (tail, head), edges in merged.items():
-        wrong = any(edge.source in subject.marked or edge in subject.marked_edges for edge in edges)
+        mark = next(filter(None, [subject.mark_of(edge) for edge in edges]), None)
         about = f"{len(edges)} edge{'s' if len(edges) > 1 else ''} from {tail} to {head}"
         attributes = {"id": f"e{tail.removeprefix('n')}-{head.removeprefix('n')}", "edgetooltip": about}
         if len(edges) > 1:
             attributes["label"] = f"×{len(edges)}"
-        yield _Arrow(tail, head, {**attributes, **_line(subject, wrong)})
+        yield _Arrow(tail, head, {**attributes, **_line(mark)})
     for i, node in enumerate(subject.graph.outputs.values()):
         number = subject.number[node]
         tail = subject.id(node) if node.value is None else f"n{number}-o{i}"
-        yield _Arrow(tail, f"o{i}", {"id": f"e{number}-o{i}", **_line(subject, node in subject.marked)})
+        yield _Arrow(tail, f"o{i}", {"id": f"e{number}-o{i}", **_line(subject.marks.get(node))})
 
 
 def _node_arrow(subject: _Subject, edge: Edge) -> _Arrow:
@@ -296,15 +307,11 @@ def _node_arrow(subject: _Subject, edge: Edge) -> _Arrow:
     attributes = {"id": f"e{source}-{target}-{slot}", "edgetooltip": f"argument {slot + 1} of n{target}: {op.name}"}
     if op.arity > 1 and not op.commutative:
         attributes["headlabel"] = str(slot + 1)
-    return _Arrow(
-        tail,
-        f"n{target}",
-        {**attributes, **_line(subject, edge.source in subject.marked or edge in subject.marked_edges)},
-    )
+    return _Arrow(tail, f"n{target}", {**attributes, **_line(subject.mark_of(edge))})
 
 
-def _line(subject: _Subject, wrong: bool) -> Attributes:
-    return {"color": subject.mark.line, "penwidth": "2.5"} if wrong else {}
+def _line(mark: Paint | None) -> Attributes:
+    return {"color": mark.line, "penwidth": "2.5"} if mark else {}
 
 
 # The words of DOT.

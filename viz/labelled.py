@@ -23,7 +23,7 @@ LABEL = 8.0  # points
 APART = 1.1  # of a label's height, from one to the next
 GAP = 6.0  # points between the end of a curve and its label
 LETTER = 0.58  # of a label's size, the width of a letter
-REACH = 14  # half heights that a label may be moved up or down
+REACH = 26  # half heights that a label may be moved up or down
 ROOM = 0.2  # of the axis, for the names
 
 
@@ -40,18 +40,18 @@ class Line:
 
 @dataclass(frozen=True)
 class Panel:
-    """Curves under a title."""
+    """Curves under a title.  x, y: the axes' names."""
 
     title: str
+    x: str
+    y: str
     lines: Sequence[Line]
 
 
-def labelled(
-    panels: Sequence[Panel], x: Sequence[str], y: Sequence[str], *, columns: int = 2, shared: bool = True
-) -> Figure:
+def labelled(panels: Sequence[Panel], *, columns: int = 2, shared: bool = True) -> Figure:
     """Panels with logarithmic axes, x from large on the left to small on the right.
 
-    x, y: the axes' names, one for each panel.  shared: all panels have the same scales.
+    shared: all panels have the same scales.
     """
     with _style():
         rows = -(-len(panels) // columns)
@@ -59,18 +59,20 @@ def labelled(
         axes = figure.subplots(rows, columns, sharex=shared, sharey=shared, squeeze=False)
         for axis in axes.flat[len(panels) :]:
             axis.set_axis_off()
-        for number, (axis, panel) in enumerate(zip(axes.flat, panels, strict=False)):
+        for axis, panel in zip(axes.flat, panels, strict=False):
             axis.set_xscale("log")
             axis.set_yscale("log")
             for each in panel.lines:
                 _draw(axis, each)
             axis.set_title(panel.title, fontsize=10, loc="left")
-            axis.set_xlabel(x[number])
-            axis.set_ylabel(y[number])
+            axis.set_xlabel(panel.x)
+            axis.set_ylabel(panel.y)
             axis.tick_params(labelbottom=True, labelleft=True)
             axis.grid(**GRID)
         for axis in axes.flat[:1] if shared else axes.flat[: len(panels)]:
             low, high = axis.get_xlim()
+            if len(_decades(low, high)) < 2:
+                low, high = 10.0 ** math.floor(math.log10(low)), 10.0 ** math.ceil(math.log10(high))
             axis.set_xlim(high, low * (low / high) ** ROOM)
             axis.set_xticks(_decades(low, high))
             axis.xaxis.minorticks_off()
@@ -162,8 +164,8 @@ class Box(NamedTuple):
             & (inked[:, 0] < self.right)
             & (abs(inked[:, 1] - self.middle) < self.height / 2)
         )
-        away = abs(self.middle - end[1]) / self.height + 0.5 * (self.left - end[0]) / self.height
-        return 1000.0 * float(names) + 0.7 * float(np.count_nonzero(on)) + away
+        away = float(abs(self.middle - end[1]) + 0.5 * (self.left - end[0])) / self.height
+        return 1000.0 * names + 0.7 * float(np.count_nonzero(on)) + away
 
 
 def _dense(path: Points) -> Points:

@@ -37,16 +37,6 @@ TITLES = {
     "chain_rule_literal": "chain rule, literal",
 }
 COLOURS = dict(zip(TITLES.values(), (theme.SPURIOUS, theme.ORANGE, theme.BLUE, theme.PURPLE), strict=True))
-# The paper's letters: angular velocity, angular acceleration, torque.
-LETTERS = {
-    "q0": "θ",
-    "qd0": "ω",
-    "qdd0": "α",
-    "q0_old": "θ old",
-    "qd0_old": "ω old",
-    "p0": "p = ∂L/∂ω",
-    "p0_dot": "τ = dp/dt",
-}
 SNAPSHOTS = 6
 
 
@@ -397,7 +387,7 @@ def _drawn(name: str, heading: str, graph: Graph, caption: str, **figures: int) 
     """A drawing of a graph as SVG, PNG and DOT, its counts in the caption."""
     counts = graph.counts()
     caption = f"{caption} {counts.nodes} nodes, {counts.edges} edges."
-    drawing = to_dot(graph, names=LETTERS, marked=spurious(graph), clusters=False)
+    drawing = to_dot(graph, names=theme.ONE_JOINT, marked=spurious(graph), clusters=False)
     svg = render_svg(drawing)
     files: dict[str, str | bytes] = {
         f"{name}.svg": svg,

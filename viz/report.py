@@ -80,30 +80,43 @@ def _target(found: Mapping[str, Any] | None) -> str:
 
 
 def _against_time(content: Content) -> Section:
-    panels, best = _panels(content, _error, _seconds)
-    svg = to_adaptive_svg(
-        labelled(panels, ["error at the end (smaller to the right)"] * len(panels), ["run time [s]"] * len(panels))
-    )
+    panels, best = _panels(content, _error, "error at the end")
     caption = "Run time against error at the end: lower and further right is better. The same scales in all panels."
     if best:
         caption += f" Dashed among the others: our {' and '.join(best)}, for comparison."
-    return Section("time", "Run time against error", [Picture("time", svg, caption)])
+    return Section("time", "Run time against error", [_picture("time", panels, caption)])
 
 
-def _panels(content: Content, x: Any, y: Any) -> tuple[list[Panel], list[str]]:
-    """Ours and the others, each of equal and of chosen steps; and which of ours stand among the others."""
-    panels, shown = [], []
+def _picture(name: str, panels: Sequence[Panel], caption: str, shared: bool = True) -> Block:
+    """The panels, or words where there is nothing to draw."""
+    if not panels:
+        return Paragraph("No run gave numbers to draw.")
+    return Picture(name, to_adaptive_svg(labelled(panels, shared=shared)), caption)
+
+
+def _panels(content: Content, x: Any, name: str) -> tuple[list[Panel], list[str]]:
+    """Run times against x, which has that name, of ours and the others, of equal and of chosen steps.
+
+    Besides, which of ours stand among the others.
+    """
+    panels: list[Panel] = []
+    shown: list[str] = []
+    axes = f"{name} (smaller to the right)", "run time [s]"
     for kind in (EQUAL, CHOSEN):
         of_kind = [each for each in content["curves"] if each["kind"] == kind]
         ours, others = ([each for each in of_kind if each["ours"] is mine] for mine in (True, False))
         if ours:
-            panels.append(Panel(f"ours, {kind}", [_line(each, x, y, *_look(k, each)) for k, each in enumerate(ours)]))
+            panels.append(
+                Panel(
+                    f"ours, {kind}", *axes, [_line(each, x, _seconds, *_look(k, each)) for k, each in enumerate(ours)]
+                )
+            )
         if others:
             best = _best(ours, content)
             shown += [each["name"] for each in best]
-            drawn = [_line(each, x, y, *_look(k, each)) for k, each in enumerate(others)]
-            drawn += [_line(each, x, y, 0, True, "ours: ") for each in best]
-            panels.append(Panel(f"others, {kind}", drawn))
+            drawn = [_line(each, x, _seconds, *_look(k, each)) for k, each in enumerate(others)]
+            drawn += [_line(each, x, _seconds, 0, True, "ours: ") for each in best]
+            panels.append(Panel(f"others, {kind}", *axes, drawn))
     return [each for each in panels if any(len(line.x) for line in each.lines)], shown
 
 
@@ -165,7 +178,7 @@ def _drawn(point: Mapping[str, Any]) -> bool:
 
 
 def _orders(content: Content) -> Section:
-    panels, x_names, y_names = [], [], []
+    panels = []
     for kind in (EQUAL, CHOSEN):
         for mine in (True, False):
             curves = [each for each in content["curves"] if each["kind"] == kind and each["ours"] is mine]
@@ -177,10 +190,9 @@ def _orders(content: Content) -> Section:
             if kind == CHOSEN and len(knobs) > 1:
                 lines.append(Line("error = tolerance", knobs, knobs, None))
             if any(len(line.x) for line in lines):
-                panels.append(Panel(f"{'ours' if mine else 'others'}, {kind}", lines))
-                x_names.append(f"{'step [s]' if kind == EQUAL else 'relative tolerance'} (smaller to the right)")
-                y_names.append("largest error" if kind == EQUAL else "error at the end")
-    svg = to_adaptive_svg(labelled(panels, x_names, y_names, shared=False))
+                x = f"{'step [s]' if kind == EQUAL else 'relative tolerance'} (smaller to the right)"
+                y = "largest error" if kind == EQUAL else "error at the end"
+                panels.append(Panel(f"{'ours' if mine else 'others'}, {kind}", x, y, lines))
     rows = [
         [
             each["name"],
@@ -204,7 +216,7 @@ def _orders(content: Content) -> Section:
         "orders",
         "Error against step and tolerance",
         [
-            Picture("orders", svg, "Error against step, and against tolerance; smaller is to the right and down."),
+            _picture("orders", panels, "Error against step, and against tolerance: smaller is right and down.", False),
             Table("Orders, and the error of the model apart from that of the integrator", header, rows),
             Paragraph(words),
         ],
@@ -212,13 +224,9 @@ def _orders(content: Content) -> Section:
 
 
 def _energy(content: Content) -> Section:
-    panels, _ = _panels(content, _drift, _seconds)
-    if not panels:
-        return Section("energy", "Energy", [Paragraph("No run kept numbers to compare energies.")])
-    names = ["change of energy (smaller to the right)"] * len(panels)
-    svg = to_adaptive_svg(labelled(panels, names, ["run time [s]"] * len(panels)))
+    panels, _ = _panels(content, _drift, "change of energy")
     caption = "Run time against the largest change of energy over the instants, relative to the largest kinetic energy."
-    return Section("energy", "Energy", [Picture("energy", svg, caption)])
+    return Section("energy", "Energy", [_picture("energy", panels, caption)])
 
 
 def _cold(content: Content) -> Section:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
+import textwrap
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -23,6 +25,7 @@ Row = Mapping[str, Any]
 FROM, TO = 1e-12, 1e13  # shares of a bound that are drawn; what is outside is drawn at the border
 WIDTH, LINE, FRAME = 10.0, 0.17, 1.0  # inches: of a picture, of each case, and for the axis
 NAME = "stability"  # of the files
+NAMES = 34  # letters of a case's name on a line
 
 
 def write(folder: Path, content: Content, figures: str) -> Path:
@@ -50,10 +53,7 @@ def _rows(content: Content) -> list[Row]:
 def _introduction(content: Content) -> list[Block]:
     counts = Counter(row["verdict"] for row in _rows(content))
     verdict = f"{counts['meets']} of {len(_rows(content))} rows meet their bounds"
-    if counts["limit"]:
-        verdict += f"; {counts['limit']} do not, for a reason that is known and given below"
-    if counts["unexplained"]:
-        verdict += f"; {counts['unexplained']} do not and should"
+    verdict += f"; limits with a known reason: {counts['limit']}; unexplained: {counts['unexplained']}"
     quick = " A quick run: some of the cases, shorter runs, shorter arms." if content["quick"] else ""
     load = "" if content["load"] is None else f" The load of the machine was {content['load']:.1f} at the end."
     return [
@@ -110,17 +110,23 @@ def _section(section: Mapping[str, Any]) -> Section:
 
 
 def _lines(row: Row, missed: bool = False) -> list[list[str]]:
-    """A line of cells for each figure, or for each that is beyond its bound; what they share stands in the first."""
-    lines: list[list[str]] = []
+    """A line of cells for each figure, or for each that is beyond its bound; what they share stands in the first.
+
+    A long name goes on in the lines below.
+    """
+    own: list[list[str]] = []
     for each in row["figures"]:
-        if missed and each["meets"]:
-            continue
-        first = not lines
-        shared = [row["case"], row["method"], row["verdict"]] if first else ["", "", ""]
-        bound = "" if each["bound"] == "inf" else _number(each["bound"])
-        own = [each["quantity"] + _unit(each), _number(each["value"]) + ("" if each["meets"] else " ✗"), bound]
-        lines.append([*shared, *own, *(_run(row) if first else ["", ""])])
-    return lines or [[row["case"], row["method"], row["verdict"], row["stopped"], "", "", *_run(row)]]
+        if not (missed and each["meets"]):
+            bound = "" if each["bound"] == "inf" else _number(each["bound"])
+            value = _number(each["value"]) + ("" if each["meets"] else " ✗")
+            own.append([each["quantity"] + _unit(each), value, bound])
+    name = textwrap.wrap(row["case"], NAMES)
+    shared = [row["method"], row["verdict"]], _run(row)
+    lines = []
+    for first, figure in itertools.zip_longest(name, own, fillvalue=None):
+        (method, verdict), run = shared if not lines else (["", ""], ["", ""])
+        lines.append([first or "", method, verdict, *(figure or ["", "", ""]), *run])
+    return lines
 
 
 def _unit(figure: Mapping[str, Any]) -> str:

@@ -57,6 +57,7 @@ ROLES = {
 OUTPUT = Paint("output", WHITE, BLACK)
 COLLAPSED = Paint("collapsed part", tint(GREY, 0.25), LINE)
 MARKED = _paint("spurious", SPURIOUS, 0.60)
+MARKS = (MARKED, _paint("marked", BLUE, 0.60))  # of several groups of marked nodes, the first and the second
 
 
 def role_of(node: Node) -> str:
@@ -94,6 +95,16 @@ _GREEK = dict(
     )
 )
 _LETTERS = {**_GREEK, "q": "q", "qd": "q\u0307", "qdd": "q\u0308"}  # the dots of a time derivative combine with q
+# The paper's letters for one joint: angular velocity, angular acceleration, torque.
+ONE_JOINT = {
+    "q0": "θ",
+    "qd0": "ω",
+    "qdd0": "α",
+    "q0_old": "θ old",
+    "qd0_old": "ω old",
+    "p0": "p = ∂L/∂ω",
+    "p0_dot": "τ = dp/dt",
+}
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 _WORD = re.compile(r"(?<![A-Za-z0-9])([A-Za-z]+)([0-9]*)(?![A-Za-z0-9])")
 

@@ -12,6 +12,7 @@ from ..graph import Graph
 from ..label import ADJOINT
 from ..network import minimum_cut
 from ..node import Edge, Node, constant
+from ..source_lines import lines_text
 from .finding import Finding
 from .names import Name, Names, joined, many
 from .reach import between, made_of_more, makers, users
@@ -84,7 +85,11 @@ def _blame(names: Names, inside: list[Node], dependent: list[Node], on: list[Nod
             "dependent": [names.text(sink) for sink in dict.fromkeys([sink for _, sink in pairs])],
             "on": [names.text(source) for source in dict.fromkeys([source for source, _ in pairs])],
             "cut": [
-                {"text": _edge_text(names, edge), "edge": [number[edge.source], number[edge.target], edge.slot]}
+                {
+                    "text": _edge_text(names, edge),
+                    "edge": [number[edge.source], number[edge.target], edge.slot],
+                    "lines": [str(line) for line in sorted(edge.target.lines)],
+                }
                 for edge in cut
             ],
             "paths": [_path_text(names, path) for path in paths],
@@ -109,9 +114,11 @@ def _report(
     shown = [_edge_text(names, edge) for edge in cut]
     width = max(map(len, shown))
     gains = "would gain" if through == set() else "gains"
-    for text, path in zip(shown, paths, strict=True):
+    for edge, text, path in zip(cut, shown, paths, strict=True):
         leak = leaks[path[0].source, path[-1].target]
         lines.append(f"  {text:<{width}}  through it {leak.derivative} {gains} {leak.gains}")
+        if edge.target.lines:
+            lines.append(f"    written at {lines_text([edge.target])}")
         if len(path) > 2:
             lines.append(f"    on the path {_path_text(names, path)}")
     if through:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from ..errors import GraphError
 from ..graph import Graph
 from ..node import CONSTANT, Node
+from ..source_lines import lines_text
 
 Name = str | Node
 LENGTH = 32  # characters up to which a node is written out; a longer one refers to its parts by their %numbers
@@ -103,8 +104,9 @@ class Names:
         return self._written(node, 1)[0]
 
     def line(self, node: Node) -> str:
-        """The node as in the listing, with its tags: `%7 = qd0 * dt  [euler]`."""
+        """The node as in the listing, with its tags, and its lines if known: `%7 = qd0 * dt  [euler]  arm.py:12`."""
         tags = f"  [{', '.join(sorted(node.tags))}]" if node.tags else ""
+        tags += f"  {lines_text([node])}" if node.lines else ""
         if not node.args:
             return self.short(node) + tags
         name = f"  ({node.name})" if node.name else ""

@@ -10,6 +10,7 @@ from typing import Any
 from ..errors import GraphError
 from ..graph import Graph
 from ..node import Edge, Node
+from ..source_lines import lines_text
 from .names import Name, Names, many
 from .paths import best_paths, by_target, path_count
 from .reach import between
@@ -194,10 +195,13 @@ def _path(names: Names, output: str, edges: tuple[Edge, ...], value: float | Non
     inner = [edge.target for edge in edges if edge.target.name or edge.target.op.name not in SUMS]
     start, end = names.text(edges[0].source), [] if inner and names.text(inner[-1]) == output else [output]
     text = " -> ".join([start, *[names.text(node) for node in inner], *end])
-    if len(text) > LENGTH:
-        return Path(edges, value, " -> ".join([start, *_route(inner), *end]))
     tags = sorted({tag for node in inner for tag in node.tags})
-    return Path(edges, value, f"{text}  [{', '.join(tags)}]" if tags else text)
+    if len(text) > LENGTH:
+        text = " -> ".join([start, *_route(inner), *end])
+    elif tags:
+        text += f"  [{', '.join(tags)}]"
+    lines = lines_text(inner)
+    return Path(edges, value, f"{text}  {lines}" if lines else text)
 
 
 def _route(nodes: Sequence[Node]) -> list[str]:

@@ -19,10 +19,9 @@ from typing import Any
 from ..scipy_run import PREFIX
 from ..simulate import simulate
 from ..state_equation import state_inputs
-from .peers import Case
+from .peers import Case, UnavailableError
 from .peers.casadi import CasadiPeer
-from .peers.heyoka import HeyokaPeer
-from .trajectory_peers import casadi_equations, heyoka_equations
+from .trajectory_peers import MOST, casadi_equations, heyoka_derivatives, heyoka_equations
 from .trajectory_runs import problem_of
 from .trajectory_scenes import Setting, load
 
@@ -64,19 +63,18 @@ def _ours(setting: Setting, method: str | None = None) -> None:
 
 
 def _heyoka(setting: Setting, compact: bool = False, cached: bool = False) -> None:
-    """From the Lagrangian by heyoka's own derivatives; a state equation as it is."""
+    """From the Lagrangian by heyoka's own derivatives; a state equation, or what it cannot derive, from ours."""
     hy: Any = import_module("heyoka")
     if not cached and hasattr(hy.llvm_state, "set_diskcache_enabled"):  # what other processes have compiled
         hy.llvm_state.set_diskcache_enabled(False)
-    if setting.mechanical:
-        case = Case(setting.name, setting.model)
-        rates, inputs = HeyokaPeer(case)._expressions("forward")
-        state = inputs[: 2 * case.n]
-        rates = hy.subs(rates, {f"last_{i}": hy.expression(0.0) for i in range(case.n)})
-        system = list(zip(state, [*state[case.n :], *rates], strict=True))
-    else:
+    try:
+        system = heyoka_derivatives(hy, setting)
+    except UnavailableError:
         system = heyoka_equations(hy, problem_of(setting))
-    hy.taylor_adaptive(system, list(setting.start), compact_mode=compact).propagate_until(setting.t_end)
+    run = hy.taylor_adaptive(system, list(setting.start), compact_mode=compact)
+    outcome, _, _, steps, *_ = run.propagate_until(setting.t_end, max_steps=MOST)
+    if outcome != hy.taylor_outcome.time_limit:
+        raise RuntimeError(f"stopped after {steps} steps")
 
 
 def _casadi(setting: Setting) -> None:

@@ -36,7 +36,8 @@ def renew(names: Iterable[str] | None = None, say: Callable[[str], None] = lambd
         if result is not None:
             found[name] = entry(case, result)
             say(f"{name}: {result.how}")
-    ordered = {name: found[name] for name in cases.names() if name in found}
+    known = [name for name, case in cases.TABLE.items() if name in found and (case.exact or case.method)]
+    ordered = {name: found[name] for name in known}
     FILE.write_text(json.dumps(ordered, indent=1) + "\n", encoding="utf-8")
     _kept.cache_clear()
 

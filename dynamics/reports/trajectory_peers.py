@@ -15,8 +15,9 @@ from ..integrators import Problem
 from ..scipy_run import PREFIX, SOLVERS
 from ..system import TIME
 from ..trajectory import Array
-from .peers import PEERS, Case
+from .peers import PEERS, Case, UnavailableError
 from .peers.casadi import _NAMES as CASADI_NAMES
+from .peers.heyoka import HeyokaPeer
 from .peers.mujoco import MujocoPeer
 from .peers.translate import translated
 from .trajectory_runs import EQUAL, Contender, Outcome, Scipy
@@ -202,10 +203,21 @@ def heyoka_equations(hy: Any, problem: Problem) -> list[tuple[Any, Any]]:
     """Our rate as heyoka's pairs of variable and expression. Raises UnavailableError for an operation it has not."""
     graph = problem.rate
     env = {node: hy.time if node.name == TIME else hy.make_vars(f"x_{node.name}") for node in graph.inputs}
-    functions = SimpleNamespace(**vars(hy), hypot=lambda a, b: hy.sqrt(a * a + b * b))
+    functions = SimpleNamespace(**vars(hy), where=hy.select, hypot=lambda a, b: hy.sqrt(a * a + b * b))
     values = translated(graph.nodes, env, functions, number=hy.expression)
     states = [env[node] for node in graph.inputs[: problem.size]]
     return list(zip(states, [hy.expression(values[rate]) for rate in graph.outputs.values()], strict=True))
+
+
+def heyoka_derivatives(hy: Any, setting: Setting) -> list[tuple[Any, Any]]:
+    """heyoka's own equations, from the Lagrangian. Raises UnavailableError for what it cannot derive."""
+    if not setting.mechanical:
+        raise UnavailableError("derives equations of a Lagrangian alone")
+    case = Case(setting.name, setting.model)
+    rates, inputs = HeyokaPeer(case)._expressions("forward")
+    rates = hy.subs(rates, {f"last_{i}": hy.expression(0.0) for i in range(case.n)})
+    state = inputs[: 2 * case.n]
+    return list(zip(state, [*state[case.n :], *rates], strict=True))
 
 
 def casadi_equations(ca: Any, problem: Problem) -> dict[str, Any]:

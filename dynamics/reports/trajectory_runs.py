@@ -13,14 +13,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..integrators import METHODS, Problem
+from ..rows import Rows
 from ..run import AdaptiveRun, FixedRun, Tally
 from ..scipy_run import PREFIX, ScipyRun
-from ..rows import Rows
 from ..state_equation import state_inputs
 from ..trajectory import Array
 from .trajectory_scenes import Setting
 
 EQUAL, CHOSEN = "equal steps", "chosen steps"
+TRIAL = 4096  # steps that tell how long many more take
 LONGEST = 3.0  # s; a run that takes longer is given up
 
 
@@ -141,7 +142,17 @@ class Ours(Contender):
     def ready(self, knob: float) -> Callable[[], Outcome]:
         """See Contender."""
         template, ends = self._plain, (0.0, self.setting.t_end)
+        if self.kind == EQUAL and self._at_least(knob) > LONGEST:  # such a run does not look at the clock on its way
+            return lambda: Outcome(self.start, status=f"would take longer than {LONGEST:g} s")
         return lambda: finished(self._run(knob, template, ends), self.start)
+
+    def _at_least(self, knob: float) -> float:
+        """Seconds that so many equal steps take, by the first few of them."""
+        run = self._run(knob, self._plain, (0.0, self.setting.t_end))
+        vars(run)["most"] = TRIAL
+        begin = time.perf_counter()
+        finished(run, self.start)
+        return (time.perf_counter() - begin) * knob / min(knob, TRIAL)
 
     def rows(self, knob: float) -> Array:
         """See Contender."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -23,14 +23,14 @@ from ..trajectory import Array
 INTERVALS = 64  # between the times at which errors are taken
 DECADES = 12  # of the times, where they are spread by powers of ten
 
-Solve = Callable[[Sequence[float], int, str | Path | None], Reference]
+Known = Callable[[Sequence[float], str | Path | None], Reference]
 
 
 @dataclass(frozen=True)
 class Setting:
     """What a report is made of.
 
-    start: q and then qd, or the states of an OdeSystem.  solve(times, digits, folder): the exact motion.
+    start: q and then qd, or the states of an OdeSystem.  known(times, folder): the exact motion, of a case.
     sizes: what errors of the states are relative to; empty for the largest values over the times.
     decades: times go up by powers of ten, and errors are relative to the state's value at that time.
     """
@@ -40,7 +40,7 @@ class Setting:
     model: Any
     start: tuple[float, ...]
     t_end: float  # s
-    solve: Solve
+    known: Known | None = None
     sizes: tuple[float, ...] = ()
     stiff: bool = False
     decades: bool = False
@@ -52,6 +52,12 @@ class Setting:
         if self.decades:
             return [*(self.t_end * 10.0 ** (k / 4) for k in range(-4 * DECADES, 0)), self.t_end]
         return [self.t_end * k / INTERVALS for k in range(INTERVALS + 1)]
+
+    def exact(self, digits: int, folder: str | Path | None = None) -> Reference:
+        """The motion at `times`: a case's own, or to so many digits. Raises what `multiprecision.reference` raises."""
+        if self.known is not None:
+            return self.known(self.times, folder)
+        return reference(self.model, self.start, self.times, digits=digits, folder=folder)
 
     @property
     def mechanical(self) -> bool:
@@ -80,7 +86,7 @@ def _of_case(case: Case, decades: bool = False) -> Setting:
         case.build(),
         case.start,
         case.t_end,
-        lambda times, digits, folder: _known(case, times, folder),
+        lambda times, folder: _known(case, times, folder),
         sizes=() if decades else case.size,
         stiff=case.stiff,
         decades=decades,
@@ -97,11 +103,7 @@ def _known(case: Case, times: Sequence[float], folder: str | Path | None) -> Ref
 def _of_scene(name: str, **options: Any) -> Setting:
     scene = scenes.load(name, **options)
     start = (*scene.q, *scene.qd)
-
-    def solve(times: Sequence[float], digits: int, folder: str | Path | None) -> Reference:
-        return reference(scene, start, times, digits=digits, folder=folder)
-
-    return Setting(scene.name, scene.about, scene.model, start, scene.t_end, solve, left_out=scene.left_out)
+    return Setting(scene.name, scene.about, scene.model, start, scene.t_end, left_out=scene.left_out)
 
 
 SETTINGS: dict[str, Callable[[], Setting]] = {
@@ -125,10 +127,9 @@ def load(
     t_end [s], start: in place of its own.  ignore: leave out what of a file a mechanism cannot have.
     Raises ValueError for a name that is none of these, a horizon that is not positive, or a start of another length.
     """
-    if name in SETTINGS:
-        found = SETTINGS[name]()
-    elif name in cases.names():
-        found = _of_case(cases.load(name))
+    own = name in SETTINGS or name in cases.names()  # with a start that the exact motion belongs to
+    if own:
+        found = SETTINGS[name]() if name in SETTINGS else _of_case(cases.load(name))
     elif name in scenes.names() or Path(name).suffix:
         found = _of_scene(name, **({"ignore": True} if ignore and name not in scenes.names() else {}))
     else:
@@ -136,31 +137,15 @@ def load(
             f"there is no scene {name!r}; there are {', '.join([*scenes.names(), *SETTINGS])}, the cases "
             f"({', '.join(cases.names()[:3])}, ..), and files that end in .xml or .urdf"
         )
-    if t_end is not None and not (math.isfinite(t_end) and t_end > 0.0):
-        raise ValueError(f"t_end must be positive and finite, got {t_end!r} s")
-    if start is not None and len(start) != len(found.start):
-        states = state_inputs(found.model).states
-        raise ValueError(f"the start needs {len(states)} numbers ({', '.join(states[:12])}), got {len(start)}")
-    if start is not None and name not in scenes.names() and not Path(name).suffix:
-        raise ValueError(f"{name!r} has a start of its own; scenes and files take others")
-    if t_end is None and start is None:
-        return found
-    chosen = tuple(map(float, found.start if start is None else start))
-    solve = found.solve
+    if t_end is not None:
+        if not (math.isfinite(t_end) and t_end > 0.0):
+            raise ValueError(f"t_end must be positive and finite, got {t_end!r} s")
+        found = replace(found, t_end=float(t_end))
     if start is not None:
-
-        def solve(times: Sequence[float], digits: int, folder: str | Path | None) -> Reference:
-            return reference(found.model, chosen, times, digits=digits, folder=folder)
-
-    return Setting(
-        found.name,
-        found.about,
-        found.model,
-        chosen,
-        found.t_end if t_end is None else float(t_end),
-        solve,
-        found.sizes,
-        found.stiff,
-        found.decades,
-        found.left_out,
-    )
+        states = state_inputs(found.model).states
+        if len(start) != len(states):
+            raise ValueError(f"the start needs {len(states)} numbers ({', '.join(states[:12])}), got {len(start)}")
+        if own:
+            raise ValueError(f"{name!r} has a start of its own; scenes and files take others")
+        found = replace(found, start=tuple(map(float, start)))
+    return found

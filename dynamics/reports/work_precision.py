@@ -35,6 +35,7 @@ from .trajectory_scenes import INTERVALS, Setting, load
 
 DIGITS = 30
 LIMIT = 0.3  # s; no finer knob is tried after a run of this length
+PATIENCE = 3.0  # times as long for the others, most of which need more time for the same error
 CHUNK = 5e-3  # s, of runs that are timed in one turn
 WORST, FLOOR = 1e-1, 5e-12  # errors between which an order is fitted: above is no order yet, below is rounding
 FITTED = 3  # points of equal steps, the finest between those bounds: the coarser are no order yet
@@ -137,8 +138,8 @@ def work_precision(
 
     name, options: as of `trajectory_scenes.load`.  methods: ours.  peers: of `PEERS`; what is not installed is absent.
     digits: of the exact motion.  turns: all contenders run in turns, this often.  limit: seconds of a run after which
-    no finer knob is tried.  cold: of `cold_start.STARTS`, with `cold_turns` turns and `budget` seconds each.
-    folder: where exact motions are kept.  backend: see `simulate`.  say: takes lines of progress.
+    no finer knob is tried, thrice as long for the others.  cold: of `cold_start.STARTS`, with `cold_turns` turns and
+    `budget` seconds each.  folder: where exact motions are kept.  backend: see `simulate`.  say: takes progress lines.
 
     Raises ValueError for a name that is not known, ImportError without what makes the exact motion, and what
     `multiprecision.reference` raises.
@@ -151,7 +152,7 @@ def work_precision(
     setting = load(name, **(options or {}))
     begins, before = time.perf_counter(), _load()
     say(f"{name}: exact motion")
-    exact = setting.solve(setting.times, digits, folder)
+    exact = setting.exact(digits, folder)
     spent = time.perf_counter() - begins
     problem, scales = problem_of(setting), setting.scales(exact)
     smallest = float(scales.min())
@@ -160,7 +161,7 @@ def work_precision(
     judge = Judge(setting, exact, scales)
     for contender in _contenders(setting, smallest, problem, methods, peers, backend, absent):
         say(f"{name}: {contender.name}")
-        entry = _sweep(contender, judge, limit)
+        entry = _sweep(contender, judge, limit if contender.ours else PATIENCE * limit)
         if entry.tried:
             entries.append(entry)
         else:
@@ -307,7 +308,10 @@ class Entry:
 def _point(contender: Contender, tried: Tried, judge: Judge) -> Point:
     outcome = tried.outcome
     with np.errstate(all="ignore"):
-        rows = contender.rows(tried.knob)
+        try:
+            rows = contender.rows(tried.knob)
+        except Exception:  # noqa: BLE001 (a peer may fail at these instants where it did not at the end alone)
+            rows = np.full(judge.exact.x.shape, math.nan)
         largest = float(np.max(judge.errors(rows)))
         drift = judge.drift(rows) if math.isfinite(largest) else None
     return Point(
@@ -330,19 +334,20 @@ def _sweep(contender: Contender, judge: Judge, limit: float) -> Entry:
     best, stalled = math.inf, 0
     knobs = contender.tolerances if contender.kind == CHOSEN else [float(INTERVALS * 2**k) for k in range(24)]
     for knob in knobs:
+        begin = time.perf_counter()
         try:
             run = contender.ready(knob)
             begin = time.perf_counter()
             outcome = run()
-            spent = time.perf_counter() - begin
             status = outcome.status
         except Exception as error:  # noqa: BLE001 (whatever a peer's own code raises is a line in the report)
             status = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+        spent = time.perf_counter() - begin
         if not status and not math.isfinite(error_at_end := judge.at_end(outcome.x)):
             status = "left the numbers"
         entry.stopped = status
         if status:
-            if entry.tried:  # a coarse knob may fail, and a finer one not
+            if entry.tried or spent > limit:  # a coarse knob may fail, and a finer one not
                 break
             continue
         entry.tried.append(Tried(knob, run, outcome, error_at_end))

@@ -12,27 +12,28 @@ from cgraph import Graph
 
 from ..system import TIME, System
 
+STATE = ("q", "qd", "qdd", "tau")
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def at_state(
     system: System,
     graph: Graph,
-    *,
+    state: Mapping[str, ArrayLike | None],
     t: float = 0.0,
     parameters: Mapping[str, float] | None = None,
-    **state: ArrayLike | None,
 ) -> Array:
-    """The outputs, (n_out,) or (N, n_out), at q, qd, qdd, tau: (n,) or (N, n) each, those that the graph takes.
+    """The outputs, (n_out,) or (N, n_out), at a state {"q": .., "qd": .., "qdd": .., "tau": ..}, (n,) or (N, n) each.
 
-    None is zero. Parameters have the system's values unless given. Raises ValueError for another shape or a parameter
-    that the system does not have.
+    What of the state is None or missing is zero. Parameters have the system's values unless given.
+    Raises ValueError for another shape or a parameter that the system does not have.
     """
     if unknown := set(parameters or {}) - set(system.parameters):
-        raise ValueError(f"the system has no parameter {sorted(unknown)[0]!r} (it has {', '.join(system.parameters)})")
+        raise ValueError(f"the system has no parameter {min(unknown)!r} (it has {', '.join(system.parameters)})")
     values: dict[str, Any] = {TIME: float(t), **system.parameters, **(parameters or {})}
     shape: tuple[int, ...] = ()
-    for name, given in state.items():
+    for name in STATE:
+        given = state.get(name)
         rows = np.zeros(system.n) if given is None else np.asarray(given, dtype=np.float64)
         if rows.ndim not in (1, 2) or rows.shape[-1] != system.n:
             raise ValueError(f"{name} must have the shape ({system.n},) or (N, {system.n}), got {rows.shape}")

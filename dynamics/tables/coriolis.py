@@ -52,7 +52,8 @@ def matrix(system: System, forces: list[Node], build: Builder) -> list[list[Node
 
 def quadratic(system: System) -> None:
     """Raises ValueError unless L is quadratic in the velocities, that is, M does not depend on them."""
-    rows = hessian_nodes(*folded([system.lagrangian], Builder()), system.qd)
+    (lagrangian,) = folded([system.lagrangian], Builder())
+    rows = hessian_nodes(lagrangian, system.qd)
     moving = set(topological([entry for row in rows for entry in row])) & set(system.qd)
     if moving:
         name = min(str(node.name) for node in moving)

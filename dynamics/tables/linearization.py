@@ -29,7 +29,7 @@ def linearization(model: Any) -> Graph:
     nodes of differentiating forward dynamics itself. M is factored densely up to 6 coordinates, else eliminated on the
     graph of L, which also keeps the digits of a long chain.
 
-    Inputs q0.., qd0.., tau0.., t if needed, parameters; outputs A_0_0, .. row by row, (2n, 2n), then B_0_0, .., (2n, n).
+    Inputs q0.., qd0.., tau0.., t if needed, parameters; outputs A_0_0, .., (2n, 2n), and B_0_0, .., (2n, n).
     Raises SingularMassMatrixError for a coordinate without inertia.
     """
     system = as_system(model)
@@ -59,7 +59,7 @@ def _slopes(system: System, accelerations: list[Node], build: Builder) -> list[l
     rows = [cotangents({torque: ONE}, state, build) for torque in torques.outputs.values()]
     entries = {str(k): entry for k, entry in enumerate([entry for row in rows for entry in row])}
     at = dict(zip([str(node.name) for node in system.qdd], accelerations, strict=True))
-    flat = list(cg.specialize(Graph(torques.inputs, entries), at).outputs.values())
+    flat = list(cg.specialize(Graph([*torques.inputs, *system.tau], entries), at).outputs.values())
     return [flat[i * len(state) : (i + 1) * len(state)] for i in range(system.n)]
 
 
@@ -79,7 +79,7 @@ def linearize(
     """
     system = as_system(model)
     n = system.n
-    flat = at_state(system, linearization(system), q=q, qd=qd, tau=tau, t=t, parameters=parameters)
+    flat = at_state(system, linearization(system), {"q": q, "qd": qd, "tau": tau}, t, parameters)
     if flat.ndim != 1:
         raise ValueError(f"linearize takes one state, q, qd and tau of the shape ({n},)")
     return flat[: 4 * n * n].reshape(2 * n, 2 * n), flat[4 * n * n :].reshape(2 * n, n)

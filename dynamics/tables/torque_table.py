@@ -59,7 +59,7 @@ class TorqueTable:
         parameters: Mapping[str, float] | None = None,
     ) -> TorqueTable:
         """The table with its numbers at a state, (n,) each; None is rest. Raises ValueError for another shape."""
-        flat = at_state(self.system, self.graph, q=q, qd=qd, qdd=qdd, t=t, parameters=parameters)
+        flat = at_state(self.system, self.graph, {"q": q, "qd": qd, "qdd": qdd}, t, parameters)
         if flat.ndim != 1:
             raise ValueError(f"a table has one state, q, qd and qdd of the shape ({self.system.n},)")
         return replace(self, values=flat.reshape(len(self.rows), len(self.columns)))
@@ -117,17 +117,30 @@ def written(node: Node) -> str:
     text: dict[Node, str] = {}
     for each in topological([node]):
         if each.args:
-            inner = [f"({text[arg]})" if re.search(r" [+-] |^-", text[arg]) else text[arg] for arg in each.args]
-            text[each] = each.op.python.format(*inner)
+            parts = [_part(each, slot, arg, text[arg]) for slot, arg in enumerate(each.args)]
+            text[each] = each.op.python.format(*parts)
         else:
             text[each] = str(each.name) if each.value is None else f"{each.value:g}"
     return text[node]
 
 
+def _part(of: Node, slot: int, arg: Node, text: str) -> str:
+    """An argument's text, in brackets where the operation needs them."""
+    if "(" in of.op.python:
+        return text
+    weak = ("neg", "sub") if of.op.name == "add" and slot else () if of.op.name in ("add", "sub") and not slot else None
+    tight = of.op.name in ("div", "pow", "neg")
+    operator = bool(arg.args) and "(" not in arg.op.python
+    sum_ = arg.op.name in (("add", "sub", "neg") if weak is None else weak)
+    return f"({text})" if (operator and (sum_ or tight)) or (slot and text.startswith("-")) else text
+
+
 def _aligned(rows: Sequence[Sequence[str]], gap: str) -> str:
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [
-        gap.join([row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))])
+        gap.join(
+            [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
+        )
         for row in rows
     ]
     return "".join(f"{line.rstrip()}\n" for line in lines)

@@ -31,9 +31,7 @@ def torque_by_link(model: Any) -> TorqueTable:
     """
     system = as_system(model)
     build = Builder()
-    rows = [
-        _torques(system, each, build) for each in folded(system.partial_lagrangians, Builder())
-    ]
+    rows = [_torques(system, each, build) for each in folded(system.partial_lagrangians, Builder())]
     names = _names(system)
     outside = _outside(system, build)
     rows += outside.values()

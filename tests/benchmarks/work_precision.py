@@ -24,8 +24,7 @@ from dynamics.integrators import METHODS, Problem
 from dynamics.reports.bench_table import machine
 from dynamics.reports.cold_start import cold_starts
 from dynamics.reports.energy_drift import METHODS as SYMPLECTIC, drift
-from dynamics.reports.peers import Case
-from dynamics.reports.trajectory_peers import EPSILON, Cvodes, Heyoka
+from dynamics.reports.trajectory_peers import EPSILON, Cvodes, Heyoka, heyoka_derivatives
 from dynamics.reports.trajectory_runs import Contender, Ours, Outcome, Scipy, problem_of
 from dynamics.reports.trajectory_scenes import load
 from dynamics.reports.work_precision import Judge, work_precision
@@ -61,7 +60,7 @@ class Timed(NamedTuple):
 def bench(name: str, folder: str, digits: int = 30, **options: Any) -> Bench:
     """The setting of that name."""
     setting = load(name, **options)
-    exact = setting.solve(setting.times, digits, folder)
+    exact = setting.exact(digits, folder)
     scales = setting.scales(exact)
     print(f"\n{setting.name}, to t = {setting.t_end:g} s. Exact motion: {exact.how}; its error {exact.error:.0e}")
     return Bench(setting, problem_of(setting), Judge(setting, exact, scales), float(scales.min()))
@@ -135,18 +134,6 @@ def orders(folder: str) -> None:
             print(f"   {curve.name:18} declared {curve.order}  fitted {told}")
 
 
-def heyoka_own(setting: Any) -> tuple[list[tuple[Any, Any]], Any]:
-    """heyoka's equations by its own derivatives of the Lagrangian."""
-    from dynamics.reports.peers.heyoka import HeyokaPeer
-
-    case = Case(setting.name, setting.model)
-    peer = HeyokaPeer(case)
-    rates, inputs = peer._expressions("forward")
-    rates = peer.heyoka.subs(rates, {f"last_{i}": peer.heyoka.expression(0.0) for i in range(case.n)})
-    state = inputs[: 2 * case.n]
-    return list(zip(state, [*state[case.n :], *rates], strict=True)), peer.heyoka
-
-
 def taylor(folder: str) -> None:
     """The damped triple pendulum to 10 s, beside heyoka's Taylor integrator and CVODES, at 1e-12; and cold starts."""
     made = bench("triple_pendulum", folder, t_end=10.0)
@@ -161,7 +148,7 @@ def taylor(folder: str) -> None:
     for name in ("heyoka, our equations", "heyoka, its own derivatives"):
         contender = Heyoka(made.setting, made.smallest, made.problem)
         if "own" in name:
-            contender.system, _ = heyoka_own(made.setting)
+            contender.system = heyoka_derivatives(contender.heyoka, made.setting)
         default += met(contender, [EPSILON], made.judge, target, f"{name}, default")
         timed += met(contender, knobs, made.judge, target, f"{name}, loosest")
     timed += met(

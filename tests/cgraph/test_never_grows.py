@@ -6,8 +6,7 @@ Values may move by rounding: by four units of the last place times the condition
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from mpmath import mpf
 
 import cgraph as cg

@@ -208,6 +208,32 @@ def test_no_role_and_no_tag_has_the_colour_of_the_spurious() -> None:
     assert theme.SPURIOUS not in used | set(theme.SERIES)
 
 
+def test_two_groups_of_marked_nodes_have_a_colour_and_a_line_of_the_legend_each() -> None:
+    graph = spring()
+    groups = {
+        name: {node for node in graph.nodes if name in node.tags and node.args} for name in ("kinetic", "potential")
+    }
+    assert all(groups.values())
+    drawn, lines = boxes(graph, marked=groups), arrows(graph, marked=groups)
+    for paint, (name, nodes) in zip(theme.MARKS, groups.items(), strict=True):
+        for i, node in enumerate(graph.nodes):
+            if node.value is None:
+                assert (drawn[f"n{i}"]["color"] == paint.line) == (node in nodes)
+        for line, edge in zip(lines, graph.edges, strict=False):
+            assert (line.get("color") == paint.line) == (edge.source in nodes)
+        assert f"label={name}" in to_dot(graph, marked=groups).source
+    assert theme.MARKS[0].line != theme.MARKS[1].line
+
+
+def test_marked_groups_share_no_node_and_are_two_at_most() -> None:
+    node = spring().nodes[-1]
+    graph = cg.Graph(spring().inputs, {"f": node})
+    with pytest.raises(ValueError, match="1 marked nodes are in both groups"):
+        to_dot(graph, marked={"a": {node}, "b": {node}})
+    with pytest.raises(ValueError, match="at most 2 groups, got 3"):
+        to_dot(graph, marked={"a": {node}, "b": (), "c": ()})
+
+
 def test_a_marked_node_of_another_graph_is_refused() -> None:
     with pytest.raises(ValueError, match="1 of 1 marked nodes are not in the graph"):
         to_dot(spring(), marked={chain().nodes[-1]})

@@ -36,8 +36,8 @@ class Version:
         names = self.graph.input_names
         if unknown := [name for name in self.at if name not in names]:
             raise ValueError(f"version {self.name!r} has values for {unknown[0]!r}, which is not an input of its graph")
-        if strange := [node for node in self.marked if node not in set(self.graph.nodes)]:
-            raise ValueError(f"version {self.name!r}: {strange[0]!r} is marked, but not in its graph")
+        if strange := set(self.marked) - set(self.graph.nodes):
+            raise ValueError(f"version {self.name!r}: {next(iter(strange))!r} is marked, but not in its graph")
         table = np.full((length, len(names)), UNKNOWN)
         for i, name in enumerate(names):
             value = np.asarray(self.at.get(name, UNKNOWN), dtype=np.float64)
@@ -52,23 +52,24 @@ class Version:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Points that move, drawn beside the graph as sticks.
+    """The instants that the page plays, and points that move, drawn beside the graph as sticks.
 
-    t: (T,) [s].  points: (T, k, 2) [m], x to the right, y up.  parents: (k,), the point that each hangs on, or -1.
+    t: (T,) [s].  points: (T, k, 2) [m], x to the right, y up, or None.  parents: (k,), the point each hangs on, or -1.
     """
 
     t: Array
-    points: Array
-    parents: Sequence[int]
+    points: Array | None = None
+    parents: Sequence[int] = ()
 
     def check(self) -> None:
         """Raises ValueError for shapes that do not fit, or values that are not finite."""
-        good = self.points.ndim == 3 and self.points.shape == (len(self.t), len(self.parents), 2) and len(self.t) > 0
-        if not good or not (np.isfinite(self.points).all() and np.isfinite(self.t).all()):
-            raise ValueError(
-                f"a motion needs finite t (T,), points (T, k, 2) and parents (k,), got shapes {self.t.shape}, "
-                f"{self.points.shape} and ({len(self.parents)},)"
-            )
+        if self.t.ndim != 1 or not len(self.t) or not np.isfinite(self.t).all():
+            raise ValueError(f"a motion needs instants t (T,) that are finite, got shape {self.t.shape}")
+        if self.points is None:
+            return
+        wanted = (len(self.t), len(self.parents), 2)
+        if self.points.shape != wanted or not self.parents or not np.isfinite(self.points).all():
+            raise ValueError(f"a motion needs finite points (T, k, 2) = {wanted}, got shape {self.points.shape}")
         if any(not -1 <= parent < i for i, parent in enumerate(self.parents)):
             raise ValueError(f"parents must be -1 or an earlier point, got {list(self.parents)}")
 

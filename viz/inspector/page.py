@@ -71,7 +71,8 @@ def page(
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
         f"<style>{_colours()}{_asset('page.css')}</style>\n</head>\n<body>\n{body}\n"
-        f'<script id="data" type="application/json">{held}</script>\n<script>"use strict";\n{script}\nstart();</script>\n'
+        f'<script id="data" type="application/json">{held}</script>\n'
+        f'<script>"use strict";\n{script}\nstart();</script>\n'
         "</body>\n</html>\n"
     )
 

@@ -1,8 +1,8 @@
 // The picture: clusters in columns by body and rows by stage, folded or not, and the lines between what is shown.
 
 const SVG = "http://www.w3.org/2000/svg";
-const BOX = { width: 132, height: 34, gap: 12, title: 18, pad: 8 };
-const CELL = { gap: 26, title: 24, most: 10 };
+const BOX = { width: 116, height: 46, gap: 12, title: 18, pad: 8 };
+const CELL = { gap: 38, title: 24, aspect: 1.35 };
 const LEAF = { height: 30, gap: 8, row: 44 };
 const NODE = 34; // height of a node's ellipse or box
 
@@ -13,10 +13,12 @@ function element(name, attributes, parent) {
   return made;
 }
 
+const titleOf = (cluster) => [cluster.marked ? "spurious" : "", cluster.title].filter(Boolean).join(" ");
+
 /** Where everything goes, for the clusters that are folded; the same for all versions. */
 function arrange(data, folded) {
   const sizes = data.clusters.map((cluster, c) => (folded.has(c) ? { w: BOX.width, h: BOX.height }
-    : { w: Math.max(cluster.width, 70) + 2 * BOX.pad, h: cluster.height + BOX.title + BOX.pad }));
+    : { w: Math.max(cluster.width + 2 * BOX.pad, 7 * titleOf(cluster).length + 54), h: cluster.height + BOX.title + BOX.pad }));
   const cells = new Map();
   data.clusters.forEach((cluster, c) => {
     const key = `${data.columns.indexOf(cluster.column)} ${data.stages.indexOf(cluster.stage)}`;
@@ -24,10 +26,11 @@ function arrange(data, folded) {
   });
   const flowed = new Map([...cells].map(([key, own]) => [key, flow(own, sizes)]));
   const cell = (column, stage) => flowed.get(`${column} ${stage}`) ?? { w: 0, h: 0, at: [] };
-  const boxes = [], titles = [], bands = Math.ceil(data.columns.length / CELL.most) || 1;
-  const perBand = Math.ceil(data.columns.length / bands);
+  const boxes = [], titles = [];
   const stages = data.stages.map((_, i) => i);
   const widths = data.columns.map((_, i) => Math.max(90, ...stages.map((stage) => cell(i, stage).w)));
+  const bands = data.bands ??= bandsFor(widths, stages.map((stage) => Math.max(...widths.map((_, i) => cell(i, stage).h))));
+  const perBand = Math.ceil(data.columns.length / bands);
   const inputs = new Map(), outputs = new Map(); // place: width; name: width
   for (const version of data.versions) {
     for (const [, node] of version.inputs) {
@@ -68,6 +71,22 @@ function arrange(data, folded) {
   }
   const bottom = line(inputs, total, y + 8);
   return { boxes, titles, inputs: bottom.at, outputs: top.at, width: total, height: bottom.end + 8 };
+}
+
+/** Into how many bands columns of these widths are broken: one, unless the picture is much larger with more. */
+function bandsFor(widths, heights) {
+  const high = heights.reduce((sum, each) => sum + (each ? each + CELL.gap : 0), CELL.title);
+  const scale = (bands) => {
+    const per = Math.ceil(widths.length / bands);
+    let most = 0;
+    for (let i = 0; i < widths.length; i += per) {
+      most = Math.max(most, widths.slice(i, i + per).reduce((sum, each) => sum + each + CELL.gap, 0));
+    }
+    return Math.min(CELL.aspect / (most + 150), 1 / (bands * high + 2 * LEAF.row));
+  };
+  let best = 1;
+  for (let bands = 2; bands <= widths.length; bands++) if (scale(bands) > 1.7 * scale(1) && scale(bands) > 1.05 * scale(best)) best = bands;
+  return best;
 }
 
 /** Boxes of a cell from left to right, in lines. */
@@ -125,6 +144,7 @@ function brief(value) {
   if (Number.isNaN(value)) return "NaN";
   if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
   const size = Math.abs(value);
+  if (size < 1e-12) return size ? "≈0" : "0";
   const text = size && (size < 1e-3 || size >= 1e5) ? value.toExponential(1) : String(+value.toPrecision(3));
   return text.replace("-", "−").replace("e−", "e-");
 }
@@ -154,11 +174,11 @@ function draw(svg, data, version, folded) {
   });
   data.clusters.forEach((cluster, c) => {
     if (!inside[c].length) return;
-    const at = layout.boxes[c], id = `c${c}`, kind = inside[c][0];
+    const at = layout.boxes[c], id = `c${c}`;
     const role = cluster.marked ? "wrong" : commonRole(version, inside[c]);
     const many = inside[c].length;
-    const words = [cluster.marked ? "spurious" : "", cluster.title || (cluster.marked ? "" : "other")].filter(Boolean).join(" ");
-    const title = `${words} (${many})`;
+    const words = titleOf(cluster);
+    const title = words ? `${words} (${many})` : `${many} node${many > 1 ? "s" : ""}`;
     if (!folded.has(c)) {
       const group = element("g", { class: `frame ${role}`, "data-cluster": c, tabindex: -1, role: "button" }, frames);
       group.setAttribute("aria-label", `fold ${cluster.column} ${title}`);
@@ -167,11 +187,13 @@ function draw(svg, data, version, folded) {
       label.textContent = `▾ ${title}`;
       return;
     }
-    const item = shape(shapes, id, { ...at }, `box ${role}`, `▸ ${title}`, true);
+    const first = words ? (cluster.marked ? "spurious" : cluster.title) : title;
+    const second = !words ? "" : cluster.marked && cluster.title ? `${cluster.title} (${many})` : `${many} node${many > 1 ? "s" : ""}`;
+    const item = shape(shapes, id, { ...at }, `box ${role}`, `▸ ${first}`, true);
     item.group.setAttribute("data-cluster", c);
     item.group.setAttribute("aria-expanded", "false");
     item.group.setAttribute("aria-label", `${cluster.column}, ${cluster.stage}, ${title} nodes, folded`);
-    items.set(id, { ...item, nodes: inside[c], kind });
+    items.set(id, { ...item, nodes: inside[c], second });
     for (const node of inside[c]) shownBy[node] = id;
   });
   version.ops.forEach((op, node) => {
@@ -207,9 +229,9 @@ function shape(parent, id, at, kind, words, square) {
   const group = element("g", { id, class: `item ${kind}`, tabindex: -1, role: "button" }, parent);
   const form = { class: "shape", x: at.x, y: at.y, width: at.w, height: at.h, rx: square ? 5 : at.h / 2 };
   element("rect", form, group);
-  const label = element("text", { class: "label", x: at.x + at.w / 2, y: at.y + at.h / 2 - 2 }, group);
+  const label = element("text", { class: "label", x: at.x + at.w / 2, y: at.y + at.h / 2 - (at.h > 40 ? 4 : 2) }, group);
   label.textContent = words;
-  const value = element("text", { class: "value", x: at.x + at.w / 2, y: at.y + at.h - 6 }, group);
+  const value = element("text", { class: "value", x: at.x + at.w / 2, y: at.y + at.h - (at.h > 40 ? 9 : 6) }, group);
   return { group, value, at };
 }
 

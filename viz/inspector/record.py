@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
@@ -18,14 +17,14 @@ from .content import Motion, Version
 from .layers import layered
 
 ENERGIES = ("kinetic", "potential")  # a tag beside one of these is a body
+OTHER = "other"  # of a body, what carries no energy's tag
 MANY = 60  # clusters; above, they are not split by energy
-STAGES = {(PRIMAL,): "as written", (ADJOINT,): "reverse sweep", (TANGENT,): "forward sweep"}
-_TWICE = "forward over reverse"
+STAGES = {PRIMAL: "as written", ADJOINT: "reverse sweep", TANGENT: "forward sweep"}
+TWICE = "both sweeps"
 _TALL = 34  # pixels that a node's label takes at least
 
 
-@dataclass(frozen=True)
-class Group:
+class Group(NamedTuple):
     """What a cluster's nodes have in common."""
 
     column: str  # body, or another tag
@@ -40,27 +39,31 @@ def record(versions: Sequence[Version], motion: Motion | None) -> dict[str, Any]
     A place is a position of the picture: nodes that compute the same in two versions share it.
     """
     bodies = _bodies(versions)
-    fine = [[_group(node, bodies, node in version.marked) for node in version.graph.nodes] for version in versions]
-    if len({group for groups in fine for group in groups}) > MANY:
-        fine = [[Group(each.column, each.stage, "", each.marked) for each in groups] for groups in fine]
+    rows = [version.rows(len(motion.t) if motion else 1) for version in versions]
+    marked = [frozenset(version.marked) for version in versions]
+    fine = [
+        [_group(node, bodies, node in wrong) for node in v.graph.nodes]
+        for v, wrong in zip(versions, marked, strict=True)
+    ]
+    if len({group for groups in fine for group in groups if group}) > MANY:  # an energy more or less is then too fine
+        fine = [[each and each._replace(title="") for each in groups] for groups in fine]
     places, at = _places(versions, fine)
     clusters = sorted({group for _, group, _ in places if group}, key=_cluster_order)
     drawn = _drawn(places, clusters, versions, at)
-    rows = [version.rows(len(motion.t) if motion else 1) for version in versions]
     return {
         "ops": {op.name: [op.symbol, op.commutative] for op in OPS.values()},
         "slopes": {op.name: slopes(op.name) for op in OPS.values()},
         **drawn,
-        "stages": _by_depth(versions, fine),
+        "stages": [stage for stage in (*STAGES.values(), TWICE) if any(group.stage == stage for group in clusters)],
         "columns": _columns(clusters, bodies),
-        "versions": [
-            {**_version(version, at[i]), "rows": rows[i].tolist()} for i, version in enumerate(versions)
-        ],
+        "versions": [{**_version(version, at[i]), "rows": rows[i].tolist()} for i, version in enumerate(versions)],
         "motion": None
         if motion is None
         else {
             "t": [_short(t) for t in motion.t],
-            "points": [[[_short(x), _short(y)] for x, y in each] for each in motion.points],
+            "points": None
+            if motion.points is None
+            else [[[_short(x), _short(y)] for x, y in each] for each in motion.points],
             "parents": list(motion.parents),
         },
     }
@@ -84,8 +87,6 @@ def slopes(name: str) -> dict[str, Any]:
     return {"code": code, "out": [number[node] for node in partials]}
 
 
-
-
 def _bodies(versions: Sequence[Version]) -> list[str]:
     """Tags that stand beside an energy, in the order in which they come; all tags with a number if there is none."""
     found: dict[str, None] = {}
@@ -105,14 +106,14 @@ def _group(node: Node, bodies: Sequence[str], marked: bool) -> Group | None:
     own = [body for body in bodies if body in node.tags] if node.tags else []
     rest = sorted(node.tags - set(own), key=theme.natural_order)
     column = own[0] if own else rest.pop(0) if rest else ""
-    return Group(column, _stage(node), ", ".join(rest), marked)
+    return Group(column, _stage(node), ", ".join(rest) or (OTHER if own else ""), marked)
 
 
 def _stage(node: Node) -> str:
     roles = node.roles
     if ADJOINT in roles and TANGENT in roles and PRIMAL not in roles:
-        return _TWICE
-    return next((STAGES[(role,)] for role in (PRIMAL, ADJOINT, TANGENT) if role in roles), STAGES[(PRIMAL,)])
+        return TWICE
+    return next((stage for role, stage in STAGES.items() if role in roles), STAGES[PRIMAL])
 
 
 _Place = tuple[Node, Group | None, list[tuple[int, int]]]  # a first node there, its cluster, and (version, node) there
@@ -209,16 +210,6 @@ def _columns(clusters: Sequence[Group], bodies: Sequence[str]) -> list[str]:
     return [*sorted(used - set(bodies), key=theme.natural_order), *[body for body in bodies if body in used]]
 
 
-def _by_depth(versions: Sequence[Version], groups: Sequence[Sequence[Group | None]]) -> list[str]:
-    """Stages from the first computed to the last, by the mean place of their nodes in the order of evaluation."""
-    found: dict[str, list[float]] = {}
-    for own in groups:
-        for i, group in enumerate(own):
-            if group:
-                found.setdefault(group.stage, []).append(i / len(own))
-    return sorted(found, key=lambda stage: (stage != STAGES[(PRIMAL,)], sum(found[stage]) / len(found[stage])))
-
-
 def _version(version: Version, place: Sequence[int]) -> dict[str, Any]:
     graph = version.graph
     number = {node: i for i, node in enumerate(graph.nodes)}
@@ -229,7 +220,7 @@ def _version(version: Version, place: Sequence[int]) -> dict[str, Any]:
         args.append(_number(node.value) if node.value is not None else [number[arg] for arg in node.args])
         kind = (tuple(sorted(node.tags, key=theme.natural_order)), theme.role_of(node))
         label.append(labels.setdefault(kind, len(labels)))
-    marked = [i for node, i in number.items() if node in set(version.marked)]
+    marked = sorted([number[node] for node in set(version.marked)])
     names = {i: [node.name, theme.pretty(node.name)] for node, i in number.items() if node.name}
     return {
         "name": version.name,

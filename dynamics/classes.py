@@ -1,0 +1,26 @@
+"""Classes of a formulation's nodes: what its equations need, what embedding the Euler relation adds, what is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from cgraph import Graph, Node
+from cgraph.label import ADJOINT
+
+from .formulations import EULER, spurious
+
+
+def formulation_classes(graph: Graph) -> Callable[[Node], str]:
+    """The class of each node of a graph of `inverse_dynamics`, as `cg.diff` asks for it.
+
+    "spurious adjoint": it serves only derivatives through q = qd dt + q_old.  "Euler edge": the embedded relations
+    q = qd dt + q_old and qd = qdd dt + qd_old, and their rates.  "needed": all else.
+    """
+    wrong = spurious(graph)
+
+    def name(node: Node) -> str:
+        if node in wrong:
+            return "spurious adjoint"
+        return "Euler edge" if EULER in node.tags and ADJOINT not in node.roles else "needed"
+
+    return name

@@ -1,0 +1,73 @@
+"""Residuals: equations that must hold, how far they are from it, and a certificate of all of them."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Bound:
+    """How large a residual may be, and why."""
+
+    name: str
+    value: float
+    reason: str
+
+
+ROUNDING = Bound("rounding", 1e-13, "the same terms summed in another order, some hundred roundings of the largest")
+POSITIVE = Bound("positive", 0.0, "the smallest eigenvalue of M, scaled to a unit diagonal, exceeds its rounding")
+DIFFERENCES = Bound("differences", 1e-7, "what halving the step of fourth-order differences does not account for")
+PEERS = Bound("peers", 1e-10, "the rounding of two programs, and inertias that pass through principal axes")
+
+
+@dataclass(frozen=True)
+class Residual:
+    """An equation, and by how much the worst state misses it, relative to the terms of the equation."""
+
+    equation: str
+    value: float
+    bound: Bound
+    note: str = ""
+
+    @property
+    def passed(self) -> bool:
+        """Whether it is within its bound; NaN is not."""
+        return self.value <= self.bound.value
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What holds of a model's graphs at random states."""
+
+    states: int
+    seed: int
+    residuals: tuple[Residual, ...]
+    left_out: tuple[str, ...]  # equations that say nothing of this model and peers that are not there: a sentence each
+
+    @property
+    def passed(self) -> bool:
+        """Whether all residuals are within their bounds."""
+        return all([each.passed for each in self.residuals])
+
+    def text(self) -> str:
+        """A line for each residual, then the bounds with their reasons, and what was left out."""
+        wide = max([len(each.equation) for each in self.residuals])
+        lines = [
+            f"{'ok  ' if each.passed else 'FAIL'}  {each.equation:{wide}}  {each.value:8.1e}  {each.bound.name}"
+            + (f"  ({each.note})" if each.note else "")
+            for each in self.residuals
+        ]
+        lines.append(f"{self.states} random states, seed {self.seed}. Bounds:")
+        bounds = dict.fromkeys([each.bound for each in self.residuals])
+        lines += [f"  {each.name}, {each.value:g}: {each.reason}" for each in bounds]
+        lines += [f"left out: {each}" for each in self.left_out]
+        return "\n".join(lines) + "\n"
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return (
+            {"passed": self.passed}
+            | asdict(self)
+            | {"residuals": [asdict(each) | {"passed": each.passed} for each in self.residuals]}
+        )

@@ -1,0 +1,189 @@
+"""The certificate: it passes for what is right, finds what is wrong, and names the term that two models differ in."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import replace
+
+import pytest
+
+import cgraph as cg
+import dynamics as dyn
+from cgraph.node import OPS
+from dynamics.mjcf import to_mjcf
+from dynamics.tables import certificate
+from dynamics.tables.certificate import certify
+from dynamics.tables.residual import ROUNDING, Certificate, Residual
+from tests.dynamics.mechanisms import FAMILIES
+from tests.dynamics.models import MODELS
+from viz import cli
+
+FEW = 5  # states
+
+
+def failed(found: Certificate) -> dict[str, str]:
+    return {each.equation: each.note for each in found.residuals if not each.passed}
+
+
+@pytest.mark.parametrize("name", dyn.scenes.names())
+def test_every_scene_passes(name: str) -> None:
+    assert failed(certify(dyn.scenes.load(name), FEW)) == {}
+
+
+@pytest.mark.parametrize("make", [*MODELS.values(), lambda: FAMILIES["welded"](5)], ids=[*MODELS, "welded"])
+def test_every_kind_of_model_passes(make) -> None:
+    found = certify(make(), FEW, speed=0.5)
+    assert failed(found) == {}
+    assert len(found.residuals) >= 10
+    assert found.text().count("ok  ") == len(found.residuals)
+
+
+def test_the_same_seed_gives_the_same_certificate() -> None:
+    arm = dyn.scenes.load("triple_pendulum")
+    first, again, other = (certify(arm, FEW, seed) for seed in (1, 1, 2))
+    assert first == again
+    assert first.residuals != other.residuals
+
+
+def test_a_wrong_rule_of_differentiation_is_found() -> None:
+    """All derivatives agree with each other then; differences do not."""
+    rule = OPS["cos"].partials
+    arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.7])
+    object.__setattr__(OPS["cos"], "partials", lambda y, x: tuple([1.01 * each for each in rule(y, x)]))
+    try:
+        found = failed(certify(arm, FEW))
+    finally:
+        object.__setattr__(OPS["cos"], "partials", rule)
+    assert {"AD: slope of L along a line = differences", "AD: slope of tau along a line = differences"} <= set(found)
+    assert "energy: dE/dqd = M qd" not in found
+
+
+@pytest.mark.parametrize(
+    ("function", "found"),
+    [
+        ("bias", {"coriolis: C qd + gravity = bias"}),
+        ("mass_matrix", {"M: d2L/dqd2 = columns of inverse dynamics", "energy: dE/dqd = M qd"}),
+        ("energy", {"energy: dE/dt = qd . (tau + forces - damping)", "energy: dE/dqd = M qd"}),
+        ("forward_dynamics", {"inverse dynamics of forward dynamics = tau"}),
+        ("coriolis", {"coriolis: C qd + gravity = bias", "coriolis: dM/dt - 2 C is skew"}),
+        ("torque_by_link", {"links: partial torques add up to tau"}),
+        ("torque_by_motion", {"motion: torques by motion add up to tau"}),
+        ("inverse_dynamics", {"inverse dynamics of forward dynamics = tau"}),
+    ],
+)
+def test_a_wrong_graph_is_found(function: str, found: set[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """One part in a million on the graph's first output."""
+    right = getattr(certificate, function)
+
+    def bent(graph: cg.Graph) -> cg.Graph:
+        outputs = dict(graph.outputs)
+        first = next(iter(outputs))
+        return cg.Graph(graph.inputs, outputs | {first: outputs[first] * (1.0 + 1e-6)})
+
+    def wrong(*arguments):
+        made = right(*arguments)
+        return bent(made) if isinstance(made, cg.Graph) else replace(made, graph=bent(made.graph))
+
+    monkeypatch.setattr(certificate, function, wrong)
+    arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.7], damping=0.1)
+    assert found <= set(failed(certify(arm, FEW)))
+
+
+def test_inertia_that_is_negative_is_found() -> None:
+    system = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 + 1.5 * qd[0] * qd[1] + 0.5 * qd[1] ** 2, ["a", "b"])
+    assert set(failed(certify(system, FEW))) == {"M: positive definite"}
+
+
+def test_nan_fails() -> None:
+    assert not Residual("x", math.nan, ROUNDING).passed
+
+
+def twins() -> dict[str, tuple[str, str]]:
+    """What is changed in MuJoCo's model of a mechanism, and what is said of it."""
+    return {
+        r'armature="': ('armature="1', "armature"),
+        r'damping="': ('damping="1', "damping"),
+        r'stiffness="': ('stiffness="1', "joint springs"),
+        r'mass="': ('mass="1', "mass and its place"),
+        r'gravity="': ('gravity="1', "gravity"),
+        r'type="hinge"': ('type="hinge" frictionloss="0.3"', "friction loss"),
+    }
+
+
+@pytest.mark.parametrize("what", twins())
+def test_the_term_that_a_twin_differs_in_is_named(what: str) -> None:
+    pytest.importorskip("mujoco")
+    mechanism = FAMILIES["mixed"](4)
+    changed, term = twins()[what]
+    found = failed(certify(mechanism, FEW, twin=to_mjcf(mechanism).replace(what, changed, 1)))
+    assert found == {"inverse dynamics = MuJoCo's": f"they agree without {term}"}
+
+
+def test_two_terms_are_named_together() -> None:
+    pytest.importorskip("mujoco")
+    mechanism = FAMILIES["mixed"](4)
+    text = to_mjcf(mechanism).replace('armature="', 'armature="1', 1).replace('damping="', 'damping="1', 1)
+    found = failed(certify(mechanism, FEW, twin=text))
+    assert found == {"inverse dynamics = MuJoCo's": "they agree without damping and armature"}
+
+
+def test_rods_are_told_from_capsules_by_their_inertia() -> None:
+    """The masses of capsules, whose inertia MuJoCo takes from their shape."""
+    pytest.importorskip("mujoco")
+    arm = dyn.scenes.load("triple_pendulum").model
+    masses = iter([link.mass for link in arm.links])
+    text = to_mjcf(arm).replace('inertiafromgeom="false"', 'inertiafromgeom="true"')
+    text = re.sub('type="capsule"', lambda found: f'{found[0]} mass="{next(masses)}"', text)
+    found = failed(certify(arm, FEW, twin=text))
+    assert found == {"inverse dynamics = MuJoCo's": "they agree without inertia about the centres of mass"}
+
+
+def test_a_twin_of_another_size_is_left_out() -> None:
+    pytest.importorskip("mujoco")
+    arm = dyn.planar_arm([1.0, 1.0], [1.0, 1.0])
+    found = certify(arm, FEW, twin=to_mjcf(dyn.planar_arm([1.0], [1.0])))
+    assert "MuJoCo: the twin has 1 degrees of freedom, the model 2" in found.left_out
+
+
+def test_pinocchio_agrees_when_it_is_there() -> None:
+    pytest.importorskip("pinocchio", reason="the bench extra has it")
+    for model in (FAMILIES["branched"](5), dyn.planar_arm([1.0, 0.8], [1.0, 0.7], damping=0.1, gravity=3.0)):
+        found = certify(model, FEW)
+        assert failed(found) == {}
+        assert "inverse dynamics = Pinocchio's" in [each.equation for each in found.residuals]
+
+
+def test_forces_on_bodies_are_not_asked_of_peers() -> None:
+    mechanism = FAMILIES["serial"](3)
+    pushed = replace(mechanism, forces=[dyn.Force("b2", (1.0, 2.0, "f"))], parameters={"f": 3.0})
+    assert failed(certify(pushed, FEW)) == {}
+
+
+@pytest.mark.parametrize("states", [0, -1])
+def test_a_certificate_needs_states(states: int) -> None:
+    with pytest.raises(ValueError, match="at least one state"):
+        certify(dyn.scenes.load("spring_mass"), states)
+
+
+def test_the_command_prints_a_certificate(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["certify", "spring_mass", "--states", "3"]) == 0
+    assert "dM/dt - 2 C is skew" in capsys.readouterr().out
+    assert cli.main(["certify", "triple_pendulum", "--states", "3", "--seed", "4", "--json"]) == 0
+    given = json.loads(capsys.readouterr().out)
+    assert (given["scene"], given["passed"], given["states"], given["seed"]) == ("triple_pendulum", True, 3, 4)
+    assert all(each["value"] <= each["bound"]["value"] and each["bound"]["reason"] for each in given["residuals"])
+
+
+def test_the_command_fails_with_the_residual(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("mujoco")
+    model = tmp_path / "model.xml"
+    model.write_text(
+        '<mujoco><worldbody><body name="a"><joint name="j" axis="0 1 0" frictionloss="0.1"/>'
+        '<geom size="0.1" pos="0.2 0 0"/></body></worldbody></mujoco>'
+    )
+    assert cli.main(["certify", str(model), "--ignore", "--states", "3"]) == 1
+    printed = capsys.readouterr()
+    assert "(they agree without friction loss)" in printed.out
+    assert printed.err.endswith("error: model: 1 residual(s) exceed their bound: inverse dynamics = MuJoCo's\n")

@@ -1,0 +1,89 @@
+"""The Coriolis matrix: closed form, Christoffel's symbols from differences of M, and what holds of every one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pytest import approx
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.system import as_system
+from dynamics.tables.at_state import at_state
+from dynamics.tables.coriolis import coriolis, damping_force
+from tests.dynamics.mechanisms import FAMILIES
+from tests.dynamics.models import MODELS, Array, magnetic, random_arm, relativistic, states
+
+STEP = 1e-3  # of differences of fourth order: they are right to some 1e-11
+DIFFERENCES = 1e-9
+ROUNDING = 1e-12  # of the largest entry
+
+MECHANISMS = {name: lambda make=make: make(5) for name, make in FAMILIES.items()}
+SCLERONOMIC = {name: MODELS[name] for name in ("arm of 1", "arm of 3", "coupled springs", "cart pendulum", "magnetic")}
+
+
+def matrix(graph: cg.Graph, model: object, **state: Array) -> Array:
+    n = as_system(model).n
+    return at_state(as_system(model), graph, state).reshape(-1, n, n)
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_its_entries_are_christoffel_s_symbols_times_the_velocities(name: str) -> None:
+    mechanism, mass = MECHANISMS[name](), dyn.mass_matrix(MECHANISMS[name]())
+    given, n = states(mechanism, 3, 1), mechanism.system.n
+    q, qd = given["q"], given["qd"]
+
+    def slope(k: int) -> Array:
+        at = {s: matrix(mass, mechanism, q=q + s * STEP * np.eye(n)[k], qd=qd) for s in (-2, -1, 1, 2)}
+        return (8 * (at[1] - at[-1]) - (at[2] - at[-2])) / (12 * STEP)
+
+    slopes = np.stack([slope(k) for k in range(n)], axis=-1)  # dM_ij/dq_k
+    symbols = 0.5 * (slopes + np.swapaxes(slopes, 2, 3) - np.moveaxis(slopes, 3, 1))  # i, j, k
+    expected = np.einsum("sijk,sk->sij", symbols, qd)
+    assert matrix(coriolis(mechanism), mechanism, q=q, qd=qd) == approx(expected, abs=DIFFERENCES * abs(expected).max())
+
+
+def test_of_two_links_it_is_the_textbook_s() -> None:
+    arm = random_arm(2)
+    given = states(arm, 10)
+    q, qd = given["q"], given["qd"]
+    h = -arm.links[1].mass * arm.links[0].length * arm.links[1].center * np.sin(q[:, 1])
+    rows = [[h * qd[:, 1], h * (qd[:, 0] + qd[:, 1])], [-h * qd[:, 0], 0 * h]]
+    found = matrix(coriolis(arm), arm, q=q, qd=qd)
+    assert found == approx(np.moveaxis(np.array(rows), 2, 0), rel=ROUNDING, abs=1e-15)
+
+
+@pytest.mark.parametrize("name", [*MECHANISMS, *SCLERONOMIC])
+def test_it_gives_the_bias_and_leaves_a_skew_matrix(name: str) -> None:
+    model = (MECHANISMS | SCLERONOMIC)[name]()
+    system, given = as_system(model), states(model, 10)
+    q, qd = given["q"], given["qd"]
+    found = matrix(coriolis(model), model, q=q, qd=qd)
+    bias, gravity = (at_state(system, graph, given) for graph in (dyn.bias(model), dyn.gravity_force(model)))
+    assert np.einsum("sij,sj->si", found, qd) + gravity == approx(bias, abs=ROUNDING * abs(bias).max())
+    along = cg.jvp(dyn.mass_matrix(model), system.q)
+    values = {f"q{i}": q[:, i] for i in range(system.n)} | {f"q{i}_dot": qd[:, i] for i in range(system.n)}
+    values |= {f"qd{i}": qd[:, i] for i in range(system.n)} | system.parameters | {"t": 0.0}
+    change = np.stack(list(along.evaluate({name: values[name] for name in along.input_names}).values()), axis=-1)
+    skew = change.reshape(found.shape) - 2 * found
+    assert skew + np.swapaxes(skew, 1, 2) == approx(0 * skew, abs=ROUNDING * max(1.0, abs(found).max()))
+
+
+def test_forces_linear_in_velocity_count_in_full() -> None:
+    """A charge in a magnetic field B: the force is B (-y', x'), all of it in C."""
+    model = magnetic()
+    found = matrix(coriolis(model), model, q=np.ones(2), qd=np.ones(2))[0]
+    assert found == approx(np.array([[0.0, -2.0], [2.0, 0.0]]))
+
+
+def test_a_lagrangian_that_is_not_quadratic_is_refused() -> None:
+    with pytest.raises(ValueError, match="quadratic in the velocities, its mass matrix depends on qd0"):
+        coriolis(relativistic())
+
+
+def test_damping_takes_its_coefficient_times_the_velocity() -> None:
+    arm = random_arm(3)
+    graph = damping_force(arm)
+    qd = np.array([1.0, -2.0, 3.0])
+    assert at_state(arm.system, graph, {"qd": qd, "q": qd}) == approx(np.array(arm.damping) * qd)
+    assert {tag for node in graph.nodes for tag in node.tags} == {"damping"}

@@ -1,0 +1,104 @@
+"""Linearisation against differences of other programs' accelerations, Pinocchio's derivatives, and closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pytest import approx
+
+import dynamics as dyn
+from dynamics.system import as_system
+from dynamics.tables.at_state import at_state
+from dynamics.tables.linearization import linearization, linearize
+from tests.dynamics.mechanisms import FAMILIES, turned_arm
+from tests.dynamics.models import MODELS, Array, at, random_arm, states
+
+STEP = 1e-3
+DIFFERENCES = 1e-7  # fourth order at that step, of what M^-1 magnifies
+ROUNDING = 1e-11
+
+
+def differences(rate: object, x: Array) -> Array:
+    """The Jacobian of rate(x) by central differences of fourth order."""
+    columns = []
+    for unit in np.eye(len(x)):
+        v = {s: rate(x + s * STEP * unit) for s in (-2, -1, 1, 2)}  # type: ignore[operator]
+        columns.append((8 * (v[1] - v[-1]) - (v[2] - v[-2])) / (12 * STEP))
+    return np.stack(columns, axis=1)
+
+
+def test_of_a_pendulum_it_is_the_textbook_s() -> None:
+    arm = dyn.planar_arm([3.0], [2.0], damping=0.5)
+    a, b = linearize(arm, [0.4], [7.0], [1.0])
+    assert a == approx(np.array([[0.0, 1.0], [-29.43 * np.cos(0.4) / 4.0, -0.5 / 4.0]]))
+    assert b == approx(np.array([[0.0], [0.25]]))
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_it_is_the_slope_of_forward_dynamics(name: str) -> None:
+    model = MODELS[name]()
+    system, state = as_system(model), at(states(model, 1), 0)
+    n, t, accelerations = system.n, 0.3, dyn.forward_dynamics(model)
+
+    def rate(x: Array) -> Array:
+        qdd = at_state(system, accelerations, {"q": x[:n], "qd": x[n : 2 * n], "tau": x[2 * n :]}, t)
+        return np.concatenate([x[n : 2 * n], qdd])
+
+    expected = differences(rate, np.concatenate([state["q"], state["qd"], state["tau"]]))
+    found = np.hstack(linearize(model, state["q"], state["qd"], state["tau"], t=t))
+    assert found == approx(expected, abs=DIFFERENCES * abs(expected).max())
+
+
+@pytest.mark.parametrize("model", [random_arm(3), turned_arm(4), FAMILIES["mixed"](7)], ids=["planar", "arm", "mixed"])
+def test_it_is_the_slope_of_mujoco_s_accelerations(model: object) -> None:
+    pytest.importorskip("mujoco")
+    from dynamics.mujoco_io import MujocoTwin
+
+    twin, n, state = MujocoTwin(model), as_system(model).n, at(states(model, 1, 2), 0)  # type: ignore[arg-type]
+    names = [twin.model.joint(i).name for i in range(n)]
+    wanted = [name.replace(" ", "") if name not in names else name for name in as_system(model).coordinates]
+    order = np.array([names.index(name) for name in wanted])
+
+    def rate(x: Array) -> Array:
+        given = [np.empty(n) for _ in range(3)]
+        for row, part in zip(given, np.split(x, 3), strict=True):
+            row[order] = part
+        return twin.accelerations(*given)[order]
+
+    expected = differences(rate, np.concatenate([state["q"], state["qd"], state["tau"]]))
+    a, b = linearize(model, state["q"], state["qd"], state["tau"])
+    assert np.hstack([a, b])[n:] == approx(expected, abs=DIFFERENCES * abs(expected).max())
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_pinocchio_s_derivatives_of_aba_are_the_same(family: str) -> None:
+    pinocchio = pytest.importorskip("pinocchio", reason="the bench extra has it")
+    from tests.dynamics.pinocchio_twin import PinocchioTwin
+
+    mechanism = FAMILIES[family](6)
+    twin, state, n = PinocchioTwin(mechanism), at(states(mechanism, 1, 3), 0), mechanism.system.n
+    q, qd, tau = (state[name] for name in ("q", "qd", "tau"))
+    theirs, square = twin._theirs, np.ix_(twin.order, twin.order)
+    pinocchio.computeABADerivatives(twin.model, twin.data, theirs(q), theirs(qd), theirs(tau - twin._passive(q, qd)))
+    upper = np.triu(twin.data.Minv)
+    inverse = (upper + np.triu(upper, 1).T)[square]
+    by_q = twin.data.ddq_dq[square] - inverse * twin.stiffness
+    by_qd = twin.data.ddq_dv[square] - inverse * twin.damping
+    a, b = linearize(mechanism, q, qd, tau)
+    for found, expected in ((a[n:, :n], by_q), (a[n:, n:], by_qd), (b[n:], inverse)):
+        assert found == approx(expected, abs=ROUNDING * abs(expected).max())
+
+
+def test_the_graph_takes_many_states_and_is_smaller_than_that_of_forward_dynamics_differentiated() -> None:
+    arm = turned_arm(7)
+    graph = linearization(arm)
+    assert len(graph.nodes) < 18_000  # 30 000 by reverse mode through forward dynamics
+    given = states(arm, 3)
+    rows = at_state(arm.system, graph, given)
+    one = np.concatenate([each.ravel() for each in linearize(arm, *(given[name][1] for name in ("q", "qd", "tau")))])
+    assert rows[1] == approx(one, rel=1e-9, abs=1e-9)
+
+
+def test_one_state_at_a_time() -> None:
+    with pytest.raises(ValueError, match="one state"):
+        linearize(random_arm(2), np.zeros((3, 2)), np.zeros((3, 2)))

@@ -1,0 +1,78 @@
+"""What there is to inspect in a scene, and where its joints are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import dynamics as dyn
+from dynamics.inspection import DT, FORMULATIONS, inspection
+from dynamics.scenes import Scene
+from dynamics.skeleton import skeleton
+
+INTEGRATED = 1e-9  # N m: the state is one that the equations hold at, whatever the error of the motion
+
+
+def test_the_free_motion_takes_no_torque_by_the_chain_rule_alone():
+    found = inspection(dyn.scenes.load("triple_pendulum"))
+    assert tuple(each.name for each in found.versions) == FORMULATIONS
+    wrong = []
+    for each in found.versions:
+        tau = np.stack(list(each.graph.evaluate(each.at).values()))
+        wrong.append(np.abs(tau).max())
+        assert bool(each.marked) == (wrong[-1] > INTEGRATED)
+        assert ("vermillion" in each.about) == bool(each.marked)
+    assert wrong[0] > 1.0
+    assert wrong[2] < INTEGRATED
+
+
+def test_the_embedded_step_ends_in_the_state_of_the_others():
+    embedded, _, chain = inspection(dyn.scenes.load("triple_pendulum")).versions
+    for i in range(3):
+        qd = embedded.at[f"qd{i}_old"] + DT * embedded.at[f"qdd{i}"]
+        assert np.allclose(qd, chain.at[f"qd{i}"], rtol=0, atol=1e-12)
+        assert np.allclose(embedded.at[f"q{i}_old"] + DT * qd, chain.at[f"q{i}"], rtol=0, atol=1e-12)
+
+
+def test_shares_of_the_torque_add_up():
+    shares = dict(inspection(dyn.scenes.load("triple_pendulum")).shares)
+    total = shares.pop("all")
+    assert set(shares) == {"link 1", "link 2", "link 3", "damping and forces"}
+    assert sum(shares.values()) == pytest.approx(total, abs=1e-12)
+    assert shares["damping and forces"] == pytest.approx(np.zeros(3), abs=1e-12)  # at rest
+    assert shares["link 1"][1:] == pytest.approx([0.0, 0.0])  # the first link does not load the others' joints
+
+
+def test_forward_dynamics_and_a_system_without_places():
+    found = inspection(dyn.scenes.load("spring_mass"), forward=True, t_end=np.pi)
+    (version,) = found.versions
+    assert found.skeleton is None
+    assert found.shares == {}
+    qdd = version.graph.evaluate(version.at)["qdd0"]
+    assert np.allclose(qdd, -np.cos(found.t), atol=1e-5)  # I = k = 1, let go at 1
+
+
+def test_joints_of_a_planar_arm_are_a_link_apart():
+    q = np.random.default_rng(0).uniform(-3, 3, (5, 3))
+    points, parents = skeleton(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7]), q)
+    assert parents == (-1, 0, 1, 2)
+    assert np.linalg.norm(np.diff(points, axis=1), axis=2) == pytest.approx(np.tile([1.0, 0.8, 0.7], (5, 1)))
+    assert points[:, 1] == pytest.approx(np.stack([np.sin(q[:, 0]), -np.cos(q[:, 0])], axis=1))
+
+
+def test_a_mechanism_hangs_together():
+    joint = dyn.mechanism.Joint("revolute", axis=(0, -1, 0), position=(0.0, 0.0, -0.5))
+    bodies = [
+        dyn.mechanism.Body("a", joint, mass=1.0, center=(0, 0, -0.25)),
+        dyn.mechanism.Body("b", joint, "a", mass=1.0, center=(0, 0, -0.25)),
+    ]
+    points, parents = skeleton(dyn.Mechanism(bodies), [[0.3, 0.2]])
+    assert parents == (-1, 0, 1)
+    a = np.array([np.sin(0.3), -np.cos(0.3)]) * 0.5
+    tip = np.array([np.sin(0.5), -np.cos(0.5)]) * 0.25
+    assert points[0] == pytest.approx(np.array([[0.0, -0.5], [0.0, -0.5] + a, [0.0, -0.5] + a + tip]))
+
+
+def test_a_time_out_of_range_is_refused():
+    with pytest.raises(ValueError, match="t_end"):
+        inspection(Scene("x", "", dyn.planar_arm([1.0], [1.0]), (0.0,), (0.0,), 1.0), t_end=-1.0)

@@ -1,0 +1,303 @@
+"""Pruning: what a scene does not need is not in its graph, and the account of it adds up."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from pytest import approx, mark, raises
+
+import cgraph as cg
+import dynamics as dyn
+from cgraph.structure_hash import structure_hash
+from tests.dynamics.mechanisms import FAMILIES, in_space, random_inertia, random_rotation, turned_arm
+from tests.dynamics.test_reconfiguration import arm
+
+BOTH = (dyn.inverse_dynamics, dyn.forward_dynamics)
+PAPER = dyn.scenes.load("triple_pendulum").model
+AGREEMENT = 1e-11  # of the largest value: rounding of two codes
+
+Equations = Callable[[Any], cg.Graph]
+
+
+def nodes(graph: cg.Graph) -> int:
+    return len(graph.nodes)
+
+
+def at_random(graph: cg.Graph, seed: int = 0) -> dict[str, float]:
+    rng = np.random.default_rng(seed)
+    return {name: float(rng.uniform(-1.5, 1.5)) for name in graph.input_names}
+
+
+def assert_alike(left: cg.Graph, right: cg.Graph) -> None:
+    """The same outputs at ten states."""
+    for seed in range(10):
+        given = at_random(right, seed)
+        expected = np.array(list(right.evaluate(given).values()))
+        found = np.array(list(left.evaluate({name: given[name] for name in left.input_names}).values()))
+        assert found == approx(expected, abs=AGREEMENT * max(1.0, np.abs(expected).max()))
+
+
+# --- bodies that move in a plane, and inertia that no motion shows: against energies in the world's axes
+
+
+def in_planes(seed: int) -> dyn.Mechanism:
+    """A tree of hinges and slides, most along one axis, some against it, some across; gravity any, along, or none."""
+    rng = np.random.default_rng(seed)
+    bodies: list[dyn.Body] = []
+    for i in range(6):
+        axis = ((0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))[int(rng.integers(0, 3 + (i > 3)))]
+        kind = "prismatic" if rng.random() < 0.3 else "revolute"
+        first = random_rotation(rng) if i == 0 else np.eye(3)
+        joint = dyn.Joint(kind, axis, 0.4 * rng.normal(size=3), first, armature=0.1)
+        parent = f"b{rng.integers(max(0, i - 2), i)}" if i else "world"
+        bodies.append(dyn.Body(f"b{i}", joint, parent, rng.uniform(0.5, 2.0), 0.2 * rng.normal(size=3),
+                               random_inertia(rng)))  # fmt: skip
+    along = 9.81 * np.asarray(bodies[0].joint.orientation)[:, 2]
+    return dyn.Mechanism(bodies, (rng.normal(size=3), along, np.zeros(3))[seed % 3])
+
+
+def energies_in_the_world(mechanism: dyn.Mechanism, state: dict[str, float]) -> tuple[float, float]:
+    """K and P, body by body, from the motion of centres of mass."""
+    kinetic = potential = 0.0
+    for i, body in enumerate(mechanism.moving):
+        found = {name: float(value) for name, value in mechanism.motion(body.name, body.center).evaluate(state).items()}
+        x, v, w = (
+            np.array([found[name] for name in names]) for names in ("xyz", ("vx", "vy", "vz"), ("wx", "wy", "wz"))
+        )
+        turn = np.array([[found[f"R_{i}_{j}"] for j in range(3)] for i in range(3)])
+        spin = turn.T @ w
+        kinetic += (body.mass * v @ v + spin @ np.asarray(body.inertia) @ spin) / 2.0
+        kinetic += body.joint.armature * state[f"qd{i}"] ** 2 / 2.0
+        potential -= body.mass * float(np.asarray(mechanism.gravity) @ x)
+    return kinetic, potential
+
+
+@mark.parametrize("seed", range(18))
+@mark.parametrize("regrouped", [False, True])
+def test_the_lagrangian_is_the_energy_in_the_world_s_axes(seed: int, regrouped: bool) -> None:
+    mechanism = replace(in_planes(seed), regrouped=regrouped)
+    system = mechanism.system
+    graph = cg.Graph([*system.q, *system.qd], {"L": system.lagrangian})
+    energy = dyn.energy(mechanism)
+    for each in range(3):
+        state = at_random(graph, each)
+        kinetic, potential = energies_in_the_world(mechanism, state)
+        scale = abs(kinetic) + abs(potential)
+        assert graph.evaluate(state)["L"] == approx(kinetic - potential, abs=AGREEMENT * scale)
+        assert energy.evaluate(state)["E"] == approx(kinetic + potential, abs=AGREEMENT * scale)
+
+
+@mark.parametrize("seed", range(12))
+def test_torques_in_planes_are_those_body_by_body(seed: int) -> None:
+    mechanism = in_planes(seed)
+    n = len(mechanism.moving)
+    for model in (mechanism, replace(mechanism, regrouped=True)):
+        run, graph = dyn.RecursiveInverseDynamics(model), dyn.inverse_dynamics(mechanism)
+        q, qd, qdd = np.random.default_rng(seed).normal(size=(3, n))
+        expected = np.array(list(graph.evaluate(dict(zip(graph.input_names, [*q, *qd, *qdd], strict=True))).values()))
+        assert run(q, qd, qdd) == approx(expected, abs=AGREEMENT * max(1.0, np.abs(expected).max()))
+
+
+@mark.parametrize("family", FAMILIES)
+@mark.parametrize("equations", BOTH)
+def test_regrouped_inertia_moves_alike_in_no_more_nodes(family: str, equations: Equations) -> None:
+    mechanism = FAMILIES[family](6)
+    pruned = dyn.prune(mechanism, equations)
+    assert_alike(pruned.graph, equations(mechanism))
+    assert nodes(pruned.graph) <= nodes(equations(mechanism))
+    kept = dyn.prune(mechanism, equations, regroup=False)
+    assert structure_hash(kept.graph) == structure_hash(equations(mechanism))
+    assert sum(each.nodes for each in kept.remains) == nodes(kept.graph) - nodes(pruned.graph)
+
+
+def test_what_regrouping_saves() -> None:
+    """Seven numbers of a body in place of ten; in a plane two in place of three. No mass, where all joints turn."""
+    counts = {name: [(nodes(equations(model)), nodes(dyn.prune(model, equations).graph)) for equations in BOTH]
+              for name, model in (("paper", in_space(PAPER)), ("arm of 7", turned_arm(7)))}  # fmt: skip
+    assert counts == {"paper": [(175, 158), (196, 175)], "arm of 7": [(1428, 1236), (2651, 2493)]}
+    assert all(link.mass == 0.0 for link in replace(turned_arm(7), regrouped=True).links)
+
+
+# --- the paper's scene
+
+
+def test_the_paper_s_arm_spelled_in_space_prunes_to_its_planar_graph() -> None:
+    """At most 1.1 times the nodes of the planar Lagrangian written by hand; in the end, fewer."""
+    by_hand = [nodes(equations(PAPER)) for equations in BOTH]
+    in_full = [nodes(equations(in_space(PAPER))) for equations in BOTH]
+    pruned = [nodes(dyn.prune(in_space(PAPER), equations).graph) for equations in BOTH]
+    assert (by_hand, in_full, pruned) == ([171, 199], [175, 196], [158, 175])
+    assert all(found <= 1.1 * hand for found, hand in zip(in_full, by_hand, strict=True))
+    assert nodes(dyn.gravity_force(in_space(PAPER))) == nodes(dyn.gravity_force(PAPER)) == 20
+    for equations in BOTH:
+        assert_alike(dyn.prune(in_space(PAPER), equations).graph, equations(PAPER))
+
+
+# --- effects
+
+
+@mark.parametrize("model", [PAPER, arm(3), turned_arm(3)], ids=["paper", "arm", "turned arm"])
+@mark.parametrize("equations", BOTH)
+def test_without_gravity_and_damping_the_kinetic_energy_is_all(model: Any, equations: Equations) -> None:
+    """As many nodes as from a Lagrangian that is the kinetic energy alone."""
+    system = model.system
+    by_hand = equations(dyn.System(lambda q, qd, t: system.kinetic, system.coordinates))
+    pruned = dyn.prune(model, equations, effects=["springs"] if isinstance(model, dyn.Mechanism) else [], regroup=False)
+    assert nodes(pruned.graph) == nodes(by_hand)
+    assert_alike(pruned.graph, by_hand)
+    assert not {"potential", "damping"} & {tag for node in pruned.graph.nodes for tag in node.tags}
+
+
+def test_without_gravity_the_base_s_angle_is_gone() -> None:
+    """The paper's arm in space: 113 nodes, where the planar Lagrangian, in angles from the vertical, has 158."""
+    counts = [nodes(dyn.prune(in_space(PAPER), each, effects=[], regroup=False).graph) for each in BOTH]
+    by_hand = [nodes(dyn.prune(PAPER, each, effects=[]).graph) for each in BOTH]
+    assert (counts, by_hand) == ([113, 154], [158, 185])
+    graph = dyn.prune(in_space(PAPER), effects=[]).graph
+    assert "q0" not in {node.name for node in graph.nodes}
+    assert_alike(graph, dyn.prune(PAPER, effects=[]).graph)
+
+
+def test_a_base_about_the_vertical_has_no_gravity() -> None:
+    graph = dyn.gravity_force(turned_arm(3))
+    assert graph.outputs["gravity0"].value == 0.0
+    assert graph.outputs["gravity1"].value is None
+    assert "q0" not in {node.name for node in dyn.inverse_dynamics(turned_arm(3)).nodes}
+    (row,) = [each for each in dyn.prune(turned_arm(3)).absent if each.what.startswith("gravity")]
+    assert (row.what, row.nodes > 0) == ("gravity at link 1", True)
+
+
+@mark.parametrize(
+    ("model", "found", "hand"),
+    [(PAPER, 19, 19), (in_space(PAPER), 19, 19), (arm(3), 123, 123), (turned_arm(4), 51, 52)],
+    ids=["paper", "space", "arm", "turned arm"],
+)
+def test_at_rest_the_gravity_force_is_all(model: Any, found: int, hand: int) -> None:
+    """tau at qd = qdd = 0, of springs and gravity, is -dL/dq of the Lagrangian at rest, node for node."""
+    pruned = dyn.prune(model, values={"qd": 0.0, "qdd": 0.0}, regroup=False)
+    system = model.system
+    rest = cg.specialize(
+        cg.Graph([*system.q, *system.qd], {"L": system.lagrangian}), {qd.name: 0.0 for qd in system.qd}
+    )
+    slopes = cg.gradient(rest).outputs.values()
+    by_hand = cg.simplify(cg.Graph(system.q, {f"tau{i}": -slope for i, slope in enumerate(slopes)}))
+    assert (nodes(pruned.graph), nodes(by_hand)) == (found, hand)
+    assert found <= nodes(dyn.gravity_force(model))
+    assert_alike(pruned.graph, by_hand)
+    assert pruned.graph.input_names == tuple(q.name for q in system.q)
+
+
+def test_each_effect_that_a_joint_has_not_leaves_no_node() -> None:
+    """Of one joint with an effect and two without, the nodes are those of the one."""
+    base = dyn.prune(arm(3), effects=["gravity"], regroup=False)
+    tags = {"damping": "damping", "stiffness": "link 2", "armature": "link 2"}
+    for number in tags:
+        bodies = [replace(body, joint=replace(body.joint, damping=0.0)) for body in arm(3).bodies]
+        bodies[1] = replace(bodies[1], joint=replace(bodies[1].joint, **{number: 0.3}))
+        grown = nodes(dyn.inverse_dynamics(dyn.Mechanism(bodies))) - nodes(base.graph)
+        assert grown == {"damping": 3, "stiffness": 3, "armature": 3}[number]  # a constant, a product and a sum
+
+
+def test_a_constant_mass_matrix_is_factored_once_and_for_all() -> None:
+    """Four slides one on the other: no product but the springs', and a division for each mass but one of 1 kg."""
+    slides = dyn.Mechanism([
+        dyn.Body(f"b{i}", dyn.Joint("prismatic", (1, 0, 0), stiffness=2.0), f"b{i - 1}" if i else "world", mass=1.0 + i)
+        for i in range(4)
+    ])  # fmt: skip
+    counts = dyn.forward_dynamics(slides).counts()
+    assert counts.by_operation == {"variable": 8, "add": 7, "sub": 7, "constant": 4, "mul": 4, "div": 3}
+
+
+def test_bodies_without_mass_and_welds_leave_nothing() -> None:
+    bare = turned_arm(3)
+    frames = [dyn.Body("flange", dyn.Joint("fixed", position=(0.0, 0.1, 0.0)), "link 3"), dyn.Body("sensor",
+              dyn.Joint("fixed", position=(0.2, 0.0, 0.0)), "flange")]  # fmt: skip
+    framed = dyn.Mechanism([*bare.bodies, *frames])
+    for equations in BOTH:
+        assert structure_hash(equations(framed)) == structure_hash(equations(bare))
+    cross = dyn.Body("cross", dyn.Joint("revolute", (1.0, 0.0, 0.0)), "link 3")
+    tool = dyn.Body("tool", dyn.Joint("revolute", (0.0, 1.0, 0.0)), "cross", 0.5, (0.0, 0.0, 0.2), (0.01, 0.01, 0.01))
+    wrist = dyn.Mechanism([*bare.bodies, cross, tool])
+    assert "cross" not in {tag for node in wrist.system.partial_lagrangians[3].args for tag in node.tags}
+    rows = {each.what: each for each in dyn.prune(wrist).absent}
+    assert rows["mass of cross"].nodes > 0
+
+
+# --- locked joints, outputs and inputs
+
+
+def test_a_locked_joint_leaves_the_shorter_arm_s_nodes() -> None:
+    """Of ten links, the last, one in the middle, and the first: as many as the arm of nine has, within 1.02."""
+    for equations, ten, nine, first in ((BOTH[0], 3934, 3477, 3492), (BOTH[1], 9163, 8062, 8077)):
+        counts = [
+            nodes(dyn.prune(arm(10), equations, lock={f"link {k}": 0.3}, regroup=False).graph) for k in (10, 5, 1)
+        ]
+        assert (nodes(equations(arm(10))), nodes(equations(arm(9)))) == (ten, nine)
+        assert counts == [nine, nine, first]
+        assert first <= 1.02 * nine
+
+
+def test_the_account_adds_up() -> None:
+    push = dyn.Force("link 3", (1.0, "push", 0.0))
+    bodies = [replace(body, joint=replace(body.joint, armature=0.1, stiffness=2.0)) for body in arm(4).bodies]
+    model = dyn.Mechanism(bodies, forces=[push], parameters={"push": 2.0})
+    pruned = dyn.prune(model, effects=[], lock={"link 4": 0.2}, values={"qd": 0.0}, outputs=["tau1"])
+    assert [each.what for each in pruned.left_out] == [
+        "gravity", "damping", "springs", "armature", "forces", "joint of link 4", "input qd", "other outputs",
+        "unobservable inertial numbers"]  # fmt: skip
+    assert all(each.nodes > 0 and each.edges > 0 for each in pruned.left_out)
+    assert sum(each.nodes for each in pruned.left_out) == nodes(pruned.full) - nodes(pruned.graph)
+    assert sum(each.edges for each in pruned.left_out) == len(pruned.full.edges) - len(pruned.graph.edges)
+    assert list(pruned.graph.outputs) == ["tau1"]
+    assert nodes(pruned.full) == nodes(dyn.inverse_dynamics(model))
+    assert [each.what for each in pruned.absent] == [
+        "gravity", "damping of link 1, link 2, link 3", "springs of link 1, link 2, link 3",
+        "armature of link 1, link 2, link 3"]  # fmt: skip
+    assert [each.nodes for each in pruned.absent] == [42, 0, 3, 3]  # where nothing moves, damping is nothing
+    text = str(pruned)
+    assert "damping: switched off (" in text
+    assert f"{nodes(pruned.graph)} nodes" in text
+
+
+def test_what_is_locked_and_bound_computes_the_rest_as_before() -> None:
+    model = arm(4)
+    pruned = dyn.prune(model, lock={"link 4": 0.2}, values={"qd": 0.0, "qdd1": 0.5}, outputs=["tau2", "tau0"])
+    given = at_random(pruned.graph) | {f"qd{i}": 0.0 for i in range(3)} | {"qdd1": 0.5}
+    full = dyn.inverse_dynamics(model).evaluate(given | {"q3": 0.2, "qd3": 0.0, "qdd3": 0.0})
+    found = pruned.graph.evaluate({name: given[name] for name in pruned.graph.input_names})
+    assert found == {name: approx(full[name], rel=1e-12) for name in ("tau2", "tau0")}
+
+
+def test_parameters_become_numbers() -> None:
+    scene = dyn.scenes.load("spring_mass")
+    pruned = dyn.prune(scene, dyn.forward_dynamics, values=scene.system.parameters)
+    assert pruned.graph.input_names == ("q0", "qd0", "tau0")
+    assert pruned.graph.evaluate({"q0": 0.3, "qd0": 0.0, "tau0": 1.0}) == {"qdd0": approx(0.7)}
+    assert (nodes(pruned.full), nodes(pruned.graph)) == (7, 3)
+
+
+def test_damping_and_forces_of_any_lagrangian_can_be_left_out() -> None:
+    system = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 2.0 * q[0] ** 2, ["x"],
+                        forces=lambda q, qd, t: [cg.sin(t)], damping=0.3)  # fmt: skip
+    whole = ["gravity", "springs", "armature"]
+    pruned = dyn.prune(system, dyn.forward_dynamics, effects=whole)
+    assert [each.what for each in pruned.left_out] == ["damping", "forces"]
+    assert pruned.graph.evaluate({"q0": 0.5, "qd0": 1.0, "tau0": 3.0}) == {"qdd0": approx(1.0)}
+    kept = dyn.prune(system, dyn.forward_dynamics, effects=[*whole, "forces"]).graph
+    assert kept.evaluate({"q0": 0.5, "qd0": 1.0, "tau0": 3.0, "t": 0.7}) == {"qdd0": approx(1.0 + np.sin(0.7))}
+    with raises(ValueError, match="gravity cannot be told apart"):
+        dyn.prune(system, effects=[])
+
+
+def test_wrong_use() -> None:
+    with raises(ValueError, match="effects are gravity, damping, springs, armature, forces, got 'friction'"):
+        dyn.prune(PAPER, effects=["friction"])
+    with raises(ValueError, match="can be locked of a Mechanism, got PlanarArm"):
+        dyn.prune(PAPER, lock={"link 3": 0.0})
+    with raises(dyn.MechanismError, match="there is no body 'nobody'"):
+        dyn.prune(arm(2), lock={"nobody": 0.0})
+    with raises(cg.GraphError, match="no input 'w'"):
+        dyn.prune(PAPER, values={"w": 1.0})
+    with raises(cg.GraphError, match="no output g"):
+        dyn.prune(PAPER, outputs=["g"])

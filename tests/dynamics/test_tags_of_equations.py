@@ -1,0 +1,44 @@
+"""Tags on the equations of motion: every node says where it comes from, and gravity can be told from the rest."""
+
+from __future__ import annotations
+
+import pytest
+
+import cgraph as cg
+import dynamics as dyn
+from tests.dynamics.mechanisms import FAMILIES, turned_arm
+
+MODELS = {name: lambda name=name: dyn.scenes.load(name) for name in dyn.scenes.names()}
+MODELS |= {"turned": lambda: turned_arm(3), "mixed": lambda: FAMILIES["mixed"](3)}
+GRAPHS = {name: lambda model, name=name: dyn.inverse_dynamics(model, name) for name in dyn.FORMULATIONS}
+GRAPHS |= {name: lambda model, name=name: dyn.forward_dynamics(model, name) for name in ("recursive", "dense")}
+
+
+def untagged(graph: cg.Graph) -> list[cg.Node]:
+    """Operations without tags; leaves are shared by all."""
+    return [node for node in graph.nodes if node.args and not node.tags]
+
+
+@pytest.mark.parametrize("graph", GRAPHS)
+@pytest.mark.parametrize("model", MODELS)
+def test_every_operation_has_a_tag(model: str, graph: str) -> None:
+    assert untagged(GRAPHS[graph](MODELS[model]())) == []
+
+
+@pytest.mark.parametrize("graph", GRAPHS)
+@pytest.mark.parametrize("model", MODELS)
+def test_some_operations_come_of_the_potential(model: str, graph: str) -> None:
+    nodes = GRAPHS[graph](MODELS[model]()).nodes
+    assert [node for node in nodes if "potential" in node.tags]
+
+
+def test_every_gravity_force_is_made_of_products_that_come_of_the_potential() -> None:
+    graph = dyn.gravity_force(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7]))
+    for name, node in graph.outputs.items():
+        nodes = cg.Graph(graph.inputs, {name: node}).nodes
+        assert [each for each in nodes if each.op.name == "mul" and "potential" in each.tags]
+
+
+def test_without_gravity_nothing_comes_of_the_potential() -> None:
+    weightless = dyn.inverse_dynamics(dyn.planar_arm([1.0, 0.8], [1.0, 0.8], gravity=0.0))
+    assert [node for node in weightless.nodes if "potential" in node.tags] == []

@@ -1,0 +1,362 @@
+"""Error and run time: errors are those of closed forms, orders are those declared, others get what ours gets."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pytest import approx, raises
+
+import dynamics as dyn
+from dynamics.integrators import METHODS
+from dynamics.reports import work_precision as module
+from dynamics.reports.cold_start import cold_starts
+from dynamics.reports.trajectory_peers import EPSILON, Cvodes, Heyoka, Mujoco
+from dynamics.reports.trajectory_runs import CHOSEN, EQUAL, Contender, Ours, Outcome, Scipy, problem_of
+from dynamics.reports.trajectory_scenes import INTERVALS, Setting, load, names
+from dynamics.reports.work_precision import (
+    FLOOR,
+    Curve,
+    Judge,
+    Point,
+    WorkPrecision,
+    fitted_order,
+    targets,
+    to_csv,
+    work_precision,
+)
+
+T_END = 10.0  # s, of the scene spring_mass: q = cos t
+ROUNDING = 1e-9  # a thousand times that of a power of R(i h) in float64
+TIMES = np.linspace(0.0, T_END, INTERVALS + 1)
+
+
+@pytest.fixture(scope="module")
+def report() -> WorkPrecision:
+    """The oscillator by some of ours, quickly."""
+    pytest.importorskip("flint")
+    pytest.importorskip("llvmlite")
+    methods = ("euler", "rk4", "dop853", "verlet", "midpoint", "radau")
+    return work_precision("spring_mass", methods=methods, peers=(), cold=(), turns=1, limit=0.05)
+
+
+def curve(report: WorkPrecision, name: str) -> Curve:
+    return next(each for each in report.curves if each.name == name)
+
+
+def after(multiplier: complex, count: int) -> np.ndarray[Any, np.dtype[np.complex128]]:
+    """q - i qd of the oscillator at TIMES, when a step multiplies it by that; exactly, it turns by exp(i t)."""
+    return multiplier ** (np.arange(INTERVALS + 1) * (count // INTERVALS))
+
+
+@pytest.mark.parametrize(
+    ("name", "factor"),
+    [
+        ("euler", lambda w: 1 + w),
+        ("rk4", lambda w: 1 + w + w**2 / 2 + w**3 / 6 + w**4 / 24),
+        ("midpoint", lambda w: (1 + w / 2) / (1 - w / 2)),
+    ],
+)
+def test_errors_are_those_of_the_method_s_stability_function(report: WorkPrecision, name: str, factor: Any) -> None:
+    """A step of a Runge-Kutta method multiplies q - i qd by R(i h), so that its error is known without a run."""
+    largest = np.array([1.0, np.abs(np.sin(TIMES)).max()])  # of q and qd
+    for point in curve(report, name).points:
+        count = int(point.knob)
+        found = after(factor(1j * T_END / count), count) - np.exp(1j * TIMES)
+        errors = np.max(np.abs([found.real, found.imag]).T / largest, axis=1)
+        assert point.steps == count
+        assert point.step == approx(T_END / count)
+        if errors[-1] > ROUNDING:
+            assert point.error == approx(errors[-1], rel=1e-3)
+            assert point.largest == approx(errors.max(), rel=1e-3)
+
+
+def test_energy_drift_is_that_of_the_stability_function(report: WorkPrecision) -> None:
+    for point in curve(report, "rk4").points:
+        count = int(point.knob)
+        w = 1j * T_END / count
+        energy = np.abs(after(1 + w + w**2 / 2 + w**3 / 6 + w**4 / 24, count)) ** 2 / 2
+        if abs(energy[-1] - 0.5) > ROUNDING:
+            assert point.drift == approx(np.abs(energy - 0.5).max() / (np.sin(TIMES) ** 2 / 2).max(), rel=1e-3)
+
+
+def test_counts_are_those_of_a_simulation(report: WorkPrecision) -> None:
+    """The same run through `simulate`, which makes its program by itself."""
+    scene = dyn.scenes.load("spring_mass")
+    for name in ("dop853", "radau"):
+        point = next(each for each in curve(report, name).points if each.knob == approx(1e-6))
+        smallest = float(np.abs(np.sin(TIMES)).max())  # of the largest values of q and qd
+        run = dyn.simulate(scene, scene.q, scene.qd, T_END, name, rtol=point.knob, atol=point.knob * smallest)
+        counts = run.stats.steps, run.stats.rejected, run.stats.evaluations
+        assert (point.steps, point.rejected, point.evaluations) == counts
+        error = max(abs(run.q[-1, 0] - math.cos(T_END)), abs(run.qd[-1, 0] + math.sin(T_END)) / smallest)
+        assert point.error == approx(error, rel=1e-4)
+        assert point.largest >= point.error
+    point = curve(report, "rk4").points[2]
+    assert (point.steps, point.evaluations) == (point.knob, 4 * point.knob)
+
+
+def test_the_absolute_tolerance_goes_with_the_smallest_state() -> None:
+    scene = dyn.scenes.load("spring_mass")
+    found = load("spring_mass")
+    outcome = Ours("dop853", found, 1e-4, problem_of(found)).ready(1e-5)()
+    run = dyn.simulate(scene, scene.q, scene.qd, T_END, "dop853", rtol=1e-5, atol=1e-9)
+    assert (outcome.steps, outcome.evaluations) == (run.stats.steps, run.stats.evaluations)
+    assert outcome.steps != dyn.simulate(scene, scene.q, scene.qd, T_END, "dop853", rtol=1e-5, atol=1e-5).stats.steps
+
+
+def test_knobs_go_from_coarse_to_fine_and_stop(report: WorkPrecision) -> None:
+    for each in report.curves:
+        knobs = [point.knob for point in each.points]
+        assert knobs == sorted(knobs, reverse=each.kind == CHOSEN)
+        assert each.stopped
+        assert all(0.0 < point.seconds <= point.median for point in each.points)
+        assert each.kind == (CHOSEN if METHODS[each.name].adaptive else EQUAL)
+
+
+def test_the_fitted_order_is_the_declared_one(report: WorkPrecision) -> None:
+    for name in ("euler", "rk4", "verlet", "midpoint"):
+        found = curve(report, name)
+        assert found.fitted == approx(found.order, abs=0.05)
+
+
+def test_an_order_is_fitted_above_rounding_alone() -> None:
+    steps = [2.0**-k for k in range(3, 16)]
+    errors = [7.0 * h**3 + 1e-15 for h in steps]
+    assert fitted_order(steps, errors, 3) == approx(3.0, abs=1e-3)
+    assert fitted_order(steps, [50.0 * h**3 * (1 + 20 * h) for h in steps], 3) == approx(3.0, abs=0.05)
+    assert fitted_order(steps[:2], errors[:2]) is None
+    assert fitted_order(steps, [FLOOR / 2] * len(steps)) is None
+
+
+def point(error: float, seconds: float, knob: float = 1e-6) -> Point:
+    return Point(knob, 0.1, seconds, seconds, 10, 0, 40, error, error, None)
+
+
+def test_targets_are_the_fastest_runs_that_are_good_enough() -> None:
+    curves = [
+        Curve("rk4", "", True, EQUAL, 4, None, None, "", (point(1e-2, 1.0), point(1e-7, 4.0))),
+        Curve("dop853", "", True, CHOSEN, 8, None, None, "", (point(1e-7, 2.0), point(1e-13, 8.0))),
+        Curve("MuJoCo RK4", "", False, EQUAL, 4, None, None, "", (point(1e-8, 6.0),)),
+    ]
+    found = [(each.error, each.group, each.name, each.seconds, each.ratio) for each in targets(curves)]
+    assert found == [
+        (1e-3, "ours", "dop853", 2.0, 1.0),
+        (1e-3, "MuJoCo", "MuJoCo RK4", 6.0, 3.0),
+        (1e-6, "ours", "dop853", 2.0, 1.0),
+        (1e-6, "MuJoCo", "MuJoCo RK4", 6.0, 3.0),
+        (1e-9, "ours", "dop853", 8.0, 1.0),
+        (1e-12, "ours", "dop853", 8.0, 1.0),
+    ]
+
+
+def test_csv_and_json_hold_the_points(report: WorkPrecision) -> None:
+    rows = list(csv.DictReader(io.StringIO(to_csv(report))))
+    assert len(rows) == sum(len(each.points) for each in report.curves)
+    first = report.curves[0].points[0]
+    assert (float(rows[0]["error_at_end"]), int(rows[0]["steps"])) == (first.error, first.steps)
+    content = json.loads(json.dumps(report.content(), allow_nan=False))
+    assert content["reference_error"] <= 1e-30
+    assert content["curves"][0]["points"][0]["error"] == first.error
+    assert content["targets"][0]["group"] == "ours"
+
+
+def setting(name: str, **options: Any) -> tuple[Setting, Judge, float]:
+    """A setting with its exact motion, to twenty digits."""
+    pytest.importorskip("flint")
+    found = load(name, **options)
+    exact = found.exact(20, None)
+    scales = found.scales(exact)
+    return found, Judge(found, exact, scales), float(scales.min())
+
+
+@pytest.fixture(scope="module")
+def arm() -> tuple[Setting, Judge, float]:
+    return setting("triple_pendulum", t_end=1.0)
+
+
+def test_mujoco_s_rk4_makes_the_error_that_ours_makes(arm: tuple[Setting, Judge, float]) -> None:
+    pytest.importorskip("mujoco")
+    found, judge, smallest = arm
+    theirs, ours = Mujoco("RK4", found, smallest), Ours("rk4", found, smallest, problem_of(found))
+    for steps in (64, 256):
+        error = judge.at_end(ours.ready(steps)().x)
+        assert judge.at_end(theirs.ready(steps)().x) == approx(error, rel=1e-5)
+        assert float(judge.errors(theirs.rows(steps)).max()) == approx(
+            float(judge.errors(ours.rows(steps)).max()), rel=1e-5
+        )
+
+
+def test_mujoco_s_order_of_the_joints_is_undone() -> None:
+    """A tree whose coordinates MuJoCo keeps in another order, branch by branch."""
+    pytest.importorskip("mujoco")
+    pytest.importorskip("flint")
+    bodies = [
+        dyn.Body(name, dyn.Joint("revolute", (0.0, 1.0, 0.0), (0.1, 0.0, -0.3)), parent, mass, (0.0, 0.0, -0.2))
+        for name, parent, mass in (("a", "world", 1.0), ("b", "a", 0.5), ("c", "a", 0.7), ("d", "b", 0.3))
+    ]
+    start = (0.1, 0.4, -0.3, 0.8, 0.5, -0.2, 0.7, 0.3)
+    found = Setting("tree", "", dyn.Mechanism(bodies), start, 0.5)
+    exact = found.exact(15)
+    judge, theirs = Judge(found, exact, found.scales(exact)), Mujoco("RK4", found, 1.0)
+    assert list(theirs.peer.order) != [0, 1, 2, 3]
+    assert judge.at_end(theirs.ready(512)().x) < 1e-8
+    assert float(judge.errors(theirs.rows(512)).max()) < 1e-8
+    difference = module.Entry(theirs).curve(judge, problem_of(found)).model_error
+    assert difference is not None
+    assert difference < 1e-10  # rounding, of a mass matrix of thin rods
+
+
+@pytest.mark.parametrize("kind", ["Euler", "implicit", "implicitfast"])
+def test_mujoco_s_first_order_integrators_come_nearer_with_the_step(
+    arm: tuple[Setting, Judge, float], kind: str
+) -> None:
+    pytest.importorskip("mujoco")
+    found, judge, smallest = arm
+    theirs = Mujoco(kind, found, smallest)
+    coarse, fine = (judge.at_end(theirs.ready(steps)().x) for steps in (4096, 8192))
+    assert coarse / fine == approx(2.0, rel=0.02)
+
+
+@pytest.mark.parametrize("damping", [0.1, 0.2])
+def test_the_error_of_a_model_is_told_apart(arm: tuple[Setting, Judge, float], damping: float) -> None:
+    """MuJoCo's rates are ours to rounding; with another damping they differ by what that damping does."""
+    pytest.importorskip("mujoco")
+    found, judge, smallest = arm
+    theirs = Mujoco("RK4", found, smallest)
+    theirs.model.dof_damping[:] = damping
+    entry = module.Entry(theirs)
+    difference = entry.curve(judge, problem_of(found)).model_error
+    assert difference is not None
+    assert difference < 1e-12 if damping == 0.1 else 1e-3 < difference < 10.0
+
+
+def test_cvodes_gets_our_equations(arm: tuple[Setting, Judge, float]) -> None:
+    pytest.importorskip("casadi")
+    found, judge, smallest = arm
+    for kind in ("BDF", "Adams"):
+        theirs = Cvodes(kind, found, smallest, problem_of(found))
+        assert judge.at_end(theirs.ready(1e-9)().x) < 1e-6
+        assert float(judge.errors(theirs.rows(1e-9)).max()) < 1e-6
+        entry = module.Entry(theirs).curve(judge, problem_of(found))
+        assert entry.model_error is not None
+        assert entry.model_error < 1e-12
+
+
+def test_heyoka_gets_our_equations() -> None:
+    pytest.importorskip("heyoka")
+    found, judge, smallest = setting("spring_mass")
+    theirs = Heyoka(found, smallest, problem_of(found))
+    assert judge.at_end(theirs.ready(EPSILON)().x) < 1e-13
+    assert judge.at_end(theirs.ready(1e-4)().x) < 1e-2
+    assert float(judge.errors(theirs.rows(EPSILON)).max()) < 1e-13
+    x = np.array([[0.3, -0.7], [1.0, 2.0]])
+    assert theirs.rates(x) == approx(np.array([[-0.7, -0.3], [2.0, -1.0]]))
+
+
+def test_scipy_runs_on_our_rate() -> None:
+    pytest.importorskip("scipy")
+    found, judge, smallest = setting("spring_mass")
+    for solver in ("DOP853", "LSODA", "Radau"):
+        theirs = Scipy(solver, found, smallest, problem_of(found))
+        assert judge.at_end(theirs.ready(1e-7)().x) < 1e-4
+        assert theirs.ready(1e-7)().rejected is None  # it does not tell
+        assert float(judge.errors(theirs.rows(1e-7)).max()) < 1e-4
+
+
+class Broken(Contender):
+    """Raises, gives no numbers, and gets better only at fine knobs."""
+
+    tolerances: Sequence[float] = (1e-1, 1e-2, 1e-3, 1e-4)
+
+    def ready(self, knob: float) -> Any:
+        def run() -> Outcome:
+            if knob == 1e-1:
+                raise RuntimeError("too\ncoarse")
+            if knob == 1e-4:
+                return Outcome(np.array([math.nan, 0.0]))
+            return Outcome(np.array([math.cos(T_END), -math.sin(T_END)]) + knob, 1)
+
+        return run
+
+    def rows(self, knob: float) -> Any:
+        if knob == 1e-2:
+            raise RuntimeError("not at these instants")
+        return np.full((INTERVALS + 1, 2), math.nan)
+
+
+def test_a_contender_that_fails_keeps_its_good_points_and_a_reason() -> None:
+    found, judge, smallest = setting("spring_mass")
+    entry = module._sweep(Broken("broken", "", found, smallest), judge, 1.0)
+    assert [each.knob for each in entry.tried] == [1e-2, 1e-3]
+    assert entry.stopped == "left the numbers"
+    assert entry.tried[0].error == approx(1e-2, rel=1e-2)
+    module._in_turns(entry.tried, 1)
+    for each in entry.curve(judge, problem_of(found)).points:
+        assert each.largest == math.inf
+        assert each.drift is None
+
+
+def test_what_cannot_be_made_is_absent_with_its_reason() -> None:
+    pytest.importorskip("mujoco")
+    pytest.importorskip("flint")
+    found = work_precision("spring_mass", methods=("rk4",), peers=("MuJoCo",), cold=(), turns=1, limit=1e-5)
+    assert [each.name for each in found.curves] == ["rk4"]
+    assert found.absent["MuJoCo RK4"] == "takes rigid bodies, not a Lagrangian"
+
+
+def test_settings() -> None:
+    assert {"kepler 0.3", "kepler 0.9", "robertson"} <= set(names())
+    arm, planet, reaction = load("triple_pendulum"), load("kepler 0.9"), load("robertson")
+    assert (arm.conservative, planet.conservative, reaction.conservative) == (False, True, False)
+    assert not reaction.mechanical
+    assert len(arm.times) == INTERVALS + 1
+    assert (arm.times[-1], reaction.times[-1]) == (arm.t_end, 1e11)
+    assert reaction.times[0] == approx(0.1)
+    moved = load("triple_pendulum", t_end=1.5, start=[0.1, 0.2, 0.3, 0.0, 0.0, 0.0])
+    assert (moved.t_end, moved.start) == (1.5, (0.1, 0.2, 0.3, 0.0, 0.0, 0.0))
+    assert load("damped spring pendulum, k = 1e+08").name == load("spring pendulum 1e8").name
+
+
+def test_another_start_has_another_exact_motion() -> None:
+    pytest.importorskip("flint")
+    found = load("spring_mass", start=[0.0, 2.0], t_end=1.0)
+    exact = found.exact(15, None)
+    assert exact.x[-1] == approx(np.array([2.0 * math.sin(1.0), 2.0 * math.cos(1.0)]), rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"name": "nothing"}, "there is no scene 'nothing'"),
+        ({"name": "spring_mass", "options": {"t_end": -1.0}}, "t_end must be positive"),
+        ({"name": "spring_mass", "options": {"start": [1.0]}}, r"the start needs 2 numbers \(q0, qd0\), got 1"),
+        ({"name": "kepler 0.3", "options": {"start": [1.0] * 4}}, "has a start of its own"),
+        ({"name": "spring_mass", "methods": ["rk5"]}, "there is no method 'rk5'"),
+        ({"name": "spring_mass", "peers": ["Drake"]}, "there is no peer 'Drake'"),
+        ({"name": "spring_mass", "cold": ["Drake"]}, "there is no cold start 'Drake'"),
+        ({"name": "spring_mass", "turns": 0}, "turns must be at least 1"),
+    ],
+)
+def test_mistakes(arguments: dict[str, Any], said: str) -> None:
+    with raises(ValueError, match=said):
+        work_precision(**arguments)
+
+
+def test_cold_starts_run_in_processes_of_their_own(tmp_path: Path) -> None:
+    pytest.importorskip("llvmlite")
+    (found,) = cold_starts("spring_mass", {}, ["ours"], turns=2)
+    assert (found.turns, found.status) == (2, "")
+    assert 0.0 < found.seconds <= found.median
+    (late,) = cold_starts("spring_mass", {}, ["ours"], turns=2, budget=0.01)
+    assert (late.turns, late.status) == (0, "not ready within 0.01 s")
+    assert math.isnan(late.seconds)
+    (wrong,) = cold_starts("nothing", {}, ["ours"], turns=2)
+    assert "there is no scene 'nothing'" in wrong.status

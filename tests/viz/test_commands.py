@@ -1,0 +1,235 @@
+"""The commands that explain: lint, why and diff, as a person starts them."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cgraph as cg
+import dynamics as dyn
+from viz import cli, theme
+from viz.commands.point import filled
+
+RIGHT, FLAWED = ("chain_rule", "chain_rule_literal"), ("euler_embedded", "kinetic_only", "kinetic_only_exact")
+MODEL = """<mujoco><compiler angle="radian"/><worldbody>
+<body name="a"><joint name="slide" type="slide" axis="1 0 0"/><geom size="0.1" contype="0"/>
+<body name="b"><joint name="hinge" axis="0 1 0"/><geom size="0.1" pos="0 0 -0.5" contype="0"/></body></body>
+</worldbody></mujoco>"""
+ROUNDING = 1e-12  # relative, for sums of a few thousand products
+
+
+def said(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 0) -> str:
+    """What the command prints, with the exit status checked."""
+    assert cli.main(arguments) == status
+    return capsys.readouterr().out
+
+
+def figures(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 0) -> dict:
+    return json.loads(said(capsys, *arguments, "--json", status=status))
+
+
+def by_differences(graph: cg.Graph, output: str, name: str, at: dict[str, float]) -> float:
+    """A derivative by central differences, extrapolated twice: no derivative rule is used."""
+
+    def slope(step: float) -> float:
+        high, low = (graph.evaluate({**at, name: at[name] + sign * step})[output] for sign in (1.0, -1.0))
+        return float(high - low) / (2.0 * step)
+
+    one, half, quarter = (slope(0.02 / 2**i) for i in range(3))
+    first, second = (4 * half - one) / 3, (4 * quarter - half) / 3
+    return (16 * second - first) / 15
+
+
+@pytest.mark.parametrize("formulation", RIGHT)
+def test_lint_proves_that_the_chain_rule_keeps_q_and_qd_apart(capsys, formulation):
+    text = said(capsys, "lint", "triple_pendulum", "--formulation", formulation)
+    assert text.count("Holds: ") == 2
+    assert "q0, q1 and q2 are inputs" in text
+
+
+@pytest.mark.parametrize("formulation", FLAWED)
+def test_lint_blames_the_edges_of_the_embedding(capsys, formulation):
+    found = figures(capsys, "lint", "triple_pendulum", "--formulation", formulation, status=1)
+    (finding,) = found["findings"]
+    assert [cut["text"] for cut in finding["cut"]] == [f"qd{i} * dt -> q{i}" for i in range(3)]
+    assert [each["gains"] for each in finding["corrupted"]] == [f"dt * dL/dq{i}" for i in range(3)]
+    exact = formulation == "kinetic_only_exact"  # embedded, but no derivative is taken through it
+    assert (finding["derivatives_through"] == 0) == exact
+
+
+@pytest.mark.parametrize("n", range(1, 11))
+def test_the_fewest_edges_to_cut_are_one_for_each_joint(n):
+    arm = dyn.scenes.load("chain", n=n)
+    groups = [f"q{i}" for i in range(n)], [f"qd{i}" for i in range(n)]
+    found = cg.lint(dyn.inverse_dynamics(arm, "euler_embedded"), independent=[groups], function="L")
+    assert not found.ok
+    assert len(found.edges) == n
+    assert {(edge.target.name, edge.slot) for edge in found.edges} == {(f"q{i}", 0) for i in range(n)}
+    assert cg.lint(dyn.inverse_dynamics(arm), independent=[groups], function="L").ok
+
+
+def test_lint_takes_a_file_with_a_coordinate_that_nothing_uses(tmp_path, capsys):
+    pytest.importorskip("mujoco")
+    model = tmp_path / "cart.xml"
+    model.write_text(MODEL)
+    assert "Holds" in said(capsys, "lint", str(model))
+    found = figures(capsys, "lint", str(model), "--formulation", "euler_embedded", status=1)
+    assert found["scene"] == "cart"
+    assert "qd1 * dt -> q1" in [cut["text"] for cut in found["findings"][0]["cut"]]
+
+
+def test_lint_looks_in_a_box_and_at_a_point(capsys):
+    text = said(capsys, "lint", "triple_pendulum", "--box", "q0=-1:1,qd0=0:2", "--at", "q0=0.5")
+    assert "no slope is unbounded in the box" in text
+    assert "no sum loses 4 digits at this point" in text
+
+
+def test_why_adds_up_to_the_derivative(capsys):
+    found = figures(capsys, "why", "triple_pendulum", "tau0", "q2", "--k", "1000")
+    assert found["paths"] == len(found["listed"]) == 22
+    graph = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"))
+    exact = by_differences(graph, "tau0", "q2", found["at"])
+    assert sum(path["value"] for path in found["listed"]) == pytest.approx(exact, rel=1e-9)
+    assert found["difference"] <= ROUNDING
+    text = said(capsys, "why", "triple_pendulum", "tau0", "q2", "--k", "1000")
+    assert "These are all." in text
+    assert "|sum of path products - derivative by a reverse sweep| = " in text
+
+
+def test_why_says_what_share_is_listed(capsys):
+    text = said(capsys, "why", "triple_pendulum", "tau0", "q2", "--k", "3", "--at", "q0=0.1,q2=-0.4")
+    assert "At q0=0.1 " in text
+    assert " q2=-0.4 " in text
+    assert "The 3 heaviest add up to " in text
+    assert "% of the weight of all." in text
+    assert "|sum over all 22 path products - derivative by a reverse sweep| = " in text
+
+
+def test_why_on_forward_dynamics_and_on_a_long_arm(capsys):
+    found = figures(capsys, "why", "chain", "qdd9", "tau0", "--forward", "--k", "1")
+    graph = dyn.forward_dynamics(dyn.scenes.load("chain"))
+    exact = by_differences(graph, "qdd9", "tau0", found["at"])
+    assert found["derivative"] == pytest.approx(exact, rel=1e-7)
+    assert found["difference"] <= ROUNDING * found["weight"]
+
+
+def test_two_that_are_not_connected_are_told_why_not(capsys):
+    assert said(capsys, "why", "spring_mass", "tau0", "qd0").startswith("tau0 does not depend on qd0.\n")
+    found = figures(capsys, "why", "spring_mass", "tau0", "qd0")
+    assert found["depends"] is False
+    assert found["made_from_inputs"] == ["q0", "qdd0", "I", "k"]
+
+
+def test_diff_has_totals_that_add_up_and_a_class_for_every_node(capsys):
+    found = figures(capsys, "diff", "triple_pendulum")
+    for side in ("left", "right"):
+        only = found[f"only_{side}"]
+        assert found["in_both"] + len(only) == found[f"{side}_nodes"]
+        assert sum(found[f"{side}_classes"].values()) == len(only)
+    assert set(found["left_classes"]) == {"needed", "spurious adjoint", "Euler edge"}
+    assert set(found["right_classes"]) == {"needed"}
+    arm = dyn.scenes.load("triple_pendulum")
+    assert found["left_nodes"] == len(dyn.inverse_dynamics(arm, "euler_embedded").nodes)
+    assert found["left_classes"]["spurious adjoint"] == len(dyn.spurious(dyn.inverse_dynamics(arm, "euler_embedded")))
+    text = said(capsys, "diff", "triple_pendulum", "--formulations", "chain_rule", "chain_rule_literal")
+    assert text.startswith("left: chain_rule, 171 nodes = ")
+    assert "spurious" not in text
+
+
+def test_two_runs_print_the_same_bytes():
+    command = [sys.executable, "-m", "viz", "diff", "spring_mass", "--json"]
+    folder = str(Path(cli.__file__).parents[1])
+    runs = {
+        subprocess.run(
+            command, env=os.environ | {"PYTHONHASHSEED": seed, "PYTHONPATH": folder}, capture_output=True, check=True
+        ).stdout
+        for seed in ("1", "2")
+    }
+    assert len(runs) == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "colours"),
+    [
+        (["lint", "spring_mass", "--formulation", "euler_embedded"], 1, theme.MARKS[:1]),
+        (["why", "spring_mass", "tau0", "q0"], 0, theme.MARKS[:1]),
+        (["why", "spring_mass", "tau0", "qd0"], 0, theme.MARKS[1:]),
+        (["diff", "spring_mass"], 0, theme.MARKS),
+    ],
+)
+def test_the_answer_is_marked(tmp_path, capsys, monkeypatch, arguments, status, colours):
+    monkeypatch.setattr("viz.commands.scene.render_svg", lambda drawing: drawing.source)  # a picture takes seconds
+    target = tmp_path / "answer.svg"
+    said(capsys, *arguments, "--svg", str(target), status=status)
+    heavy = [line for line in target.read_text(encoding="utf-8").splitlines() if "penwidth" in line]
+    for paint in theme.MARKS:
+        assert any(f'color="{paint.line}"' in line for line in heavy) == (paint in colours)
+
+
+def test_the_answer_is_drawn(tmp_path, capsys):
+    target = tmp_path / "answer.svg"
+    said(capsys, "diff", "spring_mass", "--svg", str(target))
+    svg = target.read_text(encoding="utf-8")
+    assert svg.startswith("<svg")
+    assert "only euler_embedded" in svg
+    assert "only chain_rule" in svg
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["why", "triple_pendulum", "tau0", "q9"], "nothing in the graph is called 'q9'"),
+        (["why", "triple_pendulum", "tau9", "q0"], "nothing in the graph is called 'tau9'"),
+        (["why", "spring_mass", "tau0", "q0", "--at", "zz=1"], "the graph has no input zz"),
+        (["lint", "spring_mass", "--box", "zz=0:1"], "the graph has no input zz"),
+        (["diff", "nowhere"], "there is no scene 'nowhere'"),
+        (["lesson", "--out", "lesson.txt"], "--out must end in .html"),
+    ],
+)
+def test_a_mistake_gets_one_line_and_exit_status_1(capsys, arguments, message):
+    assert cli.main(arguments) == 1
+    error = capsys.readouterr().err
+    assert error.startswith("cgraph: error: ")
+    assert error.count("\n") == 1
+    assert message in error
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["lint"],
+        ["why", "spring_mass", "tau0"],
+        ["why", "spring_mass", "tau0", "q0", "--k", "-1"],
+        ["why", "spring_mass", "tau0", "q0", "--at", "q0"],
+        ["why", "spring_mass", "tau0", "q0", "--at", "q0=nan"],
+        ["why", "spring_mass", "tau0", "q0", "--svg", "answer.png"],
+        ["why", "spring_mass", "tau0", "q0", "--forward", "--formulation", "kinetic_only"],
+        ["lint", "spring_mass", "--box", "q0=1"],
+        ["lint", "spring_mass", "--box", "q0=2:1"],
+        ["diff", "spring_mass", "--formulations", "chain_rule"],
+        ["diff", "spring_mass", "--formulations", "chain_rule", "none"],
+        ["lesson"],
+    ],
+)
+def test_wrong_usage_has_exit_status_2(capsys, arguments):
+    with pytest.raises(SystemExit) as stop:
+        cli.main(arguments)
+    assert stop.value.code == 2
+    assert "usage: cgraph" in capsys.readouterr().err
+
+
+def test_a_point_keeps_parameters_and_is_always_the_same():
+    scene = dyn.scenes.load("spring_mass")
+    graph = dyn.inverse_dynamics(scene, "euler_embedded")
+    at = filled(graph, scene, {"qdd0": 2.0})
+    assert at == filled(graph, scene, {"qdd0": 2.0})
+    assert set(at) == set(graph.input_names)
+    assert (at["I"], at["k"], at["dt"], at["qdd0"]) == (1.0, 1.0, 1e-3, 2.0)
+    assert -1.0 <= at["q0_old"] <= 1.0
+    assert np.isfinite(list(graph.evaluate(at).values())).all()

@@ -1,0 +1,359 @@
+"""The inspector's page: self-contained, and its script computes what the library does."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import shutil
+import subprocess
+from itertools import product
+
+import numpy as np
+import pytest
+
+import cgraph as cg
+import dynamics as dyn
+import viz
+from cgraph.ops import OPS
+from dynamics.inspection import FORMULATIONS, inspection
+from viz import cli
+from viz.inspector import Motion, Table, Version
+from viz.inspector.layers import GAP, STEP, layered
+from viz.inspector.page import SCRIPTS, _asset
+from viz.inspector.record import record, slopes
+
+JAVASCRIPT_LIBM = 1e-12  # relative: a browser's sin and exp may differ from the C library's in the last bits
+
+
+def data_of(text: str) -> dict:
+    """The JSON that the script of a page reads."""
+    return json.loads(re.search(r'<script id="data" type="application/json">(.*?)</script>', text, re.DOTALL)[1])
+
+
+def versions(scene: str = "triple_pendulum") -> list[Version]:
+    return [Version(*each[:4]) for each in inspection(dyn.scenes.load(scene)).versions]
+
+
+@pytest.fixture(scope="module")
+def pendulum(tmp_path_factory) -> str:
+    out = tmp_path_factory.mktemp("page") / "page.html"
+    assert cli.main(["inspect", "triple_pendulum", "--out", str(out)]) == 0
+    return out.read_text(encoding="utf-8")
+
+
+# What the file is.
+
+
+def test_a_page_is_one_small_file_that_loads_nothing(pendulum):
+    assert len(pendulum.encode()) < 1.5e6
+    assert set(re.findall(r"https?://[^\s\"'<]+", pendulum)) == {"http://www.w3.org/2000/svg"}  # a name, not an address
+    assert "default-src 'none'" in pendulum
+    assert re.findall(r'(?:src|href)="([^"]*)"', pendulum) == ["data:,"]
+    assert not re.search(r"@import|url\(|fetch\(|XMLHttpRequest|import\(|localStorage", pendulum)
+
+
+def test_it_has_all_formulations_with_their_counts_and_spurious_nodes(pendulum):
+    data = data_of(pendulum)
+    assert [each["name"] for each in data["versions"]] == [name.replace("_", " ") for name in FORMULATIONS]
+    for name, each in zip(FORMULATIONS, data["versions"], strict=True):
+        graph = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"), name)
+        assert each["counts"] == [graph.counts().nodes, graph.counts().edges]
+        assert len(each["marked"]) == len(dyn.spurious(graph))
+        assert len(each["rows"]) == len(data["motion"]["t"])
+    assert "Torques that each part takes" in pendulum
+
+
+def test_text_of_a_graph_stays_text():
+    with cg.tag("</script><b>"):
+        node = cg.named("<i>&", cg.sin(cg.variable("x<y")))
+    text = viz.page(
+        cg.Graph(cg.variables(["x<y"]), {"<u>": node}), title="<s>", tables=[Table("<q>", ["<a>"], [["<c>"]])]
+    )
+    assert not any(f"<{letter}>" in text for letter in "iusqac")
+    assert "</script><b>" not in text
+    assert data_of(text)["versions"][0]["outputs"][0][0] == "<u>"
+
+
+def test_a_notebook_shows_it_in_a_frame():
+    graph = cg.Graph(cg.variables("x y"), {"z": cg.variable("x") * cg.variable("y")})
+    shown = viz.page(graph)._repr_html_()
+    assert shown.startswith("<iframe srcdoc=")
+    assert shown.count('"') == 8  # the page's own are escaped
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda graph: viz.page([]), "versions"),
+        (lambda graph: viz.page([Version("a", graph)] * 2), "names of their own"),
+        (lambda graph: viz.page(graph, at={"w": 1.0}), "'w'"),
+        (lambda graph: viz.page(graph, at={"x": math.nan}), "finite"),
+        (lambda graph: viz.page(graph, at={"x": [1.0, 2.0]}), "one finite number"),
+        (lambda graph: viz.page(graph, marked=[cg.variable("w")]), "not in its graph"),
+        (lambda graph: viz.page(graph, motion=Motion(np.zeros(0))), "motion"),
+        (lambda graph: viz.page(graph, motion=Motion(np.zeros(2), np.zeros((2, 1, 3)), (-1,))), "(2, 1, 2)"),
+        (lambda graph: viz.page(graph, motion=Motion(np.zeros(2), np.zeros((2, 1, 2)), (0,))), "parents"),
+    ],
+)
+def test_a_mistake_is_told_in_one_line(make, said):
+    graph = cg.Graph([cg.variable("x")], {"y": cg.sin(cg.variable("x"))})
+    with pytest.raises(ValueError, match=re.escape(said)) as caught:
+        make(graph)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_command_tells_sizes(tmp_path, capsys):
+    out = tmp_path / "page.html"
+    assert cli.main(["inspect", "spring_mass", "--forward", "--json", "--out", str(out)]) == 0
+    found = json.loads(capsys.readouterr().out)
+    counts = dyn.forward_dynamics(dyn.scenes.load("spring_mass")).counts()
+    assert found["versions"] == {"forward dynamics": {"nodes": counts.nodes, "edges": counts.edges, "spurious": 0}}
+    assert found["bytes"] == out.stat().st_size
+    assert data_of(out.read_text(encoding="utf-8"))["motion"]["points"] is None
+
+
+def test_the_command_refuses_what_is_no_page(tmp_path, capsys):
+    assert cli.main(["inspect", "spring_mass", "--out", str(tmp_path / "page.png")]) == 1
+    assert capsys.readouterr().err.startswith("cgraph: error: --out must end in .html")
+    assert list(tmp_path.iterdir()) == []
+
+
+# Where nodes are.
+
+
+def test_nodes_that_compute_the_same_keep_their_place():
+    data = record(versions(), None)
+    own = [each["place"] for each in data["versions"]]
+    assert all(len(set(places)) == len(places) for places in own)
+    euler, kinetic, chain = map(set, own)
+    assert len(euler & kinetic) > 0.7 * len(euler)
+    assert len(euler & chain) > 0.4 * len(chain)  # dL/dq, and what both derivatives are made of
+
+
+def test_marked_nodes_have_clusters_of_their_own():
+    data = record(versions(), None)
+    for each in data["versions"]:
+        for node, place in enumerate(each["place"]):
+            cluster = data["places"][place][0]
+            assert cluster < 0 or data["clusters"][cluster]["marked"] == (node in each["marked"])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_layers_put_arguments_below_and_nothing_on_top_of_another(seed):
+    rng = np.random.default_rng(seed)
+    widths = rng.uniform(30, 90, 60)
+    edges = sorted({(int(a), int(b)) for a, b in rng.integers(0, 60, (90, 2)) if a < b})
+    x, y, width, height = layered(widths, edges)
+    assert all(y[source] >= y[target] + STEP for source, target in edges)
+    for a in range(60):
+        assert widths[a] / 2 <= x[a] + 1e-9
+        assert x[a] + widths[a] / 2 <= width + 1e-9
+        assert 0 < y[a] < height
+        for b in range(a):
+            assert y[a] != y[b] or abs(x[a] - x[b]) >= (widths[a] + widths[b]) / 2 + GAP - 1e-6
+
+
+def test_an_empty_cluster_has_no_size():
+    assert layered([], []) == ([], [], 0.0, 0.0)
+
+
+def test_slopes_are_the_differences_of_every_operation():
+    for op in OPS.values():
+        program = slopes(op.name)
+        for sample in op.samples:
+            work = [op.scalar(*sample), *sample]
+            for line in program["code"]:
+                work.append(line if isinstance(line, float) else OPS[line[0]].scalar(*[work[i] for i in line[1:]]))
+            for slot, result in enumerate(program["out"]):
+                h = 1e-6
+                up, down = [[v + sign * h * (i == slot) for i, v in enumerate(sample)] for sign in (1, -1)]
+                difference = (op.scalar(*up) - op.scalar(*down)) / (2 * h)
+                assert work[result] == pytest.approx(difference, abs=1e-8), op.name
+
+
+# What the script computes, in Node where it is installed.
+
+
+def run_script(program: str, given: object) -> object:
+    """The value that a program prints as JSON, after the page's scripts."""
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("needs node")
+    text = "\n".join([*map(_asset, SCRIPTS), f"const given = {json.dumps(given)};", program])
+    done = subprocess.run([node, "-"], input=text, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_the_script_knows_every_operation():
+    cases = [[op.name, list(sample)] for op in OPS.values() for sample in op.samples]
+    found = run_script("console.log(JSON.stringify(given.map(([op, args]) => VALUE[op](...args))));", cases)
+    for (name, sample), value in zip(cases, found, strict=True):
+        assert value == pytest.approx(OPS[name].scalar(*sample), rel=JAVASCRIPT_LIBM), name
+
+
+SPECIAL = [0.0, -0.0, 1.0, -1.0, 0.5, -2.0, math.inf, -math.inf, math.nan, 1e300]
+
+
+def test_the_script_agrees_where_numbers_are_special():
+    cases = [[op.name, [*a]] for op in OPS.values() for a in product(SPECIAL, repeat=op.arity)]
+    texts = [[name, [repr(each).replace("inf", "Infinity").replace("nan", "NaN") for each in a]] for name, a in cases]
+    program = """console.log(JSON.stringify(given.map(([op, args]) => String(VALUE[op](...args.map(Number))))));"""
+    for (name, args), text in zip(cases, run_script(program, texts), strict=True):
+        expected = OPS[name].scalar(*args)
+        value = float(text.replace("Infinity", "inf"))
+        assert value == pytest.approx(expected, rel=JAVASCRIPT_LIBM, nan_ok=True), (name, args)
+
+
+STATES = """
+const result = given.versions.map((each) => {
+  const version = prepare(each);
+  return each.rows.map((row) => {
+    const values = evaluate(version, row), slopes = slopesAt(version, given.slopes, values);
+    const out = version.outputs[0][2];
+    const bars = adjoints(version, slopes, out);
+    return { values: version.outputs.map(([, , node]) => values[node]),
+      bars: version.inputs.map(([, node]) => (node < 0 ? 0 : bars[node])),
+      paths: version.inputs.map(([, node]) => (node < 0 ? "0" : pathCount(version, node, out).toString())),
+      heaviest: version.inputs.map(([, node]) => (node < 0 ? []
+        : heaviest(version, slopes, node, out, 3).map((path) => path.product))) };
+  });
+});
+console.log(JSON.stringify(result));
+"""
+
+
+def test_values_adjoints_and_paths_of_the_script_are_those_of_the_library():
+    rng = np.random.default_rng(1)
+    given = []
+    for each in versions():
+        at = {name: rng.uniform(-1, 1) for name in each.graph.input_names}
+        given.append(Version(each.name, each.graph, marked=each.marked, at=at))
+    for version, [found] in zip(given, run_script(STATES, record(given, None)), strict=True):
+        graph, at = version.graph, {name: float(value) for name, value in version.at.items()}
+        values = graph.evaluate(at)
+        scale = max(abs(value) for value in values.values())
+        assert found["values"] == pytest.approx(list(values.values()), abs=JAVASCRIPT_LIBM * scale)
+        step = 1e-6
+        for i, name in enumerate(graph.input_names):
+            up, down = [graph.evaluate(at | {name: at[name] + sign * step})["tau0"] for sign in (1, -1)]
+            assert found["bars"][i] == pytest.approx((up - down) / (2 * step), abs=1e-6 * max(1.0, scale))
+            why = cg.why(graph, "tau0", name, at=at, k=3)
+            assert int(found["paths"][i]) == why.count
+            assert [abs(p) for p in found["heaviest"][i]] == pytest.approx(
+                [abs(path.value) for path in why.paths], rel=1e-9
+            )
+
+
+def test_huge_numbers_of_paths_are_exact():
+    x = y = cg.variable("x")
+    for _ in range(200):
+        y = y * y
+    given = record([Version("squares", cg.Graph([x], {"y": y}), at={"x": 1.0})], None)
+    [[found]] = run_script(STATES, given)
+    assert int(found["paths"][0]) == 2**200
+
+
+# The page in a browser, where Playwright and a Chromium are installed.
+
+
+@pytest.fixture(scope="module")
+def browser():
+    api = pytest.importorskip("playwright.sync_api")
+    program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if program is None:
+        pytest.skip("needs Chromium")
+    with api.sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def opened(browser, pendulum, tmp_path):
+    """The page of the triple pendulum, open; it must neither ask for anything nor complain."""
+    (tmp_path / "page.html").write_text(pendulum, encoding="utf-8")
+    page = browser.new_page(viewport={"width": 1280, "height": 800})
+    said, asked = [], []
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto((tmp_path / "page.html").as_uri())
+    yield page
+    assert said == []
+    assert [url for url in asked if not url.startswith(("file:", "data:"))] == []
+    page.close()
+
+
+def test_the_spurious_branch_is_seen_at_once_and_gone_by_the_chain_rule(opened):
+    data = json.loads(opened.evaluate("document.getElementById('data').textContent"))
+    wrong = {data["places"][data["versions"][0]["place"][node]][0] for node in data["versions"][0]["marked"]}
+    assert opened.locator(".item.box.wrong").count() == len(wrong)
+    assert opened.locator(".item.wrong .label").first.inner_html().count("spurious") == 1
+    opened.keyboard.press("u")
+    assert opened.locator(".item.wrong").count() == 55
+    opened.keyboard.press("3")
+    assert opened.locator(".item.wrong").count() == 0
+    assert opened.locator("#results td.off").count() > 0  # the others' torques, beside it
+
+
+def test_clusters_fold_and_unfold(opened):
+    opened.click("#unfold")
+    assert opened.locator(".item.box").count() == 0
+    nodes = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"), "euler_embedded").nodes
+    assert opened.locator(".item.node, .item.leaf").count() == sum(node.value is None for node in nodes)
+    opened.keyboard.press("f")
+    assert opened.locator(".item.node").count() == 0
+    opened.locator(".item.box").first.click()
+    assert opened.locator(".frame").count() == 1
+
+
+def test_two_clicks_ask_why(opened):
+    opened.keyboard.press("3")
+    opened.locator('[aria-label$=", q0"]').click()
+    opened.locator("#otau0").click()
+    graph = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"))
+    at = dict.fromkeys(graph.input_names, 0.5)
+    assert f": {cg.why(graph, 'tau0', 'q0', at=at).count} paths" in opened.inner_text("#why")
+    assert opened.locator(".onpath").count() > 2
+    assert opened.locator("#node math").count() == 1
+    opened.keyboard.press("Escape")
+    assert opened.locator(".onpath").count() == 0
+
+
+def test_a_hover_shows_what_a_node_needs(opened):
+    opened.locator("#otau1").hover()
+    assert opened.locator(".item[data-part=ancestor]").count() > 10
+    assert opened.locator(".item[data-part=descendant]").count() == 0
+
+
+def test_search_finds_by_name_and_tag(opened):
+    opened.keyboard.press("/")
+    opened.keyboard.type("link 2")
+    graph = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"), "euler_embedded")
+    tagged = sum("link 2" in node.tags and node.value is None for node in graph.nodes)
+    assert opened.inner_text("#trail") == f"{tagged} nodes found"
+
+
+def test_sweeps_step_forward_and_back(opened):
+    opened.keyboard.press("]")
+    opened.keyboard.press("]")
+    assert opened.inner_text("#step").startswith("forward, 1 of 249")
+    opened.evaluate("(s) => { s.value = 250; s.oninput(); }", opened.query_selector("#sweep"))
+    assert opened.inner_text("#step").startswith("reverse, 1 of 249")
+    assert opened.inner_text("#step").endswith("has adjoint 0") or "has adjoint 1" in opened.inner_text("#step")
+
+
+def test_the_motion_moves_the_values(opened):
+    before = opened.inner_text("#results")
+    opened.evaluate("(s) => { s.value = 80; s.oninput(); }", opened.query_selector("#time"))
+    assert opened.inner_text("#results") != before
+    assert opened.inner_text("#clock") == f"{80 * 3.0 / 89:.2f} s"
+
+
+def test_the_theme_can_be_switched(opened):
+    ink = "getComputedStyle(document.body).color"
+    before = opened.evaluate(ink)
+    opened.click("#theme")
+    assert opened.evaluate(ink) != before

@@ -1,0 +1,238 @@
+"""Reports as pages: names at the ends of curves lie apart, pages need no other file, files are whole or absent."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from viz import cli, theme
+from viz.document import Document, Paragraph, Picture, Section, Table, to_html, to_markdown
+
+pytest.importorskip("matplotlib")
+
+from matplotlib.text import Text
+
+from viz.labelled import Line, Panel, bars, labelled
+from viz.plot import to_adaptive_svg
+from viz.report import _power, _time, work_precision
+
+
+def point(knob: float, seconds: float, error: float | None, **others: Any) -> dict[str, Any]:
+    row = {"knob": knob, "step": 0.1 * knob, "seconds": seconds, "median": 1.5 * seconds, "steps": 10}
+    row |= {"rejected": None, "evaluations": 40, "error": error, "largest": error, "drift": error}
+    return row | others
+
+
+def curve(name: str, ours: bool, kind: str, points: list[dict[str, Any]], **others: Any) -> dict[str, Any]:
+    row = {"name": name, "about": f"about {name}", "ours": ours, "kind": kind, "order": 4, "fitted": 3.987}
+    return row | {"model_error": None, "stopped": "rounding", "points": points} | others
+
+
+def content(**others: Any) -> dict[str, Any]:
+    """The plain data of a report."""
+    tolerances = [10.0**-k for k in range(3, 12)]
+    steps = [64.0 * 2**k for k in range(8)]
+    curves = [
+        curve("rk4", True, "equal steps", [point(n, 1e-6 * n, 1e3 * n**-4) for n in steps]),
+        curve("dop853", True, "chosen steps", [point(r, 1e-4 * r**-0.1, 0.5 * r) for r in tolerances]),
+        curve("MuJoCo RK4", False, "equal steps", [point(n, 1e-5 * n, 1e3 * n**-4) for n in steps], model_error=5e-15),
+        curve(
+            "scipy:LSODA", False, "chosen steps", [point(r, 1e-2, 2 * r) for r in tolerances], order=None, fitted=None
+        ),
+    ]
+    cold = {"about": "a start", "median": 0.2, "loading": 0.1, "turns": 5, "status": ""}
+    return {
+        "name": "an arm <3>",
+        "about": "an arm",
+        "states": 6,
+        "t_end": 10.0,
+        "nodes": 190,
+        "conservative": True,
+        "stiff": False,
+        "relative_to": "largest",
+        "times": [0.0, 5.0, 10.0],
+        "reference": "Taylor series",
+        "reference_error": 1e-34,
+        "machine": "a machine",
+        "load": [1.0, None],
+        "curves": curves,
+        "cold": [
+            {"name": "ours", "seconds": 0.1, **cold},
+            {"name": "other", "seconds": None, **cold, "status": "late"},
+        ],
+        "absent": {"heyoka Taylor": "not installed"},
+        "left_out": ["contacts"],
+        "targets": [
+            {"error": 1e-6, "group": "ours", "name": "dop853", "knob": 1e-6, "seconds": 4e-4, "ratio": 1.0},
+            {"error": 1e-6, "group": "SciPy", "name": "scipy:LSODA", "knob": 1e-7, "seconds": 1e-2, "ratio": 25.0},
+        ],
+    } | others
+
+
+def shown(page: str) -> str:
+    """The text of a page."""
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", re.sub(r"<style>.*?</style>", "", page, flags=re.DOTALL)))
+
+
+@pytest.fixture(scope="module")
+def page() -> str:
+    return to_html(work_precision(content()))
+
+
+def test_the_page_says_what_was_measured(page: str) -> None:
+    for words in (
+        "Error and run time: an arm &lt;3&gt;",
+        "It was made by: Taylor series. Its own error is 1.0e-34.",
+        "a machine",
+        "Left out of the model: contacts.",
+        "400 µs dop853",
+        "10 ms LSODA [25]",
+        "5.0e-15",
+        "3.99",
+        "other: late.",
+        "heyoka Taylor not installed",
+    ):
+        assert words in shown(page).replace("A machine", "a machine"), words
+
+
+def test_the_page_needs_no_other_file(page: str) -> None:
+    links = re.findall(r"""(?:src|href)=["']([^"']+)""", page)
+    assert links
+    assert all(link.startswith(("#", "data:")) for link in links)
+    assert "url(" not in page
+    pictures = re.findall(r"data:image/svg\+xml;base64,([A-Za-z0-9+/=]+)", page)
+    assert len(pictures) == 4
+    for picture in pictures:
+        ElementTree.fromstring(base64.b64decode(picture).decode())
+
+
+def test_a_report_without_results_is_still_a_page() -> None:
+    curves = [curve("euler", True, "equal steps", [point(64.0, 1e-3, 1e6)])]
+    empty = content(curves=curves, cold=[], targets=[], absent={}, conservative=True)
+    page = shown(to_html(work_precision(empty)))
+    assert "No contender came near the exact motion." in page
+    assert "Every contender that was asked has points." in page
+
+
+def test_missing_numbers_are_dashes() -> None:
+    lost = point(64.0, 1e-3, 1.0, largest=None, drift=None, step=None, steps=None)
+    report = content(curves=[curve("rk4", True, "equal steps", [lost])])
+    rows = next(s for s in work_precision(report).sections if s.anchor == "points").blocks[1]
+    assert isinstance(rows, Table)
+    assert rows.rows == [["64", "-", "-", "40", "1 ms", "1.5 ms", "1.0e0", "-", "-"]]
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(None, "-"), (0.0, "0"), (1.26e-12, "1.3e-12"), (3e-5, "3.0e-5"), (2e11, "2.0e+11")]
+)
+def test_numbers_have_two_digits(value: float | None, text: str) -> None:
+    assert _power(value) == text
+
+
+@pytest.mark.parametrize(("value", "text"), [(None, "-"), (2.5, "2.5 s"), (0.0123, "12.3 ms"), (4.5e-7, "0.45 µs")])
+def test_times_have_units(value: float | None, text: str) -> None:
+    assert _time(value) == text
+
+
+def test_markdown_has_what_the_page_has() -> None:
+    table = Table("A | B", ["name", "value"], [["x|y", "1"], ["z", "2"]])
+    picture = Picture("curve", "<svg/>", "a curve")
+    document = Document(
+        "Title", [Paragraph("First.")], [Section("s", "Heading", [table, picture, Paragraph("!", True)])]
+    )
+    assert to_markdown(document, "arm-") == (
+        "# Title\n\nFirst.\n\n## Heading\n\n**A | B**\n\n| name | value |\n|:--|--:|\n| x\\|y | 1 |\n| z | 2 |\n\n"
+        "![a curve](arm-curve.svg)\n\n> !\n"
+    )
+    assert document.pictures() == [picture]
+    page = to_html(document)
+    assert "<h2>Heading</h2>" in page
+    assert "<td>x|y</td>" in page
+
+
+def test_names_lie_apart_and_inside() -> None:
+    """Ten curves that end within a few pixels of each other."""
+    x = np.geomspace(1e-1, 1e-9, 9)
+    lines = [Line(f"contender {k}", x, 1e-3 * (1 + 0.03 * k) * x**-0.2, k) for k in range(10)]
+    figure = labelled([Panel("many", "x", "y", lines)], columns=1)
+    figure.draw_without_rendering()
+    (axis,) = figure.axes
+    boxes = [Text.get_window_extent(text) for text in axis.texts]  # without the lines that lead to them
+    assert len(boxes) == 10
+    for i, a in enumerate(boxes):
+        for b in boxes[:i]:
+            assert not (a.x0 < b.x1 and b.x0 < a.x1 and a.y0 + 1 < b.y1 and b.y0 + 1 < a.y1)
+    frame = axis.get_window_extent()
+    assert all(box.x1 <= frame.x1 + 0.1 * frame.width for box in boxes)
+    assert all(frame.y0 < box.y0 + 2 and box.y1 - 2 < frame.y1 for box in boxes)
+
+
+def test_a_narrow_axis_has_two_powers_of_ten() -> None:
+    figure = labelled([Panel("narrow", "x", "y", [Line("a", [3e-5, 2e-5], [1.0, 2.0])])], columns=1)
+    (axis,) = figure.axes
+    assert [tick for tick in axis.get_xticks() if 1e-6 < tick < 1e-3] == pytest.approx([1e-4, 1e-5])
+
+
+def test_the_ink_of_a_picture_follows_the_page() -> None:
+    svg = to_adaptive_svg(bars(["a", "b"], [0.1, 20.0], "time [s]"))
+    root = ElementTree.fromstring(svg)
+    (style,) = [each for each in root.iter("{http://www.w3.org/2000/svg}style") if "prefers" in (each.text or "")]
+    assert theme.DARK_TEXT in str(style.text)
+    assert "fill: currentColor" in str(style.text)  # of letters, which have no colour of their own
+    drawn = svg.replace(str(style.text), "")
+    for ink in (theme.TEXT, theme.LINE, "#000000", "#FFFFFF"):
+        assert ink.lower() not in drawn.lower()
+
+
+MEASURED = ["report", "spring_mass", "--quick", "--methods", "rk4,dop853", "--peers", ""]
+
+
+def test_the_command_writes_whole_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("flint")
+    assert cli.main([*MEASURED, "--t-end", "2", "--start", "1,0.5", "--out", str(tmp_path / "r")]) == 0
+    assert "spring_mass.html: 2 integrators" in capsys.readouterr().out
+    names = {path.name for path in (tmp_path / "r").iterdir()}
+    pictures = {f"spring_mass-{name}.svg" for name in ("time", "orders", "energy")}
+    assert names == {*pictures, "exact", *(f"spring_mass.{kind}" for kind in ("html", "md", "csv", "json"))}
+    data = json.loads((tmp_path / "r" / "spring_mass.json").read_text())
+    assert (data["t_end"], data["states"]) == (2.0, 2)
+    assert {each["name"] for each in data["curves"]} == {"rk4", "dop853"}
+
+
+def test_an_interrupted_report_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("flint")
+    from dynamics.reports import work_precision as measured
+
+    def interrupt(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(measured, "_in_turns", interrupt)
+    assert cli.main([*MEASURED, "--out", str(tmp_path / "r")]) == 130
+    left = [path for path in tmp_path.rglob("*") if path.is_file() and path.parent.name != "exact"]
+    assert left == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["report", "nothing"], "there is no scene 'nothing'"),
+        (["report", "spring_mass", "spring_mass"], "each scene needs a name of its own"),
+        (["report", "spring_mass", "--methods", "rk5"], "there is no method 'rk5'"),
+        (["report", "spring_mass", "--start", "1,x"], "could not convert"),
+    ],
+)
+def test_mistakes_get_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], said: str
+) -> None:
+    assert cli.main([*arguments, "--out", str(tmp_path / "r")]) == 1
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert said in error
+    assert not (tmp_path / "r").exists()

@@ -1,0 +1,143 @@
+"""The page of the stability table: verdicts, figures and reasons, on one page and as files."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from viz import cli, stability
+
+pytest.importorskip("matplotlib")
+
+
+def figure(value: float | str, meets: bool, bound: float | str = 1.0) -> dict[str, Any]:
+    why = "a reason of the bound"
+    return {"quantity": "error", "value": value, "bound": bound, "unit": "ulp", "why": why, "meets": meets}
+
+
+def row(case: str, verdict: str, *figures: dict[str, Any], reason: str = "", stopped: str = "") -> dict[str, Any]:
+    run = {"steps": 12, "rejected": 3, "seconds": 0.25, "stopped": stopped}
+    about = f"what is hard about {case}"
+    shared = {"section": "Cases", "case": case, "about": about, "method": "radau", "verdict": verdict, "reason": reason}
+    return {**shared, **run, "figures": list(figures)}
+
+
+ROWS = [
+    row("Robertson", "meets", figure(1e-9, True), figure(0.5, True, "inf")),
+    row(
+        "a name that is longer than there is room for",
+        "limit",
+        figure(7.0, False),
+        reason="A known <reason>.",
+    ),
+    row("another", "limit", figure(8.0, False), reason="A known <reason>."),
+    row("broken", "unexplained", figure("nan", False), stopped="stopped at t = 1 s"),
+]
+CONTENT = {
+    "machine": "a processor",
+    "load": 0.5,
+    "date": "2025-01-01",
+    "seconds": 12.0,
+    "quick": False,
+    "sections": [
+        {"name": "Cases", "about": "What the figures are.", "rows": ROWS},
+        {"name": "Empty", "about": "Nothing.", "rows": []},
+    ],
+}
+
+
+def test_the_page_counts_verdicts_and_gives_every_reason_once() -> None:
+    page = stability.to_html(stability.document(CONTENT))
+    assert "1 of 4 rows meet their bounds; limits with a known reason: 2; unexplained: 1." in page
+    assert page.count("A known &lt;reason&gt;.") == 1
+    assert "Unexplained. stopped at t = 1 s" in page
+    assert "Empty" not in page
+
+
+def test_a_line_is_a_figure_and_a_long_name_goes_on_below() -> None:
+    assert [line[0] for line in stability._lines(ROWS[1])] == [
+        "a name that is longer than there",
+        "is room for",
+    ]
+    first, second = stability._lines(ROWS[0])
+    assert first == ["Robertson", "radau", "meets", "error [ulp]", "1.0e-09", "1", "12 + 3", "0.25"]
+    assert second == ["", "", "", "error [ulp]", "0.5", "", "", ""]
+    assert stability._lines(ROWS[3])[0][4] == "nan ✗"
+
+
+@pytest.mark.parametrize(
+    ("value", "bound", "share"),
+    [
+        (2.0, 4.0, 0.5),
+        ("nan", 1.0, stability.TO),
+        ("inf", 1.0, stability.TO),
+        (0.0, 0.0, stability.FROM),
+        (1.0, 0.0, 1e13),
+    ],
+)
+def test_a_share_is_drawn_within_the_picture(value: float | str, bound: float, share: float) -> None:
+    assert stability._share({"value": value, "bound": bound}) == share
+
+
+def test_what_is_beyond_its_bound_is_drawn_in_the_colour_of_what_is_wrong() -> None:
+    axis = stability.shares(ROWS).axes[0]
+    met, missed = (line for line in axis.lines if line.get_marker() in ("o", "X"))
+    assert list(met.get_xdata()) == [1e-9]
+    assert list(missed.get_xdata()) == [7.0, 8.0, stability.TO]
+    assert missed.get_color() == stability.theme.SPURIOUS
+    assert [label.get_text() for label in axis.get_yticklabels()] == [each["case"] for each in ROWS]
+
+
+def test_files_are_written_and_the_page_needs_no_other(tmp_path: Path) -> None:
+    page = stability.write(tmp_path / "new", CONTENT, "section,case\n")
+    assert {each.name for each in page.parent.iterdir()} == {
+        "stability.html",
+        "stability.md",
+        "stability.csv",
+        "stability.json",
+        "stability-cases.svg",
+    }
+    text = page.read_text(encoding="utf-8")
+    assert not re.search(r'(src|href)="(?!data:|#)', text)
+    assert json.loads((tmp_path / "new" / "stability.json").read_text(encoding="utf-8")) == CONTENT
+    assert "![Figures over their bounds" in (tmp_path / "new" / "stability.md").read_text(encoding="utf-8")
+
+
+def test_a_report_of_nothing_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    for arguments in ([], ["chain", "--stability"]):
+        assert cli.main(["report", *arguments]) == 1
+        assert "a report needs a scene, or --stability and none" in capsys.readouterr().err
+
+
+def test_the_command_writes_the_table_and_fails_for_an_unexplained_row(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two cases in place of all, one by a method that does not suit it."""
+    from dynamics.reports import case_runs
+
+    def two(quick: bool) -> Any:
+        assert quick
+        yield from case_runs.verdicts(["exponential decay"], ("dopri5",))
+        yield from case_runs.verdicts(["Kapitza's pendulum"], methods)
+
+    monkeypatch.setattr(cli.stability, "verdicts", two)
+    methods = ("dopri5",)
+    assert cli.main(["report", "--stability", "--quick", "--out", str(tmp_path)]) == 0
+    printed = capsys.readouterr()
+    assert "2 rows: 2 meets, 0 limit, 0 unexplained" in printed.out
+    assert "cgraph: meets       exponential decay, dopri5" in printed.err
+    assert len((tmp_path / "stability.csv").read_text(encoding="utf-8").splitlines()) == 3
+    methods = ("euler",)
+    assert cli.main(["report", "--stability", "--quick", "--json", "--out", str(tmp_path)]) == 1
+    printed = capsys.readouterr()
+    assert json.loads(printed.out)["sections"][0]["rows"][1]["verdict"] == "unexplained"
+    assert "beyond its bound without a known reason: Kapitza's pendulum by euler" in printed.err
+
+
+@pytest.mark.slow
+def test_a_quick_report_succeeds(tmp_path: Path) -> None:
+    pytest.importorskip("flint")
+    assert cli.main(["report", "--stability", "--quick", "--out", str(tmp_path)]) == 0
+    assert (tmp_path / "stability.html").stat().st_size > 100_000

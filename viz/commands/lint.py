@@ -1,0 +1,57 @@
+"""`cgraph lint`: are q and qd independent of one another in a scene's equations? A proof, or what is to blame."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+import cgraph as cg
+from dynamics import inverse_dynamics
+
+from ..dot import to_dot
+from .point import REST, box, filled, point
+from .scene import Commands, draw, may_draw_and_print, scene_of, state_names, takes_a_formulation, takes_a_scene
+
+
+def add(commands: Commands[argparse.ArgumentParser]) -> None:
+    """The command's arguments."""
+    parser = commands.add_parser(
+        "lint",
+        help="check that q and qd are independent in a scene's equations; status 1 and the blame if they are not",
+    )
+    takes_a_scene(parser)
+    takes_a_formulation(parser)
+    parser.add_argument(
+        "--box",
+        type=box,
+        metavar="A=LOW:HIGH,...",
+        help="look for slopes that could be unbounded in this box of inputs",
+    )
+    parser.add_argument(
+        "--at", type=point, metavar="A=1,B=2", help=f"look for sums that lose digits at this point; {REST}"
+    )
+    may_draw_and_print(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the proof or the blame; 1 where anything is not as declared."""
+    scene = scene_of(options)
+    graph = inverse_dynamics(scene, options.formulation)
+    q, qd = state_names(graph, scene.system.n)
+    found = cg.lint(
+        graph,
+        independent=[(q, qd)] if q and qd else [],
+        box=options.box,
+        at=None if options.at is None else filled(graph, scene, options.at),
+        function="L",
+    )
+    if options.json:
+        print(json.dumps({"scene": scene.name, "formulation": options.formulation} | found.to_dict(), indent=1))
+    else:
+        print(found if q and qd else f"Holds: the equations have no {'coordinates' if qd else 'velocities'}.\n{found}")
+    if options.svg:
+        caption = f"{scene.name}: inverse dynamics, {options.formulation.replace('_', ' ')}"
+        drawing = to_dot(graph, marked=found.nodes, marked_label="to blame", marked_edges=found.edges, caption=caption)
+        draw(options, drawing)
+    return 0 if found.ok else 1

@@ -1,0 +1,76 @@
+"""Points and boxes of a graph's inputs, from the command line: `q0=0.1,qd0=2` and `q0=-1:1`."""
+
+from __future__ import annotations
+
+import argparse
+import math
+
+import numpy as np
+
+from cgraph import Graph
+from dynamics.scenes import Scene
+
+SEED, DIGITS = 20250814, 3  # of the numbers that nobody gave: always the same, and short enough to be typed again
+DT = 1e-3  # s, the step of an embedded relation
+SHOWN = 12  # inputs that a line of text names
+
+REST = (
+    f"of the inputs that it leaves out, parameters keep their values, dt is {DT} s, t is 0, "
+    "and the rest have numbers between -1 and 1, always the same"
+)
+
+
+def point(text: str) -> dict[str, float]:
+    """`q0=0.1,qd0=2` as numbers by name, for argparse."""
+    return {name: _number(name, value) for name, value in _pairs(text)}
+
+
+def box(text: str) -> dict[str, tuple[float, float]]:
+    """`q0=-1:1,qd0=0:2` as intervals by name, for argparse."""
+    found = {}
+    for name, value in _pairs(text):
+        low, colon, high = value.partition(":")
+        if not colon:
+            raise argparse.ArgumentTypeError(f"{name} needs an interval such as -1:1, got {value!r}")
+        found[name] = _number(name, low), _number(name, high)
+        if found[name][0] > found[name][1]:
+            raise argparse.ArgumentTypeError(f"{name} needs its lower end first, got {value!r}")
+    return found
+
+
+def filled(graph: Graph, scene: Scene, given: dict[str, float]) -> dict[str, float]:
+    """The given numbers with the rest that the graph's inputs need; names that the graph has not are kept."""
+    chosen = np.random.default_rng(SEED)
+    parameters = scene.system.parameters
+    found = {}
+    for name in graph.input_names:
+        number = round(chosen.uniform(-1.0, 1.0), DIGITS)
+        found[name] = parameters[name] if name in parameters else {"dt": DT, "t": 0.0}.get(name, number)
+    return found | given
+
+
+def point_text(at: dict[str, float]) -> str:
+    """`q0=0.1 qd0=2`, and of many inputs the first."""
+    shown = [f"{name}={value:g}" for name, value in list(at.items())[:SHOWN]]
+    rest = [f"and {len(at) - SHOWN} more"] if len(at) > SHOWN else []
+    return " ".join([*shown, *rest])
+
+
+def _pairs(text: str) -> list[tuple[str, str]]:
+    pairs = []
+    for part in filter(None, text.split(",")):
+        name, equals, value = part.partition("=")
+        if not equals or not name.strip():
+            raise argparse.ArgumentTypeError(f"expected NAME=VALUE, separated by commas, got {part!r}")
+        pairs.append((name.strip(), value))
+    return pairs
+
+
+def _number(name: str, text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise argparse.ArgumentTypeError(f"{name} needs a finite number, got {text!r}")
+    return number

@@ -1,0 +1,66 @@
+"""The arguments that several commands share: a scene, a formulation, a picture; and what they stand for."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from cgraph import Graph
+from cgraph.files import write
+from dynamics import FORMULATIONS, scenes
+
+from ..render import Drawing, render_svg
+
+Commands = argparse._SubParsersAction  # what `add_subparsers` returns has no public name
+
+
+def takes_a_scene(command: argparse.ArgumentParser) -> None:
+    """The arguments that `scene_of` reads."""
+    command.add_argument("scene", metavar="SCENE", help=f"{', '.join(scenes.names())}, or a model file, MJCF or URDF")
+    may_ignore(command)
+
+
+def may_ignore(command: argparse.ArgumentParser) -> None:
+    """The argument by which what cannot be modelled is left out."""
+    command.add_argument("--ignore", action="store_true", help="leave out what of a model file cannot be modelled")
+
+
+def scene_of(options: argparse.Namespace) -> scenes.Scene:
+    """The scene that the arguments name; what of a file is left out goes to standard error, a line each."""
+    scene = scenes.load(options.scene, **({"ignore": True} if options.ignore else {}))
+    for what in scene.left_out:
+        print(f"cgraph: {scene.name}: left out {what}", file=sys.stderr)
+    return scene
+
+
+def takes_a_formulation(command: argparse._ActionsContainer) -> None:
+    """The argument `--formulation`."""
+    command.add_argument(
+        "--formulation", default="chain_rule", choices=sorted(FORMULATIONS), help="default: chain_rule"
+    )
+
+
+def may_draw_and_print(command: argparse.ArgumentParser) -> None:
+    """The arguments `--json` and `--svg`; `draw` writes the picture."""
+    command.add_argument("--json", action="store_true", help="print as JSON")
+    command.add_argument("--svg", type=_svg_file, metavar="FILE", help="draw the graph, with the answer marked")
+
+
+def draw(options: argparse.Namespace, drawing: Drawing) -> None:
+    """Write a drawing to the file that `--svg` names."""
+    write(options.svg, render_svg(drawing))
+    print(f"cgraph: drawn in {options.svg}", file=sys.stderr)
+
+
+def state_names(graph: Graph, n: int) -> tuple[list[str], list[str]]:
+    """Names of the coordinates and of the velocities that the graph has, as inputs or as inner nodes."""
+    known = {node.name for node in (*graph.inputs, *graph.nodes)}
+    q, qd = ([f"{letter}{i}" for i in range(n) if f"{letter}{i}" in known] for letter in ("q", "qd"))
+    return q, qd
+
+
+def _svg_file(text: str) -> Path:
+    if not text.endswith(".svg"):
+        raise argparse.ArgumentTypeError(f"the picture's file must end in .svg, got {text!r}")
+    return Path(text)
