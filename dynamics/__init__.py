@@ -28,6 +28,13 @@ from .simulate import simulate
 from .state_equation import state_equation
 from .subtree import Subtree
 from .system import System, as_system
+from .tables.certificate import certify
+from .tables.coriolis import coriolis, damping_force
+from .tables.linearization import linearization, linearize
+from .tables.regressor import inertial_parameters, regressor
+from .tables.residual import Certificate
+from .tables.torque_table import TorqueTable
+from .tables.torques import torque_by_link, torque_by_motion
 from .trajectory import Crossings, Stats, Trajectory
 from .urdf import to_urdf
 
@@ -35,6 +42,7 @@ __all__ = [
     "EFFECTS",
     "FORMULATIONS",
     "Body",
+    "Certificate",
     "Crossings",
     "Dropped",
     "Ensemble",
@@ -58,16 +66,23 @@ __all__ = [
     "Stats",
     "Subtree",
     "System",
+    "TorqueTable",
     "Trajectory",
     "as_system",
     "bias",
     "cases",
+    "certify",
     "check_pivot",
+    "coriolis",
+    "damping_force",
     "dropped",
     "energy",
     "forward_dynamics",
     "gravity_force",
+    "inertial_parameters",
     "inverse_dynamics",
+    "linearization",
+    "linearize",
     "load_mjcf",
     "load_urdf",
     "mass_matrix",
@@ -77,6 +92,7 @@ __all__ = [
     "planar_arm",
     "prune",
     "reference",
+    "regressor",
     "scenes",
     "serial_arm",
     "simulate",
@@ -85,5 +101,7 @@ __all__ = [
     "state_equation",
     "to_mjcf",
     "to_urdf",
+    "torque_by_link",
+    "torque_by_motion",
     "tree",
 ]

@@ -14,7 +14,7 @@ PAGES = {
     path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
     for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 }
-RUN = ("README.md", "docs/tutorial.md", "docs/howto.md")
+RUN = ("README.md", "docs/tutorial.md", "docs/howto.md", "docs/tables.md", "docs/ensembles.md", "docs/pruning.md")
 FENCE = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 MARK = "-- end of example --"
 SECONDS = 120  # for one page; each takes a few

@@ -13,7 +13,6 @@ from pathlib import Path
 
 from cgraph.files import write
 from dynamics import EFFECTS, FORMULATIONS, forward_dynamics, inverse_dynamics, scenes, spurious
-from dynamics.inspection import inspection
 from dynamics.integrators import METHODS
 from dynamics.reports import pruning as pruning_report, stability, stability_table, trajectory_scenes, work_precision
 from dynamics.reports.bench import MODES, PEERS, QUICK, SCENES, TASKS, Row, bench
@@ -22,10 +21,9 @@ from dynamics.reports.cold_start import STARTS
 from dynamics.tables.certificate import certify
 
 from . import pruning
-from .commands import diff, lesson, lint, why
+from .commands import diff, inspect, lesson, lint, why
 from .commands.scene import may_ignore, scene_of, takes_a_scene
 from .dot import to_dot
-from .inspector import Motion, Table, Version, page
 from .render import render_png, render_svg
 
 
@@ -104,15 +102,7 @@ def _parser() -> argparse.ArgumentParser:
     checked.add_argument("--json", action="store_true", help="print as JSON")
     checked.set_defaults(run=_certify)
 
-    inspect = commands.add_parser("inspect", help="one page on which a scene's equations unfold, move and answer")
-    takes_a_scene(inspect)
-    inspect.add_argument("--out", type=Path, required=True, help="file to write: .html")
-    inspect.add_argument("--forward", action="store_true", help="forward dynamics, in place of the three formulations")
-    inspect.add_argument("--t-end", type=float, metavar="S", help="how long it moves, instead of the scene's own time")
-    inspect.add_argument("--json", action="store_true", help="print the sizes as JSON")
-    inspect.set_defaults(run=_inspect)
-
-    for command in (lint, why, diff, lesson):
+    for command in (inspect, lint, why, diff, lesson):
         command.add(commands)
     return parser
 
@@ -291,33 +281,6 @@ def _draw(options: argparse.Namespace) -> None:
     else:
         raise ValueError(f"--out must end in .svg, .png, .dot or .txt, got {options.out}")
     print(f"{options.out}: {counts.nodes} nodes, {counts.edges} edges")
-
-
-def _inspect(options: argparse.Namespace) -> None:
-    if options.out.suffix != ".html":
-        raise ValueError(f"--out must end in .html, got {options.out}")
-    scene = scene_of(options)
-    found = inspection(scene, forward=options.forward, t_end=options.t_end)
-    bones = found.skeleton
-    head = ["part", *(f"τ{i} [N m]" for i in range(scene.system.n))]
-    rows = [[part, *(f"{value:.4g}" for value in torques)] for part, torques in found.shares.items()]
-    text = page(
-        [Version(each.name.replace("_", " "), *each[1:]) for each in found.versions],
-        title=f"{scene.name}: {'forward' if options.forward else 'inverse'} dynamics",
-        motion=Motion(found.t, bones.points, bones.parents) if bones else Motion(found.t, None, ()),
-        tables=[Table("Torques that each part takes at t = 0", head, rows)] if rows else [],
-    )
-    write(options.out, text)
-    sizes = {
-        each.name: {"nodes": len(each.graph.nodes), "edges": len(each.graph.edges), "spurious": len(each.marked)}
-        for each in found.versions
-    }
-    size = len(text.encode())
-    if options.json:
-        print(json.dumps({"scene": scene.name, "bytes": size, "versions": sizes}, indent=1))
-    else:
-        counts = ", ".join(f"{name} {each['nodes']} nodes" for name, each in sizes.items())
-        print(f"{options.out}: {counts}; {size / 1e6:.2f} MB")
 
 
 def _certify(options: argparse.Namespace) -> None:

@@ -77,6 +77,7 @@ def labelled(panels: Sequence[Panel], *, columns: int = 2, shared: bool = True) 
             axis.set_xticks(_decades(low, high))
             axis.xaxis.minorticks_off()
         figure.draw_without_rendering()
+        figure.set_layout_engine("none")  # the names are placed for axes where they are now
         for axis, panel in zip(axes.flat, panels, strict=False):
             _name(axis, panel.lines)
     return figure

@@ -122,7 +122,7 @@ def _lines(row: Row, missed: bool = False) -> list[list[str]]:
             own.append([each["quantity"] + _unit(each), value, bound])
     name = textwrap.wrap(row["case"], NAMES)
     shared = [row["method"], row["verdict"]], _run(row)
-    lines = []
+    lines: list[list[str]] = []
     for first, figure in itertools.zip_longest(name, own, fillvalue=None):
         (method, verdict), run = shared if not lines else (["", ""], ["", ""])
         lines.append([first or "", method, verdict, *(figure or ["", "", ""]), *run])

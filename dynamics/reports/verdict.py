@@ -56,11 +56,6 @@ class Verdict:
         """The verdict."""
         return "meets" if self.meets else "limit" if self.reason else "unexplained"
 
-    @property
-    def worst(self) -> Figure:
-        """The figure that is nearest to its bound, or furthest beyond it."""
-        return max(self.figures, key=_share)
-
     def as_dict(self) -> dict[str, Any]:
         """Everything, for JSON: numbers that are not finite as text."""
         figures = [
@@ -77,12 +72,6 @@ class Verdict:
         own = {name: getattr(self, name) for name in ("section", "case", "about", "method")}
         run = {name: getattr(self, name) for name in ("steps", "rejected", "seconds", "stopped")}
         return {**own, "verdict": self.words, "reason": self.reason, **run, "figures": figures}
-
-
-def _share(figure: Figure) -> float:
-    if not figure.meets:
-        return float("inf") if figure.value != figure.value or not figure.bound else figure.value / figure.bound
-    return figure.value / figure.bound if figure.bound else 0.0
 
 
 def _number(value: float) -> float | str:

@@ -202,7 +202,7 @@ def peers(model: Any, twin: Any = None) -> Iterator[tuple[str, Callable[[], Aske
         yield "MuJoCo", lambda: _translated(MujocoPeer, model)
     else:
         yield "MuJoCo", lambda: _original(twin, model)
-    yield "Pinocchio", lambda: _translated(_pinocchio, model)
+    yield "Pinocchio", lambda: _translated(PinocchioPeer, model)
 
 
 def residual(name: str, peer: Asked, model: Any, at: Mapping[str, Array]) -> Residual:
@@ -241,13 +241,6 @@ def bare(model: Any) -> PlanarArm | Mechanism:
     if not isinstance(bodies, Mechanism):
         raise NotComparableError("takes rigid bodies, not a Lagrangian")
     return replace(bodies, forces=(), parameters={}) if bodies.forces else bodies
-
-
-def _pinocchio(case: Case) -> Peer:
-    peer, model = PinocchioPeer(case), case.model
-    # Its reader of MJCF leaves gravity at the default.
-    peer.twin.gravity.linear = np.array((0.0, 0.0, -model.gravity) if isinstance(model, PlanarArm) else model.gravity)
-    return peer
 
 
 def _translated(kind: Callable[[Case], Peer], model: Any) -> Translation:

@@ -214,12 +214,14 @@ def test_two_groups_of_marked_nodes_have_a_colour_and_a_line_of_the_legend_each(
         name: {node for node in graph.nodes if name in node.tags and node.args} for name in ("kinetic", "potential")
     }
     assert all(groups.values())
+    number = {node: i for i, node in enumerate(graph.nodes)}
     drawn, lines = boxes(graph, marked=groups), arrows(graph, marked=groups)
     for paint, (name, nodes) in zip(theme.MARKS, groups.items(), strict=True):
         for i, node in enumerate(graph.nodes):
             if node.value is None:
                 assert (drawn[f"n{i}"]["color"] == paint.line) == (node in nodes)
-        for line, edge in zip(lines, graph.edges, strict=False):
+        for edge in graph.edges:
+            line = lines[f"e{number[edge.source]}-{number[edge.target]}-{edge.slot}"][2]
             assert (line.get("color") == paint.line) == (edge.source in nodes)
         assert f"label={name}" in to_dot(graph, marked=groups).source
     assert theme.MARKS[0].line != theme.MARKS[1].line

@@ -189,7 +189,7 @@ function draw(svg, data, version, folded) {
     }
     const first = words ? (cluster.marked ? "spurious" : cluster.title) : title;
     const second = !words ? "" : cluster.marked && cluster.title ? `${cluster.title} (${many})` : `${many} node${many > 1 ? "s" : ""}`;
-    const item = shape(shapes, id, { ...at }, `box ${role}`, `▸ ${first}`, true);
+    const item = shape(shapes, id, { ...at }, `box ${role}`, `▸ ${first.length > 13 ? `${first.slice(0, 12)}…` : first}`, true);
     item.group.setAttribute("data-cluster", c);
     item.group.setAttribute("aria-expanded", "false");
     item.group.setAttribute("aria-label", `${cluster.column}, ${cluster.stage}, ${title} nodes, folded`);

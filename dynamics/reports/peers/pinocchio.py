@@ -33,6 +33,9 @@ class PinocchioPeer(Peer):
             path = Path(folder) / "model.xml"
             path.write_text(to_mjcf(model), encoding="utf-8")
             self.twin = pinocchio.buildModelFromMJCF(str(path))
+        # Its reader of MJCF leaves gravity at the default.
+        pull = model.gravity if isinstance(model, Mechanism) else (0.0, 0.0, -model.gravity)
+        self.twin.gravity.linear = np.asarray(pull, dtype=np.float64)
         self.data = self.twin.createData()
         self.order = np.array([self.twin.joints[self.twin.getJointId(name)].idx_v for name in names])
         self.at = np.argsort(self.order)

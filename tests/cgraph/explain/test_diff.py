@@ -13,6 +13,7 @@ from hypothesis import given, settings
 import cgraph as cg
 import dynamics as dyn
 from cgraph.explain import diff
+from dynamics.classes import formulation_classes
 from tests.strategies import Case, cases
 
 x, y, z = cg.variables("x y z")
@@ -82,29 +83,18 @@ def test_copies_are_paired_once_each():
     assert (len(found.common), len(found.only_left), len(found.only_right)) == (4, 1, 0)
 
 
-def formulation_classes(graph: cg.Graph):
-    wrong = dyn.spurious(graph)
-
-    def name(node: cg.Node) -> str:
-        if node in wrong:
-            return "spurious"
-        return "Euler edge" if "euler" in node.tags and "adjoint" not in node.roles else "needed"
-
-    return name
-
-
 def test_the_chain_rule_and_by_definition_differ_by_the_embedding():
     arm = dyn.planar_arm([1.0] * 3, [1.0] * 3)
     chain, embedded = dyn.inverse_dynamics(arm), dyn.inverse_dynamics(arm, "euler_embedded")
     atoms = "q0 q1 q2 qd0 qd1 qd2"
     found = diff(chain, embedded, atoms=atoms, classify=formulation_classes)
-    assert found.classes("right")["spurious"] == len(dyn.spurious(embedded))
+    assert found.classes("right")["spurious adjoint"] == len(dyn.spurious(embedded))
     assert set(found.classes("left")) == {"needed"}
     assert len(found.common) > 2 * len(diff(chain, embedded).common)  # without atoms, q is never the same
     both = found.together()
     assert {"right q0", "right qd2", "left tau0", "right tau0"} <= set(both.graph.outputs)
     text = json.dumps(found.to_dict(), allow_nan=False)
-    assert '"class": "spurious"' in text
+    assert '"class": "spurious adjoint"' in text
 
 
 def test_two_runs_are_byte_for_byte_the_same():

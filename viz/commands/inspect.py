@@ -1,0 +1,52 @@
+"""`cgraph inspect`: one page on which the graphs of a scene's equations unfold, move and answer."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from cgraph.files import write
+from dynamics.inspection import inspection
+
+from ..inspector import Motion, Table, Version, page
+from .scene import Commands, scene_of, takes_a_scene
+
+
+def add(commands: Commands[argparse.ArgumentParser]) -> None:
+    """The command's arguments."""
+    parser = commands.add_parser("inspect", help="one page on which a scene's equations unfold, move and answer")
+    takes_a_scene(parser)
+    parser.add_argument("--out", type=Path, required=True, help="file to write: .html")
+    parser.add_argument("--forward", action="store_true", help="forward dynamics, in place of the three formulations")
+    parser.add_argument("--t-end", type=float, metavar="S", help="how long it moves, instead of the scene's own time")
+    parser.add_argument("--json", action="store_true", help="print the sizes as JSON")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Write the page."""
+    if options.out.suffix != ".html":
+        raise ValueError(f"--out must end in .html, got {options.out}")
+    scene = scene_of(options)
+    found = inspection(scene, forward=options.forward, t_end=options.t_end)
+    bones = found.skeleton
+    head = ["part", *(f"τ{i} [N m]" for i in range(scene.system.n))]
+    rows = [[part, *(f"{value:.4g}" for value in torques)] for part, torques in found.shares.items()]
+    text = page(
+        [Version(each.name.replace("_", " "), *each[1:]) for each in found.versions],
+        title=f"{scene.name}: {'forward' if options.forward else 'inverse'} dynamics",
+        motion=Motion(found.t, bones.points, bones.parents) if bones else Motion(found.t, None, ()),
+        tables=[Table("Torques that each part takes at t = 0", head, rows)] if rows else [],
+    )
+    write(options.out, text)
+    sizes = {
+        each.name: {"nodes": len(each.graph.nodes), "edges": len(each.graph.edges), "spurious": len(each.marked)}
+        for each in found.versions
+    }
+    size = len(text.encode())
+    if options.json:
+        print(json.dumps({"scene": scene.name, "bytes": size, "versions": sizes}, indent=1))
+    else:
+        counts = ", ".join(f"{name} {each['nodes']} nodes" for name, each in sizes.items())
+        print(f"{options.out}: {counts}; {size / 1e6:.2f} MB")
