@@ -41,6 +41,8 @@ class Mujoco(Contender):
     def __init__(self, integrator: str, setting: Setting, smallest: float) -> None:
         super().__init__(f"MuJoCo {integrator}", "MuJoCo's own equations and loop", setting, smallest)
         self.order = MUJOCO[integrator]
+        if not setting.mechanical:
+            raise UnavailableError("takes rigid bodies, not a system of first order")
         self.peer = MujocoPeer(Case(setting.name, setting.model))
         self.module = self.peer.mujoco
         self.model = self.peer.twin.model

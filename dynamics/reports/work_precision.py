@@ -341,7 +341,8 @@ def _sweep(contender: Contender, judge: Judge, limit: float) -> Entry:
             outcome = run()
             status = outcome.status
         except Exception as error:  # noqa: BLE001 (whatever a peer's own code raises is a line in the report)
-            status = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+            kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
+            status = kind + " ".join(str(error).split())[:200]
         spent = time.perf_counter() - begin
         if not status and not math.isfinite(error_at_end := judge.at_end(outcome.x)):
             status = "left the numbers"

@@ -21,9 +21,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))  # so that a checkout runs without being installed
 
 import dynamics as dyn
+from dynamics.ensembles.simulate_many import simulate_many
 from dynamics.integrators.tableau import RK4
 from dynamics.reports.peers.case import Case
-from dynamics.ensembles.simulate_many import simulate_many
 
 T_END, DT = 1.0, 1e-3
 STEPS = 1000
