@@ -61,28 +61,38 @@ def solve_nodes(
     build = build or Builder()
     order = _dependent(output, wrt)
     with building(build) as labelled:
-        walk = _Walk(build, output, dict(zip(wrt, rhs, strict=True)), at or {}, set(order))
+        walk = _Walk(build, output, dict(zip(wrt, rhs, strict=True)), at or {}, order)
         for node in reversed(order):
             labelled(node.label.derived(ADJOINT))
-            if node in walk.position:
+            if node in walk.sums:
+                walk.eliminate_sum(node)
+            elif node in walk.inside:
+                continue
+            elif node in walk.position:
                 walk.eliminate(node)
             else:
                 walk.hand_down(node)
         dots: dict[Node, Node] = {}
         for node in order:
             labelled(node.label.derived(TANGENT))
-            if node in walk.position:
+            if node in walk.inside:
+                continue  # found with the sum that it is in
+            if node in walk.solved:
                 solved = walk.solved[node]
                 dot = solved.alone
                 for other, gain in solved.gains.items():
                     dot = dot - gain * dots[other]
+                if node in walk.sums:
+                    variable, other, p, p_other = walk.sums[node]
+                    rest = dot if other not in dots else dot - p_other * dots[other]
+                    dots[variable] = p * rest  # p is 1 or -1
             else:
                 dot = _total([p * dots[arg] for arg, p in walk.partials[node].items()])
             dots[node] = dot
         x = [dots[node] for node in wrt]
         if positive:
             labelled(output.label.derived(ADJOINT))
-            x.append(first_not_positive({walk.position[node]: solved.pivot for node, solved in walk.solved.items()}))
+            x.append(first_not_positive({walk.index(node): solved.pivot for node, solved in walk.solved.items()}))
     return x
 
 
@@ -98,10 +108,10 @@ class _Walk:
     """The state of the walk from the output down: adjoints, W and b of the live nodes, and what was eliminated."""
 
     def __init__(
-        self, build: Builder, output: Node, rhs: dict[Node, Node], at: Mapping[Node, Node], depends: set[Node]
+        self, build: Builder, output: Node, rhs: dict[Node, Node], at: Mapping[Node, Node], order: Sequence[Node]
     ) -> None:
         self.build = build
-        self.depends = depends
+        self.depends = set(order)
         self.position = {node: i for i, node in enumerate(rhs)}
         self.bars: dict[Node, Node] = {output: ONE}
         self.rhs = dict(rhs)
@@ -109,6 +119,8 @@ class _Walk:
             self.rhs[node] = self.rhs.get(node, ZERO) + inner
         self.rows: dict[Node, dict[Node, Node]] = {}  # W, both halves
         self.solved: dict[Node, _Solved] = {}
+        self.sums = _sums(order, self.position)
+        self.inside = {each.variable for each in self.sums.values()}
         self.partials: dict[Node, dict[Node, Node]] = {}  # of each operation, by argument that depends on w
 
     def _take(self, node: Node) -> tuple[Node, dict[Node, Node]]:
@@ -129,10 +141,12 @@ class _Walk:
 
     def eliminate(self, node: Node) -> None:
         """A variable whose uses are all behind: its row of W t = b gives it in terms of the live nodes."""
+        self._reduce(node, self.rhs[node])
+
+    def _reduce(self, node: Node, rhs: Node) -> None:
         pivot, row = self._take(node)
         if pivot.value == 0.0:
-            raise SingularError(self.position[node])
-        rhs = self.rhs[node]
+            raise SingularError(self.index(node))
         gains = {other: value / pivot for other, value in row.items()}
         others = list(row)
         for i, a in enumerate(others):
@@ -140,6 +154,23 @@ class _Walk:
                 self._add(a, b, -(gains[a] * row[b]))
             self.rhs[a] = self.rhs.get(a, ZERO) - gains[a] * rhs
         self.solved[node] = _Solved(pivot, rhs / pivot, gains)
+
+    def index(self, node: Node) -> int:
+        """The place among `wrt` of an eliminated variable, or of the one in an eliminated sum."""
+        return self.position[self.sums[node].variable if node in self.sums else node]
+
+    def eliminate_sum(self, node: Node) -> None:
+        """A sum z = p_w w + p a with the only use of a variable w: z is as free as w, and is eliminated in its place.
+
+        Handed down to w and a first, W_zz would be in the rows of both, for the elimination to take out of a's again:
+        a difference that keeps nothing where W_zz is much larger than what a has of its own.
+        """
+        variable, other, p, p_other = self.sums[node]
+        bar, own, applied = self.bars.pop(node, ZERO), self.rhs.pop(node, ZERO), p * self.rhs[variable]
+        self._reduce(node, own + applied)
+        if other in self.depends:
+            self.bars[other] = self.bars.get(other, ZERO) + p_other * bar
+            self.rhs[other] = self.rhs.get(other, ZERO) - p_other * applied
 
     def hand_down(self, node: Node) -> None:
         """An operation: t = sum p t_arg takes it out of W t = b, and its curvature goes to its arguments."""
@@ -174,6 +205,32 @@ class _Walk:
             a, b = node.args[j], node.args[k]
             if a in self.depends and b in self.depends:
                 self._add(a, b, 2.0 * (bar * second) if a is b and j != k else bar * second)
+
+
+class _SumOf(NamedTuple):
+    """A sum p variable + p_other other."""
+
+    variable: Node
+    other: Node
+    p: float
+    p_other: float
+
+
+def _sums(order: Sequence[Node], position: Mapping[Node, int]) -> dict[Node, _SumOf]:
+    """The sums and differences with the only use of a variable; of two, the later one."""
+    uses: dict[Node, int] = {}
+    for node in order:
+        for arg in node.args:
+            uses[arg] = uses.get(arg, 0) + 1
+    found = {}
+    for node in order:
+        if node.op.name in ("add", "sub"):
+            signs = (1.0, 1.0 if node.op.name == "add" else -1.0)
+            free = [k for k, each in enumerate(node.args) if each in position and uses[each] == 1]
+            if free:
+                k = max(free, key=lambda k: position[node.args[k]])
+                found[node] = _SumOf(node.args[k], node.args[1 - k], signs[k], signs[1 - k])
+    return found
 
 
 def _dependent(output: Node, wrt: Sequence[Node]) -> list[Node]:

@@ -17,6 +17,7 @@ from .bench import AGREES, MODES, OURS, TASKS, Cell, Row
 from .peers import PEERS
 
 WIDTH = 120  # characters
+HOW = "pip install 'cgraph[bench]'; PyTorch by itself"  # to install what is missing
 GAPS = ("  ", " ")  # between columns: the second where the first is too wide
 
 
@@ -30,7 +31,7 @@ def tables(rows: Sequence[Row], where: str = "") -> str:
         f"* the fastest of its row.  ! it differs from ours by more than {AGREES:g}.  - a: not measured, see below.",
         "",
         *[f"{peer:<11} {PEERS[peer].about}" for peer in shown],
-        *([f"not installed: {', '.join(missing)} (pip install 'cgraph[bench]'; PyTorch by itself)"] if missing else []),
+        *(textwrap.wrap(f"not installed: {', '.join(missing)} ({HOW})", WIDTH) if missing else []),
     ]
     for task, about in TASKS.items():
         of_task = [row for row in rows if row.task == task]
