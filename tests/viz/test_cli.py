@@ -94,7 +94,10 @@ def test_wrong_usage_gets_the_usage_and_exit_status_2(arguments):
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("command", [[], ["paper"], ["bench"], ["scenes"], ["draw"]])
+COMMANDS = "paper bench scenes draw report certify inspect lint why diff lesson".split()
+
+
+@pytest.mark.parametrize("command", [[], *([each] for each in COMMANDS)])
 def test_every_command_has_help(command):
     done = run(*command, "--help")
     assert done.returncode == 0

@@ -20,6 +20,8 @@ class HeyokaPeer(Peer):
         super().__init__(case)
         import heyoka
 
+        if hasattr(heyoka.llvm_state, "set_diskcache_enabled"):  # else a second run finds the first one's code
+            heyoka.llvm_state.set_diskcache_enabled(False)
         self.heyoka = heyoka
         self.functions: dict[str, Any] = {}
 
