@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,12 +11,18 @@ from numpy.typing import ArrayLike
 from ..errors import GraphError
 from ..evaluate import Array
 from ..graph import Graph
+from ..node import CONSTANT, Node, variable
+from ..order import rebuild, topological
 from .program import Call, Program
 from .runner import runner
 
 
 class Loop:
-    """A graph that runs on its own results, see `loop`.  graph: one pass.  carry: {input: the output that follows}."""
+    """A graph that runs on its own results, see `loop`.
+
+    graph: one pass.  carry: {input: the output that follows}.  before: what depends on inputs that hold their values
+    alone, which is computed once before the first pass; None where there is nothing of the kind.
+    """
 
     def __init__(self, graph: Graph, carry: Mapping[str, str], backend: str, *, fast: bool, fma: bool) -> None:
         for name in carry:
@@ -27,10 +34,15 @@ class Loop:
         self.graph, self.carry = graph, dict(carry)
         self._moving = [graph.input_names.index(name) for name in carry]
         self._held = [k for k, name in enumerate(graph.input_names) if name not in carry]
-        inputs = [graph.inputs[k] for k in (*self._moving, *self._held)]
-        one_pass = Graph(inputs, {name: graph.outputs[carry[name]] for name in carry})
-        registers = {"carry": len(self._moving), "held": len(self._held)}
-        program = Program(registers, [Call(one_pass, ("carry", "held"), ("carry",))], record=["carry"])
+        moving, held = ([graph.inputs[k] for k in chosen] for chosen in (self._moving, self._held))
+        wanted = [graph.outputs[carry[name]] for name in carry]
+        self.before, still = _still(wanted, held)
+        new = rebuild(wanted, still, lambda n, args: Node(n.op, args, n.label, name=n.name))
+        one_pass = Graph(
+            [*moving, *held, *still.values()], dict(zip(carry, [new[node] for node in wanted], strict=True))
+        )
+        registers = {"carry": len(moving), "held": len(held), "still": len(still)}
+        program = Program(registers, [Call(one_pass, ("carry", "held", "still"), ("carry",))], record=["carry"])
         self._runner = runner(program, backend, fast=fast, fma=fma)
 
     def __call__(self, x: ArrayLike, passes: int, every: int = 1) -> Array:
@@ -51,7 +63,27 @@ class Loop:
             wanted = f"({count},)" if dimensions == 1 else f"({count}, N)"
             raise GraphError(f"x must have shape {wanted}, one row for each input, got {given.shape}")
         registers = {"carry": given[self._moving], "held": given[self._held]}
+        if self.before is not None:
+            values = self.before.evaluate(dict(zip(self.before.input_names, given[self._held], strict=True)))
+            registers["still"] = np.array(list(values.values()))
         return self._runner.memory(registers, None if dimensions == 1 else given.shape[1])
+
+
+def _still(outputs: Sequence[Node], held: Sequence[Node]) -> tuple[Graph | None, dict[Node, Node]]:
+    """What the outputs need of operations on `held` alone: as a graph, and a variable to stand for each."""
+    nodes = topological(outputs)
+    constant = {node for node in nodes if node.op is CONSTANT}
+    fixed = constant | set(held)
+    for node in nodes:
+        if node.args and fixed.issuperset(node.args):
+            fixed.add(node)
+    used = [arg for node in nodes if node not in fixed for arg in node.args] + list(outputs)
+    taken = {node.name for node in nodes}
+    names = (name for name in (f"still{k}" for k in itertools.count()) if name not in taken)
+    found = [node for node in dict.fromkeys(used) if node in fixed and node.args]
+    if not found:
+        return None, {}
+    return Graph(held, {f"{k}": node for k, node in enumerate(found)}), {node: variable(next(names)) for node in found}
 
 
 def loop(

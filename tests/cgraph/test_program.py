@@ -55,6 +55,21 @@ def test_a_carry_that_trades_places(backend: str) -> None:
     assert swap([1.0, 2.0], 3).tolist() == [[2.0, 1.0], [1.0, 2.0], [2.0, 1.0]]
 
 
+def test_what_does_not_change_is_computed_before_the_first_pass(backend: str) -> None:
+    x, k, still0 = cg.variables("x k still0")
+    graph = cg.Graph([k, x, still0], {"next": x * cg.exp(-k) + cg.sin(k) * still0, "same": cg.sqrt(k)})
+    run = cg.loop(graph, {"x": "next"}, backend, fma=False)
+    assert run.before is not None
+    assert [len(run.before.outputs), run.before.input_names] == [2, ("k", "still0")]
+    values = [0.7, 1.0, 2.0]
+    expected = 1.0
+    for _ in range(3):
+        expected = graph.evaluate({"k": 0.7, "x": expected, "still0": 2.0})["next"]
+    assert run(values, 3)[-1, 0] == expected
+    assert run.batch(np.array([values] * 5).T, 3)[-1, 0].tolist() == [expected] * 5
+    assert cg.loop(spring(), {"x": "x_next", "v": "v_next"}, backend).before is None
+
+
 def test_registers_that_are_read_and_written(backend: str) -> None:
     a, b = cg.variables("a b")
     swap = cg.Graph([a, b], {"p": b + 0.0, "q": a + 0.0})
