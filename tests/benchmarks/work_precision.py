@@ -295,7 +295,7 @@ def main() -> None:
     """Print the parts asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)} (default: all)")
-    parser.add_argument("--exact", default="build/exact", help="folder where exact motions are kept (default: build/exact)")
+    parser.add_argument("--exact", default="build/exact", help="where exact motions are kept (default: build/exact)")
     options = parser.parse_args()
     print(machine())
     for part in options.parts or PARTS:
