@@ -15,6 +15,7 @@ import cgraph as cg
 from .equations import energy
 from .event import Event, crossings, event_graph
 from .integrators import METHODS, Problem
+from .limits import check_limits
 from .progress import Progress
 from .rows import Rows, from_start, recorded_times
 from .run import AdaptiveRun, FixedRun, Hermite, Piece, Tally
@@ -70,13 +71,7 @@ def simulate(
     solver = solver_of(method)
     if solver is None and method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)} or scipy:..., got {method!r}")
-    for what, value, unit in (("t_end", t_end, " s"), ("dt", dt, " s"), ("first_step", first_step, " s")):
-        if value is not None and not (math.isfinite(value) and value > 0.0):
-            raise ValueError(f"{what} must be positive and finite, got {value!r}{unit}")
-    if not (rtol >= 0.0 and atol >= 0.0 and 0.0 < rtol + atol < math.inf):
-        raise ValueError(f"rtol and atol must be finite, not negative and not both 0, got {rtol!r} and {atol!r}")
-    if not max_steps >= 1:
-        raise ValueError(f"max_steps must be at least 1, got {max_steps!r}")
+    check_limits(t_end, dt, first_step, rtol, atol, max_steps)
     inputs = state_inputs(model)
     values = _parameter_values(inputs.parameters, parameters)
     n = len(inputs.applied)

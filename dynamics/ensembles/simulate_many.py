@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..integrators import METHODS, Problem
+from ..limits import check_limits
 from ..progress import Progress
 from ..rows import from_start, recorded_times
 from ..simulate import DT
@@ -75,13 +76,7 @@ def simulate_many(
     """
     if method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
-    for what, value, unit in (("t_end", t_end, " s"), ("dt", dt, " s"), ("first_step", first_step, " s")):
-        if value is not None and not (math.isfinite(value) and value > 0.0):
-            raise ValueError(f"{what} must be positive and finite, got {value!r}{unit}")
-    if not (rtol >= 0.0 and atol >= 0.0 and 0.0 < rtol + atol < math.inf):
-        raise ValueError(f"rtol and atol must be finite, not negative and not both 0, got {rtol!r} and {atol!r}")
-    if not max_steps >= 1:
-        raise ValueError(f"max_steps must be at least 1, got {max_steps!r}")
+    check_limits(t_end, dt, first_step, rtol, atol, max_steps)
     if chunk is not None and (not isinstance(chunk, (int, np.integer)) or chunk < 1):
         raise ValueError(f"chunk must be a whole number from 1, got {chunk!r}")
     crew, adaptive = checked(workers), METHODS[method].adaptive

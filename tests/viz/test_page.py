@@ -179,7 +179,7 @@ def run_script(program: str, given: object) -> object:
     """The value that a program prints as JSON, after the page's scripts."""
     node = shutil.which("node")
     if node is None:
-        pytest.skip("needs node")
+        pytest.skip("there is no node on PATH")
     text = "\n".join([*map(_asset, SCRIPTS), f"const given = {json.dumps(given)};", program])
     done = subprocess.run([node, "-"], input=text, capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode == 0, done.stderr
@@ -260,10 +260,10 @@ def test_huge_numbers_of_paths_are_exact():
 
 @pytest.fixture(scope="module")
 def browser():
-    api = pytest.importorskip("playwright.sync_api")
+    api = pytest.importorskip("playwright.sync_api", reason="the browser extra has it")
     program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
     if program is None:
-        pytest.skip("needs Chromium")
+        pytest.skip("there is no Chromium on PATH")
     with api.sync_playwright() as playwright:
         opened = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
         yield opened
