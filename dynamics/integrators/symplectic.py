@@ -3,20 +3,25 @@
 Stages Q_i = q + h sum_j a_ij V_j and P_i = p + h sum_j b_ij F(Q_j, V_j), with the velocity V_i that belongs to P_i at
 Q_i; a step adds h sum_i w_i V_i to q and h sum_i w_i F_i to p (Hairer, Lubich and Wanner, sections II.2 and VI.4). The
 stages are found by iterating on the velocities until they no longer come nearer, each turn a Newton step of
-V_i -> P_i(V_i), so that nothing has to be explicit, separable or quadratic. Sums over many steps are compensated.
+V_i -> P_i(V_i), so that nothing has to be explicit, separable or quadratic. Sums over many steps are compensated, and
+numbers of the method that float64 does not hold are two, the second what rounding took off the first: a method is only
+symplectic as exactly as w_i b_ij + w_j a_ji = w_i w_j, and what is missing adds up to a drift of the energy (Hairer,
+McLachlan and Razakarivony, BIT Numerical Mathematics 2008).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 import cgraph as cg
-from cgraph import Graph
+from cgraph import Graph, Node
 from cgraph.program import Call, Map, Program, Statement, Sum, While
 
 from .adaptive import count, first_pass
-from .elements import SAME, ahead, function, weighted
+from .elements import SAME, function, weighted
 from .fixed import advance, moment, registers
 from .problem import Problem
 
@@ -26,34 +31,47 @@ LOOSE = 1e-9  # one above this, when the turns are over, is no convergence: the 
 REPEATS = 8  # Newton steps for the velocity of a momentum that is not linear in it
 
 
+Row = tuple[Fraction, ...]
+
+
 @dataclass(frozen=True)
 class Partitioned:
     """The numbers: q's a_ij, p's b_ij, weights w_i, and the times c_i of the stages. The same a and b: Gauss."""
 
     order: int
-    a: tuple[tuple[float, ...], ...]
-    b: tuple[tuple[float, ...], ...]
-    w: tuple[float, ...]
-    c: tuple[float, ...]
+    a: tuple[Row, ...]
+    b: tuple[Row, ...]
+    w: Row
+    c: Row
 
 
-def _gauss(order: int, a: tuple[tuple[float, ...], ...], w: tuple[float, ...]) -> Partitioned:
-    return Partitioned(order, a, a, w, tuple([math.fsum(row) for row in a]))
+def _gauss(order: int, a: tuple[Row, ...], w: Row) -> Partitioned:
+    return Partitioned(order, a, a, w, tuple([sum(row, _0) for row in a]))
 
 
-_R3, _R15 = math.sqrt(3.0), math.sqrt(15.0)
-SYMPLECTIC_EULER = Partitioned(1, a=((0.0,),), b=((1.0,),), w=(1.0,), c=(0.0,))
-VERLET = Partitioned(2, a=((0, 0), (1 / 2, 1 / 2)), b=((1 / 2, 0), (1 / 2, 0)), w=(1 / 2, 1 / 2), c=(0.0, 1.0))
-MIDPOINT = _gauss(2, ((1 / 2,),), (1.0,))
-GAUSS4 = _gauss(4, ((1 / 4, 1 / 4 - _R3 / 6), (1 / 4 + _R3 / 6, 1 / 4)), (1 / 2, 1 / 2))
+def _over(denominator: int, *numerators: int) -> Row:
+    return tuple([Fraction(each, denominator) for each in numerators])
+
+
+def _root(n: int) -> Fraction:
+    """Its square root to forty digits."""
+    return Fraction(math.isqrt(n * 10**80), 10**40)
+
+
+_0, _1 = Fraction(0), Fraction(1)
+_R3, _R15 = _root(3), _root(15)
+SYMPLECTIC_EULER = Partitioned(1, a=((_0,),), b=((_1,),), w=(_1,), c=(_0,))
+VERLET = Partitioned(2, a=(_over(2, 0, 0), _over(2, 1, 1)), b=(_over(2, 1, 0),) * 2, w=_over(2, 1, 1), c=(_0, _1))
+MIDPOINT = _gauss(2, (_over(2, 1),), (_1,))
+GAUSS4 = _gauss(4, ((_1 / 4, _1 / 4 - _R3 / 6), (_1 / 4 + _R3 / 6, _1 / 4)), _over(2, 1, 1))
 GAUSS6 = _gauss(
     6,
     (
-        (5 / 36, 2 / 9 - _R15 / 15, 5 / 36 - _R15 / 30),
-        (5 / 36 + _R15 / 24, 2 / 9, 5 / 36 - _R15 / 24),
-        (5 / 36 + _R15 / 30, 2 / 9 + _R15 / 15, 5 / 36),
+        (5 * _1 / 36, 2 * _1 / 9 - _R15 / 15, 5 * _1 / 36 - _R15 / 30),
+        (5 * _1 / 36 + _R15 / 24, 2 * _1 / 9, 5 * _1 / 36 - _R15 / 24),
+        (5 * _1 / 36 + _R15 / 30, 2 * _1 / 9 + _R15 / 15, 5 * _1 / 36),
     ),
-    (5 / 18, 4 / 9, 5 / 18),
+    _over(18, 5, 8, 5),
 )
 
 
@@ -107,11 +125,20 @@ def _program(method: Partitioned, problem: Problem, own: dict[str, int], body: l
     return Program({**registers(problem), **own, **single}, body, record=["t", "x"], stop="lost")
 
 
-def _stage(weights: tuple[float, ...], base: str, slope: str, target: str) -> Map:
+def _stage(weights: Row, base: str, slope: str, target: str) -> Map:
     """target = base + h * (sum of weight * slope)."""
     used = [k for k, weight in enumerate(weights) if weight]
-    slopes = [f"{slope}{k}" for k in used]
-    return Map(ahead([weights[k] for k in used]), (base, "h", *slopes), (target,))
+    x, h, *slopes = cg.variables(["x", "h", *(f"s{k}" for k in used)])
+    change, rest = _change(h, slopes, [weights[k] for k in used])
+    graph = Graph([x, h, *slopes], {"y": x + (change if rest is None else change + rest)})
+    return Map(graph, (base, "h", *[f"{slope}{k}" for k in used]), (target,))
+
+
+def _change(h: Node, slopes: Sequence[Node], weights: Sequence[Fraction]) -> tuple[Node, Node | None]:
+    """h * (sum of weight * slope), by the weights as float64 holds them, and by what it leaves of them."""
+    held = [float(each) for each in weights]
+    left = [float(each - Fraction(number)) for each, number in zip(weights, held, strict=True)]
+    return h * weighted(slopes, held), h * weighted(slopes, left) if any(left) else None
 
 
 def _force(problem: Problem, q: str, v: str, t: str, target: str) -> Call:
@@ -125,7 +152,7 @@ def _velocity(problem: Problem, q: str, v: str, momentum: str, t: str, target: s
 def _iterated(method: Partitioned, turn: list[Statement]) -> list[Statement]:
     """Times and a first guess of the stages, and turns from V to W until W = V to rounding."""
     stages = range(len(method.w))
-    body: list[Statement] = [moment(f"time{i}", method.c[i]) for i in stages]
+    body: list[Statement] = [moment(f"time{i}", float(method.c[i])) for i in stages]
     begin = Graph([], {"going": 1.0, "turns": 0.0, "change_old": math.inf})
     body.append(Call(begin, (), ("going", "turns", "change_old")))
     difference = function("w v", change=(cg.variable("w") - cg.variable("v")) ** 2.0)
@@ -161,12 +188,13 @@ def _guess_at_rest(method: Partitioned, velocity: str) -> list[Statement]:
     return [Map(SAME, (velocity,), (f"V{i}",)) for i in range(len(method.w))]
 
 
-def _added(base: str, lost: str, slope: str, weights: tuple[float, ...]) -> Map:
+def _added(base: str, lost: str, slope: str, weights: Row) -> Map:
     """base += h * (sum of weight * slope), with what rounding took off kept for the next step (Kahan)."""
-    x, rest, h, *slopes = cg.variables(["x", "lost", "h", *(f"s{k}" for k in range(len(weights)))])
-    more = h * weighted(slopes, weights) + rest
+    x, before, h, *slopes = cg.variables(["x", "lost", "h", *(f"s{k}" for k in range(len(weights)))])
+    change, rest = _change(h, slopes, weights)
+    more = change + (before if rest is None else before + rest)
     total = x + more
-    graph = Graph([x, rest, h, *slopes], {"x": total, "lost": more - (total - x)})
+    graph = Graph([x, before, h, *slopes], {"x": total, "lost": more - (total - x)})
     return Map(graph, (base, lost, "h", *[f"{slope}{k}" for k in range(len(weights))]), (base, lost))
 
 
@@ -179,12 +207,12 @@ def _settled(problem: Problem) -> list[Statement]:
 def _explicit(method: Partitioned, problem: Problem) -> list[Statement]:
     """Kinetic energy of the velocities alone with a constant mass matrix, forces of the coordinates: no iteration."""
     half = method is VERLET
-    kick = _stage((0.5,) if half else (1.0,), "momentum", "F", "momentum")
+    kick = _stage(_over(2, 1 if half else 2), "momentum", "F", "momentum")
     body: list[Statement] = [
         _force(problem, "q", "v", "t", "F0"),
         kick,
         _velocity(problem, "q", "v", "momentum", "t", "v"),
-        _added("q", "q_lost", "V", (1.0,)),
+        _added("q", "q_lost", "V", (_1,)),
         moment("later", 1.0),
     ]
     body.insert(3, Map(SAME, ("v",), ("V0",)))
