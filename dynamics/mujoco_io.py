@@ -6,6 +6,7 @@ import io
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,24 @@ def mujoco() -> Any:
     except ImportError as error:
         raise ImportError("MuJoCo is not installed: pip install 'cgraph[mujoco]'") from error
     return module
+
+
+def rollout(model: Any, starts: Array, states: Array) -> Callable[[], None]:
+    """A run of MuJoCo's own native loop of steps, one thread, from every start.
+
+    starts: (N, 1 + 2n), the time, positions and velocities in MuJoCo's order.  states: (N, steps, 1 + 2n), which each
+    run overwrites with what is after every step. The model, such as its time step, is read when it runs.
+    """
+    module = mujoco()
+    from mujoco.rollout import rollout as native
+
+    models, data = [model] * len(starts), [module.MjData(model)]  # one datum: one thread
+    steps, sensors = states.shape[1], np.empty((*states.shape[:2], 0))
+
+    def run() -> None:
+        native(models, data, starts, nstep=steps, state=states, sensordata=sensors, skip_checks=True)
+
+    return run
 
 
 class MujocoTwin:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from . import theme
-from .plot import Array as Points, _figure, _style
+from .plot import Array as Points, empty_figure, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,9 +53,9 @@ def labelled(panels: Sequence[Panel], *, columns: int = 2, shared: bool = True) 
 
     shared: all panels have the same scales.
     """
-    with _style():
+    with style():
         rows = -(-len(panels) // columns)
-        figure = _figure(10.0, 4.4 * rows)
+        figure = empty_figure(10.0, 4.4 * rows)
         axes = figure.subplots(rows, columns, sharex=shared, sharey=shared, squeeze=False)
         for axis in axes.flat[len(panels) :]:
             axis.set_axis_off()
@@ -180,8 +180,8 @@ def _dense(path: Points) -> Points:
 
 def bars(names: Sequence[str], values: Sequence[float], x: str) -> Figure:
     """Points on a logarithmic axis, a row each, with their values beside them."""
-    with _style():
-        figure = _figure(10.0, 0.9 + 0.34 * len(names))
+    with style():
+        figure = empty_figure(10.0, 0.9 + 0.34 * len(names))
         axis = figure.subplots()
         rows = range(len(names))
         axis.set_xscale("log")

@@ -25,7 +25,7 @@ STYLE: dict[Any, Any] = {
 }
 
 
-def _figure(width: float, height: float) -> Figure:
+def empty_figure(width: float, height: float) -> Figure:
     """An empty figure, size in inches, drawn without a display. Raises ImportError naming the extra."""
     try:
         from matplotlib.figure import Figure
@@ -34,7 +34,8 @@ def _figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def _style() -> Any:
+def style() -> Any:
+    """A context in which matplotlib draws as all pictures look."""
     from matplotlib import rc_context
 
     return rc_context(STYLE)
@@ -43,7 +44,7 @@ def _style() -> Any:
 def to_svg(figure: Figure) -> str:
     """The figure as SVG text, the same bytes in every run."""
     buffer = io.BytesIO()
-    with _style():
+    with style():
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     return buffer.getvalue().decode()
 
@@ -51,7 +52,7 @@ def to_svg(figure: Figure) -> str:
 def to_adaptive_svg(figure: Figure) -> str:
     """As `to_svg`, without a background and with ink for light and dark pages, as the reader's system asks."""
     buffer = io.BytesIO()
-    with _style():
+    with style():
         figure.savefig(buffer, format="svg", metadata={"Date": None}, transparent=True)
     svg = buffer.getvalue().decode()
     for ink in (theme.TEXT, theme.LINE, theme.BLACK):
@@ -64,7 +65,7 @@ def to_adaptive_svg(figure: Figure) -> str:
 def to_png(figure: Figure, dpi: int = 160) -> bytes:
     """The figure as PNG."""
     buffer = io.BytesIO()
-    with _style():
+    with style():
         figure.savefig(buffer, format="png", dpi=dpi)
     return buffer.getvalue()
 
@@ -74,12 +75,12 @@ def snapshots(times: Array, positions: Array, instants: Sequence[float], traces:
 
     times: (T,) [s].  positions: (T, n + 1, 2) [m], base, joints and tip.
     """
-    with _style():
+    with style():
         reach = 1.08 * np.abs(positions[..., 0]).max()
         low, high = positions[..., 1].min() - 0.15 * reach, positions[..., 1].max() + 0.15 * reach
         columns = -(-len(instants) // 2)
         panel = 9.0 / columns  # inches; equal scales fix the height
-        figure = _figure(9.0, 2 * (0.86 * panel * (high - low) / (2 * reach) + 0.42) + 0.3)
+        figure = empty_figure(9.0, 2 * (0.86 * panel * (high - low) / (2 * reach) + 0.42) + 0.3)
         axes = figure.subplots(2, columns, sharex=True, sharey=True)
         for letter, (axis, instant) in zip("abcdefghijkl", zip(axes.flat, instants, strict=False), strict=False):
             row = int(np.abs(times - instant).argmin())
@@ -103,9 +104,9 @@ def snapshots(times: Array, positions: Array, instants: Sequence[float], traces:
 
 def images(pictures: Sequence[Array], titles: Sequence[str]) -> Figure:
     """Pictures, (height, width, 3) each, in two rows under their titles."""
-    with _style():
+    with style():
         shape = pictures[0].shape
-        figure = _figure(9.0, 2 * (9.0 / -(-len(pictures) // 2) * shape[0] / shape[1] + 0.3))
+        figure = empty_figure(9.0, 2 * (9.0 / -(-len(pictures) // 2) * shape[0] / shape[1] + 0.3))
         for axis, picture, title in zip(figure.subplots(2, -(-len(pictures) // 2)).flat, pictures, titles, strict=True):
             axis.imshow(picture)
             axis.set_title(title, fontsize=10, loc="left")
@@ -118,8 +119,8 @@ def bars(groups: Mapping[str, Mapping[str, tuple[float, float]]], colours: Mappi
 
     colours: {bar: colour}.
     """
-    with _style():
-        figure = _figure(9.0, 3.6)
+    with style():
+        figure = empty_figure(9.0, 3.6)
         for axis, (title, values) in zip(
             np.atleast_1d(figure.subplots(1, len(groups))).flat, groups.items(), strict=True
         ):
@@ -151,8 +152,8 @@ def powers(
     kinds: curves come in groups of so many, one colour a group and one line style a place in the group.
     colours: {curve: colour} in place of a colour for each group.
     """
-    with _style():
-        figure = _figure(9.0, 3.9)
+    with style():
+        figure = empty_figure(9.0, 3.9)
         axes = np.atleast_1d(figure.subplots(1, len(panels)))
         labels: dict[str, Any] = {}
         for axis, label, (title, curves) in zip(axes.flat, y, panels.items(), strict=True):

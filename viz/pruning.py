@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
-from cgraph.files import write as write_file
-
-from .document import Block, Document, Paragraph, Section, Table, to_html, to_markdown
+from .document import Block, Document, Paragraph, Section, Table
 
 Content = Mapping[str, Any]  # what `dynamics.reports.pruning.report` gives
 HEADER = ["", "why", "nodes", "edges"]
@@ -50,13 +45,3 @@ def _section(graph: Content) -> Section:
 
 def _rows(found: Sequence[Content]) -> list[list[str]]:
     return [[each["what"], each["why"], f"{each['nodes']}", f"{each['edges']}"] for each in found]
-
-
-def write(folder: Path, content: Content) -> Path:
-    """Write page, Markdown and JSON into a folder, each at once; returns the page."""
-    folder.mkdir(parents=True, exist_ok=True)
-    stem = re.sub(r"[^A-Za-z0-9.+-]+", "_", content["name"]).strip("_") + "-pruning"
-    made = document(content)
-    write_file(folder / f"{stem}.json", json.dumps(content, indent=1))
-    write_file(folder / f"{stem}.md", to_markdown(made))
-    return write_file(folder / f"{stem}.html", to_html(made))

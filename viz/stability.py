@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import itertools
-import json
 import re
 import textwrap
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cgraph.files import write as write_file
-
 from . import theme
-from .document import Block, Document, Paragraph, Picture, Section, Table, to_html, to_markdown
-from .plot import _figure, _style, to_adaptive_svg
+from .document import Block, Document, Paragraph, Picture, Section, Table
+from .plot import empty_figure, style, to_adaptive_svg
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,20 +20,7 @@ Content = Mapping[str, Any]  # what `content()` of the report gives, or its JSON
 Row = Mapping[str, Any]
 FROM, TO = 1e-12, 1e13  # shares of a bound that are drawn; what is outside is drawn at the border
 WIDTH, LINE, FRAME = 10.0, 0.17, 1.0  # inches: of a picture, of each case, and for the axis
-NAME = "stability"  # of the files
 NAMES = 34  # letters of a case's name on a line
-
-
-def write(folder: Path, content: Content, figures: str) -> Path:
-    """Write stability.html, .md with its pictures, .csv and .json into a folder; returns the page. figures: as CSV."""
-    folder.mkdir(parents=True, exist_ok=True)
-    page = document(content)
-    for picture in page.pictures():
-        write_file(folder / f"{NAME}-{picture.name}.svg", picture.svg)
-    write_file(folder / f"{NAME}.json", json.dumps(content, indent=1))
-    write_file(folder / f"{NAME}.csv", figures)
-    write_file(folder / f"{NAME}.md", to_markdown(page, f"{NAME}-"))
-    return write_file(folder / f"{NAME}.html", to_html(page))
 
 
 def document(content: Content) -> Document:
@@ -155,8 +138,8 @@ def shares(rows: Sequence[Row]) -> Figure:
         for each in row["figures"]
         if each["bound"] != "inf"
     ]
-    with _style():
-        figure = _figure(WIDTH, FRAME + LINE * len(names))
+    with style():
+        figure = empty_figure(WIDTH, FRAME + LINE * len(names))
         axis = figure.subplots()
         axis.set_xscale("log")
         axis.axvline(1.0, color=theme.LINE, linewidth=1.0)

@@ -20,7 +20,8 @@ from ..scipy_run import PREFIX
 from ..simulate import simulate
 from ..state_equation import state_inputs
 from .peers import Case, UnavailableError
-from .peers.casadi import CasadiPeer
+from .peers.casadi import CasadiPeer, casadi
+from .peers.heyoka import heyoka, leave_cache
 from .trajectory_peers import MOST, casadi_equations, heyoka_derivatives, heyoka_equations
 from .trajectory_runs import problem_of
 from .trajectory_scenes import Setting, load
@@ -64,9 +65,9 @@ def _ours(setting: Setting, method: str | None = None) -> None:
 
 def _heyoka(setting: Setting, compact: bool = False, cached: bool = False) -> None:
     """From the Lagrangian by heyoka's own derivatives; a state equation, or what it cannot derive, from ours."""
-    hy: Any = import_module("heyoka")
-    if not cached and hasattr(hy.llvm_state, "set_diskcache_enabled"):  # what other processes have compiled
-        hy.llvm_state.set_diskcache_enabled(False)
+    hy = heyoka()
+    if not cached:
+        leave_cache(hy)
     try:
         system = heyoka_derivatives(hy, setting)
     except UnavailableError:
@@ -79,7 +80,7 @@ def _heyoka(setting: Setting, compact: bool = False, cached: bool = False) -> No
 
 def _casadi(setting: Setting) -> None:
     """From the Lagrangian by CasADi's own derivatives; a state equation as it is."""
-    ca: Any = import_module("casadi")
+    ca = casadi()
     if setting.mechanical:
         case = Case(setting.name, setting.model)
         q, qd = ca.SX.sym("q", case.n), ca.SX.sym("qd", case.n)

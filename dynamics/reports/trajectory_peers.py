@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from importlib import import_module
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from ..integrators import Problem
+from ..mujoco_io import rollout
 from ..scipy_run import PREFIX, SOLVERS
 from ..system import TIME
 from ..trajectory import Array
-from .peers import PEERS, Case, UnavailableError
-from .peers.casadi import _NAMES as CASADI_NAMES
-from .peers.heyoka import HeyokaPeer
+from .peers import Case, UnavailableError
+from .peers.casadi import NAMES as CASADI_NAMES, casadi
+from .peers.heyoka import expressions, heyoka
 from .peers.mujoco import MujocoPeer
 from .peers.translate import translated
 from .trajectory_runs import EQUAL, Contender, Outcome, Scipy
@@ -44,10 +44,8 @@ class Mujoco(Contender):
         if not setting.mechanical:
             raise UnavailableError("takes rigid bodies, not a system of first order")
         self.peer = MujocoPeer(Case(setting.name, setting.model))
-        self.module = self.peer.mujoco
         self.model = self.peer.twin.model
-        self.model.opt.integrator = getattr(self.module.mjtIntegrator, f"mjINT_{integrator.upper()}")
-        self.rollout = import_module(f"{self.module.__name__}.rollout").rollout
+        self.model.opt.integrator = getattr(self.peer.mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
         n, order, at = self.peer.case.n, self.peer.order, self.peer.at
         self.taken = np.concatenate([1 + order, 1 + n + order])  # ours among time, qpos, qvel
         self.begin = np.concatenate([[0.0], self.start[:n][at], self.start[n:][at]])[None]
@@ -74,13 +72,11 @@ class Mujoco(Contender):
     def _states(self, steps: int) -> tuple[Array, Callable[[], Any]]:
         """Where the states of a run go, (1, steps, ..), and the run."""
         states = np.empty((1, steps, self.begin.shape[1]))
-        sensors, data = np.empty((1, steps, 0)), [self.module.MjData(self.model)]
+        native = rollout(self.model, self.begin, states)
 
         def run() -> None:
             self.model.opt.timestep = self.setting.t_end / steps  # shared by the runs of all steps
-            self.rollout(
-                [self.model], data, self.begin, nstep=steps, state=states, sensordata=sensors, skip_checks=True
-            )
+            native()
 
         return states, run
 
@@ -191,16 +187,6 @@ class Cvodes(Contender):
         return np.array([np.array(found(row, 0.0)).ravel() for row in x])
 
 
-def heyoka() -> Any:
-    """The module. Raises ImportError when it is not there."""
-    return import_module(PEERS["heyoka"].package)
-
-
-def casadi() -> Any:
-    """The module. Raises ImportError when it is not there."""
-    return import_module(PEERS["casadi"].package)
-
-
 def heyoka_equations(hy: Any, problem: Problem) -> list[tuple[Any, Any]]:
     """Our rate as heyoka's pairs of variable and expression. Raises UnavailableError for an operation it has not."""
     graph = problem.rate
@@ -216,7 +202,7 @@ def heyoka_derivatives(hy: Any, setting: Setting) -> list[tuple[Any, Any]]:
     if not setting.mechanical:
         raise UnavailableError("derives equations of a Lagrangian alone")
     case = Case(setting.name, setting.model)
-    rates, inputs = HeyokaPeer(case)._expressions("forward")
+    rates, inputs = expressions(case, "forward")
     rates = hy.subs(rates, {f"last_{i}": hy.expression(0.0) for i in range(case.n)})
     state = inputs[: 2 * case.n]
     return list(zip(state, [*state[case.n :], *rates], strict=True))

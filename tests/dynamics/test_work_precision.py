@@ -18,7 +18,7 @@ import dynamics as dyn
 from dynamics.integrators import METHODS
 from dynamics.reports import work_precision as module
 from dynamics.reports.cold_start import cold_starts
-from dynamics.reports.trajectory_peers import EPSILON, Cvodes, Heyoka, Mujoco
+from dynamics.reports.trajectory_peers import EPSILON, Cvodes, Heyoka, Mujoco, heyoka_derivatives
 from dynamics.reports.trajectory_runs import CHOSEN, EQUAL, Contender, Ours, Outcome, Scipy, problem_of
 from dynamics.reports.trajectory_scenes import INTERVALS, Setting, load, names
 from dynamics.reports.work_precision import (
@@ -259,6 +259,22 @@ def test_heyoka_gets_our_equations() -> None:
     assert float(judge.errors(theirs.rows(EPSILON)).max()) < 1e-13
     x = np.array([[0.3, -0.7], [1.0, 2.0]])
     assert theirs.rates(x) == approx(np.array([[-0.7, -0.3], [2.0, -1.0]]))
+
+
+def test_heyokas_derivatives_leave_its_cache_as_it_is() -> None:
+    """Or a cold start that is to find compiled code would find none."""
+    hy = pytest.importorskip("heyoka")
+    state = hy.llvm_state
+    if not hasattr(state, "get_diskcache_enabled"):
+        pytest.skip("this heyoka has no cache on disk")
+    before = state.get_diskcache_enabled()
+    try:
+        for enabled in (True, False):
+            state.set_diskcache_enabled(enabled)
+            assert len(heyoka_derivatives(hy, load("spring_mass"))) == 2
+            assert state.get_diskcache_enabled() is enabled
+    finally:
+        state.set_diskcache_enabled(before)
 
 
 def test_scipy_runs_on_our_rate() -> None:

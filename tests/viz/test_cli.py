@@ -108,7 +108,7 @@ def test_ctrl_c_gives_one_line_and_exit_status_130(monkeypatch, capsys):
     def interrupt(_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(cli, "_scenes", interrupt)
+    monkeypatch.setattr("viz.commands.scenes.run", interrupt)
     assert cli.main(["scenes"]) == 130
     assert capsys.readouterr().err == "cgraph: interrupted\n"
 

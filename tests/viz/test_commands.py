@@ -95,6 +95,14 @@ def test_lint_takes_a_file_with_a_coordinate_that_nothing_uses(tmp_path, capsys)
     assert "qd1 * dt -> q1" in [cut["text"] for cut in found["findings"][0]["cut"]]
 
 
+def test_the_page_of_a_file_tells_forces_from_torques(tmp_path, capsys):
+    pytest.importorskip("mujoco")
+    model, page = tmp_path / "cart.xml", tmp_path / "page.html"
+    model.write_text(MODEL)
+    said(capsys, "inspect", str(model), "--t-end", "0.1", "--out", str(page))
+    assert "Torques that each part takes at t = 0 [N m, of slides N]" in page.read_text(encoding="utf-8")
+
+
 def test_lint_looks_in_a_box_and_at_a_point(capsys):
     text = said(capsys, "lint", "triple_pendulum", "--box", "q0=-1:1,qd0=0:2", "--at", "q0=0.5")
     assert "no slope is unbounded in the box" in text
@@ -184,7 +192,7 @@ def test_two_runs_print_the_same_bytes():
     ],
 )
 def test_the_answer_is_marked(tmp_path, capsys, monkeypatch, arguments, status, colours):
-    monkeypatch.setattr("viz.commands.scene.render_svg", lambda drawing: drawing.source)  # a picture takes seconds
+    monkeypatch.setattr("viz.commands.arguments.render_svg", lambda drawing: drawing.source)  # a picture takes seconds
     target = tmp_path / "answer.svg"
     said(capsys, *arguments, "--svg", str(target), status=status)
     heavy = [line for line in target.read_text(encoding="utf-8").splitlines() if "penwidth" in line]

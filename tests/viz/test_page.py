@@ -61,7 +61,10 @@ def test_it_has_all_formulations_with_their_counts_and_spurious_nodes(pendulum):
         assert each["counts"] == [graph.counts().nodes, graph.counts().edges]
         assert len(each["marked"]) == len(dyn.spurious(graph))
         assert len(each["rows"]) == len(data["motion"]["t"])
-    assert "Torques that each part takes" in pendulum
+    table = pendulum.partition("Torques that each part takes at t = 0 [N m]")[2].partition("</table>")[0]
+    assert "<td>link 2</td><td>−0.9391</td>" in table
+    assert "<td>≈0</td>" in table  # what is left of the difference that damping is
+    assert "e-1" not in table
 
 
 def test_text_of_a_graph_stays_text():
@@ -317,6 +320,8 @@ def test_two_clicks_ask_why(opened):
     at = dict.fromkeys(graph.input_names, 0.5)
     assert f": {cg.why(graph, 'tau0', 'q0', at=at).count} paths" in opened.inner_text("#why")
     assert opened.locator(".onpath").count() > 2
+    assert opened.locator("#otau0.onpath.picked").count() == 1  # the output that was clicked, and the line to it
+    assert opened.locator('.line.onpath[data-to="otau0"]').count() == 1
     assert opened.locator("#node math").count() == 1
     opened.keyboard.press("Escape")
     assert opened.locator(".onpath").count() == 0
@@ -338,11 +343,39 @@ def test_search_finds_by_name_and_tag(opened):
 
 def test_sweeps_step_forward_and_back(opened):
     opened.keyboard.press("]")
+    assert opened.inner_text("#step") == "Before the first node."
     opened.keyboard.press("]")
-    assert opened.inner_text("#step").startswith("forward, 1 of 249")
-    opened.evaluate("(s) => { s.value = 250; s.oninput(); }", opened.query_selector("#sweep"))
-    assert opened.inner_text("#step").startswith("reverse, 1 of 249")
-    assert opened.inner_text("#step").endswith("has adjoint 0") or "has adjoint 1" in opened.inner_text("#step")
+    opened.keyboard.press("]")
+    assert opened.inner_text("#step").startswith("forward, 2 of 249: ")
+    opened.keyboard.press("[")
+    assert opened.inner_text("#step").startswith("forward, 1 of 249: ")
+
+
+def test_the_reverse_sweep_goes_from_the_chosen_output_to_its_derivatives(opened):
+    graph = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"), "euler_embedded")
+    move = "(slider, to) => { slider.value = to; slider.oninput(); }"
+    last = graph.nodes[-1]
+    assert last is graph.outputs["tau2"]
+    for output, adjoint in (("tau2", "1"), ("tau0", "0")):  # tau0 does not depend on tau2
+        opened.select_option("#from", output)
+        opened.eval_on_selector("#sweep", move, len(graph.nodes) + 1)
+        assert opened.inner_text("#step") == f"reverse, 1 of 249: τ₂ (+) has adjoint {adjoint}"
+    opened.eval_on_selector("#sweep", move, 2 * len(graph.nodes))
+    shown = opened.inner_text("#step").partition("reverse, 249 of 249: q̈₀ has adjoint ")[2]
+    at = dict(opened.eval_on_selector_all("#inputs input", "(all) => all.map((e) => [e.ariaLabel, Number(e.value)])"))
+    up, down = [graph.evaluate(at | {"qdd0": at["qdd0"] + sign * 1e-3})["tau0"] for sign in (1, -1)]
+    assert float(shown.replace("−", "-")) == pytest.approx((up - down) / 2e-3, rel=5e-3)  # three digits are shown
+
+
+def test_a_box_is_called_by_its_tags_and_says_how_many_nodes_it_has(opened):
+    opened.keyboard.press("3")
+    graph = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"))
+    damping = sum("damping" in node.tags and node.value is None for node in graph.nodes)
+    box = opened.locator(f'[aria-label="damping, as written, {damping} nodes, folded"]')
+    assert box.locator("text").all_text_contents() == ["▸ damping", f"{damping} nodes"]
+    drawn = sum(node.value is None for node in graph.nodes)
+    said = f"{len(graph.inputs)} of {drawn} nodes unfolded; {len(graph.nodes) - drawn} constants"
+    assert opened.inner_text("#trail") == said
 
 
 def test_the_motion_moves_the_values(opened):

@@ -9,6 +9,7 @@ import dynamics as dyn
 from dynamics.reports import pruning as pruning_report
 from viz import pruning
 from viz.cli import main
+from viz.document import to_html
 
 
 def test_the_page_has_every_row_of_the_account() -> None:
@@ -19,7 +20,7 @@ def test_the_page_has_every_row_of_the_account() -> None:
     assert [each["what"] for each in forward["left_out"]] == ["gravity"]  # it has no such input
     for graph in content["graphs"]:
         assert sum(each["nodes"] for each in graph["left_out"]) == graph["full"]["nodes"] - graph["pruned"]["nodes"]
-    page = pruning.to_html(pruning.document(content))
+    page = to_html(pruning.document(content))
     for each in (row for graph in content["graphs"] for row in graph["left_out"]):
         assert f"<td>{each['what']}</td><td>{each['why']}</td><td>{each['nodes']}</td>" in page
 

@@ -14,6 +14,7 @@ import pytest
 
 from viz import cli, theme
 from viz.document import Document, Paragraph, Picture, Section, Table, to_html, to_markdown
+from viz.document_files import write_document
 
 pytest.importorskip("matplotlib")
 
@@ -155,6 +156,18 @@ def test_markdown_has_what_the_page_has() -> None:
     page = to_html(document)
     assert "<h2>Heading</h2>" in page
     assert "<td>x|y</td>" in page
+
+
+def test_files_of_a_document_are_called_by_its_name(tmp_path: Path) -> None:
+    document = Document("Title", [Picture("curve", "<svg/>", "a curve")])
+    page = write_document(tmp_path / "new", "an arm <3>", document, {"a": 1}, kind="kind")
+    assert page == tmp_path / "new" / "an_arm_3-kind.html"
+    assert {each.name: each.read_text(encoding="utf-8") for each in page.parent.iterdir()} == {
+        "an_arm_3-kind.html": to_html(document),
+        "an_arm_3-kind.md": to_markdown(document, "an_arm_3-kind-"),
+        "an_arm_3-kind.json": '{\n "a": 1\n}',
+        "an_arm_3-kind-curve.svg": "<svg/>",
+    }
 
 
 def test_names_lie_apart_and_inside() -> None:

@@ -8,6 +8,8 @@ from typing import Any
 import pytest
 
 from viz import cli, stability
+from viz.document import to_html
+from viz.document_files import write_document
 
 pytest.importorskip("matplotlib")
 
@@ -49,7 +51,7 @@ CONTENT = {
 
 
 def test_the_page_counts_verdicts_and_gives_every_reason_once() -> None:
-    page = stability.to_html(stability.document(CONTENT))
+    page = to_html(stability.document(CONTENT))
     assert "1 of 4 rows meet their bounds; limits with a known reason: 2; unexplained: 1." in page
     assert page.count("A known &lt;reason&gt;.") == 1
     assert "Unexplained. stopped at t = 1 s" in page
@@ -91,7 +93,7 @@ def test_what_is_beyond_its_bound_is_drawn_in_the_colour_of_what_is_wrong() -> N
 
 
 def test_files_are_written_and_the_page_needs_no_other(tmp_path: Path) -> None:
-    page = stability.write(tmp_path / "new", CONTENT, "section,case\n")
+    page = write_document(tmp_path / "new", "stability", stability.document(CONTENT), CONTENT, "section,case\n")
     assert {each.name for each in page.parent.iterdir()} == {
         "stability.html",
         "stability.md",
@@ -122,7 +124,7 @@ def test_the_command_writes_the_table_and_fails_for_an_unexplained_row(
         yield from case_runs.verdicts(["exponential decay"], ("dopri5",))
         yield from case_runs.verdicts(["Kapitza's pendulum"], methods)
 
-    monkeypatch.setattr(cli.stability, "verdicts", two)
+    monkeypatch.setattr("dynamics.reports.stability.verdicts", two)
     methods = ("dopri5",)
     assert cli.main(["report", "--stability", "--quick", "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr()

@@ -10,7 +10,7 @@ from dynamics import FORMULATIONS, inverse_dynamics
 from dynamics.classes import formulation_classes
 
 from ..dot import to_dot
-from .scene import Commands, draw, may_draw_and_print, scene_of, state_names, takes_a_scene
+from .arguments import Commands, draw, may_draw_and_print, scene_of, state_names, takes_a_scene
 
 
 def add(commands: Commands[argparse.ArgumentParser]) -> None:

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from cgraph.files import write
+from dynamics import scenes
 from dynamics.inspection import inspection
 
+from .. import theme
 from ..inspector import Motion, Table, Version, page
-from .scene import Commands, scene_of, takes_a_scene
+from .arguments import Commands, scene_of, takes_a_scene
+
+ROUNDING = 1e-12  # of the largest torque: smaller ones are what is left of a difference
 
 
 def add(commands: Commands[argparse.ArgumentParser]) -> None:
@@ -31,13 +39,11 @@ def run(options: argparse.Namespace) -> None:
     scene = scene_of(options)
     found = inspection(scene, forward=options.forward, t_end=options.t_end)
     bones = found.skeleton
-    head = ["part", *(f"τ{i} [N m]" for i in range(scene.system.n))]
-    rows = [[part, *(f"{value:.4g}" for value in torques)] for part, torques in found.shares.items()]
     text = page(
         [Version(each.name.replace("_", " "), *each[1:]) for each in found.versions],
         title=f"{scene.name}: {'forward' if options.forward else 'inverse'} dynamics",
         motion=Motion(found.t, bones.points, bones.parents) if bones else Motion(found.t, None, ()),
-        tables=[Table("Torques that each part takes at t = 0", head, rows)] if rows else [],
+        tables=[_torques(scene, found.shares)] if found.shares else [],
     )
     write(options.out, text)
     sizes = {
@@ -50,3 +56,16 @@ def run(options: argparse.Namespace) -> None:
     else:
         counts = ", ".join(f"{name} {each['nodes']} nodes" for name, each in sizes.items())
         print(f"{options.out}: {counts}; {size / 1e6:.2f} MB")
+
+
+def _torques(scene: scenes.Scene, shares: Mapping[str, NDArray[np.float64]]) -> Table:
+    """A row for each part; what is rounding beside the largest number is written as such."""
+    largest = max(float(np.abs(torques).max()) for torques in shares.values())
+
+    def text(value: float) -> str:
+        return "≈0" if 0.0 < abs(value) <= ROUNDING * largest else f"{value:.4g}".replace("-", "−")
+
+    slides = any(body.joint.kind == "prismatic" for body in getattr(scene.model, "moving", ()))
+    caption = f"Torques that each part takes at t = 0 [N m{', of slides N' if slides else ''}]"
+    rows = [[part, *map(text, torques)] for part, torques in shares.items()]
+    return Table(caption, ["part", *(theme.pretty(f"tau{i}") for i in range(scene.system.n))], rows)

@@ -15,7 +15,7 @@ from dynamics import inverse_dynamics, momentum_rate, scenes, spurious
 from dynamics.reports.equation3 import equation3
 
 from ..lesson import Lesson, page
-from .scene import Commands
+from .arguments import Commands
 
 STEPS = (1.0, 0.1, 0.01, 1e-3, 1e-6)  # s
 ARM_DT = 1e-6  # s

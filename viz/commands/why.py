@@ -12,8 +12,8 @@ from cgraph.reverse import cotangents
 from dynamics import forward_dynamics, inverse_dynamics
 
 from ..dot import to_dot
+from .arguments import Commands, draw, may_draw_and_print, scene_of, takes_a_formulation, takes_a_scene
 from .point import REST, filled, point, point_text
-from .scene import Commands, draw, may_draw_and_print, scene_of, takes_a_formulation, takes_a_scene
 
 
 def add(commands: Commands[argparse.ArgumentParser]) -> None:

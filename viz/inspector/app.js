@@ -94,7 +94,9 @@ function start() {
   }
   function announce() {
     const one = [...drawn.items.values()].filter((item) => item.group.dataset.node !== undefined && !item.output).length;
-    $("trail").textContent = `${one} of ${version().counts[0] - version().constants.size} nodes unfolded`;
+    const constants = version().constants.size;
+    $("trail").textContent = `${one} of ${version().counts[0] - constants} nodes unfolded`
+      + `${constants ? `; ${constants} constant${constants > 1 ? "s" : ""}` : ""}`;
   }
 
   // Marks
@@ -135,8 +137,12 @@ function start() {
   }
   function mark() {
     clear("picked");
-    if (state.picked >= 0) drawn.items.get(drawn.shownBy[state.picked])?.group.classList.add("picked");
-    if (state.before >= 0) drawn.items.get(drawn.shownBy[state.before])?.group.classList.add("picked");
+    for (const node of [state.picked, state.before]) shapesOf(node).forEach((item) => item.group.classList.add("picked"));
+  }
+  /** What shows a node: itself or the box that it is in, and the outputs that it is. */
+  function shapesOf(node) {
+    const named = outputs().filter(([, , out]) => out === node).map(([name]) => `o${name}`);
+    return [drawn.shownBy[node], ...named].map((id) => drawn.items.get(id)).filter(Boolean);
   }
   function paintSweep() {
     clear("current", "done");
@@ -152,9 +158,10 @@ function start() {
     clear("onpath");
     svg.classList.toggle("tracing", Boolean(state.path));
     if (!state.path) return;
-    const ids = state.path.map((node) => drawn.shownBy[node]);
-    ids.forEach((id) => drawn.items.get(id)?.group.classList.add("onpath"));
-    const steps = new Set(state.path.slice(1).map((node, i) => `${state.path[i]} ${node}`));
+    const last = state.path.at(-1);
+    state.path.slice(0, -1).forEach((node) => drawn.items.get(drawn.shownBy[node])?.group.classList.add("onpath"));
+    shapesOf(last).forEach((item) => item.group.classList.add("onpath"));
+    const steps = new Set([...state.path.slice(1).map((node, i) => `${state.path[i]} ${node}`), `${last} ${last}`]); // to an output
     for (const { path, pairs } of drawn.arrows) {
       if (pairs.some(([s, t]) => steps.has(`${s} ${t}`))) path.classList.add("onpath");
     }
@@ -214,7 +221,7 @@ function start() {
     const rows = names.map((name) => `<tr><th scope="row">${html(pretty.get(name))}</th>${found.map((each, i) => {
       const value = each.get(name), truth = right < 0 ? value : found[right].get(name);
       const off = value !== undefined && truth !== undefined && Math.abs(value - truth) > 0.01 * Math.max(0.1, Math.abs(truth));
-      return `<td class="${off ? "off" : ""}">${value === undefined ? "" : (Math.abs(value) < 5e-4 ? "0" : brief(value))}</td>`;
+      return `<td class="${off ? "off" : ""}">${value === undefined ? "" : (value && Math.abs(value) < 5e-4 ? "≈0" : brief(value))}</td>`;
     }).join("")}</tr>`);
     $("results").innerHTML = `<table><thead><tr><th></th>${versions.map((each) => `<th scope="col">${html(each.name)}</th>`).join("")}</tr></thead>`
       + `<tbody>${rows.join("")}</tbody></table>${right < 0 ? "" : `<p class="quiet">In vermillion: differs from ${html(versions[right].name)}.</p>`}`;

@@ -178,7 +178,8 @@ function draw(svg, data, version, folded) {
     const role = cluster.marked ? "wrong" : commonRole(version, inside[c]);
     const many = inside[c].length;
     const words = titleOf(cluster);
-    const title = words ? `${words} (${many})` : `${many} node${many > 1 ? "s" : ""}`;
+    const count = `${many} node${many > 1 ? "s" : ""}`;
+    const title = words ? `${words} (${many})` : count;
     if (!folded.has(c)) {
       const group = element("g", { class: `frame ${role}`, "data-cluster": c, tabindex: -1, role: "button" }, frames);
       group.setAttribute("aria-label", `fold ${cluster.column} ${title}`);
@@ -187,12 +188,12 @@ function draw(svg, data, version, folded) {
       label.textContent = `▾ ${title}`;
       return;
     }
-    const first = words ? (cluster.marked ? "spurious" : cluster.title) : title;
-    const second = !words ? "" : cluster.marked && cluster.title ? `${cluster.title} (${many})` : `${many} node${many > 1 ? "s" : ""}`;
+    const first = cluster.marked ? "spurious" : cluster.title || cluster.column || "no tag";
+    const second = cluster.marked && cluster.title ? `${cluster.title} (${many})` : count;
     const item = shape(shapes, id, { ...at }, `box ${role}`, `▸ ${first.length > 13 ? `${first.slice(0, 12)}…` : first}`, true);
     item.group.setAttribute("data-cluster", c);
     item.group.setAttribute("aria-expanded", "false");
-    item.group.setAttribute("aria-label", `${cluster.column}, ${cluster.stage}, ${title} nodes, folded`);
+    item.group.setAttribute("aria-label", [cluster.column, cluster.stage, words, count, "folded"].filter(Boolean).join(", "));
     items.set(id, { ...item, nodes: inside[c], second });
     for (const node of inside[c]) shownBy[node] = id;
   });

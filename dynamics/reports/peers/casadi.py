@@ -18,7 +18,8 @@ from .ours import task_graph
 from .translate import lagrangian, translated
 
 FLAGS = ("-O3", "-march=native", "-shared", "-fPIC")
-_NAMES = {"abs": "fabs", "minimum": "fmin", "maximum": "fmax", "where": "if_else"}
+# Of our operations, where CasADi has another name.
+NAMES = {"abs": "fabs", "minimum": "fmin", "maximum": "fmax", "where": "if_else"}
 
 
 class CasadiPeer(Peer):
@@ -29,9 +30,7 @@ class CasadiPeer(Peer):
 
     def __init__(self, case: Case, native: bool = False, own_graph: bool = True) -> None:
         super().__init__(case)
-        import casadi
-
-        self.casadi, self.native = casadi, native
+        self.casadi, self.native = casadi(), native
         self.compiler = os.environ.get("CC") or shutil.which("gcc") or shutil.which("cc")
         self.function = cache(self._lagrange if own_graph else self._ours)
 
@@ -41,7 +40,7 @@ class CasadiPeer(Peer):
         if task == "rk4":
             return self._step(self.function("forward"))
         q, qd, last = (ca.SX.sym(name, n) for name in ("q", "qd", "last"))
-        energy, forces = lagrangian(self.case, ca.vertsplit(q), ca.vertsplit(qd), ca, _NAMES, ca.SX)
+        energy, forces = lagrangian(self.case, ca.vertsplit(q), ca.vertsplit(qd), ca, NAMES, ca.SX)
         p, slope = ca.gradient(energy, qd), ca.gradient(energy, q)
         known = ca.vertcat(*forces) - ca.DM(list(self.case.system.damping)) * qd + slope
         if task == "inverse":
@@ -59,7 +58,7 @@ class CasadiPeer(Peer):
             return self._step(self.function("forward"))
         graph = task_graph(self.case, task)
         x = ca.SX.sym("x", len(graph.inputs))
-        values = translated(graph.nodes, dict(zip(graph.inputs, ca.vertsplit(x), strict=True)), ca, _NAMES, ca.SX)
+        values = translated(graph.nodes, dict(zip(graph.inputs, ca.vertsplit(x), strict=True)), ca, NAMES, ca.SX)
         return ca.Function(task, [x], [ca.vertcat(*[values[node] for node in graph.outputs.values()])])
 
     def _step(self, forward: Any) -> Any:
@@ -125,3 +124,10 @@ class CasadiPeer(Peer):
             if done.returncode:
                 raise UnavailableError(f"the C compiler failed: {done.stderr.strip()[-200:]}")
             return self.casadi.external(function.name(), str(library))
+
+
+def casadi() -> Any:
+    """The module. Raises ImportError when it is not there."""
+    import casadi as module
+
+    return module

@@ -18,36 +18,47 @@ class HeyokaPeer(Peer):
 
     def __init__(self, case: Case) -> None:
         super().__init__(case)
-        import heyoka
-
-        if hasattr(heyoka.llvm_state, "set_diskcache_enabled"):  # else a second run finds the first one's code
-            heyoka.llvm_state.set_diskcache_enabled(False)
-        self.heyoka = heyoka
+        self.heyoka = heyoka()
+        leave_cache(self.heyoka)
         self.functions: dict[str, Any] = {}
 
     def prepare(self, task: str, mode: str) -> Contender:
         """See Peer."""
         if task not in self.functions:
-            outputs, inputs = self._expressions(task)
+            outputs, inputs = expressions(self.case, task)
             self.functions[task] = self.heyoka.cfunc(outputs, inputs, compact_mode=self.case.n > COMPACT)
         function, many = self.functions[task], mode == "batch"
         x = self.case.points(task) if many else self.case.point(task)
         y = np.empty((self.case.n, *x.shape[1:]))
         return Contender(lambda: function(x, outputs=y), lambda _: y.copy(), BATCH if many else 1)
 
-    def _expressions(self, task: str) -> tuple[list[Any], list[Any]]:
-        """The task's outputs and inputs."""
-        hy, n = self.heyoka, self.case.n
-        inputs = hy.make_vars(*[f"{block}_{i}" for block in ("q", "qd", "last") for i in range(n)])
-        q, qd, last = inputs[:n], inputs[n : 2 * n], inputs[2 * n :]
-        energy, forces = lagrangian(self.case, q, qd, hy, number=hy.expression)
-        slopes = list(hy.diff_tensors([energy], diff_args=[*q, *qd], diff_order=1).gradient)
-        rows = hy.diff_tensors(slopes[n:], diff_args=[*q, *qd], diff_order=1).jacobian
-        damping = self.case.system.damping
-        known = [slopes[i] + forces[i] - damping[i] * qd[i] for i in range(n)]
-        moved = [hy.sum([rows[i, k] * qd[k] for k in range(n)]) for i in range(n)]
-        if task == "forward":
-            mass = [[rows[i, n + k] for k in range(n)] for i in range(n)]
-            return ldl_solve(mass, [last[i] + known[i] - moved[i] for i in range(n)]), inputs
-        inertia = [hy.sum([rows[i, n + k] * last[k] for k in range(n)]) for i in range(n)]
-        return [inertia[i] + moved[i] - known[i] for i in range(n)], inputs
+
+def heyoka() -> Any:
+    """The module. Raises ImportError when it is not there."""
+    import heyoka as module
+
+    return module
+
+
+def leave_cache(hy: Any) -> None:
+    """Let this process compile all by itself; else a second run finds on disk what the first one has compiled."""
+    if hasattr(hy.llvm_state, "set_diskcache_enabled"):
+        hy.llvm_state.set_diskcache_enabled(False)
+
+
+def expressions(case: Case, task: str) -> tuple[list[Any], list[Any]]:
+    """Outputs and inputs of inverse or forward dynamics in heyoka's expressions, by its own derivatives."""
+    hy, n = heyoka(), case.n
+    inputs = hy.make_vars(*[f"{block}_{i}" for block in ("q", "qd", "last") for i in range(n)])
+    q, qd, last = inputs[:n], inputs[n : 2 * n], inputs[2 * n :]
+    energy, forces = lagrangian(case, q, qd, hy, number=hy.expression)
+    slopes = list(hy.diff_tensors([energy], diff_args=[*q, *qd], diff_order=1).gradient)
+    rows = hy.diff_tensors(slopes[n:], diff_args=[*q, *qd], diff_order=1).jacobian
+    damping = case.system.damping
+    known = [slopes[i] + forces[i] - damping[i] * qd[i] for i in range(n)]
+    moved = [hy.sum([rows[i, k] * qd[k] for k in range(n)]) for i in range(n)]
+    if task == "forward":
+        mass = [[rows[i, n + k] for k in range(n)] for i in range(n)]
+        return ldl_solve(mass, [last[i] + known[i] - moved[i] for i in range(n)]), inputs
+    inertia = [hy.sum([rows[i, n + k] * last[k] for k in range(n)]) for i in range(n)]
+    return [inertia[i] + moved[i] - known[i] for i in range(n)], inputs

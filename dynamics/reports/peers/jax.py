@@ -12,7 +12,7 @@ from .contender import Contender, Peer, ldl_solve
 from .translate import lagrangian
 
 SHORT = 10  # coordinates; beyond, a solve written out takes longer to compile than it gains on LAPACK's Cholesky
-_NAMES = {f"a{name}": f"arc{name}" for name in ("sin", "cos", "tan")} | {"atan2": "arctan2"}
+NAMES = {f"a{name}": f"arc{name}" for name in ("sin", "cos", "tan")} | {"atan2": "arctan2"}
 
 
 class JaxPeer(Peer):
@@ -28,11 +28,11 @@ class JaxPeer(Peer):
         self.jax, self.np = jax, jax.numpy
 
     def _energy(self, q: Any, qd: Any) -> Any:
-        return lagrangian(self.case, q, qd, self.np, _NAMES)[0]
+        return lagrangian(self.case, q, qd, self.np, NAMES)[0]
 
     def _known(self, q: Any, qd: Any) -> Any:
         """dL/dq, applied forces and damping."""
-        forces = self.np.stack([self.np.asarray(f) for f in lagrangian(self.case, q, qd, self.np, _NAMES)[1]])
+        forces = self.np.stack([self.np.asarray(f) for f in lagrangian(self.case, q, qd, self.np, NAMES)[1]])
         damping = self.np.array(self.case.system.damping) * qd
         return self.jax.grad(self._energy, 0)(q, qd) + forces - damping
 

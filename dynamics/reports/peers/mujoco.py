@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
 from typing import Any
 
 import numpy as np
 
 from ...mechanism import Mechanism
-from ...mujoco_io import MujocoTwin
+from ...mujoco_io import MujocoTwin, rollout
 from ...planar_arm import PlanarArm
 from .case import BATCH, DT, PASSES, Array, Case
 from .contender import Contender, Peer, UnavailableError
@@ -62,21 +61,15 @@ class MujocoPeer(Peer):
 
     def _rollout(self, mode: str) -> Contender:
         """A thousand steps of one state, or one step of each of many, by MuJoCo's own loop in one thread."""
-        module = importlib.import_module(f"{self.mujoco.__name__}.rollout")
-        n, model = self.case.n, self.twin.model
+        n = self.case.n
         steps = PASSES if mode == "loop" else 1
         x = self.case.points("rk4") if mode == "batch" else self.case.point("rk4")[:, None]
         starts = np.hstack([np.zeros((x.shape[1], 1)), x[self.at].T, x[n + self.at].T])  # time, qpos, qvel
         states = np.empty((len(starts), steps, starts.shape[1]))
-        sensors = np.empty((len(starts), steps, 0))
-        models, data = [model] * len(starts), [self.mujoco.MjData(model)]  # one datum: one thread
         taken = np.concatenate([1 + self.order, 1 + n + self.order])
-
-        def run() -> None:
-            module.rollout(models, data, starts, nstep=steps, state=states, sensordata=sensors, skip_checks=True)
 
         def result(_: Any) -> Array:
             last: Array = states[:, -1, taken].T
             return last.copy() if mode == "batch" else last[:, 0].copy()
 
-        return Contender(run, result, BATCH if mode == "batch" else PASSES)
+        return Contender(rollout(self.twin.model, starts, states), result, BATCH if mode == "batch" else PASSES)

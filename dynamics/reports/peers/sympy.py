@@ -10,7 +10,7 @@ from .case import BATCH, Array, Case
 from .contender import Contender, Peer
 from .translate import lagrangian
 
-_NAMES = {"abs": "Abs", "minimum": "Min", "maximum": "Max"}
+NAMES = {"abs": "Abs", "minimum": "Min", "maximum": "Max"}
 
 
 class SympyPeer(Peer):
@@ -35,7 +35,7 @@ class SympyPeer(Peer):
         sp, n = self.sympy, self.case.n
         inputs = sp.symbols([f"{block}_{i}" for block in ("q", "qd", "last") for i in range(n)])
         q, qd, last = inputs[:n], inputs[n : 2 * n], inputs[2 * n :]
-        energy, forces = lagrangian(self.case, q, qd, sp, _NAMES, sp.Float)
+        energy, forces = lagrangian(self.case, q, qd, sp, NAMES, sp.Float)
         p = [sp.diff(energy, each) for each in qd]
         damping = self.case.system.damping
         known = [sp.diff(energy, q[i]) + forces[i] - damping[i] * qd[i] for i in range(n)]

@@ -30,8 +30,13 @@ def scene_of(options: argparse.Namespace) -> scenes.Scene:
     """The scene that the arguments name; what of a file is left out goes to standard error, a line each."""
     scene = scenes.load(options.scene, **({"ignore": True} if options.ignore else {}))
     for what in scene.left_out:
-        print(f"cgraph: {scene.name}: left out {what}", file=sys.stderr)
+        say(f"{scene.name}: left out {what}")
     return scene
+
+
+def say(line: str) -> None:
+    """A line of progress or of warning, on standard error."""
+    print(f"cgraph: {line}", file=sys.stderr, flush=True)
 
 
 def takes_a_formulation(command: argparse._ActionsContainer) -> None:
@@ -50,7 +55,7 @@ def may_draw_and_print(command: argparse.ArgumentParser) -> None:
 def draw(options: argparse.Namespace, drawing: Drawing) -> None:
     """Write a drawing to the file that `--svg` names."""
     write(options.svg, render_svg(drawing))
-    print(f"cgraph: drawn in {options.svg}", file=sys.stderr)
+    say(f"drawn in {options.svg}")
 
 
 def state_names(graph: Graph, n: int) -> tuple[list[str], list[str]]:

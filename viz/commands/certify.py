@@ -1,0 +1,38 @@
+"""`cgraph certify`: equations that a scene's graphs must fulfil, and their agreement with other software."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from dynamics import scenes
+from dynamics.tables.certificate import certify
+
+from .arguments import Commands, scene_of, takes_a_scene
+
+
+def add(commands: Commands[argparse.ArgumentParser]) -> None:
+    """The command's arguments."""
+    parser = commands.add_parser(
+        "certify", help="equations that a scene's graphs must fulfil, at random states, and agreement with peers"
+    )
+    takes_a_scene(parser)
+    parser.add_argument("--states", type=int, default=20, metavar="N", help="random states (default: 20)")
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the random states (default: 0)")
+    parser.add_argument("--json", action="store_true", help="print as JSON")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Print the residuals. Raises RuntimeError where one exceeds its bound."""
+    scene = scene_of(options)
+    twin = None if options.scene in scenes.names() else Path(options.scene)
+    certificate = certify(scene, options.states, options.seed, twin=twin)
+    if options.json:
+        print(json.dumps({"scene": scene.name} | certificate.as_dict(), indent=1))
+    else:
+        print(certificate.text(), end="")
+    if not certificate.passed:
+        failed = [each.equation for each in certificate.residuals if not each.passed]
+        raise RuntimeError(f"{scene.name}: {len(failed)} residual(s) exceed their bound: {'; '.join(failed)}")

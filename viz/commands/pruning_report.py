@@ -1,0 +1,34 @@
+"""`cgraph report --pruning`: what a scene's graphs hold and leave out, as a page."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from dynamics import EFFECTS, scenes
+from dynamics.reports import pruning
+
+from .. import pruning as page
+from ..document_files import write_document
+
+
+def run(options: argparse.Namespace) -> None:
+    """Write a page for each scene."""
+    without = [each for each in options.without.split(",") if each]
+    if unknown := [each for each in without if each not in EFFECTS]:
+        raise ValueError(f"effects are {', '.join(EFFECTS)}, got {unknown[0]!r}")
+    if wrong := [each for each in options.lock if "=" not in each]:
+        raise ValueError(f"--lock must be a body and a coordinate, BODY=AT, got {wrong[0]!r}")
+    lock = {body: float(at) for body, _, at in (each.rpartition("=") for each in options.lock)}
+    found = []
+    for name in options.scenes:
+        scene = scenes.load(name, **({"ignore": True} if options.ignore else {}))
+        content = pruning.report(scene, effects=[each for each in EFFECTS if each not in without], lock=lock)
+        found.append(content)
+        written = write_document(options.out, content["name"], page.document(content), content, kind="pruning")
+        if not options.json:
+            sizes = [f"{each['equations']} {each['full']['nodes']} to {each['pruned']['nodes']} nodes"
+                     for each in content["graphs"]]  # fmt: skip
+            print(f"{written}: {', '.join(sizes)}")
+    if options.json:
+        print(json.dumps(found, indent=1))

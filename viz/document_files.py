@@ -1,0 +1,32 @@
+"""Files of a document: one page, its Markdown with pictures, its rows as CSV, and its data as JSON."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from cgraph.files import write
+
+from .document import Document, to_html, to_markdown
+
+
+def write_document(
+    folder: Path, name: str, document: Document, data: Mapping[str, Any], rows: str | None = None, *, kind: str = ""
+) -> Path:
+    """Write the files of one document into a folder, made if it is missing, each at once; returns the page.
+
+    They are called by the name, with `_` for what a file's name should not have, and `-kind` where there is a kind.
+    data: what the document was made of.  rows: as CSV; without them that file is left out.
+    """
+    stem = "-".join(filter(None, [re.sub(r"[^A-Za-z0-9.+-]+", "_", name).strip("_"), kind]))
+    folder.mkdir(parents=True, exist_ok=True)
+    for picture in document.pictures():
+        write(folder / f"{stem}-{picture.name}.svg", picture.svg)
+    write(folder / f"{stem}.json", json.dumps(data, indent=1))
+    if rows is not None:
+        write(folder / f"{stem}.csv", rows)
+    write(folder / f"{stem}.md", to_markdown(document, f"{stem}-"))
+    return write(folder / f"{stem}.html", to_html(document))
