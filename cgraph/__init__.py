@@ -3,6 +3,7 @@
 from .c import CSource
 from .codegen import Compiled, clear_cache, compile
 from .counts import Counts
+from .double_double import double_double
 from .errors import GraphError
 from .explain import Diff, Lint, Why, WhyNot, diff, lint, why, why_not
 from .forward import jvp
@@ -69,6 +70,7 @@ __all__ = [
     "cos",
     "cosh",
     "diff",
+    "double_double",
     "equal",
     "exp",
     "expm1",

@@ -6,18 +6,22 @@ centre and inertia, damping, gravity), the error is
 The sum is what a relative change of each x_j makes of y_i: the componentwise condition, in the maximum norm. So 1 is
 what rounding the data once would do, whatever the algorithm. The derivatives are the graph's own (`cg.jvp`, of an arm
 whose parameters are inputs), the exact values come from closed formulas in multiprecision.
+
+In double-double the parameters are inputs too. Built in, products of them are rounded when the graph is made, each on
+its own, and then m l_1 l_2, m l_1 and m g no longer belong to one m: with a mass of 1e12 that moves the light links.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import cgraph as cg
-from cgraph import Graph, Node
+from cgraph import Compiled, Graph, Node
 
 from ..equations import forward_dynamics
 from ..formulations import inverse_dynamics
@@ -36,9 +40,20 @@ LINKS, QUICK = (3, 10, 50), (3, 10)
 STATES = 5  # of each arm
 LANES = 9  # of a batch: full vectors and what is left over
 SEED = 2025
-TASKS: dict[str, tuple[Callable[..., Graph], Callable[..., Pair]]] = {
-    "inverse dynamics": (inverse_dynamics, torques),
-    "forward dynamics": (forward_dynamics, accelerations),
+
+
+class Task(NamedTuple):
+    """What is evaluated.  doubled: in double-double, see above."""
+
+    derive: Callable[..., Graph]
+    exact: Callable[..., Pair]
+    doubled: bool = False
+
+
+TASKS = {
+    "inverse dynamics": Task(inverse_dynamics, torques),
+    "forward dynamics": Task(forward_dynamics, accelerations),
+    "forward dynamics in double-double": Task(forward_dynamics, accelerations, doubled=True),
 }
 
 
@@ -80,13 +95,13 @@ def verdicts(links: Sequence[int] = LINKS, backends: Sequence[str] | None = None
     point and for a batch. Raises ImportError without python-flint.
     """
     chosen = tuple(backends or available())
-    for task in TASKS:
-        conditions = [Condition(task, n) for n in links]
+    for name, task in TASKS.items():
+        arms = [Arms(task, n, chosen) for n in links]
         for family in FAMILIES:
-            figures = tuple([figure(task, family, condition, chosen) for condition in conditions])
-            name = f"{task}, {family.name}"
-            known = reason(SECTION, name, "", figures)
-            yield Verdict(SECTION, name, family.about, "+".join(chosen), figures, reason=known)
+            figures = tuple([figure(family, each) for each in arms])
+            case = f"{name}, {family.name}"
+            known = reason(SECTION, case, "", figures)
+            yield Verdict(SECTION, case, family.about, "+".join(chosen), figures, reason=known)
 
 
 def available() -> tuple[str, ...]:
@@ -98,22 +113,22 @@ def available() -> tuple[str, ...]:
     return ("python", "llvm")
 
 
-def figure(task: str, family: Family, condition: Condition, backends: Sequence[str]) -> Figure:
+def figure(family: Family, arms: Arms) -> Figure:
     """The worst error over some states, one point at a time and in a batch."""
-    n, (derive, solve) = condition.n, TASKS[task]
+    n = arms.n
     rng = np.random.default_rng([SEED, n])
     arm = arm_of(family, n, rng)
-    graph = derive(arm)
-    functions = [cg.compile(graph, backend) for backend in backends]
+    functions = arms.functions(arm)
     worst = 0.0
     for _ in range(STATES):
         q = rng.uniform(-family.angle, family.angle, n)
         qd, third = family.velocity * rng.normal(size=n), 5.0 * rng.normal(size=n)
-        exact, point = solve(arm, q, qd, third), np.concatenate([q, qd, third])
-        size = np.max(np.abs(exact.high) + condition(arm, point))
+        exact, point = arms.task.exact(arm, q, qd, third), np.concatenate([q, qd, third])
+        size = np.max(np.abs(exact.high) + arms.condition(arm, point))
+        given = arms.with_parameters(arm, point) if arms.task.doubled else point
         for function in functions:
-            lanes = function.batch(np.repeat(point[:, None], LANES, axis=1))
-            for found in (function(point), lanes[:, 0], lanes[:, -1]):
+            lanes = function.batch(np.repeat(given[:, None], LANES, axis=1))
+            for found in (function(given), lanes[:, 0], lanes[:, -1]):
                 error = np.max(np.abs(exact.deviation(found))) / (ULP * size)
                 worst = float(np.maximum(worst, error))  # NaN stays NaN
     return Figure(f"{n} links", worst, BOUND, "ulp", "of the condition: some operations one after another, each an ulp")
@@ -128,18 +143,39 @@ def arm_of(family: Family, n: int, rng: np.random.Generator) -> PlanarArm:
     return planar_arm(masses.tolist(), lengths.tolist(), damping=0.1)
 
 
-class Condition:
-    """sum_j |df_i/dx_j| |x_j| over all inputs and parameters of an arm of n links, by the JVP of its graph."""
+class Arms:
+    """A task for arms of n links: what evaluates it, and its condition."""
 
-    def __init__(self, task: str, n: int) -> None:
-        self.n = n
-        graph = TASKS[task][0](arm_with_parameters(n))
-        self._slopes = cg.compile(cg.simplify(cg.jvp(graph)), "numpy")
+    def __init__(self, task: Task, n: int, backends: Sequence[str] = ()) -> None:
+        self.task, self.n, self.backends = task, n, backends
+        self._graph = task.derive(arm_with_parameters(n))
 
-    def __call__(self, arm: PlanarArm, point: Array) -> Array:
-        """(n,), at the values (3n,) of the inputs in the order of the graph: angles, velocities, and the third."""
+    def functions(self, arm: PlanarArm) -> list[Compiled]:
+        """What evaluates the task, one for each backend; in double-double one for all arms."""
+        return self._doubled if self.task.doubled else self._compiled(self.task.derive(arm))
+
+    @cached_property
+    def _doubled(self) -> list[Compiled]:
+        return self._compiled(cg.double_double(self._graph))
+
+    def _compiled(self, graph: Graph) -> list[Compiled]:
+        return [cg.compile(graph, backend) for backend in self.backends]
+
+    def with_parameters(self, arm: PlanarArm, point: Array) -> Array:
+        """The inputs of the graph whose parameters are inputs: the point (3n,), and then those of the arm."""
         rows = [(each.mass, each.length, each.center, each.inertia) for each in arm.links]
-        x = np.array([*point, *np.array(rows).T.ravel(), *arm.damping, arm.gravity])
+        return np.array([*point, *np.array(rows).T.ravel(), *arm.damping, arm.gravity])
+
+    @cached_property
+    def _slopes(self) -> Compiled:
+        return cg.compile(cg.simplify(cg.jvp(self._graph)), "numpy")
+
+    def condition(self, arm: PlanarArm, point: Array) -> Array:
+        """sum_j |df_i/dx_j| |x_j| over all inputs and parameters, (n,), by the JVP of the graph.
+
+        point: (3n,), angles, velocities, and the third.
+        """
+        x = self.with_parameters(arm, point)
         directions = np.concatenate([np.repeat(x[:, None], len(x), axis=1), np.diag(x)])
         with np.errstate(all="ignore"):
             moved: Array = np.abs(self._slopes.batch(directions)).sum(axis=1)

@@ -268,7 +268,7 @@ def test_the_condition_is_what_changes_of_the_data_make(task: str) -> None:
     importorskip("flint")
     n, step = 3, 1e-7
     arm, q, qd, third = random_arm(n)
-    solve = single_evaluations.TASKS[task][1]
+    solve = single_evaluations.TASKS[task].exact
     expected = np.zeros(n)
 
     def change(there: Any, back: Any) -> None:
@@ -289,7 +289,7 @@ def test_the_condition_is_what_changes_of_the_data_make(task: str) -> None:
         scaled = [tuple([c * (1.0 + sign * step * (j == i)) for j, c in enumerate(arm.damping)]) for sign in (1, -1)]
         change(*[solve(replace(arm, damping=each), q, qd, third) for each in scaled])
     change(*[solve(replace(arm, gravity=arm.gravity * (1.0 + sign * step)), q, qd, third) for sign in (1, -1)])
-    found = single_evaluations.Condition(task, n)(arm, point)
+    found = single_evaluations.Arms(single_evaluations.TASKS[task], n).condition(arm, point)
     assert found == approx(expected, rel=1e-5)
 
 
@@ -297,23 +297,36 @@ def test_the_condition_is_what_changes_of_the_data_make(task: str) -> None:
 @mark.parametrize("task", single_evaluations.TASKS)
 def test_single_evaluations_are_within_the_bound(task: str, family: single_evaluations.Family) -> None:
     importorskip("flint")
-    condition = single_evaluations.Condition(task, 4)
-    assert single_evaluations.figure(task, family, condition, ["python"]).meets
+    arms = single_evaluations.Arms(single_evaluations.TASKS[task], 4, ["python"])
+    assert single_evaluations.figure(family, arms).meets
 
 
-def test_a_constant_that_is_off_is_seen(monkeypatch: MonkeyPatch) -> None:
+HEAVY = next(each for each in single_evaluations.FAMILIES if each.name == "last mass 1e12")
+
+
+def test_a_heavy_mass_at_the_end_of_a_chain_needs_double_double() -> None:
+    importorskip("flint")
+    plain, doubled = (
+        single_evaluations.figure(HEAVY, single_evaluations.Arms(single_evaluations.TASKS[task], 8, ["python"]))
+        for task in ("forward dynamics", "forward dynamics in double-double")
+    )
+    assert plain.value > 1e6
+    assert doubled.value < 1.0
+
+
+def test_a_constant_that_is_off_is_seen() -> None:
     """A mass wrong by 1e-13 is some hundred ulps of the condition."""
     importorskip("flint")
-    task = "forward dynamics"
-    condition = single_evaluations.Condition(task, 3)
-    derive, solve = single_evaluations.TASKS[task]
+    task = single_evaluations.TASKS["forward dynamics"]
 
-    def off(arm: dyn.PlanarArm) -> cg.Graph:
+    def off(arm: Any) -> cg.Graph:
+        if not isinstance(arm, dyn.PlanarArm):
+            return task.derive(arm)
         first = replace(arm.links[0], mass=arm.links[0].mass * (1.0 + 1e-13))
-        return derive(replace(arm, links=(first, *arm.links[1:])))
+        return task.derive(replace(arm, links=(first, *arm.links[1:])))
 
-    monkeypatch.setitem(single_evaluations.TASKS, task, (off, solve))
-    assert not single_evaluations.figure(task, single_evaluations.FAMILIES[0], condition, ["python"]).meets
+    arms = single_evaluations.Arms(task._replace(derive=off), 3, ["python"])
+    assert not single_evaluations.figure(single_evaluations.FAMILIES[0], arms).meets
 
 
 # Huge angles
