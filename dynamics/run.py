@@ -17,6 +17,7 @@ from cgraph.program import Runner, runner
 
 from .integrators import Method, Problem
 from .integrators.adaptive import DONE, TOO_SMALL
+from .limits import Limits
 from .trajectory import Array
 
 Indices = np.ndarray[Any, np.dtype[np.intp]]
@@ -186,7 +187,7 @@ class FixedRun(Run):
 
 
 class AdaptiveRun(Run):
-    """Steps chosen by the method so that each one's error stays within rtol |x| + atol."""
+    """Steps chosen by the method."""
 
     def __init__(
         self,
@@ -194,38 +195,33 @@ class AdaptiveRun(Run):
         method: Method,
         parameters: Sequence[float],
         backend: str,
+        limits: Limits,
         *,
-        t_end: float,
-        rtol: float,
-        atol: float,
-        longest: float,
-        first: float | None,
-        most: float,
         dense: bool,
     ) -> None:
         super().__init__(problem, method, parameters, backend, dense=dense)
-        self.t_end, self.rtol, self.atol = t_end, rtol, atol
-        self.longest, self.first, self.most = longest, first, most
+        self.limits = limits
 
     def pieces(self, x: Array) -> Iterator[Piece]:
         """See Tally."""
+        limits = self.limits
         start: Mapping[str, float | Array | list[float]] = {
             "x": x,
             "p": self.parameters,
-            "end": self.t_end,
-            "rtol": self.rtol,
-            "atol": self.atol,
-            "next": self._first_step(x) if self.first is None else self.first,
-            "longest": self.longest,
+            "end": limits.t_end,
+            "rtol": limits.rtol,
+            "atol": limits.atol,
+            "next": self._first_step(x) if limits.first is None else limits.first,
+            "longest": limits.longest,
             "fresh": 1.0,
             "error_old": 1e-4,
             "accepted": 1.0,
         }
         memory = self.runner.memory(start)
         while True:
-            left = self.most - self.steps - self.rejected
+            left = limits.most - self.steps - self.rejected
             if left <= 0:
-                self.status = self.too_many(self._number(memory, "t"), self.most)
+                self.status = self.too_many(self._number(memory, "t"), limits.most)
                 return
             rows, _ = self._advance(memory, int(min(left, 2**31)), whole=False)
             status = self._number(memory, "status")
@@ -257,7 +253,7 @@ class AdaptiveRun(Run):
         if where := self.where(self.runner.read(memory, "x_new")):
             return f"stopped at t = {t:.6g} s: {where}, however small"
         x = self.runner.read(memory, "x")
-        speed = np.abs(self._rate(t, x)) / (self.atol + self.rtol * np.abs(x))
+        speed = np.abs(self._rate(t, x)) / self._scale(x)
         return f"{text}; fastest is {self.component(int(np.nanargmax(speed)))}"
 
     def _rate(self, t: float, x: Array) -> Array:
@@ -265,16 +261,21 @@ class AdaptiveRun(Run):
         values = dict(zip(names, [*x.tolist(), t, *self.parameters], strict=True))
         return np.array(list(self.problem.rate.evaluate(values).values()), dtype=np.float64)
 
+    def _scale(self, x: Array) -> Array:
+        """What an error is measured by."""
+        size: Array = self.limits.atol + self.limits.rtol * np.abs(x)
+        return size
+
     def _first_step(self, x: Array) -> float:
         """A step that two half steps confirm: their difference is within the tolerance.
 
         The estimate of an embedded method can vanish by symmetry, such as at a start from rest, and a guess from the
         first derivatives can be far off; halving cannot be fooled by either.
         """
-        order, scale = self.method.order, self.atol + self.rtol * np.abs(x)
+        order, scale = self.method.order, self._scale(x)
         anything = {"rtol": HUGE, "atol": HUGE, "longest": math.inf, "end": math.inf, "fresh": 1.0, "accepted": 1.0}
         memory = self.runner.memory({"x": x, "p": self.parameters, "error_old": 1.0, **anything})
-        h = min(self.t_end, self.longest) * LEAP
+        h = min(self.limits.t_end, self.limits.longest) * LEAP
         for _ in range(TRIALS):
             with np.errstate(all="ignore"):
                 change = (self._forced(memory, [h]) - self._forced(memory, [0.5 * h, 0.5 * h])) / scale

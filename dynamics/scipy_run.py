@@ -10,6 +10,7 @@ import numpy as np
 import cgraph as cg
 
 from .integrators import Problem
+from .limits import Limits
 from .run import PIECE, Clock, Piece, Tally
 from .trajectory import Array
 
@@ -26,13 +27,8 @@ class ScipyRun(Tally):
         problem: Problem,
         solver: str,
         backend: str,
+        limits: Limits,
         *,
-        t_end: float,
-        rtol: float,
-        atol: float,
-        longest: float,
-        first: float | None,
-        most: float,
         asked: Array | None,
     ) -> None:
         super().__init__(problem)
@@ -41,21 +37,23 @@ class ScipyRun(Tally):
         except ImportError:
             raise ImportError(f"method {PREFIX + solver!r} needs SciPy: pip install 'cgraph[scipy]'") from None
         self.solver, self.make = solver, getattr(integrate, solver)
-        self.options: dict[str, Any] = {"rtol": rtol, "atol": atol, "max_step": longest, "first_step": first}
-        self.t_end, self.most, self.asked = t_end, most, asked
+        self.limits, self.asked = limits, asked
         self._rate = cg.compile(problem.rate, backend)
+        self._jacobian: dict[str, Any] = {}
         if solver in IMPLICIT:
             slopes, m = cg.compile(problem.jacobian, backend), problem.size
-            self.options["jac"] = lambda t, x: slopes([*x, t]).reshape(m, m)
+            self._jacobian["jac"] = lambda t, x: slopes([*x, t]).reshape(m, m)
 
     def pieces(self, x: Array) -> Iterator[Piece]:
         """See Tally."""
-        solver = self.make(lambda t, x: self._rate([*x, t]), 0.0, x, self.t_end, **self.options)
+        limits = self.limits
+        options = {"rtol": limits.rtol, "atol": limits.atol, "max_step": limits.longest, "first_step": limits.first}
+        solver = self.make(lambda t, x: self._rate([*x, t]), 0.0, x, limits.t_end, **options, **self._jacobian)
         times, states = [0.0], [np.array(x)]
         clock = Clock()
         while solver.status == "running":
-            if self.steps >= self.most:
-                self.status = self.too_many(solver.t, self.most)
+            if self.steps >= limits.most:
+                self.status = self.too_many(solver.t, limits.most)
                 break
             message = solver.step()
             self.evaluations = solver.nfev

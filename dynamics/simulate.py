@@ -15,7 +15,7 @@ import cgraph as cg
 from .equations import energy
 from .event import Event, crossings, event_graph
 from .integrators import METHODS, Problem
-from .limits import check_limits
+from .limits import limits_of
 from .progress import Progress
 from .rows import Rows, from_start, recorded_times
 from .run import AdaptiveRun, FixedRun, Hermite, Piece, Tally
@@ -37,7 +37,7 @@ def simulate(
     *,
     dt: float | None = None,
     rtol: float = 1e-8,
-    atol: float = 1e-10,
+    atol: ArrayLike = 1e-10,
     t_eval: ArrayLike | None = None,
     events: Event | Iterable[Event] = (),
     tau: float | Sequence[float] = 0.0,
@@ -55,7 +55,8 @@ def simulate(
         "scipy:Radau", "scipy:BDF", "scipy:LSODA", "scipy:DOP853", "scipy:RK45".
     dt [s]: the largest step. With equal steps (1e-3 by default) the steps between two recorded instants are equal and
         at most dt, so that the last row is at t_end exactly. Chosen steps have no limit by default.
-    rtol, atol: the error of a chosen step, relative to each component of the state, and absolute.
+    rtol, atol: the error of a chosen step, relative to each component of the state, and absolute: one number for all,
+        or one for each component, (2 n,) of q and then qd.
     t_eval: increasing times in [0, t_end] to record; by default every step. Chosen steps are not changed by it.
     events: instants to find on the way, see `Event`.
     tau: constant applied force, for all coordinates or for each.  parameters: values in place of the system's own.
@@ -71,8 +72,8 @@ def simulate(
     solver = solver_of(method)
     if solver is None and method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)} or scipy:..., got {method!r}")
-    check_limits(t_end, dt, first_step, rtol, atol, max_steps)
     inputs = state_inputs(model)
+    limits = limits_of(inputs.states, t_end, dt, first_step, rtol, atol, max_steps)
     values = _parameter_values(inputs.parameters, parameters)
     n = len(inputs.applied)
     bound = {f"tau{i}": each for i, each in enumerate(per_coordinate("tau", tau, n))} if n else {}
@@ -81,20 +82,12 @@ def simulate(
     wanted = (events,) if isinstance(events, Event) else tuple(events)
     asked = None if t_eval is None else recorded_times(t_eval, t_end)
 
-    limits: dict[str, Any] = {
-        "rtol": rtol,
-        "atol": atol,
-        "longest": math.inf if dt is None else dt,
-        "first": first_step,
-    }
     run: Tally
     if solver is not None:
-        run = ScipyRun(problem, solver, backend, t_end=float(t_end), most=max_steps, asked=asked, **limits)
+        run = ScipyRun(problem, solver, backend, limits, asked=asked)
     elif METHODS[method].adaptive:
         dense = bool(wanted) or asked is not None
-        run = AdaptiveRun(
-            problem, METHODS[method], (), backend, t_end=float(t_end), most=max_steps, dense=dense, **limits
-        )
+        run = AdaptiveRun(problem, METHODS[method], (), backend, limits, dense=dense)
     else:
         size = DT if dt is None else dt
         instants = [0.0, float(t_end)] if asked is None else from_start(asked)

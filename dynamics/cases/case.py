@@ -16,6 +16,7 @@ from ..state_equation import as_ode
 from ..system import as_system
 
 RTOL = 1e-9  # the relative tolerance that the bounds are for
+ATOL = 1e-3 * RTOL  # the absolute one, in the SI unit of each state
 SLACK = 1e3  # steps add their errors up, and a tolerance is met to a factor only
 DIGITS = 20  # of a reference: four more than float64 can tell
 
@@ -45,6 +46,8 @@ class Case:
 
     start: q and then qd, or the states of an OdeSystem.  size: a natural size of each state; empty for the larger of
     its values at the start and at t_end.
+    atol: absolute tolerance, where that of one in a thousand of RTOL in SI units is too much or too little; for all
+    states, or for each.
     growth: what the flow makes of a small relative error of the start by t_end (the largest of all states, each
     relative to its size); `sensitivity.growth` measures it. None where there is no solution to compare with.
     invariants(model): a graph over the state (and t, parameters) whose outputs do not change along the motion.
@@ -58,6 +61,7 @@ class Case:
     watch: tuple[Watch, ...]
     stiff: bool = False  # whether an explicit method needs steps far below what the motion asks for
     size: tuple[float, ...] = ()
+    atol: float | tuple[float, ...] = ATOL
     growth: float | None = None
     invariants: Callable[[Any], Graph] | None = None
     exact: Exact | None = None  # a closed form of the motion, or of a limit of it that the watch then names

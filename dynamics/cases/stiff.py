@@ -12,7 +12,7 @@ from ..multiprecision import Reference, closed_forms
 from ..multiprecision.trajectory import from_text
 from ..ode_system import OdeSystem
 from ..system import System
-from .case import GROWN, Case, Watch, conserved, conserved_states, energy_watch, error_watch
+from .case import ATOL, GROWN, Case, Watch, conserved, conserved_states, energy_watch, error_watch
 
 GRAVITY = 9.81  # m/s^2
 RATIO = 10.0  # of damping to the critical one
@@ -68,6 +68,7 @@ def rigid(times: Sequence[float]) -> Reference:
 
 def _damped(stiffness: float, growth: float) -> Case:
     angle, stretch = 1.0, GRAVITY / stiffness
+    size = (stretch, 1.0, stretch * math.sqrt(GRAVITY), math.sqrt(GRAVITY))
     damping = 2.0 * RATIO * math.sqrt(stiffness)
     return Case(
         name=f"damped spring pendulum, k = {stiffness:g}",
@@ -77,7 +78,8 @@ def _damped(stiffness: float, growth: float) -> Case:
         t_end=10.0,
         watch=(error_watch(growth, "the flow's growth: the fast error dies out"),),
         stiff=True,
-        size=(stretch, 1.0, stretch * math.sqrt(GRAVITY), math.sqrt(GRAVITY)),
+        size=size,
+        atol=tuple([ATOL * each for each in size]),  # the extension may be as small as ATOL itself
         growth=growth,
         method="radau",
     )

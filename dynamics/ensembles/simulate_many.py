@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..integrators import METHODS, Problem
-from ..limits import check_limits
+from ..limits import limits_of
 from ..progress import Progress
 from ..rows import from_start, recorded_times
 from ..simulate import DT
+from ..state_equation import state_inputs
 from .chunk import Chunk, Part
 from .ensemble import Ensemble, EnsembleStats
 from .portable import portable
@@ -43,7 +44,7 @@ def simulate_many(
     *,
     dt: float | None = None,
     rtol: float = 1e-8,
-    atol: float = 1e-10,
+    atol: ArrayLike = 1e-10,
     t_eval: ArrayLike | None = None,
     tau: ArrayLike = 0.0,
     parameters: Mapping[str, ArrayLike] | None = None,
@@ -76,7 +77,7 @@ def simulate_many(
     """
     if method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
-    check_limits(t_end, dt, first_step, rtol, atol, max_steps)
+    limits = limits_of(state_inputs(model).states, t_end, dt, first_step, rtol, atol, max_steps)
     if chunk is not None and (not isinstance(chunk, (int, np.integer)) or chunk < 1):
         raise ValueError(f"chunk must be a whole number from 1, got {chunk!r}")
     crew, adaptive = checked(workers), METHODS[method].adaptive
@@ -95,8 +96,7 @@ def simulate_many(
     course: list[Stretch] = []
     plan: dict[str, Any]
     if adaptive:
-        plan = {"t_end": float(t_end), "rtol": rtol, "atol": atol, "longest": math.inf if dt is None else size}
-        plan |= {"first": first_step, "most": max_steps}
+        plan = {"limits": limits}
     else:
         instants = [0.0, float(t_end)] if asked is None else from_start(asked)
         plan = {"instants": instants, "dt": size, "each": asked is None, "most": max_steps}

@@ -15,6 +15,7 @@ import numpy as np
 from cgraph.program import Runner, runner
 from cgraph.program.runner import Record
 
+from ..limits import Limits
 from ..rows import Rows
 from ..run import AdaptiveRun, FixedRun
 from ..trajectory import Array
@@ -119,6 +120,5 @@ def _alone(pickled: bytes, backend: str) -> FixedRun | AdaptiveRun:
     """A run to be copied; its numbers come from `plan`."""
     problem = cast(Any, pickle.loads(pickled))  # noqa: S301  # it came with the task itself
     if problem.adaptive:
-        limits = dict.fromkeys(("t_end", "rtol", "atol", "longest", "first", "most"), 1.0)
-        return AdaptiveRun(problem, problem, (), backend, dense=True, **limits)
+        return AdaptiveRun(problem, problem, (), backend, Limits(), dense=True)
     return FixedRun(problem, problem, (), backend, instants=(), dt=1.0, each=False, most=0.0)

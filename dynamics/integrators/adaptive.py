@@ -1,10 +1,10 @@
 """Programs that choose their steps: the registers that all of them have, step control, and explicit embedded methods.
 
 A pass is a trial of one step. Registers: x the state, t, p the parameters, evaluations, as with equal steps; `h` the
-step tried, `next` the one to try next and `longest` the longest allowed; `end` where to stop; rtol, atol; accepted (1
-or 0), status; rejected, a count; `error`, the estimate of the last trial, 1 at the tolerance; x_new what the trial
-arrived at; `fresh`, 1 before the first pass; and of the last accepted step t_old, x_old and, for its dense output,
-dense1, ..
+step tried, `next` the one to try next and `longest` the longest allowed; `end` where to stop; rtol, and atol for each
+component of the state; accepted (1 or 0), status; rejected, a count; `error`, the estimate of the last trial, 1 at the
+tolerance; x_new what the trial arrived at; `fresh`, 1 before the first pass; and of the last accepted step t_old, x_old
+and, for its dense output, dense1, ..
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ RESOLUTION = 4.0 * 2.0**-52  # steps below this share of t hardly move t
 
 def registers(problem: Problem) -> dict[str, int]:
     """What every program has."""
-    names = "t h next longest end fresh rtol atol accepted status rejected error error_old evaluations t_old t_new"
+    names = "t h next longest end fresh rtol accepted status rejected error error_old evaluations t_old t_new"
     m = problem.size
-    return {"x": m, "p": len(problem.parameters), **dict.fromkeys(names.split(), 1), "x_new": m, "x_old": m}
+    states = dict.fromkeys(("x", "x_new", "x_old", "atol"), m)
+    return {**states, "p": len(problem.parameters), **dict.fromkeys(names.split(), 1)}
 
 
 def recorded(dense: bool, degree: int) -> list[str]:

@@ -29,8 +29,6 @@ EQUAL_STEPS: dict[str, dict[str, float]] = {  # case: method: step [s]
 }
 LARGE = 200  # coordinates; beyond, one method is enough of a wait
 MOST_STEPS = 3 * 10**6
-ATOL = 1e-3 * RTOL  # absolute, in the unit of each state: SI
-ATOL_LARGE = RTOL  # of a large case: less is below the rounding of its accelerations, and steps shrink to 1/100
 BLOCK = 4096  # rows whose invariants are taken at once
 
 
@@ -84,7 +82,7 @@ def trajectory(case: Case, model: Any, method: str) -> Trajectory:
         method,
         dt=EQUAL_STEPS.get(case.name, {}).get(method),
         rtol=RTOL,
-        atol=ATOL if len(case.start) <= 2 * LARGE else ATOL_LARGE,
+        atol=case.atol,
         max_steps=MOST_STEPS,
         progress=False,
     )

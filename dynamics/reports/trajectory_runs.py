@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..integrators import METHODS, Problem
+from ..limits import Limits
 from ..rows import Rows
 from ..run import AdaptiveRun, FixedRun, Tally
 from ..scipy_run import PREFIX, ScipyRun
@@ -124,16 +125,14 @@ class Ours(Contender):
     def _template(self, dense: bool) -> Tally:
         """A run to be copied; its numbers come later."""
         if self.method.adaptive:
-            limits: dict[str, Any] = dict.fromkeys(("t_end", "rtol", "atol", "longest", "first", "most"), 1.0)
-            return AdaptiveRun(self.problem, self.method, (), self.backend, dense=dense, **limits)
+            return AdaptiveRun(self.problem, self.method, (), self.backend, Limits(), dense=dense)
         return FixedRun(self.problem, self.method, (), self.backend, instants=(), dt=1.0, each=False, most=math.inf)
 
     def _run(self, knob: float, template: Tally, instants: Sequence[float]) -> Tally:
         run = copy.copy(template)
         t_end = self.setting.t_end
         if self.method.adaptive:
-            plan: dict[str, Any] = {"t_end": t_end, "rtol": knob, "atol": self.absolute(knob)}
-            plan |= {"longest": math.inf, "first": None, "most": math.inf}
+            plan: dict[str, Any] = {"limits": Limits(t_end, knob, self.absolute(knob))}
         else:
             plan = {"instants": instants, "dt": t_end / knob}
         vars(run).update(plan)
@@ -167,13 +166,12 @@ class Scipy(Contender):
 
     def __init__(self, solver: str, setting: Setting, smallest: float, problem: Problem, backend: str = "auto") -> None:
         super().__init__(PREFIX + solver, "SciPy's solver on our compiled rate", setting, smallest)
-        limits: dict[str, Any] = {"t_end": setting.t_end, "longest": math.inf, "first": None, "most": math.inf}
-        self._template = ScipyRun(problem, solver, backend, rtol=1e-3, atol=1e-6, asked=None, **limits)
+        self._template = ScipyRun(problem, solver, backend, Limits(), asked=None)
         self.order = {"DOP853": 8, "Radau": 5, "RK45": 5}.get(solver)
 
     def _run(self, knob: float, asked: Array | None) -> Tally:
         run = copy.copy(self._template)
-        run.options = run.options | {"rtol": knob, "atol": self.absolute(knob)}
+        run.limits = Limits(self.setting.t_end, knob, self.absolute(knob))
         run.asked = asked
         return run
 

@@ -90,6 +90,31 @@ def test_the_error_follows_the_tolerance(method: str) -> None:
     assert errors[-1] > 1e-4  # no more accurate than asked for beyond measure
 
 
+@mark.parametrize("method", [*ADAPTIVE, "scipy:DOP853"])
+def test_each_state_may_have_an_absolute_tolerance_of_its_own(method: str) -> None:
+    """A small state that oscillates is only resolved by a tolerance of its own."""
+    pytest.importorskip("scipy")
+    small = 1e-9
+    system = dyn.OdeSystem(lambda x, t: [cg.cos(t), small * cg.cos(40.0 * t) + 0.0 * x[0]], ["x", "y"])
+
+    def error(atol: Any) -> float:
+        run = dyn.simulate(system, [0.0, 0.0], None, 3.0, method, rtol=1e-30 if ours else 1e-13, atol=atol)
+        return float(abs(run.q[-1, 1] / small - math.sin(120.0) / 40.0))
+
+    ours = method in ADAPTIVE
+    assert error([1e-6, 1e-6 * small]) < 1e-4
+    assert error([1e-6, 1e-6]) > 1e-4
+
+
+@mark.parametrize("method", ADAPTIVE)
+def test_one_absolute_tolerance_is_the_same_for_each_state(method: str) -> None:
+    runs = [
+        dyn.simulate(planet(), *PERIHELION, 1.0, method, rtol=1e-6, atol=atol, backend="python")
+        for atol in (1e-7, [1e-7] * 4)
+    ]
+    assert np.array_equal(runs[0].q, runs[1].q)
+
+
 @mark.parametrize("method", ADAPTIVE)
 def test_dense_output_is_as_good_as_the_steps(method: str) -> None:
     pytest.importorskip("llvmlite")
@@ -357,6 +382,9 @@ def test_tolerances_out_of_range_are_refused() -> None:
         ({"rtol": -1.0}, "rtol and atol must be finite"),
         ({"rtol": 0.0, "atol": 0.0}, "not both 0"),
         ({"atol": math.nan}, "rtol and atol"),
+        ({"atol": [1e-9, 1e-9, 1e-9, -1.0]}, "rtol and atol"),
+        ({"rtol": 0.0, "atol": [1e-9, 1e-9, 0.0, 1e-9]}, "not both 0"),
+        ({"atol": [1e-9, 1e-9]}, r"shape \(4,\), one for each of q0, q1, qd0, qd1; got \(2,\)"),
         ({"first_step": 0.0}, "first_step must be positive and finite, got 0.0 s"),
         ({"max_steps": 0}, "max_steps must be at least 1, got 0"),
         ({"events": [dyn.Event("e", lambda q, qd, t: 1.0)]}, "event 'e' must be a node of the state"),
