@@ -8,7 +8,6 @@ trajectory, median and range. Peers run the first of the trajectories, as many a
 """
 
 import argparse
-import importlib
 import os
 import sys
 import time
@@ -47,24 +46,23 @@ def ours(q: Array, qd: Array, **options: object) -> Run:
 
 def mujoco(q: Array, qd: Array) -> Run:
     """MuJoCo's rollout in one thread; contacts and whatever else the pendulum does not need are off."""
+    from dynamics.mujoco_io import rollout
     from dynamics.reports.peers.mujoco import MujocoPeer
 
     peer = MujocoPeer(Case("triple_pendulum", dyn.scenes.load("triple_pendulum")))
     model, n = peer.twin.model, q.shape[1]
     model.opt.timestep = DT
-    rollout = importlib.import_module("mujoco.rollout")
     starts = np.hstack([np.zeros((len(q), 1)), q[:, peer.at], qd[:, peer.at]])  # time, qpos, qvel
-    states, sensors = np.empty((BLOCK, STEPS, 1 + 2 * n)), np.empty((BLOCK, STEPS, 0))
-    data, taken = [peer.mujoco.MjData(model)], np.concatenate([1 + peer.order, 1 + n + peer.order])
+    states = np.empty((BLOCK, STEPS, 1 + 2 * n))
+    blocks = [starts[k : k + BLOCK] for k in range(0, len(starts), BLOCK)]
+    runs = [rollout(model, some, states[: len(some)]) for some in blocks]
+    taken = np.concatenate([1 + peer.order, 1 + n + peer.order])
 
     def run() -> Array:
         last = []
-        for k in range(0, len(starts), BLOCK):
-            some = starts[k : k + BLOCK]
-            state, sensordata = states[: len(some)], sensors[: len(some)]
-            models = [model] * len(some)
-            rollout.rollout(models, data, some, nstep=STEPS, state=state, sensordata=sensordata, skip_checks=True)
-            last.append(state[:, -1, taken])
+        for some, each in zip(blocks, runs, strict=True):
+            each()
+            last.append(states[: len(some), -1, taken])
         return np.concatenate(last)
 
     return run
