@@ -8,6 +8,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from .limits import Limits
 from .trajectory import Array
 
 Indices = np.ndarray[Any, np.dtype[np.intp]]
+KEPT = 16  # programs that stay ready for another run
 PIECE = 0.1  # s of run time after which a run comes back to Python: for Ctrl-C, progress and events
 FIRST = 32  # passes of the first piece, before it is known how long one takes
 LEAP = 1e-2  # of the whole run: the first step that is tried
@@ -105,7 +107,7 @@ class Run(Tally):
     ) -> None:
         super().__init__(problem)
         self.method, self.dense = method, dense
-        self.runner: Runner = runner(method.program(problem, dense), backend)
+        self.runner = _ready(problem, method, dense, backend)
         self.parameters = list(parameters)
         self._passes = FIRST
 
@@ -121,6 +123,12 @@ class Run(Tally):
 
     def _number(self, memory: Array, name: str) -> float:
         return float(self.runner.read(memory, name)[0])
+
+
+@lru_cache(KEPT)
+def _ready(problem: Problem, method: Method, dense: bool, backend: str) -> Runner:
+    """The method's steps, made ready once for runs of the same problem."""
+    return runner(method.program(problem, dense), backend)
 
 
 class FixedRun(Run):

@@ -10,11 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-import cgraph as cg
-
-from .equations import energy
 from .event import Event, crossings, event_graph
-from .integrators import METHODS, Problem
+from .integrators import METHODS, Problem, problem_of
 from .limits import limits_of
 from .progress import Progress
 from .rows import Rows, from_start, recorded_times
@@ -77,7 +74,7 @@ def simulate(
     values = _parameter_values(inputs.parameters, parameters)
     n = len(inputs.applied)
     bound = {f"tau{i}": each for i, each in enumerate(per_coordinate("tau", tau, n))} if n else {}
-    problem = Problem(model, bound | values)
+    problem = problem_of(model, bound | values)
     state = _start(problem, q, qd)
     wanted = (events,) if isinstance(events, Event) else tuple(events)
     asked = None if t_eval is None else recorded_times(t_eval, t_end)
@@ -122,7 +119,7 @@ def simulate(
     )
     half = n or problem.size
     return Trajectory(
-        times, table[:, :half], table[:, half:], _energies(problem, values, times, table), stats, watch.found(half)
+        times, table[:, :half], table[:, half:], _energies(problem, times, table), stats, watch.found(half)
     )
 
 
@@ -172,18 +169,15 @@ def _until(piece: Piece, t: float, x: Array) -> Piece:
     return cut
 
 
-def _energies(problem: Problem, values: Mapping[str, float], times: Array, table: Array) -> Array:
+def _energies(problem: Problem, times: Array, table: Array) -> Array:
     """The energy at each row; NaN for a system of first order."""
     result = np.full(len(times), math.nan)
-    if problem.system is None:
+    if problem.energy is None:
         return result
-    graph = cg.specialize(energy(problem.system), values)
     for start in range(0, len(times), BLOCK):
         part = slice(start, start + BLOCK)
         given: dict[str, Any] = dict(zip(problem.states, table[part].T, strict=True))
-        if TIME in graph.input_names:
-            given[TIME] = times[part]
-        result[part] = graph.evaluate(given)["E"]
+        result[part] = problem.energy.evaluate(given | {TIME: times[part]})["E"]
     return result
 
 

@@ -29,7 +29,7 @@ class Straight(NamedTuple):
     one_pass: Program
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Portable:
     """What a run reads of its Problem and its Method, in place of both."""
 

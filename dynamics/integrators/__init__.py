@@ -6,7 +6,7 @@ from .adaptive import embedded
 from .dop853 import DOP853
 from .fixed import explicit
 from .method import Method
-from .problem import Problem
+from .problem import Problem, problem_of
 from .radau import ORDER as RADAU_ORDER, radau
 from .rodas import RODAS5P, rosenbrock
 from .symplectic import GAUSS4, GAUSS6, MIDPOINT, SYMPLECTIC_EULER, VERLET, Partitioned, partitioned
@@ -39,4 +39,4 @@ METHODS: dict[str, Method] = {
     "gauss6": _partitioned(GAUSS6),
 }
 
-__all__ = ["METHODS", "Method", "Problem"]
+__all__ = ["METHODS", "Method", "Problem", "problem_of"]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cached_property
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import cgraph as cg
@@ -15,10 +16,12 @@ from cgraph.label import building
 from cgraph.order import topological
 from cgraph.reverse import cotangents
 
+from ..equations import energy
 from ..state_equation import as_ode, state_equation, state_inputs
 from ..system import TIME, System, as_system, called
 
 ONE = cg.constant(1.0)
+KEPT = 16  # problems whose graphs stay for another run
 
 
 class Mechanics(NamedTuple):
@@ -78,6 +81,11 @@ class Problem:
     def rate(self) -> Graph:
         """f: inputs the states, t, parameters; outputs the rates of the states."""
         return self.bind(self.states, state_equation(self.model))
+
+    @cached_property
+    def energy(self) -> Graph | None:
+        """The total energy E of a mechanical system: inputs the states, t, parameters."""
+        return None if self.system is None else self.bind(self.states, energy(self.system))
 
     @cached_property
     def timed(self) -> bool:
@@ -151,6 +159,30 @@ class Problem:
         """The graph with what is bound built in, and its inputs in the order that every method relies on."""
         found = cg.specialize(graph, {name: value for name, value in self._bound.items() if name in graph.input_names})
         return Graph(cg.variables([*first, TIME, *self.parameters]), found.outputs)
+
+
+def problem_of(model: Any, bound: Mapping[str, float]) -> Problem:
+    """The problem of a model; asked for again, while it is among the last few, the one that has its graphs already."""
+    inputs, ode = state_inputs(model), as_ode(model)
+    if ode is not None:
+        what: tuple[Any, ...] = (ode.rates,)
+    else:
+        system = as_system(model)
+        what = (system.coordinates, system.partial_lagrangians, system.forces, system.damping)
+    numbers = tuple([(name, float(value).hex()) for name, value in bound.items()])  # 0.0 and -0.0 stay apart
+    return _kept(_Request((*what, inputs.states, inputs.applied, tuple(inputs.parameters), numbers), model, bound))
+
+
+@dataclass(frozen=True)
+class _Request:
+    key: tuple[Any, ...]
+    model: Any = field(compare=False)
+    bound: Mapping[str, float] = field(compare=False)
+
+
+@lru_cache(KEPT)
+def _kept(request: _Request) -> Problem:
+    return Problem(request.model, request.bound)
 
 
 def _reaches(nodes: Iterable[Node], variables: Iterable[Node]) -> bool:

@@ -10,6 +10,7 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics.integrators import problem_of
 from dynamics.integrators.tableau import DOPRI5, EULER, RK4, Tableau
 from dynamics.progress import Progress
 from dynamics.run import Run
@@ -297,3 +298,29 @@ def test_an_interrupted_run_ends_its_progress_line(capsys, monkeypatch) -> None:
     with raises(KeyboardInterrupt):
         interrupted()
     assert capsys.readouterr().err.endswith(" 50%  2 s\n")
+
+
+def test_what_was_made_for_a_model_is_used_again_and_only_for_the_same() -> None:
+    """Each change of a model or of its numbers gives the motion that a fresh one has."""
+
+    def model(mass: float = 1.0) -> dyn.System:
+        return dyn.System(
+            lambda q, qd, t, p: 0.5 * mass * qd[0] ** 2 - 0.5 * p["k"] * q[0] ** 2, ["x"], {"k": 2.0}, damping=0.1
+        )
+
+    def ends(system: dyn.System, **options: Any) -> float:
+        return float(dyn.simulate(system, [1.0], [0.0], 1.0, "dop853", **options).q[-1, 0])
+
+    kept = model()
+    first = ends(kept)
+    made = problem_of(kept, {"k": 2.0, "tau0": 0.0})
+    assert made is problem_of(kept, {"k": 2.0, "tau0": 0.0})
+    assert made is not problem_of(kept, {"k": 2.0, "tau0": -0.0})
+    assert ends(kept) == first
+    assert ends(model(2.0)) != first
+    assert ends(kept, parameters={"k": 3.0}) == ends(model(), parameters={"k": 3.0}) != first
+    assert ends(kept, tau=0.5) != first
+    kept.parameters["k"] = 3.0
+    assert ends(kept) == ends(model(), parameters={"k": 3.0})
+    kept.damping = (0.7,)
+    assert ends(kept, parameters={"k": 2.0}) != first
