@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from .elimination_order import Step, steps
 from .fold import Builder
 from .graph import Graph
 from .label import ADJOINT, TANGENT, building
 from .ldl import SingularError, first_not_positive
 from .node import Node, Scalar, as_node
 from .order import topological
+from .rotations import Rotation, rotations
 from .second_order import second_partials
 
 ZERO, ONE = as_node(0.0), as_node(1.0)
@@ -49,7 +51,7 @@ def solve_nodes(
 ) -> list[Node]:
     """As `hessian_solve`, on nodes.
 
-    at: {node z under output: b_z}, right-hand sides at inner nodes, which stand for (dz/dw)^T b_z more at w, but are
+    at: {node z: b_z}, right-hand sides at nodes that depend on w, which stand for (dz/dw)^T b_z more at w, but are
     carried to w by the elimination itself: fewer nodes, and no large sums at w that it then has to undo.
 
     The tangents t of all nodes that depend on w make f's second differential stationary: W t = b, with W the symmetric
@@ -59,37 +61,17 @@ def solve_nodes(
     gives the tangents, and those of w are x. For a tree of bodies this is the articulated-body algorithm.
     """
     build = build or Builder()
-    order = _dependent(output, wrt)
+    order = _dependent([output, *(at or ())], wrt)
     with building(build) as labelled:
         walk = _Walk(build, output, dict(zip(wrt, rhs, strict=True)), at or {}, order)
-        for node in reversed(order):
-            labelled(node.label.derived(ADJOINT))
-            if node in walk.sums:
-                walk.eliminate_sum(node)
-            elif node in walk.inside:
-                continue
-            elif node in walk.position:
-                walk.eliminate(node)
-            else:
-                walk.hand_down(node)
-        dots: dict[Node, Node] = {}
-        for node in order:
-            labelled(node.label.derived(TANGENT))
-            if node in walk.inside:
-                continue  # found with the sum that it is in
-            if node in walk.solved:
-                solved = walk.solved[node]
-                dot = solved.alone
-                for other, gain in solved.gains.items():
-                    dot = dot - gain * dots[other]
-                if node in walk.sums:
-                    variable, other, p, p_other = walk.sums[node]
-                    rest = dot if other not in dots else dot - p_other * dots[other]
-                    dots[variable] = p * rest  # p is 1 or -1
-            else:
-                dot = _total([p * dots[arg] for arg, p in walk.partials[node].items()])
-            dots[node] = dot
-        x = [dots[node] for node in wrt]
+        plan = steps(walk.arguments(order), walk.rotations)
+        for step in plan:
+            labelled(_of(step).label.derived(ADJOINT))
+            walk.take(step)
+        for step in reversed(plan):
+            labelled(_of(step).label.derived(TANGENT))
+            walk.find_tangents(step)
+        x = [walk.dots[node] for node in wrt]
         if positive:
             labelled(output.label.derived(ADJOINT))
             x.append(first_not_positive({walk.index(node): solved.pivot for node, solved in walk.solved.items()}))
@@ -120,8 +102,26 @@ class _Walk:
         self.rows: dict[Node, dict[Node, Node]] = {}  # W, both halves
         self.solved: dict[Node, _Solved] = {}
         self.sums = _sums(order, self.position)
-        self.inside = {each.variable for each in self.sums.values()}
+        found = [r for r in rotations(order, self.depends, at) if not {r.first, r.second} & self.sums.keys()]
+        self.rotations = {r.first: r for r in found}
+        self.dots: dict[Node, Node] = {}  # tangents
         self.partials: dict[Node, dict[Node, Node]] = {}  # of each operation, by argument that depends on w
+
+    def arguments(self, order: Sequence[Node]) -> dict[Node, list[Node]]:
+        """What each node hands down to; not in it are nodes that are done with another."""
+        firsts = {r.second: r.first for r in self.rotations.values()}
+        inside = {node for r in self.rotations.values() for node in r.products}
+        inside |= {each.variable for each in self.sums.values()} | firsts.keys()
+        found = {}
+        for node in order:
+            if node not in inside:
+                args: Sequence[Node] = node.args
+                if node in self.sums:
+                    args = (self.sums[node].other,)
+                elif node in self.rotations:
+                    args = self.rotations[node].x, self.rotations[node].y
+                found[node] = list(dict.fromkeys([firsts.get(arg, arg) for arg in args if arg in self.depends]))
+        return found
 
     def _take(self, node: Node) -> tuple[Node, dict[Node, Node]]:
         """W of a node with itself and with the others; the node leaves W."""
@@ -138,6 +138,37 @@ class _Walk:
         total = row[b] + value if b in row else value
         row[b] = total
         self.rows.setdefault(b, {})[a] = total
+
+    def take(self, step: Step) -> None:
+        """A step from the output down: what it takes out of W t = b."""
+        if isinstance(step, list):
+            self.turn_back(step)
+        elif step in self.sums:
+            self.eliminate_sum(step)
+        elif step in self.position:
+            self.eliminate(step)
+        else:
+            self.hand_down(step)
+
+    def find_tangents(self, step: Step) -> None:
+        """The same step in the sweep back up: its tangents, by those of the steps taken after it."""
+        dots = self.dots
+        if isinstance(step, list):
+            for r in step:
+                dots[r.first] = r.sign_x * (r.cos * dots[r.x] + r.sin * dots[r.y])
+                dots[r.second] = r.sign_y * (r.cos * dots[r.y] - r.sin * dots[r.x])
+        elif step in self.solved:
+            solved = self.solved[step]
+            dot = solved.alone
+            for other, gain in solved.gains.items():
+                dot = dot - gain * dots[other]
+            dots[step] = dot
+            if step in self.sums:
+                variable, other, p, p_other = self.sums[step]
+                rest = dot if other not in dots else dot - p_other * dots[other]
+                dots[variable] = p * rest  # p is 1 or -1
+        else:
+            dots[step] = _total([p * dots[arg] for arg, p in self.partials[step].items()])
 
     def eliminate(self, node: Node) -> None:
         """A variable whose uses are all behind: its row of W t = b gives it in terms of the live nodes."""
@@ -172,6 +203,50 @@ class _Walk:
             self.bars[other] = self.bars.get(other, ZERO) + p_other * bar
             self.rhs[other] = self.rhs.get(other, ZERO) - p_other * applied
 
+    def turn_back(self, group: Sequence[Rotation]) -> None:
+        """Rotations by one angle, done at once: with c^2 + s^2 = 1 their blocks of W cost half of product by product.
+
+        The adjoints and W of x and y are those of the sums turned back, by x = c p - s q, y = s p + c q.
+        """
+        signs = {r.first: r.sign_x for r in group} | {r.second: r.sign_y for r in group}
+        within: dict[tuple[Node, Node], Node] = {}
+        others: dict[Node, dict[Node, Node]] = {}
+        for node, sign in signs.items():
+            for other, value in self.rows.get(node, {}).items():
+                if other in signs:
+                    within[node, other] = sign * signs[other] * value
+                else:
+                    others.setdefault(other, {})[node] = sign * value
+        for node in signs:
+            self._take(node)
+        for i, r in enumerate(group):
+            p, q, x, y, c, s = r[:6]
+            for table in (self.bars, self.rhs):
+                a, b = r.sign_x * table.pop(p, ZERO), r.sign_y * table.pop(q, ZERO)
+                table[x] = table.get(x, ZERO) + (c * a - s * b)
+                table[y] = table.get(y, ZERO) + (s * a + c * b)
+            for other, row in others.items():
+                a, b = row.get(p, ZERO), row.get(q, ZERO)
+                self._add_both(x, other, c * a - s * b)
+                self._add_both(y, other, s * a + c * b)
+            for r2 in group[:i]:
+                p2, q2, x2, y2 = r2[:4]
+                pp, pq, qp, qq = (within.get(pair, ZERO) for pair in ((p, p2), (p, q2), (q, p2), (q, q2)))
+                u = s * (pp - qq) + c * (pq + qp)
+                self._add_both(x, x2, pp - s * u)
+                self._add_both(y, y2, qq + s * u)
+                self._add_both(x, y2, c * u - qp)
+                self._add_both(y, x2, c * u - pq)
+            pp, pq, qq = (within.get(pair, ZERO) for pair in ((p, p), (p, q), (q, q)))
+            u = s * (pp - qq) + 2.0 * c * pq
+            self._add(x, x, pp - s * u)
+            self._add(y, y, qq + s * u)
+            self._add(x, y, c * u - pq)
+
+    def _add_both(self, a: Node, b: Node, value: Node) -> None:
+        """An entry of W and the one across, which are one where a is b."""
+        self._add(a, b, 2.0 * value if a is b else value)
+
     def hand_down(self, node: Node) -> None:
         """An operation: t = sum p t_arg takes it out of W t = b, and its curvature goes to its arguments."""
         pivot, row = self._take(node)
@@ -185,7 +260,7 @@ class _Walk:
             self.bars[arg] = self.bars.get(arg, ZERO) + bar * p
             self.rhs[arg] = self.rhs.get(arg, ZERO) + p * rhs
             for other, value in row.items():
-                self._add(arg, other, 2.0 * (p * value) if arg is other else p * value)
+                self._add_both(arg, other, p * value)
         self._curve(partials, pivot)
         if bar.value != 0.0:
             self._bend(node, bar)
@@ -233,11 +308,16 @@ def _sums(order: Sequence[Node], position: Mapping[Node, int]) -> dict[Node, _Su
     return found
 
 
-def _dependent(output: Node, wrt: Sequence[Node]) -> list[Node]:
+def _of(step: Step) -> Node:
+    """The node of a step, of rotations the first."""
+    return step[0].first if isinstance(step, list) else step
+
+
+def _dependent(outputs: Sequence[Node], wrt: Sequence[Node]) -> list[Node]:
     """The nodes that depend on `wrt`, arguments first, each variable just before its first use."""
     depends = set(wrt)
     order = []
-    for node in topological([output]):
+    for node in topological(outputs):
         if node in depends or any([arg in depends for arg in node.args]):
             depends.add(node)
             order.append(node)

@@ -27,7 +27,7 @@ from dynamics.reports.bench_scenes import binary_tree, turned_arm
 from dynamics.reports.fit import exponent
 
 solving = sys.modules["cgraph.hessian_solve"]  # the module; `cgraph.hessian_solve` is the function
-solve_nodes, rates, eliminated = solving.solve_nodes, equations.rates, solving._dependent
+solve_nodes, rates = solving.solve_nodes, equations.rates
 PLANAR = (3, 10, 20, 50, 100, 200)
 
 
@@ -105,11 +105,6 @@ def lu_solve(lower: Sequence[Sequence[Node]], rhs: Sequence[Node], build: Builde
     return x
 
 
-def all_last(output: Node, wrt: Sequence[Node]) -> list[Node]:
-    """Every velocity is placed first, so that it is eliminated last: a dense solve by the same walk."""
-    return [*wrt, *(node for node in eliminated(output, wrt) if node not in set(wrt))]
-
-
 def without(op: str, constant: float) -> Callable[..., Node | None]:
     """The folding rule of an operation, except where an argument is this constant."""
     rule = fold._RULES[cg.ops.OPS[op]]
@@ -147,7 +142,7 @@ VARIANTS: dict[str, Variant] = {
     "energy by the centre's velocity": (lambda: replaced(mechanism, "energy", body_about_center), 10**6),
     "no rates but qd": (lambda: replaced(equations, "rates", lambda output, q, qd, t, build: list(qd)), 10**6),
     "inertial terms carried apart": (lambda: replaced(equations, "solve_nodes", pulled), 10**6),
-    "velocities eliminated last": (lambda: replaced(solving, "_dependent", all_last), 20),
+    "rotations product by product": (lambda: replaced(solving, "rotations", lambda *_: []), 10**6),
     "dense": (lambda: replaced(equations, "SHORT", 0), 15),
     "dense, without symmetry": (lambda: replaced(equations, "ldl_solve", lu_solve), 15),
     "sine and cosine not shared": (lambda: unshared("sin", "cos"), 100),

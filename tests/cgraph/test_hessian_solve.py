@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 
 import mpmath
@@ -11,8 +12,11 @@ import pytest
 
 import cgraph as cg
 from cgraph import GraphError
+from cgraph.elimination_order import steps
 from cgraph.hessian_solve import solve_nodes
 from cgraph.ldl import SingularError, ldl_solve
+from cgraph.order import topological
+from cgraph.rotations import rotations
 
 # Each function runs on nodes and, with mpmath's functions, on high-precision numbers: {name: (function, inputs)}.
 FUNCTIONS = {
@@ -162,3 +166,123 @@ def test_right_hand_sides_at_inner_nodes_are_carried_to_the_variables():
     graph = cg.Graph([*x, *b], {f"s{i}": node for i, node in enumerate([*carried, *apart])})
     found = cg.compile(graph)(np.random.default_rng(0).uniform(0.2, 0.8, 8))
     assert found[:3] == pytest.approx(found[3:], rel=1e-13)
+
+
+def turning(m, a, b, x):
+    """Two vectors turned by one angle, one of them by another as well; mirrored, with an input in two pairs.
+
+    The last variable is met before them, so what comes of it has to pass them down and up again.
+    """
+    ca, sa, cb, sb = m.cos(a), m.sin(a), m.cos(b), m.sin(b)
+    u, v, w = x[0] + x[3] * x[3], m.sin(x[1]) - x[2], m.exp(x[2]) + x[3]
+    p, q = ca * u + sa * v, ca * v - sa * u
+    r, s = sa * w - ca * v, sa * v + ca * w  # turned the other way, one of them with its sign turned
+    y, z = cb * p - sb * r, sb * p + cb * r
+    k, n = cb * s + sb * y, cb * s - sb * y  # no rotation: both would have to be as long as (s, y)
+    squares = sum(8 * e * e for e in x)
+    last = (p - 2 * q + 3 * r + s * s) * x[4]
+    return last + p * p * q + 3 * q * q + y * z * s + 2 * y * y + 4 * z * z + k * n * p + 5 * s * s + squares
+
+
+def test_rotations_are_turned_back_as_one() -> None:
+    x, rhs = cg.variables("x0 x1 x2 x3 x4"), cg.variables("r0 r1 r2 r3 r4")
+    a, b = cg.variables("a b")
+    solved = cg.hessian_solve(cg.Graph([a, b, *x], {"f": turning(cg, a, b, x)}), x, rhs)
+    function = cg.compile(cg.Graph([a, b, *x, *rhs], {f"s{i}": node for i, node in enumerate(solved)}))
+    rng = np.random.default_rng(4)
+    for _ in range(5):
+        angles, point, right = rng.uniform(-3.0, 3.0, 2), rng.uniform(-0.3, 0.3, 5), rng.normal(size=5)
+        hessian = np.empty((5, 5))
+        with mpmath.workdps(40):
+            energy = partial(lambda angles, *v: turning(mpmath, *angles, v), [mpmath.mpf(each) for each in angles])
+            for i in range(5):
+                for j in range(5):
+                    orders = tuple((k == i) + (k == j) for k in range(5))
+                    hessian[i, j] = mpmath.diff(energy, tuple(map(mpmath.mpf, point)), orders)
+        expected = np.linalg.solve(hessian, right)
+        assert function(np.concatenate([angles, point, right])) == pytest.approx(
+            expected, rel=1e-13, abs=1e-13 * np.abs(expected).max()
+        )
+
+
+def test_which_pairs_of_sums_are_rotations() -> None:
+    def found(make: Callable[..., tuple[cg.Node, ...]], kept: bool = False) -> int:
+        a, b, *x = cg.variables("a b x y z")
+        nodes = make(cg.cos(a), cg.sin(a), cg.sin(b), *x)
+        order = [node for node in topological(nodes) if node.op.name in ("add", "sub", "mul")]
+        return len(rotations(order, {*x, *order}, [order[0]] if kept else []))
+
+    assert found(lambda c, s, o, x, y, z: (c * x + s * y, c * y - s * x)) == 1
+    assert found(lambda c, s, o, x, y, z: (s * x - y * c, y * s + x * c)) == 1
+    assert found(lambda c, s, o, x, y, z: (c * x + s * y, c * y - s * x), kept=True) == 0
+    assert found(lambda c, s, o, x, y, z: (c * x + s * y, c * y + s * x)) == 0
+    assert found(lambda c, s, o, x, y, z: (c * x + s * y, c * z - s * x)) == 0
+    assert found(lambda c, s, o, x, y, z: (c * x + o * y, c * y - o * x)) == 0
+    assert found(lambda c, s, o, x, y, z: (c * x + s * x, c * x - s * x)) == 0
+
+    def used_again(c: cg.Node, s: cg.Node, o: cg.Node, x: cg.Node, y: cg.Node, z: cg.Node) -> tuple[cg.Node, ...]:
+        product = c * x
+        return product + s * y, c * y - s * x, product * z
+
+    assert found(used_again) == 0
+
+
+def test_turning_a_pair_back_costs_what_its_blocks_need() -> None:
+    """Of two pairs by one angle, blocks of 3, 3 and 4 numbers: 9, 9 and 11 operations, and one for 2 c."""
+    a, *x = cg.variables("a x0 x1 x2 x3")
+    c, s = cg.cos(a), cg.sin(a)
+    p, q, r, t = c * x[0] + s * x[1], c * x[1] - s * x[0], c * x[2] + s * x[3], c * x[3] - s * x[2]
+    energy = cg.cosh(p + 2.0 * q + 3.0 * r + 4.0 * t) + cg.exp(p) + cg.exp(q) + cg.exp(r) + cg.exp(t)
+
+    def size() -> int:
+        solved = cg.hessian_solve(cg.Graph([a, *x], {"f": energy}), x, [1.0, 2.0, 3.0, 4.0])
+        return len(cg.simplify(cg.Graph([a, *x], {f"s{i}": node for i, node in enumerate(solved)})).nodes)
+
+    assert size() == 126
+
+
+def test_steps_are_those_of_the_order_from_its_end_with_rotations_by_one_angle_at_once() -> None:
+    a, b, *x = cg.variables("a b x0 x1 x2 x3")
+    c, s, o, r = cg.cos(a), cg.sin(a), cg.cos(b), cg.sin(b)
+
+    def turned(c: cg.Node, s: cg.Node, x: cg.Node, y: cg.Node) -> tuple[cg.Node, cg.Node]:
+        return c * x + s * y, c * y - s * x
+
+    p, q = turned(c, s, x[0], x[1])
+    u, v = turned(c, s, x[2], cg.exp(x[3]))
+    y, z = turned(o, r, p, u)
+    again = turned(c, s, y, v)  # by the same angle, but of what the first are turned to
+    energy = q * again[0] + z * again[1]
+    order = [node for node in topological([energy]) if node.args and {*node.args} & {*x, *topological([energy])}]
+    order = [*x, *(node for node in order if node not in (c, s, o, r))]
+    found = {each.first: each for each in rotations(order, set(order), [])}
+    inside = {node for each in found.values() for node in (*each.products, each.second)}
+    firsts = {each.second: each.first for each in found.values()}
+    arguments = {
+        node: {firsts.get(arg, arg) for arg in ((found[node].x, found[node].y) if node in found else node.args)}
+        for node in order
+        if node not in inside
+    }
+    plan = steps(arguments, found)
+    assert sorted(len(step) for step in plan if isinstance(step, list)) == [1, 1, 2]
+    done: set[cg.Node] = set()
+    for step in plan:
+        taken = [each.first for each in step] if isinstance(step, list) else [step]
+        assert all(user in done for user, args in arguments.items() if {*taken} & {*args})
+        done.update(taken)
+    assert done == arguments.keys()
+    assert steps(dict.fromkeys(x, ()), {}) == x[::-1]
+
+
+def test_a_right_hand_side_at_a_product_within_a_rotation_is_carried_too() -> None:
+    a, *x = cg.variables("a x0 x1")
+    c, s = cg.cos(a), cg.sin(a)
+    product = c * x[0]
+    p, q = product + s * x[1], c * x[1] - s * x[0]
+    energy = p * p + p * q + 3 * q * q
+    b = cg.variables("b0 b1 bp")
+    carried = solve_nodes(energy, x, b[:2], at={product: b[2]})
+    apart = cg.hessian_solve(cg.Graph([a, *x], {"f": energy}), x, [b[0] + c * b[2], b[1]])
+    graph = cg.Graph([a, *x, *b], {f"s{i}": node for i, node in enumerate([*carried, *apart])})
+    found = cg.compile(graph)(np.random.default_rng(0).uniform(0.2, 0.8, 6))
+    assert found[:2] == pytest.approx(found[2:], rel=1e-13)
