@@ -55,7 +55,7 @@ def gravity_force(model: Any) -> Graph:
     Inputs q0.., qd0.., t if needed, parameters; outputs gravity0.. [N m or N].
     """
     system = as_system(model)
-    at_rest = substituted(_bias(system), dict.fromkeys(system.qd, ZERO))
+    at_rest = substituted(_derived(system).bias(system, Builder()), dict.fromkeys(system.qd, ZERO))
     return cg.simplify(system.graph({f"gravity{i}": node for i, node in enumerate(at_rest)}, system.q, system.qd))
 
 
@@ -87,9 +87,10 @@ SHORT = 6  # coordinates; beyond, the dense graph is larger on a tree of bodies,
 
 
 def forward_dynamics(model: Any, method: str = "auto", *, positive: bool = False) -> Graph:
-    """Accelerations: qdd = M^-1 (tau + forces - damping * qd - bias), from the Lagrangian alone.
+    """Accelerations: qdd = M^-1 (tau + forces - damping * qd - bias), from the Lagrangian.
 
     Inputs q0.., qd0.., tau0.., t if needed, parameters; outputs qdd0.. [rad/s^2 or m/s^2].
+    A mechanism gives the bias itself (`System.bias_forces`); of others it is derived.
     method: "recursive", elimination on the graph of L without forming M (`cg.hessian_solve`): for a tree of bodies the
     number of nodes is linear in n. "dense", M factored as LDL^T: smaller for very short arms. "auto", the smaller of
     the two up to 6 coordinates, else recursive.
@@ -168,6 +169,23 @@ class _Terms(NamedTuple):
 
 
 def _terms(system: System) -> _Terms:
+    """As the system gives its bias, or else derived from L."""
+    given = system.bias_forces()
+    if given is None:
+        return _derived(system)
+    pairs = [node for pair in given for node in pair]
+    build = Builder()
+    lagrangian, *nodes = folded([system.lagrangian, *system.forces, *pairs], build)
+    forces, pairs = nodes[: system.n], nodes[system.n :]
+    inertial: dict[Node, Node] = {}
+    with building(build):
+        for velocity, force in zip(pairs[::2], pairs[1::2], strict=True):
+            if velocity.value is None:  # else nothing moves there
+                inertial[velocity] = inertial.get(velocity, ZERO) + force
+    return _Terms(lagrangian, forces, inertial, [ZERO] * system.n)
+
+
+def _derived(system: System) -> _Terms:
     # Two builders: a term of L must not get the tags of an equal term that derives from it, and hand them on.
     written, build = Builder(), Builder()
     lagrangian, *forces = folded([system.lagrangian, *system.forces], written)

@@ -94,14 +94,8 @@ def link(body: Body, outer: Array) -> Link:
 def carried(parent: Motion, link: Link, kind: str, q: Node, qd: Node) -> Motion:
     """The motion of a link, "revolute" or "prismatic", from that of its parent."""
     along = link.turn[2][2]  # the joint's axis on the parent's
-    if parent.turned and abs(along) != 1.0:
-        parent = _in_own_axes(parent)
-    place = link.place
-    if kind == "prismatic":
-        x, y, z = (row[2] * q for row in link.turn)
-        place = spatial.plus(place, (x, y, z))
-    if parent.turned:
-        place = spatial.turned_about_z(parent.turned.cos, -parent.turned.sin, place)
+    parent = carrier(parent, link)
+    place = placed(parent, link, kind, q)
     with cg.tag("kinetic"):
         omega = spatial.turned(link.turn, parent.omega)
         velocity = spatial.turned(link.turn, spatial.plus(parent.velocity, spatial.cross(parent.omega, place)))
@@ -126,6 +120,22 @@ def carried(parent: Motion, link: Link, kind: str, q: Node, qd: Node) -> Motion:
     with cg.tag("potential"):
         up = spatial.turned_about_z(c, s, up)
     return Motion((x, y, z + qd), velocity, up, height)
+
+
+def carrier(parent: Motion, link: Link) -> Motion:
+    """The parent's motion in the axes that the link is carried in: those of a plane where it stays in the plane."""
+    return _in_own_axes(parent) if parent.turned and abs(link.turn[2][2]) != 1.0 else parent
+
+
+def placed(carrier: Motion, link: Link, kind: str, q: Node) -> Triple:
+    """Where the link's origin is from its parent's, in the axes of `carrier`."""
+    place = link.place
+    if kind == "prismatic":
+        x, y, z = (row[2] * q for row in link.turn)
+        place = spatial.plus(place, (x, y, z))
+    if carrier.turned:
+        place = spatial.turned_about_z(carrier.turned.cos, -carrier.turned.sin, place)
+    return place
 
 
 def _in_own_axes(motion: Motion) -> Motion:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from numbers import Integral
-from typing import Any
+from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -17,7 +17,7 @@ from cgraph import Graph, Node
 from cgraph.fold import Builder
 from cgraph.label import building
 
-from . import spatial
+from . import newton_euler, spatial
 from .base_parameters import regrouped
 from .body import WORLD, Body, Joint, MechanismError, checked, shape_of, vector
 from .force import Force, Reach, check, generalized, reach
@@ -25,7 +25,7 @@ from .kinematic_tree import Carrier, locked, parents_first, welded, with_mass_to
 from .link import Link, Motion, axes_of, carried, energy, ground, link
 from .spatial import ZERO, Array
 from .subtree import Subtree, as_subtree, below, inserted
-from .system import System, parameter_value
+from .system import BiasForce, BodySystem, System, parameter_value
 
 __all__ = ["WORLD", "Body", "Force", "Joint", "Mechanism", "MechanismError", "serial_arm", "tree"]
 
@@ -36,10 +36,18 @@ class _Made:
     def __init__(self) -> None:
         self.bodies: WeakKeyDictionary[Body, Body] = WeakKeyDictionary()  # checked
         self.links: WeakKeyDictionary[Body, tuple[Body | None, Link]] = WeakKeyDictionary()  # with the parent
-        self.partials: dict[tuple[Any, ...], tuple[Motion, Motion, Node]] = {}  # partial Lagrangians, with both motions
+        self.partials: dict[tuple[Any, ...], _Moved] = {}
 
     def __reduce__(self) -> tuple[type[_Made], tuple[()]]:
         return _Made, ()  # a copy in another process makes its own
+
+
+class _Moved(NamedTuple):
+    """A body's parent's motion, its own, and its partial Lagrangian."""
+
+    parent: Motion
+    motion: Motion
+    partial: Node
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +127,8 @@ class Mechanism:
         """
         if not self.moving:
             raise MechanismError("the mechanism has no joint that moves")
-        return System(
+        return BodySystem(
+            self._bias_forces,
             lambda q, qd, t: self._partial_lagrangians(q, qd),
             [body.name for body in self.moving],
             self._values,
@@ -169,25 +178,48 @@ class Mechanism:
         return generalized([(force, self._reach(force.body, q, qd)) for force in self.forces], qd, p)
 
     def _partial_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
-        rest = ground(self.gravity)
-        made = self._made.partials
-        rest = made.setdefault(("ground", *[each.value for each in rest.up]), (rest, rest, ZERO))[0]
-        motions = {WORLD: rest}
-        partials = []
         with building(Builder()):
-            for body, made_of, angle, rate in zip(self.moving, self.links, q, qd, strict=True):
-                parent, kind = motions[body.parent], body.joint.kind
-                key = (id(parent), body.name, kind, angle.name, *made_of.numbers)
-                if key not in made:
-                    with cg.tag(body.name):
-                        motion = carried(parent, made_of, kind, angle, rate)
-                        made[key] = parent, motion, energy(motion, made_of, angle, rate)
-                _, motions[body.name], partial = made[key]
-                partials.append(partial)
+            moved = self._moved(q, qd)
+            partials = [each.partial for each in moved]
             if self.regrouped:
                 with cg.tag("potential"):
-                    partials[0] = partials[0] - spatial.dot(rest.up, spatial.constant(self._links[1]))
+                    partials[0] = partials[0] - spatial.dot(self._ground.up, spatial.constant(self._links[1]))
         return partials
+
+    @property
+    def _ground(self) -> Motion:
+        rest = ground(self.gravity)
+        return self._made.partials.setdefault(
+            ("ground", *[each.value for each in rest.up]), _Moved(rest, rest, ZERO)
+        ).motion
+
+    def _moved(self, q: Sequence[Node], qd: Sequence[Node]) -> list[_Moved]:
+        made, rest = self._made.partials, self._ground
+        motions = {WORLD: rest}
+        found = []
+        for body, made_of, angle, rate in zip(self.moving, self.links, q, qd, strict=True):
+            parent, kind = motions[body.parent], body.joint.kind
+            key = (id(parent), body.name, kind, angle.name, *made_of.numbers)
+            if key not in made:
+                with cg.tag(body.name):
+                    motion = carried(parent, made_of, kind, angle, rate)
+                    made[key] = _Moved(parent, motion, energy(motion, made_of, angle, rate))
+            found.append(made[key])
+            motions[body.name] = made[key].motion
+        return found
+
+    def _bias_forces(self, q: Sequence[Node], qd: Sequence[Node]) -> list[BiasForce]:
+        found = []
+        with building(Builder()):
+            accelerations = {WORLD: newton_euler.at_rest(self._ground)}
+            moved = self._moved(q, qd)
+            for body, made_of, moves, angle, rate in zip(self.moving, self.links, moved, q, qd, strict=True):
+                with cg.tag(body.name):
+                    acceleration = accelerations[body.name] = newton_euler.accelerated(
+                        accelerations[body.parent], moves.parent, moves.motion, made_of, body.joint.kind, angle, rate
+                    )
+                    found += newton_euler.forces(acceleration, moves.motion, made_of, angle, rate)
+        return found
 
     @property
     def links(self) -> list[Link]:

@@ -6,14 +6,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import cgraph as cg
 from cgraph import Node
 
-from .system import System, per_coordinate
+from .system import BiasForce, BodySystem, System, per_coordinate
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -26,6 +26,17 @@ class Link:
     length: float  # m, joint to joint
     center: float  # m, joint to centre of mass
     inertia: float  # kg m^2, about the centre of mass
+
+
+class _Motion(NamedTuple):
+    """A link and its motion."""
+
+    tag: str
+    link: Link
+    omega: Node  # angular velocity
+    sin: Node  # of its angle from the vertical
+    cos: Node
+    velocity: tuple[Node, Node] | None  # of its joint; None: fixed
 
 
 @dataclass(frozen=True)
@@ -44,42 +55,74 @@ class PlanarArm:
     def system(self) -> System:
         """The Lagrangian system, one partial Lagrangian L_i = K_i - P_i for each link, tagged with link and energy."""
         names = [f"joint {i + 1}" for i in range(len(self.links))]
-        return System(lambda q, qd, t: self._partial_lagrangians(q, qd), names, damping=self.damping)
+        return BodySystem(
+            self._bias_forces, lambda q, qd, t: self._partial_lagrangians(q, qd), names, damping=self.damping
+        )
+
+    def _motions(self, q: Sequence[Node], qd: Sequence[Node]) -> list[_Motion]:
+        motions: list[_Motion] = []
+        angle: Node | float = 0.0
+        omega: Node | float = 0.0
+        velocity: tuple[Node, Node] | None = None
+        for i, link in enumerate(self.links):
+            name = f"link {i + 1}"
+            with cg.tag(name):
+                angle = q[i] if i == 0 else angle + q[i]
+                omega = qd[i] if i == 0 else omega + qd[i]
+                s, c = cg.sin(angle), cg.cos(angle)
+                motions.append(_Motion(name, link, omega, s, c, velocity))
+                if i + 1 < len(self.links):
+                    with cg.tag("kinetic"):
+                        speed = link.length * omega
+                        x, y = speed * c, speed * s
+                        velocity = (x, y) if velocity is None else (velocity[0] + x, velocity[1] + y)
+        return motions
 
     def _partial_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
         # With the first moment m c and the inertia about the joint, m c^2 + I, in place of the velocity of the centre
         # of mass, K_i = 1/2 m v.v + m c w (v . n) + 1/2 (m c^2 + I) w^2: fewer nodes. v is the joint's velocity, w the
         # link's angular velocity, n = (cos, sin) of its angle the direction in which w moves it.
         partials: list[Node] = []
-        angle: Node | float = 0.0
-        omega: Node | float = 0.0
-        velocity: tuple[Node, Node] | None = None  # of the joint, None while it is fixed
         height: Node | None = None  # of the joint
-        for i, link in enumerate(self.links):
-            with cg.tag(f"link {i + 1}"):
-                angle = q[i] if i == 0 else angle + q[i]
-                omega = qd[i] if i == 0 else omega + qd[i]
-                s, c = cg.sin(angle), cg.cos(angle)
-                moment = link.mass * link.center
-                with cg.tag("kinetic"):
-                    kinetic = 0.5 * (moment * link.center + link.inertia) * (omega * omega)
-                    if velocity is not None:
-                        x, y = velocity
-                        kinetic = kinetic + 0.5 * link.mass * (x * x + y * y) + moment * (omega * (x * c + y * s))
-                with cg.tag("potential"):
-                    potential = -(moment * self.gravity) * c
-                    if height is not None:
-                        potential = link.mass * self.gravity * height + potential
+        for name, link, omega, s, c, velocity in self._motions(q, qd):
+            moment = link.mass * link.center
+            with cg.tag(name, "kinetic"):
+                kinetic = 0.5 * (moment * link.center + link.inertia) * (omega * omega)
+                if velocity is not None:
+                    x, y = velocity
+                    kinetic = kinetic + 0.5 * link.mass * (x * x + y * y) + moment * (omega * (x * c + y * s))
+            with cg.tag(name, "potential"):
+                potential = -(moment * self.gravity) * c
+                if height is not None:
+                    potential = link.mass * self.gravity * height + potential
+                drop = link.length * c
+                height = -drop if height is None else height - drop
+            with cg.tag(name):
                 partials.append(kinetic - potential)
-                if i + 1 < len(self.links):
-                    with cg.tag("kinetic"):
-                        speed = link.length * omega
-                        x, y = speed * c, speed * s
-                        velocity = (x, y) if velocity is None else (velocity[0] + x, velocity[1] + y)
-                    with cg.tag("potential"):
-                        drop = link.length * c
-                        height = -drop if height is None else height - drop
         return partials
+
+    def _bias_forces(self, q: Sequence[Node], qd: Sequence[Node]) -> list[BiasForce]:
+        """The Newton-Euler equations at qdd = 0, where no link's angular velocity changes; gravity lifts the base.
+
+        A link needs the force m a - m c w^2 e at its joint, which moves with a, and the torque m c (a . n) about it,
+        with e = (sin, -cos) the direction of the link.
+        """
+        found: list[BiasForce] = []
+        a: tuple[Node, Node] = cg.constant(0.0), cg.constant(self.gravity)
+        energies = ("kinetic", "potential") if self.gravity else ("kinetic",)  # that it comes of
+        for name, link, omega, s, c, velocity in self._motions(q, qd):
+            moment = link.mass * link.center
+            with cg.tag(name, "kinetic"):
+                square = omega * omega
+                inward = -s * square, c * square
+            with cg.tag(name, *energies):
+                found.append((omega, moment * (a[0] * c + a[1] * s)))
+                if velocity is not None:
+                    found += [
+                        (v, link.mass * each + moment * e) for v, each, e in zip(velocity, a, inward, strict=True)
+                    ]
+                a = a[0] + link.length * inward[0], a[1] + link.length * inward[1]
+        return found
 
     def joint_positions(self, q: Array) -> Array:
         """Places of base, joints and tip [m], (T, n + 1, 2), x to the right and y up, for joint angles q, (T, n)."""

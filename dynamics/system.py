@@ -15,6 +15,7 @@ from cgraph import Graph, Node
 from cgraph.order import topological
 
 TIME = "t"
+BiasForce = tuple[Node, Node]  # a velocity, and the force that is there
 _RESERVED = re.compile(r"(q|qd|qdd|tau)\d+(_old)?|t|dt")
 
 
@@ -136,6 +137,13 @@ class System:
                 potential.append(node if sign < 0 else -node)
         return _sum(kinetic), _sum(potential)
 
+    def bias_forces(self) -> Sequence[BiasForce] | None:
+        """The bias as forces f at velocities z, nodes of L: sum of f dz/dqd = d/dt dL/dqd - dL/dq at qdd = 0.
+
+        None where nobody knows better than to derive it from L, as here.
+        """
+        return None
+
     def graph(self, outputs: Mapping[str, Node], *state: Sequence[Node]) -> Graph:
         """A graph over state variables, then t if needed, then the parameters."""
         return Graph([node for part in state for node in part] + self.extra_inputs, outputs)
@@ -143,6 +151,23 @@ class System:
     def __repr__(self) -> str:
         parameters = f", parameters {', '.join(self.parameters)}" if self.parameters else ""
         return f"<System of {self.n} coordinate(s) {', '.join(self.coordinates[:6])}{parameters}>"
+
+
+class BodySystem(System):
+    """The system of bodies that give their bias themselves, by bias_forces(q, qd)."""
+
+    def __init__(
+        self,
+        bias_forces: Callable[[Sequence[Node], Sequence[Node]], Sequence[BiasForce]],
+        *of_system: Any,
+        **more: Any,
+    ) -> None:
+        super().__init__(*of_system, **more)
+        self._bias_forces = bias_forces
+
+    def bias_forces(self) -> Sequence[BiasForce]:
+        """See System."""
+        return self._bias_forces(self.q, self.qd)
 
 
 def as_system(model: Any) -> System:

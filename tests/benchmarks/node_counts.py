@@ -25,6 +25,7 @@ from cgraph.reverse import cotangents
 from dynamics import equations, link as links, mechanism, spatial
 from dynamics.reports.bench_scenes import binary_tree, turned_arm
 from dynamics.reports.fit import exponent
+from dynamics.system import BodySystem
 
 solving = sys.modules["cgraph.hessian_solve"]  # the module; `cgraph.hessian_solve` is the function
 solve_nodes, rates = solving.solve_nodes, equations.rates
@@ -142,6 +143,7 @@ VARIANTS: dict[str, Variant] = {
     "energy by the centre's velocity": (lambda: replaced(mechanism, "energy", body_about_center), 10**6),
     "no rates but qd": (lambda: replaced(equations, "rates", lambda output, q, qd, t, build: list(qd)), 10**6),
     "inertial terms carried apart": (lambda: replaced(equations, "solve_nodes", pulled), 10**6),
+    "bias from the Lagrangian": (lambda: replaced(BodySystem, "bias_forces", lambda system: None), 10**6),
     "rotations product by product": (lambda: replaced(solving, "rotations", lambda *_: []), 10**6),
     "dense": (lambda: replaced(equations, "SHORT", 0), 15),
     "dense, without symmetry": (lambda: replaced(equations, "ldl_solve", lu_solve), 15),

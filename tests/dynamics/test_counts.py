@@ -48,8 +48,8 @@ def test_each_further_equal_link_adds_148_edges(n: int) -> None:
 
 
 @mark.parametrize("n", range(3, 13))
-def test_each_further_equal_link_adds_111_nodes_to_forward_dynamics(n: int) -> None:
-    assert len(dyn.forward_dynamics(equal_links(n), "recursive").nodes) == 193 + 111 * (n - 3)
+def test_each_further_equal_link_adds_93_nodes_to_forward_dynamics(n: int) -> None:
+    assert len(dyn.forward_dynamics(equal_links(n), "recursive").nodes) == 163 + 93 * (n - 3)
 
 
 @fixture(scope="module")

@@ -115,7 +115,7 @@ def test_what_regrouping_saves() -> None:
     """Seven numbers of a body in place of ten; in a plane two in place of three. No mass, where all joints turn."""
     counts = {name: [(nodes(equations(model)), nodes(dyn.prune(model, equations).graph)) for equations in BOTH]
               for name, model in (("paper", in_space(PAPER)), ("arm of 7", turned_arm(7)))}  # fmt: skip
-    assert counts == {"paper": [(175, 158), (196, 175)], "arm of 7": [(1428, 1236), (2481, 2217)]}
+    assert counts == {"paper": [(175, 158), (161, 139)], "arm of 7": [(1428, 1236), (1865, 1671)]}
     assert all(link.mass == 0.0 for link in replace(turned_arm(7), regrouped=True).links)
 
 
@@ -127,7 +127,7 @@ def test_the_paper_s_arm_spelled_in_space_prunes_to_its_planar_graph() -> None:
     by_hand = [nodes(equations(PAPER)) for equations in BOTH]
     in_full = [nodes(equations(in_space(PAPER))) for equations in BOTH]
     pruned = [nodes(dyn.prune(in_space(PAPER), equations).graph) for equations in BOTH]
-    assert (by_hand, in_full, pruned) == ([171, 198], [175, 196], [158, 175])
+    assert (by_hand, in_full, pruned) == ([171, 167], [175, 161], [158, 139])
     assert all(found <= 1.1 * hand for found, hand in zip(in_full, by_hand, strict=True))
     assert nodes(dyn.gravity_force(in_space(PAPER))) == nodes(dyn.gravity_force(PAPER)) == 20
     for equations in BOTH:
@@ -140,11 +140,14 @@ def test_the_paper_s_arm_spelled_in_space_prunes_to_its_planar_graph() -> None:
 @mark.parametrize("model", [PAPER, arm(3), turned_arm(3)], ids=["paper", "arm", "turned arm"])
 @mark.parametrize("equations", BOTH)
 def test_without_gravity_and_damping_the_kinetic_energy_is_all(model: Any, equations: Equations) -> None:
-    """As many nodes as from a Lagrangian that is the kinetic energy alone."""
+    """No more nodes than from a Lagrangian that is the kinetic energy alone."""
     system = model.system
     by_hand = equations(dyn.System(lambda q, qd, t: system.kinetic, system.coordinates))
     pruned = dyn.prune(model, equations, effects=["springs"] if isinstance(model, dyn.Mechanism) else [], regroup=False)
-    assert nodes(pruned.graph) == nodes(by_hand)
+    if equations is BOTH[0]:
+        assert nodes(pruned.graph) == nodes(by_hand)
+    else:  # the bias that bodies give themselves takes fewer
+        assert nodes(pruned.graph) < nodes(by_hand)
     assert_alike(pruned.graph, by_hand)
     assert not {"potential", "damping"} & {tag for node in pruned.graph.nodes for tag in node.tags}
 
@@ -153,7 +156,7 @@ def test_without_gravity_the_base_s_angle_is_gone() -> None:
     """The paper's arm in space: 113 nodes, where the planar Lagrangian, in angles from the vertical, has 158."""
     counts = [nodes(dyn.prune(in_space(PAPER), each, effects=[], regroup=False).graph) for each in BOTH]
     by_hand = [nodes(dyn.prune(PAPER, each, effects=[]).graph) for each in BOTH]
-    assert (counts, by_hand) == ([113, 154], [158, 184])
+    assert (counts, by_hand) == ([113, 114], [158, 155])
     graph = dyn.prune(in_space(PAPER), effects=[]).graph
     assert "q0" not in {node.name for node in graph.nodes}
     assert_alike(graph, dyn.prune(PAPER, effects=[]).graph)
@@ -229,7 +232,7 @@ def test_bodies_without_mass_and_welds_leave_nothing() -> None:
 
 def test_a_locked_joint_leaves_the_shorter_arm_s_nodes() -> None:
     """Of ten links, the last, one in the middle, and the first: as many as the arm of nine has, within 1.02."""
-    for equations, ten, nine, first in ((BOTH[0], 3934, 3477, 3492), (BOTH[1], 8747, 7693, 7708)):
+    for equations, ten, nine, first in ((BOTH[0], 3934, 3477, 3492), (BOTH[1], 6749, 5944, 5955)):
         counts = [
             nodes(dyn.prune(arm(10), equations, lock={f"link {k}": 0.3}, regroup=False).graph) for k in (10, 5, 1)
         ]
