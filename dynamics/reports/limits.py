@@ -26,8 +26,8 @@ _COARSE = (
 )
 _HEAVY = (
     "Elimination from the tip to the base: two joints take up all the inertia of a heavy link at the end, and what is "
-    "left for the next joints, that of the light links, is the difference of two large numbers. Float64 keeps little of "
-    "it at 12 decades; double-double meets the bound."
+    "left for the next joints, that of the light links, is the difference of two large numbers. Float64 keeps little "
+    "of it at 12 decades; double-double meets the bound."
 )
 
 # (section, case, method); an empty method stands for every one.
