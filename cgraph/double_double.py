@@ -40,6 +40,8 @@ def double_double(graph: Graph, *, low: bool = False) -> Graph:
     Every back end keeps them, fused multiply-add or not, but `fast=True` and `cg.simplify`, which take sums in another
     order, do not: simplify before. What overflows becomes NaN, from 1e300 on for the operands of a product.
     """
+    if not isinstance(graph, Graph):
+        raise TypeError(f"double_double takes a Graph, got {type(graph).__name__}: {graph!r:.60}")
     pairs: dict[Node, Pair] = {}
     with building(_made) as labelled:
         for node in topological(graph.outputs.values()):

@@ -112,7 +112,7 @@ def forward_dynamics(model: Any, method: str = "auto", *, positive: bool = False
         name = system.coordinates[error.index]
         problem = "not positive definite" if error.pivot else "singular"
         raise SingularMassMatrixError(
-            f"the mass matrix is {problem}: coordinate {name!r} has no inertia of its own"
+            f"the mass matrix is {problem}: coordinate {name!r} has no inertia, or none that others do not share"
         ) from None
     return min(graphs, key=lambda graph: len(graph.nodes))
 

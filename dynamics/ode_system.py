@@ -9,7 +9,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.order import topological
 
-from .system import TIME, as_node, called, parameter_value, sequence
+from .system import TIME, Parameters, as_node, called, parameter_value, sequence
 
 RESERVED = (TIME, "dt")
 
@@ -35,7 +35,7 @@ class OdeSystem:
         self.parameters = {name: parameter_value(name, value) for name, value in (parameters or {}).items()}
         if shared := [name for name in self.states if name in self.parameters]:
             raise ValueError(f"{shared[0]!r} is both a state and a parameter; choose another name for one of them")
-        p = {name: cg.variable(name) for name in self.parameters}
+        p = Parameters(self.parameters)
         given = sequence("rate must give", called("rate", rate, self.x, self.t, p))
         if len(given) != self.n:
             raise ValueError(f"rate must give {self.n} values, one for each state, got {len(given)}")

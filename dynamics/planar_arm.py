@@ -12,8 +12,9 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
+from cgraph.real import real_number
 
-from .system import BiasForce, BodySystem, System, per_coordinate
+from .system import BiasForce, BodySystem, System, per_coordinate, sequence
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -145,15 +146,16 @@ def planar_arm(
     model: "rod", a slender uniform rod with inertia m l^2 / 12; "point", the mass at the link's far end.
     gravity [m/s^2].  Raises ValueError when a number is out of range or the counts differ.
     """
+    masses, lengths = sequence("masses must be", masses), sequence("lengths must be", lengths)
     if len(masses) != len(lengths) or not len(masses):
         raise ValueError(f"an arm needs as many masses as lengths, at least one; got {len(masses)} and {len(lengths)}")
     if model not in ("rod", "point"):
         raise ValueError(f'model must be "rod" or "point", got {model!r}')
-    if not math.isfinite(gravity):
+    if not math.isfinite(real_number("gravity", gravity)):
         raise ValueError(f"gravity must be finite, got {gravity!r} m/s^2")
     for i, (mass, length) in enumerate(zip(masses, lengths, strict=True)):
         for what, value, unit in (("mass", mass, "kg"), ("length", length, "m")):
-            if not (math.isfinite(value) and value > 0.0):
+            if not (math.isfinite(real_number(f"link {i + 1}: {what}", value)) and value > 0.0):
                 raise ValueError(f"link {i + 1}: {what} must be positive and finite, got {value!r} {unit}")
     links = [
         Link(mass, length, length / 2, mass * length * length / 12)

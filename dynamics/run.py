@@ -18,7 +18,7 @@ from cgraph.program import Runner, runner
 
 from .integrators import Method, Problem
 from .integrators.adaptive import DONE, TOO_SMALL
-from .limits import Limits
+from .limits import Limits, step_count
 from .trajectory import Array
 
 Indices = np.ndarray[Any, np.dtype[np.intp]]
@@ -157,7 +157,7 @@ class FixedRun(Run):
         memory = self.runner.memory(start)
         m = self.problem.size
         for begin, end in itertools.pairwise(self.instants):
-            steps = max(1, math.ceil((end - begin) / self.dt * (1.0 - 1e-12)))
+            steps = step_count(end - begin, self.dt)
             size = (end - begin) / steps
             for name, value in (("start", begin), ("t", begin), ("count", 0.0), ("h", size)):
                 self.runner.write(memory, name, value)

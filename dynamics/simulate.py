@@ -10,18 +10,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cgraph.real import real_array
+
 from .event import Event, crossings, event_graph
 from .integrators import METHODS, Problem, problem_of
-from .limits import limits_of
+from .integrators.adaptive import RESOLUTION
+from .limits import limits_of, step_count
+from .memory import room
 from .progress import Progress
 from .rows import Rows, from_start, recorded_times
 from .run import AdaptiveRun, FixedRun, Hermite, Piece, Tally
 from .scipy_run import ScipyRun, solver_of
 from .state_equation import state_inputs
-from .system import TIME, parameter_value, per_coordinate
+from .system import TIME, parameter_value, per_coordinate, sequence
 from .trajectory import Array, Crossings, Stats, Trajectory
 
 DT = 1e-3  # s, the step of methods of equal steps
+TABLES = 3  # that the rows are in at most at once, while they are put together
 BLOCK = 4096  # rows whose energy is taken at once
 
 
@@ -66,6 +71,8 @@ def simulate(
     same.
     Raises ValueError for arguments out of range, SingularMassMatrixError for a coordinate without inertia.
     """
+    if not isinstance(method, str):
+        raise TypeError(f"method must be one of {', '.join(METHODS)} or scipy:..., got {method!r:.60}")
     solver = solver_of(method)
     if solver is None and method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)} or scipy:..., got {method!r}")
@@ -76,7 +83,9 @@ def simulate(
     bound = {f"tau{i}": each for i, each in enumerate(per_coordinate("tau", tau, n))} if n else {}
     problem = problem_of(model, bound | values)
     state = _start(problem, q, qd)
-    wanted = (events,) if isinstance(events, Event) else tuple(events)
+    wanted = (events,) if isinstance(events, Event) else tuple(sequence("events must be", events))
+    if other := [each for each in wanted if not isinstance(each, Event)]:
+        raise TypeError(f"events must be of the type Event, got {type(other[0]).__name__}: {other[0]!r:.60}")
     asked = None if t_eval is None else recorded_times(t_eval, t_end)
 
     run: Tally
@@ -89,8 +98,9 @@ def simulate(
         size = DT if dt is None else dt
         instants = [0.0, float(t_end)] if asked is None else from_start(asked)
         each = asked is None or bool(wanted)
+        _check_steps(t_end, size, problem.size if asked is None else 0)
         run = FixedRun(problem, METHODS[method], (), backend, instants=instants, dt=size, each=each, most=max_steps)
-    rows = Rows(state, asked)
+    rows, most = Rows(state, asked), room() / TABLES
     watch = _Watch(problem, wanted)
     begin = time.perf_counter()
     try:
@@ -98,6 +108,9 @@ def simulate(
             for piece in run.pieces(state):
                 ended = watch(piece)
                 rows.add(piece if ended is None else _until(*ended))
+                if rows.size > most:
+                    run.status = f"stopped at t = {rows.last:.6g} s: the rows fill the memory; t_eval records fewer"
+                    break
                 if ended is not None:
                     run.status = watch.status
                     break
@@ -161,6 +174,18 @@ class _Watch:
         return result
 
 
+def _check_steps(t_end: float, dt: float, m: int) -> None:
+    """Raises ValueError for steps that do not move the time, MemoryError where rows of m numbers have no place."""
+    if dt < RESOLUTION * t_end:
+        raise ValueError(f"dt = {dt:g} s is below the resolution of the time at t_end = {t_end:g} s")
+    size, free = 8 * TABLES * step_count(t_end, dt) * m, room()
+    if size > free:
+        raise MemoryError(
+            f"{step_count(t_end, dt)} steps of {m} numbers take {size / 2**30:.3g} GiB, and {free / 2**30:.3g} GiB are "
+            "free: record fewer times (t_eval)"
+        )
+
+
 def _until(piece: Piece, t: float, x: Array) -> Piece:
     """The steps up to an instant inside one, which becomes the last."""
     keep = int(np.searchsorted(piece.t, t)) + 1
@@ -193,7 +218,7 @@ def _start(problem: Problem, q: ArrayLike, qd: ArrayLike | None) -> Array:
 
 
 def _state(what: str, value: ArrayLike, n: int, each: str) -> Array:
-    array = np.asarray(value, dtype=np.float64)
+    array = real_array(what, value)
     if array.shape != (n,):
         raise ValueError(f"{what} must have shape ({n},), one for each {each}, got {array.shape}")
     if not np.isfinite(array).all():
@@ -202,6 +227,8 @@ def _state(what: str, value: ArrayLike, n: int, each: str) -> Array:
 
 
 def _parameter_values(own: Mapping[str, float], parameters: Mapping[str, float] | None) -> dict[str, float]:
+    if not isinstance(parameters, Mapping | None):
+        raise TypeError(f"parameters must be a mapping of names to numbers, got {parameters!r:.60}")
     given = dict(parameters or {})
     if unknown := [name for name in given if name not in own]:
         raise ValueError(f"the system has no parameter {', '.join(unknown)} (it has {', '.join(own) or 'none'})")

@@ -6,17 +6,29 @@ import inspect
 import math
 import numbers
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, NoReturn
 
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.order import topological
+from cgraph.real import real_number
 
 TIME = "t"
 BiasForce = tuple[Node, Node]  # a velocity, and the force that is there
 _RESERVED = re.compile(r"(q|qd|qdd|tau)\d+(_old)?|t|dt")
+
+
+class Parameters(dict[str, Node]):
+    """{name: node} of the parameters of a system, as its functions get them."""
+
+    def __init__(self, names: Iterable[str]) -> None:
+        super().__init__({name: cg.variable(name) for name in names})
+
+    def __missing__(self, name: str) -> NoReturn:
+        has = ", ".join(self) or "none"
+        raise ValueError(f"the system has no parameter {name!r} (it has {has}); give it to `parameters`")
 
 
 class System:
@@ -45,7 +57,7 @@ class System:
         self.coordinates = _coordinate_names(coordinates)
         self.parameters = {name: parameter_value(name, value) for name, value in (parameters or {}).items()}
         self.damping = per_coordinate("damping", damping, self.n, minimum=0.0)
-        p = {name: cg.variable(name) for name in self.parameters}
+        p = Parameters(self.parameters)
         given = called("lagrangian", lagrangian, self.q, self.qd, self.t, p)
         partials = [given] if isinstance(given, (Node, numbers.Real)) else sequence("the lagrangian must give", given)
         if not partials:
@@ -184,7 +196,7 @@ def per_coordinate(what: str, value: float | Sequence[float], n: int, minimum: f
     if len(values) != n:
         raise ValueError(f"{what} needs one number for each of the {n} coordinates, got {len(values)}")
     for i, each in enumerate(values):
-        if not math.isfinite(each) or each < minimum:
+        if not math.isfinite(real_number(f"{what} of coordinate {i}", each)) or each < minimum:
             bound = f" and at least {minimum:g}" if math.isfinite(minimum) else ""
             raise ValueError(f"{what} must be finite{bound}, got {each!r} for coordinate {i}")
     return tuple([float(each) for each in values])

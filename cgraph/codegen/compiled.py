@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ..errors import GraphError
 from ..evaluate import Array
 from ..graph import Graph
+from ..real import real_array
 from .threads import share, thread_count
 
 
@@ -45,7 +46,7 @@ class Compiled(ABC):
         Raises GraphError for another shape, ValueError for less than one thread.
         """
         count = thread_count(threads)
-        points = np.asarray(X, dtype=np.float64)
+        points = real_array("X", X)
         if points.ndim != 2 or points.shape[0] != self.n_in:
             raise GraphError(f"X must have shape ({self.n_in}, N), one row for each input, got {points.shape}")
         total = points.shape[1]
@@ -88,7 +89,7 @@ class Compiled(ABC):
         """`bind`, after its checks."""
 
     def _point(self, x: ArrayLike) -> Array:
-        point = np.asarray(x, dtype=np.float64)
+        point = real_array("x", x)
         if point.shape != (self.n_in,):
             raise GraphError(f"x must have shape ({self.n_in},), one value for each input, got {point.shape}")
         return point

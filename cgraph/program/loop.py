@@ -13,6 +13,7 @@ from ..evaluate import Array
 from ..graph import Graph
 from ..node import CONSTANT, Node, variable
 from ..order import rebuild, topological
+from ..real import real_array
 from .program import Call, Program
 from .runner import runner
 
@@ -57,7 +58,7 @@ class Loop:
         return self._runner.run_many(self._memory(X, 2), passes, every).rows
 
     def _memory(self, x: ArrayLike, dimensions: int) -> Array:
-        given = np.asarray(x, dtype=np.float64)
+        given = real_array("x", x)
         count = len(self.graph.inputs)
         if given.ndim != dimensions or given.shape[0] != count:
             wanted = f"({count},)" if dimensions == 1 else f"({count}, N)"

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import math
-import os
 import pickle
 import time
 from collections.abc import Mapping
-from contextlib import closing, suppress
-from pathlib import Path
+from contextlib import closing
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..integrators import METHODS, Problem
-from ..limits import limits_of
+from ..limits import limits_of, step_count
+from ..memory import room
 from ..progress import Progress
 from ..rows import from_start, recorded_times
 from ..simulate import DT
@@ -24,7 +23,7 @@ from .chunk import Chunk, Part
 from .ensemble import Ensemble, EnsembleStats
 from .portable import portable
 from .starts import starts
-from .stretch import Stretch, step_count, stretches
+from .stretch import Stretch, stretches
 from .task import Task
 from .workers import Map, Workers, checked, finished
 
@@ -32,7 +31,6 @@ VECTOR = 8  # lanes, or a multiple of them, of every processor: a chunk of traje
 LARGEST = 256  # trajectories in a chunk, unless asked for
 SHARES = 4  # chunks for each worker, so that workers of unlike speed finish together
 UNKNOWN = 16  # workers behind a map, which does not say
-MOST = 0.9  # of the memory that is free, for the result
 
 
 def simulate_many(
@@ -88,7 +86,12 @@ def simulate_many(
     size = DT if dt is None else float(dt)
     steps = step_count(t_end, size)
     rows = steps + 1 if asked is None else len(asked)
-    _fits(len(x), rows, x.shape[1])
+    taken, free = 8 * len(x) * rows * x.shape[1], room()
+    if taken > free:
+        raise MemoryError(
+            f"{len(x)} trajectories of {rows} rows of {x.shape[1]} numbers take {taken / 2**30:.3g} GiB, and "
+            f"{free / 2**30:.3g} GiB are free: record fewer times (t_eval) or simulate fewer at once"
+        )
 
     begin = time.perf_counter()
     problem = Problem(model, same)
@@ -168,23 +171,3 @@ def _width(count: int, chunk: int | None, workers: int | Map, *, whole: bool) ->
     if chunk is None:
         chunk = min(LARGEST, math.ceil(count / (SHARES * (UNKNOWN if callable(workers) else workers))))
     return math.ceil(chunk / VECTOR) * VECTOR if whole else int(chunk)
-
-
-def _fits(count: int, rows: int, m: int) -> None:
-    """Raises MemoryError for a result that has no place in the memory that is free."""
-    size, free = 8 * count * rows * m, _free_memory()
-    if size > MOST * free:
-        raise MemoryError(
-            f"{count} trajectories of {rows} rows of {m} numbers take {size / 2**30:.3g} GiB, and {free / 2**30:.3g} "
-            "GiB are free: record fewer times (t_eval) or simulate fewer at once"
-        )
-
-
-def _free_memory() -> float:
-    """Bytes that can be taken without swapping; where the system does not say, all there are, or no limit."""
-    with suppress(OSError, StopIteration):  # Linux
-        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
-        return 1024.0 * next(int(line.split()[1]) for line in lines if line.startswith("MemAvailable:"))
-    with suppress(OSError, ValueError, AttributeError):  # macOS
-        return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
-    return math.inf

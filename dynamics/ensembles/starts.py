@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cgraph.real import real_array
+
 from ..state_equation import as_ode, state_inputs
 from ..system import parameter_value, per_coordinate
 from ..trajectory import Array
@@ -59,7 +61,7 @@ def starts(
 
 
 def _array(what: str, value: ArrayLike, n: int) -> Array:
-    array = np.asarray(value, dtype=np.float64)
+    array = real_array(what, value)
     if array.ndim not in (1, 2) or array.shape[-1] != n:
         raise ValueError(f"{what} must have shape (N, {n}), or ({n},) for all trajectories, got {array.shape}")
     if not (good := np.isfinite(array)).all():
@@ -70,7 +72,7 @@ def _array(what: str, value: ArrayLike, n: int) -> Array:
 
 
 def _column(name: str, value: ArrayLike) -> Array:
-    array = np.asarray(value, dtype=np.float64)
+    array = real_array(f"parameter {name!r}", value)
     if array.ndim != 1:
         raise ValueError(f"parameter {name!r} must be a number or have shape (N,), got {array.shape}")
     if not (good := np.isfinite(array)).all():

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+
+from ..limits import step_count
 
 SAME = 4.0  # units of the last bit of the time, by which instants may miss an even spacing
 
@@ -31,11 +32,6 @@ class Stretch(NamedTuple):
             for done in range(0, self.each, most_passes):
                 steps = min(most_passes, self.each - done)
                 yield steps, steps, done + steps == self.each
-
-
-def step_count(length: float, dt: float) -> int:
-    """The fewest equal steps of at most dt; a dt too short by rounding is long enough."""
-    return max(1, math.ceil(length / dt * (1.0 - 1e-12)))
 
 
 def stretches(instants: Sequence[float], dt: float) -> list[Stretch]:

@@ -18,7 +18,7 @@ from cgraph.reverse import cotangents
 
 from ..equations import energy
 from ..state_equation import as_ode, state_equation, state_inputs
-from ..system import TIME, System, as_system, called
+from ..system import TIME, Parameters, System, as_system, called
 
 ONE = cg.constant(1.0)
 KEPT = 16  # problems whose graphs stay for another run
@@ -64,7 +64,7 @@ class Problem:
 
         Raises TypeError for what is no such function, ValueError for a result that is no node of the state.
         """
-        p = {name: cg.variable(name) for name in state_inputs(self.model).parameters}
+        p = Parameters(state_inputs(self.model).parameters)
         if self.system is None:
             arguments: tuple[Any, ...] = (cg.variables(list(self.states)), cg.variable(TIME), p)
         else:

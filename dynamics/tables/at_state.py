@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
+from cgraph.real import real_array
 
 from ..system import TIME, System
 
@@ -26,7 +27,7 @@ def at_state(
     """The outputs, (n_out,) or (N, n_out), at a state {"q": .., "qd": .., "qdd": .., "tau": ..}, (n,) or (N, n) each.
 
     What of the state is None or missing is zero. Parameters have the system's values unless given.
-    Raises ValueError for another shape or a parameter that the system does not have.
+    Raises ValueError for another shape, what is not finite, or a parameter that the system does not have.
     """
     if unknown := set(parameters or {}) - set(system.parameters):
         raise ValueError(f"the system has no parameter {min(unknown)!r} (it has {', '.join(system.parameters)})")
@@ -34,9 +35,11 @@ def at_state(
     shape: tuple[int, ...] = ()
     for name in STATE:
         given = state.get(name)
-        rows = np.zeros(system.n) if given is None else np.asarray(given, dtype=np.float64)
+        rows = np.zeros(system.n) if given is None else real_array(name, given)
         if rows.ndim not in (1, 2) or rows.shape[-1] != system.n:
             raise ValueError(f"{name} must have the shape ({system.n},) or (N, {system.n}), got {rows.shape}")
+        if not np.isfinite(rows).all():
+            raise ValueError(f"{name} must be finite, got {rows[~np.isfinite(rows)][0]}")
         shape = np.broadcast_shapes(shape, rows.shape[:-1])
         values |= {f"{name}{i}": column if rows.ndim == 2 else float(column) for i, column in enumerate(rows.T)}
     outputs = graph.evaluate({name: values[name] for name in graph.input_names}).values()

@@ -386,7 +386,7 @@ def test_tolerances_out_of_range_are_refused() -> None:
         ({"rtol": 0.0, "atol": [1e-9, 1e-9, 0.0, 1e-9]}, "not both 0"),
         ({"atol": [1e-9, 1e-9]}, r"shape \(4,\), one for each of q0, q1, qd0, qd1; got \(2,\)"),
         ({"first_step": 0.0}, "first_step must be positive and finite, got 0.0 s"),
-        ({"max_steps": 0}, "max_steps must be at least 1, got 0"),
+        ({"max_steps": 0}, "max_steps must be a whole number, at least 1, or infinite, got 0"),
         ({"events": [dyn.Event("e", lambda q, qd, t: 1.0)]}, "event 'e' must be a node of the state"),
         ({"events": [dyn.Event("e", lambda q, qd, t: cg.variable("z"))]}, "event 'e' must be a node of the state"),
     ):
@@ -402,3 +402,22 @@ def test_steps_grow_and_shrink_within_limits() -> None:
     run = dyn.simulate(planet(), *PERIHELION, 10.0, "dopri5")
     ratios = [after / before for before, after in itertools.pairwise(np.diff(run.t)[:-2])]
     assert max(ratios) <= 5.0 * (1 + 1e-12)
+
+
+@mark.parametrize("method", ["dop853", "dopri5", "rk4", "radau", "gauss6"])
+def test_two_crossings_in_one_step_are_both_found(method: str) -> None:
+    """x = sin t touches 0.999 and goes back 0.09 s later; steps are longer."""
+    circle = dyn.OdeSystem(lambda x, t: [x[1], -x[0]], ["x", "v"])
+    over = dyn.Event("over", lambda x, t: x[0] - 0.99)
+    dt = {"rk4": 0.1, "gauss6": 0.2}.get(method)
+    run = dyn.simulate(circle, [0.0, 1.0], None, 10.0, method, dt=dt, rtol=1e-9, atol=1e-9, events=[over])
+    peak = np.arccos(0.99)
+    expected = [turn * 2.0 * np.pi + 0.5 * np.pi + side * peak for turn in (0, 1) for side in (-1, 1)]
+    assert run.events["over"].t == approx(expected, abs=2e-4 if method in ("rk4", "gauss6") else 1e-6)
+
+
+def test_an_event_is_what_it_says() -> None:
+    with raises(TypeError, match="an event needs a name, a function, and True or False for `terminal`, got 'e', 1"):
+        dyn.Event("e", 1)  # type: ignore[arg-type]
+    with raises(TypeError, match="True or False for `terminal`"):
+        dyn.Event("e", lambda q, qd, t: q[0], terminal="no")  # type: ignore[arg-type]

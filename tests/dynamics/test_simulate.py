@@ -324,3 +324,61 @@ def test_what_was_made_for_a_model_is_used_again_and_only_for_the_same() -> None
     assert ends(kept) == ends(model(), parameters={"k": 3.0})
     kept.damping = (0.7,)
     assert ends(kept, parameters={"k": 2.0}) != first
+
+
+CALLS: list[tuple[dict[str, Any], type[Exception], str]] = [
+    ({"max_steps": 2.5}, ValueError, "max_steps must be a whole number, at least 1, or infinite, got 2.5"),
+    ({"max_steps": "a"}, TypeError, "max_steps must be a number, got str: 'a'"),
+    ({"t_end": "1"}, TypeError, "t_end must be a number, got str: '1'"),
+    ({"dt": "a"}, TypeError, "dt must be a number, got str: 'a'"),
+    ({"dt": 1e-17}, ValueError, "dt = 1e-17 s is below the resolution of the time at t_end = 1 s"),
+    ({"dt": 1e-13}, MemoryError, r"9999999999990 steps of 2 numbers take .* GiB are free: record fewer times"),
+    ({"tau": "x"}, TypeError, "tau of coordinate 0 must be a number, got str: 'x'"),
+    ({"rtol": [1e-3]}, TypeError, r"rtol must be a number, got list: \[0.001\]"),
+    ({"atol": ["1e-9", "1e-9"]}, TypeError, "atol must be real numbers, got text"),
+    ({"method": None}, TypeError, "method must be one of euler, .* got None"),
+    ({"events": "a"}, TypeError, "events must be of the type Event, got str: 'a'"),
+    ({"events": lambda q: q}, TypeError, "events must be a sequence"),
+    ({"parameters": [1]}, TypeError, r"parameters must be a mapping of names to numbers, got \[1\]"),
+    ({"q": [1 + 2j]}, TypeError, "q must be real numbers, got complex numbers"),
+    ({"q": np.ma.masked_array([1.0], [True])}, TypeError, "q must be real numbers, got an array with masked values"),
+    ({"q": ["1"]}, TypeError, "q must be real numbers, got text"),
+    ({"q": [None]}, TypeError, "q must be real numbers, got NoneType: None"),
+    ({"q": [[1.0], [1.0, 2.0]]}, ValueError, "q must be an array of real numbers, got rows of different lengths"),
+    ({"t_eval": [0.0, 0.5, 0.25]}, ValueError, "t_eval must be increasing .*, got 0.5 before 0.25"),
+    ({"t_eval": [0.0, 1.5]}, ValueError, r"in \[0, t_end = 1 s\], got 1.5"),
+    ({"t_eval": [[0.0]]}, ValueError, r"got shape \(1, 1\)"),
+]
+
+
+@mark.parametrize(("given", "error", "message"), CALLS)
+def test_what_cannot_be_is_refused_in_a_sentence(given: dict[str, Any], error: type[Exception], message: str) -> None:
+    arguments: dict[str, Any] = {"q": [1.0], "qd": [0.0], "t_end": 1.0} | given
+    with raises(error, match=message):
+        dyn.simulate(oscillator(), arguments.pop("q"), arguments.pop("qd"), arguments.pop("t_end"), **arguments)
+
+
+def test_a_last_time_past_the_end_by_rounding_is_the_end() -> None:
+    times = 0.1 * np.arange(4)
+    assert times[-1] > 0.3
+    run = dyn.simulate(oscillator(), [1.0], [0.0], 0.3, t_eval=times)
+    assert run.t[-1] == 0.3
+    assert times[-1] > 0.3  # the caller's array is as it was
+
+
+def test_rows_that_fill_the_memory_end_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = dyn.simulate(oscillator(), [1.0], [0.0], 200.0, "dop853", dt=1e-2)
+    hundred = 3.0 * 24.0 * 100.0  # rows of time and state
+    monkeypatch.setattr(sys.modules["dynamics.simulate"], "room", lambda: hundred)
+    run = dyn.simulate(oscillator(), [1.0], [0.0], 200.0, "dop853", dt=1e-2)
+    assert run.stats.status.startswith("stopped at t = ")
+    assert "the rows fill the memory; t_eval records fewer" in run.stats.status
+    assert not run.stats.complete
+    assert np.array_equal(run.q, whole.q[: len(run.q)])
+
+
+def test_a_parameter_that_the_system_has_not_is_named() -> None:
+    with raises(ValueError, match=r"the system has no parameter 'm' \(it has none\); give it to `parameters`"):
+        System(lambda q, qd, t, p: p["m"] * qd[0] ** 2, ["x"])
+    with raises(ValueError, match=r"the system has no parameter 'm' \(it has k\)"):
+        dyn.OdeSystem(lambda x, t, p: [p["m"] * x[0]], ["x"], {"k": 1.0})
