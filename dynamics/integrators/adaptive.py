@@ -13,7 +13,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.program import Call, If, Map, Program, Statement, Sum
 
-from .elements import SAME, function, scaled, weighted
+from .elements import SAME, compensated, function, scaled, weighted
 from .fixed import moment, point, stage
 from .problem import Problem
 from .tableau import Tableau
@@ -103,18 +103,27 @@ def embedded(tableau: Tableau, problem: Problem, dense: bool) -> Program:
     body: list[Statement] = [first_pass(Call(problem.rate, ("x", "t", "p"), ("slope0",)), count(1)), trial()]
     for k in range(1, stages):
         body += stage(problem, tableau, k)
-    body += [point("x_new", tableau.b), moment("at_t", 1.0), Call(problem.rate, ("x_new", "at_t", "p"), (last,))]
+    body += [_arrival(tableau.b), moment("at_t", 1.0), Call(problem.rate, ("x_new", "at_t", "p"), (last,))]
     body += [_squared(weights, slopes, f"sum{k}") for k, weights in enumerate(tableau.error)]
     body += [_estimate(len(tableau.error), m), control(tableau.estimate, stages)]
-    kept = Map(SAME, (last,), ("slope0",))
-    body.append(commit(*(_dense(tableau, problem) if dense else ()), kept))
+    kept = (Map(SAME, (last,), ("slope0",)), Map(SAME, ("lost_new",), ("lost",)))
+    body.append(commit(*(_dense(tableau, problem) if dense else ()), *kept))
     degree = len(tableau.dense[0])
     own = {f"slope{k}": m for k in range(stages + 1 + (len(tableau.extra) if dense else 0))}
-    own |= {f"sum{k}": 1 for k in range(len(tableau.error))} | {"at": m, "at_t": 1}
+    own |= {f"sum{k}": 1 for k in range(len(tableau.error))} | {"at": m, "at_t": 1, "lost": m, "lost_new": m}
     if dense:
         own |= {f"dense{k + 1}": m for k in range(degree)}
     record = recorded(dense, degree)
     return Program({**registers(problem), **own}, body, record, record_if="accepted", stop="status")
+
+
+def _arrival(weights: tuple[float, ...]) -> Map:
+    """x_new = x + h * (sum of weight * slope) with what rounding took off the step before; lost_new, what off this."""
+    used = [k for k, weight in enumerate(weights) if weight]
+    x, before, h, *slopes = cg.variables(["x", "lost", "h", *(f"s{k}" for k in used)])
+    total, lost = compensated(x, h * weighted(slopes, [weights[k] for k in used]) + before)
+    graph = Graph([x, before, h, *slopes], {"x": total, "lost": lost})
+    return Map(graph, ("x", "lost", "h", *[f"slope{k}" for k in used]), ("x_new", "lost_new"))
 
 
 def measured(error: str, m: int) -> list[Statement]:

@@ -31,6 +31,12 @@ def scaled(weights: Sequence[float]) -> Graph:
     return Graph([h, *slopes], {"y": h * weighted(slopes, weights)})
 
 
+def compensated(x: Node, more: Node) -> tuple[Node, Node]:
+    """x + more, and what rounding takes off it, which the next sum may be given back (Kahan)."""
+    total = x + more
+    return total, more - (total - x)
+
+
 def function(inputs: str, **outputs: float | Node) -> Graph:
     """A graph over these inputs."""
     return Graph(cg.variables(inputs), outputs)

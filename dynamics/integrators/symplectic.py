@@ -21,7 +21,7 @@ from cgraph import Graph, Node
 from cgraph.program import Call, Map, Program, Statement, Sum, While
 
 from .adaptive import count, first_pass
-from .elements import SAME, function, weighted
+from .elements import SAME, compensated, function, weighted
 from .fixed import advance, moment, registers
 from .problem import Problem
 
@@ -189,12 +189,11 @@ def _guess_at_rest(method: Partitioned, velocity: str) -> list[Statement]:
 
 
 def _added(base: str, lost: str, slope: str, weights: Row) -> Map:
-    """base += h * (sum of weight * slope), with what rounding took off kept for the next step (Kahan)."""
+    """base += h * (sum of weight * slope), with what rounding took off kept for the next step."""
     x, before, h, *slopes = cg.variables(["x", "lost", "h", *(f"s{k}" for k in range(len(weights)))])
     change, rest = _change(h, slopes, weights)
-    more = change + (before if rest is None else before + rest)
-    total = x + more
-    graph = Graph([x, before, h, *slopes], {"x": total, "lost": more - (total - x)})
+    total, lost_next = compensated(x, change + (before if rest is None else before + rest))
+    graph = Graph([x, before, h, *slopes], {"x": total, "lost": lost_next})
     return Map(graph, (base, lost, "h", *[f"{slope}{k}" for k in range(len(weights))]), (base, lost))
 
 
