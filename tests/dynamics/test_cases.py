@@ -189,7 +189,7 @@ def test_equations_are_those_written_by_hand(name: str) -> None:
 
 def test_equations_of_a_chain_are_those_written_by_hand() -> None:
     """Ten links by the builder of the hundred, which take a while by hand."""
-    case, by_hand = chains.long_chain(10, 1.0, 1e-12), bodies([0.1] * 10, [0.1] * 10)
+    case, by_hand = chains.long_chain(10, 1.0), bodies([0.1] * 10, [0.1] * 10)
     for state in around(case)[:2]:
         found = np.array(list(state_equation(case.build()).evaluate(values(case, state, 0.0)).values()))
         expected = np.array(by_hand(state, 0.0))
