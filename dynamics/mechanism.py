@@ -89,6 +89,16 @@ class Mechanism:
         for name, value in self._values.items():
             parameter_value(name, value)
 
+    def __repr__(self) -> str:
+        moving = [body.name for body in self.moving]
+        parts = [f"{len(self.bodies)} bodies, {len(moving)} coordinate(s) {', '.join(moving[:6])}"]
+        parts[0] += ", ..." if len(moving) > 6 else ""
+        parts += [f"locked {', '.join(list(self.locked)[:6])}"] if self.locked else []
+        parts += [f"forces on {', '.join([force.body for force in self.forces[:6]])}"] if self.forces else []
+        parts += [f"parameters {', '.join(self._values)}"] if self._values else []
+        parts += [f"gravity {', '.join([f'{each:g}' for each in np.asarray(self.gravity)])}"]
+        return f"<Mechanism of {'; '.join(parts)}>"
+
     @property
     def moving(self) -> tuple[Body, ...]:
         """The bodies that move, parents first, with all that is welded to them merged into their inertia."""

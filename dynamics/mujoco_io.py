@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from cgraph.errors import install
+
 from .mechanism import Mechanism
 from .mjcf import CAMERA, to_mjcf
 from .planar_arm import PlanarArm
@@ -23,7 +25,7 @@ def mujoco() -> Any:
     try:
         import mujoco as module
     except ImportError as error:
-        raise ImportError("MuJoCo is not installed: pip install 'cgraph[mujoco]'") from error
+        raise ImportError(f"MuJoCo is not installed: {install('mujoco')}") from error
     return module
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -37,7 +38,11 @@ def load_mjcf(source: Any, *, ignore: bool = False, left_out: list[str] | None =
     Raises MechanismError for a file that is missing or wrong, for what a mechanism cannot have, unless `ignore`, and as
     Mechanism does. Raises ImportError without MuJoCo.
     """
-    model = source if isinstance(source, mujoco().MjModel) else _compiled(source)
+    model = source if isinstance(source, mujoco().MjModel) else _compiled(source, _called(source))
+    return _mechanism(model, ignore, left_out)
+
+
+def _mechanism(model: Any, ignore: bool, left_out: list[str] | None) -> Mechanism:
     serious, outside = _not_modelled(model), _acting_from_outside(model)
     if serious and not ignore:
         raise MechanismError(f"a mechanism cannot have {'; '.join(serious)} (the option ignore leaves this out)")
@@ -46,10 +51,11 @@ def load_mjcf(source: Any, *, ignore: bool = False, left_out: list[str] | None =
     names = _names(model)
     bodies: list[Body] = []
     ends = [(WORLD, np.zeros(3))]  # of each MuJoCo body: the last of its chain, and its origin in that one's frame
-    for body in range(1, model.nbody):
-        chain, origin = _chain(model, body, names, *ends[model.body_parentid[body]])
-        bodies += chain
-        ends.append((chain[-1].name, origin))
+    with np.errstate(all="ignore"):  # of numbers that are not finite Mechanism says where they stand
+        for body in range(1, model.nbody):
+            chain, origin = _chain(model, body, names, *ends[model.body_parentid[body]])
+            bodies += chain
+            ends.append((chain[-1].name, origin))
     return Mechanism(bodies, model.opt.gravity * (not _disabled(model, "GRAVITY")))
 
 
@@ -59,6 +65,11 @@ def load_urdf(source: Any, *, ignore: bool = False, left_out: list[str] | None =
     source: a path or the XML text (it starts with "<"). Shapes are not read, so their meshes need not be there; the
     root link stands still. ignore, left_out and errors as for `load_mjcf`.
     """
+    return _mechanism(_compiled(_without_shapes(source), _called(source)), ignore, left_out)
+
+
+def _without_shapes(source: Any) -> str:
+    """The text of a URDF without the shapes of its links."""
     text = _text(source)
     try:
         robot = ElementTree.fromstring(text)  # noqa: S314 - MuJoCo is about to read the same text
@@ -69,13 +80,20 @@ def load_urdf(source: Any, *, ignore: bool = False, left_out: list[str] | None =
     for link in robot.iter("link"):
         for shape in [each for each in link if each.tag in ("visual", "collision")]:
             link.remove(shape)
-    return load_mjcf(ElementTree.tostring(robot, encoding="unicode"), ignore=ignore, left_out=left_out)
+    return ElementTree.tostring(robot, encoding="unicode")
 
 
 def load_model(source: Any, *, ignore: bool = False, left_out: list[str] | None = None) -> Mechanism:
     """As `load_urdf` for XML whose root element is <robot>, else as `load_mjcf`."""
     load = load_urdf if _root(source) == "robot" else load_mjcf
     return load(source, ignore=ignore, left_out=left_out)
+
+
+def compiled(source: Any) -> Any:
+    """MuJoCo's own model, an MjModel, of what `load_model` takes. Raises MechanismError and ImportError as it does."""
+    if isinstance(source, mujoco().MjModel):
+        return source
+    return _compiled(_without_shapes(source) if _root(source) == "robot" else source, _called(source))
 
 
 def _root(source: Any) -> str:
@@ -93,7 +111,7 @@ def _is_text(source: Any) -> bool:
 
 
 def _called(source: Any) -> str:
-    return "the given text" if _is_text(source) else f"{os.fspath(source)!r}"
+    return "the given text" if _is_text(source) else f"{str(source)!r}"
 
 
 def _path(source: Any) -> Path:
@@ -115,15 +133,27 @@ def _text(source: Any) -> str:
         raise MechanismError(f"{_called(source)} is not text") from None
 
 
-def _compiled(source: Any) -> Any:
-    """MuJoCo's model of a path or text."""
+def _compiled(source: Any, called: str) -> Any:
+    """MuJoCo's model of a path or text.
+
+    MuJoCo by itself prints its warnings and adds them to a file in the current folder; a handler takes them instead.
+    """
     models = mujoco().MjModel
+    given = _text(source) if _is_text(source) else str(_path(source))
+    said: list[str] = []
+    before = mujoco().get_mju_user_warning()
+    mujoco().set_mju_user_warning(said.append)
     try:
-        return models.from_xml_string(_text(source)) if _is_text(source) else models.from_xml_path(str(_path(source)))
-    except MechanismError:
-        raise
+        model = models.from_xml_string(given) if _is_text(source) else models.from_xml_path(given)
     except ValueError as error:
-        raise MechanismError(f"MuJoCo cannot read {_called(source)}: {' '.join(str(error).split())}") from None
+        raise MechanismError(f"MuJoCo cannot read {called}: {' '.join(str(error).split())}") from None
+    finally:
+        mujoco().set_mju_user_warning(before)
+    if any(["NaN" in each for each in said]):
+        raise MechanismError(f"{called} has a number that is NaN, and a model needs finite ones")
+    for each in said:
+        warnings.warn(f"MuJoCo on {called}: {' '.join(each.split())}", stacklevel=4)
+    return model
 
 
 def _names(model: Any) -> list[str]:
@@ -206,14 +236,15 @@ def _not_modelled(model: Any) -> list[str]:
     """What the model has and a mechanism cannot have."""
     free = [j for j in range(model.njnt) if not _kind(model, j)]
     pulling = sorted(set().union(*(_where(model, f"tendon_{what}") for what in _OF_A_TENDON)))
+    tendons = [model.tendon(i).name or f"number {i}" for i in pulling]
     equalities = 0 if _disabled(model, "CONSTRAINT", "EQUALITY") else int(np.sum(model.eq_active0))
     rubbing = _any(model, "dof_frictionloss", "tendon_frictionloss") and not _disabled(
         model, "CONSTRAINT", "FRICTIONLOSS"
     )
     return _present(
         {
-            f"free or ball joints ({_listed(model.joint, free)})": free,
-            f"tendons with a spring, damper or mass ({_listed(model.tendon, pulling)})": pulling,
+            f"free or ball joints ({_listed(_joint_names(model, free))})": free,
+            f"tendons with a spring, damper or mass ({_listed(tendons)})": pulling,
             f"equality constraints ({equalities})": equalities,
             "friction loss": rubbing,
             "springs or dampers that are not linear": _any(model, *_NOT_LINEAR),
@@ -234,7 +265,7 @@ def _acting_from_outside(model: Any) -> list[str]:
     return _present(
         {
             "contacts": touching and not _disabled(model, "CONSTRAINT", "CONTACT"),
-            f"joint limits ({_listed(model.joint, limits)})": limits and limited,
+            f"joint limits ({_listed(_joint_names(model, limits))})": limits and limited,
             "tendon limits": _any(model, "tendon_limited") and limited,
             f"actuators ({model.nu})": model.nu and not _disabled(model, "ACTUATION"),
         }
@@ -255,7 +286,12 @@ def _any(model: Any, *fields: str) -> bool:
     return any([_where(model, field) for field in fields])
 
 
-def _listed(view: Any, ids: Sequence[int]) -> str:
-    """The names of some of a model's elements, or the first few of many."""
-    names = [view(i).name or f"number {i}" for i in ids]
-    return ", ".join(names[:5] + (["..."] if len(names) > 5 else []))
+def _joint_names(model: Any, joints: Sequence[int]) -> list[str]:
+    """Names of joints; of one that has none, the body's."""
+    bodies = _names(model)
+    return [model.joint(j).name or f"of body {bodies[model.jnt_bodyid[j]]!r}" for j in joints]
+
+
+def _listed(names: Sequence[str]) -> str:
+    """All of the names, or the first few of many."""
+    return ", ".join([*names[:5], *(["..."] if len(names) > 5 else [])])

@@ -52,6 +52,11 @@ class PlanarArm:
     damping: tuple[float, ...]  # N m s, each joint
     gravity: float  # m/s^2, downwards
 
+    def __repr__(self) -> str:
+        masses, lengths = (sum([getattr(link, name) for link in self.links]) for name in ("mass", "length"))
+        size = f"{len(self.links)} link(s): {masses:g} kg, {lengths:g} m"
+        return f"<PlanarArm of {size}{', damped' if any(self.damping) else ''}; gravity {self.gravity:g}>"
+
     @cached_property
     def system(self) -> System:
         """The Lagrangian system, one partial Lagrangian L_i = K_i - P_i for each link, tagged with link and energy."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -69,14 +69,14 @@ class Pruned:
 
     @cached_property
     def absent(self) -> tuple[LeftOut, ...]:
-        """What the model that is left has not, so that no graph of it has nodes for it, each counted by putting it in.
+        """What the model as given has not, so that no graph of it has nodes for it, each counted by putting it in.
 
         Gravity as on earth or, along the axes of some joints, askew; 0.3 for damping, stiffness and armature; a body of
         1 kg for one without mass; a hinge in place of a weld.
         """
         last = self.steps[-1]
         result = []
-        for what, why, model in _absent(self.model):
+        for what, why, model in _absent(self.model, self.steps[0].model):
             with_it = replace(last, model=model).graph(self.equations)
             result.append(LeftOut(what, why, *_saved(with_it, self.graph)))
         return tuple(result)
@@ -223,33 +223,33 @@ def _without(model: Any, effect: str) -> Any:
     )
 
 
-def _with(model: Mechanism, effect: str, number: float) -> Mechanism:
-    """The mechanism with that damping, stiffness or armature at every joint that moves and has it, or has it not."""
-    name = _JOINT[effect]
-    change: dict[str, Any] = {name: number}
+def _with(model: Mechanism, effect: str, number: float, among: Collection[str] | None = None) -> Mechanism:
+    """The mechanism with that damping, stiffness or armature at the joints of those bodies, or at all that move."""
+    change: dict[str, Any] = {_JOINT[effect]: number}
 
     def changed(body: Body) -> Body:
-        moves = body.joint.kind != "fixed" and (not number or not getattr(body.joint, name))
-        return replace(body, joint=replace(body.joint, **change)) if moves else body
+        chosen = body.joint.kind != "fixed" if among is None else body.name in among
+        return replace(body, joint=replace(body.joint, **change)) if chosen else body
 
     return replace(model, bodies=tuple([changed(body) for body in model.bodies]))
 
 
-def _absent(model: Any) -> Iterator[tuple[str, str, Any]]:
-    """What, why, and the model with it."""
+def _absent(model: Any, given: Any) -> Iterator[tuple[str, str, Any]]:
+    """What, why, and the model with it. given: the model before anything was switched off, which is not absent."""
     if not isinstance(model, Mechanism):
         return
-    if not np.any(np.asarray(model.gravity)):
+    if not np.any(np.asarray(given.gravity)):
         yield "gravity", "it is zero", replace(model, gravity=FREE_FALL)
-    else:
+    elif np.any(np.asarray(model.gravity)):
         forces = gravity_force(replace(model, bodies=_with(model, "springs", 0.0).bodies)).outputs.values()
         free = [body.name for body, force in zip(model.moving, forces, strict=True) if force.value == 0.0]
         if free:
             yield f"gravity at {_listed(free)}", "it does no work there", replace(model, gravity=SKEW)
     for effect, name in _JOINT.items():
-        without = [body.name for body in model.moving if not getattr(body.joint, name)]
+        had = {body.name for body in given.moving if getattr(body.joint, name)}
+        without = [body.name for body in model.moving if not getattr(body.joint, name) and body.name not in had]
         if without:
-            yield f"{effect} of {_listed(without)}", "it is zero", _with(model, effect, NUMBER)
+            yield f"{effect} of {_listed(without)}", "it is zero", _with(model, effect, NUMBER, without)
     if massless := [body.name for body in model.bodies if not body.mass and not np.any(np.asarray(body.inertia))]:
         yield f"mass of {_listed(massless)}", "it is zero", _replaced(model, massless, _heavy)
     if welds := [body.name for body in model.bodies if body.joint.kind == "fixed" and body.mass]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 import cgraph as cg
+from cgraph.errors import install
 
 from .integrators import Problem
 from .limits import Limits
@@ -35,7 +36,7 @@ class ScipyRun(Tally):
         try:
             from scipy import integrate
         except ImportError:
-            raise ImportError(f"method {PREFIX + solver!r} needs SciPy: pip install 'cgraph[scipy]'") from None
+            raise ImportError(f"method {PREFIX + solver!r} needs SciPy: {install('scipy')}") from None
         self.solver, self.make = solver, getattr(integrate, solver)
         self.limits, self.asked = limits, asked
         self._rate = cg.compile(problem.rate, backend)

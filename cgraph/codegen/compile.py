@@ -27,7 +27,7 @@ def compile(
 ) -> Compiled:
     """The graph as a function: `fn(x)` at one point, `fn.batch(X)` at many, `fn.source` to read.
 
-    backend: "llvm", machine code (`pip install 'cgraph[native]'`); "python", generated Python over floats; "numpy",
+    backend: "llvm", machine code (extra `native`); "python", generated Python over floats; "numpy",
     generated NumPy over arrays; "auto", machine code where llvmlite is installed and the graph has at most 100 000
     nodes, else generated Python for `fn(x)` and generated NumPy for `fn.batch(X)`. All agree with `graph.evaluate`, on
     floats and on arrays respectively.

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from functools import cache as cached
 from typing import Any
 
+from ..errors import install
 from .cache import Cache
 
 LEVEL = 2  # of the code generator's optimisation; the text has no redundancy for passes over it to find
@@ -87,7 +88,7 @@ def host() -> Host:
     try:
         from llvmlite import __version__, binding
     except ImportError:
-        raise ImportError("machine code needs llvmlite: pip install 'cgraph[native]'") from None
+        raise ImportError(f"machine code needs llvmlite: {install('native')}") from None
     return _host(binding, __version__)
 
 

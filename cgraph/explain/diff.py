@@ -130,7 +130,8 @@ def diff(left: Graph, right: Graph, *, atoms: str | Iterable[str] = (), classify
     """
     chosen = set(atoms.replace(",", " ").split() if isinstance(atoms, str) else atoms)
     named = {node: node.name for graph in (left, right) for node in graph.nodes if node.name in chosen}
-    if missing := chosen.difference(named.values()):
+    unused = [name for graph in (left, right) for name in graph.input_names]  # an input that nothing uses is no node
+    if missing := chosen.difference(named.values(), unused):
         raise GraphError(f"neither graph has a node called {', '.join(sorted(missing))}")
     standing = {node: name for node, name in named.items() if name is not None}
     left_hashes, right_hashes = (node_hashes(graph.nodes, standing) for graph in (left, right))

@@ -39,3 +39,10 @@ class Ensemble:
     q: Array
     qd: Array
     stats: EnsembleStats
+
+    def __repr__(self) -> str:
+        many, rows, n = self.q.shape
+        what = f"{n} coordinate(s)" if self.qd.shape[2] else f"{n} state(s)"
+        span = f", t = {self.t[0]:g} .. {self.t[-1]:g} s" if rows else ""
+        whole = int(np.count_nonzero(self.stats.complete))
+        return f"<Ensemble of {many}, {what}: {rows} rows{span}; {self.stats.method}, {whole} reached t_end>"

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from cgraph.errors import install
+
 from .trajectory import Reference, from_text
 
 DIGITS = 30  # of the texts; the stated error is 10^-DIGITS
@@ -16,7 +18,7 @@ def _solution(times: Sequence[float], state: Callable[[Any, Any], Sequence[Any]]
     try:
         import mpmath
     except ImportError:
-        raise ImportError('closed forms need mpmath: pip install "cgraph[reference]"') from None
+        raise ImportError(f"closed forms need mpmath: {install('reference')}") from None
     mp = mpmath.mp
     with mp.workdps(DIGITS + GUARD):
         rows = [[mpmath.nstr(mp.mpf(each), DIGITS + 6) for each in state(mp, mp.mpf(t))] for t in map(float, times)]

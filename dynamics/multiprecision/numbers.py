@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from cgraph.errors import install
+
 Number = Any  # flint.arb: a midpoint of the working precision with a bound on its rounding error
 
 BITS_PER_DIGIT = math.log2(10.0)
@@ -17,7 +19,7 @@ def flint() -> Any:
     try:
         import flint
     except ImportError:
-        raise ImportError('reference solutions need python-flint: pip install "cgraph[reference]"') from None
+        raise ImportError(f"reference solutions need python-flint: {install('reference')}") from None
     return flint
 
 

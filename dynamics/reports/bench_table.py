@@ -13,11 +13,13 @@ from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 
+from cgraph.errors import install
+
 from .bench import AGREES, MODES, OURS, TASKS, Cell, Row
 from .peers import PEERS
 
 WIDTH = 120  # characters
-HOW = "pip install 'cgraph[bench]'; PyTorch by itself"  # to install what is missing
+HOW = f"{install('bench')}; PyTorch by itself"  # to install what is missing
 GAPS = ("  ", " ")  # between columns: the second where the first is too wide
 
 

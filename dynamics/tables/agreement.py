@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
@@ -15,6 +14,7 @@ from ..body import Body, MechanismError
 from ..formulations import inverse_dynamics
 from ..mechanism import Mechanism
 from ..mujoco_io import mujoco
+from ..mujoco_load import compiled
 from ..planar_arm import Link, PlanarArm
 from ..reports.peers.case import Case
 from ..reports.peers.contender import Peer, UnavailableError
@@ -196,12 +196,12 @@ class Original:
         return Original(model)
 
 
-def peers(model: Any, twin: Any = None) -> Iterator[tuple[str, Callable[[], Asked]]]:
-    """Name of each peer, and what makes it for a model: raises NotComparableError with the reason."""
-    if twin is None:
-        yield "MuJoCo", lambda: _translated(MujocoPeer, model)
-    else:
-        yield "MuJoCo", lambda: _original(twin, model)
+def peers(model: Any, twin: Original | None = None) -> Iterator[tuple[str, Callable[[], Asked]]]:
+    """Name of each peer, and what makes it for a model: raises NotComparableError with the reason.
+
+    twin: MuJoCo's, in place of the translation.
+    """
+    yield "MuJoCo", lambda: twin or _translated(MujocoPeer, model)
     yield "Pinocchio", lambda: _translated(PinocchioPeer, model)
 
 
@@ -252,21 +252,19 @@ def _translated(kind: Callable[[Case], Peer], model: Any) -> Translation:
         raise NotComparableError(str(error)) from None
 
 
-def _original(twin: Any, model: Any) -> Original:
-    module = mujoco()
-    text = isinstance(twin, str) and twin.lstrip().startswith("<")
+def original(twin: Any, model: Any) -> Original:
+    """MuJoCo on what `load_model` takes, with the coordinates of the model.
+
+    Raises ValueError for a twin that cannot be read or has another number of coordinates, and for a model that is not
+    of rigid bodies.
+    """
+    module, theirs = mujoco(), copy.copy(compiled(twin))
     try:
-        if isinstance(twin, module.MjModel):
-            theirs = copy.copy(twin)
-        elif text:
-            theirs = module.MjModel.from_xml_string(twin)
-        else:
-            theirs = module.MjModel.from_xml_path(os.fspath(twin))
-    except ValueError as error:
-        raise NotComparableError(f"cannot read the twin: {' '.join(str(error).split())}") from None
-    n = as_system(bare(model)).n
+        n = as_system(bare(model)).n
+    except NotComparableError as error:
+        raise ValueError(f"a twin is compared with rigid bodies: MuJoCo {error}") from None
     if (theirs.nq, theirs.nv) != (n, n):
-        raise NotComparableError(f"the twin has {theirs.nv} degrees of freedom, the model {n}")
+        raise ValueError(f"the twin has {theirs.nv} degrees of freedom, the model {n}")
     for unused in ("CONTACT", "LIMIT", "ACTUATION"):
         theirs.opt.disableflags |= getattr(module.mjtDisableBit, f"mjDSBL_{unused}")
     return Original(theirs)

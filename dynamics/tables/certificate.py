@@ -32,16 +32,20 @@ def certify(model: Any, states: int = 20, seed: int = 0, *, speed: float = 1.0, 
     """Check the model's graphs against each other, against differences of L, and against MuJoCo and Pinocchio.
 
     states, seed, speed: random q, uniform in -pi .. pi, and qd, qdd, tau, normal with the deviation `speed`.
-    twin: what MuJoCo compares with in place of the model's own translation: a path or text of MJCF, or an MjModel, with
-        the same joints in the same order. Its contacts, joint limits and actuators are left out.
+    twin: what MuJoCo compares with in place of the model's own translation: a path or text of MJCF or URDF, or an
+        MjModel, with the same joints in the same order. Its contacts, joint limits and actuators are left out.
     A peer that disagrees is asked again with one term taken out on both sides, then two; what restores the agreement is
     in the residual's note.
 
-    Raises ValueError for fewer than one state, SingularMassMatrixError for a coordinate without inertia, ImportError
-    for a twin without MuJoCo.
+    Raises ValueError for fewer than one state, a seed below 0, and a twin that cannot be read, has another number of
+    coordinates, or stands beside a model that is not of rigid bodies; SingularMassMatrixError for a coordinate without
+    inertia; ImportError for a twin without MuJoCo.
     """
     if states < 1:
         raise ValueError(f"a certificate needs at least one state, got {states!r}")
+    if seed < 0:
+        raise ValueError(f"the seed of a certificate must be at least 0, got {seed!r}")
+    theirs = None if twin is None else agreement.original(twin, model)
     rng = np.random.default_rng(seed)
     system = as_system(model)
     shape = (states, system.n)
@@ -56,7 +60,7 @@ def certify(model: Any, states: int = 20, seed: int = 0, *, speed: float = 1.0, 
         left_out.append(f"the Coriolis matrix: {error}")
     else:
         residuals += checks.of_coriolis()
-    for name, peer in agreement.peers(model, twin):
+    for name, peer in agreement.peers(model, theirs):
         try:
             residuals.append(agreement.residual(name, peer(), model, at))
         except agreement.NotComparableError as error:

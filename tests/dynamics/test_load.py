@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pytest import approx, importorskip, mark, param, raises
+from pytest import approx, importorskip, mark, param, raises, warns
 
 import cgraph as cg
 import dynamics as dyn
@@ -158,6 +158,7 @@ def test_what_the_options_switch_off_is_off(flag: str, joint: str) -> None:
     assert len(dyn.inverse_dynamics(off).nodes) < len(dyn.inverse_dynamics(on).nodes)
 
 
+@mark.filterwarnings("ignore:MuJoCo on the given text")  # of bodies without mass
 def test_names_are_mujoco_s_or_new_ones() -> None:
     mechanism = dyn.load_mjcf(
         mjcf(
@@ -212,6 +213,7 @@ TENDON = '<tendon><fixed name="string" stiffness="3"><joint joint="j" coef="1"/>
 NOT_MODELLED = [
     param(mjcf(HINGE + BALL), "free or ball joints (ball)", id="ball"),
     param(mjcf(FREE), "free or ball joints (root)", id="free"),
+    param(mjcf(FREE.replace(' name="root"', "")), "free or ball joints (of body 'f')", id="nameless"),
     param(
         mjcf(HINGE).replace("</mujoco>", TENDON + "</mujoco>"),
         "tendons with a spring, damper or mass (string)",
@@ -328,6 +330,41 @@ def test_a_urdf_file_is_its_text(tmp_path: Path) -> None:
     file = tmp_path / "arm.urdf"
     file.write_text("\ufeff\n" + URDF, encoding="utf-8")
     assert dyn.load_urdf(file).system.coordinates == ("l1", "l2", "l3")
+
+
+def test_what_mujoco_cannot_read_of_a_urdf_file_names_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "arm.urdf"
+    file.write_text('<robot name="a"><link name="b"/><joint name="j" type="fixed"><parent link="b"/></joint></robot>')
+    with raises(MechanismError, match=f"^MuJoCo cannot read '{re.escape(str(file))}': "):
+        dyn.load_urdf(file)
+
+
+@mark.parametrize("number", ["nan", "inf"])
+@mark.parametrize("attribute", ["stiffness", "damping", "armature", "ref", "pos", "axis"])
+def test_a_number_that_is_not_finite_is_one_sentence(
+    tmp_path: Path, monkeypatch: Any, capfd: Any, attribute: str, number: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    value = f"{number} 0 0" if attribute in ("pos", "axis") else number
+    text = mjcf(f'<body name="a"><joint {attribute}="{value}"/>{INERTIAL}</body>')
+    with raises(MechanismError, match="finite"):
+        dyn.load_mjcf(text)
+    assert list(tmp_path.iterdir()) == []  # MuJoCo's own log
+    assert capfd.readouterr() == ("", "")
+
+
+def test_other_warnings_of_mujoco_are_python_s(monkeypatch: Any) -> None:
+    read = mujoco.MjModel.from_xml_string
+
+    def odd(text: str) -> Any:
+        mujoco.get_mju_user_warning()("this is odd\n")
+        return read(text)
+
+    monkeypatch.setattr(mujoco.MjModel, "from_xml_string", odd)
+    before = mujoco.get_mju_user_warning()
+    with warns(UserWarning, match="^MuJoCo on the given text: this is odd$"):
+        dyn.load_mjcf(mjcf(HINGE))
+    assert mujoco.get_mju_user_warning() is before
 
 
 @mark.parametrize(

@@ -254,10 +254,19 @@ def test_the_account_adds_up() -> None:
     assert sum(each.edges for each in pruned.left_out) == len(pruned.full.edges) - len(pruned.graph.edges)
     assert list(pruned.graph.outputs) == ["tau1"]
     assert nodes(pruned.full) == nodes(dyn.inverse_dynamics(model))
-    assert [each.what for each in pruned.absent] == [
+    assert pruned.absent == ()  # what was switched off has its row above
+    bare = replace(
+        model,
+        bodies=[replace(body, joint=replace(body.joint, armature=0, stiffness=0, damping=0)) for body in bodies],
+        gravity=(0, 0, 0),
+        forces=(),
+        parameters={},
+    )
+    never = dyn.prune(bare, lock={"link 4": 0.2}, values={"qd": 0.0}, outputs=["tau1"])
+    assert [each.what for each in never.absent] == [
         "gravity", "damping of link 1, link 2, link 3", "springs of link 1, link 2, link 3",
         "armature of link 1, link 2, link 3"]  # fmt: skip
-    assert [each.nodes for each in pruned.absent] == [42, 0, 3, 3]  # where nothing moves, damping is nothing
+    assert [each.nodes for each in never.absent] == [42, 0, 3, 3]  # where nothing moves, damping is nothing
     text = str(pruned)
     assert "damping: switched off (" in text
     assert f"{nodes(pruned.graph)} nodes" in text
@@ -304,3 +313,21 @@ def test_wrong_use() -> None:
         dyn.prune(PAPER, values={"w": 1.0})
     with raises(cg.GraphError, match="no output g"):
         dyn.prune(PAPER, outputs=["g"])
+
+
+@mark.parametrize("effect", ["gravity", "damping", "springs", "armature"])
+def test_what_was_switched_off_is_not_said_to_be_missing(effect: str) -> None:
+    """A tree in which one joint alone has each effect: of the others it is absent, as before the switch."""
+    first, *others = dyn.tree([-1, 0, 1]).bodies
+    first = replace(first, joint=replace(first.joint, damping=0.1, stiffness=2.0, armature=0.3))
+    model = dyn.Mechanism([first, *others])
+    pruned = dyn.prune(model, effects=[each for each in dyn.EFFECTS if each != effect])
+    assert (pruned.left_out[0].what, pruned.left_out[0].why) == (effect, "switched off")
+    rows = {each.what: each.nodes for each in pruned.absent}
+    assert list(rows) == [f"{each} of link 2, link 3" for each in ("damping", "springs", "armature")]
+    if effect == "springs":  # counted at those two joints alone: one more number, and k (q - 0) in two torques
+        bodies = [first, *(replace(each, joint=replace(each.joint, stiffness=0.3)) for each in others)]
+        with_springs = dyn.Mechanism([replace(first, joint=replace(first.joint, stiffness=0.0)), *bodies[1:]])
+        assert rows["springs of link 2, link 3"] == nodes(dyn.inverse_dynamics(with_springs)) - nodes(
+            dyn.inverse_dynamics(dyn.Mechanism([replace(first, joint=replace(first.joint, stiffness=0.0)), *others]))
+        )

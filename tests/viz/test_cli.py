@@ -70,7 +70,8 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
         (["draw", "spring_mass", "--out", "x.jpg"], "must end in .svg, .png, .dot or .txt"),
         (["draw", "spring_mass", "--out", "missing/x.dot"], "does not exist"),
         (["draw", "spring_mass", "--out", "x.dot", "--collapse", "link 9"], "link 9"),
-        (["paper", "--out", "a_file"], "a_file"),
+        (["paper", "--out", "a_file"], "cannot write into the folder a_file: a_file is a file"),
+        (["certify", "nowhere.xml"], "there is no file 'nowhere.xml'"),
     ],
 )
 def test_a_mistake_gets_one_line_and_exit_status_1(tmp_path, arguments, said):
@@ -79,8 +80,18 @@ def test_a_mistake_gets_one_line_and_exit_status_1(tmp_path, arguments, said):
     assert done.returncode == 1
     assert done.stderr.count("\n") == 1
     assert done.stderr.startswith("cgraph: error: ")
+    assert "Errno" not in done.stderr
     assert said in done.stderr
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a_file"]
+
+
+def test_what_the_system_says_has_no_number(monkeypatch, capsys):
+    def fail(_):
+        open("/nowhere/at/all")  # noqa: PTH123, SIM115 - what raises is Python itself
+
+    monkeypatch.setattr("viz.commands.scenes.run", fail)
+    assert cli.main(["scenes"]) == 1
+    assert capsys.readouterr().err == "cgraph: error: /nowhere/at/all: No such file or directory\n"
 
 
 WRONG = ([], ["paint"], ["draw"], ["draw", "chain", "--out", "x.dot", "--formulation", "f"])

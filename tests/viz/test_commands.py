@@ -95,6 +95,16 @@ def test_lint_takes_a_file_with_a_coordinate_that_nothing_uses(tmp_path, capsys)
     assert "qd1 * dt -> q1" in [cut["text"] for cut in found["findings"][0]["cut"]]
 
 
+def test_diff_takes_a_file_with_a_coordinate_that_nothing_uses(tmp_path, capsys):
+    pytest.importorskip("mujoco")
+    model = tmp_path / "cart.xml"
+    model.write_text(MODEL)
+    found = figures(capsys, "diff", str(model))
+    for side in ("left", "right"):
+        assert found["in_both"] + len(found[f"only_{side}"]) == found[f"{side}_nodes"]
+    assert found["left_classes"]["spurious adjoint"] > 0
+
+
 def test_the_page_of_a_file_tells_forces_from_torques(tmp_path, capsys):
     pytest.importorskip("mujoco")
     model, page = tmp_path / "cart.xml", tmp_path / "page.html"
@@ -216,6 +226,7 @@ def test_the_answer_is_drawn(tmp_path, capsys):
         (["why", "triple_pendulum", "tau9", "q0"], "nothing in the graph is called 'tau9'"),
         (["why", "spring_mass", "tau0", "q0", "--at", "zz=1"], "the graph has no input zz"),
         (["lint", "spring_mass", "--box", "zz=0:1"], "the graph has no input zz"),
+        (["inspect", "spring_mass", "--out", "x.html", "--t-end", "1e9"], "--t-end must be at most 1000 s"),
         (["diff", "nowhere"], "there is no scene 'nowhere'"),
         (["lesson", "--out", "lesson.txt"], "--out must end in .html"),
     ],
@@ -236,6 +247,11 @@ def test_a_mistake_gets_one_line_and_exit_status_1(capsys, arguments, message):
         ["why", "spring_mass", "tau0", "q0", "--k", "-1"],
         ["why", "spring_mass", "tau0", "q0", "--at", "q0"],
         ["why", "spring_mass", "tau0", "q0", "--at", "q0=nan"],
+        ["why", "spring_mass", "tau0", "q0", "--at", "q0=1,q0=2"],
+        ["lint", "spring_mass", "--box", "q0=0:1,q0=0:2"],
+        ["certify", "spring_mass", "--seed", "-1"],
+        ["bench", "--budget", "-1"],
+        ["inspect", "spring_mass", "--out", "x.html", "--t-end", "0"],
         ["why", "spring_mass", "tau0", "q0", "--svg", "answer.png"],
         ["why", "spring_mass", "tau0", "q0", "--forward", "--formulation", "kinetic_only"],
         ["lint", "spring_mass", "--box", "q0=1"],

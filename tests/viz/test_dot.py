@@ -395,5 +395,5 @@ def test_the_same_graph_gives_the_same_text_in_every_run() -> None:
 
 def test_without_graphviz_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "graphviz", None)
-    with pytest.raises(ImportError, match=r"pip install cgraph\[viz\]"):
+    with pytest.raises(ImportError, match=r"pip install '\.\[viz\]'"):
         to_dot(spring())

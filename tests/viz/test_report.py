@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
+import sys
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -14,7 +15,7 @@ import pytest
 
 from viz import cli, theme
 from viz.document import Document, Paragraph, Picture, Section, Table, to_html, to_markdown
-from viz.document_files import write_document
+from viz.document_files import check_writable, write_document
 
 pytest.importorskip("matplotlib")
 
@@ -238,7 +239,16 @@ def test_an_interrupted_report_leaves_no_file(tmp_path: Path, monkeypatch: pytes
         (["report", "nothing"], "there is no scene 'nothing'"),
         (["report", "spring_mass", "spring_mass"], "each scene needs a name of its own"),
         (["report", "spring_mass", "--methods", "rk5"], "there is no method 'rk5'"),
-        (["report", "spring_mass", "--start", "1,x"], "could not convert"),
+        (["report", "spring_mass", "--start", "1"], "the start needs 2 numbers"),
+        (["report", "spring_mass", "--without", "gravity"], "--without goes with --pruning"),
+        (["report", "spring_mass", "--lock", "a=1"], "--lock goes with --pruning"),
+        (["report", "spring_mass", "--pruning", "--quick"], "--quick goes with a report of run times or --stability"),
+        (["report", "spring_mass", "--pruning", "--peers", ""], "--peers goes with a report of run times"),
+        (["report", "--stability", "--budget", "3"], "--budget goes with a report of run times"),
+        (["report", "--stability", "--ignore"], "--ignore goes with a report of run times or --pruning"),
+        (["report", "--stability", "--pruning"], "one at a time"),
+        (["report", "--pruning"], "a report needs a scene"),
+        (["report", "chain", "--pruning", "--lock", "a=1", "--lock", "a=2"], "--lock takes each body once"),
     ],
 )
 def test_mistakes_get_one_line(
@@ -249,3 +259,51 @@ def test_mistakes_get_one_line(
     assert error.count("\n") == 1
     assert said in error
     assert not (tmp_path / "r").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--start", "a,b"], "argument --start: expected a finite number, got 'a'"),
+        (["--start", "1,nan"], "argument --start: expected a finite number, got 'nan'"),
+        (["--pruning", "--lock", "tip=x"], "argument --lock: expected a finite number, got 'x'"),
+        (["--pruning", "--lock", "tip"], "argument --lock: expected a body and a coordinate, BODY=AT, got 'tip'"),
+        (["--budget", "-1"], "argument --budget: expected a positive number, got '-1'"),
+        (["--t-end", "inf"], "argument --t-end: expected a finite number, got 'inf'"),
+    ],
+)
+def test_wrong_numbers_name_the_option(capsys: pytest.CaptureFixture[str], arguments: list[str], said: str) -> None:
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["report", "spring_mass", *arguments])
+    assert stop.value.code == 2
+    assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("arguments", [["spring_mass"], ["spring_mass", "--pruning"], ["--stability"]])
+def test_a_folder_that_cannot_be_filled_is_found_before_the_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, arguments: list[str]
+) -> None:
+    worked = []
+    for name in ("work_precision.work_precision", "stability.run", "pruning.report"):
+        monkeypatch.setattr(f"dynamics.reports.{name}", lambda *_, **__: worked.append("worked"))
+    (tmp_path / "file").write_text("in the way")
+    assert cli.main(["report", *arguments, "--out", str(tmp_path / "file" / "new")]) == 1
+    error = capsys.readouterr().err
+    assert f"cannot write into the folder {tmp_path / 'file' / 'new'}: {tmp_path / 'file'} is a file" in error
+    assert "Errno" not in error
+    assert not worked
+
+
+def test_without_matplotlib_no_report_is_begun(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    monkeypatch.setattr("dynamics.reports.work_precision.work_precision", lambda *_, **__: pytest.fail("begun"))
+    assert cli.main(["report", "spring_mass", "--out", str(tmp_path / "r")]) == 1
+    assert "plots need matplotlib" in capsys.readouterr().err
+
+
+def test_trying_a_folder_leaves_nothing(tmp_path: Path) -> None:
+    check_writable(tmp_path / "a" / "b")
+    check_writable(tmp_path)
+    assert list(tmp_path.iterdir()) == []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from pathlib import Path
 
@@ -44,6 +45,32 @@ def takes_a_formulation(command: argparse._ActionsContainer) -> None:
     command.add_argument(
         "--formulation", default="chain_rule", choices=sorted(FORMULATIONS), help="default: chain_rule"
     )
+
+
+def whole(text: str) -> int:
+    """A whole number, at least 0, for argparse."""
+    if not (text.isascii() and text.isdecimal()):
+        raise argparse.ArgumentTypeError(f"expected a whole number, at least 0, got {text!r}")
+    return int(text)
+
+
+def number(text: str) -> float:
+    """A finite number, for argparse."""
+    try:
+        found = float(text)
+    except ValueError:
+        found = math.nan
+    if not math.isfinite(found):
+        raise argparse.ArgumentTypeError(f"expected a finite number, got {text!r}")
+    return found
+
+
+def positive(text: str) -> float:
+    """A positive number, for argparse."""
+    found = number(text)
+    if found <= 0.0:
+        raise argparse.ArgumentTypeError(f"expected a positive number, got {text!r}")
+    return found
 
 
 def may_draw_and_print(command: argparse.ArgumentParser) -> None:

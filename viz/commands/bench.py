@@ -9,7 +9,7 @@ from dataclasses import asdict
 from dynamics.reports.bench import MODES, PEERS, QUICK, SCENES, TASKS, Row, bench
 from dynamics.reports.bench_table import machine, tables
 
-from .arguments import Commands, may_ignore, say
+from .arguments import Commands, may_ignore, positive, say
 
 
 def add(commands: Commands[argparse.ArgumentParser]) -> None:
@@ -28,7 +28,7 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
         parser.add_argument(f"--{what}", metavar="A,B", help=f"only these of {', '.join(known)}")
     parser.add_argument("--quick", action="store_true", help=f"fewer turns and, unless named, {', '.join(QUICK)} alone")
     parser.add_argument(
-        "--budget", type=float, metavar="S", help="seconds a peer may take to make one task (default: 60; quick: 20)"
+        "--budget", type=positive, metavar="S", help="seconds a peer may take to make one task (default: 60; quick: 20)"
     )
     parser.add_argument("--json", action="store_true", help="print as JSON")
     parser.set_defaults(run=run)

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from cgraph.files import write
 from dynamics import scenes
-from dynamics.inspection import inspection
+from dynamics.inspection import FRAMES, inspection
 
 from .. import theme
 from ..inspector import Motion, Table, Version, page
-from .arguments import Commands, scene_of, takes_a_scene
+from .arguments import Commands, positive, scene_of, takes_a_scene
 
 ROUNDING = 1e-12  # of the largest torque: smaller ones are what is left of a difference
+LONGEST = 1000.0  # s: seconds of work for an arm of ten links
 
 
 def add(commands: Commands[argparse.ArgumentParser]) -> None:
@@ -27,7 +28,7 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
     takes_a_scene(parser)
     parser.add_argument("--out", type=Path, required=True, help="file to write: .html")
     parser.add_argument("--forward", action="store_true", help="forward dynamics, in place of the three formulations")
-    parser.add_argument("--t-end", type=float, metavar="S", help="how long it moves, instead of the scene's own time")
+    parser.add_argument("--t-end", type=positive, metavar="S", help="how long it moves, in place of the scene's time")
     parser.add_argument("--json", action="store_true", help="print the sizes as JSON")
     parser.set_defaults(run=run)
 
@@ -36,6 +37,8 @@ def run(options: argparse.Namespace) -> None:
     """Write the page."""
     if options.out.suffix != ".html":
         raise ValueError(f"--out must end in .html, got {options.out}")
+    if options.t_end is not None and options.t_end > LONGEST:
+        raise ValueError(f"--t-end must be at most {LONGEST:g} s, got {options.t_end:g} s: a page has {FRAMES} times")
     scene = scene_of(options)
     found = inspection(scene, forward=options.forward, t_end=options.t_end)
     bones = found.skeleton

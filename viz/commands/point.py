@@ -57,13 +57,16 @@ def point_text(at: dict[str, float]) -> str:
 
 
 def _pairs(text: str) -> list[tuple[str, str]]:
-    pairs = []
+    pairs: dict[str, str] = {}
     for part in filter(None, text.split(",")):
         name, equals, value = part.partition("=")
         if not equals or not name.strip():
             raise argparse.ArgumentTypeError(f"expected NAME=VALUE, separated by commas, got {part!r}")
-        pairs.append((name.strip(), value))
-    return pairs
+        name = name.strip()
+        if name in pairs:
+            raise argparse.ArgumentTypeError(f"{name} is given twice, as {pairs[name]} and as {value}")
+        pairs[name] = value
+    return list(pairs.items())
 
 
 def _number(name: str, text: str) -> float:

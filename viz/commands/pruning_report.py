@@ -9,17 +9,19 @@ from dynamics import EFFECTS, scenes
 from dynamics.reports import pruning
 
 from .. import pruning as page
-from ..document_files import write_document
+from ..document_files import check_writable, write_document
 
 
 def run(options: argparse.Namespace) -> None:
     """Write a page for each scene."""
-    without = [each for each in options.without.split(",") if each]
+    without = [each for each in (options.without or "").split(",") if each]
     if unknown := [each for each in without if each not in EFFECTS]:
         raise ValueError(f"effects are {', '.join(EFFECTS)}, got {unknown[0]!r}")
-    if wrong := [each for each in options.lock if "=" not in each]:
-        raise ValueError(f"--lock must be a body and a coordinate, BODY=AT, got {wrong[0]!r}")
-    lock = {body: float(at) for body, _, at in (each.rpartition("=") for each in options.lock)}
+    locked = options.lock or []
+    lock = dict(locked)
+    if len(lock) < len(locked):
+        raise ValueError(f"--lock takes each body once, got {', '.join(body for body, _ in locked)}")
+    check_writable(options.out)
     found = []
     for name in options.scenes:
         scene = scenes.load(name, **({"ignore": True} if options.ignore else {}))

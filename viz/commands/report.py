@@ -12,9 +12,24 @@ from dynamics.reports import trajectory_scenes, work_precision
 from dynamics.reports.cold_start import STARTS
 
 from .. import report as page
-from ..document_files import write_document
+from ..document_files import check_writable, write_document
+from ..plot import check_can_plot
 from . import pruning_report, stability_report
-from .arguments import Commands, may_ignore, say
+from .arguments import Commands, may_ignore, number, positive, say
+
+CURVES, STABILITY, PRUNING = "a report of run times", "--stability", "--pruning"
+GO_WITH = {  # options that not every kind of report has
+    "ignore": (CURVES, PRUNING),
+    "t_end": (CURVES,),
+    "start": (CURVES,),
+    "methods": (CURVES,),
+    "peers": (CURVES,),
+    "budget": (CURVES,),
+    "quick": (CURVES, STABILITY),
+    "without": (PRUNING,),
+    "lock": (PRUNING,),
+}
+BUDGET = 60.0  # s
 
 
 def add(commands: Commands[argparse.ArgumentParser]) -> None:
@@ -31,33 +46,45 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
     )
     may_ignore(parser)
     parser.add_argument("--out", type=Path, default=Path("report"), help="folder to fill (default: report)")
-    parser.add_argument("--t-end", type=float, metavar="S", help="how long, instead of the scene's own time")
-    parser.add_argument("--start", metavar="A,B", help="q and then qd, instead of the scene's own start")
+    parser.add_argument("--t-end", type=positive, metavar="S", help="how long, instead of the scene's own time")
+    parser.add_argument("--start", type=_state, metavar="A,B", help="q and then qd, instead of the scene's own start")
     parser.add_argument("--methods", metavar="A,B", help=f"only these of {', '.join(METHODS)}")
     parser.add_argument("--peers", metavar="A,B", help=f"only these of {', '.join(work_precision.PEERS)}; '' for none")
     parser.add_argument("--quick", action="store_true", help="fewer turns, shorter runs, and no cold starts")
     parser.add_argument(
-        "--budget", type=float, default=60.0, metavar="S", help="seconds that a cold start may take (default: 60)"
+        "--budget", type=positive, metavar="S", help=f"seconds that a cold start may take (default: {BUDGET:g})"
     )
     parser.add_argument("--json", action="store_true", help="print as JSON")
     parser.add_argument("--pruning", action="store_true", help="instead: what the scene's graphs hold and leave out")
-    parser.add_argument("--without", default="", metavar="A,B", help=f"with --pruning: leave out {', '.join(EFFECTS)}")
+    parser.add_argument("--without", metavar="A,B", help=f"with --pruning: leave out {', '.join(EFFECTS)}")
     parser.add_argument(
-        "--lock", action="append", default=[], metavar="BODY=AT", help="with --pruning: lock a joint there [rad or m]"
+        "--lock", type=_locked, action="append", metavar="BODY=AT", help="with --pruning: lock a joint there [rad or m]"
     )
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
     """Write the pages that the arguments ask for."""
-    if options.pruning:
-        pruning_report.run(options)
-    elif bool(options.scenes) == options.stability:
+    if options.stability and options.pruning:
+        raise ValueError("--stability and --pruning are two reports: one at a time")
+    kind = STABILITY if options.stability else PRUNING if options.pruning else CURVES
+    if bool(options.scenes) == options.stability:
         raise ValueError("a report needs a scene, or --stability and none")
-    elif options.stability:
-        stability_report.run(options)
-    else:
-        _curves(options)
+    for name, kinds in GO_WITH.items():
+        if kind not in kinds and getattr(options, name) not in (None, False):
+            raise ValueError(f"--{name.replace('_', '-')} goes with {' or '.join(kinds)}, not with {kind}")
+    {CURVES: _curves, STABILITY: stability_report.run, PRUNING: pruning_report.run}[kind](options)
+
+
+def _state(text: str) -> list[float]:
+    return [number(each) for each in text.split(",")]
+
+
+def _locked(text: str) -> tuple[str, float]:
+    body, equals, at = text.rpartition("=")
+    if not (equals and body):
+        raise argparse.ArgumentTypeError(f"expected a body and a coordinate, BODY=AT, got {text!r}")
+    return body, number(at)
 
 
 def _curves(options: argparse.Namespace) -> None:
@@ -65,9 +92,10 @@ def _curves(options: argparse.Namespace) -> None:
     named = {trajectory_scenes.load(name, ignore=options.ignore).name for name in options.scenes}
     if len(named) < len(options.scenes):
         raise ValueError(f"each scene needs a name of its own for its files, got {', '.join(options.scenes)}")
-    chosen = {"t_end": options.t_end, "ignore": options.ignore}
-    chosen["start"] = [float(each) for each in options.start.split(",")] if options.start else None
+    chosen = {"t_end": options.t_end, "start": options.start, "ignore": options.ignore}
     peers = work_precision.PEERS if options.peers is None else tuple(filter(None, options.peers.split(",")))
+    check_can_plot()
+    check_writable(options.out)
     found = []
     for name in options.scenes:
         report = work_precision.work_precision(
@@ -77,7 +105,7 @@ def _curves(options: argparse.Namespace) -> None:
             turns=3 if options.quick else 9,
             limit=0.03 if options.quick else work_precision.LIMIT,
             cold=() if options.quick else tuple(STARTS),
-            budget=options.budget,
+            budget=BUDGET if options.budget is None else options.budget,
             folder=options.out / "exact",
             options=chosen,
             say=say,

@@ -9,7 +9,8 @@ import time
 from dynamics.reports import stability, stability_table
 
 from .. import stability as page
-from ..document_files import write_document
+from ..document_files import check_writable, write_document
+from ..plot import check_can_plot
 from .arguments import say
 
 NAME = "stability"  # of the files
@@ -17,6 +18,8 @@ NAME = "stability"  # of the files
 
 def run(options: argparse.Namespace) -> None:
     """Write the page and print the table. Raises RuntimeError for a row beyond its bound without a known reason."""
+    check_can_plot()
+    check_writable(options.out)
     begin = time.perf_counter()
     found = stability.run(options.quick, say)
     content = stability.content(found, time.perf_counter() - begin, options.quick)

@@ -12,7 +12,7 @@ from cgraph.reverse import cotangents
 from dynamics import forward_dynamics, inverse_dynamics
 
 from ..dot import to_dot
-from .arguments import Commands, draw, may_draw_and_print, scene_of, takes_a_formulation, takes_a_scene
+from .arguments import Commands, draw, may_draw_and_print, scene_of, takes_a_formulation, takes_a_scene, whole
 from .point import REST, filled, point, point_text
 
 
@@ -25,7 +25,7 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
     which = parser.add_mutually_exclusive_group()
     takes_a_formulation(which)
     which.add_argument("--forward", action="store_true", help="of forward dynamics, with outputs such as qdd0")
-    parser.add_argument("--k", type=_whole, default=10, metavar="K", help="paths to list, heaviest first (default: 10)")
+    parser.add_argument("--k", type=whole, default=10, metavar="K", help="paths to list, heaviest first (default: 10)")
     parser.add_argument("--at", type=point, default={}, metavar="A=1,B=2", help=f"where paths are weighed; {REST}")
     may_draw_and_print(parser)
     parser.set_defaults(run=run)
@@ -70,9 +70,3 @@ def _by_reverse_sweep(graph: Graph, output: str, source: str, at: dict[str, floa
     names = Names(graph)
     (bar,) = cotangents({names.output(output): cg.constant(1.0)}, [names.one(source)])
     return float(Graph(graph.inputs, {"bar": bar}).evaluate(at)["bar"])
-
-
-def _whole(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"expected a whole number of paths, at least 0, got {text!r}")
-    return int(text)

@@ -130,3 +130,13 @@ def test_a_graph_does_not_differ_from_itself_however_deep():
     assert len(found.common) == len(graph.nodes)
     assert str(found).splitlines()[-1] == "Computed alike: f."
     assert len(found.together().graph.nodes) == len(graph.nodes)
+
+
+def test_a_variable_that_neither_graph_uses_is_an_atom_all_the_same() -> None:
+    x, y = cg.variable("x"), cg.variable("y")
+    left, right = cg.Graph([x, y], {"f": cg.sin(y)}), cg.Graph([x, y], {"f": cg.cos(y)})
+    found = cg.diff(left, right, atoms="x y")
+    assert list(found.atoms.values()) == ["y"]
+    assert found.other_outputs == ("f",)
+    with pytest.raises(cg.GraphError, match="neither graph has a node called z"):
+        cg.diff(left, right, atoms="x z")

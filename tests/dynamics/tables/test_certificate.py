@@ -140,11 +140,57 @@ def test_rods_are_told_from_capsules_by_their_inertia() -> None:
     assert found == {"inverse dynamics = MuJoCo's": "they agree without inertia about the centres of mass"}
 
 
-def test_a_twin_of_another_size_is_left_out() -> None:
+@pytest.mark.parametrize(
+    ("twin", "said"),
+    [
+        (to_mjcf(dyn.planar_arm([1.0], [1.0])), "the twin has 1 degrees of freedom, the model 2"),
+        ("/nowhere/arm.xml", "there is no file '/nowhere/arm.xml'"),
+        ("garbage", "there is no file 'garbage'"),
+        ("<mujoco><garbage/></mujoco>", "MuJoCo cannot read the given text"),
+        (7, "a model is a path, XML text or an MjModel, got int"),
+    ],
+)
+def test_a_twin_that_cannot_be_compared_is_an_error(twin, said: str) -> None:
     pytest.importorskip("mujoco")
-    arm = dyn.planar_arm([1.0, 1.0], [1.0, 1.0])
-    found = certify(arm, FEW, twin=to_mjcf(dyn.planar_arm([1.0], [1.0])))
-    assert "MuJoCo: the twin has 1 degrees of freedom, the model 2" in found.left_out
+    with pytest.raises(ValueError, match=re.escape(said)):
+        certify(dyn.planar_arm([1.0, 1.0], [1.0, 1.0]), FEW, twin=twin)
+
+
+def test_a_twin_needs_rigid_bodies() -> None:
+    pytest.importorskip("mujoco")
+    with pytest.raises(ValueError, match="a twin is compared with rigid bodies"):
+        certify(dyn.scenes.load("spring_mass"), FEW, twin=to_mjcf(dyn.planar_arm([1.0], [1.0])))
+
+
+def test_a_urdf_file_is_a_twin(tmp_path) -> None:
+    """Its shapes are not read, so a mesh that is not there is no reason."""
+    pytest.importorskip("mujoco")
+    shape = '<visual><geometry><mesh filename="nowhere.stl"/></geometry></visual>'
+    joint = dyn.Joint("revolute", (0.0, 1.0, 0.0), (0.0, 0.0, -1.0))
+    arm = dyn.serial_arm([{"joint": joint, "mass": 1.0, "center": (0.0, 0.0, -0.5), "inertia": (0.2, 0.2, 0.1)}] * 2)
+    file = tmp_path / "arm.urdf"
+    file.write_text(dyn.to_urdf(arm).replace("<inertial>", f"{shape}<inertial>"))
+    found = certify(arm, FEW, twin=file)
+    assert failed(found) == {}
+    assert "inverse dynamics = MuJoCo's" in [each.equation for each in found.residuals]
+
+
+def test_a_seed_is_not_negative() -> None:
+    with pytest.raises(ValueError, match="seed of a certificate must be at least 0, got -1"):
+        certify(dyn.scenes.load("spring_mass"), FEW, -1)
+
+
+def test_the_command_translates_what_joints_were_left_out_of(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("mujoco")
+    model = tmp_path / "model.xml"
+    model.write_text(
+        '<mujoco><worldbody><body name="a"><joint axis="0 1 0"/><geom size="0.1" pos="0.2 0 0"/><body name="b">'
+        '<joint type="ball"/><geom size="0.1" pos="0 0 0.5"/></body></body></worldbody></mujoco>'
+    )
+    assert cli.main(["certify", str(model), "--ignore", "--states", "3"]) == 0
+    printed = capsys.readouterr()
+    assert "inverse dynamics = MuJoCo's" in printed.out
+    assert "MuJoCo gets the model without" in printed.err
 
 
 def test_pinocchio_agrees_when_it_is_there() -> None:
