@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import math
 
 import numpy as np
 
 from cgraph import Graph
 from dynamics.scenes import Scene
+
+from .arguments import number
 
 SEED, DIGITS = 20250814, 3  # of the numbers that nobody gave: always the same, and short enough to be typed again
 DT = 1e-3  # s, the step of an embedded relation
@@ -71,9 +72,6 @@ def _pairs(text: str) -> list[tuple[str, str]]:
 
 def _number(name: str, text: str) -> float:
     try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise argparse.ArgumentTypeError(f"{name} needs a finite number, got {text!r}")
-    return number
+        return number(text)
+    except argparse.ArgumentTypeError as error:
+        raise argparse.ArgumentTypeError(f"{name}: {error}") from None
