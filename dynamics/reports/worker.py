@@ -60,7 +60,8 @@ class Worker:
 
     def prepare(self, task: str, mode: str, budget: float) -> Prepared | Refused:
         """Make and check the contender for a task and a mode; the process ends if it takes longer than `budget` s."""
-        self._pipe.send((task, mode))
+        if (told := self._tell(task, mode)) is not None:
+            return told
         if not self._pipe.poll(budget):
             self.end()
             return Refused(f"not ready within {budget:g} s")
@@ -69,18 +70,28 @@ class Worker:
 
     def turn(self, task: str, mode: str) -> float:
         """Seconds for an evaluation, over as many runs as make a measurable time. Raises RuntimeError when it dies."""
-        self._pipe.send((task, mode))
-        answer = self._answer()
+        answer = self._tell(task, mode) or self._answer()
         if isinstance(answer, Refused):
             raise RuntimeError(answer.reason)
         return float(answer)
 
+    def _tell(self, task: str, mode: str) -> Refused | None:
+        """Send what is asked for; a refusal when nobody is there to read it."""
+        try:
+            self._pipe.send((task, mode))
+        except OSError:  # the pipe broke, or `end` has closed it
+            return self._ended()
+        return None
+
     def _answer(self) -> Any:
         try:
             return self._pipe.recv()
-        except (EOFError, ConnectionError):
-            self._process.join()
-            return Refused(f"its process ended with status {self._process.exitcode}")
+        except (EOFError, OSError):
+            return self._ended()
+
+    def _ended(self) -> Refused:
+        self._process.join()
+        return Refused(f"its process ended with status {self._process.exitcode}")
 
     @property
     def alive(self) -> bool:

@@ -163,6 +163,7 @@ def test_an_error_in_another_thread_is_raised_in_the_callers():
         share(work, range(2), 2)
 
 
+@pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize("number", [1, 2])
 def test_ctrl_c_stops_after_the_blocks_under_way(number):
     main, done = threading.current_thread(), []

@@ -183,12 +183,16 @@ def test_a_worker_that_is_late_is_ended_and_not_asked_for_what_contains_the_same
     assert again == skipped
 
 
-def test_a_worker_that_dies_is_told():
+@pytest.mark.parametrize("gone", [False, True])  # the pipe breaks at the answer, or already at the question
+def test_a_worker_that_dies_is_told(gone):
     worker = Worker(partial(model, "planar 3"), "ours")
     assert isinstance(worker.prepare("forward", "call", budget=60.0), Prepared)
     worker._process.kill()
+    if gone:
+        worker._process.join()
     with pytest.raises(RuntimeError, match="its process ended with status -"):
         worker.turn("forward", "call")
+    assert isinstance(worker.prepare("inverse", "call", budget=60.0), Refused)
     worker.end()
 
 

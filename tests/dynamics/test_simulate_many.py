@@ -267,6 +267,7 @@ def test_max_steps() -> None:
         assert result.stats.steps.max() <= 4
 
 
+@mark.usefixtures("ctrl_c")
 @mark.parametrize("workers", [1, 3])
 @mark.parametrize("method", ["rk4", "midpoint"])
 def test_ctrl_c_comes_back_and_leaves_no_thread(workers: int, method: str) -> None:
