@@ -1,18 +1,16 @@
 """cgraph: computational graphs of equations, with forward and reverse automatic differentiation."""
 
-from .c import CSource
+from .autodiff.forward import jvp
+from .autodiff.hessian_solve import hessian_solve
+from .autodiff.jacobian import hessian, jacobian
+from .autodiff.reverse import gradient, vjp
 from .codegen import Compiled, clear_cache, compile
-from .counts import Counts
-from .double_double import double_double
-from .errors import GraphError
-from .explain import Diff, Lint, Why, WhyNot, diff, lint, why, why_not
-from .forward import jvp
-from .graph import Graph
-from .hessian_solve import hessian_solve
-from .jacobian import hessian, jacobian
-from .label import tag
-from .node import Edge, Node, constant, named, variable, variables
-from .ops import (
+from .codegen.c import CSource, to_c
+from .core.counts import Counts
+from .core.graph import Graph
+from .core.label import tag
+from .core.node import Edge, Node, constant, named, variable, variables
+from .core.ops import (
     abs_ as abs,
     acos,
     asin,
@@ -40,11 +38,13 @@ from .ops import (
     tanh,
     where,
 )
+from .core.source_lines import recording_lines
+from .core.structure_hash import structure_hash
+from .errors import GraphError
+from .explain import Diff, Lint, Why, WhyNot, diff, lint, why, why_not
 from .program import Loop, loop
-from .reverse import gradient, vjp
-from .simplify import simplify, specialize
-from .source_lines import recording_lines
-from .structure_hash import structure_hash
+from .simplify.double_double import double_double
+from .simplify.simplify import simplify, specialize
 
 __all__ = [
     "CSource",
@@ -102,6 +102,7 @@ __all__ = [
     "tag",
     "tan",
     "tanh",
+    "to_c",
     "variable",
     "variables",
     "vjp",

@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.fold import Builder, folded
-from cgraph.forward import tangents
-from cgraph.hessian_solve import solve_nodes
-from cgraph.jacobian import hessian_nodes
-from cgraph.label import building
-from cgraph.ldl import SingularError, ldl_solve
-from cgraph.reverse import cotangents
+from cgraph.autodiff.forward import tangents
+from cgraph.autodiff.hessian_solve import solve_nodes
+from cgraph.autodiff.jacobian import hessian_nodes
+from cgraph.autodiff.ldl_solve import SingularError, ldl_solve
+from cgraph.autodiff.reverse import cotangents
+from cgraph.core.label import building
+from cgraph.simplify.builder import Builder, folded
 
 from .formulations import ONE, ZERO, substituted
 from .rates import rates

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.fold import Builder
-from cgraph.label import building
-from cgraph.order import topological
-from cgraph.reverse import cotangents
+from cgraph.autodiff.reverse import cotangents
+from cgraph.core.label import building
+from cgraph.core.traversal import topological
+from cgraph.simplify.builder import Builder
 
 from . import spatial
 from .body import Body, MechanismError, vector

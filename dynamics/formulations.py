@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.fold import Builder
-from cgraph.forward import tangents
-from cgraph.label import TANGENT, building
-from cgraph.order import topological
-from cgraph.reverse import cotangents
+from cgraph.autodiff.forward import tangents
+from cgraph.autodiff.reverse import cotangents
+from cgraph.core.label import TANGENT, building
+from cgraph.core.traversal import topological
+from cgraph.simplify.builder import Builder
 
 from .system import System, as_system
 

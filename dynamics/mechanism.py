@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.fold import Builder
-from cgraph.label import building
+from cgraph.core.label import building
+from cgraph.simplify.builder import Builder
 
 from . import newton_euler, spatial
 from .base_parameters import regrouped

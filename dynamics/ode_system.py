@@ -7,7 +7,7 @@ from functools import cached_property
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.order import topological
+from cgraph.core.traversal import topological
 
 from .system import TIME, Parameters, as_node, called, parameter_value, sequence
 

@@ -12,7 +12,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.real import real_number
+from cgraph.util.real_arrays import real_number
 
 from .system import BiasForce, BodySystem, System, per_coordinate, sequence
 

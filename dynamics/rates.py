@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cgraph import Node
-from cgraph.fold import Builder
-from cgraph.label import UNLABELLED
-from cgraph.order import topological
+from cgraph.core.label import UNLABELLED
+from cgraph.core.traversal import topological
+from cgraph.simplify.builder import Builder
 
 
 def rates(output: Node, q: Sequence[Node], qd: Sequence[Node], t: Node, build: Builder) -> list[Node]:

@@ -17,10 +17,10 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Compiled, Graph, Node
-from cgraph.fold import Builder
-from cgraph.forward import tangents
-from cgraph.label import building
-from cgraph.reverse import cotangents
+from cgraph.autodiff.forward import tangents
+from cgraph.autodiff.reverse import cotangents
+from cgraph.core.label import building
+from cgraph.simplify.builder import Builder
 
 from .link import Link, Motion, carried, energy, ground
 from .mechanism import Mechanism

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.real import real_array
+from cgraph.util.real_arrays import real_array
 
 from .run import Piece
 from .trajectory import Array

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.real import real_array
+from cgraph.util.real_arrays import real_array
 
 from .event import Event, crossings, event_graph
 from .integrators import METHODS, Problem, problem_of

@@ -12,8 +12,8 @@ from typing import Any, NoReturn
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.order import topological
-from cgraph.real import real_number
+from cgraph.core.traversal import topological
+from cgraph.util.real_arrays import real_number
 
 TIME = "t"
 BiasForce = tuple[Node, Node]  # a velocity, and the force that is there

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from hypothesis import strategies as st
 
 import cgraph as cg
-from cgraph.node import OPS, apply
+from cgraph.core.node import OPS, apply
 from tests import high_precision
 
 REAL = (-8.0, 8.0)

@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
-from cgraph.files import write
+from cgraph.util.atomic_write import write
 
 from .document import Document, to_html, to_markdown
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cgraph import Graph
-from cgraph.expand import format_polynomial
-from cgraph.files import write
+from cgraph.simplify.polynomial import format_polynomial
+from cgraph.util.atomic_write import write
 from dynamics import momentum_rate, scenes, spurious
 from dynamics.mujoco_io import frames
 from dynamics.progress import Progress

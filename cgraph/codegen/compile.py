@@ -8,10 +8,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..graph import Graph
+from ..core.graph import Graph
 from .compiled import Compiled
-from .generated import Generated
-from .native import Native
+from .native_function import Native
+from .python_function import Generated
 
 BACKENDS = ("auto", "python", "numpy", "llvm")
 LARGE = 100_000  # nodes; beyond, making machine code takes longer than most callers gain

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..core.evaluate import Array
+from ..core.graph import Graph
 from ..errors import GraphError
-from ..evaluate import Array
-from ..graph import Graph
-from ..real import real_array
-from .threads import share, thread_count
+from ..util.real_arrays import real_array
+from ..util.threads import share, thread_count
 
 
 class Compiled(ABC):

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Container, Mapping
 from typing import NamedTuple
 
-from ..graph import Graph
-from ..node import Node
-from .lanes import POLYNOMIAL
+from ..core.graph import Graph
+from ..core.node import Node
+from .vector_math import POLYNOMIAL
 
 
 class Joined(NamedTuple):

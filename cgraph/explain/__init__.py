@@ -1,8 +1,8 @@
 """Explanations of a graph: what of it is not as declared, why outputs depend on inputs, how two differ."""
 
-from .diff import Diff, Together, diff
-from .finding import Finding
-from .lint import Lint, lint
+from .compare import Diff, Together, diff
+from .lint.finding import Finding
+from .lint.lint import Lint, lint
 from .why import Path, Why, why
 from .why_not import WhyNot, why_not
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from ..core.graph import Graph
+from ..core.node import CONSTANT, Node
+from ..core.source_lines import lines_text
 from ..errors import GraphError
-from ..graph import Graph
-from ..node import CONSTANT, Node
-from ..source_lines import lines_text
 
 Name = str | Node
 LENGTH = 32  # characters up to which a node is written out; a longer one refers to its parts by their %numbers

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from operator import itemgetter
 
-from ..node import Edge, Node
+from ..core.node import Edge, Node
 
 
 def path_count(nodes: Sequence[Node], edges: Sequence[Edge], source: Node, sink: Node) -> int:

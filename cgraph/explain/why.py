@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..core.graph import Graph
+from ..core.node import Edge, Node
+from ..core.source_lines import lines_text
 from ..errors import GraphError
-from ..graph import Graph
-from ..node import Edge, Node
-from ..source_lines import lines_text
+from .edge_partials import Point, edge_slopes
 from .names import Name, Names, many
 from .paths import best_paths, by_target, path_count
-from .reach import between
-from .slopes import Point, edge_slopes
+from .reachability import between
 
 EXACT = 10**15  # up to here a number of paths is printed digit by digit
 LENGTH = 90  # characters up to which a path is written out; a longer one is told by the tags that it passes

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from ..core.graph import Graph
+from ..core.node import Node
 from ..errors import GraphError
-from ..graph import Graph
-from ..node import Node
 from .names import Name, Names, joined, many
-from .reach import makers, users
+from .reachability import makers, users
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,12 +8,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..core.evaluate import Array
+from ..core.graph import Graph
+from ..core.node import CONSTANT, Node, variable
+from ..core.traversal import rebuild, topological
 from ..errors import GraphError
-from ..evaluate import Array
-from ..graph import Graph
-from ..node import CONSTANT, Node, variable
-from ..order import rebuild, topological
-from ..real import real_array
+from ..util.real_arrays import real_array
 from .program import Call, Program
 from .runner import runner
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..core.graph import Graph
 from ..errors import GraphError
-from ..graph import Graph
 
 
 @dataclass(frozen=True)

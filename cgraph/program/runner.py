@@ -12,16 +12,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..codegen import llvm
+from ..codegen import llvm_engine as llvm
 from ..codegen.compile import compile
 from ..codegen.compiled import Compiled
-from ..codegen.native import flags_of
+from ..codegen.native_function import flags_of
+from ..core.evaluate import Array
+from ..core.graph import Graph
 from ..errors import GraphError
-from ..evaluate import Array
-from ..graph import Graph
-from . import lu
+from . import lu_solve as lu
+from .llvm_ir import offsets, program_functions, program_ir
 from .program import Call, Factor, If, Map, Program, Solve, Statement, Sum, While
-from .text import offsets, program_functions, program_ir
 
 BACKENDS = ("auto", "python", "llvm")
 _RUN = ctypes.CFUNCTYPE(

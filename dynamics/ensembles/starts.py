@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.real import real_array
+from cgraph.util.real_arrays import real_array
 
 from ..state_equation import as_ode, state_inputs
 from ..system import parameter_value, per_coordinate

@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.fold import Builder
-from cgraph.hessian_solve import solve_nodes
-from cgraph.jacobian import hessian_nodes
-from cgraph.label import building
-from cgraph.order import topological
-from cgraph.reverse import cotangents
+from cgraph.autodiff.hessian_solve import solve_nodes
+from cgraph.autodiff.jacobian import hessian_nodes
+from cgraph.autodiff.reverse import cotangents
+from cgraph.core.label import building
+from cgraph.core.traversal import topological
+from cgraph.simplify.builder import Builder
 
 from ..equations import energy
 from ..state_equation import as_ode, state_equation, state_inputs

@@ -16,8 +16,8 @@ from typing import Any
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.node import as_node
-from cgraph.order import topological
+from cgraph.core.node import as_node
+from cgraph.core.traversal import topological
 
 from ..system import TIME
 from .numbers import VALUES, Number, sign

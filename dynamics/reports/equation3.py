@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cgraph.expand import Polynomial, expand, format_polynomial
+from cgraph.simplify.polynomial import Polynomial, expand, format_polynomial
 
 from ..formulations import momentum_rate
 from ..scenes import spring_mass

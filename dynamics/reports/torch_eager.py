@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cgraph import Node
-from cgraph.order import topological
+from cgraph.core.traversal import topological
 
 from ..system import System
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
-from cgraph.real import real_array
+from cgraph.util.real_arrays import real_array
 
 from ..system import TIME, System
 

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.fold import Builder
-from cgraph.forward import tangents
-from cgraph.reverse import cotangents
+from cgraph.autodiff.forward import tangents
+from cgraph.autodiff.reverse import cotangents
+from cgraph.simplify.builder import Builder
 
 from ..equations import bias, energy, forward_dynamics, gravity_force, mass_matrix
 from ..formulations import ONE, ZERO, inverse_dynamics

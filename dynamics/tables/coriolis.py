@@ -6,11 +6,11 @@ from typing import Any
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.fold import Builder, folded
-from cgraph.forward import tangents
-from cgraph.jacobian import hessian_nodes
-from cgraph.label import building
-from cgraph.order import topological
+from cgraph.autodiff.forward import tangents
+from cgraph.autodiff.jacobian import hessian_nodes
+from cgraph.core.label import building
+from cgraph.core.traversal import topological
+from cgraph.simplify.builder import Builder, folded
 
 from ..equations import bias
 from ..formulations import ONE, ZERO, substituted

@@ -9,8 +9,8 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.fold import Builder
-from cgraph.label import building
+from cgraph.core.label import building
+from cgraph.simplify.builder import Builder
 
 from .. import spatial
 from ..body import WORLD

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph, Node
-from cgraph.order import topological
+from cgraph.core.traversal import topological
 
 from ..system import System
 from .at_state import Array, at_state

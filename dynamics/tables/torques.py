@@ -7,11 +7,11 @@ from typing import Any
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.fold import Builder, folded
-from cgraph.forward import tangents
-from cgraph.jacobian import hessian_nodes
-from cgraph.label import building
-from cgraph.reverse import cotangents
+from cgraph.autodiff.forward import tangents
+from cgraph.autodiff.jacobian import hessian_nodes
+from cgraph.autodiff.reverse import cotangents
+from cgraph.core.label import building
+from cgraph.simplify.builder import Builder, folded
 
 from ..equations import bias, gravity_force
 from ..formulations import ONE, ZERO

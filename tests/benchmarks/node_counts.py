@@ -18,16 +18,17 @@ import numpy as np
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph import Node, fold
-from cgraph.fold import Builder
-from cgraph.label import building
-from cgraph.reverse import cotangents
+from cgraph import Node
+from cgraph.autodiff.reverse import cotangents
+from cgraph.core.label import building
+from cgraph.simplify import builder as fold
+from cgraph.simplify.builder import Builder
 from dynamics import equations, link as links, mechanism, spatial
 from dynamics.reports.bench_scenes import binary_tree, turned_arm
 from dynamics.reports.fit import exponent
 from dynamics.system import BodySystem
 
-solving = sys.modules["cgraph.hessian_solve"]  # the module; `cgraph.hessian_solve` is the function
+solving = sys.modules["cgraph.autodiff.hessian_solve"]  # the module; `cgraph.hessian_solve` is the function
 solve_nodes, rates = solving.solve_nodes, equations.rates
 PLANAR = (3, 10, 20, 50, 100, 200)
 

@@ -22,7 +22,7 @@ import numpy as np
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.structure_hash import structure_hash
+from cgraph.core.structure_hash import structure_hash
 from dynamics.spatial import rotation
 from tests.dynamics.test_reconfiguration import arm
 

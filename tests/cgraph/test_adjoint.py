@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings, strategies as st
 from mpmath import mpf
 
 import cgraph as cg
-from cgraph.node import OPS, apply
+from cgraph.core.node import OPS, apply
 from tests import high_precision
 from tests.strategies import Case, cases, numbers
 

@@ -15,9 +15,9 @@ from hypothesis import Phase, given, settings, strategies as st
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.c import body
-from cgraph.files import write
-from cgraph.node import OPS, apply
+from cgraph.codegen.c import c_statements as body
+from cgraph.core.node import OPS, apply
+from cgraph.util.atomic_write import write
 from tests.strategies import DOMAINS, cases
 
 CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
@@ -91,7 +91,7 @@ def operations(tmp_path_factory):
     @cache
     def at(level):
         (folder / level).mkdir()
-        return build(folder / level, [graph_of(op).to_c(f"op_{op.name}") for op in OPS.values()], [f"-{level}"])
+        return build(folder / level, [cg.to_c(graph_of(op), f"op_{op.name}") for op in OPS.values()], [f"-{level}"])
 
     return at
 
@@ -112,7 +112,7 @@ def test_random_graphs_agree_with_evaluate_to_the_last_bit(batch, part, tmp_path
     """Also when cut into parts of a few operations."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(body, "PART", part)
-        sources = [case.graph.to_c(f"graph{k}") for k, case in enumerate(batch)]
+        sources = [cg.to_c(case.graph, f"graph{k}") for k, case in enumerate(batch)]
     library = build(tmp_path_factory.mktemp("random"), sources)
     for case, source in zip(batch, sources, strict=True):
         point = [case.values[name] for name in case.graph.input_names]
@@ -124,7 +124,7 @@ def test_random_graphs_agree_with_evaluate_to_the_last_bit(batch, part, tmp_path
 def test_forward_dynamics_agree_with_evaluate_to_the_last_bit(links, tmp_path):
     graph = dyn.forward_dynamics(dyn.planar_arm([1.0] * links, [0.7] * links, damping=0.1))
     points = np.random.default_rng(links).normal(size=(100, len(graph.inputs)))
-    library = build(tmp_path, [graph.to_c("arm")], ["-O2", "-march=native"] if links == 3 else ["-O2"])
+    library = build(tmp_path, [cg.to_c(graph, "arm")], ["-O2", "-march=native"] if links == 3 else ["-O2"])
     assert same(called(library, "arm", graph, points), evaluated(graph, points))
 
 
@@ -132,7 +132,7 @@ def test_forward_dynamics_agree_with_evaluate_to_the_last_bit(links, tmp_path):
 def test_a_long_graph_is_cut_into_parts(tmp_path, monkeypatch):
     graph = dyn.forward_dynamics(dyn.planar_arm([1.0] * 10, [0.7] * 10))
     monkeypatch.setattr(body, "PART", 100)
-    source = graph.to_c("arm")
+    source = cg.to_c(graph, "arm")
     statements = [len(part.splitlines()) for part in source.source.split("static void")[1:]]
     assert len(statements) == math.ceil(sum(1 for node in graph.nodes if node.args) / 100)
     (size,) = map(int, re.findall(r"double w\[(\d+)\];", source.source))
@@ -145,7 +145,7 @@ def test_a_deep_graph_needs_no_recursion():
     x = node = cg.variable("x")
     for _ in range(100_000):
         node = cg.sin(node)
-    source = cg.Graph([x], {"y": node}).to_c("deep").source
+    source = cg.to_c(cg.Graph([x], {"y": node}), "deep").source
     assert source.count("static void deep_part_") == 50
     assert "double w[1];" in source
 
@@ -156,7 +156,7 @@ def test_the_sine_and_the_cosine_of_one_angle_are_those_of_evaluate(tmp_path):
     x = cg.variable("x")
     graph = cg.Graph([x], {"sin": cg.sin(x), "cos": cg.cos(x)})
     points = np.random.default_rng(0).uniform(-1e3, 1e3, (5000, 1))
-    assert same(called(build(tmp_path, [graph.to_c("both")]), "both", graph, points), evaluated(graph, points))
+    assert same(called(build(tmp_path, [cg.to_c(graph, "both")]), "both", graph, points), evaluated(graph, points))
 
 
 @needs_cc
@@ -166,7 +166,7 @@ def test_powers_by_a_constant_are_those_of_evaluate(tmp_path):
     graph = cg.Graph([x], {"square": x**2, "inverse": x**-1, "exponential": 2**x})
     drawn = np.random.default_rng(0).uniform(0.5, 4.0, 20_000).tolist()
     points = [[x] for x in drawn if math.pow(x, 2.0) != x * x or math.pow(x, -1.0) != 1 / x]
-    library = build(tmp_path, [graph.to_c("power")])
+    library = build(tmp_path, [cg.to_c(graph, "power")])
     assert same(called(library, "power", graph, points), evaluated(graph, points))
 
 
@@ -180,7 +180,7 @@ def test_fused_multiply_add_only_when_asked(tmp_path):
     for fma in (False, True):
         (tmp_path / str(fma)).mkdir()
         flags = ["-std=gnu99", "-O2", "-march=native"]
-        found[fma] = called(build(tmp_path / str(fma), [graph.to_c("f", fma=fma)], flags), "f", graph, points)
+        found[fma] = called(build(tmp_path / str(fma), [cg.to_c(graph, "f", fma=fma)], flags), "f", graph, points)
     assert same(found[False], evaluated(graph, points))
     macros = run([CC, "-march=native", "-dM", "-E", "-x", "c", "/dev/null"])
     if "__FP_FAST_FMA " in macros:
@@ -194,7 +194,7 @@ def test_inputs_unused_passed_on_and_shared_by_outputs(tmp_path):
     u = x * y
     several = cg.Graph([z, y, x], {"a": u, "b": u, "x": x, "x again": x, "c": -math.inf, "d": -0.0, "nan": x / x})
     fixed = cg.Graph([], {"c": cg.sin(cg.constant(0.3)), "nan": cg.log(cg.constant(-1.0))})
-    library = build(tmp_path, [several.to_c("several"), fixed.to_c("fixed")])
+    library = build(tmp_path, [cg.to_c(several, "several"), cg.to_c(fixed, "fixed")])
     assert same(called(library, "several", several, [[3, 0, 0]]), evaluated(several, [[3, 0, 0]]))
     assert same(called(library, "fixed", fixed, [[]]), evaluated(fixed, [[]]))
 
@@ -227,7 +227,7 @@ def test_names_that_collide_have_places_of_their_own(tmp_path):
         "\ud800\u202e": inputs[1] * 3,
     }
     graph = cg.Graph(inputs, outputs)
-    source = graph.to_c("odd")
+    source = cg.to_c(graph, "odd")
     places = re.findall(r"^    (ODD_(?:IN|OUT)_\w+) = (\d+),", source.header, re.MULTILINE)
     assert [int(row) for _, row in places] == [*range(len(inputs)), *range(len(outputs))]
     assert len({name for name, _ in places}) == len(places)
@@ -242,7 +242,7 @@ def test_names_that_collide_have_places_of_their_own(tmp_path):
 def test_a_name_of_one_s_own_stands_beside_the_value():
     x, y = cg.variables("x y")
     graph = cg.Graph([x, y], {"f": cg.exp(cg.named("radius", x * y))})
-    assert "const double v1 = x[F_IN_x] * x[F_IN_y]; /* radius */" in graph.to_c("f").source
+    assert "const double v1 = x[F_IN_x] * x[F_IN_y]; /* radius */" in cg.to_c(graph, "f").source
     assert "%1 = mul x y  (radius)" in graph.listing()
 
 
@@ -283,7 +283,7 @@ def stepped():
 
 @needs_cc
 def test_a_program_simulates_with_the_header_alone(tmp_path):
-    source, _ = pendulum().to_c("pendulum").write(tmp_path)
+    source, _ = cg.to_c(pendulum(), "pendulum").write(tmp_path)
     write(tmp_path / "main.c", USE)
     run(
         [
@@ -305,7 +305,7 @@ def test_a_program_simulates_with_the_header_alone(tmp_path):
 @pytest.mark.skipif(CXX is None, reason="no C++ compiler")
 @pytest.mark.parametrize("standard", ["c++98", "c++20"])
 def test_the_header_is_one_of_cpp_too(standard, tmp_path):
-    source, _ = pendulum().to_c("pendulum").write(tmp_path)
+    source, _ = cg.to_c(pendulum(), "pendulum").write(tmp_path)
     write(tmp_path / "main.cpp", USE)
     (tmp_path / "twice.cpp").write_text('#include "pendulum.h"\n#include "pendulum.h"\n', encoding="utf-8")
     run([CC, *STRICT, "-O2", "-c", str(source), "-o", str(tmp_path / "pendulum.o")])
@@ -317,22 +317,22 @@ def test_the_header_is_one_of_cpp_too(standard, tmp_path):
 @pytest.mark.parametrize("name", ["", "2x", "a b", "a-b", "f\n", "_f", "θ", "x.y"])
 def test_a_name_that_is_no_identifier_is_an_error(name):
     with pytest.raises(ValueError, match="must be a letter, then letters, digits and _, got"):
-        pendulum().to_c(name)
+        cg.to_c(pendulum(), name)
 
 
 @pytest.mark.parametrize("name", ["double", "class", "main", "sin", "sinf", "y0", "math", "restrict"])
 def test_a_name_that_is_taken_is_an_error(name):
     with pytest.raises(ValueError, match=f"must not be a word of C, C\\+\\+ or their library, got '{name}'"):
-        pendulum().to_c(name)
+        cg.to_c(pendulum(), name)
 
 
 def test_a_name_that_is_no_string_is_an_error():
     with pytest.raises(TypeError, match="must be a string, got int: 3"):
-        pendulum().to_c(3)
+        cg.to_c(pendulum(), 3)
 
 
 def test_both_files_are_written(tmp_path):
-    made = pendulum().to_c("pendulum")
+    made = cg.to_c(pendulum(), "pendulum")
     source, header = made.write(str(tmp_path))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["pendulum.c", "pendulum.h"]
     assert source.read_text(encoding="utf-8") == made.source

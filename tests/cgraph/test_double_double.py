@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
-from cgraph.order import topological
+from cgraph.core.traversal import topological
 
 ROUND = 2.0**-98  # of an operation, with some to spare; relative to a bound on the terms that went into it
 BACKENDS = {"python": {}, "numpy": {}, "llvm": {}, "llvm without fused multiply-add": {"fma": False}}

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 
 import cgraph as cg
-from cgraph.node import OPS
+from cgraph.core.node import OPS
 from tests.strategies import cases
 
 x, y = cg.variables("x y")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import cgraph as cg
+from cgraph.core.node import CONSTANT, OPS, VARIABLE, Node
 from cgraph.errors import GraphError
-from cgraph.node import CONSTANT, OPS, VARIABLE, Node
 
 x, y, z = cg.variables("x y z")
 

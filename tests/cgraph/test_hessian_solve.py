@@ -12,11 +12,11 @@ import pytest
 
 import cgraph as cg
 from cgraph import GraphError
-from cgraph.elimination_order import steps
-from cgraph.hessian_solve import solve_nodes
-from cgraph.ldl import SingularError, ldl_solve
-from cgraph.order import topological
-from cgraph.rotations import rotations
+from cgraph.autodiff.elimination_order import steps
+from cgraph.autodiff.hessian_solve import solve_nodes
+from cgraph.autodiff.ldl_solve import SingularError, ldl_solve
+from cgraph.autodiff.rotation_pairs import rotations
+from cgraph.core.traversal import topological
 
 # Each function runs on nodes and, with mpmath's functions, on high-precision numbers: {name: (function, inputs)}.
 FUNCTIONS = {

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 
 import cgraph as cg
-from cgraph.codegen import llvm
-from cgraph.codegen.ir import TOGETHER, batch_ir, libm_functions
+from cgraph.codegen import llvm_engine as llvm
+from cgraph.codegen.llvm_ir import TOGETHER, batch_ir, libm_functions
 from cgraph.codegen.schedule import Joined, joined_calls, schedule
-from cgraph.node import OPS, apply
+from cgraph.core.node import OPS, apply
 from tests.strategies import cases
 from tests.ulps import exact, same, ulps_apart
 

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 
 import cgraph as cg
-from cgraph.node import OPS, apply
+from cgraph.core.node import OPS, apply
 from tests.strategies import DOMAINS, cases
 from tests.ulps import same, ulps_apart
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from cgraph.node import Node
+from cgraph.core.node import Node
 
 x, y = cg.variables("x y")
 X, Y = 0.7, 0.4  # their values

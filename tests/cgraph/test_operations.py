@@ -11,7 +11,7 @@ import pytest
 from mpmath import mpf
 
 import cgraph as cg
-from cgraph.node import OPS, Op, apply
+from cgraph.core.node import OPS, Op, apply
 from tests import high_precision
 from tests.strategies import DOMAINS
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 
 import cgraph as cg
-from cgraph.node import OPS, apply
-from cgraph.structure_hash import node_hashes, structure_hash
+from cgraph.core.node import OPS, apply
+from cgraph.core.structure_hash import node_hashes, structure_hash
 from tests.strategies import Case, cases
 
 x, y, z = cg.variables("x y z")

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from cgraph.codegen import generated, native, threads
-from cgraph.codegen.threads import share, thread_count
+from cgraph.codegen import native_function as native, python_function as generated
+from cgraph.util import threads
+from cgraph.util.threads import share, thread_count
 
 BATCH_ULPS = 4  # of a batch against one point at a time: polynomials in place of libm
 PATIENCE = 30.0  # seconds until a test that waits for another thread gives up

@@ -6,7 +6,7 @@ from pytest import approx, mark
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.order import rebuild
+from cgraph.core.traversal import rebuild
 from tests import high_precision
 from tests.dynamics.models import MODELS, at, before, error, named, random_arm, run, states
 

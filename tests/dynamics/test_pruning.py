@@ -9,7 +9,7 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.structure_hash import structure_hash
+from cgraph.core.structure_hash import structure_hash
 from tests.dynamics.mechanisms import FAMILIES, in_space, random_inertia, random_rotation, turned_arm
 from tests.dynamics.test_reconfiguration import arm
 

@@ -7,8 +7,8 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.fold import Builder, folded
-from cgraph.order import topological
+from cgraph.core.traversal import topological
+from cgraph.simplify.builder import Builder, folded
 from dynamics.equations import bias
 from dynamics.rates import rates
 from tests import high_precision

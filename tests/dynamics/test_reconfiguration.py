@@ -6,7 +6,7 @@ import numpy as np
 from pytest import approx, mark, raises
 
 import dynamics as dyn
-from cgraph.structure_hash import structure_hash
+from cgraph.core.structure_hash import structure_hash
 from dynamics.body import WORLD
 from tests.dynamics.mechanisms import random_mechanism
 

@@ -15,7 +15,7 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.node import OPS, apply
+from cgraph.core.node import OPS, apply
 from dynamics import cases
 from dynamics.multiprecision import Reference, ReferenceFailedError, closed_forms, reference
 from dynamics.multiprecision.reference import METHODS

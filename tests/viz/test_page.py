@@ -15,7 +15,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 import viz
-from cgraph.ops import OPS
+from cgraph.core.ops import OPS
 from dynamics.inspection import FORMULATIONS, inspection
 from viz import cli
 from viz.inspector import Motion, Table, Version

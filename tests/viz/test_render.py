@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from cgraph.files import write
+from cgraph.util.atomic_write import write
 from viz import graph_svg, render_png, render_svg, theme, to_dot
 from viz.render import LARGE, RenderError
 

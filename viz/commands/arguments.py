@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from cgraph import Graph
-from cgraph.files import write
+from cgraph.util.atomic_write import write
 from dynamics import FORMULATIONS, scenes
 
 from ..render import Drawing, render_svg

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cgraph.files import write
+from cgraph.util.atomic_write import write
 from dynamics import inverse_dynamics, spurious
 
 from ..dot import to_dot

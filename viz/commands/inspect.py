@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cgraph.files import write
+from cgraph.util.atomic_write import write
 from dynamics import scenes
 from dynamics.inspection import FRAMES, inspection
 

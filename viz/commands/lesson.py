@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cgraph import Graph
-from cgraph.files import write
+from cgraph.util.atomic_write import write
 from dynamics import inverse_dynamics, momentum_rate, scenes, spurious
 from dynamics.reports.equation3 import equation3
 

@@ -7,8 +7,8 @@ import json
 
 import cgraph as cg
 from cgraph import Graph
+from cgraph.autodiff.reverse import cotangents
 from cgraph.explain.names import Names
-from cgraph.reverse import cotangents
 from dynamics import forward_dynamics, inverse_dynamics
 
 from ..dot import to_dot

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.label import ADJOINT, PRIMAL, TANGENT
-from cgraph.ops import OPS
+from cgraph.core.label import ADJOINT, PRIMAL, TANGENT
+from cgraph.core.ops import OPS
 
 from .. import theme
 from .content import Motion, Version

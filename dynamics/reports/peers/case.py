@@ -10,7 +10,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.order import topological
+from cgraph.core.traversal import topological
 
 from ...integrators.tableau import RK4
 from ...system import TIME, System, as_system

@@ -10,12 +10,12 @@ from hypothesis import assume, given, settings, strategies as st
 
 import cgraph as cg
 import dynamics as dyn
+from cgraph.core.node import OPS, apply
 from cgraph.explain import lint
-from cgraph.explain.cancellation import rounded
-from cgraph.explain.interval import ROWS
+from cgraph.explain.lint.cancellation import rounded
+from cgraph.explain.lint.interval import ROWS
+from cgraph.explain.lint.singular import intervals
 from cgraph.explain.names import Names
-from cgraph.explain.singular import intervals
-from cgraph.node import OPS, apply
 from tests import high_precision
 from tests.strategies import DOMAINS, Case, cases
 

@@ -11,7 +11,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.node import OPS
+from cgraph.core.node import OPS
 from dynamics.mjcf import to_mjcf
 from dynamics.tables import certificate
 from dynamics.tables.certificate import certify

@@ -1,0 +1,1 @@
+"""Automatic differentiation: forward and reverse mode, whole derivatives, and solving with a Hessian."""

@@ -1,0 +1,95 @@
+"""Reverse mode: cotangents pulled from the outputs to the inputs, and the transforms `vjp` and `gradient`."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+
+from ..core.graph import Graph
+from ..core.label import ADJOINT, UNLABELLED, Label, building
+from ..core.node import Node, as_node, variable
+from ..core.ops import strong_mul
+from ..core.traversal import topological
+from ..simplify.builder import Builder
+from .forward import free_suffix
+
+
+def cotangents(
+    seeds: Mapping[Node, Node], wrt: Sequence[Node], build: Builder | None = None, *, fixed: Collection[Node] = ()
+) -> list[Node]:
+    """Cotangents of the nodes `wrt`: sum over seeds y of y_bar dy/d(node), zero where nothing depends on it.
+
+    seeds: {y: y_bar}.  wrt: leaves or inner nodes; an inner node's cotangent counts every use of it, and flows on to
+    what it is made from, so that several nodes of `wrt` may depend on one another.
+    fixed: inner nodes that are taken as independent of what they are made from: nothing flows on from there.
+    """
+    order = topological(seeds)
+    active = set(wrt)
+    for node in order:
+        if any([arg in active for arg in node.args]):
+            active.add(node)
+    bars = dict(seeds)
+    # Behind an argument that a selecting operation may leave out, a zero cotangent must win over an infinite partial.
+    guarded: set[Node] = set()
+    # A cotangent that is a constant carries no tags: what is made of it at an argument takes them from the use itself.
+    bare: dict[Node, Label] = {}
+    with building(build or Builder()) as labelled:
+        for node in reversed(order):
+            bar = bars.get(node)
+            if bar is None or node not in active or not node.args or node in fixed:
+                continue
+            guard = node.op.selects or node in guarded
+            labelled(_label(node, bare))
+            terms: dict[Node, Node] = {}  # by argument first, so that x * x gives 2 * (bar * x)
+            for arg, partial in zip(node.args, node.op.partials(node, *node.args), strict=True):
+                if arg in active:
+                    term = strong_mul(bar, partial) if guard else bar * partial
+                    terms[arg] = terms[arg] + term if arg in terms else term
+            for arg, term in terms.items():
+                if guard:
+                    guarded.add(arg)
+                if term.value == 0.0:
+                    continue
+                if term.value is not None:
+                    bare[arg] = bare.get(arg, UNLABELLED).with_tags_of(node.label)
+                if arg in bars:  # the sum over all uses of arg is about arg, not about this use
+                    labelled(_label(arg, bare))
+                    bars[arg] = bars[arg] + term
+                else:
+                    bars[arg] = term
+    zero = as_node(0.0)
+    return [bars.get(node, zero) for node in wrt]
+
+
+def _label(node: Node, bare: Mapping[Node, Label]) -> Label:
+    own = node.label.derived(ADJOINT)
+    return own.with_tags_of(bare[node]) if node in bare else own
+
+
+def vjp(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Graph:
+    """x -> y becomes (x, y_bar) -> x_bar with x_bar = J(x)^T y_bar: one reverse sweep.
+
+    The inputs of the result are those of `graph`, then one cotangent `y_bar` for each output; its outputs are `x_bar`
+    for each input in `wrt` (default: all). Where such a name is taken the suffix is `_bar2`, `_bar3`, ...
+    Raises GraphError when `wrt` names no input.
+    """
+    chosen = graph.select_inputs(wrt)
+    suffix = free_suffix("_bar", graph.input_names, list(graph.outputs))
+    bars = {name: variable(f"{name}{suffix}") for name in graph.outputs}
+    seeds: dict[Node, Node] = {}
+    for name, node in graph.outputs.items():  # two names may share a node
+        seeds[node] = seeds[node] + bars[name] if node in seeds else bars[name]
+    results = cotangents(seeds, chosen)
+    outputs = {f"{node.name}{suffix}": bar for node, bar in zip(chosen, results, strict=True)}
+    return Graph((*graph.inputs, *bars.values()), outputs)
+
+
+def gradient(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Graph:
+    """x -> y, one output, becomes x -> (dy/dx_i): one reverse sweep; outputs are named `dy/dx_i`.
+
+    Raises GraphError when there are several outputs (see `jacobian`) or `wrt` names no input.
+    """
+    output = graph.only_output()
+    (name,) = graph.outputs
+    chosen = graph.select_inputs(wrt)
+    results = cotangents({output: as_node(1.0)}, chosen)
+    return Graph(graph.inputs, {f"d{name}/d{node.name}": bar for node, bar in zip(chosen, results, strict=True)})

@@ -1,0 +1,121 @@
+"""C source: the two files of a C99 function from an array of inputs to an array of outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from ...core.graph import Graph
+from ...util.atomic_write import write
+from .c_identifiers import check_function_name, distinct
+from .c_statements import comment, functions
+
+_HEADER = """\
+/* {name}: {n_out} outputs of {n_in} inputs, written by cgraph. Units are those of the equations behind it. */
+#ifndef {NAME}_H
+#define {NAME}_H
+
+#ifdef __cplusplus
+extern "C" {{
+#endif
+
+/* Places in x, and their number. */
+enum {{
+{inputs}
+}};
+
+/* Places in y, and their number. */
+enum {{
+{outputs}
+}};
+
+/* y[{NAME}_N_OUT] at x[{NAME}_N_IN]; the arrays must not overlap. Any number of threads may call it. */
+void {name}(const double *x, double *y);
+
+#ifdef __cplusplus
+}}
+#endif
+
+#endif
+"""
+
+# GCC does not know the standard's pragma and, unless told to be strict (-std=c99), fuses where the processor can.
+_CONTRACT = """\
+/* {meaning} */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize ("fp-contract={gcc}")
+#else
+#pragma STDC FP_CONTRACT {standard}
+#endif
+"""
+_ROUNDING = {
+    False: {
+        "meaning": "Every product and every sum is rounded by itself: no fused multiply-add.",
+        "gcc": "off",
+        "standard": "OFF",
+    },
+    True: {
+        "meaning": "A product and the sum that it goes into may be rounded once: fused multiply-add.",
+        "gcc": "fast",
+        "standard": "ON",
+    },
+}
+
+
+class CSource(NamedTuple):
+    """A C99 function `void name(const double *x, double *y)`: the texts of name.c and name.h."""
+
+    name: str
+    source: str
+    header: str
+
+    def write(self, folder: str | Path) -> tuple[Path, Path]:
+        """Write name.c and name.h into a folder, each by way of a temporary file; returns their paths.
+
+        Raises OSError, with the path in its message, when the folder is missing or must not be written to.
+        """
+        header = write(Path(folder) / f"{self.name}.h", self.header)
+        return write(Path(folder) / f"{self.name}.c", self.source), header
+
+
+def to_c(graph: Graph, name: str = "function", *, fma: bool = False) -> CSource:
+    """C99 source and header of `void name(const double *x, double *y)`; `.write(folder)` makes the two files.
+
+    It needs the C library alone: no heap, no globals, no recursion. The header names the places of inputs in x and
+    of outputs in y, for name "arm" as in `x[ARM_IN_q0]`, `y[ARM_OUT_tau0]`, and their numbers ARM_N_IN, ARM_N_OUT.
+    Values are those of `evaluate` to the last bit where both use the same C library (`hypot` to one unit of it),
+    unless compiler options such as -ffast-math give that up.
+    fma: let the compiler round a product and the sum that it goes into once.
+
+    Raises TypeError for what is no Graph, ValueError for a name that is no identifier of C, or a word of C, C++ or
+    their library.
+    """
+    if not isinstance(graph, Graph):
+        raise TypeError(f"to_c takes a Graph, got {type(graph).__name__}: {graph!r:.60}")
+    check_function_name(name)
+    inputs, outputs, input_names = graph.inputs, graph.outputs, graph.input_names
+    places = [f"{name.upper()}_IN_{word}" for word in distinct(input_names)]
+    results = [f"{name.upper()}_OUT_{word}" for word in distinct(list(outputs))]
+    header = _HEADER.format(
+        name=name,
+        NAME=name.upper(),
+        n_in=len(inputs),
+        n_out=len(outputs),
+        inputs=_enumerators(places, input_names, f"{name.upper()}_N_IN"),
+        outputs=_enumerators(results, list(outputs), f"{name.upper()}_N_OUT"),
+    )
+    contract = _CONTRACT.format(**_ROUNDING[fma])
+    text = functions(
+        name, graph.nodes, dict(zip(inputs, places, strict=True)), list(zip(results, outputs.values(), strict=True))
+    )
+    source = "\n".join([f'#include "{name}.h"\n\n#include <math.h>\n', contract, *text])
+    return CSource(name, source, header)
+
+
+def _enumerators(places: Sequence[str], names: Sequence[str], count: str) -> str:
+    lines = [
+        f"    {place} = {row}," + ("" if place.endswith(f"_{name}") else f" /* {comment(name)} */")
+        for row, (place, name) in enumerate(zip(places, names, strict=True))
+    ]
+    return "\n".join([*lines, f"    {count} = {len(places)}"])

@@ -1,0 +1,97 @@
+"""LLVM through llvmlite: text to machine code for this processor."""
+
+from __future__ import annotations
+
+import ctypes.util
+import threading
+import weakref
+from collections.abc import Iterable
+from functools import cache as cached
+from typing import Any
+
+from ..errors import install
+from .disk_cache import Cache
+
+LEVEL = 2  # of the code generator's optimisation; the text has no redundancy for passes over it to find
+_lock = threading.Lock()  # llvmlite compiles in one context
+
+
+class Code:
+    """Machine code, alive as long as this object is."""
+
+    def __init__(self, engine: Any) -> None:
+        self._engine = engine
+        # Not by the engine's own __del__: in a cycle of garbage Python may end LLVM's context before what lives in it.
+        weakref.finalize(self, engine.close).atexit = False
+
+    def address(self, name: str) -> int:
+        """Where a function begins."""
+        return int(self._engine.get_function_address(name))
+
+    def function(self, name: str, prototype: Any) -> Any:
+        """A function for calls through ctypes, of a type that `ctypes.CFUNCTYPE` gives; it keeps the code alive."""
+        found = prototype(self.address(name))
+        found.code = self
+        return found
+
+
+class Host:
+    """The processor, as LLVM knows it.  lanes: the doubles in one of its vectors."""
+
+    def __init__(self, binding: Any, version: str) -> None:
+        self._binding = binding
+        binding.initialize_native_target()
+        binding.initialize_native_asmprinter()
+        features = binding.get_host_cpu_features()
+        self.lanes = 8 if features.get("avx512f") else 4 if features.get("avx2") else 2
+        self._name, self._features = binding.get_host_cpu_name(), features.flatten()
+        self._target = binding.Target.from_default_triple()
+        llvm = (f"llvmlite {version}", f"LLVM {binding.llvm_version_info}", f"level {LEVEL}")
+        self._identity = "\n".join((*llvm, self._target.triple, self._name, self._features))
+
+    def compile(self, text: str, functions: Iterable[str], cache: Cache | None = None) -> Code:
+        """Machine code, made or found in the cache, of a module's text that calls these functions of the C library."""
+        with _lock:
+            self._find(functions)
+            if cache is None:
+                return self._loaded(self._translated(text))
+            return self._loaded(cache.fetch(f"{self._identity}\n{text}", lambda: self._translated(text)))
+
+    def _translated(self, text: str) -> bytes:
+        """An object file of the text. LLVM's own cache wants the text parsed even when it has the object."""
+        module = self._binding.parse_assembly(text, self._binding.create_context())
+        return bytes(self._machine().emit_object(module))
+
+    def _loaded(self, object_file: bytes) -> Code:
+        """The object file in memory that can be run. LLVM believes what it reads: a damaged one ends the process."""
+        binding = self._binding
+        nothing = binding.parse_assembly("", binding.create_context())  # an engine begins with a module
+        engine = binding.create_mcjit_compiler(nothing, self._machine())
+        engine.add_object_file(binding.ObjectFileRef.from_data(object_file))
+        engine.finalize_object()
+        return Code(engine)
+
+    def _machine(self) -> Any:
+        return self._target.create_target_machine(cpu=self._name, features=self._features, opt=LEVEL, jit=True)
+
+    def _find(self, functions: Iterable[str]) -> None:
+        """See that LLVM finds the functions: it would end the process over a missing one."""
+        find = self._binding.address_of_symbol
+        if not all(map(find, functions)):
+            self._binding.load_library_permanently(ctypes.util.find_library("m") or "ucrtbase")
+        if missing := [name for name in functions if not find(name)]:
+            raise RuntimeError(f"the C library of this machine has no {', '.join(missing)}")
+
+
+def host() -> Host:
+    """This machine. Raises ImportError when llvmlite is not installed."""
+    try:
+        from llvmlite import __version__, binding
+    except ImportError:
+        raise ImportError(f"machine code needs llvmlite: {install('native')}") from None
+    return _host(binding, __version__)
+
+
+@cached
+def _host(binding: Any, version: str) -> Host:
+    return Host(binding, version)

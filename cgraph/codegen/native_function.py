@@ -1,0 +1,120 @@
+"""Native: a graph as machine code, for one point and for vectors of them."""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+from collections.abc import Callable
+from functools import partial
+from struct import Struct
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..core.evaluate import Array
+from ..core.graph import Graph
+from . import llvm_engine as llvm
+from .compiled import Compiled
+from .disk_cache import open_cache
+from .llvm_ir import batch_ir, libm_functions, scalar_ir
+
+_POINT = ctypes.PYFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)  # too short a call to give the interpreter away for
+_BATCH = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
+WORK = 2**23  # nodes times columns in a block of a batch: some tenths of a millisecond, several times a thread's start
+_Buffers = tuple[Any, Array, memoryview, Callable[[], None]]  # memory of x; y, as an array and as memory; the call
+_FAST = "reassoc nsz arcp contract afn"  # all but the promise that there is no NaN and no infinity
+
+
+def flags_of(fast: bool, fma: bool) -> str:
+    """What the arithmetic may do, in LLVM's words."""
+    return _FAST if fast else "contract" if fma else ""
+
+
+class Native(Compiled):
+    """Machine code through LLVM. The function of one point is made at once, that of batches at its first use.
+
+    options: fast, fma and cache, see `compile`. Any number of threads may call it at once.
+    """
+
+    def __init__(self, graph: Graph, backend: str, options: dict[str, Any]) -> None:
+        super().__init__(graph, backend, options)
+        self._flags = flags_of(options["fast"], options["fma"])
+        self._cache = open_cache(options["cache"])
+        self._host = llvm.host()
+        self.source = scalar_ir(graph, self._flags)
+        self._entry = self._compiled(self.source, "point", _POINT)
+        self._free: list[_Buffers] = []  # pop and append are atomic: no lock, and a call inside a call is safe
+        self._pack, self._unpack = Struct(f"{self.n_in}d").pack_into, Struct(f"{self.n_out}d").unpack_from
+        self._batch_entry: Callable[[int, int, int, int, int], None] | None = None
+        self._batch_lock = threading.Lock()
+
+    def __call__(self, x: ArrayLike) -> Array:
+        """See Compiled."""
+        buffers = self._take()
+        x_memory, y, _, run = buffers
+        point = x if type(x) is np.ndarray else self._point(x)
+        try:
+            x_memory[:] = point  # compares shape and type, and copies: quicker than to look at them first
+        except ValueError:
+            x_memory[:] = self._point(point).copy()
+        run()
+        result = y.copy()
+        self._free.append(buffers)
+        return result
+
+    def values(self, x: list[float]) -> tuple[float, ...]:
+        """See Compiled."""
+        buffers = self._take()
+        x_memory, _, y_memory, run = buffers
+        self._pack(x_memory, 0, *x)
+        run()
+        result = self._unpack(y_memory)
+        self._free.append(buffers)
+        return result
+
+    def batch_source(self) -> str:
+        """The text in LLVM's language of the function for batches."""
+        return batch_ir(self.graph, self._host.lanes, self._flags)
+
+    def _take(self) -> _Buffers:
+        """Where one call at a time puts its point and finds its result."""
+        try:
+            return self._free.pop()
+        except IndexError:
+            x, y = np.empty(self.n_in), np.empty(self.n_out)
+            return x.data, y, y.data, self._bound(x, y)
+
+    def _bound(self, x: Array, y: Array) -> Callable[[], None]:
+        return partial(self._entry, x.ctypes.data_as(ctypes.c_void_p), y.ctypes.data_as(ctypes.c_void_p))
+
+    def _columns(self) -> tuple[int, Callable[[Array, Array], None]]:
+        with self._batch_lock:
+            if self._batch_entry is None:
+                self._batch_entry = self._compiled(self.batch_source(), "batch", _BATCH)
+        lanes = self._host.lanes
+        return max(WORK // len(self.graph.nodes) // lanes, 1) * lanes, partial(_sweep, self._batch_entry, lanes)
+
+    def _compiled(self, text: str, name: str, prototype: Any) -> Any:
+        return self._host.compile(text, libm_functions(self.graph), self._cache).function(name, prototype)
+
+
+def _sweep(entry: Callable[[int, int, int, int, int], None], lanes: int, points: Array, result: Array) -> None:
+    """Vectors of columns; the last few are filled up to a whole vector by repeating one."""
+    if points.strides[1] != points.itemsize or not points.flags.aligned:
+        points = np.array(points, order="C")
+    count = points.shape[1]
+    whole = count - count % lanes
+    if whole:
+        _run(entry, points, result, whole)
+    if whole < count:
+        filled = np.repeat(points[:, -1:], lanes, axis=1)
+        filled[:, : count - whole] = points[:, whole:]
+        values = np.empty((len(result), lanes))
+        _run(entry, filled, values, lanes)
+        result[:, whole:] = values[:, : count - whole]
+
+
+def _run(entry: Callable[[int, int, int, int, int], None], points: Array, result: Array, count: int) -> None:
+    strides = points.strides[0] // points.itemsize, result.strides[0] // result.itemsize
+    entry(points.ctypes.data, result.ctypes.data, count, *strides)

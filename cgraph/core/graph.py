@@ -1,0 +1,213 @@
+"""The graph: named inputs to named outputs, and the nodes that the outputs reach."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING, Any
+
+from ..errors import GraphError
+from .counts import Counts, count
+from .evaluate import Value, evaluate
+from .label import label
+from .listing import listing
+from .networkx_queries import to_networkx
+from .node import CONSTANT, VARIABLE, Edge, Node, Op, Scalar, as_node, variable
+from .ops import OPS
+from .traversal import rebuild, topological
+
+if TYPE_CHECKING:
+    import networkx
+
+
+class Graph:
+    """A computational graph from named inputs to named outputs.
+
+    inputs: variables, in the order in which arrays of values are read; they may be unused.
+    outputs: {name: node or number}, in the order in which arrays of results are written.
+
+    Raises GraphError for no outputs, a repeated input, or an output that needs a variable which is not an input;
+    TypeError for an input that is not a variable or an output that is not a node.
+    """
+
+    inputs: tuple[Node, ...]
+    outputs: dict[str, Node]
+    nodes: tuple[Node, ...]
+
+    def __init__(self, inputs: Sequence[Node], outputs: Mapping[str, Scalar]) -> None:
+        if isinstance(inputs, Node):
+            raise TypeError("inputs must be a sequence of variables, got a single Node; write [x]")
+        self.inputs = tuple(inputs)
+        if not isinstance(outputs, Mapping):
+            raise TypeError(f"outputs must map names to nodes, got {type(outputs).__name__}")
+        for node in self.inputs:
+            if not isinstance(node, Node) or node.op is not VARIABLE:
+                raise TypeError(f"an input must be a variable, got {node!r:.60}")
+        names = self.input_names
+        if len(set(names)) < len(names):
+            twice = next(name for name in names if names.count(name) > 1)
+            raise GraphError(f"input {twice!r} is listed more than once")
+        if not outputs:
+            raise GraphError("a graph needs at least one output")
+        self.outputs = {}
+        for name, value in outputs.items():
+            if not isinstance(name, str) or not name:
+                raise TypeError(f"an output's name must be a non-empty string, got {name!r:.60}")
+            try:
+                self.outputs[name] = as_node(value)
+            except TypeError as error:
+                raise TypeError(f"output {name!r}: {error}") from None
+        self.nodes = tuple(topological(self.outputs.values()))
+        known = set(self.inputs)
+        free = [node.name for node in self.nodes if node.op is VARIABLE and node not in known]
+        if free:
+            listed = ", ".join(repr(name) for name in sorted(map(str, free)))
+            raise GraphError(f"the outputs need {listed}, not among the inputs ({', '.join(names) or 'none'})")
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Names of the inputs, in order."""
+        return tuple([str(node.name) for node in self.inputs])
+
+    @cached_property
+    def edges(self) -> tuple[Edge, ...]:
+        """Every use of a node by another, in the order of `nodes`."""
+        return tuple([Edge(arg, node, slot) for node in self.nodes for slot, arg in enumerate(node.args)])
+
+    def select_inputs(self, wrt: str | Node | Sequence[str | Node] | None) -> tuple[Node, ...]:
+        """The inputs named by `wrt`: a name, a variable, a sequence of them, or None for all.
+
+        Raises GraphError for one that the graph does not have.
+        """
+        if wrt is None:
+            return self.inputs
+        chosen = []
+        for each in (wrt,) if isinstance(wrt, (str, Node)) else wrt:
+            node = variable(each) if isinstance(each, str) else each
+            if not isinstance(node, Node):
+                raise TypeError(f"wrt must name inputs by strings or variables, got {node!r:.60}")
+            if node not in self.inputs:
+                raise GraphError(f"the graph has no input {node.name or node!r} (it has {', '.join(self.input_names)})")
+            chosen.append(node)
+        return tuple(chosen)
+
+    def only_output(self) -> Node:
+        """The single output. Raises GraphError when there are several."""
+        if len(self.outputs) != 1:
+            raise GraphError(f"this needs a graph with one output, got {len(self.outputs)}: {', '.join(self.outputs)}")
+        return next(iter(self.outputs.values()))
+
+    def __call__(self, *args: Scalar, **named: Scalar) -> dict[str, Node]:
+        """The outputs as nodes, with nodes or numbers put in place of the inputs, in order or by name."""
+        if len(args) > len(self.inputs):
+            raise TypeError(f"the graph has {len(self.inputs)} inputs, got {len(args)} arguments")
+        replace = dict(zip(self.inputs, map(as_node, args), strict=False))
+        for name, value in named.items():
+            (node,) = self.select_inputs(name)
+            if node in replace:
+                raise TypeError(f"input {name!r} is given twice")
+            replace[node] = as_node(value)
+        missing = [str(node.name) for node in self.inputs if node not in replace]
+        if missing:
+            raise TypeError(f"no value for input {', '.join(missing)}")
+        new = rebuild(self.outputs.values(), replace, lambda n, args: Node(n.op, args, n.label, name=n.name))
+        return {name: new[node] for name, node in self.outputs.items()}
+
+    def evaluate(self, values: Mapping[str, Value]) -> dict[str, Value]:
+        """Values of the outputs at `values`: {input name: float or array}; arrays broadcast. See `evaluate.py`."""
+        return evaluate(self.inputs, self.nodes, self.outputs, values)
+
+    def counts(self) -> Counts:
+        """Nodes, edges, depth, width, and nodes by operation, tag and role."""
+        return count(self.nodes)
+
+    def listing(self) -> str:
+        """The graph as text, a node a line; the same graph gives the same text in every run."""
+        return listing(self.input_names, self.nodes, self.outputs)
+
+    def check(self) -> None:
+        """Raise GraphError unless every node is well formed and the order is topological."""
+        for node in self.nodes:
+            _check_node(node)
+        if set(topological(self.outputs.values())) != set(self.nodes):
+            raise GraphError("the nodes are not those that the outputs reach")
+        before: set[Node] = set()
+        for node in self.nodes:
+            if not before.issuperset(node.args):
+                raise GraphError(f"{node!r} comes before one of its arguments")
+            before.add(node)
+
+    def to_networkx(self) -> networkx.MultiDiGraph:
+        """A networkx.MultiDiGraph from arguments to uses.
+
+        Nodes are numbered as in `nodes` (unused inputs follow), with op, name, value, tags, roles and outputs (names)
+        as attributes; the key of an edge is the argument's slot.
+        """
+        return to_networkx(self.nodes, self.inputs, self.outputs)
+
+    def __repr__(self) -> str:
+        return (
+            f"<Graph ({_short(self.input_names)}) -> ({_short(tuple(self.outputs))}): "
+            f"{len(self.nodes)} nodes, {sum(len(node.args) for node in self.nodes)} edges>"
+        )
+
+    def _repr_svg_(self) -> str | None:
+        """The drawing that a notebook shows, when a drawing package is installed (extra `viz`)."""
+        for renderer in entry_points(group="cgraph.renderers", name="svg"):
+            try:
+                return str(renderer.load()(self))
+            except (ImportError, RuntimeError):  # no renderer here: the notebook falls back to the text form
+                return None
+        return None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restore, (self.input_names, tuple(_records(self.nodes)), self._output_numbers())
+
+    def _output_numbers(self) -> dict[str, int]:
+        number = {node: i for i, node in enumerate(self.nodes)}
+        return {name: number[node] for name, node in self.outputs.items()}
+
+
+def _short(names: Sequence[str]) -> str:
+    return ", ".join(names if len(names) <= 6 else [*names[:3], "...", names[-1]])
+
+
+def _check_node(node: Node) -> None:
+    if not isinstance(node, Node) or not isinstance(node.op, Op):
+        raise GraphError(f"a {type(node).__name__} is not a node of an operation in the table")
+    if node.op is CONSTANT:
+        if type(node.value) is not float or node.value != node.value:
+            raise GraphError(f"constant {node.value!r} is not a number")
+    elif node.op is VARIABLE:
+        if not node.name:
+            raise GraphError("a variable has no name")
+    elif OPS.get(node.op.name) is not node.op:
+        raise GraphError(f"operation {node.op.name!r} is not in the table")
+    if len(node.args) != node.op.arity:
+        raise GraphError(f"{node.op.name} takes {node.op.arity} argument(s), a node has {len(node.args)}")
+    for arg in node.args:
+        if not isinstance(arg, Node):
+            raise GraphError(f"an argument of {node!r} is not a node: {arg!r:.60}")
+
+
+def _records(nodes: Sequence[Node]) -> Iterator[tuple[Any, ...]]:
+    """One flat record a node, so that pickling a deep graph needs no recursion."""
+    number = {node: i for i, node in enumerate(nodes)}
+    for node in nodes:
+        sets = tuple([tuple(sorted(each)) for each in (node.tags, node.roles, node.lines)])
+        yield node.op.name, tuple([number[arg] for arg in node.args]), node.value, node.name, sets
+
+
+def _restore(inputs: tuple[str, ...], records: tuple[tuple[Any, ...], ...], outputs: dict[str, int]) -> Graph:
+    from_record: list[Node] = []
+    for op, args, value, name, sets in records:
+        if op == CONSTANT.name:
+            node = as_node(value)
+        elif op == VARIABLE.name:
+            node = variable(name)
+        else:
+            kept = label(*map(frozenset, sets))
+            node = Node(OPS[op], tuple([from_record[i] for i in args]), kept, name=name)
+        from_record.append(node)
+    return Graph([variable(name) for name in inputs], {name: from_record[i] for name, i in outputs.items()})

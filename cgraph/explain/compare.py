@@ -1,0 +1,178 @@
+"""What two graphs have in common by structure, and what only one of them has."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+from ..core.graph import Graph
+from ..core.node import VARIABLE, Node, variable
+from ..core.structure_hash import node_hashes
+from ..errors import GraphError
+from .names import Names, joined, many
+
+Classify = Callable[[Graph], Callable[[Node], str]]
+Side = Literal["left", "right"]
+_SHOWN = 12  # classes that the text lists
+
+
+class Together(NamedTuple):
+    """Two graphs in one: common nodes once. To mark in a drawing: what only one of them has."""
+
+    graph: Graph
+    only_left: frozenset[Node]
+    only_right: frozenset[Node]
+
+
+@dataclass(frozen=True, eq=False)
+class Diff:
+    """The nodes of two graphs, paired by structure; see `diff`. `str` of it is the summary.
+
+    common: pairs (node of left, node of right) that compute the same; a node is in one pair at most.
+    only_left, only_right: the rest, in the order of each graph's nodes.
+    same_outputs, other_outputs: names that both graphs have, computed alike or not.
+    atoms: {node: name} of the nodes that stand for a variable.
+    """
+
+    left: Graph
+    right: Graph
+    common: tuple[tuple[Node, Node], ...]
+    only_left: tuple[Node, ...]
+    only_right: tuple[Node, ...]
+    same_outputs: tuple[str, ...]
+    other_outputs: tuple[str, ...]
+    atoms: dict[Node, str]
+    classify: Classify
+
+    def classes(self, side: Side) -> dict[str, int]:
+        """{class: number of nodes} of what only that side has, the largest first."""
+        graph, nodes = (self.left, self.only_left) if side == "left" else (self.right, self.only_right)
+        name_of = self.classify(graph)
+        counts = Counter([name_of(node) for node in nodes])
+        return dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
+
+    def __str__(self) -> str:
+        sizes = f"{many(len(self.left.nodes), 'node')} left, {len(self.right.nodes)} right"
+        only = f"{len(self.only_left)} only left, {len(self.only_right)} only right"
+        lines = [f"{sizes}: {len(self.common)} in both, {only}."]
+        if self.same_outputs:
+            lines.append(f"Computed alike: {joined(self.same_outputs)}.")
+        if self.other_outputs:
+            lines.append(f"Computed otherwise: {joined(self.other_outputs)}.")
+        sides: tuple[Side, Side] = ("left", "right")
+        for side in sides:
+            if rows := list(self.classes(side).items()):
+                lines.append(f"Only {side}:")
+                lines += [f"  {number:>5}  {name}" for name, number in rows[:_SHOWN]]
+                if rest := rows[_SHOWN:]:
+                    lines.append(f"  {sum([number for _, number in rest]):>5}  in {len(rest)} more classes")
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same for JSON; nodes are numbered as in `graph.nodes` of their graph."""
+        left, right = ({node: i for i, node in enumerate(graph.nodes)} for graph in (self.left, self.right))
+        return {
+            "common": [[left[a], right[b]] for a, b in self.common],
+            "only_left": _described(self.left, self.only_left, self.classify),
+            "only_right": _described(self.right, self.only_right, self.classify),
+            "left_classes": self.classes("left"),
+            "right_classes": self.classes("right"),
+            "same_outputs": list(self.same_outputs),
+            "other_outputs": list(self.other_outputs),
+        }
+
+    def together(self) -> Together:
+        """Both graphs in one, for a single drawing.
+
+        An output that both compute alike keeps its name, any other is `left tau0` or `right tau0`. An atom is drawn as
+        the variable that it stands for; what a graph computes it from ends in an output of its own, `right q0`.
+        """
+        outputs: dict[str, Node] = {}
+        marked: list[set[Node]] = []
+        inputs: dict[Node, None] = {}
+        given: dict[Node, Node] = {}
+        for side, graph, only in (("left", self.left, self.only_left), ("right", self.right, self.only_right)):
+            into: dict[Node, Node] = {}
+            mark = set()
+            for node in graph.nodes:
+                args = tuple([into[arg] for arg in node.args])
+                made = node if args == node.args else Node(node.op, args, node.label, name=node.name)
+                if node.args and node in self.atoms:
+                    outputs[f"{side} {self.atoms[node]}"] = made
+                    mark.add(made)
+                    made = variable(self.atoms[node])
+                into[node] = given.get(node, made)
+            for name, node in graph.outputs.items():
+                outputs[name if name in self.same_outputs else f"{side} {name}"] = into[node]
+            inputs |= dict.fromkeys([*graph.inputs, *[node for node in into.values() if node.op is VARIABLE]])
+            marked.append(mark | {into[node] for node in only})
+            if side == "left":
+                given = {b: into[a] for a, b in self.common}
+        both = Graph(list(inputs), outputs)
+        left, right = (frozenset(mark.intersection(both.nodes)) for mark in marked)
+        return Together(both, left, right)
+
+
+def diff(left: Graph, right: Graph, *, atoms: str | Iterable[str] = (), classify: Classify | None = None) -> Diff:
+    """Compare two graphs by structure.
+
+    Two nodes are alike when they are the same operation on alike arguments, in any order where they commute, the same
+    constant to the last bit, or variables of one name. Tags, roles and names of operations do not count. A graph may
+    hold several alike nodes; each is paired once.
+    atoms: names that stand for a variable in either graph whatever they are made from there, such as "q0 qd0" where
+        one graph has them as inputs and the other computes them.
+    classify: called with each graph, gives a function from its nodes to the name of a class; by default, the roles
+        and tags of a node.
+
+    Raises GraphError for an atom that neither graph has.
+    """
+    chosen = set(atoms.replace(",", " ").split() if isinstance(atoms, str) else atoms)
+    named = {node: node.name for graph in (left, right) for node in graph.nodes if node.name in chosen}
+    unused = [name for graph in (left, right) for name in graph.input_names]  # an input that nothing uses is no node
+    if missing := chosen.difference(named.values(), unused):
+        raise GraphError(f"neither graph has a node called {', '.join(sorted(missing))}")
+    standing = {node: name for node, name in named.items() if name is not None}
+    left_hashes, right_hashes = (node_hashes(graph.nodes, standing) for graph in (left, right))
+    common = _paired(left_hashes, right_hashes)
+    lefts, rights = {a for a, _ in common}, {b for _, b in common}
+    only_left = tuple([node for node in left.nodes if node not in lefts])
+    only_right = tuple([node for node in right.nodes if node not in rights])
+    shared = [name for name in left.outputs if name in right.outputs]
+    same = [name for name in shared if left_hashes[left.outputs[name]] == right_hashes[right.outputs[name]]]
+    return Diff(
+        left,
+        right,
+        tuple(common),
+        only_left,
+        only_right,
+        tuple(same),
+        tuple([name for name in shared if name not in same]),
+        standing,
+        classify or _by_label,
+    )
+
+
+def _paired(left: dict[Node, bytes], right: dict[Node, bytes]) -> list[tuple[Node, Node]]:
+    """Pairs of alike nodes, in the order of the right graph: a node that both have with itself, others in order."""
+    partner = {node: node for node, digest in right.items() if left.get(node) == digest}
+    free: dict[bytes, list[Node]] = {}
+    for node, digest in reversed(left.items()):
+        if node not in partner:
+            free.setdefault(digest, []).append(node)
+    for node, digest in right.items():
+        if node not in partner and free.get(digest):
+            partner[node] = free[digest].pop()
+    return [(partner[node], node) for node in right if node in partner]
+
+
+def _by_label(graph: Graph) -> Callable[[Node], str]:
+    """Classes such as `adjoint, tangent; kinetic, link 3`, as in the listing."""
+    return lambda node: "; ".join([", ".join(sorted(part)) for part in (node.roles, node.tags) if part]) or node.op.name
+
+
+def _described(graph: Graph, nodes: Iterable[Node], classify: Classify) -> list[dict[str, Any]]:
+    names, name_of = Names(graph), classify(graph)
+    number = {node: i for i, node in enumerate(graph.nodes)}
+    return [{"node": number[node], "text": names.line(node), "class": name_of(node)} for node in nodes]

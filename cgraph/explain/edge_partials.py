@@ -1,0 +1,40 @@
+"""Numbers at a point: the value of every node, and the local partial derivative of every edge."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Mapping, Sequence
+
+from ..core.graph import Graph
+from ..core.node import Edge, Node
+from ..errors import GraphError
+
+Point = Mapping[str, float]
+
+
+def checked(graph: Graph, at: Point) -> dict[str, float]:
+    """The point as floats. Raises GraphError for a missing or unknown name, ValueError for what is no finite number."""
+    for name, value in at.items():
+        if isinstance(value, bool) or not isinstance(value, numbers.Real) or not math.isfinite(value):
+            raise ValueError(f"at: input {name!r} must be a finite number, got {value!r:.60}")
+    if missing := [name for name in graph.input_names if name not in at]:
+        raise GraphError(f"at: no value for input {', '.join(missing)}")
+    if unknown := [name for name in at if name not in graph.input_names]:
+        raise GraphError(f"at: the graph has no input {', '.join(unknown)} (it has {', '.join(graph.input_names)})")
+    return {name: float(value) for name, value in at.items()}
+
+
+def node_values(graph: Graph, nodes: Sequence[Node], at: Point) -> list[float]:
+    """The values of nodes of the graph at a point."""
+    found = (
+        Graph(graph.inputs, {str(i): node for i, node in enumerate(nodes)}).evaluate(checked(graph, at))
+        if nodes
+        else {}
+    )
+    return [float(found[str(i)]) for i in range(len(nodes))]
+
+
+def edge_slopes(graph: Graph, edges: Sequence[Edge], at: Point) -> list[float]:
+    """d target / d source of each edge alone, at a point; NaN or infinite where there is no derivative."""
+    return node_values(graph, [edge.partial for edge in edges], at)

@@ -1,0 +1,93 @@
+"""Cancellation: sums that lose digits at a point, by a running bound of the rounding error."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ...core.node import Edge, Node
+from ..edge_partials import Point, edge_slopes, node_values
+from ..names import Names
+from .finding import Finding
+
+UNIT = 2.0**-53  # relative error of one rounding
+DIGITS = -math.log10(UNIT)  # 15.95 decimal digits of a float64
+_SUMS = ("add", "sub")
+# Roundings of an operation's own result, in units. The four operations, square root and products: one, by IEEE 754.
+# None where the result is one of the arguments or a whole number. All else is a library function: two units, one ulp.
+_ROUNDINGS = dict.fromkeys(("add", "sub", "mul", "strong_mul", "div", "sqrt"), 1.0) | dict.fromkeys(
+    ("neg", "abs", "sign", "minimum", "maximum", "where", "less", "less_equal", "equal", "not_equal"), 0.0
+)
+_LIBRARY = 2.0
+
+
+@dataclass(frozen=True)
+class Rounded:
+    """The value of each node at a point, and a bound of its absolute rounding error, to first order."""
+
+    values: dict[Node, float]
+    errors: dict[Node, float]
+
+    def digits(self, node: Node) -> float:
+        """Decimal digits of the value that the bound leaves certain, 0 to 16; infinite where nothing was rounded."""
+        error, size = self.errors[node], abs(self.values[node])
+        if error == 0.0:
+            return math.inf
+        return max(0.0, -math.log10(error / size)) if size else 0.0
+
+
+def rounded(names: Names, at: Point) -> Rounded:
+    """Values and error bounds: each input is off by half a unit in the last place, as a decimal number would be.
+
+    An error passes on through the local partials, in absolute value, and each operation adds its own.
+    """
+    graph = names.graph
+    values = dict(zip(graph.nodes, node_values(graph, graph.nodes, at), strict=True))
+    edges = [Edge(arg, node, slot) for node in graph.nodes for slot, arg in enumerate(node.args)]
+    slopes = iter(edge_slopes(graph, edges, at))
+    errors: dict[Node, float] = {}
+    for node in graph.nodes:
+        inherited = [_times(next(slopes), errors[arg]) for arg in node.args]
+        own = UNIT * _ROUNDINGS.get(node.op.name, _LIBRARY) if node.args else UNIT if node.value is None else 0.0
+        errors[node] = sum(inherited) + own * abs(values[node])
+    return Rounded(values, errors)
+
+
+def cancellations(names: Names, at: Point, threshold: float) -> list[Finding]:
+    """The sums and differences that lose `threshold` digits or more by themselves at the point."""
+    found = rounded(names, at)
+    findings = []
+    for node in names.graph.nodes:
+        if node.op.name not in _SUMS or not math.isfinite(found.errors[node]):
+            continue
+        before = min([found.digits(arg) for arg in node.args])
+        inherited = sum([found.errors[arg] for arg in node.args])
+        size = abs(found.values[node])
+        after = (max(0.0, -math.log10(inherited / size)) if size else 0.0) if inherited else math.inf
+        lost = before - after if math.isfinite(after) else 0.0
+        if lost >= threshold:
+            findings.append(_finding(names, node, found, lost, after))
+    return findings
+
+
+def _finding(names: Names, node: Node, found: Rounded, lost: float, left: float) -> Finding:
+    a, b = (found.values[arg] for arg in node.args)
+    first, second = (f"{value:.{min(17, math.ceil(lost) + 2)}g}" for value in (a, b))
+    sign = "+" if node.op.name == "add" else "-"
+    text = (
+        f"{names.line(node)}: {first} {sign} {f'({second})' if b < 0 else second} leaves {found.values[node]:.3g}; "
+        f"{lost:.0f} digits are lost here, {left:.0f} remain."
+    )
+    data = {
+        "number": names.number[node],
+        "tags": sorted(node.tags),
+        "value": found.values[node],
+        "arguments": [a, b],
+        "digits_lost": lost,
+        "digits_left": left,
+    }
+    return Finding("cancellation", text, (node,), data=data)
+
+
+def _times(slope: float, error: float) -> float:
+    return abs(slope) * error if error and slope else 0.0

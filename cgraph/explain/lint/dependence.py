@@ -1,0 +1,35 @@
+"""Dependence: inputs that nothing uses, and outputs that do not depend on what they should."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from ..names import Name, Names, joined
+from ..reachability import makers
+from .finding import Finding
+
+
+def unused_inputs(names: Names) -> list[Finding]:
+    """The inputs that no output depends on."""
+    used = set(names.graph.nodes)
+    unused = [node for node in names.graph.inputs if node not in used]
+    return [
+        Finding("unused input", f"Nothing uses the input {node.name}.", (node,), data={"input": str(node.name)})
+        for node in unused
+    ]
+
+
+def missing_dependences(names: Names, depends: Mapping[Name, Name | Sequence[Name]]) -> list[Finding]:
+    """The outputs that do not depend on each of the nodes declared for them."""
+    findings = []
+    for output, declared in depends.items():
+        sink = names.output(output)
+        made = makers([sink])
+        inputs = [str(node.name) for node in names.graph.inputs if node in made]
+        for node in names.group(declared):
+            if node not in made:
+                said, name = output if isinstance(output, str) else names.text(sink), names.text(node)
+                text = f"{said} does not depend on {name}; it is made from {joined(inputs, 12) or 'numbers'}."
+                data = {"output": said, "input": name, "made_from_inputs": inputs}
+                findings.append(Finding("missing dependence", text, (sink, node), data=data))
+    return findings

@@ -1,0 +1,215 @@
+"""Independence: the proof that no path leads from one group of nodes to another, or the edges to blame for one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+from ...autodiff.forward import tangents
+from ...core.graph import Graph
+from ...core.label import ADJOINT
+from ...core.networkx_queries import minimum_cut
+from ...core.node import Edge, Node, constant
+from ...core.source_lines import lines_text
+from ...errors import GraphError
+from ...simplify.builder import Builder
+from ..names import Name, Names, joined, many
+from ..reachability import between, made_of_more, makers, users
+from .finding import Finding
+
+Group = Name | Sequence[Name]
+STEPS = 8  # nodes that a path's text names; of more, the first and the last
+SLOPE_NODES = 200  # a dependence made from more nodes has no formula that fits a line
+
+
+class Leak(NamedTuple):
+    """A derivative that counts another one as well: df/dqd gains dt * df/dq."""
+
+    derivative: str
+    gains: str
+
+
+def check_independence(names: Names, first: Group, second: Group, function: str) -> tuple[list[Finding], list[str]]:
+    """What makes one group depend on the other, either way; and the proofs where nothing does.
+
+    Raises GraphError when the groups share a node.
+    """
+    groups = names.group(first), names.group(second)
+    if shared := [node for node in groups[0] if node in set(groups[1])]:
+        raise GraphError(f"{names.text(shared[0])} is in both groups, and cannot be independent of itself")
+    findings, proofs = [], []
+    for dependent, on in (groups, groups[::-1]):
+        inside = between(names.graph.nodes, on, dependent)
+        if inside:
+            findings.append(_blame(names, inside, dependent, on, function))
+        else:
+            proofs.append(_proof(names, dependent, on))
+    return findings, proofs
+
+
+def _proof(names: Names, dependent: list[Node], on: list[Node]) -> str:
+    to = _called(names, dependent)
+    said = f"no path leads from {_called(names, on)} to {to}"
+    if not any([node.args for node in dependent]):
+        return f"{said}: {to} {'are inputs' if len(dependent) > 1 else 'is an input'}."
+    made = makers(dependent)
+    sources = [str(node.name) for node in names.graph.inputs if node in made]
+    return f"{said}, made from {joined(sources, 12) or 'numbers'} alone."
+
+
+def _blame(names: Names, inside: list[Node], dependent: list[Node], on: list[Node], function: str) -> Finding:
+    """The finding for `dependent`, which depends on `on` through the nodes `inside`."""
+    allowed, sources, sinks = set(inside), set(on), set(dependent)
+    edges = [
+        Edge(arg, node, slot)
+        for node in inside
+        if node not in sources
+        for slot, arg in enumerate(node.args)
+        if arg in allowed and arg not in sinks
+    ]
+    starts, ends = [node for node in on if node in allowed], [node for node in dependent if node in allowed]
+    cut = minimum_cut(edges, starts, ends)
+    paths = _paths_through(cut, edges, starts, ends)
+    pairs = dict.fromkeys([(path[0].source, path[-1].target) for path in paths])
+    leaks = [_leak(names, *pair, sources | sinks, function) for pair in pairs]
+    through = _derivatives_through(names.graph, paths)
+    needed = makers(names.graph.outputs.values(), through or ())
+    wrong = [node for node in names.graph.nodes if node not in needed]
+    number = {node: i for i, node in enumerate(names.graph.nodes)}
+    return Finding(
+        "dependence",
+        _report(names, cut, paths, dict(zip(pairs, leaks, strict=True)), through, wrong),
+        tuple(wrong) or tuple(dict.fromkeys([node for path in paths for edge in path for node in edge[:2]])),
+        tuple(cut),
+        {
+            "dependent": [names.text(sink) for sink in dict.fromkeys([sink for _, sink in pairs])],
+            "on": [names.text(source) for source in dict.fromkeys([source for source, _ in pairs])],
+            "cut": [
+                {
+                    "text": _edge_text(names, edge),
+                    "edge": [number[edge.source], number[edge.target], edge.slot],
+                    "lines": [str(line) for line in sorted(edge.target.lines)],
+                }
+                for edge in cut
+            ],
+            "paths": [_path_text(names, path) for path in paths],
+            "corrupted": [leak._asdict() for leak in leaks],
+            "derivatives_through": None if through is None else len(through),
+            "nodes_for_this_alone": [number[node] for node in wrong],
+        },
+    )
+
+
+def _report(
+    names: Names,
+    cut: Sequence[Edge],
+    paths: Sequence[Sequence[Edge]],
+    leaks: Mapping[tuple[Node, Node], Leak],
+    through: set[Node] | None,
+    wrong: Sequence[Node],
+) -> str:
+    sources, sinks = (list(dict.fromkeys(ends)) for ends in zip(*leaks, strict=True))
+    dependence = f"{_called(names, sinks)} {_verb(sinks, 'depend')} on {_called(names, sources)}."
+    lines = [f"{dependence} Without {'this edge' if len(cut) == 1 else f'these {len(cut)} edges'} there is no path:"]
+    shown = [_edge_text(names, edge) for edge in cut]
+    width = max(map(len, shown))
+    gains = "would gain" if through == set() else "gains"
+    for edge, text, path in zip(cut, shown, paths, strict=True):
+        leak = leaks[path[0].source, path[-1].target]
+        lines.append(f"  {text:<{width}}  through it {leak.derivative} {gains} {leak.gains}")
+        if edge.target.lines:
+            lines.append(f"    written at {lines_text([edge.target])}")
+        if len(path) > 2:
+            lines.append(f"    on the path {_path_text(names, path)}")
+    if through:
+        affected = users(names.graph.nodes, through)
+        outputs = [name for name, node in names.graph.outputs.items() if node in affected]
+        alone = f"{many(len(wrong), 'node')} of {len(names.graph.nodes)} {_verb(wrong, 'serve')} nothing else."
+        lines.append(f"{joined(outputs)} {_verb(outputs, 'contain')} what was gained; {alone}")
+    elif through is not None:
+        lines.append("No derivative in this graph was taken that way.")
+    return "\n".join(lines)
+
+
+def _paths_through(
+    cut: Sequence[Edge], edges: Sequence[Edge], sources: Iterable[Node], sinks: Iterable[Node]
+) -> list[list[Edge]]:
+    """For each edge of the cut a shortest path from a source to a sink through it."""
+    before = _breadth_first(edges, sources, 0, 1)
+    after = _breadth_first(edges, sinks, 1, 0)
+    paths = []
+    for edge in cut:
+        start, end = [], []
+        node = edge.source
+        while (step := before[node]) is not None:
+            start.append(step)
+            node = step.source
+        node = edge.target
+        while (step := after[node]) is not None:
+            end.append(step)
+            node = step.target
+        paths.append([*reversed(start), edge, *end])
+    return paths
+
+
+def _breadth_first(edges: Sequence[Edge], starts: Iterable[Node], near: int, far: int) -> dict[Node, Edge | None]:
+    """The edge by which each node is first met from `starts`, walking from end `near` of an edge to end `far`."""
+    leaving: dict[Node, list[Edge]] = {}
+    for edge in edges:
+        leaving.setdefault(edge[near], []).append(edge)  # type: ignore[arg-type]  # 0 and 1 are the nodes
+    met: dict[Node, Edge | None] = dict.fromkeys(starts)
+    queue = list(met)
+    for node in queue:
+        for edge in leaving.get(node, ()):
+            other: Node = edge[far]  # type: ignore[assignment]
+            if other not in met:
+                met[other] = edge
+                queue.append(other)
+    return met
+
+
+def _leak(names: Names, source: Node, sink: Node, members: set[Node], function: str) -> Leak:
+    """What the derivative by `source` gains through `sink`: its slope, past no other member of the two groups."""
+    a, b = names.text(source), names.text(sink)
+    gained = f"d{function}/d{b}"
+    slope = None
+    if not made_of_more(sink, SLOPE_NODES):
+        seeds = {node: constant(0.0) for node in members if node not in (source, sink)} | {source: constant(1.0)}
+        slope = tangents(seeds, [sink], Builder()).get(sink)
+    text = names.text(slope) if slope is not None else "?"
+    if "?" in text:
+        text = f"d{b}/d{a}"
+    elif " " in text:
+        text = f"({text})" if any(f" {sign} " in text for sign in "+-<=") else text
+    return Leak(f"d{function}/d{a}", gained if text == "1" else f"{text} * {gained}")
+
+
+def _derivatives_through(graph: Graph, paths: Sequence[Sequence[Edge]]) -> set[Node] | None:
+    """The adjoint nodes that came by these paths, told by the tags that only the paths' inner nodes have.
+
+    None where no tag tells them apart.
+    """
+    ends = {path[0].source for path in paths} | {path[-1].target for path in paths}
+    inner = {edge.target for path in paths for edge in path} - ends
+    own = {tag for node in inner for tag in node.tags} - {tag for node in ends for tag in node.tags}
+    return {node for node in graph.nodes if ADJOINT in node.roles and own & node.tags} if own else None
+
+
+def _edge_text(names: Names, edge: Edge) -> str:
+    return f"{names.text(edge.source)} -> {names.text(edge.target)}"
+
+
+def _path_text(names: Names, path: Sequence[Edge]) -> str:
+    nodes = [path[0].source, *[edge.target for edge in path]]
+    if len(nodes) <= STEPS:
+        return " -> ".join([names.text(node) for node in nodes])
+    first, last = ([names.text(node) for node in part] for part in (nodes[: STEPS // 2], nodes[-(STEPS // 2) :]))
+    return " -> ".join([*first, "...", *last])
+
+
+def _called(names: Names, nodes: Iterable[Node]) -> str:
+    return joined([names.text(node) for node in nodes], 12)
+
+
+def _verb(subjects: Sequence[object], verb: str) -> str:
+    return verb if len(subjects) > 1 else f"{verb}s"

@@ -1,0 +1,78 @@
+"""Singular nodes: operations whose slope is unbounded, or that have no value, somewhere in a box of inputs."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Mapping
+
+from ...core.graph import Graph
+from ...core.node import CONSTANT, VARIABLE, Node
+from ...errors import GraphError
+from ..names import Names
+from .finding import Finding
+from .interval import LINE, Interval, singular_at, value_of
+
+Box = Mapping[str, float | tuple[float, float]]
+
+
+def intervals(graph: Graph, box: Box) -> dict[Node, Interval]:
+    """Bounds of the value of every node for inputs in the box; an input that it leaves out is any number.
+
+    box: {input: (low, high) or a number}. The bounds hold, but may be wide: an interval forgets which values belong
+    together. Raises GraphError for an unknown input, ValueError for what is no interval.
+    """
+    if unknown := [name for name in box if name not in graph.input_names]:
+        raise GraphError(f"box: the graph has no input {', '.join(unknown)} (it has {', '.join(graph.input_names)})")
+    given = {name: _interval(name, value) for name, value in box.items()}
+    found: dict[Node, Interval] = {}
+    for node in graph.nodes:
+        if node.op is VARIABLE:
+            found[node] = given.get(str(node.name), LINE)
+        elif node.op is CONSTANT:
+            assert node.value is not None
+            found[node] = (node.value, node.value)
+        else:
+            same = len(node.args) == 2 and node.args[0] is node.args[1]
+            found[node] = value_of(node.op.name, [found[arg] for arg in node.args], same=same)
+    return found
+
+
+def singular_nodes(names: Names, box: Box) -> list[Finding]:
+    """The operations that could meet a singular point of theirs for inputs in the box."""
+    bounds = intervals(names.graph, box)
+    findings = []
+    for node in names.graph.nodes:
+        reason = singular_at(node.op.name, [bounds[arg] for arg in node.args]) if node.args else None
+        if reason is not None:
+            arguments = {names.text(arg): bounds[arg] for arg in node.args if arg.value is None}
+            within = " and ".join([f"{name} is within {_shown(bound)}" for name, bound in arguments.items()])
+            data = {
+                "number": names.number[node],
+                "operation": node.op.name,
+                "tags": sorted(node.tags),
+                "reason": reason,
+                "arguments": {name: [_json(end) for end in bound] for name, bound in arguments.items()},
+            }
+            text = f"{names.line(node)}: {reason}" + (f"; {within}." if within else ".")
+            findings.append(Finding("singular", text, (node,), data=data))
+    return findings
+
+
+def _interval(name: str, value: object) -> Interval:
+    ends = (value, value) if isinstance(value, numbers.Real) else value
+    if not isinstance(ends, (tuple, list)) or len(ends) != 2:
+        raise ValueError(f"box: input {name!r} needs (low, high) or a number, got {value!r:.60}")
+    low, high = ends
+    if not all([isinstance(end, numbers.Real) and not isinstance(end, bool) for end in ends]) or not low <= high:
+        raise ValueError(f"box: input {name!r} needs numbers low <= high, got {value!r:.60}")
+    return float(low), float(high)
+
+
+def _shown(bound: Interval) -> str:
+    return f"[{bound[0]:.4g}, {bound[1]:.4g}]"
+
+
+def _json(end: float) -> float | None:
+    """JSON has no infinity: None says that there is no bound."""
+    return end if math.isfinite(end) else None

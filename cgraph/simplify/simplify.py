@@ -1,0 +1,50 @@
+"""Simplification: folding, common subexpressions and algebra; and `specialize`, which binds inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from ..core.graph import Graph
+from ..core.node import Node, Scalar, constant
+from ..core.traversal import rebuild
+from ..errors import GraphError
+from .builder import Builder, folded
+
+
+def simplify(graph: Graph) -> Graph:
+    """The same function in fewer nodes: constants folded and collected, equal nodes merged, `1 * x` and the like gone.
+
+    Never grows: the result has at most as many nodes and, for as many nodes, no more edges.
+
+    Assumes finite operands and non-zero divisors: `0 * x = 0`, `x - x = 0`, `x / x = 1`, `x + 0 = x` also for -0.0.
+    Sums and products may be taken in another order, so values can differ by rounding.
+    """
+    nodes = folded(graph.outputs.values(), Builder())
+    candidate = Graph(graph.inputs, dict(zip(graph.outputs, nodes, strict=True)))
+    return candidate if _size(candidate) < _size(graph) else graph
+
+
+def _size(graph: Graph) -> tuple[int, int]:
+    return len(graph.nodes), sum([len(node.args) for node in graph.nodes])
+
+
+def specialize(graph: Graph, values: Mapping[str, Scalar], outputs: Sequence[str] | None = None) -> Graph:
+    """The graph with inputs bound to numbers (or nodes over its other inputs), simplified; bound inputs are gone.
+
+    values: {input name: number}.  outputs: names of those to keep (default: all).
+    Raises GraphError for a name that the graph does not have, ValueError for NaN.
+    """
+    replace = {}
+    for name, value in values.items():
+        (node,) = graph.select_inputs(name)
+        try:
+            replace[node] = value if isinstance(value, Node) else constant(value)
+        except (TypeError, ValueError) as error:
+            raise type(error)(f"input {name!r}: {error}") from None
+    if outputs is not None:
+        if unknown := [name for name in outputs if name not in graph.outputs]:
+            raise GraphError(f"the graph has no output {', '.join(unknown)} (it has {', '.join(graph.outputs)})")
+        graph = Graph(graph.inputs, {name: graph.outputs[name] for name in outputs})
+    inputs = [node for node in graph.inputs if node not in replace]
+    new = rebuild(graph.outputs.values(), replace, lambda n, args: Node(n.op, args, n.label, name=n.name))
+    return simplify(Graph(inputs, {name: new[node] for name, node in graph.outputs.items()}))
