@@ -1,8 +1,8 @@
 """dynamics: equations of motion on computational graphs, from Lagrangians and planar arms."""
 
-from . import cases, scenes
-from .ensembles import Ensemble, EnsembleStats, simulate_many
-from .equations import (
+from . import scenes
+from .equations.coriolis import coriolis, damping_force
+from .equations.equations_of_motion import (
     SingularMassMatrixError,
     bias,
     check_pivot,
@@ -12,31 +12,32 @@ from .equations import (
     mass_matrix,
     momentum,
 )
-from .event import Event
-from .formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious
-from .handover import Dropped, FreeBody, PickedUp, dropped, picked_up
-from .mechanism import Body, Force, Joint, Mechanism, MechanismError, serial_arm, tree
-from .mjcf import to_mjcf
-from .mujoco_load import load_mjcf, load_urdf
-from .multiprecision import Reference, reference
-from .ode_system import OdeSystem
-from .planar_arm import Link, PlanarArm, planar_arm
-from .pruning import EFFECTS, LeftOut, Pruned, prune
-from .recursive import RecursiveInverseDynamics
-from .scenes import Scene
-from .simulate import simulate
-from .state_equation import state_equation
-from .subtree import Subtree
-from .system import System, as_system
-from .tables.certificate import certify
-from .tables.coriolis import coriolis, damping_force
-from .tables.linearization import linearization, linearize
-from .tables.regressor import inertial_parameters, regressor
-from .tables.residual import Certificate
-from .tables.torque_table import TorqueTable
-from .tables.torques import torque_by_link, torque_by_motion
-from .trajectory import Crossings, Stats, Trajectory
-from .urdf import to_urdf
+from .equations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious
+from .equations.linearization import linearization, linearize
+from .equations.state_equation import state_equation
+from .equations.torque_decomposition import torque_by_link, torque_by_motion
+from .equations.torque_table import TorqueTable
+from .experiments.stability import cases
+from .io.load import load_mjcf, load_urdf
+from .io.mjcf import to_mjcf
+from .io.urdf import to_urdf
+from .multibody.impact import Dropped, FreeBody, PickedUp, dropped, picked_up
+from .multibody.mechanism import Body, Force, Joint, Mechanism, MechanismError, serial_arm, tree
+from .multibody.planar_arm import Link, PlanarArm, planar_arm
+from .multibody.pruning import EFFECTS, LeftOut, Pruned, prune
+from .multibody.recursive_inverse_dynamics import RecursiveInverseDynamics
+from .multibody.regressor import inertial_parameters, regressor
+from .multibody.subtree import Subtree
+from .reference import Reference, reference
+from .scenes.scenes import Scene
+from .simulation.ensembles import Ensemble, EnsembleStats, simulate_many
+from .simulation.events import Event
+from .simulation.simulate import simulate
+from .simulation.trajectory import Crossings, Stats, Trajectory
+from .systems.ode_system import OdeSystem
+from .systems.system import System, as_system
+from .verification.certificate import certify
+from .verification.residual import Certificate
 
 __all__ = [
     "EFFECTS",

@@ -15,13 +15,13 @@ from cgraph import Graph
 from cgraph.simplify.polynomial import format_polynomial
 from cgraph.util.atomic_write import write
 from dynamics import momentum_rate, scenes, spurious
-from dynamics.mujoco_io import frames
-from dynamics.progress import Progress
-from dynamics.reports.equation3 import PAPER, equation3
-from dynamics.reports.fall import fall, largest_differences, mujoco_fall
-from dynamics.reports.law import law_of_arms
-from dynamics.reports.scaling import FITTED_FROM, scaling
-from dynamics.reports.speed import PAPER_MS, Row, table1
+from dynamics.experiments.paper_numbers.embedding_error import law_of_arms
+from dynamics.experiments.paper_numbers.equation3 import PAPER, equation3
+from dynamics.experiments.paper_numbers.free_fall import fall, largest_differences, mujoco_fall
+from dynamics.experiments.paper_numbers.node_scaling import FITTED_FROM, scaling
+from dynamics.experiments.paper_numbers.table_1 import PAPER_MS, Row, table1
+from dynamics.io.mujoco_model import frames
+from dynamics.simulation.progress_bar import Progress
 
 from . import html, plot, theme
 from .document_files import check_writable

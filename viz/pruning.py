@@ -7,7 +7,7 @@ from typing import Any
 
 from .document import Block, Document, Paragraph, Section, Table
 
-Content = Mapping[str, Any]  # what `dynamics.reports.pruning.report` gives
+Content = Mapping[str, Any]  # what `dynamics.experiments.pruning.report` gives
 HEADER = ["", "why", "nodes", "edges"]
 
 

@@ -2,13 +2,13 @@
 
 from functools import partial
 
-from .adaptive import embedded
 from .dop853 import DOP853
-from .fixed import explicit
+from .explicit import explicit
 from .method import Method
 from .problem import Problem, problem_of
 from .radau import ORDER as RADAU_ORDER, radau
-from .rodas import RODAS5P, rosenbrock
+from .rosenbrock import RODAS5P, rosenbrock
+from .step_control import embedded
 from .symplectic import GAUSS4, GAUSS6, MIDPOINT, SYMPLECTIC_EULER, VERLET, Partitioned, partitioned
 from .tableau import DOPRI5, EULER, RK4, Tableau
 

@@ -16,9 +16,9 @@ from cgraph.core.label import building
 from cgraph.core.traversal import topological
 from cgraph.simplify.builder import Builder
 
-from ..equations import energy
-from ..state_equation import as_ode, state_equation, state_inputs
-from ..system import TIME, Parameters, System, as_system, called
+from ..equations.equations_of_motion import energy
+from ..equations.state_equation import as_ode, state_equation, state_inputs
+from ..systems.system import TIME, Parameters, System, as_system, called
 
 ONE = cg.constant(1.0)
 KEPT = 16  # problems whose graphs stay for another run

@@ -15,10 +15,10 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.program import Call, Factor, If, Map, Program, Solve, Statement, Sum, While
 
-from .adaptive import commit, control, count, first_pass, measured, recorded, registers, scale, trial
-from .elements import SAME, identity, weighted
-from .fixed import moment
+from .elementwise import SAME, identity, weighted
+from .explicit import moment
 from .problem import Problem
+from .step_control import commit, control, count, first_pass, measured, recorded, registers, scale, trial
 from .tableau import Row
 
 _R6 = math.sqrt(6.0)

@@ -20,10 +20,10 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.program import Call, Map, Program, Statement, Sum, While
 
-from .adaptive import count, first_pass
-from .elements import SAME, compensated, function, weighted
-from .fixed import advance, moment, registers
+from .elementwise import SAME, compensated, function, weighted
+from .explicit import advance, moment, registers
 from .problem import Problem
+from .step_control import count, first_pass
 
 TURNS = 60.0  # of the iteration for the stages, at most
 ENOUGH = 2.0**-53  # a change below this, relative, is rounding

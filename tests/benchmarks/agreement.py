@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))  # so that a checkout runs wi
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.mujoco_io import MujocoTwin
+from dynamics.io.mujoco_model import MujocoTwin
 from tests.dynamics.models import at, error, random_arm, states
 
 QUANTITIES = {

@@ -20,9 +20,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))  # so that a checkout runs without being installed
 
 import dynamics as dyn
-from dynamics.ensembles.simulate_many import simulate_many
 from dynamics.integrators.tableau import RK4
-from dynamics.reports.peers.case import Case
+from dynamics.peers.case import Case
+from dynamics.simulation.ensembles.simulate_many import simulate_many
 
 T_END, DT = 1.0, 1e-3
 STEPS = 1000
@@ -46,8 +46,8 @@ def ours(q: Array, qd: Array, **options: object) -> Run:
 
 def mujoco(q: Array, qd: Array) -> Run:
     """MuJoCo's rollout in one thread; contacts and whatever else the pendulum does not need are off."""
-    from dynamics.mujoco_io import rollout
-    from dynamics.reports.peers.mujoco import MujocoPeer
+    from dynamics.io.mujoco_model import rollout
+    from dynamics.peers.mujoco import MujocoPeer
 
     peer = MujocoPeer(Case("triple_pendulum", dyn.scenes.load("triple_pendulum")))
     model, n = peer.twin.model, q.shape[1]
@@ -70,7 +70,7 @@ def mujoco(q: Array, qd: Array) -> Run:
 
 def jax(q: Array, qd: Array) -> Run:
     """JAX's own derivatives of the same Lagrangian: jit of vmap of lax.scan, in double precision."""
-    from dynamics.reports.peers.jax import JaxPeer
+    from dynamics.peers.jax import JaxPeer
 
     peer = JaxPeer(Case("triple_pendulum", dyn.scenes.load("triple_pendulum")))
     np_, n = peer.np, q.shape[1]

@@ -19,8 +19,8 @@ import numpy as np
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.multiprecision.planar_chain import accelerations
-from dynamics.reports.bench_scenes import turned_arm
+from dynamics.experiments.speed.bench_scenes import turned_arm
+from dynamics.reference.planar_arm_equations import accelerations
 from tests.dynamics.dense_reference import chain_accelerations
 
 

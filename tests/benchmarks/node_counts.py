@@ -23,10 +23,11 @@ from cgraph.autodiff.reverse import cotangents
 from cgraph.core.label import building
 from cgraph.simplify import builder as fold
 from cgraph.simplify.builder import Builder
-from dynamics import equations, link as links, mechanism, spatial
-from dynamics.reports.bench_scenes import binary_tree, turned_arm
-from dynamics.reports.fit import exponent
-from dynamics.system import BodySystem
+from dynamics.equations import equations_of_motion as equations
+from dynamics.experiments.paper_numbers.fit import exponent
+from dynamics.experiments.speed.bench_scenes import binary_tree, turned_arm
+from dynamics.multibody import link as links, mechanism, spatial
+from dynamics.systems.system import BodySystem
 
 solving = sys.modules["cgraph.autodiff.hessian_solve"]  # the module; `cgraph.hessian_solve` is the function
 solve_nodes, rates = solving.solve_nodes, equations.rates

@@ -23,7 +23,7 @@ import numpy as np
 import cgraph as cg
 import dynamics as dyn
 from cgraph.core.structure_hash import structure_hash
-from dynamics.spatial import rotation
+from dynamics.multibody.spatial import rotation
 from tests.dynamics.test_reconfiguration import arm
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -20,14 +20,14 @@ sys.path.insert(0, str(Path(__file__).parents[2]))  # so that a checkout runs wi
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics.experiments.speed.bench_table import machine
+from dynamics.experiments.work_precision.cold_start import cold_starts
+from dynamics.experiments.work_precision.energy_drift import METHODS as SYMPLECTIC, drift
+from dynamics.experiments.work_precision.trajectory_peers import EPSILON, Cvodes, Heyoka, heyoka_derivatives
+from dynamics.experiments.work_precision.trajectory_runs import Contender, Ours, Outcome, Scipy, problem_of
+from dynamics.experiments.work_precision.trajectory_scenes import load
+from dynamics.experiments.work_precision.work_precision import Judge, work_precision
 from dynamics.integrators import METHODS, Problem
-from dynamics.reports.bench_table import machine
-from dynamics.reports.cold_start import cold_starts
-from dynamics.reports.energy_drift import METHODS as SYMPLECTIC, drift
-from dynamics.reports.trajectory_peers import EPSILON, Cvodes, Heyoka, heyoka_derivatives
-from dynamics.reports.trajectory_runs import Contender, Ours, Outcome, Scipy, problem_of
-from dynamics.reports.trajectory_scenes import load
-from dynamics.reports.work_precision import Judge, work_precision
 
 FIXED = tuple([name for name, method in METHODS.items() if not method.adaptive])
 TURNS = 15

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 import dynamics as dyn
-from dynamics.mechanism import WORLD, Body, Joint, Mechanism
-from dynamics.spatial import rotation
+from dynamics.multibody.mechanism import WORLD, Body, Joint, Mechanism
+from dynamics.multibody.spatial import rotation
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

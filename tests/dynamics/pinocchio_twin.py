@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio
 
 import dynamics as dyn
-from dynamics.mechanism import WORLD
+from dynamics.multibody.mechanism import WORLD
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
-from dynamics.mujoco_io import MujocoTwin
-from dynamics.reports import bench as module
-from dynamics.reports.bench import MODES, PEERS, TASKS, Cell, Crew, Row, bench
-from dynamics.reports.bench_scenes import SCENES, model
-from dynamics.reports.bench_table import digits, machine, tables
-from dynamics.reports.peers import Case, UnavailableError
-from dynamics.reports.peers.case import BATCH, DT, NUDGE, PASSES
-from dynamics.reports.peers.contender import ldl_solve
-from dynamics.reports.worker import Prepared, Refused, Worker
+from dynamics.experiments.speed import bench as module
+from dynamics.experiments.speed.bench import MODES, PEERS, TASKS, Cell, Crew, Row, bench
+from dynamics.experiments.speed.bench_scenes import SCENES, model
+from dynamics.experiments.speed.bench_table import digits, machine, tables
+from dynamics.experiments.speed.worker import Prepared, Refused, Worker
+from dynamics.io.mujoco_model import MujocoTwin
+from dynamics.peers import Case, UnavailableError
+from dynamics.peers.case import BATCH, DT, NUDGE, PASSES
+from dynamics.peers.contender import ldl_solve
 from viz import cli
 
 ROUNDING = 1e-10  # of a loop: the motion is that much larger than the last bit of the state it is taken from

@@ -9,11 +9,11 @@ import numpy as np
 from mpmath import mp
 from pytest import approx, mark, param, raises
 
-from dynamics import cases
-from dynamics.cases import chains, rotation, sensitivity, stiff
-from dynamics.cases.case import Case
-from dynamics.multiprecision import reference
-from dynamics.state_equation import state_equation, state_inputs
+from dynamics.equations.state_equation import state_equation, state_inputs
+from dynamics.experiments.stability import cases
+from dynamics.experiments.stability.cases import chains, rotation, sensitivity, stiff
+from dynamics.experiments.stability.cases.case import Case
+from dynamics.reference import reference
 from tests import high_precision
 from tests.dynamics.models import Array
 

@@ -10,7 +10,7 @@ from pytest import approx, mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.system import System
+from dynamics.systems.system import System
 from tests.dynamics.models import Array, oscillator
 
 TRUNCATION = 1e-10  # of RK4 at dt = 1 ms over 3 s: 3 (1e-3 w)^4 / 120 for w up to 3 rad/s, and rounding beside it

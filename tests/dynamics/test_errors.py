@@ -10,8 +10,8 @@ from pytest import mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics import mujoco_io
-from dynamics.system import System
+from dynamics.io import mujoco_model as mujoco_io
+from dynamics.systems.system import System
 
 
 def mass(q: Any, qd: Any, t: Any) -> cg.Node:

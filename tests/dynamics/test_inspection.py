@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
-from dynamics.inspection import DT, FORMULATIONS, inspection
-from dynamics.scenes import Scene
-from dynamics.skeleton import skeleton
+from dynamics.multibody.joint_positions import skeleton
+from dynamics.scenes.inspection import DT, FORMULATIONS, inspection
+from dynamics.scenes.scenes import Scene
 
 INTEGRATED = 1e-9  # N m: the state is one that the equations hold at, whatever the error of the motion
 

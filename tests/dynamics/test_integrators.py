@@ -15,10 +15,10 @@ import dynamics as dyn
 from dynamics.integrators import METHODS, Problem
 from dynamics.integrators.dop853 import DOP853
 from dynamics.integrators.radau import _A, _POWERS, _T, _T_INVERSE
-from dynamics.integrators.rodas import RODAS5P
+from dynamics.integrators.rosenbrock import RODAS5P
 from dynamics.integrators.symplectic import GAUSS4, GAUSS6, MIDPOINT, SYMPLECTIC_EULER, VERLET, Partitioned
 from dynamics.integrators.tableau import DOPRI5, Tableau
-from dynamics.system import System
+from dynamics.systems.system import System
 
 FIXED = [name for name, method in METHODS.items() if not method.adaptive]
 ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]

@@ -15,8 +15,8 @@ from pytest import approx, importorskip, mark, param, raises, warns
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.mechanism import Body, Joint, Mechanism, MechanismError
-from dynamics.spatial import rotation
+from dynamics.multibody.mechanism import Body, Joint, Mechanism, MechanismError
+from dynamics.multibody.spatial import rotation
 from tests.dynamics.mechanisms import FAMILIES, turned_arm
 from tests.dynamics.models import error
 

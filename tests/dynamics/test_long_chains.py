@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
-from dynamics.multiprecision.planar_chain import accelerations
+from dynamics.reference.planar_arm_equations import accelerations
 from tests.dynamics.dense_reference import Array, chain_accelerations
 from tests.dynamics.mechanisms import turned_arm
 

@@ -12,9 +12,9 @@ from pytest import approx, mark, param, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.mechanism import Body, Joint, Mechanism, MechanismError
-from dynamics.mujoco_io import MujocoTwin
-from dynamics.spatial import from_quaternion, rotation, to_quaternion
+from dynamics.io.mujoco_model import MujocoTwin
+from dynamics.multibody.mechanism import Body, Joint, Mechanism, MechanismError
+from dynamics.multibody.spatial import from_quaternion, rotation, to_quaternion
 from tests.dynamics.mechanisms import (
     FAMILIES,
     in_space,

@@ -5,7 +5,7 @@ from pytest import approx, fixture, mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.mujoco_io import MujocoTwin, to_mjcf
+from dynamics.io.mujoco_model import MujocoTwin, to_mjcf
 from tests.dynamics.models import Array, at, error, random_arm, states
 
 STATES = 100

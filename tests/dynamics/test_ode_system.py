@@ -5,8 +5,8 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.ode_system import OdeSystem
-from dynamics.state_equation import state_equation, state_inputs
+from dynamics.equations.state_equation import state_equation, state_inputs
+from dynamics.systems.ode_system import OdeSystem
 from tests.dynamics.models import MODELS, at, inputs, states
 
 

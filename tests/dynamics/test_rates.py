@@ -9,8 +9,8 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph.core.traversal import topological
 from cgraph.simplify.builder import Builder, folded
-from dynamics.equations import bias
-from dynamics.rates import rates
+from dynamics.equations.equations_of_motion import bias
+from dynamics.equations.velocity_nodes import rates
 from tests import high_precision
 
 N = 3

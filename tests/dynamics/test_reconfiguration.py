@@ -7,7 +7,7 @@ from pytest import approx, mark, raises
 
 import dynamics as dyn
 from cgraph.core.structure_hash import structure_hash
-from dynamics.body import WORLD
+from dynamics.multibody.body import WORLD
 from tests.dynamics.mechanisms import random_mechanism
 
 TOOL = dyn.Body("tool", dyn.Joint("fixed", position=(0.1, 0.0, -0.2)), mass=0.4, center=(0.0, 0.05, 0.0),

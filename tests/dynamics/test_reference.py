@@ -16,16 +16,16 @@ from pytest import approx, mark, raises
 import cgraph as cg
 import dynamics as dyn
 from cgraph.core.node import OPS, apply
-from dynamics import cases
-from dynamics.multiprecision import Reference, ReferenceFailedError, closed_forms, reference
-from dynamics.multiprecision.reference import METHODS
-from dynamics.ode_system import OdeSystem
-from dynamics.state_equation import state_equation, state_inputs
+from dynamics.equations.state_equation import state_equation, state_inputs
+from dynamics.experiments.stability import cases
+from dynamics.reference import Reference, ReferenceFailedError, closed_forms, reference
+from dynamics.reference.reference import METHODS
+from dynamics.systems.ode_system import OdeSystem
 from tests.high_precision import OPERATIONS
 
 pytest.importorskip("flint", reason="reference solutions need python-flint")
-from dynamics.multiprecision.numbers import working
-from dynamics.multiprecision.series import Series
+from dynamics.reference.flint_numbers import working
+from dynamics.reference.taylor_series import Series
 
 ORDER = 12
 TWELVE_ORDERS = 1e-25  # relative, of numbers with 60 digits that mpmath differentiates numerically

@@ -12,7 +12,7 @@ from pytest import mark, raises
 
 import dynamics as dyn
 from dynamics import scenes
-from dynamics.mechanism import MechanismError
+from dynamics.multibody.mechanism import MechanismError
 
 INERTIAL = '<inertial pos="0.1 0.2 -0.3" mass="1.3" diaginertia="0.3 0.4 0.5"/>'
 MJCF = f"""<?xml version="1.0"?><!-- a hinge and a slide --><mujoco><worldbody>

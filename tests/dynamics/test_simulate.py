@@ -12,9 +12,9 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics.integrators import problem_of
 from dynamics.integrators.tableau import DOPRI5, EULER, RK4, Tableau
-from dynamics.progress import Progress
-from dynamics.run import Run
-from dynamics.system import System
+from dynamics.simulation.progress_bar import Progress
+from dynamics.simulation.stepping import Run
+from dynamics.systems.system import System
 from tests.dynamics.models import oscillator, random_arm
 
 ROUNDING = 1e-14  # of a few sums of fractions
@@ -158,7 +158,7 @@ def test_ctrl_c_keeps_the_rows(method: str, monkeypatch: pytest.MonkeyPatch) -> 
             raise KeyboardInterrupt
         return real(*args, **options)
 
-    monkeypatch.setattr("dynamics.run.PIECE", 0.0)  # a pass at a time, after the first pieces
+    monkeypatch.setattr("dynamics.simulation.stepping.PIECE", 0.0)  # a pass at a time, after the first pieces
     monkeypatch.setattr(Run, "_advance", advance)
     result = dyn.simulate(oscillator(), [1.0], [0.0], 10.0, method, dt=0.01)
     kept = len(result.t)
@@ -247,9 +247,9 @@ class Clock:
 
 def printed(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tick: float, **options: Any) -> str:
     """What a run of ten rows, in pieces of one, writes to standard error, on a clock of that tick."""
-    monkeypatch.setattr("dynamics.progress.time", Clock(tick))
-    monkeypatch.setattr("dynamics.run.FIRST", 1)
-    monkeypatch.setattr("dynamics.run.PIECE", 0.0)
+    monkeypatch.setattr("dynamics.simulation.progress_bar.time", Clock(tick))
+    monkeypatch.setattr("dynamics.simulation.stepping.FIRST", 1)
+    monkeypatch.setattr("dynamics.simulation.stepping.PIECE", 0.0)
     dyn.simulate(oscillator(), [1.0], [0.0], 1.0, dt=0.1, **options)
     out, err = capsys.readouterr()
     assert out == ""
@@ -270,7 +270,7 @@ def test_a_short_run_writes_nothing(capsys, monkeypatch) -> None:
 
 
 def test_progress_is_written_at_most_ten_times_a_second(capsys, monkeypatch) -> None:
-    monkeypatch.setattr("dynamics.progress.time", Clock(0.03))
+    monkeypatch.setattr("dynamics.simulation.progress_bar.time", Clock(0.03))
     with Progress("count", total=1000.0, show=True) as progress:
         for i in range(1000):
             progress(i)
@@ -294,7 +294,7 @@ def test_an_interrupted_run_ends_its_progress_line(capsys, monkeypatch) -> None:
             progress(0.5)
             raise KeyboardInterrupt
 
-    monkeypatch.setattr("dynamics.progress.time", Clock(2.0))
+    monkeypatch.setattr("dynamics.simulation.progress_bar.time", Clock(2.0))
     with raises(KeyboardInterrupt):
         interrupted()
     assert capsys.readouterr().err.endswith(" 50%  2 s\n")
@@ -369,7 +369,7 @@ def test_a_last_time_past_the_end_by_rounding_is_the_end() -> None:
 def test_rows_that_fill_the_memory_end_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = dyn.simulate(oscillator(), [1.0], [0.0], 200.0, "dop853", dt=1e-2)
     hundred = 3.0 * 24.0 * 100.0  # rows of time and state
-    monkeypatch.setattr(sys.modules["dynamics.simulate"], "room", lambda: hundred)
+    monkeypatch.setattr(sys.modules["dynamics.simulation.simulate"], "room", lambda: hundred)
     run = dyn.simulate(oscillator(), [1.0], [0.0], 200.0, "dop853", dt=1e-2)
     assert run.stats.status.startswith("stopped at t = ")
     assert "the rows fill the memory; t_eval records fewer" in run.stats.status

@@ -15,12 +15,12 @@ from hypothesis import given, strategies as st
 from pytest import approx, mark, raises
 
 import dynamics as dyn
-from dynamics.ensembles import task
-from dynamics.ensembles.ensemble import Ensemble
-from dynamics.ensembles.simulate_many import simulate_many
-from dynamics.ensembles.stretch import stretches
 from dynamics.integrators import METHODS
-from dynamics.system import System, as_system
+from dynamics.simulation.ensembles import task
+from dynamics.simulation.ensembles.ensemble import Ensemble
+from dynamics.simulation.ensembles.simulate_many import simulate_many
+from dynamics.simulation.ensembles.step_grid import stretches
+from dynamics.systems.system import System, as_system
 from tests.dynamics.models import oscillator, random_arm
 
 RK4_ERROR = 1e-11  # of a period at dt = 1 ms: (w dt)^4 w t / 120
@@ -71,7 +71,7 @@ def test_starts_forces_and_parameters_are_each_trajectory_s_own(method: str, err
 
 def test_arms_move_as_mujoco_s_do() -> None:
     pytest.importorskip("mujoco")
-    from dynamics.mujoco_io import MujocoTwin
+    from dynamics.io.mujoco_model import MujocoTwin
 
     arm, q, qd = arms(10, 3)
     result = simulate_many(arm, q, qd, 0.5)
@@ -129,8 +129,8 @@ def test_t_eval_chooses_the_rows(times: Any) -> None:
 
 def test_many_steps_come_in_many_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = [simulate_many(*arms(9), 0.2, t_eval=times) for times in (None, [0.05, 0.2], [0.15, 0.2])]
-    monkeypatch.setattr("dynamics.ensembles.side_by_side.WORK", 5000)
-    monkeypatch.setattr("dynamics.ensembles.side_by_side.NUMBERS", 200)
+    monkeypatch.setattr("dynamics.simulation.ensembles.vectorized.WORK", 5000)
+    monkeypatch.setattr("dynamics.simulation.ensembles.vectorized.NUMBERS", 200)
     pieces = [simulate_many(*arms(9), 0.2, t_eval=times) for times in (None, [0.05, 0.2], [0.15, 0.2])]
     assert all(map(same, whole, pieces))
 
@@ -306,7 +306,7 @@ def test_an_error_in_a_thread_is_raised_and_leaves_no_thread(monkeypatch: pytest
     def broken(*_: object) -> None:
         raise RuntimeError("broken")
 
-    monkeypatch.setattr("dynamics.ensembles.side_by_side.SideBySide.advance", broken)
+    monkeypatch.setattr("dynamics.simulation.ensembles.vectorized.SideBySide.advance", broken)
     with raises(RuntimeError, match="broken"):
         simulate_many(*arms(29), 0.1, workers=3, chunk=8)
     assert set(threading.enumerate()) == before

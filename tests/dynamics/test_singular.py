@@ -10,7 +10,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations import SingularMassMatrixError, check_pivot, forward_dynamics
+from dynamics.equations.equations_of_motion import SingularMassMatrixError, check_pivot, forward_dynamics
 
 METHODS = ["recursive", "dense"]
 

@@ -13,21 +13,21 @@ from pytest import MonkeyPatch, approx, importorskip, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics import cases
-from dynamics.integrators import METHODS, Method
-from dynamics.integrators.adaptive import embedded
-from dynamics.integrators.tableau import DOPRI5
-from dynamics.reports import (
+from dynamics.experiments.stability import (
     case_runs,
-    energy_drift,
+    cases,
     huge_angles,
-    limits,
+    known_limits as limits,
     single_evaluations,
     solutions,
     stability,
     stability_table,
 )
-from dynamics.reports.verdict import Figure, Verdict
+from dynamics.experiments.stability.verdict import Figure, Verdict
+from dynamics.experiments.work_precision import energy_drift
+from dynamics.integrators import METHODS, Method
+from dynamics.integrators.step_control import embedded
+from dynamics.integrators.tableau import DOPRI5
 from tests.dynamics.models import Array
 from tests.dynamics.reference import floats, lagrange
 
@@ -229,7 +229,7 @@ def random_arm(n: int) -> tuple[dyn.PlanarArm, Array, Array, Array]:
 def test_exact_torques_are_those_of_lagranges_equation(n: int) -> None:
     """By differences of L itself in 80 digits: another formula, other arithmetic."""
     importorskip("flint")
-    from dynamics.multiprecision.planar_chain import torques
+    from dynamics.reference.planar_arm_equations import torques
 
     arm, q, qd, qdd = random_arm(n)
     expected = lagrange(arm, {"q": q, "qd": qd, "qdd": qdd})
@@ -240,7 +240,7 @@ def test_exact_torques_are_those_of_lagranges_equation(n: int) -> None:
 @mark.parametrize("n", [1, 2, 5, 20])
 def test_exact_accelerations_give_the_torques_back(n: int) -> None:
     importorskip("flint")
-    from dynamics.multiprecision.planar_chain import accelerations, torques
+    from dynamics.reference.planar_arm_equations import accelerations, torques
 
     arm, q, qd, tau = random_arm(n)
     qdd = accelerations(arm, q, qd, tau)
@@ -253,7 +253,7 @@ def test_exact_accelerations_give_the_torques_back(n: int) -> None:
 def test_digits_are_added_until_the_result_has_enough() -> None:
     """Masses 24 decades apart, for which the first attempt cannot do."""
     importorskip("flint")
-    from dynamics.multiprecision.planar_chain import accelerations, torques
+    from dynamics.reference.planar_arm_equations import accelerations, torques
 
     _, q, qd, tau = random_arm(6)
     arm = dyn.planar_arm([1e-24] * 5 + [1.0], [1.0] * 6)

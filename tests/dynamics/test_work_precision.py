@@ -15,13 +15,20 @@ import pytest
 from pytest import approx, raises
 
 import dynamics as dyn
-from dynamics.integrators import METHODS
-from dynamics.reports import work_precision as module
-from dynamics.reports.cold_start import cold_starts
-from dynamics.reports.trajectory_peers import EPSILON, Cvodes, Heyoka, Mujoco, heyoka_derivatives
-from dynamics.reports.trajectory_runs import CHOSEN, EQUAL, Contender, Ours, Outcome, Scipy, problem_of
-from dynamics.reports.trajectory_scenes import INTERVALS, Setting, load, names
-from dynamics.reports.work_precision import (
+from dynamics.experiments.work_precision import work_precision as module
+from dynamics.experiments.work_precision.cold_start import cold_starts
+from dynamics.experiments.work_precision.trajectory_peers import EPSILON, Cvodes, Heyoka, Mujoco, heyoka_derivatives
+from dynamics.experiments.work_precision.trajectory_runs import (
+    CHOSEN,
+    EQUAL,
+    Contender,
+    Ours,
+    Outcome,
+    Scipy,
+    problem_of,
+)
+from dynamics.experiments.work_precision.trajectory_scenes import INTERVALS, Setting, load, names
+from dynamics.experiments.work_precision.work_precision import (
     FLOOR,
     Curve,
     Judge,
@@ -32,6 +39,7 @@ from dynamics.reports.work_precision import (
     to_csv,
     work_precision,
 )
+from dynamics.integrators import METHODS
 
 T_END = 10.0  # s, of the scene spring_mass: q = cos t
 ROUNDING = 1e-9  # a thousand times that of a power of R(i h) in float64

@@ -16,7 +16,7 @@ import cgraph as cg
 import dynamics as dyn
 import viz
 from cgraph.core.ops import OPS
-from dynamics.inspection import FORMULATIONS, inspection
+from dynamics.scenes.inspection import FORMULATIONS, inspection
 from viz import cli
 from viz.inspector import Motion, Table, Version
 from viz.inspector.layers import GAP, STEP, layered

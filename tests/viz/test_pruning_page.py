@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import dynamics as dyn
-from dynamics.reports import pruning as pruning_report
+from dynamics.experiments import pruning as pruning_report
 from viz import pruning
 from viz.cli import main
 from viz.document import to_html

@@ -222,7 +222,7 @@ def test_the_command_writes_whole_files(tmp_path: Path, capsys: pytest.CaptureFi
 
 def test_an_interrupted_report_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("flint")
-    from dynamics.reports import work_precision as measured
+    from dynamics.experiments.work_precision import work_precision as measured
 
     def interrupt(*_: Any) -> None:
         raise KeyboardInterrupt
@@ -298,7 +298,9 @@ def test_without_matplotlib_no_report_is_begun(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    monkeypatch.setattr("dynamics.reports.work_precision.work_precision", lambda *_, **__: pytest.fail("begun"))
+    monkeypatch.setattr(
+        "dynamics.experiments.work_precision.work_precision.work_precision", lambda *_, **__: pytest.fail("begun")
+    )
     assert cli.main(["report", "spring_mass", "--out", str(tmp_path / "r")]) == 1
     assert "plots need matplotlib" in capsys.readouterr().err
 

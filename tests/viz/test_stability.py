@@ -117,14 +117,14 @@ def test_the_command_writes_the_table_and_fails_for_an_unexplained_row(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Two cases in place of all, one by a method that does not suit it."""
-    from dynamics.reports import case_runs
+    from dynamics.experiments.stability import case_runs
 
     def two(quick: bool) -> Any:
         assert quick
         yield from case_runs.verdicts(["exponential decay"], ("dopri5",))
         yield from case_runs.verdicts(["Kapitza's pendulum"], methods)
 
-    monkeypatch.setattr("dynamics.reports.stability.verdicts", two)
+    monkeypatch.setattr("dynamics.experiments.stability.stability.verdicts", two)
     methods = ("dopri5",)
     assert cli.main(["report", "--stability", "--quick", "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr()

@@ -6,8 +6,8 @@ import argparse
 import json
 from dataclasses import asdict
 
-from dynamics.reports.bench import MODES, PEERS, QUICK, SCENES, TASKS, Row, bench
-from dynamics.reports.bench_table import machine, tables
+from dynamics.experiments.speed.bench import MODES, PEERS, QUICK, SCENES, TASKS, Row, bench
+from dynamics.experiments.speed.bench_table import machine, tables
 
 from .arguments import Commands, may_ignore, positive, say
 

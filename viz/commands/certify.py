@@ -6,8 +6,8 @@ import argparse
 import json
 
 from dynamics import scenes
-from dynamics.mujoco_load import compiled
-from dynamics.tables.certificate import certify
+from dynamics.io.load import compiled
+from dynamics.verification.certificate import certify
 
 from .arguments import Commands, say, scene_of, takes_a_scene, whole
 

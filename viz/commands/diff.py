@@ -7,7 +7,7 @@ import json
 
 import cgraph as cg
 from dynamics import FORMULATIONS, inverse_dynamics
-from dynamics.classes import formulation_classes
+from dynamics.equations.node_classes import formulation_classes
 
 from ..dot import to_dot
 from .arguments import Commands, draw, may_draw_and_print, scene_of, state_names, takes_a_scene

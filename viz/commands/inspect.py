@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cgraph.util.atomic_write import write
 from dynamics import scenes
-from dynamics.inspection import FRAMES, inspection
+from dynamics.scenes.inspection import FRAMES, inspection
 
 from .. import theme
 from ..inspector import Motion, Table, Version, page

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from cgraph import Graph
 from cgraph.util.atomic_write import write
 from dynamics import inverse_dynamics, momentum_rate, scenes, spurious
-from dynamics.reports.equation3 import equation3
+from dynamics.experiments.paper_numbers.equation3 import equation3
 
 from ..lesson import Lesson, page
 from .arguments import Commands

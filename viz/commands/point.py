@@ -7,7 +7,7 @@ import argparse
 import numpy as np
 
 from cgraph import Graph
-from dynamics.scenes import Scene
+from dynamics.scenes.scenes import Scene
 
 from .arguments import number
 

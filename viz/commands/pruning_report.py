@@ -6,7 +6,7 @@ import argparse
 import json
 
 from dynamics import EFFECTS, scenes
-from dynamics.reports import pruning
+from dynamics.experiments import pruning
 
 from .. import pruning as page
 from ..document_files import check_writable, write_document

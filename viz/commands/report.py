@@ -7,9 +7,9 @@ import json
 from pathlib import Path
 
 from dynamics import EFFECTS, scenes
+from dynamics.experiments.work_precision import trajectory_scenes, work_precision
+from dynamics.experiments.work_precision.cold_start import STARTS
 from dynamics.integrators import METHODS
-from dynamics.reports import trajectory_scenes, work_precision
-from dynamics.reports.cold_start import STARTS
 
 from .. import report as page
 from ..document_files import check_writable, write_document

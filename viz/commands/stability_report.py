@@ -6,7 +6,7 @@ import argparse
 import json
 import time
 
-from dynamics.reports import stability, stability_table
+from dynamics.experiments.stability import stability, stability_table
 
 from .. import stability as page
 from ..document_files import check_writable, write_document

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 import cgraph as cg
 import dynamics as dyn
 from cgraph.explain import diff
-from dynamics.classes import formulation_classes
+from dynamics.equations.node_classes import formulation_classes
 from tests.strategies import Case, cases
 
 x, y, z = cg.variables("x y z")

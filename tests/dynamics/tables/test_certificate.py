@@ -12,10 +12,10 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from cgraph.core.node import OPS
-from dynamics.mjcf import to_mjcf
-from dynamics.tables import certificate
-from dynamics.tables.certificate import certify
-from dynamics.tables.residual import ROUNDING, Certificate, Residual
+from dynamics.io.mjcf import to_mjcf
+from dynamics.verification import certificate
+from dynamics.verification.certificate import certify
+from dynamics.verification.residual import ROUNDING, Certificate, Residual
 from tests.dynamics.mechanisms import FAMILIES
 from tests.dynamics.models import MODELS
 from viz import cli

@@ -8,9 +8,9 @@ from pytest import approx
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.system import as_system
-from dynamics.tables.at_state import at_state
-from dynamics.tables.coriolis import coriolis, damping_force
+from dynamics.equations.coriolis import coriolis, damping_force
+from dynamics.equations.evaluate_at import at_state
+from dynamics.systems.system import as_system
 from tests.dynamics.mechanisms import FAMILIES
 from tests.dynamics.models import MODELS, Array, magnetic, random_arm, relativistic, states
 

@@ -10,7 +10,7 @@ from pytest import approx
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.tables.coriolis import coriolis
+from dynamics.equations.coriolis import coriolis
 from tests.dynamics.models import Array
 
 RESIDUAL = 1e-8  # N, of forces of some 10 N: the rounding of the plant's accelerations
@@ -104,7 +104,7 @@ def test_on_our_own_plant() -> None:
 
 def test_on_mujoco_s_plant(record_property: Callable[[str, object], None]) -> None:
     pytest.importorskip("mujoco")
-    from dynamics.mujoco_io import MujocoTwin
+    from dynamics.io.mujoco_model import MujocoTwin
 
     residual, off = closed_loop(MujocoTwin(robot()).accelerations)
     record_property("residual [N]", residual)

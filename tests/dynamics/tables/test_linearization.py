@@ -7,9 +7,9 @@ import pytest
 from pytest import approx
 
 import dynamics as dyn
-from dynamics.system import as_system
-from dynamics.tables.at_state import at_state
-from dynamics.tables.linearization import linearization, linearize
+from dynamics.equations.evaluate_at import at_state
+from dynamics.equations.linearization import linearization, linearize
+from dynamics.systems.system import as_system
 from tests.dynamics.mechanisms import FAMILIES, turned_arm
 from tests.dynamics.models import MODELS, Array, at, random_arm, states
 
@@ -52,7 +52,7 @@ def test_it_is_the_slope_of_forward_dynamics(name: str) -> None:
 @pytest.mark.parametrize("model", [random_arm(3), turned_arm(4), FAMILIES["mixed"](7)], ids=["planar", "arm", "mixed"])
 def test_it_is_the_slope_of_mujoco_s_accelerations(model: object) -> None:
     pytest.importorskip("mujoco")
-    from dynamics.mujoco_io import MujocoTwin
+    from dynamics.io.mujoco_model import MujocoTwin
 
     twin, n, state = MujocoTwin(model), as_system(model).n, at(states(model, 1, 2), 0)  # type: ignore[arg-type]
     names = [twin.model.joint(i).name for i in range(n)]

@@ -7,8 +7,8 @@ import pytest
 from pytest import approx
 
 import dynamics as dyn
-from dynamics.tables.at_state import at_state
-from dynamics.tables.regressor import inertial_parameters, regressor
+from dynamics.equations.evaluate_at import at_state
+from dynamics.multibody.regressor import inertial_parameters, regressor
 from tests.dynamics.mechanisms import FAMILIES, in_space, turned_arm
 from tests.dynamics.models import Array, at, random_arm, states
 
@@ -63,7 +63,7 @@ def test_it_is_pinocchio_s(family: str) -> None:
 def test_pinocchio_s_coriolis_matrix_and_gravity_are_ours(family: str) -> None:
     """Its matrix is that of Christoffel's symbols too, entry by entry."""
     pinocchio = pytest.importorskip("pinocchio", reason="the bench extra has it")
-    from dynamics.tables.coriolis import coriolis
+    from dynamics.equations.coriolis import coriolis
     from tests.dynamics.pinocchio_twin import PinocchioTwin
 
     mechanism = FAMILIES[family](6)

@@ -7,10 +7,10 @@ import pytest
 from pytest import approx
 
 import dynamics as dyn
-from dynamics.system import as_system
-from dynamics.tables.at_state import at_state
-from dynamics.tables.torque_table import TorqueTable
-from dynamics.tables.torques import torque_by_link, torque_by_motion
+from dynamics.equations.evaluate_at import at_state
+from dynamics.equations.torque_decomposition import torque_by_link, torque_by_motion
+from dynamics.equations.torque_table import TorqueTable
+from dynamics.systems.system import as_system
 from tests.dynamics.mechanisms import FAMILIES, turned_tree
 from tests.dynamics.models import MODELS, Array, at, random_arm, states
 

@@ -1,0 +1,1 @@
+"""Equations: the graphs that a Lagrangian gives, in any of its formulations."""

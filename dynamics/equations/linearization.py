@@ -1,0 +1,85 @@
+"""Linearisation: the exact derivative of the state equation, as a graph and at a state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph.autodiff.hessian_solve import solve_nodes
+from cgraph.autodiff.jacobian import hessian_nodes
+from cgraph.autodiff.ldl_solve import ldl_solve
+from cgraph.autodiff.reverse import cotangents
+from cgraph.core.label import building
+from cgraph.simplify.builder import Builder, folded
+
+from ..systems.system import System, as_system
+from .equations_of_motion import SHORT, forward_dynamics
+from .evaluate_at import Array, at_state
+from .formulations import ONE, ZERO, inverse_dynamics
+
+
+def linearization(model: Any) -> Graph:
+    """A and B of d(xdot) = A dx + B dtau, x = (q, qd), at any state.
+
+    From tau(q, qd, qdd) = const: M dqdd = dtau - (d tau / dx) dx, at the qdd of forward dynamics. That takes half the
+    nodes of differentiating forward dynamics itself. M is factored densely up to 6 coordinates, else eliminated on the
+    graph of L, which also keeps the digits of a long chain.
+
+    Inputs q0.., qd0.., tau0.., t if needed, parameters; outputs A_0_0, .., (2n, 2n), and B_0_0, .., (2n, n).
+    Raises SingularMassMatrixError for a coordinate without inertia.
+    """
+    system = as_system(model)
+    n, build = system.n, Builder()
+    accelerations = forward_dynamics(system)
+    (lagrangian,) = folded([system.lagrangian], Builder())
+    slopes = _slopes(system, list(accelerations.outputs.values()), build)
+    with building(build):
+        sides = [[-row[j] for row in slopes] for j in range(2 * n)]
+    sides += [[ONE if i == j else ZERO for i in range(n)] for j in range(n)]
+    if n <= SHORT:
+        lower = hessian_nodes(lagrangian, system.qd, build)
+        columns = [ldl_solve(lower, side, build) for side in sides]
+    else:
+        columns = [solve_nodes(lagrangian, system.qd, side, build) for side in sides]
+    rows = [[ONE if j == n + i else ZERO for j in range(3 * n)] for i in range(n)]
+    rows += [[column[i] for column in columns] for i in range(n)]
+    outputs = {f"A_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[: 2 * n])}
+    outputs |= {f"B_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[2 * n :])}
+    return cg.simplify(Graph(accelerations.inputs, outputs))
+
+
+def _slopes(system: System, accelerations: list[Node], build: Builder) -> list[list[Node]]:
+    """Rows of d tau / d(q, qd), (n, 2n), at these accelerations."""
+    torques = inverse_dynamics(system)
+    state = [*system.q, *system.qd]
+    rows = [cotangents({torque: ONE}, state, build) for torque in torques.outputs.values()]
+    entries = {str(k): entry for k, entry in enumerate([entry for row in rows for entry in row])}
+    at = dict(zip([str(node.name) for node in system.qdd], accelerations, strict=True))
+    flat = list(cg.specialize(Graph([*torques.inputs, *system.tau], entries), at).outputs.values())
+    return [flat[i * len(state) : (i + 1) * len(state)] for i in range(system.n)]
+
+
+def linearize(
+    model: Any,
+    q: ArrayLike,
+    qd: ArrayLike,
+    tau: ArrayLike | None = None,
+    *,
+    t: float = 0.0,
+    parameters: Mapping[str, float] | None = None,
+) -> tuple[Array, Array]:
+    """A, (2n, 2n), and B, (2n, n), of d(xdot) = A dx + B dtau, x = (q, qd), at a state and applied forces (default 0).
+
+    q, qd, tau: (n,).  parameters: {name: value} in place of the model's own. For many states, compile `linearization`.
+    Raises ValueError for arrays of another shape, and as `linearization`.
+    """
+    system = as_system(model)
+    n = system.n
+    flat = at_state(system, linearization(system), {"q": q, "qd": qd, "tau": tau}, t, parameters)
+    if flat.ndim != 1:
+        raise ValueError(f"linearize takes one state, q, qd and tau of the shape ({n},)")
+    return flat[: 4 * n * n].reshape(2 * n, 2 * n), flat[4 * n * n :].reshape(2 * n, n)

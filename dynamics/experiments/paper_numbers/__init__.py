@@ -1,0 +1,1 @@
+"""The numbers of Kusaka and Tanaka (2025), measured."""

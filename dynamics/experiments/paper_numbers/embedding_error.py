@@ -1,0 +1,65 @@
+"""The law of the embedding: the error of the by-definition and kinetic-only torques against dt, and its limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import cgraph as cg
+
+from ...equations.formulations import inverse_dynamics
+from ...multibody.planar_arm import planar_arm
+from ...systems.system import as_system
+from .fit import exponent
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+STEPS = tuple(10.0 ** (-k / 2) for k in range(4, 13))  # s, 1e-2 to 1e-6
+
+
+@dataclass(frozen=True)
+class Law:
+    """At one state of a model: how far a formulation's torque is from the true one, and from its limit.
+
+    error, distance: (len(dt),) largest entries [N m].  limit: (n,), the part of tau + limit that stays as dt -> 0.
+    slope: fitted power of dt in `distance`.
+    """
+
+    formulation: str
+    n: int
+    dt: Array
+    error: Array  # |tau_formulation - tau|
+    distance: Array  # |tau_formulation - (tau + limit)|
+    limit: Array  # dL/dq by definition, dK/dq for kinetic only
+    slope: float
+
+
+def law(model: Any, q: Array, qd: Array, qdd: Array, formulation: str, steps: Sequence[float] = STEPS) -> Law:
+    """The law at the state (q, qd, qdd), each (n,), for "euler_embedded" or "kinetic_only"."""
+    system = as_system(model)
+    energy = {"euler_embedded": system.lagrangian, "kinetic_only": system.kinetic}[formulation]
+    parameters = list(system.parameters.values())
+    true = cg.compile(inverse_dynamics(system))(np.concatenate([q, qd, qdd, parameters]))
+    slopes = cg.jacobian(system.graph({"E": energy}, system.q, system.qd), wrt=system.q)
+    limit = cg.compile(slopes)(np.concatenate([q, qd, parameters]))
+    flawed = cg.compile(inverse_dynamics(system, formulation))
+    error, distance = [], []
+    for dt in steps:
+        tau = flawed(np.concatenate([q - qd * dt, qd - qdd * dt, qdd, [dt], parameters]))
+        error.append(np.abs(tau - true).max())
+        distance.append(np.abs(tau - true - limit).max())
+    fitted = exponent(steps, distance) if min(distance) > 0 else float("nan")
+    return Law(formulation, system.n, np.array(steps), np.array(error), np.array(distance), limit, fitted)
+
+
+def law_of_arms(counts: Sequence[int] = (1, 2, 3, 6), seed: int = 0) -> list[Law]:
+    """The law of both flawed formulations at a random state of arms of 1, 2, 3 and 6 links."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for n in counts:
+        arm = planar_arm(rng.uniform(0.5, 1.5, n).tolist(), rng.uniform(0.5, 1.5, n).tolist())
+        q, qd, qdd = rng.uniform(-1.0, 1.0, (3, n))
+        found += [law(arm, q, qd, qdd, formulation) for formulation in ("euler_embedded", "kinetic_only")]
+    return found

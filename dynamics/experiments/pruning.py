@@ -1,0 +1,63 @@
+"""Pruning report: what a scene's graphs hold and what was left out of them, as plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from cgraph import Graph
+
+from ..equations.equations_of_motion import forward_dynamics
+from ..equations.formulations import inverse_dynamics
+from ..multibody.pruning import EFFECTS, Equations, LeftOut, Pruned, prune
+from ..scenes.scenes import Scene
+
+EQUATIONS: dict[str, Equations] = {"inverse dynamics": inverse_dynamics, "forward dynamics": forward_dynamics}
+
+
+def report(
+    scene: Scene,
+    *,
+    effects: Iterable[str] = EFFECTS,
+    lock: Mapping[str, float] | None = None,
+    values: Mapping[str, float] | None = None,
+    regroup: bool = True,
+) -> dict[str, Any]:
+    """What `prune` makes of a scene's inverse and forward dynamics, for JSON.
+
+    effects, lock, regroup: as of `prune`.  values: the same, where the equations have that input.
+    """
+    kept = tuple(effects)
+    found = []
+    for title, equations in EQUATIONS.items():
+        known = _inputs(equations(scene))
+        bound = {name: value for name, value in (values or {}).items() if name in known}
+        pruned = prune(scene, equations, effects=kept, lock=lock, values=bound, regroup=regroup)
+        found.append({"equations": title, **_account(pruned)})
+    return {"name": scene.name, "about": scene.about, "effects": list(kept), "graphs": found}
+
+
+def _inputs(graph: Graph) -> set[str]:
+    """Names of the inputs, and of their groups."""
+    return {part for name in graph.input_names for part in (name, name.rstrip("0123456789"))}
+
+
+def _account(pruned: Pruned) -> dict[str, Any]:
+    full, left = pruned.full.counts().by_tag, pruned.graph.counts().by_tag
+    return {
+        "full": _size(pruned.full),
+        "pruned": _size(pruned.graph),
+        "left_out": [_row(each) for each in pruned.left_out],
+        "absent": [_row(each) for each in pruned.absent],
+        "remains": [_row(each) for each in pruned.remains],
+        "by_tag": {tag: [full.get(tag, 0), left.get(tag, 0)] for tag in sorted({*full, *left})},
+    }
+
+
+def _size(graph: Graph) -> dict[str, int]:
+    counts = graph.counts()
+    return {"nodes": counts.nodes, "edges": counts.edges, "depth": counts.depth}
+
+
+def _row(each: LeftOut) -> dict[str, Any]:
+    return {"what": each.what, "why": each.why, "nodes": each.nodes, "edges": each.edges}

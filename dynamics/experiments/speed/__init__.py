@@ -1,0 +1,1 @@
+"""Speed: our machine code beside other software, on the same tasks in turns."""

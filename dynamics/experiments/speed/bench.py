@@ -1,0 +1,181 @@
+"""The bench: tasks of mechanics on a few models by our compiled graph and by its peers, in turns in one run."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from ...peers import PEERS, Case
+from ...peers.case import TASKS, Array
+from ...peers.contender import MODES
+from .bench_scenes import QUICK, SCENES, model
+from .worker import Load, Prepared, Worker
+
+OURS = "ours"
+AGREES = 1e-8  # largest relative difference that passes without a flag: rounding on a long chain, and no more
+FEWEST, LONG = 3, 5.0  # turns of a peer that takes longer than so many seconds for all of its turns
+CONTAINS = {"rk4": "forward"}  # who is late with the second is not asked for the first
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One peer on one task of one scene in one mode.
+
+    micros: median time of an evaluation [us].  low, high: quartiles.  made: from the model to the first result [s].
+    difference: largest, from ours, over the largest entry of ours; of a step or a loop, that of the motion.
+    size: nodes or instructions, where they can be counted.
+    """
+
+    micros: float
+    low: float
+    high: float
+    made: float
+    difference: float
+    size: int | None
+
+
+@dataclass(frozen=True)
+class Row:
+    """One scene, task and mode.  skipped: {peer: reason}, of peers that are installed and have such a function."""
+
+    scene: str
+    task: str
+    mode: str
+    coordinates: int
+    cells: dict[str, Cell] = field(default_factory=dict)
+    skipped: dict[str, str] = field(default_factory=dict)
+
+
+def bench(
+    scenes: Sequence[str] = tuple(SCENES),
+    tasks: Sequence[str] = tuple(TASKS),
+    modes: Sequence[str] = tuple(MODES),
+    peers: Sequence[str] = tuple(PEERS),
+    *,
+    repeats: int = 15,
+    budget: float = 60.0,
+    ignore: bool = False,
+    say: Callable[[str], None] = lambda line: None,
+) -> Iterator[Row]:
+    """Rows, scene by scene, as they are measured. Ours is among the peers in any case.
+
+    scenes: names among `SCENES`, of `dynamics.scenes`, or paths of model files.  repeats: turns of each peer.
+    budget: seconds that a peer may take to make one task in one mode.  ignore: leave out what a file's mechanism cannot
+    have.  say: takes lines of progress.
+    Raises ValueError for an unknown name or a budget that is not positive, RuntimeError when ours is not ready in time.
+    """
+    for what, given, known in (("task", tasks, TASKS), ("mode", modes, MODES), ("peer", peers, PEERS)):
+        if unknown := [name for name in given if name not in known]:
+            raise ValueError(f"there is no {what} {unknown[0]!r}; the {what}s are {', '.join(known)}")
+    if not budget > 0.0:
+        raise ValueError(f"the budget must be positive, got {budget!r} s")
+    loads: dict[str, Load] = {name: partial(model, name, ignore) for name in scenes}
+    cases = {}
+    for name, load in loads.items():  # a wrong name is told before anything is measured
+        found, left_out = load()
+        cases[name] = Case(name, found)
+        for what in left_out:
+            say(f"{name}: left out {what}")
+    wanted = [name for name, kind in PEERS.items() if name == OURS or (name in peers and kind.installed)]
+    asked = {task: [mode for mode in MODES if mode in modes] for task in TASKS if task in tasks}
+    return _rows(cases, loads, asked, wanted, repeats, budget, say)
+
+
+def _rows(
+    cases: dict[str, Case],
+    loads: dict[str, Load],
+    asked: dict[str, list[str]],
+    peers: list[str],
+    repeats: int,
+    budget: float,
+    say: Callable[[str], None],
+) -> Iterator[Row]:
+    for scene, case in cases.items():
+        late: dict[str, dict[str, str]] = {}
+        for task, modes in asked.items():
+            late[task] = dict(late.get(CONTAINS.get(task, ""), {}))
+            crew = Crew(loads[scene], peers, budget, late[task])
+            try:
+                for mode in modes:
+                    say(f"{scene}, {task}, {mode}")
+                    yield _row(case, task, mode, crew, repeats)
+            finally:
+                crew.end()
+
+
+def _row(case: Case, task: str, mode: str, crew: Crew, repeats: int) -> Row:
+    row = Row(case.name, task, mode, case.n)
+    ready = crew.prepared(task, mode, row.skipped)
+    samples: dict[str, list[float]] = {peer: [] for peer in ready}
+    used = dict.fromkeys(ready, 0.0)
+    for turn in range(repeats):  # in turns, so that all share the machine's moods
+        for peer in [each for each in ready if turn < FEWEST or used[each] < LONG]:
+            begin = time.perf_counter()
+            try:
+                samples[peer].append(1e6 * crew.workers[peer].turn(task, mode))
+            except RuntimeError as error:
+                row.skipped[peer] = str(error)
+                del ready[peer]
+            used[peer] += time.perf_counter() - begin
+    if OURS not in ready:
+        raise RuntimeError(f"{case.name}, {task}, {mode}: no figures of ours to compare with: {row.skipped[OURS]}")
+    start = _start(case, task, mode)
+    expected = ready[OURS].values - start
+    for peer, made in ready.items():
+        low, middle, high = np.percentile(samples[peer], (25, 50, 75)).tolist()
+        difference = float(np.abs(made.values - start - expected).max() / np.abs(expected).max())
+        row.cells[peer] = Cell(middle, low, high, made.seconds, difference, made.size)
+    return row
+
+
+def _start(case: Case, task: str, mode: str) -> Array:
+    """What the values of a step or a loop are measured from: they move little, and it is the motion that counts."""
+    if mode == "loop":
+        return case.point(task)
+    if task == "rk4":
+        return case.points(task) if mode == "batch" else case.point(task)
+    return np.zeros(1)
+
+
+class Crew:
+    """A worker for each peer on one task of one scene.  late: {peer: why it is not asked any more}."""
+
+    def __init__(self, load: Load, peers: Sequence[str], budget: float, late: dict[str, str]) -> None:
+        self.load, self.peers, self.budget, self.late = load, peers, budget, late
+        self.workers: dict[str, Worker] = {}
+
+    def prepared(self, task: str, mode: str, skipped: dict[str, str]) -> dict[str, Prepared]:
+        """The peers that are ready; why others are not goes to `skipped`."""
+        ready = {}
+        for peer in self.peers:
+            if (task, mode) not in PEERS[peer].offers:
+                continue
+            if peer in self.late:
+                skipped[peer] = self.late[peer]
+                continue
+            worker = self._worker(peer)
+            answer = worker.prepare(task, mode, self.budget)
+            if isinstance(answer, Prepared):
+                ready[peer] = answer
+            else:
+                skipped[peer] = answer.reason
+                if not worker.alive:
+                    self.late[peer] = answer.reason
+        return ready
+
+    def _worker(self, peer: str) -> Worker:
+        if peer not in self.workers or not self.workers[peer].alive:
+            self.workers[peer] = Worker(self.load, peer)
+        return self.workers[peer]
+
+    def end(self) -> None:
+        """End all processes."""
+        for worker in self.workers.values():
+            worker.end()
+
+
+__all__ = ["AGREES", "MODES", "OURS", "PEERS", "QUICK", "SCENES", "TASKS", "Cell", "Row", "bench"]

@@ -1,0 +1,72 @@
+"""The bench's own scenes: planar chains, 3D arms and a tree, of sizes that show how cost grows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ... import scenes
+from ...multibody.body import WORLD, Body, Joint
+from ...multibody.mechanism import Mechanism
+from ...multibody.planar_arm import planar_arm
+from ...multibody.spatial import rotation
+
+
+def turned_arm(n: int) -> Mechanism:
+    """A 3D arm of n revolute joints, full inertias, frames turned by quarter turns."""
+    rng = np.random.default_rng(n)
+    return Mechanism([_body(i, WORLD if i == 0 else f"link{i}", rng) for i in range(n)])
+
+
+def binary_tree(n: int) -> Mechanism:
+    """A tree of n revolute bodies, each with two children until there are n."""
+    rng = np.random.default_rng(n)
+    return Mechanism([_body(i, WORLD if i == 0 else f"link{(i - 1) // 2 + 1}", rng) for i in range(n)])
+
+
+def _body(i: int, parent: str, rng: np.random.Generator) -> Body:
+    mixed = rng.normal(size=(3, 3))
+    second = 0.05 * mixed @ mixed.T + 0.01 * np.eye(3)  # of mass; any such matrix is a body's
+    turn = rotation(np.array([1.0, 0.0, 0.0]), (0.0, math.pi / 2, -math.pi / 2)[i % 3])
+    return Body(
+        f"link{i + 1}",
+        Joint("revolute", position=(0.1, 0.0, 0.3) if i else (0.0, 0.0, 0.0), orientation=turn, damping=0.1),
+        parent,
+        mass=float(rng.uniform(1.0, 2.0)),
+        center=0.1 * rng.normal(size=3),
+        inertia=np.trace(second) * np.eye(3) - second,
+    )
+
+
+SCENES: dict[str, Callable[[], Any]] = {
+    "planar 3": lambda: planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7], damping=0.1),
+    "planar 7": lambda: planar_arm([0.5] * 7, [0.5] * 7, damping=0.1),
+    "planar 20": lambda: planar_arm([0.2] * 20, [0.2] * 20, damping=0.1),
+    "planar 50": lambda: planar_arm([0.1] * 50, [0.1] * 50, damping=0.1),
+    "planar 100": lambda: planar_arm([0.1] * 100, [0.1] * 100, damping=0.1),
+    "arm 7": lambda: turned_arm(7),
+    "arm 30": lambda: turned_arm(30),
+    "tree 15": lambda: binary_tree(15),
+}
+QUICK = ("planar 3", "planar 7", "arm 7")
+
+
+def model(name: str, ignore: bool = False) -> tuple[Any, tuple[str, ...]]:
+    """The model of that name, of `SCENES` or else of `dynamics.scenes` or a file, and what it leaves out of the file.
+
+    ignore: leave out what a mechanism cannot have. Raises ValueError for a name that is neither, and as
+    `dynamics.scenes.load` does.
+    """
+    if name in SCENES:
+        return SCENES[name](), ()
+    if name not in scenes.names() and not Path(name).suffix:
+        raise ValueError(
+            f"there is no scene {name!r}; the bench has {', '.join(SCENES)}, the scenes {', '.join(scenes.names())}, "
+            "and files are those that end in .xml or .urdf"
+        )
+    scene = scenes.load(name, **({"ignore": True} if ignore and name not in scenes.names() else {}))
+    return scene.model, scene.left_out

@@ -1,0 +1,181 @@
+"""Tables of the bench, as text for a terminal: a table for each task and mode, scenes down, contenders across."""
+
+from __future__ import annotations
+
+import math
+import platform
+import re
+import statistics
+import string
+import textwrap
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from importlib import metadata
+from pathlib import Path
+
+from cgraph.errors import install
+
+from ...peers import PEERS
+from .bench import AGREES, MODES, OURS, TASKS, Cell, Row
+
+WIDTH = 120  # characters
+HOW = f"{install('bench')}; PyTorch by itself"  # to install what is missing
+GAPS = ("  ", " ")  # between columns: the second where the first is too wide
+
+
+def tables(rows: Sequence[Row], where: str = "") -> str:
+    """All tables of these rows, with what the columns and marks mean.  where: the machine, in words."""
+    shown = [peer for peer in PEERS if any(peer in row.cells or peer in row.skipped for row in rows)]
+    missing = [peer for peer, kind in PEERS.items() if not kind.installed]
+    lines = [
+        *([*textwrap.wrap(where, WIDTH), ""] if where else []),
+        "Medians of alternating turns on one core. In brackets: times ours, above 1 where ours is faster.",
+        f"* the fastest of its row.  ! it differs from ours by more than {AGREES:g}.  - a: not measured, see below.",
+        "",
+        *[f"{peer:<11} {PEERS[peer].about}" for peer in shown],
+        *(textwrap.wrap(f"not installed: {', '.join(missing)} ({HOW})", WIDTH) if missing else []),
+    ]
+    for task, about in TASKS.items():
+        of_task = [row for row in rows if row.task == task]
+        if not of_task:
+            continue
+        lines += ["", "", f"{about[0].upper()}{about[1:]}"]
+        for mode, says in MODES.items():
+            if of_mode := [row for row in of_task if row.mode == mode]:
+                lines += ["", f"{says[0].upper()}{says[1:]} [us]", *_table(of_mode, _times), *_spread(of_mode)]
+        first = [row for row in of_task if row.mode == of_task[0].mode]
+        lines += ["", "From the model to the first result [s], and the nodes of our graph", *_table(first, _made, True)]
+        lines += ["", "Largest difference from ours, over the largest entry", *_table(_worst(of_task), _differences)]
+    return "\n".join(lines)
+
+
+def _times(row: Row) -> dict[str, tuple[str, str]]:
+    """Time, and ratio with marks, of each peer."""
+    ours = row.cells[OURS].micros
+    best = min(cell.micros for cell in row.cells.values())
+    result = {}
+    for peer, cell in row.cells.items():
+        ratio = "" if peer == OURS else f"[{digits(cell.micros / ours, 2)}]"
+        marks = ("*" if cell.micros == best else "") + ("" if agrees(cell) else "!")
+        result[peer] = digits(cell.micros, 3), ratio + marks
+    return result
+
+
+def _made(row: Row) -> dict[str, tuple[str, str]]:
+    return {peer: (digits(cell.made, 2), "") for peer, cell in row.cells.items()}
+
+
+def _differences(row: Row) -> dict[str, tuple[str, str]]:
+    return {
+        peer: (f"{cell.difference:.0e}", "" if agrees(cell) else "!")
+        for peer, cell in row.cells.items()
+        if peer != OURS
+    }
+
+
+def _worst(rows: Sequence[Row]) -> list[Row]:
+    """One row for each scene, of each peer the cell that differs most over the modes."""
+    result: dict[str, Row] = {}
+    for row in rows:
+        kept = result.setdefault(row.scene, Row(row.scene, row.task, row.mode, row.coordinates))
+        for peer, cell in row.cells.items():
+            if peer not in kept.cells or not cell.difference <= kept.cells[peer].difference:
+                kept.cells[peer] = cell
+    return list(result.values())
+
+
+def agrees(cell: Cell) -> bool:
+    """The difference is that of rounding; NaN is not."""
+    return cell.difference <= AGREES
+
+
+def digits(value: float, count: int) -> str:
+    """The number with `count` significant digits, without an exponent."""
+    if not (math.isfinite(value) and value > 0.0):
+        return str(value)
+    return f"{value:.{max(0, count - 1 - math.floor(math.log10(value)))}f}"
+
+
+def _table(rows: Sequence[Row], read: Callable[[Row], dict[str, tuple[str, str]]], nodes: bool = False) -> list[str]:
+    """Lines of a table; blocks of columns under each other where they do not fit, then its footnotes."""
+    cells = {row.scene: read(row) for row in rows}
+    notes: dict[str, str] = {}  # reason: letter
+    shown = [peer for peer in PEERS if any(peer in cells[row.scene] for row in rows)]
+    unseen: dict[str, str] = {}  # peer: reason, where it is the same for all
+    for row in rows:
+        for peer, reason in row.skipped.items():
+            if peer in shown:
+                letter = notes.setdefault(reason, string.ascii_lowercase[min(len(notes), 25)])
+                cells[row.scene][peer] = "-", letter
+            else:
+                unseen[peer] = reason
+    columns = [_column(peer, [cells[row.scene].get(peer, ("", "")) for row in rows]) for peer in shown]
+    if nodes:
+        columns.insert(0, _column("nodes", [(str(row.cells[OURS].size), "") for row in rows]))
+    left = _flush(["scene", *[row.scene for row in rows]])
+    lines: list[str] = []
+    widths, space = [len(column[0]) for column in columns], WIDTH - len(left[0])
+    gap = next((each for each in GAPS if sum(widths) + len(each) * len(widths) <= space), GAPS[-1])
+    for block in _blocks(columns, len(gap), space):
+        lines += [gap.join(parts).rstrip() for parts in zip(left, *block, strict=True)]
+    lines += [f"{letter}: {reason}" for reason, letter in notes.items()]
+    return lines + [f"without {peer}: {reason}" for peer, reason in unseen.items()]
+
+
+def _column(head: str, cells: Sequence[tuple[str, str]]) -> list[str]:
+    """Numbers flush right, what follows them flush left, under a head that stands over the numbers."""
+    after = max(len(right) for _, right in cells)
+    before = max([len(left) for left, _ in cells] + [len(head) - (after + 1 if after else 0)])
+    space = " " if after else ""
+    return [head.rjust(before).ljust(before + len(space) + after)] + [
+        f"{left:>{before}}{space}{right:<{after}}" for left, right in cells
+    ]
+
+
+def _flush(texts: Sequence[str]) -> list[str]:
+    width = max(map(len, texts))
+    return [text.ljust(width) for text in texts]
+
+
+def _blocks(columns: Sequence[list[str]], gap: int, width: int) -> list[list[list[str]]]:
+    blocks: list[list[list[str]]] = [[]]
+    used = 0
+    for column in columns:
+        needed = gap + len(column[0])
+        if blocks[-1] and used + needed > width:
+            blocks.append([])
+            used = 0
+        blocks[-1].append(column)
+        used += needed
+    return blocks
+
+
+def _spread(rows: Sequence[Row]) -> list[str]:
+    """How much the turns of a contender differed."""
+    spreads = {
+        (peer, row.scene): 100.0 * (cell.high - cell.low) / cell.micros
+        for row in rows
+        for peer, cell in row.cells.items()
+    }
+    worst = max(spreads, key=lambda each: spreads[each])
+    usual, most = digits(statistics.median(spreads.values()), 2), digits(spreads[worst], 2)
+    return [f"spread between quartiles: {usual} % of the median as a rule, {most} % at most ({', '.join(worst)})"]
+
+
+def machine() -> str:
+    """The processor and the versions that the figures belong to."""
+    packages = []
+    for name in ("numpy", "llvmlite", "casadi", "pin", "mujoco", "heyoka", "jax", "sympy", "torch"):
+        with suppress(metadata.PackageNotFoundError):
+            packages.append(f"{name} {metadata.version(name)}")
+    return f"{_processor()}, Python {platform.python_version()}, {', '.join(packages)}"
+
+
+def _processor() -> str:
+    try:
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+    except OSError:
+        return platform.processor() or platform.machine()
+    facts = dict(re.findall(r"^(model name|flags)\s*:\s*(.*)$", text, flags=re.MULTILINE))
+    vectors = next((each for each in ("avx512f", "avx2") if each in facts.get("flags", "").split()), "")
+    return " ".join(filter(None, [facts.get("model name", platform.machine()), vectors and f"({vectors})"]))

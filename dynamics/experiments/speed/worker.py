@@ -1,0 +1,179 @@
+"""Worker: a process of its own for one peer on one scene, which prepares contenders and runs them when told.
+
+A peer that takes too long or falls over is ended with its process; the others go on.
+"""
+
+from __future__ import annotations
+
+import gc
+import math
+import multiprocessing
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from importlib import import_module
+from multiprocessing.connection import Connection
+from typing import Any
+
+from ...peers import PEERS, Case, Contender, UnavailableError
+from ...peers.case import Array
+
+Load = Callable[[], tuple[Any, tuple[str, ...]]]  # makes the model anew in the worker; lambdas do not travel
+CHUNK = 2e-3  # s, at least, of runs that are timed together
+_ONE_CORE = {
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false",
+    "TF_CPP_MIN_LOG_LEVEL": "3",
+}
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A contender that is ready.  seconds: from the model to its first result.  values: that result."""
+
+    seconds: float
+    values: Array
+    size: int | None
+
+
+@dataclass(frozen=True)
+class Refused:
+    """A contender that is not, and why."""
+
+    reason: str
+
+
+class Worker:
+    """One peer on one scene, in a process of its own."""
+
+    def __init__(self, load: Load, peer: str) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._pipe, theirs = context.Pipe()
+        self._process = context.Process(target=_serve, args=(theirs, load, peer), daemon=True)
+        with _single_core():
+            self._process.start()
+        theirs.close()
+
+    def prepare(self, task: str, mode: str, budget: float) -> Prepared | Refused:
+        """Make and check the contender for a task and a mode; the process ends if it takes longer than `budget` s."""
+        if (told := self._tell(task, mode)) is not None:
+            return told
+        if not self._pipe.poll(budget):
+            self.end()
+            return Refused(f"not ready within {budget:g} s")
+        answer: Prepared | Refused = self._answer()
+        return answer
+
+    def turn(self, task: str, mode: str) -> float:
+        """Seconds for an evaluation, over as many runs as make a measurable time. Raises RuntimeError when it dies."""
+        answer = self._tell(task, mode) or self._answer()
+        if isinstance(answer, Refused):
+            raise RuntimeError(answer.reason)
+        return float(answer)
+
+    def _tell(self, task: str, mode: str) -> Refused | None:
+        """Send what is asked for; a refusal when nobody is there to read it."""
+        try:
+            self._pipe.send((task, mode))
+        except OSError:  # the pipe broke, or `end` has closed it
+            return self._ended()
+        return None
+
+    def _answer(self) -> Any:
+        try:
+            return self._pipe.recv()
+        except (EOFError, OSError):
+            return self._ended()
+
+    def _ended(self) -> Refused:
+        self._process.join()
+        return Refused(f"its process ended with status {self._process.exitcode}")
+
+    @property
+    def alive(self) -> bool:
+        """It can still be asked."""
+        return self._process.is_alive()
+
+    def end(self) -> None:
+        """End the process, and a compiler that it may have started."""
+        if self._process.is_alive() and self._process.pid:
+            with suppress(ProcessLookupError, AttributeError):  # AttributeError: no process groups on this platform
+                os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.kill()
+        self._process.join()
+        self._pipe.close()
+
+
+def _serve(pipe: Connection, load: Load, name: str) -> None:
+    """The process's side: (task, mode) is prepared when it is new, and timed when it is not."""
+    with suppress(AttributeError, OSError):
+        os.setsid()  # so that a compiler ends with it
+    with suppress(KeyboardInterrupt, EOFError, BrokenPipeError):
+        kind = PEERS[name]
+        with suppress(Exception):  # loading a package is no part of making a contender; what is wrong shows again there
+            import_module(kind.package)
+        contenders: dict[tuple[str, str], tuple[Contender, int]] = {}
+        case, peer = Case(name, load()[0]), None
+        while True:
+            asked = pipe.recv()
+            if asked in contenders:
+                pipe.send(_timed(*contenders[asked]))
+                continue
+            start = time.perf_counter()
+            try:
+                peer = peer or kind.make(case)
+                contender = peer.prepare(*asked)
+                found = contender.run()
+                seconds = time.perf_counter() - start
+                contenders[asked] = contender, _repetitions(contender)
+                pipe.send(Prepared(seconds, contender.result(found), contender.size))
+            except UnavailableError as error:
+                pipe.send(Refused(str(error)))
+            except Exception as error:  # noqa: BLE001 (whatever a peer's own code raises is a line in the report)
+                pipe.send(Refused(f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"))
+
+
+def _repetitions(contender: Contender) -> int:
+    """How many runs make a measurable time."""
+    start = time.perf_counter()
+    contender.run()
+    once = time.perf_counter() - start
+    return max(1, math.ceil(CHUNK / once)) if once < CHUNK else 1
+
+
+def _timed(contender: Contender, repetitions: int) -> float:
+    """Seconds for an evaluation."""
+    run = contender.run
+    gc.disable()
+    try:
+        run()  # other processes have had the caches since
+        start = time.perf_counter()
+        for _ in range(repetitions):
+            run()
+        return (time.perf_counter() - start) / (repetitions * contender.evaluations)
+    finally:
+        gc.enable()
+
+
+@contextmanager
+def _single_core() -> Iterator[None]:
+    """Processes started within run on one core, the same for all, and start no threads to share it."""
+    before = {name: os.environ.get(name) for name in _ONE_CORE}
+    os.environ.update(_ONE_CORE)
+    cores = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
+    try:
+        if cores:
+            os.sched_setaffinity(0, {max(cores)})
+        yield
+    finally:
+        if cores:
+            os.sched_setaffinity(0, cores)
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

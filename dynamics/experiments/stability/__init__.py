@@ -1,0 +1,1 @@
+"""Stability: stiff and extreme cases, a verdict for each."""

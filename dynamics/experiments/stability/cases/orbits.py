@@ -1,0 +1,43 @@
+"""Orbits: Kepler's problem with large eccentricity over many turns."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import cgraph as cg
+
+from ....reference import closed_forms
+from ....systems.system import System
+from .case import GROWN, RTOL, SLACK, Case, Watch, conserved, energy_watch, error_watch
+
+
+def _lagrangian(q: Any, qd: Any, t: Any) -> list[cg.Node]:
+    return [0.5 * (qd[0] ** 2 + qd[1] ** 2), 1.0 / cg.hypot(q[0], q[1])]
+
+
+def kepler(eccentricity: float, orbits: float, growth: float) -> Case:
+    """A unit mass about a unit centre, semi-major axis 1 m, from the pericentre."""
+    start = closed_forms.kepler_start(eccentricity)
+    return Case(
+        name=f"Kepler, e = {eccentricity:g}",
+        about=f"{orbits:g} orbits with a close passage each: the step must change by (1 - e)^1.5",
+        build=lambda: System(_lagrangian, ["x", "y"]),
+        start=start,
+        t_end=2.0 * math.pi * orbits,
+        watch=(
+            energy_watch(0.5),
+            Watch("angular momentum", SLACK * RTOL, "the force is central", math.sqrt(1.0 - eccentricity**2)),
+            error_watch(growth, GROWN),
+        ),
+        size=(2.0, 1.0, 1.0, 1.0),
+        growth=growth,
+        invariants=conserved(**{"angular momentum": lambda q, qd: q[0] * qd[1] - q[1] * qd[0]}),
+        exact=lambda times: closed_forms.kepler(times, eccentricity),
+        method="taylor",
+    )
+
+
+def cases() -> list[Case]:
+    """The rows of this file. All end near the apocentre, where the phase matters least."""
+    return [kepler(0.9, 100.5, 1.0e4), kepler(0.99, 100.5, 9.5e4), kepler(0.999, 20.5, 1.9e5)]

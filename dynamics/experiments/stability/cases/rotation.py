@@ -1,0 +1,144 @@
+"""Rotation: a free body about its middle axis, and the heavy top, in Euler angles away from their singularity."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import cgraph as cg
+
+from ....reference import closed_forms
+from ....systems.ode_system import OdeSystem
+from ....systems.system import System
+from .case import GROWN, RTOL, SLACK, Case, Watch, conserved, conserved_states, energy_watch, error_watch
+
+INERTIA = (1.0, 2.0, 3.0)  # kg m^2, principal
+OMEGA = (0.001, 1.0, 0.002)  # rad/s in the body's axes: about the middle axis, and a little aside
+HEAVY = (0.05, 0.05, 0.02)  # kg m^2, of the top about its tip
+PULL = 1.0  # N m, m g l of the top
+
+
+def spin(q: Any, qd: Any) -> tuple[cg.Node, cg.Node, cg.Node]:
+    """Angular velocity in the body's axes, of Euler angles (precession, tilt, spin) about z, x', z''."""
+    sine, cosine, tilt = cg.sin(q[2]), cg.cos(q[2]), cg.sin(q[1])
+    return (
+        qd[0] * tilt * sine + qd[1] * cosine,
+        qd[0] * tilt * cosine - qd[1] * sine,
+        qd[0] * cg.cos(q[1]) + qd[2],
+    )
+
+
+def rotor(inertia: Sequence[float], pull: float) -> System:
+    """A body with a fixed point. pull: weight times the distance of the centre of mass, along the third axis [N m]."""
+
+    def lagrangian(q: Any, qd: Any, t: Any) -> list[cg.Node]:
+        parts = [0.5 * (moment * omega**2) for moment, omega in zip(inertia, spin(q, qd), strict=True)]
+        return [*parts, -pull * cg.cos(q[1])] if pull else parts
+
+    return System(lagrangian, ["precession", "tilt", "spin"])
+
+
+def _start(inertia: Sequence[float], omega: Sequence[float]) -> tuple[float, ...]:
+    """Euler angles and their rates with the angular momentum along z, where the tilt of a free body stays off 0 and pi.
+
+    The tilt is the angle between the angular momentum and the third axis, and the body never turns about that.
+    """
+    x, y, z = (a * b for a, b in zip(inertia, omega, strict=True))
+    tilt, angle = math.atan2(math.hypot(x, y), z), math.atan2(x, y)
+    across = omega[0] * math.sin(angle) + omega[1] * math.cos(angle)
+    precession = across / math.sin(tilt)
+    tilting = omega[0] * math.cos(angle) - omega[1] * math.sin(angle)
+    return 0.0, tilt, angle, precession, tilting, omega[2] - precession * math.cos(tilt)
+
+
+def _total(q: Any, qd: Any) -> cg.Node:
+    """The square of the angular momentum of the free body."""
+    x, y, z = ((moment * omega) ** 2 for moment, omega in zip(INERTIA, spin(q, qd), strict=True))
+    return x + y + z
+
+
+def euler_equations(growth: float) -> Case:
+    """Euler's equations alone: angular velocity in the body's axes."""
+
+    def rate(w: Any, t: Any) -> list[cg.Node]:
+        i = INERTIA
+        return [
+            ((i[1] - i[2]) / i[0]) * (w[1] * w[2]),
+            ((i[2] - i[0]) / i[1]) * (w[2] * w[0]),
+            ((i[0] - i[1]) / i[2]) * (w[0] * w[1]),
+        ]
+
+    return Case(
+        name="free body about its middle axis, Euler's equations",
+        about="long rests next to an unstable rotation, and sudden flips",
+        build=lambda: OdeSystem(rate, ["w1", "w2", "w3"]),
+        start=OMEGA,
+        t_end=100.0,
+        watch=(
+            Watch("energy", SLACK * RTOL, "no torque does work", 1.0),
+            Watch("momentum", SLACK * RTOL, "no torque", 4.0),
+            error_watch(growth, GROWN),
+        ),
+        size=(1.0, 1.0, 1.0),
+        growth=growth,
+        invariants=conserved_states(
+            energy=lambda w: 0.5 * (INERTIA[0] * w[0] ** 2 + INERTIA[1] * w[1] ** 2 + INERTIA[2] * w[2] ** 2),
+            momentum=lambda w: (INERTIA[0] * w[0]) ** 2 + (INERTIA[1] * w[1]) ** 2 + (INERTIA[2] * w[2]) ** 2,
+        ),
+        exact=lambda times: closed_forms.free_rigid_body(times, INERTIA, OMEGA),
+        method="taylor",
+    )
+
+
+def middle_axis(growth: float) -> Case:
+    """The same motion as a Lagrangian system of three Euler angles."""
+    return Case(
+        name="free body about its middle axis, Euler angles",
+        about="the same flips, with a mass matrix that depends on the angles",
+        build=lambda: rotor(INERTIA, 0.0),
+        start=_start(INERTIA, OMEGA),
+        t_end=100.0,
+        watch=(
+            energy_watch(1.0),
+            Watch("momentum", SLACK * RTOL, "no torque", 4.0),
+            error_watch(growth, GROWN),
+        ),
+        size=(100.0, 1.0, 10.0, 1.0, 1.0, 1.0),
+        growth=growth,
+        invariants=conserved(momentum=_total),
+        method="taylor",
+    )
+
+
+def heavy_top(growth: float) -> Case:
+    """Lagrange's top, fast, let go without precession: its axis nods with cusps."""
+
+    def precession(q: Any, qd: Any) -> cg.Node:
+        x, y, z = (moment * omega for moment, omega in zip(HEAVY, spin(q, qd), strict=True))
+        return cg.sin(q[1]) * (x * cg.sin(q[2]) + y * cg.cos(q[2])) + z * cg.cos(q[1])
+
+    return Case(
+        name="heavy top",
+        about="a fast spin and a slow nod; three integrals of the motion",
+        build=lambda: rotor(HEAVY, PULL),
+        start=(0.0, 0.5, 0.0, 0.0, 0.0, 50.0),
+        t_end=10.0,
+        size=(10.0, 0.5, 500.0, 2.0, 1.0, 50.0),
+        watch=(
+            energy_watch(PULL),
+            Watch("spin momentum", SLACK * RTOL, "the top is symmetric", 1.0),
+            Watch("vertical momentum", SLACK * RTOL, "gravity has no moment about the vertical", 1.0),
+            error_watch(growth, GROWN),
+        ),
+        growth=growth,
+        invariants=conserved(
+            **{"spin momentum": lambda q, qd: HEAVY[2] * spin(q, qd)[2], "vertical momentum": precession}
+        ),
+        method="taylor",
+    )
+
+
+def cases() -> list[Case]:
+    """The rows of this file."""
+    return [euler_equations(1.0), middle_axis(18.0), heavy_top(110.0)]

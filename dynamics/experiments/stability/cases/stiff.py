@@ -1,0 +1,161 @@
+"""Stiff cases: a spring pendulum up to k = 10^12, Van der Pol, Robertson, Prothero and Robinson."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import cgraph as cg
+
+from ....reference import Reference, closed_forms
+from ....reference.solution import from_text
+from ....systems.ode_system import OdeSystem
+from ....systems.system import System
+from .case import ATOL, GROWN, Case, Watch, conserved, conserved_states, energy_watch, error_watch
+
+GRAVITY = 9.81  # m/s^2
+RATIO = 10.0  # of damping to the critical one
+
+
+def spring_pendulum(stiffness: float, damping: float) -> System:
+    """1 kg on a spring of rest length 1 m; q = (extension [m], angle [rad]). Damping [N s/m] along the spring."""
+
+    def lagrangian(q: Any, qd: Any, t: Any) -> list[cg.Node]:
+        length = 1.0 + q[0]
+        return [
+            0.5 * (qd[0] ** 2 + (length * qd[1]) ** 2),
+            GRAVITY * length * cg.cos(q[1]) - 0.5 * stiffness * q[0] ** 2,
+        ]
+
+    return System(lagrangian, ["extension", "angle"], damping=[damping, 0.0])
+
+
+def _undamped(stiffness: float, growth: float | None) -> Case:
+    angle = 1.0
+    start = (GRAVITY * math.cos(angle) / stiffness, angle, 0.0, 0.0)
+    scale = GRAVITY
+    limit = 100.0 * GRAVITY / stiffness + 1e-6
+    watch = [energy_watch(scale)]
+    if growth is None:  # too many oscillations to follow; their mean is known
+        why = "the rigid pendulum is the limit: its distance is of the order of the extension, m g / k"
+        watch.append(Watch("error 1 3", limit, why))
+    else:
+        watch.append(error_watch(growth, GROWN))
+    stretch = GRAVITY / stiffness
+    return Case(
+        name=f"spring pendulum, k = {stiffness:g}",
+        about="a fast oscillation that nothing damps, hardly excited by the start",
+        build=lambda: spring_pendulum(stiffness, 0.0),
+        start=start,
+        t_end=10.0,
+        watch=tuple(watch),
+        stiff=stiffness > 1e6,
+        size=(stretch, 1.0, math.sqrt(stiffness) * stretch, math.sqrt(GRAVITY)),
+        growth=growth,
+        invariants=conserved(),
+        exact=rigid if growth is None else None,
+        method="taylor" if growth is not None else None,
+    )
+
+
+def rigid(times: Sequence[float]) -> Reference:
+    """The limit of an inextensible spring, with extension zero."""
+    rigid = closed_forms.pendulum(times, 1.0, GRAVITY)
+    rows = [("0", q, "0", qd) for q, qd in rigid.decimal]
+    return from_text(rigid.t, rows, rigid.error, f"{rigid.how}, of the limit of a rigid rod")
+
+
+def _damped(stiffness: float, growth: float) -> Case:
+    angle, stretch = 1.0, GRAVITY / stiffness
+    size = (stretch, 1.0, stretch * math.sqrt(GRAVITY), math.sqrt(GRAVITY))
+    damping = 2.0 * RATIO * math.sqrt(stiffness)
+    return Case(
+        name=f"damped spring pendulum, k = {stiffness:g}",
+        about="a fast motion that dies out at once: stiff in the sense of implicit methods",
+        build=lambda: spring_pendulum(stiffness, damping),
+        start=(2.0 * stretch, angle, 0.0, 0.0),
+        t_end=10.0,
+        watch=(error_watch(growth, "the flow's growth: the fast error dies out"),),
+        stiff=True,
+        size=size,
+        atol=tuple([ATOL * each for each in size]),  # the extension may be as small as ATOL itself
+        growth=growth,
+        method="radau",
+    )
+
+
+def van_der_pol(mu: float, growth: float) -> Case:
+    """y'' = mu^2 ((1 - y^2) y' - y), time in units of mu (Hairer and Wanner, "Solving ODEs II", section IV.1)."""
+    return Case(
+        name=f"Van der Pol, mu = {mu:g}",
+        about="slow arcs and jumps of width mu^-2, in the scaled time of the test set",
+        build=lambda: OdeSystem(
+            lambda x, t, p: [x[1], p["mu"] * p["mu"] * ((1.0 - x[0] * x[0]) * x[1] - x[0])], ["y", "z"], {"mu": mu}
+        ),
+        start=(2.0, 0.0),
+        t_end=2.0,
+        watch=(error_watch(growth, "the flow's growth: errors across a slow arc die out, along it they stay"),),
+        stiff=True,
+        size=(2.0, 1.0),
+        growth=growth,
+        method="radau",
+    )
+
+
+def robertson() -> Case:
+    """The reaction of Robertson (1966), to t = 10^11 as in the Test Set for IVP Solvers."""
+    return Case(
+        name="Robertson, to 1e11",
+        about="rates from 0.04 to 3e7 over sixteen decades of time; a negative concentration runs away",
+        build=lambda: OdeSystem(
+            lambda x, t: [
+                -0.04 * x[0] + 1e4 * x[1] * x[2],
+                0.04 * x[0] - 1e4 * x[1] * x[2] - 3e7 * x[1] * x[1],
+                3e7 * x[1] * x[1],
+            ],
+            ["a", "b", "c"],
+        ),
+        start=(1.0, 0.0, 0.0),
+        t_end=1e11,
+        watch=(
+            error_watch(2.1, "errors die out; sizes are those at the end, 2e-8, 8e-14 and 1"),
+            Watch("mass", 1e-12, "a + b + c is linear, and every Runge-Kutta method keeps it to rounding"),
+        ),
+        stiff=True,
+        size=(2e-8, 8e-14, 1.0),
+        growth=2.1,
+        invariants=conserved_states(mass=lambda x: x[0] + x[1] + x[2]),
+        method="radau",
+    )
+
+
+def prothero_robinson(rate: float) -> Case:
+    """x' = -rate (x - cos t) - sin t, whose solution from 1 is cos t."""
+    return Case(
+        name=f"Prothero-Robinson, rate {rate:g}",
+        about="a smooth solution beside a fast decay: methods lose order here",
+        build=lambda: OdeSystem(lambda x, t: [-rate * (x[0] - cg.cos(t)) - cg.sin(t)], ["x"]),
+        start=(1.0,),
+        t_end=10.0,
+        watch=(error_watch(1.0, "errors die out"),),
+        stiff=True,
+        size=(1.0,),
+        growth=0.0,
+        exact=closed_forms.cosine,
+        method="radau",
+    )
+
+
+def cases() -> list[Case]:
+    """The rows of this file."""
+    undamped = {1e2: 9.5, 1e4: 4.0, 1e6: 4.0, 1e8: None, 1e10: None, 1e12: None}
+    damped = {1e2: 2.6, 1e4: 3.9, 1e6: 6.3, 1e8: 7.4, 1e10: 7.5, 1e12: 7.5}
+    return [
+        *[_undamped(k, growth) for k, growth in undamped.items()],
+        *[_damped(k, growth) for k, growth in damped.items()],
+        van_der_pol(1e3, 2.9),
+        van_der_pol(1e6, 2.9),
+        robertson(),
+        prothero_robinson(1e6),
+    ]

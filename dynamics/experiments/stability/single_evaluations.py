@@ -1,0 +1,210 @@
+"""Single evaluations: torques and accelerations in float64 beside fifty digits, in ulps of what rounding the data does.
+
+For y = f(x), x all inputs and parameters (angles, velocities, torques or accelerations, of each link mass, length,
+centre and inertia, damping, gravity), the error is
+    max_i |y_i - exact_i| / (ulp max_i (|y_i| + sum_j |df_i/dx_j| |x_j|)),    ulp = 2^-52.
+The sum is what a relative change of each x_j makes of y_i: the componentwise condition, in the maximum norm. So 1 is
+what rounding the data once would do, whatever the algorithm. The derivatives are the graph's own (`cg.jvp`, of an arm
+whose parameters are inputs), the exact values come from closed formulas in multiprecision.
+
+In double-double the parameters are inputs too. Built in, products of them are rounded when the graph is made, each on
+its own, and then m l_1 l_2, m l_1 and m g no longer belong to one m: with a mass of 1e12 that moves the light links.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Compiled, Graph, Node
+
+from ...equations.equations_of_motion import forward_dynamics
+from ...equations.formulations import inverse_dynamics
+from ...multibody.planar_arm import PlanarArm, planar_arm
+from ...reference.planar_arm_equations import Pair, accelerations, torques
+from ...systems.system import System
+from .known_limits import reason
+from .verdict import Figure, Verdict
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+SECTION = "Single evaluations"
+ULP = 2.0**-52
+BOUND = 10.0  # ulps of the condition
+LINKS, QUICK = (3, 10, 50), (3, 10)
+STATES = 5  # of each arm
+LANES = 9  # of a batch: full vectors and what is left over
+SEED = 2025
+
+
+class Task(NamedTuple):
+    """What is evaluated.  doubled: in double-double, see above."""
+
+    derive: Callable[..., Graph]
+    exact: Callable[..., Pair]
+    doubled: bool = False
+
+
+TASKS = {
+    "inverse dynamics": Task(inverse_dynamics, torques),
+    "forward dynamics": Task(forward_dynamics, accelerations),
+    "forward dynamics in double-double": Task(forward_dynamics, accelerations, doubled=True),
+}
+
+
+@dataclass(frozen=True)
+class Family:
+    """Arms and states: random around 1, changed by these. Masses and lengths of every other link, or of the last."""
+
+    name: str
+    about: str
+    mass: float = 1.0
+    length: float = 1.0
+    last: bool = False  # the last link alone
+    angle: float = 3.0  # rad, the largest
+    velocity: float = 2.0  # rad/s, standard deviation
+
+
+FAMILIES = (
+    Family("ordinary", "masses and lengths about 1, any angles"),
+    Family("nearly straight", "angles of 1e-3 rad: rows of the mass matrix nearly alike", angle=1e-3),
+    Family("angles of 1e8 rad", "the sum of angles is rounded to 1e-8 rad", angle=1e8),
+    Family("angles of 1e15 rad", "the sum of angles is rounded to 0.1 rad", angle=1e15),
+    Family("velocities of 1e8 rad/s", "gravity and torques are lost in rounding", velocity=1e8),
+    Family("velocities of 1e-310 rad/s", "squares of velocities vanish", velocity=1e-310),
+    Family("every other mass 1e-12", "light links between heavy ones", mass=1e-12),
+    Family("last mass 1e-12", "a light link at the end", mass=1e-12, last=True),
+    Family("every other mass 1e12", "heavy links between light ones", mass=1e12),
+    Family("last mass 1e12", "a heavy link at the end of light ones", mass=1e12, last=True),
+    Family("every other length 1e-6", "short links between long ones", length=1e-6),
+    Family("last length 1e-6", "a short link at the end", length=1e-6, last=True),
+    Family("every other length 1e6", "long links between short ones", length=1e6),
+    Family("last length 1e6", "a long link at the end of short ones", length=1e6, last=True),
+)
+
+
+def verdicts(links: Sequence[int] = LINKS, backends: Sequence[str] | None = None) -> Iterator[Verdict]:
+    """A verdict for each task and family, with a figure for each number of links: the worst of states and backends.
+
+    backends: of `cg.compile`; default: Python, and machine code where llvmlite is installed. Each is called at one
+    point and for a batch. Raises ImportError without python-flint.
+    """
+    chosen = tuple(backends or available())
+    for name, task in TASKS.items():
+        arms = [Arms(task, n, chosen) for n in links]
+        for family in FAMILIES:
+            figures = tuple([figure(family, each) for each in arms])
+            case = f"{name}, {family.name}"
+            known = reason(SECTION, case, "", figures)
+            yield Verdict(SECTION, case, family.about, "+".join(chosen), figures, reason=known)
+
+
+def available() -> tuple[str, ...]:
+    """Python, and machine code where llvmlite is installed."""
+    try:
+        cg.compile(cg.Graph([], {"one": 1.0}), "llvm")
+    except ImportError:
+        return ("python",)
+    return ("python", "llvm")
+
+
+def figure(family: Family, arms: Arms) -> Figure:
+    """The worst error over some states, one point at a time and in a batch."""
+    n = arms.n
+    rng = np.random.default_rng([SEED, n])
+    arm = arm_of(family, n, rng)
+    functions = arms.functions(arm)
+    worst = 0.0
+    for _ in range(STATES):
+        q = rng.uniform(-family.angle, family.angle, n)
+        qd, third = family.velocity * rng.normal(size=n), 5.0 * rng.normal(size=n)
+        exact, point = arms.task.exact(arm, q, qd, third), np.concatenate([q, qd, third])
+        size = np.max(np.abs(exact.high) + arms.condition(arm, point))
+        given = arms.with_parameters(arm, point) if arms.task.doubled else point
+        for function in functions:
+            lanes = function.batch(np.repeat(given[:, None], LANES, axis=1))
+            for found in (function(given), lanes[:, 0], lanes[:, -1]):
+                error = np.max(np.abs(exact.deviation(found))) / (ULP * size)
+                worst = float(np.maximum(worst, error))  # NaN stays NaN
+    return Figure(f"{n} links", worst, BOUND, "ulp", "of the condition: some operations one after another, each an ulp")
+
+
+def arm_of(family: Family, n: int, rng: np.random.Generator) -> PlanarArm:
+    """A random arm of the family."""
+    masses, lengths = rng.uniform(0.5, 1.5, n), rng.uniform(0.5, 1.5, n)
+    changed = slice(n - 1, n) if family.last else slice(1, n, 2)
+    masses[changed] *= family.mass
+    lengths[changed] *= family.length
+    return planar_arm(masses.tolist(), lengths.tolist(), damping=0.1)
+
+
+class Arms:
+    """A task for arms of n links: what evaluates it, and its condition."""
+
+    def __init__(self, task: Task, n: int, backends: Sequence[str] = ()) -> None:
+        self.task, self.n, self.backends = task, n, backends
+        self._graph = task.derive(arm_with_parameters(n))
+
+    def functions(self, arm: PlanarArm) -> list[Compiled]:
+        """What evaluates the task, one for each backend; in double-double one for all arms."""
+        return self._doubled if self.task.doubled else self._compiled(self.task.derive(arm))
+
+    @cached_property
+    def _doubled(self) -> list[Compiled]:
+        return self._compiled(cg.double_double(self._graph))
+
+    def _compiled(self, graph: Graph) -> list[Compiled]:
+        return [cg.compile(graph, backend) for backend in self.backends]
+
+    def with_parameters(self, arm: PlanarArm, point: Array) -> Array:
+        """The inputs of the graph whose parameters are inputs: the point (3n,), and then those of the arm."""
+        rows = [(each.mass, each.length, each.center, each.inertia) for each in arm.links]
+        return np.array([*point, *np.array(rows).T.ravel(), *arm.damping, arm.gravity])
+
+    @cached_property
+    def _slopes(self) -> Compiled:
+        return cg.compile(cg.simplify(cg.jvp(self._graph)), "numpy")
+
+    def condition(self, arm: PlanarArm, point: Array) -> Array:
+        """sum_j |df_i/dx_j| |x_j| over all inputs and parameters, (n,), by the JVP of the graph.
+
+        point: (3n,), angles, velocities, and the third.
+        """
+        x = self.with_parameters(arm, point)
+        directions = np.concatenate([np.repeat(x[:, None], len(x), axis=1), np.diag(x)])
+        with np.errstate(all="ignore"):
+            moved: Array = np.abs(self._slopes.batch(directions)).sum(axis=1)
+        return moved
+
+
+def arm_with_parameters(n: int) -> System:
+    """A planar arm whose numbers are parameters, in the order mass0.., length0.., center0.., inertia0.., damping0.., g.
+
+    Written plainly, by positions and velocities of the centres of mass.
+    """
+
+    def lagrangian(q: Sequence[Node], qd: Sequence[Node], t: Node, p: dict[str, Node]) -> list[Node]:
+        partials: list[Node] = []
+        angle, omega, u, v, drop = (cg.constant(0.0) for _ in range(5))
+        for i in range(n):
+            angle, omega = angle + q[i], omega + qd[i]
+            s, c, mass, center = cg.sin(angle), cg.cos(angle), p[f"mass{i}"], p[f"center{i}"]
+            across, up = u + center * (omega * c), v + center * (omega * s)
+            kinetic = 0.5 * mass * (across * across + up * up) + 0.5 * p[f"inertia{i}"] * (omega * omega)
+            partials.append(kinetic + mass * p["g"] * (drop + center * c))
+            length = p[f"length{i}"]
+            u, v, drop = u + length * (omega * c), v + length * (omega * s), drop + length * c
+        return partials
+
+    names = [f"{what}{i}" for what in ("mass", "length", "center", "inertia", "damping") for i in range(n)]
+    return System(
+        lagrangian,
+        [f"joint {i + 1}" for i in range(n)],
+        dict.fromkeys([*names, "g"], 1.0),
+        forces=lambda q, qd, t, p: [-p[f"damping{i}"] * qd[i] for i in range(n)],
+    )

@@ -1,0 +1,192 @@
+"""Cold starts: from a model to the end of its first run, each in a process of its own that finds nothing compiled."""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
+
+from ...equations.state_equation import state_inputs
+from ...peers import Case, UnavailableError
+from ...peers.casadi import CasadiPeer, casadi
+from ...peers.heyoka import heyoka, leave_cache
+from ...simulation.scipy_solvers import PREFIX
+from ...simulation.simulate import simulate
+from .trajectory_peers import MOST, casadi_equations, heyoka_derivatives, heyoka_equations
+from .trajectory_runs import problem_of
+from .trajectory_scenes import Setting, load
+
+RTOL = 1e-9  # of all but heyoka, whose default is the resolution of float64
+LONG = 5.0  # s; what takes longer is started once
+
+
+@dataclass(frozen=True)
+class ColdStart:
+    """seconds: the shortest of the turns; median of them.  loading: of the packages [s], beforehand.
+
+    status: empty, or why there is no figure.
+    """
+
+    name: str
+    about: str
+    seconds: float
+    median: float
+    loading: float
+    turns: int
+    status: str = ""
+
+
+@dataclass(frozen=True)
+class _Start:
+    about: str
+    packages: tuple[str, ...]
+    run: Callable[[Setting], Any]
+    primed: bool = False  # the first start is there to fill a cache, and does not count
+
+
+def _ours(setting: Setting, method: str | None = None) -> None:
+    n = len(state_inputs(setting.model).applied) or len(setting.start)
+    qd = setting.start[n:] if setting.mechanical else None
+    method = method or ("radau" if setting.stiff else "dop853")
+    found = simulate(setting.model, setting.start[:n], qd, setting.t_end, method, rtol=RTOL, atol=RTOL, progress=False)
+    if not found.stats.complete:
+        raise RuntimeError(found.stats.status)
+
+
+def _heyoka(setting: Setting, compact: bool = False, cached: bool = False) -> None:
+    """From the Lagrangian by heyoka's own derivatives; a state equation, or what it cannot derive, from ours."""
+    hy = heyoka()
+    if not cached:
+        leave_cache(hy)
+    try:
+        system = heyoka_derivatives(hy, setting)
+    except UnavailableError:
+        system = heyoka_equations(hy, problem_of(setting))
+    run = hy.taylor_adaptive(system, list(setting.start), compact_mode=compact)
+    outcome, _, _, steps, *_ = run.propagate_until(setting.t_end, max_steps=MOST)
+    if outcome != hy.taylor_outcome.time_limit:
+        raise RuntimeError(f"stopped after {steps} steps")
+
+
+def _casadi(setting: Setting) -> None:
+    """From the Lagrangian by CasADi's own derivatives; a state equation as it is."""
+    ca = casadi()
+    if setting.mechanical:
+        case = Case(setting.name, setting.model)
+        q, qd = ca.SX.sym("q", case.n), ca.SX.sym("qd", case.n)
+        qdd = CasadiPeer(case).function("forward")(ca.vertcat(q, qd, ca.SX.zeros(case.n)))
+        equations = {"x": ca.vertcat(q, qd), "ode": ca.vertcat(qd, qdd)}
+    else:
+        equations = casadi_equations(ca, problem_of(setting))
+    options = {"reltol": RTOL, "abstol": RTOL, "max_num_steps": 1_000_000}
+    ca.integrator("run", "cvodes", equations, 0.0, setting.t_end, options)(x0=list(setting.start))
+
+
+STARTS = {
+    "ours": _Start("our graph, LLVM, and a run of dop853 (radau where it is stiff)", ("llvmlite.binding",), _ours),
+    "scipy": _Start(
+        "our graph, LLVM, and SciPy's DOP853 (Radau where it is stiff) on it",
+        ("llvmlite.binding", "scipy.integrate"),
+        lambda setting: _ours(setting, PREFIX + ("Radau" if setting.stiff else "DOP853")),
+    ),
+    "CasADi": _Start("CasADi's own derivatives in its virtual machine, and a run of CVODES", ("casadi",), _casadi),
+    "heyoka compact": _Start(
+        "heyoka's own derivatives, its Taylor integrator in compact mode at its default tolerance, and a run",
+        ("heyoka",),
+        partial(_heyoka, compact=True),
+    ),
+    "heyoka": _Start("the same, with its code written out", ("heyoka",), _heyoka),
+    "heyoka cached": _Start(
+        "the same, when an earlier process has left the machine code in heyoka's cache on disk",
+        ("heyoka",),
+        partial(_heyoka, cached=True),
+        primed=True,
+    ),
+}
+
+
+def cold_starts(
+    name: str,
+    options: dict[str, Any],
+    wanted: Sequence[str] = tuple(STARTS),
+    *,
+    turns: int = 5,
+    budget: float = 60.0,
+    say: Callable[[str], None] = lambda line: None,
+) -> list[ColdStart]:
+    """Cold starts of a setting, in turns.  name, options: as of `trajectory_scenes.load`.
+
+    budget: seconds after which one is given up.  What needs a package that is not installed is left out.
+    """
+    asked = [each for each in wanted if all(find_spec(package.partition(".")[0]) for package in STARTS[each].packages)]
+    times: dict[str, list[float]] = {each: [] for each in asked}
+    loading, status = dict.fromkeys(asked, 0.0), dict.fromkeys(asked, "")
+    for turn in range(turns):
+        for each in asked:
+            if status[each] or (turn and min(times[each]) > LONG):
+                continue
+            if not turn:
+                say(f"{name}: cold start, {each}")
+            request = {"which": each, "name": name, "options": options}
+            if not turn and STARTS[each].primed:
+                _in_a_process(request, budget)
+            answer = _in_a_process(request, budget)
+            if isinstance(answer, str):
+                status[each] = answer
+            else:
+                times[each].append(answer["seconds"])
+                loading[each] = answer["loading"]
+    result = []
+    for each in asked:
+        found = times[each] or [float("nan")]
+        about = STARTS[each].about
+        row = (min(found), statistics.median(found), loading[each], len(times[each]), status[each])
+        result.append(ColdStart(each, about, *row))
+    return result
+
+
+def _in_a_process(given: dict[str, Any], budget: float) -> dict[str, float] | str:
+    """What `child` printed, or why it did not."""
+    command = [sys.executable, "-c", f"from {__name__} import child; child()"]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    try:
+        done = subprocess.run(
+            command,
+            input=json.dumps(given),
+            capture_output=True,
+            text=True,
+            timeout=budget,
+            check=False,
+            env=environment,
+        )
+    except subprocess.TimeoutExpired:
+        return f"not ready within {budget:g} s"
+    with suppress(ValueError, IndexError):
+        found: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
+        return found
+    lines = done.stderr.strip().splitlines()
+    return (lines[-1] if lines else f"its process ended with status {done.returncode}")[:200]
+
+
+def child() -> None:
+    """The process's side: what to start comes on standard input, how long it took goes to standard output."""
+    given = json.loads(sys.stdin.read())
+    start = STARTS[given["which"]]
+    begin = time.perf_counter()
+    for package in start.packages:
+        import_module(package)
+    loading = time.perf_counter() - begin
+    setting = load(given["name"], **given["options"])
+    begin = time.perf_counter()
+    start.run(setting)
+    sys.stdout.write(json.dumps({"seconds": time.perf_counter() - begin, "loading": loading}))

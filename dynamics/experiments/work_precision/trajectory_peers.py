@@ -1,0 +1,229 @@
+"""Contenders of other software: MuJoCo's integrators, heyoka's Taylor series, CVODES through CasADi."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from ...integrators import Problem
+from ...io.mujoco_model import rollout
+from ...peers import Case, UnavailableError
+from ...peers.casadi import NAMES as CASADI_NAMES, casadi
+from ...peers.heyoka import expressions, heyoka
+from ...peers.mujoco import MujocoPeer
+from ...peers.translate import translated
+from ...simulation.scipy_solvers import PREFIX, SOLVERS
+from ...simulation.trajectory import Array
+from ...systems.system import TIME
+from .trajectory_runs import EQUAL, Contender, Outcome, Scipy
+from .trajectory_scenes import INTERVALS, Setting
+
+EPSILON = 2.0**-52
+COMPACT = 300  # nodes of the rate; beyond, heyoka's code written out takes minutes to compile
+MOST = 100_000  # steps of heyoka and of CVODES
+MUJOCO = {"Euler": 1, "RK4": 4, "implicit": 1, "implicitfast": 1}  # with the orders of their errors
+CVODES: dict[str, dict[str, Any]] = {
+    "BDF": {},
+    "Adams": {"linear_multistep_method": "adams", "nonlinear_solver_iteration": "functional"},
+}
+
+
+class Mujoco(Contender):
+    """One of MuJoCo's integrators in its own native loop (`rollout`), on the model's MJCF, contacts off."""
+
+    kind = EQUAL
+
+    def __init__(self, integrator: str, setting: Setting, smallest: float) -> None:
+        super().__init__(f"MuJoCo {integrator}", "MuJoCo's own equations and loop", setting, smallest)
+        self.order = MUJOCO[integrator]
+        if not setting.mechanical:
+            raise UnavailableError("takes rigid bodies, not a system of first order")
+        self.peer = MujocoPeer(Case(setting.name, setting.model))
+        self.model = self.peer.twin.model
+        self.model.opt.integrator = getattr(self.peer.mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
+        n, order, at = self.peer.case.n, self.peer.order, self.peer.at
+        self.taken = np.concatenate([1 + order, 1 + n + order])  # ours among time, qpos, qvel
+        self.begin = np.concatenate([[0.0], self.start[:n][at], self.start[n:][at]])[None]
+
+    def ready(self, knob: float) -> Callable[[], Outcome]:
+        """See Contender."""
+        states, run = self._states(int(knob))
+
+        def whole() -> Outcome:
+            run()
+            return Outcome(states[0, -1, self.taken], int(knob))
+
+        return whole
+
+    def rows(self, knob: float) -> Array:
+        """See Contender."""
+        steps = int(knob)
+        states, run = self._states(steps)
+        run()
+        every = steps // INTERVALS
+        found: Array = np.vstack([self.start, states[0, every - 1 :: every][:, self.taken]])
+        return found
+
+    def _states(self, steps: int) -> tuple[Array, Callable[[], Any]]:
+        """Where the states of a run go, (1, steps, ..), and the run."""
+        states = np.empty((1, steps, self.begin.shape[1]))
+        native = rollout(self.model, self.begin, states)
+
+        def run() -> None:
+            self.model.opt.timestep = self.setting.t_end / steps  # shared by the runs of all steps
+            native()
+
+        return states, run
+
+    def rates(self, x: Array) -> Array:
+        """See Contender: velocities as they are, accelerations by MuJoCo."""
+        n, order, at = self.peer.case.n, self.peer.order, self.peer.at
+        twin, none = self.peer.twin, np.zeros(self.peer.case.n)
+        found = [twin.accelerations(row[:n][at], row[n:][at], none)[order] for row in x]
+        return np.hstack([x[:, n:], found])
+
+
+class Heyoka(Contender):
+    """heyoka's adaptive Taylor series on our equations, node for node.  compact: its compact mode."""
+
+    tolerances = (1e-4, 1e-7, 1e-10, 1e-12, EPSILON)  # each is compiled anew; the last is its default
+
+    def __init__(self, setting: Setting, smallest: float, problem: Problem) -> None:
+        self.compact = len(problem.rate.nodes) > COMPACT
+        how = "compact mode" if self.compact else "written out"
+        super().__init__("heyoka Taylor", f"heyoka's taylor_adaptive on our equations, {how}", setting, smallest)
+        self.heyoka = heyoka()
+        self.system = heyoka_equations(self.heyoka, problem)
+        self._made: dict[float, Any] = {}
+
+    def integrator(self, knob: float) -> Any:
+        """Compiled for a tolerance, at the start."""
+        if knob not in self._made:
+            options = {} if knob == EPSILON else {"tol": knob}
+            self._made[knob] = self.heyoka.taylor_adaptive(
+                self.system, self.start.tolist(), compact_mode=self.compact, **options
+            )
+        made = self._made[knob]
+        made.time = 0.0
+        made.state[:] = self.start
+        return made
+
+    def ready(self, knob: float) -> Callable[[], Outcome]:
+        """See Contender."""
+        made = self.integrator(knob)
+        t_end, limit = self.setting.t_end, self.heyoka.taylor_outcome.time_limit
+
+        def run() -> Outcome:
+            made.time = 0.0
+            made.state[:] = self.start
+            outcome, _, _, steps, *_ = made.propagate_until(t_end, max_steps=MOST)
+            status = "" if outcome == limit else f"stopped after {steps} steps"
+            return Outcome(made.state.copy(), steps, None, None, status)
+
+        return run
+
+    def rows(self, knob: float) -> Array:
+        """See Contender."""
+        made = self.integrator(knob)
+        times = self.setting.times
+        if times[0] > 0.0:
+            made.propagate_until(times[0], max_steps=MOST)
+        found: Array = made.propagate_grid(times, max_steps=MOST)[-1]
+        result = np.full((len(times), len(self.start)), math.nan)
+        result[: len(found)] = found
+        return result
+
+    def rates(self, x: Array) -> Array:
+        """See Contender."""
+        variables, expressions = zip(*self.system, strict=True)
+        function = self.heyoka.cfunc(list(expressions), list(variables), compact_mode=True)
+        times = {"time": np.zeros(len(x))} if function.is_time_dependent else {}
+        found: Array = function(np.ascontiguousarray(x.T), **times).T
+        return found
+
+
+class Cvodes(Contender):
+    """CVODES as CasADi calls it, on our equations, node for node, in CasADi's virtual machine."""
+
+    tolerances = tuple([10.0**-k for k in range(3, 13)])
+
+    def __init__(self, kind: str, setting: Setting, smallest: float, problem: Problem) -> None:
+        super().__init__(f"CVODES {kind}", "CasADi's cvodes on our equations", setting, smallest)
+        self.casadi = casadi()
+        self.options = CVODES[kind]
+        self.equations = casadi_equations(self.casadi, problem)
+
+    def _function(self, knob: float, times: Sequence[float]) -> Any:
+        options = {"reltol": knob, "abstol": self.absolute(knob), "max_num_steps": MOST, "show_eval_warnings": False}
+        return self.casadi.integrator("run", "cvodes", self.equations, 0.0, list(times), options | self.options)
+
+    def ready(self, knob: float) -> Callable[[], Outcome]:
+        """See Contender."""
+        function, start = self._function(knob, [self.setting.t_end]), self.start.tolist()
+
+        def run() -> Outcome:
+            state = np.array(function(x0=start)["xf"]).ravel()
+            stats = function.stats()
+            return Outcome(state, stats["nsteps"], stats["netfails"], stats["nfevals"])
+
+        return run
+
+    def rows(self, knob: float) -> Array:
+        """See Contender."""
+        times = self.setting.times
+        found = np.array(self._function(knob, times)(x0=self.start.tolist())["xf"]).T
+        result: Array = found
+        return result
+
+    def rates(self, x: Array) -> Array:
+        """See Contender."""
+        ca, parts = self.casadi, self.equations
+        found = ca.Function("rate", [parts["x"], parts["t"]], [parts["ode"]])
+        return np.array([np.array(found(row, 0.0)).ravel() for row in x])
+
+
+def heyoka_equations(hy: Any, problem: Problem) -> list[tuple[Any, Any]]:
+    """Our rate as heyoka's pairs of variable and expression. Raises UnavailableError for an operation it has not."""
+    graph = problem.rate
+    env = {node: hy.time if node.name == TIME else hy.make_vars(f"x_{node.name}") for node in graph.inputs}
+    functions = SimpleNamespace(**vars(hy), where=hy.select, hypot=lambda a, b: hy.sqrt(a * a + b * b))
+    values = translated(graph.nodes, env, functions, number=hy.expression)
+    states = [env[node] for node in graph.inputs[: problem.size]]
+    return list(zip(states, [hy.expression(values[rate]) for rate in graph.outputs.values()], strict=True))
+
+
+def heyoka_derivatives(hy: Any, setting: Setting) -> list[tuple[Any, Any]]:
+    """heyoka's own equations, from the Lagrangian. Raises UnavailableError for what it cannot derive."""
+    if not setting.mechanical:
+        raise UnavailableError("derives equations of a Lagrangian alone")
+    case = Case(setting.name, setting.model)
+    rates, inputs = expressions(case, "forward")
+    rates = hy.subs(rates, {f"last_{i}": hy.expression(0.0) for i in range(case.n)})
+    state = inputs[: 2 * case.n]
+    return list(zip(state, [*state[case.n :], *rates], strict=True))
+
+
+def casadi_equations(ca: Any, problem: Problem) -> dict[str, Any]:
+    """Our rate as CasADi's x, t and ode. Raises UnavailableError for an operation it has not."""
+    graph, x, t = problem.rate, ca.SX.sym("x", problem.size), ca.SX.sym("t")
+    env = dict(zip(graph.inputs, [*ca.vertsplit(x), t], strict=True))
+    values = translated(graph.nodes, env, ca, CASADI_NAMES, ca.SX)
+    return {"x": x, "t": t, "ode": ca.vertcat(*[values[rate] for rate in graph.outputs.values()])}
+
+
+def offers(setting: Setting, smallest: float, problem: Problem, backend: str) -> dict[str, Callable[[], Contender]]:
+    """The peers that could be asked, by name; making one raises ImportError, UnavailableError or ValueError."""
+    found: dict[str, Callable[[], Contender]] = {}
+    for solver in SOLVERS:
+        found[f"{PREFIX}{solver}"] = partial(Scipy, solver, setting, smallest, problem, backend)
+    for integrator in MUJOCO:
+        found[f"MuJoCo {integrator}"] = partial(Mujoco, integrator, setting, smallest)
+    found["heyoka Taylor"] = partial(Heyoka, setting, smallest, problem)
+    for kind in CVODES:
+        found[f"CVODES {kind}"] = partial(Cvodes, kind, setting, smallest, problem)
+    return found

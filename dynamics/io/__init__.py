@@ -1,0 +1,1 @@
+"""Files of models: MJCF and URDF, read and written, and MuJoCo twins."""

@@ -1,0 +1,272 @@
+"""Pruning: the graph of what a question needs, and what was left out of it, why, and how many nodes that saved."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Graph
+
+from ..equations.equations_of_motion import gravity_force
+from ..equations.formulations import inverse_dynamics
+from ..systems.system import System, as_system
+from .body import Body
+from .mechanism import Mechanism
+from .planar_arm import PlanarArm
+
+EFFECTS = ("gravity", "damping", "springs", "armature", "forces")
+FREE_FALL = (0.0, 0.0, -9.81)  # m/s^2, put in to count what gravity would take
+SKEW = (-3.0, -5.0, -7.0)  # m/s^2, along no axis
+NUMBER = 0.3  # put in for a damping, stiffness, .. that a model has not
+GROUPS = ("q", "qd", "qdd", "tau")
+_JOINT = {"damping": "damping", "springs": "stiffness", "armature": "armature"}
+NEVER = "unobservable inertial numbers"
+
+Equations = Callable[[Any], Graph]
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Something that is not in a graph.  nodes, edges: how many more there would be with it."""
+
+    what: str
+    why: str
+    nodes: int
+    edges: int
+
+    def __str__(self) -> str:
+        return f"{self.what}: {self.why} ({self.nodes} nodes, {self.edges} edges)"
+
+
+@dataclass(frozen=True, eq=False)
+class Pruned:
+    """What `prune` makes: the model that is left and its graph. The accounts are made when they are asked for."""
+
+    model: Any
+    graph: Graph
+    equations: Equations
+    steps: tuple[_Step, ...]  # from the model as given to what is left
+
+    @cached_property
+    def full(self) -> Graph:
+        """The graph of the model as given."""
+        return self.steps[0].graph(self.equations)
+
+    @cached_property
+    def left_out(self) -> tuple[LeftOut, ...]:
+        """What was in the full graph, in the order in which it was taken out: the nodes add up to the difference."""
+        before, result = self.full, []
+        for step in self.steps[1:]:
+            after = self.graph if step is self.steps[-1] else step.graph(self.equations)
+            result.append(LeftOut(step.what, step.why, *_saved(before, after)))
+            before = after
+        return tuple(result)
+
+    @cached_property
+    def absent(self) -> tuple[LeftOut, ...]:
+        """What the model as given has not, so that no graph of it has nodes for it, each counted by putting it in.
+
+        Gravity as on earth or, along the axes of some joints, askew; 0.3 for damping, stiffness and armature; a body of
+        1 kg for one without mass; a hinge in place of a weld.
+        """
+        last = self.steps[-1]
+        result = []
+        for what, why, model in _absent(self.model, self.steps[0].model):
+            with_it = replace(last, model=model).graph(self.equations)
+            result.append(LeftOut(what, why, *_saved(with_it, self.graph)))
+        return tuple(result)
+
+    @cached_property
+    def remains(self) -> tuple[LeftOut, ...]:
+        """What is in the graph though no motion shows it; and the nodes that `regroup` would save."""
+        if not isinstance(self.model, Mechanism) or self.model.regrouped:
+            return ()
+        last = self.steps[-1]
+        without = replace(last, model=replace(self.model, regrouped=True)).graph(self.equations)
+        nodes, edges = _saved(self.graph, without)
+        return (LeftOut(NEVER, "not regrouped", nodes, edges),) if nodes > 0 else ()
+
+    def __str__(self) -> str:
+        lines = [f"{_size(self.full)} as given, {_size(self.graph)} left."]
+        for title, rows in (("Left out", self.left_out), ("Not there", self.absent), ("Remains", self.remains)):
+            if rows:
+                lines += [f"{title}:", *(f"  {row}" for row in rows)]
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """A model and what is asked of it, after `what` was taken out."""
+
+    model: Any
+    values: Mapping[str, float]
+    outputs: tuple[str, ...] | None
+    what: str = ""
+    why: str = ""
+
+    def graph(self, equations: Equations) -> Graph:
+        graph = equations(self.model)
+        if not self.values and self.outputs is None:
+            return graph
+        return cg.specialize(graph, _bound(graph, self.values), self.outputs)
+
+
+def prune(
+    model: Any,
+    equations: Equations = inverse_dynamics,
+    *,
+    effects: Iterable[str] = EFFECTS,
+    lock: Mapping[str, float] | None = None,
+    values: Mapping[str, float] | None = None,
+    outputs: Sequence[str] | None = None,
+    regroup: bool = True,
+) -> Pruned:
+    """The equations of a model with what is asked for and nothing else.
+
+    equations: the function that makes the graph, `inverse_dynamics`, `forward_dynamics`, `mass_matrix`, ...
+    effects: those of gravity, damping, springs, armature, forces that are kept. Of a Lagrangian that is not a
+        mechanism's or an arm's, only damping and forces can be told apart.
+    lock: {body: coordinate} of joints to lock, of a mechanism.
+    values: {input: number} of inputs that become constants: parameters, or the state; "q", "qd", "qdd", "tau" stand for
+        all of their kind, so that {"qd": 0, "qdd": 0} leaves the torques that hold a posture.
+    outputs: names of those to keep.
+    regroup: inertial numbers that no motion shows are given to the bodies further in, where that saves nodes. The graph
+        computes the same, in fewer nodes; the tag of a body then no longer stands for its own inertia alone.
+
+    Inputs that nothing depends on any more stay inputs, so that callers need not change.
+    Raises ValueError for an effect that is unknown or cannot be told apart; as `Mechanism.lock`, as `cg.specialize`.
+    """
+    model = getattr(model, "model", model)  # of a scene
+    kept = list(effects)
+    if unknown := [each for each in kept if each not in EFFECTS]:
+        raise ValueError(f"effects are {', '.join(EFFECTS)}, got {unknown[0]!r}")
+    steps = [_Step(model, {}, None)]
+
+    def take(what: str, why: str, **changes: Any) -> None:
+        steps.append(replace(steps[-1], what=what, why=why, **changes))
+
+    for effect in EFFECTS:
+        if effect not in kept and _has(steps[-1].model, effect):
+            take(effect, "switched off", model=_without(steps[-1].model, effect))
+    for body, at in (lock or {}).items():
+        if not isinstance(model, Mechanism):
+            raise ValueError(f"a joint can be locked of a Mechanism, got {type(model).__name__}")
+        take(f"joint of {body}", f"locked at {at:g}", model=steps[-1].model.lock(body, at))
+    for name, value in (values or {}).items():
+        take(f"input {name}", f"is {value:g}", values={**steps[-1].values, name: value})
+    if outputs is not None:
+        take("other outputs", f"only {', '.join(outputs)} asked for", outputs=tuple(outputs))
+    last = steps[-1].model
+    graph = steps[-1].graph(equations)
+    if regroup and isinstance(last, Mechanism) and not last.regrouped:
+        fewer = replace(steps[-1], model=replace(last, regrouped=True), what=NEVER, why="regrouped")
+        candidate = fewer.graph(equations)
+        if len(candidate.nodes) < len(graph.nodes):
+            steps.append(fewer)
+            graph = candidate
+    return Pruned(steps[-1].model, graph, equations, tuple(steps))
+
+
+def _bound(graph: Graph, values: Mapping[str, float]) -> dict[str, float]:
+    """The values by the graph's own names; a group's for every input of the group."""
+    result: dict[str, float] = {}
+    for name, value in values.items():
+        members = [each for each in graph.input_names if each.startswith(name) and each[len(name) :].isdecimal()]
+        result |= dict.fromkeys(members if name in GROUPS and members else [name], value)
+    return result
+
+
+def _saved(before: Graph, after: Graph) -> tuple[int, int]:
+    return len(before.nodes) - len(after.nodes), len(before.edges) - len(after.edges)
+
+
+def _size(graph: Graph) -> str:
+    return f"{len(graph.nodes)} nodes and {len(graph.edges)} edges"
+
+
+def _has(model: Any, effect: str) -> bool:
+    """Whether the model has an effect. Raises ValueError for one that cannot be told apart."""
+    if isinstance(model, Mechanism):
+        if effect in _JOINT:
+            return any(getattr(body.joint, _JOINT[effect]) for body in model.moving)
+        return bool(np.any(np.asarray(model.gravity))) if effect == "gravity" else bool(model.forces)
+    system = as_system(model)
+    if effect == "damping":
+        return any(system.damping)
+    if effect == "forces":
+        return any(force.value != 0.0 for force in system.forces)
+    if isinstance(model, PlanarArm):
+        return effect == "gravity" and model.gravity != 0.0
+    raise ValueError(f"the Lagrangian of {model!r:.60} is given as a whole: {effect} cannot be told apart in it")
+
+
+def _without(model: Any, effect: str) -> Any:
+    if isinstance(model, Mechanism):
+        if effect == "gravity":
+            return replace(model, gravity=(0.0, 0.0, 0.0))
+        return replace(model, forces=(), parameters={}) if effect == "forces" else _with(model, effect, 0.0)
+    if isinstance(model, PlanarArm):
+        still = (0.0,) * len(model.damping)
+        return replace(model, gravity=0.0) if effect == "gravity" else replace(model, damping=still)
+    system = as_system(model)
+    return System(
+        lambda q, qd, t: system.partial_lagrangians,
+        system.coordinates,
+        system.parameters,
+        forces=(lambda q, qd, t: system.forces) if effect == "damping" else None,
+        damping=0.0 if effect == "damping" else system.damping,
+    )
+
+
+def _with(model: Mechanism, effect: str, number: float, among: Collection[str] | None = None) -> Mechanism:
+    """The mechanism with that damping, stiffness or armature at the joints of those bodies, or at all that move."""
+    change: dict[str, Any] = {_JOINT[effect]: number}
+
+    def changed(body: Body) -> Body:
+        chosen = body.joint.kind != "fixed" if among is None else body.name in among
+        return replace(body, joint=replace(body.joint, **change)) if chosen else body
+
+    return replace(model, bodies=tuple([changed(body) for body in model.bodies]))
+
+
+def _absent(model: Any, given: Any) -> Iterator[tuple[str, str, Any]]:
+    """What, why, and the model with it. given: the model before anything was switched off, which is not absent."""
+    if not isinstance(model, Mechanism):
+        return
+    if not np.any(np.asarray(given.gravity)):
+        yield "gravity", "it is zero", replace(model, gravity=FREE_FALL)
+    elif np.any(np.asarray(model.gravity)):
+        forces = gravity_force(replace(model, bodies=_with(model, "springs", 0.0).bodies)).outputs.values()
+        free = [body.name for body, force in zip(model.moving, forces, strict=True) if force.value == 0.0]
+        if free:
+            yield f"gravity at {_listed(free)}", "it does no work there", replace(model, gravity=SKEW)
+    for effect, name in _JOINT.items():
+        had = {body.name for body in given.moving if getattr(body.joint, name)}
+        without = [body.name for body in model.moving if not getattr(body.joint, name) and body.name not in had]
+        if without:
+            yield f"{effect} of {_listed(without)}", "it is zero", _with(model, effect, NUMBER, without)
+    if massless := [body.name for body in model.bodies if not body.mass and not np.any(np.asarray(body.inertia))]:
+        yield f"mass of {_listed(massless)}", "it is zero", _replaced(model, massless, _heavy)
+    if welds := [body.name for body in model.bodies if body.joint.kind == "fixed" and body.mass]:
+        yield f"joint of {_listed(welds)}", "it is welded on", _replaced(model, welds, _hinged)
+
+
+def _replaced(model: Mechanism, names: Sequence[str], change: Callable[[Body], Body]) -> Mechanism:
+    return replace(model, bodies=tuple([change(body) if body.name in names else body for body in model.bodies]))
+
+
+def _heavy(body: Body) -> Body:
+    return replace(body, mass=1.0, center=(0.1, 0.2, 0.3), inertia=(0.1, 0.2, 0.25))
+
+
+def _hinged(body: Body) -> Body:
+    return replace(body, joint=replace(body.joint, kind="revolute", armature=NUMBER))
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names if len(names) <= 4 else [*names[:3], f"{len(names) - 3} more"])

@@ -1,0 +1,94 @@
+"""The regressor: joint forces as a matrix times the bodies' inertial parameters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph.core.label import building
+from cgraph.simplify.builder import Builder
+
+from ..equations.formulations import inverse_dynamics
+from ..systems.system import System
+from . import spatial
+from .body import WORLD
+from .link import Link, axes_of, carried, energy, ground, link
+from .mechanism import Mechanism
+from .spatial import Array
+
+PARAMETERS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")  # the order of Pinocchio
+_LOWER = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))  # entries of I in that order
+
+
+def regressor(model: Any) -> Graph:
+    """Y(q, qd, qdd) with Y pi = tau - armature qdd - damping qd - spring forces + applied forces.
+
+    pi: for each moving body the ten `PARAMETERS`, see `inertial_parameters`. Each partial Lagrangian is linear in them,
+    so Y is the Jacobian of inverse dynamics by them: one reverse sweep a joint over the graph in which they are
+    variables. A column of zeros is a parameter that no motion reveals; which combinations of the others do, the rank
+    of stacked Y tells.
+
+    model: a Mechanism, or a scene of one.  Inputs q0.., qd0.., qdd0..; outputs Y_0_0, Y_0_1, .. row by row, (n, 10 n).
+    Raises TypeError for another model.
+    """
+    mechanism = _mechanism(model)
+    names = [f"{each}_{i}" for i in range(len(mechanism.moving)) for each in PARAMETERS]
+    system = System(
+        lambda q, qd, t, p: _partial_lagrangians(mechanism, q, qd, [p[name] for name in names]),
+        [body.name for body in mechanism.moving],
+        dict.fromkeys(names, 0.0),
+    )
+    slopes = cg.jacobian(inverse_dynamics(system), names).outputs.values()
+    width = len(names)
+    outputs = {f"Y_{k // width}_{k % width}": slope for k, slope in enumerate(slopes)}
+    return cg.simplify(Graph([*system.q, *system.qd, *system.qdd], outputs))
+
+
+def inertial_parameters(model: Any) -> Array:
+    """(n, 10): of each moving body mass [kg], first moment m c [kg m], and inertia about its joint's origin [kg m^2].
+
+    Rows are as `PARAMETERS`, in the body's axes, all that is welded to it merged in. Raises as `regressor`.
+    """
+    rows = []
+    for body in _mechanism(model).moving:
+        center = np.asarray(body.center)
+        inertia = spatial.about(np.asarray(body.inertia), body.mass, center)
+        rows.append([body.mass, *(body.mass * center), *(inertia[i, j] for i, j in _LOWER)])
+    return np.array(rows)
+
+
+def _mechanism(model: Any) -> Mechanism:
+    mechanism = getattr(model, "model", model)
+    if not isinstance(mechanism, Mechanism):
+        raise TypeError(f"a regressor needs a Mechanism, got {type(mechanism).__name__}: {mechanism!r:.60}")
+    return mechanism
+
+
+def _partial_lagrangians(mechanism: Mechanism, q: list[Node], qd: list[Node], pi: list[Node]) -> list[Node]:
+    motions, axes = {WORLD: ground(mechanism.gravity)}, {WORLD: np.eye(3)}
+    partials = []
+    with building(Builder()):
+        for i, body in enumerate(mechanism.moving):
+            axes[body.name] = axes_of(body)
+            known = link(body, axes[body.parent])
+            with cg.tag(body.name):
+                motions[body.name] = carried(motions[body.parent], known, body.joint.kind, q[i], qd[i])
+                unknown = _symbolic(known, axes[body.name], pi[10 * i : 10 * i + 10])
+                partials.append(energy(motions[body.name], unknown, q[i], qd[i]))
+    return partials
+
+
+def _symbolic(known: Link, axes: Array, pi: list[Node]) -> Link:
+    """The link with its inertial numbers as nodes, turned from the body's axes into those of its motion."""
+    mass, x, y, z, *lower = pi
+    entries = dict(zip(_LOWER, lower, strict=True))
+    inertia = [[entries[max(i, j), min(i, j)] for j in range(3)] for i in range(3)]
+    half = [spatial.turned(axes.tolist(), (row[0], row[1], row[2])) for row in inertia]  # I axes, as I is symmetric
+    columns = [spatial.turned(axes.tolist(), (half[0][j], half[1][j], half[2][j])) for j in range(3)]
+    turned = [[columns[j][i] for j in range(3)] for i in range(3)]
+    moment = spatial.turned(axes.tolist(), (x, y, z))
+    return replace(known, mass=mass, moment=moment, inertia=turned, damping=0.0, stiffness=0.0, rest=0.0, armature=0.0)

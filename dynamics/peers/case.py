@@ -1,0 +1,77 @@
+"""Case: one model of the bench, and the states at which everybody is asked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph.core.traversal import topological
+
+from ..integrators.tableau import RK4
+from ..systems.system import TIME, System, as_system
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+# Each task takes one vector, the blocks end to end, and gives the last block's kind.
+TASKS = {
+    "inverse": "inverse dynamics, (q, qd, qdd) -> tau",
+    "forward": "forward dynamics, (q, qd, tau) -> qdd",
+    "rk4": "one RK4 step, (q, qd) -> (q, qd) after dt, tau = 0",
+}
+BATCH = 4096  # states
+PASSES = 1000  # of a native loop
+DT = 1e-5  # s, the step of RK4: short, so that a thousand of them do not magnify rounding
+NUDGE = 1e-8  # how far a pass moves each block of its input along its result
+
+
+class Case:
+    """A model, its system with its parameters bound, and what goes into each task.
+
+    Raises ValueError for a system that depends on time.
+    """
+
+    def __init__(self, name: str, model: Any) -> None:
+        self.name, self.model = name, model
+        self.system: System = as_system(model)
+        self.n = self.system.n
+        if TIME in [str(node.name) for node in self.system.extra_inputs]:
+            raise ValueError(f"{name} depends on time, and the bench compares systems that do not")
+
+    def bound(self, graph: Graph) -> Graph:
+        """The graph with its parameters at the system's values."""
+        return cg.specialize(graph, dict(self.system.parameters)) if self.system.parameters else graph
+
+    @cached_property
+    def order(self) -> list[Node]:
+        """The nodes of the Lagrangian and the applied forces, arguments first."""
+        return topological([self.system.lagrangian, *self.system.forces])
+
+    def point(self, task: str) -> Array:
+        """The input of one call."""
+        return np.random.default_rng(0).normal(size=self.width(task))
+
+    def points(self, task: str) -> Array:
+        """The inputs of a batch, (n_in, BATCH)."""
+        return np.random.default_rng(1).normal(size=(self.width(task), BATCH))
+
+    def width(self, task: str) -> int:
+        """How many numbers go into a task."""
+        return (2 if task == "rk4" else 3) * self.n
+
+
+def rk4_step(rate: Callable[[Any], Any], x: Any) -> Any:
+    """The state after one RK4 step of `DT` from x, where xdot = rate(x); x: anything with sums and multiples."""
+    slopes: list[Any] = []
+    for weights in (*RK4.a, RK4.b):
+        at = x
+        for weight, slope in zip(weights, slopes, strict=True):
+            if weight:
+                at = at + (DT * weight) * slope
+        if len(slopes) < len(RK4.b):
+            slopes.append(rate(at))
+    return at

@@ -1,0 +1,75 @@
+"""MuJoCo: mj_forward, mj_inverse, and RK4 by mj_step and rollout."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..io.mujoco_model import MujocoTwin, rollout
+from ..multibody.mechanism import Mechanism
+from ..multibody.planar_arm import PlanarArm
+from .case import BATCH, DT, PASSES, Array, Case
+from .contender import Contender, Peer, UnavailableError
+
+
+def joint_names(case: Case) -> list[str]:
+    """Names of the joints in MJCF, in the order of the coordinates. Raises UnavailableError for a bare Lagrangian."""
+    model = getattr(case.model, "model", case.model)  # of a scene
+    if isinstance(model, Mechanism):
+        return [body.name for body in model.moving]
+    if isinstance(model, PlanarArm):
+        return [f"joint{i + 1}" for i in range(len(model.links))]
+    raise UnavailableError("takes rigid bodies, not a Lagrangian")
+
+
+class MujocoPeer(Peer):
+    """MuJoCo on the model's MJCF, contacts off; sensors, actuation and constraints too, as there are none."""
+
+    def __init__(self, case: Case) -> None:
+        super().__init__(case)
+        names = joint_names(case)
+        self.twin = MujocoTwin(getattr(case.model, "model", case.model), timestep=DT)
+        self.mujoco, model = self.twin.mujoco, self.twin.model
+        for unused in ("CONSTRAINT", "SENSOR", "ACTUATION", "WARMSTART"):
+            model.opt.disableflags |= getattr(self.mujoco.mjtDisableBit, f"mjDSBL_{unused}")
+        self.order = np.array([model.joint(name).id for name in names])  # of ours, in theirs
+        self.at = np.argsort(self.order)
+
+    def prepare(self, task: str, mode: str) -> Contender:
+        """See Peer."""
+        if mode != "call":
+            return self._rollout(mode)
+        m, model, data = self.mujoco, self.twin.model, self.twin.data
+        n, x = self.case.n, self.case.point(task)
+        data.qpos[:], data.qvel[:] = x[self.at], x[n + self.at]
+        if task == "forward":
+            data.qfrc_applied[:] = x[2 * n + self.at]
+            return Contender(lambda: m.mj_forward(model, data), lambda _: np.array(data.qacc[self.order]))
+        if task == "inverse":
+            data.qacc[:] = x[2 * n + self.at]
+            return Contender(lambda: m.mj_inverse(model, data), lambda _: np.array(data.qfrc_inverse[self.order]))
+        q, qd = data.qpos.copy(), data.qvel.copy()
+        data.qfrc_applied[:] = 0.0
+
+        def step(_: Any) -> Array:  # the timed steps have gone on from the start
+            data.qpos[:], data.qvel[:] = q, qd
+            m.mj_step(model, data)
+            return np.concatenate([data.qpos[self.order], data.qvel[self.order]])
+
+        return Contender(lambda: m.mj_step(model, data), step)
+
+    def _rollout(self, mode: str) -> Contender:
+        """A thousand steps of one state, or one step of each of many, by MuJoCo's own loop in one thread."""
+        n = self.case.n
+        steps = PASSES if mode == "loop" else 1
+        x = self.case.points("rk4") if mode == "batch" else self.case.point("rk4")[:, None]
+        starts = np.hstack([np.zeros((x.shape[1], 1)), x[self.at].T, x[n + self.at].T])  # time, qpos, qvel
+        states = np.empty((len(starts), steps, starts.shape[1]))
+        taken = np.concatenate([1 + self.order, 1 + n + self.order])
+
+        def result(_: Any) -> Array:
+            last: Array = states[:, -1, taken].T
+            return last.copy() if mode == "batch" else last[:, 0].copy()
+
+        return Contender(rollout(self.twin.model, starts, states), result, BATCH if mode == "batch" else PASSES)

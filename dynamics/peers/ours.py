@@ -1,0 +1,79 @@
+"""Ours: the graph as machine code, and as generated NumPy over arrays."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Graph
+
+from ..equations.equations_of_motion import forward_dynamics
+from ..equations.formulations import inverse_dynamics
+from .case import NUDGE, PASSES, Array, Case, rk4_step
+from .contender import Contender, Peer
+
+
+def task_graph(case: Case, task: str) -> Graph:
+    """Our graph of a task."""
+    if task == "rk4":
+        return step_graph(case.bound(forward_dynamics(case.model)))
+    return case.bound((inverse_dynamics if task == "inverse" else forward_dynamics)(case.model))
+
+
+def step_graph(forward: Graph) -> Graph:
+    """(q0.., qd0..) -> (q0_next.., qd0_next..), one RK4 step without applied torque."""
+    n = len(forward.outputs)
+    rate = cg.specialize(forward, {f"tau{i}": 0.0 for i in range(n)})
+    state = cg.variables([f"q{i}" for i in range(n)] + [f"qd{i}" for i in range(n)])
+    after = rk4_step(lambda x: np.array([*x[n:], *rate(*x).values()]), np.array(state))
+    return cg.simplify(Graph(state, {f"{node.name}_next": x for node, x in zip(state, after, strict=True)}))
+
+
+def carried(case: Case, task: str, graph: Graph) -> tuple[Graph, dict[str, str]]:
+    """One pass of a loop over a task, and what its inputs become: the state after the step, or a nudged input."""
+    if task == "rk4":
+        return graph, dict(zip(graph.input_names, graph.outputs, strict=True))
+    results = list(graph.outputs.values())
+    nudged = [x + NUDGE * results[i % case.n] for i, x in enumerate(graph.inputs)]
+    names = [f"{node.name}_next" for node in graph.inputs]
+    moved = Graph(graph.inputs, dict(zip(names, nudged, strict=True)))
+    return moved, dict(zip(moved.input_names, names, strict=True))
+
+
+class Ours(Peer):
+    """Our graph, compiled by LLVM: the calls `bind`, `cg.loop` and `batch`."""
+
+    def __init__(self, case: Case) -> None:
+        super().__init__(case)
+        self.graph = cache(lambda task: task_graph(case, task))
+        self.function = cache(lambda task: cg.compile(self.graph(task)))
+
+    def prepare(self, task: str, mode: str) -> Contender:
+        """See Peer."""
+        graph, points = self.graph(task), self.case.points(task)
+        size = len(graph.nodes)
+        if mode == "loop":
+            loop, x = cg.loop(*carried(self.case, task, graph)), self.case.point(task)
+            return Contender(lambda: loop(x, PASSES, PASSES), lambda rows: rows[-1], PASSES, size)
+        function = self.function(task)
+        if mode == "batch":
+            return Contender(lambda: function.batch(points), _same, points.shape[1], size)
+        y = np.empty(function.n_out)
+        return Contender(function.bind(self.case.point(task), y), lambda _: y.copy(), 1, size)
+
+
+class OurNumpy(Peer):
+    """Our graph as generated NumPy over arrays: what there is without llvmlite. For batches."""
+
+    def prepare(self, task: str, mode: str) -> Contender:
+        """See Peer."""
+        function, points = cg.compile(task_graph(self.case, task), backend="numpy"), self.case.points(task)
+        return Contender(lambda: function.batch(points), _same, points.shape[1], len(function.graph.nodes))
+
+
+def _same(values: Any) -> Array:
+    array: Array = values
+    return array

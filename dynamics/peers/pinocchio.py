@@ -1,0 +1,103 @@
+"""Pinocchio: rnea and aba, C++ called from Python, and its parallel loops over them on one thread."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..io.mjcf import to_mjcf
+from ..multibody.mechanism import Mechanism
+from .case import BATCH, Array, Case, rk4_step
+from .contender import Contender, Peer, UnavailableError
+from .mujoco import joint_names
+
+
+class PinocchioPeer(Peer):
+    """Pinocchio on the model's MJCF.
+
+    Damping and springs, which its algorithms leave out, are taken off the torque or added to it outside what is timed,
+    except within a step of RK4.
+    """
+
+    def __init__(self, case: Case) -> None:
+        super().__init__(case)
+        import pinocchio
+
+        self.pinocchio = pinocchio
+        names = joint_names(case)
+        model = getattr(case.model, "model", case.model)
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "model.xml"
+            path.write_text(to_mjcf(model), encoding="utf-8")
+            self.twin = pinocchio.buildModelFromMJCF(str(path))
+        # Its reader of MJCF leaves gravity at the default.
+        pull = model.gravity if isinstance(model, Mechanism) else (0.0, 0.0, -model.gravity)
+        self.twin.gravity.linear = np.asarray(pull, dtype=np.float64)
+        self.data = self.twin.createData()
+        self.order = np.array([self.twin.joints[self.twin.getJointId(name)].idx_v for name in names])
+        self.at = np.argsort(self.order)
+        joints = [body.joint for body in model.moving] if isinstance(model, Mechanism) else []
+        self.stiffness = np.array([joint.stiffness for joint in joints] or np.zeros(case.n))
+        self.rest = np.array([joint.rest for joint in joints] or np.zeros(case.n))
+        self.damping = np.array(case.system.damping)
+
+    def _passive(self, x: Array) -> Array:
+        """The torque of dampers and springs against the motion, in our order; x: (2n or 3n,) or with columns."""
+        n = self.case.n
+        damping, stiffness, rest = (
+            each.reshape(-1, *[1] * (x.ndim - 1)) for each in (self.damping, self.stiffness, self.rest)
+        )
+        force: Array = damping * x[n : 2 * n] + stiffness * (x[:n] - rest)
+        return force
+
+    def _arguments(self, x: Array, task: str) -> tuple[Array, Array, Array]:
+        """q, v and the third argument in Pinocchio's order."""
+        n = self.case.n
+        last = x[2 * n :] - self._passive(x) if task == "forward" else x[2 * n :]
+        return x[self.at], x[n + self.at], last[self.at]
+
+    def prepare(self, task: str, mode: str) -> Contender:
+        """See Peer."""
+        if task == "rk4":
+            return self._step()
+        x = self.case.point(task) if mode == "call" else self.case.points(task)
+        added = 0.0 if task == "forward" else self._passive(x)
+        arguments = self._arguments(x, task)
+        if mode == "call":
+            algorithm = self.pinocchio.aba if task == "forward" else self.pinocchio.rnea
+            twin, data = self.twin, self.data
+            return Contender(lambda: algorithm(twin, data, *arguments), lambda y: y[self.order] + added)
+        return self._many("abaInParallel" if task == "forward" else "rneaInParallel", arguments, added)
+
+    def _many(self, name: str, arguments: tuple[Array, ...], added: Any) -> Contender:
+        """Its loop over the columns of a batch, on one thread. Builds without OpenMP lack it."""
+        algorithm = getattr(self.pinocchio, name, None)
+        if algorithm is None:
+            raise UnavailableError(f"this build has no {name}")
+        pool = self.pinocchio.ModelPool(self.twin, 1)
+        columns = [np.asfortranarray(each) for each in arguments]
+        y = np.zeros((self.case.n, BATCH), order="F")
+        return Contender(
+            lambda: algorithm(1, pool, *columns, y),
+            lambda found: (y if found is None else found)[self.order] + added,
+            BATCH,
+        )
+
+    def _step(self) -> Contender:
+        """RK4 in Python over aba."""
+        n, twin, data, aba = self.case.n, self.twin, self.data, self.pinocchio.aba
+        damping, stiffness, rest = self.damping[self.at], self.stiffness[self.at], self.rest[self.at]
+        bare = not stiffness.any()
+
+        def rate(x: Array) -> Array:
+            q, v = x[:n], x[n:]
+            torque = -damping * v if bare else -damping * v - stiffness * (q - rest)
+            return np.concatenate([v, aba(twin, data, q, v, torque)])
+
+        x = self.case.point("rk4")
+        x = np.concatenate([x[self.at], x[n + self.at]])
+        back = np.concatenate([self.order, n + self.order])
+        return Contender(lambda: rk4_step(rate, x), lambda y: y[back])

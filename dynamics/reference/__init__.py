@@ -1,0 +1,7 @@
+"""Multiprecision: reference trajectories to many digits with a stated error, to measure others against."""
+
+from .reference import METHODS, reference
+from .solution import Reference
+from .taylor_integrator import ReferenceFailedError
+
+__all__ = ["METHODS", "Reference", "ReferenceFailedError", "reference"]

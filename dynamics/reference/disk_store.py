@@ -1,0 +1,99 @@
+"""A folder of reference solutions: one JSON file each, named by all that the solution depends on."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from cgraph import Graph
+
+from .solution import Reference, from_text
+
+FORMAT = 1  # part of the name: count it up when the method changes so that old solutions are not what would be computed
+
+
+def key(
+    graph: Graph,
+    states: Sequence[str],
+    start: Sequence[float],
+    times: Sequence[float],
+    given: Mapping[str, float],
+    method: str,
+    digits: int,
+) -> str:
+    """The name of a solution: a hash of the equations by structure, numbers by their bits."""
+    number = {node: i for i, node in enumerate(graph.nodes)}
+    nodes = [
+        (
+            node.op.name,
+            [number[arg] for arg in node.args],
+            None if node.value is None else node.value.hex(),
+            node.name if node.op.name == "variable" else None,
+        )
+        for node in graph.nodes
+    ]
+    rates = [number[node] for node in graph.outputs.values()]
+    numbers = [[float(each).hex() for each in row] for row in (start, times, given.values())]
+    content = [FORMAT, nodes, rates, list(states), list(given), numbers, method, digits]
+    return hashlib.sha256(json.dumps(content).encode()).hexdigest()
+
+
+class Store:
+    """Solutions in a folder, which is made when needed. Several programs may use it at once."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def get(self, name: str, times: Sequence[float], width: int, solve: Callable[[], Reference]) -> Reference:
+        """The solution of that name, at these times with so many states; computed and kept when it is not there."""
+        path = self.folder / f"{name}.json"
+        found = _read(path, times, width)
+        if found is not None:
+            return found
+        solution = solve()
+        self.folder.mkdir(parents=True, exist_ok=True)
+        # Written aside and moved into place, so that a reader sees all of it or nothing.
+        handle, aside = tempfile.mkstemp(dir=self.folder, suffix=".part")
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                json.dump(_signed(solution), file)
+            Path(aside).replace(path)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                Path(aside).unlink()
+            raise
+        return solution
+
+
+def _signed(solution: Reference) -> dict[str, Any]:
+    content = {
+        "t": [each.hex() for each in solution.t],
+        "x": [list(row) for row in solution.decimal],
+        "error": solution.error.hex(),
+        "how": solution.how,
+    }
+    return content | {"sum": _sum(content)}
+
+
+def _sum(content: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _read(path: Path, times: Sequence[float], width: int) -> Reference | None:
+    """The solution in a file, or None when there is none or it is not what was written."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        if content.pop("sum") != _sum(content):
+            return None
+        t = [float.fromhex(each) for each in content["t"]]
+        if t != list(times) or {len(row) for row in content["x"]} != {width}:
+            return None
+        return from_text(t, content["x"], float.fromhex(content["error"]), content["how"])
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return None

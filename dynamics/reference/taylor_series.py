@@ -1,0 +1,305 @@
+"""Taylor series: the coefficients of a solution of xdot = f(x, t), from the graph of f.
+
+Sums, products, quotients and the piecewise operations have recurrences of their own. For every other operation the
+table's partials are the recurrence: with y = op(a, b), ydot = (dy/da) adot + (dy/db) bdot, so coefficient k of y is
+
+    y_k = (1/k) sum over arguments a, sum i = 1..k, of  i a_i g_{k-i},     g the series of the node dy/da.
+
+Only g_0 .. g_{k-1} are asked for, so g may depend on y itself, as for exp, tan or the pair sine and cosine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from operator import mul
+from typing import Any
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph.core.node import as_node
+from cgraph.core.traversal import topological
+
+from ..systems.system import TIME
+from .flint_numbers import VALUES, Number, sign
+
+Push = Callable[[int], None]  # appends coefficient k of one series, those of its arguments being there
+Key = tuple[Any, ...]
+
+POWERS = 64  # whole exponents up to this size become products
+
+
+class Series:
+    """The recurrences of a state equation, and its coefficients at a point.
+
+    graph: inputs the states, then others; outputs the rates in the order of `states`.
+    constants: {name of an input: number} for all inputs but the states and t.
+    number: the constructor of numbers, at the precision at which the series will be used.
+
+    switches: {piecewise node: series whose sign chooses its piece}.  forced: {piecewise node: that sign}, imposed in
+    the next expansion where the value at the point does not tell, as just after a switch.
+    """
+
+    def __init__(self, graph: Graph, states: Sequence[str], constants: Mapping[str, Any], number: Any) -> None:
+        self.number = number
+        self.coefficients: list[list[Number]] = []  # of each series; those of the last expansion
+        self.switches: dict[int, int] = {}
+        self.forced: dict[int, int] = {}
+        self.sides: dict[int, int] = {}  # {piecewise node: the sign that it took}
+        self._number_of: dict[Key, int] = {}  # (operation, arguments): which series
+        self._of_node: dict[Node, int] = {}
+        self._moving: list[bool] = []  # whether a series depends on the state or on t
+        self._slopes: dict[int, list[Number]] = {}  # series: i a_i for i = 1, 2, ..
+        self._push: list[Push] = []
+        for name in graph.input_names:
+            self._append(("variable", name), number(constants[name]) if name in constants else None)
+        self._states = [self._number_of["variable", name] for name in states]
+        self._time = self._number_of.get(("variable", TIME))
+        self._rates = [self._intern(node) for node in graph.outputs.values()]
+
+    def expand(self, x: Sequence[Number], t: Number, order: int) -> list[list[Number]]:
+        """Coefficients 0 .. order >= 1 of each state, around the state x at time t."""
+        while True:
+            self._run(x, t, order)
+            wrong = {
+                node: side
+                for node, switch in self.switches.items()
+                if node not in self.forced and (side := self._side(switch)) != self.sides[node]
+            }
+            if not wrong:
+                return [self.coefficients[i] for i in self._states]
+            self.forced |= wrong
+
+    def rate(self, x: Sequence[Number], t: Number) -> list[Number]:
+        """f(x, t)."""
+        self.forced = {}
+        return [coefficients[1] for coefficients in self.expand(x, t, 1)]
+
+    def _side(self, switch: int) -> int:
+        """The sign of a series just after the point: that of its first coefficient that is not zero."""
+        return next((side for each in self.coefficients[switch] if (side := sign(each))), 0)
+
+    def _run(self, x: Sequence[Number], t: Number, order: int) -> None:
+        for moving, coefficients in zip(self._moving, self.coefficients, strict=True):
+            if moving:
+                coefficients.clear()
+        for slopes in self._slopes.values():
+            slopes.clear()
+        for i, value in zip(self._states, x, strict=True):
+            self.coefficients[i].append(value)
+        for k in range(order):
+            if self._time is not None:
+                self.coefficients[self._time].append(t if k == 0 else self.number(int(k == 1)))
+            for push in self._push:
+                push(k)
+            for i, rate in zip(self._states, self._rates, strict=True):
+                self.coefficients[i].append(self.get(rate, k) / (k + 1))
+
+    def get(self, i: int, k: int) -> Number:
+        """Coefficient k of series i; a constant has one coefficient only."""
+        return self.coefficients[i][k] if k == 0 or self._moving[i] else self.number(0)
+
+    def moving(self, i: int) -> bool:
+        """Whether series i depends on the state or on t."""
+        return self._moving[i]
+
+    def shared(self, name: str, *args: int) -> int:
+        """The series of an operation on series, made when it is not there."""
+        key = (name, *args)
+        if key in self._number_of:
+            return self._number_of[key]
+        if not any(self._moving[i] for i in args):
+            return self._append(key, VALUES[name](*[self.coefficients[i][0] for i in args]))
+        if name in _SWITCHES:
+            switch = self.shared("sub", *args) if len(args) == 2 else args[0]
+            i = self._append(key, None)
+            self.switches[i] = switch
+            self._push.append(_piecewise(self, name, i, switch, *args))
+        else:
+            i = self._append(key, None)
+            self._push.append(_RULES[name](self, i, *args))
+        return i
+
+    def slopes(self, i: int) -> list[Number]:
+        """The list of k a_k, k = 1, 2, .., of series i."""
+        if i not in self._slopes:
+            own, result = self.coefficients[i], self._slopes.setdefault(i, [])
+            self._push.append(lambda k: result.append(k * own[k]) if k else None)
+        return self._slopes[i]
+
+    def _intern(self, root: Node) -> int:
+        """The series of a node, with all it needs. Nothing is folded: a folded constant would be rounded to float64."""
+        waiting = [root]
+        while waiting:
+            for node in topological([waiting.pop()]):
+                if node not in self._of_node:
+                    self._of_node[node] = self._made(node, waiting)
+        return self._of_node[root]
+
+    def _made(self, node: Node, waiting: list[Node]) -> int:
+        name, args = node.op.name, [self._of_node[arg] for arg in node.args]
+        if name == "variable":
+            return self._number_of["variable", node.name]
+        if name == "constant":
+            made = self._number_of.get(("constant", node.value))
+            return self._append(("constant", node.value), self.number(node.value)) if made is None else made
+        if name in _RULES or name in _SWITCHES or not any(self._moving[i] for i in args):
+            return self.shared(name, *args)
+        key = (name, *args)
+        if key not in self._number_of:
+            if name == "pow":
+                self._number_of[key] = self._intern(_power(*node.args))
+            else:
+                self._integral(self._append(key, None), node, args, waiting)
+        return self._number_of[key]
+
+    def _append(self, key: Key, still: Number | None) -> int:
+        i = self._number_of[key] = len(self.coefficients)
+        self._moving.append(still is None)
+        self.coefficients.append([] if still is None else [still])
+        return i
+
+    def _integral(self, i: int, node: Node, args: Sequence[int], waiting: list[Node]) -> None:
+        """The recurrence by the table's partials. They may depend on the node itself, so they are made after it."""
+        self._of_node[node] = i
+        own, value = self.coefficients[i], VALUES[node.op.name]
+        at = [self.coefficients[arg] for arg in args]
+        terms = []
+        for arg, partial in zip(args, map(as_node, node.op.partials(node, *node.args)), strict=True):
+            if self._moving[arg]:
+                terms.append((self.slopes(arg), partial))
+                waiting.append(partial)
+        slopes = [slope for slope, _ in terms]
+        series: list[int] = []
+
+        def push(k: int) -> None:
+            if k == 0:
+                own.append(value(*[coefficients[0] for coefficients in at]))
+                return
+            if not series:
+                series.extend([self._of_node[partial] for _, partial in terms])
+            total = self.number(0)
+            for slope, j in zip(slopes, series, strict=True):
+                if self._moving[j]:
+                    total = sum(map(mul, slope, self.coefficients[j][k - 1 :: -1]), total)
+                else:
+                    total += slope[k - 1] * self.coefficients[j][0]
+            own.append(total / k)
+
+        self._push.append(push)
+
+
+def _power(a: Node, b: Node) -> Node:
+    """a**b by operations that have series: products for a whole exponent, else exp(b log a)."""
+    exponent = b.value
+    if exponent is None or exponent != int(exponent) or abs(exponent) > POWERS:
+        return cg.sqrt(a) if exponent == 0.5 else cg.exp(b * cg.log(a))
+    result: Node | None = None
+    square, rest = a, abs(int(exponent))
+    while rest:
+        if rest & 1:
+            result = square if result is None else result * square
+        rest >>= 1
+        if rest:
+            square = square * square
+    if result is None:
+        return as_node(1.0)
+    return 1.0 / result if exponent < 0 else result
+
+
+def _linear(s: Series, i: int, a: int, b: int, subtract: bool) -> Push:
+    own, first, second = s.coefficients[i], s.coefficients[a], s.coefficients[b]
+    if not s.moving(b):
+        return lambda k: own.append(first[k] if k else (first[0] - second[0] if subtract else first[0] + second[0]))
+    if not s.moving(a):
+        if subtract:
+            return lambda k: own.append(-second[k] if k else first[0] - second[0])
+        return lambda k: own.append(second[k] if k else first[0] + second[0])
+    if subtract:
+        return lambda k: own.append(first[k] - second[k])
+    return lambda k: own.append(first[k] + second[k])
+
+
+def _neg(s: Series, i: int, a: int) -> Push:
+    own, first = s.coefficients[i], s.coefficients[a]
+    return lambda k: own.append(-first[k])
+
+
+def _mul(s: Series, i: int, a: int, b: int) -> Push:
+    own, first, second = s.coefficients[i], s.coefficients[a], s.coefficients[b]
+    if not s.moving(a):
+        return lambda k: own.append(first[0] * second[k])
+    if not s.moving(b):
+        return lambda k: own.append(first[k] * second[0])
+    if a != b:
+        return lambda k: own.append(sum(map(mul, first, second[::-1])))
+
+    def square(k: int) -> None:  # the products that come twice are taken once
+        half = (k + 1) // 2
+        twice = 2 * sum(map(mul, first[:half], first[k : k - half : -1]))
+        own.append(twice if k % 2 else twice + first[half] * first[half])
+
+    return square
+
+
+def _div(s: Series, i: int, a: int, b: int) -> Push:
+    own, first, second = s.coefficients[i], s.coefficients[a], s.coefficients[b]
+    if not s.moving(b):
+        return lambda k: own.append(first[k] / second[0])
+
+    def push(k: int) -> None:  # y b = a
+        known = sum(map(mul, second[1:], own[::-1]))
+        own.append((s.get(a, k) - known) / second[0])
+
+    return push
+
+
+def _strong_mul(s: Series, i: int, a: int, b: int) -> Push:
+    own = s.coefficients[i]
+
+    def push(k: int) -> None:
+        pairs = [(s.get(a, j), s.get(b, k - j)) for j in range(k + 1)]
+        own.append(sum([x * y for x, y in pairs if x != 0 and y != 0], s.number(0)))
+
+    return push
+
+
+_RULES: dict[str, Callable[..., Push]] = {
+    "add": lambda s, i, a, b: _linear(s, i, a, b, subtract=False),
+    "sub": lambda s, i, a, b: _linear(s, i, a, b, subtract=True),
+    "neg": _neg,
+    "mul": _mul,
+    "div": _div,
+    "strong_mul": _strong_mul,
+}
+
+# From the sign of the first argument, or of a - b where there are two, to a factor or to which argument is taken.
+_SWITCHES: dict[str, Callable[[int], int]] = {
+    "where": lambda side: 1 if side else 2,
+    "abs": lambda side: -1 if side < 0 else 1,
+    "sign": lambda side: side,
+    "minimum": lambda side: int(side > 0),
+    "maximum": lambda side: int(side < 0),
+    "less": lambda side: int(side < 0),
+    "less_equal": lambda side: int(side <= 0),
+    "equal": lambda side: int(side == 0),
+    "not_equal": lambda side: int(side != 0),
+}
+
+_CHOICES = ("where", "minimum", "maximum")
+
+
+def _piecewise(s: Series, name: str, i: int, switch: int, *args: int) -> Push:
+    own, decide = s.coefficients[i], _SWITCHES[name]
+
+    def push(k: int) -> None:
+        if k == 0:
+            s.sides[i] = s.forced[i] if i in s.forced else sign(s.coefficients[switch][0])
+        choice = decide(s.sides[i])
+        if name == "abs":
+            own.append(choice * s.coefficients[switch][k])
+        elif name in _CHOICES:
+            own.append(s.get(args[choice], k))
+        else:
+            own.append(s.number(choice if k == 0 else 0))
+
+    return push

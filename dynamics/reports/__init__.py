@@ -1,1 +1,0 @@
-"""Reports: figures measured on scenes, as plain data for a page, a plot or a test."""

@@ -1,0 +1,119 @@
+"""What there is to inspect in a scene: its equations as graphs, their inputs along its motion, its joints' places."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cgraph import Graph, Node
+
+from ..equations.equations_of_motion import forward_dynamics
+from ..equations.formulations import inverse_dynamics, spurious
+from ..multibody.joint_positions import Skeleton, skeleton
+from ..multibody.mechanism import Mechanism
+from ..simulation.simulate import simulate
+from ..systems.system import System
+from .scenes import Scene
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+FORMULATIONS = ("euler_embedded", "kinetic_only", "chain_rule")  # those of the paper, the flawed ones first
+FRAMES, RATE = 150, 30.0  # most instants shown, and how many a second
+DT = 1e-3  # s, the step that the embedded formulations take
+
+
+class Equations(NamedTuple):
+    """A graph of the equations.  about: what to see.  marked: spurious nodes.  at: {input: (T,) or a number}."""
+
+    name: str
+    graph: Graph
+    about: str
+    marked: frozenset[Node]
+    at: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """versions: the equations.  t: (T,) [s].  skeleton: joints along the motion, None where the model has no places.
+
+    shares: {part: torques (n,) [N m or N] at t = 0}, what each partial Lagrangian takes, and the rest; {} for one part.
+    """
+
+    versions: tuple[Equations, ...]
+    t: Array
+    skeleton: Skeleton | None
+    shares: Mapping[str, Array]
+
+
+def inspection(scene: Scene, *, forward: bool = False, t_end: float | None = None) -> Inspection:
+    """The scene's inverse dynamics by the three formulations, or its forward dynamics, along its free motion.
+
+    Raises ValueError for t_end out of range, and as `simulate` does.
+    """
+    system, end = scene.system, scene.t_end if t_end is None else t_end
+    frames = int(min(FRAMES, max(2.0, RATE * end))) if np.isfinite(end) else 2
+    times = np.linspace(0.0, end, frames) if end > 0.0 else None
+    run = simulate(system, scene.q, scene.qd, end, "dopri5", rtol=1e-6, atol=1e-8, t_eval=times)
+    rate = forward_dynamics(system)
+    state = _named(q=run.q, qd=run.qd, tau=np.zeros_like(run.q)) | system.parameters | {"t": run.t}
+    if forward:
+        about = "Accelerations from torques: solved joint by joint from the tip to the base, then back out to the tip."
+        versions = [Equations("forward dynamics", rate, about, frozenset(), _needed(rate, state))]
+    else:
+        found = rate.evaluate(_needed(rate, state))
+        qdd = np.stack([np.broadcast_to(found[f"qdd{i}"], len(run.t)) for i in range(system.n)], axis=1)
+        old = {"q": run.q - DT * run.qd, "qd": run.qd - DT * qdd}
+        state |= _named(qdd=qdd) | {"dt": DT}
+        state |= {f"{name}{i}_old": table[:, i] for name, table in old.items() for i in range(system.n)}
+        versions = [_version(system, name, state) for name in FORMULATIONS]
+    return Inspection(tuple(versions), run.t, skeleton(scene.model, run.q), _shares(scene, state))
+
+
+def _version(system: System, name: str, state: Mapping[str, Any]) -> Equations:
+    graph = inverse_dynamics(system, name)
+    wrong = spurious(graph)
+    if wrong:
+        through = "of the kinetic energy " if name == "kinetic_only" else ""
+        about = (
+            f"Look at what is vermillion: {len(wrong)} of {len(graph.nodes)} nodes. The velocity derivative {through}"
+            "was taken through q = qd dt + q_old, so it reached q as well, and a branch that does not belong there "
+            "runs into the torques. No smaller dt takes it away."
+        )
+    else:
+        about = f"No spurious branch: {len(graph.nodes)} nodes, and the torques that the motion takes."
+    moving = " Nothing drives the joints here, so the torques should be 0." if not wrong else ""
+    return Equations(name, graph, about + moving, wrong, _needed(graph, state))
+
+
+def _named(**tables: Array) -> dict[str, Any]:
+    return {f"{name}{i}": table[:, i] for name, table in tables.items() for i in range(table.shape[1])}
+
+
+def _needed(graph: Graph, state: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: state[name] for name in graph.input_names}
+
+
+def _shares(scene: Scene, state: Mapping[str, Any]) -> dict[str, Array]:
+    """Inverse dynamics of each partial Lagrangian alone, which adds up to the whole but for damping and forces."""
+    system = scene.system
+    parts = system.partial_lagrangians
+    if len(parts) < 2 or "qdd0" not in state or (isinstance(scene.model, Mechanism) and scene.model.regrouped):
+        return {}
+    names = [body.name for body in scene.model.moving] if isinstance(scene.model, Mechanism) else []
+    if len(names) != len(parts):
+        names = [f"link {i + 1}" for i in range(len(parts))]
+
+    def torques(model: System) -> Array:
+        graph = inverse_dynamics(model)
+        at = {name: np.atleast_1d(value)[0] for name, value in _needed(graph, state).items()}
+        return np.array([float(graph.evaluate(at)[f"tau{i}"]) for i in range(system.n)])
+
+    # the parts are nodes over the system's own variables, so a function that gives one makes a system of it
+    shares = {
+        name: torques(System(lambda *_, part=part: part, system.coordinates, system.parameters))
+        for name, part in zip(names, parts, strict=True)
+    }
+    total = torques(system)
+    return shares | {"damping and forces": total - sum(shares.values()), "all": total}

@@ -1,0 +1,118 @@
+"""Scenes: named models and models of files with a start, for examples, figures and the command line."""
+
+from __future__ import annotations
+
+import inspect
+import math
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from numbers import Integral
+from pathlib import Path
+from typing import Any
+
+import cgraph as cg
+from cgraph import Node
+
+from ..io.load import load_model
+from ..multibody.planar_arm import planar_arm
+from ..systems.system import System, as_system
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A model, the state it starts from, and how long it is watched."""
+
+    name: str
+    about: str  # one line
+    model: Any  # a System, or what has one
+    q: tuple[float, ...]  # rad or m
+    qd: tuple[float, ...]  # rad/s or m/s
+    t_end: float  # s
+    left_out: tuple[str, ...] = ()  # of a file, what the model has not: a sentence each
+
+    @property
+    def system(self) -> System:
+        """The Lagrangian system of the model."""
+        return as_system(self.model)
+
+
+def spring_mass() -> Scene:
+    """A rotor of inertia I held by a spring of stiffness k, the one-joint system of Figures 1 to 3."""
+
+    def lagrangian(q: Sequence[Node], qd: Sequence[Node], t: Node, p: Mapping[str, Node]) -> Node:
+        with cg.tag("kinetic"):
+            kinetic = 0.5 * p["I"] * qd[0] ** 2
+        with cg.tag("potential"):
+            potential = 0.5 * p["k"] * q[0] ** 2
+        return kinetic - potential
+
+    system = System(lagrangian, coordinates=["theta"], parameters={"I": 1.0, "k": 1.0})
+    about = "a rotor on a spring, L = I qd^2/2 - k q^2/2 (Figures 1 to 3)"
+    return Scene("spring_mass", about, system, (1.0,), (0.0,), 10.0)
+
+
+def triple_pendulum(model: str = "rod") -> Scene:
+    """The paper's three-link arm: masses 1.0 0.8 0.7 kg, lengths 1.0 0.8 0.7 m, damping 0.1 N m s, in free fall.
+
+    It starts at rest, straight out to the right: q = (pi/2, 0, 0). model: "rod" or "point", as in `planar_arm`.
+    """
+    arm = planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7], damping=0.1, model=model)
+    about = "the three-link arm in free fall (Figures 4 to 6, Table 1)"
+    return Scene("triple_pendulum", about, arm, (math.pi / 2, 0.0, 0.0), (0.0,) * 3, 3.0)
+
+
+def chain(n: int = 10) -> Scene:
+    """A chain of n equal rods, 1 kg and 1 m in all, let go at 45 degrees."""
+    if not isinstance(n, Integral) or n < 1:
+        raise ValueError(f"a chain needs at least one link, got {n!r:.60}")
+    arm = planar_arm([1.0 / n] * n, [1.0 / n] * n)
+    start = (math.pi / 4,) + (0.0,) * (n - 1)
+    return Scene("chain", f"a chain of {n} equal rods, let go at 45 degrees", arm, start, (0.0,) * n, 3.0)
+
+
+_SCENES: dict[str, Callable[..., Scene]] = {each.__name__: each for each in (spring_mass, triple_pendulum, chain)}
+_SUFFIXES = (".xml", ".urdf")
+
+
+def of_file(path: str | os.PathLike[str], ignore: bool = False) -> Scene:
+    """The mechanism of a file, MJCF or URDF, at rest at q = 0; named as the file is, without its suffix.
+
+    ignore: leave out what a mechanism cannot have; `left_out` says what. Raises as `load_mjcf` does.
+    """
+    left_out: list[str] = []
+    mechanism = load_model(path, ignore=ignore, left_out=left_out)
+    n = mechanism.system.n
+    about = f"{len(mechanism.moving)} moving bodies of {os.fspath(path)}"
+    return Scene(Path(path).stem, about, mechanism, (0.0,) * n, (0.0,) * n, 3.0, tuple(left_out))
+
+
+def names() -> list[str]:
+    """Names of the scenes."""
+    return list(_SCENES)
+
+
+def load(name: str | os.PathLike[str], /, **options: Any) -> Scene:
+    """The scene of that name, or of the MJCF or URDF file at that path; options go to its function.
+
+    As in `load("chain", n=20)` and `load("robot.xml", ignore=True)`. A path is what ends in .xml or .urdf, or is
+    there as a file.
+
+    Raises ValueError for a name that is neither, TypeError for an option that its function has not, and as `of_file`.
+    """
+    make: Callable[..., Scene]
+    if isinstance(name, str) and name in _SCENES:
+        make = _SCENES[name]
+    elif isinstance(name, str | os.PathLike) and (Path(name).suffix.lower() in _SUFFIXES or Path(name).is_file()):
+        make = partial(of_file, name)
+    else:
+        raise ValueError(
+            f"there is no scene {name!r:.200}; the scenes are {', '.join(_SCENES)}, "
+            f"and any file that ends in {' or '.join(_SUFFIXES)}"
+        )
+    known = list(inspect.signature(make).parameters)
+    if unknown := [option for option in options if option not in known]:
+        has = f"its options are {', '.join(known)}" if known else "it has none"
+        raise TypeError(f"scene {os.fspath(name)!r} has no option {unknown[0]!r}; {has}")
+    return make(**options)

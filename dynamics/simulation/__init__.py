@@ -1,0 +1,1 @@
+"""Simulation: the motion of a model from a start, as rows, events and statistics."""

@@ -1,0 +1,93 @@
+"""Starts: what the trajectories of an ensemble begin with, and what of it is their own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cgraph.util.real_arrays import real_array
+
+from ...equations.state_equation import as_ode, state_inputs
+from ...systems.system import parameter_value, per_coordinate
+from ..trajectory import Array
+
+
+class Starts(NamedTuple):
+    """N states, and the other inputs of the state equation: one number for all, or one for each trajectory."""
+
+    x: Array  # (N, m)
+    same: dict[str, float]
+    own: dict[str, Array]  # (N,) each
+
+
+def starts(
+    model: Any, q: ArrayLike, qd: ArrayLike | None, tau: ArrayLike, parameters: Mapping[str, ArrayLike] | None
+) -> Starts:
+    """What `simulate_many` was given. Raises ValueError for shapes that do not fit, and for what is not finite."""
+    inputs = state_inputs(model)
+    n = len(inputs.applied) or len(inputs.states)
+    given = {"q": _array("q", q, n)}
+    if as_ode(model) is None:
+        if qd is None:
+            raise ValueError(f"qd must have shape (N, {n}) or ({n},), got None")
+        given["qd"] = _array("qd", qd, n)
+    elif qd is not None or np.any(tau):
+        raise ValueError("qd must be None and tau 0 for a system of first order; q holds its whole state")
+    same: dict[str, float] = dict(inputs.parameters)
+    columns: dict[str, Array] = {}
+    for name, value in (parameters or {}).items():
+        if name not in inputs.parameters:
+            has = ", ".join(inputs.parameters) or "none"
+            raise ValueError(f"the system has no parameter {name} (it has {has})")
+        if np.ndim(value) == 0:
+            same[name] = parameter_value(name, np.asarray(value).item())
+        else:
+            columns[name] = _column(name, value)
+            del same[name]
+    if np.ndim(tau) == 2:
+        given["tau"] = _array("tau", tau, n)
+    else:
+        values = np.asarray(tau).tolist()
+        same |= zip(inputs.applied, per_coordinate("tau", values, n) if inputs.applied else (), strict=True)
+    counts = {what: len(array) for what, array in given.items() if array.ndim == 2}
+    counts |= {f"parameter {name!r}": len(array) for name, array in columns.items()}
+    count = _one_count(counts)
+    own = dict(zip(inputs.applied, given.pop("tau").T, strict=True)) if "tau" in given else {}
+    x = np.concatenate([np.broadcast_to(array, (count, n)) for array in given.values()], axis=1)
+    return Starts(x, same, own | columns)
+
+
+def _array(what: str, value: ArrayLike, n: int) -> Array:
+    array = real_array(what, value)
+    if array.ndim not in (1, 2) or array.shape[-1] != n:
+        raise ValueError(f"{what} must have shape (N, {n}), or ({n},) for all trajectories, got {array.shape}")
+    if not (good := np.isfinite(array)).all():
+        *row, column = np.argwhere(~good)[0].tolist()
+        of = f" of trajectory {row[0]}" if row else ""
+        raise ValueError(f"{what} must be finite, got {array[*row, column]} at index {column}{of}")
+    return array
+
+
+def _column(name: str, value: ArrayLike) -> Array:
+    array = real_array(f"parameter {name!r}", value)
+    if array.ndim != 1:
+        raise ValueError(f"parameter {name!r} must be a number or have shape (N,), got {array.shape}")
+    if not (good := np.isfinite(array)).all():
+        k = int(np.argmin(good))
+        raise ValueError(f"parameter {name!r} must be finite, got {array[k]} for trajectory {k}")
+    return array
+
+
+def _one_count(counts: Mapping[str, int]) -> int:
+    if not counts:
+        raise ValueError("how many trajectories: q, qd, tau or a parameter must have a row for each, (N, n) or (N,)")
+    if len(set(counts.values())) > 1:
+        rows = ", ".join(f"{what} has {count}" for what, count in counts.items())
+        raise ValueError(f"q, qd, tau and parameters must have the same number of trajectories, got: {rows}")
+    count = next(iter(counts.values()))
+    if not count:
+        raise ValueError("there must be at least one trajectory, got 0")
+    return count

@@ -1,1 +1,0 @@
-"""Tables taken from one graph: matrices, torque by link and by motion, linearisation, regressor, certificate."""

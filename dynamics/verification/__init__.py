@@ -1,0 +1,1 @@
+"""Verification: equations that hold whatever the model is, and agreement with other software."""

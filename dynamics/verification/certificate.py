@@ -1,0 +1,243 @@
+"""The certificate of a model: equations among its graphs that hold whatever the model is, and agreement with peers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import cgraph as cg
+from cgraph import Graph
+from cgraph.autodiff.forward import tangents
+from cgraph.autodiff.reverse import cotangents
+from cgraph.simplify.builder import Builder
+
+from ..equations.coriolis import coriolis, quadratic
+from ..equations.equations_of_motion import bias, energy, forward_dynamics, gravity_force, mass_matrix
+from ..equations.evaluate_at import Array, at_state
+from ..equations.formulations import ONE, ZERO, inverse_dynamics
+from ..equations.torque_decomposition import torque_by_link, torque_by_motion
+from ..equations.torque_table import TorqueTable
+from ..systems.system import System, as_system
+from . import peer_agreement as agreement
+from .residual import DIFFERENCES, POSITIVE, ROUNDING, Certificate, Residual
+
+STEP = 1e-3  # of differences, in units of the coordinates
+
+
+def certify(model: Any, states: int = 20, seed: int = 0, *, speed: float = 1.0, twin: Any = None) -> Certificate:
+    """Check the model's graphs against each other, against differences of L, and against MuJoCo and Pinocchio.
+
+    states, seed, speed: random q, uniform in -pi .. pi, and qd, qdd, tau, normal with the deviation `speed`.
+    twin: what MuJoCo compares with in place of the model's own translation: a path or text of MJCF or URDF, or an
+        MjModel, with the same joints in the same order. Its contacts, joint limits and actuators are left out.
+    A peer that disagrees is asked again with one term taken out on both sides, then two; what restores the agreement is
+    in the residual's note.
+
+    Raises ValueError for fewer than one state, a seed below 0, and a twin that cannot be read, has another number of
+    coordinates, or stands beside a model that is not of rigid bodies; SingularMassMatrixError for a coordinate without
+    inertia; ImportError for a twin without MuJoCo.
+    """
+    if states < 1:
+        raise ValueError(f"a certificate needs at least one state, got {states!r}")
+    if seed < 0:
+        raise ValueError(f"the seed of a certificate must be at least 0, got {seed!r}")
+    theirs = None if twin is None else agreement.original(twin, model)
+    rng = np.random.default_rng(seed)
+    system = as_system(model)
+    shape = (states, system.n)
+    at = {"q": rng.uniform(-np.pi, np.pi, shape)} | {
+        name: speed * rng.normal(size=shape) for name in ("qd", "qdd", "tau")
+    }
+    checks, left_out = _Checks(system, at, rng), []
+    residuals = list(checks.always())
+    try:
+        quadratic(system)
+    except ValueError as error:
+        left_out.append(f"the Coriolis matrix: {error}")
+    else:
+        residuals += checks.of_coriolis()
+    for name, peer in agreement.peers(model, theirs):
+        try:
+            residuals.append(agreement.residual(name, peer(), model, at))
+        except agreement.NotComparableError as error:
+            left_out.append(f"{name}: {error}")
+    return Certificate(states, seed, tuple(residuals), tuple(left_out))
+
+
+class _Checks:
+    """The equations at some states."""
+
+    def __init__(self, system: System, at: dict[str, Array], rng: np.random.Generator) -> None:
+        self.system, self.at, self.rng = system, at, rng
+        self.timed = system.t in system.extra_inputs
+        self.t = float(rng.uniform())
+
+    def value(self, graph: Graph, **other: ArrayLike | None) -> Array:
+        """Outputs, (N, n_out), at the states, some of them replaced."""
+        return at_state(self.system, graph, {**self.at, **other}, self.t)
+
+    def matrix(self, graph: Graph) -> Array:
+        """Outputs as (N, n, n)."""
+        return self.value(graph).reshape(-1, self.system.n, self.system.n)
+
+    def graph(self, outputs: dict[str, cg.Node]) -> Graph:
+        return self.system.graph(outputs, self.system.q, self.system.qd, self.system.qdd)
+
+    def rate(self, graph: Graph) -> Graph:
+        """d/dt of the outputs along (qd, qdd)."""
+        system = self.system
+        x_dot = dict(zip([*system.q, *system.qd], [*system.qd, *system.qdd], strict=True))
+        dots = tangents(x_dot | ({system.t: ONE} if self.timed else {}), graph.outputs.values())
+        return self.graph({name: dots.get(node, ZERO) for name, node in graph.outputs.items()})
+
+    @cached_property
+    def inverse(self) -> Graph:
+        return inverse_dynamics(self.system)
+
+    @cached_property
+    def inertia(self) -> Array:
+        return self.matrix(mass_matrix(self.system))
+
+    @cached_property
+    def bias(self) -> Array:
+        return self.value(bias(self.system))
+
+    @cached_property
+    def gravity(self) -> Array:
+        return self.value(gravity_force(self.system))
+
+    @cached_property
+    def accelerations(self) -> Array:
+        return self.value(forward_dynamics(self.system))
+
+    def always(self) -> Iterator[Residual]:
+        """What holds for every Lagrangian."""
+        yield from self._mass_matrix()
+        yield self._forward()
+        yield self._power()
+        yield self._energy()
+        yield self._sum("links: partial torques add up to tau", torque_by_link(self.system))
+        yield self._adjoint()
+        for name, graph in (("L", self.graph({"L": self.system.lagrangian})), ("tau", self.inverse)):
+            yield self._differences(f"AD: slope of {name} along a line = differences", graph)
+
+    def of_coriolis(self) -> Iterator[Residual]:
+        """What holds for one that is quadratic in the velocities."""
+        matrix = self.matrix(coriolis(self.system))
+        qd = self.at["qd"]
+        terms = np.abs(matrix) @ np.abs(qd)[..., None]
+        force = (matrix @ qd[..., None])[..., 0]
+        yield Residual(
+            "coriolis: C qd + gravity = bias",
+            _worst(force + self.gravity - self.bias, terms[..., 0] + np.abs(self.gravity)),
+            ROUNDING,
+        )
+        if not self.timed:
+            rate = self.matrix(self.rate(mass_matrix(self.system)))
+            skew = rate - 2.0 * matrix
+            yield Residual(
+                "coriolis: dM/dt - 2 C is skew",
+                _worst(skew + np.swapaxes(skew, 1, 2), np.abs(rate) + np.abs(matrix)),
+                ROUNDING,
+            )
+        yield self._sum("motion: torques by motion add up to tau", torque_by_motion(self.system))
+
+    def _mass_matrix(self) -> Iterator[Residual]:
+        n = self.system.n
+        still = self.value(self.inverse, qdd=None)
+        columns = np.stack([self.value(self.inverse, qdd=unit) - still for unit in np.eye(n)], axis=-1)
+        terms = np.abs(columns) + np.abs(still)[..., None]
+        yield Residual(
+            "M: symmetric, as columns of inverse dynamics",
+            _worst(columns - np.swapaxes(columns, 1, 2), terms),
+            ROUNDING,
+        )
+        yield Residual("M: d2L/dqd2 = columns of inverse dynamics", _worst(columns - self.inertia, terms), ROUNDING)
+        size = np.sqrt(np.maximum(np.einsum("kii->ki", self.inertia), np.finfo(float).tiny))
+        smallest = float(np.linalg.eigvalsh(self.inertia / (size[:, :, None] * size[:, None, :])).min())
+        missing = max(0.0, n * np.finfo(float).eps - smallest)
+        yield Residual("M: positive definite", missing, POSITIVE, f"smallest eigenvalue {smallest:.1e}, scaled")
+
+    def _forward(self) -> Residual:
+        tau, qdd = self.at["tau"], self.accelerations
+        terms = (np.abs(self.inertia) @ np.abs(qdd)[..., None])[..., 0] + np.abs(self.bias) + np.abs(tau)
+        return Residual(
+            "inverse dynamics of forward dynamics = tau",
+            _worst(self.value(self.inverse, qdd=qdd) - tau, terms),
+            ROUNDING,
+        )
+
+    def _power(self) -> Residual:
+        system, qd, tau, qdd = self.system, self.at["qd"], self.at["tau"], self.accelerations
+        gained = self.value(self.rate(energy(system)), qdd=qdd)[..., 0]
+        forces = self.value(self.graph({f"f{i}": node for i, node in enumerate(system.forces)}))
+        power = qd * (tau + forces - np.array(system.damping) * qd)
+        equation = "energy: dE/dt = qd . (tau + forces - damping)"
+        if self.timed:
+            (slope,) = cotangents({system.lagrangian: ONE}, [system.t])
+            power = np.concatenate([power, -self.value(self.graph({"dL/dt": slope}))], axis=-1)
+            equation += " - dL/dt"
+        terms = np.abs(qd) * ((np.abs(self.inertia) @ np.abs(qdd)[..., None])[..., 0] + np.abs(self.bias))
+        total = np.abs(power).sum(axis=-1) + terms.sum(axis=-1)
+        return Residual(equation, _worst((gained - power.sum(axis=-1))[:, None], total[:, None]), ROUNDING)
+
+    def _energy(self) -> Residual:
+        qd = self.at["qd"]
+        slopes = self.value(cg.gradient(energy(self.system), self.system.qd))
+        momenta = self.inertia @ qd[..., None]
+        terms = np.abs(self.inertia) @ np.abs(qd)[..., None]
+        return Residual("energy: dE/dqd = M qd", _worst(slopes - momenta[..., 0], terms[..., 0]), ROUNDING)
+
+    def _sum(self, equation: str, table: TorqueTable) -> Residual:
+        cells = self.value(table.graph).reshape(-1, len(table.rows), len(table.columns))
+        axis = 1 if table.downwards else 2
+        tau = self.value(self.inverse)
+        return Residual(equation, _worst(cells.sum(axis=axis) - tau, np.abs(cells).sum(axis=axis)), ROUNDING)
+
+    def _adjoint(self) -> Residual:
+        """u . (J v) by forward mode and (J^T u) . v by reverse mode, J = d tau / d(q, qd, qdd)."""
+        system = self.system
+        state = [*system.q, *system.qd, *system.qdd]
+        u, v = self.rng.normal(size=system.n), self.rng.normal(size=len(state))
+        torques = list(self.inverse.outputs.values())
+        dots = tangents({x: cg.constant(float(each)) for x, each in zip(state, v, strict=True)}, torques)
+        pushed = self.value(self.graph({str(i): dots.get(node, ZERO) for i, node in enumerate(torques)}))
+        seeds: dict[cg.Node, cg.Node] = {}
+        for node, each in zip(torques, u, strict=True):
+            seeds[node] = seeds.get(node, ZERO) + float(each)
+        bars = cotangents(seeds, state, Builder())
+        pulled = self.value(self.graph({str(i): bar for i, bar in enumerate(bars)}))
+        terms = np.abs(pushed * u).sum(axis=-1) + np.abs(pulled * v).sum(axis=-1)
+        return Residual(
+            "AD: u . (J v) = (J^T u) . v for tau", _worst((pushed @ u - pulled @ v)[:, None], terms[:, None]), ROUNDING
+        )
+
+    def _differences(self, equation: str, graph: Graph) -> Residual:
+        """Catches what no comparison of derivatives with derivatives can: a rule of differentiation that is wrong."""
+        system = self.system
+        names = ("q", "qd", "qdd")
+        line = {name: self.rng.normal(size=system.n) for name in names}
+        given = [cg.constant(float(each)) for name in names for each in line[name]]
+        dots = tangents(dict(zip([*system.q, *system.qd, *system.qdd], given, strict=True)), graph.outputs.values())
+        slope = self.value(self.graph({name: dots.get(node, ZERO) for name, node in graph.outputs.items()}))
+
+        def moved(steps: float) -> Array:
+            return self.value(graph, **{name: self.at[name] + steps * STEP * line[name] for name in names})
+
+        around = {steps: moved(steps) for steps in (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)}
+        wide, narrow = (
+            (8.0 * (around[h] - around[-h]) - (around[2 * h] - around[-2 * h])) / (12.0 * h * STEP) for h in (1.0, 0.5)
+        )
+        unexplained = np.maximum(np.abs(slope - narrow) - np.abs(wide - narrow), 0.0)
+        scale = np.abs(slope) + np.max([np.abs(each) for each in around.values()], axis=0)
+        return Residual(equation, _worst(unexplained, scale), DIFFERENCES)
+
+
+def _worst(difference: Array, terms: Array) -> float:
+    """The largest difference relative to the largest term of its state; over all states. NaN stays."""
+    flat = [np.abs(each).reshape(len(each), -1).max(axis=1) for each in (difference, terms)]
+    return float(np.max(np.divide(flat[0], flat[1], out=np.array(flat[0]), where=flat[1] > 0.0)))

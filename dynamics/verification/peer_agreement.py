@@ -1,0 +1,270 @@
+"""Agreement with MuJoCo and Pinocchio, and which term of the model explains it where there is none."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from ..equations.evaluate_at import Array, at_state
+from ..equations.formulations import inverse_dynamics
+from ..io.load import compiled
+from ..io.mujoco_model import mujoco
+from ..multibody.body import Body, MechanismError
+from ..multibody.mechanism import Mechanism
+from ..multibody.planar_arm import Link, PlanarArm
+from ..peers.case import Case
+from ..peers.contender import Peer, UnavailableError
+from ..peers.mujoco import MujocoPeer
+from ..peers.pinocchio import PinocchioPeer
+from ..systems.system import as_system
+from .residual import PEERS, Residual
+
+ASKED = 4  # states at which a disagreement is explained
+TAKEN = 2  # terms at most that are taken out together
+_NO_MASS = 1e-13  # kg, so little that it weighs nothing beside what is left
+
+
+class NotComparableError(Exception):
+    """Why a peer has nothing to say of a model."""
+
+
+class Term(NamedTuple):
+    """A term of the equations, and how both sides are made alike in it.
+
+    body, link, model: the change to each body of a mechanism, to each link of an arm, to the rest of either.
+    theirs: the change to MuJoCo's model of a file.
+    """
+
+    body: Callable[[Body], Body]
+    link: Callable[[Link], Link]
+    model: Callable[[Any], Any]
+    theirs: Callable[[Any], None]
+
+
+def _same(x: Any) -> Any:
+    return x
+
+
+def _joint(**changes: Any) -> Callable[[Body], Body]:
+    return lambda body: replace(body, joint=replace(body.joint, **changes))
+
+
+def _zeroed(*fields: str) -> Callable[[Any], None]:
+    """MuJoCo's fields to zero, those that its version has."""
+
+    def change(model: Any) -> None:
+        for name in fields:
+            if hasattr(model, name):
+                getattr(model, name)[...] = 0.0
+
+    return change
+
+
+def _still(model: Any) -> Any:
+    return replace(model, gravity=0.0 if isinstance(model, PlanarArm) else (0.0, 0.0, 0.0))
+
+
+def _floating(model: Any) -> None:
+    model.opt.gravity[:] = 0.0
+
+
+def _alike(model: Any) -> None:
+    model.body_inertia[model.body_mass > _NO_MASS] = 1.0
+
+
+def _weightless(model: Any) -> None:
+    model.body_mass[model.body_mass > _NO_MASS] = _NO_MASS
+
+
+def _thin(model: Any) -> None:
+    model.opt.density = model.opt.viscosity = 0.0
+
+
+def _unbound(model: Any) -> None:
+    model.opt.disableflags |= mujoco().mjtDisableBit.mjDSBL_EQUALITY
+
+
+def _undamped(model: Any) -> Any:
+    return replace(model, damping=(0.0,) * len(model.links)) if isinstance(model, PlanarArm) else model
+
+
+TERMS: dict[str, Term] = {
+    "damping": Term(_joint(damping=0.0), _same, _undamped, _zeroed("dof_damping", "dof_dampingpoly")),
+    "joint springs": Term(_joint(stiffness=0.0), _same, _same, _zeroed("jnt_stiffness", "jnt_stiffnesspoly")),
+    "armature": Term(_joint(armature=0.0), _same, _same, _zeroed("dof_armature")),
+    "gravity": Term(_same, _same, _still, _floating),
+    "inertia about the centres of mass": Term(
+        lambda body: replace(body, inertia=(1.0, 1.0, 1.0)) if body.mass > _NO_MASS else body,
+        lambda link: replace(link, inertia=1.0),
+        _same,
+        _alike,
+    ),
+    "mass and its place": Term(
+        lambda body: replace(body, mass=_NO_MASS) if body.mass > _NO_MASS else body,
+        lambda link: replace(link, mass=_NO_MASS),
+        _same,
+        _weightless,
+    ),
+    "friction loss": Term(_same, _same, _same, _zeroed("dof_frictionloss", "tendon_frictionloss")),
+    "tendons": Term(_same, _same, _same, _zeroed("tendon_stiffness", "tendon_damping", "tendon_armature")),
+    "equality constraints": Term(_same, _same, _same, _unbound),
+    "fluid": Term(_same, _same, _same, _thin),
+}
+
+
+def without(model: PlanarArm | Mechanism, terms: Sequence[str]) -> PlanarArm | Mechanism:
+    """The model with these of the `TERMS` taken out, or made alike for all."""
+    for name in terms:
+        term = TERMS[name]
+        model = term.model(model)
+        if isinstance(model, PlanarArm):
+            model = replace(model, links=tuple([term.link(link) for link in model.links]))
+        else:
+            model = replace(model, bodies=tuple([term.body(body) for body in model.bodies]))
+    return model
+
+
+class Asked(Protocol):
+    """A peer that has the model."""
+
+    def inverse(self, at: Mapping[str, Array]) -> Array:
+        """tau, (N, n), of q, qd, qdd, (N, n) each."""
+        ...
+
+    def without(self, terms: Sequence[str]) -> Asked:
+        """The same, with these of the `TERMS` taken out."""
+        ...
+
+
+class _At(Case):
+    """A case that is asked at a state of ours."""
+
+    state: Array
+
+    def point(self, task: str) -> Array:
+        return self.state
+
+
+class Translation:
+    """A peer on the model as `to_mjcf` writes it."""
+
+    def __init__(self, kind: Callable[[Case], Peer], model: PlanarArm | Mechanism) -> None:
+        self.kind, self.model = kind, model
+        self.case = _At("the model", model)
+        self.peer = kind(self.case)
+
+    def inverse(self, at: Mapping[str, Array]) -> Array:
+        """See Asked."""
+        rows = []
+        for state in np.concatenate([at["q"], at["qd"], at["qdd"]], axis=1):
+            self.case.state = state
+            asked = self.peer.prepare("inverse", "call")
+            rows.append(asked.result(asked.run()))
+        return np.array(rows)
+
+    def without(self, terms: Sequence[str]) -> Translation:
+        """See Asked."""
+        return Translation(self.kind, without(self.model, terms))
+
+
+class Original:
+    """MuJoCo on a model of its own: of a file, say."""
+
+    def __init__(self, model: Any) -> None:
+        self.model = model
+
+    def inverse(self, at: Mapping[str, Array]) -> Array:
+        """See Asked."""
+        module, data = mujoco(), mujoco().MjData(self.model)
+        rows = []
+        for data.qpos[:], data.qvel[:], data.qacc[:] in zip(at["q"], at["qd"], at["qdd"], strict=True):
+            module.mj_inverse(self.model, data)
+            rows.append(np.array(data.qfrc_inverse))
+        return np.array(rows)
+
+    def without(self, terms: Sequence[str]) -> Original:
+        """See Asked."""
+        model = copy.copy(self.model)
+        for name in terms:
+            TERMS[name].theirs(model)
+        mujoco().mj_setConst(model, mujoco().MjData(model))
+        return Original(model)
+
+
+def peers(model: Any, twin: Original | None = None) -> Iterator[tuple[str, Callable[[], Asked]]]:
+    """Name of each peer, and what makes it for a model: raises NotComparableError with the reason.
+
+    twin: MuJoCo's, in place of the translation.
+    """
+    yield "MuJoCo", lambda: twin or _translated(MujocoPeer, model)
+    yield "Pinocchio", lambda: _translated(PinocchioPeer, model)
+
+
+def residual(name: str, peer: Asked, model: Any, at: Mapping[str, Array]) -> Residual:
+    """How far the inverse dynamics of a peer is from ours, with what explains it where that is too far."""
+    bodies = bare(model)
+    value = disagreement(bodies, peer, at)
+    note = "" if value <= PEERS.value else explanation(bodies, peer, at)
+    return Residual(f"inverse dynamics = {name}'s", value, PEERS, note)
+
+
+def explanation(model: PlanarArm | Mechanism, peer: Asked, at: Mapping[str, Array]) -> str:
+    """The one or two of the `TERMS` without which there is agreement, in words."""
+    few = {name: rows[:ASKED] for name, rows in at.items()}
+    for count in range(1, TAKEN + 1):
+        for terms in combinations(TERMS, count):
+            if disagreement(without(model, terms), peer.without(terms), few) <= PEERS.value:
+                return f"they agree without {' and '.join(terms)}"
+    return f"no {TAKEN} terms explain it"
+
+
+def disagreement(model: PlanarArm | Mechanism, peer: Asked, at: Mapping[str, Array]) -> float:
+    """The largest difference of the torques, relative to the largest torque of its state; over all states."""
+    ours = at_state(as_system(model), inverse_dynamics(model), at)
+    size = np.maximum(np.abs(ours).max(axis=1), np.finfo(float).tiny)
+    return float(np.max(np.abs(ours - peer.inverse(at)).max(axis=1) / size))
+
+
+def bare(model: Any) -> PlanarArm | Mechanism:
+    """The arm or mechanism of a model, without forces on its bodies, which the peers do not have.
+
+    Raises NotComparableError for another model.
+    """
+    bodies = getattr(model, "model", model)
+    if isinstance(bodies, PlanarArm):
+        return bodies
+    if not isinstance(bodies, Mechanism):
+        raise NotComparableError("takes rigid bodies, not a Lagrangian")
+    return replace(bodies, forces=(), parameters={}) if bodies.forces else bodies
+
+
+def _translated(kind: Callable[[Case], Peer], model: Any) -> Translation:
+    try:
+        return Translation(kind, bare(model))
+    except ImportError:
+        raise NotComparableError("is not installed") from None
+    except (UnavailableError, MechanismError) as error:
+        raise NotComparableError(str(error)) from None
+
+
+def original(twin: Any, model: Any) -> Original:
+    """MuJoCo on what `load_model` takes, with the coordinates of the model.
+
+    Raises ValueError for a twin that cannot be read or has another number of coordinates, and for a model that is not
+    of rigid bodies.
+    """
+    module, theirs = mujoco(), copy.copy(compiled(twin))
+    try:
+        n = as_system(bare(model)).n
+    except NotComparableError as error:
+        raise ValueError(f"a twin is compared with rigid bodies: MuJoCo {error}") from None
+    if (theirs.nq, theirs.nv) != (n, n):
+        raise ValueError(f"the twin has {theirs.nv} degrees of freedom, the model {n}")
+    for unused in ("CONTACT", "LIMIT", "ACTUATION"):
+        theirs.opt.disableflags |= getattr(module.mjtDisableBit, f"mjDSBL_{unused}")
+    return Original(theirs)
