@@ -12,7 +12,7 @@ import pytest
 
 import cgraph as cg
 from viz import render_svg, theme, to_dot
-from viz.dot import main_tag
+from viz.graph_drawing.dot import main_tag
 
 SVG = "{http://www.w3.org/2000/svg}"
 

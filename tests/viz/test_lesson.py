@@ -10,7 +10,7 @@ import pytest
 
 from viz import cli
 from viz.commands.lesson import ARM_DT, ARM_Q, ARM_QD, lesson
-from viz.lesson import page
+from viz.pages.lesson import page
 
 VOID = {"meta", "br", "img", "link", "input", "hr"}
 

@@ -9,8 +9,8 @@ import sys
 import pytest
 
 from viz import theme
-from viz.paper import write_paper
-from viz.render import RenderError
+from viz.graph_drawing.render import RenderError
+from viz.paper.paper import write_paper
 
 FIGURES = ("fig1", "fig2", "fig3", "fig4", "fig5", "fig6", "law", "scaling")
 

@@ -7,9 +7,9 @@ import pytest
 
 import dynamics as dyn
 from dynamics.experiments import pruning as pruning_report
-from viz import pruning
 from viz.cli import main
-from viz.document import to_html
+from viz.pages import pruning
+from viz.pages.document import to_html
 
 
 def test_the_page_has_every_row_of_the_account() -> None:

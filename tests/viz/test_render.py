@@ -16,7 +16,7 @@ import pytest
 import cgraph as cg
 from cgraph.util.atomic_write import write
 from viz import graph_svg, render_png, render_svg, theme, to_dot
-from viz.render import LARGE, RenderError
+from viz.graph_drawing.render import LARGE, RenderError
 
 
 def square() -> cg.Graph:

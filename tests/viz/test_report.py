@@ -14,16 +14,16 @@ import numpy as np
 import pytest
 
 from viz import cli, theme
-from viz.document import Document, Paragraph, Picture, Section, Table, to_html, to_markdown
-from viz.document_files import check_writable, write_document
+from viz.pages.document import Document, Paragraph, Picture, Section, Table, to_html, to_markdown
+from viz.pages.write_document import check_writable, write_document
 
 pytest.importorskip("matplotlib")
 
 from matplotlib.text import Text
 
-from viz.labelled import Line, Panel, bars, labelled
-from viz.plot import to_adaptive_svg
-from viz.report import _power, _time, work_precision
+from viz.pages.work_precision import _power, _time, work_precision
+from viz.plots.direct_labels import Line, Panel, bars, labelled
+from viz.plots.plot import to_adaptive_svg
 
 
 def point(knob: float, seconds: float, error: float | None, **others: Any) -> dict[str, Any]:

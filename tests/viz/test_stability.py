@@ -7,9 +7,10 @@ from typing import Any
 
 import pytest
 
-from viz import cli, stability
-from viz.document import to_html
-from viz.document_files import write_document
+from viz import cli
+from viz.pages import stability
+from viz.pages.document import to_html
+from viz.pages.write_document import write_document
 
 pytest.importorskip("matplotlib")
 

@@ -11,7 +11,7 @@ from cgraph import Graph
 from cgraph.util.atomic_write import write
 from dynamics import FORMULATIONS, scenes
 
-from ..render import Drawing, render_svg
+from ..graph_drawing.render import Drawing, render_svg
 
 Commands = argparse._SubParsersAction  # what `add_subparsers` returns has no public name
 

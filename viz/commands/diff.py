@@ -9,7 +9,7 @@ import cgraph as cg
 from dynamics import FORMULATIONS, inverse_dynamics
 from dynamics.equations.node_classes import formulation_classes
 
-from ..dot import to_dot
+from ..graph_drawing.dot import to_dot
 from .arguments import Commands, draw, may_draw_and_print, scene_of, state_names, takes_a_scene
 
 

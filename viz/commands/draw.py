@@ -8,8 +8,8 @@ from pathlib import Path
 from cgraph.util.atomic_write import write
 from dynamics import inverse_dynamics, spurious
 
-from ..dot import to_dot
-from ..render import render_png, render_svg
+from ..graph_drawing.dot import to_dot
+from ..graph_drawing.render import render_png, render_svg
 from .arguments import Commands, scene_of, takes_a_formulation, takes_a_scene
 
 

@@ -14,7 +14,7 @@ from cgraph.util.atomic_write import write
 from dynamics import inverse_dynamics, momentum_rate, scenes, spurious
 from dynamics.experiments.paper_numbers.equation3 import equation3
 
-from ..lesson import Lesson, page
+from ..pages.lesson import Lesson, page
 from .arguments import Commands
 
 STEPS = (1.0, 0.1, 0.01, 1e-3, 1e-6)  # s

@@ -8,7 +8,7 @@ import json
 import cgraph as cg
 from dynamics import inverse_dynamics
 
-from ..dot import to_dot
+from ..graph_drawing.dot import to_dot
 from .arguments import Commands, draw, may_draw_and_print, scene_of, state_names, takes_a_formulation, takes_a_scene
 from .point import REST, box, filled, point
 

@@ -7,7 +7,7 @@ import json
 import sys
 from pathlib import Path
 
-from ..paper import write_paper
+from ..paper.paper import write_paper
 from .arguments import Commands
 
 

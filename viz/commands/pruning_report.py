@@ -8,8 +8,8 @@ import json
 from dynamics import EFFECTS, scenes
 from dynamics.experiments import pruning
 
-from .. import pruning as page
-from ..document_files import check_writable, write_document
+from ..pages import pruning as page
+from ..pages.write_document import check_writable, write_document
 
 
 def run(options: argparse.Namespace) -> None:

@@ -11,9 +11,9 @@ from dynamics.experiments.work_precision import trajectory_scenes, work_precisio
 from dynamics.experiments.work_precision.cold_start import STARTS
 from dynamics.integrators import METHODS
 
-from .. import report as page
-from ..document_files import check_writable, write_document
-from ..plot import check_can_plot
+from ..pages import work_precision as page
+from ..pages.write_document import check_writable, write_document
+from ..plots.plot import check_can_plot
 from . import pruning_report, stability_report
 from .arguments import Commands, may_ignore, number, positive, say
 

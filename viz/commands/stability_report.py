@@ -8,9 +8,9 @@ import time
 
 from dynamics.experiments.stability import stability, stability_table
 
-from .. import stability as page
-from ..document_files import check_writable, write_document
-from ..plot import check_can_plot
+from ..pages import stability as page
+from ..pages.write_document import check_writable, write_document
+from ..plots.plot import check_can_plot
 from .arguments import say
 
 NAME = "stability"  # of the files

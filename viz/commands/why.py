@@ -11,7 +11,7 @@ from cgraph.autodiff.reverse import cotangents
 from cgraph.explain.names import Names
 from dynamics import forward_dynamics, inverse_dynamics
 
-from ..dot import to_dot
+from ..graph_drawing.dot import to_dot
 from .arguments import Commands, draw, may_draw_and_print, scene_of, takes_a_formulation, takes_a_scene, whole
 from .point import REST, filled, point, point_text
 

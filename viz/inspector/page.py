@@ -10,7 +10,8 @@ from typing import Any
 
 from cgraph import Graph, Node
 
-from .. import html, theme
+from .. import theme
+from ..pages import html
 from .content import Motion, Table, Version
 from .record import record
 

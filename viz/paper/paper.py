@@ -23,10 +23,12 @@ from dynamics.experiments.paper_numbers.table_1 import PAPER_MS, Row, table1
 from dynamics.io.mujoco_model import frames
 from dynamics.simulation.progress_bar import Progress
 
-from . import html, plot, theme
-from .document_files import check_writable
-from .dot import to_dot
-from .render import check_can_draw, render_png, render_svg
+from .. import theme
+from ..graph_drawing.dot import to_dot
+from ..graph_drawing.render import check_can_draw, render_png, render_svg
+from ..pages import html
+from ..pages.write_document import check_writable
+from ..plots import plot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,9 +9,9 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from . import theme
+from .. import theme
+from ..plots.plot import empty_figure, style, to_adaptive_svg
 from .document import Block, Document, Paragraph, Picture, Section, Table
-from .plot import empty_figure, style, to_adaptive_svg
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

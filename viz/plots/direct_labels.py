@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from . import theme
+from .. import theme
 from .plot import Array as Points, empty_figure, style
 
 if TYPE_CHECKING:

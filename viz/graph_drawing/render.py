@@ -12,7 +12,7 @@ from typing import Protocol
 from cgraph import Graph, constant
 from cgraph.errors import install
 
-from . import theme
+from .. import theme
 from .dot import to_dot
 
 ENGINES = ("dot", "neato", "fdp", "sfdp", "circo", "twopi", "osage", "patchwork")

@@ -13,9 +13,9 @@ import numpy as np
 
 from cgraph import Graph, Node
 
-from . import theme
-from .dot import to_dot
-from .render import render_svg
+from .. import theme
+from ..graph_drawing.dot import to_dot
+from ..graph_drawing.render import render_svg
 
 _PAGE = Path(__file__).with_name("lesson.html")
 _LETTER = 1.15  # height of a figure's letters, in those of the page

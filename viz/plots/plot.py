@@ -10,7 +10,7 @@ import numpy as np
 
 from cgraph.errors import install
 
-from . import theme
+from .. import theme
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -6,7 +6,7 @@ import base64
 from collections.abc import Sequence
 from html import escape
 
-from . import theme
+from .. import theme
 
 _STYLE = f"""
 :root {{ color-scheme: light dark; --text: {theme.TEXT}; --back: #FFFFFF; --soft: #F4F4F2; --line: #D8D8D4; }}

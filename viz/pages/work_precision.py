@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..plots.direct_labels import Line, Panel, bars, labelled
+from ..plots.plot import to_adaptive_svg
 from .document import Block, Document, Paragraph, Picture, Section, Table
-from .labelled import Line, Panel, bars, labelled
-from .plot import to_adaptive_svg
 
 Content = Mapping[str, Any]  # what `content()` of the report gives, or its JSON file
 EQUAL, CHOSEN = "equal steps", "chosen steps"

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Literal
 from cgraph import Edge, Graph, Node
 from cgraph.errors import install
 
-from . import theme
-from .theme import Paint
+from .. import theme
+from ..theme import Paint
 
 if TYPE_CHECKING:
     from graphviz import Digraph

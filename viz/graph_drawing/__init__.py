@@ -1,0 +1,1 @@
+"""Drawings of graphs: DOT, and pictures made from it."""
