@@ -33,7 +33,7 @@ docs: $(INSTALLED)docs,viz,mujoco  ## the documentation, into docs/_build/html
 bench: $(INSTALLED)bench  ## the comparisons with other software
 	$(BIN)/cgraph bench
 	@for script in tests/benchmarks/*.py; do echo "== $$script"; $(BIN)/python "$$script" || exit 1; done
-	$(BIN)/python -m pytest tests/dynamics/test_pinocchio.py -q
+	$(BIN)/python -m pytest tests/dynamics/multibody/test_pinocchio.py -q
 
 clean:  ## remove .venv, paper and all else that the targets above make where nothing else is said
 	rm -rf .venv paper docs/_build build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -37,7 +37,7 @@ OPTIONAL = {
     "torch": None,  # measured when it is there, never asked for
 }
 TYPES = "TYPE_CHECKING"
-DYNAMICS_IN_VIZ = re.compile(r"viz/(paper\w*(/\w+)*|commands/\w+|cli|__main__)\.py")
+DYNAMICS_IN_VIZ = re.compile(r"viz/(paper/\w+|commands/\w+|cli|__main__)\.py")
 
 
 def imports(text: str, package: str = "", for_types: bool = True) -> set[str]:

@@ -24,7 +24,7 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph.core.structure_hash import structure_hash
 from dynamics.multibody.spatial import rotation
-from tests.dynamics.test_reconfiguration import arm
+from tests.dynamics.multibody.test_reconfiguration import arm
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Torque = Callable[[Array], Array]  # of q, where qd = q / 2 and qdd = -q

@@ -11,7 +11,7 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph.core.structure_hash import structure_hash
 from tests.dynamics.mechanisms import FAMILIES, in_space, random_inertia, random_rotation, turned_arm
-from tests.dynamics.test_reconfiguration import arm
+from tests.dynamics.multibody.test_reconfiguration import arm
 
 BOTH = (dyn.inverse_dynamics, dyn.forward_dynamics)
 PAPER = dyn.scenes.load("triple_pendulum").model

@@ -21,7 +21,7 @@ from cgraph.codegen import clear_cache, disk_cache as cache, llvm_engine as llvm
 llvmlite = pytest.importorskip("llvmlite")
 binding = pytest.importorskip("llvmlite.binding")
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 POINT = [0.3, -0.7]
 POINTS = np.linspace([-2.0, 0.5], [1e7, 3.0], 37).T  # beyond the range of the polynomials, too
 POSIX = pytest.mark.skipif(os.name == "nt", reason="permissions of POSIX")

@@ -69,7 +69,7 @@ def test_a_reason_accounts_for_so_much_and_no_more() -> None:
 
 
 def test_every_limit_is_of_a_row_that_exists_and_is_told_in_the_documentation() -> None:
-    text = (Path(__file__).parents[2] / "docs" / "stability.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[3] / "docs" / "stability.md").read_text(encoding="utf-8")
     single = {f"{task}, {each.name}" for task in single_evaluations.TASKS for each in single_evaluations.FAMILIES}
     for section, case, method in limits.LIMITS:
         assert case in {"Cases": set(cases.names()), "Single evaluations": single}[section]
