@@ -9,7 +9,7 @@ from .codegen.c import CSource, to_c
 from .core.counts import Counts
 from .core.graph import Graph
 from .core.label import tag
-from .core.node import Edge, Node, constant, named, variable, variables
+from .core.node import Edge, Node, constant, variable, variables, with_name
 from .core.ops import (
     abs_ as abs,
     acos,
@@ -41,16 +41,16 @@ from .core.ops import (
 from .core.source_lines import recording_lines
 from .core.structure_hash import structure_hash
 from .errors import GraphError
-from .explain import Diff, Lint, Why, WhyNot, diff, lint, why, why_not
+from .explain import Comparison, Lint, Why, WhyNot, compare, lint, why, why_not
 from .program import Loop, loop
 from .simplify.double_double import double_double
 from .simplify.simplify import simplify, specialize
 
 __all__ = [
     "CSource",
+    "Comparison",
     "Compiled",
     "Counts",
-    "Diff",
     "Edge",
     "Graph",
     "GraphError",
@@ -65,11 +65,11 @@ __all__ = [
     "atan",
     "atan2",
     "clear_cache",
+    "compare",
     "compile",
     "constant",
     "cos",
     "cosh",
-    "diff",
     "double_double",
     "equal",
     "exp",
@@ -88,7 +88,6 @@ __all__ = [
     "loop",
     "maximum",
     "minimum",
-    "named",
     "not_equal",
     "pow",
     "recording_lines",
@@ -109,4 +108,5 @@ __all__ = [
     "where",
     "why",
     "why_not",
+    "with_name",
 ]

@@ -5,26 +5,26 @@ from .equations.coriolis import coriolis, damping_force
 from .equations.equations_of_motion import (
     SingularMassMatrixError,
     bias,
-    check_pivot,
     energy,
     forward_dynamics,
     gravity_force,
     mass_matrix,
     momentum,
+    raise_if_singular,
 )
-from .equations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious
-from .equations.linearization import linearization, linearize
+from .equations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious_nodes
+from .equations.linearization import linearize, state_space
 from .equations.state_equation import state_equation
-from .equations.torque_decomposition import torque_by_link, torque_by_motion
+from .equations.torque_decomposition import torque_by_joint_motion, torque_by_link
 from .equations.torque_table import TorqueTable
 from .experiments.stability import cases
 from .io.load import load_mjcf, load_urdf
 from .io.mjcf import to_mjcf
 from .io.urdf import to_urdf
-from .multibody.impact import Dropped, FreeBody, PickedUp, dropped, picked_up
+from .multibody.impact import Attached, FreeBody, Released, attach_with_impact, release
 from .multibody.mechanism import Body, Force, Joint, Mechanism, MechanismError, serial_arm, tree
 from .multibody.planar_arm import Link, PlanarArm, planar_arm
-from .multibody.pruning import EFFECTS, LeftOut, Pruned, prune
+from .multibody.pruning import EFFECTS, OmittedTerm, PruneResult, prune
 from .multibody.recursive_inverse_dynamics import RecursiveInverseDynamics
 from .multibody.regressor import inertial_parameters, regressor
 from .multibody.subtree import Subtree
@@ -42,26 +42,26 @@ from .verification.residual import Certificate
 __all__ = [
     "EFFECTS",
     "FORMULATIONS",
+    "Attached",
     "Body",
     "Certificate",
     "Crossings",
-    "Dropped",
     "Ensemble",
     "EnsembleStats",
     "Event",
     "Force",
     "FreeBody",
     "Joint",
-    "LeftOut",
     "Link",
     "Mechanism",
     "MechanismError",
     "OdeSystem",
-    "PickedUp",
+    "OmittedTerm",
     "PlanarArm",
-    "Pruned",
+    "PruneResult",
     "RecursiveInverseDynamics",
     "Reference",
+    "Released",
     "Scene",
     "SingularMassMatrixError",
     "Stats",
@@ -70,39 +70,39 @@ __all__ = [
     "TorqueTable",
     "Trajectory",
     "as_system",
+    "attach_with_impact",
     "bias",
     "cases",
     "certify",
-    "check_pivot",
     "coriolis",
     "damping_force",
-    "dropped",
     "energy",
     "forward_dynamics",
     "gravity_force",
     "inertial_parameters",
     "inverse_dynamics",
-    "linearization",
     "linearize",
     "load_mjcf",
     "load_urdf",
     "mass_matrix",
     "momentum",
     "momentum_rate",
-    "picked_up",
     "planar_arm",
     "prune",
+    "raise_if_singular",
     "reference",
     "regressor",
+    "release",
     "scenes",
     "serial_arm",
     "simulate",
     "simulate_many",
-    "spurious",
+    "spurious_nodes",
     "state_equation",
+    "state_space",
     "to_mjcf",
     "to_urdf",
+    "torque_by_joint_motion",
     "torque_by_link",
-    "torque_by_motion",
     "tree",
 ]

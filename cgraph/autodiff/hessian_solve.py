@@ -19,7 +19,7 @@ ZERO, ONE = as_node(0.0), as_node(1.0)
 
 
 def hessian_solve(
-    graph: Graph, wrt: str | Node | Sequence[str | Node], rhs: Sequence[Scalar], *, positive: bool = False
+    graph: Graph, wrt: str | Node | Sequence[str | Node], rhs: Sequence[Scalar], *, check: bool = False
 ) -> list[Node]:
     """Nodes x with (d2f/dw2) x = rhs, for the one output f of `graph` and the inputs w of `wrt`.
 
@@ -37,7 +37,7 @@ def hessian_solve(
     chosen = graph.select_inputs(wrt)
     if len(rhs) != len(chosen):
         raise ValueError(f"rhs needs one entry for each of the {len(chosen)} variables, got {len(rhs)}")
-    return solve_nodes(graph.only_output(), chosen, [as_node(each) for each in rhs], positive=positive)
+    return solve_nodes(graph.only_output(), chosen, [as_node(each) for each in rhs], check=check)
 
 
 def solve_nodes(
@@ -47,7 +47,7 @@ def solve_nodes(
     build: Builder | None = None,
     *,
     at: Mapping[Node, Node] | None = None,
-    positive: bool = False,
+    check: bool = False,
 ) -> list[Node]:
     """As `hessian_solve`, on nodes.
 
@@ -72,7 +72,7 @@ def solve_nodes(
             labelled(_of(step).label.derived(TANGENT))
             walk.find_tangents(step)
         x = [walk.dots[node] for node in wrt]
-        if positive:
+        if check:
             labelled(output.label.derived(ADJOINT))
             x.append(first_not_positive({walk.index(node): solved.pivot for node, solved in walk.solved.items()}))
     return x

@@ -12,7 +12,7 @@ from ..simplify.builder import Builder
 
 
 class SingularError(GraphError):
-    """A pivot that is the constant zero, or a negative one where it should be positive: `pivot`, of row `index`."""
+    """A pivot that is the constant zero, or a negative one where it should be positive: `info`, of row `index`."""
 
     def __init__(self, index: int, pivot: float = 0.0) -> None:
         problem = "not positive definite" if pivot else "singular by structure"
@@ -22,13 +22,13 @@ class SingularError(GraphError):
 
 
 def ldl_solve(
-    lower: Sequence[Sequence[Node]], rhs: Sequence[Node], build: Builder | None = None, *, positive: bool = False
+    lower: Sequence[Sequence[Node]], rhs: Sequence[Node], build: Builder | None = None, *, check: bool = False
 ) -> list[Node]:
     """Nodes x with A x = rhs, for the symmetric A whose lower triangle has the rows `lower`.
 
     Eliminates from the last row up: along a chain of bodies that is from the tip to the base, the order in which
     pivots are articulated inertias. No pivoting: A must be definite. Structural zeros cost nothing.
-    positive: one more node follows x, see `first_not_positive`.
+    check: one more node follows x, see `first_not_positive`.
     Raises SingularError when a pivot is the constant zero.
     """
     n = len(rhs)
@@ -51,7 +51,7 @@ def ldl_solve(
             for gain, known in zip(gains[i], x, strict=True):
                 total = total - gain * known
             x.append(total)
-        if positive:
+        if check:
             x.append(first_not_positive({i: a[i][i] for i in reversed(range(n))}))
     return x
 

@@ -55,7 +55,7 @@ class Node:
     """An immutable node of a computational graph: a constant, a named variable or an operation.
 
     op: its row of the operation table; `VARIABLE` or `CONSTANT` for a leaf.
-    args: argument nodes.  value: a constant's number.  name: a variable's name, or one given by `named`.
+    args: argument nodes.  value: a constant's number.  name: a variable's name, or one given by `with_name`.
     tags, roles: what the node means, see `cg.tag`.  lines: where it was written, see `cg.recording_lines`.
 
     Nodes compare and hash by identity. Arithmetic with nodes and numbers makes new nodes, kept as written;
@@ -267,7 +267,7 @@ def as_node(value: Scalar) -> Node:
     return value if isinstance(value, Node) else constant(value)
 
 
-def named(name: str, node: Node) -> Node:
+def with_name(node: Node, name: str) -> Node:
     """The same operation with a name of its own, for listings, drawings and explanations.
 
     Leaves keep what they are: a variable has its name already, and a constant is shared.

@@ -1,9 +1,9 @@
 """Explanations of a graph: what of it is not as declared, why outputs depend on inputs, how two differ."""
 
-from .compare import Diff, Together, diff
+from .compare import Comparison, Together, compare
 from .lint.finding import Finding
 from .lint.lint import Lint, lint
 from .why import Path, Why, why
 from .why_not import WhyNot, why_not
 
-__all__ = ["Diff", "Finding", "Lint", "Path", "Together", "Why", "WhyNot", "diff", "lint", "why", "why_not"]
+__all__ = ["Comparison", "Finding", "Lint", "Path", "Together", "Why", "WhyNot", "compare", "lint", "why", "why_not"]

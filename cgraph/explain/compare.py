@@ -27,8 +27,8 @@ class Together(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Diff:
-    """The nodes of two graphs, paired by structure; see `diff`. `str` of it is the summary.
+class Comparison:
+    """The nodes of two graphs, paired by structure; see `compare`. `str` of it is the summary.
 
     common: pairs (node of left, node of right) that compute the same; a node is in one pair at most.
     only_left, only_right: the rest, in the order of each graph's nodes.
@@ -115,7 +115,9 @@ class Diff:
         return Together(both, left, right)
 
 
-def diff(left: Graph, right: Graph, *, atoms: str | Iterable[str] = (), classify: Classify | None = None) -> Diff:
+def compare(
+    left: Graph, right: Graph, *, atoms: str | Iterable[str] = (), classify: Classify | None = None
+) -> Comparison:
     """Compare two graphs by structure.
 
     Two nodes are alike when they are the same operation on alike arguments, in any order where they commute, the same
@@ -141,7 +143,7 @@ def diff(left: Graph, right: Graph, *, atoms: str | Iterable[str] = (), classify
     only_right = tuple([node for node in right.nodes if node not in rights])
     shared = [name for name in left.outputs if name in right.outputs]
     same = [name for name in shared if left_hashes[left.outputs[name]] == right_hashes[right.outputs[name]]]
-    return Diff(
+    return Comparison(
         left,
         right,
         tuple(common),

@@ -121,7 +121,7 @@ def why(graph: Graph, output: Name, input: Name, at: Point | None = None, k: int
 
     A path's weight is the product of the local partials along it; over all paths these add up to the derivative. All
     numbers come from sweeps over the nodes: no list of paths is ever made, so 10^20 of them are no matter.
-    output, input: names of an output and an input, or of a node named by `cg.named`, or a node.
+    output, input: names of an output and an input, or of a node named by `cg.with_name`, or a node.
     at: {input: number} for all inputs. Without it, the k shortest paths are listed.
 
     Raises GraphError for a name that the graph does not have or that several nodes have, and where the derivative is

@@ -86,7 +86,7 @@ METHODS = ("auto", "recursive", "dense")
 SHORT = 6  # coordinates; beyond, the dense graph is larger on a tree of bodies, and takes long to build
 
 
-def forward_dynamics(model: Any, method: str = "auto", *, positive: bool = False) -> Graph:
+def forward_dynamics(model: Any, method: str = "auto", *, check: bool = False) -> Graph:
     """Accelerations: qdd = M^-1 (tau + forces - damping * qd - bias), from the Lagrangian.
 
     Inputs q0.., qd0.., tau0.., t if needed, parameters; outputs qdd0.. [rad/s^2 or m/s^2].
@@ -94,9 +94,9 @@ def forward_dynamics(model: Any, method: str = "auto", *, positive: bool = False
     method: "recursive", elimination on the graph of L without forming M (`cg.hessian_solve`): for a tree of bodies the
     number of nodes is linear in n. "dense", M factored as LDL^T: smaller for very short arms. "auto", the smaller of
     the two up to 6 coordinates, else recursive.
-    positive: one more output, `pivot`: 0 where M is positive definite, else 1 + the index of the coordinate that was
-    found to have no inertia left, or a negative one; the accelerations mean nothing there. `check_pivot` raises on it.
-    Three nodes a coordinate. Without, the result where M is singular is infinite, NaN or meaningless.
+    check: one more output, `info`: 0 where M is positive definite, else 1 + the index of the coordinate that was
+    found to have no inertia left, or a negative one; the accelerations mean nothing there. `raise_if_singular`
+    raises on it. Three nodes a coordinate. Without, the result where M is singular is infinite, NaN or meaningless.
 
     Raises SingularMassMatrixError, naming the coordinate, when M is singular at every state; ValueError for an unknown
     method.
@@ -107,7 +107,7 @@ def forward_dynamics(model: Any, method: str = "auto", *, positive: bool = False
     methods = [method] if method != "auto" else ["recursive", "dense"] if system.n <= SHORT else ["recursive"]
     known = _terms(system)
     try:
-        graphs = [_accelerations(system, known, each, positive) for each in methods]
+        graphs = [_accelerations(system, known, each, check) for each in methods]
     except SingularError as error:
         name = system.coordinates[error.index]
         problem = "not positive definite" if error.pivot else "singular"
@@ -117,12 +117,12 @@ def forward_dynamics(model: Any, method: str = "auto", *, positive: bool = False
     return min(graphs, key=lambda graph: len(graph.nodes))
 
 
-def check_pivot(model: Any, pivot: ArrayLike) -> None:
-    """Raise SingularMassMatrixError, naming the coordinate, unless the output `pivot` of `forward_dynamics` is 0.
+def raise_if_singular(model: Any, info: ArrayLike) -> None:
+    """Raise SingularMassMatrixError, naming the coordinate, unless the output `info` of `forward_dynamics` is 0.
 
-    pivot: a number, or an array of any shape; the first entry that is not 0 is reported, with its index.
+    info: a number, or an array of any shape; the first entry that is not 0 is reported, with its index.
     """
-    values = np.asarray(pivot)
+    values = np.asarray(info)
     failed = np.argwhere(values != 0.0)
     if len(failed):
         at = tuple(failed[0].tolist())
@@ -133,7 +133,7 @@ def check_pivot(model: Any, pivot: ArrayLike) -> None:
         )
 
 
-def _accelerations(system: System, known: _Terms, method: str, positive: bool) -> Graph:
+def _accelerations(system: System, known: _Terms, method: str, check: bool) -> Graph:
     build = Builder()
     with building(build):
         slopes = known.gradient if method == "recursive" else [-bias for bias in known.bias(system, build)]
@@ -145,10 +145,10 @@ def _accelerations(system: System, known: _Terms, method: str, positive: bool) -
         ]
         inertial = {velocity: -rate for velocity, rate in known.inertial.items()}
     if method == "recursive":  # carries the inertial terms to the coordinates on its way
-        solved = solve_nodes(known.lagrangian, system.qd, rhs, build, at=inertial, positive=positive)
+        solved = solve_nodes(known.lagrangian, system.qd, rhs, build, at=inertial, check=check)
     else:
-        solved = ldl_solve(hessian_nodes(known.lagrangian, system.qd, build), rhs, build, positive=positive)
-    names = [f"qdd{i}" for i in range(system.n)] + ["pivot"] * positive
+        solved = ldl_solve(hessian_nodes(known.lagrangian, system.qd, build), rhs, build, check=check)
+    names = [f"qdd{i}" for i in range(system.n)] + ["info"] * check
     outputs = dict(zip(names, solved, strict=True))
     return cg.simplify(system.graph(outputs, system.q, system.qd, system.tau))
 

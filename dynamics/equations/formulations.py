@@ -127,7 +127,7 @@ def momentum_rate(
     return _finished(system.graph(outputs, terms.inputs), simplify)
 
 
-def spurious(graph: Graph) -> frozenset[Node]:
+def spurious_nodes(graph: Graph) -> frozenset[Node]:
     """Nodes that are there only because a derivative was taken through the embedded Euler relation.
 
     They are the adjoints that the product qd dt of q = qd dt + q_old passes on, and all that only these need.
@@ -177,11 +177,12 @@ class _Embedding:
         self.inputs = [*q_old, *qd_old, *system.qdd, self.dt]
         with cg.tag(EULER):
             self.qd = [
-                cg.named(f"qd{i}", a * self.dt + old) for i, (a, old) in enumerate(zip(system.qdd, qd_old, strict=True))
+                cg.with_name(a * self.dt + old, f"qd{i}")
+                for i, (a, old) in enumerate(zip(system.qdd, qd_old, strict=True))
             ]
             with cg.tag(COUPLING):
                 moved = [v * self.dt for v in self.qd]
-            self.q = [cg.named(f"q{i}", m + old) for i, (m, old) in enumerate(zip(moved, q_old, strict=True))]
+            self.q = [cg.with_name(m + old, f"q{i}") for i, (m, old) in enumerate(zip(moved, q_old, strict=True))]
 
     def of(self, *nodes: Node) -> list[Node]:
         """Nodes over (q, qd) as nodes over the embedded state."""

@@ -22,7 +22,7 @@ from .evaluate_at import Array, at_state
 from .formulations import ONE, ZERO, inverse_dynamics
 
 
-def linearization(model: Any) -> Graph:
+def state_space(model: Any) -> Graph:
     """A and B of d(xdot) = A dx + B dtau, x = (q, qd), at any state.
 
     From tau(q, qd, qdd) = const: M dqdd = dtau - (d tau / dx) dx, at the qdd of forward dynamics. That takes half the
@@ -74,12 +74,12 @@ def linearize(
 ) -> tuple[Array, Array]:
     """A, (2n, 2n), and B, (2n, n), of d(xdot) = A dx + B dtau, x = (q, qd), at a state and applied forces (default 0).
 
-    q, qd, tau: (n,).  parameters: {name: value} in place of the model's own. For many states, compile `linearization`.
-    Raises ValueError for arrays of another shape, and as `linearization`.
+    q, qd, tau: (n,).  parameters: {name: value} in place of the model's own. For many states, compile `state_space`.
+    Raises ValueError for arrays of another shape, and as `state_space`.
     """
     system = as_system(model)
     n = system.n
-    flat = at_state(system, linearization(system), {"q": q, "qd": qd, "tau": tau}, t, parameters)
+    flat = at_state(system, state_space(system), {"q": q, "qd": qd, "tau": tau}, t, parameters)
     if flat.ndim != 1:
         raise ValueError(f"linearize takes one state, q, qd and tau of the shape ({n},)")
     return flat[: 4 * n * n].reshape(2 * n, 2 * n), flat[4 * n * n :].reshape(2 * n, n)

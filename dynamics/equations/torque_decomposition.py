@@ -27,7 +27,7 @@ def torque_by_link(model: Any) -> TorqueTable:
 
     Rows of damping and of applied forces follow, where the model has them; columns add up to tau. A link that a joint
     does not carry has no share of its torque, whatever the state: such cells are zero by structure.
-    Of a mechanism written with base parameters (`regrouped`) a row is not what its body alone takes.
+    Of a mechanism written with base parameters (`base_parameters`) a row is not what its body alone takes.
     """
     system = as_system(model)
     build = Builder()
@@ -40,7 +40,7 @@ def torque_by_link(model: Any) -> TorqueTable:
     return TorqueTable("torque by link", (*names, *outside), system.coordinates, system, graph, True)
 
 
-def torque_by_motion(model: Any) -> TorqueTable:
+def torque_by_joint_motion(model: Any) -> TorqueTable:
     """Row i, column j: the torque at joint i for the motion of joint j, M_ij qdd_j + C_ij qd_j.
 
     C is that of Christoffel's symbols (`coriolis`): of a Coriolis force, which two velocities make together, each has

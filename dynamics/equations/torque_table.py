@@ -64,17 +64,20 @@ class TorqueTable:
             raise ValueError(f"a table has one state, q, qd and qdd of the shape ({self.system.n},)")
         return replace(self, values=flat.reshape(len(self.rows), len(self.columns)))
 
-    def text(self, digits: int = 4) -> str:
+    def to_text(self, digits: int = 4) -> str:
         """The table in columns of text, with the sum tau; without a state, each cell's expression or its size."""
         return _aligned(self._cells(digits), "  ")
 
-    def markdown(self, digits: int = 4) -> str:
+    def __str__(self) -> str:
+        return self.to_text().rstrip("\n")
+
+    def to_markdown(self, digits: int = 4) -> str:
         """The same as a Markdown table."""
         head, *body = [[cell.replace("|", "\\|") for cell in row] for row in self._cells(digits)]
         ruled = [head, ["---", *["---:"] * (len(head) - 1)], *body]
         return "".join(f"| {' | '.join(row)} |\n" for row in ruled)
 
-    def latex(self, digits: int = 4) -> str:
+    def to_latex(self, digits: int = 4) -> str:
         """The same as a LaTeX `tabular` that needs no package."""
         head, *body = [" & ".join(map(_latex, row)) + r" \\" for row in self._cells(digits)]
         columns = "l" + "r" * len(self._cells(digits)[0][1:])

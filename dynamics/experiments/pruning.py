@@ -9,7 +9,7 @@ from cgraph import Graph
 
 from ..equations.equations_of_motion import forward_dynamics
 from ..equations.formulations import inverse_dynamics
-from ..multibody.pruning import EFFECTS, Equations, LeftOut, Pruned, prune
+from ..multibody.pruning import EFFECTS, Equations, OmittedTerm, PruneResult, prune
 from ..scenes.scenes import Scene
 
 EQUATIONS: dict[str, Equations] = {"inverse dynamics": inverse_dynamics, "forward dynamics": forward_dynamics}
@@ -42,7 +42,7 @@ def _inputs(graph: Graph) -> set[str]:
     return {part for name in graph.input_names for part in (name, name.rstrip("0123456789"))}
 
 
-def _account(pruned: Pruned) -> dict[str, Any]:
+def _account(pruned: PruneResult) -> dict[str, Any]:
     full, left = pruned.full.counts().by_tag, pruned.graph.counts().by_tag
     return {
         "full": _size(pruned.full),
@@ -59,5 +59,5 @@ def _size(graph: Graph) -> dict[str, int]:
     return {"nodes": counts.nodes, "edges": counts.edges, "depth": counts.depth}
 
 
-def _row(each: LeftOut) -> dict[str, Any]:
+def _row(each: OmittedTerm) -> dict[str, Any]:
     return {"what": each.what, "why": each.why, "nodes": each.nodes, "edges": each.edges}

@@ -214,7 +214,7 @@ def _joint(model: Any, j: int, position: Array, orientation: Array) -> Joint:
         orientation,
         damping=float(model.dof_damping[dof]) * (not _disabled(model, "DAMPER")),
         stiffness=float(model.jnt_stiffness[j]) * (not _disabled(model, "SPRING")),
-        rest=float(model.qpos_spring[model.jnt_qposadr[j]]),
+        spring_reference=float(model.qpos_spring[model.jnt_qposadr[j]]),
         armature=float(model.dof_armature[dof]),
     )
 

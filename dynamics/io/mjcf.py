@@ -99,7 +99,7 @@ def _body_lines(body: Body) -> list[str]:
     joint = body.joint
     x, y, _ = np.asarray(joint.orientation).T
     kind = "hinge" if joint.kind == "revolute" else "slide"
-    spring = f'stiffness="{joint.stiffness!r}" springref="{joint.rest!r}" armature="{joint.armature!r}"'
+    spring = f'stiffness="{joint.stiffness!r}" springref="{joint.spring_reference!r}" armature="{joint.armature!r}"'
     axis = f'axis="{numbers(joint.axis)}" damping="{joint.damping!r}"'
     mass = max(body.mass, _SMALLEST)
     name = quoteattr(body.name)

@@ -29,7 +29,8 @@ class Joint:
     kind: "revolute" (turns about `axis`), "prismatic" (slides along it) or "fixed" (welded).
     axis: (3,) in the body's axes; need not have length 1.
     position: (3,) [m], orientation: (3, 3): the body's frame in its parent's at q = 0; the joint is at its origin.
-    damping [N m s or N s/m], stiffness [N m/rad or N/m] towards `rest` [rad or m], armature [kg m^2 or kg]: >= 0.
+    damping [N m s or N s/m], stiffness [N m/rad or N/m] towards `spring_reference` [rad or m], armature
+        [kg m^2 or kg]: >= 0.
     """
 
     kind: str
@@ -38,7 +39,7 @@ class Joint:
     orientation: ArrayLike = field(default_factory=lambda: np.eye(3))
     damping: float = 0.0
     stiffness: float = 0.0
-    rest: float = 0.0
+    spring_reference: float = 0.0
     armature: float = 0.0
 
 
@@ -123,7 +124,7 @@ def _checked_joint(where: str, joint: Joint) -> Joint:
         orientation=spatial.snapped(orientation),
         damping=_number(f"{where}: damping", joint.damping),
         stiffness=_number(f"{where}: stiffness", joint.stiffness),
-        rest=_number(f"{where}: rest", joint.rest, minimum=-math.inf),
+        spring_reference=_number(f"{where}: spring_reference", joint.spring_reference, minimum=-math.inf),
         armature=_number(f"{where}: armature", joint.armature),
     )
 

@@ -25,7 +25,7 @@ class FreeBody(NamedTuple):
     orientation: Array  # (3, 3), its axes as columns
 
 
-class PickedUp(NamedTuple):
+class Attached(NamedTuple):
     """mechanism: with the body.  q, qd: its state after the impact.  energy: what the impact took [J]."""
 
     mechanism: Mechanism
@@ -34,7 +34,7 @@ class PickedUp(NamedTuple):
     energy: float
 
 
-class Dropped(NamedTuple):
+class Released(NamedTuple):
     """mechanism: without the body.  q, qd: its state.  body: how the body leaves."""
 
     mechanism: Mechanism
@@ -43,7 +43,7 @@ class Dropped(NamedTuple):
     body: FreeBody
 
 
-def picked_up(
+def attach_with_impact(
     mechanism: Mechanism,
     q: ArrayLike,
     qd: ArrayLike,
@@ -52,7 +52,7 @@ def picked_up(
     *,
     velocity: ArrayLike = (0.0, 0.0, 0.0),
     omega: ArrayLike = (0.0, 0.0, 0.0),
-) -> PickedUp:
+) -> Attached:
     """A free body is caught, and hangs from then on as its joint says.
 
     The impact is inelastic and takes no time: positions stay, no force but its own matters, and velocities jump so
@@ -61,11 +61,11 @@ def picked_up(
         parent. Where it is has to be where it hangs: see `Mechanism.motion`. A joint that is new stands at 0.
     velocity: (3,) [m/s] of its centre of mass, omega: (3,) [rad/s], both in the world's axes.
 
-    Raises as `Mechanism.attach` and `Mechanism.state_of`.
+    Raises as `Mechanism.attach` and `Mechanism.map_state_from`.
     """
     whole = mechanism.attach(body, to)
     v, w = vector("velocity", velocity), vector("omega", omega)
-    q_new, qd_old = whole.state_of(mechanism, q, qd)
+    q_new, qd_old = whole.map_state_from(mechanism, q, qd)
     coordinates = {each.name: i for i, each in enumerate(whole.moving)}
     p = np.zeros(len(coordinates))
     before = _momentum(mechanism, np.asarray(q, dtype=np.float64), np.asarray(qd, dtype=np.float64))
@@ -76,22 +76,23 @@ def picked_up(
     p += given.mass * along.T @ v + about.T @ inertia @ w
     qd_new = _velocities(whole, q_new, p)
     energy = float(np.asarray(qd, dtype=np.float64) @ before + given.mass * v @ v + w @ inertia @ w - qd_new @ p) / 2.0
-    return PickedUp(whole, q_new, qd_new, energy)
+    return Attached(whole, q_new, qd_new, energy)
 
 
-def dropped(mechanism: Mechanism, q: ArrayLike, qd: ArrayLike, body: str) -> Dropped:
+def release(mechanism: Mechanism, q: ArrayLike, qd: ArrayLike, body: str) -> Released:
     """A body is let go: all velocities stay, and it leaves as the one that held it moved there.
 
-    q, qd: (n,). Raises MechanismError for an unknown body and one that carries others, and as `Mechanism.state_of`.
+    q, qd: (n,). Raises MechanismError for an unknown body and one that carries others, and as
+    `Mechanism.map_state_from`.
     """
     bodies = mechanism.subtree(body).bodies
     if len(bodies) > 1:
         raise MechanismError(f"body {body!r} carries {bodies[1].name!r}; a body that is let go must carry no other")
     rest = mechanism.detach(body)
     values = [np.asarray(each, dtype=np.float64) for each in (q, qd)]
-    q_rest, qd_rest = rest.state_of(mechanism, *values)
+    q_rest, qd_rest = rest.map_state_from(mechanism, *values)
     free, _, _ = _motion(mechanism, checked(bodies[0]), *values)
-    return Dropped(rest, q_rest, qd_rest, free)
+    return Released(rest, q_rest, qd_rest, free)
 
 
 def _motion(mechanism: Mechanism, body: Body, q: Array, qd: Array) -> tuple[FreeBody, Array, Array]:

@@ -54,7 +54,7 @@ class Link:
     inertia: Matrix  # (3, 3), the lower triangle counts
     damping: float | Node
     stiffness: float | Node
-    rest: float | Node
+    spring_reference: float | Node
     armature: float | Node
 
     @cached_property
@@ -62,7 +62,7 @@ class Link:
         """Turn, place, mass, moment, inertia (lower triangle), damping, stiffness, rest, armature."""
         turn = [each for row in self.turn for each in row]
         lower = [self.inertia[i][j] for i in range(3) for j in range(i + 1)]
-        others = (self.damping, self.stiffness, self.rest, self.armature)
+        others = (self.damping, self.stiffness, self.spring_reference, self.armature)
         return [float(each) for each in (*turn, *self.place, self.mass, *self.moment, *lower, *others)]
 
 
@@ -87,7 +87,7 @@ def link(body: Body, outer: Array) -> Link:
     inertia = spatial.about(axes.T @ np.asarray(body.inertia) @ axes, body.mass, center)
     inertia = np.where(np.abs(inertia) <= spatial.SNAP * np.abs(inertia).max(initial=0.0), 0.0, inertia)
     moment = spatial.constant(spatial.snapped(body.mass * center))
-    numbers = (joint.damping, joint.stiffness, joint.rest, joint.armature)
+    numbers = (joint.damping, joint.stiffness, joint.spring_reference, joint.armature)
     return Link(turn.tolist(), place, body.mass, moment, inertia.tolist(), *numbers)
 
 
@@ -165,7 +165,7 @@ def energy(motion: Motion, link: Link, q: Node, qd: Node) -> Node:
         terms.append(0.5 * link.armature * (qd * qd))
         kinetic = spatial.total(terms)
     with cg.tag("potential"):
-        stretch = q - link.rest
+        stretch = q - link.spring_reference
         potential = link.mass * motion.height + spatial.dot(own.up, link.moment)
         potential = potential + 0.5 * link.stiffness * (stretch * stretch)
     return kinetic - potential

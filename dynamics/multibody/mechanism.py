@@ -59,8 +59,8 @@ class Mechanism:
     parameters: values of the parameters that forces name, {name: value}; one without a value is 0. As of any system,
         parameters are inputs of the graphs, and `simulate` binds them.
     locked: {body: coordinate [rad or m]} of joints that stand still: their bodies are welded on, see `lock`.
-    regrouped: written with the fewest inertial numbers (`base_parameters.py`). Smaller graphs of the same motion; but
-        a partial Lagrangian is then not the energy of its body.
+    base_parameters: written with the fewest inertial numbers (`base_parameters.py`). Smaller graphs of the same
+        motion; but a partial Lagrangian is then not the energy of its body.
 
     Raises MechanismError for an unknown parent, a cycle, a repeated name, numbers that are not finite or out of range,
     an inertia that no body can have, a coordinate that moves no mass and has no armature, a force on an unknown body,
@@ -72,7 +72,7 @@ class Mechanism:
     forces: Sequence[Force] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     locked: Mapping[str, float] = field(default_factory=dict)
-    regrouped: bool = False
+    base_parameters: bool = False
     _made: _Made = field(default_factory=_Made, repr=False, kw_only=True)
 
     def __post_init__(self) -> None:
@@ -191,7 +191,7 @@ class Mechanism:
         with building(Builder()):
             moved = self._moved(q, qd)
             partials = [each.partial for each in moved]
-            if self.regrouped:
+            if self.base_parameters:
                 with cg.tag("potential"):
                     partials[0] = partials[0] - spatial.dot(self._ground.up, spatial.constant(self._links[1]))
         return partials
@@ -241,7 +241,7 @@ class Mechanism:
         """The links, and the first moment of what of their inertia is the world's."""
         by_name: dict[str, Body | None] = {body.name: body for body in self.moving} | {WORLD: None}
         links = [self._link(body, by_name[body.parent]) for body in self.moving]
-        if self.regrouped:
+        if self.base_parameters:
             return regrouped(links, [body.joint.kind for body in self.moving], self.parents)
         return links, np.zeros(3)
 
@@ -317,7 +317,7 @@ class Mechanism:
             locked={**self.locked, **given.locked},
         )
 
-    def state_of(self, other: Mechanism, q: ArrayLike, qd: ArrayLike) -> tuple[Array, Array]:
+    def map_state_from(self, other: Mechanism, q: ArrayLike, qd: ArrayLike) -> tuple[Array, Array]:
         """The state (q, qd) of another mechanism as one of this: joints of the same name keep theirs.
 
         A joint that was locked stands where it was locked, one that is new at 0, both still. Raises ValueError for

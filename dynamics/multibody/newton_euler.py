@@ -86,7 +86,7 @@ def forces(acceleration: Acceleration, motion: Motion, link: Link, q: Node, qd: 
         force = spatial.plus((link.mass * a[0], link.mass * a[1], link.mass * a[2]), force)
         torque = [a + b for a, b in zip(torque, spatial.cross(moment, a), strict=True)]
     with cg.tag(POTENTIAL):
-        spring = link.stiffness * (q - link.rest)
+        spring = link.stiffness * (q - link.spring_reference)
     return list(zip((*motion.velocity, *motion.omega, qd), (*force, *torque, spring), strict=True))
 
 

@@ -142,20 +142,20 @@ def planar_arm(
     masses: Sequence[float],
     lengths: Sequence[float],
     damping: float | Sequence[float] = 0.0,
-    model: str = "rod",
+    mass_model: str = "rod",
     gravity: float = 9.81,
 ) -> PlanarArm:
     """A planar arm, links from the base outwards.
 
     masses [kg] and lengths [m]: positive, one for each link.  damping [N m s]: at least 0, for all joints or each.
-    model: "rod", a slender uniform rod with inertia m l^2 / 12; "point", the mass at the link's far end.
+    mass_model: "rod", a slender uniform rod with inertia m l^2 / 12; "point", the mass at the link's far end.
     gravity [m/s^2].  Raises ValueError when a number is out of range or the counts differ.
     """
     masses, lengths = sequence("masses must be", masses), sequence("lengths must be", lengths)
     if len(masses) != len(lengths) or not len(masses):
         raise ValueError(f"an arm needs as many masses as lengths, at least one; got {len(masses)} and {len(lengths)}")
-    if model not in ("rod", "point"):
-        raise ValueError(f'model must be "rod" or "point", got {model!r}')
+    if mass_model not in ("rod", "point"):
+        raise ValueError(f'mass_model must be "rod" or "point", got {mass_model!r}')
     if not math.isfinite(real_number("gravity", gravity)):
         raise ValueError(f"gravity must be finite, got {gravity!r} m/s^2")
     for i, (mass, length) in enumerate(zip(masses, lengths, strict=True)):
@@ -164,7 +164,7 @@ def planar_arm(
                 raise ValueError(f"link {i + 1}: {what} must be positive and finite, got {value!r} {unit}")
     links = [
         Link(mass, length, length / 2, mass * length * length / 12)
-        if model == "rod"
+        if mass_model == "rod"
         else Link(mass, length, length, 0.0)
         for mass, length in zip(map(float, masses), map(float, lengths), strict=True)
     ]

@@ -31,7 +31,7 @@ Equations = Callable[[Any], Graph]
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class OmittedTerm:
     """Something that is not in a graph.  nodes, edges: how many more there would be with it."""
 
     what: str
@@ -44,7 +44,7 @@ class LeftOut:
 
 
 @dataclass(frozen=True, eq=False)
-class Pruned:
+class PruneResult:
     """What `prune` makes: the model that is left and its graph. The accounts are made when they are asked for."""
 
     model: Any
@@ -58,17 +58,17 @@ class Pruned:
         return self.steps[0].graph(self.equations)
 
     @cached_property
-    def left_out(self) -> tuple[LeftOut, ...]:
+    def left_out(self) -> tuple[OmittedTerm, ...]:
         """What was in the full graph, in the order in which it was taken out: the nodes add up to the difference."""
         before, result = self.full, []
         for step in self.steps[1:]:
             after = self.graph if step is self.steps[-1] else step.graph(self.equations)
-            result.append(LeftOut(step.what, step.why, *_saved(before, after)))
+            result.append(OmittedTerm(step.what, step.why, *_saved(before, after)))
             before = after
         return tuple(result)
 
     @cached_property
-    def absent(self) -> tuple[LeftOut, ...]:
+    def absent(self) -> tuple[OmittedTerm, ...]:
         """What the model as given has not, so that no graph of it has nodes for it, each counted by putting it in.
 
         Gravity as on earth or, along the axes of some joints, askew; 0.3 for damping, stiffness and armature; a body of
@@ -78,18 +78,18 @@ class Pruned:
         result = []
         for what, why, model in _absent(self.model, self.steps[0].model):
             with_it = replace(last, model=model).graph(self.equations)
-            result.append(LeftOut(what, why, *_saved(with_it, self.graph)))
+            result.append(OmittedTerm(what, why, *_saved(with_it, self.graph)))
         return tuple(result)
 
     @cached_property
-    def remains(self) -> tuple[LeftOut, ...]:
+    def remains(self) -> tuple[OmittedTerm, ...]:
         """What is in the graph though no motion shows it; and the nodes that `regroup` would save."""
-        if not isinstance(self.model, Mechanism) or self.model.regrouped:
+        if not isinstance(self.model, Mechanism) or self.model.base_parameters:
             return ()
         last = self.steps[-1]
-        without = replace(last, model=replace(self.model, regrouped=True)).graph(self.equations)
+        without = replace(last, model=replace(self.model, base_parameters=True)).graph(self.equations)
         nodes, edges = _saved(self.graph, without)
-        return (LeftOut(NEVER, "not regrouped", nodes, edges),) if nodes > 0 else ()
+        return (OmittedTerm(NEVER, "not regrouped", nodes, edges),) if nodes > 0 else ()
 
     def __str__(self) -> str:
         lines = [f"{_size(self.full)} as given, {_size(self.graph)} left."]
@@ -125,7 +125,7 @@ def prune(
     values: Mapping[str, float] | None = None,
     outputs: Sequence[str] | None = None,
     regroup: bool = True,
-) -> Pruned:
+) -> PruneResult:
     """The equations of a model with what is asked for and nothing else.
 
     equations: the function that makes the graph, `inverse_dynamics`, `forward_dynamics`, `mass_matrix`, ...
@@ -163,13 +163,13 @@ def prune(
         take("other outputs", f"only {', '.join(outputs)} asked for", outputs=tuple(outputs))
     last = steps[-1].model
     graph = steps[-1].graph(equations)
-    if regroup and isinstance(last, Mechanism) and not last.regrouped:
-        fewer = replace(steps[-1], model=replace(last, regrouped=True), what=NEVER, why="regrouped")
+    if regroup and isinstance(last, Mechanism) and not last.base_parameters:
+        fewer = replace(steps[-1], model=replace(last, base_parameters=True), what=NEVER, why="regrouped")
         candidate = fewer.graph(equations)
         if len(candidate.nodes) < len(graph.nodes):
             steps.append(fewer)
             graph = candidate
-    return Pruned(steps[-1].model, graph, equations, tuple(steps))
+    return PruneResult(steps[-1].model, graph, equations, tuple(steps))
 
 
 def _bound(graph: Graph, values: Mapping[str, float]) -> dict[str, float]:

@@ -91,4 +91,6 @@ def _symbolic(known: Link, axes: Array, pi: list[Node]) -> Link:
     columns = [spatial.turned(axes.tolist(), (half[0][j], half[1][j], half[2][j])) for j in range(3)]
     turned = [[columns[j][i] for j in range(3)] for i in range(3)]
     moment = spatial.turned(axes.tolist(), (x, y, z))
-    return replace(known, mass=mass, moment=moment, inertia=turned, damping=0.0, stiffness=0.0, rest=0.0, armature=0.0)
+    return replace(
+        known, mass=mass, moment=moment, inertia=turned, damping=0.0, stiffness=0.0, spring_reference=0.0, armature=0.0
+    )

@@ -41,14 +41,14 @@ class PinocchioPeer(Peer):
         self.at = np.argsort(self.order)
         joints = [body.joint for body in model.moving] if isinstance(model, Mechanism) else []
         self.stiffness = np.array([joint.stiffness for joint in joints] or np.zeros(case.n))
-        self.rest = np.array([joint.rest for joint in joints] or np.zeros(case.n))
+        self.spring_reference = np.array([joint.spring_reference for joint in joints] or np.zeros(case.n))
         self.damping = np.array(case.system.damping)
 
     def _passive(self, x: Array) -> Array:
         """The torque of dampers and springs against the motion, in our order; x: (2n or 3n,) or with columns."""
         n = self.case.n
         damping, stiffness, rest = (
-            each.reshape(-1, *[1] * (x.ndim - 1)) for each in (self.damping, self.stiffness, self.rest)
+            each.reshape(-1, *[1] * (x.ndim - 1)) for each in (self.damping, self.stiffness, self.spring_reference)
         )
         force: Array = damping * x[n : 2 * n] + stiffness * (x[:n] - rest)
         return force
@@ -89,7 +89,7 @@ class PinocchioPeer(Peer):
     def _step(self) -> Contender:
         """RK4 in Python over aba."""
         n, twin, data, aba = self.case.n, self.twin, self.data, self.pinocchio.aba
-        damping, stiffness, rest = self.damping[self.at], self.stiffness[self.at], self.rest[self.at]
+        damping, stiffness, rest = self.damping[self.at], self.stiffness[self.at], self.spring_reference[self.at]
         bare = not stiffness.any()
 
         def rate(x: Array) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from cgraph import Graph, Node
 
 from ..equations.equations_of_motion import forward_dynamics
-from ..equations.formulations import inverse_dynamics, spurious
+from ..equations.formulations import inverse_dynamics, spurious_nodes
 from ..multibody.joint_positions import Skeleton, skeleton
 from ..multibody.mechanism import Mechanism
 from ..simulation.simulate import simulate
@@ -73,7 +73,7 @@ def inspection(scene: Scene, *, forward: bool = False, t_end: float | None = Non
 
 def _version(system: System, name: str, state: Mapping[str, Any]) -> Equations:
     graph = inverse_dynamics(system, name)
-    wrong = spurious(graph)
+    wrong = spurious_nodes(graph)
     if wrong:
         through = "of the kinetic energy " if name == "kinetic_only" else ""
         about = (
@@ -99,7 +99,7 @@ def _shares(scene: Scene, state: Mapping[str, Any]) -> dict[str, Array]:
     """Inverse dynamics of each partial Lagrangian alone, which adds up to the whole but for damping and forces."""
     system = scene.system
     parts = system.partial_lagrangians
-    if len(parts) < 2 or "qdd0" not in state or (isinstance(scene.model, Mechanism) and scene.model.regrouped):
+    if len(parts) < 2 or "qdd0" not in state or (isinstance(scene.model, Mechanism) and scene.model.base_parameters):
         return {}
     names = [body.name for body in scene.model.moving] if isinstance(scene.model, Mechanism) else []
     if len(names) != len(parts):

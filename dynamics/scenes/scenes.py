@@ -53,12 +53,12 @@ def spring_mass() -> Scene:
     return Scene("spring_mass", about, system, (1.0,), (0.0,), 10.0)
 
 
-def triple_pendulum(model: str = "rod") -> Scene:
+def triple_pendulum(mass_model: str = "rod") -> Scene:
     """The paper's three-link arm: masses 1.0 0.8 0.7 kg, lengths 1.0 0.8 0.7 m, damping 0.1 N m s, in free fall.
 
-    It starts at rest, straight out to the right: q = (pi/2, 0, 0). model: "rod" or "point", as in `planar_arm`.
+    It starts at rest, straight out to the right: q = (pi/2, 0, 0). mass_model: "rod" or "point", as in `planar_arm`.
     """
-    arm = planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7], damping=0.1, model=model)
+    arm = planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7], damping=0.1, mass_model=mass_model)
     about = "the three-link arm in free fall (Figures 4 to 6, Table 1)"
     return Scene("triple_pendulum", about, arm, (math.pi / 2, 0.0, 0.0), (0.0,) * 3, 3.0)
 

@@ -67,7 +67,7 @@ def simulate(
     progress: a progress line on standard error; None shows it on a terminal, for runs over a second.
 
     A step that gives a state that is not finite, or has to be smaller than the resolution of t, ends the run: the
-    trajectory keeps what was computed before it and `stats.status` names the time and the coordinate. Ctrl-C does the
+    trajectory keeps what was computed before it and `stats.message` names the time and the coordinate. Ctrl-C does the
     same.
     Raises ValueError for arguments out of range, SingularMassMatrixError for a coordinate without inertia.
     """

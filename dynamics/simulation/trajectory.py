@@ -13,16 +13,16 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 @dataclass(frozen=True)
 class Stats:
-    """How a run went. complete: it reached t_end; if not, `status` says where and why it stopped."""
+    """How a run went. success: it reached t_end; if not, `message` says where and why it stopped."""
 
     method: str
     steps: int  # accepted
     rejected: int  # trials of a step that were not accepted
-    evaluations: int  # of the rate of the state
+    nfev: int  # of the rate of the state
     dt: float  # s, the largest step taken
     seconds: float  # run time of the steps, without building and compiling
-    complete: bool
-    status: str
+    success: bool
+    message: str
 
 
 class Crossings(NamedTuple):
@@ -52,4 +52,4 @@ class Trajectory:
         what = f"{n} coordinate(s)" if self.qd.shape[1] else f"{n} state(s)"
         rows = f"{len(self.t)} rows, t = {self.t[0]:g} .. {self.t[-1]:g} s" if len(self.t) else "no rows"
         happened = "".join([f", {len(found.t)} of event {name}" for name, found in self.events.items()])
-        return f"<Trajectory of {what}: {rows}{happened}; {stats.method}, {stats.steps} steps, {stats.status}>"
+        return f"<Trajectory of {what}: {rows}{happened}; {stats.method}, {stats.steps} steps, {stats.message}>"

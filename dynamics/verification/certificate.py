@@ -19,7 +19,7 @@ from ..equations.coriolis import coriolis, quadratic
 from ..equations.equations_of_motion import bias, energy, forward_dynamics, gravity_force, mass_matrix
 from ..equations.evaluate_at import Array, at_state
 from ..equations.formulations import ONE, ZERO, inverse_dynamics
-from ..equations.torque_decomposition import torque_by_link, torque_by_motion
+from ..equations.torque_decomposition import torque_by_joint_motion, torque_by_link
 from ..equations.torque_table import TorqueTable
 from ..systems.system import System, as_system
 from . import peer_agreement as agreement
@@ -144,7 +144,7 @@ class _Checks:
                 _worst(skew + np.swapaxes(skew, 1, 2), np.abs(rate) + np.abs(matrix)),
                 ROUNDING,
             )
-        yield self._sum("motion: torques by motion add up to tau", torque_by_motion(self.system))
+        yield self._sum("motion: torques by motion add up to tau", torque_by_joint_motion(self.system))
 
     def _mass_matrix(self) -> Iterator[Residual]:
         n = self.system.n

@@ -50,7 +50,7 @@ class Certificate:
         """Whether all residuals are within their bounds."""
         return all([each.passed for each in self.residuals])
 
-    def text(self) -> str:
+    def __str__(self) -> str:
         """A line for each residual, then the bounds with their reasons, and what was left out."""
         wide = max([len(each.equation) for each in self.residuals])
         lines = [
@@ -62,9 +62,9 @@ class Certificate:
         bounds = dict.fromkeys([each.bound for each in self.residuals])
         lines += [f"  {each.name}, {each.value:g}: {each.reason}" for each in bounds]
         lines += [f"left out: {each}" for each in self.left_out]
-        return "\n".join(lines) + "\n"
+        return "\n".join(lines)
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """For JSON."""
         return (
             {"passed": self.passed}

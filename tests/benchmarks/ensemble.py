@@ -38,7 +38,7 @@ def ours(q: Array, qd: Array, **options: object) -> Run:
 
     def run() -> Array:
         result = simulate_many(model, q, qd, T_END, dt=DT, t_eval=[T_END], **options)
-        assert result.stats.complete.all()
+        assert result.stats.success.all()
         return np.hstack([result.q[:, -1], result.qd[:, -1]])
 
     return run

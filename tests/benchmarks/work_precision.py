@@ -285,7 +285,7 @@ def energy(folder: str, steps: int = 10**6, starts: int = 12) -> None:
         slopes = np.array([each.drift for each in found])
         mean, error = slopes.mean(), slopes.std(ddof=1) / np.sqrt(starts)
         seconds = min(run.stats.seconds for run in runs)
-        stopped = " ".join({run.stats.status for run in runs if not run.stats.complete})
+        stopped = " ".join({run.stats.message for run in runs if not run.stats.success})
         print(
             f"   {method:18} band {max(each.band for each in found):.2e}  drift {mean:+.2e} +- {error:.1e} "
             f"({abs(mean) / error:.1f} standard errors)  {seconds:.1f} s a run  {stopped}",

@@ -29,7 +29,12 @@ def random_rotation(rng: np.random.Generator) -> Array:
 
 def random_joint(kind: str, rng: np.random.Generator, **others: Any) -> Joint:
     """A joint about any axis, anywhere, with damping, spring and armature."""
-    numbers = {"damping": rng.uniform(), "stiffness": rng.uniform(), "rest": rng.normal(), "armature": rng.uniform()}
+    numbers = {
+        "damping": rng.uniform(),
+        "stiffness": rng.uniform(),
+        "spring_reference": rng.normal(),
+        "armature": rng.uniform(),
+    }
     return Joint(kind, rng.normal(size=3), 0.3 * rng.normal(size=3), random_rotation(rng), **(numbers | others))
 
 

@@ -48,8 +48,8 @@ class PinocchioTwin:
         self.order = np.array([self.model.joints[self.joints[name]].idx_v for name in mechanism.system.coordinates])
         of = {body.name: body.joint for body in moving}
         joints = [of[name] for name in mechanism.system.coordinates]
-        self.damping, self.stiffness, self.rest, armature = np.array(
-            [[joint.damping, joint.stiffness, joint.rest, joint.armature] for joint in joints]
+        self.damping, self.stiffness, self.spring_reference, armature = np.array(
+            [[joint.damping, joint.stiffness, joint.spring_reference, joint.armature] for joint in joints]
         ).T
         self.model.armature = self._theirs(armature)
 
@@ -76,7 +76,7 @@ class PinocchioTwin:
         return result
 
     def _passive(self, q: Array, qd: Array) -> Array:
-        return self.damping * qd + self.stiffness * (q - self.rest)
+        return self.damping * qd + self.stiffness * (q - self.spring_reference)
 
     def rnea(self, q: Array, qd: Array, qdd: Array) -> Array:
         """tau, (n,), of a motion."""

@@ -1,6 +1,6 @@
 """Commands of the command line `cgraph`, a file each: its arguments, and the function that it runs."""
 
-from . import bench, certify, diff, draw, inspect, lesson, lint, paper, report, scenes, why
+from . import bench, certify, compare, draw, inspect, lesson, lint, paper, report, scenes, why
 
 # In the order of the help.
-COMMANDS = (paper, bench, report, scenes, draw, certify, inspect, lint, why, diff, lesson)
+COMMANDS = (paper, bench, report, scenes, draw, certify, inspect, lint, why, compare, lesson)

@@ -33,9 +33,9 @@ def run(options: argparse.Namespace) -> None:
         twin = None
     certificate = certify(scene, options.states, options.seed, twin=twin)
     if options.json:
-        print(json.dumps({"scene": scene.name} | certificate.as_dict(), indent=1))
+        print(json.dumps({"scene": scene.name} | certificate.to_dict(), indent=1))
     else:
-        print(certificate.text(), end="")
+        print(certificate)
     if not certificate.passed:
         failed = [each.equation for each in certificate.residuals if not each.passed]
         raise RuntimeError(f"{scene.name}: {len(failed)} residual(s) exceed their bound: {'; '.join(failed)}")

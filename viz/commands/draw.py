@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from cgraph.util.atomic_write import write
-from dynamics import inverse_dynamics, spurious
+from dynamics import inverse_dynamics, spurious_nodes
 
 from ..graph_drawing.dot import to_dot
 from ..graph_drawing.render import render_png, render_svg
@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> None:
         write(options.out, graph.listing())
     elif kind in (".dot", ".svg", ".png"):
         caption = f"{scene.name}: inverse dynamics, {options.formulation.replace('_', ' ')}"
-        drawing = to_dot(graph, marked=spurious(graph), collapse=options.collapse, caption=caption)
+        drawing = to_dot(graph, marked=spurious_nodes(graph), collapse=options.collapse, caption=caption)
         if kind == ".dot":
             write(options.out, str(drawing.source))
         else:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cgraph import Graph
 from cgraph.util.atomic_write import write
-from dynamics import inverse_dynamics, momentum_rate, scenes, spurious
+from dynamics import inverse_dynamics, momentum_rate, scenes, spurious_nodes
 from dynamics.experiments.paper_numbers.equation3 import equation3
 
 from ..pages.lesson import Lesson, page
@@ -48,7 +48,7 @@ def lesson() -> Lesson:
     steps = [(dt, float(flawed.evaluate({**state, "q0_old": 1.0 - dt, "dt": dt})["p0_dot"])) for dt in STEPS]
     torque, error = _arm()
     return Lesson(
-        flawed, kinetic, right, spurious(flawed), str(equation3("euler_embedded")), steps, error, torque, ARM_DT
+        flawed, kinetic, right, spurious_nodes(flawed), str(equation3("euler_embedded")), steps, error, torque, ARM_DT
     )
 
 

@@ -110,7 +110,7 @@ def _curves(options: argparse.Namespace) -> None:
             options=chosen,
             say=say,
         )
-        content = report.content()
+        content = report.to_dict()
         found.append(content)
         document, rows = page.work_precision(content), work_precision.to_csv(report)
         written = write_document(options.out, content["name"], document, content, rows)

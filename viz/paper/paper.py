@@ -14,7 +14,7 @@ import numpy as np
 from cgraph import Graph
 from cgraph.simplify.polynomial import format_polynomial
 from cgraph.util.atomic_write import write
-from dynamics import momentum_rate, scenes, spurious
+from dynamics import momentum_rate, scenes, spurious_nodes
 from dynamics.experiments.paper_numbers.embedding_error import law_of_arms
 from dynamics.experiments.paper_numbers.equation3 import PAPER, equation3
 from dynamics.experiments.paper_numbers.free_fall import fall, largest_differences, mujoco_fall
@@ -107,7 +107,7 @@ def equations() -> Part:
 def figure1() -> Part:
     """Figure 1: by definition, with the Euler relation embedded."""
     graph = _one_joint("euler_embedded")
-    wrong = spurious(graph)
+    wrong = spurious_nodes(graph)
     edges = sum(edge.source in wrong for edge in graph.edges)
     caption = (
         f"Figure 1. By definition, with the Euler relation embedded. {len(wrong)} of {len(graph.nodes)} nodes and "
@@ -393,7 +393,7 @@ def _drawn(name: str, heading: str, graph: Graph, caption: str, **figures: int) 
     """A drawing of a graph as SVG, PNG and DOT, its counts in the caption."""
     counts = graph.counts()
     caption = f"{caption} {counts.nodes} nodes, {counts.edges} edges."
-    drawing = to_dot(graph, names=theme.ONE_JOINT, marked=spurious(graph), clusters=False)
+    drawing = to_dot(graph, names=theme.ONE_JOINT, marked=spurious_nodes(graph), clusters=False)
     svg = render_svg(drawing)
     files: dict[str, str | bytes] = {
         f"{name}.svg": svg,

@@ -79,7 +79,7 @@ def lint(
 
     independent: pairs of groups, neither of which may be made from the other, whatever else both are made from:
         `("q0 q1", "qd0 qd1")` or a list of such pairs. A group is a name or several in one string, or a sequence of
-        names and nodes; inner nodes have names by `cg.named`. A violation is blamed on the fewest edges that would
+        names and nodes; inner nodes have names by `cg.with_name`. A violation is blamed on the fewest edges that would
         have to be cut, those nearest to what should be independent, and tells what a derivative through them counts.
     function: what the texts call the function that is differentiated, such as "L".
     depends: {output: inputs or nodes that it should depend on}.

@@ -51,7 +51,7 @@ def verdict(case: Case, method: str) -> Verdict:
     model, solution = case.build(), solutions.solution(case)
     run = trajectory(case, model, method)
     found = {}
-    if solution is not None and run.stats.complete:
+    if solution is not None and run.stats.success:
         found = errors(case, run, solution)
     watched = {watch.quantity for watch in case.watch}
     found |= changes(case, model, run, {name for name in watched if not name.startswith("error")})
@@ -65,7 +65,7 @@ def verdict(case: Case, method: str) -> Verdict:
         run.stats.steps,
         run.stats.rejected,
         run.stats.seconds,
-        "" if run.stats.complete else run.stats.status,
+        "" if run.stats.success else run.stats.message,
         reason(SECTION, case.name, method, figures),
     )
 

@@ -77,7 +77,7 @@ def content(found: Sequence[Verdict], seconds: float, quick: bool = False) -> di
         "seconds": seconds,
         "quick": quick,
         "sections": [
-            {"name": name, "about": about, "rows": [each.as_dict() for each in found if each.section == name]}
+            {"name": name, "about": about, "rows": [each.to_dict() for each in found if each.section == name]}
             for name, about in ABOUT.items()
         ],
     }
@@ -98,7 +98,7 @@ def to_csv(found: Sequence[Verdict]) -> str:
     writer = csv.DictWriter(text, columns, lineterminator="\n")
     writer.writeheader()
     for verdict in found:
-        row = verdict.as_dict()
+        row = verdict.to_dict()
         for figure in row["figures"]:
             known = row | figure
             writer.writerow({name: known[name] for name in columns})

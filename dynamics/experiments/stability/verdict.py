@@ -56,7 +56,7 @@ class Verdict:
         """The verdict."""
         return "meets" if self.meets else "limit" if self.reason else "unexplained"
 
-    def as_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Everything, for JSON: numbers that are not finite as text."""
         figures = [
             {

@@ -59,8 +59,8 @@ def _ours(setting: Setting, method: str | None = None) -> None:
     qd = setting.start[n:] if setting.mechanical else None
     method = method or ("radau" if setting.stiff else "dop853")
     found = simulate(setting.model, setting.start[:n], qd, setting.t_end, method, rtol=RTOL, atol=RTOL, progress=False)
-    if not found.stats.complete:
-        raise RuntimeError(found.stats.status)
+    if not found.stats.success:
+        raise RuntimeError(found.stats.message)
 
 
 def _heyoka(setting: Setting, compact: bool = False, cached: bool = False) -> None:

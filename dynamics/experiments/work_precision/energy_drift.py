@@ -98,6 +98,6 @@ def verdict(model: Model, method: str, steps: int) -> Verdict:
         run.stats.steps,
         0,
         run.stats.seconds,
-        "" if run.stats.complete else run.stats.status,
+        "" if run.stats.success else run.stats.message,
         reason(SECTION, model.name, method, figures),
     )

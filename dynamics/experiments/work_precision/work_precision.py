@@ -112,7 +112,7 @@ class WorkPrecision:
     absent: dict[str, str] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
 
-    def content(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """All of it as plain data for JSON; None in place of what is no number."""
         plain: dict[str, Any] = _plain(asdict(self) | {"targets": [asdict(each) for each in targets(self.curves)]})
         return plain

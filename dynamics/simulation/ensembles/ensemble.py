@@ -19,11 +19,11 @@ class EnsembleStats:
     method: str
     steps: Counts  # (N,), accepted
     rejected: Counts  # (N,), trials of a step that were not accepted
-    evaluations: Counts  # (N,), of the rate of the state
+    nfev: Counts  # (N,), of the rate of the state
     dt: Array  # (N,) s, the largest step taken
     seconds: float  # run time of all of them together, making the machine code included
-    complete: np.ndarray[Any, np.dtype[np.bool_]]  # (N,), it reached t_end
-    status: tuple[str, ...]  # N sentences: "reached t_end", or where and why it stopped
+    success: np.ndarray[Any, np.dtype[np.bool_]]  # (N,), it reached t_end
+    message: tuple[str, ...]  # N sentences: "reached t_end", or where and why it stopped
 
 
 @dataclass(frozen=True)
@@ -44,5 +44,5 @@ class Ensemble:
         many, rows, n = self.q.shape
         what = f"{n} coordinate(s)" if self.qd.shape[2] else f"{n} state(s)"
         span = f", t = {self.t[0]:g} .. {self.t[-1]:g} s" if rows else ""
-        whole = int(np.count_nonzero(self.stats.complete))
+        whole = int(np.count_nonzero(self.stats.success))
         return f"<Ensemble of {many}, {what}: {rows} rows{span}; {self.stats.method}, {whole} reached t_end>"

@@ -68,7 +68,7 @@ def simulate_many(
 
     Where every state takes the same course (euler, rk4; verlet and symplectic_euler of a constant mass matrix and
     forces that do not depend on qd), trajectories run side by side, a vector of them at a time; else one by one.
-    One that leaves the numbers is NaN from there on, `stats.status` names the time and the coordinate, and the others
+    One that leaves the numbers is NaN from there on, `stats.message` names the time and the coordinate, and the others
     go on. Ctrl-C keeps the chunks that are done.
     Raises ValueError for arguments out of range or of another shape, MemoryError for a result that would not fit,
     SingularMassMatrixError for a coordinate without inertia, TypeError for `workers` that give no results.

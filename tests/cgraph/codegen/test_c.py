@@ -223,7 +223,7 @@ AWKWARD = [
 def test_names_that_collide_have_places_of_their_own(tmp_path):
     inputs = cg.variables(AWKWARD)
     outputs = dict(zip(AWKWARD, inputs, strict=True)) | {
-        "two\nlines \\": cg.named("*/ named /*", 2 * inputs[0]),
+        "two\nlines \\": cg.with_name(2 * inputs[0], "*/ named /*"),
         "\ud800\u202e": inputs[1] * 3,
     }
     graph = cg.Graph(inputs, outputs)
@@ -241,7 +241,7 @@ def test_names_that_collide_have_places_of_their_own(tmp_path):
 
 def test_a_name_of_one_s_own_stands_beside_the_value():
     x, y = cg.variables("x y")
-    graph = cg.Graph([x, y], {"f": cg.exp(cg.named("radius", x * y))})
+    graph = cg.Graph([x, y], {"f": cg.exp(cg.with_name(x * y, "radius"))})
     assert "const double v1 = x[F_IN_x] * x[F_IN_y]; /* radius */" in cg.to_c(graph, "f").source
     assert "%1 = mul x y  (radius)" in graph.listing()
 

@@ -24,7 +24,7 @@ def pendulum() -> cg.Graph:
     with cg.tag("kinetic"):
         kinetic = 0.5 * (y * y)
     with cg.tag("potential"):
-        potential = cg.named("P", 9.81 * (1 - cg.cos(x)))
+        potential = cg.with_name(9.81 * (1 - cg.cos(x)), "P")
     return cg.Graph([x, y], {"L": kinetic - potential, "P": potential})
 
 
@@ -197,7 +197,7 @@ def test_a_pickle_and_a_copy_are_the_same_graph(case):
 
 
 def test_a_pickle_keeps_names_tags_unused_inputs_and_signed_zeros():
-    graph = cg.Graph([x, y], {"f": cg.named("P", x + -0.0), "g": -0.0})
+    graph = cg.Graph([x, y], {"f": cg.with_name(x + -0.0, "P"), "g": -0.0})
     again = pickle.loads(pickle.dumps(graph))
     assert again.input_names == ("x", "y")
     assert again.outputs["f"].name == "P"
@@ -223,6 +223,6 @@ def test_a_graph_and_a_node_have_a_short_repr():
     assert repr(pendulum()) == "<Graph (x, y) -> (L, P): 11 nodes, 11 edges>"
     many = cg.Graph(cg.variables([f"q{i}" for i in range(20)]), {"f": 1.0})
     assert repr(many) == "<Graph (q0, q1, q2, ..., q19) -> (f): 1 nodes, 0 edges>"
-    assert (repr(x), repr(cg.constant(2)), repr(x * y), repr(cg.named("K", x * y))) == (
+    assert (repr(x), repr(cg.constant(2)), repr(x * y), repr(cg.with_name(x * y, "K"))) == (
         "<node variable x>", "<node 2.0>", "<node mul>", "<node mul K>",
     )  # fmt: skip

@@ -65,7 +65,7 @@ def test_names_that_run_together_stay_apart():
 def test_tags_names_and_copies_do_not_count():
     plain = graph(cg.sin(x) * cg.sin(x))
     with cg.tag("link 1"):
-        same = cg.named("s", cg.sin(x))
+        same = cg.with_name(cg.sin(x), "s")
         tagged = graph(same * same)
     assert structure_hash(plain) == structure_hash(tagged)
 

@@ -169,13 +169,13 @@ def test_differentiating_in_one_thread_does_not_fold_what_another_writes():
 
 
 def test_a_name_is_kept_by_listings_and_inlining():
-    energy = cg.named("K", x * y)
+    energy = cg.with_name(x * y, "K")
     assert (energy.name, energy.op.name, energy.args) == ("K", "mul", (x, y))
     assert cg.Graph([x, y], {"f": energy + 1})(x=1.0, y=x)["f"].args[0].name == "K"
-    assert cg.named("K", x) is x
-    assert cg.named("K", 2.0) is cg.constant(2.0)
+    assert cg.with_name(x, "K") is x
+    assert cg.with_name(2.0, "K") is cg.constant(2.0)
 
 
 def test_a_name_is_kept_by_simplify():
-    twice = cg.Graph([x, y], {"f": cg.sin(x * y) + cg.exp(cg.named("K", x * y))})
+    twice = cg.Graph([x, y], {"f": cg.sin(x * y) + cg.exp(cg.with_name(x * y, "K"))})
     assert "K" in {node.name for node in cg.simplify(twice).nodes}

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.explain import diff
+from cgraph.explain import compare
 from dynamics.equations.node_classes import formulation_classes
 from tests.strategies import Case, cases
 
@@ -31,7 +31,7 @@ def spelled(node: cg.Node) -> str:
 @given(cases(max_operations=10), cases(max_operations=10))
 def test_every_node_is_counted_once_and_pairs_are_alike(one: Case, other: Case):
     for left, right in ((one.graph, other.graph), (one.graph, one.graph), (one.graph, cg.simplify(one.graph))):
-        found = diff(left, right)
+        found = compare(left, right)
         assert {a for a, _ in found.common} | set(found.only_left) == set(left.nodes)
         assert {b for _, b in found.common} | set(found.only_right) == set(right.nodes)
         assert len(found.common) + len(found.only_left) == len(left.nodes)
@@ -46,7 +46,7 @@ def test_every_node_is_counted_once_and_pairs_are_alike(one: Case, other: Case):
 @settings(max_examples=60)
 @given(cases(max_operations=12), cases(max_operations=12))
 def test_both_graphs_are_in_the_one_of_both(one: Case, other: Case):
-    found = diff(one.graph, other.graph)
+    found = compare(one.graph, other.graph)
     both = found.together()
     both.graph.check()
     values = {name: (one.values | other.values)[name] for name in both.graph.input_names}
@@ -65,7 +65,7 @@ def test_the_summary():
     with cg.tag("spring"):
         left = cg.Graph([x, y], {"f": cg.sin(x) + y, "g": x * y})
     right = cg.Graph([x, y], {"f": cg.sin(x) - y, "g": y * x})
-    assert str(diff(left, right)) == (
+    assert str(compare(left, right)) == (
         "5 nodes left, 5 right: 4 in both, 1 only left, 1 only right.\n"
         "Computed alike: g.\n"
         "Computed otherwise: f.\n"
@@ -79,7 +79,7 @@ def test_the_summary():
 def test_copies_are_paired_once_each():
     left = cg.Graph([x], {"f": cg.sin(x) * cg.sin(x), "g": cg.sin(x)})
     right = cg.Graph([x], {"f": cg.sin(x) * cg.sin(x)})
-    found = diff(left, right)
+    found = compare(left, right)
     assert (len(found.common), len(found.only_left), len(found.only_right)) == (4, 1, 0)
 
 
@@ -87,10 +87,10 @@ def test_the_chain_rule_and_by_definition_differ_by_the_embedding():
     arm = dyn.planar_arm([1.0] * 3, [1.0] * 3)
     chain, embedded = dyn.inverse_dynamics(arm), dyn.inverse_dynamics(arm, "euler_embedded")
     atoms = "q0 q1 q2 qd0 qd1 qd2"
-    found = diff(chain, embedded, atoms=atoms, classify=formulation_classes)
-    assert found.classes("right")["spurious adjoint"] == len(dyn.spurious(embedded))
+    found = compare(chain, embedded, atoms=atoms, classify=formulation_classes)
+    assert found.classes("right")["spurious adjoint"] == len(dyn.spurious_nodes(embedded))
     assert set(found.classes("left")) == {"needed"}
-    assert len(found.common) > 2 * len(diff(chain, embedded).common)  # without atoms, q is never the same
+    assert len(found.common) > 2 * len(compare(chain, embedded).common)  # without atoms, q is never the same
     both = found.together()
     assert {"right q0", "right qd2", "left tau0", "right tau0"} <= set(both.graph.outputs)
     text = json.dumps(found.to_dict(), allow_nan=False)
@@ -99,8 +99,8 @@ def test_the_chain_rule_and_by_definition_differ_by_the_embedding():
 
 def test_two_runs_are_byte_for_byte_the_same():
     program = (
-        "import json, dynamics as dyn; from cgraph.explain import diff; arm = dyn.planar_arm([1.0] * 2, [1.0] * 2);"
-        "d = diff(dyn.inverse_dynamics(arm), dyn.inverse_dynamics(arm, 'kinetic_only'), atoms='q0 q1 qd0 qd1');"
+        "import json, dynamics as dyn; from cgraph.explain import compare; arm = dyn.planar_arm([1.0] * 2, [1.0] * 2);"
+        "d = compare(dyn.inverse_dynamics(arm), dyn.inverse_dynamics(arm, 'kinetic_only'), atoms='q0 q1 qd0 qd1');"
         "print(d, json.dumps(d.to_dict()), d.together().graph.listing())"
     )
     runs = {
@@ -118,7 +118,7 @@ def test_two_runs_are_byte_for_byte_the_same():
 def test_an_unknown_atom_is_refused():
     graph = cg.Graph([x], {"f": x})
     with pytest.raises(cg.GraphError, match="neither graph has a node called w"):
-        diff(graph, graph, atoms="x w")
+        compare(graph, graph, atoms="x w")
 
 
 def test_a_graph_does_not_differ_from_itself_however_deep():
@@ -126,7 +126,7 @@ def test_a_graph_does_not_differ_from_itself_however_deep():
     for _ in range(20_000):
         node = cg.sin(node)
     graph = cg.Graph([x], {"f": node})
-    found = diff(graph, cg.Graph([x], graph(x)))
+    found = compare(graph, cg.Graph([x], graph(x)))
     assert len(found.common) == len(graph.nodes)
     assert str(found).splitlines()[-1] == "Computed alike: f."
     assert len(found.together().graph.nodes) == len(graph.nodes)
@@ -135,8 +135,8 @@ def test_a_graph_does_not_differ_from_itself_however_deep():
 def test_a_variable_that_neither_graph_uses_is_an_atom_all_the_same() -> None:
     x, y = cg.variable("x"), cg.variable("y")
     left, right = cg.Graph([x, y], {"f": cg.sin(y)}), cg.Graph([x, y], {"f": cg.cos(y)})
-    found = cg.diff(left, right, atoms="x y")
+    found = cg.compare(left, right, atoms="x y")
     assert list(found.atoms.values()) == ["y"]
     assert found.other_outputs == ("f",)
     with pytest.raises(cg.GraphError, match="neither graph has a node called z"):
-        cg.diff(left, right, atoms="x z")
+        cg.compare(left, right, atoms="x z")

@@ -72,7 +72,7 @@ def test_the_derivative_and_the_weight_are_those_at_50_digits(case: Case):
 
 def test_paths_are_told_by_names_and_tags():
     with cg.tag("spring"):
-        force = cg.named("force", 3.0 * x)
+        force = cg.with_name(3.0 * x, "force")
     graph = cg.Graph([x, y], {"power": force * y + cg.sin(x)})
     assert str(why(graph, "power", "x", {"x": 0.0, "y": 0.25})) == (
         "power depends on x along 2 paths.\n"
@@ -116,7 +116,7 @@ def test_deep_graphs_need_no_recursion_and_may_have_more_paths_than_a_float_can_
 
 
 def test_a_named_node_inside_is_an_input_or_an_output_too():
-    radius = cg.named("radius", cg.hypot(x, y))
+    radius = cg.with_name(cg.hypot(x, y), "radius")
     graph = cg.Graph([x, y], {"f": radius * radius, "g": cg.exp(radius)})
     assert why(graph, "f", "radius", {"x": 3.0, "y": 4.0}).derivative == 10.0
     assert why(graph, radius, "x", {"x": 3.0, "y": 4.0}).derivative == pytest.approx(0.6)
@@ -187,7 +187,7 @@ def test_wrong_arguments_are_named(arguments, error, words):
 
 
 def test_a_name_of_two_nodes_is_no_answer():
-    graph = cg.Graph([x], {"f": cg.named("a", cg.sin(x)) + cg.named("a", cg.cos(x))})
+    graph = cg.Graph([x], {"f": cg.with_name(cg.sin(x), "a") + cg.with_name(cg.cos(x), "a")})
     with pytest.raises(cg.GraphError, match="2 nodes are called 'a'; give the node itself"):
         why(graph, "f", "a")
 

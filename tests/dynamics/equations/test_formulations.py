@@ -65,7 +65,7 @@ def test_without_its_spurious_nodes_a_flawed_graph_is_the_rate_of_the_right_mome
     arm, dt = random_arm(n), 0.05
     state = before(at(states(arm, 1, seed=3), 0), dt)
     graph = dyn.momentum_rate(arm, formulation, simplify=simplify)
-    gone = dict.fromkeys(dyn.spurious(graph), cg.constant(0.0))
+    gone = dict.fromkeys(dyn.spurious_nodes(graph), cg.constant(0.0))
     kept = rebuild(graph.outputs.values(), gone, lambda node, args: cg.Node(node.op, args, name=node.name))
     cut = cg.Graph(graph.inputs, {name: kept[node] for name, node in graph.outputs.items()})
 
@@ -89,7 +89,7 @@ def test_without_its_spurious_nodes_a_flawed_graph_is_the_rate_of_the_right_mome
 @mark.parametrize("name", MODELS)
 @mark.parametrize("formulation", ["chain_rule", "chain_rule_literal", "kinetic_only_exact"])
 def test_nothing_is_spurious_where_the_momentum_is_taken_at_an_independent_state(name: str, formulation: str) -> None:
-    assert dyn.spurious(dyn.inverse_dynamics(MODELS[name](), formulation)) == frozenset()
+    assert dyn.spurious_nodes(dyn.inverse_dynamics(MODELS[name](), formulation)) == frozenset()
 
 
 @mark.parametrize("n", [2, 3])
@@ -97,7 +97,7 @@ def test_nothing_is_spurious_where_the_momentum_is_taken_at_an_independent_state
 def test_spurious_nodes_change_the_torque_of_an_arm(n: int, formulation: str) -> None:
     arm = random_arm(n)
     graph = dyn.inverse_dynamics(arm, formulation)
-    assert dyn.spurious(graph)
+    assert dyn.spurious_nodes(graph)
     state = before(states(arm, 20), dt=1e-6)
     assert error(run(graph, state), run(dyn.inverse_dynamics(arm), state)) > 1e-3
 

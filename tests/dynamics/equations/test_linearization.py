@@ -8,7 +8,7 @@ from pytest import approx
 
 import dynamics as dyn
 from dynamics.equations.evaluate_at import at_state
-from dynamics.equations.linearization import linearization, linearize
+from dynamics.equations.linearization import linearize, state_space
 from dynamics.systems.system import as_system
 from tests.dynamics.mechanisms import FAMILIES, turned_arm
 from tests.dynamics.models import MODELS, Array, at, random_arm, states
@@ -91,7 +91,7 @@ def test_pinocchio_s_derivatives_of_aba_are_the_same(family: str) -> None:
 
 def test_the_graph_takes_many_states_and_is_smaller_than_that_of_forward_dynamics_differentiated() -> None:
     arm = turned_arm(7)
-    graph = linearization(arm)
+    graph = state_space(arm)
     assert len(graph.nodes) < 18_000  # 30 000 by reverse mode through forward dynamics
     given = states(arm, 3)
     rows = at_state(arm.system, graph, given)

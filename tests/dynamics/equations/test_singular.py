@@ -10,16 +10,16 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.equations_of_motion import SingularMassMatrixError, check_pivot, forward_dynamics
+from dynamics.equations.equations_of_motion import SingularMassMatrixError, forward_dynamics, raise_if_singular
 
 METHODS = ["recursive", "dense"]
 
 
 def accelerations(system: dyn.System, method: str, **values: float) -> dict[str, float]:
     """The outputs at a state that is zero but for `values`, checked."""
-    graph = forward_dynamics(system, method, positive=True)
+    graph = forward_dynamics(system, method, check=True)
     result = graph.evaluate(dict.fromkeys(graph.input_names, 0.0) | system.parameters | values)
-    check_pivot(system, result["pivot"])
+    raise_if_singular(system, result["info"])
     return result
 
 
@@ -81,17 +81,17 @@ def string(n: int) -> dyn.System:
 
 def test_the_first_of_thirty_that_fails_is_named_in_a_batch_with_its_state():
     system = string(30)
-    graph = forward_dynamics(system, positive=True)
+    graph = forward_dynamics(system, check=True)
     assert len(graph.nodes) <= len(forward_dynamics(system).nodes) + 3 * 30 + 1
     columns = np.array([[system.parameters.get(name, 0.1)] * 4 for name in graph.input_names])
     columns[graph.input_names.index("m17"), 2] = -1.0
     columns[graph.input_names.index("m4"), 2] = -1.0
     run = cg.compile(graph)
-    pivot = run.batch(columns)[list(graph.outputs).index("pivot")]
+    pivot = run.batch(columns)[list(graph.outputs).index("info")]
     assert pivot.tolist() == [0.0, 0.0, 18.0, 0.0]
-    check_pivot(system, pivot[:2])
+    raise_if_singular(system, pivot[:2])
     with pytest.raises(SingularMassMatrixError, match="at state 2: coordinate 'bead 17'"):
-        check_pivot(system, pivot)
+        raise_if_singular(system, pivot)
     for name, column in zip(["m0", "m29"], columns.T, strict=False):
         column[graph.input_names.index(name)] = -1.0
         assert system.coordinates[int(run(column)[-1]) - 1] == f"bead {name[1:]}"
@@ -99,7 +99,7 @@ def test_the_first_of_thirty_that_fails_is_named_in_a_batch_with_its_state():
 
 def test_the_pivots_say_what_the_eigenvalues_say():
     system = string(6)
-    graph, matrix = forward_dynamics(system, "recursive", positive=True), dyn.mass_matrix(system)
+    graph, matrix = forward_dynamics(system, "recursive", check=True), dyn.mass_matrix(system)
     rng = np.random.default_rng(0)
     signs = set()
     for _ in range(40):
@@ -107,18 +107,18 @@ def test_the_pivots_say_what_the_eigenvalues_say():
         values = dict.fromkeys(graph.input_names, 0.3) | masses
         entries = matrix.evaluate({name: values[name] for name in matrix.input_names})
         positive = np.linalg.eigvalsh(np.reshape(list(entries.values()), (6, 6))).min() > 0
-        assert (graph.evaluate(values)["pivot"] == 0.0) == positive
+        assert (graph.evaluate(values)["info"] == 0.0) == positive
         signs.add(bool(positive))
     assert signs == {True, False}
 
 
 def test_without_asking_nothing_is_added():
     arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.8])
-    assert "pivot" not in forward_dynamics(arm).outputs
+    assert "info" not in forward_dynamics(arm).outputs
 
 
 def test_a_coordinate_without_inertia_is_an_error_at_once():
     system = dyn.System(lambda q, qd, t: 0.5 * qd[0] * qd[0] - qd[1] * qd[1], ["good", "bad"])
     assert len(forward_dynamics(system).outputs) == 2
     with pytest.raises(SingularMassMatrixError, match="not positive definite: coordinate 'bad'"):
-        forward_dynamics(system, positive=True)
+        forward_dynamics(system, check=True)

@@ -8,14 +8,14 @@ from pytest import approx
 
 import dynamics as dyn
 from dynamics.equations.evaluate_at import at_state
-from dynamics.equations.torque_decomposition import torque_by_link, torque_by_motion
+from dynamics.equations.torque_decomposition import torque_by_joint_motion, torque_by_link
 from dynamics.equations.torque_table import TorqueTable
 from dynamics.systems.system import as_system
 from tests.dynamics.mechanisms import FAMILIES, turned_tree
 from tests.dynamics.models import MODELS, Array, at, random_arm, states
 
 ROUNDING = 1e-12
-TABLES = {each.__name__: each for each in (torque_by_link, torque_by_motion)}
+TABLES = {each.__name__: each for each in (torque_by_link, torque_by_joint_motion)}
 QUADRATIC = {name: make for name, make in MODELS.items() if name != "relativistic"}
 EVERY = QUADRATIC | {name: lambda make=make: make(5) for name, make in FAMILIES.items()}
 
@@ -59,7 +59,7 @@ def test_a_joint_feels_no_link_that_it_does_not_carry() -> None:
             i = (i - 1) // 2
     table = torque_by_link(turned_tree(7))
     assert (table.zeros[:7] == ~carried).all()
-    both = torque_by_motion(turned_tree(7)).zeros[:, :7]
+    both = torque_by_joint_motion(turned_tree(7)).zeros[:, :7]
     assert (both == ~(carried.T @ carried)).all()  # joints move each other where one link hangs on both
 
 
@@ -69,12 +69,12 @@ def test_half_of_a_coriolis_force_belongs_to_each_of_its_velocities() -> None:
     q, qd = np.array([0.3, 0.7]), np.array([1.1, -0.6])
     h = -arm.links[1].mass * arm.links[0].length * arm.links[1].center * np.sin(q[1])
     expected = h * np.array([[qd[0] * qd[1], qd[0] * qd[1] + qd[1] ** 2], [-(qd[0] ** 2), 0.0]])
-    assert torque_by_motion(arm).at(q, qd).values[:, :2] == approx(expected)
+    assert torque_by_joint_motion(arm).at(q, qd).values[:, :2] == approx(expected)
 
 
 def test_motion_of_one_joint_alone_fills_its_column_alone() -> None:
     arm = random_arm(3, damped=False)
-    values = torque_by_motion(arm).at(np.array([0.1, 0.5, -0.3]), qdd=np.array([0.0, 2.0, 0.0])).values
+    values = torque_by_joint_motion(arm).at(np.array([0.1, 0.5, -0.3]), qdd=np.array([0.0, 2.0, 0.0])).values
     assert (values[:, [0, 2]] == 0.0).all()
     mass = at_state(arm.system, dyn.mass_matrix(arm), {"q": [0.1, 0.5, -0.3]}).reshape(3, 3)
     assert values[:, 1] == approx(2.0 * mass[:, 1])
@@ -85,7 +85,7 @@ def pendulum() -> TorqueTable:
 
 
 def test_a_table_without_a_state_shows_expressions() -> None:
-    assert pendulum().text() == (
+    assert pendulum().to_text() == (
         "                               joint 1\n"
         "link 1   4 * qdd0 - (-29.43 * sin(q0))\n"
         "damping                      0.5 * qd0\n"
@@ -99,14 +99,14 @@ def small() -> TorqueTable:
 
 
 def test_tables_as_text_markdown_and_latex() -> None:
-    assert small().text() == (
+    assert small().to_text() == (
         "        joint 1  joint 2\nlink 1        4        ·\nlink 2    6.333    1.333\ntau       10.33    1.333\n"
     )
-    assert small().markdown(3) == (
+    assert small().to_markdown(3) == (
         "|  | joint 1 | joint 2 |\n| --- | ---: | ---: |\n| link 1 | 4 | · |\n| link 2 | 6.33 | 1.33 |\n"
         "| tau | 10.3 | 1.33 |\n"
     )
-    assert small().latex(3).splitlines()[2:6] == [
+    assert small().to_latex(3).splitlines()[2:6] == [
         r" & joint 1 & joint 2 \\",
         r"\hline",
         r"link 1 & $4$ & $\cdot$ \\",
@@ -117,9 +117,9 @@ def test_tables_as_text_markdown_and_latex() -> None:
 def test_names_are_escaped_and_small_numbers_have_powers_in_latex() -> None:
     system = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2, ["a_b|c"])
     table = torque_by_link(system).at([0.0], qdd=[1e-9])
-    assert r"a\_b|c" in table.latex()
-    assert r"$1 \cdot 10^{-9}$" in table.latex()
-    assert r"a_b\|c" in table.markdown()
+    assert r"a\_b|c" in table.to_latex()
+    assert r"$1 \cdot 10^{-9}$" in table.to_latex()
+    assert r"a_b\|c" in table.to_markdown()
 
 
 @pytest.mark.parametrize("wrong", [np.zeros(3), np.zeros((2, 2)), 0.0])

@@ -36,7 +36,7 @@ def tree() -> dyn.Mechanism:
                 position=(0.1, 0.2, -0.3),
                 damping=0.2,
                 stiffness=1.5,
-                rest=0.3,
+                spring_reference=0.3,
                 armature=0.05,
             ),
             parent,

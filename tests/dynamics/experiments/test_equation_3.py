@@ -92,7 +92,7 @@ def test_the_flawed_graph_of_equation_3_reads_as_the_paper_has_it() -> None:
 def test_spurious_is_the_branch_of_the_spring() -> None:
     """Of the 17 nodes by definition, the right inertial term has I, qdd and I qdd; a subtraction joins the rest on."""
     graph = dyn.momentum_rate(SPRING_MASS, "euler_embedded")
-    gone = dyn.spurious(graph)
+    gone = dyn.spurious_nodes(graph)
     kept = [node for node in graph.nodes if node not in gone]
     assert (len(graph.nodes), len(gone)) == (17, 13)
     assert sorted(node.name or node.op.name for node in kept) == ["I", "mul", "qdd0", "sub"]
@@ -103,13 +103,13 @@ def test_spurious_is_the_branch_of_the_spring() -> None:
 
 @mark.parametrize("formulation", ["chain_rule", "chain_rule_literal", "kinetic_only", "kinetic_only_exact"])
 def test_nothing_is_spurious_in_a_right_formulation_of_one_joint(formulation: str) -> None:
-    assert dyn.spurious(dyn.inverse_dynamics(SPRING_MASS, formulation)) == frozenset()
-    assert dyn.spurious(dyn.momentum_rate(SPRING_MASS, formulation)) == frozenset()
+    assert dyn.spurious_nodes(dyn.inverse_dynamics(SPRING_MASS, formulation)) == frozenset()
+    assert dyn.spurious_nodes(dyn.momentum_rate(SPRING_MASS, formulation)) == frozenset()
 
 
 def test_spurious_is_seen_before_simplification_too() -> None:
     graph = dyn.momentum_rate(SPRING_MASS, "euler_embedded", simplify=False)
-    kept = [node for node in graph.nodes if node not in dyn.spurious(graph)]
+    kept = [node for node in graph.nodes if node not in dyn.spurious_nodes(graph)]
     assert sorted(node.name or node.op.name for node in kept) == ["I", "mul", "qdd0", "sub"]
 
 

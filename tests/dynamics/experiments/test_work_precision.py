@@ -102,7 +102,7 @@ def test_counts_are_those_of_a_simulation(report: WorkPrecision) -> None:
         point = next(each for each in curve(report, name).points if each.knob == approx(1e-6))
         smallest = float(np.abs(np.sin(TIMES)).max())  # of the largest values of q and qd
         run = dyn.simulate(scene, scene.q, scene.qd, T_END, name, rtol=point.knob, atol=point.knob * smallest)
-        counts = run.stats.steps, run.stats.rejected, run.stats.evaluations
+        counts = run.stats.steps, run.stats.rejected, run.stats.nfev
         assert (point.steps, point.rejected, point.evaluations) == counts
         error = max(abs(run.q[-1, 0] - math.cos(T_END)), abs(run.qd[-1, 0] + math.sin(T_END)) / smallest)
         assert point.error == approx(error, rel=1e-4)
@@ -116,7 +116,7 @@ def test_the_absolute_tolerance_goes_with_the_smallest_state() -> None:
     found = load("spring_mass")
     outcome = Ours("dop853", found, 1e-4, problem_of(found)).ready(1e-5)()
     run = dyn.simulate(scene, scene.q, scene.qd, T_END, "dop853", rtol=1e-5, atol=1e-9)
-    assert (outcome.steps, outcome.evaluations) == (run.stats.steps, run.stats.evaluations)
+    assert (outcome.steps, outcome.evaluations) == (run.stats.steps, run.stats.nfev)
     assert outcome.steps != dyn.simulate(scene, scene.q, scene.qd, T_END, "dop853", rtol=1e-5, atol=1e-5).stats.steps
 
 
@@ -170,7 +170,7 @@ def test_csv_and_json_hold_the_points(report: WorkPrecision) -> None:
     assert len(rows) == sum(len(each.points) for each in report.curves)
     first = report.curves[0].points[0]
     assert (float(rows[0]["error_at_end"]), int(rows[0]["steps"])) == (first.error, first.steps)
-    content = json.loads(json.dumps(report.content(), allow_nan=False))
+    content = json.loads(json.dumps(report.to_dict(), allow_nan=False))
     assert content["reference_error"] <= 1e-30
     assert content["curves"][0]["points"][0]["error"] == first.error
     assert content["targets"][0]["group"] == "ours"

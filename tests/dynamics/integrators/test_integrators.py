@@ -84,7 +84,7 @@ def test_the_error_follows_the_tolerance(method: str) -> None:
     errors = []
     for tolerance in (1e-5, 1e-7, 1e-9, 1e-11):
         run = dyn.simulate(planet(), *PERIHELION, 2.5, method, rtol=tolerance, atol=tolerance)
-        assert run.stats.complete
+        assert run.stats.success
         errors.append(np.abs(run.q[-1] - position(2.5)).max() / tolerance)
     assert max(errors) < 200.0
     assert errors[-1] > 1e-4  # no more accurate than asked for beyond measure
@@ -141,7 +141,7 @@ def test_both_back_ends_take_the_same_steps(method: str) -> None:
     # An estimate is a difference of nearly equal numbers: rounding moves the steps a little.
     assert runs[0].q == approx(runs[1].q, abs=1e-13 if method in FIXED else 1e-6)
     assert runs[0].q[-1] == approx(runs[1].q[-1], abs=1e-10)
-    assert runs[0].stats.evaluations == approx(runs[1].stats.evaluations, abs=30)  # rounding decides when turns end
+    assert runs[0].stats.nfev == approx(runs[1].stats.nfev, abs=30)  # rounding decides when turns end
 
 
 @mark.parametrize("tableau", [DOPRI5, DOP853], ids=["dopri5", "dop853"])
@@ -274,9 +274,9 @@ def test_events_are_found_where_they_are(method: str) -> None:
     assert run.events["axis"].t == approx(np.pi * np.arange(1, 4), abs=tolerance)
     assert run.events["upward"].t == approx([2 * np.pi], abs=tolerance)
     assert run.events["axis"].q[0] == approx([-1.0 - ECCENTRICITY, 0.0], abs=tolerance)
-    assert (run.t[-1], run.stats.status) == (approx(11.0, abs=1e-12), "event 'late' at t = 11 s")
+    assert (run.t[-1], run.stats.message) == (approx(11.0, abs=1e-12), "event 'late' at t = 11 s")
     assert run.q[-1] == approx(position(11.0 - 2 * np.pi), abs=tolerance)
-    assert not run.stats.complete
+    assert not run.stats.success
 
 
 def test_an_event_between_the_times_asked_for() -> None:
@@ -294,18 +294,21 @@ def test_a_run_that_its_steps_cannot_follow_says_so() -> None:
     blow = dyn.OdeSystem(lambda x, t: [x[0] * x[0], 0.0], ["wild", "calm"])
     for method in ADAPTIVE:
         run = dyn.simulate(blow, [1.0, 1.0], None, 2.0, method)
-        assert not run.stats.complete
-        assert run.stats.status.startswith("stopped at t = 1 s: ")
-        assert "state 'wild'" in run.stats.status
+        assert not run.stats.success
+        assert run.stats.message.startswith("stopped at t = 1 s: ")
+        assert "state 'wild'" in run.stats.message
         assert run.t[-1] == approx(1.0, abs=1e-6)
     turns = dyn.simulate(cart(), [0.1, 3.0], [0.0, 90.0], 1.0, "gauss4", dt=0.5)
-    assert "did not converge; the step is too long" in turns.stats.status
+    assert "did not converge; the step is too long" in turns.stats.message
 
 
 def test_a_start_whose_rate_is_no_number() -> None:
     root = dyn.OdeSystem(lambda x, t: [1.0, cg.log(x[1])], ["a", "b"])
     run = dyn.simulate(root, [0.0, -1.0], None, 1.0, "dopri5")
-    assert (len(run.t), run.stats.status) == (1, "stopped at t = 0 s: the rate of state 'b' is not finite at the start")
+    assert (len(run.t), run.stats.message) == (
+        1,
+        "stopped at t = 0 s: the rate of state 'b' is not finite at the start",
+    )
 
 
 @mark.parametrize("method", ["rk4", "dopri5", "rodas", "scipy:RK45"])
@@ -313,12 +316,12 @@ def test_max_steps_ends_a_run(method: str) -> None:
     if method.startswith("scipy"):
         pytest.importorskip("scipy")
     run = dyn.simulate(planet(), *PERIHELION, 50.0, method, dt=0.01, max_steps=17)
-    assert (len(run.t), run.stats.steps, run.stats.complete) == (
+    assert (len(run.t), run.stats.steps, run.stats.success) == (
         18 - run.stats.rejected,
         17 - run.stats.rejected,
         False,
     )
-    assert run.stats.status.endswith("after max_steps = 17 steps")
+    assert run.stats.message.endswith("after max_steps = 17 steps")
 
 
 @mark.parametrize("method", ADAPTIVE)
@@ -370,7 +373,7 @@ def test_solvers_of_scipy(solver: str) -> None:
     times = [0.0, 0.4, 1.1, 2.5]
     run = dyn.simulate(planet(), *PERIHELION, 2.5, f"scipy:{solver}", rtol=1e-8, atol=1e-8, t_eval=times)
     assert run.q == approx(np.array([position(t) for t in times]), abs=3e-6)
-    assert (run.stats.complete, run.stats.method) == (True, f"scipy:{solver}")
+    assert (run.stats.success, run.stats.method) == (True, f"scipy:{solver}")
     every = dyn.simulate(planet(), *PERIHELION, 2.5, f"scipy:{solver}")
     assert len(every.t) == every.stats.steps + 1
     with raises(ValueError, match=r"SciPy's methods are scipy:Radau, .*, got 'scipy:Nothing'"):

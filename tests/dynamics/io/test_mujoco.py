@@ -72,7 +72,7 @@ def motion(arm: dyn.PlanarArm, q: Array, t_end: float, dt: float) -> tuple[dyn.T
 
 @mark.parametrize("model", ["rod", "point"])
 def test_the_triple_pendulum_moves_as_in_mujoco(model: str) -> None:
-    scene = dyn.scenes.load("triple_pendulum", model=model)
+    scene = dyn.scenes.load("triple_pendulum", mass_model=model)
     ours, (q, qd) = motion(scene.model, np.array(scene.q), t_end=1.0, dt=1e-3)
     assert ours.q == approx(q, rel=0.0, abs=SAME_STEPS)
     assert ours.qd == approx(qd, rel=0.0, abs=SAME_STEPS)

@@ -82,12 +82,12 @@ def test_a_rotor_that_catches_a_point_mass_slows_down_as_the_closed_form_says() 
     inertia, mass, length, w = 0.3, 0.8, 0.5, 2.0
     rotor = dyn.Mechanism([dyn.Body("rotor", dyn.Joint("revolute"), inertia=(inertia,) * 3)])
     bead = dyn.Body("bead", dyn.Joint("fixed", position=(length, 0.0, 0.0)), "rotor", mass)
-    found = dyn.picked_up(rotor, [0.4], [w], bead)
+    found = dyn.attach_with_impact(rotor, [0.4], [w], bead)
     assert found.qd[0] == approx(inertia * w / (inertia + mass * length**2), rel=1e-15)
     assert found.energy == approx(0.5 * inertia * w**2 * mass * length**2 / (inertia + mass * length**2), rel=1e-14)
-    moving = dyn.picked_up(rotor, [0.0], [w], bead, velocity=(0.0, 3.0, 0.0))
+    moving = dyn.attach_with_impact(rotor, [0.0], [w], bead, velocity=(0.0, 3.0, 0.0))
     assert moving.qd[0] == approx((inertia * w + mass * length * 3.0) / (inertia + mass * length**2), rel=1e-15)
-    along = dyn.picked_up(rotor, [0.0], [w], bead, velocity=(0.0, w * length, 0.0), omega=(0.0, 0.0, w))
+    along = dyn.attach_with_impact(rotor, [0.0], [w], bead, velocity=(0.0, w * length, 0.0), omega=(0.0, 0.0, w))
     assert (along.qd[0], along.energy) == (approx(w, rel=1e-15), approx(0.0, abs=1e-15))
 
 
@@ -97,7 +97,7 @@ def test_the_energy_lost_is_that_of_an_inelastic_impact(seed: int) -> None:
     holder, body = arm(seed=seed), load(seed)
     rng = np.random.default_rng(seed)
     q, qd, v, w = rng.normal(size=(4, 3))
-    found = dyn.picked_up(holder, q, qd, body, velocity=v, omega=w)
+    found = dyn.attach_with_impact(holder, q, qd, body, velocity=v, omega=w)
     place = np.asarray(body.joint.position) + np.asarray(body.center)
     m = np.array(list(values(dyn.mass_matrix(holder), q=q, qd=qd).values())).reshape(3, 3)
     j = jacobian(holder, "b2", place, q)
@@ -121,13 +121,13 @@ def test_angular_momentum_about_the_base_s_axis_is_kept(seed: int) -> None:
                                      b.center, b.inertia) for b in holder.bodies], (0.0, 0.0, 0.0))  # fmt: skip
     body = load(seed)
     q, qd, v, w = rng.normal(size=(4, 3))
-    found = dyn.picked_up(holder, q, qd, body, velocity=v, omega=w)
+    found = dyn.attach_with_impact(holder, q, qd, body, velocity=v, omega=w)
     moves = values(found.mechanism.motion("load", body.center), q=q, qd=qd)
     place = np.array([moves[name] for name in "xyz"])
     before = about_z(holder, q, qd) + _spin(body, place, v, w, turn(moves))
     assert about_z(found.mechanism, q, found.qd) == approx(before, rel=1e-12)
     later = dyn.simulate(found.mechanism, q, found.qd, 0.5, **TIGHT)
-    left = dyn.dropped(found.mechanism, later.q[-1], later.qd[-1], "load")
+    left = dyn.release(found.mechanism, later.q[-1], later.qd[-1], "load")
     free = _spin(body, left.body.position, left.body.velocity, left.body.omega, left.body.orientation)
     assert about_z(left.mechanism, left.q, left.qd) + free == approx(before, rel=1e-8)
 
@@ -135,7 +135,7 @@ def test_angular_momentum_about_the_base_s_axis_is_kept(seed: int) -> None:
 def test_a_body_that_is_let_go_leaves_with_the_velocity_of_the_hand() -> None:
     holder = arm().attach(load())
     q, qd = np.random.default_rng(1).normal(size=(2, 3))
-    found = dyn.dropped(holder, q, qd, "load")
+    found = dyn.release(holder, q, qd, "load")
     assert (found.q.tolist(), found.qd.tolist()) == (q.tolist(), qd.tolist())
     assert [body.name for body in found.mechanism.bodies] == ["b0", "b1", "b2"]
     twist = jacobian(holder, "load", load().center, q) @ qd
@@ -143,7 +143,7 @@ def test_a_body_that_is_let_go_leaves_with_the_velocity_of_the_hand() -> None:
     place, axes = pose(holder, "load", load().center, q)
     assert found.body.position == approx(place, abs=1e-14)
     assert found.body.orientation == approx(axes, abs=1e-14)
-    again = dyn.picked_up(found.mechanism, q, qd, load(), velocity=found.body.velocity, omega=found.body.omega)
+    again = dyn.attach_with_impact(found.mechanism, q, qd, load(), velocity=found.body.velocity, omega=found.body.omega)
     assert (again.qd, again.energy) == (approx(qd, rel=1e-12), approx(0.0, abs=1e-12))
 
 
@@ -152,12 +152,12 @@ def test_a_body_can_be_caught_on_a_hinge_and_by_a_locked_arm() -> None:
     holder = arm(gravity=(0.0, 0.0, 0.0))
     hook = dyn.Body("load", dyn.Joint("revolute", (0.0, 0.0, 1.0), (0.1, 0.0, 0.0)), "b2", 0.7, inertia=(0.1, 0.1, 0.2))
     q, qd = np.random.default_rng(2).normal(size=(2, 3))
-    found = dyn.picked_up(holder, q, qd, hook)
+    found = dyn.attach_with_impact(holder, q, qd, hook)
     assert (found.q.shape, found.q[3]) == ((4,), 0.0)
     spin = values(found.mechanism.motion("load"), q=found.q, qd=found.qd)
     axis = turn(values(found.mechanism.motion("load"), q=found.q, qd=found.qd))[:, 2]
     assert float(axis @ [spin["wx"], spin["wy"], spin["wz"]]) == approx(0.0, abs=1e-13)
-    held = dyn.picked_up(holder.lock("b2", 0.3), q[:2], qd[:2], load())
+    held = dyn.attach_with_impact(holder.lock("b2", 0.3), q[:2], qd[:2], load())
     assert held.qd.shape == (2,)
     assert held.energy > 0.0
 
@@ -167,10 +167,10 @@ def test_an_arm_picks_up_carries_and_drops_with_all_energy_accounted_for() -> No
     rods = dyn.tree([-1, 0, 1], gravity=(0.0, 0.0, -9.81))
     hand = dyn.Body("load", dyn.Joint("fixed", position=(0.0, 0.0, -1.0)), "link 3", 0.5, inertia=(1e-3,) * 3)
     first = dyn.simulate(rods, [1.0, 0.4, -0.3], [0.0] * 3, 0.6, **TIGHT)
-    found = dyn.picked_up(rods, first.q[-1], first.qd[-1], hand)
+    found = dyn.attach_with_impact(rods, first.q[-1], first.qd[-1], hand)
     place = pose(found.mechanism, "load", (0.0, 0.0, 0.0), found.q)[0]
     second = dyn.simulate(found.mechanism, found.q, found.qd, 0.5, **TIGHT)
-    left = dyn.dropped(found.mechanism, second.q[-1], second.qd[-1], "load")
+    left = dyn.release(found.mechanism, second.q[-1], second.qd[-1], "load")
     third = dyn.simulate(left.mechanism, left.q, left.qd, 0.4, **TIGHT)
     weight = hand.mass * 9.81
     start = first.energy[0] + weight * place[2]  # at rest, waiting
@@ -188,10 +188,10 @@ def test_an_arm_picks_up_carries_and_drops_with_all_energy_accounted_for() -> No
 def test_wrong_hand_overs_are_refused() -> None:
     holder = arm()
     with raises(dyn.MechanismError, match="body 'b0' carries 'b1'"):
-        dyn.dropped(holder, [0.0] * 3, [0.0] * 3, "b0")
+        dyn.release(holder, [0.0] * 3, [0.0] * 3, "b0")
     with raises(dyn.MechanismError, match="there is no body 'nobody'"):
-        dyn.dropped(holder, [0.0] * 3, [0.0] * 3, "nobody")
+        dyn.release(holder, [0.0] * 3, [0.0] * 3, "nobody")
     with raises(ValueError, match=r"q must have shape \(3,\)"):
-        dyn.picked_up(holder, [0.0], [0.0] * 3, load())
+        dyn.attach_with_impact(holder, [0.0], [0.0] * 3, load())
     with raises(dyn.MechanismError, match="velocity must be"):
-        dyn.picked_up(holder, [0.0] * 3, [0.0] * 3, load(), velocity=(1.0, 2.0))
+        dyn.attach_with_impact(holder, [0.0] * 3, [0.0] * 3, load(), velocity=(1.0, 2.0))

@@ -126,7 +126,7 @@ def values(graph: cg.Graph, **inputs: float) -> list[float]:
 
 
 def test_a_slide_with_everything_by_hand() -> None:
-    joint = Joint("prismatic", (0.0, 0.0, 2.0), damping=0.7, stiffness=5.0, rest=0.3, armature=0.5)
+    joint = Joint("prismatic", (0.0, 0.0, 2.0), damping=0.7, stiffness=5.0, spring_reference=0.3, armature=0.5)
     mechanism = Mechanism([Body("a", joint, mass=2.0)], gravity=(0.0, 3.0, -4.0))
     expected = 2.5 * 1.1 + 0.7 * 0.2 + 5.0 * (0.9 - 0.3) + 2.0 * 4.0
     assert values(dyn.inverse_dynamics(mechanism), q0=0.9, qd0=0.2, qdd0=1.1) == approx([expected])
@@ -279,7 +279,7 @@ BAD = [
         {"joint": hinge(stiffness=-1.0)}, "body 'a': stiffness must be finite and at least 0, got -1.0", id="stiffness"
     ),
     param({"joint": hinge(armature=-1.0)}, "body 'a': armature must be finite and at least 0, got -1.0", id="armature"),
-    param({"joint": hinge(rest=np.nan)}, "body 'a': rest must be finite", id="rest"),
+    param({"joint": hinge(spring_reference=np.nan)}, "body 'a': spring_reference must be finite", id="spring_reference"),
     param({"joint": hinge(position=(0, np.inf, 0))}, "body 'a': position must be (3,) finite numbers", id="position"),
     param({"mass": -0.8}, "body 'a': mass must be finite and at least 0, got -0.8 kg", id="mass"),
     param({"mass": np.nan}, "body 'a': mass must be finite and at least 0, got nan kg", id="mass nan"),

@@ -22,7 +22,7 @@ def in_a_plane_and_out() -> Mechanism:
     rng = np.random.default_rng(5)
 
     def body(name: str, kind: str, parent: str, axis: tuple[float, float, float]) -> Body:
-        joint = Joint(kind, axis, 0.3 * rng.normal(size=3), stiffness=0.7, rest=0.2, armature=0.1)
+        joint = Joint(kind, axis, 0.3 * rng.normal(size=3), stiffness=0.7, spring_reference=0.2, armature=0.1)
         return replace(random_body(name, kind, parent, rng), joint=joint)
 
     x, y, z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -43,11 +43,11 @@ MODELS: dict[str, Callable[[], Mechanism | dyn.PlanarArm]] = {
     "plane": lambda: in_space(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7])),
     "plane and out": in_a_plane_and_out,
     "no gravity": lambda: replace(FAMILIES["mixed"](5), gravity=(0.0, 0.0, 0.0)),
-    "regrouped": lambda: replace(FAMILIES["branched"](6), regrouped=True),
+    "regrouped": lambda: replace(FAMILIES["branched"](6), base_parameters=True),
     "planar arm": lambda: dyn.planar_arm([1.0, 0.8, 0.7, 0.9], [1.0, 0.8, 0.7, 0.4], damping=0.1),
-    "planar arm of points": lambda: dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7], model="point", gravity=-3.0),
+    "planar arm of points": lambda: dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7], mass_model="point", gravity=-3.0),
     "pendulum": lambda: dyn.planar_arm([1.3], [0.7]),
-    "regrouped slides": lambda: replace(in_a_plane_and_out(), regrouped=True),
+    "regrouped slides": lambda: replace(in_a_plane_and_out(), base_parameters=True),
 }
 
 

@@ -76,7 +76,7 @@ def energies_in_the_world(mechanism: dyn.Mechanism, state: dict[str, float]) -> 
 @mark.parametrize("seed", range(18))
 @mark.parametrize("regrouped", [False, True])
 def test_the_lagrangian_is_the_energy_in_the_world_s_axes(seed: int, regrouped: bool) -> None:
-    mechanism = replace(in_planes(seed), regrouped=regrouped)
+    mechanism = replace(in_planes(seed), base_parameters=regrouped)
     system = mechanism.system
     graph = cg.Graph([*system.q, *system.qd], {"L": system.lagrangian})
     energy = dyn.energy(mechanism)
@@ -92,7 +92,7 @@ def test_the_lagrangian_is_the_energy_in_the_world_s_axes(seed: int, regrouped: 
 def test_torques_in_planes_are_those_body_by_body(seed: int) -> None:
     mechanism = in_planes(seed)
     n = len(mechanism.moving)
-    for model in (mechanism, replace(mechanism, regrouped=True)):
+    for model in (mechanism, replace(mechanism, base_parameters=True)):
         run, graph = dyn.RecursiveInverseDynamics(model), dyn.inverse_dynamics(mechanism)
         q, qd, qdd = np.random.default_rng(seed).normal(size=(3, n))
         expected = np.array(list(graph.evaluate(dict(zip(graph.input_names, [*q, *qd, *qdd], strict=True))).values()))
@@ -116,7 +116,7 @@ def test_what_regrouping_saves() -> None:
     counts = {name: [(nodes(equations(model)), nodes(dyn.prune(model, equations).graph)) for equations in BOTH]
               for name, model in (("paper", in_space(PAPER)), ("arm of 7", turned_arm(7)))}  # fmt: skip
     assert counts == {"paper": [(175, 158), (161, 139)], "arm of 7": [(1428, 1236), (1865, 1671)]}
-    assert all(link.mass == 0.0 for link in replace(turned_arm(7), regrouped=True).links)
+    assert all(link.mass == 0.0 for link in replace(turned_arm(7), base_parameters=True).links)
 
 
 # --- the paper's scene

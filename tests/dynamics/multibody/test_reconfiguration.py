@@ -144,12 +144,12 @@ def test_the_state_of_untouched_joints_carries_over() -> None:
     old = arm(4)
     q, qd = np.array([0.1, 0.2, 0.3, 0.4]), np.array([1.0, 2.0, 3.0, 4.0])
     held = old.lock("link 2", at=0.2)
-    q_held, qd_held = held.state_of(old, q, qd)
+    q_held, qd_held = held.map_state_from(old, q, qd)
     assert (q_held.tolist(), qd_held.tolist()) == ([0.1, 0.3, 0.4], [1.0, 3.0, 4.0])
-    q_free, qd_free = held.unlock("link 2").state_of(held, q_held, qd_held)
+    q_free, qd_free = held.unlock("link 2").map_state_from(held, q_held, qd_held)
     assert (q_free.tolist(), qd_free.tolist()) == ([0.1, 0.2, 0.3, 0.4], [1.0, 0.0, 3.0, 4.0])
     with raises(ValueError, match=r"qd must have shape \(4,\)"):
-        held.state_of(old, q, [0.0])
+        held.map_state_from(old, q, [0.0])
 
 
 @mark.parametrize("seed", range(8))
@@ -164,7 +164,7 @@ def test_torques_body_by_body_are_those_of_the_graph(seed: int) -> None:
 
 def test_torques_body_by_body_of_a_pendulum_are_the_closed_form() -> None:
     mass, length, inertia, damping = 1.3, 0.7, 0.02, 0.3
-    joint = dyn.Joint("revolute", (0.0, 1.0, 0.0), damping=damping, stiffness=2.0, rest=0.1, armature=0.05)
+    joint = dyn.Joint("revolute", (0.0, 1.0, 0.0), damping=damping, stiffness=2.0, spring_reference=0.1, armature=0.05)
     bob = dyn.Body("bob", joint, mass=mass, center=(0.0, 0.0, -length), inertia=(inertia, inertia, inertia))
     run = dyn.RecursiveInverseDynamics(dyn.Mechanism([bob]))
     q, qd, qdd = 0.4, 1.1, -0.6

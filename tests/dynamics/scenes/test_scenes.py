@@ -56,7 +56,7 @@ def test_a_scene_is_called_by_its_name_and_starts_in_a_state_of_its_model(name: 
 
 def test_options_go_to_the_scene_s_function() -> None:
     assert scenes.load("chain", n=4).system.n == 4
-    assert scenes.load("triple_pendulum", model="point").model.links[0].inertia == 0.0
+    assert scenes.load("triple_pendulum", mass_model="point").model.links[0].inertia == 0.0
 
 
 @mark.parametrize(

@@ -85,9 +85,9 @@ def test_energy_is_the_energy_graph_at_every_row() -> None:
 @mark.parametrize(("method", "stages"), [("euler", 1), ("rk4", 4), ("verlet", 2), ("symplectic_euler", 1)])
 def test_statistics_count_what_was_done(method: str, stages: int) -> None:
     stats = dyn.simulate(oscillator(), [1.0], [0.0], 1.0, method, dt=0.03).stats
-    assert (stats.method, stats.steps, stats.rejected, stats.evaluations) == (method, 34, 0, 34 * stages)
+    assert (stats.method, stats.steps, stats.rejected, stats.nfev) == (method, 34, 0, 34 * stages)
     assert stats.dt == approx(1.0 / 34, rel=1e-12)
-    assert (stats.complete, stats.status) == (True, "reached t_end")
+    assert (stats.success, stats.message) == (True, "reached t_end")
     assert stats.seconds > 0.0
 
 
@@ -112,10 +112,10 @@ def test_a_tableau_meets_the_conditions_of_its_order(method: Tableau) -> None:
 
 def test_a_run_that_leaves_the_numbers_keeps_its_rows_and_says_where() -> None:
     result = dyn.simulate(runaway(), [0.0, 0.0], [0.0, 1.0], 2.0, dt=0.01)
-    assert not result.stats.complete
-    assert result.stats.status.startswith("stopped at t = 1.0")
-    assert "'wild'" in result.stats.status
-    assert "calm" not in result.stats.status
+    assert not result.stats.success
+    assert result.stats.message.startswith("stopped at t = 1.0")
+    assert "'wild'" in result.stats.message
+    assert "calm" not in result.stats.message
     assert 0.9 < result.t[-1] < 1.1
     assert len(result.t) == len(result.q) == len(result.energy) == result.stats.steps + 1
     assert np.isfinite(result.q).all()
@@ -125,16 +125,16 @@ def test_a_run_that_leaves_the_numbers_keeps_its_rows_and_says_where() -> None:
 
 def test_a_run_that_stops_before_the_first_recorded_instant_has_no_rows() -> None:
     result = dyn.simulate(runaway(), [0.0, 0.0], [0.0, 1.0], 2.0, dt=0.01, t_eval=[1.5, 2.0])
-    assert (result.stats.complete, result.t.shape, result.q.shape, result.energy.shape) == (False, (0,), (0, 2), (0,))
-    assert "stopped at t = 1.0" in result.stats.status
+    assert (result.stats.success, result.t.shape, result.q.shape, result.energy.shape) == (False, (0,), (0, 2), (0,))
+    assert "stopped at t = 1.0" in result.stats.message
 
 
 @pytest.mark.filterwarnings("error")
 @mark.parametrize("parameters", [{"m": 0.0}, {"m": 1e-300}])
 def test_an_infinite_acceleration_stops_the_run_without_a_warning(parameters: dict[str, float]) -> None:
     result = dyn.simulate(oscillator(), [1.0], [0.0], 1.0, dt=0.1, parameters=parameters)
-    assert (len(result.t), result.stats.complete, result.stats.steps) == (1, False, 0)
-    assert result.stats.status.startswith("stopped at t = 0.1 s: ")
+    assert (len(result.t), result.stats.success, result.stats.steps) == (1, False, 0)
+    assert result.stats.message.startswith("stopped at t = 0.1 s: ")
 
 
 @pytest.mark.filterwarnings("error")
@@ -142,8 +142,8 @@ def test_leaving_a_function_s_domain_stops_the_run() -> None:
     """A particle on the potential -sqrt(q) that is thrown at q = 0, beyond which the root is no number."""
     system = System(lambda q, qd, t: 0.5 * qd[0] ** 2 + cg.sqrt(q[0]), ["height"])
     result = dyn.simulate(system, [1.0], [-3.0], 1.0, dt=0.01)
-    assert not result.stats.complete
-    assert "'height' is nan" in result.stats.status
+    assert not result.stats.success
+    assert "'height' is nan" in result.stats.message
     assert 0.2 < result.t[-1] < 0.6
     assert np.isfinite(result.q).all()
 
@@ -162,9 +162,9 @@ def test_ctrl_c_keeps_the_rows(method: str, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(Run, "_advance", advance)
     result = dyn.simulate(oscillator(), [1.0], [0.0], 10.0, method, dt=0.01)
     kept = len(result.t)
-    assert (kept, result.stats.complete) == (result.stats.steps + 1, False)
+    assert (kept, result.stats.success) == (result.stats.steps + 1, False)
     assert kept == 34  # the first piece of 32, one more
-    assert result.stats.status == f"interrupted after t = {result.t[-1]:.6g} s"
+    assert result.stats.message == f"interrupted after t = {result.t[-1]:.6g} s"
     monkeypatch.undo()
     whole = dyn.simulate(oscillator(), [1.0], [0.0], 10.0, method, dt=0.01)
     assert (result.q == whole.q[:kept]).all()
@@ -371,9 +371,9 @@ def test_rows_that_fill_the_memory_end_the_run(monkeypatch: pytest.MonkeyPatch) 
     hundred = 3.0 * 24.0 * 100.0  # rows of time and state
     monkeypatch.setattr(sys.modules["dynamics.simulation.simulate"], "room", lambda: hundred)
     run = dyn.simulate(oscillator(), [1.0], [0.0], 200.0, "dop853", dt=1e-2)
-    assert run.stats.status.startswith("stopped at t = ")
-    assert "the rows fill the memory; t_eval records fewer" in run.stats.status
-    assert not run.stats.complete
+    assert run.stats.message.startswith("stopped at t = ")
+    assert "the rows fill the memory; t_eval records fewer" in run.stats.message
+    assert not run.stats.success
     assert np.array_equal(run.q, whole.q[: len(run.q)])
 
 

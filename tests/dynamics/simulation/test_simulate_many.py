@@ -46,9 +46,9 @@ def runaway() -> System:
 
 def same(a: Ensemble, b: Ensemble) -> bool:
     """To the last bit, NaN included."""
-    arrays = [(x.t, x.q, x.qd, x.stats.steps, x.stats.evaluations, x.stats.rejected, x.stats.dt) for x in (a, b)]
+    arrays = [(x.t, x.q, x.qd, x.stats.steps, x.stats.nfev, x.stats.rejected, x.stats.dt) for x in (a, b)]
     equal = all(np.array_equal(x, y, equal_nan=True) for x, y in zip(*arrays, strict=True))
-    return equal and a.stats.status == b.stats.status
+    return equal and a.stats.message == b.stats.message
 
 
 @mark.parametrize(
@@ -65,8 +65,8 @@ def test_starts_forces_and_parameters_are_each_trajectory_s_own(method: str, err
     assert result.q[:, :, 0] == approx(middle + (q - middle) * np.cos(w * t) + qd / w * np.sin(w * t), abs=error)
     assert result.qd[:, :, 0] == approx(-w * (q - middle) * np.sin(w * t) + qd * np.cos(w * t), abs=2 * error)
     assert (result.t.tolist(), result.q.shape) == (TIMES, (11, 4, 1))
-    assert result.stats.complete.all()
-    assert set(result.stats.status) == {"reached t_end"}
+    assert result.stats.success.all()
+    assert set(result.stats.message) == {"reached t_end"}
 
 
 def test_arms_move_as_mujoco_s_do() -> None:
@@ -94,8 +94,8 @@ def test_every_method_gives_what_simulate_gives(model: Any, method: str) -> None
     for k in range(9):
         one = dyn.simulate(model, q[k], qd[k], 0.3, method, dt=0.01, t_eval=[0.1, 0.2, 0.3])
         assert np.hstack([result.q[k], result.qd[k]]) == approx(np.hstack([one.q, one.qd]), abs=ROUNDING)
-        found = [int(each[k]) for each in (result.stats.steps, result.stats.rejected, result.stats.evaluations)]
-        assert found == [one.stats.steps, one.stats.rejected, one.stats.evaluations]
+        found = [int(each[k]) for each in (result.stats.steps, result.stats.rejected, result.stats.nfev)]
+        assert found == [one.stats.steps, one.stats.rejected, one.stats.nfev]
         assert result.stats.dt[k] == approx(one.stats.dt, rel=1e-12)
 
 
@@ -226,7 +226,7 @@ def test_one_that_leaves_the_numbers_is_nan_from_there_and_says_where(method: st
     qd[4, 1], qd[9, 1] = 1.0, 2.0
     result = simulate_many(runaway(), q, qd, 2.0, method, dt=0.01, t_eval=np.linspace(0.0, 2.0, 21))
     others = [k for k in range(17) if k not in (4, 9)]
-    assert result.stats.complete.tolist() == [k in others for k in range(17)]
+    assert result.stats.success.tolist() == [k in others for k in range(17)]
     assert (result.q[others] == calm.q[others]).all()
     assert (result.qd[others] == calm.qd[others]).all()
     for k, v in ((4, 1.0), (9, 2.0)):
@@ -235,7 +235,7 @@ def test_one_that_leaves_the_numbers_is_nan_from_there_and_says_where(method: st
         assert not finite[result.t > 1.5 / v].any()
         one = dyn.simulate(runaway(), q[k], qd[k], 2.0, method, dt=0.01, t_eval=np.linspace(0.0, 2.0, 21)).stats
         stats = result.stats
-        assert (stats.status[k], stats.steps[k], stats.evaluations[k]) == (one.status, one.steps, one.evaluations)
+        assert (stats.message[k], stats.steps[k], stats.nfev[k]) == (one.message, one.steps, one.nfev)
         assert ("'wild'" if method != "midpoint" else "did not converge") in one.status
         assert len(result.t) - finite.all(axis=1).sum() == np.isnan(result.q[k, :, 0]).sum()
 
@@ -247,22 +247,22 @@ def test_a_neighbour_that_is_lost_is_not_felt_in_an_arm() -> None:
     result = simulate_many(model, q, qd, 0.5)
     others = [k for k in range(16) if k not in (3, 11)]
     assert (result.q[others] == calm.q[others]).all()
-    assert result.stats.status[3].startswith("stopped at t = 0.001 s: coordinate 'joint 1' is")
+    assert result.stats.message[3].startswith("stopped at t = 0.001 s: coordinate 'joint 1' is")
     assert np.isnan(result.q[3, 1:]).all()
     assert result.q[3, 0].tolist() == q[3].tolist()
 
 
 def test_all_may_be_lost() -> None:
     result = simulate_many(runaway(), np.zeros((3, 2)), [0.0, 1.0], 9.0, dt=0.1)
-    assert not result.stats.complete.any()
-    assert len(set(result.stats.status)) == 1
+    assert not result.stats.success.any()
+    assert len(set(result.stats.message)) == 1
     assert np.isnan(result.q[:, -1]).all()
 
 
 def test_max_steps() -> None:
     for method in ("rk4", "dop853"):
         result = simulate_many(*arms(3), 5.0, method, t_eval=[0.0, 5.0], max_steps=4)
-        assert all("after max_steps = 4 steps" in each for each in result.stats.status)
+        assert all("after max_steps = 4 steps" in each for each in result.stats.message)
         assert np.isnan(result.q[:, 1]).all()
         assert result.stats.steps.max() <= 4
 
@@ -282,7 +282,7 @@ def test_ctrl_c_comes_back_and_leaves_no_thread(workers: int, method: str) -> No
     timer.join()
     assert time.perf_counter() - begin < 60.0  # of days
     assert set(threading.enumerate()) == before
-    assert set(result.stats.status) == {"interrupted"}
+    assert set(result.stats.message) == {"interrupted"}
     assert np.isnan(result.q).all()
 
 
@@ -294,10 +294,10 @@ def test_ctrl_c_keeps_what_is_done() -> None:
             yield function(each)
 
     whole, result = (simulate_many(*arms(29), 0.1, workers=workers, chunk=8) for workers in (1, interrupted))
-    assert result.stats.complete.tolist() == [True] * 16 + [False] * 13
+    assert result.stats.success.tolist() == [True] * 16 + [False] * 13
     assert (result.q[:16] == whole.q[:16]).all()
     assert np.isnan(result.q[16:]).all()
-    assert result.stats.status[15:17] == ("reached t_end", "interrupted")
+    assert result.stats.message[15:17] == ("reached t_end", "interrupted")
 
 
 def test_an_error_in_a_thread_is_raised_and_leaves_no_thread(monkeypatch: pytest.MonkeyPatch) -> None:

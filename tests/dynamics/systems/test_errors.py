@@ -29,7 +29,7 @@ _ARMS: dict[str, tuple[dict[str, Any], str]] = {
     "infinite length": ({"lengths": [math.inf, 1.0]}, "link 1: length must be positive and finite, got inf m"),
     "counts differ": ({"lengths": [1.0]}, "as many masses as lengths, at least one; got 2 and 1"),
     "no links": ({"masses": [], "lengths": []}, "as many masses as lengths, at least one; got 0 and 0"),
-    "model": ({"model": "beam"}, """model must be "rod" or "point", got 'beam'"""),
+    "mass_model": ({"mass_model": "beam"}, """mass_model must be "rod" or "point", got 'beam'"""),
     "gravity": ({"gravity": math.nan}, "gravity must be finite, got nan m/s"),
     "negative damping": ({"damping": [0.1, -0.1]}, "damping must be finite and at least 0, got -0.1 for coordinate 1"),
     "NaN damping": ({"damping": math.nan}, "damping must be finite and at least 0, got nan for coordinate 0"),

@@ -124,7 +124,7 @@ def test_two_outputs_of_one_node_are_two_boxes() -> None:
 
 def test_a_named_operation_shows_name_and_symbol() -> None:
     x = cg.variable("x")
-    assert boxes(cg.Graph([x], {"y": cg.named("energy", x * x)}))["n1"]["label"] == "energy\n×"
+    assert boxes(cg.Graph([x], {"y": cg.with_name(x * x, "energy")}))["n1"]["label"] == "energy\n×"
 
 
 def test_given_names_win_over_prettified_ones() -> None:

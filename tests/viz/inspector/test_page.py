@@ -59,7 +59,7 @@ def test_it_has_all_formulations_with_their_counts_and_spurious_nodes(pendulum):
     for name, each in zip(FORMULATIONS, data["versions"], strict=True):
         graph = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"), name)
         assert each["counts"] == [graph.counts().nodes, graph.counts().edges]
-        assert len(each["marked"]) == len(dyn.spurious(graph))
+        assert len(each["marked"]) == len(dyn.spurious_nodes(graph))
         assert len(each["rows"]) == len(data["motion"]["t"])
     table = pendulum.partition("Torques that each part takes at t = 0 [N m]")[2].partition("</table>")[0]
     assert "<td>link 2</td><td>−0.9391</td>" in table
@@ -69,7 +69,7 @@ def test_it_has_all_formulations_with_their_counts_and_spurious_nodes(pendulum):
 
 def test_text_of_a_graph_stays_text():
     with cg.tag("</script><b>"):
-        node = cg.named("<i>&", cg.sin(cg.variable("x<y")))
+        node = cg.with_name(cg.sin(cg.variable("x<y")), "<i>&")
     text = viz.page(
         cg.Graph(cg.variables(["x<y"]), {"<u>": node}), title="<s>", tables=[Table("<q>", ["<a>"], [["<c>"]])]
     )

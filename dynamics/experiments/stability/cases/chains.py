@@ -48,7 +48,7 @@ def mass_ratio(ratio: float, growth: float) -> Case:
     """Two points on unit rods without mass, the lower `ratio` times as heavy as the upper."""
 
     def build() -> PlanarArm:
-        return planar_arm([1.0, ratio], [1.0, 1.0], model="point", gravity=GRAVITY)
+        return planar_arm([1.0, ratio], [1.0, 1.0], mass_model="point", gravity=GRAVITY)
 
     about = (
         "a light link under a heavy one" if ratio < 1.0 else "a light link above a heavy one swings fast in its pull"

@@ -44,7 +44,7 @@ def test_by_definition_the_blame_is_one_edge_for_each_joint(n, simplify):
     assert [edge.target.name for edge in finding.edges] == [f"q{i}" for i in range(n)]
     assert finding.data["paths"] == [f"qd{i} -> qd{i} * dt -> q{i}" for i in range(n)]
     assert finding.data["corrupted"] == [{"derivative": f"dL/dqd{i}", "gains": f"dt * dL/dq{i}"} for i in range(n)]
-    assert found.nodes == dyn.spurious(graph)
+    assert found.nodes == dyn.spurious_nodes(graph)
     assert found.edges == set(finding.edges) <= set(graph.edges)
 
 
@@ -79,7 +79,7 @@ def test_the_gain_is_what_the_derivative_has_too_much():
         return 0.5 * qd * qd * cg.cos(q) - q * q
 
     old, v, dt = cg.variables("old v dt")
-    q = cg.named("q", v * dt + old)
+    q = cg.with_name(v * dt + old, "q")
     graph = cg.Graph([old, v, dt], {"L": energy(q, v)})
     (finding,) = lint(graph, independent=("q", "v"), function="L").findings
     assert finding.data["corrupted"] == [{"derivative": "dL/dv", "gains": "dt * dL/dq"}]
@@ -135,9 +135,9 @@ def test_of_cuts_of_one_size_the_one_nearest_to_the_dependent_is_blamed():
 
 
 def test_two_uses_are_two_edges():
-    a = cg.named("a", cg.sin(x) * cg.sin(x) + y)
+    a = cg.with_name(cg.sin(x) * cg.sin(x) + y, "a")
     assert len(lint(cg.Graph([x, y], {"f": a}), independent=("a", "x")).edges) == 1  # one behind the product
-    a = cg.named("a", x * x)
+    a = cg.with_name(x * x, "a")
     assert len(lint(cg.Graph([x], {"f": a}), independent=("a", "x")).edges) == 2
     once = cg.sin(x)
     (finding,) = lint(cg.Graph([x], {"f": once * once}), independent=("f", "x")).findings
@@ -145,7 +145,7 @@ def test_two_uses_are_two_edges():
 
 
 def test_groups_may_be_given_in_many_ways():
-    graph = cg.Graph([x, y, z], {"f": cg.named("two words", x * y) + z})
+    graph = cg.Graph([x, y, z], {"f": cg.with_name(x * y, "two words") + z})
     for pairs in (("x y", "z"), [("x, y", "z")], [(["x", "y"], "z")], [((x, "y"), z)], [("x", "z"), ("y", "z")]):
         assert lint(graph, independent=pairs).ok
     assert not lint(graph, independent=("two words", "x")).ok

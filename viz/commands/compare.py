@@ -1,4 +1,4 @@
-"""`cgraph diff`: what two formulations of a scene's equations have in common, and what only one of them has."""
+"""`cgraph compare`: what two formulations of a scene's equations have in common, and what only one of them has."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .arguments import Commands, draw, may_draw_and_print, scene_of, state_names
 
 def add(commands: Commands[argparse.ArgumentParser]) -> None:
     """The command's arguments."""
-    parser = commands.add_parser("diff", help="compare two formulations of a scene's equations, node by node")
+    parser = commands.add_parser("compare", help="compare two formulations of a scene's equations, node by node")
     takes_a_scene(parser)
     parser.add_argument(
         "--formulations",
@@ -34,7 +34,7 @@ def run(options: argparse.Namespace) -> int:
     scene = scene_of(options)
     left, right = (inverse_dynamics(scene, each) for each in options.formulations)
     state = [name for graph in (left, right) for names in state_names(graph, scene.system.n) for name in names]
-    found = cg.diff(left, right, atoms=dict.fromkeys(state), classify=formulation_classes)
+    found = cg.compare(left, right, atoms=dict.fromkeys(state), classify=formulation_classes)
     if options.json:
         named = dict(zip(("left", "right"), options.formulations, strict=True))
         sizes = {"left_nodes": len(left.nodes), "right_nodes": len(right.nodes), "in_both": len(found.common)}
