@@ -34,8 +34,9 @@ from .simulation.ensembles import Ensemble, EnsembleStats, simulate_many
 from .simulation.events import Event
 from .simulation.simulate import simulate
 from .simulation.trajectory import Crossings, Stats, Trajectory
+from .systems.model import as_system
 from .systems.ode_system import OdeSystem
-from .systems.system import System, as_system
+from .systems.system import System
 from .verification.certificate import certify
 from .verification.residual import Certificate
 

@@ -6,7 +6,7 @@ import secrets
 from pathlib import Path
 
 
-def write(path: str | Path, data: str | bytes) -> Path:
+def atomic_write(path: str | Path, data: str | bytes) -> Path:
     """Write data (text as UTF-8) to path by way of a temporary file beside it; returns the path.
 
     Raises OSError, with the path in its message, when the folder is missing or must not be written to; what was at

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.autodiff.forward import tangents
-from cgraph.autodiff.jacobian import hessian_nodes
-from cgraph.core.label import building
-from cgraph.core.traversal import topological
-from cgraph.simplify.builder import Builder, folded
+from cgraph.extend import Builder, building, folded, hessian_nodes, tangents, topological
 
-from ..systems.system import System, as_system
+from ..systems.model import Model, as_system
+from ..systems.system import System
 from .equations_of_motion import bias
 from .formulations import ONE, ZERO, substituted
 
 
-def coriolis(model: Any) -> Graph:
+def coriolis(model: Model) -> Graph:
     """C(q, qd) with C qd + gravity_force = bias and dM/dt - 2 C skew.
 
     The Coriolis force is quadratic in qd with Christoffel's symbols as coefficients, c_i = sum_jk Gamma_ijk qd_j qd_k,
@@ -60,7 +55,7 @@ def quadratic(system: System) -> None:
         raise ValueError(f"the Lagrangian must be quadratic in the velocities, its mass matrix depends on {name}")
 
 
-def damping_force(model: Any) -> Graph:
+def damping_force(model: Model) -> Graph:
     """The torque that viscous damping takes, D qd. Inputs q0.., qd0..; outputs damping0.. [N m or N]."""
     system = as_system(model)
     with building(Builder()), cg.tag("damping"):

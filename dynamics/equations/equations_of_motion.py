@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.autodiff.forward import tangents
-from cgraph.autodiff.hessian_solve import solve_nodes
-from cgraph.autodiff.jacobian import hessian_nodes
-from cgraph.autodiff.ldl_solve import SingularError, ldl_solve
-from cgraph.autodiff.reverse import cotangents
-from cgraph.core.label import building
-from cgraph.simplify.builder import Builder, folded
+from cgraph.extend import (
+    Builder,
+    SingularError,
+    building,
+    cotangents,
+    folded,
+    hessian_nodes,
+    ldl_solve,
+    solve_nodes,
+    tangents,
+)
 
-from ..systems.system import System, as_system
+from ..systems.model import Model, as_system
+from ..systems.system import System
 from .formulations import ONE, ZERO, substituted
 from .velocity_nodes import rates
 
@@ -26,7 +31,7 @@ class SingularMassMatrixError(ValueError):
     """A coordinate that has no inertia, so that its acceleration is not determined."""
 
 
-def mass_matrix(model: Any) -> Graph:
+def mass_matrix(model: Model) -> Graph:
     """M(q), the part of tau that multiplies qdd: M = d2L/dqd2.
 
     Inputs q0.., qd0.. (M depends on qd only for a Lagrangian that is not quadratic), t if needed, parameters.
@@ -39,7 +44,7 @@ def mass_matrix(model: Any) -> Graph:
     return cg.simplify(system.graph(outputs, system.q, system.qd))
 
 
-def bias(model: Any) -> Graph:
+def bias(model: Model) -> Graph:
     """Coriolis, centrifugal and gravity force together: tau at qdd = 0 without damping and applied forces.
 
     Inputs q0.., qd0.., t if needed, parameters; outputs bias0.. [N m or N].
@@ -49,7 +54,7 @@ def bias(model: Any) -> Graph:
     return cg.simplify(system.graph(outputs, system.q, system.qd))
 
 
-def gravity_force(model: Any) -> Graph:
+def gravity_force(model: Model) -> Graph:
     """The bias at rest: dP/dq, from gravity and springs.
 
     Inputs q0.., qd0.., t if needed, parameters; outputs gravity0.. [N m or N].
@@ -59,14 +64,14 @@ def gravity_force(model: Any) -> Graph:
     return cg.simplify(system.graph({f"gravity{i}": node for i, node in enumerate(at_rest)}, system.q, system.qd))
 
 
-def momentum(model: Any) -> Graph:
+def momentum(model: Model) -> Graph:
     """Generalized momenta p = dL/dqd. Inputs q0.., qd0.., t if needed, parameters; outputs p0.. ."""
     system = as_system(model)
     bars = cotangents({system.lagrangian: ONE}, system.qd)
     return cg.simplify(system.graph({f"p{i}": bar for i, bar in enumerate(bars)}, system.q, system.qd))
 
 
-def energy(model: Any) -> Graph:
+def energy(model: Model) -> Graph:
     """Total energy E = qd . dL/dqd - L, which is K + P for a kinetic energy quadratic in qd.
 
     Inputs q0.., qd0.., t if needed, parameters; output E [J].
@@ -86,7 +91,7 @@ METHODS = ("auto", "recursive", "dense")
 SHORT = 6  # coordinates; beyond, the dense graph is larger on a tree of bodies, and takes long to build
 
 
-def forward_dynamics(model: Any, method: str = "auto", *, check: bool = False) -> Graph:
+def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False) -> Graph:
     """Accelerations: qdd = M^-1 (tau + forces - damping * qd - bias), from the Lagrangian.
 
     Inputs q0.., qd0.., tau0.., t if needed, parameters; outputs qdd0.. [rad/s^2 or m/s^2].
@@ -117,7 +122,7 @@ def forward_dynamics(model: Any, method: str = "auto", *, check: bool = False) -
     return min(graphs, key=lambda graph: len(graph.nodes))
 
 
-def raise_if_singular(model: Any, info: ArrayLike) -> None:
+def raise_if_singular(model: Model, info: ArrayLike) -> None:
     """Raise SingularMassMatrixError, naming the coordinate, unless the output `info` of `forward_dynamics` is 0.
 
     info: a number, or an array of any shape; the first entry that is not 0 is reported, with its index.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
-from cgraph.util.real_arrays import real_array
+from cgraph.extend import real_array
 
 from ..systems.system import TIME, System
 

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.autodiff.forward import tangents
-from cgraph.autodiff.reverse import cotangents
-from cgraph.core.label import TANGENT, building
-from cgraph.core.traversal import topological
-from cgraph.simplify.builder import Builder
+from cgraph.extend import TANGENT, Builder, building, cotangents, tangents, topological
 
-from ..systems.system import System, as_system
+from ..systems.model import Model, as_system
+from ..systems.system import System
 
 EULER = "euler"  # tag of the embedded relations q = qd dt + q_old and qd = qdd dt + qd_old
 COUPLING = "q of qd"  # tag of the product qd dt in the first of them, through which dL/dqd reaches dL/dq
@@ -89,7 +86,7 @@ FORMULATIONS: dict[str, Callable[[System], Terms]] = {
 }
 
 
-def inverse_dynamics(model: Any, formulation: str = "chain_rule", *, simplify: bool = True) -> Graph:
+def inverse_dynamics(model: Model, formulation: str = "chain_rule", *, simplify: bool = True) -> Graph:
     """tau of the motion: tau = d/dt dL/dqd - dL/dq + damping * qd - forces, by one of the `FORMULATIONS`.
 
     "chain_rule", "chain_rule_literal": inputs q0.., qd0.., qdd0.., then t if needed and parameters.
@@ -114,7 +111,7 @@ def inverse_dynamics(model: Any, formulation: str = "chain_rule", *, simplify: b
 
 
 def momentum_rate(
-    model: Any, formulation: str = "chain_rule", *, simplify: bool = True, keep_momentum: bool = False
+    model: Model, formulation: str = "chain_rule", *, simplify: bool = True, keep_momentum: bool = False
 ) -> Graph:
     """The inertial term d/dt dL/dqd alone, outputs p0_dot.. : the left side of Eq. (3) and of Figures 1 to 3.
 

@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.autodiff.hessian_solve import solve_nodes
-from cgraph.autodiff.jacobian import hessian_nodes
-from cgraph.autodiff.ldl_solve import ldl_solve
-from cgraph.autodiff.reverse import cotangents
-from cgraph.core.label import building
-from cgraph.simplify.builder import Builder, folded
+from cgraph.extend import Builder, building, cotangents, folded, hessian_nodes, ldl_solve, solve_nodes
 
-from ..systems.system import System, as_system
+from ..systems.model import Model, as_system
+from ..systems.system import System
 from .equations_of_motion import SHORT, forward_dynamics
 from .evaluate_at import Array, at_state
 from .formulations import ONE, ZERO, inverse_dynamics
 
 
-def state_space(model: Any) -> Graph:
+def state_space(model: Model) -> Graph:
     """A and B of d(xdot) = A dx + B dtau, x = (q, qd), at any state.
 
     From tau(q, qd, qdd) = const: M dqdd = dtau - (d tau / dx) dx, at the qdd of forward dynamics. That takes half the
@@ -64,7 +59,7 @@ def _slopes(system: System, accelerations: list[Node], build: Builder) -> list[l
 
 
 def linearize(
-    model: Any,
+    model: Model,
     q: ArrayLike,
     qd: ArrayLike,
     tau: ArrayLike | None = None,

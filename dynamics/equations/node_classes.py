@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from cgraph import Graph, Node
-from cgraph.core.label import ADJOINT
+from cgraph.extend import ADJOINT
 
 from .formulations import EULER, spurious_nodes
 

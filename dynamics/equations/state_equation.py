@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from cgraph import Graph
 
-from ..systems.ode_system import OdeSystem
-from ..systems.system import TIME, as_system
+from ..systems.model import Model, as_ode, as_system
+from ..systems.system import TIME
 from .equations_of_motion import forward_dynamics
 
 
-def state_equation(model: Any) -> Graph:
+def state_equation(model: Model) -> Graph:
     """The rates of a model's state.
 
     A System, or what has one: inputs q0.., qd0.., tau0.., t if needed, parameters; outputs q0_dot.., qd0_dot.. with
@@ -30,12 +30,6 @@ def state_equation(model: Any) -> Graph:
     return Graph(accelerations.inputs, outputs)
 
 
-def as_ode(model: Any) -> OdeSystem | None:
-    """The OdeSystem of a model: itself, or what it has as `.system`; None for a mechanical one."""
-    system = getattr(model, "system", model)
-    return system if isinstance(system, OdeSystem) else None
-
-
 class Inputs(NamedTuple):
     """What the inputs of a state equation are, in the order of the graph."""
 
@@ -45,7 +39,7 @@ class Inputs(NamedTuple):
     parameters: dict[str, float]  # with the model's own values
 
 
-def state_inputs(model: Any) -> Inputs:
+def state_inputs(model: Model) -> Inputs:
     """The names behind `state_equation(model)`, without building it."""
     ode = as_ode(model)
     if ode is not None:

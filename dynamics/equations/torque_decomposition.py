@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.autodiff.forward import tangents
-from cgraph.autodiff.jacobian import hessian_nodes
-from cgraph.autodiff.reverse import cotangents
-from cgraph.core.label import building
-from cgraph.simplify.builder import Builder, folded
+from cgraph.extend import Builder, building, cotangents, folded, hessian_nodes, tangents
 
-from ..systems.system import System, as_system
+from ..systems.model import Model, as_system
+from ..systems.system import System
 from . import coriolis
 from .equations_of_motion import bias, gravity_force
 from .formulations import ONE, ZERO
@@ -22,7 +18,7 @@ from .torque_table import TorqueTable
 _ENERGIES = {"kinetic", "potential"}
 
 
-def torque_by_link(model: Any) -> TorqueTable:
+def torque_by_link(model: Model) -> TorqueTable:
     """Row k, column i: what the partial Lagrangian L_k has of tau_i, d/dt dL_k/dqd_i - dL_k/dq_i.
 
     Rows of damping and of applied forces follow, where the model has them; columns add up to tau. A link that a joint
@@ -40,7 +36,7 @@ def torque_by_link(model: Any) -> TorqueTable:
     return TorqueTable("torque by link", (*names, *outside), system.coordinates, system, graph, True)
 
 
-def torque_by_joint_motion(model: Any) -> TorqueTable:
+def torque_by_joint_motion(model: Model) -> TorqueTable:
     """Row i, column j: the torque at joint i for the motion of joint j, M_ij qdd_j + C_ij qd_j.
 
     C is that of Christoffel's symbols (`coriolis`): of a Coriolis force, which two velocities make together, each has

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph, Node
-from cgraph.core.traversal import topological
+from cgraph.extend import topological
 
 from ..systems.system import System
 from .evaluate_at import Array, at_state

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cgraph import Node
-from cgraph.core.label import UNLABELLED
-from cgraph.core.traversal import topological
-from cgraph.simplify.builder import Builder
+from cgraph.extend import UNLABELLED, Builder, topological
 
 
 def rates(output: Node, q: Sequence[Node], qd: Sequence[Node], t: Node, build: Builder) -> list[Node]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.program import Call
+from cgraph.extend import Call
 
 
 def weighted(nodes: Sequence[Node], weights: Sequence[float]) -> Node:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.program import Call, Map, Program, Statement, Sum
+from cgraph.extend import Call, Map, Program, Statement, Sum
 
 from .elementwise import ahead
 from .problem import Problem

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from cgraph.program import Program
+from cgraph.extend import Program
 
 from .problem import Problem
 

@@ -9,16 +9,12 @@ from typing import Any, NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.autodiff.hessian_solve import solve_nodes
-from cgraph.autodiff.jacobian import hessian_nodes
-from cgraph.autodiff.reverse import cotangents
-from cgraph.core.label import building
-from cgraph.core.traversal import topological
-from cgraph.simplify.builder import Builder
+from cgraph.extend import Builder, building, cotangents, hessian_nodes, solve_nodes, topological
 
 from ..equations.equations_of_motion import energy
-from ..equations.state_equation import as_ode, state_equation, state_inputs
-from ..systems.system import TIME, Parameters, System, as_system, called
+from ..equations.state_equation import state_equation, state_inputs
+from ..systems.model import Model, as_ode, as_system
+from ..systems.system import TIME, Parameters, System, called
 
 ONE = cg.constant(1.0)
 KEPT = 16  # problems whose graphs stay for another run
@@ -40,7 +36,7 @@ class Problem:
     bound: {input: number} of parameters and applied forces that are built in; the others stay inputs, `parameters`.
     """
 
-    def __init__(self, model: Any, bound: Mapping[str, float]) -> None:
+    def __init__(self, model: Model, bound: Mapping[str, float]) -> None:
         inputs = state_inputs(model)
         self.model = model
         self.states = inputs.states
@@ -161,7 +157,7 @@ class Problem:
         return Graph(cg.variables([*first, TIME, *self.parameters]), found.outputs)
 
 
-def problem_of(model: Any, bound: Mapping[str, float]) -> Problem:
+def problem_of(model: Model, bound: Mapping[str, float]) -> Problem:
     """The problem of a model; asked for again, while it is among the last few, the one that has its graphs already."""
     inputs, ode = state_inputs(model), as_ode(model)
     if ode is not None:
@@ -176,7 +172,7 @@ def problem_of(model: Any, bound: Mapping[str, float]) -> Problem:
 @dataclass(frozen=True)
 class _Request:
     key: tuple[Any, ...]
-    model: Any = field(compare=False)
+    model: Model = field(compare=False)
     bound: Mapping[str, float] = field(compare=False)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.program import Call, Factor, If, Map, Program, Solve, Statement, Sum, While
+from cgraph.extend import Call, Factor, If, Map, Program, Solve, Statement, Sum, While
 
 from .elementwise import SAME, identity, weighted
 from .explicit import moment

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.program import Call, Factor, If, Map, Program, Solve, Statement
+from cgraph.extend import Call, Factor, If, Map, Program, Solve, Statement
 
 from .elementwise import SAME, identity, weighted
 from .explicit import moment

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.program import Call, If, Map, Program, Statement, Sum
+from cgraph.extend import Call, If, Map, Program, Statement, Sum
 
 from .elementwise import SAME, compensated, function, scaled, weighted
 from .explicit import moment, point, stage

@@ -18,7 +18,7 @@ from fractions import Fraction
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.program import Call, Map, Program, Statement, Sum, While
+from cgraph.extend import Call, Map, Program, Statement, Sum, While
 
 from .elementwise import SAME, compensated, function, weighted
 from .explicit import advance, moment, registers

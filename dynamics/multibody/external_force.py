@@ -13,10 +13,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.autodiff.reverse import cotangents
-from cgraph.core.label import building
-from cgraph.core.traversal import topological
-from cgraph.simplify.builder import Builder
+from cgraph.extend import Builder, building, cotangents, topological
 
 from . import spatial
 from .body import Body, MechanismError, vector

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..systems.model import Model
 from .mechanism import Mechanism
 from .planar_arm import PlanarArm
 
@@ -21,7 +22,7 @@ class Skeleton(NamedTuple):
     parents: tuple[int, ...]
 
 
-def skeleton(model: Any, q: ArrayLike) -> Skeleton | None:
+def skeleton(model: Model, q: ArrayLike) -> Skeleton | None:
     """Places of joints and tips for q, (T, n); None for a model that has none, such as a bare System.
 
     A mechanism that moves in a plane of two axes is seen at a right angle to it, any other from above and one side.

@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.core.label import building
-from cgraph.simplify.builder import Builder
+from cgraph.extend import Builder, building
 
 from ..systems.system import BiasForce, BodySystem, System, parameter_value
 from . import newton_euler, spatial
@@ -103,6 +102,16 @@ class Mechanism:
     def moving(self) -> tuple[Body, ...]:
         """The bodies that move, parents first, with all that is welded to them merged into their inertia."""
         return self._merged[0]
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the moving bodies, one for each coordinate."""
+        return tuple([body.name for body in self.moving])
+
+    @property
+    def ode(self) -> None:
+        """None: a mechanism has a Lagrangian, see `Model`."""
+        return None
 
     @property
     def _carriers(self) -> dict[str, Carrier]:

@@ -12,7 +12,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.util.real_arrays import real_number
+from cgraph.extend import real_number
 
 from ..systems.system import BiasForce, BodySystem, System, per_coordinate, sequence
 
@@ -56,6 +56,21 @@ class PlanarArm:
         masses, lengths = (sum([getattr(link, name) for link in self.links]) for name in ("mass", "length"))
         size = f"{len(self.links)} link(s): {masses:g} kg, {lengths:g} m"
         return f"<PlanarArm of {size}{', damped' if any(self.damping) else ''}; gravity {self.gravity:g}>"
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the joints."""
+        return tuple([f"joint {i + 1}" for i in range(len(self.links))])
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """None: all its numbers are constants."""
+        return {}
+
+    @property
+    def ode(self) -> None:
+        """None: an arm has a Lagrangian, see `Model`."""
+        return None
 
     @cached_property
     def system(self) -> System:

@@ -14,7 +14,8 @@ from cgraph import Graph
 
 from ..equations.equations_of_motion import gravity_force
 from ..equations.formulations import inverse_dynamics
-from ..systems.system import System, as_system
+from ..systems.model import Model, as_system
+from ..systems.system import System
 from .body import Body
 from .mechanism import Mechanism
 from .planar_arm import PlanarArm
@@ -47,7 +48,7 @@ class OmittedTerm:
 class PruneResult:
     """What `prune` makes: the model that is left and its graph. The accounts are made when they are asked for."""
 
-    model: Any
+    model: Model
     graph: Graph
     equations: Equations
     steps: tuple[_Step, ...]  # from the model as given to what is left
@@ -103,7 +104,7 @@ class PruneResult:
 class _Step:
     """A model and what is asked of it, after `what` was taken out."""
 
-    model: Any
+    model: Model
     values: Mapping[str, float]
     outputs: tuple[str, ...] | None
     what: str = ""
@@ -117,7 +118,7 @@ class _Step:
 
 
 def prune(
-    model: Any,
+    model: Model,
     equations: Equations = inverse_dynamics,
     *,
     effects: Iterable[str] = EFFECTS,
@@ -189,7 +190,7 @@ def _size(graph: Graph) -> str:
     return f"{len(graph.nodes)} nodes and {len(graph.edges)} edges"
 
 
-def _has(model: Any, effect: str) -> bool:
+def _has(model: Model, effect: str) -> bool:
     """Whether the model has an effect. Raises ValueError for one that cannot be told apart."""
     if isinstance(model, Mechanism):
         if effect in _JOINT:
@@ -205,7 +206,7 @@ def _has(model: Any, effect: str) -> bool:
     raise ValueError(f"the Lagrangian of {model!r:.60} is given as a whole: {effect} cannot be told apart in it")
 
 
-def _without(model: Any, effect: str) -> Any:
+def _without(model: Model, effect: str) -> Any:
     if isinstance(model, Mechanism):
         if effect == "gravity":
             return replace(model, gravity=(0.0, 0.0, 0.0))
@@ -234,7 +235,7 @@ def _with(model: Mechanism, effect: str, number: float, among: Collection[str] |
     return replace(model, bodies=tuple([changed(body) for body in model.bodies]))
 
 
-def _absent(model: Any, given: Any) -> Iterator[tuple[str, str, Any]]:
+def _absent(model: Model, given: Any) -> Iterator[tuple[str, str, Any]]:
     """What, why, and the model with it. given: the model before anything was switched off, which is not absent."""
     if not isinstance(model, Mechanism):
         return

@@ -17,10 +17,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Compiled, Graph, Node
-from cgraph.autodiff.forward import tangents
-from cgraph.autodiff.reverse import cotangents
-from cgraph.core.label import building
-from cgraph.simplify.builder import Builder
+from cgraph.extend import Builder, building, cotangents, tangents
 
 from .link import Link, Motion, carried, energy, ground
 from .mechanism import Mechanism

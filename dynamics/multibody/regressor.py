@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.core.label import building
-from cgraph.simplify.builder import Builder
+from cgraph.extend import Builder, building
 
 from ..equations.formulations import inverse_dynamics
+from ..systems.model import Model
 from ..systems.system import System
 from . import spatial
 from .body import WORLD
@@ -24,7 +23,7 @@ PARAMETERS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")  
 _LOWER = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))  # entries of I in that order
 
 
-def regressor(model: Any) -> Graph:
+def regressor(model: Model) -> Graph:
     """Y(q, qd, qdd) with Y pi = tau - armature qdd - damping qd - spring forces + applied forces.
 
     pi: for each moving body the ten `PARAMETERS`, see `inertial_parameters`. Each partial Lagrangian is linear in them,
@@ -48,7 +47,7 @@ def regressor(model: Any) -> Graph:
     return cg.simplify(Graph([*system.q, *system.qd, *system.qdd], outputs))
 
 
-def inertial_parameters(model: Any) -> Array:
+def inertial_parameters(model: Model) -> Array:
     """(n, 10): of each moving body mass [kg], first moment m c [kg m], and inertia about its joint's origin [kg m^2].
 
     Rows are as `PARAMETERS`, in the body's axes, all that is welded to it merged in. Raises as `regressor`.
@@ -61,7 +60,7 @@ def inertial_parameters(model: Any) -> Array:
     return np.array(rows)
 
 
-def _mechanism(model: Any) -> Mechanism:
+def _mechanism(model: Model) -> Mechanism:
     mechanism = getattr(model, "model", model)
     if not isinstance(mechanism, Mechanism):
         raise TypeError(f"a regressor needs a Mechanism, got {type(mechanism).__name__}: {mechanism!r:.60}")

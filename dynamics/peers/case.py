@@ -10,10 +10,11 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.core.traversal import topological
+from cgraph.extend import topological
 
 from ..integrators.tableau import RK4
-from ..systems.system import TIME, System, as_system
+from ..systems.model import Model, as_system
+from ..systems.system import TIME, System
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -35,7 +36,7 @@ class Case:
     Raises ValueError for a system that depends on time.
     """
 
-    def __init__(self, name: str, model: Any) -> None:
+    def __init__(self, name: str, model: Model) -> None:
         self.name, self.model = name, model
         self.system: System = as_system(model)
         self.n = self.system.n

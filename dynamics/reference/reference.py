@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..equations.state_equation import state_equation, state_inputs
+from ..systems.model import Model
 from ..systems.system import parameter_value, per_coordinate
 from .collocation import collocation
 from .disk_store import Store, key
@@ -27,7 +28,7 @@ SPARE = 6  # digits written beyond those asked for
 
 
 def reference(
-    model: Any,
+    model: Model,
     start: ArrayLike,
     times: Sequence[float] | ArrayLike,
     parameters: Mapping[str, float] | None = None,

@@ -16,8 +16,7 @@ from typing import Any
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.core.node import as_node
-from cgraph.core.traversal import topological
+from cgraph.extend import as_node, topological
 
 from ..systems.system import TIME
 from .flint_numbers import VALUES, Number, sign

@@ -17,7 +17,9 @@ from cgraph import Node
 
 from ..io.load import load_model
 from ..multibody.planar_arm import planar_arm
-from ..systems.system import System, as_system
+from ..systems.model import Model, as_ode, as_system
+from ..systems.ode_system import OdeSystem
+from ..systems.system import System
 
 
 @dataclass(frozen=True)
@@ -26,16 +28,31 @@ class Scene:
 
     name: str
     about: str  # one line
-    model: Any  # a System, or what has one
+    model: Model  # a System, or what has one
     q: tuple[float, ...]  # rad or m
     qd: tuple[float, ...]  # rad/s or m/s
     t_end: float  # s
     left_out: tuple[str, ...] = ()  # of a file, what the model has not: a sentence each
 
     @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Those of the model."""
+        return self.model.coordinates
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Those of the model."""
+        return self.model.parameters
+
+    @property
     def system(self) -> System:
-        """The Lagrangian system of the model."""
+        """The Lagrangian system of the model. Raises TypeError where it has none."""
         return as_system(self.model)
+
+    @property
+    def ode(self) -> OdeSystem | None:
+        """The first-order system of the model, if it is one."""
+        return as_ode(self.model)
 
 
 def spring_mass() -> Scene:

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.util.real_arrays import real_array
+from cgraph.extend import real_array
 
 from .stepping import Piece
 from .trajectory import Array

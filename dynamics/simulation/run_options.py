@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.util.real_arrays import real_array, real_number
+from cgraph.extend import real_array, real_number
 
 from .trajectory import Array
 

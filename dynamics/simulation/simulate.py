@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.util.real_arrays import real_array
+from cgraph.extend import real_array
 
 from ..equations.state_equation import state_inputs
 from ..integrators import METHODS, Problem, problem_of
 from ..integrators.step_control import RESOLUTION
+from ..systems.model import Model
 from ..systems.system import TIME, parameter_value, per_coordinate, sequence
 from .events import Event, crossings, event_graph
 from .free_memory import room
@@ -31,7 +32,7 @@ BLOCK = 4096  # rows whose energy is taken at once
 
 
 def simulate(
-    model: Any,
+    model: Model,
     q: ArrayLike,
     qd: ArrayLike | None,
     t_end: float,

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import cgraph as cg
-from cgraph.program import Runner, runner
+from cgraph.extend import Runner, runner
 
 from ..integrators import Method, Problem
 from ..integrators.step_control import DONE, TOO_SMALL

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.core.traversal import topological
+from cgraph.extend import topological
 
 from .system import TIME, Parameters, as_node, called, parameter_value, sequence
 
@@ -44,6 +44,21 @@ class OdeSystem:
         for node in topological(self.rates):
             if node.op.name == "variable" and node not in known:
                 raise ValueError(f"the rate uses {node.name!r}, which is no state, parameter or t")
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """The states, as a `Model` has them."""
+        return self.states
+
+    @property
+    def system(self) -> None:
+        """None: no Lagrangian."""
+        return None
+
+    @property
+    def ode(self) -> OdeSystem:
+        """The system itself, as a `Model` has it."""
+        return self
 
     @property
     def n(self) -> int:

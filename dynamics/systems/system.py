@@ -12,8 +12,7 @@ from typing import Any, NoReturn
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.core.traversal import topological
-from cgraph.util.real_arrays import real_number
+from cgraph.extend import real_number, topological
 
 TIME = "t"
 BiasForce = tuple[Node, Node]  # a velocity, and the force that is there
@@ -74,6 +73,16 @@ class System:
         for node in topological((*self.partial_lagrangians, *self.forces)):
             if node.op.name == "variable" and node not in known:
                 raise ValueError(f"the system uses {node.name!r}, which is no coordinate, parameter or t")
+
+    @property
+    def system(self) -> System:
+        """The system itself, as a `Model` has it."""
+        return self
+
+    @property
+    def ode(self) -> None:
+        """None: no first-order system."""
+        return None
 
     @property
     def n(self) -> int:
@@ -180,14 +189,6 @@ class BodySystem(System):
     def bias_forces(self) -> Sequence[BiasForce]:
         """See System."""
         return self._bias_forces(self.q, self.qd)
-
-
-def as_system(model: Any) -> System:
-    """The system of a model: a System itself, or what has one as `.system` (an arm, a mechanism, a scene)."""
-    system = getattr(model, "system", model)
-    if not isinstance(system, System):
-        raise TypeError(f"expected a System, an arm or a scene, got {type(model).__name__}: {model!r:.60}")
-    return system
 
 
 def per_coordinate(what: str, value: float | Sequence[float], n: int, minimum: float = -math.inf) -> tuple[float, ...]:

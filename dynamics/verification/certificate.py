@@ -11,9 +11,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.autodiff.forward import tangents
-from cgraph.autodiff.reverse import cotangents
-from cgraph.simplify.builder import Builder
+from cgraph.extend import Builder, cotangents, tangents
 
 from ..equations.coriolis import coriolis, quadratic
 from ..equations.equations_of_motion import bias, energy, forward_dynamics, gravity_force, mass_matrix
@@ -21,14 +19,15 @@ from ..equations.evaluate_at import Array, at_state
 from ..equations.formulations import ONE, ZERO, inverse_dynamics
 from ..equations.torque_decomposition import torque_by_joint_motion, torque_by_link
 from ..equations.torque_table import TorqueTable
-from ..systems.system import System, as_system
+from ..systems.model import Model, as_system
+from ..systems.system import System
 from . import peer_agreement as agreement
 from .residual import DIFFERENCES, POSITIVE, ROUNDING, Certificate, Residual
 
 STEP = 1e-3  # of differences, in units of the coordinates
 
 
-def certify(model: Any, states: int = 20, seed: int = 0, *, speed: float = 1.0, twin: Any = None) -> Certificate:
+def certify(model: Model, states: int = 20, seed: int = 0, *, speed: float = 1.0, twin: Any = None) -> Certificate:
     """Check the model's graphs against each other, against differences of L, and against MuJoCo and Pinocchio.
 
     states, seed, speed: random q, uniform in -pi .. pi, and qd, qdd, tau, normal with the deviation `speed`.

@@ -21,7 +21,7 @@ from ..peers.case import Case
 from ..peers.contender import Peer, UnavailableError
 from ..peers.mujoco import MujocoPeer
 from ..peers.pinocchio import PinocchioPeer
-from ..systems.system import as_system
+from ..systems.model import as_system
 from .residual import PEERS, Residual
 
 ASKED = 4  # states at which a disagreement is explained

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from cgraph import Graph
-from cgraph.util.atomic_write import write
+from cgraph.extend import atomic_write
 from dynamics import FORMULATIONS, scenes
 
 from ..graph_drawing.render import Drawing, render_svg
@@ -81,7 +81,7 @@ def may_draw_and_print(command: argparse.ArgumentParser) -> None:
 
 def draw(options: argparse.Namespace, drawing: Drawing) -> None:
     """Write a drawing to the file that `--svg` names."""
-    write(options.svg, render_svg(drawing))
+    atomic_write(options.svg, render_svg(drawing))
     say(f"drawn in {options.svg}")
 
 

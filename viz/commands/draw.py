@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cgraph.util.atomic_write import write
+from cgraph.extend import atomic_write
 from dynamics import inverse_dynamics, spurious_nodes
 
 from ..graph_drawing.dot import to_dot
@@ -34,15 +34,15 @@ def run(options: argparse.Namespace) -> None:
     counts = graph.counts()
     kind = options.out.suffix
     if kind == ".txt":
-        write(options.out, graph.listing())
+        atomic_write(options.out, graph.listing())
     elif kind in (".dot", ".svg", ".png"):
         caption = f"{scene.name}: inverse dynamics, {options.formulation.replace('_', ' ')}"
         drawing = to_dot(graph, marked=spurious_nodes(graph), collapse=options.collapse, caption=caption)
         if kind == ".dot":
-            write(options.out, str(drawing.source))
+            atomic_write(options.out, str(drawing.source))
         else:
             svg = render_svg(drawing)
-            write(options.out, svg if kind == ".svg" else render_png(svg))
+            atomic_write(options.out, svg if kind == ".svg" else render_png(svg))
     else:
         raise ValueError(f"--out must end in .svg, .png, .dot or .txt, got {options.out}")
     print(f"{options.out}: {counts.nodes} nodes, {counts.edges} edges")

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cgraph.util.atomic_write import write
+from cgraph.extend import atomic_write
 from dynamics import scenes
 from dynamics.scenes.inspection import FRAMES, inspection
 
@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> None:
         motion=Motion(found.t, bones.points, bones.parents) if bones else Motion(found.t, None, ()),
         tables=[_torques(scene, found.shares)] if found.shares else [],
     )
-    write(options.out, text)
+    atomic_write(options.out, text)
     sizes = {
         each.name: {"nodes": len(each.graph.nodes), "edges": len(each.graph.edges), "spurious": len(each.marked)}
         for each in found.versions

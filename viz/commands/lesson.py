@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cgraph import Graph
-from cgraph.util.atomic_write import write
+from cgraph.extend import atomic_write
 from dynamics import inverse_dynamics, momentum_rate, scenes, spurious_nodes
 from dynamics.experiments.paper_numbers.equation3 import equation3
 
@@ -33,7 +33,7 @@ def run(options: argparse.Namespace) -> None:
     """Write the page."""
     if options.out.suffix != ".html":
         raise ValueError(f"--out must end in .html, got {options.out}")
-    write(options.out, page(lesson()))
+    atomic_write(options.out, page(lesson()))
     print(f"{options.out}: five questions on Figures 1 to 3")
 
 

@@ -7,8 +7,7 @@ import json
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.autodiff.reverse import cotangents
-from cgraph.explain.names import Names
+from cgraph.extend import Names, cotangents
 from dynamics import forward_dynamics, inverse_dynamics
 
 from ..graph_drawing.dot import to_dot

@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.core.label import ADJOINT, PRIMAL, TANGENT
-from cgraph.core.ops import OPS
+from cgraph.extend import ADJOINT, OPS, PRIMAL, TANGENT
 
 from .. import theme
 from .content import Motion, Version

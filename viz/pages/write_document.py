@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
-from cgraph.util.atomic_write import write
+from cgraph.extend import atomic_write
 
 from .document import Document, to_html, to_markdown
 
@@ -47,9 +47,9 @@ def write_document(
     stem = "-".join(filter(None, [re.sub(r"[^A-Za-z0-9.+-]+", "_", name).strip("_"), kind]))
     folder.mkdir(parents=True, exist_ok=True)
     for picture in document.pictures():
-        write(folder / f"{stem}-{picture.name}.svg", picture.svg)
-    write(folder / f"{stem}.json", json.dumps(data, indent=1))
+        atomic_write(folder / f"{stem}-{picture.name}.svg", picture.svg)
+    atomic_write(folder / f"{stem}.json", json.dumps(data, indent=1))
     if rows is not None:
-        write(folder / f"{stem}.csv", rows)
-    write(folder / f"{stem}.md", to_markdown(document, f"{stem}-"))
-    return write(folder / f"{stem}.html", to_html(document))
+        atomic_write(folder / f"{stem}.csv", rows)
+    atomic_write(folder / f"{stem}.md", to_markdown(document, f"{stem}-"))
+    return atomic_write(folder / f"{stem}.html", to_html(document))

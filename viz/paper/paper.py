@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cgraph import Graph
-from cgraph.simplify.polynomial import format_polynomial
-from cgraph.util.atomic_write import write
+from cgraph.extend import atomic_write, format_polynomial
 from dynamics import momentum_rate, scenes, spurious_nodes
 from dynamics.experiments.paper_numbers.embedding_error import law_of_arms
 from dynamics.experiments.paper_numbers.equation3 import PAPER, equation3
@@ -70,12 +69,12 @@ def write_paper(folder: Path, say: Callable[[str], None]) -> dict[str, Any]:
         )
         part = make()
         for name, content in part.files.items():
-            write(folder / name, content)
+            atomic_write(folder / name, content)
         say(f"      {', '.join(part.files)}")
         parts.append(part)
     data = {part.name: part.data for part in parts}
-    write(folder / "figures.json", json.dumps(data, indent=1, allow_nan=False) + "\n")
-    write(folder / "index.html", _page(parts))
+    atomic_write(folder / "figures.json", json.dumps(data, indent=1, allow_nan=False) + "\n")
+    atomic_write(folder / "index.html", _page(parts))
     say(f"All of it on one page: {folder / 'index.html'}")
     return data
 

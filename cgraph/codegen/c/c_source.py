@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ...core.graph import Graph
-from ...util.atomic_write import write
+from ...util.atomic_write import atomic_write
 from .c_identifiers import check_function_name, distinct
 from .c_statements import comment, functions
 
@@ -70,13 +70,13 @@ class CSource(NamedTuple):
     source: str
     header: str
 
-    def write(self, folder: str | Path) -> tuple[Path, Path]:
+    def atomic_write(self, folder: str | Path) -> tuple[Path, Path]:
         """Write name.c and name.h into a folder, each by way of a temporary file; returns their paths.
 
         Raises OSError, with the path in its message, when the folder is missing or must not be written to.
         """
-        header = write(Path(folder) / f"{self.name}.h", self.header)
-        return write(Path(folder) / f"{self.name}.c", self.source), header
+        header = atomic_write(Path(folder) / f"{self.name}.h", self.header)
+        return atomic_write(Path(folder) / f"{self.name}.c", self.source), header
 
 
 def to_c(graph: Graph, name: str = "function", *, fma: bool = False) -> CSource:

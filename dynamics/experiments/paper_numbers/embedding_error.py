@@ -12,7 +12,7 @@ import cgraph as cg
 
 from ...equations.formulations import inverse_dynamics
 from ...multibody.planar_arm import planar_arm
-from ...systems.system import as_system
+from ...systems.model import Model, as_system
 from .fit import exponent
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -36,7 +36,7 @@ class Law:
     slope: float
 
 
-def law(model: Any, q: Array, qd: Array, qdd: Array, formulation: str, steps: Sequence[float] = STEPS) -> Law:
+def law(model: Model, q: Array, qd: Array, qdd: Array, formulation: str, steps: Sequence[float] = STEPS) -> Law:
     """The law at the state (q, qd, qdd), each (n,), for "euler_embedded" or "kinetic_only"."""
     system = as_system(model)
     energy = {"euler_embedded": system.lagrangian, "kinetic_only": system.kinetic}[formulation]

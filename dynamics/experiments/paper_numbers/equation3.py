@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cgraph.simplify.polynomial import Polynomial, expand, format_polynomial
+from cgraph.extend import Polynomial, expand, format_polynomial
 
 from ...equations.formulations import momentum_rate
 from ...scenes.scenes import spring_mass

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cgraph import Node
-from cgraph.core.traversal import topological
+from cgraph.extend import topological
 
 from ...systems.system import System
 

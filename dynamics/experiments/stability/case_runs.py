@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ...equations.state_equation import as_ode, state_inputs
+from ...equations.state_equation import state_inputs
 from ...reference import Reference
 from ...simulation.simulate import simulate
 from ...simulation.trajectory import Trajectory
+from ...systems.model import Model, as_ode
 from ...systems.system import TIME
 from . import cases, solutions
 from .cases import RTOL, Case, Watch
@@ -70,7 +71,7 @@ def verdict(case: Case, method: str) -> Verdict:
     )
 
 
-def trajectory(case: Case, model: Any, method: str) -> Trajectory:
+def trajectory(case: Case, model: Model, method: str) -> Trajectory:
     """The run of a case."""
     half = len(case.start) if as_ode(model) else len(case.start) // 2
     return simulate(
@@ -108,7 +109,7 @@ def errors(case: Case, run: Trajectory, solution: Reference) -> dict[str, float]
     return found
 
 
-def changes(case: Case, model: Any, run: Trajectory, wanted: set[str]) -> dict[str, float]:
+def changes(case: Case, model: Model, run: Trajectory, wanted: set[str]) -> dict[str, float]:
     """The largest change of these invariants during the run, each in its own unit."""
     if wanted == {"energy"} and as_ode(model) is None:  # simulate has taken it already
         return {"energy": float(np.max(np.abs(run.energy - run.energy[0])))}

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from ... import scenes
-from ...equations.state_equation import as_ode, state_inputs
+from ...equations.state_equation import state_inputs
 from ...reference import Reference, reference
 from ...reference.solution import scale
 from ...simulation.trajectory import Array
-from ...systems.system import as_system
+from ...systems.model import Model, as_ode, as_system
 from ..stability import cases
 from ..stability.cases import Case
 from ..stability.cases.orbits import kepler
@@ -38,7 +38,7 @@ class Setting:
 
     name: str
     about: str
-    model: Any
+    model: Model
     start: tuple[float, ...]
     t_end: float  # s
     known: Known | None = None

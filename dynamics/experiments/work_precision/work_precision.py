@@ -25,7 +25,8 @@ from ...peers import UnavailableError
 from ...reference import Reference
 from ...simulation.scipy_solvers import PREFIX
 from ...simulation.trajectory import Array
-from ...systems.system import System, as_system
+from ...systems.model import as_system
+from ...systems.system import System
 from ..paper_numbers.fit import exponent
 from ..speed.bench_table import machine
 from .cold_start import STARTS, ColdStart, cold_starts

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.util.real_arrays import real_array
+from cgraph.extend import real_array
 
-from ...equations.state_equation import as_ode, state_inputs
+from ...equations.state_equation import state_inputs
+from ...systems.model import Model, as_ode
 from ...systems.system import parameter_value, per_coordinate
 from ..trajectory import Array
 
@@ -24,7 +25,7 @@ class Starts(NamedTuple):
 
 
 def starts(
-    model: Any, q: ArrayLike, qd: ArrayLike | None, tau: ArrayLike, parameters: Mapping[str, ArrayLike] | None
+    model: Model, q: ArrayLike, qd: ArrayLike | None, tau: ArrayLike, parameters: Mapping[str, ArrayLike] | None
 ) -> Starts:
     """What `simulate_many` was given. Raises ValueError for shapes that do not fit, and for what is not finite."""
     inputs = state_inputs(model)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from cgraph import Graph
-from cgraph.program import Factor, If, Program, Solve, While
+from cgraph.extend import Factor, If, Program, Solve, While
 
 from ...integrators import Method, Problem
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from ...equations.state_equation import state_inputs
 from ...integrators import METHODS, Problem
+from ...systems.model import Model
 from ..free_memory import room
 from ..progress_bar import Progress
 from ..recorder import from_start, recorded_times
@@ -34,7 +35,7 @@ UNKNOWN = 16  # workers behind a map, which does not say
 
 
 def simulate_many(
-    model: Any,
+    model: Model,
     q: ArrayLike,
     qd: ArrayLike | None,
     t_end: float,

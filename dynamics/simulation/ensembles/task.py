@@ -12,8 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from cgraph.program import Runner, runner
-from cgraph.program.runner import Record
+from cgraph.extend import Record, Runner, runner
 
 from ..recorder import Rows
 from ..run_options import Limits

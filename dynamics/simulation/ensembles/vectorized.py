@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cgraph.program import Runner
+from cgraph.extend import Runner
 
 from ..trajectory import Array
 from .chunk import Chunk, Part

@@ -10,7 +10,7 @@ from queue import Empty, SimpleQueue
 
 import numpy as np
 
-from cgraph.util.threads import thread_count
+from cgraph.extend import thread_count
 
 from ..trajectory import Array
 from .chunk import Chunk, Part

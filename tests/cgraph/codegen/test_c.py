@@ -17,7 +17,7 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph.codegen.c import c_statements as body
 from cgraph.core.node import OPS, apply
-from cgraph.util.atomic_write import write
+from cgraph.util.atomic_write import atomic_write
 from tests.strategies import DOMAINS, cases
 
 CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
@@ -284,7 +284,7 @@ def stepped():
 @needs_cc
 def test_a_program_simulates_with_the_header_alone(tmp_path):
     source, _ = cg.to_c(pendulum(), "pendulum").write(tmp_path)
-    write(tmp_path / "main.c", USE)
+    atomic_write(tmp_path / "main.c", USE)
     run(
         [
             CC,
@@ -306,7 +306,7 @@ def test_a_program_simulates_with_the_header_alone(tmp_path):
 @pytest.mark.parametrize("standard", ["c++98", "c++20"])
 def test_the_header_is_one_of_cpp_too(standard, tmp_path):
     source, _ = cg.to_c(pendulum(), "pendulum").write(tmp_path)
-    write(tmp_path / "main.cpp", USE)
+    atomic_write(tmp_path / "main.cpp", USE)
     (tmp_path / "twice.cpp").write_text('#include "pendulum.h"\n#include "pendulum.h"\n', encoding="utf-8")
     run([CC, *STRICT, "-O2", "-c", str(source), "-o", str(tmp_path / "pendulum.o")])
     files = [str(tmp_path / name) for name in ("main.cpp", "twice.cpp", "pendulum.o")]

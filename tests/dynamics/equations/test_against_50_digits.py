@@ -5,7 +5,7 @@ from pytest import approx, mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.systems.system import as_system
+from dynamics.systems.model import as_system
 from tests.dynamics.models import MODELS, Array, at, random_arm, run, states
 from tests.dynamics.reference import Terms, floats, lagrange
 

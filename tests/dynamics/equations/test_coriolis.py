@@ -10,7 +10,7 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.coriolis import coriolis, damping_force
 from dynamics.equations.evaluate_at import at_state
-from dynamics.systems.system import as_system
+from dynamics.systems.model import as_system
 from tests.dynamics.mechanisms import FAMILIES
 from tests.dynamics.models import MODELS, Array, magnetic, random_arm, relativistic, states
 

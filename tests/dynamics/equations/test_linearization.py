@@ -9,7 +9,7 @@ from pytest import approx
 import dynamics as dyn
 from dynamics.equations.evaluate_at import at_state
 from dynamics.equations.linearization import linearize, state_space
-from dynamics.systems.system import as_system
+from dynamics.systems.model import as_system
 from tests.dynamics.mechanisms import FAMILIES, turned_arm
 from tests.dynamics.models import MODELS, Array, at, random_arm, states
 

@@ -10,7 +10,7 @@ import dynamics as dyn
 from dynamics.equations.evaluate_at import at_state
 from dynamics.equations.torque_decomposition import torque_by_joint_motion, torque_by_link
 from dynamics.equations.torque_table import TorqueTable
-from dynamics.systems.system import as_system
+from dynamics.systems.model import as_system
 from tests.dynamics.mechanisms import FAMILIES, turned_tree
 from tests.dynamics.models import MODELS, Array, at, random_arm, states
 

@@ -5,7 +5,7 @@ from mpmath import mp
 from pytest import approx, fixture, mark
 
 import dynamics as dyn
-from dynamics.systems.system import as_system
+from dynamics.systems.model import as_system
 from tests import high_precision
 from tests.dynamics.models import MODELS, Array, at, before, named, random_arm, run, states
 from tests.dynamics.reference import floats, lagrange

@@ -279,7 +279,9 @@ BAD = [
         {"joint": hinge(stiffness=-1.0)}, "body 'a': stiffness must be finite and at least 0, got -1.0", id="stiffness"
     ),
     param({"joint": hinge(armature=-1.0)}, "body 'a': armature must be finite and at least 0, got -1.0", id="armature"),
-    param({"joint": hinge(spring_reference=np.nan)}, "body 'a': spring_reference must be finite", id="spring_reference"),
+    param(
+        {"joint": hinge(spring_reference=np.nan)}, "body 'a': spring_reference must be finite", id="spring_reference"
+    ),
     param({"joint": hinge(position=(0, np.inf, 0))}, "body 'a': position must be (3,) finite numbers", id="position"),
     param({"mass": -0.8}, "body 'a': mass must be finite and at least 0, got -0.8 kg", id="mass"),
     param({"mass": np.nan}, "body 'a': mass must be finite and at least 0, got nan kg", id="mass nan"),

@@ -8,7 +8,7 @@ from mpmath import mp, mpf
 from pytest import approx, mark
 
 import dynamics as dyn
-from dynamics.systems.system import as_system
+from dynamics.systems.model import as_system
 from tests.dynamics.models import at, random_arm, run, states
 
 ROUNDING = 1e-13

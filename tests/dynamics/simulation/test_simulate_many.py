@@ -20,7 +20,8 @@ from dynamics.simulation.ensembles import task
 from dynamics.simulation.ensembles.ensemble import Ensemble
 from dynamics.simulation.ensembles.simulate_many import simulate_many
 from dynamics.simulation.ensembles.step_grid import stretches
-from dynamics.systems.system import System, as_system
+from dynamics.systems.model import as_system
+from dynamics.systems.system import System
 from tests.dynamics.models import oscillator, random_arm
 
 RK4_ERROR = 1e-11  # of a period at dt = 1 ms: (w dt)^4 w t / 120

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from cgraph.util.atomic_write import write
+from cgraph.util.atomic_write import atomic_write
 from viz import graph_svg, render_png, render_svg, theme, to_dot
 from viz.graph_drawing.render import LARGE, RenderError
 
@@ -200,15 +200,15 @@ def test_a_notebook_is_spared_a_graph_that_is_too_large() -> None:
 
 
 def test_write_makes_the_file_with_text_or_bytes(tmp_path: Path) -> None:
-    assert write(tmp_path / "a.svg", "ω₀\n").read_bytes() == "ω₀\n".encode()
-    assert write(str(tmp_path / "a.png"), b"\x00\xff").read_bytes() == b"\x00\xff"
+    assert atomic_write(tmp_path / "a.svg", "ω₀\n").read_bytes() == "ω₀\n".encode()
+    assert atomic_write(str(tmp_path / "a.png"), b"\x00\xff").read_bytes() == b"\x00\xff"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.png", "a.svg"]
 
 
 def test_write_replaces_a_file_and_keeps_a_link(tmp_path: Path) -> None:
-    write(tmp_path / "real", "old")
+    atomic_write(tmp_path / "real", "old")
     (tmp_path / "link").symlink_to("real")
-    write(tmp_path / "link", "new")
+    atomic_write(tmp_path / "link", "new")
     assert (tmp_path / "real").read_text() == "new"
     assert (tmp_path / "link").is_symlink()
 
@@ -217,7 +217,7 @@ def test_write_replaces_a_file_and_keeps_a_link(tmp_path: Path) -> None:
 def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(
     step: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    write(tmp_path / "a", "old")
+    atomic_write(tmp_path / "a", "old")
     original = Path.write_bytes
 
     def full(self: Path, data: Any) -> int:
@@ -227,20 +227,20 @@ def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(
 
     monkeypatch.setattr(Path, step, full)
     with pytest.raises(OSError, match=r"cannot write .*a: No space left"):
-        write(tmp_path / "a", "new")
+        atomic_write(tmp_path / "a", "new")
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
     assert (tmp_path / "a").read_text() == "old"
 
 
 def test_write_names_the_folder_that_is_missing(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match=r"the folder .*nowhere does not exist"):
-        write(tmp_path / "nowhere" / "a", "x")
+        atomic_write(tmp_path / "nowhere" / "a", "x")
 
 
 def test_write_refuses_a_folder(tmp_path: Path) -> None:
     (tmp_path / "b").mkdir()
     with pytest.raises(OSError, match="that is a folder"):
-        write(tmp_path / "b", "x")
+        atomic_write(tmp_path / "b", "x")
     assert [path.name for path in tmp_path.iterdir()] == ["b"]
 
 
@@ -250,4 +250,4 @@ def test_write_says_that_a_folder_is_read_only(monkeypatch: pytest.MonkeyPatch, 
 
     monkeypatch.setattr(Path, "write_bytes", refused)  # the superuser may write anywhere, so no real folder refuses
     with pytest.raises(PermissionError, match=r"cannot write .*a: Permission denied"):
-        write(tmp_path / "a", "x")
+        atomic_write(tmp_path / "a", "x")

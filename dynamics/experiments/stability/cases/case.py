@@ -11,9 +11,8 @@ import cgraph as cg
 from cgraph import Graph, Node
 
 from ....equations.equations_of_motion import energy
-from ....equations.state_equation import as_ode
 from ....reference import Reference, reference
-from ....systems.system import as_system
+from ....systems.model import Model, as_ode, as_system
 
 RTOL = 1e-9  # the relative tolerance that the bounds are for
 ATOL = 1e-3 * RTOL  # the absolute one, in the SI unit of each state
@@ -101,7 +100,7 @@ def energy_watch(scale: float, why: str = "nothing takes energy in or out") -> W
 def conserved(**others: Callable[..., Node]) -> Callable[[Any], Graph]:
     """The energy of a mechanical model, and others: functions of (q, qd) that give a node."""
 
-    def graph(model: Any) -> Graph:
+    def graph(model: Model) -> Graph:
         system = as_system(model)
         found = energy(system)
         outputs = {"energy": found.outputs["E"]}
@@ -114,7 +113,7 @@ def conserved(**others: Callable[..., Node]) -> Callable[[Any], Graph]:
 def conserved_states(**functions: Callable[..., Node]) -> Callable[[Any], Graph]:
     """Functions of the states of an OdeSystem that do not change."""
 
-    def graph(model: Any) -> Graph:
+    def graph(model: Model) -> Graph:
         ode = as_ode(model)
         assert ode is not None
         return Graph([*ode.x, *ode.extra_inputs], {name: function(ode.x) for name, function in functions.items()})

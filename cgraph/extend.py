@@ -1,0 +1,92 @@
+"""The node-level interface: what a package that derives, transforms or runs graphs of its own is built on.
+
+`cgraph` itself is for people who write equations. This module is for code that makes nodes in bulk: it says how
+derived nodes are folded and shared, pushes and pulls derivatives node by node, solves on the graph, and repeats
+graphs natively. `dynamics` and `viz` import from `cgraph` and from here, and from nowhere deeper. What is listed here
+is kept stable.
+
+**Build**: `Builder` folds and shares; `with building(Builder()):` sends every formula inside through it. `folded`
+copies nodes through a builder, `topological` gives all nodes that some nodes reach, arguments first.
+
+**Differentiate**: `cotangents` pulls from outputs, `tangents` pushes from inputs, `hessian_nodes` gives the lower
+triangle of second derivatives, all as nodes.
+
+**Solve**: `solve_nodes` is `cg.hessian_solve` on nodes, `ldl_solve` the dense factorisation; both raise
+`SingularError`.
+
+**Read**: `expand` and `format_polynomial` write a polynomial out, `Names` tells nodes in a person's words, `OPS` is
+the table of operations, and `ADJOINT`, `PRIMAL`, `TANGENT` are the roles that a label may have.
+
+**Run**: a `Program` is graphs over registers of numbers (`Call`, `Map`, `Sum`, `Factor`, `Solve`, `If`, `While`), and
+`runner` makes it machine code or Python.
+
+**At the edges**: `real_array` and `real_number` check what a caller passed, `thread_count` reads `threads=`,
+`atomic_write` writes a file whole or not at all.
+
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Builder, building, cotangents
+    >>> x, y = cg.variables("x y")
+    >>> build = Builder()
+    >>> with building(build):
+    ...     area = x * y
+    >>> dx, dy = cotangents({area: cg.constant(1.0)}, [x, y], build)
+    >>> dx is y, dy is x
+    (True, True)
+"""
+
+from .autodiff.forward import tangents
+from .autodiff.hessian_solve import solve_nodes
+from .autodiff.jacobian import hessian_nodes
+from .autodiff.ldl_solve import SingularError, ldl_solve
+from .autodiff.reverse import cotangents
+from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED, building
+from .core.node import as_node
+from .core.ops import OPS
+from .core.traversal import topological
+from .explain.names import Names
+from .program import Call, Factor, If, Map, Program, Runner, Solve, Statement, Sum, While, runner
+from .program.runner import Record
+from .simplify.builder import Builder, folded
+from .simplify.polynomial import Polynomial, expand, format_polynomial
+from .util.atomic_write import atomic_write
+from .util.real_arrays import real_array, real_number
+from .util.threads import thread_count
+
+__all__ = [
+    "ADJOINT",
+    "OPS",
+    "PRIMAL",
+    "TANGENT",
+    "UNLABELLED",
+    "Builder",
+    "Call",
+    "Factor",
+    "If",
+    "Map",
+    "Names",
+    "Polynomial",
+    "Program",
+    "Record",
+    "Runner",
+    "SingularError",
+    "Solve",
+    "Statement",
+    "Sum",
+    "While",
+    "as_node",
+    "atomic_write",
+    "building",
+    "cotangents",
+    "expand",
+    "folded",
+    "format_polynomial",
+    "hessian_nodes",
+    "ldl_solve",
+    "real_array",
+    "real_number",
+    "runner",
+    "solve_nodes",
+    "tangents",
+    "thread_count",
+    "topological",
+]

@@ -1,0 +1,53 @@
+"""Model: what every function of `dynamics` takes, whatever it is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from .ode_system import OdeSystem
+    from .system import System
+
+
+class Model(Protocol):
+    """A system, a mechanism or a scene: names, parameters, and the equations behind them.
+
+    `System`, `OdeSystem`, `Mechanism` and `Scene` are models. A class of your own becomes one by these four attributes.
+    One of `system` and `ode` is there, the other is None.
+
+    coordinates: names, in the order of q0, q1, ...; of a first-order system its states.
+    parameters: {name: value}; each is an input of the graphs, and a run binds it to the value.
+    system: the Lagrangian system.  ode: the first-order system.
+    """
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates, or of the states."""
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Values by name."""
+
+    @property
+    def system(self) -> System | None:
+        """The Lagrangian system."""
+
+    @property
+    def ode(self) -> OdeSystem | None:
+        """The first-order system."""
+
+
+def as_system(model: Model) -> System:
+    """The Lagrangian system of a model. Raises TypeError for a first-order system and for what is no model."""
+    system: System | None = getattr(model, "system", None)
+    if system is None:
+        what = "a first-order system, which has no Lagrangian" if getattr(model, "ode", None) is not None else ""
+        what = what or f"{type(model).__name__}: {model!r:.60}"
+        raise TypeError(f"expected a System, a mechanism or a scene, got {what}")
+    return system
+
+
+def as_ode(model: Model) -> OdeSystem | None:
+    """The first-order system of a model; None for a mechanical one."""
+    return getattr(model, "ode", None)
