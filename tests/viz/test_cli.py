@@ -105,7 +105,7 @@ def test_wrong_usage_gets_the_usage_and_exit_status_2(arguments):
     assert "Traceback" not in done.stderr
 
 
-COMMANDS = "paper bench scenes draw report certify inspect lint why diff lesson".split()
+COMMANDS = "paper bench scenes draw report certify inspect lint why compare lesson".split()
 
 
 @pytest.mark.parametrize("command", [[], *([each] for each in COMMANDS)])

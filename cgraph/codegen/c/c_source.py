@@ -70,7 +70,7 @@ class CSource(NamedTuple):
     source: str
     header: str
 
-    def atomic_write(self, folder: str | Path) -> tuple[Path, Path]:
+    def write(self, folder: str | Path) -> tuple[Path, Path]:
         """Write name.c and name.h into a folder, each by way of a temporary file; returns their paths.
 
         Raises OSError, with the path in its message, when the folder is missing or must not be written to.

@@ -285,7 +285,7 @@ def test_a_user_without_a_home_gets_a_warning(monkeypatch):
 WORKER = """
 import sys
 import cgraph as cg
-from tests.cgraph.test_cache import bits, graph
+from tests.cgraph.codegen.test_disk_cache import bits, graph
 graphs = [graph(constant) for constant in (1.0, 2.0, 3.0)]
 print("ready", flush=True)
 sys.stdin.readline()

@@ -84,7 +84,7 @@ def test_a_copy_has_the_same_hash(case: Case):
 def test_every_process_gives_the_same_hash():
     """Python's own hash of a string differs between processes; this must not."""
     program = (
-        "import cgraph as cg; from cgraph.structure_hash import structure_hash; x, y = cg.variables('x y');"
+        "import cgraph as cg; from cgraph.core.structure_hash import structure_hash; x, y = cg.variables('x y');"
         "print(structure_hash(cg.Graph([x, y], {'f': cg.atan2(y, 0.1 * x) + cg.hypot(x, y)})))"
     )
     root = str(Path(cg.__file__).parents[1])

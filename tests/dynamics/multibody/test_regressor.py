@@ -25,7 +25,7 @@ def test_times_the_parameters_it_is_the_torque_of_the_bodies(family: str) -> Non
     mechanism = FAMILIES[family](6)
     given = states(mechanism, 20)
     joints = [body.joint for body in mechanism.moving]
-    armature, damping, stiffness, rest = np.array([(j.armature, j.damping, j.stiffness, j.rest) for j in joints]).T
+    armature, damping, stiffness, rest = np.array([(j.armature, j.damping, j.stiffness, j.spring_reference) for j in joints]).T
     tau = at_state(mechanism.system, dyn.inverse_dynamics(mechanism), given)
     tau = tau - armature * given["qdd"] - damping * given["qd"] - stiffness * (given["q"] - rest)
     found = np.einsum("sikp,kp->si", value(mechanism, given), inertial_parameters(mechanism))
@@ -71,7 +71,7 @@ def test_pinocchio_s_coriolis_matrix_and_gravity_are_ours(family: str) -> None:
     q, qd = (twin._theirs(state[name]) for name in ("q", "qd"))
     matrix = pinocchio.computeCoriolisMatrix(twin.model, twin.data, q, qd)[np.ix_(twin.order, twin.order)]
     weight = pinocchio.computeGeneralizedGravity(twin.model, twin.data, q)[twin.order]
-    weight = weight + twin.stiffness * (state["q"] - twin.rest)
+    weight = weight + twin.stiffness * (state["q"] - twin.spring_reference)
     found = at_state(mechanism.system, coriolis(mechanism), state).reshape(n, n)
     assert found == approx(matrix, abs=ROUNDING * abs(matrix).max())
     gravity = at_state(mechanism.system, dyn.gravity_force(mechanism), state)

@@ -61,10 +61,10 @@ def test_joints_of_a_planar_arm_are_a_link_apart():
 
 
 def test_a_mechanism_hangs_together():
-    joint = dyn.mechanism.Joint("revolute", axis=(0, -1, 0), position=(0.0, 0.0, -0.5))
+    joint = dyn.Joint("revolute", axis=(0, -1, 0), position=(0.0, 0.0, -0.5))
     bodies = [
-        dyn.mechanism.Body("a", joint, mass=1.0, center=(0, 0, -0.25)),
-        dyn.mechanism.Body("b", joint, "a", mass=1.0, center=(0, 0, -0.25)),
+        dyn.Body("a", joint, mass=1.0, center=(0, 0, -0.25)),
+        dyn.Body("b", joint, "a", mass=1.0, center=(0, 0, -0.25)),
     ]
     points, parents = skeleton(dyn.Mechanism(bodies), [[0.3, 0.2]])
     assert parents == (-1, 0, 1)

@@ -122,7 +122,7 @@ def test_an_unknown_formulation_is_named_with_those_that_there_are(make) -> None
 
 @mark.parametrize("make", [dyn.inverse_dynamics, dyn.mass_matrix, dyn.bias, dyn.energy, dyn.forward_dynamics])
 def test_what_is_no_model_is_refused(make) -> None:
-    with raises(TypeError, match="expected a System, an arm or a scene, got str: 'triple_pendulum'"):
+    with raises(TypeError, match="expected a System, a mechanism or a scene, got str: 'triple_pendulum'"):
         make("triple_pendulum")
 
 

@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 import pytest
 
 import cgraph as cg
+from cgraph.core.node import OPS, Op, apply
 from viz import render_svg, theme, to_dot
 from viz.graph_drawing.dot import main_tag
 
@@ -93,10 +94,10 @@ def test_an_operation_shows_its_symbol() -> None:
             assert drawn[f"n{i}"]["label"] == node.op.symbol
 
 
-@pytest.mark.parametrize("op", [op for op in cg.node.OPS.values() if op.symbol], ids=lambda op: op.name)
-def test_every_row_of_the_table_can_be_drawn(op: cg.node.Op) -> None:
+@pytest.mark.parametrize("op", [op for op in OPS.values() if op.symbol], ids=lambda op: op.name)
+def test_every_row_of_the_table_can_be_drawn(op: Op) -> None:
     inputs = cg.variables([f"x{i}" for i in range(op.arity)])
-    graph = cg.Graph(inputs, {"y": cg.node.apply(op, *inputs)})
+    graph = cg.Graph(inputs, {"y": apply(op, *inputs)})
     assert boxes(graph)[f"n{len(graph.nodes) - 1}"]["label"] == op.symbol
 
 

@@ -284,8 +284,8 @@ def test_a_folder_that_cannot_be_filled_is_found_before_the_work(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, arguments: list[str]
 ) -> None:
     worked = []
-    for name in ("work_precision.work_precision", "stability.run", "pruning.report"):
-        monkeypatch.setattr(f"dynamics.reports.{name}", lambda *_, **__: worked.append("worked"))
+    for name in ("work_precision.work_precision.work_precision", "stability.stability.run", "pruning.report"):
+        monkeypatch.setattr(f"dynamics.experiments.{name}", lambda *_, **__: worked.append("worked"))
     (tmp_path / "file").write_text("in the way")
     assert cli.main(["report", *arguments, "--out", str(tmp_path / "file" / "new")]) == 1
     error = capsys.readouterr().err
