@@ -55,3 +55,5 @@ DOPRI5 = Tableau(
         (0, 40617522 / 29380423, -110615467 / 29380423, 69997945 / 29380423),
     ),
 )
+
+TABLEAUS = {"euler": EULER, "rk4": RK4, "dopri5": DOPRI5}  # a new row here is a new method of `simulate`

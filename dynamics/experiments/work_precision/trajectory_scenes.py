@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from cgraph.extend import Array
+
 from ... import scenes
 from ...equations.state_equation import state_inputs
 from ...reference import Reference, reference
 from ...reference.solution import scale
-from ...simulation.trajectory import Array
 from ...systems.model import Model, as_ode, as_system
 from ..stability import cases
 from ..stability.cases import Case

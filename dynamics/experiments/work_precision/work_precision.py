@@ -18,13 +18,13 @@ from typing import Any
 import numpy as np
 
 from cgraph import Graph
+from cgraph.extend import Array
 
 from ...equations.equations_of_motion import energy
 from ...integrators import METHODS, Problem
 from ...peers import UnavailableError
 from ...reference import Reference
-from ...simulation.scipy_solvers import PREFIX
-from ...simulation.trajectory import Array
+from ...simulation.run_options import SCIPY
 from ...systems.model import as_system
 from ...systems.system import System
 from ..paper_numbers.fit import exponent
@@ -45,7 +45,7 @@ STALLED = 2  # knobs in a row without a smaller error, after which no finer one 
 PEERS = ("MuJoCo", "SciPy", "heyoka", "CasADi")  # what can be named in place of its contenders
 OURS = "ours"
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
-_BEGINS = {"MuJoCo": "MuJoCo", "SciPy": PREFIX, "heyoka": "heyoka", "CasADi": "CVODES"}
+_BEGINS = {"MuJoCo": "MuJoCo", "SciPy": SCIPY, "heyoka": "heyoka", "CasADi": "CVODES"}
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,14 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS, Problem
+from dynamics.integrators import METHODS, derive, mechanics
 from dynamics.integrators.dop853 import DOP853
 from dynamics.integrators.radau import _A, _POWERS, _T, _T_INVERSE
 from dynamics.integrators.rosenbrock import RODAS5P
 from dynamics.integrators.symplectic import GAUSS4, GAUSS6, MIDPOINT, SYMPLECTIC_EULER, VERLET, Partitioned
 from dynamics.integrators.tableau import DOPRI5, Tableau
 from dynamics.systems.system import System
+from tests.dynamics.step_options import step
 
 FIXED = [name for name, method in METHODS.items() if not method.adaptive]
 ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
@@ -212,8 +213,8 @@ def test_a_symplectic_step_keeps_area(method: str) -> None:
     """The map (q, p) of one step, by central differences, has J^T S J = S."""
     pytest.importorskip("llvmlite")
     arm = dyn.planar_arm([1.0, 0.7], [0.9, 0.6])
-    problem = Problem(arm, {"tau0": 0.0, "tau1": 0.0})
-    momentum, n = problem.mechanics.momentum, 2
+    problem = derive(arm, {"tau0": 0.0, "tau1": 0.0})
+    momentum, n = mechanics(problem).momentum, 2
 
     def p_of(q: Any, qd: Any) -> Any:
         return np.array(list(momentum.evaluate(dict(zip(momentum.input_names, [*q, *qd, 0.0], strict=True))).values()))
@@ -268,7 +269,14 @@ def test_events_are_found_where_they_are(method: str) -> None:
     upward = dyn.Event("upward", lambda q, qd, t: q[1], direction=1)
     late = dyn.Event("late", lambda q, qd, t: t - 11.0, terminal=True)
     run = dyn.simulate(
-        planet(), *PERIHELION, 20.0, method, rtol=1e-11, atol=1e-11, dt=1e-3, events=[crossing, upward, late]
+        planet(),
+        *PERIHELION,
+        20.0,
+        method,
+        rtol=1e-11,
+        atol=1e-11,
+        **step(method, 1e-3),
+        events=[crossing, upward, late],
     )
     tolerance = 2e-5 if method == "verlet" else 1e-8
     assert run.events["axis"].t == approx(np.pi * np.arange(1, 4), abs=tolerance)
@@ -283,7 +291,7 @@ def test_an_event_between_the_times_asked_for() -> None:
     ground = dyn.Event("ground", lambda q, qd, t, p: q[0] - p["floor"], terminal=True)
     ball = System(lambda q, qd, t, p: 0.5 * qd[0] ** 2 - 9.81 * q[0], ["height"], {"floor": 0.5})
     for method in ("rk4", "dop853"):
-        run = dyn.simulate(ball, [1.0], [0.0], 1.0, method, dt=0.01, t_eval=[0.0, 0.3, 0.9], events=ground)
+        run = dyn.simulate(ball, [1.0], [0.0], 1.0, method, **step(method, 0.01), t_eval=[0.0, 0.3, 0.9], events=ground)
         assert run.t.tolist() == [0.0, 0.3]
         assert run.events["ground"].t == approx([math.sqrt(2 * 0.5 / 9.81)], rel=1e-12)
         assert run.events["ground"].qd[0] == approx([-math.sqrt(2 * 9.81 * 0.5)], rel=1e-12)
@@ -315,7 +323,7 @@ def test_a_start_whose_rate_is_no_number() -> None:
 def test_max_steps_ends_a_run(method: str) -> None:
     if method.startswith("scipy"):
         pytest.importorskip("scipy")
-    run = dyn.simulate(planet(), *PERIHELION, 50.0, method, dt=0.01, max_steps=17)
+    run = dyn.simulate(planet(), *PERIHELION, 50.0, method, **step(method, 0.01), max_steps=17)
     assert (len(run.t), run.stats.steps, run.stats.success) == (
         18 - run.stats.rejected,
         17 - run.stats.rejected,
@@ -325,8 +333,8 @@ def test_max_steps_ends_a_run(method: str) -> None:
 
 
 @mark.parametrize("method", ADAPTIVE)
-def test_dt_is_the_longest_step_and_the_end_is_met(method: str) -> None:
-    run = dyn.simulate(planet(), *PERIHELION, 1.0, method, dt=0.13)
+def test_max_step_is_the_longest_step_and_the_end_is_met(method: str) -> None:
+    run = dyn.simulate(planet(), *PERIHELION, 1.0, method, max_step=0.13)
     assert np.diff(run.t).max() <= 0.13 * (1 + 1e-12)
     assert run.stats.dt <= 0.13
     assert run.t[-1] == 1.0
@@ -335,7 +343,7 @@ def test_dt_is_the_longest_step_and_the_end_is_met(method: str) -> None:
 def test_systems_of_first_order() -> None:
     turning = dyn.OdeSystem(lambda x, t, p: [p["w"] * x[1], -p["w"] * x[0]], ["a", "b"], {"w": 2.0})
     for method in (*ADAPTIVE, "rk4", "midpoint", "gauss4", "gauss6", "euler"):
-        run = dyn.simulate(turning, [1.0, 0.0], None, 1.0, method, dt=1e-3)
+        run = dyn.simulate(turning, [1.0, 0.0], None, 1.0, method, **step(method, 1e-3))
         assert run.q[-1] == approx([math.cos(2.0), -math.sin(2.0)], abs=5e-3 if method == "euler" else 1e-5)
         assert run.qd.shape == (len(run.t), 0)
         assert np.isnan(run.energy).all()
@@ -363,7 +371,7 @@ def test_a_driven_system() -> None:
     driven = System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 0.5 * q[0] ** 2 + q[0] * cg.cos(2.0 * t), ["x"])
     exact = (math.cos(3.0) - math.cos(6.0)) / 3.0
     for method in METHODS:
-        run = dyn.simulate(driven, [0.0], [0.0], 3.0, method, dt=1e-3, rtol=1e-10, atol=1e-10)
+        run = dyn.simulate(driven, [0.0], [0.0], 3.0, method, **step(method, 1e-3), rtol=1e-10, atol=1e-10)
         assert run.q[-1, 0] == approx(exact, abs={1: 2e-3, 2: 1e-5}.get(METHODS[method].order, 1e-8)), method
 
 
@@ -412,8 +420,8 @@ def test_two_crossings_in_one_step_are_both_found(method: str) -> None:
     """x = sin t touches 0.999 and goes back 0.09 s later; steps are longer."""
     circle = dyn.OdeSystem(lambda x, t: [x[1], -x[0]], ["x", "v"])
     over = dyn.Event("over", lambda x, t: x[0] - 0.99)
-    dt = {"rk4": 0.1, "gauss6": 0.2}.get(method)
-    run = dyn.simulate(circle, [0.0, 1.0], None, 10.0, method, dt=dt, rtol=1e-9, atol=1e-9, events=[over])
+    steps = {"rk4": {"dt": 0.1}, "gauss6": {"dt": 0.2}}.get(method, {})
+    run = dyn.simulate(circle, [0.0, 1.0], None, 10.0, method, **steps, rtol=1e-9, atol=1e-9, events=[over])
     peak = np.arccos(0.99)
     expected = [turn * 2.0 * np.pi + 0.5 * np.pi + side * peak for turn in (0, 1) for side in (-1, 1)]
     assert run.events["over"].t == approx(expected, abs=2e-4 if method in ("rk4", "gauss6") else 1e-6)

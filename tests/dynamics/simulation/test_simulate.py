@@ -10,12 +10,13 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import problem_of
+from dynamics.integrators import derive
 from dynamics.integrators.tableau import DOPRI5, EULER, RK4, Tableau
 from dynamics.simulation.progress_bar import Progress
-from dynamics.simulation.stepping import Run
+from dynamics.simulation.stepping import NativeIntegration
 from dynamics.systems.system import System
 from tests.dynamics.models import oscillator, random_arm
+from tests.dynamics.step_options import step
 
 ROUNDING = 1e-14  # of a few sums of fractions
 
@@ -150,7 +151,7 @@ def test_leaving_a_function_s_domain_stops_the_run() -> None:
 
 @mark.parametrize("method", ["rk4", "gauss4", "dopri5"])
 def test_ctrl_c_keeps_the_rows(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    real, calls = Run._advance, []
+    real, calls = NativeIntegration._advance, []
 
     def advance(*args: Any, **options: Any) -> Any:
         calls.append(None)
@@ -158,15 +159,15 @@ def test_ctrl_c_keeps_the_rows(method: str, monkeypatch: pytest.MonkeyPatch) -> 
             raise KeyboardInterrupt
         return real(*args, **options)
 
-    monkeypatch.setattr("dynamics.simulation.stepping.PIECE", 0.0)  # a pass at a time, after the first pieces
-    monkeypatch.setattr(Run, "_advance", advance)
-    result = dyn.simulate(oscillator(), [1.0], [0.0], 10.0, method, dt=0.01)
+    monkeypatch.setattr("dynamics.simulation.stepping.BLOCK_TIME", 0.0)  # a pass at a time, after the first block
+    monkeypatch.setattr(NativeIntegration, "_advance", advance)
+    result = dyn.simulate(oscillator(), [1.0], [0.0], 10.0, method, **step(method, 0.01))
     kept = len(result.t)
     assert (kept, result.stats.success) == (result.stats.steps + 1, False)
-    assert kept == 34  # the first piece of 32, one more
+    assert kept == 34  # the first block of 32, one more
     assert result.stats.message == f"interrupted after t = {result.t[-1]:.6g} s"
     monkeypatch.undo()
-    whole = dyn.simulate(oscillator(), [1.0], [0.0], 10.0, method, dt=0.01)
+    whole = dyn.simulate(oscillator(), [1.0], [0.0], 10.0, method, **step(method, 0.01))
     assert (result.q == whole.q[:kept]).all()
     assert (result.energy == whole.energy[:kept]).all()
 
@@ -246,10 +247,10 @@ class Clock:
 
 
 def printed(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tick: float, **options: Any) -> str:
-    """What a run of ten rows, in pieces of one, writes to standard error, on a clock of that tick."""
+    """What a run of ten rows, in blocks of one, writes to standard error, on a clock of that tick."""
     monkeypatch.setattr("dynamics.simulation.progress_bar.time", Clock(tick))
-    monkeypatch.setattr("dynamics.simulation.stepping.FIRST", 1)
-    monkeypatch.setattr("dynamics.simulation.stepping.PIECE", 0.0)
+    monkeypatch.setattr("dynamics.simulation.stepping.FIRST_PASSES", 1)
+    monkeypatch.setattr("dynamics.simulation.stepping.BLOCK_TIME", 0.0)
     dyn.simulate(oscillator(), [1.0], [0.0], 1.0, dt=0.1, **options)
     out, err = capsys.readouterr()
     assert out == ""
@@ -313,9 +314,9 @@ def test_what_was_made_for_a_model_is_used_again_and_only_for_the_same() -> None
 
     kept = model()
     first = ends(kept)
-    made = problem_of(kept, {"k": 2.0, "tau0": 0.0})
-    assert made is problem_of(kept, {"k": 2.0, "tau0": 0.0})
-    assert made is not problem_of(kept, {"k": 2.0, "tau0": -0.0})
+    made = derive(kept, {"k": 2.0, "tau0": 0.0})
+    assert made is derive(kept, {"k": 2.0, "tau0": 0.0})
+    assert made is not derive(kept, {"k": 2.0, "tau0": -0.0})
     assert ends(kept) == first
     assert ends(model(2.0)) != first
     assert ends(kept, parameters={"k": 3.0}) == ends(model(), parameters={"k": 3.0}) != first
@@ -331,6 +332,14 @@ CALLS: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"max_steps": "a"}, TypeError, "max_steps must be a number, got str: 'a'"),
     ({"t_end": "1"}, TypeError, "t_end must be a number, got str: '1'"),
     ({"dt": "a"}, TypeError, "dt must be a number, got str: 'a'"),
+    (
+        {"method": "dopri5", "dt": 0.1},
+        ValueError,
+        r"'dopri5' chooses its steps: .* max_step, not by dt \(got dt = 0.1 s",
+    ),
+    ({"method": "scipy:BDF", "dt": 0.1}, ValueError, "method 'scipy:BDF' chooses its steps: limit them by max_step"),
+    ({"max_step": 0.1}, ValueError, r"'rk4' makes equal steps: .* dt, not by max_step \(got max_step = 0.1 s\)"),
+    ({"method": "dopri5", "max_step": 0.0}, ValueError, "max_step must be positive and finite, got 0.0 s"),
     ({"dt": 1e-17}, ValueError, "dt = 1e-17 s is below the resolution of the time at t_end = 1 s"),
     ({"dt": 1e-13}, MemoryError, r"9999999999990 steps of 2 numbers take .* GiB are free: record fewer times"),
     ({"tau": "x"}, TypeError, "tau of coordinate 0 must be a number, got str: 'x'"),
@@ -367,10 +376,10 @@ def test_a_last_time_past_the_end_by_rounding_is_the_end() -> None:
 
 
 def test_rows_that_fill_the_memory_end_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = dyn.simulate(oscillator(), [1.0], [0.0], 200.0, "dop853", dt=1e-2)
+    whole = dyn.simulate(oscillator(), [1.0], [0.0], 200.0, "dop853", max_step=1e-2)
     hundred = 3.0 * 24.0 * 100.0  # rows of time and state
     monkeypatch.setattr(sys.modules["dynamics.simulation.simulate"], "room", lambda: hundred)
-    run = dyn.simulate(oscillator(), [1.0], [0.0], 200.0, "dop853", dt=1e-2)
+    run = dyn.simulate(oscillator(), [1.0], [0.0], 200.0, "dop853", max_step=1e-2)
     assert run.stats.message.startswith("stopped at t = ")
     assert "the rows fill the memory; t_eval records fewer" in run.stats.message
     assert not run.stats.success

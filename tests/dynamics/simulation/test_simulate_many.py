@@ -19,10 +19,11 @@ from dynamics.integrators import METHODS
 from dynamics.simulation.ensembles import task
 from dynamics.simulation.ensembles.ensemble import Ensemble
 from dynamics.simulation.ensembles.simulate_many import simulate_many
-from dynamics.simulation.ensembles.step_grid import stretches
+from dynamics.simulation.ensembles.step_grid import grids_between
 from dynamics.systems.model import as_system
 from dynamics.systems.system import System
 from tests.dynamics.models import oscillator, random_arm
+from tests.dynamics.step_options import step
 
 RK4_ERROR = 1e-11  # of a period at dt = 1 ms: (w dt)^4 w t / 120
 VERLET_ERROR = 1e-6  # (w dt)^2 w t / 24
@@ -91,9 +92,9 @@ def test_arms_move_as_mujoco_s_do() -> None:
 )
 def test_every_method_gives_what_simulate_gives(model: Any, method: str) -> None:
     q, qd = np.random.default_rng(1).normal(size=(2, 9, len(as_system(model).coordinates)))
-    result = simulate_many(model, q, qd, 0.3, method, dt=0.01, t_eval=[0.1, 0.2, 0.3])
+    result = simulate_many(model, q, qd, 0.3, method, **step(method, 0.01), t_eval=[0.1, 0.2, 0.3])
     for k in range(9):
-        one = dyn.simulate(model, q[k], qd[k], 0.3, method, dt=0.01, t_eval=[0.1, 0.2, 0.3])
+        one = dyn.simulate(model, q[k], qd[k], 0.3, method, **step(method, 0.01), t_eval=[0.1, 0.2, 0.3])
         assert np.hstack([result.q[k], result.qd[k]]) == approx(np.hstack([one.q, one.qd]), abs=ROUNDING)
         found = [int(each[k]) for each in (result.stats.steps, result.stats.rejected, result.stats.nfev)]
         assert found == [one.stats.steps, one.stats.rejected, one.stats.nfev]
@@ -128,12 +129,12 @@ def test_t_eval_chooses_the_rows(times: Any) -> None:
     assert result.q[1, :, 0] == approx(2.0 * np.cos(math.sqrt(1.5) * result.t), abs=RK4_ERROR)
 
 
-def test_many_steps_come_in_many_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_steps_come_in_many_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = [simulate_many(*arms(9), 0.2, t_eval=times) for times in (None, [0.05, 0.2], [0.15, 0.2])]
     monkeypatch.setattr("dynamics.simulation.ensembles.vectorized.WORK", 5000)
     monkeypatch.setattr("dynamics.simulation.ensembles.vectorized.NUMBERS", 200)
-    pieces = [simulate_many(*arms(9), 0.2, t_eval=times) for times in (None, [0.05, 0.2], [0.15, 0.2])]
-    assert all(map(same, whole, pieces))
+    blocks = [simulate_many(*arms(9), 0.2, t_eval=times) for times in (None, [0.05, 0.2], [0.15, 0.2])]
+    assert all(map(same, whole, blocks))
 
 
 # Who runs it
@@ -152,7 +153,7 @@ def test_threads_and_chunks_change_nothing(method: str, backend: str) -> None:
     if backend == "llvm":
         pytest.importorskip("llvmlite")
     arguments, options = case(method)
-    options |= {"backend": backend, "dt": 0.02}
+    options |= {"backend": backend, **step(method, 0.02)}
     alone = simulate_many(*arguments, **options)
     assert same(alone, simulate_many(*arguments, **options, workers=3))
     assert same(alone, simulate_many(*arguments, **options, workers=None, chunk=7))
@@ -175,7 +176,7 @@ def test_processes_change_nothing_and_make_the_code_once(method: str) -> None:
 
 
 def programs_made() -> int:
-    return task._together.cache_info().misses + task._alone.cache_info().misses
+    return task._vector_code.cache_info().misses + task._compiled.cache_info().misses
 
 
 def test_threads_make_the_code_once(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -223,9 +224,9 @@ def test_dask_changes_nothing() -> None:
 def test_one_that_leaves_the_numbers_is_nan_from_there_and_says_where(method: str) -> None:
     qd = np.zeros((17, 2))
     q = np.random.default_rng(0).normal(size=(17, 2))
-    calm = simulate_many(runaway(), q, qd, 2.0, method, dt=0.01, t_eval=np.linspace(0.0, 2.0, 21))
+    calm = simulate_many(runaway(), q, qd, 2.0, method, **step(method, 0.01), t_eval=np.linspace(0.0, 2.0, 21))
     qd[4, 1], qd[9, 1] = 1.0, 2.0
-    result = simulate_many(runaway(), q, qd, 2.0, method, dt=0.01, t_eval=np.linspace(0.0, 2.0, 21))
+    result = simulate_many(runaway(), q, qd, 2.0, method, **step(method, 0.01), t_eval=np.linspace(0.0, 2.0, 21))
     others = [k for k in range(17) if k not in (4, 9)]
     assert result.stats.success.tolist() == [k in others for k in range(17)]
     assert (result.q[others] == calm.q[others]).all()
@@ -234,7 +235,9 @@ def test_one_that_leaves_the_numbers_is_nan_from_there_and_says_where(method: st
         finite = np.isfinite(np.concatenate([result.q[k], result.qd[k]], axis=1))
         assert finite[result.t < 0.9 / v].all()
         assert not finite[result.t > 1.5 / v].any()
-        one = dyn.simulate(runaway(), q[k], qd[k], 2.0, method, dt=0.01, t_eval=np.linspace(0.0, 2.0, 21)).stats
+        one = dyn.simulate(
+            runaway(), q[k], qd[k], 2.0, method, **step(method, 0.01), t_eval=np.linspace(0.0, 2.0, 21)
+        ).stats
         stats = result.stats
         assert (stats.message[k], stats.steps[k], stats.nfev[k]) == (one.message, one.steps, one.nfev)
         assert ("'wild'" if method != "midpoint" else "did not converge") in one.message
@@ -307,7 +310,7 @@ def test_an_error_in_a_thread_is_raised_and_leaves_no_thread(monkeypatch: pytest
     def broken(*_: object) -> None:
         raise RuntimeError("broken")
 
-    monkeypatch.setattr("dynamics.simulation.ensembles.vectorized.SideBySide.advance", broken)
+    monkeypatch.setattr("dynamics.simulation.ensembles.vectorized.VectorizedIntegration.advance", broken)
     with raises(RuntimeError, match="broken"):
         simulate_many(*arms(29), 0.1, workers=3, chunk=8)
     assert set(threading.enumerate()) == before
@@ -378,18 +381,16 @@ def test_a_result_that_would_not_fit_is_refused() -> None:
     dt=st.floats(1e-2, 3.0),
     limits=st.tuples(st.integers(1, 50), st.integers(1, 5)),
 )
-def test_stretches_meet_every_instant_in_steps_of_at_most_dt(
-    gaps: list[float], dt: float, limits: tuple[int, int]
-) -> None:
+def test_grids_meet_every_instant_in_steps_of_at_most_dt(gaps: list[float], dt: float, limits: tuple[int, int]) -> None:
     instants = [0.0, *np.cumsum(gaps).tolist()]
     met = [0.0]
-    for stretch in stretches(instants, dt):
-        assert stretch.begin == approx(met[-1], rel=1e-14, abs=1e-14)
-        assert stretch.h <= dt * (1 + 1e-11)
-        met += [stretch.begin + (k + 1) * stretch.each * stretch.h for k in range(stretch.rows)]
-        pieces = list(stretch.pieces(*limits))
-        assert sum(steps for steps, _, _ in pieces) == stretch.each * stretch.rows
-        assert sum(steps // every for steps, every, due in pieces if due) == stretch.rows
-        assert all(steps <= limits[0] for steps, _, _ in pieces)
+    for grid in grids_between(instants, dt):
+        assert grid.begin == approx(met[-1], rel=1e-14, abs=1e-14)
+        assert grid.h <= dt * (1 + 1e-11)
+        met += [grid.begin + (k + 1) * grid.steps * grid.h for k in range(grid.rows)]
+        blocks = list(grid.blocks(*limits))
+        assert sum(steps for steps, _, _ in blocks) == grid.steps * grid.rows
+        assert sum(steps // every for steps, every, due in blocks if due) == grid.rows
+        assert all(steps <= limits[0] for steps, _, _ in blocks)
     assert met == approx(instants, rel=1e-14)
-    assert len(stretches(np.linspace(0.0, 3.0, 1001).tolist(), dt)) == 1
+    assert len(grids_between(np.linspace(0.0, 3.0, 1001).tolist(), dt)) == 1
