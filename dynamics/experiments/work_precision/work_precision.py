@@ -143,7 +143,7 @@ def work_precision(
     `budget` seconds each.  folder: where exact motions are kept.  backend: see `simulate`.  say: takes progress lines.
 
     Raises ValueError for a name that is not known, ImportError without what makes the exact motion, and what
-    `multiprecision.reference` raises.
+    `reference` raises.
     """
     for what, given, known in (("method", methods, METHODS), ("peer", peers, PEERS), ("cold start", cold, STARTS)):
         if unknown := [each for each in given if each not in known]:
