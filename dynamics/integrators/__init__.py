@@ -17,7 +17,7 @@ from .tableau import TABLEAUS, Tableau
 def runge_kutta(tableau: Tableau) -> Method:
     """An explicit Runge-Kutta method: equal steps, or steps by error where the tableau has weights of an estimate."""
     if tableau.error:
-        return Method(tableau.order, partial(embedded, tableau), adaptive=True, degree=len(tableau.dense[0]))
+        return Method(tableau.order, partial(embedded, tableau), adaptive=True, degree=len(tableau.interpolant[0]))
     return Method(tableau.order, lambda problem, _: explicit(tableau, problem), adaptive=False)
 
 

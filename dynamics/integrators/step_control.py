@@ -108,7 +108,7 @@ def embedded(tableau: Tableau, problem: Problem, dense: bool) -> Program:
     body += [_estimate(len(tableau.error), m), control(tableau.estimate, stages)]
     kept = (Map(SAME, (last,), ("slope0",)), Map(SAME, ("rounding_new",), ("rounding",)))
     body.append(accept_step(*(_dense(tableau, problem) if dense else ()), *kept))
-    degree = len(tableau.dense[0])
+    degree = len(tableau.interpolant[0])
     own = {f"slope{k}": m for k in range(stages + 1 + (len(tableau.extra) if dense else 0))}
     own |= {f"sum{k}": 1 for k in range(len(tableau.error))} | {"at": m, "at_t": 1, "rounding": m, "rounding_new": m}
     if dense:
@@ -166,8 +166,8 @@ def _dense(tableau: Tableau, problem: Problem) -> tuple[Statement, ...]:
         ]
     if tableau.extra:
         body.append(count(len(tableau.extra)))
-    for power in range(len(tableau.dense[0])):
-        weights = tuple([row[power] for row in tableau.dense])
+    for power in range(len(tableau.interpolant[0])):
+        weights = tuple([row[power] for row in tableau.interpolant])
         used = [k for k, weight in enumerate(weights) if weight]
         slopes = tuple([f"slope{k}" for k in used])
         body.append(Map(scaled([weights[k] for k in used]), ("h", *slopes), (f"dense{power + 1}",)))

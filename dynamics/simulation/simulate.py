@@ -112,7 +112,7 @@ def simulate(
     >>> arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.8])
     >>> run = dyn.simulate(arm, [1.0, 0.5], [0.0, 0.0], t_end=1.0, method="dop853", t_eval=[0.0, 0.5, 1.0])
     >>> run.q.round(3).tolist()
-    [[1.0, 0.5], [-0.103, 0.138], [-0.93, -0.63]]
+    [[1.0, 0.5], [0.31, -0.04], [-0.989, 0.108]]
     """
     options = RunOptions(t_end, method, dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
     watched = as_events(events)

@@ -61,10 +61,10 @@ class Crossings(NamedTuple):
     Examples
     --------
     >>> import dynamics as dyn
-    >>> upright = dyn.Event("hanging", lambda q, qd, t: q[0])
-    >>> run = dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.1], [0.0], 2.0, events=upright)
+    >>> hanging = dyn.Event("hanging", lambda q, qd, t: q[0])
+    >>> run = dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.1], [0.0], 2.0, events=hanging)
     >>> run.events["hanging"].t.round(4)
-    array([0.4101, 1.2302])
+    array([0.4097, 1.2292])
     """
 
     t: Array

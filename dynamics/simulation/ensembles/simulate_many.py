@@ -103,7 +103,7 @@ def simulate_many(
     >>> import dynamics as dyn
     >>> fan = dyn.simulate_many(dyn.planar_arm([1.0], [1.0]), [[0.1], [0.2], [0.3]], [0.0], 1.0, t_eval=[0.5, 1.0])
     >>> fan.q[:, -1, 0].round(4).tolist()
-    [-0.0768, -0.1535, -0.2299]
+    [-0.077, -0.155, -0.2348]
     """
     if isinstance(method, str) and method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")

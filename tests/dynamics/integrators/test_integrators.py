@@ -12,7 +12,7 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS, derive, mechanics
+from dynamics.integrators import METHODS, derive, mechanics, runge_kutta
 from dynamics.integrators.dop853 import DOP853
 from dynamics.integrators.radau import _A, _POWERS, _T, _T_INVERSE
 from dynamics.integrators.rosenbrock import RODAS5P
@@ -24,6 +24,7 @@ from tests.dynamics.step_options import step
 FIXED = [name for name, method in METHODS.items() if not method.adaptive]
 ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
 ECCENTRICITY = 0.3
+FITTED_ORDER = 0.05  # of a fitted order: what the next order adds at these steps
 
 
 def planet() -> System:
@@ -76,7 +77,7 @@ def test_the_fitted_order_is_the_declared_one(method: str, system: str) -> None:
     runs = [dyn.simulate(model, *start, t_end, method, dt=t_end / n, t_eval=times) for n in counts.tolist()]
     errors = [np.linalg.norm(run.q - exact) for run in runs]
     order = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
-    assert order == approx(METHODS[method].order, abs=0.05)
+    assert order == approx(METHODS[method].order, abs=FITTED_ORDER)
 
 
 @mark.parametrize("method", ADAPTIVE)
@@ -432,3 +433,35 @@ def test_an_event_is_what_it_says() -> None:
         dyn.Event("e", 1)  # type: ignore[arg-type]
     with raises(TypeError, match="True or False for `terminal`"):
         dyn.Event("e", lambda q, qd, t: q[0], terminal="no")  # type: ignore[arg-type]
+
+
+BOGACKI_SHAMPINE = Tableau(
+    3,
+    c=(0, 1 / 2, 3 / 4),
+    a=((), (1 / 2,), (0, 3 / 4)),
+    b=(2 / 9, 1 / 3, 4 / 9),
+    error=((5 / 72, -1 / 12, -1 / 9, 1 / 8),),
+    estimate=3,
+)  # Applied Mathematics Letters 2 (1989) 321
+RALSTON = Tableau(2, c=(0, 2 / 3), a=((), (2 / 3,)), b=(1 / 4, 3 / 4))
+
+
+def test_a_tableau_alone_is_a_method_of_equal_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(METHODS, "ralston", runge_kutta(RALSTON))
+    ends = [dyn.simulate(planet(), *PERIHELION, 1.0, "ralston", dt=h).q[-1] for h in (1e-2, 5e-3)]
+    errors = [np.abs(end - position(1.0)).max() for end in ends]
+    assert math.log2(errors[0] / errors[1]) == approx(RALSTON.order, abs=FITTED_ORDER)
+
+
+def test_a_tableau_with_an_estimate_chooses_its_steps_and_has_dense_output(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(METHODS, "bs23", runge_kutta(BOGACKI_SHAMPINE))
+    options: dict[str, Any] = {"rtol": 1e-8, "atol": 1e-8, "backend": "auto"}
+    plain = dyn.simulate(planet(), *PERIHELION, 1.0, "bs23", **options)
+    times = np.linspace(0.0, 1.0, 101)
+    dense = dyn.simulate(planet(), *PERIHELION, 1.0, "bs23", t_eval=times, **options)
+    assert dense.stats.steps == plain.stats.steps < 2000
+    at_steps = np.abs(plain.q - [position(t) for t in plain.t]).max()
+    assert at_steps < 1e-6
+    assert np.abs(dense.q - [position(t) for t in times]).max() < 2.0 * at_steps
+    many = dyn.simulate_many(planet(), [PERIHELION[0]] * 3, PERIHELION[1], 1.0, "bs23", t_eval=times, **options)
+    assert np.array_equal(many.q[1], dense.q)
