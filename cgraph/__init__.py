@@ -8,7 +8,6 @@ from .codegen import Compiled, clear_cache, compile
 from .codegen.c import CSource, to_c
 from .core.counts import Counts
 from .core.graph import Graph
-from .core.label import tag
 from .core.node import Edge, Node, constant, variable, variables, with_name
 from .core.ops import (
     abs_ as abs,
@@ -38,6 +37,7 @@ from .core.ops import (
     tanh,
     where,
 )
+from .core.scope import tag
 from .core.source_lines import recording_lines
 from .core.structure_hash import structure_hash
 from .errors import GraphError

@@ -39,9 +39,10 @@ from .autodiff.hessian_solve import solve_nodes
 from .autodiff.jacobian import hessian_nodes
 from .autodiff.ldl_solve import SingularError, ldl_solve
 from .autodiff.reverse import cotangents
-from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED, building
+from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED
 from .core.node import as_node
 from .core.ops import OPS
+from .core.scope import building
 from .core.traversal import topological
 from .explain.names import Names
 from .program import Call, Factor, If, Map, Program, Runner, Solve, Statement, Sum, While, runner

@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from ..core.graph import Graph
-from ..core.label import ADJOINT, TANGENT, building
+from ..core.label import ADJOINT, TANGENT
 from ..core.node import Node, Scalar, as_node
+from ..core.scope import building
 from ..core.traversal import topological
 from ..simplify.builder import Builder
 from .elimination_order import Step, steps

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ..core.label import building
 from ..core.node import Node, as_node
 from ..core.ops import less, where
+from ..core.scope import building
 from ..errors import GraphError
 from ..simplify.builder import Builder
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from ..core.graph import Graph
-from ..core.label import ADJOINT, UNLABELLED, Label, building
+from ..core.label import ADJOINT, UNLABELLED, Label
 from ..core.node import Node, as_node, variable
 from ..core.ops import strong_mul
+from ..core.scope import building
 from ..core.traversal import topological
 from ..simplify.builder import Builder
 from .forward import free_suffix

@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import cache
 from typing import NamedTuple
 
-from ..core.label import building
 from ..core.node import Node, Op, as_node, variable
+from ..core.scope import building
 from ..core.traversal import topological
 from ..simplify.builder import Builder
 from .forward import tangents

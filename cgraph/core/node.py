@@ -11,7 +11,8 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from .label import INPUT, UNLABELLED, Label, SourceLine, current, label
+from .label import INPUT, UNLABELLED, Label, SourceLine, label
+from .scope import current
 
 _INPUT = label(roles=frozenset({INPUT}))
 
@@ -284,7 +285,8 @@ def apply(op: Op, *args: Scalar) -> Node:
     scope = current.get()
     if scope.build is None:
         return Node(op, nodes, scope.label)
-    return scope.build(op, nodes, scope.label)
+    node: Node = scope.build(op, nodes, scope.label)
+    return node
 
 
 def _binary(name: str, a: Scalar, b: Scalar) -> Node:

@@ -7,8 +7,9 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from .label import Label, Scope, SourceLine, current
+from .label import Label, SourceLine
 from .node import Node, Op
+from .scope import Scope, current
 
 # Whose lines say nothing to the person who calls: this library, and what calls back from between.
 _PASSED_OVER = frozenset({"cgraph", "dynamics", "functools", "numpy"})

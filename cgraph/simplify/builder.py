@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection
 
-from ..core.label import Label, building
+from ..core.label import Label
 from ..core.node import CONSTANT, OPS, Node, Op, constant
 from ..core.ops import cos, sin, sqrt
+from ..core.scope import building
 from ..core.traversal import rebuild
 
 # Rules see the arguments of the node to be, not all constant, and give a node that stands for it, or None. They take

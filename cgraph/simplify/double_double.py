@@ -11,9 +11,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from ..core.graph import Graph
-from ..core.label import Label, building
+from ..core.label import Label
 from ..core.node import CONSTANT, Node, Op, apply, as_node, constant
 from ..core.ops import abs_, equal, less, less_equal, maximum, minimum, not_equal, sign, sqrt, strong_mul, where
+from ..core.scope import building
 from ..core.traversal import topological
 
 ZERO = constant(0.0)
