@@ -37,7 +37,7 @@ the table of operations, and `ADJOINT`, `PRIMAL`, `TANGENT` are the roles that a
 from .autodiff.forward import tangents
 from .autodiff.hessian_solve import solve_nodes
 from .autodiff.jacobian import hessian_nodes
-from .autodiff.ldl_solve import SingularError, ldl_solve
+from .autodiff.ldl_solve import SingularError, ldl_elimination, ldl_solve
 from .autodiff.reverse import cotangents
 from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED
 from .core.node import as_node
@@ -82,6 +82,7 @@ __all__ = [
     "folded",
     "format_polynomial",
     "hessian_nodes",
+    "ldl_elimination",
     "ldl_solve",
     "real_array",
     "real_number",

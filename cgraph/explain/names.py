@@ -34,14 +34,14 @@ class Names:
     def __init__(self, graph: Graph) -> None:
         self.graph = graph
         self.number: dict[Node, int] = {}
-        self.called: dict[str, list[Node]] = {}
+        self.by_name: dict[str, list[Node]] = {}
         for node in graph.nodes:
             if node.args:
                 self.number[node] = len(self.number) + 1
         self.known = dict.fromkeys((*graph.inputs, *graph.nodes))
         for node in self.known:
             if node.name is not None:
-                self.called.setdefault(node.name, []).append(node)
+                self.by_name.setdefault(node.name, []).append(node)
 
     # From a name to nodes.
 
@@ -53,14 +53,14 @@ class Names:
             return [who]
         if not isinstance(who, str):
             raise TypeError(f"a node is given by its name or itself, got {type(who).__name__}: {who!r:.60}")
-        found = self.called.get(who, []) + ([self.graph.outputs[who]] if who in self.graph.outputs else [])
+        found = self.by_name.get(who, []) + ([self.graph.outputs[who]] if who in self.graph.outputs else [])
         if not found:
             raise GraphError(f"nothing in the graph is called {who!r} ({self._known()})")
         return list(dict.fromkeys(found))
 
     def group(self, who: Name | Sequence[Name]) -> list[Node]:
         """The nodes of a group: a name or several in one string, a node, or a sequence of these."""
-        if isinstance(who, str) and who not in self.called and who not in self.graph.outputs:
+        if isinstance(who, str) and who not in self.by_name and who not in self.graph.outputs:
             who = who.replace(",", " ").split()
         if not isinstance(who, (str, Node, Iterable)):
             raise TypeError(f"a group is a name or several, or nodes; got {type(who).__name__}: {who!r:.60}")
@@ -81,7 +81,7 @@ class Names:
         return self.graph.outputs[who] if isinstance(who, str) and who in self.graph.outputs else self.one(who)
 
     def _known(self) -> str:
-        named = [name for name, nodes in self.called.items() if any(node.args for node in nodes)]
+        named = [name for name, nodes in self.by_name.items() if any(node.args for node in nodes)]
         parts = (("inputs", self.graph.input_names), ("named nodes", named), ("outputs", tuple(self.graph.outputs)))
         return "; ".join(f"{what} {_listed(names)}" for what, names in parts if names)
 
@@ -110,10 +110,10 @@ class Names:
         if not node.args:
             return self.short(node) + tags
         name = f"  ({node.name})" if node.name else ""
-        return f"%{self.number[node]} = {self.made(node)}{name}{tags}"
+        return f"%{self.number[node]} = {self.formula(node)}{name}{tags}"
 
-    def made(self, node: Node) -> str:
-        """What an operation computes from its arguments, these by name or %number."""
+    def formula(self, node: Node) -> str:
+        """The operation on its arguments, these by name or %number: `qd0 * dt`."""
         return self._written(node, 1)[0]
 
     def _written(self, node: Node, depth: int) -> tuple[str, int]:

@@ -131,7 +131,7 @@ def why(graph: Graph, output: Name, input: Name, at: Point | None = None, k: int
     if not isinstance(k, int) or isinstance(k, bool) or k < 0:
         raise ValueError(f"k must be a whole number of paths, at least 0, got {k!r}")
     source, sink = names.one(input), names.output(output)
-    to, origin = _said(names, output), _said(names, input)
+    to, origin = _name_of(names, output), _name_of(names, input)
     nodes = between(graph.nodes, [source], [sink])
     inside = set(nodes)
     edges = [Edge(arg, node, slot) for node in nodes for slot, arg in enumerate(node.args) if arg in inside]
@@ -142,40 +142,43 @@ def why(graph: Graph, output: Name, input: Name, at: Point | None = None, k: int
         found = best_paths(nodes, edges, source, sink, k, lambda edge: 1.0) if count else []
         return Why(graph, to, origin, count, tuple([_path(names, to, each, None) for each in found]))
     slopes = dict(zip(edges, edge_slopes(graph, edges, at), strict=True))
-    edges = _alive(names, nodes, edges, slopes, sink)
-    derivative, weight = _sums(nodes, edges, slopes, source, sink)
+    edges = _contributing(names, nodes, edges, slopes, sink)
+    derivative, weight = _path_sums(nodes, edges, slopes, source, sink)
     found = best_paths(nodes, edges, source, sink, k, lambda edge: -math.log(abs(slopes[edge]))) if count else []
     paths = [_path(names, to, each, math.prod([slopes[edge] for edge in each])) for each in found]
     return Why(graph, to, origin, count, tuple(paths), derivative, weight)
 
 
-def _alive(
+def _contributing(
     names: Names, nodes: Sequence[Node], edges: Sequence[Edge], slopes: dict[Edge, float], sink: Node
 ) -> list[Edge]:
-    """The edges that matter: with a partial other than zero, and before nothing but such edges on some way.
+    """The edges with a nonzero partial from which a path of such edges leads to the sink.
 
-    What lies behind a zero, such as the branch that `where` leaves out, may have no derivative: zero wins.
+    What lies behind a zero, such as the branch that `where` does not take, may have no derivative: zero wins.
     """
-    alive = {sink}
+    live = {sink}
     kept = []
     incoming = by_target(edges)
     for node in reversed(nodes):
-        for edge in incoming.get(node, ()) if node in alive else ():
+        for edge in incoming.get(node, ()) if node in live else ():
             slope = slopes[edge]
             if slope == 0.0:
                 continue
             if not math.isfinite(slope):
                 raise GraphError(f"the derivative of {names.line(node)} by {names.text(edge.source)} is {slope} here")
-            alive.add(edge.source)
+            live.add(edge.source)
             kept.append(edge)
     chosen = set(kept)
     return [edge for edge in edges if edge in chosen]
 
 
-def _sums(
+def _path_sums(
     nodes: Sequence[Node], edges: Sequence[Edge], slopes: dict[Edge, float], source: Node, sink: Node
 ) -> tuple[float, float]:
-    """The sum over all paths of the product of slopes, and of its absolute value: forward accumulation."""
+    """Sum over all paths of the product of partials, and of its absolute value, by forward accumulation.
+
+    s_source = 1, s_y = sum over edges (x, y) of (dy/dx) s_x; weights with |dy/dx|.
+    """
     sums = dict.fromkeys(nodes, 0.0)
     weights = dict.fromkeys(nodes, 0.0)
     sums[source] = weights[source] = 1.0
@@ -185,7 +188,7 @@ def _sums(
     return sums.get(sink, 0.0), weights.get(sink, 0.0)
 
 
-def _said(names: Names, who: Name) -> str:
+def _name_of(names: Names, who: Name) -> str:
     return who if isinstance(who, str) else names.text(who)
 
 

@@ -9,7 +9,7 @@ from ..core.graph import Graph
 from ..core.node import Node
 from ..errors import GraphError
 from .names import Name, Names, joined, many
-from .reachability import makers, users
+from .reachability import ancestors, descendants
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ def why_not(graph: Graph, output: Name, input: Name) -> WhyNot:  # noqa: A002 (i
     """
     names = Names(graph)
     source, sink = names.one(input), names.output(output)
-    reached, made_from = users(graph.nodes, [source]), makers([sink])
+    reached, made_from = descendants(graph.nodes, [source]), ancestors([sink])
     to, origin = (who if isinstance(who, str) else names.text(who) for who in (output, input))
     if sink in reached:
         raise GraphError(f"{to} depends on {origin}; cg.why lists the paths")

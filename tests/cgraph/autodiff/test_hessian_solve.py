@@ -12,7 +12,7 @@ import pytest
 
 import cgraph as cg
 from cgraph import GraphError
-from cgraph.autodiff.elimination_order import steps
+from cgraph.autodiff.elimination_order import elimination_steps
 from cgraph.autodiff.hessian_solve import solve_nodes
 from cgraph.autodiff.ldl_solve import SingularError, ldl_solve
 from cgraph.autodiff.rotation_pairs import rotations
@@ -263,7 +263,7 @@ def test_steps_are_those_of_the_order_from_its_end_with_rotations_by_one_angle_a
         for node in order
         if node not in inside
     }
-    plan = steps(arguments, found)
+    plan = elimination_steps(arguments, found)
     assert sorted(len(step) for step in plan if isinstance(step, list)) == [1, 1, 2]
     done: set[cg.Node] = set()
     for step in plan:
@@ -271,7 +271,7 @@ def test_steps_are_those_of_the_order_from_its_end_with_rotations_by_one_angle_a
         assert all(user in done for user, args in arguments.items() if {*taken} & {*args})
         done.update(taken)
     assert done == arguments.keys()
-    assert steps(dict.fromkeys(x, ()), {}) == x[::-1]
+    assert elimination_steps(dict.fromkeys(x, ()), {}) == x[::-1]
 
 
 def test_a_right_hand_side_at_a_product_within_a_rotation_is_carried_too() -> None:
