@@ -45,8 +45,7 @@ from .core.ops import OPS
 from .core.scope import building
 from .core.traversal import topological
 from .explain.names import Names
-from .program import Call, Factor, If, Map, Program, Runner, Solve, Statement, Sum, While, runner
-from .program.runner import Record
+from .program import Call, Factor, If, Map, Program, Record, Runner, Solve, Statement, Sum, While, runner
 from .simplify.builder import Builder, folded
 from .simplify.polynomial import Polynomial, expand, format_polynomial
 from .util.atomic_write import atomic_write
