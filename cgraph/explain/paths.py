@@ -1,4 +1,4 @@
-"""Paths through a graph: how many there are, and the k best, without walking them one by one."""
+"""Paths through a graph: their number and the k best, by one sweep over the nodes."""
 
 from __future__ import annotations
 

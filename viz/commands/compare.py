@@ -47,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
             print(f"{side}: {name}, {len(graph.nodes)} nodes = {both} in both + {len(only)} only {side}")
         print(found)
     if options.svg:
-        together = found.together()
+        together = found.overlay()
         marks = dict(
             zip(
                 [f"only {each}" for each in options.formulations],
