@@ -63,34 +63,15 @@ class Graph:
     nodes: tuple[Node, ...]
 
     def __init__(self, inputs: Sequence[Node], outputs: Mapping[str, Scalar]) -> None:
-        if isinstance(inputs, Node):
-            raise TypeError("inputs must be a sequence of variables, got a single Node; write [x]")
-        self.inputs = tuple(inputs)
-        if not isinstance(outputs, Mapping):
-            raise TypeError(f"outputs must map names to nodes, got {type(outputs).__name__}")
-        for node in self.inputs:
-            if not isinstance(node, Node) or node.op is not VARIABLE:
-                raise TypeError(f"an input must be a variable, got {node!r:.60}")
-        names = self.input_names
-        if len(set(names)) < len(names):
-            twice = next(name for name in names if names.count(name) > 1)
-            raise GraphError(f"input {twice!r} is listed more than once")
-        if not outputs:
-            raise GraphError("a graph needs at least one output")
-        self.outputs = {}
-        for name, value in outputs.items():
-            if not isinstance(name, str) or not name:
-                raise TypeError(f"an output's name must be a non-empty string, got {name!r:.60}")
-            try:
-                self.outputs[name] = as_node(value)
-            except TypeError as error:
-                raise TypeError(f"output {name!r}: {error}") from None
+        self.inputs = _checked_inputs(inputs)
+        self.outputs = _checked_outputs(outputs)
         self.nodes = tuple(topological(self.outputs.values()))
         known = set(self.inputs)
         free = [node.name for node in self.nodes if node.op is VARIABLE and node not in known]
         if free:
             listed = ", ".join(repr(name) for name in sorted(map(str, free)))
-            raise GraphError(f"the outputs need {listed}, not among the inputs ({', '.join(names) or 'none'})")
+            names = ", ".join(self.input_names) or "none"
+            raise GraphError(f"the outputs need {listed}, not among the inputs ({names})")
 
     @property
     def input_names(self) -> tuple[str, ...]:
@@ -227,6 +208,36 @@ class Graph:
     def _output_numbers(self) -> dict[str, int]:
         number = {node: i for i, node in enumerate(self.nodes)}
         return {name: number[node] for name, node in self.outputs.items()}
+
+
+def _checked_inputs(inputs: Sequence[Node]) -> tuple[Node, ...]:
+    if isinstance(inputs, Node):
+        raise TypeError("inputs must be a sequence of variables, got a single Node; write [x]")
+    nodes = tuple(inputs)
+    for node in nodes:
+        if not isinstance(node, Node) or node.op is not VARIABLE:
+            raise TypeError(f"an input must be a variable, got {node!r:.60}")
+    names = [node.name for node in nodes]
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise GraphError(f"input {twice!r} is listed more than once")
+    return nodes
+
+
+def _checked_outputs(outputs: Mapping[str, Scalar]) -> dict[str, Node]:
+    if not isinstance(outputs, Mapping):
+        raise TypeError(f"outputs must map names to nodes, got {type(outputs).__name__}")
+    if not outputs:
+        raise GraphError("a graph needs at least one output")
+    nodes = {}
+    for name, value in outputs.items():
+        if not isinstance(name, str) or not name:
+            raise TypeError(f"an output's name must be a non-empty string, got {name!r:.60}")
+        try:
+            nodes[name] = as_node(value)
+        except TypeError as error:
+            raise TypeError(f"output {name!r}: {error}") from None
+    return nodes
 
 
 def _short(names: Sequence[str]) -> str:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
-import os
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from cgraph import Graph
+from cgraph.extend import atomic_write
 
 from .solution import Reference, from_text
 
@@ -58,16 +56,7 @@ class Store:
             return found
         solution = solve()
         self.folder.mkdir(parents=True, exist_ok=True)
-        # Written aside and moved into place, so that a reader sees all of it or nothing.
-        handle, aside = tempfile.mkstemp(dir=self.folder, suffix=".part")
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                json.dump(_signed(solution), file)
-            Path(aside).replace(path)
-        except BaseException:
-            with contextlib.suppress(OSError):
-                Path(aside).unlink()
-            raise
+        atomic_write(path, json.dumps(_signed(solution)))  # a reader sees all of it or nothing
         return solution
 
 
