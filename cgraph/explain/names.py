@@ -13,7 +13,7 @@ Name = str | Node
 LENGTH = 32  # characters up to which a node is written out; a longer one refers to its parts by their %numbers
 DEPTH = 4  # most operations within one another in such a text
 
-# Symbol between two arguments, and its precedence; all other operations are written as functions.
+# Symbol between two arguments, and how strongly it binds; all other operations are written as functions.
 _INFIX = {
     "less": ("<", 0),
     "less_equal": ("<=", 0),
@@ -25,7 +25,7 @@ _INFIX = {
     "strong_mul": ("*", 2),
     "div": ("/", 2),
 }
-_NEGATION, _WHOLE = 1, 9  # the precedence of a leading minus, and of a name or a function
+_NEGATION, _WHOLE = 1, 9  # how strongly a leading minus binds, and a name or a function
 
 
 class Names:
@@ -141,20 +141,20 @@ class Names:
         return self._written(node, 1)[0]
 
     def _written(self, node: Node, depth: int) -> tuple[str, int]:
-        """Text with at most `depth` operations within one another, and the precedence of the outermost one."""
+        """Text with at most `depth` operations within one another, and how strongly the outermost one binds."""
         parts = [
             self._written(arg, depth - 1) if depth > 1 and arg.args and not arg.name else (self.short(arg), _WHOLE)
             for arg in node.args
         ]
         if node.op.name in _INFIX:
-            symbol, precedence = _INFIX[node.op.name]
+            symbol, strength = _INFIX[node.op.name]
             (a, left), (b, right) = parts
-            a = f"({a})" if left < precedence else a
-            b = f"({b})" if right <= precedence or b.startswith("-") else b
-            return f"{a} {symbol} {b}", precedence
+            a = f"({a})" if left < strength else a
+            b = f"({b})" if right <= strength or b.startswith("-") else b
+            return f"{a} {symbol} {b}", strength
         if node.op.name == "neg":
-            text, precedence = parts[0]
-            return (f"-({text})" if precedence <= _NEGATION or text.startswith("-") else f"-{text}"), _NEGATION
+            text, strength = parts[0]
+            return (f"-({text})" if strength <= _NEGATION or text.startswith("-") else f"-{text}"), _NEGATION
         return f"{node.op.name}({', '.join([text for text, _ in parts])})", _WHOLE
 
 

@@ -19,7 +19,7 @@ from .reachability import between
 EXACT = 10**15  # up to here a number of paths is printed digit by digit
 LENGTH = 90  # characters up to which a path is written out; a longer one is written by its tags
 STEPS = 12  # neighbors in tags that such a path names; of more, the first and the last
-SUMS = ("add", "sub", "neg")  # a path's text leaves these out: their partials are 1 or -1
+SUMS = ("add", "sub", "neg")  # a path's text passes these over: they hand the value on, at most with its sign turned
 
 
 @dataclass(frozen=True, eq=False)
