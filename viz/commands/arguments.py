@@ -23,8 +23,8 @@ def takes_a_scene(command: argparse.ArgumentParser) -> None:
 
 
 def may_ignore(command: argparse.ArgumentParser) -> None:
-    """The argument by which what cannot be modelled is left out."""
-    command.add_argument("--ignore", action="store_true", help="leave out what of a model file cannot be modelled")
+    """The argument by which what cannot be modeled is left out."""
+    command.add_argument("--ignore", action="store_true", help="leave out what of a model file cannot be modeled")
 
 
 def scene_of(options: argparse.Namespace) -> scenes.Scene:

@@ -28,7 +28,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Picture:
-    """SVG whose ink takes the page's colours, see `plot.to_adaptive_svg`.  name: of its file, without suffix."""
+    """SVG whose ink takes the page's colors, see `plot.to_adaptive_svg`.  name: of its file, without suffix."""
 
     name: str
     svg: str

@@ -130,7 +130,7 @@ def _number(value: float | str) -> str:
 
 
 def shares(rows: Sequence[Row]) -> Figure:
-    """Every figure over its bound, a line for each case, on one logarithmic axis; those beyond 1 in another colour."""
+    """Every figure over its bound, a line for each case, on one logarithmic axis; those beyond 1 in another color."""
     names = list(dict.fromkeys(row["case"] for row in rows))
     points = [
         (_share(each), names.index(row["case"]), each["meets"])
@@ -143,11 +143,11 @@ def shares(rows: Sequence[Row]) -> Figure:
         axis = figure.subplots()
         axis.set_xscale("log")
         axis.axvline(1.0, color=theme.LINE, linewidth=1.0)
-        axis.hlines(range(len(names)), FROM, TO, color=theme.GREY, linewidth=0.3)
-        for meets, colour, marker in ((True, theme.BLUE, "o"), (False, theme.SPURIOUS, "X")):
+        axis.hlines(range(len(names)), FROM, TO, color=theme.GRAY, linewidth=0.3)
+        for meets, color, marker in ((True, theme.BLUE, "o"), (False, theme.SPURIOUS, "X")):
             chosen = [(x, y) for x, y, met in points if met is meets]
             x, y = ([point[k] for point in chosen] for k in (0, 1))
-            axis.plot(x, y, marker, color=colour, markersize=4.5, clip_on=False)
+            axis.plot(x, y, marker, color=color, markersize=4.5, clip_on=False)
         axis.set_yticks(range(len(names)), names, fontsize=8)
         axis.tick_params(axis="y", length=0)
         axis.set_xlim(FROM, TO)

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..plots.direct_labels import Line, Panel, bars, labelled
+from ..plots.direct_labels import Line, Panel, bars, labeled
 from ..plots.plot import to_adaptive_svg
 from .document import Block, Document, Paragraph, Picture, Section, Table
 
 Content = Mapping[str, Any]  # what `content()` of the report gives, or its JSON file
 EQUAL, CHOSEN = "equal steps", "chosen steps"
 DRAWN = 3.0  # errors above are no motion of this kind any more
-MAKERS = {"scipy:": 1, "heyoka": 2, "CVODES": 3, "MuJoCo": 4}  # a colour for what comes from one maker; ours is 0
+MAKERS = {"scipy:": 1, "heyoka": 2, "CVODES": 3, "MuJoCo": 4}  # a color for what comes from one maker; ours is 0
 
 
 def work_precision(content: Content) -> Document:
@@ -91,7 +91,7 @@ def _picture(name: str, panels: Sequence[Panel], caption: str, shared: bool = Tr
     """The panels, or words where there is nothing to draw."""
     if not panels:
         return Paragraph("No run gave numbers to draw.")
-    return Picture(name, to_adaptive_svg(labelled(panels, shared=shared)), caption)
+    return Picture(name, to_adaptive_svg(labeled(panels, shared=shared)), caption)
 
 
 def _panels(content: Content, x: Any, name: str) -> tuple[list[Panel], list[str]]:
@@ -121,7 +121,7 @@ def _panels(content: Content, x: Any, name: str) -> tuple[list[Panel], list[str]
 
 
 def _maker(name: str) -> int:
-    return next((colour for begin, colour in MAKERS.items() if name.startswith(begin)), 4)
+    return next((color for begin, color in MAKERS.items() if name.startswith(begin)), 4)
 
 
 def _best(ours: Sequence[Mapping[str, Any]], content: Content) -> list[Mapping[str, Any]]:
@@ -138,10 +138,10 @@ def _best(ours: Sequence[Mapping[str, Any]], content: Content) -> list[Mapping[s
     return [reached[min(times)[1]][1]]
 
 
-def _line(curve: Mapping[str, Any], x: Any, y: Any, colour: int, dashed: bool, before: str = "") -> Line:
+def _line(curve: Mapping[str, Any], x: Any, y: Any, color: int, dashed: bool, before: str = "") -> Line:
     kept = [(x(p), y(p)) for p in curve["points"] if x(p) and y(p) and _drawn(p)]
     name = before + curve["name"].removeprefix("MuJoCo ")
-    return Line(name, [a for a, _ in kept], [b for _, b in kept], colour, dashed)
+    return Line(name, [a for a, _ in kept], [b for _, b in kept], color, dashed)
 
 
 def _step(point: Mapping[str, Any]) -> Any:
@@ -169,7 +169,7 @@ def _drift(point: Mapping[str, Any]) -> Any:
 
 
 def _look(number: int, curve: Mapping[str, Any]) -> tuple[int, bool]:
-    """Colour and dashes of a curve: of ours each has its own, of others each maker."""
+    """Color and dashes of a curve: of ours each has its own, of others each maker."""
     return (number, number >= 5) if curve["ours"] else (_maker(curve["name"]), False)
 
 

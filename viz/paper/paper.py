@@ -38,7 +38,7 @@ TITLES = {
     "chain_rule": "chain rule",
     "chain_rule_literal": "chain rule, literal",
 }
-COLOURS = dict(zip(TITLES.values(), (theme.SPURIOUS, theme.ORANGE, theme.BLUE, theme.PURPLE), strict=True))
+COLORS = dict(zip(TITLES.values(), (theme.SPURIOUS, theme.ORANGE, theme.BLUE, theme.PURPLE), strict=True))
 SNAPSHOTS = 6
 
 
@@ -244,7 +244,7 @@ def figure6() -> Part:
         for way in ways
     }
     groups["the paper [ms]"] = {TITLES[name]: value for name, value in PAPER_MS.items()}
-    picture = plot.bars(groups, COLOURS)
+    picture = plot.bars(groups, COLORS)
     drawn = _pictures("fig6", picture)
     header = (
         "formulation",
@@ -324,7 +324,7 @@ def scaling_of_counts() -> Part:
         "edges": {TITLES[row.formulation]: (row.n, [float(each) for each in row.edges]) for row in rows},
         "one compiled evaluation": {TITLES[row.formulation]: (row.n, row.microseconds) for row in rows},
     }
-    picture = plot.powers(panels, "links n", ["edges", "time [µs]"], colours=COLOURS)
+    picture = plot.powers(panels, "links n", ["edges", "time [µs]"], colors=COLORS)
     drawn = _pictures("scaling", picture)
     header = (
         "formulation",

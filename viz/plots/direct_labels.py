@@ -1,4 +1,4 @@
-"""Log-log plots whose curves carry their names at their ends: no legend, and colours that need not tell them apart."""
+"""Log-log plots whose curves carry their names at their ends: no legend, and colors that need not tell them apart."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLOURS = (theme.BLUE, theme.ORANGE, theme.GREEN, theme.PURPLE, theme.SKY_BLUE)  # seen on white and on black
+COLORS = (theme.BLUE, theme.ORANGE, theme.GREEN, theme.PURPLE, theme.SKY_BLUE)  # seen on white and on black
 GRID: dict[str, Any] = {"color": "#808080", "alpha": 0.25, "linewidth": 0.6}
 LABEL = 8.0  # points
 APART = 1.1  # of a label's height, from one to the next
@@ -29,12 +29,12 @@ ROOM = 0.2  # of the axis, for the names
 
 @dataclass(frozen=True)
 class Line:
-    """A curve.  colour: a number, the same for what belongs together; None: a thin guide in the colour of the text."""
+    """A curve.  color: a number, the same for what belongs together; None: a thin guide in the color of the text."""
 
     name: str
     x: Sequence[float]
     y: Sequence[float]
-    colour: int | None = 0
+    color: int | None = 0
     dashed: bool = False
 
 
@@ -48,7 +48,7 @@ class Panel:
     lines: Sequence[Line]
 
 
-def labelled(panels: Sequence[Panel], *, columns: int = 2, shared: bool = True) -> Figure:
+def labeled(panels: Sequence[Panel], *, columns: int = 2, shared: bool = True) -> Figure:
     """Panels with logarithmic axes, x from large on the left to small on the right.
 
     shared: all panels have the same scales.
@@ -91,14 +91,14 @@ def _decades(low: float, high: float) -> list[float]:
 
 
 def _draw(axis: Axes, line: Line) -> None:
-    if line.colour is None:
+    if line.color is None:
         axis.plot(line.x, line.y, color=theme.LINE, linewidth=0.8, linestyle=(0, (1, 2)))
         return
     axis.plot(
         line.x,
         line.y,
-        color=COLOURS[line.colour % len(COLOURS)],
-        marker="osD^v"[line.colour // len(COLOURS) % 5],
+        color=COLORS[line.color % len(COLORS)],
+        marker="osD^v"[line.color // len(COLORS) % 5],
         markersize=3.2,
         linewidth=1.4,
         linestyle="--" if line.dashed else "-",

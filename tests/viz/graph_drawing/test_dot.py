@@ -169,7 +169,7 @@ def test_argument_order_is_written_where_it_matters() -> None:
     assert marks == {"sub": {"1", "2"}, "add": {None}}
 
 
-def test_a_role_has_its_colour_and_its_line_in_the_legend() -> None:
+def test_a_role_has_its_color_and_its_line_in_the_legend() -> None:
     graph = cg.jvp(cg.gradient(spring()))
     drawn = boxes(graph)
     for i, node in enumerate(graph.nodes):
@@ -184,7 +184,7 @@ def test_the_legend_can_be_left_out() -> None:
     assert "legend" not in to_dot(spring(), legend=False).source
 
 
-def test_marked_nodes_and_the_edges_out_of_them_have_the_one_colour() -> None:
+def test_marked_nodes_and_the_edges_out_of_them_have_the_one_color() -> None:
     graph = spring()
     marked = {node for node in graph.nodes if "potential" in node.tags}
     number = {node: i for i, node in enumerate(graph.nodes)}
@@ -204,12 +204,12 @@ def test_the_legend_names_the_marked_only_when_there_are_some() -> None:
     assert "wrong term" not in to_dot(graph, marked_label="wrong term").source
 
 
-def test_no_role_and_no_tag_has_the_colour_of_the_spurious() -> None:
+def test_no_role_and_no_tag_has_the_color_of_the_spurious() -> None:
     used = {paint.line for paint in theme.ROLES.values()} | {paint.fill for paint in theme.ROLES.values()}
     assert theme.SPURIOUS not in used | set(theme.SERIES)
 
 
-def test_two_groups_of_marked_nodes_have_a_colour_and_a_line_of_the_legend_each() -> None:
+def test_two_groups_of_marked_nodes_have_a_color_and_a_line_of_the_legend_each() -> None:
     graph = spring()
     groups = {
         name: {node for node in graph.nodes if name in node.tags and node.args} for name in ("kinetic", "potential")
@@ -282,8 +282,8 @@ def test_link_10_comes_after_link_9() -> None:
     assert sorted(tags, key=theme.natural_order) == ["base", "link 1", "link 9", "link 10"]
 
 
-def test_tag_colours_depend_on_the_set_of_tags_alone() -> None:
-    assert theme.tag_colours(["b", "a", "c"]) == theme.tag_colours(["c", "b", "a", "a"])
+def test_tag_colors_depend_on_the_set_of_tags_alone() -> None:
+    assert theme.tag_colors(["b", "a", "c"]) == theme.tag_colors(["c", "b", "a", "a"])
 
 
 def test_a_collapsed_tag_is_one_box_that_counts_its_nodes() -> None:

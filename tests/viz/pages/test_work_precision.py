@@ -22,7 +22,7 @@ pytest.importorskip("matplotlib")
 from matplotlib.text import Text
 
 from viz.pages.work_precision import _power, _time, work_precision
-from viz.plots.direct_labels import Line, Panel, bars, labelled
+from viz.plots.direct_labels import Line, Panel, bars, labeled
 from viz.plots.plot import to_adaptive_svg
 
 
@@ -175,7 +175,7 @@ def test_names_lie_apart_and_inside() -> None:
     """Ten curves that end within a few pixels of each other."""
     x = np.geomspace(1e-1, 1e-9, 9)
     lines = [Line(f"contender {k}", x, 1e-3 * (1 + 0.03 * k) * x**-0.2, k) for k in range(10)]
-    figure = labelled([Panel("many", "x", "y", lines)], columns=1)
+    figure = labeled([Panel("many", "x", "y", lines)], columns=1)
     figure.draw_without_rendering()
     (axis,) = figure.axes
     boxes = [Text.get_window_extent(text) for text in axis.texts]  # without the lines that lead to them
@@ -189,7 +189,7 @@ def test_names_lie_apart_and_inside() -> None:
 
 
 def test_a_narrow_axis_has_two_powers_of_ten() -> None:
-    figure = labelled([Panel("narrow", "x", "y", [Line("a", [3e-5, 2e-5], [1.0, 2.0])])], columns=1)
+    figure = labeled([Panel("narrow", "x", "y", [Line("a", [3e-5, 2e-5], [1.0, 2.0])])], columns=1)
     (axis,) = figure.axes
     assert [tick for tick in axis.get_xticks() if 1e-6 < tick < 1e-3] == pytest.approx([1e-4, 1e-5])
 
@@ -199,7 +199,7 @@ def test_the_ink_of_a_picture_follows_the_page() -> None:
     root = ElementTree.fromstring(svg)
     (style,) = [each for each in root.iter("{http://www.w3.org/2000/svg}style") if "prefers" in (each.text or "")]
     assert theme.DARK_TEXT in str(style.text)
-    assert "fill: currentColor" in str(style.text)  # of letters, which have no colour of their own
+    assert "fill: currentColor" in str(style.text)  # of letters, which have no color of their own
     drawn = svg.replace(str(style.text), "")
     for ink in (theme.TEXT, theme.LINE, "#000000", "#FFFFFF"):
         assert ink.lower() not in drawn.lower()
