@@ -69,14 +69,6 @@ def to_adaptive_svg(figure: Figure) -> str:
     return f"{head}<style>svg {{ color: {theme.TEXT}; fill: currentColor; }} {dark}</style>\n <defs>{rest}"
 
 
-def to_png(figure: Figure, dpi: int = 160) -> bytes:
-    """The figure as PNG."""
-    buffer = io.BytesIO()
-    with style():
-        figure.savefig(buffer, format="png", dpi=dpi)
-    return buffer.getvalue()
-
-
 def snapshots(times: Array, positions: Array, instants: Sequence[float], traces: bool = True) -> Figure:
     """Poses of an arm at `instants`, a panel each, with the way each joint has come.
 
