@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from typing import Protocol
 
 from cgraph import Graph, constant
-from cgraph.errors import install
+from cgraph.extend import install
 
 from .. import theme
 from .dot import to_dot

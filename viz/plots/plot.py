@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cgraph.errors import install
+from cgraph.extend import install
 
 from .. import theme
 
