@@ -30,7 +30,7 @@ FONT_SIZE, SMALL_FONT_SIZE = 14, 10  # points
 def tint(color: str, strength: float) -> str:
     """The color mixed with white: 0 is white, 1 the color itself."""
     channels = (int(color[i : i + 2], 16) for i in (1, 3, 5))
-    return "#" + "".join(f"{round(255 - strength * (255 - each)):02X}" for each in channels)
+    return "#" + "".join(f"{round(255 - strength * (255 - channel)):02X}" for channel in channels)
 
 
 @dataclass(frozen=True)

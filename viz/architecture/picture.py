@@ -22,7 +22,7 @@ _FAINT, _CLEAR, _WRONG = (
 )
 
 
-def to_dot(found: Architecture) -> Digraph:
+def to_dot(plan: Architecture) -> Digraph:
     """The drawing of an architecture; each floor is a row, the highest at the top.
 
     A loose module has a dashed frame. An arrow that a longer way implies is faint; one that climbs is vermillion.
@@ -30,26 +30,26 @@ def to_dot(found: Architecture) -> Digraph:
     """
     drawing = digraph("TB")
     drawing.attr(ranksep="0.55", nodesep="0.3")
-    boxes = {name: _box(found, name) for name in found.floors}
-    for floor in sorted(set(found.floors.values()), reverse=True):
+    boxes = {name: _box(plan, name) for name in plan.floors}
+    for floor in sorted(set(plan.floors.values()), reverse=True):
         with drawing.subgraph() as row:
             row.attr(rank="same")
-            draw_boxes(row, [boxes[name] for name, at in found.floors.items() if at == floor])
-    draw_arrows(drawing, [_arrow(found, each) for each in found.arrows])
+            draw_boxes(row, [boxes[name] for name, at in plan.floors.items() if at == floor])
+    draw_arrows(drawing, [_arrow(plan, each) for each in plan.arrows])
     return drawing
 
 
-def _box(found: Architecture, name: str) -> Box:
+def _box(plan: Architecture, name: str) -> Box:
     package, _, room = name.partition(".")
     color = _COLORS.get(package, theme.GRAY)
-    look = _ROOM if name in found.rooms else _LOOSE
-    tooltip = f"{name}, floor {found.floors[name]}"
+    look = _ROOM if name in plan.rooms else _LOOSE
+    tooltip = f"{name}, floor {plan.floors[name]}"
     return Box(name, Paint(package, theme.tint(color, 0.3), color), {**look, "label": room or name, "tooltip": tooltip})
 
 
-def _arrow(found: Architecture, arrow: tuple[str, str]) -> Arrow:
+def _arrow(plan: Architecture, arrow: tuple[str, str]) -> Arrow:
     importer, imported = arrow
-    look = _WRONG if found.climbs(arrow) else _FAINT if found.implied(arrow) else _CLEAR
+    look = _WRONG if plan.climbs(arrow) else _FAINT if plan.implied(arrow) else _CLEAR
     return Arrow(
         importer, imported, {"id": f"{importer}->{imported}", "edgetooltip": f"{importer} imports {imported}", **look}
     )

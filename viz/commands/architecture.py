@@ -32,14 +32,14 @@ def run(options: argparse.Namespace) -> int:
     """Print the rooms by floor, the arrows, and what is wrong; 1 where anything is."""
     if options.out is not None and options.out.suffix not in (".svg", ".png", ".dot"):
         raise ValueError(f"--out must end in .svg, .png or .dot, got {options.out}")
-    found = architecture(options.package)
-    print(json.dumps(found.to_dict(), indent=1) if options.json else found)
+    plan = architecture(options.package)
+    print(json.dumps(plan.to_dict(), indent=1) if options.json else plan)
     if options.out is not None:
-        drawing = to_dot(found)
+        drawing = to_dot(plan)
         if options.out.suffix == ".dot":
             atomic_write(options.out, str(drawing.source))
         else:
             svg = render_svg(drawing)
             atomic_write(options.out, svg if options.out.suffix == ".svg" else render_png(svg))
         say(f"drawn in {options.out}")
-    return 0 if found.sound else 1
+    return 0 if plan.sound else 1

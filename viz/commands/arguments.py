@@ -57,20 +57,20 @@ def whole(text: str) -> int:
 def number(text: str) -> float:
     """A finite number, for argparse."""
     try:
-        found = float(text)
+        value = float(text)
     except ValueError:
-        found = math.nan
-    if not math.isfinite(found):
+        value = math.nan
+    if not math.isfinite(value):
         raise argparse.ArgumentTypeError(f"expected a finite number, got {text!r}")
-    return found
+    return value
 
 
 def positive(text: str) -> float:
     """A positive number, for argparse."""
-    found = number(text)
-    if found <= 0.0:
+    value = number(text)
+    if value <= 0.0:
         raise argparse.ArgumentTypeError(f"expected a positive number, got {text!r}")
-    return found
+    return value
 
 
 def may_draw_and_print(command: argparse.ArgumentParser) -> None:

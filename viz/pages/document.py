@@ -63,7 +63,7 @@ class Document:
 
 def to_html(document: Document) -> str:
     """The document as a page that needs no other file."""
-    sections = [(each.anchor, each.heading, _html(each.blocks)) for each in document.sections]
+    sections = [(section.anchor, section.heading, _html(section.blocks)) for section in document.sections]
     return html.page(document.title, _html(document.introduction), sections)
 
 

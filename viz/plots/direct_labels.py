@@ -62,8 +62,8 @@ def labeled(panels: Sequence[Panel], *, columns: int = 2, shared: bool = True) -
         for axis, panel in zip(axes.flat, panels, strict=False):
             axis.set_xscale("log")
             axis.set_yscale("log")
-            for each in panel.lines:
-                _draw(axis, each)
+            for line in panel.lines:
+                _draw(axis, line)
             axis.set_title(panel.title, fontsize=10, loc="left")
             axis.set_xlabel(panel.x)
             axis.set_ylabel(panel.y)
@@ -114,7 +114,7 @@ def _name(axis: Axes, lines: Sequence[Line]) -> None:
     height, letter = APART * LABEL * scale, LETTER * LABEL * scale
     placed: list[Box] = []
     named = [line for line in lines if len(line.x)]
-    for line, path in sorted(zip(named, paths, strict=True), key=lambda each: -each[1][-1, 1]):
+    for line, path in sorted(zip(named, paths, strict=True), key=lambda pair: -pair[1][-1, 1]):
         end = path[-1]
         width = letter * len(line.name)
         left = min(end[0] + GAP * scale, frame.x1 - width)
@@ -124,10 +124,8 @@ def _name(axis: Axes, lines: Sequence[Line]) -> None:
             for dy in range(-REACH, REACH + 1)
             if left + dx * letter + width <= frame.x1 + 1.0
         ]
-        inside = [
-            each for each in choices if frame.y0 < each.middle - height / 2 and each.middle + height / 2 < frame.y1
-        ]
-        best = min(inside or choices, key=lambda each: each.cost(end, placed, inked, letter))
+        inside = [box for box in choices if frame.y0 < box.middle - height / 2 and box.middle + height / 2 < frame.y1]
+        best = min(inside or choices, key=lambda box: box.cost(end, placed, inked, letter))
         placed.append(best)
         moved = abs(best.middle - end[1]) > 0.6 * height or best.left - end[0] > 2.5 * GAP * scale
         arrow: dict[str, Any] = {"arrowstyle": "-", "color": theme.LINE, "linewidth": 0.5, "shrinkA": 1, "shrinkB": 2}
@@ -155,10 +153,10 @@ class Box(NamedTuple):
     def cost(self, end: Points, placed: Sequence[Box], inked: Points, letter: float) -> float:
         """How bad it is there: on another name is worst, then on curves, then far from the end."""
         names = sum(
-            each.left - 2 * letter < self.right
-            and self.left - 2 * letter < each.right
-            and abs(each.middle - self.middle) < self.height
-            for each in placed
+            other.left - 2 * letter < self.right
+            and self.left - 2 * letter < other.right
+            and abs(other.middle - self.middle) < self.height
+            for other in placed
         )
         on = (
             (inked[:, 0] > self.left - 2)
