@@ -76,7 +76,9 @@ def labeled(panels: Sequence[Panel], *, columns: int = 2, shared: bool = True) -
             axis.set_xlim(high, low * (low / high) ** ROOM)
             axis.set_xticks(_decades(low, high))
             axis.xaxis.minorticks_off()
-        figure.draw_without_rendering()
+        layout = figure.get_layout_engine()
+        assert layout is not None
+        layout.execute(figure)
         figure.set_layout_engine("none")  # the names are placed for axes where they are now
         for axis, panel in zip(axes.flat, panels, strict=False):
             _name(axis, panel.lines)
