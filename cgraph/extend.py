@@ -21,7 +21,7 @@ the table of operations, and `ADJOINT`, `PRIMAL`, `TANGENT` are the roles that a
 `runner` makes it machine code or Python.
 
 **At the edges**: `real_array` and `real_number` check what a caller passed, `thread_count` reads `threads=`,
-`atomic_write` writes a file whole or not at all.
+`atomic_write` writes a file whole or not at all, `install` ends an error about a missing package.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, building, cotangents
@@ -44,6 +44,7 @@ from .core.node import as_node
 from .core.ops import OPS
 from .core.scope import building
 from .core.traversal import topological
+from .errors import install
 from .explain.names import Names
 from .program import Call, Factor, If, Map, Program, Record, Runner, Solve, Statement, Sum, While, runner
 from .simplify.builder import Builder, folded
@@ -82,6 +83,7 @@ __all__ = [
     "format_polynomial",
     "hessian_nodes",
     "ldl_elimination",
+    "install",
     "ldl_solve",
     "real_array",
     "real_number",

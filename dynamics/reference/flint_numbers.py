@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from cgraph.errors import install
+from cgraph.extend import install
 
 Number = Any  # flint.arb: a midpoint of the working precision with a bound on its rounding error
 

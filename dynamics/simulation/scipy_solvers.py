@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import cgraph as cg
-from cgraph.errors import install
+from cgraph.extend import install
 
 from ..integrators import Problem
 from .run_options import Limits
