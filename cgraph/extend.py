@@ -21,7 +21,8 @@ the table of operations, and `ADJOINT`, `PRIMAL`, `TANGENT` are the roles that a
 `runner` makes it machine code or Python.
 
 **At the edges**: `real_array` and `real_number` check what a caller passed, `thread_count` reads `threads=`,
-`atomic_write` writes a file whole or not at all, `install` ends an error about a missing package.
+`atomic_write` writes a file whole or not at all, `install` ends an error about a missing package. `Array` is the type of
+an array of float64.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, building, cotangents
@@ -39,6 +40,7 @@ from .autodiff.hessian_solve import solve_nodes
 from .autodiff.jacobian import hessian_nodes
 from .autodiff.ldl_solve import SingularError, ldl_elimination, ldl_solve
 from .autodiff.reverse import cotangents
+from .core.evaluate import Array
 from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED
 from .core.node import as_node
 from .core.ops import OPS
@@ -59,6 +61,7 @@ __all__ = [
     "PRIMAL",
     "TANGENT",
     "UNLABELLED",
+    "Array",
     "Builder",
     "Call",
     "Factor",

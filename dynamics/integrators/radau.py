@@ -16,9 +16,9 @@ from cgraph import Graph, Node
 from cgraph.extend import Call, Factor, If, Map, Program, Solve, Statement, Sum, While
 
 from .elementwise import SAME, identity, weighted
-from .explicit import moment
-from .problem import Problem
-from .step_control import commit, control, count, first_pass, measured, recorded, registers, scale, trial
+from .explicit import stage_time
+from .problem import Problem, state_jacobian
+from .step_control import accept_step, control, count, first_pass, measured, recorded, registers, scale, trial
 from .tableau import Row
 
 _R6 = math.sqrt(6.0)
@@ -66,10 +66,10 @@ def radau(problem: Problem, dense: bool) -> Program:
 
     body: list[Statement] = [
         first_pass(identity(m), *[Call(Graph([], {f"{k}": 0.0 for k in range(m)}), (), (name,)) for name in powers]),
-        If("accepted", (evaluated(problem.jacobian, "jacobian"), evaluated(problem.rate, "rate"), count(1))),
+        If("accepted", (evaluated(state_jacobian(problem), "jacobian"), evaluated(problem.rate, "rate"), count(1))),
         trial(),
         *_matrices(m),
-        *[moment(f"time{k}", _C[k]) for k in range(3)],
+        *[stage_time(f"time{k}", _C[k]) for k in range(3)],
         *_guess(z, powers),
         *_combined(_T_INVERSE, z, w),
         _begin(),
@@ -77,7 +77,7 @@ def radau(problem: Problem, dense: bool) -> Program:
         _sum_of("x", z[2:], (1.0,), "x_new"),
         *_estimate(problem, z),
         control(4, 0),
-        commit(*_dense(z, powers), Call(SAME, ("h",), ("h_old",))),
+        accept_step(*_dense(z, powers), Call(SAME, ("h",), ("h_old",))),
     ]
     own = {"unit": m * m, "jacobian": m * m, "real": m * m, "complex": 4 * m * m, "pivots": m, "pivots2": 2 * m}
     own |= dict.fromkeys((*z, *w, *f, *powers, "rate", "at", "right0", "error_vector"), m) | {"right12": 2 * m}

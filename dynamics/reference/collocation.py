@@ -16,13 +16,12 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
+from cgraph.extend import Array
 
 from ..systems.system import TIME
 from .flint_numbers import Number, flint, log2_size, working
 from .taylor_integrator import ReferenceFailedError, step_size
 from .taylor_series import Series
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 GUARD = 40  # digits of arithmetic beyond the tolerance: a stiff rate is a small difference of large terms
 SETTLED = 24  # digits beyond the tolerance to which the stages are solved for: a stiff rate loses most of them

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..trajectory import Array
+from cgraph.extend import Array
+
 from .ensemble import Counts
 
 
