@@ -14,7 +14,7 @@ from cgraph.extend import Builder, building, cotangents, hessian_nodes, solve_no
 from ..equations.equations_of_motion import energy
 from ..equations.state_equation import state_equation, state_inputs
 from ..systems.model import Model, as_ode, as_system
-from ..systems.system import TIME, Parameters, System, called
+from ..systems.system import TIME, Parameters, System, call_user_function
 
 ONE = cg.constant(1.0)
 KEPT = 16  # problems whose graphs stay for another run
@@ -65,7 +65,7 @@ class Problem:
             arguments: tuple[Any, ...] = (cg.variables(list(self.states)), cg.variable(TIME), p)
         else:
             arguments = (self.system.q, self.system.qd, self.system.t, p)
-        node = called(what, function, *arguments)
+        node = call_user_function(what, function, *arguments)
         known = set(self.inputs)
         if not isinstance(node, Node) or any(
             each.op.name == "variable" and each not in known for each in topological([node])

@@ -67,7 +67,7 @@ def reference(
         raise ValueError(f"the model has no parameter {unknown[0]!r} (it has {', '.join(inputs.parameters) or 'none'})")
     given = inputs.parameters | {name: parameter_value(name, value) for name, value in (parameters or {}).items()}
     if inputs.applied:
-        given |= dict(zip(inputs.applied, per_coordinate("tau", tau, len(inputs.applied)), strict=True))
+        given |= dict(zip(inputs.applied, per_coordinate("tau", tau, model.coordinates), strict=True))
     graph = state_equation(model)
 
     def solve() -> Reference:

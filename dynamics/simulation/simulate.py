@@ -81,7 +81,7 @@ def simulate(
     limits = limits_of(inputs.states, t_end, dt, first_step, rtol, atol, max_steps)
     values = _parameter_values(inputs.parameters, parameters)
     n = len(inputs.applied)
-    bound = {f"tau{i}": each for i, each in enumerate(per_coordinate("tau", tau, n))} if n else {}
+    bound = {f"tau{i}": each for i, each in enumerate(per_coordinate("tau", tau, model.coordinates))} if n else {}
     problem = problem_of(model, bound | values)
     state = _start(problem, q, qd)
     wanted = (events,) if isinstance(events, Event) else tuple(sequence("events must be", events))

@@ -52,7 +52,9 @@ def starts(
         given["tau"] = _array("tau", tau, n)
     else:
         values = np.asarray(tau).tolist()
-        same |= zip(inputs.applied, per_coordinate("tau", values, n) if inputs.applied else (), strict=True)
+        same |= zip(
+            inputs.applied, per_coordinate("tau", values, model.coordinates) if inputs.applied else (), strict=True
+        )
     counts = {what: len(array) for what, array in given.items() if array.ndim == 2}
     counts |= {f"parameter {name!r}": len(array) for name, array in columns.items()}
     count = _one_count(counts)
