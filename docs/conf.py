@@ -25,10 +25,41 @@ python_maximum_signature_line_length = 100
 def docstring_to_rst(app, what, name, obj, options, lines):
     """Docstrings here are plain text with `code` in single backticks; say that in reStructuredText.
 
-    An indented paragraph is code; one with indented lines below its first keeps its lines.
+    An indented paragraph is code; one with indented lines below its first keeps its lines. A line of dashes makes the
+    line above it the title of a section, as NumPy's docstrings have them: what follows it is a list of terms, each with
+    its indented text, or, under Examples, code.
     """
-    paragraphs = re.split(r"\n\s*\n", "\n".join(lines).strip("\n"))
-    lines[:] = "\n\n".join(map(_paragraph, paragraphs)).split("\n")
+    text = "\n".join(lines).strip("\n")
+    parts = SECTION.split(text)  # text, title, text, title, text, ..
+    blocks = [_prose_paragraphs(parts[0])]
+    for title, body in zip(parts[1::2], parts[2::2]):
+        blocks += [f".. rubric:: {title}", (_code if title == "Examples" else _terms)(body.strip("\n"))]
+    lines[:] = "\n\n".join(blocks).split("\n")
+
+
+SECTION = re.compile(r"^(Parameters|Returns|Raises|Attributes|Examples|Yields|Notes)\n-{3,}$", re.MULTILINE)
+
+
+def _prose_paragraphs(text):
+    return "\n\n".join(map(_paragraph, re.split(r"\n\s*\n", text.strip("\n"))))
+
+
+def _code(text):
+    return "::\n\n" + indent(text, "    ")
+
+
+def _terms(text):
+    """A definition list: a line at the margin is a term, the indented lines below it are its text."""
+    lines = []
+    for line in text.split("\n"):
+        term = bool(line[:1].strip())
+        if term and lines and lines[-1][:1].strip():
+            lines.append(NO_TEXT)
+        lines.append(("" if term else "    ") + _prose(line.strip()) if line.strip() else "")
+    return "\n".join([*lines, *([NO_TEXT] if lines[-1][:1].strip() else [])])
+
+
+NO_TEXT = "    \\ "  # an escaped space: a definition must have a text
 
 
 def _paragraph(text):

@@ -91,12 +91,7 @@ FORMULATIONS: dict[str, Callable[[System], LagrangeTerms]] = {
     formulation.__name__: formulation
     for formulation in (chain_rule, chain_rule_literal, euler_embedded, kinetic_only, kinetic_only_exact)
 }
-"""Formulations of Lagrange's equation by name, right and wrong ones: what `inverse_dynamics` takes.
-
->>> import dynamics as dyn
->>> list(dyn.FORMULATIONS)
-['chain_rule', 'chain_rule_literal', 'euler_embedded', 'kinetic_only', 'kinetic_only_exact']
-"""
+"""Formulations of Lagrange's equation by name, right and wrong ones: what `inverse_dynamics` takes."""
 
 
 def inverse_dynamics(model: Model, formulation: str = "chain_rule", *, simplify: bool = True) -> Graph:
@@ -133,6 +128,8 @@ def inverse_dynamics(model: Model, formulation: str = "chain_rule", *, simplify:
     >>> block = dyn.System(lambda q, qd, t: 0.5 * 4.0 * qd[0] ** 2, ["x"], damping=0.5)
     >>> dyn.inverse_dynamics(block).evaluate({"q0": 0.0, "qd0": 2.0, "qdd0": 3.0})
     {'tau0': 13.0}
+    >>> list(dyn.FORMULATIONS)
+    ['chain_rule', 'chain_rule_literal', 'euler_embedded', 'kinetic_only', 'kinetic_only_exact']
     """
     system = as_system(model)
     terms = _lagrange_terms(system, formulation)
