@@ -21,8 +21,8 @@ the table of operations, and `ADJOINT`, `PRIMAL`, `TANGENT` are the roles that a
 `runner` makes it machine code or Python.
 
 **At the edges**: `real_array` and `real_number` check what a caller passed, `thread_count` reads `threads=`,
-`atomic_write` writes a file whole or not at all, `install` ends an error about a missing package. `Array` is the type of
-an array of float64.
+`atomic_write` writes a file whole or not at all, `install` ends an error about a missing package. `Array` is the type
+of an array of float64.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, building, cotangents
@@ -85,8 +85,8 @@ __all__ = [
     "folded",
     "format_polynomial",
     "hessian_nodes",
-    "ldl_elimination",
     "install",
+    "ldl_elimination",
     "ldl_solve",
     "real_array",
     "real_number",
