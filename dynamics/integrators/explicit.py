@@ -24,7 +24,7 @@ def registers(problem: Problem) -> dict[str, int]:
 
 
 def advance(evaluations: int) -> list[Statement]:
-    """The step is made: the next time, computed from the start so that it does not drift, and a look at the state."""
+    """After a step: the next time, computed from the start so that it does not drift; whether the state is finite."""
     names = ("start", "count", "h", "evaluations")
     start, count, h, done = inputs = cg.variables(names)
     outputs = {"t": start + (count + 1.0) * h, "count": count + 1.0, "evaluations": done + float(evaluations)}
@@ -63,5 +63,5 @@ def explicit(tableau: Tableau, problem: Problem) -> Program:
         body += stage(problem, tableau, k)
     body += [stage_state("x", tableau.b), *advance(len(tableau.b))]
     slopes = {f"slope{k}": problem.size for k in range(len(tableau.b))}
-    own = {"at": problem.size, "at_t": 1, **slopes}
-    return Program({**registers(problem), **own}, body, record=["t", "x"], stop="nonfinite")
+    lengths = {"at": problem.size, "at_t": 1, **slopes}
+    return Program({**registers(problem), **lengths}, body, record=["t", "x"], stop="nonfinite")

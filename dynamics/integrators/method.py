@@ -35,7 +35,7 @@ class Method:
 
     ======================  =========================================================================================
     x (m), p                the state, and the values of the problem's parameters
-    t, start, count, h      the time start + count h, where the steps start, how many are made, and the step [s]
+    t, start, count, h      the time start + count h, where the steps start, how many are done, and the step [s]
     evaluations             of the rate, so far
     nonfinite               0; the run ends when a pass leaves another number
     fresh                   1 before the first pass, where the program has this register

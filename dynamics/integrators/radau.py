@@ -79,11 +79,11 @@ def radau(problem: Problem, dense: bool) -> Program:
         control(4, 0),
         accept_step(*_dense(z, powers), Call(SAME, ("h",), ("h_old",))),
     ]
-    own = {"unit": m * m, "jacobian": m * m, "real": m * m, "complex": 4 * m * m, "pivots": m, "pivots2": 2 * m}
-    own |= dict.fromkeys((*z, *w, *f, *powers, "rate", "at", "right0", "error_vector"), m) | {"right12": 2 * m}
+    lengths = {"unit": m * m, "jacobian": m * m, "real": m * m, "complex": 4 * m * m, "pivots": m, "pivots2": 2 * m}
+    lengths |= dict.fromkeys((*z, *w, *f, *powers, "rate", "at", "right0", "error_vector"), m) | {"right12": 2 * m}
     single = "going turns change change_old newton sum converged h_old again time0 time1 time2"
-    own |= dict.fromkeys(single.split(), 1)
-    return Program({**registers(problem), **own}, body, recorded(dense, 3), record_if="accepted", stop="status")
+    lengths |= dict.fromkeys(single.split(), 1)
+    return Program({**registers(problem), **lengths}, body, recorded(dense, 3), record_if="accepted", stop="status")
 
 
 def _matrices(m: int) -> list[Statement]:
@@ -98,13 +98,13 @@ def _matrices(m: int) -> list[Statement]:
 
     rows: list[list[Node | float]] = []
     for row in range(m):
-        same = [a - each if column == row else -each for column, each in enumerate(jacobian[row])]
+        same = [a - entry if column == row else -entry for column, entry in enumerate(jacobian[row])]
         rows.append([*same, *diagonal(b, row)])
     for row in range(m):
-        same = [a - each if column == row else -each for column, each in enumerate(jacobian[row])]
+        same = [a - entry if column == row else -entry for column, entry in enumerate(jacobian[row])]
         rows.append([*diagonal(-b, row), *same])
     entries: dict[str, Node | float] = {f"{k}": entry for k, entry in enumerate(entry for row in rows for entry in row)}
-    both = Graph([*(each for row in jacobian for each in row), h], entries)
+    both = Graph([*(entry for row in jacobian for entry in row), h], entries)
     return [real, Factor("real", "pivots"), Call(both, ("jacobian", "h"), ("complex",)), Factor("complex", "pivots2")]
 
 

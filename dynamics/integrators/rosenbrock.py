@@ -101,12 +101,14 @@ def rosenbrock(method: Rosenbrock, problem: Problem, dense: bool) -> Program:
         accept_step(*(_dense(method, slopes) if dense else ())),
     ]
     degree = len(method.dense) + 1
-    own = dict.fromkeys(("unit", "jacobian", "matrix"), m * m) | dict.fromkeys(("pivots", "at", "rate", *slopes), m)
-    own |= {"time_slope": m if timed else 0, "at_t": 1, "sum": 1}
+    lengths = dict.fromkeys(("unit", "jacobian", "matrix"), m * m) | dict.fromkeys(("pivots", "at", "rate", *slopes), m)
+    lengths |= {"time_slope": m if timed else 0, "at_t": 1, "sum": 1}
     if dense:
-        own |= {f"{name}{k + 1}": m for name, count in (("h_", degree - 1), ("dense", degree)) for k in range(count)}
+        lengths |= {
+            f"{name}{k + 1}": m for name, count in (("h_", degree - 1), ("dense", degree)) for k in range(count)
+        }
     record = recorded(dense, degree)
-    return Program({**registers(problem), **own}, body, record, record_if="accepted", stop="status")
+    return Program({**registers(problem), **lengths}, body, record, record_if="accepted", stop="status")
 
 
 def _matrix(gamma: float) -> Map:

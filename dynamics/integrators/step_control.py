@@ -109,12 +109,17 @@ def embedded(tableau: Tableau, problem: Problem, dense: bool) -> Program:
     kept = (Map(SAME, (last,), ("slope0",)), Map(SAME, ("rounding_new",), ("rounding",)))
     body.append(accept_step(*(_dense(tableau, problem) if dense else ()), *kept))
     degree = len(tableau.interpolant[0])
-    own = {f"slope{k}": m for k in range(stages + 1 + (len(tableau.extra) if dense else 0))}
-    own |= {f"sum{k}": 1 for k in range(len(tableau.error))} | {"at": m, "at_t": 1, "rounding": m, "rounding_new": m}
+    lengths = {f"slope{k}": m for k in range(stages + 1 + (len(tableau.extra) if dense else 0))}
+    lengths |= {f"sum{k}": 1 for k in range(len(tableau.error))} | {
+        "at": m,
+        "at_t": 1,
+        "rounding": m,
+        "rounding_new": m,
+    }
     if dense:
-        own |= {f"dense{k + 1}": m for k in range(degree)}
+        lengths |= {f"dense{k + 1}": m for k in range(degree)}
     record = recorded(dense, degree)
-    return Program({**registers(problem), **own}, body, record, record_if="accepted", stop="status")
+    return Program({**registers(problem), **lengths}, body, record, record_if="accepted", stop="status")
 
 
 def _arrival(weights: tuple[float, ...]) -> Map:

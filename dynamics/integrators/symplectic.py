@@ -2,7 +2,7 @@
 
 Stages Q_i = q + h sum_j a_ij V_j and P_i = p + h sum_j b_ij F(Q_j, V_j), with the velocity V_i that belongs to P_i at
 Q_i; a step adds h sum_i w_i V_i to q and h sum_i w_i F_i to p (Hairer, Lubich and Wanner, sections II.2 and VI.4). The
-stages are found by iterating on the velocities until they no longer come nearer, each turn a Newton step of
+stages are solved for by iterating on the velocities until they no longer come nearer, each turn a Newton step of
 V_i -> P_i(V_i), so that nothing has to be explicit, separable or quadratic. Sums over many steps are compensated, and
 numbers of the method that float64 does not hold are two, the second what rounding took off the first: a method is only
 symplectic as exactly as w_i b_ij + w_j a_ji = w_i w_j, and what is missing adds up to a drift of the energy (Hairer,
@@ -51,7 +51,7 @@ def _gauss(order: int, a: tuple[Row, ...], w: Row) -> Partitioned:
 
 
 def _over(denominator: int, *numerators: int) -> Row:
-    return tuple([Fraction(each, denominator) for each in numerators])
+    return tuple([Fraction(numerator, denominator) for numerator in numerators])
 
 
 def _root(n: int) -> Fraction:
@@ -91,8 +91,8 @@ def partitioned(method: Partitioned, problem: Problem) -> Program:
 def _of_momenta(method: Partitioned, problem: Problem) -> Program:
     graphs, n = mechanics(problem), problem.size // 2
     stages = range(len(method.w))
-    own = {"q": n, "v": n, "momentum": n, "q_rounding": n, "momentum_rounding": n}
-    own |= {f"{name}{i}": n for name in ("Q", "V", "P", "F", "W") for i in stages}
+    lengths = {"q": n, "v": n, "momentum": n, "q_rounding": n, "momentum_rounding": n}
+    lengths |= {f"{name}{i}": n for name in ("Q", "V", "P", "F", "W") for i in stages}
     read = Call(graphs.momentum, ("x", "t", "p"), ("momentum",))
     start = [_copied(problem.size, ("x",), ("q", "v")), read]
     if graphs.separable and method in (SYMPLECTIC_EULER, VERLET):
@@ -108,30 +108,30 @@ def _of_momenta(method: Partitioned, problem: Problem) -> Program:
         body += [_added("q", "q_rounding", "V", method.w), _added("momentum", "momentum_rounding", "F", method.w)]
         body += [stage_time("later", 1.0), *_settled(graphs)]
     body += [_copied(problem.size, ("q", "v"), ("x",)), *advance(0)]
-    return _program(method, problem, own, [first_pass(*start, *_guess_at_rest(method, "v")), *body])
+    return _program(method, problem, lengths, [first_pass(*start, *_guess_at_rest(method, "v")), *body])
 
 
 def _of_first_order(method: Partitioned, problem: Problem) -> Program:
     if method.a is not method.b:
         raise ValueError("this method advances coordinates and momenta in turn; a system of first order has none")
     m, stages = problem.size, range(len(method.w))
-    own = {"x_rounding": m} | {f"{name}{i}": m for name in ("Q", "V", "W") for i in stages}
+    lengths = {"x_rounding": m} | {f"{name}{i}": m for name in ("Q", "V", "W") for i in stages}
     turn: list[Statement] = []
     for i in stages:
         turn.append(_stage(method.a[i], "x", "V", f"Q{i}"))
         turn.append(Call(problem.rate, (f"Q{i}", f"time{i}", "p"), (f"W{i}",)))
     body = [*_iterated(method, turn), _added("x", "x_rounding", "V", method.w), *advance(0)]
     rate = Call(problem.rate, ("x", "t", "p"), ("W0",))
-    return _program(method, problem, own, [first_pass(rate, *_guess_at_rest(method, "W0")), *body])
+    return _program(method, problem, lengths, [first_pass(rate, *_guess_at_rest(method, "W0")), *body])
 
 
-def _program(method: Partitioned, problem: Problem, own: dict[str, int], body: list[Statement]) -> Program:
+def _program(method: Partitioned, problem: Problem, lengths: dict[str, int], body: list[Statement]) -> Program:
     single = dict.fromkeys(("fresh", "failed", "going", "turns", "change", "speed", "change_old", "later"), 1)
     single |= {f"{name}{i}": 1 for name in ("time", "change", "speed") for i in range(len(method.w))}
     nonfinite, failed = names = cg.variables("nonfinite failed")
     either = Graph(names, {"nonfinite": nonfinite + failed})
     body = [*body, Call(either, ("nonfinite", "failed"), ("nonfinite",))]
-    return Program({**registers(problem), **own, **single}, body, record=["t", "x"], stop="nonfinite")
+    return Program({**registers(problem), **lengths, **single}, body, record=["t", "x"], stop="nonfinite")
 
 
 def _stage(weights: Row, base: str, slope: str, target: str) -> Map:
@@ -145,8 +145,8 @@ def _stage(weights: Row, base: str, slope: str, target: str) -> Map:
 
 def _change(h: Node, slopes: Sequence[Node], weights: Sequence[Fraction]) -> tuple[Node, Node | None]:
     """h * (sum of weight * slope), by the weights as float64 holds them, and by what it leaves of them."""
-    held = [float(each) for each in weights]
-    left = [float(each - Fraction(number)) for each, number in zip(weights, held, strict=True)]
+    held = [float(weight) for weight in weights]
+    left = [float(weight - Fraction(number)) for weight, number in zip(weights, held, strict=True)]
     return h * weighted(slopes, held), h * weighted(slopes, left) if any(left) else None
 
 

@@ -54,7 +54,7 @@ def accelerations(arm: PlanarArm, q: Array, qd: Array, tau: Array) -> Pair:
     """qdd [rad/s^2] of a planar arm under torques tau, (n,). Raises ImportError without python-flint."""
 
     def solved(terms: _Equations, number: Callable[[Any], Number]) -> Vector:
-        torque = [number(each) - c for each, c in zip(tau.tolist(), terms.damping, strict=True)]
+        torque = [number(value) - c for value, c in zip(tau.tolist(), terms.damping, strict=True)]
         beyond = [*torque[1:], number(0)]
         right = [[a - b + r] for a, b, r in zip(torque, beyond, terms.right, strict=True)]
         matrix = flint().arb_mat(terms.matrix)
@@ -84,10 +84,10 @@ def _bounded(
                 x = solved(_terms(number, arm, q, qd), number)
             except ZeroDivisionError:  # flint: the matrix cannot be told from a singular one
                 x = []
-            largest = max([abs(float(each.mid())) for each in x], default=math.nan)
-            if x and max(float(each.rad()) for each in x) <= LOST * largest:
-                high = [float(each.mid()) for each in x]
-                low = [float((each - h).mid()) for each, h in zip(x, high, strict=True)]
+            largest = max([abs(float(value.mid())) for value in x], default=math.nan)
+            if x and max(float(value.rad()) for value in x) <= LOST * largest:
+                high = [float(value.mid()) for value in x]
+                low = [float((value - h).mid()) for value, h in zip(x, high, strict=True)]
                 return Pair(np.array(high), np.array(low))
         digits *= 2
     raise ArithmeticError(f"{MOST} digits are not enough for an arm of {len(arm.links)} links")
@@ -97,12 +97,12 @@ def _terms(number: Callable[[Any], Number], arm: PlanarArm, q: Array, qd: Array)
     n = len(arm.links)
     theta, omega = _running(number, q), _running(number, qd)
     mass, length, center, inertia = (
-        [number(each) for each in row]
+        [number(value) for value in row]
         for row in zip(*[(link.mass, link.length, link.center, link.inertia) for link in arm.links], strict=True)
     )
     beyond = [*list(itertools.accumulate(reversed(mass)))[::-1][1:], number(0)]  # mass carried at the far end
     first = [m * c + b * s for m, c, b, s in zip(mass, center, beyond, length, strict=True)]
-    sin, cos = [each.sin() for each in theta], [each.cos() for each in theta]
+    sin, cos = [angle.sin() for angle in theta], [angle.cos() for angle in theta]
     matrix = [[number(0)] * n for _ in range(n)]
     right = [-number(arm.gravity) * f * s for f, s in zip(first, sin, strict=True)]
     for i in range(n):
@@ -118,7 +118,7 @@ def _terms(number: Callable[[Any], Number], arm: PlanarArm, q: Array, qd: Array)
 
 
 def _running(number: Callable[[Any], Number], values: Array) -> Vector:
-    return list(itertools.accumulate([number(each) for each in values.tolist()]))
+    return list(itertools.accumulate([number(value) for value in values.tolist()]))
 
 
 def _dot(a: Sequence[Number], b: Sequence[Number]) -> Number:

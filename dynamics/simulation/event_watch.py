@@ -46,7 +46,7 @@ class EventWatch:
         """Of each event by name, with states split after `half` numbers into q and qd."""
         result = {}
         for number, event in enumerate(self.events):
-            own = [(t, x) for k, t, x in self._crossings if k == number]
-            states = np.array([x for _, x in own]).reshape(len(own), self.problem.size)
-            result[event.name] = Crossings(np.array([t for t, _ in own]), states[:, :half], states[:, half:])
+            matching = [(t, x) for k, t, x in self._crossings if k == number]
+            states = np.array([x for _, x in matching]).reshape(len(matching), self.problem.size)
+            result[event.name] = Crossings(np.array([t for t, _ in matching]), states[:, :half], states[:, half:])
         return result

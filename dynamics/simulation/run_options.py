@@ -44,7 +44,7 @@ class RunOptions:
     t_eval : array_like, optional
         Increasing times in [0, t_end] to record, (T,) [s]; by default every step. Chosen steps are not changed by it.
     first_step : float, optional
-        The first chosen step [s], in place of the one that is found by trial.
+        The first chosen step [s], in place of one chosen by trial.
     max_steps : float
         Steps, rejected ones included, after which the run stops.
     backend : str
@@ -55,7 +55,7 @@ class RunOptions:
     Raises
     ------
     TypeError, ValueError
-        Naming the argument, what was needed and what was given.
+        Naming the argument, what was needed and what it is.
 
     Examples
     --------

@@ -135,7 +135,7 @@ def simulate(
 
 
 def _compiled(problem: Problem, options: RunOptions, *, watched: bool) -> Integration:
-    """The run before its first step, its machine code made. Watched steps need their insides, or all of them."""
+    """The run before its first step, compiled. Watched, it needs its dense output, or every equal step."""
     solver = options.scipy_solver
     if solver is not None:
         return ScipyIntegration(scipy_solver(problem, solver, options.backend), options)

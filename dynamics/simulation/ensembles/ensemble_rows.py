@@ -40,7 +40,7 @@ class EnsembleRows:
             )
 
     def stats(self, method: str, seconds: float) -> EnsembleStats:
-        """How it went. Rows that have not come are made NaN."""
+        """How it went. Rows that have not come become NaN."""
         self.rows[~self.arrived] = math.nan
         success = np.array([status == REACHED for status in self.status])
         return EnsembleStats(

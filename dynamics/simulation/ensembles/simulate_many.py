@@ -55,7 +55,7 @@ def simulate_many(
     backend: str = "auto",
     progress: bool | None = None,
 ) -> Ensemble:
-    """The motions of a system from N starts at t = 0 to t_end, by one program that is made once.
+    """The motions of a system from N starts at t = 0 to t_end, by one program that is compiled once.
 
     Where the steps do not branch on the state (euler, rk4; verlet and symplectic_euler of a constant mass matrix and
     forces that do not depend on qd), trajectories run side by side, a vector of them at a time; else one by one. One
@@ -179,7 +179,7 @@ def _chunks(start: Starts, parameters: Sequence[str], width: int) -> list[Chunk]
 
 
 def _width(count: int, chunk: int | None, workers: int | Map, *, whole: bool) -> int:
-    """Trajectories in a chunk; whole: of whole vectors, so that a trajectory has the same neighbours in any chunk."""
+    """Trajectories in a chunk; whole: of whole vectors, so that a trajectory has the same neighbors in any chunk."""
     if chunk is None:
         chunk = min(LARGEST, math.ceil(count / (SHARES * (UNKNOWN if callable(workers) else workers))))
     return math.ceil(chunk / VECTOR) * VECTOR if whole else int(chunk)

@@ -26,7 +26,7 @@ KEPT = 8  # programs that a process keeps ready
 
 @dataclass(frozen=True)
 class Task:
-    """The function that runs chunks. It goes to other processes as it is, and is made ready there once."""
+    """The function that runs chunks. It goes to other processes as it is, and is compiled there once."""
 
     pickled: bytes  # a StepProgram; that it is the same as another's is seen without reading it
     options: RunOptions
@@ -85,7 +85,7 @@ def _vector_code(pickled: bytes, backend: str) -> VectorCode:
     one_pass = runner(programs.one_pass, backend)
     for code in (start, one_pass):
         if code is not None:
-            code.run_many(np.zeros((code.size, 0)), 0)  # the code for vectors is made at its first use
+            code.run_many(np.zeros((code.size, 0)), 0)  # the code for vectors is compiled at its first use
     return VectorCode(program, start, one_pass)
 
 

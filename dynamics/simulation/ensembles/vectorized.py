@@ -28,7 +28,7 @@ class VectorizedIntegration:
     """One run of the trajectories of a chunk, into a part, from its row `at` on.
 
     A trajectory whose state is no longer finite is noticed after the block in which it stopped being so. From there its
-    lane repeats a neighbour, since NaN is slow to compute with, and its rows are made NaN in the end.
+    lane repeats a neighbor, since NaN is slow to compute with, and its rows become NaN in the end.
     """
 
     def __init__(self, code: VectorCode, chunk: Chunk, part: Part, at: int) -> None:
@@ -51,7 +51,7 @@ class VectorizedIntegration:
         self.part.dt[self._live] = np.maximum(self.part.dt[self._live], grid.h)
 
     def advance(self, steps: int, every: int, due: bool) -> None:
-        """Make steps; those after each `every`th are rows if they are due."""
+        """Make steps; those after every `every`th are rows if they are due."""
         if not self._live.any():
             return
         before, m = self._memories.copy(), self.program.size
@@ -69,7 +69,7 @@ class VectorizedIntegration:
         self._done += steps
 
     def end(self) -> None:
-        """All steps are made."""
+        """Count the steps, and end what has failed."""
         live, evaluations = self._live, self.runner.read(self._memories, "evaluations")[0]
         self.part.steps[live], self.part.evaluations[live] = self._done, evaluations[live]
         for k in np.flatnonzero(~live):

@@ -1,4 +1,4 @@
-"""simulate_many: every trajectory is its own, whoever runs it and whatever its neighbours do."""
+"""simulate_many: every trajectory is its own, whoever runs it and whatever its neighbors do."""
 
 import math
 from typing import Any
@@ -148,7 +148,7 @@ def test_one_that_leaves_the_numbers_is_nan_from_there_and_says_where(method: st
         assert len(result.t) - finite.all(axis=1).sum() == np.isnan(result.q[k, :, 0]).sum()
 
 
-def test_a_neighbour_that_is_lost_is_not_felt_in_an_arm() -> None:
+def test_a_neighbor_that_fails_is_not_felt_in_an_arm() -> None:
     model, q, qd = arms(16)
     calm = simulate_many(model, q, qd, 0.5)
     qd[3], q[11] = 1e200, 1e9
@@ -160,7 +160,7 @@ def test_a_neighbour_that_is_lost_is_not_felt_in_an_arm() -> None:
     assert result.q[3, 0].tolist() == q[3].tolist()
 
 
-def test_all_may_be_lost() -> None:
+def test_all_may_fail() -> None:
     result = simulate_many(runaway(), np.zeros((3, 2)), [0.0, 1.0], 9.0, dt=0.1)
     assert not result.stats.success.any()
     assert len(set(result.stats.message)) == 1
