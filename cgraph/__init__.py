@@ -1,5 +1,7 @@
 """cgraph: computational graphs of equations, with forward and reverse automatic differentiation."""
 
+from typing import TYPE_CHECKING as _TYPES
+
 from .autodiff.forward import jvp
 from .autodiff.hessian_solve import hessian_solve
 from .autodiff.jacobian import hessian, jacobian
@@ -7,9 +9,11 @@ from .autodiff.reverse import gradient, vjp
 from .codegen import Compiled, clear_cache, compile
 from .codegen.c import CSource, to_c
 from .core.counts import Counts
+from .core.functions import function as _function
 from .core.graph import Graph
 from .core.node import Edge, Node, constant, variable, variables, with_name
 from .core.ops import (
+    OPS as _OPS,
     abs_ as abs,
     acos,
     asin,
@@ -110,3 +114,11 @@ __all__ = [
     "why_not",
     "with_name",
 ]
+
+if not _TYPES:
+
+    def __getattr__(name: str) -> object:
+        """The function of a row that was added to the operation table: `cg.cbrt` of the row "cbrt"."""
+        if name in _OPS:
+            return globals().setdefault(name, _function(_OPS[name]))
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -15,7 +15,7 @@ triangle of second derivatives, all as nodes.
 `SingularError`.
 
 **Read**: `expand` and `format_polynomial` write a polynomial out, `Names` tells nodes in a person's words, `OPS` is
-the table of operations, and `ADJOINT`, `PRIMAL`, `TANGENT` are the roles that a label may have.
+the table of operations, a row of it an `Op`, and `ADJOINT`, `PRIMAL`, `TANGENT` are the roles that a label may have.
 
 **Run**: a `Program` is graphs over registers of numbers (`Call`, `Map`, `Sum`, `Factor`, `Solve`, `If`, `While`), and
 `runner` makes it machine code or Python.
@@ -43,6 +43,7 @@ from .autodiff.reverse import cotangents
 from .core.evaluate import Array
 from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED
 from .core.node import as_node
+from .core.operation import Op
 from .core.ops import OPS
 from .core.scope import building
 from .core.traversal import topological
@@ -68,6 +69,7 @@ __all__ = [
     "If",
     "Map",
     "Names",
+    "Op",
     "Polynomial",
     "Program",
     "Record",

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from ..core.graph import Graph
 from ..core.label import TANGENT
 from ..core.node import Node, as_node, variable
-from ..core.ops import strong_mul
+from ..core.ops import zero_safe_mul
 from ..core.scope import building
 from ..core.traversal import topological
 from ..simplify.builder import Builder
@@ -48,7 +48,7 @@ def tangents(seeds: Mapping[Node, Node], outputs: Iterable[Node], build: Builder
             total: Node | None = None
             for arg, partial in zip(node.args, node.op.partials(node, *node.args), strict=True):
                 if arg in dots:
-                    term = (strong_mul if node.op.selects else _mul)(partial, dots[arg])
+                    term = (zero_safe_mul if node.op.selects else _mul)(partial, dots[arg])
                     total = term if total is None else total + term
             assert total is not None
             if total.value != 0.0:

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from ..core.graph import Graph
 from ..core.label import ADJOINT, UNLABELLED, Label
 from ..core.node import Node, as_node, variable
-from ..core.ops import strong_mul
+from ..core.ops import zero_safe_mul
 from ..core.scope import building
 from ..core.traversal import topological
 from ..simplify.builder import Builder
@@ -64,7 +64,7 @@ def cotangents(
             terms: dict[Node, Node] = {}  # by argument first, so that x * x gives 2 * (bar * x)
             for arg, partial in zip(node.args, node.op.partials(node, *node.args), strict=True):
                 if arg in active:
-                    term = strong_mul(bar, partial) if guard else bar * partial
+                    term = zero_safe_mul(bar, partial) if guard else bar * partial
                     terms[arg] = terms[arg] + term if arg in terms else term
             for arg, term in terms.items():
                 if guard:

@@ -4,37 +4,17 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any, NamedTuple, NoReturn
 from weakref import WeakValueDictionary
 
 import numpy as np
 
 from .label import INPUT, UNLABELLED, Label, SourceLine, label
+from .operation import Op as Op  # noqa: PLC0414 (beside the nodes that it makes)
 from .scope import current
 
 _INPUT = label(roles=frozenset({INPUT}))
-
-
-@dataclass(frozen=True, eq=False)
-class Op:
-    """One row of the operation table (`ops.py`): all that any part of the library knows of an operation."""
-
-    name: str
-    arity: int
-    scalar: Callable[..., float]  # value on floats, IEEE results where `math` would raise
-    array: Callable[..., Any]  # value on arrays
-    partials: Callable[..., tuple[Node | float, ...]]  # of (output, *arguments), one for each argument
-    python: str  # text in generated Python, over floats
-    numpy: str  # text in generated NumPy, over arrays
-    symbol: str  # text in a drawing
-    samples: tuple[tuple[float, ...], ...] = ()  # points inside the domain, away from kinks
-    commutative: bool = False
-    selects: bool = False  # an unused argument must not reach the result, not even as NaN
-
-    def __repr__(self) -> str:
-        return f"<op {self.name}>"
 
 
 def _no_partials(*_: Node) -> tuple[Node | float, ...]:
@@ -42,7 +22,7 @@ def _no_partials(*_: Node) -> tuple[Node | float, ...]:
 
 
 def _leaf(name: str) -> Op:
-    return Op(name, 0, float, float, _no_partials, "", "", "")
+    return Op(name, 0, float, float, _no_partials)
 
 
 VARIABLE = _leaf("variable")

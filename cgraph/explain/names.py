@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from ..core.graph import Graph
 from ..core.node import CONSTANT, Node
+from ..core.operation import SUM
 from ..core.source_lines import lines_text
 from ..errors import GraphError
 
@@ -13,19 +14,7 @@ Name = str | Node
 LENGTH = 32  # characters up to which a node is written out; a longer one refers to its parts by their %numbers
 DEPTH = 4  # most operations within one another in such a text
 
-# Symbol between two arguments, and how strongly it binds; all other operations are written as functions.
-_INFIX = {
-    "less": ("<", 0),
-    "less_equal": ("<=", 0),
-    "equal": ("==", 0),
-    "not_equal": ("!=", 0),
-    "add": ("+", 1),
-    "sub": ("-", 1),
-    "mul": ("*", 2),
-    "strong_mul": ("*", 2),
-    "div": ("/", 2),
-}
-_NEGATION, _WHOLE = 1, 9  # how strongly a leading minus binds, and a name or a function
+_NEGATION, _WHOLE = SUM, 9  # how strongly a leading minus binds, and a name or a function
 
 
 class Names:
@@ -146,13 +135,13 @@ class Names:
             self._written(arg, depth - 1) if depth > 1 and arg.args and not arg.name else (self.short(arg), _WHOLE)
             for arg in node.args
         ]
-        if node.op.name in _INFIX:
-            symbol, strength = _INFIX[node.op.name]
+        if node.op.infix is not None:
+            symbol, strength = node.op.infix
             (a, left), (b, right) = parts
             a = f"({a})" if left < strength else a
             b = f"({b})" if right <= strength or b.startswith("-") else b
             return f"{a} {symbol} {b}", strength
-        if node.op.name == "neg":
+        if node.op.signs == (-1,):
             text, strength = parts[0]
             return (f"-({text})" if strength <= _NEGATION or text.startswith("-") else f"-{text}"), _NEGATION
         return f"{node.op.name}({', '.join([text for text, _ in parts])})", _WHOLE

@@ -19,7 +19,6 @@ from .reachability import between
 EXACT = 10**15  # up to here a number of paths is printed digit by digit
 LENGTH = 90  # characters up to which a path is written out; a longer one is written by its tags
 STEPS = 12  # neighbors in tags that such a path names; of more, the first and the last
-SUMS = ("add", "sub", "neg")  # a path's text passes these over: they hand the value on, at most with its sign turned
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,7 +249,7 @@ def _name_of(names: Names, who: Name) -> str:
 def _path(names: Names, output: str, edges: tuple[Edge, ...], value: float | None) -> Path:
     if not edges:
         return Path(edges, value, output)
-    inner = [edge.target for edge in edges if edge.target.name or edge.target.op.name not in SUMS]
+    inner = [edge.target for edge in edges if edge.target.name or not edge.target.op.signs]  # sums hand the value on
     start, end = names.text(edges[0].source), [] if inner and names.text(inner[-1]) == output else [output]
     text = " -> ".join([start, *[names.text(node) for node in inner], *end])
     tags = sorted({tag for node in inner for tag in node.tags})

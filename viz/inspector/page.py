@@ -13,6 +13,7 @@ from cgraph import Graph, Node
 from .. import theme
 from ..pages import html
 from .content import Motion, Table, Version
+from .operations import operations
 from .record import record
 
 SCRIPTS = ("values.js", "paths.js", "formula.js", "picture.js", "arm.js", "app.js")
@@ -93,7 +94,7 @@ def page(
     if motion is not None:
         motion.check()
     data = {"title": title, "introduction": "" if isinstance(graph, Graph) else about, **record(versions, motion)}
-    script = "\n".join(_asset(name) for name in SCRIPTS)
+    script = scripts()
     # "<" in the data could end the element that holds it
     held = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
     shown = "".join(html.table(each.caption, each.header, each.rows) for each in tables)
@@ -107,6 +108,11 @@ def page(
         f'<script>"use strict";\n{script}\nstart();</script>\n'
         "</body>\n</html>\n"
     )
+
+
+def scripts() -> str:
+    """The page's JavaScript: operations from their table, then the files."""
+    return "\n".join([operations(), *[_asset(name) for name in SCRIPTS]])
 
 
 def _asset(name: str) -> str:

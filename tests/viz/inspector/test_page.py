@@ -19,7 +19,7 @@ from cgraph.core.ops import OPS
 from dynamics.scenes.inspection import FORMULATIONS, inspection
 from viz import cli
 from viz.inspector import Motion, Table, Version
-from viz.inspector.page import SCRIPTS, _asset
+from viz.inspector.page import scripts
 from viz.inspector.record import record, slopes
 
 JAVASCRIPT_LIBM = 1e-12  # relative: a browser's sin and exp may differ from the C library's in the last bits
@@ -143,7 +143,7 @@ def test_marked_nodes_have_clusters_of_their_own():
 
 def test_slopes_are_the_differences_of_every_operation():
     for op in OPS.values():
-        program = slopes(op.name)
+        program = slopes(op)
         for sample in op.samples:
             work = [op.scalar(*sample), *sample]
             for line in program["code"]:
@@ -163,7 +163,7 @@ def run_script(program: str, given: object) -> object:
     node = shutil.which("node")
     if node is None:
         pytest.skip("there is no node on PATH")
-    text = "\n".join([*map(_asset, SCRIPTS), f"const given = {json.dumps(given)};", program])
+    text = "\n".join([scripts(), f"const given = {json.dumps(given)};", program])
     done = subprocess.run([node, "-"], input=text, capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
