@@ -11,8 +11,8 @@ copies nodes through a builder, `topological` gives all nodes that some nodes re
 **Differentiate**: `cotangents` pulls from outputs, `tangents` pushes from inputs, `hessian_nodes` gives the lower
 triangle of second derivatives, all as nodes.
 
-**Solve**: `solve_nodes` is `cg.hessian_solve` on nodes, `ldl_solve` the dense factorisation; both raise
-`SingularError`.
+**Solve**: `solve_nodes` is `cg.hessian_solve` on nodes, `ldl_solve` the dense factorization; both raise
+`SingularError`. `ldl_elimination` does the same over any numbers.
 
 **Read**: `expand` and `format_polynomial` write a polynomial out, `Names` tells nodes in a person's words, `OPS` is
 the table of operations, a row of it an `Op`, and `ADJOINT`, `PRIMAL`, `TANGENT` are the roles that a label may have.

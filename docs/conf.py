@@ -17,9 +17,7 @@ exclude_patterns = ["_build"]
 html_theme = "furo"
 html_title = "cgraph"
 
-suppress_warnings = [
-    "ref.python"
-]  # a word of a type, such as the n of "n sequences of Node", that is also some attribute
+suppress_warnings = ["ref.python"]  # a word of a type that is some attribute: the n of "n sequences of Node"
 napoleon_google_docstring = False
 napoleon_custom_sections = [("Attributes", "params_style")]  # a table, not members beside those that autodoc lists
 autodoc_member_order = "bysource"

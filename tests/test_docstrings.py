@@ -19,8 +19,8 @@ from cgraph.errors import install
 
 ROOT = Path(__file__).parents[1]
 PUBLIC = (cg, cgraph.extend, dyn, viz)
-# What an example may use without importing it, and how it is compared: `...` stands for any text.
-NAMES = {"cg": cg, "dyn": dyn, "viz": viz, "np": np, "__name__": "__main__"}
+# What an example may use without importing it, beside the names of its module; in its output `...` is any text.
+NAMES = {"cg": cg, "dyn": dyn, "viz": viz, "np": np}
 FLAGS = doctest.ELLIPSIS
 
 # Public names whose docstrings lack a part that `lacks` asks for, by package. May only shrink.
@@ -57,7 +57,7 @@ def examples() -> list[doctest.DocTest]:
 
 def run(example: doctest.DocTest) -> None:
     """Raises AssertionError for another output; skips where an optional package is missing that the error names."""
-    example.globs = dict(NAMES)
+    example.globs = NAMES | example.globs
     try:
         doctest.DebugRunner(optionflags=FLAGS).run(example)
     except doctest.DocTestFailure as failure:
@@ -115,7 +115,7 @@ def lacks(value: type | FunctionType) -> list[str]:
         taken = list(inspect.signature(value).parameters)
         if explained is None:
             missing.append("Parameters")
-        elif documented(explained) != taken:
+        elif sorted(documented(explained)) != sorted(taken):
             missing.append(f"Parameters for {', '.join(taken)} (it has {', '.join(documented(explained))})")
     return missing
 

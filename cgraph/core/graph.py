@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import GraphError
 from .counts import Counts, count
+from .edge import Edge
 from .evaluate import Value, evaluate
 from .label import label
 from .listing import listing
 from .networkx_queries import to_networkx
-from .node import CONSTANT, VARIABLE, Edge, Node, Op, Scalar, as_node, variable
+from .node import CONSTANT, VARIABLE, Node, Op, Scalar, as_node, variable
 from .ops import OPS
 from .traversal import rebuild, topological
 

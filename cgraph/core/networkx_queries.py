@@ -6,7 +6,8 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from .node import Edge, Node
+from .edge import Edge
+from .node import Node
 
 if TYPE_CHECKING:
     import networkx

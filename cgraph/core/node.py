@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Sequence
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 from weakref import WeakValueDictionary
 
 import numpy as np
@@ -206,36 +205,6 @@ def register(op: Op, ufunc: Any = None) -> None:
         _BY_UFUNC[ufunc or op.array] = op
 
 
-class Edge(NamedTuple):
-    """One use of a node by another.
-
-    Attributes
-    ----------
-    source, target : Node
-        The argument, and the operation that uses it.
-    slot : int
-        Which argument of the target it is, from 0.
-    partial : Node
-        d target / d source through this slot alone.
-
-    Examples
-    --------
-    >>> import cgraph as cg
-    >>> x, y = cg.variables("x y")
-    >>> cg.Edge(x, x * y, 0).partial
-    <node variable y>
-    """
-
-    source: Node
-    target: Node
-    slot: int
-
-    @property
-    def partial(self) -> Node:
-        """d target / d source through this slot alone, as a node."""
-        return as_node(self.target.op.partials(self.target, *self.target.args)[self.slot])
-
-
 _constants: WeakValueDictionary[tuple[float, float], Node] = WeakValueDictionary()
 _variables: WeakValueDictionary[str, Node] = WeakValueDictionary()
 
@@ -317,29 +286,6 @@ def variable(name: str) -> Node:
     return node
 
 
-def variables(names: str | Sequence[str]) -> list[Node]:
-    """Several variables.
-
-    Parameters
-    ----------
-    names : str or sequence of str
-        Names, in one string with spaces or commas between them, or one by one.
-
-    Returns
-    -------
-    list of Node
-        The variables, in this order.
-
-    Examples
-    --------
-    >>> import cgraph as cg
-    >>> cg.variables("q0 q1")
-    [<node variable q0>, <node variable q1>]
-    """
-    split = names.replace(",", " ").split() if isinstance(names, str) else names
-    return [variable(name) for name in split]
-
-
 def as_node(value: Scalar) -> Node:
     """The node itself, or the constant of a number.
 
@@ -360,32 +306,6 @@ def as_node(value: Scalar) -> Node:
     <node 1.0>
     """
     return value if isinstance(value, Node) else constant(value)
-
-
-def with_name(node: Node, name: str) -> Node:
-    """A copy of an operation with a name, for listings, drawings and explanations.
-
-    Parameters
-    ----------
-    node : Node
-        An operation. A leaf is returned as it is: a variable has its name already, and a constant is shared.
-    name : str
-        What to call it.
-
-    Returns
-    -------
-    Node
-        The copy.
-
-    Examples
-    --------
-    >>> import cgraph as cg
-    >>> m, v = cg.variables("m v")
-    >>> cg.with_name(m * v, "p")
-    <node mul p>
-    """
-    node = as_node(node)
-    return Node(node.op, node.args, node.label, name=name) if node.args else node
 
 
 def apply(op: Op, *args: Scalar) -> Node:

@@ -6,8 +6,9 @@ import math
 import numbers
 from collections.abc import Mapping, Sequence
 
+from ..core.edge import Edge
 from ..core.graph import Graph
-from ..core.node import Edge, Node
+from ..core.node import Node
 from ..errors import GraphError
 
 Point = Mapping[str, float]

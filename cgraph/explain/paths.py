@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable, Sequence
 from operator import itemgetter
 
-from ..core.node import Edge, Node
+from ..core.edge import Edge
+from ..core.node import Node
 
 
 def path_count(nodes: Sequence[Node], edges: Sequence[Edge], source: Node, sink: Node) -> int:

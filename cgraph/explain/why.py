@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..core.edge import Edge
 from ..core.graph import Graph
-from ..core.node import Edge, Node
+from ..core.node import Node
 from ..core.source_lines import lines_text
 from ..errors import GraphError
 from .edge_partials import Point, edge_slopes

@@ -89,16 +89,16 @@ class Loop:
         return self._runner.run_many(self._memory(X, 2), passes, every).rows
 
     def _memory(self, x: ArrayLike, dimensions: int) -> Array:
-        given = real_array("x", x)
+        values = real_array("x", x)
         count = len(self.graph.inputs)
-        if given.ndim != dimensions or given.shape[0] != count:
+        if values.ndim != dimensions or values.shape[0] != count:
             wanted = f"({count},)" if dimensions == 1 else f"({count}, N)"
-            raise GraphError(f"x must have shape {wanted}, one row for each input, got {given.shape}")
-        registers = {"carry": given[self._moving], "held": given[self._held]}
+            raise GraphError(f"x must have shape {wanted}, one row for each input, got {values.shape}")
+        registers = {"carry": values[self._moving], "held": values[self._held]}
         if self.invariants is not None:
-            values = self.invariants.evaluate(dict(zip(self.invariants.input_names, given[self._held], strict=True)))
-            registers["invariant"] = np.array(list(values.values()))
-        return self._runner.memory(registers, None if dimensions == 1 else given.shape[1])
+            held = dict(zip(self.invariants.input_names, values[self._held], strict=True))
+            registers["invariant"] = np.array(list(self.invariants.evaluate(held).values()))
+        return self._runner.memory(registers, None if dimensions == 1 else values.shape[1])
 
 
 def _loop_invariants(outputs: Sequence[Node], held: Sequence[Node]) -> tuple[Graph | None, dict[Node, Node]]:

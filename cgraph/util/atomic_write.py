@@ -6,7 +6,7 @@ import secrets
 from pathlib import Path
 
 
-def atomic_write(path: str | Path, data: str | bytes) -> Path:
+def atomic_write(path: str | Path, data: str | bytes, *, mode: int = 0o666) -> Path:
     """Write a file whole or not at all, by way of a temporary file beside it.
 
     Parameters
@@ -15,6 +15,8 @@ def atomic_write(path: str | Path, data: str | bytes) -> Path:
         Where to; a link is followed, and stays a link.
     data : str or bytes
         What to write; text as UTF-8.
+    mode : int
+        Permissions of the file, less the process's umask: 0o600 keeps it from others.
 
     Returns
     -------
@@ -40,6 +42,7 @@ def atomic_write(path: str | Path, data: str | bytes) -> Path:
     temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
     try:
         try:
+            temporary.touch(mode, exist_ok=False)
             temporary.write_bytes(data.encode() if isinstance(data, str) else data)
             temporary.replace(target)
         finally:

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ...core.node import Edge, Node
+from ...core.edge import Edge
+from ...core.node import Node
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,10 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from ...autodiff.forward import tangents
+from ...core.edge import Edge
 from ...core.graph import Graph
 from ...core.label import ADJOINT
 from ...core.networkx_queries import minimum_cut
-from ...core.node import Edge, Node, constant
+from ...core.node import Node, constant
 from ...core.source_lines import lines_text
 from ...errors import GraphError
 from ...simplify.builder import Builder

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ...core.edge import Edge
 from ...core.graph import Graph
-from ...core.node import Edge, Node
+from ...core.node import Node
 from ..edge_partials import Point
 from ..names import Name, Names, many
 from .cancellation import cancellations, rounded
