@@ -23,7 +23,7 @@ from .progress_bar import Progress
 from .recorder import Recorder
 from .run_options import TABLES, RunOptions
 from .scipy_solvers import ScipyIntegration, scipy_solver
-from .step_program import compile_steps
+from .step_program import compile_steps, step_program
 from .stepping import Integration, integration
 from .trajectory import Stats, Trajectory
 
@@ -114,19 +114,25 @@ def simulate(
     >>> run.q.round(3).tolist()
     [[1.0, 0.5], [0.31, -0.04], [-0.989, 0.108]]
     """
+    # Check
     options = RunOptions(t_end, method, dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
     watched = as_events(events)
     start = initial_value(model, q, qd, tau, parameters)
     options.check(start.states)
     options.check_room(len(start.x))
 
+    # Derive the equations, xdot = f(x, t), the energy and the events as graphs
     problem = derive(model, start.bound)
     energy, watch = total_energy(problem), EventWatch(problem, watched)
+
+    # Write the steps of the method over these graphs, and compile them
     run = _compiled(problem, options, watched=bool(watched))
 
+    # Integrate, noting rows and events
     recorder = Recorder(start.x, options.times)
     seconds = _integrate(run, start.x, recorder, watch, options)
 
+    # Put the result together
     times, states = recorder.table()
     half = len(start.x) if problem.system is None else problem.system.n
     stats = _stats(run, options.method, seconds)
@@ -140,8 +146,8 @@ def _compiled(problem: Problem, options: RunOptions, *, watched: bool) -> Integr
     if solver is not None:
         return ScipyIntegration(scipy_solver(problem, solver, options.backend), options)
     method = METHODS[options.method]
-    dense = method.adaptive and (watched or options.times is not None)
-    return integration(compile_steps(problem, method, dense, options.backend), options, every_step=watched)
+    program = step_program(problem, method, dense=method.adaptive and (watched or options.times is not None))
+    return integration(compile_steps(program, options.backend), options, every_step=watched)
 
 
 def _integrate(run: Integration, x: Array, recorder: Recorder, watch: EventWatch, options: RunOptions) -> float:

@@ -1,4 +1,4 @@
-"""StepProgram: a method's steps over a problem's graphs, as plain data that pickles, unlike a model; and its code."""
+"""StepProgram: the steps of a method on the graphs of a problem, as plain data that pickles; and its compiled form."""
 
 from __future__ import annotations
 
@@ -39,9 +39,11 @@ class CompiledSteps:
     runner: Runner
 
 
+@lru_cache(KEPT)
 def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgram:
-    """The steps of a method on a problem; `dense` asks a method that chooses its steps for dense output.
+    """The steps of a method on a problem, all graphs that they need derived; of the last few, those written before.
 
+    dense: whether a method that chooses its steps records its dense output.
     Raises SingularMassMatrixError for a coordinate without inertia, ValueError for a method that the model has not.
     """
     return StepProgram(
@@ -56,7 +58,6 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
 
 
 @lru_cache(KEPT)
-def compile_steps(problem: Problem, method: Method, dense: bool, backend: str) -> CompiledSteps:
-    """The steps of a method on a problem, ready to run; of the last few, those compiled before."""
-    program = step_program(problem, method, dense=dense)
+def compile_steps(program: StepProgram, backend: str) -> CompiledSteps:
+    """The steps, ready to run; of the last few, those compiled before."""
     return CompiledSteps(program, runner(program.steps, backend))

@@ -18,7 +18,7 @@ from ...integrators import METHODS, Problem, derive
 from ...simulation.recorder import Recorder
 from ...simulation.run_options import SCIPY, RunOptions
 from ...simulation.scipy_solvers import ScipyIntegration, scipy_solver
-from ...simulation.step_program import CompiledSteps, compile_steps
+from ...simulation.step_program import CompiledSteps, compile_steps, step_program
 from ...simulation.stepping import Integration, integration
 from .trajectory_scenes import Setting
 
@@ -117,11 +117,12 @@ class Ours(Contender):
 
     @cached_property
     def _plain(self) -> CompiledSteps:
-        return compile_steps(self.problem, self.method, False, self.backend)
+        return compile_steps(step_program(self.problem, self.method, dense=False), self.backend)
 
     @cached_property
     def _dense(self) -> CompiledSteps:
-        return compile_steps(self.problem, self.method, True, self.backend) if self.method.adaptive else self._plain
+        program = step_program(self.problem, self.method, dense=self.method.adaptive)
+        return compile_steps(program, self.backend)
 
     def _options(self, knob: float, times: Sequence[float], max_steps: float = math.inf) -> RunOptions:
         t_end = self.setting.t_end

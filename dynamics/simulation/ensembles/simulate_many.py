@@ -105,6 +105,7 @@ def simulate_many(
     >>> fan.q[:, -1, 0].round(4).tolist()
     [-0.077, -0.155, -0.2348]
     """
+    # Check
     if isinstance(method, str) and method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
     options = RunOptions(t_end, method, dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
@@ -115,16 +116,21 @@ def simulate_many(
     count = _row_count(options)
     _check_room(start.x, count)
 
+    # Derive the equations as graphs, and write the steps of the method over them
     begin = time.perf_counter()
     problem = derive(model, start.same)
     program = step_program(problem, METHODS[method], dense=True)
+
+    # Share out the work: what a worker is sent, and the starts of chunks of trajectories
     grids = _grids(program, options)
     task = Task(pickle.dumps(program), options, count, tuple(grids))
     chunks = _chunks(start, problem.parameters, _width(len(start.x), chunk, team, whole=bool(grids)))
 
+    # Integrate, by whoever takes the chunks and compiles the steps
     result = EnsembleRows(len(start.x), count, problem.size)
     _run(task, chunks, team, result)
 
+    # Put the result together
     half = problem.size if problem.system is None else problem.system.n
     stats, rows = result.stats(method, time.perf_counter() - begin), result.rows
     return Ensemble(_row_times(options), rows[:, :, :half], rows[:, :, half:], stats)

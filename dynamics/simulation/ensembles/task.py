@@ -14,7 +14,7 @@ from cgraph.extend import Array, runner
 
 from ..recorder import Recorder
 from ..run_options import RunOptions
-from ..step_program import CompiledSteps, StepProgram
+from ..step_program import CompiledSteps, StepProgram, compile_steps
 from ..stepping import StoppedError, integration
 from .branch_free import branch_free
 from .chunk import Chunk, Part, empty
@@ -91,5 +91,4 @@ def _vector_code(pickled: bytes, backend: str) -> VectorCode:
 
 @lru_cache(KEPT)
 def _compiled(pickled: bytes, backend: str) -> CompiledSteps:
-    program: StepProgram = pickle.loads(pickled)  # noqa: S301  # it came with the task itself
-    return CompiledSteps(program, runner(program.steps, backend))
+    return compile_steps(pickle.loads(pickled), backend)  # noqa: S301  # it came with the task itself
