@@ -39,7 +39,7 @@ class Architecture:
 
     def climbs(self, arrow: tuple[str, str]) -> bool:
         """Whether any import behind an arrow is one that the table does not allow."""
-        return any(each in self.climbing for each in self.arrows[arrow])
+        return any(pair in self.climbing for pair in self.arrows[arrow])
 
     def implied(self, arrow: tuple[str, str]) -> bool:
         """Whether a longer way leads from the arrow's importer to what it imports."""
@@ -59,15 +59,17 @@ class Architecture:
                 {"importer": a, "imported": b, "imports": len(behind), "climbs": self.climbs((a, b))}
                 for (a, b), behind in self.arrows.items()
             ],
-            "climbing": [list(each) for each in self.climbing],
-            "circles": [list(each) for each in self.circles],
-            "file_circles": [list(each) for each in self.file_circles],
+            "climbing": [list(pair) for pair in self.climbing],
+            "circles": [list(circle) for circle in self.circles],
+            "file_circles": [list(circle) for circle in self.file_circles],
             "loose": {package: list(names) for package, names in self.loose.items()},
         }
 
     def __str__(self) -> str:
         height = max(self.floors.values(), default=0)
-        lines = [f"{len(self.rooms)} rooms on {height} floors, {len(self.arrows)} arrows"]
+        lines = [
+            f"{len(self.rooms)} rooms (folders) on {height} floors, {len(self.arrows)} arrows (imports between them)"
+        ]
         lines += [
             f"{floor:3}  {', '.join([name for name, at in self.floors.items() if at == floor])}"
             for floor in range(height, 0, -1)
@@ -76,8 +78,8 @@ class Architecture:
         imported = {name: [low for high, low in self.arrows if high == name] for name in downward}
         lines += [f"{name} imports {', '.join(lower)}" for name, lower in imported.items() if lower]
         lines += _listed("arrows that climb", [f"{a} imports {b}" for a, b in self.climbing])
-        lines += _listed("circles of rooms", [", ".join(each) for each in self.circles])
-        lines += _listed("circles of files", [", ".join(each) for each in self.file_circles])
+        lines += _listed("circles of rooms", [", ".join(circle) for circle in self.circles])
+        lines += _listed("circles of files", [", ".join(circle) for circle in self.file_circles])
         for package, names in self.loose.items():
             lines.append(f"loose modules in {package}: {', '.join(names) or 'none'}")
         return "\n".join(lines)

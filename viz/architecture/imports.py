@@ -102,7 +102,7 @@ def uses(known: Mapping[str, Module]) -> dict[str, set[str]]:
     is imported as a whole, as by `import cgraph as cg`, leads to all that it shows.
     """
     return {
-        name: {target for each in module.imports for target in _targets(known, each.module, each.name)} - {name}
+        name: {target for line in module.imports for target in _targets(known, line.module, line.name)} - {name}
         for name, module in known.items()
         if not module.is_face
     }
@@ -118,7 +118,7 @@ def _targets(
         return set()
     at = known[module]
     shown = at.imports if at.is_face or at.is_package else ()
-    chosen = [each for each in shown if each.bound == name] or (at.imports if at.is_face else [])
+    chosen = [line for line in shown if line.bound == name] or (at.imports if at.is_face else [])
     if not chosen:
         return {module}
-    return {target for each in chosen for target in _targets(known, each.module, each.name, through | {module})}
+    return {target for line in chosen for target in _targets(known, line.module, line.name, through | {module})}

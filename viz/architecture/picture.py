@@ -35,7 +35,7 @@ def to_dot(plan: Architecture) -> Digraph:
         with drawing.subgraph() as row:
             row.attr(rank="same")
             draw_boxes(row, [boxes[name] for name, at in plan.floors.items() if at == floor])
-    draw_arrows(drawing, [_arrow(plan, each) for each in plan.arrows])
+    draw_arrows(drawing, [_arrow(plan, arrow) for arrow in plan.arrows])
     return drawing
 
 

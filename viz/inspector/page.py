@@ -96,15 +96,15 @@ def page(
     data = {"title": title, "introduction": "" if isinstance(graph, Graph) else about, **record(versions, motion)}
     script = scripts()
     # "<" in the data could end the element that holds it
-    held = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
-    shown = "".join(html.table(each.caption, each.header, each.rows) for each in tables)
+    text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
+    shown = "".join(html.table(table.caption, table.header, table.rows) for table in tables)
     body = _asset("page.html").replace("{title}", escape(title)).replace("{tables}", shown)
     return Page(
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
         f"<style>{_colors()}{_asset('page.css')}</style>\n</head>\n<body>\n{body}\n"
-        f'<script id="data" type="application/json">{held}</script>\n'
+        f'<script id="data" type="application/json">{text}</script>\n'
         f'<script>"use strict";\n{script}\nstart();</script>\n'
         "</body>\n</html>\n"
     )

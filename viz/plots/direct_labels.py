@@ -79,7 +79,7 @@ def labeled(panels: Sequence[Panel], *, columns: int = 2, shared: bool = True) -
         layout = figure.get_layout_engine()
         assert layout is not None
         layout.execute(figure)
-        figure.set_layout_engine("none")  # the names are placed for axes where they are now
+        figure.set_layout_engine(None)  # the names are placed for axes where they are now
         for axis, panel in zip(axes.flat, panels, strict=False):
             _name(axis, panel.lines)
     return figure

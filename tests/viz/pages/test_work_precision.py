@@ -110,7 +110,14 @@ def test_the_page_needs_no_other_file(page: str) -> None:
         ElementTree.fromstring(base64.b64decode(picture).decode())
 
 
-def test_a_report_without_results_is_still_a_page() -> None:
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures are empty, where only words and tables are looked at: drawing takes seconds."""
+    monkeypatch.setattr("viz.pages.work_precision.labeled", lambda *_, **__: None)
+    monkeypatch.setattr("viz.pages.work_precision.to_adaptive_svg", lambda _: "<svg/>")
+
+
+def test_a_report_without_results_is_still_a_page(undrawn: None) -> None:
     curves = [curve("euler", True, "equal steps", [point(64.0, 1e-3, 1e6)])]
     empty = content(curves=curves, cold=[], targets=[], absent={}, conservative=True)
     page = shown(to_html(work_precision(empty)))
@@ -118,7 +125,7 @@ def test_a_report_without_results_is_still_a_page() -> None:
     assert "Every contender that was asked has points." in page
 
 
-def test_missing_numbers_are_dashes() -> None:
+def test_missing_numbers_are_dashes(undrawn: None) -> None:
     lost = point(64.0, 1e-3, 1.0, largest=None, drift=None, step=None, steps=None)
     report = content(curves=[curve("rk4", True, "equal steps", [lost])])
     rows = next(s for s in work_precision(report).sections if s.anchor == "points").blocks[1]
