@@ -1,5 +1,7 @@
-"""The pages: their examples run and print what is shown, and what they name exists."""
+"""The pages and the docstrings: their examples run and print what is shown, and what they name exists."""
 
+import doctest
+import importlib
 import os
 import re
 import subprocess
@@ -7,14 +9,26 @@ import sys
 from pathlib import Path
 from pkgutil import resolve_name
 
+import numpy as np
 import pytest
+
+import cgraph
+import dynamics
+import viz
 
 ROOT = Path(__file__).parents[1]
 PAGES = {
     path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
     for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 }
-RUN = ("README.md", "docs/tutorial.md", "docs/howto.md", "docs/tables.md", "docs/ensembles.md", "docs/pruning.md")
+RUN = [name for name, page in PAGES.items() if "```python\n" in page]
+MODULES = [
+    ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+    for package in (cgraph, dynamics, viz)
+    for path in sorted(Path(package.__file__).parent.rglob("*.py"))
+    if ">>> " in path.read_text(encoding="utf-8")
+]
+NAMES = {"cg": cgraph, "dyn": dynamics, "np": np, "viz": viz}  # what every example may use without importing it
 FENCE = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 MARK = "-- end of example --"
 SECONDS = 120  # for one page; each takes a few
@@ -63,6 +77,17 @@ def test_examples_print_what_is_shown(name: str, tmp_path: Path) -> None:
     printed = run.stdout.split(f"{MARK}\n")[:-1]
     shown = [(line, output) for line, _, output in examples(PAGES[name])]
     assert [(line, text) for (line, _), text in zip(shown, printed, strict=True)] == shown
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_examples_of_docstrings_print_what_is_shown(
+    module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In an empty folder; what differs is in the captured output."""
+    monkeypatch.chdir(tmp_path)
+    result = doctest.testmod(importlib.import_module(module), extraglobs=NAMES)
+    assert result.attempted > 0
+    assert result.failed == 0
 
 
 @pytest.mark.parametrize("name", PAGES)

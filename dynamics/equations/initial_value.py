@@ -14,7 +14,7 @@ from cgraph.extend import Array, real_array
 
 from ..systems.model import Model, as_ode
 from ..systems.system import parameter_value, per_coordinate
-from .state_equation import Inputs, state_inputs
+from .state_equation import StateInputs, state_inputs
 
 PAST = 1e-14  # of the end: some roundings, by which a last time may lie past it
 
@@ -44,7 +44,7 @@ def initial_value(
     inputs = state_inputs(model)
     values = _parameters(inputs, parameters)
     if inputs.applied:
-        values = dict(zip(inputs.applied, per_coordinate("tau", tau, len(inputs.applied)), strict=True)) | values
+        values = dict(zip(inputs.applied, per_coordinate("tau", tau, model.coordinates), strict=True)) | values
     return InitialValue(_state(model, inputs, q, qd), inputs.states, values)
 
 
@@ -54,7 +54,7 @@ def split_state(model: Model, x: Sequence[float]) -> tuple[Sequence[float], Sequ
     return (x, None) if as_ode(model) is not None else (x[:half], x[half:])
 
 
-def check_names(inputs: Inputs, names: Iterable[str]) -> None:
+def check_names(inputs: StateInputs, names: Iterable[str]) -> None:
     """Raises ValueError for a name that is no parameter."""
     if unknown := [str(name) for name in names if name not in inputs.parameters]:
         has = ", ".join(inputs.parameters) or "none"
@@ -82,7 +82,7 @@ def increasing_times(t_eval: ArrayLike, t_end: float = math.inf) -> Array:
     return times
 
 
-def _parameters(inputs: Inputs, parameters: Mapping[str, float] | None) -> dict[str, float]:
+def _parameters(inputs: StateInputs, parameters: Mapping[str, float] | None) -> dict[str, float]:
     if not isinstance(parameters, Mapping | None):
         raise TypeError(f"parameters must be a mapping of names to numbers, got {parameters!r:.60}")
     chosen = dict(parameters or {})
@@ -90,7 +90,7 @@ def _parameters(inputs: Inputs, parameters: Mapping[str, float] | None) -> dict[
     return inputs.parameters | {name: parameter_value(name, value) for name, value in chosen.items()}
 
 
-def _state(model: Model, inputs: Inputs, q: ArrayLike, qd: ArrayLike | None) -> Array:
+def _state(model: Model, inputs: StateInputs, q: ArrayLike, qd: ArrayLike | None) -> Array:
     if as_ode(model) is not None:
         if qd is not None:
             raise ValueError("qd must be None for a system of first order; q holds its whole state")

@@ -14,7 +14,7 @@ from cgraph.extend import topological
 from ..equations.equations_of_motion import energy
 from ..equations.state_equation import state_equation, state_inputs
 from ..systems.model import Model, as_ode, as_system
-from ..systems.system import TIME, Parameters, System, called
+from ..systems.system import TIME, Parameters, System, call_user_function
 
 KEPT = 16  # problems whose graphs stay for another run
 
@@ -121,7 +121,7 @@ def quantity(problem: Problem, what: str, function: Callable[..., Any]) -> Node:
         arguments: tuple[Any, ...] = (cg.variables(list(problem.states)), cg.variable(TIME), p)
     else:
         arguments = (problem.system.q, problem.system.qd, problem.system.t, p)
-    node = called(what, function, *arguments)
+    node = call_user_function(what, function, *arguments)
     known = set(quantity_inputs(problem))
     if not isinstance(node, Node) or any(
         other.op.name == "variable" and other not in known for other in topological([node])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from cgraph.errors import install
+from cgraph.extend import install
 
 from .solution import Reference, from_text
 

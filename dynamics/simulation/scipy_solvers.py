@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 import cgraph as cg
-from cgraph.errors import install
-from cgraph.extend import Array
+from cgraph.extend import Array, install
 
 from ..integrators import Problem, state_jacobian
 from .dense_output import StepBlock

@@ -20,17 +20,17 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph import Node
 from cgraph.autodiff.reverse import cotangents
-from cgraph.core.label import building
+from cgraph.extend import building
 from cgraph.simplify import builder as fold
 from cgraph.simplify.builder import Builder
-from dynamics.equations import equations_of_motion as equations
+from dynamics.equations import bias_terms, equations_of_motion as equations
 from dynamics.experiments.paper_numbers.fit import exponent
 from dynamics.experiments.speed.bench_scenes import binary_tree, turned_arm
 from dynamics.multibody import link as links, mechanism, spatial
 from dynamics.systems.system import BodySystem
 
 solving = sys.modules["cgraph.autodiff.hessian_solve"]  # the module; `cgraph.hessian_solve` is the function
-solve_nodes, rates = solving.solve_nodes, equations.rates
+solve_nodes = solving.solve_nodes
 PLANAR = (3, 10, 20, 50, 100, 200)
 
 
@@ -143,11 +143,14 @@ Variant = tuple[Callable[[], AbstractContextManager[Any]], int]
 VARIANTS: dict[str, Variant] = {
     "every idea": (nullcontext, 10**6),
     "energy by the centre's velocity": (lambda: replaced(mechanism, "energy", body_about_center), 10**6),
-    "no rates but qd": (lambda: replaced(equations, "rates", lambda output, q, qd, t, build: list(qd)), 10**6),
+    "no velocity nodes but qd": (
+        lambda: replaced(bias_terms, "velocity_nodes", lambda output, q, qd, t, build: list(qd)),
+        10**6,
+    ),
     "inertial terms carried apart": (lambda: replaced(equations, "solve_nodes", pulled), 10**6),
     "bias from the Lagrangian": (lambda: replaced(BodySystem, "bias_forces", lambda system: None), 10**6),
     "rotations product by product": (lambda: replaced(solving, "rotations", lambda *_: []), 10**6),
-    "dense": (lambda: replaced(equations, "SHORT", 0), 15),
+    "dense": (lambda: replaced(equations, "DENSE_UP_TO", 0), 15),
     "dense, without symmetry": (lambda: replaced(equations, "ldl_solve", lu_solve), 15),
     "sine and cosine not shared": (lambda: unshared("sin", "cos"), 100),
     "no zeros left out": (lambda: rules(**{op: without(op, 0.0) for op in ("add", "sub", "mul", "div")}), 20),

@@ -51,7 +51,8 @@ def starts(
         arrays["tau"] = _array("tau", tau, n)
     else:
         values = np.asarray(tau).tolist()
-        same |= zip(inputs.applied, per_coordinate("tau", values, n) if inputs.applied else (), strict=True)
+        applied = per_coordinate("tau", values, model.coordinates) if inputs.applied else ()
+        same |= zip(inputs.applied, applied, strict=True)
     counts = {what: len(array) for what, array in arrays.items() if array.ndim == 2}
     counts |= {f"parameter {name!r}": len(array) for name, array in columns.items()}
     count = _one_count(counts)
