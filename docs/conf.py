@@ -32,7 +32,7 @@ def docstring_to_rst(app, what, name, obj, options, lines):
     text = "\n".join(lines).strip("\n")
     parts = SECTION.split(text)  # text, title, text, title, text, ..
     blocks = [_prose_paragraphs(parts[0])]
-    for title, body in zip(parts[1::2], parts[2::2]):
+    for title, body in zip(parts[1::2], parts[2::2], strict=True):
         blocks += [f".. rubric:: {title}", (_code if title == "Examples" else _terms)(body.strip("\n"))]
     lines[:] = "\n\n".join(blocks).split("\n")
 
