@@ -1,5 +1,7 @@
 """cgraph: computational graphs of equations, with forward and reverse automatic differentiation."""
 
+from typing import TYPE_CHECKING as _TYPES
+
 from .autodiff.forward import jvp
 from .autodiff.hessian_solve import hessian_solve
 from .autodiff.jacobian import hessian, jacobian
@@ -7,10 +9,13 @@ from .autodiff.reverse import gradient, vjp
 from .codegen import Compiled, clear_cache, compile
 from .codegen.c import CSource, to_c
 from .core.counts import Counts
+from .core.edge import Edge
+from .core.functions import function as _function
 from .core.graph import Graph
-from .core.label import tag
-from .core.node import Edge, Node, constant, variable, variables, with_name
+from .core.naming import variables, with_name
+from .core.node import Node, constant, variable
 from .core.ops import (
+    OPS as _OPS,
     abs_ as abs,
     acos,
     asin,
@@ -38,6 +43,7 @@ from .core.ops import (
     tanh,
     where,
 )
+from .core.scope import tag
 from .core.source_lines import recording_lines
 from .core.structure_hash import structure_hash
 from .errors import GraphError
@@ -110,3 +116,11 @@ __all__ = [
     "why_not",
     "with_name",
 ]
+
+if not _TYPES:
+
+    def __getattr__(name: str) -> object:
+        """The function of a row that was added to the operation table: `cg.cbrt` of the row "cbrt"."""
+        if name in _OPS:
+            return globals().setdefault(name, _function(_OPS[name]))
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -11,17 +11,18 @@ copies nodes through a builder, `topological` gives all nodes that some nodes re
 **Differentiate**: `cotangents` pulls from outputs, `tangents` pushes from inputs, `hessian_nodes` gives the lower
 triangle of second derivatives, all as nodes.
 
-**Solve**: `solve_nodes` is `cg.hessian_solve` on nodes, `ldl_solve` the dense factorisation; both raise
-`SingularError`.
+**Solve**: `solve_nodes` is `cg.hessian_solve` on nodes, `ldl_solve` the dense factorization; both raise
+`SingularError`. `ldl_elimination` does the same over any numbers.
 
 **Read**: `expand` and `format_polynomial` write a polynomial out, `Names` tells nodes in a person's words, `OPS` is
-the table of operations, and `ADJOINT`, `PRIMAL`, `TANGENT` are the roles that a label may have.
+the table of operations, a row of it an `Op`, and `ADJOINT`, `PRIMAL`, `TANGENT` are the roles that a label may have.
 
 **Run**: a `Program` is graphs over registers of numbers (`Call`, `Map`, `Sum`, `Factor`, `Solve`, `If`, `While`), and
 `runner` makes it machine code or Python.
 
 **At the edges**: `real_array` and `real_number` check what a caller passed, `thread_count` reads `threads=`,
-`atomic_write` writes a file whole or not at all.
+`atomic_write` writes a file whole or not at all, `install` ends an error about a missing package. `Array` is the type
+of an array of float64.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, building, cotangents
@@ -37,15 +38,18 @@ the table of operations, and `ADJOINT`, `PRIMAL`, `TANGENT` are the roles that a
 from .autodiff.forward import tangents
 from .autodiff.hessian_solve import solve_nodes
 from .autodiff.jacobian import hessian_nodes
-from .autodiff.ldl_solve import SingularError, ldl_solve
+from .autodiff.ldl_solve import SingularError, ldl_elimination, ldl_solve
 from .autodiff.reverse import cotangents
-from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED, building
+from .core.evaluate import Array
+from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED
 from .core.node import as_node
+from .core.operation import Op
 from .core.ops import OPS
+from .core.scope import building
 from .core.traversal import topological
+from .errors import install
 from .explain.names import Names
-from .program import Call, Factor, If, Map, Program, Runner, Solve, Statement, Sum, While, runner
-from .program.runner import Record
+from .program import Call, Factor, If, Map, Program, Record, Runner, Solve, Statement, Sum, While, runner
 from .simplify.builder import Builder, folded
 from .simplify.polynomial import Polynomial, expand, format_polynomial
 from .util.atomic_write import atomic_write
@@ -58,12 +62,14 @@ __all__ = [
     "PRIMAL",
     "TANGENT",
     "UNLABELLED",
+    "Array",
     "Builder",
     "Call",
     "Factor",
     "If",
     "Map",
     "Names",
+    "Op",
     "Polynomial",
     "Program",
     "Record",
@@ -81,6 +87,8 @@ __all__ = [
     "folded",
     "format_polynomial",
     "hessian_nodes",
+    "install",
+    "ldl_elimination",
     "ldl_solve",
     "real_array",
     "real_number",

@@ -8,35 +8,14 @@ import mpmath
 from mpmath import mp, mpf
 
 import cgraph as cg
+from cgraph.extend import OPS
 
 DIGITS = 50
 Number = float | mpf
 
-OPERATIONS: dict[str, Callable[..., mpf]] = {
-    "add": lambda a, b: a + b,
-    "sub": lambda a, b: a - b,
-    "mul": lambda a, b: a * b,
-    "div": lambda a, b: a / b,
-    "neg": lambda a: -a,
-    "pow": lambda a, b: mpmath.power(a, b),
-    "sqrt": mpmath.sqrt,
-    "exp": mpmath.exp,
-    "expm1": mpmath.expm1,
-    "log": mpmath.log,
-    "log1p": lambda a: mpmath.log(1 + a),
-    "sin": mpmath.sin,
-    "cos": mpmath.cos,
-    "tan": mpmath.tan,
-    "asin": mpmath.asin,
-    "acos": mpmath.acos,
-    "atan": mpmath.atan,
-    "atan2": mpmath.atan2,
-    "hypot": lambda a, b: mpmath.sqrt(a * a + b * b),
-    "sinh": mpmath.sinh,
-    "cosh": mpmath.cosh,
-    "tanh": mpmath.tanh,
+# Of an operation that is neither an operator nor here: mpmath's function of its name, else the row's own.
+_WRITTEN: dict[str, Callable[..., mpf]] = {
     "abs": lambda a: -a if a < 0 else a,
-    "sign": lambda a: mpf((a > 0) - (a < 0)),
     "minimum": lambda a, b: min(a, b),
     "maximum": lambda a, b: max(a, b),
     "less": lambda a, b: mpf(a < b),
@@ -44,18 +23,14 @@ OPERATIONS: dict[str, Callable[..., mpf]] = {
     "equal": lambda a, b: mpf(a == b),
     "not_equal": lambda a, b: mpf(a != b),
     "where": lambda c, a, b: a if c != 0 else b,
-    "strong_mul": lambda a, b: a * b,  # the zero rule matters for infinities only, which have no place here
+    "zero_safe_mul": lambda a, b: a * b,  # the zero rule matters for infinities only, which have no place here
+}
+OPERATIONS: dict[str, Callable[..., mpf]] = {
+    op.name: op.operator or _WRITTEN.get(op.name) or getattr(mpmath, op.name, op.precise) for op in OPS.values()
 }
 
-# Arguments whose distance decides the result: the operation jumps or has a kink where they meet.
-_KINKS: dict[str, Callable[..., mpf]] = {
-    "abs": abs,
-    "sign": abs,
-    **dict.fromkeys(("minimum", "maximum", "less", "less_equal", "equal", "not_equal"), lambda a, b: abs(a - b)),
-}
-
-# An argument in which the function is a step, so that a derivative in it means nothing.
-STEPS = {("where", 0)}
+# An argument in which the function is a step, so that a derivative in it means nothing: the condition of `where`.
+STEPS = {(op.name, 0) for op in OPS.values() if op.piece is not None and op.arity == 3}
 
 
 def node_values(graph: cg.Graph, values: Mapping[str, Number], digits: int = DIGITS) -> dict[cg.Node, mpf]:
@@ -85,9 +60,10 @@ def kink_distance(graph: cg.Graph, values: Mapping[str, Number]) -> float:
     """
     env = node_values(graph, values)
     distances = [
-        _KINKS[node.op.name](*(env[arg] for arg in node.args))
+        abs(env[node.args[0]] - (env[node.args[1]] if node.op.arity == 2 else 0))
         for node in graph.nodes
-        if node.op.name in _KINKS
+        if node.op.piece is not None
+        and node.op.arity < 3  # the condition of `where` is a comparison, which counts itself
         and len(set(node.args)) == node.op.arity
         and any(arg.op.name != "constant" for arg in node.args)
     ]

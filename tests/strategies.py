@@ -11,25 +11,6 @@ import cgraph as cg
 from cgraph.core.node import OPS, apply
 from tests import high_precision
 
-REAL = (-8.0, 8.0)
-UNIT = (-0.8, 0.8)
-POSITIVE = (0.4, 2.5)
-
-# For every operation, an interval for each argument: inside the domain, and where the condition is moderate.
-DOMAINS: dict[str, tuple[tuple[float, float], ...]] = {
-    **dict.fromkeys(("add", "sub", "mul", "strong_mul", "minimum", "maximum"), (REAL, REAL)),
-    **dict.fromkeys(("less", "less_equal", "equal", "not_equal"), (REAL, REAL)),
-    **dict.fromkeys(("neg", "sin", "cos", "atan", "abs", "sign"), (REAL,)),
-    **dict.fromkeys(("exp", "expm1", "sinh", "cosh", "tanh"), ((-2.0, 2.0),)),
-    **dict.fromkeys(("asin", "acos", "log1p"), (UNIT,)),
-    **dict.fromkeys(("sqrt", "log"), (POSITIVE,)),
-    **dict.fromkeys(("atan2", "hypot"), (REAL, POSITIVE)),
-    "div": (REAL, POSITIVE),
-    "pow": (POSITIVE, (-3.0, 3.0)),
-    "tan": ((-1.2, 1.2),),
-    "where": ((0.0, 1.0), REAL, REAL),
-}
-
 
 class Case(NamedTuple):
     """A graph and a point at which every node of it is finite."""
@@ -66,7 +47,7 @@ def cases(draw: st.DrawFn, max_operations: int = 20, max_outputs: int = 3) -> Ca
         with cg.tag(*([tag] if tag else [])):
             if name == "where":
                 chosen[0] = _node("less", chosen[0], chosen[1])
-            arguments = [_into(*each, *domain) for each, domain in zip(chosen, DOMAINS[name], strict=False)]
+            arguments = [_into(*each, *domain) for each, domain in zip(chosen, OPS[name].domain, strict=False)]
             pool.append(_node(name, *arguments))
     last = pool[-draw(st.integers(1, max_outputs)) :]
     return Case(cg.Graph(cg.variables(list(names)), {f"f{i}": node for i, (node, _) in enumerate(last)}), values)

@@ -14,52 +14,6 @@ from .vector_math import helpers
 BLOCK = 1024  # nodes in a basic block: some of LLVM's passes cost more than proportionally in the length of one
 TOGETHER = 4  # arguments in a joined call at one point: a vector of them is one register or two on every processor
 
-# An instruction or a few for each operation that needs no library: {r} result, {0} {1} {2} arguments, {t} type, {b}
-# type of a comparison, {f} flags, {s} suffix of an intrinsic, {zero} {one} {minus} constants.
-# Others are libm's, by name.
-INLINE = {
-    "add": ("{r} = fadd {f}{t} {0}, {1}",),
-    "sub": ("{r} = fsub {f}{t} {0}, {1}",),
-    "mul": ("{r} = fmul {f}{t} {0}, {1}",),
-    "div": ("{r} = fdiv {f}{t} {0}, {1}",),
-    "neg": ("{r} = fneg {t} {0}",),
-    "abs": ("{r} = call {t} @llvm.fabs.{s}({t} {0})",),
-    "sqrt": ("{r} = call {t} @llvm.sqrt.{s}({t} {0})",),
-    "sign": (
-        "{r}.above = fcmp ogt {t} {0}, {zero}",
-        "{r}.below = fcmp olt {t} {0}, {zero}",
-        "{r}.nan = fcmp uno {t} {0}, {zero}",
-        "{r}.up = select {b} {r}.above, {t} {one}, {t} {zero}",
-        "{r}.down = select {b} {r}.below, {t} {minus}, {t} {r}.up",
-        "{r} = select {b} {r}.nan, {t} {0}, {t} {r}.down",
-    ),
-    "minimum": (
-        "{r}.nan = fcmp uno {t} {0}, {zero}",
-        "{r}.less = fcmp ole {t} {0}, {1}",
-        "{r}.first = or {b} {r}.nan, {r}.less",
-        "{r} = select {b} {r}.first, {t} {0}, {t} {1}",
-    ),
-    "maximum": (
-        "{r}.nan = fcmp uno {t} {0}, {zero}",
-        "{r}.more = fcmp oge {t} {0}, {1}",
-        "{r}.first = or {b} {r}.nan, {r}.more",
-        "{r} = select {b} {r}.first, {t} {0}, {t} {1}",
-    ),
-    "less": ("{r}.is = fcmp olt {t} {0}, {1}", "{r} = select {b} {r}.is, {t} {one}, {t} {zero}"),
-    "less_equal": ("{r}.is = fcmp ole {t} {0}, {1}", "{r} = select {b} {r}.is, {t} {one}, {t} {zero}"),
-    "equal": ("{r}.is = fcmp oeq {t} {0}, {1}", "{r} = select {b} {r}.is, {t} {one}, {t} {zero}"),
-    "not_equal": ("{r}.is = fcmp une {t} {0}, {1}", "{r} = select {b} {r}.is, {t} {one}, {t} {zero}"),
-    "where": ("{r}.is = fcmp une {t} {0}, {zero}", "{r} = select {b} {r}.is, {t} {1}, {t} {2}"),
-    "strong_mul": (
-        "{r}.a = fcmp une {t} {0}, {zero}",
-        "{r}.b = fcmp une {t} {1}, {zero}",
-        "{r}.both = and {b} {r}.a, {r}.b",
-        "{r}.product = fmul {f}{t} {0}, {1}",
-        "{r} = select {b} {r}.both, {t} {r}.product, {t} {zero}",
-    ),
-}
-
-
 # Lines that compute, under a name, the address of row k of the inputs ("x") or outputs ("y"): (base, name, k) -> lines
 Address = Callable[[str, str, int], list[str]]
 
@@ -77,7 +31,7 @@ class Arithmetic(NamedTuple):
         return "double" if self.lanes == 1 else f"<{self.lanes} x double>"
 
     def words(self) -> dict[str, str]:
-        """What the templates of `INLINE` name."""
+        """What the column `llvm` of the operation table names."""
         return {
             "t": self.type,
             "b": "i1" if self.lanes == 1 else f"<{self.lanes} x i1>",
@@ -96,8 +50,8 @@ class Arithmetic(NamedTuple):
 
 def libm_functions(graph: Graph) -> dict[str, int]:
     """The functions of the C library that the graph calls, and how many arguments each takes."""
-    calls = {n.op.name: n.op.arity for n in graph.nodes if n.op is not CONSTANT and n.op is not VARIABLE}
-    return {name: arity for name, arity in sorted(calls.items()) if name not in INLINE}
+    calls = {node.op.library: node.op.arity for node in graph.nodes if node.args and not node.op.llvm}
+    return dict(sorted(calls.items()))
 
 
 def point_arithmetic(flags: str) -> Arithmetic:
@@ -159,7 +113,7 @@ def preamble(graphs: Iterable[Graph], arithmetic: Arithmetic) -> list[str]:
         calls = _joined_calls(graph, arithmetic)
         called |= {"".join(call.names): 1 for call in calls.values()}
         if arithmetic.lanes > 1:
-            alone = {node.op.name for node in graph.nodes if node not in calls}
+            alone = {node.op.library for node in graph.nodes if node not in calls}
             called |= {name: arity for name, arity in libm_functions(graph).items() if name in alone}
     return [*declarations(libm), *helpers(called, _vector(arithmetic).lanes, arithmetic.flags)]
 
@@ -189,7 +143,7 @@ def body(graph: Graph, arithmetic: Arithmetic, address: Address) -> list[str]:
     names: dict[Node | Joined, str] = {}
     lines: list[str] = []
 
-    for number, step in enumerate(schedule(graph, calls, libm_functions(graph))):
+    for number, step in enumerate(schedule(graph, calls)):
         r = names[step] = f"%v{number}"
         if number and number % BLOCK == 0:
             lines += [f"  br label %block{number}", f"block{number}:"]
@@ -203,13 +157,13 @@ def body(graph: Graph, arithmetic: Arithmetic, address: Address) -> list[str]:
         elif node.op is VARIABLE:
             lines += address("x", f"%x{number}", rows[node])
             lines.append(f"  {r} = load {t}, ptr %x{number}, align 8")
-        elif node.op.name in INLINE:
-            lines += [f"  {line.format(*args, r=r, **words)}" for line in INLINE[node.op.name]]
+        elif node.op.llvm:
+            lines += [f"  {line.format(*args, r=r, **words)}" for line in node.op.llvm]
         elif node in calls:
             names[node], more = _result(node, calls[node], r, names[calls[node]], arithmetic)
             lines += more
         else:
-            lines.append(f"  {r} = call {t} @{prefix}{node.op.name}({', '.join(f'{t} {arg}' for arg in args)})")
+            lines.append(f"  {r} = call {t} @{prefix}{node.op.library}({', '.join(f'{t} {arg}' for arg in args)})")
         for row in stored.get(node, ()):
             lines += address("y", f"%y{row}", row)
             lines.append(f"  store {t} {names[node]}, ptr %y{row}, align 8")
@@ -238,7 +192,7 @@ def _result(node: Node, call: Joined, r: str, called: str, arithmetic: Arithmeti
     """One node out of the results of its call: the value's name, and the lines that make it."""
     t, lines = _vector(arithmetic).type, []
     if len(call.names) > 1:
-        lines.append(f"  {r}.all = extractvalue {{{t}, {t}}} {called}, {call.names.index(node.op.name)}")
+        lines.append(f"  {r}.all = extractvalue {{{t}, {t}}} {called}, {call.names.index(node.op.library)}")
         called = f"{r}.all"
     if arithmetic.lanes == 1:
         lines.append(f"  {r} = extractelement {t} {called}, i32 {call.arguments.index(node.args[0])}")

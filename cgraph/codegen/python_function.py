@@ -21,11 +21,7 @@ from .python_source import source
 BLOCK = 4096  # states a NumPy sweep takes at once: its temporaries stay in the cache
 
 _Function = Callable[[Any], tuple[Any, ...]]
-_PLAIN = ("abs", "float", "inf", "np", "power")
-# Names in generated Python: `math` functions, which are fast and raise outside their domain, else the table's own.
-_PYTHON = {name: getattr(math, name, op.scalar) for name, op in OPS.items()} | {"inf": math.inf, "abs": builtins.abs}
-_PYTHON["hypot"] = OPS["hypot"].scalar  # see the table
-_NUMPY = {"np": np, "inf": math.inf, "power": OPS["pow"].array}
+_PLAIN = ("float", "inf", "np")
 
 
 class Generated(Compiled):
@@ -34,9 +30,9 @@ class Generated(Compiled):
     def __init__(self, graph: Graph, backend: str, options: dict[str, Any]) -> None:
         super().__init__(graph, backend, options)
         dialect = "numpy" if backend == "numpy" else "python"
-        self.source = source(graph, dialect, {*_PYTHON, *_PLAIN})
-        self._python = _executable(self.source, _PYTHON) if dialect == "python" else None
-        self._numpy = _executable(self.source, _NUMPY) if dialect == "numpy" else None
+        self.source = source(graph, dialect, {*OPS, *_PLAIN})
+        self._python = _executable(self.source, dialect) if dialect == "python" else None
+        self._numpy = _executable(self.source, dialect) if dialect == "numpy" else None
 
     def __call__(self, x: ArrayLike) -> Array:
         """See Compiled."""
@@ -57,7 +53,7 @@ class Generated(Compiled):
         if self.backend == "python":
             return sys.maxsize, self._one_by_one  # the interpreter runs one thread at a time
         if self._numpy is None:
-            self._numpy = _executable(source(self.graph, "numpy", {*_PYTHON, *_PLAIN}), _NUMPY)
+            self._numpy = _executable(source(self.graph, "numpy", {*OPS, *_PLAIN}), "numpy")
         return BLOCK, partial(_sweep, self._numpy)
 
     def _one_by_one(self, points: Array, result: Array) -> None:
@@ -77,8 +73,10 @@ def _sweep(function: _Function, points: Array, result: Array) -> None:
             row[:] = value
 
 
-def _executable(text: str, helpers: dict[str, Any]) -> _Function:
-    namespace = dict(helpers)
+def _executable(text: str, dialect: str) -> _Function:
+    """The text's function. An operation's name stands for its value on floats, which may raise, or on arrays."""
+    namespace: dict[str, Any] = {name: op.raising if dialect == "python" else op.array for name, op in OPS.items()}
+    namespace |= {"inf": math.inf, "np": np}
     exec(builtins.compile(text, "<cgraph>", "exec"), namespace)  # noqa: S102 (the text is our own)
     function: _Function = namespace["function"]
     return function

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from ..core.graph import Graph
@@ -17,16 +17,16 @@ class Joined(NamedTuple):
     arguments: tuple[Node, ...]
 
 
-def schedule(graph: Graph, calls: Mapping[Node, Joined], library: Container[str]) -> list[Node | Joined]:
+def schedule(graph: Graph, calls: Mapping[Node, Joined]) -> list[Node | Joined]:
     """Every node once, arguments first, and before the results of a joined call the call.
 
-    library: names of the operations that are calls. These come as early as they can, since a call empties the
-    registers and at first there is little in them. Else the order is depth first from the outputs, and of a node's
-    arguments the one that needs the most registers comes first: what is computed first must be kept while the other is
-    (Sethi and Ullman 1970; the fewest registers, where nothing is shared).
+    Calls of library functions come as early as they can, since a call empties the registers and at first there is
+    little in them. Else the order is depth first from the outputs, and of a node's arguments the one that needs the
+    most registers comes first: what is computed first must be kept while the other is (Sethi and Ullman 1970; the
+    fewest registers, where nothing is shared).
     """
     registers = _registers(graph)
-    early = [calls.get(node, node) for node in graph.nodes if node.op.name in library]
+    early = [calls.get(node, node) for node in graph.nodes if node.args and not node.op.llvm]
     order: list[Node | Joined] = []
     done: set[Node | Joined] = set()
     stack: list[Node | Joined] = [*reversed(graph.outputs.values()), *reversed(early)]
@@ -69,10 +69,9 @@ def joined_calls(graph: Graph, together: int) -> dict[Node, Joined]:
     groups: dict[tuple[int, str], dict[Node, list[Node]]] = {}  # (level, kind) -> argument -> its calls
     for node in graph.nodes:
         level[node] = max([level[arg] for arg in node.args], default=0)
-        if node.op.name in POLYNOMIAL:
+        if node.op.vector:
             level[node] += 1
-            kind = "angle" if node.op.name in ("sin", "cos") else node.op.name
-            groups.setdefault((level[node], kind), {}).setdefault(node.args[0], []).append(node)
+            groups.setdefault((level[node], node.op.vector), {}).setdefault(node.args[0], []).append(node)
     calls: dict[Node, Joined] = {}
     for group in groups.values():
         arguments = tuple(group)
@@ -80,7 +79,7 @@ def joined_calls(graph: Graph, together: int) -> dict[Node, Joined]:
             chosen = arguments[start : start + together]
             nodes = [node for argument in chosen for node in group[argument]]
             if len(nodes) > 1:
-                names = {node.op.name for node in nodes}
+                names = {node.op.library for node in nodes}
                 call = Joined(tuple([name for name in POLYNOMIAL if name in names]), chosen)
                 calls.update(dict.fromkeys(nodes, call))
     return calls

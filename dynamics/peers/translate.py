@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -10,15 +9,6 @@ from cgraph import Node
 
 from .case import Case
 from .contender import UnavailableError
-
-_OPERATORS = {
-    "add": operator.add,
-    "sub": operator.sub,
-    "mul": operator.mul,
-    "div": operator.truediv,
-    "neg": operator.neg,
-    "pow": operator.pow,
-}
 
 
 def translated(
@@ -41,7 +31,7 @@ def translated(
             result[node] = number(node.value)
             continue
         name = node.op.name
-        function: Any = _OPERATORS.get(name)
+        function: Any = node.op.operator
         function = function or getattr(functions, (names or {}).get(name, name), None)
         if function is None:
             raise UnavailableError(f"has no operation {name!r}")

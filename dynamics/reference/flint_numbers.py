@@ -1,13 +1,14 @@
-"""Numbers of any precision: python-flint's, the value of every operation on them, and their decimal text."""
+"""Numbers of any precision: python-flint's, the value of operations on them, and their decimal text."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
-from cgraph.errors import install
+from cgraph.extend import Op, install
 
 Number = Any  # flint.arb: a midpoint of the working precision with a bound on its rounding error
 
@@ -54,48 +55,25 @@ def sign(x: Number) -> int:
     return int(mid > 0) - int(mid < 0)
 
 
-def _pow(a: Number, b: Number) -> Number:
-    whole = b.unique_fmpz() if b.is_exact() else None
-    return a ** (b if whole is None else int(whole))
+def value(op: Op) -> Callable[..., Number]:
+    """The operation on numbers: by its row of the operation table, else the numbers' method of that name.
+
+    Raises NotImplementedError when there is neither.
+    """
+    function = op.precise or op.operator
+    if function is not None:
+        return function
+    if op.piece is not None:
+        return partial(_piece, op.piece)
+    method: Callable[..., Number] | None = getattr(flint().arb, op.name, None)
+    if method is None:
+        raise NotImplementedError(
+            f"{op.name} has no multiprecision value: its row of the operation table needs the column `precise`, a "
+            f"function of python-flint's numbers, which have no method of that name"
+        )
+    return method
 
 
-def _hypot(a: Number, b: Number) -> Number:
-    return (a * a + b * b).sqrt()
-
-
-# fmt: off   (a table is read by columns)
-VALUES: dict[str, Callable[..., Number]] = {
-    "add": lambda a, b: a + b,
-    "sub": lambda a, b: a - b,
-    "mul": lambda a, b: a * b,
-    "div": lambda a, b: a / b,
-    "neg": lambda a: -a,
-    "pow": _pow,
-    "sqrt": lambda a: a.sqrt(),
-    "exp": lambda a: a.exp(),
-    "expm1": lambda a: a.expm1(),
-    "log": lambda a: a.log(),
-    "log1p": lambda a: a.log1p(),
-    "sin": lambda a: a.sin(),
-    "cos": lambda a: a.cos(),
-    "tan": lambda a: a.tan(),
-    "asin": lambda a: a.asin(),
-    "acos": lambda a: a.acos(),
-    "atan": lambda a: a.atan(),
-    "atan2": lambda a, b: type(a).atan2(a, b),
-    "hypot": _hypot,
-    "sinh": lambda a: a.sinh(),
-    "cosh": lambda a: a.cosh(),
-    "tanh": lambda a: a.tanh(),
-    "abs": lambda a: -a if sign(a) < 0 else a,
-    "sign": lambda a: 0 * a + sign(a),
-    "minimum": lambda a, b: a if sign(a - b) <= 0 else b,
-    "maximum": lambda a, b: a if sign(a - b) >= 0 else b,
-    "less": lambda a, b: 0 * a + (sign(a - b) < 0),
-    "less_equal": lambda a, b: 0 * a + (sign(a - b) <= 0),
-    "equal": lambda a, b: 0 * a + (sign(a - b) == 0),
-    "not_equal": lambda a, b: 0 * a + (sign(a - b) != 0),
-    "where": lambda c, a, b: a if sign(c) else b,
-    "strong_mul": lambda a, b: a * b if sign(a) and sign(b) else 0 * (a if sign(a) == 0 else b),
-}
-# fmt: on
+def _piece(piece: Callable[[int], tuple[int | None, int]], *args: Number) -> Number:
+    slot, factor = piece(sign(args[0] - args[1] if len(args) == 2 else args[0]))
+    return 0 * args[0] + factor if slot is None else factor * args[slot]

@@ -14,17 +14,14 @@ from collections.abc import Callable, Mapping, Sequence
 from operator import mul
 from typing import Any
 
-import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import as_node, topological
+from cgraph.extend import OPS, Op, as_node, topological
 
 from ..systems.system import TIME
-from .flint_numbers import VALUES, Number, sign
+from .flint_numbers import Number, sign, value
 
 Push = Callable[[int], None]  # appends coefficient k of one series, those of its arguments being there
 Key = tuple[Any, ...]
-
-POWERS = 64  # whole exponents up to this size become products
 
 
 class Series:
@@ -83,8 +80,8 @@ class Series:
                 coefficients.clear()
         for slopes in self._slopes.values():
             slopes.clear()
-        for i, value in zip(self._states, x, strict=True):
-            self.coefficients[i].append(value)
+        for i, number in zip(self._states, x, strict=True):
+            self.coefficients[i].append(number)
         for k in range(order):
             if self._time is not None:
                 self.coefficients[self._time].append(t if k == 0 else self.number(int(k == 1)))
@@ -101,22 +98,27 @@ class Series:
         """Whether series i depends on the state or on t."""
         return self._moving[i]
 
-    def shared(self, name: str, *args: int) -> int:
+    def shared(self, op: Op, *args: int) -> int:
         """The series of an operation on series, made when it is not there."""
-        key = (name, *args)
+        key = (op.name, *args)
         if key in self._number_of:
             return self._number_of[key]
         if not any(self._moving[i] for i in args):
-            return self._append(key, VALUES[name](*[self.coefficients[i][0] for i in args]))
-        if name in _SWITCHES:
-            switch = self.shared("sub", *args) if len(args) == 2 else args[0]
+            return self._append(key, value(op)(*[self.coefficients[i][0] for i in args]))
+        if op.piece is not None:
+            switch = self.shared(OPS["sub"], *args) if len(args) == 2 else args[0]
             i = self._append(key, None)
             self.switches[i] = switch
-            self._push.append(_piecewise(self, name, i, switch, *args))
+            self._push.append(_piecewise(self, i, op, switch, *args))
         else:
             i = self._append(key, None)
-            self._push.append(_RULES[name](self, i, *args))
+            self._push.append(self._recurrence(i, op, *args))
         return i
+
+    def _recurrence(self, i: int, op: Op, *args: int) -> Push:
+        own, rule, known = self.coefficients[i], op.series, [self.coefficients[arg] for arg in args]
+        assert rule is not None
+        return lambda k: own.append(rule(k, own, *known))
 
     def slopes(self, i: int) -> list[Number]:
         """The list of k a_k, k = 1, 2, .., of series i."""
@@ -141,12 +143,12 @@ class Series:
         if name == "constant":
             made = self._number_of.get(("constant", node.value))
             return self._append(("constant", node.value), self.number(node.value)) if made is None else made
-        if name in _RULES or name in _SWITCHES or not any(self._moving[i] for i in args):
-            return self.shared(name, *args)
+        if node.op.series or node.op.piece or not any(self._moving[i] for i in args):
+            return self.shared(node.op, *args)
         key = (name, *args)
         if key not in self._number_of:
-            if name == "pow":
-                self._number_of[key] = self._intern(_power(*node.args))
+            if node.op.rewrite is not None:
+                self._number_of[key] = self._intern(node.op.rewrite(*node.args))
             else:
                 self._integral(self._append(key, None), node, args, waiting)
         return self._number_of[key]
@@ -160,7 +162,7 @@ class Series:
     def _integral(self, i: int, node: Node, args: Sequence[int], waiting: list[Node]) -> None:
         """The recurrence by the table's partials. They may depend on the node itself, so they are made after it."""
         self._of_node[node] = i
-        own, value = self.coefficients[i], VALUES[node.op.name]
+        own, at_point = self.coefficients[i], value(node.op)
         at = [self.coefficients[arg] for arg in args]
         terms = []
         for arg, partial in zip(args, map(as_node, node.op.partials(node, *node.args)), strict=True):
@@ -172,7 +174,7 @@ class Series:
 
         def push(k: int) -> None:
             if k == 0:
-                own.append(value(*[coefficients[0] for coefficients in at]))
+                own.append(at_point(*[coefficients[0] for coefficients in at]))
                 return
             if not series:
                 series.extend([self._of_node[partial] for _, partial in terms])
@@ -187,118 +189,18 @@ class Series:
         self._push.append(push)
 
 
-def _power(a: Node, b: Node) -> Node:
-    """a**b by operations that have series: products for a whole exponent, else exp(b log a)."""
-    exponent = b.value
-    if exponent is None or exponent != int(exponent) or abs(exponent) > POWERS:
-        return cg.sqrt(a) if exponent == 0.5 else cg.exp(b * cg.log(a))
-    result: Node | None = None
-    square, rest = a, abs(int(exponent))
-    while rest:
-        if rest & 1:
-            result = square if result is None else result * square
-        rest >>= 1
-        if rest:
-            square = square * square
-    if result is None:
-        return as_node(1.0)
-    return 1.0 / result if exponent < 0 else result
-
-
-def _linear(s: Series, i: int, a: int, b: int, subtract: bool) -> Push:
-    own, first, second = s.coefficients[i], s.coefficients[a], s.coefficients[b]
-    if not s.moving(b):
-        return lambda k: own.append(first[k] if k else (first[0] - second[0] if subtract else first[0] + second[0]))
-    if not s.moving(a):
-        if subtract:
-            return lambda k: own.append(-second[k] if k else first[0] - second[0])
-        return lambda k: own.append(second[k] if k else first[0] + second[0])
-    if subtract:
-        return lambda k: own.append(first[k] - second[k])
-    return lambda k: own.append(first[k] + second[k])
-
-
-def _neg(s: Series, i: int, a: int) -> Push:
-    own, first = s.coefficients[i], s.coefficients[a]
-    return lambda k: own.append(-first[k])
-
-
-def _mul(s: Series, i: int, a: int, b: int) -> Push:
-    own, first, second = s.coefficients[i], s.coefficients[a], s.coefficients[b]
-    if not s.moving(a):
-        return lambda k: own.append(first[0] * second[k])
-    if not s.moving(b):
-        return lambda k: own.append(first[k] * second[0])
-    if a != b:
-        return lambda k: own.append(sum(map(mul, first, second[::-1])))
-
-    def square(k: int) -> None:  # the products that come twice are taken once
-        half = (k + 1) // 2
-        twice = 2 * sum(map(mul, first[:half], first[k : k - half : -1]))
-        own.append(twice if k % 2 else twice + first[half] * first[half])
-
-    return square
-
-
-def _div(s: Series, i: int, a: int, b: int) -> Push:
-    own, first, second = s.coefficients[i], s.coefficients[a], s.coefficients[b]
-    if not s.moving(b):
-        return lambda k: own.append(first[k] / second[0])
-
-    def push(k: int) -> None:  # y b = a
-        known = sum(map(mul, second[1:], own[::-1]))
-        own.append((s.get(a, k) - known) / second[0])
-
-    return push
-
-
-def _strong_mul(s: Series, i: int, a: int, b: int) -> Push:
-    own = s.coefficients[i]
-
-    def push(k: int) -> None:
-        pairs = [(s.get(a, j), s.get(b, k - j)) for j in range(k + 1)]
-        own.append(sum([x * y for x, y in pairs if x != 0 and y != 0], s.number(0)))
-
-    return push
-
-
-_RULES: dict[str, Callable[..., Push]] = {
-    "add": lambda s, i, a, b: _linear(s, i, a, b, subtract=False),
-    "sub": lambda s, i, a, b: _linear(s, i, a, b, subtract=True),
-    "neg": _neg,
-    "mul": _mul,
-    "div": _div,
-    "strong_mul": _strong_mul,
-}
-
-# From the sign of the first argument, or of a - b where there are two, to a factor or to which argument is taken.
-_SWITCHES: dict[str, Callable[[int], int]] = {
-    "where": lambda side: 1 if side else 2,
-    "abs": lambda side: -1 if side < 0 else 1,
-    "sign": lambda side: side,
-    "minimum": lambda side: int(side > 0),
-    "maximum": lambda side: int(side < 0),
-    "less": lambda side: int(side < 0),
-    "less_equal": lambda side: int(side <= 0),
-    "equal": lambda side: int(side == 0),
-    "not_equal": lambda side: int(side != 0),
-}
-
-_CHOICES = ("where", "minimum", "maximum")
-
-
-def _piecewise(s: Series, name: str, i: int, switch: int, *args: int) -> Push:
-    own, decide = s.coefficients[i], _SWITCHES[name]
+def _piecewise(s: Series, i: int, op: Op, switch: int, *args: int) -> Push:
+    own, piece = s.coefficients[i], op.piece
+    assert piece is not None
 
     def push(k: int) -> None:
         if k == 0:
             s.sides[i] = s.forced[i] if i in s.forced else sign(s.coefficients[switch][0])
-        choice = decide(s.sides[i])
-        if name == "abs":
-            own.append(choice * s.coefficients[switch][k])
-        elif name in _CHOICES:
-            own.append(s.get(args[choice], k))
+        slot, factor = piece(s.sides[i])
+        if slot is None:
+            own.append(s.number(0 if k else factor))
         else:
-            own.append(s.number(choice if k == 0 else 0))
+            coefficient = s.get(args[slot], k)
+            own.append(coefficient if factor == 1 else factor * coefficient)
 
     return push

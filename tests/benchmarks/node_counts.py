@@ -20,7 +20,7 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph import Node
 from cgraph.autodiff.reverse import cotangents
-from cgraph.core.label import building
+from cgraph.extend import building
 from cgraph.simplify import builder as fold
 from cgraph.simplify.builder import Builder
 from dynamics.equations import bias_terms, equations_of_motion as equations

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import ADJOINT, OPS, PRIMAL, TANGENT
+from cgraph.extend import ADJOINT, OPS, PRIMAL, TANGENT, Op
 
 from .. import theme
 from .content import Motion, Version
@@ -51,7 +51,7 @@ def record(versions: Sequence[Version], motion: Motion | None) -> dict[str, Any]
     drawn = _drawn(places, clusters, versions, at)
     return {
         "ops": {op.name: [op.symbol, op.commutative] for op in OPS.values()},
-        "slopes": {op.name: slopes(op.name) for op in OPS.values()},
+        "slopes": {op.name: slopes(op) for op in OPS.values()},
         **drawn,
         "stages": [stage for stage in (*STAGES.values(), TWICE) if any(group.stage == stage for group in clusters)],
         "columns": _columns(clusters, bodies),
@@ -68,13 +68,12 @@ def record(versions: Sequence[Version], motion: Motion | None) -> dict[str, Any]
     }
 
 
-def slopes(name: str) -> dict[str, Any]:
+def slopes(op: Op) -> dict[str, Any]:
     """The partials of an operation as a small program, from its row: 0 is the output, 1.. the arguments, then `code`.
 
     A line of code is a number, or an operation and the numbers of its arguments; `out` names one result an argument.
     """
-    op = OPS[name]
-    y, *args = cg.variables(["y", *"abc"[: op.arity]])
+    y, *args = cg.variables(["y", *[f"x{slot}" for slot in range(op.arity)]])
     partials = [cg.constant(each) if not isinstance(each, Node) else each for each in op.partials(y, *args)]
     graph = Graph([y, *args], {str(i): node for i, node in enumerate(partials)})
     number = {node: i for i, node in enumerate([y, *args])}

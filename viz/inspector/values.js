@@ -1,20 +1,5 @@
 // Values of nodes, slopes of edges and adjoints of a version at a point.
 
-const signOf = (a) => (a !== a ? a : (a > 0) - (a < 0));
-const VALUE = {
-  add: (a, b) => a + b, sub: (a, b) => a - b, mul: (a, b) => a * b, div: (a, b) => a / b, neg: (a) => -a,
-  // as in C: 1 to any power and anything to the power 0 are 1, NaN or not
-  pow: (a, b) => (a === 1 || b === 0 || (a === -1 && (b === Infinity || b === -Infinity)) ? 1 : a ** b),
-  sqrt: Math.sqrt, exp: Math.exp, expm1: Math.expm1, log: Math.log, log1p: Math.log1p,
-  sin: Math.sin, cos: Math.cos, tan: Math.tan, asin: Math.asin, acos: Math.acos, atan: Math.atan,
-  atan2: Math.atan2, hypot: Math.hypot, sinh: Math.sinh, cosh: Math.cosh, tanh: Math.tanh,
-  abs: Math.abs, sign: signOf,
-  minimum: (a, b) => (a <= b || a !== a ? a : b), maximum: (a, b) => (a >= b || a !== a ? a : b),
-  less: (a, b) => +(a < b), less_equal: (a, b) => +(a <= b), equal: (a, b) => +(a === b),
-  not_equal: (a, b) => +(a !== b), where: (c, a, b) => (c !== 0 ? a : b),
-  strong_mul: (a, b) => (a !== 0 && b !== 0 ? a * b : 0),
-};
-
 /** A version made ready: constants as numbers, uses of each node, edges in the order of evaluation. */
 function prepare(version) {
   const constants = new Map();
@@ -41,7 +26,7 @@ function evaluate(version, row) {
     const a = version.args[i];
     if (a.length === 1) found[i] = VALUE[version.ops[i]](found[a[0]]);
     else if (a.length === 2) found[i] = VALUE[version.ops[i]](found[a[0]], found[a[1]]);
-    else if (a.length === 3) found[i] = VALUE[version.ops[i]](found[a[0]], found[a[1]], found[a[2]]);
+    else if (a.length) found[i] = VALUE[version.ops[i]](...a.map((arg) => found[arg]));
   }
   return found;
 }
@@ -66,7 +51,7 @@ function adjoints(version, slopes, output, steps = version.ops.length) {
   const last = version.ops.length - 1;
   for (let node = last; node > last - steps; node--) {
     if (bars[node] === 0) continue;
-    version.args[node].forEach((arg, slot) => { bars[arg] += VALUE.strong_mul(bars[node], slopes[node][slot]); });
+    version.args[node].forEach((arg, slot) => { bars[arg] += VALUE.zero_safe_mul(bars[node], slopes[node][slot]); });
   }
   return bars;
 }

@@ -10,37 +10,6 @@ from ...core.node import CONSTANT, VARIABLE, Node
 
 PART = 2000  # operations in a function: compilers take more than proportionally to its length
 
-# Expressions for the operations that are not functions of math.h under their own names. An argument is a name, a
-# place in an array or a number; {name} is the function being written.
-EXPRESSIONS = {
-    "add": "{0} + {1}",
-    "sub": "{0} - {1}",
-    "mul": "{0} * {1}",
-    "div": "{0} / {1}",
-    "neg": "-{0}",
-    "pow": "{name}_pow({0}, {1})",
-    "abs": "fabs({0})",
-    "sign": "{0} > 0.0 ? 1.0 : ({0} < 0.0 ? -1.0 : ({0} != {0} ? {0} : 0.0))",
-    "minimum": "({0} <= {1} || {0} != {0}) ? {0} : {1}",
-    "maximum": "({0} >= {1} || {0} != {0}) ? {0} : {1}",
-    "less": "{0} < {1} ? 1.0 : 0.0",
-    "less_equal": "{0} <= {1} ? 1.0 : 0.0",
-    "equal": "{0} == {1} ? 1.0 : 0.0",
-    "not_equal": "{0} != {1} ? 1.0 : 0.0",
-    "where": "{0} != 0.0 ? {1} : {2}",
-    "strong_mul": "({0} != 0.0 && {1} != 0.0) ? {0} * {1} : 0.0",
-}
-
-
-_POWER = """\
-/* Through volatile: compilers make pow(a, 2.0) into a * a and pow(2.0, b) into exp2(b), of another last bit. */
-static double {name}_pow(double a, double b)
-{{
-    const volatile double base = a, exponent = b;
-    return pow(base, exponent);
-}}
-"""
-
 
 def functions(
     name: str, nodes: Sequence[Node], places: Mapping[Node, str], results: Sequence[tuple[str, Node]]
@@ -58,7 +27,7 @@ def functions(
         stored.setdefault(node, []).append(place)
 
     parts, w_size = _parts(name, nodes, steps, text, stored)
-    power = [_POWER.format(name=name)] if any([node.op.name == "pow" for node in steps]) else []
+    helpers = [text.format(name=name) for text in dict.fromkeys([node.op.c_helper for node in steps]) if text]
     computed = set(steps)
     body = [f"y[{place}] = {text[node]};" for place, node in results if node not in computed]
     if len(parts) > 1:
@@ -66,7 +35,7 @@ def functions(
         body = [f"double w[{max(w_size, 1)}];", *body, *[f"{function}(x, w, y);" for function in called]]
         arrays = "const double *restrict x, double *restrict w, double *restrict y"
         unused = ["(void)x, (void)w, (void)y;"]  # a part need not touch all three
-        power += [
+        helpers += [
             _function(f"static void {function}({arrays})", unused + part)
             for function, part in zip(called, parts, strict=True)
         ]
@@ -74,7 +43,7 @@ def functions(
         body += parts[0] if parts else []
         if not any([node.op is VARIABLE for node in nodes]):
             body.insert(0, "(void)x;")
-    return [*power, _function(f"void {name}(const double *restrict x, double *restrict y)", body)]
+    return [*helpers, _function(f"void {name}(const double *restrict x, double *restrict y)", body)]
 
 
 def _function(signature: str, body: Sequence[str]) -> str:
@@ -97,8 +66,7 @@ def _parts(
     for i, node in enumerate(steps):
         if i % PART == 0:
             parts.append([])
-        template = EXPRESSIONS.get(node.op.name, f"{node.op.name}({', '.join(('{0}', '{1}')[: node.op.arity])})")
-        expression = template.format(*[text[arg] for arg in node.args], name=name)
+        expression = node.op.c.format(*[text[arg] for arg in node.args], name=name)
         free += read_last.pop(i, ())
         last = last_use.get(node, i)
         if last // PART == i // PART:

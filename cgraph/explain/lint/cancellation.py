@@ -5,20 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ...core.node import Edge, Node
+from ...core.edge import Edge
+from ...core.node import Node
 from ..edge_partials import Point, edge_slopes, node_values
 from ..names import Names
 from .finding import Finding
 
 UNIT = 2.0**-53  # relative error of one rounding
 DIGITS = -math.log10(UNIT)  # 15.95 decimal digits of a float64
-_SUMS = ("add", "sub")
-# Roundings of an operation's own result, in units. The four operations, square root and products: one, by IEEE 754.
-# None where the result is one of the arguments or a whole number. All else is a library function: two units, one ulp.
-_ROUNDINGS = dict.fromkeys(("add", "sub", "mul", "strong_mul", "div", "sqrt"), 1.0) | dict.fromkeys(
-    ("neg", "abs", "sign", "minimum", "maximum", "where", "less", "less_equal", "equal", "not_equal"), 0.0
-)
-_LIBRARY = 2.0
 
 
 @dataclass(frozen=True)
@@ -48,7 +42,7 @@ def rounded(names: Names, at: Point) -> Rounded:
     errors: dict[Node, float] = {}
     for node in graph.nodes:
         inherited = [_times(next(slopes), errors[arg]) for arg in node.args]
-        own = UNIT * _ROUNDINGS.get(node.op.name, _LIBRARY) if node.args else UNIT if node.value is None else 0.0
+        own = UNIT * node.op.rounding if node.args else UNIT if node.value is None else 0.0
         errors[node] = sum(inherited) + own * abs(values[node])
     return Rounded(values, errors)
 
@@ -58,7 +52,7 @@ def cancellations(names: Names, at: Point, threshold: float) -> list[Finding]:
     found = rounded(names, at)
     findings = []
     for node in names.graph.nodes:
-        if node.op.name not in _SUMS or not math.isfinite(found.errors[node]):
+        if len(node.op.signs) != 2 or not math.isfinite(found.errors[node]):
             continue
         before = min([found.digits(arg) for arg in node.args])
         inherited = sum([found.errors[arg] for arg in node.args])
@@ -73,7 +67,7 @@ def cancellations(names: Names, at: Point, threshold: float) -> list[Finding]:
 def _finding(names: Names, node: Node, found: Rounded, lost: float, left: float) -> Finding:
     a, b = (found.values[arg] for arg in node.args)
     first, second = (f"{value:.{min(17, math.ceil(lost) + 2)}g}" for value in (a, b))
-    sign = "+" if node.op.name == "add" else "-"
+    sign = "+" if node.op.signs[1] > 0 else "-"
     text = (
         f"{names.line(node)}: {first} {sign} {f'({second})' if b < 0 else second} leaves {found.values[node]:.3g}; "
         f"{lost:.0f} digits are lost here, {left:.0f} remain."

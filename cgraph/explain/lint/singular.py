@@ -7,11 +7,12 @@ import numbers
 from collections.abc import Mapping
 
 from ...core.graph import Graph
-from ...core.node import CONSTANT, VARIABLE, Node
+from ...core.node import CONSTANT, VARIABLE, Node, Op
+from ...core.op_intervals import LINE
+from ...core.operation import Interval
 from ...errors import GraphError
 from ..names import Names
 from .finding import Finding
-from .interval import LINE, Interval, singular_at, value_of
 
 Box = Mapping[str, float | tuple[float, float]]
 
@@ -34,8 +35,24 @@ def intervals(graph: Graph, box: Box) -> dict[Node, Interval]:
             found[node] = (node.value, node.value)
         else:
             same = len(node.args) == 2 and node.args[0] is node.args[1]
-            found[node] = value_of(node.op.name, [found[arg] for arg in node.args], same=same)
+            found[node] = value_of(node.op, [found[arg] for arg in node.args], same=same)
     return found
+
+
+def value_of(op: Op, arguments: list[Interval], *, same: bool = False) -> Interval:
+    """The interval of an operation's value; `same`: its two arguments are one node."""
+    if op.interval is None:
+        return LINE
+    if same and op.interval_of_same is not None:
+        return op.interval_of_same(arguments[0])
+    return op.interval(*arguments)
+
+
+def singular_at(op: Op, arguments: list[Interval]) -> str | None:
+    """Where within the arguments' intervals the operation has no bounded slope, in words; None if nowhere."""
+    if op.singular is not None:
+        return op.singular(*arguments)
+    return None if op.interval is not None else f"{op.name}, of which no bounds are known"
 
 
 def singular_nodes(names: Names, box: Box) -> list[Finding]:
@@ -43,7 +60,7 @@ def singular_nodes(names: Names, box: Box) -> list[Finding]:
     bounds = intervals(names.graph, box)
     findings = []
     for node in names.graph.nodes:
-        reason = singular_at(node.op.name, [bounds[arg] for arg in node.args]) if node.args else None
+        reason = singular_at(node.op, [bounds[arg] for arg in node.args]) if node.args else None
         if reason is not None:
             arguments = {names.text(arg): bounds[arg] for arg in node.args if arg.value is None}
             within = " and ".join([f"{name} is within {_shown(bound)}" for name, bound in arguments.items()])

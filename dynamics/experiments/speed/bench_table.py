@@ -13,7 +13,7 @@ from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 
-from cgraph.errors import install
+from cgraph.extend import install
 
 from ...peers import PEERS
 from .bench import AGREES, MODES, OURS, TASKS, Cell, Row

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ...equations.initial_value import split_state
 from ...equations.state_equation import state_inputs
 from ...reference import Reference
 from ...simulation.simulate import simulate
@@ -73,11 +74,11 @@ def verdict(case: Case, method: str) -> Verdict:
 
 def trajectory(case: Case, model: Model, method: str) -> Trajectory:
     """The run of a case."""
-    half = len(case.start) if as_ode(model) else len(case.start) // 2
+    q, qd = split_state(model, case.start)
     return simulate(
         model,
-        case.start[:half],
-        case.start[half:] or None,
+        q,
+        qd,
         case.t_end,
         method,
         dt=EQUAL_STEPS.get(case.name, {}).get(method),

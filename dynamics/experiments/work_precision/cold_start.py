@@ -20,7 +20,7 @@ from ...equations.state_equation import state_inputs
 from ...peers import Case, UnavailableError
 from ...peers.casadi import CasadiPeer, casadi
 from ...peers.heyoka import heyoka, leave_cache
-from ...simulation.scipy_solvers import PREFIX
+from ...simulation.run_options import SCIPY
 from ...simulation.simulate import simulate
 from .trajectory_peers import MOST, casadi_equations, heyoka_derivatives, heyoka_equations
 from .trajectory_runs import problem_of
@@ -97,7 +97,7 @@ STARTS = {
     "scipy": _Start(
         "our graph, LLVM, and SciPy's DOP853 (Radau where it is stiff) on it",
         ("llvmlite.binding", "scipy.integrate"),
-        lambda setting: _ours(setting, PREFIX + ("Radau" if setting.stiff else "DOP853")),
+        lambda setting: _ours(setting, SCIPY + ("Radau" if setting.stiff else "DOP853")),
     ),
     "CasADi": _Start("CasADi's own derivatives in its virtual machine, and a run of CVODES", ("casadi",), _casadi),
     "heyoka compact": _Start(

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from cgraph.extend import Array
+
 from ...integrators import Problem
 from ...io.mujoco_model import rollout
 from ...peers import Case, UnavailableError
@@ -17,8 +19,7 @@ from ...peers.casadi import NAMES as CASADI_NAMES, casadi
 from ...peers.heyoka import expressions, heyoka
 from ...peers.mujoco import MujocoPeer
 from ...peers.translate import translated
-from ...simulation.scipy_solvers import PREFIX, SOLVERS
-from ...simulation.trajectory import Array
+from ...simulation.run_options import SCIPY, SCIPY_SOLVERS
 from ...systems.system import TIME
 from .trajectory_runs import EQUAL, Contender, Outcome, Scipy
 from .trajectory_scenes import INTERVALS, Setting
@@ -219,8 +220,8 @@ def casadi_equations(ca: Any, problem: Problem) -> dict[str, Any]:
 def offers(setting: Setting, smallest: float, problem: Problem, backend: str) -> dict[str, Callable[[], Contender]]:
     """The peers that could be asked, by name; making one raises ImportError, UnavailableError or ValueError."""
     found: dict[str, Callable[[], Contender]] = {}
-    for solver in SOLVERS:
-        found[f"{PREFIX}{solver}"] = partial(Scipy, solver, setting, smallest, problem, backend)
+    for solver in SCIPY_SOLVERS:
+        found[f"{SCIPY}{solver}"] = partial(Scipy, solver, setting, smallest, problem, backend)
     for integrator in MUJOCO:
         found[f"MuJoCo {integrator}"] = partial(Mujoco, integrator, setting, smallest)
     found["heyoka Taylor"] = partial(Heyoka, setting, smallest, problem)

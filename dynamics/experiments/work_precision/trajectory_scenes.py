@@ -11,11 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from cgraph.extend import Array
+
 from ... import scenes
+from ...equations.initial_value import split_state
 from ...equations.state_equation import state_inputs
 from ...reference import Reference, reference
 from ...reference.solution import scale
-from ...simulation.trajectory import Array
 from ...systems.model import Model, as_ode, as_system
 from ..stability import cases
 from ..stability.cases import Case
@@ -55,10 +57,10 @@ class Setting:
         return [self.t_end * k / INTERVALS for k in range(INTERVALS + 1)]
 
     def exact(self, digits: int, folder: str | Path | None = None) -> Reference:
-        """The motion at `times`: a case's own, or to so many digits. Raises what `multiprecision.reference` raises."""
+        """The motion at `times`: a case's own, or to so many digits. Raises what `reference` raises."""
         if self.known is not None:
             return self.known(self.times, folder)
-        return reference(self.model, self.start, self.times, digits=digits, folder=folder)
+        return reference(self.model, *split_state(self.model, self.start), self.times, digits=digits, folder=folder)
 
     @property
     def mechanical(self) -> bool:

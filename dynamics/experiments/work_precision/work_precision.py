@@ -18,13 +18,13 @@ from typing import Any
 import numpy as np
 
 from cgraph import Graph
+from cgraph.extend import Array
 
 from ...equations.equations_of_motion import energy
 from ...integrators import METHODS, Problem
 from ...peers import UnavailableError
 from ...reference import Reference
-from ...simulation.scipy_solvers import PREFIX
-from ...simulation.trajectory import Array
+from ...simulation.run_options import SCIPY
 from ...systems.model import as_system
 from ...systems.system import System
 from ..paper_numbers.fit import exponent
@@ -45,7 +45,7 @@ STALLED = 2  # knobs in a row without a smaller error, after which no finer one 
 PEERS = ("MuJoCo", "SciPy", "heyoka", "CasADi")  # what can be named in place of its contenders
 OURS = "ours"
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
-_BEGINS = {"MuJoCo": "MuJoCo", "SciPy": PREFIX, "heyoka": "heyoka", "CasADi": "CVODES"}
+_BEGINS = {"MuJoCo": "MuJoCo", "SciPy": SCIPY, "heyoka": "heyoka", "CasADi": "CVODES"}
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ def work_precision(
     `budget` seconds each.  folder: where exact motions are kept.  backend: see `simulate`.  say: takes progress lines.
 
     Raises ValueError for a name that is not known, ImportError without what makes the exact motion, and what
-    `multiprecision.reference` raises.
+    `reference` raises.
     """
     for what, given, known in (("method", methods, METHODS), ("peer", peers, PEERS), ("cold start", cold, STARTS)):
         if unknown := [each for each in given if each not in known]:

@@ -18,7 +18,7 @@ import dynamics as dyn
 from cgraph.codegen.c import c_statements as body
 from cgraph.core.node import OPS, apply
 from cgraph.util.atomic_write import atomic_write
-from tests.strategies import DOMAINS, cases
+from tests.strategies import cases
 
 CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 CXX = shutil.which("c++") or shutil.which("g++") or shutil.which("clang++")
@@ -76,7 +76,7 @@ def graph_of(op):
 def points_of(op):
     """Samples, points of the domain, and every combination of IEEE specials."""
     source = random.Random(op.name)
-    drawn = [tuple(source.uniform(*interval) for interval in DOMAINS[op.name]) for _ in range(200)]
+    drawn = [tuple(source.uniform(*interval) for interval in op.domain) for _ in range(200)]
     return [*op.samples, *drawn, *itertools.product(SPECIAL, repeat=op.arity)]
 
 

@@ -235,7 +235,7 @@ def test_one_at_a_time_only_sine_and_cosine_of_one_angle_are_joined():
 
 def assert_complete_and_in_order(graph, together):
     calls = joined_calls(graph, together)
-    order = schedule(graph, calls, FUNCTIONS)
+    order = schedule(graph, calls)
     place = {step: k for k, step in enumerate(order)}
     assert len(place) == len(order)
     assert {step for step in order if not isinstance(step, Joined)} == set(graph.nodes)
@@ -267,7 +267,7 @@ def test_the_argument_that_needs_more_registers_is_computed_first():
     a, b, c, d, e = cg.variables("a b c d e")
     wide = (a * b) / (c * d)
     for graph in (cg.Graph([a, b, c, d, e], {"y": -e + wide}), cg.Graph([a, b, c, d, e], {"y": wide + -e})):
-        order = schedule(graph, {}, ())
+        order = schedule(graph, {})
         assert order.index(wide) < order.index(e)
 
 
@@ -276,4 +276,4 @@ def test_a_schedule_of_a_deep_graph_needs_no_recursion_and_no_square_of_its_size
     for _ in range(30_000):
         node = cg.sin(node) * cg.cos(node)
     graph = cg.Graph([x], {"y": node})
-    assert len(schedule(graph, joined_calls(graph, TOGETHER), FUNCTIONS)) == len(graph.nodes) + 30_000
+    assert len(schedule(graph, joined_calls(graph, TOGETHER))) == len(graph.nodes) + 30_000

@@ -19,8 +19,7 @@ from cgraph.core.ops import OPS
 from dynamics.scenes.inspection import FORMULATIONS, inspection
 from viz import cli
 from viz.inspector import Motion, Table, Version
-from viz.inspector.layers import GAP, STEP, layered
-from viz.inspector.page import SCRIPTS, _asset
+from viz.inspector.page import scripts
 from viz.inspector.record import record, slopes
 
 JAVASCRIPT_LIBM = 1e-12  # relative: a browser's sin and exp may differ from the C library's in the last bits
@@ -142,28 +141,9 @@ def test_marked_nodes_have_clusters_of_their_own():
             assert cluster < 0 or data["clusters"][cluster]["marked"] == (node in each["marked"])
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_layers_put_arguments_below_and_nothing_on_top_of_another(seed):
-    rng = np.random.default_rng(seed)
-    widths = rng.uniform(30, 90, 60)
-    edges = sorted({(int(a), int(b)) for a, b in rng.integers(0, 60, (90, 2)) if a < b})
-    x, y, width, height = layered(widths, edges)
-    assert all(y[source] >= y[target] + STEP for source, target in edges)
-    for a in range(60):
-        assert widths[a] / 2 <= x[a] + 1e-9
-        assert x[a] + widths[a] / 2 <= width + 1e-9
-        assert 0 < y[a] < height
-        for b in range(a):
-            assert y[a] != y[b] or abs(x[a] - x[b]) >= (widths[a] + widths[b]) / 2 + GAP - 1e-6
-
-
-def test_an_empty_cluster_has_no_size():
-    assert layered([], []) == ([], [], 0.0, 0.0)
-
-
 def test_slopes_are_the_differences_of_every_operation():
     for op in OPS.values():
-        program = slopes(op.name)
+        program = slopes(op)
         for sample in op.samples:
             work = [op.scalar(*sample), *sample]
             for line in program["code"]:
@@ -183,7 +163,7 @@ def run_script(program: str, given: object) -> object:
     node = shutil.which("node")
     if node is None:
         pytest.skip("there is no node on PATH")
-    text = "\n".join([*map(_asset, SCRIPTS), f"const given = {json.dumps(given)};", program])
+    text = "\n".join([scripts(), f"const given = {json.dumps(given)};", program])
     done = subprocess.run([node, "-"], input=text, capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)

@@ -84,7 +84,7 @@ def test_a_share_is_drawn_within_the_picture(value: float | str, bound: float, s
     assert stability._share({"value": value, "bound": bound}) == share
 
 
-def test_what_is_beyond_its_bound_is_drawn_in_the_colour_of_what_is_wrong() -> None:
+def test_what_is_beyond_its_bound_is_drawn_in_the_color_of_what_is_wrong() -> None:
     axis = stability.shares(ROWS).axes[0]
     met, missed = (line for line in axis.lines if line.get_marker() in ("o", "X"))
     assert list(met.get_xdata()) == [1e-9]

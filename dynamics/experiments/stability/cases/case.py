@@ -11,6 +11,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 
 from ....equations.equations_of_motion import energy
+from ....equations.initial_value import split_state
 from ....reference import Reference, reference
 from ....systems.model import Model, as_ode, as_system
 
@@ -64,19 +65,20 @@ class Case:
     growth: float | None = None
     invariants: Callable[[Any], Graph] | None = None
     exact: Exact | None = None  # a closed form of the motion, or of a limit of it that the watch then names
-    method: str | None = None  # of `multiprecision.reference`, where it carries the model to t_end in a minute or so
+    method: str | None = None  # of `reference`, where it carries the model to t_end in a minute or so
 
     def solution(self, times: Sequence[float] | None = None, folder: str | Path | None = None) -> Reference | None:
         """The motion at `times` (default: t_end), from the closed form or else computed; None when there is neither.
 
-        folder: as of `multiprecision.reference`. Raises ImportError without python-flint or mpmath.
+        folder: as of `reference`. Raises ImportError without python-flint or mpmath.
         """
         at = [self.t_end] if times is None else [float(t) for t in times]
         if self.exact is not None:
             return self.exact(at)
         if self.method is None:
             return None
-        return reference(self.build(), self.start, at, digits=DIGITS, method=self.method, folder=folder)
+        model = self.build()
+        return reference(model, *split_state(model, self.start), at, digits=DIGITS, method=self.method, folder=folder)
 
     def sizes(self, folder: str | Path | None = None) -> tuple[float, ...]:
         """A size for each state: `size`, or the larger of the values at the start and at t_end, or 1 for zeros."""

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ....equations.initial_value import split_state
 from ....reference import Reference, reference
 from .case import Case
 
@@ -24,7 +25,8 @@ def growth(case: Case, folder: str | Path | None = None) -> float:
     model, size, worst = case.build(), np.array(case.sizes(folder)), 0.0
 
     def end(start: tuple[float, ...]) -> Reference:
-        return reference(model, start, [case.t_end], digits=DIGITS, method=str(case.method), folder=folder)
+        at = split_state(model, start)
+        return reference(model, *at, [case.t_end], digits=DIGITS, method=str(case.method), folder=folder)
 
     there = end(case.start)
     for i, value in enumerate(case.start):

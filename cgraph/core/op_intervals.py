@@ -1,53 +1,22 @@
-"""Interval arithmetic over the operation table: bounds of a value, and where a slope has none.
+"""Interval arithmetic of the operations: bounds of a value, and in words where a slope has none.
 
-Bounds are outward: they hold for real numbers, and for float64 whose library functions err by ULPS at most. A row here
-belongs to each row of the operation table; an operation without one has any value, and is reported.
+Bounds are outward: they hold for real numbers, and for float64 whose library functions err by ULPS at most.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
-from ...core.node import OPS
+from .node import OPS
+from .operation import Interval
 
-Interval = tuple[float, float]
 LINE: Interval = (-math.inf, math.inf)
 FLAG: Interval = (0.0, 1.0)
 ULPS = 4  # C libraries in use stay within 2 (glibc manual, "Known Maximum Errors"); the vector ones of NumPy within 4
 _FAR = 2.0**20  # beyond, sine and cosine are taken for anything in [-1, 1]: the period's own rounding would matter
 _LARGEST = math.nextafter(math.inf, 0.0)
 _SLACK = 1e-9  # by which an extremum of sine or cosine may lie outside an interval and is counted as inside
-
-
-@dataclass(frozen=True)
-class Row:
-    """What intervals know of an operation.
-
-    value: of the arguments' intervals.  singular: in words, where the slope is unbounded or there is none, or None.
-    same: value when both arguments are one node, where that is narrower.
-    """
-
-    value: Callable[..., Interval]
-    singular: Callable[..., str | None] = lambda *_: None
-    same: Callable[[Interval], Interval] | None = None
-
-
-def value_of(name: str, arguments: list[Interval], *, same: bool = False) -> Interval:
-    """The interval of an operation's value; `same`: its two arguments are one node."""
-    row = ROWS.get(name)
-    if row is None:
-        return LINE
-    if same and row.same is not None:
-        return row.same(arguments[0])
-    return row.value(*arguments)
-
-
-def singular_at(name: str, arguments: list[Interval]) -> str | None:
-    """Where within the arguments' intervals the operation has no bounded slope, in words; None if nowhere."""
-    row = ROWS.get(name)
-    return row.singular(*arguments) if row is not None else f"{name}, of which no bounds are known"
 
 
 # Rounding outwards. A bound that is infinite by overflow alone becomes the largest number on the inner side.
@@ -95,12 +64,19 @@ def _quotient(a: float, b: float) -> Interval:
 # Operations.
 
 
-def _add(a: Interval, b: Interval) -> Interval:
+def add(a: Interval, b: Interval) -> Interval:
+    """Bounds of a + b."""
     return _sum(a[0], b[0], _down, -math.inf), _sum(a[1], b[1], _up, math.inf)
 
 
-def _neg(a: Interval) -> Interval:
+def neg(a: Interval) -> Interval:
+    """Bounds of -a."""
     return -a[1], -a[0]
+
+
+def sub(a: Interval, b: Interval) -> Interval:
+    """Bounds of a - b."""
+    return add(a, neg(b))
 
 
 def _corners(rule: Callable[[float, float], Interval], a: Interval, b: Interval) -> Interval:
@@ -108,21 +84,24 @@ def _corners(rule: Callable[[float, float], Interval], a: Interval, b: Interval)
     return min([low for low, _ in corners]), max([high for _, high in corners])
 
 
-def _mul(a: Interval, b: Interval) -> Interval:
+def mul(a: Interval, b: Interval) -> Interval:
+    """Bounds of a * b."""
     return _corners(_product, a, b)
 
 
-def _square(a: Interval) -> Interval:
-    small, large = _magnitude(a)
+def square(a: Interval) -> Interval:
+    """Bounds of a * a."""
+    small, large = magnitude(a)
     return _product(small, small)[0], _product(large, large)[1]
 
 
-def _div(a: Interval, b: Interval) -> Interval:
+def div(a: Interval, b: Interval) -> Interval:
+    """Bounds of a / b."""
     return LINE if b[0] <= 0.0 <= b[1] else _corners(_quotient, a, b)
 
 
-def _magnitude(a: Interval) -> Interval:
-    """|a|"""
+def magnitude(a: Interval) -> Interval:
+    """Bounds of |a|."""
     return (0.0 if a[0] <= 0.0 <= a[1] else min(abs(a[0]), abs(a[1]))), max(abs(a[0]), abs(a[1]))
 
 
@@ -132,7 +111,7 @@ def _meet(a: Interval, low: float, high: float) -> Interval | None:
     return kept if kept[0] <= kept[1] else None
 
 
-def _rising(
+def rising(
     name: str, domain: Interval = LINE, bounds: Interval = LINE, ulps: int = ULPS, *, falling: bool = False
 ) -> Callable[[Interval], Interval]:
     """The interval of a monotonous function on its domain; outside of it there is no number to bound."""
@@ -147,7 +126,7 @@ def _rising(
     return value
 
 
-def _wave(name: str, top: float) -> Callable[[Interval], Interval]:
+def wave(name: str, top: float) -> Callable[[Interval], Interval]:
     """The interval of a sine or cosine, whose maxima lie at top + 2 pi k."""
 
     def value(a: Interval) -> Interval:
@@ -165,28 +144,37 @@ def _contains_turn(a: Interval, start: float, period: float) -> bool:
     return math.floor((a[1] - start) / period + _SLACK) >= math.ceil((a[0] - start) / period - _SLACK)
 
 
-def _tan(a: Interval) -> Interval:
+def tan(a: Interval) -> Interval:
+    """Bounds of tan a, none beside a pole."""
     if _tan_pole(a):
         return LINE
-    return _rising("tan")(a)
+    return rising("tan")(a)
+
+
+def no_tangent(a: Interval) -> str | None:
+    """The poles of the tangent."""
+    return "value and slope are infinite at odd multiples of pi/2" if _tan_pole(a) else None
 
 
 def _tan_pole(a: Interval) -> bool:
     return not max(abs(a[0]), abs(a[1])) < _FAR or _contains_turn(a, math.pi / 2, math.pi)
 
 
-def _cosh(a: Interval) -> Interval:
-    low, high = _rising("cosh")(_magnitude(a))
+def cosh(a: Interval) -> Interval:
+    """Bounds of cosh a."""
+    low, high = rising("cosh")(magnitude(a))
     return max(low, 1.0), high
 
 
-def _hypot(a: Interval, b: Interval) -> Interval:
-    (a0, a1), (b0, b1) = _magnitude(a), _magnitude(b)
+def hypot(a: Interval, b: Interval) -> Interval:
+    """Bounds of sqrt(a * a + b * b)."""
+    (a0, a1), (b0, b1) = magnitude(a), magnitude(b)
     low = math.hypot(a0, b0)
     return max(0.0, _down(low, ULPS)), _up(math.hypot(a1, b1), ULPS)
 
 
-def _atan2(y: Interval, x: Interval) -> Interval:
+def atan2(y: Interval, x: Interval) -> Interval:
+    """Bounds of the angle of (x, y)."""
     if y[0] <= 0.0 <= y[1] and x[0] <= 0.0:  # the origin, or the half line along which the angle jumps
         return _down(-math.pi), _up(math.pi)
     corners = [math.atan2(v, u) for v in y for u in x]
@@ -198,7 +186,8 @@ def _outwards(low: float, high: float) -> Interval:
     return (low if low == 0.0 else _down(low, ULPS)), (high if high == 0.0 else _up(high, ULPS))
 
 
-def _pow(a: Interval, b: Interval) -> Interval:
+def pow(a: Interval, b: Interval) -> Interval:
+    """Bounds of a ** b."""
     if b[0] == b[1] and b[0].is_integer():
         return _whole_power(a, b[0])
     if a[0] < 0.0 and b[0] != b[1]:
@@ -222,7 +211,8 @@ def _whole_power(a: Interval, n: float) -> Interval:
     return _down(min(ends), ULPS), _up(max(ends), ULPS)
 
 
-def _where(c: Interval, a: Interval, b: Interval) -> Interval:
+def where(c: Interval, a: Interval, b: Interval) -> Interval:
+    """Bounds of the part that the condition can choose."""
     if c == (0.0, 0.0):
         return b
     return a if c[0] > 0.0 or c[1] < 0.0 else _hull(a, b)
@@ -232,29 +222,48 @@ def _hull(a: Interval, b: Interval) -> Interval:
     return min(a[0], b[0]), max(a[1], b[1])
 
 
-def _less(a: Interval, b: Interval) -> Interval:
+def minimum(a: Interval, b: Interval) -> Interval:
+    """Bounds of the smaller."""
+    return min(a[0], b[0]), min(a[1], b[1])
+
+
+def maximum(a: Interval, b: Interval) -> Interval:
+    """Bounds of the larger."""
+    return max(a[0], b[0]), max(a[1], b[1])
+
+
+def always(value: float) -> Callable[[Interval], Interval]:
+    """A value that does not depend on the argument."""
+    return lambda a: (value, value)
+
+
+def less(a: Interval, b: Interval) -> Interval:
+    """Bounds of a < b."""
     return (1.0, 1.0) if a[1] < b[0] else (0.0, 0.0) if a[0] >= b[1] else FLAG
 
 
-def _less_equal(a: Interval, b: Interval) -> Interval:
+def less_equal(a: Interval, b: Interval) -> Interval:
+    """Bounds of a <= b."""
     return (1.0, 1.0) if a[1] <= b[0] else (0.0, 0.0) if a[0] > b[1] else FLAG
 
 
-def _equal(a: Interval, b: Interval) -> Interval:
+def equal(a: Interval, b: Interval) -> Interval:
+    """Bounds of a == b."""
     if a == b and a[0] == a[1]:
         return 1.0, 1.0
     return (0.0, 0.0) if a[1] < b[0] or b[1] < a[0] else FLAG
 
 
-def _not_equal(a: Interval, b: Interval) -> Interval:
-    low, high = _equal(a, b)
+def not_equal(a: Interval, b: Interval) -> Interval:
+    """Bounds of a != b."""
+    low, high = equal(a, b)
     return 1.0 - high, 1.0 - low
 
 
 # Where a slope is unbounded or is none, in words that follow "the slope of sqrt is".
 
 
-def _below(limit: float, there: str) -> Callable[[Interval], str | None]:
+def below(limit: float, there: str) -> Callable[[Interval], str | None]:
     """For a domain that begins at `limit`."""
 
     def singular(a: Interval) -> str | None:
@@ -265,59 +274,27 @@ def _below(limit: float, there: str) -> Callable[[Interval], str | None]:
     return singular
 
 
-def _arc(a: Interval) -> str | None:
+def arc(a: Interval) -> str | None:
+    """For asin and acos."""
     if a[0] < -1.0 or a[1] > 1.0:
         return "there is no value beyond -1 and 1, and the slope is infinite at both"
     return "the slope is infinite at -1 and 1" if a[0] == -1.0 or a[1] == 1.0 else None
 
 
-def _divisor(a: Interval, b: Interval) -> str | None:
+def divisor(a: Interval, b: Interval) -> str | None:
+    """For a quotient."""
     return "the divisor can be 0" if b[0] <= 0.0 <= b[1] else None
 
 
-def _origin(words: str) -> Callable[[Interval, Interval], str | None]:
+def origin(words: str) -> Callable[[Interval, Interval], str | None]:
+    """For functions of a point in the plane."""
     return lambda a, b: words if a[0] <= 0.0 <= a[1] and b[0] <= 0.0 <= b[1] else None
 
 
-def _power(a: Interval, b: Interval) -> str | None:
+def power(a: Interval, b: Interval) -> str | None:
+    """For a ** b."""
     if b[0] == b[1] and b[0].is_integer():
         return "the base can be 0 under a negative power" if b[0] < 0.0 and a[0] <= 0.0 <= a[1] else None
     if a[0] < 0.0:
         return "there is no value at a negative base, unless the power is whole"
     return "the slope is infinite where the base is 0" if a[0] == 0.0 and b[0] < 1.0 else None
-
-
-ROWS: dict[str, Row] = {
-    "add": Row(_add, same=lambda a: _mul((2.0, 2.0), a)),
-    "sub": Row(lambda a, b: _add(a, _neg(b)), same=lambda a: (0.0, 0.0)),
-    "mul": Row(_mul, same=_square),
-    "strong_mul": Row(_mul, same=_square),
-    "div": Row(_div, _divisor),
-    "neg": Row(_neg),
-    "pow": Row(_pow, _power),
-    "sqrt": Row(_rising("sqrt", (0.0, math.inf), (0.0, math.inf), ulps=1), _below(0.0, "the slope is infinite")),
-    "exp": Row(_rising("exp", bounds=(0.0, math.inf))),
-    "expm1": Row(_rising("expm1", bounds=(-1.0, math.inf))),
-    "log": Row(_rising("log", (0.0, math.inf)), _below(0.0, "value and slope are infinite")),
-    "log1p": Row(_rising("log1p", (-1.0, math.inf)), _below(-1.0, "value and slope are infinite")),
-    "sin": Row(_wave("sin", math.pi / 2)),
-    "cos": Row(_wave("cos", 0.0)),
-    "tan": Row(_tan, lambda a: "value and slope are infinite at odd multiples of pi/2" if _tan_pole(a) else None),
-    "asin": Row(_rising("asin", (-1.0, 1.0)), _arc),
-    "acos": Row(_rising("acos", (-1.0, 1.0), (0.0, math.inf), falling=True), _arc),
-    "atan": Row(_rising("atan")),
-    "atan2": Row(_atan2, _origin("the slope is unbounded where both arguments are 0")),
-    "hypot": Row(_hypot, _origin("there is no slope where both arguments are 0")),
-    "sinh": Row(_rising("sinh")),
-    "cosh": Row(_cosh),
-    "tanh": Row(_rising("tanh", bounds=(-1.0, 1.0))),
-    "abs": Row(_magnitude),
-    "sign": Row(_rising("sign", bounds=(-1.0, 1.0), ulps=0)),
-    "minimum": Row(lambda a, b: (min(a[0], b[0]), min(a[1], b[1]))),
-    "maximum": Row(lambda a, b: (max(a[0], b[0]), max(a[1], b[1]))),
-    "less": Row(_less, same=lambda a: (0.0, 0.0)),
-    "less_equal": Row(_less_equal, same=lambda a: (1.0, 1.0)),
-    "equal": Row(_equal, same=lambda a: (1.0, 1.0)),
-    "not_equal": Row(_not_equal, same=lambda a: (0.0, 0.0)),
-    "where": Row(_where),
-}

@@ -1,0 +1,68 @@
+"""The function of an operation, from nodes or numbers to a node, with the signature and the help that its row gives."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+
+from .node import Node, Scalar, apply
+from .operation import Op
+
+Function = Callable[..., Node]
+
+_HELP = """\
+{about}
+
+Parameters
+----------
+{parameters} : Node or float
+    Nodes, or numbers, which become constants.
+
+Returns
+-------
+Node
+    The node {name}({parameters}). Where the operation has no value, that of the node is NaN or infinite.
+
+Raises
+------
+TypeError
+    When an argument is neither a node nor a real number.
+ValueError
+    When an argument is NaN.
+
+Examples
+--------
+>>> import cgraph as cg
+>>> graph = cg.Graph(cg.variables("{names}"), {{"result": cg.{name}(*cg.variables("{names}"))}})
+>>> round(graph.evaluate({values})["result"], 6)
+{result!r}
+"""
+
+
+def function(op: Op) -> Function:
+    """The function that makes nodes of an operation."""
+    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+    parameters = [inspect.Parameter(name, kind, annotation=Scalar) for name in op.parameters]
+    signature = inspect.Signature(parameters, return_annotation=Node)
+
+    def make(*args: Scalar, **named: Scalar) -> Node:
+        return apply(op, *(signature.bind(*args, **named).args if named else args))
+
+    make.__name__ = make.__qualname__ = op.name
+    make.__doc__ = _help(op)
+    make.__signature__ = signature  # type: ignore[attr-defined]
+    return make
+
+
+def _help(op: Op) -> str:
+    if not op.samples:
+        return op.about
+    sample = op.samples[0]
+    return _HELP.format(
+        about=op.about,
+        parameters=", ".join(op.parameters),
+        name=op.name,
+        names=" ".join(op.parameters),
+        values="{" + ", ".join(f'"{name}": {x}' for name, x in zip(op.parameters, sample, strict=True)) + "}",
+        result=round(op.scalar(*sample), 6),
+    )

@@ -1,0 +1,51 @@
+"""Values of operations on floats and on arrays, where Python's or NumPy's own are not IEEE's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from typing import Any
+
+import numpy as np
+
+
+def ieee(function: Callable[..., float], ufunc: Any) -> Callable[..., float]:
+    """`function` of the math module, with NumPy's IEEE result (NaN, infinity) where it would raise."""
+
+    @wraps(function)
+    def value(*args: float) -> float:
+        try:
+            return function(*args)
+        except (ValueError, OverflowError, ZeroDivisionError):
+            with np.errstate(all="ignore"):
+                return float(ufunc(*args))
+
+    return value
+
+
+def flag(ufunc: Any) -> Callable[..., Any]:
+    """A comparison of arrays as 1.0 and 0.0."""
+    return lambda a, b: ufunc(a, b) * 1.0
+
+
+def zero_safe_mul_arrays(a: Any, b: Any) -> Any:
+    """a * b, and 0 where a or b is 0."""
+    return np.where((a == 0) | (b == 0), 0.0, np.multiply(a, b))
+
+
+def power_arrays(a: Any, b: Any) -> Any:
+    """a ** b, one rule for every exponent."""
+    # With one exponent for all, np.power(a, 0.5) would be a square root: -0.0 at -0.0 and NaN at -inf.
+    base, exponent = np.broadcast_arrays(a, b)
+    return np.power(base, exponent.copy())
+
+
+def hypot(a: float, b: float) -> float:
+    """The C library's, as in NumPy and in machine code; Python's own differs from it in the last bit."""
+    with np.errstate(all="ignore"):
+        return float(np.hypot(a, b))
+
+
+def sign(a: float) -> float:
+    """-1.0, 0.0 or 1.0; NaN of NaN."""
+    return a if a != a else float((a > 0) - (a < 0))
