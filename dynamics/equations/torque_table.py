@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph, Node
-from cgraph.extend import topological
+from cgraph.extend import Names, topological
 
 from ..systems.system import System
 from .evaluate_at import Array, evaluate_at
 
 STRUCTURAL_ZERO = "·"  # a cell that is zero by structure, at every state
-LONGEST_EXPRESSION = 6  # operations up to which a cell without a state is written out
+LONGEST_EXPRESSION = 40  # characters of a cell that is written out, with q0 for the coordinate's name
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +115,7 @@ class TorqueTable:
         return replace(self, values=flat.reshape(len(self.rows), len(self.columns)))
 
     def to_text(self, digits: int = 4) -> str:
-        """The table in columns of text, with the sum tau; without a state, each cell's expression or its size."""
+        """The table in columns of text, with the sum tau; without a state, expressions or their sizes."""
         return _aligned(self._cells(digits), "  ")
 
     def __str__(self) -> str:
@@ -139,12 +139,12 @@ class TorqueTable:
         rows = [[name, *row] for name, row in zip(self.rows, cells, strict=True)]
         head = ["", *self.columns]
         if self.values is not None:
-            sums = [f"{each:.{digits}g}" for each in self.total]
+            sums = [f"{torque:.{digits}g}" for torque in self.total]
             if self.sum_axis == 0:
                 rows.append(["tau", *sums])
             else:
                 head.append("tau")
-                rows = [[*row, each] for row, each in zip(rows, sums, strict=True)]
+                rows = [[*row, total] for row, total in zip(rows, sums, strict=True)]
         return [head, *rows]
 
     def _numbers(self, digits: int) -> list[list[str]]:
@@ -155,37 +155,19 @@ class TorqueTable:
         ]
 
     def _expressions(self) -> list[list[str]]:
-        flat = [expression_text(node, self.system.display_names) for node in self.graph.outputs.values()]
+        names = Names(self.graph)
+        cells = [self._expression(names, node) for node in self.graph.outputs.values()]
         width = len(self.columns)
-        return [flat[i * width : (i + 1) * width] for i in range(len(self.rows))]
+        return [cells[i * width : (i + 1) * width] for i in range(len(self.rows))]
 
-
-def expression_text(node: Node, names: Mapping[str, str]) -> str:
-    """The node's expression where that is short, variables under `names`, else the number of its operations."""
-    if node.value == 0.0:
-        return STRUCTURAL_ZERO
-    operations = [each for each in topological([node]) if each.args]
-    if len(operations) > LONGEST_EXPRESSION:
-        return f"{len(operations)} operations"
-    text: dict[Node, str] = {}
-    for each in topological([node]):
-        if each.args:
-            parts = [_part(each, slot, arg, text[arg]) for slot, arg in enumerate(each.args)]
-            text[each] = each.op.python.format(*parts)
-        else:
-            text[each] = names.get(str(each.name), str(each.name)) if each.value is None else f"{each.value:g}"
-    return text[node]
-
-
-def _part(of: Node, slot: int, arg: Node, text: str) -> str:
-    """An argument's text, in brackets where the operation needs them."""
-    if "(" in of.op.python:
-        return text
-    weak = ("neg", "sub") if of.op.name == "add" and slot else () if of.op.name in ("add", "sub") and not slot else None
-    tight = of.op.name in ("div", "pow", "neg")
-    operator = bool(arg.args) and "(" not in arg.op.python
-    sum_ = arg.op.name in (("add", "sub", "neg") if weak is None else weak)
-    return f"({text})" if (operator and (sum_ or tight)) or (slot and text.startswith("-")) else text
+    def _expression(self, names: Names, node: Node) -> str:
+        """A cell written out, coordinates by name, or the number of its operations where that would be too long."""
+        if node.value == 0.0:
+            return STRUCTURAL_ZERO
+        text = names.text(node, LONGEST_EXPRESSION)
+        if "%" in text:  # it refers to a line of the listing
+            return f"{len([part for part in topological([node]) if part.args])} operations"
+        return re.sub(r"\b(q|qd|qdd)\d+\b", lambda match: self.system.display_names[match[0]], text)
 
 
 def _aligned(rows: Sequence[Sequence[str]], gap: str) -> str:

@@ -1,4 +1,4 @@
-"""Linearisation against differences of other programs' accelerations, Pinocchio's derivatives, and closed forms."""
+"""Linearization against differences of other programs' accelerations, Pinocchio's derivatives, and closed forms."""
 
 from __future__ import annotations
 
