@@ -41,13 +41,14 @@ class Op:
     name: str
     arity: int
     scalar: Callable[..., float]  # value on floats; functions of `math` give `array`'s IEEE results where they raise
-    array: Callable[..., Any]  # value on arrays; np.cbrt(node) makes the node where it is a ufunc
+    array: Callable[..., Any]  # value on arrays
     partials: Callable[..., tuple[Any, ...]]  # of (output, *arguments): a node or number for each argument
     samples: tuple[tuple[float, ...], ...] = ()  # points inside the domain, away from kinks; the help shows the first
 
     # Its function `cg.name`, and texts.
     arguments: str = ""  # parameter names; default x, or a b, or a b c
     about: str = ""  # a sentence for the help; default says which node is made
+    ufunc: Any = None  # of NumPy, makes the node of nodes, as np.sin(x) does; default `array` where it is one
     symbol: str = ""  # in drawings; default the name
     infix: tuple[str, int] | None = None  # in explanations, and how strongly it binds; default name(a, b)
     mathml: MathML | None = None  # in formulas of pages; default name(a, b)
@@ -91,7 +92,8 @@ class Op:
         if self.arity == 0:  # variable and constant have no texts
             return
         call = f"({', '.join(f'{{{slot}}}' for slot in range(self.arity))})"
-        ufunc = isinstance(self.array, np.ufunc) and getattr(np, self.array.__name__, None) is self.array
+        ufunc = self.array if isinstance(self.array, np.ufunc) else None
+        in_numpy = ufunc is not None and getattr(np, ufunc.__name__, None) is ufunc
         library = self.library or self.name
         filled = {
             "arguments": "x" if self.arity == 1 else " ".join("abcdefgh"[: self.arity]),
@@ -99,7 +101,8 @@ class Op:
             "symbol": self.name,
             "domain": self._around_samples(),
             "python": f"{self.name}{call}",
-            "numpy": f"np.{self.array.__name__}{call}" if ufunc else f"{self.name}{call}",
+            "ufunc": ufunc,
+            "numpy": f"np.{self.array.__name__}{call}" if in_numpy else f"{self.name}{call}",
             "library": library,
             "c": f"{library}{call}",
             "javascript": f"Math.{self.name} ?? (() => NaN)",

@@ -115,7 +115,7 @@ def runner(program: Program, backend: str = "auto", *, fast: bool = False, fma: 
     if backend != "python":
         try:
             return NativeRunner(program, flags_of(fast, fma))
-        except ImportError:
+        except (ImportError, llvm.MissingFunctionError):
             if backend == "llvm":
                 raise
     return PlainRunner(program)
