@@ -79,7 +79,7 @@ _ROWS = (
        ((0.3, -0.7), (2.0, 1.5)), about="The product a * b, and 0 where a or b is 0, even if the other is infinite or NaN.",
        symbol="⊗", infix=("*", PRODUCT), mathml=MathML("{0}<mo>·</mo>{1}", (PRODUCT, PRODUCT), PRODUCT),
        commutative=True, selects=True, fold=folding.zero_safe_mul, double_double=dd.zero_safe_mul,
-       series=series.zero_safe_mul, precise=lambda a, b: a * b if a and b else b if a else a, domain=(_REAL, _REAL),
+       series=series.zero_safe_mul, precise=lambda a, b: a if a == 0 else b if b == 0 else a * b, domain=(_REAL, _REAL),
        interval=bounds.mul, interval_of_same=bounds.square, rounding=1.0,
        python="({0} * {1} if {0} and {1} else 0.0)", numpy="np.where(({0} == 0) | ({1} == 0), 0.0, {0} * {1})",
        llvm=texts.LLVM_ZERO_SAFE_MUL, c="({0} != 0.0 && {1} != 0.0) ? {0} * {1} : 0.0",

@@ -67,6 +67,13 @@ def test_series_of_every_operation_is_that_of_mpmath(name: str, point: tuple[flo
         assert max(abs(a - b) for a, b in zip(found, expected, strict=True)) <= TWELVE_ORDERS * size
 
 
+def test_zero_wins_over_infinity_in_a_zero_safe_product() -> None:
+    with working(40) as number:
+        product, zero, infinite = value(OPS["zero_safe_mul"]), number(0), number("inf")
+        assert product(zero, infinite) == product(infinite, zero) == 0
+        assert product(number(2), number(3)) == 6
+
+
 @mark.parametrize("exponent", [-3.0, -1.0, 0.0, 0.5, 1.0, 2.0, 5.0, 7.5, 100.0])
 def test_series_of_powers(exponent: float) -> None:
     with mpmath.mp.workdps(60):
