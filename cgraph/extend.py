@@ -42,7 +42,7 @@ from .autodiff.ldl_solve import SingularError, ldl_solve
 from .autodiff.reverse import cotangents
 from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED, building
 from .core.node import as_node, register
-from .core.operation import Op
+from .core.operation import MathML, Op
 from .core.ops import OPS
 from .core.traversal import topological
 from .explain.names import Names
@@ -65,6 +65,7 @@ __all__ = [
     "Factor",
     "If",
     "Map",
+    "MathML",
     "Names",
     "Op",
     "Polynomial",

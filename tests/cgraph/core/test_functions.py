@@ -2,6 +2,7 @@
 
 import doctest
 import inspect
+import pickle
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -72,6 +73,14 @@ def test_a_row_that_does_not_fit_is_refused(change: dict[str, object], said: str
     with pytest.raises(ValueError, match=said):
         register(replace(OPS["sin"], domain=((0.0, 1.0),), **change))
     assert before == OPS
+
+
+def test_a_graph_is_not_read_without_the_row_of_its_operation(monkeypatch: pytest.MonkeyPatch) -> None:
+    x = cg.variable("x")
+    text = pickle.dumps(cg.Graph([x], {"y": cg.tan(x)}))
+    monkeypatch.delitem(OPS, "tan")
+    with pytest.raises(cg.GraphError, match="operation 'tan' is not in the table: register its row"):
+        pickle.loads(text)
 
 
 def test_a_row_fills_its_texts_from_its_name() -> None:

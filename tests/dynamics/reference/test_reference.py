@@ -3,7 +3,6 @@
 import itertools
 import json
 import math
-import operator
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -383,15 +382,6 @@ def test_a_run_that_fails_leaves_nothing_in_the_folder(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-ARITHMETIC = {
-    "add": operator.add,
-    "sub": operator.sub,
-    "mul": operator.mul,
-    "div": operator.truediv,
-    "neg": operator.neg,
-}
-
-
 def heyoka_end(model: Any, start: list[float], t_end: float) -> list[str]:
     """The state by heyoka's Taylor integrator in quadruple precision, from the same graph: series of its own."""
     hy = pytest.importorskip("heyoka")
@@ -405,7 +395,7 @@ def heyoka_end(model: Any, start: list[float], t_end: float) -> list[str]:
         elif node.op.name == "constant":
             env[node] = hy.expression(real(node.value))
         else:
-            function = ARITHMETIC.get(node.op.name) or getattr(hy, node.op.name)
+            function = node.op.operator or getattr(hy, node.op.name)
             env[node] = function(*[env[arg] for arg in node.args])
     equations = [(hy.make_vars(name), env[node]) for name, node in zip(names, graph.outputs.values(), strict=True)]
     run = hy.taylor_adaptive(
