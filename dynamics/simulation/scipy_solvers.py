@@ -94,3 +94,10 @@ def solver_of(method: str) -> str | None:
     if name not in SOLVERS:
         raise ValueError(f"SciPy's methods are {', '.join(PREFIX + each for each in SOLVERS)}, got {method!r}")
     return name
+
+
+def solve_ivp() -> Any:
+    """SciPy's `solve_ivp` itself, to compare with. Raises ImportError without SciPy."""
+    from scipy.integrate import solve_ivp as function
+
+    return function

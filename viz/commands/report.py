@@ -9,6 +9,7 @@ from pathlib import Path
 from dynamics import EFFECTS, scenes
 from dynamics.experiments.work_precision import trajectory_scenes, work_precision
 from dynamics.experiments.work_precision.cold_start import STARTS
+from dynamics.experiments.work_precision.report import PEERS, to_csv
 from dynamics.integrators import METHODS
 
 from ..pages import work_precision as page
@@ -49,7 +50,7 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
     parser.add_argument("--t-end", type=positive, metavar="S", help="how long, instead of the scene's own time")
     parser.add_argument("--start", type=_state, metavar="A,B", help="q and then qd, instead of the scene's own start")
     parser.add_argument("--methods", metavar="A,B", help=f"only these of {', '.join(METHODS)}")
-    parser.add_argument("--peers", metavar="A,B", help=f"only these of {', '.join(work_precision.PEERS)}; '' for none")
+    parser.add_argument("--peers", metavar="A,B", help=f"only these of {', '.join(PEERS)}; '' for none")
     parser.add_argument("--quick", action="store_true", help="fewer turns, shorter runs, and no cold starts")
     parser.add_argument(
         "--budget", type=positive, metavar="S", help=f"seconds that a cold start may take (default: {BUDGET:g})"
@@ -93,7 +94,7 @@ def _curves(options: argparse.Namespace) -> None:
     if len(named) < len(options.scenes):
         raise ValueError(f"each scene needs a name of its own for its files, got {', '.join(options.scenes)}")
     chosen = {"t_end": options.t_end, "start": options.start, "ignore": options.ignore}
-    peers = work_precision.PEERS if options.peers is None else tuple(filter(None, options.peers.split(",")))
+    peers = tuple(PEERS) if options.peers is None else tuple(filter(None, options.peers.split(",")))
     check_can_plot()
     check_writable(options.out)
     found = []
@@ -112,7 +113,7 @@ def _curves(options: argparse.Namespace) -> None:
         )
         content = report.to_dict()
         found.append(content)
-        document, rows = page.work_precision(content), work_precision.to_csv(report)
+        document, rows = page.work_precision(content), to_csv(report)
         written = write_document(options.out, content["name"], document, content, rows)
         if not options.json:
             points = sum(len(each.points) for each in report.curves)

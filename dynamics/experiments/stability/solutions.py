@@ -11,12 +11,12 @@ from typing import Any
 from ...reference import Reference
 from ...reference.solution import from_text
 from . import cases
-from .cases import Case
+from .cases import StabilityCase
 
 FILE = Path(__file__).with_name("solutions.json")
 
 
-def solution(case: Case) -> Reference | None:
+def solution(case: StabilityCase) -> Reference | None:
     """The case's motion at its t_end; None for a case without one.
 
     Kept in a file, because some take a minute to compute; found by name, start and t_end. A test computes them again.
@@ -42,7 +42,7 @@ def renew(names: Iterable[str] | None = None, say: Callable[[str], None] = lambd
     _kept.cache_clear()
 
 
-def entry(case: Case, result: Reference) -> dict[str, Any]:
+def entry(case: StabilityCase, result: Reference) -> dict[str, Any]:
     """What the file says of a case."""
     return {
         "start": _hex(case.start),

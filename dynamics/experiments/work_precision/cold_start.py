@@ -22,9 +22,10 @@ from ...peers.casadi import CasadiPeer, casadi
 from ...peers.heyoka import heyoka, leave_cache
 from ...simulation.scipy_solvers import PREFIX
 from ...simulation.simulate import simulate
+from ..setting import Setting
 from .trajectory_peers import MOST, casadi_equations, heyoka_derivatives, heyoka_equations
 from .trajectory_runs import problem_of
-from .trajectory_scenes import Setting, load
+from .trajectory_scenes import load
 
 RTOL = 1e-9  # of all but heyoka, whose default is the resolution of float64
 LONG = 5.0  # s; what takes longer is started once

@@ -1,4 +1,4 @@
-"""Contenders of other software: MuJoCo's integrators, heyoka's Taylor series, CVODES through CasADi."""
+"""Solvers of other software: MuJoCo's integrators, heyoka's Taylor series, CVODES through CasADi."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from ...peers.translate import translated
 from ...simulation.scipy_solvers import PREFIX, SOLVERS
 from ...simulation.trajectory import Array
 from ...systems.system import TIME
-from .trajectory_runs import EQUAL, Contender, Outcome, Scipy
-from .trajectory_scenes import INTERVALS, Setting
+from ..setting import INTERVALS, Setting
+from .trajectory_runs import EQUAL, Outcome, Scipy, Solver
 
 EPSILON = 2.0**-52
 COMPACT = 300  # nodes of the rate; beyond, heyoka's code written out takes minutes to compile
@@ -33,7 +33,7 @@ CVODES: dict[str, dict[str, Any]] = {
 }
 
 
-class Mujoco(Contender):
+class Mujoco(Solver):
     """One of MuJoCo's integrators in its own native loop (`rollout`), on the model's MJCF, contacts off."""
 
     kind = EQUAL
@@ -51,7 +51,7 @@ class Mujoco(Contender):
         self.begin = np.concatenate([[0.0], self.start[:n][at], self.start[n:][at]])[None]
 
     def ready(self, knob: float) -> Callable[[], Outcome]:
-        """See Contender."""
+        """See Solver."""
         states, run = self._states(int(knob))
 
         def whole() -> Outcome:
@@ -61,7 +61,7 @@ class Mujoco(Contender):
         return whole
 
     def rows(self, knob: float) -> Array:
-        """See Contender."""
+        """See Solver."""
         steps = int(knob)
         states, run = self._states(steps)
         run()
@@ -81,24 +81,26 @@ class Mujoco(Contender):
         return states, run
 
     def rates(self, x: Array) -> Array:
-        """See Contender: velocities as they are, accelerations by MuJoCo."""
+        """See Solver: velocities as they are, accelerations by MuJoCo."""
         n, order, at = self.peer.case.n, self.peer.order, self.peer.at
         twin, none = self.peer.twin, np.zeros(self.peer.case.n)
         found = [twin.accelerations(row[:n][at], row[n:][at], none)[order] for row in x]
         return np.hstack([x[:, n:], found])
 
 
-class Heyoka(Contender):
-    """heyoka's adaptive Taylor series on our equations, node for node.  compact: its compact mode."""
+class Heyoka(Solver):
+    """heyoka's adaptive Taylor series on our equations, node for node.  derivatives: on its own in their place."""
 
     tolerances = (1e-4, 1e-7, 1e-10, 1e-12, EPSILON)  # each is compiled anew; the last is its default
 
-    def __init__(self, setting: Setting, smallest: float, problem: Problem) -> None:
+    def __init__(self, setting: Setting, smallest: float, problem: Problem, derivatives: bool = False) -> None:
         self.compact = len(problem.rate.nodes) > COMPACT
         how = "compact mode" if self.compact else "written out"
-        super().__init__("heyoka Taylor", f"heyoka's taylor_adaptive on our equations, {how}", setting, smallest)
+        whose = "its own derivatives" if derivatives else "our equations"
+        super().__init__("heyoka Taylor", f"heyoka's taylor_adaptive on {whose}, {how}", setting, smallest)
         self.heyoka = heyoka()
-        self.system = heyoka_equations(self.heyoka, problem)
+        hy = self.heyoka
+        self.system = heyoka_derivatives(hy, setting) if derivatives else heyoka_equations(hy, problem)
         self._made: dict[float, Any] = {}
 
     def integrator(self, knob: float) -> Any:
@@ -114,7 +116,7 @@ class Heyoka(Contender):
         return made
 
     def ready(self, knob: float) -> Callable[[], Outcome]:
-        """See Contender."""
+        """See Solver."""
         made = self.integrator(knob)
         t_end, limit = self.setting.t_end, self.heyoka.taylor_outcome.time_limit
 
@@ -128,7 +130,7 @@ class Heyoka(Contender):
         return run
 
     def rows(self, knob: float) -> Array:
-        """See Contender."""
+        """See Solver."""
         made = self.integrator(knob)
         times = self.setting.times
         if times[0] > 0.0:
@@ -139,7 +141,7 @@ class Heyoka(Contender):
         return result
 
     def rates(self, x: Array) -> Array:
-        """See Contender."""
+        """See Solver."""
         variables, expressions = zip(*self.system, strict=True)
         function = self.heyoka.cfunc(list(expressions), list(variables), compact_mode=True)
         times = {"time": np.zeros(len(x))} if function.is_time_dependent else {}
@@ -147,7 +149,7 @@ class Heyoka(Contender):
         return found
 
 
-class Cvodes(Contender):
+class Cvodes(Solver):
     """CVODES as CasADi calls it, on our equations, node for node, in CasADi's virtual machine."""
 
     tolerances = tuple([10.0**-k for k in range(3, 13)])
@@ -163,7 +165,7 @@ class Cvodes(Contender):
         return self.casadi.integrator("run", "cvodes", self.equations, 0.0, list(times), options | self.options)
 
     def ready(self, knob: float) -> Callable[[], Outcome]:
-        """See Contender."""
+        """See Solver."""
         function, start = self._function(knob, [self.setting.t_end]), self.start.tolist()
 
         def run() -> Outcome:
@@ -174,14 +176,14 @@ class Cvodes(Contender):
         return run
 
     def rows(self, knob: float) -> Array:
-        """See Contender."""
+        """See Solver."""
         times = self.setting.times
         found = np.array(self._function(knob, times)(x0=self.start.tolist())["xf"]).T
         result: Array = found
         return result
 
     def rates(self, x: Array) -> Array:
-        """See Contender."""
+        """See Solver."""
         ca, parts = self.casadi, self.equations
         found = ca.Function("rate", [parts["x"], parts["t"]], [parts["ode"]])
         return np.array([np.array(found(row, 0.0)).ravel() for row in x])
@@ -216,9 +218,9 @@ def casadi_equations(ca: Any, problem: Problem) -> dict[str, Any]:
     return {"x": x, "t": t, "ode": ca.vertcat(*[values[rate] for rate in graph.outputs.values()])}
 
 
-def offers(setting: Setting, smallest: float, problem: Problem, backend: str) -> dict[str, Callable[[], Contender]]:
+def offers(setting: Setting, smallest: float, problem: Problem, backend: str) -> dict[str, Callable[[], Solver]]:
     """The peers that could be asked, by name; making one raises ImportError, UnavailableError or ValueError."""
-    found: dict[str, Callable[[], Contender]] = {}
+    found: dict[str, Callable[[], Solver]] = {}
     for solver in SOLVERS:
         found[f"{PREFIX}{solver}"] = partial(Scipy, solver, setting, smallest, problem, backend)
     for integrator in MUJOCO:

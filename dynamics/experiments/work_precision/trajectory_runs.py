@@ -1,4 +1,4 @@
-"""Contenders: ways to integrate a setting, each timed from its start to t_end; ours, and SciPy on our compiled rate."""
+"""Solvers: ways to integrate a setting, timed from its start to t_end; ours, and SciPy on our compiled rate."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ...simulation.run_options import Limits
 from ...simulation.scipy_solvers import PREFIX, ScipyRun
 from ...simulation.stepping import AdaptiveRun, FixedRun, Tally
 from ...simulation.trajectory import Array
-from .trajectory_scenes import Setting
+from ..setting import Setting
 
 EQUAL, CHOSEN = "equal steps", "chosen steps"
 TRIAL = 4096  # steps that tell how long many more take
@@ -36,7 +36,7 @@ class Outcome(NamedTuple):
     status: str = ""
 
 
-class Contender(ABC):
+class Solver(ABC):
     """A way to integrate one setting.
 
     kind: `EQUAL`, where the knob is the number of steps, or `CHOSEN`, where it is the relative tolerance.
@@ -103,7 +103,7 @@ def recorded(run: Tally, start: Array, times: Sequence[float]) -> Array:
     return result
 
 
-class Ours(Contender):
+class Ours(Solver):
     """One of our methods in its native loop; the program is made once."""
 
     ours = True
@@ -139,7 +139,7 @@ class Ours(Contender):
         return run
 
     def ready(self, knob: float) -> Callable[[], Outcome]:
-        """See Contender."""
+        """See Solver."""
         template, ends = self._plain, (0.0, self.setting.t_end)
         if self.kind == EQUAL and self._at_least(knob) > LONGEST:  # such a run does not look at the clock on its way
             return lambda: Outcome(self.start, status=f"would take longer than {LONGEST:g} s")
@@ -154,12 +154,12 @@ class Ours(Contender):
         return (time.perf_counter() - begin) * knob / min(knob, TRIAL)
 
     def rows(self, knob: float) -> Array:
-        """See Contender."""
+        """See Solver."""
         times = self.setting.times
         return recorded(self._run(knob, self._dense, times), self.start, times)
 
 
-class Scipy(Contender):
+class Scipy(Solver):
     """One of SciPy's solvers on our compiled rate and Jacobian. Raises ImportError without SciPy."""
 
     tolerances = tuple([10.0**-k for k in range(3, 14)])  # it takes none smaller than 2e-14
@@ -176,10 +176,10 @@ class Scipy(Contender):
         return run
 
     def ready(self, knob: float) -> Callable[[], Outcome]:
-        """See Contender."""
+        """See Solver."""
         return lambda: finished(self._run(knob, None), self.start)._replace(rejected=None)
 
     def rows(self, knob: float) -> Array:
-        """See Contender."""
+        """See Solver."""
         times = np.array(self.setting.times)
         return recorded(self._run(knob, times), self.start, times.tolist())

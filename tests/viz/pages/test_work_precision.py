@@ -222,12 +222,10 @@ def test_the_command_writes_whole_files(tmp_path: Path, capsys: pytest.CaptureFi
 
 def test_an_interrupted_report_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("flint")
-    from dynamics.experiments.work_precision import work_precision as measured
-
     def interrupt(*_: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(measured, "_in_turns", interrupt)
+    monkeypatch.setattr("dynamics.experiments.work_precision.work_precision.in_turns", interrupt)
     assert cli.main([*MEASURED, "--out", str(tmp_path / "r")]) == 130
     left = [path for path in tmp_path.rglob("*") if path.is_file() and path.parent.name != "exact"]
     assert left == []

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from . import chains, extremes, fields, orbits, rotation, stiff
-from .case import RTOL, Case, Watch
+from .case import RTOL, Criterion, StabilityCase
 
-__all__ = ["RTOL", "TABLE", "Case", "Watch", "load", "names"]
+__all__ = ["RTOL", "TABLE", "Criterion", "StabilityCase", "load", "names"]
 
-TABLE: dict[str, Case] = {
+TABLE: dict[str, StabilityCase] = {
     case.name: case for rows in (stiff, chains, orbits, rotation, fields, extremes) for case in rows.cases()
 }
 
@@ -17,7 +17,7 @@ def names() -> list[str]:
     return list(TABLE)
 
 
-def load(name: str) -> Case:
+def load(name: str) -> StabilityCase:
     """The case of that name. Raises ValueError for a name that is not among `names()`."""
     if name not in TABLE:
         raise ValueError(f"there is no case {name!r}; the cases are {', '.join(TABLE)}")
