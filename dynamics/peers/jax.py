@@ -50,9 +50,13 @@ class JaxPeer(Peer):
             return self.np.stack(ldl_solve(mass, rhs))
         return self.jax.scipy.linalg.solve(mass, rhs, assume_a="pos")
 
-    def _step(self, x: Any) -> Any:
+    def rate(self, x: Any) -> Any:
+        """xdot of a state (q, qd) without applied torque."""
         n, join = self.case.n, self.np.concatenate
-        return rk4_step(lambda x: join([x[n:], self._forward(join([x, self.np.zeros(n)]))]), x)
+        return join([x[n:], self._forward(join([x, self.np.zeros(n)]))])
+
+    def _step(self, x: Any) -> Any:
+        return rk4_step(self.rate, x)
 
     def prepare(self, task: str, mode: str) -> Contender:
         """See Peer."""

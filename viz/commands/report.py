@@ -1,4 +1,4 @@
-"""`cgraph report`: error beside run time of integrators, as pages; or one of two other reports."""
+"""`cgraph report`: error beside run time of integrators, as pages; or one of three other reports."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ import json
 from pathlib import Path
 
 from dynamics import EFFECTS, scenes
+from dynamics.experiments.machine import machine
 from dynamics.experiments.work_precision import trajectory_scenes, work_precision
 from dynamics.experiments.work_precision.cold_start import STARTS
+from dynamics.experiments.work_precision.comparisons import COMPARISONS
 from dynamics.experiments.work_precision.report import PEERS, to_csv
 from dynamics.integrators import METHODS
 
@@ -18,7 +20,7 @@ from ..plots.plot import check_can_plot
 from . import pruning_report, stability_report
 from .arguments import Commands, may_ignore, number, positive, say
 
-CURVES, STABILITY, PRUNING = "a report of run times", "--stability", "--pruning"
+CURVES, STABILITY, PRUNING, COMPARE = "a report of run times", "--stability", "--pruning", "--compare"
 GO_WITH = {  # options that not every kind of report has
     "ignore": (CURVES, PRUNING),
     "t_end": (CURVES,),
@@ -27,6 +29,7 @@ GO_WITH = {  # options that not every kind of report has
     "peers": (CURVES,),
     "budget": (CURVES,),
     "quick": (CURVES, STABILITY),
+    "json": (CURVES, STABILITY, PRUNING),
     "without": (PRUNING,),
     "lock": (PRUNING,),
 }
@@ -55,6 +58,11 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
     parser.add_argument(
         "--budget", type=positive, metavar="S", help=f"seconds that a cold start may take (default: {BUDGET:g})"
     )
+    parser.add_argument(
+        "--compare",
+        metavar="A,B",
+        help=f"instead: print comparisons at equal error, of {', '.join(COMPARISONS)}; minutes, and no scene",
+    )
     parser.add_argument("--json", action="store_true", help="print as JSON")
     parser.add_argument("--pruning", action="store_true", help="instead: what the scene's graphs hold and leave out")
     parser.add_argument("--without", metavar="A,B", help=f"with --pruning: leave out {', '.join(EFFECTS)}")
@@ -66,15 +74,18 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Write the pages that the arguments ask for."""
-    if options.stability and options.pruning:
-        raise ValueError("--stability and --pruning are two reports: one at a time")
-    kind = STABILITY if options.stability else PRUNING if options.pruning else CURVES
-    if bool(options.scenes) == options.stability:
-        raise ValueError("a report needs a scene, or --stability and none")
-    for name, kinds in GO_WITH.items():
-        if kind not in kinds and getattr(options, name) not in (None, False):
-            raise ValueError(f"--{name.replace('_', '-')} goes with {' or '.join(kinds)}, not with {kind}")
-    {CURVES: _curves, STABILITY: stability_report.run, PRUNING: pruning_report.run}[kind](options)
+    others = {STABILITY: options.stability, PRUNING: options.pruning, COMPARE: options.compare is not None}
+    kinds = [kind for kind, asked in others.items() if asked] or [CURVES]
+    if len(kinds) > 1:
+        raise ValueError(f"{' and '.join(kinds)} are {len(kinds)} reports: one at a time")
+    kind = kinds[0]
+    if bool(options.scenes) == (kind in (STABILITY, COMPARE)):
+        raise ValueError("a report needs a scene, or --stability or --compare and none")
+    for name, with_these in GO_WITH.items():
+        if kind not in with_these and getattr(options, name) not in (None, False):
+            raise ValueError(f"--{name.replace('_', '-')} goes with {' or '.join(with_these)}, not with {kind}")
+    runs = {CURVES: _curves, STABILITY: stability_report.run, PRUNING: pruning_report.run, COMPARE: _comparisons}
+    runs[kind](options)
 
 
 def _state(text: str) -> list[float]:
@@ -86,6 +97,18 @@ def _locked(text: str) -> tuple[str, float]:
     if not (equals and body):
         raise argparse.ArgumentTypeError(f"expected a body and a coordinate, BODY=AT, got {text!r}")
     return body, number(at)
+
+
+def _comparisons(options: argparse.Namespace) -> None:
+    """Print comparisons as they are measured; exact motions are kept where reports keep theirs."""
+    names = [name for name in options.compare.split(",") if name]
+    if unknown := [name for name in names if name not in COMPARISONS]:
+        raise ValueError(f"comparisons are {', '.join(COMPARISONS)}, got {unknown[0]!r}")
+    check_writable(options.out)
+    print(machine())
+    for name in names or COMPARISONS:
+        for text in COMPARISONS[name](str(options.out / "exact")):
+            print(f"\n{text}", flush=True)
 
 
 def _curves(options: argparse.Namespace) -> None:

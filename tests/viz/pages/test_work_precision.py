@@ -246,6 +246,9 @@ def test_an_interrupted_report_leaves_no_file(tmp_path: Path, monkeypatch: pytes
         (["report", "--stability", "--ignore"], "--ignore goes with a report of run times or --pruning"),
         (["report", "--stability", "--pruning"], "one at a time"),
         (["report", "--pruning"], "a report needs a scene"),
+        (["report", "--compare", "speed"], "comparisons are orders, taylor, stiff, loops, energy, got 'speed'"),
+        (["report", "--compare", "orders", "--json"], "--json goes with a report of run times"),
+        (["report", "chain", "--compare", "orders"], "a report needs a scene, or --stability or --compare and none"),
         (["report", "chain", "--pruning", "--lock", "a=1", "--lock", "a=2"], "--lock takes each body once"),
     ],
 )

@@ -2,46 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-import dynamics as dyn
+from ..multibody.mechanism import Mechanism
+from .flint_numbers import Number, flint, working
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
-Number = Any  # flint.arb: a midpoint and a bound on its error
 Vector = list[Number]
-BITS = 220  # of arithmetic, 66 digits
+DIGITS = 66
 LOST = 1e-30  # a bound on the relative error of the results, or there were too few bits
 
 
-@contextmanager
-def _working() -> Iterator[Any]:
-    import flint
-
-    with flint.ctx.workprec(BITS):
-        yield flint
-
-
-def _solved(flint: Any, matrix: list[Vector], rhs: Vector) -> Array:
-    column = flint.arb_mat(matrix).solve(flint.arb_mat([[each] for each in rhs]))
+def _solved(matrix: list[Vector], rhs: Vector) -> Array:
+    column = flint().arb_mat(matrix).solve(flint().arb_mat([[each] for each in rhs]))
     x = [column[i, 0] for i in range(len(rhs))]
     largest = max(abs(float(each.mid())) for each in x)
     assert max(float(each.rad()) for each in x) <= LOST * largest
     return np.array([float(each.mid()) for each in x])
 
 
-def chain_accelerations(chain: dyn.Mechanism, q: Array, qd: Array, tau: Array) -> Array:
+def chain_accelerations(chain: Mechanism, q: Array, qd: Array, tau: Array) -> Array:
     """qdd of a chain of revolute joints about z, (n,): all in the world's axes, about the world's origin.
 
     With S_i the joint's twist (angular, then linear) and I_i a body's 6 x 6 inertia,
         M_ij = S_i . (sum over k >= i of I_k) S_j for j <= i,
-    and the bias is what the Newton-Euler equations give for qdd = 0.
+    and the bias is what the Newton-Euler equations give for qdd = 0. Raises ImportError without python-flint.
     """
-    with _working() as flint:
-        arb = flint.arb
+    with working(DIGITS) as arb:
         zero = arb(0)
         place, turn = [zero] * 3, [[arb(int(i == j)) for j in range(3)] for i in range(3)]
         gravity = [arb(float(each)) for each in np.asarray(chain.gravity)]
@@ -77,7 +67,7 @@ def chain_accelerations(chain: dyn.Mechanism, q: Array, qd: Array, tau: Array) -
             column = _times(carried, twists[i])
             for j in range(i + 1):
                 matrix[i][j] = matrix[j][i] = _dot(column, twists[j])
-        return _solved(flint, matrix, rhs)
+        return _solved(matrix, rhs)
 
 
 def _inertia_about_origin(arb: Any, body: Any, place: Vector, turn: list[Vector]) -> list[Vector]:
