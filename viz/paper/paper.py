@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,11 +12,12 @@ import numpy as np
 from cgraph import Graph
 from cgraph.extend import atomic_write, format_polynomial
 from dynamics import momentum_rate, scenes, spurious_nodes
-from dynamics.experiments.paper_numbers.embedding_error import law_of_arms
+from dynamics.experiments.paper_numbers.embedding_error import embedding_errors
 from dynamics.experiments.paper_numbers.equation3 import PAPER, equation3
-from dynamics.experiments.paper_numbers.free_fall import fall, largest_differences, mujoco_fall
-from dynamics.experiments.paper_numbers.node_scaling import FITTED_FROM, scaling
-from dynamics.experiments.paper_numbers.table_1 import PAPER_MS, Row, table1
+from dynamics.experiments.paper_numbers.free_fall import free_fall, largest_differences, mujoco_free_fall
+from dynamics.experiments.paper_numbers.node_scaling import FITTED_FROM, node_scaling
+from dynamics.experiments.paper_numbers.table_1 import PAPER_MS, Row, table_1
+from dynamics.experiments.text_table import csv_text
 from dynamics.io.mujoco_model import frames
 from dynamics.simulation.progress_bar import Progress
 
@@ -136,7 +135,7 @@ def figure3() -> Part:
 
 def law() -> Part:
     """The law of the embedding: torque error against dt."""
-    found = law_of_arms()
+    found = embedding_errors()
     panels: dict[str, dict[str, tuple[Sequence[float], Sequence[float]]]] = {
         "error of the torque": {},
         "distance from its limit": {},
@@ -176,7 +175,7 @@ def law() -> Part:
     )
     files: dict[str, str | bytes] = {
         **drawn.files,
-        "law.csv": _csv(header, rows),
+        "law.csv": csv_text(header, rows),
     }
     data = {
         f"{each.formulation} n={each.n}": {"slope": _finite(each.slope), "limit": float(np.abs(each.limit).max())}
@@ -188,7 +187,7 @@ def law() -> Part:
 def figures4_and_5() -> Part:
     """Figures 4 and 5: the three-link arm in free fall, by our graph and by MuJoCo."""
     scene = scenes.load("triple_pendulum")
-    run = fall(scene)
+    run = free_fall(scene)
     instants = np.linspace(0.0, scene.t_end, SNAPSHOTS)
     ours = plot.snapshots(run.trajectory.t, run.positions, instants.tolist())
     start = ", ".join(f"{each:.4g}" for each in scene.q)
@@ -201,7 +200,7 @@ def figures4_and_5() -> Part:
     section = html.figure(drawn4.svg, caption4)
     data: dict[str, Any] = {"q_end": run.trajectory.q[-1].tolist()}
     try:
-        other = mujoco_fall(run)
+        other = mujoco_free_fall(run)
     except ImportError as error:
         section += html.point(f"Figure 5 is missing on this machine. {error}")
         return Part("fall", "Figures 4 and 5: the fall", files, data | {"mujoco": None}, section)
@@ -220,7 +219,7 @@ def figures4_and_5() -> Part:
     header = ("up to t [s]", "largest |difference in q| [rad]")
     rows = [(f"{t:.2f}", f"{difference:.2e}") for t, difference in differences]
     drawn5 = _pictures("fig5", theirs)
-    files |= {**drawn5.files, "fig5.csv": _csv(header, rows)}
+    files |= {**drawn5.files, "fig5.csv": csv_text(header, rows)}
     section += (
         html.figure(drawn5.svg, caption5)
         + html.table("Our trajectory and MuJoCo's", header, rows)
@@ -235,7 +234,7 @@ def figures4_and_5() -> Part:
 
 def figure6() -> Part:
     """Figure 6 and Table 1: the time of one evaluation, 1000 evaluations."""
-    rows = table1()
+    rows = table_1()
     ways = list(rows[0].timings)
     base = {way: rows[-1].timings[way].median for way in ways}
     paper_base = PAPER_MS["chain_rule"][0]
@@ -286,7 +285,7 @@ def figure6() -> Part:
     )
     files: dict[str, str | bytes] = {
         **drawn.files,
-        "table1.csv": _csv(header, table),
+        "table1.csv": csv_text(header, table),
     }
     data = {
         row.formulation: {
@@ -319,7 +318,7 @@ def _why(rows: Sequence[Row]) -> str:
 def scaling_of_counts() -> Part:
     """Scaling: nodes, edges and time over 1 to 40 links."""
     with Progress("scaling", 1.0) as progress:
-        rows = scaling(report=progress)
+        rows = node_scaling(report=progress)
     panels: dict[str, plot.Curves] = {
         "edges": {TITLES[row.formulation]: (row.n, [float(each) for each in row.edges]) for row in rows},
         "one compiled evaluation": {TITLES[row.formulation]: (row.n, row.microseconds) for row in rows},
@@ -361,7 +360,7 @@ def scaling_of_counts() -> Part:
     ]
     files: dict[str, str | bytes] = {
         **drawn.files,
-        "scaling.csv": _csv(("formulation", "n", "nodes", "edges", "microseconds"), long),
+        "scaling.csv": csv_text(("formulation", "n", "nodes", "edges", "microseconds"), long),
     }
     data = {
         row.formulation: {"edges_exponent": row.fitted(row.edges), "nodes_exponent": row.fitted(row.nodes)}
@@ -412,14 +411,6 @@ def _page(parts: Sequence[Part]) -> str:
     return html.page(
         "The chain rule keeps q and qd apart", introduction, [(p.name, p.heading, p.section) for p in parts]
     )
-
-
-def _csv(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows(rows)
-    return buffer.getvalue()
 
 
 def _finite(value: float) -> float | None:

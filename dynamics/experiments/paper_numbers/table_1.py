@@ -37,7 +37,7 @@ class Row:
     timings: dict[str, Timing]  # {"interpreted" | "compiled" | "PyTorch eager": ...}
 
 
-def table1(evaluations: int = 1000, seed: int = 0) -> list[Row]:
+def table_1(evaluations: int = 1000, seed: int = 0) -> list[Row]:
     """The three formulations, each evaluated at random states; formulations take turns, so that drift is shared.
 
     PyTorch eager, which builds its graph anew at every evaluation, is measured beside ours where torch is installed.

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 import cgraph as cg
-from cgraph import Node
+from cgraph import Graph, Node
 from cgraph.extend import OPS, Builder, building, cotangents, solve_nodes
 
 from ...equations import equations_of_motion
@@ -162,12 +162,12 @@ VARIANTS: dict[str, tuple[Callable[[], AbstractContextManager[Any]], int]] = {
 }
 
 
-def count(variant: str, model: Model) -> int:
-    """Nodes of forward dynamics by elimination, or dense where the variant says so."""
+def variant_graph(variant: str, model: Model) -> Graph:
+    """Forward dynamics by elimination, or dense where the variant says so."""
     if variant == "energy by the center's velocity" and isinstance(model, PlanarArm):
         model = about_centers(model)
     with VARIANTS[variant][0]():
-        return len(forward_dynamics(model, "dense" if "dense" in variant else "recursive").nodes)
+        return forward_dynamics(model, "dense" if "dense" in variant else "recursive")
 
 
 def node_counts(links: int = LARGEST) -> Iterator[str]:
@@ -176,7 +176,7 @@ def node_counts(links: int = LARGEST) -> Iterator[str]:
     rows = []
     base: dict[str, int] = {}
     for variant, (_, most) in VARIANTS.items():
-        nodes = {name: count(variant, MODELS[name](n)) for name, n in sizes.items() if n <= most}
+        nodes = {name: len(variant_graph(variant, MODELS[name](n)).nodes) for name, n in sizes.items() if n <= most}
         base = base or nodes
         cells = {name: f"{k}" if base is nodes else f"{k / base[name] - 1.0:+.1%}" for name, k in nodes.items()}
         fitted = {sizes[name]: k for name, k in nodes.items() if name[0] == "p" and sizes[name] >= FITTED_FROM}
