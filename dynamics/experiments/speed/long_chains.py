@@ -13,6 +13,7 @@ import cgraph as cg
 
 from ...equations.equations_of_motion import bias, forward_dynamics, mass_matrix
 from ...multibody.planar_arm import PlanarArm, planar_arm
+from ...peers.dense_solve import dense_solve
 from ...reference.planar_arm_equations import accelerations
 from ...reference.spatial_chain_equations import chain_accelerations
 from ...systems.model import as_system
@@ -99,7 +100,10 @@ def accuracy(kind: str, n: int, spread: float) -> dict[str, float]:
         if matrix is not None:
             m = values(matrix, state).reshape(n, n)
             rhs = tau - values(biases, state) - np.array(as_system(model).damping) * qd
-            solved |= {"numpy.linalg.solve": np.linalg.solve(m, rhs), "LDL of the same, floats": ldl(m, rhs)}
+            solved |= {
+                "numpy.linalg.solve": np.linalg.solve(m, rhs),
+                "LDL of the same, floats": dense_solve(m.tolist(), rhs.tolist()),
+            }
         for name, x in solved.items():
             worst[name] = max(worst.get(name, 0.0), float(np.abs(x - exact).max() / np.abs(exact).max()))
     return worst
@@ -108,17 +112,3 @@ def accuracy(kind: str, n: int, spread: float) -> dict[str, float]:
 def values(graph: cg.Graph, state: dict[str, Any]) -> Array:
     """The outputs, from what of the state the graph needs."""
     return np.array(list(graph.evaluate({name: state[name] for name in graph.input_names}).values()))
-
-
-def ldl(matrix: Array, rhs: Array) -> Array:
-    """A dense solve from the tip up, as `forward_dynamics(method="dense")` writes it out, on floats."""
-    a, b = matrix.copy(), rhs.copy()
-    gains = np.zeros_like(a)
-    for i in reversed(range(len(b))):
-        gains[i, :i] = a[i, :i] / a[i, i]
-        a[:i, :i] -= np.outer(gains[i, :i], a[i, :i])
-        b[:i] -= gains[i, :i] * b[i]
-    x = np.zeros_like(b)
-    for i in range(len(b)):
-        x[i] = b[i] / a[i, i] - gains[i, :i] @ x[:i]
-    return x

@@ -22,10 +22,11 @@ from ...equations.formulations import inverse_dynamics
 from ...io.mjcf import to_mjcf
 from ...io.mujoco_model import mujoco
 from ...multibody.body import Body, Joint
-from ...multibody.mechanism import Mechanism, serial_arm
+from ...multibody.mechanism import Mechanism
 from ...multibody.recursive_inverse_dynamics import RecursiveInverseDynamics
 from ...multibody.spatial import rotation
 from ..text_table import table
+from .bench_scenes import turned_arm
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Torque = Callable[[Array], Array]  # of q, where qd = q / 2 and qdd = -q
@@ -34,19 +35,6 @@ LINKS, REPEATS = 30, 30
 REBUILDS = 3  # of each change: they take long
 AGREE, AGREE_MUJOCO = 1e-10, 1e-8  # relative differences that pass: rounding along the arm; MuJoCo's text has digits
 MIDDLE = 0.5  # of the arm: which joint is locked
-
-
-def arm(n: int) -> Mechanism:
-    """An arm of unlike hinges."""
-    rng = np.random.default_rng(0)
-    links = []
-    for i in range(n):
-        mixed = rng.normal(size=(3, 3))
-        second = 0.05 * mixed @ mixed.T + 0.01 * np.eye(3)
-        joint = Joint("revolute", rng.normal(size=3), (0.1, 0.0, 0.3) if i else (0.0, 0.0, 0.0), damping=0.1)
-        inertia = np.trace(second) * np.eye(3) - second
-        links.append({"joint": joint, "mass": 1.0 + 0.1 * i, "center": 0.1 * rng.normal(size=3), "inertia": inertia})
-    return serial_arm(links)
 
 
 def tool(version: int) -> Body:
@@ -96,13 +84,14 @@ class ByMujoco:
     def lock(self) -> None:
         """The joint goes, and its body is turned to where it stands."""
         body, axis = self.spec.body(self.middle.name), np.asarray(self.middle.joint.axis)
-        body.alt.xyaxes = rotation(axis / np.linalg.norm(axis), angle(self.version))[:, :2].T.ravel()
+        turned = np.asarray(self.middle.joint.orientation) @ rotation(axis, angle(self.version))
+        body.alt.xyaxes = turned[:, :2].T.ravel()
         self.spec.delete(body.joints[0])
 
     def unlock(self) -> None:
         """The joint is there again."""
         body = self.spec.body(self.middle.name)
-        body.alt.xyaxes = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+        body.alt.xyaxes = np.asarray(self.middle.joint.orientation)[:, :2].T.ravel()
         body.add_joint(type=self.mujoco.mjtJoint.mjJNT_HINGE, axis=self.middle.joint.axis, damping=0.1)
 
     def torque(self, q: Array) -> Array:
@@ -142,7 +131,7 @@ def check(what: str, torques: Array, expected: Array, largest: float) -> None:
 
 def reconfiguration(links: int = LINKS, repeats: int = REPEATS) -> Iterator[str]:
     """The table: milliseconds to the first torque, and ratios of shortest times."""
-    base = arm(links)
+    base = turned_arm(links)
     by_kernels(base)(np.zeros(links))  # the kernels are there
     name = base.bodies[-1].name
     again = base.detach(name).attach(base.subtree(name))

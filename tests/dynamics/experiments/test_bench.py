@@ -20,7 +20,7 @@ from dynamics.experiments.text_table import digits
 from dynamics.io.mujoco_model import MujocoTwin
 from dynamics.peers import Case, UnavailableError
 from dynamics.peers.case import BATCH, DT, NUDGE, PASSES
-from dynamics.peers.contender import ldl_solve
+from dynamics.peers.dense_solve import dense_solve
 from viz import cli
 
 ROUNDING = 1e-10  # of a loop: the motion is that much larger than the last bit of the state it is taken from
@@ -153,12 +153,12 @@ def test_a_system_that_depends_on_time_is_refused():
         Case("driven", driven)
 
 
-def test_ldl_solves_what_numpy_solves():
+def test_the_dense_solve_finds_what_numpy_finds():
     rng = np.random.default_rng(0)
     a = rng.normal(size=(6, 6))
     a = a @ a.T + np.eye(6)
     b = rng.normal(size=6)
-    assert np.array(ldl_solve(a, b)) == pytest.approx(np.linalg.solve(a, b), rel=1e-10)
+    assert np.array(dense_solve(a, b)) == pytest.approx(np.linalg.solve(a, b), rel=1e-10)
 
 
 def test_a_worker_answers_and_is_timed():

@@ -42,7 +42,7 @@ class StabilityCase(Setting):
     atol: absolute tolerance, where that of one in a thousand of RTOL in SI units is too much or too little; for all
     states, or for each.
     growth: what the flow makes of a small relative error of the start by t_end (the largest of all states, each
-    relative to its size); `sensitivity.growth` measures it. None where there is no solution to compare with.
+    relative to its size); the tests measure it. None where there is no solution to compare with.
     invariants(model): a graph over the state (and t, parameters) whose outputs do not change along the motion.
     """
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ....reference import Reference, reference
-from .case import StabilityCase
+from dynamics.experiments.stability.cases import StabilityCase
+from dynamics.reference import Reference, reference
 
 STEP = 2.0**-36  # of the start; a growth up to 10^6 is still a matter of first order
 DIGITS = 15
