@@ -1,4 +1,4 @@
-"""Contender: what is timed, and what it found."""
+"""Contender: what is timed, and its values."""
 
 from __future__ import annotations
 

@@ -94,7 +94,7 @@ class PinocchioPeer(Peer):
         y = np.zeros((self.case.n, BATCH), order="F")
         return Contender(
             lambda: algorithm(1, pool, *columns, y),
-            lambda found: (y if found is None else found)[self.order] + added,
+            lambda result: (y if result is None else result)[self.order] + added,
             BATCH,
         )
 

@@ -125,10 +125,10 @@ def _row(case: Case, task: str, mode: str, pool: WorkerPool, repeats: int) -> Ro
         raise RuntimeError(f"{case.name}, {task}, {mode}: no figures of ours to compare with: {row.skipped[OURS]}")
     start = _start(case, task, mode)
     expected = ready[OURS].values - start
-    for peer, made in ready.items():
+    for peer, prepared in ready.items():
         low, middle, high = np.percentile(samples[peer], (25, 50, 75)).tolist()
-        difference = float(np.abs(made.values - start - expected).max() / np.abs(expected).max())
-        row.cells[peer] = Cell(middle, low, high, made.seconds, difference, made.size)
+        difference = float(np.abs(prepared.values - start - expected).max() / np.abs(expected).max())
+        row.cells[peer] = Cell(middle, low, high, prepared.seconds, difference, prepared.size)
     return row
 
 

@@ -13,7 +13,7 @@ from .node_counts import node_counts
 from .reconfiguration import reconfiguration
 
 
-class Figure(NamedTuple):
+class BenchFigure(NamedTuple):
     """What is printed, part by part.  takes: of links, repeats and count."""
 
     about: str
@@ -22,10 +22,10 @@ class Figure(NamedTuple):
 
 
 FIGURES = {
-    "counts": Figure("nodes of forward dynamics, and what leaving out one idea adds", node_counts, ("links",)),
-    "build": Figure("time to build the graph of forward dynamics", build_time, ("links", "repeats")),
-    "agreement": Figure("largest differences from MuJoCo and Pinocchio", agreement, ("links", "count")),
-    "ensembles": Figure("many pendulums beside MuJoCo's rollout and JAX's vmap", ensembles, ("count", "repeats")),
-    "reconfiguration": Figure("first torque after a change of structure", reconfiguration, ("links", "repeats")),
-    "long-chains": Figure("cost of a thousand links, and accuracy of long chains", long_chains, ("links",)),
+    "counts": BenchFigure("nodes of forward dynamics, and what leaving out one idea adds", node_counts, ("links",)),
+    "build": BenchFigure("time to build the graph of forward dynamics", build_time, ("links", "repeats")),
+    "agreement": BenchFigure("largest differences from MuJoCo and Pinocchio", agreement, ("links", "count")),
+    "ensembles": BenchFigure("many pendulums beside MuJoCo's rollout and JAX's vmap", ensembles, ("count", "repeats")),
+    "reconfiguration": BenchFigure("first torque after a change of structure", reconfiguration, ("links", "repeats")),
+    "long-chains": BenchFigure("cost of a thousand links, and accuracy of long chains", long_chains, ("links",)),
 }

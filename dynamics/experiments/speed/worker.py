@@ -128,10 +128,10 @@ def _serve(pipe: Connection, load: Load, name: str) -> None:
             try:
                 peer = peer or kind.make(case)
                 contender = peer.prepare(*asked)
-                found = contender.run()
+                result = contender.run()
                 seconds = time.perf_counter() - start
                 contenders[asked] = contender, _repetitions(contender)
-                pipe.send(Prepared(seconds, contender.result(found), contender.size))
+                pipe.send(Prepared(seconds, contender.result(result), contender.size))
             except UnavailableError as error:
                 pipe.send(Refused(str(error)))
             except Exception as error:  # noqa: BLE001 (whatever a peer's own code raises is a line in the report)

@@ -73,6 +73,6 @@ def exact(points: Array) -> Pair:
     return Pair(np.array(high), np.array(low))
 
 
-def ulps(found: Array, known: Pair) -> float:
+def ulps(values: Array, known: Pair) -> float:
     """The largest error."""
-    return float(np.max(np.abs(known.deviation(found)) / np.spacing(np.abs(known.high))))
+    return float(np.max(np.abs(known.deviation(values)) / np.spacing(np.abs(known.high))))

@@ -125,11 +125,11 @@ def measurement(family: Family, arms: Arms) -> Measurement:
         qd, third = family.velocity * rng.normal(size=n), 5.0 * rng.normal(size=n)
         exact, point = arms.task.exact(arm, q, qd, third), np.concatenate([q, qd, third])
         size = np.max(np.abs(exact.high) + arms.condition(arm, point))
-        given = arms.with_parameters(arm, point) if arms.task.doubled else point
+        x = arms.with_parameters(arm, point) if arms.task.doubled else point
         for function in functions:
-            lanes = function.batch(np.repeat(given[:, None], LANES, axis=1))
-            for found in (function(given), lanes[:, 0], lanes[:, -1]):
-                error = np.max(np.abs(exact.deviation(found))) / (ULP * size)
+            lanes = function.batch(np.repeat(x[:, None], LANES, axis=1))
+            for values in (function(x), lanes[:, 0], lanes[:, -1]):
+                error = np.max(np.abs(exact.deviation(values))) / (ULP * size)
                 worst = float(np.maximum(worst, error))  # NaN stays NaN
     why = "of the condition: some operations one after another, each an ulp"
     return Measurement(f"{n} links", worst, BOUND, "ulp", why)

@@ -101,7 +101,7 @@ class Target:
 
 def targets(curves: Sequence[Curve], errors: Sequence[float] = TARGETS) -> list[Target]:
     """For each error, ours first."""
-    found = []
+    fastest_runs = []
     for error in errors:
         ours = None
         for group in (OURS, *PEERS):
@@ -112,8 +112,8 @@ def targets(curves: Sequence[Curve], errors: Sequence[float] = TARGETS) -> list[
             if group == OURS:
                 ours = point.seconds
             ratio = None if ours is None else point.seconds / ours
-            found.append(Target(error, group, curve.name, point.knob, point.seconds, ratio))
-    return found
+            fastest_runs.append(Target(error, group, curve.name, point.knob, point.seconds, ratio))
+    return fastest_runs
 
 
 def group_of(curve: Curve) -> str:

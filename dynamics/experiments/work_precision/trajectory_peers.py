@@ -66,8 +66,8 @@ class Mujoco(Solver):
         states, run = self._states(steps)
         run()
         every = steps // INTERVALS
-        found: Array = np.vstack([self.start, states[0, every - 1 :: every][:, self.taken]])
-        return found
+        ours: Array = np.vstack([self.start, states[0, every - 1 :: every][:, self.taken]])
+        return ours
 
     def _states(self, steps: int) -> tuple[Array, Callable[[], Any]]:
         """Where the states of a run go, (1, steps, ..), and the run."""
@@ -84,8 +84,8 @@ class Mujoco(Solver):
         """See Solver: velocities as they are, accelerations by MuJoCo."""
         n, order, at = self.peer.case.n, self.peer.order, self.peer.at
         twin, none = self.peer.twin, np.zeros(self.peer.case.n)
-        found = [twin.accelerations(row[:n][at], row[n:][at], none)[order] for row in x]
-        return np.hstack([x[:, n:], found])
+        accelerations = [twin.accelerations(row[:n][at], row[n:][at], none)[order] for row in x]
+        return np.hstack([x[:, n:], accelerations])
 
 
 class Heyoka(Solver):
@@ -110,34 +110,34 @@ class Heyoka(Solver):
             self._made[knob] = self.heyoka.taylor_adaptive(
                 self.system, self.start.tolist(), compact_mode=self.compact, **options
             )
-        made = self._made[knob]
-        made.time = 0.0
-        made.state[:] = self.start
-        return made
+        integrator = self._made[knob]
+        integrator.time = 0.0
+        integrator.state[:] = self.start
+        return integrator
 
     def ready(self, knob: float) -> Callable[[], Outcome]:
         """See Solver."""
-        made = self.integrator(knob)
+        integrator = self.integrator(knob)
         t_end, limit = self.setting.t_end, self.heyoka.taylor_outcome.time_limit
 
         def run() -> Outcome:
-            made.time = 0.0
-            made.state[:] = self.start
-            outcome, _, _, steps, *_ = made.propagate_until(t_end, max_steps=MOST)
+            integrator.time = 0.0
+            integrator.state[:] = self.start
+            outcome, _, _, steps, *_ = integrator.propagate_until(t_end, max_steps=MOST)
             status = "" if outcome == limit else f"stopped after {steps} steps"
-            return Outcome(made.state.copy(), steps, None, None, status)
+            return Outcome(integrator.state.copy(), steps, None, None, status)
 
         return run
 
     def rows(self, knob: float) -> Array:
         """See Solver."""
-        made = self.integrator(knob)
+        integrator = self.integrator(knob)
         times = self.setting.times
         if times[0] > 0.0:
-            made.propagate_until(times[0], max_steps=MOST)
-        found: Array = made.propagate_grid(times, max_steps=MOST)[-1]
+            integrator.propagate_until(times[0], max_steps=MOST)
+        states: Array = integrator.propagate_grid(times, max_steps=MOST)[-1]
         result = np.full((len(times), len(self.start)), math.nan)
-        result[: len(found)] = found
+        result[: len(states)] = states
         return result
 
     def rates(self, x: Array) -> Array:
@@ -145,8 +145,8 @@ class Heyoka(Solver):
         variables, expressions = zip(*self.system, strict=True)
         function = self.heyoka.cfunc(list(expressions), list(variables), compact_mode=True)
         times = {"time": np.zeros(len(x))} if function.is_time_dependent else {}
-        found: Array = function(np.ascontiguousarray(x.T), **times).T
-        return found
+        rates: Array = function(np.ascontiguousarray(x.T), **times).T
+        return rates
 
 
 class Cvodes(Solver):
@@ -178,15 +178,14 @@ class Cvodes(Solver):
     def rows(self, knob: float) -> Array:
         """See Solver."""
         times = self.setting.times
-        found = np.array(self._function(knob, times)(x0=self.start.tolist())["xf"]).T
-        result: Array = found
-        return result
+        states: Array = np.array(self._function(knob, times)(x0=self.start.tolist())["xf"]).T
+        return states
 
     def rates(self, x: Array) -> Array:
         """See Solver."""
         ca, parts = self.casadi, self.equations
-        found = ca.Function("rate", [parts["x"], parts["t"]], [parts["ode"]])
-        return np.array([np.array(found(row, 0.0)).ravel() for row in x])
+        rate = ca.Function("rate", [parts["x"], parts["t"]], [parts["ode"]])
+        return np.array([np.array(rate(row, 0.0)).ravel() for row in x])
 
 
 def heyoka_equations(hy: Any, problem: Problem) -> list[tuple[Any, Any]]:
@@ -220,12 +219,12 @@ def casadi_equations(ca: Any, problem: Problem) -> dict[str, Any]:
 
 def offers(setting: Setting, smallest: float, problem: Problem, backend: str) -> dict[str, Callable[[], Solver]]:
     """The peers that could be asked, by name; making one raises ImportError, UnavailableError or ValueError."""
-    found: dict[str, Callable[[], Solver]] = {}
+    makers: dict[str, Callable[[], Solver]] = {}
     for solver in SOLVERS:
-        found[f"{PREFIX}{solver}"] = partial(Scipy, solver, setting, smallest, problem, backend)
+        makers[f"{PREFIX}{solver}"] = partial(Scipy, solver, setting, smallest, problem, backend)
     for integrator in MUJOCO:
-        found[f"MuJoCo {integrator}"] = partial(Mujoco, integrator, setting, smallest)
-    found["heyoka Taylor"] = partial(Heyoka, setting, smallest, problem)
+        makers[f"MuJoCo {integrator}"] = partial(Mujoco, integrator, setting, smallest)
+    makers["heyoka Taylor"] = partial(Heyoka, setting, smallest, problem)
     for kind in CVODES:
-        found[f"CVODES {kind}"] = partial(Cvodes, kind, setting, smallest, problem)
-    return found
+        makers[f"CVODES {kind}"] = partial(Cvodes, kind, setting, smallest, problem)
+    return makers

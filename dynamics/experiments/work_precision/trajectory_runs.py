@@ -97,9 +97,9 @@ def recorded(run: Tally, start: Array, times: Sequence[float]) -> Array:
             rows.add(piece)
             if time.perf_counter() - begin > 2 * LONGEST:
                 break
-    found = rows.table()[1]
+    states = rows.table()[1]
     result = np.full((len(times), len(start)), math.nan)
-    result[: len(found)] = found
+    result[: len(states)] = states
     return result
 
 

@@ -22,6 +22,7 @@ Rate = Callable[[Array, float], Any]  # of the state and t, written without the 
 
 STATES = 4
 ROUNDING = 1e-12  # of the largest term
+LAST_BITS = 1e-15  # of numbers about 1
 LARGE = 200  # states; a larger model is measured in the benchmarks, and its family is tested at a hundred links
 
 
@@ -262,18 +263,18 @@ def test_bodies_in_euler_angles_obey_eulers_equations(name: str) -> None:
         )
         torque = pull * np.cross([0.0, 0.0, 1.0], -up)
         size = np.max(np.abs(inertia * omega)) * np.max(np.abs(omega)) + pull
-        assert inertia * omega_rate + np.cross(omega, inertia * omega) == approx(torque, rel=0.0, abs=1e-12 * size)
+        assert inertia * omega_rate + np.cross(omega, inertia * omega) == approx(torque, rel=0.0, abs=ROUNDING * size)
 
 
 def test_the_free_body_starts_with_its_momentum_along_the_vertical() -> None:
     state = np.array(cases.load("free body about its middle axis, Euler angles").start)
     omega, _ = momentum_rate(rotation.INERTIA, state, np.zeros(3))
-    assert omega == approx(np.array(rotation.OMEGA), abs=1e-15)
+    assert omega == approx(np.array(rotation.OMEGA), abs=LAST_BITS)
     up = np.array(
         [math.sin(state[1]) * math.sin(state[2]), math.sin(state[1]) * math.cos(state[2]), math.cos(state[1])]
     )
     momentum = np.array(rotation.INERTIA) * omega
-    assert momentum / np.linalg.norm(momentum) == approx(up, abs=1e-15)
+    assert momentum / np.linalg.norm(momentum) == approx(up, abs=LAST_BITS)
 
 
 WITH_INVARIANTS = [name for name, case in cases.TABLE.items() if case.invariants and len(case.start) < LARGE]
@@ -294,7 +295,7 @@ def test_invariants_do_not_change_along_the_motion(name: str) -> None:
         change = high_precision.directional(graph, inside, {k: v for k, v in direction.items() if k in inside})
         size = high_precision.path_size(graph, inside, {k: v for k, v in direction.items() if k in inside})
         for key in graph.outputs:
-            assert abs(float(change[key])) <= 1e-12 * size[key], key  # constants of both graphs are rounded
+            assert abs(float(change[key])) <= ROUNDING * size[key], key  # constants of both graphs are rounded
 
 
 @mark.parametrize("name", cases.names())

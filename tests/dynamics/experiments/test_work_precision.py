@@ -37,6 +37,12 @@ from dynamics.reference import Reference
 
 T_END = 10.0  # s, of the scene spring_mass: q = cos t
 ROUNDING = 1e-9  # a thousand times that of a power of R(i h) in float64
+LEADING = 1e-3  # relative, of an error at least 1e-9: what rounding adds to it
+REPEATED = 1e-4  # relative, of an error: the same steps in another program
+SAME_METHOD = 1e-5  # relative, of an error: MuJoCo's RK4 and ours differ by rounding alone
+SAME_RATES = 1e-12  # relative: rounding of the same equations of three links
+THOUSANDFOLD = 1e3  # an error at the end, in tolerances of a step
+LAST_BITS = 1e-13  # of a series of 25 terms at the resolution of float64
 TIMES = np.linspace(0.0, T_END, INTERVALS + 1)
 
 
@@ -76,8 +82,8 @@ def test_errors_are_those_of_the_method_s_stability_function(report: WorkPrecisi
         assert point.steps == count
         assert point.step == approx(T_END / count)
         if errors[-1] > ROUNDING:
-            assert point.error == approx(errors[-1], rel=1e-3)
-            assert point.largest == approx(errors.max(), rel=1e-3)
+            assert point.error == approx(errors[-1], rel=LEADING)
+            assert point.largest == approx(errors.max(), rel=LEADING)
 
 
 def test_energy_drift_is_that_of_the_stability_function(report: WorkPrecision) -> None:
@@ -86,7 +92,7 @@ def test_energy_drift_is_that_of_the_stability_function(report: WorkPrecision) -
         w = 1j * T_END / count
         energy = np.abs(after(1 + w + w**2 / 2 + w**3 / 6 + w**4 / 24, count)) ** 2 / 2
         if abs(energy[-1] - 0.5) > ROUNDING:
-            assert point.drift == approx(np.abs(energy - 0.5).max() / (np.sin(TIMES) ** 2 / 2).max(), rel=1e-3)
+            assert point.drift == approx(np.abs(energy - 0.5).max() / (np.sin(TIMES) ** 2 / 2).max(), rel=LEADING)
 
 
 def test_counts_are_those_of_a_simulation(report: WorkPrecision) -> None:
@@ -99,7 +105,7 @@ def test_counts_are_those_of_a_simulation(report: WorkPrecision) -> None:
         counts = run.stats.steps, run.stats.rejected, run.stats.nfev
         assert (point.steps, point.rejected, point.evaluations) == counts
         error = max(abs(run.q[-1, 0] - math.cos(T_END)), abs(run.qd[-1, 0] + math.sin(T_END)) / smallest)
-        assert point.error == approx(error, rel=1e-4)
+        assert point.error == approx(error, rel=REPEATED)
         assert point.largest >= point.error
     point = curve(report, "rk4").points[2]
     assert (point.steps, point.evaluations) == (point.knob, 4 * point.knob)
@@ -196,9 +202,9 @@ def test_mujoco_s_rk4_makes_the_error_that_ours_makes(arm: tuple[Setting, ErrorM
     theirs, ours = Mujoco("RK4", found, smallest), Ours("rk4", found, smallest, problem_of(found))
     for steps in (64, 256):
         error = metrics.at_end(ours.ready(steps)().x)
-        assert metrics.at_end(theirs.ready(steps)().x) == approx(error, rel=1e-5)
+        assert metrics.at_end(theirs.ready(steps)().x) == approx(error, rel=SAME_METHOD)
         assert float(metrics.errors(theirs.rows(steps)).max()) == approx(
-            float(metrics.errors(ours.rows(steps)).max()), rel=1e-5
+            float(metrics.errors(ours.rows(steps)).max()), rel=SAME_METHOD
         )
 
 
@@ -241,7 +247,7 @@ def test_the_error_of_a_model_is_told_apart(arm: tuple[Setting, ErrorMetrics, fl
     entry = Entry(theirs)
     difference = entry.curve(metrics, problem_of(found)).model_error
     assert difference is not None
-    assert difference < 1e-12 if damping == 0.1 else 1e-3 < difference < 10.0
+    assert difference < SAME_RATES if damping == 0.1 else 1e-3 < difference < 10.0
 
 
 def test_cvodes_gets_our_equations(arm: tuple[Setting, ErrorMetrics, float]) -> None:
@@ -249,20 +255,20 @@ def test_cvodes_gets_our_equations(arm: tuple[Setting, ErrorMetrics, float]) -> 
     found, metrics, smallest = arm
     for kind in ("BDF", "Adams"):
         theirs = Cvodes(kind, found, smallest, problem_of(found))
-        assert metrics.at_end(theirs.ready(1e-9)().x) < 1e-6
-        assert float(metrics.errors(theirs.rows(1e-9)).max()) < 1e-6
+        assert metrics.at_end(theirs.ready(1e-9)().x) < 1e-9 * THOUSANDFOLD
+        assert float(metrics.errors(theirs.rows(1e-9)).max()) < 1e-9 * THOUSANDFOLD
         entry = Entry(theirs).curve(metrics, problem_of(found))
         assert entry.model_error is not None
-        assert entry.model_error < 1e-12
+        assert entry.model_error < SAME_RATES
 
 
 def test_heyoka_gets_our_equations() -> None:
     pytest.importorskip("heyoka")
     found, metrics, smallest = setting("spring_mass")
     theirs = Heyoka(found, smallest, problem_of(found))
-    assert metrics.at_end(theirs.ready(EPSILON)().x) < 1e-13
+    assert metrics.at_end(theirs.ready(EPSILON)().x) < LAST_BITS
     assert metrics.at_end(theirs.ready(1e-4)().x) < 1e-2
-    assert float(metrics.errors(theirs.rows(EPSILON)).max()) < 1e-13
+    assert float(metrics.errors(theirs.rows(EPSILON)).max()) < LAST_BITS
     x = np.array([[0.3, -0.7], [1.0, 2.0]])
     assert theirs.rates(x) == approx(np.array([[-0.7, -0.3], [2.0, -1.0]]))
 
@@ -288,9 +294,9 @@ def test_scipy_runs_on_our_rate() -> None:
     found, metrics, smallest = setting("spring_mass")
     for solver in ("DOP853", "LSODA", "Radau"):
         theirs = Scipy(solver, found, smallest, problem_of(found))
-        assert metrics.at_end(theirs.ready(1e-7)().x) < 1e-4
+        assert metrics.at_end(theirs.ready(1e-7)().x) < 1e-7 * THOUSANDFOLD
         assert theirs.ready(1e-7)().rejected is None  # it does not tell
-        assert float(metrics.errors(theirs.rows(1e-7)).max()) < 1e-4
+        assert float(metrics.errors(theirs.rows(1e-7)).max()) < 1e-7 * THOUSANDFOLD
 
 
 class Broken(Solver):

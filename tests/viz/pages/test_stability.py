@@ -111,7 +111,7 @@ def test_files_are_written_and_the_page_needs_no_other(tmp_path: Path) -> None:
 def test_a_report_of_nothing_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     for arguments in ([], ["chain", "--stability"]):
         assert cli.main(["report", *arguments]) == 1
-        assert "a report needs a scene, or --stability and none" in capsys.readouterr().err
+        assert "a report needs a scene, or --stability or --compare and none" in capsys.readouterr().err
 
 
 def test_the_command_writes_the_table_and_fails_for_an_unexplained_row(
