@@ -15,7 +15,8 @@ triangle of second derivatives, all as nodes.
 `SingularError`. `ldl_elimination` does the same over any numbers.
 
 **Read**: `expand` and `format_polynomial` write a polynomial out, `Names` tells nodes in a person's words, `OPS` is
-the table of operations, a row of it an `Op`, and `ADJOINT`, `PRIMAL`, `TANGENT` are the roles that a label may have.
+the table of operations, `register` adds a row to it, an `Op`, and `ADJOINT`, `PRIMAL`, `TANGENT` are the roles that a
+label may have.
 
 **Run**: a `Program` is graphs over registers of numbers (`Call`, `Map`, `Sum`, `Factor`, `Solve`, `If`, `While`), and
 `runner` makes it machine code or Python.
@@ -42,8 +43,8 @@ from .autodiff.ldl_solve import SingularError, ldl_elimination, ldl_solve
 from .autodiff.reverse import cotangents
 from .core.evaluate import Array
 from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED
-from .core.node import as_node
-from .core.operation import Op
+from .core.node import as_node, register
+from .core.operation import MathML, Op
 from .core.ops import OPS
 from .core.scope import building
 from .core.traversal import topological
@@ -68,6 +69,7 @@ __all__ = [
     "Factor",
     "If",
     "Map",
+    "MathML",
     "Names",
     "Op",
     "Polynomial",
@@ -92,6 +94,7 @@ __all__ = [
     "ldl_solve",
     "real_array",
     "real_number",
+    "register",
     "runner",
     "solve_nodes",
     "tangents",

@@ -10,6 +10,7 @@ from typing import Any
 
 from ..core.graph import Graph
 from .compiled import Compiled
+from .llvm_engine import MissingFunctionError
 from .native_function import Native
 from .python_function import Generated
 
@@ -27,10 +28,10 @@ def compile(
 ) -> Compiled:
     """The graph as a function: `fn(x)` at one point, `fn.batch(X)` at many, `fn.source` to read.
 
-    backend: "llvm", machine code (extra `native`); "python", generated Python over floats; "numpy",
-    generated NumPy over arrays; "auto", machine code where llvmlite is installed and the graph has at most 100 000
-    nodes, else generated Python for `fn(x)` and generated NumPy for `fn.batch(X)`. All agree with `graph.evaluate`, on
-    floats and on arrays respectively.
+    backend: "llvm", machine code (extra `native`); "python", generated Python over floats; "numpy", generated NumPy
+    over arrays; "auto", machine code where llvmlite is installed, the C library has all functions of the graph and
+    that has at most 100 000 nodes, else generated Python for `fn(x)` and generated NumPy for `fn.batch(X)`. All agree
+    with `graph.evaluate`, on floats and on arrays respectively.
     fma: machine code may round a product and the sum it goes into once instead of twice, and take sines, cosines,
     exponentials and logarithms from polynomials (within 2 ulp); without, `fn(x)` agrees with `graph.evaluate` to the
     last bit.
@@ -42,7 +43,8 @@ def compile(
     that cannot be written gives a RuntimeWarning. `clear_cache` empties it; nothing else does.
     These three are for machine code alone.
 
-    Raises TypeError for what is no Graph, ValueError for an unknown backend, ImportError for "llvm" without llvmlite.
+    Raises TypeError for what is no Graph, ValueError for an unknown backend, ImportError for "llvm" without llvmlite,
+    RuntimeError for "llvm" where an operation is no function of the C library and its row has no instructions.
     """
     if backend not in BACKENDS:
         raise ValueError(f"backend must be one of {', '.join(BACKENDS)}, got {backend!r}")
@@ -52,7 +54,7 @@ def compile(
     if backend == "llvm" or (backend == "auto" and len(graph.nodes) <= LARGE):
         try:
             return Native(graph, backend, options)
-        except ImportError:
+        except (ImportError, MissingFunctionError):
             if backend == "llvm":
                 raise
     return Generated(graph, backend, options)

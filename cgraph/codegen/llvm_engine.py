@@ -16,6 +16,10 @@ LEVEL = 2  # of the code generator's optimisation; the text has no redundancy fo
 _lock = threading.Lock()  # llvmlite compiles in one context
 
 
+class MissingFunctionError(RuntimeError):
+    """A function that the C library of this machine does not have."""
+
+
 class Code:
     """Machine code, alive as long as this object is."""
 
@@ -80,7 +84,10 @@ class Host:
         if not all(map(find, functions)):
             self._binding.load_library_permanently(ctypes.util.find_library("m") or "ucrtbase")
         if missing := [name for name in functions if not find(name)]:
-            raise RuntimeError(f"the C library of this machine has no {', '.join(missing)}")
+            raise MissingFunctionError(
+                f"the C library of this machine has no {', '.join(missing)}: as machine code the operation needs "
+                f"instructions, the column `llvm` of its row; backends 'python' and 'numpy' do without"
+            )
 
 
 def host() -> Host:

@@ -33,7 +33,8 @@ ValueError
 Examples
 --------
 >>> import cgraph as cg
->>> graph = cg.Graph(cg.variables("{names}"), {{"result": cg.{name}(*cg.variables("{names}"))}})
+>>> inputs = cg.variables("{names}")
+>>> graph = cg.Graph(inputs, {{"result": cg.{name}(*inputs)}})
 >>> round(graph.evaluate({values})["result"], 6)
 {result!r}
 """
@@ -42,11 +43,15 @@ Examples
 def function(op: Op) -> Function:
     """The function that makes nodes of an operation."""
     kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
-    parameters = [inspect.Parameter(name, kind, annotation=Scalar) for name in op.parameters]
-    signature = inspect.Signature(parameters, return_annotation=Node)
+    signature = inspect.Signature([inspect.Parameter(name, kind) for name in op.parameters])
 
     def make(*args: Scalar, **named: Scalar) -> Node:
-        return apply(op, *(signature.bind(*args, **named).args if named else args))
+        if named:
+            try:
+                args = signature.bind(*args, **named).args
+            except TypeError as error:
+                raise TypeError(f"{op.name}{signature}: {error}") from None
+        return apply(op, *args)
 
     make.__name__ = make.__qualname__ = op.name
     make.__doc__ = _help(op)

@@ -279,6 +279,8 @@ def _restore(inputs: tuple[str, ...], records: tuple[tuple[Any, ...], ...], outp
         elif op == VARIABLE.name:
             node = variable(name)
         else:
+            if op not in OPS:
+                raise GraphError(f"operation {op!r} is not in the table: register its row before its graph is read")
             kept = label(*map(frozenset, sets))
             node = Node(OPS[op], tuple([from_record[i] for i in args]), kept, name=name)
         from_record.append(node)

@@ -196,13 +196,38 @@ _BY_UFUNC: dict[Any, Op] = {}
 _TURNED = {np.greater: np.less, np.greater_equal: np.less_equal}  # a > b is b < a
 
 
-def register(op: Op, ufunc: Any = None) -> None:
-    """Add a row to the operation table; `ufunc` on nodes makes this operation (default: its function of arrays)."""
+def register(op: Op) -> None:
+    """Add a row to the operation table: from then on every part of the library knows the operation.
+
+    Parameters
+    ----------
+    op : Op
+        The row. `cg.name` is then the function that makes its nodes, and its `ufunc` makes them too.
+
+    Raises
+    ------
+    ValueError
+        When the name is no identifier or in the table already, when parameter names or a sample do not fit the number
+        of arguments, or when there is no sample.
+
+    Examples
+    --------
+    >>> from cgraph.extend import OPS, register
+    >>> register(OPS["sin"])
+    Traceback (most recent call last):
+    ValueError: operation 'sin' is in the table already
+    """
     if op.name in OPS:
         raise ValueError(f"operation {op.name!r} is in the table already")
+    if not op.name.isidentifier():
+        raise ValueError(f"an operation's name must be an identifier, got {op.name!r}")
+    if len(op.parameters) != op.arity:
+        raise ValueError(f"operation {op.name!r} takes {op.arity} argument(s), got the names {op.arguments!r}")
+    if not op.samples or any([len(sample) != op.arity for sample in op.samples]):
+        raise ValueError(f"operation {op.name!r} needs samples of {op.arity} number(s) each, got {op.samples!r}")
     OPS[op.name] = op
-    if isinstance(ufunc or op.array, np.ufunc):
-        _BY_UFUNC[ufunc or op.array] = op
+    if op.ufunc is not None:
+        _BY_UFUNC[op.ufunc] = op
 
 
 _constants: WeakValueDictionary[tuple[float, float], Node] = WeakValueDictionary()

@@ -72,14 +72,12 @@ def mul(a: Node, b: Node) -> Node | None:
         return a.args[0] * b.args[0] if b.op.name == "neg" else -(a.args[0] * b)
     if b.op.name == "neg":
         return -(a * b.args[0])
-    if (
-        a.op.name == "mul"
-        and b.op.name == "mul"
-        and (c := a.args[0].value) is not None
-        and (d := b.args[0].value) is not None
-    ):
-        return constant(c * d) * (a.args[1] * b.args[1]) if math.isfinite(c * d) and c * d else None
-    return None
+    if a.op.name != "mul" or b.op.name != "mul":
+        return None
+    c, d = a.args[0].value, b.args[0].value
+    if c is None or d is None or not math.isfinite(c * d) or not c * d:
+        return None
+    return constant(c * d) * (a.args[1] * b.args[1])
 
 
 def _cancelled(c: float, b: Node) -> Node | None:

@@ -32,66 +32,135 @@ class MathML(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Op:
-    """One row of the operation table (`ops.py`): all that any part of the library knows of an operation.
+    """One row of the operation table: all that any part of the library knows of an operation.
 
-    The first five columns and a sample are needed; every other has a default that works, stated beside it. Nodes, where
-    a column makes some, are written with operators and the functions of `ops.py`.
+    Six columns are needed; every other has a default that works, stated here. In the library the rows are in
+    `cgraph/core/ops.py`; `register` adds one in a program of your own.
+
+    Parameters
+    ----------
+    name : str
+        An identifier; `cg.name` makes the node.
+    arity : int
+        Number of arguments.
+    scalar : callable
+        Value on floats. A function of `math` may raise: `array`'s NaN or infinity then is the value.
+    array : callable
+        Value on arrays that broadcast.
+    partials : callable
+        Of the output's node and the arguments': the partial derivative in each argument, a node or a number.
+    samples : tuple of tuples of float
+        Points inside the domain, away from kinks, for tests and for the help, which shows the first.
+    arguments : str
+        Names of the parameters, with spaces. Default "x", or "a b", or "a b c".
+    about : str
+        A sentence for the help. Default: which node is made.
+    ufunc : numpy.ufunc
+        What makes the node when called on nodes. Default `array`, where it is a ufunc.
+    symbol : str
+        In drawings. Default the name.
+    infix : (str, int)
+        In explanations, between two arguments, and how strongly it binds. Default name(a, b).
+    mathml : MathML
+        In the formulas of pages. Default name(a, b).
+    commutative : bool
+        Whether f(a, b) is f(b, a), and nodes of both are shared. Default False.
+    selects : bool
+        Whether an unused argument must not reach the result, not even as NaN. Default False.
+    signs : tuple of int
+        Of a sum, the sign of each argument. Default: no sum.
+    fold : callable
+        Of the arguments' nodes: the simpler node that stands for the operation on them, or None. Default none.
+    double_double : callable
+        Of pairs (hi, lo) of nodes: the pair of the result, or None. Default float64's value of the high parts, and the
+        low parts through the partials.
+    domain : tuple of (float, float)
+        For each argument an interval well inside, from which tests draw. Default half to 3/2 times the samples.
+    interval : callable
+        Of the arguments' bounds: bounds of the value. Default unbounded.
+    interval_of_same : callable
+        Of the bounds of the one node that both arguments are. Default as if they were two.
+    singular : callable
+        Of the arguments' bounds: where among them the slope is unbounded, in words, or None. Default None, but where
+        there is no `interval` either, that no bounds are known.
+    rounding : float
+        Units of rounding, 2**-53, of its own result. Default two, as for a function of the C library.
+    python, numpy : str
+        Text over floats and over arrays, with {} or {0}, {1} for arguments. Default name(..), with `scalar` and `array`
+        behind the name; of a ufunc np.ufunc(..).
+    library : str
+        Its function in the C library. Default of that name.
+    llvm : tuple of str
+        LLVM instructions in place of a call, see `op_texts`. Default the call, in vectors lane by lane; where the C
+        library has no such function, `cg.compile` falls back to generated Python.
+    vector : str
+        The polynomial of `codegen.vector_math` that serves vectors. Default none.
+    c, c_helper : str
+        C expression with {0}, {1} for arguments, and a C function that it calls, with {name} for the name of the one
+        being written. Default the call of the library's function, and none.
+    javascript : str
+        A function. Default Math.name, and NaN where a browser has none.
+    operator : callable
+        Of numbers and expressions of any kind, made by their operators. Default none.
+    precise : callable
+        Of multiprecision numbers. Default `operator`, `piece`, the numbers' method of that name, else an error that
+        says what is missing.
+    piece : callable
+        Of a piecewise operation: of the sign of the first argument, or of the difference of two, which argument (None:
+        the number 1) times which factor is the value. Default: smooth.
+    series : callable
+        Taylor coefficient k of (k, the result's coefficients, each argument's). Default through the partials.
+    rewrite : callable
+        The same by other operations, for their series. Default none.
     """
 
     name: str
     arity: int
-    scalar: Callable[..., float]  # value on floats; functions of `math` give `array`'s IEEE results where they raise
-    array: Callable[..., Any]  # value on arrays; np.cbrt(node) makes the node where it is a ufunc
-    partials: Callable[..., tuple[Any, ...]]  # of (output, *arguments): a node or number for each argument
-    samples: tuple[tuple[float, ...], ...] = ()  # points inside the domain, away from kinks; the help shows the first
-
-    # Its function `cg.name`, and texts.
-    arguments: str = ""  # parameter names; default x, or a b, or a b c
-    about: str = ""  # a sentence for the help; default says which node is made
-    symbol: str = ""  # in drawings; default the name
-    infix: tuple[str, int] | None = None  # in explanations, and how strongly it binds; default name(a, b)
-    mathml: MathML | None = None  # in formulas of pages; default name(a, b)
-
-    # What algebra knows.
+    scalar: Callable[..., float]
+    array: Callable[..., Any]
+    partials: Callable[..., tuple[Any, ...]]
+    samples: tuple[tuple[float, ...], ...] = ()
+    # its function and texts
+    arguments: str = ""
+    about: str = ""
+    ufunc: Any = None
+    symbol: str = ""
+    infix: tuple[str, int] | None = None
+    mathml: MathML | None = None
+    # algebra
     commutative: bool = False
-    selects: bool = False  # an unused argument must not reach the result, not even as NaN
-    signs: tuple[int, ...] = ()  # of a sum: the sign of each argument; default: no sum
-    fold: Callable[..., Any] | None = None  # of arguments: the simpler node that stands for it, or None; default none
-    double_double: Callable[..., Any] | None = None  # on pairs; default: float64's, low parts through the partials
-
-    # What errors and bounds know.
-    domain: tuple[Interval, ...] = ()  # an interval an argument, well inside; default half to 3/2 times the samples
-    interval: Callable[..., Interval] | None = None  # bounds of the value from the arguments'; default unbounded
-    interval_of_same: Callable[[Interval], Interval] | None = None  # if both are one node; default as if they were two
-    # Where the slope is unbounded, in words; default nowhere, and without an interval that no bounds are known.
+    selects: bool = False
+    signs: tuple[int, ...] = ()
+    fold: Callable[..., Any] | None = None
+    double_double: Callable[..., Any] | None = None
+    # bounds and errors
+    domain: tuple[Interval, ...] = ()
+    interval: Callable[..., Interval] | None = None
+    interval_of_same: Callable[[Interval], Interval] | None = None
     singular: Callable[..., str | None] | None = None
-    rounding: float = LIBRARY  # units of rounding, 2**-53, of its own result; default two, as for a library function
-
-    # Code.
-    python: str = ""  # over floats; default name(..), with `scalar` behind it
-    numpy: str = ""  # over arrays; default np.ufunc(..), or name(..) with `array` behind it
-    library: str = ""  # its function in the C library; default of that name
-    llvm: tuple[str, ...] = ()  # instructions in place of a call; default the call, in vectors lane by lane
-    vector: str = ""  # which polynomial of `codegen.vector_math` serves vectors; default none
-    c: str = ""  # C expression; default the call
-    c_helper: str = ""  # a C function that `c` calls; {name} is the function being written; default none
-    javascript: str = ""  # a function; default Math.name, and NaN where a browser has none
-
-    # Values in other numbers than floats.
-    operator: Callable[..., Any] | None = None  # of any numbers and expressions, by their operators; default none
-    # Of multiprecision numbers; default `operator`, `piece`, the numbers' method of that name, else a sentence.
+    rounding: float = LIBRARY
+    # code
+    python: str = ""
+    numpy: str = ""
+    library: str = ""
+    llvm: tuple[str, ...] = ()
+    vector: str = ""
+    c: str = ""
+    c_helper: str = ""
+    javascript: str = ""
+    # values in other numbers than floats
+    operator: Callable[..., Any] | None = None
     precise: Callable[..., Any] | None = None
-    # Piecewise: of the sign of the first argument, or of the difference of two, which argument (None: 1) times which
-    # factor is the value; default smooth.
     piece: Callable[[int], tuple[int | None, int]] | None = None
-    series: Callable[..., Any] | None = None  # Taylor coefficient k of (k, y, *arguments); default through the partials
-    rewrite: Callable[..., Any] | None = None  # the same by other operations, for their series; default none
+    series: Callable[..., Any] | None = None
+    rewrite: Callable[..., Any] | None = None
 
     def __post_init__(self) -> None:
         if self.arity == 0:  # variable and constant have no texts
             return
         call = f"({', '.join(f'{{{slot}}}' for slot in range(self.arity))})"
-        ufunc = isinstance(self.array, np.ufunc) and getattr(np, self.array.__name__, None) is self.array
+        ufunc = self.array if isinstance(self.array, np.ufunc) else None
+        in_numpy = ufunc is not None and getattr(np, ufunc.__name__, None) is ufunc
         library = self.library or self.name
         filled = {
             "arguments": "x" if self.arity == 1 else " ".join("abcdefgh"[: self.arity]),
@@ -99,7 +168,8 @@ class Op:
             "symbol": self.name,
             "domain": self._around_samples(),
             "python": f"{self.name}{call}",
-            "numpy": f"np.{self.array.__name__}{call}" if ufunc else f"{self.name}{call}",
+            "ufunc": ufunc,
+            "numpy": f"np.{self.array.__name__}{call}" if in_numpy else f"{self.name}{call}",
             "library": library,
             "c": f"{library}{call}",
             "javascript": f"Math.{self.name} ?? (() => NaN)",

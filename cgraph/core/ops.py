@@ -79,7 +79,7 @@ _ROWS = (
        ((0.3, -0.7), (2.0, 1.5)), about="The product a * b, and 0 where a or b is 0, even if the other is infinite or NaN.",
        symbol="⊗", infix=("*", PRODUCT), mathml=MathML("{0}<mo>·</mo>{1}", (PRODUCT, PRODUCT), PRODUCT),
        commutative=True, selects=True, fold=folding.zero_safe_mul, double_double=dd.zero_safe_mul,
-       series=series.zero_safe_mul, precise=lambda a, b: a * b if a and b else b if a else a, domain=(_REAL, _REAL),
+       series=series.zero_safe_mul, precise=lambda a, b: a if a == 0 else b if b == 0 else a * b, domain=(_REAL, _REAL),
        interval=bounds.mul, interval_of_same=bounds.square, rounding=1.0,
        python="({0} * {1} if {0} and {1} else 0.0)", numpy="np.where(({0} == 0) | ({1} == 0), 0.0, {0} * {1})",
        llvm=texts.LLVM_ZERO_SAFE_MUL, c="({0} != 0.0 && {1} != 0.0) ? {0} * {1} : 0.0",
@@ -93,7 +93,7 @@ _ROWS = (
        symbol="−", mathml=MathML("<mo>−</mo>{0}", (PRODUCT,), SUM), signs=(-1,), fold=folding.neg, double_double=dd.neg,
        series=series.neg, operator=operator.neg, domain=(_REAL,), interval=bounds.neg, rounding=0.0,
        python="-{}", numpy="-{}", llvm=("{r} = fneg {t} {0}",), c="-{0}", javascript="(a) => -a"),
-    Op("pow", 2, math.pow, values.power_arrays, _pow_partials, ((0.6, -0.7), (1.7, 2.5)), arguments="base exponent",
+    Op("pow", 2, math.pow, values.power_arrays, _pow_partials, ((0.6, -0.7), (1.7, 2.5)), arguments="base exponent", ufunc=np.power,
        about="base ** exponent.", symbol="xʸ", mathml=MathML("<msup><mrow>{0}</mrow>{1}</msup>", (LEAF, 0), PRODUCT),
        fold=folding.pow, double_double=dd.pow, rewrite=series.power, operator=operator.pow, domain=(_POSITIVE, (-3.0, 3.0)),
        interval=bounds.pow, singular=bounds.power, c="{name}_pow({0}, {1})", c_helper=texts.C_POWER,
@@ -163,13 +163,13 @@ _ROWS = (
        llvm=texts.LLVM_MAXIMUM, c="({0} >= {1} || {0} != {0}) ? {0} : {1}",
        javascript="(a, b) => (a >= b || a !== a ? a : b)"),
     Op("less", 2, lambda a, b: float(a < b), values.flag(np.less), _flat, ((0.3, -0.7), (-0.7, 0.3)),
-       about="1.0 where a < b, else 0.0.", symbol="<", infix=("<", RELATION), mathml=_relation("&lt;"),
+       about="1.0 where a < b, else 0.0.", symbol="<", ufunc=np.less, infix=("<", RELATION), mathml=_relation("&lt;"),
        double_double=dd.compared("less"), piece=lambda side: (None, int(side < 0)), domain=(_REAL, _REAL),
        interval=bounds.less, interval_of_same=bounds.always(0.0), rounding=0.0,
        python="float({} < {})", numpy="({} < {}) * 1.0", llvm=texts.llvm_comparison("olt"), c="{0} < {1} ? 1.0 : 0.0",
        javascript="(a, b) => +(a < b)"),
     Op("less_equal", 2, lambda a, b: float(a <= b), values.flag(np.less_equal), _flat, ((0.3, -0.7), (-0.7, 0.3)),
-       about="1.0 where a <= b, else 0.0.", symbol="≤", infix=("<=", RELATION), mathml=_relation("≤"),
+       about="1.0 where a <= b, else 0.0.", symbol="≤", ufunc=np.less_equal, infix=("<=", RELATION), mathml=_relation("≤"),
        double_double=dd.compared("less_equal"), piece=lambda side: (None, int(side <= 0)), domain=(_REAL, _REAL),
        interval=bounds.less_equal, interval_of_same=bounds.always(1.0), rounding=0.0,
        python="float({} <= {})", numpy="({} <= {}) * 1.0", llvm=texts.llvm_comparison("ole"), c="{0} <= {1} ? 1.0 : 0.0",
@@ -196,9 +196,8 @@ _ROWS = (
 )
 # fmt: on
 
-_UFUNCS = {"pow": np.power, "less": np.less, "less_equal": np.less_equal}  # where the row has a function of its own
 for _row in _ROWS:
-    register(_row, _UFUNCS.get(_row.name))
+    register(_row)
 
 sqrt: Function = function(OPS["sqrt"])
 exp: Function = function(OPS["exp"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..codegen.llvm_engine import MissingFunctionError
 from ..codegen.native_function import flags_of
 from .native_runner import NativeRunner
 from .program import Program
@@ -51,7 +52,7 @@ def runner(program: Program, backend: str = "auto", *, fast: bool = False, fma: 
     if backend != "python":
         try:
             return NativeRunner(program, flags_of(fast, fma))
-        except ImportError:
+        except (ImportError, MissingFunctionError):
             if backend == "llvm":
                 raise
     return PythonRunner(program)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -55,6 +56,12 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
         method.adaptive,
         dense and method.adaptive,
     )
+
+
+@lru_cache(KEPT)
+def pickled_steps(program: StepProgram) -> bytes:
+    """The steps as other processes are sent them; of the last few, those pickled before."""
+    return pickle.dumps(program)
 
 
 @lru_cache(KEPT)

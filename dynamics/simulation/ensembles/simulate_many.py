@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import pickle
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import closing
@@ -18,7 +17,7 @@ from ...systems.model import Model
 from ..free_memory import room
 from ..progress_bar import Progress
 from ..run_options import RunOptions, step_count
-from ..step_program import StepProgram, step_program
+from ..step_program import StepProgram, pickled_steps, step_program
 from .branch_free import branch_free
 from .chunk import Chunk
 from .ensemble import Ensemble
@@ -123,7 +122,7 @@ def simulate_many(
 
     # Share out the work: what a worker is sent, and the starts of chunks of trajectories
     grids = _grids(program, options)
-    task = Task(pickle.dumps(program), options, count, tuple(grids))
+    task = Task(pickled_steps(program), options, count, tuple(grids))
     chunks = _chunks(start, problem.parameters, _width(len(start.x), chunk, team, whole=bool(grids)))
 
     # Integrate, by whoever takes the chunks and compiles the steps

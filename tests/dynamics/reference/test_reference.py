@@ -2,7 +2,6 @@
 
 import itertools
 import math
-import operator
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -281,15 +280,6 @@ def test_wrong_input_is_named(changed: dict[str, Any], words: str) -> None:
         reference(**{"model": PENDULUM, "q": [1.0], "qd": [0.0], "t_eval": [1.0]} | changed)
 
 
-ARITHMETIC = {
-    "add": operator.add,
-    "sub": operator.sub,
-    "mul": operator.mul,
-    "div": operator.truediv,
-    "neg": operator.neg,
-}
-
-
 def heyoka_end(model: Any, start: list[float], t_end: float) -> list[str]:
     """The state by heyoka's Taylor integrator in quadruple precision, from the same graph: series of its own."""
     hy = pytest.importorskip("heyoka")
@@ -303,7 +293,7 @@ def heyoka_end(model: Any, start: list[float], t_end: float) -> list[str]:
         elif node.op.name == "constant":
             env[node] = hy.expression(real(node.value))
         else:
-            function = ARITHMETIC.get(node.op.name) or getattr(hy, node.op.name)
+            function = node.op.operator or getattr(hy, node.op.name)
             env[node] = function(*[env[arg] for arg in node.args])
     equations = [(hy.make_vars(name), env[node]) for name, node in zip(names, graph.outputs.values(), strict=True)]
     run = hy.taylor_adaptive(

@@ -69,3 +69,10 @@ def test_series_folds_no_constants_in_float64() -> None:
     with mpmath.mp.workdps(60):
         found = coefficients(lambda args: (args[0] * 0.0 + 0.1) + (0.2 + args[0] * 0.0), (1.0,))
         assert found[0] == mpmath.mpf(0.1) + mpmath.mpf(0.2) != mpmath.mpf(0.1 + 0.2)
+
+
+def test_zero_wins_over_infinity_in_a_zero_safe_product() -> None:
+    with working(40) as number:
+        product, zero, infinite = value(OPS["zero_safe_mul"]), number(0), number("inf")
+        assert product(zero, infinite) == product(infinite, zero) == 0
+        assert product(number(2), number(3)) == 6

@@ -35,23 +35,13 @@ def figures(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 0
     return json.loads(said(capsys, *arguments, "--json", status=status))
 
 
-COMPLEX = {
-    "add": lambda a, b: a + b,
-    "sub": lambda a, b: a - b,
-    "mul": lambda a, b: a * b,
-    "div": lambda a, b: a / b,
-    "neg": lambda a: -a,
-    "sin": cmath.sin,
-    "cos": cmath.cos,
-}
-
-
 def by_complex_step(graph: cg.Graph, output: str, name: str, at: dict[str, float]) -> float:
     """A derivative from values alone: the imaginary part at a step of 1e-200 i, which cancels nothing."""
     values: dict[cg.Node, complex] = {}
     for node in graph.nodes:
         if node.args:
-            values[node] = COMPLEX[node.op.name](*[values[arg] for arg in node.args])
+            function = node.op.operator or getattr(cmath, node.op.name)
+            values[node] = function(*[values[arg] for arg in node.args])
         else:
             values[node] = at[node.name] + (1e-200j if node.name == name else 0) if node.name else node.value
     return values[graph.outputs[output]].imag / 1e-200

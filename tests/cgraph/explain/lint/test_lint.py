@@ -11,6 +11,7 @@ from hypothesis import assume, given, settings, strategies as st
 import cgraph as cg
 import dynamics as dyn
 from cgraph.core.node import OPS, apply
+from cgraph.core.op_intervals import LINE
 from cgraph.explain import lint
 from cgraph.explain.lint.cancellation import rounded
 from cgraph.explain.lint.singular import intervals, value_of
@@ -215,7 +216,7 @@ def test_a_value_lies_within_its_bounds(name, data):
     arguments = [data.draw(st.floats(low, high)) for low, high in box]
     low, high = value_of(op, box)
     value = op.scalar(*arguments)
-    if math.isfinite(value):
+    if math.isfinite(value) and (low, high) != LINE:  # which holds every number
         assert low <= value <= high
         exact = high_precision.evaluate(
             cg.Graph(nodes := cg.variables(list("abc"[: op.arity])), {"f": apply(op, *nodes)}),

@@ -1,0 +1,223 @@
+"""What every part of the library does with the row "cbrt"; run by `test_one_row.py`, in a process that has the row."""
+
+import ctypes
+import doctest
+import inspect
+import json
+import math
+import pickle
+import shutil
+import subprocess
+from dataclasses import replace
+
+import mpmath
+import numpy as np
+import pytest
+from mpmath import mpf
+
+import cgraph as cg
+import viz
+from cgraph.core.node import apply
+from cgraph.explain.lint.cancellation import UNIT, rounded
+from cgraph.explain.lint.singular import intervals
+from cgraph.explain.names import Names
+from cgraph.extend import OPS
+from viz.inspector import Version
+from viz.inspector.page import scripts
+from viz.inspector.record import record
+
+X = cg.variable("x")
+GRAPH = cg.Graph([X], {"y": cg.cbrt(X)})
+DEEP = cg.Graph([X], {"y": cg.cbrt(cg.sin(X) + 2.0) * X})
+POINTS = (0.6, 8.0, 1e-300, 3e5)
+ROUNDING = 4e-16  # relative: two ulps
+SEVERAL = 1e-13  # relative: a few dozen roundings
+
+
+def exact(x: float) -> float:
+    return float(mpmath.cbrt(mpf(x)))
+
+
+def deep(x: mpf) -> mpf:
+    return mpmath.cbrt(mpmath.sin(x) + 2) * x
+
+
+def test_evaluation_on_floats_and_arrays():
+    for x in POINTS:
+        assert GRAPH.evaluate({"x": x})["y"] == pytest.approx(exact(x), rel=ROUNDING)
+    assert GRAPH.evaluate({"x": -8.0})["y"] == -2.0
+    assert GRAPH.evaluate({"x": np.array(POINTS)})["y"] == pytest.approx(list(map(exact, POINTS)), rel=ROUNDING)
+    assert math.isnan(GRAPH.evaluate({"x": math.nan})["y"])
+
+
+def test_the_ufunc_and_a_name_make_the_node():
+    assert np.cbrt(X).op is cg.cbrt(x=X).op is OPS["cbrt"]
+
+
+@pytest.mark.parametrize("backend", ["auto", "python", "numpy", "llvm"])
+def test_compiled_at_a_point_and_in_batches(backend):
+    if backend == "llvm":
+        pytest.importorskip("llvmlite")
+    function = cg.compile(GRAPH, backend)
+    assert [function([x])[0] for x in POINTS] == pytest.approx(list(map(exact, POINTS)), rel=ROUNDING)
+    many = np.array([POINTS * 5])
+    assert function.batch(many)[0] == pytest.approx([exact(x) for x in many[0]], rel=ROUNDING)
+    assert pickle.loads(pickle.dumps(function))([8.0])[0] == pytest.approx(2.0, rel=ROUNDING)
+
+
+@pytest.mark.parametrize("backend", ["python", "llvm"])
+def test_in_a_native_loop(backend):
+    if backend == "llvm":
+        pytest.importorskip("llvmlite")
+    repeated = cg.loop(GRAPH, {"x": "y"}, backend)
+    assert repeated([512.0], 2)[-1] == pytest.approx([2.0], rel=SEVERAL)
+
+
+def test_c(tmp_path):
+    source = cg.to_c(GRAPH, "root")
+    assert "cbrt(x[ROOT_IN_x])" in source.source
+    compiler = shutil.which("cc") or shutil.which("gcc")
+    if compiler is None:
+        return
+    file, library = source.write(tmp_path)[0], tmp_path / "root.so"
+    subprocess.run([compiler, "-shared", "-fPIC", str(file), "-o", str(library), "-lm"], check=True)
+    x, y = (ctypes.c_double * 1)(27.0), (ctypes.c_double * 1)()
+    ctypes.CDLL(str(library)).root(x, y)
+    assert y[0] == GRAPH.evaluate({"x": 27.0})["y"]
+
+
+def test_double_double_passes_low_parts_on():
+    tiny = cg.variable("tiny")
+    graph = cg.double_double(cg.Graph([X, tiny], {"y": cg.cbrt(X + tiny)}), low=True)
+    found = graph.evaluate({"x": 1.0, "tiny": 3e-20})
+    assert found["y"] == 1.0
+    assert found["y_low"] == pytest.approx(1e-20, rel=1e-12)
+
+
+def test_derivatives_to_second_order_in_both_modes():
+    at = {"x": 0.7}
+    with mpmath.workdps(50):
+        first, second = (float(mpmath.diff(deep, mpf(0.7), order)) for order in (1, 2))
+    one, two = {"x_dot": 1.0}, {"y_bar": 1.0}
+    assert list(cg.jvp(DEEP).evaluate(at | one).values()) == pytest.approx([first], rel=SEVERAL)
+    assert list(cg.vjp(DEEP).evaluate(at | two).values()) == pytest.approx([first], rel=SEVERAL)
+    assert list(cg.jacobian(DEEP).evaluate(at).values()) == pytest.approx([first], rel=SEVERAL)
+    assert list(cg.hessian(DEEP).evaluate(at).values()) == pytest.approx([second], rel=SEVERAL)
+    gradient = cg.gradient(DEEP)
+    assert list(cg.jacobian(gradient).evaluate(at).values()) == pytest.approx([second], rel=SEVERAL)
+    assert list(cg.gradient(gradient).evaluate(at).values()) == pytest.approx([second], rel=SEVERAL)
+    step = 1e-5
+    ahead, behind = (gradient.evaluate({"x": 0.7 + h})["dy/dx"] for h in (step, -step))
+    assert (ahead - behind) / (2 * step) == pytest.approx(second, rel=1e-8)
+
+
+def test_simplification_folds_and_shares():
+    twice = cg.Graph([X], {"y": cg.cbrt(X) + cg.cbrt(X), "c": cg.cbrt(cg.constant(8.0))})
+    simple = cg.simplify(twice)
+    assert [node.op.name for node in simple.nodes].count("cbrt") == 1
+    assert simple.outputs["c"].value == 2.0
+
+
+def test_lint():
+    (finding,) = cg.lint(GRAPH, box={"x": (0.5, 2.0)}).findings
+    assert "cbrt, of which no bounds are known; x is within [0.5, 2]" in str(finding)
+    assert set(intervals(GRAPH, {"x": (0.5, 2.0)}).values()) == {(0.5, 2.0), (-math.inf, math.inf)}
+    at = {"x": 0.6}
+    value = GRAPH.evaluate(at)["y"]
+    inherited = 0.6 * UNIT / (3.0 * value**2)  # of an input that is half a unit off
+    assert rounded(Names(GRAPH), at).errors[GRAPH.outputs["y"]] == pytest.approx(inherited + 2.0 * UNIT * value)
+    lossy = cg.Graph([X], {"y": cg.cbrt(X) - 1.0})
+    assert "digits are lost" in str(cg.lint(lossy, at={"x": 1.0 + 1e-9}))
+
+
+def test_structure_hash_pickle_and_listing():
+    again = pickle.loads(pickle.dumps(DEEP))
+    assert again.listing() == DEEP.listing()
+    assert "cbrt" in again.listing()
+    assert cg.structure_hash(again) == cg.structure_hash(DEEP)
+    other = cg.Graph([X], {"y": cg.sqrt(cg.sin(X) + 2.0) * X})
+    assert cg.structure_hash(other) != cg.structure_hash(DEEP)
+    assert not cg.compare(DEEP, again).only_right
+
+
+def test_why():
+    found = cg.why(DEEP, "y", "x", at={"x": 0.7})
+    assert found.count == 2
+    assert found.derivative == pytest.approx(float(mpmath.diff(deep, 0.7)), rel=1e-10)
+    assert "cbrt(" in str(cg.why(cg.Graph([X], {"y": cg.cbrt(X) * X}), "y", "x"))
+
+
+def test_the_drawing():
+    assert "cbrt" in str(viz.to_dot(GRAPH))
+
+
+def test_the_page_computes_and_writes_the_formula():
+    at = {"x": 0.7}
+    text = viz.page(DEEP, at=at)
+    assert "cbrt: Math.cbrt ?? (() => NaN)" in text
+    node = shutil.which("node")
+    if node is None:
+        return
+    program = """
+      const version = prepare(given.versions[0]), values = evaluate(version, version.rows[0]);
+      const out = version.outputs[0][2], slopes = slopesAt(version, given.slopes, values);
+      const bars = adjoints(version, slopes, out);
+      const found = [values[out], bars[version.inputs[0][1]], equation(version, out, 5)];
+      console.log(JSON.stringify(found));
+    """
+    given = json.dumps(record([Version("deep", DEEP, at=at)], None))
+    script = f"{scripts()}\nconst given = {given};\n{program}"
+    done = subprocess.run([node, "-"], input=script, capture_output=True, text=True, check=True, timeout=60)
+    value, slope, formula = json.loads(done.stdout)
+    assert value == pytest.approx(float(deep(mpf(0.7))), rel=SEVERAL)
+    assert slope == pytest.approx(float(mpmath.diff(deep, 0.7)), rel=1e-10)
+    assert '<mi>cbrt</mi><mrow><mo stretchy="false">(</mo>' in formula
+
+
+def test_reference_solutions_ask_for_a_multiprecision_value_and_take_it(monkeypatch):
+    pytest.importorskip("flint")
+    from dynamics.reference.flint_numbers import working
+    from dynamics.reference.taylor_series import Series
+    from dynamics.systems.ode_system import OdeSystem
+
+    def coefficients():
+        with working(50) as number:
+            graph = OdeSystem(lambda x, t: [apply(OPS["cbrt"], 1.0 + t)], ["y"]).graph
+            (found,) = Series(graph, ["y"], {}, number).expand([number(0)], number(0), 8)
+            return [mpf((k * found[k]).mid().str(45, radius=False)) for k in range(1, 9)]
+
+    with mpmath.workdps(50):
+        with pytest.raises(NotImplementedError, match=r"cbrt has no multiprecision value: .* the column `precise`"):
+            coefficients()
+        precise = replace(OPS["cbrt"], precise=lambda x: x ** (type(x)(1) / 3))
+        monkeypatch.setitem(OPS, "cbrt", precise)
+        expected = mpmath.taylor(lambda t: mpmath.cbrt(1 + t), 0, 7)
+        for found, each in zip(coefficients(), expected, strict=True):
+            assert abs(found - each) < mpf(10) ** -30
+
+
+def test_help():
+    assert str(inspect.signature(cg.cbrt)) == "(x)"
+    (example,) = doctest.DocTestFinder().find(cg.cbrt, "cbrt", globs={})
+    assert len(example.examples) == 4
+    assert doctest.DocTestRunner().run(example).failed == 0
+    with pytest.raises(TypeError, match="cbrt takes 1 argument"):
+        cg.cbrt(X, X)
+
+
+def test_an_operation_that_the_c_library_lacks_is_compiled_to_python(monkeypatch):
+    pytest.importorskip("llvmlite")
+    row = replace(OPS["cbrt"], name="cube_root_of", library="cube_root_of", llvm=(), python="", c="")
+    monkeypatch.setitem(OPS, row.name, row)
+    graph = cg.Graph([X], {"y": apply(row, X)})
+    assert cg.compile(graph)([8.0])[0] == 2.0
+    with pytest.raises(RuntimeError, match="C library of this machine has no cube_root_of"):
+        cg.compile(graph, "llvm")
+
+
+def test_every_optional_column_is_left_out():
+    """So that all that is tested here is what a row needs and its defaults."""
+    row, needed = OPS["cbrt"], {"name", "arity", "scalar", "array", "partials", "samples"}
+    filled = {"arguments", "about", "symbol", "domain", "ufunc", "python", "numpy", "library", "c", "javascript"}
+    fields = type(row).__dataclass_fields__
+    assert all(getattr(row, name) == fields[name].default for name in set(fields) - needed - filled)

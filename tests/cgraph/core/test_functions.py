@@ -1,0 +1,92 @@
+"""The functions of the operation table: signatures with names, help whose examples run, and rows that are refused."""
+
+import doctest
+import inspect
+import pickle
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import cgraph as cg
+from cgraph.extend import OPS, Op, register
+
+ROWS = [pytest.param(op, id=op.name) for op in OPS.values()]
+
+
+@pytest.mark.parametrize("op", ROWS)
+def test_a_function_says_its_arguments_and_shows_an_example_that_runs(op: Op) -> None:
+    function = getattr(cg, op.name)
+    assert list(inspect.signature(function).parameters) == op.parameters
+    assert len(op.parameters) == op.arity
+    (example,) = doctest.DocTestFinder().find(function, op.name, globs={})
+    assert len(example.examples) == 4
+    assert doctest.DocTestRunner().run(example).failed == 0
+    parts = ("Parameters\n", "Returns\n", "Raises\n", "Examples\n")
+    assert [function.__doc__.count(part) for part in parts] == [1] * 4
+
+
+@pytest.mark.parametrize("op", ROWS)
+def test_arguments_may_be_named_in_any_order(op: Op) -> None:
+    inputs = cg.variables(op.parameters)
+    named = dict(zip(op.parameters, inputs, strict=True))
+    node = getattr(cg, op.name)(**dict(reversed(named.items())))
+    assert (node.op, node.args) == (op, tuple(inputs))
+
+
+@pytest.mark.parametrize(
+    ("signature", "function"),
+    [
+        ("(x)", cg.sin),
+        ("(y, x)", cg.atan2),
+        ("(x, y)", cg.hypot),
+        ("(base, exponent)", cg.pow),
+        ("(a, b)", cg.minimum),
+        ("(condition, if_true, if_false)", cg.where),
+    ],
+)
+def test_signatures(signature: str, function: Callable[..., cg.Node]) -> None:
+    assert str(inspect.signature(function)) == signature
+
+
+def test_a_wrong_number_of_arguments_is_told() -> None:
+    x = cg.variable("x")
+    with pytest.raises(TypeError, match="sin takes 1 argument"):
+        cg.sin(x, x)
+    with pytest.raises(TypeError, match=r"atan2\(y, x\): missing a required argument: 'x'"):
+        cg.atan2(y=x, z=x)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({}, "'sin' is in the table already"),
+        ({"name": "my sine"}, "must be an identifier, got 'my sine'"),
+        ({"name": "sine", "arguments": "x y"}, "takes 1 argument.s., got the names 'x y'"),
+        ({"name": "sine", "samples": ()}, "needs samples of 1 number.s. each"),
+        ({"name": "sine", "samples": ((1.0, 2.0),)}, "needs samples of 1 number.s. each, got .*2.0"),
+    ],
+)
+def test_a_row_that_does_not_fit_is_refused(change: dict[str, object], said: str) -> None:
+    before = dict(OPS)
+    with pytest.raises(ValueError, match=said):
+        register(replace(OPS["sin"], domain=((0.0, 1.0),), **change))
+    assert before == OPS
+
+
+def test_a_graph_is_not_read_without_the_row_of_its_operation(monkeypatch: pytest.MonkeyPatch) -> None:
+    x = cg.variable("x")
+    text = pickle.dumps(cg.Graph([x], {"y": cg.tan(x)}))
+    monkeypatch.delitem(OPS, "tan")
+    with pytest.raises(cg.GraphError, match="operation 'tan' is not in the table: register its row"):
+        pickle.loads(text)
+
+
+def test_a_row_fills_its_texts_from_its_name() -> None:
+    row = Op("gauss", 2, lambda a, b: a, lambda a, b: a, lambda y, a, b: (1.0, 0.0), samples=((1.0, -2.0), (3.0, 0.0)))
+    assert (row.python, row.numpy, row.c) == ("gauss({0}, {1})",) * 3
+    assert (row.library, row.symbol, row.parameters, row.rounding) == ("gauss", "gauss", ["a", "b"], 2.0)
+    assert row.domain == ((0.5, 4.5), (-3.0, 0.0))
+    assert row.ufunc is None
+    assert replace(row, name="cube", array=np.cbrt, numpy="", ufunc=None).numpy == "np.cbrt({0}, {1})"

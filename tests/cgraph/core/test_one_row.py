@@ -1,0 +1,65 @@
+"""A row is all: an operation that is added as one row, in a fresh process, works in every part of the library."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+PROGRAM = """
+import math, sys
+import numpy as np
+import pytest
+from cgraph.extend import Op, register
+
+register(Op("cbrt", 1, math.cbrt, np.cbrt, lambda y, x: (1.0 / (3.0 * y * y),), samples=((0.6,),)))
+sys.exit(pytest.main(["-v", "-p", "no:cacheprovider", *sys.argv[1:]]))
+"""
+# The tests that go through the operation table, or draw operations from it.
+TABLE = (
+    "tests/cgraph/core/test_operations.py",
+    "tests/cgraph/codegen/test_llvm.py",
+    "tests/cgraph/codegen/test_c.py",
+    "tests/cgraph/explain/lint/test_lint.py",
+    "tests/viz/graph_drawing/test_dot.py",
+    "tests/viz/inspector/test_page.py",
+    "tests/dynamics/reference/test_reference.py",
+)
+
+
+def outcomes(*arguments: str) -> dict[str, list[str]]:
+    """{file: what came of each of its tests} of a run in a process that has the row."""
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, *arguments],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-2000:]
+    found: dict[str, list[str]] = {}
+    for file, outcome in re.findall(r"^(\S+\.py)::.* (PASSED|SKIPPED|FAILED|ERROR)", done.stdout, re.MULTILINE):
+        found.setdefault(file, []).append(outcome)
+    return found
+
+
+def test_every_part_of_the_library_takes_the_operation() -> None:
+    file = "tests/cgraph/core/cbrt_everywhere.py"
+    found = outcomes(file)
+    assert found[file].count("PASSED") >= 15
+
+
+def test_the_tests_of_the_table_accept_the_operation() -> None:
+    """Without a word about it in any of them."""
+    found = outcomes(*TABLE, "-k", "cbrt or the_script or slopes_are or (random_graph and llvm)")
+    assert set(found) == set(TABLE)
+
+
+@pytest.mark.parametrize("file", TABLE)
+def test_no_test_of_the_table_names_the_operation(file: str) -> None:
+    assert "cbrt" not in (ROOT / file).read_text(encoding="utf-8")
