@@ -38,7 +38,9 @@ docs: $(INSTALLED)docs,viz,mujoco  ## the documentation, into docs/_build/html
 
 bench: $(INSTALLED)bench  ## the comparisons with other software
 	$(BIN)/cgraph bench
-	@for script in tests/benchmarks/*.py; do echo "== $$script"; $(BIN)/python "$$script" || exit 1; done
+	@for figure in counts build agreement ensembles reconfiguration long-chains; do \
+		echo "== $$figure"; $(BIN)/cgraph bench "$$figure" || exit 1; done
+	$(BIN)/cgraph report --compare orders,taylor,stiff,loops,energy --out build
 	$(BIN)/python -m pytest tests/dynamics/multibody/test_pinocchio.py -q
 
 clean:  ## remove .venv, paper and all else that the targets above make where nothing else is said

@@ -91,3 +91,10 @@ class ScipyIntegration(Integration):
 def _block(times: list[float], states: list[Array]) -> StepBlock:
     t, x = np.array(times), np.array(states)
     return StepBlock(t[1:], x[1:], t[:-1], np.diff(t), x[:-1], None)
+
+
+def solve_ivp() -> Any:
+    """SciPy's `solve_ivp` itself, to compare with. Raises ImportError without SciPy."""
+    from scipy.integrate import solve_ivp as function
+
+    return function

@@ -77,7 +77,7 @@ def _section(section: Mapping[str, Any]) -> Section:
     shown = len(_HEADER) if any(row["steps"] or row["rejected"] for row in rows) else 6
     lines = [line[:shown] for row in rows for line in _lines(row)]
     hard = dict.fromkeys([f"{row['case']}: {row['about']}" for row in rows])
-    figures = [figure for row in rows for figure in row["figures"]]
+    figures = [figure for row in rows for figure in row["measurements"]]
     bounds = dict.fromkeys([f"{figure['quantity']}: {figure['why']}" for figure in figures])
     return Section(
         anchor,
@@ -98,7 +98,7 @@ def _lines(row: Row, missed: bool = False) -> list[list[str]]:
     A long name goes on in the lines below.
     """
     measured: list[list[str]] = []
-    for figure in row["figures"]:
+    for figure in row["measurements"]:
         if not (missed and figure["meets"]):
             bound = "" if figure["bound"] == "inf" else _number(figure["bound"])
             value = _number(figure["value"]) + ("" if figure["meets"] else " ✗")
@@ -135,7 +135,7 @@ def shares(rows: Sequence[Row]) -> Figure:
     points = [
         (_share(each), names.index(row["case"]), each["meets"])
         for row in rows
-        for each in row["figures"]
+        for each in row["measurements"]
         if each["bound"] != "inf"
     ]
     with style():

@@ -6,16 +6,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dynamics.experiments.paper_numbers.embedding_error import law_of_arms
+from dynamics.experiments.paper_numbers.embedding_error import embedding_errors
+from dynamics.experiments.text_table import csv_text
 
 from ..pages import html
 from ..plots import plot
-from .part import TITLES, Part, pictures, to_csv
+from .part import TITLES, Part, pictures
 
 
 def embedding() -> Part:
     """The law of the embedding: torque error against dt."""
-    laws = law_of_arms()
+    laws = embedding_errors()
     panels: dict[str, dict[str, tuple[Sequence[float], Sequence[float]]]] = {
         "error of the torque": {},
         "distance from its limit": {},
@@ -52,7 +53,7 @@ def embedding() -> Part:
             "kinetic-only method accurate on three links; its program is not public, so which of the two it is is not known."
         )
     )
-    files = drawn.files | {"law.csv": to_csv(header, rows)}
+    files = drawn.files | {"law.csv": csv_text(header, rows)}
     data = {
         f"{law.formulation} n={law.n}": {"slope": _finite(law.slope), "limit": float(np.abs(law.limit).max())}
         for law in laws

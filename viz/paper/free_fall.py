@@ -7,12 +7,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dynamics import scenes
-from dynamics.experiments.paper_numbers.free_fall import MujocoFall, fall, largest_differences, mujoco_fall
+from dynamics.experiments.paper_numbers.free_fall import (
+    MujocoFreeFall,
+    free_fall,
+    largest_differences,
+    mujoco_free_fall,
+)
+from dynamics.experiments.text_table import csv_text
 from dynamics.io.mujoco_model import frames
 
 from ..pages import html
 from ..plots import plot
-from .part import Part, pictures, to_csv
+from .part import Part, pictures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,7 +31,7 @@ SNAPSHOTS = 6
 def figures4_and_5() -> Part:
     """Figures 4 and 5: the three-link arm in free fall, by our graph and by MuJoCo."""
     scene = scenes.load("triple_pendulum")
-    run = fall(scene)
+    run = free_fall(scene)
     instants = np.linspace(0.0, scene.t_end, SNAPSHOTS)
     ours = plot.snapshots(run.trajectory.t, run.positions, instants.tolist())
     start = ", ".join(f"{angle:.4g}" for angle in scene.q)
@@ -38,7 +44,7 @@ def figures4_and_5() -> Part:
     section = html.figure(drawn4.svg, caption4)
     data: dict[str, Any] = {"q_end": run.trajectory.q[-1].tolist()}
     try:
-        other = mujoco_fall(run)
+        other = mujoco_free_fall(run)
     except ImportError as error:
         section += html.point(f"Figure 5 is missing on this machine. {error}")
         return Part("fall", "Figures 4 and 5: the fall", files, data | {"mujoco": None}, section)
@@ -49,7 +55,7 @@ def figures4_and_5() -> Part:
     header = ("up to t [s]", "largest |difference in q| [rad]")
     rows = [(f"{t:.2f}", f"{difference:.2e}") for t, difference in differences]
     drawn5 = pictures("fig5", theirs)
-    files |= {**drawn5.files, "fig5.csv": to_csv(header, rows)}
+    files |= {**drawn5.files, "fig5.csv": csv_text(header, rows)}
     section += (
         html.figure(drawn5.svg, caption5)
         + html.table("Our trajectory and MuJoCo's", header, rows)
@@ -62,7 +68,7 @@ def figures4_and_5() -> Part:
     return Part("fall", "Figures 4 and 5: the fall", files, data, section)
 
 
-def _mujoco_figure(model: Any, times: Array, other: MujocoFall, instants: Array) -> tuple[Figure, str]:
+def _mujoco_figure(model: Any, times: Array, other: MujocoFreeFall, instants: Array) -> tuple[Figure, str]:
     """MuJoCo's pictures at the instants, drawn here where its renderer finds no OpenGL; and by what they were made."""
     rendered = frames(model, other.q[[int(np.abs(times - instant).argmin()) for instant in instants]])
     if rendered is None:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .. import theme
@@ -45,12 +42,3 @@ def pictures(name: str, picture: Figure) -> Pictures:
     """A plot rendered, once, as SVG, and as PNG from that SVG."""
     svg = plot.to_svg(picture)
     return Pictures(svg, {f"{name}.svg": svg, f"{name}.png": render_png(svg, scale=SCALE)})
-
-
-def to_csv(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Texts in rows as CSV, the header first."""
-    buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows(rows)
-    return buffer.getvalue()

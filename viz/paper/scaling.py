@@ -1,24 +1,25 @@
-"""Scaling: nodes, edges and time of each formulation as links are added."""
+"""NodeScaling: nodes, edges and time of each formulation as links are added."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from dynamics.experiments.paper_numbers.node_scaling import COUNTS, FITTED_FROM, Scaling, scaling
+from dynamics.experiments.paper_numbers.node_scaling import COUNTS, FITTED_FROM, NodeScaling, node_scaling
+from dynamics.experiments.text_table import csv_text
 from dynamics.simulation.progress_bar import Progress
 
 from ..pages import html
 from ..plots import plot
-from .part import COLORS, TITLES, Part, pictures, to_csv
+from .part import COLORS, TITLES, Part, pictures
 
 
 def scaling_of_counts(links: Sequence[int] = COUNTS) -> Part:
-    """Scaling: nodes, edges and time over the number of links.
+    """NodeScaling: nodes, edges and time over the number of links.
 
     links: of the chains, in growing order, with 3 among them.
     """
     with Progress("scaling", 1.0) as progress:
-        rows = scaling(links, report=progress)
+        rows = node_scaling(links, report=progress)
     panels: dict[str, plot.Curves] = {
         "edges": {TITLES[row.formulation]: (row.n, [float(count) for count in row.edges]) for row in rows},
         "one compiled evaluation": {TITLES[row.formulation]: (row.n, row.microseconds) for row in rows},
@@ -39,15 +40,15 @@ def scaling_of_counts(links: Sequence[int] = COUNTS) -> Part:
         for row in rows
         for n, nodes, edges, time in zip(row.n, row.nodes, row.edges, row.microseconds, strict=True)
     ]
-    files = drawn.files | {"scaling.csv": to_csv(("formulation", "n", "nodes", "edges", "microseconds"), points)}
+    files = drawn.files | {"scaling.csv": csv_text(("formulation", "n", "nodes", "edges", "microseconds"), points)}
     data = {
         row.formulation: {"edges_exponent": row.fitted(row.edges), "nodes_exponent": row.fitted(row.nodes)}
         for row in rows
     }
-    return Part("scaling", "Scaling with the number of links", files, data, section)
+    return Part("scaling", "NodeScaling with the number of links", files, data, section)
 
 
-def _exponents(rows: Sequence[Scaling], longest: int) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def _exponents(rows: Sequence[NodeScaling], longest: int) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """The table of fitted exponents: header and rows."""
     header = (
         "formulation",

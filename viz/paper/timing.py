@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from dynamics.experiments.paper_numbers.table_1 import PAPER_MS, Row, table1
+from dynamics.experiments.paper_numbers.table_1 import PAPER_MS, Row, table_1
+from dynamics.experiments.text_table import csv_text
 
 from ..pages import html
 from ..plots import plot
-from .part import COLORS, TITLES, Part, pictures, to_csv
+from .part import COLORS, TITLES, Part, pictures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,7 +23,7 @@ def figure6(evaluations: int = EVALUATIONS) -> Part:
 
     evaluations: random states, each evaluated once by each formulation in turn.
     """
-    rows = table1(evaluations)
+    rows = table_1(evaluations)
     header, table = _table(rows)
     drawn = pictures("fig6", _bars(rows))
     caption = (
@@ -42,7 +43,7 @@ def figure6(evaluations: int = EVALUATIONS) -> Part:
             "∂L/∂q alone."
         )
     )
-    files = drawn.files | {"table1.csv": to_csv(header, table)}
+    files = drawn.files | {"table1.csv": csv_text(header, table)}
     data = {row.formulation: _figures(row) for row in rows}
     return Part("table1", "Figure 6 and Table 1: the cost", files, data, section)
 

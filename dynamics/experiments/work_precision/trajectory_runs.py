@@ -1,4 +1,4 @@
-"""Contenders: ways to integrate a setting, each timed from its start to t_end; ours, and SciPy on our compiled rate."""
+"""Solvers: ways to integrate a setting, timed from its start to t_end; ours, and SciPy on our compiled rate."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ...simulation.run_options import SCIPY, RunOptions
 from ...simulation.scipy_solvers import ScipyIntegration, scipy_solver
 from ...simulation.step_program import CompiledSteps, compile_steps, step_program
 from ...simulation.stepping import Integration, integration
-from .trajectory_scenes import Setting
+from ..setting import Setting
 
 EQUAL, CHOSEN = "equal steps", "chosen steps"
 TRIAL = 4096  # steps that tell how long many more take
@@ -37,7 +37,7 @@ class Outcome(NamedTuple):
     status: str = ""
 
 
-class Contender(ABC):
+class Solver(ABC):
     """A way to integrate one setting.
 
     kind: `EQUAL`, where the knob is the number of steps, or `CHOSEN`, where it is the relative tolerance.
@@ -98,13 +98,13 @@ def recorded(run: Integration, start: Array, times: Sequence[float]) -> Array:
             recorder.add(block)
             if time.perf_counter() - begin > 2 * LONGEST:
                 break
-    found = recorder.table()[1]
+    states = recorder.table()[1]
     result = np.full((len(times), len(start)), math.nan)
-    result[: len(found)] = found
+    result[: len(states)] = states
     return result
 
 
-class Ours(Contender):
+class Ours(Solver):
     """One of our methods in its native loop; the program is made once."""
 
     ours = True
@@ -150,7 +150,7 @@ class Ours(Contender):
         return recorded(integration(self._dense, self._options(knob, times)), self.start, times)
 
 
-class Scipy(Contender):
+class Scipy(Solver):
     """One of SciPy's solvers on our compiled rate and Jacobian. Raises ImportError without SciPy."""
 
     tolerances = tuple([10.0**-k for k in range(3, 14)])  # it takes none smaller than 2e-14

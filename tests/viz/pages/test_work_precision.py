@@ -162,12 +162,11 @@ def test_the_command_writes_whole_files(tmp_path: Path, capsys: pytest.CaptureFi
 
 def test_an_interrupted_report_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("flint")
-    from dynamics.experiments.work_precision import work_precision as measured
 
     def interrupt(*_: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(measured, "_in_turns", interrupt)
+    monkeypatch.setattr("dynamics.experiments.work_precision.work_precision.in_turns", interrupt)
     assert cli.main([*MEASURED, "--out", str(tmp_path / "r")]) == 130
     left = [path for path in tmp_path.rglob("*") if path.is_file() and path.parent.name != "exact"]
     assert left == []
@@ -188,6 +187,9 @@ def test_an_interrupted_report_leaves_no_file(tmp_path: Path, monkeypatch: pytes
         (["report", "--stability", "--ignore"], "--ignore goes with a report of run times or --pruning"),
         (["report", "--stability", "--pruning"], "one at a time"),
         (["report", "--pruning"], "a report needs a scene"),
+        (["report", "--compare", "speed"], "comparisons are orders, taylor, stiff, loops, energy, got 'speed'"),
+        (["report", "--compare", "orders", "--json"], "--json goes with a report of run times"),
+        (["report", "chain", "--compare", "orders"], "a report needs a scene, or --stability or --compare and none"),
         (["report", "chain", "--pruning", "--lock", "a=1", "--lock", "a=2"], "--lock takes each body once"),
     ],
 )

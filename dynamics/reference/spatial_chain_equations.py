@@ -2,55 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-import dynamics as dyn
+from ..multibody.mechanism import Mechanism
+from .flint_numbers import Number, flint, working
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
-Number = Any  # flint.arb: a midpoint and a bound on its error
 Vector = list[Number]
-BITS = 220  # of arithmetic, 66 digits
+DIGITS = 66
 LOST = 1e-30  # a bound on the relative error of the results, or there were too few bits
 
 
-@contextmanager
-def _working() -> Iterator[Any]:
-    import flint
-
-    with flint.ctx.workprec(BITS):
-        yield flint
-
-
-def _solved(flint: Any, matrix: list[Vector], rhs: Vector) -> Array:
-    column = flint.arb_mat(matrix).solve(flint.arb_mat([[each] for each in rhs]))
+def _solved(matrix: list[Vector], rhs: Vector) -> Array:
+    column = flint().arb_mat(matrix).solve(flint().arb_mat([[each] for each in rhs]))
     x = [column[i, 0] for i in range(len(rhs))]
     largest = max(abs(float(each.mid())) for each in x)
     assert max(float(each.rad()) for each in x) <= LOST * largest
     return np.array([float(each.mid()) for each in x])
 
 
-def chain_accelerations(chain: dyn.Mechanism, q: Array, qd: Array, tau: Array) -> Array:
+def chain_accelerations(chain: Mechanism, q: Array, qd: Array, tau: Array) -> Array:
     """qdd of a chain of revolute joints about z, (n,): all in the world's axes, about the world's origin.
 
     With S_i the joint's twist (angular, then linear) and I_i a body's 6 x 6 inertia,
         M_ij = S_i . (sum over k >= i of I_k) S_j for j <= i,
-    and the bias is what the Newton-Euler equations give for qdd = 0.
+    and the bias is what the Newton-Euler equations give for qdd = 0. Raises ImportError without python-flint.
     """
-    with _working() as flint:
-        arb = flint.arb
+    with working(DIGITS) as arb:
         zero = arb(0)
         place, turn = [zero] * 3, [[arb(int(i == j)) for j in range(3)] for i in range(3)]
-        gravity = [arb(float(each)) for each in np.asarray(chain.gravity)]
+        gravity = [arb(each) for each in np.asarray(chain.gravity, dtype=np.float64).tolist()]
         velocity, acceleration = [zero] * 6, [zero] * 3 + [-each for each in gravity]
         twists, inertias, forces = [], [], []
         for body, angle, rate in zip(chain.moving, q.tolist(), qd.tolist(), strict=True):
             assert body.joint.kind == "revolute"
             assert np.array_equal(body.joint.axis, [0.0, 0.0, 1.0])
-            place = _plus(place, _times(turn, [arb(float(x)) for x in body.joint.position]))
+            place = _plus(
+                place, _times(turn, [arb(x) for x in np.asarray(body.joint.position, dtype=np.float64).tolist()])
+            )
             s, c = arb(angle).sin(), arb(angle).cos()
             fixed = [[arb(float(x)) for x in row] for row in np.asarray(body.joint.orientation)]
             turn = _product(_product(turn, fixed), [[c, -s, zero], [s, c, zero], [zero, zero, arb(1)]])
@@ -77,7 +69,7 @@ def chain_accelerations(chain: dyn.Mechanism, q: Array, qd: Array, tau: Array) -
             column = _times(carried, twists[i])
             for j in range(i + 1):
                 matrix[i][j] = matrix[j][i] = _dot(column, twists[j])
-        return _solved(flint, matrix, rhs)
+        return _solved(matrix, rhs)
 
 
 def _inertia_about_origin(arb: Any, body: Any, place: Vector, turn: list[Vector]) -> list[Vector]:

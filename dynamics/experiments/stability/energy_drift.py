@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...multibody.planar_arm import planar_arm
+from ...scenes import Scene
 from ...simulation.simulate import simulate
-from ..stability.cases.orbits import kepler
-from ..stability.known_limits import reason
-from ..stability.verdict import Figure, Verdict
+from .case_result import CaseResult, Measurement
+from .cases.orbits import kepler
+from .known_limits import reason
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -21,24 +22,13 @@ BLOCKS = 16  # whose means are taken as independent; their residuals show how fa
 SIGMAS = 5.0  # with 14 degrees of freedom, a chance of 1 in 5000 for a slope that is zero
 ROUNDINGS = 8.0  # of sqrt(steps) units of rounding: three standard deviations, some six roundings a step
 UNIT = 2.0**-53
-METHODS = ("symplectic_euler", "verlet", "midpoint", "gauss4", "gauss6")
+SYMPLECTIC = ("symplectic_euler", "verlet", "midpoint", "gauss4", "gauss6")
 SECTION = "Energy over long runs"
 
-
-class Model(NamedTuple):
-    """A motion without chaos, and the step to run it with [s]."""
-
-    name: str
-    build: Callable[[], Any]
-    q: tuple[float, ...]
-    qd: tuple[float, ...]
-    dt: float
-
-
-MODELS = (
-    Model("double pendulum", lambda: planar_arm([1.0, 0.8], [1.0, 0.8]), (0.5, 0.3), (0.0, 0.0), 0.01),
-    Model("Kepler, e = 0.5", kepler(0.5, 1.0, 1.0).build, (0.5, 0.0), (0.0, math.sqrt(3.0)), 0.02),
-)
+DOUBLE = Scene("double pendulum", "two rods", planar_arm([1.0, 0.8], [1.0, 0.8]), (0.5, 0.3), (0.0, 0.0), STEPS * 0.01)
+MOTIONS: dict[str, tuple[Scene, float]] = {  # without chaos, and the step to run each with [s]
+    scene.name: (scene, step) for scene, step in ((DOUBLE, 0.01), (kepler(0.5, 1.0, 1.0), 0.02))
+}
 
 
 class Drift(NamedTuple):
@@ -67,37 +57,27 @@ def drift(energy: Array, size: float) -> Drift:
     return Drift(float(np.ptp(deviation)), slope, error)
 
 
-def verdicts(steps: int = STEPS, methods: tuple[str, ...] = METHODS) -> Iterator[Verdict]:
-    """A verdict for each model and method."""
-    for model in MODELS:
+def results(steps: int = STEPS, methods: tuple[str, ...] = SYMPLECTIC) -> Iterator[CaseResult]:
+    """A result for each motion and method."""
+    for name in MOTIONS:
         for method in methods:
-            yield verdict(model, method, steps)
+            yield result(name, method, steps)
 
 
-def verdict(model: Model, method: str, steps: int) -> Verdict:
+def result(name: str, method: str, steps: int) -> CaseResult:
     """Whether the drift of one run is zero: within five standard errors, or the random walk of its roundings."""
-    run = simulate(model.build(), model.q, model.qd, steps * model.dt, method, dt=model.dt, progress=False)
-    found = drift(run.energy, abs(float(run.energy[0])))
+    scene, step = MOTIONS[name]
+    run = simulate(scene.model, scene.q, scene.qd, steps * step, method, dt=step, progress=False)
+    measured = drift(run.energy, abs(float(run.energy[0])))
     walk = ROUNDINGS * UNIT * math.sqrt(steps)
-    figures = (
-        Figure(
-            "drift",
-            abs(found.drift),
-            max(SIGMAS * found.error, walk),
-            "of E",
-            f"{SIGMAS:g} standard errors ({found.error:.1e}), or the random walk of roundings ({walk:.1e})",
-        ),
-        Figure("band", found.band, math.inf, "of E", "the method's oscillation about the energy; stated, no bound"),
+    bound = max(SIGMAS * measured.error, walk)
+    why = f"{SIGMAS:g} standard errors ({measured.error:.1e}), or the random walk of roundings ({walk:.1e})"
+    stated = "the method's oscillation about the energy; stated, no bound"
+    rows = (
+        Measurement("drift", abs(measured.drift), bound, "of E", why),
+        Measurement("band", measured.band, math.inf, "of E", stated),
     )
-    return Verdict(
-        SECTION,
-        model.name,
-        f"{steps} steps of {model.dt:g} s",
-        method,
-        figures,
-        run.stats.steps,
-        0,
-        run.stats.seconds,
-        "" if run.stats.success else run.stats.message,
-        reason(SECTION, model.name, method, figures),
-    )
+    stopped = "" if run.stats.success else run.stats.message
+    counts = run.stats.steps, 0, run.stats.seconds, stopped
+    about = f"{steps} steps of {step:g} s"
+    return CaseResult(SECTION, name, about, method, rows, *counts, reason(SECTION, name, method, rows))

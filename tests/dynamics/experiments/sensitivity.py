@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ....equations.initial_value import split_state
-from ....reference import Reference, reference
-from .case import Case
+from dynamics.equations.initial_value import split_state
+from dynamics.experiments.stability.cases import StabilityCase
+from dynamics.reference import Reference, reference
 
 STEP = 2.0**-36  # of the start; a growth up to 10^6 is still a matter of first order
 DIGITS = 15
 
 
-def growth(case: Case, folder: str | Path | None = None) -> float:
+def growth(case: StabilityCase, folder: str | Path | None = None) -> float:
     """The largest relative change of a state at t_end for a small relative change of one state at the start.
 
     At the start relative to the state's value, or its size where that is zero; at t_end to its size. By differences of
@@ -22,7 +22,7 @@ def growth(case: Case, folder: str | Path | None = None) -> float:
     """
     if case.method is None:
         raise ValueError(f"no reference method carries {case.name!r} to its end")
-    model, size, worst = case.build(), np.array(case.sizes(folder)), 0.0
+    model, size, worst = case.model, np.array(case.sizes(case.solution(folder=folder))), 0.0
 
     def end(start: tuple[float, ...]) -> Reference:
         at = split_state(model, start)
