@@ -21,8 +21,21 @@ LIBRARY = 2.0  # units of rounding: libraries promise an ulp or so
 class MathML(NamedTuple):
     """An operation in presentation MathML.
 
-    text: with {0}, {1}, .. where the arguments go.  least: of each argument, what it must bind with to go without
-    parentheses.  binding: what the whole binds with.
+    Parameters
+    ----------
+    text : str
+        MathML with {0}, {1}, .. where the arguments go.
+    least : tuple of int
+        Of each argument, how strongly it must bind to go without parentheses: 0 a relation, 1 a sum, 2 a product, 3 a
+        function, 4 a name or a number.
+    binding : int
+        How strongly the whole binds.
+
+    Examples
+    --------
+    >>> from cgraph.extend import MathML
+    >>> MathML("<msqrt>{0}</msqrt>", (0,), 3).text.format("<mi>x</mi>")
+    '<msqrt><mi>x</mi></msqrt>'
     """
 
     text: str
@@ -112,6 +125,14 @@ class Op:
         Taylor coefficient k of (k, the result's coefficients, each argument's). Default through the partials.
     rewrite : callable
         The same by other operations, for their series. Default none.
+
+    Examples
+    --------
+    >>> import math, numpy as np
+    >>> from cgraph.extend import Op
+    >>> row = Op("cbrt", 1, math.cbrt, np.cbrt, lambda y, x: (1.0 / (3.0 * y * y),), samples=((0.6,),))
+    >>> row.numpy, row.c, row.rounding
+    ('np.cbrt({0})', 'cbrt({0})', 2.0)
     """
 
     name: str
