@@ -3,13 +3,14 @@ PYTHON ?= python3
 VENV ?= .venv
 OUT ?= paper
 WORKERS ?= 2
+WORST ?= 15
 
 BIN = $(VENV)/bin
 INSTALLED = $(VENV)/.installed-
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:  # two pips in one environment spoil it
-.PHONY: help venv paper test check docs bench clean
+.PHONY: help venv paper test check coverage docs bench clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z]*\):.*## /\1	/p' Makefile | expand -t 8
@@ -27,16 +28,23 @@ check: $(INSTALLED)test,check  ## lint, format and types
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
+coverage: $(INSTALLED)test  ## the lines that no test runs: the total, and the WORST=15 files with most of them
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal -q --timeout 600 --cov --cov-report= $(ARGS)
+	@$(BIN)/python -m coverage report --skip-covered --sort=-miss | sed -n "1,$$(($(WORST) + 2))p"
+	@$(BIN)/python -m coverage report --format=total | sed 's/.*/total: & % of all lines/'
+
 docs: $(INSTALLED)docs,viz,mujoco  ## the documentation, into docs/_build/html
 	$(BIN)/sphinx-build --fail-on-warning --keep-going -q docs docs/_build/html
 
 bench: $(INSTALLED)bench  ## the comparisons with other software
 	$(BIN)/cgraph bench
-	@for script in tests/benchmarks/*.py; do echo "== $$script"; $(BIN)/python "$$script" || exit 1; done
+	@for figure in counts build agreement ensembles reconfiguration long-chains; do \
+		echo "== $$figure"; $(BIN)/cgraph bench "$$figure" || exit 1; done
+	$(BIN)/cgraph report --compare orders,taylor,stiff,loops,energy --out build
 	$(BIN)/python -m pytest tests/dynamics/multibody/test_pinocchio.py -q
 
 clean:  ## remove .venv, paper and all else that the targets above make where nothing else is said
-	rm -rf .venv paper docs/_build build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv paper docs/_build build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage
 
 # One stamp for each set of extras, so that a second run installs nothing. The environment is kept when
 # pyproject.toml changes; pip then brings it up to date.

@@ -9,10 +9,11 @@ from .autodiff.reverse import gradient, vjp
 from .codegen import Compiled, clear_cache, compile
 from .codegen.c import CSource, to_c
 from .core.counts import Counts
+from .core.edge import Edge
 from .core.functions import function as _function
 from .core.graph import Graph
-from .core.label import tag
-from .core.node import Edge, Node, constant, variable, variables, with_name
+from .core.naming import variables, with_name
+from .core.node import Node, constant, variable
 from .core.ops import (
     OPS as _OPS,
     abs_ as abs,
@@ -42,6 +43,7 @@ from .core.ops import (
     tanh,
     where,
 )
+from .core.scope import tag
 from .core.source_lines import recording_lines
 from .core.structure_hash import structure_hash
 from .errors import GraphError

@@ -2,7 +2,15 @@
 
 
 class GraphError(ValueError):
-    """A graph that is not well formed, or is used with inputs or outputs that it does not have."""
+    """A graph is not well formed, or is asked about inputs, outputs or nodes that it does not have.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> cg.Graph([], {"y": cg.variable("x")})
+    Traceback (most recent call last):
+    cgraph.errors.GraphError: the outputs need 'x', not among the inputs (none)
+    """
 
 
 def install(extra: str) -> str:

@@ -11,8 +11,8 @@ copies nodes through a builder, `topological` gives all nodes that some nodes re
 **Differentiate**: `cotangents` pulls from outputs, `tangents` pushes from inputs, `hessian_nodes` gives the lower
 triangle of second derivatives, all as nodes.
 
-**Solve**: `solve_nodes` is `cg.hessian_solve` on nodes, `ldl_solve` the dense factorisation; both raise
-`SingularError`.
+**Solve**: `solve_nodes` is `cg.hessian_solve` on nodes, `ldl_solve` the dense factorization; both raise
+`SingularError`. `ldl_elimination` does the same over any numbers.
 
 **Read**: `expand` and `format_polynomial` write a polynomial out, `Names` tells nodes in a person's words, `OPS` is
 the table of operations, `register` adds a row to it, an `Op`, and `ADJOINT`, `PRIMAL`, `TANGENT` are the roles that a
@@ -22,7 +22,8 @@ label may have.
 `runner` makes it machine code or Python.
 
 **At the edges**: `real_array` and `real_number` check what a caller passed, `thread_count` reads `threads=`,
-`atomic_write` writes a file whole or not at all.
+`atomic_write` writes a file whole or not at all, `install` ends an error about a missing package. `Array` is the type
+of an array of float64.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, building, cotangents
@@ -38,16 +39,18 @@ label may have.
 from .autodiff.forward import tangents
 from .autodiff.hessian_solve import solve_nodes
 from .autodiff.jacobian import hessian_nodes
-from .autodiff.ldl_solve import SingularError, ldl_solve
+from .autodiff.ldl_solve import SingularError, ldl_elimination, ldl_solve
 from .autodiff.reverse import cotangents
-from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED, building
+from .core.evaluate import Array
+from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED
 from .core.node import as_node, register
 from .core.operation import MathML, Op
 from .core.ops import OPS
+from .core.scope import building
 from .core.traversal import topological
+from .errors import install
 from .explain.names import Names
-from .program import Call, Factor, If, Map, Program, Runner, Solve, Statement, Sum, While, runner
-from .program.runner import Record
+from .program import Call, Factor, If, Map, Program, Record, Runner, Solve, Statement, Sum, While, runner
 from .simplify.builder import Builder, folded
 from .simplify.polynomial import Polynomial, expand, format_polynomial
 from .util.atomic_write import atomic_write
@@ -60,6 +63,7 @@ __all__ = [
     "PRIMAL",
     "TANGENT",
     "UNLABELLED",
+    "Array",
     "Builder",
     "Call",
     "Factor",
@@ -85,6 +89,8 @@ __all__ = [
     "folded",
     "format_polynomial",
     "hessian_nodes",
+    "install",
+    "ldl_elimination",
     "ldl_solve",
     "real_array",
     "real_number",

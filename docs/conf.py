@@ -9,7 +9,7 @@ author = "the cgraph authors"
 copyright = "2026, the cgraph authors"
 version = release = installed_version("cgraph")
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.mathjax"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx.ext.napoleon"]
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build"]
@@ -17,24 +17,38 @@ exclude_patterns = ["_build"]
 html_theme = "furo"
 html_title = "cgraph"
 
+suppress_warnings = ["ref.python"]  # a word of a type that is some attribute: the n of "n sequences of Node"
+napoleon_google_docstring = False
+napoleon_custom_sections = [("Attributes", "params_style")]  # a table, not members beside those that autodoc lists
 autodoc_member_order = "bysource"
 autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Matrix", "Scalar", "Value", "Vector")}
 python_maximum_signature_line_length = 100
 
 
+SECTION = re.compile(r"(?<=\n)(?=\w[\w ]*\n-{3,}\n)")  # before the title of a section in NumPy's style
+
+
 def docstring_to_rst(app, what, name, obj, options, lines):
     """Docstrings here are plain text with `code` in single backticks; say that in reStructuredText.
 
-    An indented paragraph is code; one with indented lines below its first keeps its lines.
+    Napoleon, which comes after, makes tables of the sections. Of the text before them, an indented paragraph is code.
     """
-    paragraphs = re.split(r"\n\s*\n", "\n".join(lines).strip("\n"))
-    lines[:] = "\n\n".join(map(_paragraph, paragraphs)).split("\n")
+    text, *sections = SECTION.split("\n".join(lines).strip("\n") + "\n")
+    paragraphs = map(_paragraph, re.split(r"\n\s*\n", text.strip("\n")))
+    lines[:] = "\n\n".join([*paragraphs, *map(_section, sections)]).split("\n")
+
+
+def _section(text):
+    title, line, *body = text.split("\n")
+    if title == "Examples":
+        return text
+    return "\n".join([title, line, *map(_prose, body)])
 
 
 def _paragraph(text):
     if text.startswith((" ", ">>> ")):
         return "::\n\n" + indent(text, "    ")
-    if "\n " in text:
+    if "\n " in text:  # indented lines below the first: keep the lines
         return "\n".join("| " + re.match(" *", line)[0] + _prose(line.strip()) for line in text.split("\n"))
     return _prose(text)
 
@@ -56,5 +70,5 @@ def name_aliases(app, what, name, obj, options, signature, return_annotation):
 
 def setup(app):
     """Called by Sphinx."""
-    app.connect("autodoc-process-docstring", docstring_to_rst)
+    app.connect("autodoc-process-docstring", docstring_to_rst, priority=400)  # before napoleon
     app.connect("autodoc-process-signature", name_aliases)

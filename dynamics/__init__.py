@@ -18,6 +18,7 @@ from .equations.state_equation import state_equation
 from .equations.torque_decomposition import torque_by_joint_motion, torque_by_link
 from .equations.torque_table import TorqueTable
 from .experiments.stability import cases
+from .integrators import METHODS
 from .io.load import load_mjcf, load_urdf
 from .io.mjcf import to_mjcf
 from .io.urdf import to_urdf
@@ -43,6 +44,7 @@ from .verification.residual import Certificate
 __all__ = [
     "EFFECTS",
     "FORMULATIONS",
+    "METHODS",
     "Attached",
     "Body",
     "Certificate",

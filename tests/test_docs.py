@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from pkgutil import resolve_name
 
@@ -14,7 +15,7 @@ PAGES = {
     path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
     for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 }
-RUN = ("README.md", "docs/tutorial.md", "docs/howto.md", "docs/tables.md", "docs/ensembles.md", "docs/pruning.md")
+RUN = [name for name, page in PAGES.items() if "```python\n" in page]
 FENCE = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 MARK = "-- end of example --"
 SECONDS = 120  # for one page; each takes a few
@@ -89,3 +90,12 @@ def test_named_tests_exist(name: str) -> None:
 
 def test_the_tests_of_the_paper_s_equations_are_named() -> None:
     assert len(re.findall(r"`tests/[\w/]+\.py::\w+`", PAGES["docs/paper.md"])) >= 10
+
+
+def test_the_citation_is_of_this_version_and_of_the_paper() -> None:
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    (version,) = re.findall(r"^version: (\S+)$", citation, re.MULTILINE)
+    (doi,) = re.findall(r"^ +doi: (\S+)$", citation, re.MULTILINE)
+    assert version == project["version"]
+    assert f"https://doi.org/{doi}" in PAGES["docs/paper.md"]

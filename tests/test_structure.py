@@ -1,18 +1,22 @@
-"""The structure of the project: which way imports point, what an import loads, what is declared."""
+"""The structure of the project: which way imports point, what an import loads, how long a file may be."""
 
 import ast
+import json
 import os
 import re
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from viz.architecture.architecture import Architecture, of_modules
+from viz.architecture.imports import Module, modules
+from viz.architecture.layers import PACKAGES
+
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("cgraph", "dynamics", "viz")
-FILES = {path.relative_to(ROOT).as_posix(): path for name in PACKAGES for path in sorted((ROOT / name).rglob("*.py"))}
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 # Each is imported in one file, so that its absence is handled in one place; for types alone it may be named in others.
@@ -36,91 +40,187 @@ OPTIONAL = {
     "sympy": "sympy",
     "torch": None,  # measured when it is there, never asked for
 }
-TYPES = "TYPE_CHECKING"
-DYNAMICS_IN_VIZ = re.compile(r"viz/(paper/\w+|commands/\w+|cli|__main__)\.py")
+
+ROOMS, FLOORS = 16, 9  # at most, of the whole library
+LOOSE = {"cgraph": 3, "dynamics": 2, "viz": 3}  # modules beside __init__, at most
+FILE, CLASS, FUNCTION = 350, 200, 60  # lines at most; of a class and of a function without docstrings
+LONGER: dict[str, str] = {}  # {file, or file::name: why it may be longer}
+MODELS = {"Model", "System", "OdeSystem", "Mechanism", "PlanarArm", "Scene"}  # nobody asks which of them it has
+MUJOCO = ("dynamics/io/mujoco_model.py", "dynamics/io/mujoco_render.py")  # their models are MuJoCo's, without types
 
 
-def imports(text: str, package: str = "", for_types: bool = True) -> set[str]:
-    """Dotted names of all modules that a source text imports, at any depth; `package` is where it lies.
+@pytest.fixture(scope="module")
+def known() -> dict[str, Module]:
+    """{dotted name: module} of all three packages."""
+    found = modules(PACKAGES)
+    assert len(found) > 200
+    return found
 
-    Without `for_types`, those under `if TYPE_CHECKING:` are left out: they never run.
-    """
-    names = set()
-    tree = ast.parse(text)
-    if not for_types:
-        tree.body = [each for each in tree.body if not isinstance(each, ast.If) or ast.unparse(each.test) != TYPES]
+
+@pytest.fixture(scope="module")
+def sources(known: dict[str, Module]) -> dict[str, Module]:
+    """{file: module}."""
+    return {module.path.relative_to(ROOT).as_posix(): module for module in known.values()}
+
+
+@pytest.fixture(scope="module")
+def library(known: dict[str, Module]) -> Architecture:
+    return of_modules(known, PACKAGES)
+
+
+def roots(module: Module, for_types: bool = True) -> set[str]:
+    """Top-level packages that a module imports."""
+    return {each.module.partition(".")[0] for each in module.imports if for_types or not each.for_types}
+
+
+def docstrings(tree: ast.AST) -> Iterator[tuple[str, int, int]]:
+    """(text, line on which it starts, lines) of every docstring at or below a node."""
     for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            above = package.split(".")[: -node.level + 1 or None] if node.level else []
-            module = ".".join([*above, *([node.module] if node.module else [])])
-            names |= {module} if node.module else {f"{module}.{alias.name}" for alias in node.names}
-    return names
+        if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module) and (text := ast.get_docstring(node)):
+            yield text, node.body[0].lineno, node.body[0].end_lineno - node.body[0].lineno + 1
 
 
-def roots(file: str, for_types: bool = True) -> set[str]:
-    """Top-level packages that a file imports."""
-    package = ".".join(Path(file).parent.parts)
-    return {name.partition(".")[0] for name in imports(FILES[file].read_text(encoding="utf-8"), package, for_types)}
+def length(node: ast.FunctionDef | ast.ClassDef) -> int:
+    """Lines of a function or class, its docstrings left out."""
+    return node.end_lineno - node.lineno + 1 - sum(lines for _, _, lines in docstrings(node))
 
 
-def allowed(file: str) -> set[str]:
-    """The packages of this project that a file may import."""
-    if file.startswith("viz/") and not DYNAMICS_IN_VIZ.fullmatch(file):
-        return {"viz", "cgraph"}
-    return set(PACKAGES[: PACKAGES.index(file.partition("/")[0]) + 1])
+def test_imports_point_one_way(library: Architecture) -> None:
+    """As the table of layers in viz/architecture/layers.py has it."""
+    assert [f"{a} imports {b}" for a, b in library.climbing] == []
 
 
-def test_imports_are_found_at_any_depth() -> None:
-    text = "import a.b, c\ndef f():\n  from d.e import g\n  if 1:\n    from ..h import i\n    from .. import j"
-    assert imports(text, "p.q") == {"a.b", "c", "d.e", "p.h", "p.j"}
-    assert imports(f"if {TYPES}:\n  import a\nimport b", for_types=False) == {"b"}
+def test_nothing_imports_itself_in_a_circle(library: Architecture) -> None:
+    assert library.circles == ()
+    assert library.file_circles == ()
 
 
-@pytest.mark.parametrize("file", FILES)
-def test_imports_point_one_way(file: str) -> None:
-    assert roots(file) & set(PACKAGES) <= allowed(file)
+def test_the_library_has_few_rooms_on_few_floors(library: Architecture) -> None:
+    assert len(library.rooms) <= ROOMS
+    assert max(library.floors.values()) <= FLOORS
+    assert {package: names for package, names in library.loose.items() if len(names) > LOOSE[package]} == {}
 
 
-@pytest.mark.parametrize("file", FILES)
-def test_every_import_is_known(file: str) -> None:
-    assert roots(file) <= {*sys.stdlib_module_names, "numpy", *PACKAGES, *OPTIONAL}
+def test_every_import_is_known(sources: dict[str, Module]) -> None:
+    known = {*sys.stdlib_module_names, "numpy", *PACKAGES, *OPTIONAL}
+    assert {file: unknown for file, module in sources.items() if (unknown := roots(module) - known)} == {}
 
 
-@pytest.mark.parametrize("name", OPTIONAL)
-def test_an_optional_dependency_is_imported_in_one_file(name: str) -> None:
-    assert len(files := [file for file in FILES if name in roots(file, for_types=False)]) <= 1, files
+def test_an_optional_dependency_is_imported_in_one_file(sources: dict[str, Module]) -> None:
+    users = {name: [file for file, module in sources.items() if name in roots(module, False)] for name in OPTIONAL}
+    assert {name: files for name, files in users.items() if len(files) > 1} == {}
 
 
-@pytest.mark.parametrize("package", PACKAGES)
-def test_importing_a_package_loads_numpy_and_the_standard_library(package: str) -> None:
-    program = f"import sys, numpy.random; old = set(sys.modules); import {package}; print(*set(sys.modules) - old)"
-    run = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
-    loaded = {name.partition(".")[0] for name in run.stdout.split()}
-    assert loaded <= {*sys.stdlib_module_names, "numpy", *allowed(f"{package}/__init__.py")}
+def test_the_core_is_imported_through_its_two_faces(sources: dict[str, Module]) -> None:
+    deeper = [
+        f"{file}: {each.module}"
+        for file, module in sources.items()
+        for each in module.imports
+        if each.module.startswith("cgraph.") and not file.startswith("cgraph/") and each.module != "cgraph.extend"
+    ]
+    assert deeper == []
 
 
-@pytest.mark.parametrize("command", ["scenes", "draw --help", "draw chain --out a.dot", "report --help", "--help"])
-def test_a_command_loads_no_optional_dependency_that_it_does_not_use(command: str, tmp_path: Path) -> None:
-    program = (
-        "import atexit, sys, numpy.random; old = set(sys.modules)\n"
-        "atexit.register(lambda: print(*set(sys.modules) - old, file=sys.stderr))\n"
-        f"import viz.cli; viz.cli.main({command.split()})"
+def test_no_public_function_takes_a_model_of_any_type(sources: dict[str, Module]) -> None:
+    found = [
+        f"{file}:{node.lineno} {node.name}"
+        for file, module in sources.items()
+        if not file.startswith("cgraph/") and file not in MUJOCO
+        for parent in [module.tree, *[each for each in module.tree.body if isinstance(each, ast.ClassDef)]]
+        for node in parent.body
+        if isinstance(node, ast.FunctionDef) and (not node.name.startswith("_") or node.name == "__init__")
+        for argument in [*node.args.args, *node.args.kwonlyargs, *node.args.posonlyargs]
+        if argument.arg in ("model", "mechanism", "system", "scene")
+        if argument.annotation is None or "Any" in ast.unparse(argument.annotation)
+    ]
+    assert found == []
+
+
+def test_nobody_asks_which_kind_of_model_it_has(sources: dict[str, Module]) -> None:
+    found = [
+        f"{file}:{node.lineno} {ast.unparse(node)}"
+        for file, module in sources.items()
+        if not file.startswith("cgraph/")
+        for node in ast.walk(module.tree)
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == "isinstance"
+        if MODELS & {name.id for name in ast.walk(node.args[1]) if isinstance(name, ast.Name)}
+    ]
+    assert found == []
+
+
+def test_nothing_is_too_long(sources: dict[str, Module]) -> None:
+    found = {}
+    for file, module in sources.items():
+        lines = len(module.path.read_text(encoding="utf-8").splitlines())
+        if lines > FILE:
+            found[file] = lines
+        for node in ast.walk(module.tree):
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                limit = CLASS if isinstance(node, ast.ClassDef) else FUNCTION
+                if length(node) > limit:
+                    found[f"{file}::{node.name}"] = length(node)
+    assert {name: lines for name, lines in found.items() if name not in LONGER} == {}
+    assert set(LONGER) <= set(found)  # an exception that is needed no more goes
+
+
+def test_a_docstring_says_more_than_where_to_look(sources: dict[str, Module]) -> None:
+    pointer = re.compile(r"(See|As in|Like) `*[\w.]+`*\.?")
+    found = [
+        f"{file}:{line} {text}"
+        for file, module in sources.items()
+        for text, line, _ in docstrings(module.tree)
+        if pointer.fullmatch(text)
+    ]
+    assert found == []
+
+
+def loaded(program: str, folder: Path) -> dict[str, set[str]]:
+    """{step: packages loaded up to there} of a program that calls `step(name)`, run in a process of its own."""
+    text = (
+        "import atexit, contextlib, io, json, sys, numpy.random\n"
+        "old, steps = set(sys.modules), {}\n"
+        "def step(name): steps[name] = sorted({each.partition('.')[0] for each in set(sys.modules) - old})\n"
+        f"{program}\n"
+        "print(json.dumps(steps))"
     )
     run = subprocess.run(
-        [sys.executable, "-c", program], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True,
-        text=True, check=True
+        [sys.executable, "-c", text], cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True,
+        text=True, check=False
     )  # fmt: skip
-    loaded = {name.partition(".")[0] for name in run.stderr.split()} - {"__mp_main__"}
-    assert "viz" in loaded
-    needed = {"graphviz"} if ".dot" in command else set()
-    assert loaded <= {*sys.stdlib_module_names, "numpy", *PACKAGES, *needed}
+    assert run.returncode == 0, run.stderr
+    return {name: set(packages) - {"__mp_main__"} for name, packages in json.loads(run.stdout).items()}
 
 
-@pytest.mark.parametrize("package", PACKAGES)
-def test_a_package_is_typed(package: str) -> None:
-    assert (ROOT / package / "py.typed").is_file()
+def test_importing_a_package_loads_numpy_and_the_standard_library(tmp_path: Path) -> None:
+    steps = loaded("\n".join([f"import {package}; step('{package}')" for package in PACKAGES]), tmp_path)
+    own = {"cgraph": {"cgraph"}, "dynamics": {"cgraph", "dynamics"}, "viz": {"cgraph", "dynamics", "viz"}}
+    for package, packages in steps.items():
+        assert package in packages
+        assert packages <= {*sys.stdlib_module_names, "numpy", *own[package]}, package
+
+
+def test_drawing_knows_nothing_of_mechanics(tmp_path: Path) -> None:
+    assert "dynamics" not in loaded("import viz; step('viz')", tmp_path)["viz"]
+
+
+def test_a_command_loads_no_optional_dependency_that_it_does_not_use(tmp_path: Path) -> None:
+    commands = ["scenes", "draw --help", "report --help", "architecture viz", "--help", "draw chain --out a.dot"]
+    program = (
+        "import viz.cli\n"
+        "def main(command):\n"
+        "    with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):\n"
+        "        viz.cli.main(command.split())\n"
+        "    step(command)\n"
+        f"for command in {commands}: main(command)"
+    )
+    plain = {*sys.stdlib_module_names, "numpy", *PACKAGES}
+    for command, packages in loaded(program, tmp_path).items():
+        assert "viz" in packages
+        assert packages <= plain | ({"graphviz"} if ".dot" in command else set()), command
+
+
+def test_every_package_is_typed() -> None:
+    assert [package for package in PACKAGES if not (ROOT / package / "py.typed").is_file()] == []
 
 
 def test_every_dependency_is_explained_and_every_explained_one_is_declared() -> None:

@@ -1,4 +1,4 @@
-"""How everything looks: colours that colour-blind people can tell apart, fonts, and names in mathematical letters."""
+"""How everything looks: colors that color-blind people can tell apart, fonts, and names in mathematical letters."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cgraph.extend import ADJOINT, PRIMAL, TANGENT
 # The palette of Okabe and Ito (2008), https://jfly.uni-koeln.de/color/
 BLACK, ORANGE, SKY_BLUE, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 YELLOW, BLUE, VERMILLION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
-WHITE, GREY = "#FFFFFF", "#8C8C8C"
+WHITE, GRAY = "#FFFFFF", "#8C8C8C"
 
 SPURIOUS = VERMILLION  # kept for what is wrong, so that it means one thing in every picture
 LINKS = ("#7B3FA0", "#2A62C8", "#CC3333")  # the first, second and third link, as the paper paints them
@@ -27,35 +27,35 @@ FONT_FAMILIES = f"{FONT}, Verdana, Arial, sans-serif"  # what a browser without 
 FONT_SIZE, SMALL_FONT_SIZE = 14, 10  # points
 
 
-def tint(colour: str, strength: float) -> str:
-    """The colour mixed with white: 0 is white, 1 the colour itself."""
-    channels = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
-    return "#" + "".join(f"{round(255 - strength * (255 - each)):02X}" for each in channels)
+def tint(color: str, strength: float) -> str:
+    """The color mixed with white: 0 is white, 1 the color itself."""
+    channels = (int(color[i : i + 2], 16) for i in (1, 3, 5))
+    return "#" + "".join(f"{round(255 - strength * (255 - channel)):02X}" for channel in channels)
 
 
 @dataclass(frozen=True)
 class Paint:
-    """The colours of one kind of node, and the words that a legend has for it."""
+    """The colors of one kind of node, and the words that a legend has for it."""
 
     words: str
     fill: str
     line: str
 
 
-def _paint(words: str, colour: str, strength: float) -> Paint:
-    return Paint(words, tint(colour, strength), colour)
+def _paint(words: str, color: str, strength: float) -> Paint:
+    return Paint(words, tint(color, strength), color)
 
 
 ROLES = {
     "input": Paint("input variable", tint(YELLOW, 0.55), LINE),  # a yellow line is hard to see on white
-    "constant": Paint("constant", WHITE, GREY),
+    "constant": Paint("constant", WHITE, GRAY),
     "primal": _paint("primal: as written", SKY_BLUE, 0.40),
     "adjoint": _paint("adjoint: reverse mode", ORANGE, 0.45),
     "tangent": _paint("tangent: forward mode", GREEN, 0.35),
     "several": _paint("several of these roles", PURPLE, 0.45),
 }
 OUTPUT = Paint("output", WHITE, BLACK)
-COLLAPSED = Paint("collapsed part", tint(GREY, 0.25), LINE)
+COLLAPSED = Paint("collapsed part", tint(GRAY, 0.25), LINE)
 MARKED = _paint("spurious", SPURIOUS, 0.60)
 MARKS = (MARKED, _paint("marked", BLUE, 0.60))  # of several groups of marked nodes, the first and the second
 
@@ -70,8 +70,8 @@ def role_of(node: Node) -> str:
     return next(iter(known), PRIMAL)
 
 
-def tag_colours(tags: Iterable[str]) -> dict[str, str]:
-    """A colour for each tag, the same for the same set of tags whatever their order; more than seven repeat."""
+def tag_colors(tags: Iterable[str]) -> dict[str, str]:
+    """A color for each tag, the same for the same set of tags whatever their order; more than seven repeat."""
     return {tag: SERIES[i % len(SERIES)] for i, tag in enumerate(sorted(set(tags), key=natural_order))}
 
 

@@ -5,17 +5,39 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from ..core.graph import Graph
-from ..core.label import TANGENT, building
+from ..core.label import TANGENT
 from ..core.node import Node, as_node, variable
 from ..core.ops import zero_safe_mul
+from ..core.scope import building
 from ..core.traversal import topological
 from ..simplify.builder import Builder
 
 
 def tangents(seeds: Mapping[Node, Node], outputs: Iterable[Node], build: Builder | None = None) -> dict[Node, Node]:
-    """Tangents of nodes, sum over seeds x of (d node / d x) x_dot, for every node under `outputs` that has one.
+    """Tangents of nodes by forward mode: y_dot = sum over seeds x of (dy/dx) x_dot.
 
-    seeds: {x: x_dot}, leaves or inner nodes; what does not depend on them is absent from the result (zero).
+    Parameters
+    ----------
+    seeds : mapping of Node to Node
+        {x: x_dot}; leaves or inner nodes, which count as independent.
+    outputs : iterable of Node
+        Where to end.
+    build : Builder, optional
+        What the nodes are built by; by default a new one.
+
+    Returns
+    -------
+    dict of Node to Node
+        {y: y_dot} for every node that `outputs` reach; absent where y_dot is zero.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import tangents
+    >>> x, x_dot = cg.variables("x x_dot")
+    >>> y = cg.exp(x)
+    >>> tangents({x: x_dot}, [y])[y].args  # y_dot = y * x_dot
+    (<node exp>, <node variable x_dot>)
     """
     dots = dict(seeds)
     with building(build or Builder()) as labelled:
@@ -41,9 +63,31 @@ def _mul(a: Node | float, b: Node) -> Node:
 def jvp(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Graph:
     """x -> y becomes (x, x_dot) -> y_dot with y_dot = J(x) x_dot: one forward sweep.
 
-    The inputs of the result are those of `graph`, then one tangent `x_dot` for each input in `wrt` (default: all);
-    its outputs are `y_dot`. Where such a name is taken, as in `jvp(jvp(graph))`, the suffix is `_dot2`, `_dot3`, ...
-    Raises GraphError when `wrt` names no input.
+    Parameters
+    ----------
+    graph : Graph
+        x -> y.
+    wrt : str, Node or sequence of these, optional
+        The inputs x to differentiate by; by default all.
+
+    Returns
+    -------
+    Graph
+        Its inputs are those of `graph`, then a tangent `x_dot` for each of `wrt`; its outputs are `y_dot`. Where such a
+        name is taken, as in `jvp(jvp(graph))`, the suffix is `_dot2`, `_dot3`, ...
+
+    Raises
+    ------
+    GraphError
+        If the graph has no such input.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x, y = cg.variables("x y")
+    >>> graph = cg.jvp(cg.Graph([x, y], {"f": x * y}))
+    >>> graph.evaluate({"x": 2.0, "y": 3.0, "x_dot": 1.0, "y_dot": 0.0})
+    {'f_dot': 3.0}
     """
     chosen = graph.select_inputs(wrt)
     suffix = free_suffix("_dot", graph.input_names, [str(node.name) for node in chosen])

@@ -12,10 +12,35 @@ from .reverse import cotangents
 
 
 def jacobian(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Graph:
-    """x -> y becomes x -> (dy_i/dx_j), row by row, outputs named `dy_i/dx_j`.
+    """x -> y becomes x -> (dy_i/dx_j).
 
-    Forward mode, one sweep a column, when there are at most as many inputs in `wrt` as outputs; else reverse mode.
-    Structural zeros are the constant 0. Raises GraphError when `wrt` names no input.
+    Forward mode, one sweep a column, when there are at most as many inputs in `wrt` as outputs; else reverse mode, one
+    sweep a row.
+
+    Parameters
+    ----------
+    graph : Graph
+        x (n) -> y (m).
+    wrt : str, Node or sequence of these, optional
+        The n inputs to differentiate by; by default all.
+
+    Returns
+    -------
+    Graph
+        With the inputs of `graph` and m * n outputs named `dy_i/dx_j`, row by row; structural zeros are the constant 0.
+
+    Raises
+    ------
+    GraphError
+        If the graph has no such input.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> r, a = cg.variables("r a")
+    >>> polar = cg.Graph([r, a], {"x": r * cg.cos(a), "y": r * cg.sin(a)})
+    >>> cg.jacobian(polar).evaluate({"r": 2.0, "a": 0.0})
+    {'dx/dr': 1.0, 'dx/da': -0.0, 'dy/dr': 0.0, 'dy/da': 2.0}
     """
     chosen = graph.select_inputs(wrt)
     zero, one, build = as_node(0.0), as_node(1.0), Builder()
@@ -31,10 +56,33 @@ def jacobian(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None)
 
 
 def hessian(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Graph:
-    """x -> y, one output, becomes x -> (d2y/dx_i dx_j), row by row, outputs named `d2y/dx_idx_j`.
+    """x -> y, one output, becomes x -> (d2y/dx_i dx_j): forward mode over reverse mode.
 
-    Forward over reverse. Only the lower triangle is computed: entry (j, i) is the node of entry (i, j).
-    Raises GraphError when there are several outputs or `wrt` names no input.
+    Only the lower triangle is computed: entry (j, i) is the node of entry (i, j).
+
+    Parameters
+    ----------
+    graph : Graph
+        A function with one output y.
+    wrt : str, Node or sequence of these, optional
+        The n inputs to differentiate by; by default all.
+
+    Returns
+    -------
+    Graph
+        With the inputs of `graph` and n * n outputs named `d2y/dx_idx_j`, row by row.
+
+    Raises
+    ------
+    GraphError
+        If there are several outputs, or the graph has no such input.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x, y = cg.variables("x y")
+    >>> cg.hessian(cg.Graph([x, y], {"f": x * x * y})).evaluate({"x": 2.0, "y": 3.0})
+    {'d2f/dxdx': 6.0, 'd2f/dxdy': 4.0, 'd2f/dydx': 4.0, 'd2f/dydy': 0.0}
     """
     output = graph.only_output()
     (name,) = graph.outputs
@@ -51,7 +99,30 @@ def hessian(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) 
 
 
 def hessian_nodes(output: Node, wrt: Sequence[Node], build: Builder | None = None) -> list[list[Node]]:
-    """Rows of the lower triangle of d2 output / d wrt2, as nodes."""
+    """The lower triangle of the Hessian d2y/dx2, as nodes: forward mode over reverse mode.
+
+    Parameters
+    ----------
+    output : Node
+        y.
+    wrt : sequence of Node
+        The variables x.
+    build : Builder, optional
+        What the nodes are built by; by default a new one.
+
+    Returns
+    -------
+    list of lists of Node
+        Row i has i + 1 entries.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import hessian_nodes
+    >>> x, y = cg.variables("x y")
+    >>> hessian_nodes(x * y, [x, y])
+    [[<node 0.0>], [<node 1.0>, <node 0.0>]]
+    """
     zero, one, build = as_node(0.0), as_node(1.0), build or Builder()
     first = cotangents({output: one}, wrt, build)
     columns = [tangents({node: one}, first[j:], build) for j, node in enumerate(wrt)]

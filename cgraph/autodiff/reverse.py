@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from ..core.graph import Graph
-from ..core.label import ADJOINT, UNLABELLED, Label, building
+from ..core.label import ADJOINT, UNLABELLED, Label
 from ..core.node import Node, as_node, variable
 from ..core.ops import zero_safe_mul
+from ..core.scope import building
 from ..core.traversal import topological
 from ..simplify.builder import Builder
 from .forward import free_suffix
@@ -16,11 +17,32 @@ from .forward import free_suffix
 def cotangents(
     seeds: Mapping[Node, Node], wrt: Sequence[Node], build: Builder | None = None, *, fixed: Collection[Node] = ()
 ) -> list[Node]:
-    """Cotangents of the nodes `wrt`: sum over seeds y of y_bar dy/d(node), zero where nothing depends on it.
+    """Cotangents of nodes by reverse mode: x_bar = sum over seeds y of y_bar dy/dx.
 
-    seeds: {y: y_bar}.  wrt: leaves or inner nodes; an inner node's cotangent counts every use of it, and flows on to
-    what it is made from, so that several nodes of `wrt` may depend on one another.
-    fixed: inner nodes that are taken as independent of what they are made from: nothing flows on from there.
+    Parameters
+    ----------
+    seeds : mapping of Node to Node
+        {y: y_bar}.
+    wrt : sequence of Node
+        The nodes x, leaves or inner nodes; one may depend on another. An inner node's cotangent counts every use of it,
+        and goes on to its arguments.
+    build : Builder, optional
+        What the nodes are built by; by default a new one.
+    fixed : collection of Node
+        Inner nodes that count as independent: nothing goes on to their arguments.
+
+    Returns
+    -------
+    list of Node
+        x_bar for each of `wrt`; the constant 0 where no seed depends on it.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import cotangents
+    >>> x, y = cg.variables("x y")
+    >>> cotangents({x * y: cg.constant(1.0)}, [x, y])
+    [<node variable y>, <node variable x>]
     """
     order = topological(seeds)
     active = set(wrt)
@@ -61,16 +83,38 @@ def cotangents(
 
 
 def _label(node: Node, bare: Mapping[Node, Label]) -> Label:
-    own = node.label.derived(ADJOINT)
-    return own.with_tags_of(bare[node]) if node in bare else own
+    label = node.label.derived(ADJOINT)
+    return label.with_tags_of(bare[node]) if node in bare else label
 
 
 def vjp(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Graph:
     """x -> y becomes (x, y_bar) -> x_bar with x_bar = J(x)^T y_bar: one reverse sweep.
 
-    The inputs of the result are those of `graph`, then one cotangent `y_bar` for each output; its outputs are `x_bar`
-    for each input in `wrt` (default: all). Where such a name is taken the suffix is `_bar2`, `_bar3`, ...
-    Raises GraphError when `wrt` names no input.
+    Parameters
+    ----------
+    graph : Graph
+        x -> y.
+    wrt : str, Node or sequence of these, optional
+        The inputs x to differentiate by; by default all.
+
+    Returns
+    -------
+    Graph
+        Its inputs are those of `graph`, then a cotangent `y_bar` for each output; its outputs are `x_bar` for each of
+        `wrt`. Where such a name is taken the suffix is `_bar2`, `_bar3`, ...
+
+    Raises
+    ------
+    GraphError
+        If the graph has no such input.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x, y = cg.variables("x y")
+    >>> graph = cg.vjp(cg.Graph([x, y], {"f": x * y}))
+    >>> graph.evaluate({"x": 2.0, "y": 3.0, "f_bar": 1.0})
+    {'x_bar': 3.0, 'y_bar': 2.0}
     """
     chosen = graph.select_inputs(wrt)
     suffix = free_suffix("_bar", graph.input_names, list(graph.outputs))
@@ -84,9 +128,31 @@ def vjp(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> G
 
 
 def gradient(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Graph:
-    """x -> y, one output, becomes x -> (dy/dx_i): one reverse sweep; outputs are named `dy/dx_i`.
+    """x -> y, one output, becomes x -> (dy/dx_i): one reverse sweep.
 
-    Raises GraphError when there are several outputs (see `jacobian`) or `wrt` names no input.
+    Parameters
+    ----------
+    graph : Graph
+        A function with one output y.
+    wrt : str, Node or sequence of these, optional
+        The inputs to differentiate by; by default all.
+
+    Returns
+    -------
+    Graph
+        With the inputs of `graph` and outputs named `dy/dx_i`.
+
+    Raises
+    ------
+    GraphError
+        If there are several outputs (then see `jacobian`), or the graph has no such input.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x, y = cg.variables("x y")
+    >>> cg.gradient(cg.Graph([x, y], {"f": x * y})).evaluate({"x": 2.0, "y": 3.0})
+    {'df/dx': 3.0, 'df/dy': 2.0}
     """
     output = graph.only_output()
     (name,) = graph.outputs

@@ -1,4 +1,4 @@
-"""Rotations found in a graph: pairs of sums c x + s y and c y - s x with the cosine and sine of one angle."""
+"""Detection of plane rotations in a graph: pairs of sums c x + s y, c y - s x with cosine and sine of one angle."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..core.node import Node
 
 
 class Rotation(NamedTuple):
-    """Two sums that are x and y turned: sign_x first = c x + s y, sign_y second = c y - s x."""
+    """Two sums that are a rotation of (x, y): sign_x first = c x + s y, sign_y second = c y - s x."""
 
     first: Node
     second: Node
@@ -23,7 +23,7 @@ class Rotation(NamedTuple):
 
 
 class _Sum(NamedTuple):
-    """cos_sign c a + sin_sign s b."""
+    """The sum cos_sign c a + sin_sign s b."""
 
     node: Node
     a: Node
@@ -36,7 +36,7 @@ class _Sum(NamedTuple):
 
 
 def rotations(order: Sequence[Node], depends: Collection[Node], kept: Collection[Node]) -> list[Rotation]:
-    """The rotations of nodes that are in `depends`, by angles that are not.
+    """The rotations of pairs of nodes in `depends` by angles that are not in it.
 
     order: nodes, arguments first. The products c x, .. of a rotation have no other use among them, and are not `kept`.
     """
@@ -44,24 +44,25 @@ def rotations(order: Sequence[Node], depends: Collection[Node], kept: Collection
     for node in order:
         for arg in node.args:
             uses[arg] = uses.get(arg, 0) + 1
-    waiting: dict[tuple[Node, Node, Node], _Sum] = {}
-    found = []
+    unpaired: dict[tuple[Node, Node, Node], _Sum] = {}
+    pairs = []
     for node in order:
         this = _sum(node, depends, uses)
         if this is None:
             continue
-        other = waiting.pop((this.cos, this.b, this.a), None)
+        other = unpaired.pop((this.cos, this.b, this.a), None)
         if other is None:
-            waiting[this.cos, this.a, this.b] = this
+            unpaired[this.cos, this.a, this.b] = this
+        # c a + s b and +-(c b - s a): the products of the signs have to differ.
         elif other.cos_sign * other.sin_sign == -this.cos_sign * this.sin_sign:
             p, q = (other, this) if other.cos_sign == other.sin_sign else (this, other)
             products = p.products + q.products
-            found.append(Rotation(p.node, q.node, p.a, p.b, p.cos, p.sin, p.cos_sign, q.cos_sign, products))
-    return found
+            pairs.append(Rotation(p.node, q.node, p.a, p.b, p.cos, p.sin, p.cos_sign, q.cos_sign, products))
+    return pairs
 
 
 def _sum(node: Node, depends: Collection[Node], uses: dict[Node, int]) -> _Sum | None:
-    """The sum or difference as one of a cosine's and a sine's product, if it is that."""
+    """A sum or difference read as +-c a +- s b, where neither product has another use; else None."""
     if node.op.name not in ("add", "sub"):
         return None
     parts = {}

@@ -11,9 +11,26 @@ from .node import Node
 
 @dataclass(frozen=True)
 class Counts:
-    """Sizes of a graph; leaves (inputs and constants) count as nodes.
+    """Sizes of a graph; leaves (inputs and constants) count as nodes. `str` of it is a table.
 
-    depth: operations on the longest path.  width: most nodes at one distance from the leaves.
+    Attributes
+    ----------
+    nodes, edges : int
+        How many; an edge is one use of a node by another.
+    depth : int
+        Operations on the longest path.
+    width : int
+        The largest number of nodes at one distance from the leaves.
+    by_operation, by_tag, by_role : dict of str to int
+        Numbers of nodes, the largest first.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x = cg.variable("x")
+    >>> counts = cg.Graph([x], {"y": x * cg.sin(x)}).counts()
+    >>> counts.nodes, counts.edges, counts.depth
+    (3, 3, 2)
     """
 
     nodes: int
@@ -40,7 +57,7 @@ class Counts:
 
 
 def count(nodes: Iterable[Node]) -> Counts:
-    """Counts of nodes given in topological order."""
+    """Counts of nodes in topological order."""
     level: dict[Node, int] = {}
     operations: Counter[str] = Counter()
     tags: Counter[str] = Counter()

@@ -49,7 +49,7 @@ def evaluate(
                 args = [env[arg] for arg in node.args]
                 scalar = all([type(arg) is float for arg in args])
                 env[node] = (op.scalar if scalar else op.array)(*args)
-                for arg in node.args:  # an array is let go once nothing needs it
+                for arg in node.args:  # free an array after its last use
                     if last_use[arg] is node and arg not in kept:
                         env.pop(arg, None)
     results = {name: env[node] for name, node in outputs.items()}

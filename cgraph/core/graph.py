@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import GraphError
 from .counts import Counts, count
+from .edge import Edge
 from .evaluate import Value, evaluate
 from .label import label
 from .listing import listing
 from .networkx_queries import to_networkx
-from .node import CONSTANT, VARIABLE, Edge, Node, Op, Scalar, as_node, variable
+from .node import CONSTANT, VARIABLE, Node, Op, Scalar, as_node, variable
 from .ops import OPS
 from .traversal import rebuild, topological
 
@@ -24,11 +25,38 @@ if TYPE_CHECKING:
 class Graph:
     """A computational graph from named inputs to named outputs.
 
-    inputs: variables, in the order in which arrays of values are read; they may be unused.
-    outputs: {name: node or number}, in the order in which arrays of results are written.
+    Parameters
+    ----------
+    inputs : sequence of Node
+        Variables, in the order in which arrays of values are read; they may be unused.
+    outputs : mapping of str to Node or float
+        {name: node}, in the order in which arrays of results are written.
 
-    Raises GraphError for no outputs, a repeated input, or an output that needs a variable which is not an input;
-    TypeError for an input that is not a variable or an output that is not a node.
+    Attributes
+    ----------
+    inputs : tuple of Node
+        The variables.
+    outputs : dict of str to Node
+        The results.
+    nodes : tuple of Node
+        All nodes that the outputs reach, arguments first.
+
+    Raises
+    ------
+    GraphError
+        If there are no outputs, an input is repeated, or an output needs a variable that is not an input.
+    TypeError
+        If an input is not a variable or an output is not a node.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x, y = cg.variables("x y")
+    >>> graph = cg.Graph([x, y], {"r": cg.sqrt(x * x + y * y)})
+    >>> graph
+    <Graph (x, y) -> (r): 6 nodes, 7 edges>
+    >>> graph.evaluate({"x": 3.0, "y": 4.0})
+    {'r': 5.0}
     """
 
     inputs: tuple[Node, ...]
@@ -36,34 +64,15 @@ class Graph:
     nodes: tuple[Node, ...]
 
     def __init__(self, inputs: Sequence[Node], outputs: Mapping[str, Scalar]) -> None:
-        if isinstance(inputs, Node):
-            raise TypeError("inputs must be a sequence of variables, got a single Node; write [x]")
-        self.inputs = tuple(inputs)
-        if not isinstance(outputs, Mapping):
-            raise TypeError(f"outputs must map names to nodes, got {type(outputs).__name__}")
-        for node in self.inputs:
-            if not isinstance(node, Node) or node.op is not VARIABLE:
-                raise TypeError(f"an input must be a variable, got {node!r:.60}")
-        names = self.input_names
-        if len(set(names)) < len(names):
-            twice = next(name for name in names if names.count(name) > 1)
-            raise GraphError(f"input {twice!r} is listed more than once")
-        if not outputs:
-            raise GraphError("a graph needs at least one output")
-        self.outputs = {}
-        for name, value in outputs.items():
-            if not isinstance(name, str) or not name:
-                raise TypeError(f"an output's name must be a non-empty string, got {name!r:.60}")
-            try:
-                self.outputs[name] = as_node(value)
-            except TypeError as error:
-                raise TypeError(f"output {name!r}: {error}") from None
+        self.inputs = _checked_inputs(inputs)
+        self.outputs = _checked_outputs(outputs)
         self.nodes = tuple(topological(self.outputs.values()))
         known = set(self.inputs)
         free = [node.name for node in self.nodes if node.op is VARIABLE and node not in known]
         if free:
             listed = ", ".join(repr(name) for name in sorted(map(str, free)))
-            raise GraphError(f"the outputs need {listed}, not among the inputs ({', '.join(names) or 'none'})")
+            names = ", ".join(self.input_names) or "none"
+            raise GraphError(f"the outputs need {listed}, not among the inputs ({names})")
 
     @property
     def input_names(self) -> tuple[str, ...]:
@@ -72,19 +81,34 @@ class Graph:
 
     @cached_property
     def edges(self) -> tuple[Edge, ...]:
-        """Every use of a node by another, in the order of `nodes`."""
+        """The uses of nodes by others, in the order of `nodes`."""
         return tuple([Edge(arg, node, slot) for node in self.nodes for slot, arg in enumerate(node.args)])
 
     def select_inputs(self, wrt: str | Node | Sequence[str | Node] | None) -> tuple[Node, ...]:
-        """The inputs named by `wrt`: a name, a variable, a sequence of them, or None for all.
+        """The inputs that `wrt` names.
 
-        Raises GraphError for one that the graph does not have.
+        Parameters
+        ----------
+        wrt : str, Node, sequence of these, or None
+            A name or variable, or several; None for all inputs.
+
+        Returns
+        -------
+        tuple of Node
+            The variables.
+
+        Raises
+        ------
+        GraphError
+            If the graph has no such input.
+        TypeError
+            If `wrt` holds anything but strings and nodes.
         """
         if wrt is None:
             return self.inputs
         chosen = []
-        for each in (wrt,) if isinstance(wrt, (str, Node)) else wrt:
-            node = variable(each) if isinstance(each, str) else each
+        for name in (wrt,) if isinstance(wrt, (str, Node)) else wrt:
+            node = variable(name) if isinstance(name, str) else name
             if not isinstance(node, Node):
                 raise TypeError(f"wrt must name inputs by strings or variables, got {node!r:.60}")
             if node not in self.inputs:
@@ -93,13 +117,13 @@ class Graph:
         return tuple(chosen)
 
     def only_output(self) -> Node:
-        """The single output. Raises GraphError when there are several."""
+        """The one output. Raises GraphError if there are several."""
         if len(self.outputs) != 1:
             raise GraphError(f"this needs a graph with one output, got {len(self.outputs)}: {', '.join(self.outputs)}")
         return next(iter(self.outputs.values()))
 
     def __call__(self, *args: Scalar, **named: Scalar) -> dict[str, Node]:
-        """The outputs as nodes, with nodes or numbers put in place of the inputs, in order or by name."""
+        """The outputs as nodes, with nodes or numbers in place of the inputs, in order or by name."""
         if len(args) > len(self.inputs):
             raise TypeError(f"the graph has {len(self.inputs)} inputs, got {len(args)} arguments")
         replace = dict(zip(self.inputs, map(as_node, args), strict=False))
@@ -115,7 +139,25 @@ class Graph:
         return {name: new[node] for name, node in self.outputs.items()}
 
     def evaluate(self, values: Mapping[str, Value]) -> dict[str, Value]:
-        """Values of the outputs at `values`: {input name: float or array}; arrays broadcast. See `evaluate.py`."""
+        """Values of the outputs, in IEEE float64: out of a function's domain NaN or infinite, without an error.
+
+        Parameters
+        ----------
+        values : mapping of str to float or array
+            A value for every input; arrays broadcast.
+
+        Returns
+        -------
+        dict of str to float or ndarray
+            Floats where every input is a number, else arrays of the common shape.
+
+        Raises
+        ------
+        GraphError
+            If an input is missing or unknown, or shapes do not broadcast.
+        TypeError
+            If a value is not real.
+        """
         return evaluate(self.inputs, self.nodes, self.outputs, values)
 
     def counts(self) -> Counts:
@@ -123,7 +165,7 @@ class Graph:
         return count(self.nodes)
 
     def listing(self) -> str:
-        """The graph as text, a node a line; the same graph gives the same text in every run."""
+        """The graph as text, a node a line, the same in every run."""
         return listing(self.input_names, self.nodes, self.outputs)
 
     def check(self) -> None:
@@ -132,11 +174,11 @@ class Graph:
             _check_node(node)
         if set(topological(self.outputs.values())) != set(self.nodes):
             raise GraphError("the nodes are not those that the outputs reach")
-        before: set[Node] = set()
+        visited: set[Node] = set()
         for node in self.nodes:
-            if not before.issuperset(node.args):
+            if not visited.issuperset(node.args):
                 raise GraphError(f"{node!r} comes before one of its arguments")
-            before.add(node)
+            visited.add(node)
 
     def to_networkx(self) -> networkx.MultiDiGraph:
         """A networkx.MultiDiGraph from arguments to uses.
@@ -169,6 +211,36 @@ class Graph:
         return {name: number[node] for name, node in self.outputs.items()}
 
 
+def _checked_inputs(inputs: Sequence[Node]) -> tuple[Node, ...]:
+    if isinstance(inputs, Node):
+        raise TypeError("inputs must be a sequence of variables, got a single Node; write [x]")
+    nodes = tuple(inputs)
+    for node in nodes:
+        if not isinstance(node, Node) or node.op is not VARIABLE:
+            raise TypeError(f"an input must be a variable, got {node!r:.60}")
+    names = [node.name for node in nodes]
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise GraphError(f"input {twice!r} is listed more than once")
+    return nodes
+
+
+def _checked_outputs(outputs: Mapping[str, Scalar]) -> dict[str, Node]:
+    if not isinstance(outputs, Mapping):
+        raise TypeError(f"outputs must map names to nodes, got {type(outputs).__name__}")
+    if not outputs:
+        raise GraphError("a graph needs at least one output")
+    nodes = {}
+    for name, value in outputs.items():
+        if not isinstance(name, str) or not name:
+            raise TypeError(f"an output's name must be a non-empty string, got {name!r:.60}")
+        try:
+            nodes[name] = as_node(value)
+        except TypeError as error:
+            raise TypeError(f"output {name!r}: {error}") from None
+    return nodes
+
+
 def _short(names: Sequence[str]) -> str:
     return ", ".join(names if len(names) <= 6 else [*names[:3], "...", names[-1]])
 
@@ -195,7 +267,7 @@ def _records(nodes: Sequence[Node]) -> Iterator[tuple[Any, ...]]:
     """One flat record a node, so that pickling a deep graph needs no recursion."""
     number = {node: i for i, node in enumerate(nodes)}
     for node in nodes:
-        sets = tuple([tuple(sorted(each)) for each in (node.tags, node.roles, node.lines)])
+        sets = tuple([tuple(sorted(members)) for members in (node.tags, node.roles, node.lines)])
         yield node.op.name, tuple([number[arg] for arg in node.args]), node.value, node.name, sets
 
 

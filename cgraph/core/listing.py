@@ -8,7 +8,7 @@ from .node import CONSTANT, VARIABLE, Node
 
 
 def listing(inputs: Sequence[str], nodes: Sequence[Node], outputs: Mapping[str, Node]) -> str:
-    """Text such as `%3 = mul %1 %2  # adjoint; kinetic, link 2`, numbered in topological order."""
+    """Text such as `%3 = mul %1 %2  # adjoint; kinetic, link 2`, operations numbered in topological order."""
     lines = [f"inputs {' '.join(inputs)}"]
     text: dict[Node, str] = {}
     for node in nodes:

@@ -6,14 +6,15 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from .node import Edge, Node
+from .edge import Edge
+from .node import Node
 
 if TYPE_CHECKING:
     import networkx
 
 
 def to_networkx(nodes: Sequence[Node], inputs: Sequence[Node], outputs: Mapping[str, Node]) -> networkx.MultiDiGraph:
-    """See `Graph.to_networkx`."""
+    """A MultiDiGraph from arguments to uses, of nodes in topological order and the inputs that nothing uses."""
     import networkx
 
     result = networkx.MultiDiGraph()
@@ -49,13 +50,13 @@ def minimum_cut(edges: Sequence[Edge], sources: Collection[Node], sinks: Collect
     for (source, target), uses in Counter([(edge.source, edge.target) for edge in edges]).items():
         network.add_edge(source, target, capacity=uses)
     residual = networkx.algorithms.flow.shortest_augmenting_path(network, start, end)
-    behind: set[object] = {end}  # what could still send flow to the sinks lies behind the cut nearest to them
+    behind: set[object] = {end}  # what could send more flow to the sinks lies behind the cut nearest to them
     stack = [end]
     while stack:
         node = stack.pop()
         for before in residual.pred[node]:
-            pipe = residual[before][node]
-            if before not in behind and pipe["flow"] < pipe["capacity"]:
+            link = residual[before][node]
+            if before not in behind and link["flow"] < link["capacity"]:
                 behind.add(before)
                 stack.append(before)
     return [edge for edge in edges if edge.source not in behind and edge.target in behind]

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Sequence
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 from weakref import WeakValueDictionary
 
 import numpy as np
 
-from .label import INPUT, UNLABELLED, Label, SourceLine, current, label
+from .label import INPUT, UNLABELLED, Label, SourceLine, label
 from .operation import Op as Op  # noqa: PLC0414 (beside the nodes that it makes)
+from .scope import current
 
 _INPUT = label(roles=frozenset({INPUT}))
 
@@ -34,12 +34,33 @@ _set = object.__setattr__
 class Node:
     """An immutable node of a computational graph: a constant, a named variable or an operation.
 
-    op: its row of the operation table; `VARIABLE` or `CONSTANT` for a leaf.
-    args: argument nodes.  value: a constant's number.  name: a variable's name, or one given by `with_name`.
-    tags, roles: what the node means, see `cg.tag`.  lines: where it was written, see `cg.recording_lines`.
-
     Nodes compare and hash by identity. Arithmetic with nodes and numbers makes new nodes, kept as written;
     `<`, `<=`, `>`, `>=` make comparison nodes (1.0 or 0.0) for `cg.where`; `cg.equal` compares values.
+
+    Attributes
+    ----------
+    op : Op
+        Its row of the operation table; `VARIABLE` or `CONSTANT` for a leaf.
+    args : tuple of Node
+        Its arguments.
+    value : float or None
+        The number of a constant.
+    name : str or None
+        The name of a variable, or the one that `with_name` gave an operation.
+    tags : frozenset of str
+        Set by `cg.tag`.
+    roles : frozenset of str
+        "input", "primal", "adjoint", "tangent": what differentiation made of it.
+    lines : frozenset of SourceLine
+        Where it was written, if `cg.recording_lines` was on.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x = cg.variable("x")
+    >>> y = 2.0 * cg.sin(x)
+    >>> y, y.args
+    (<node mul>, (<node 2.0>, <node sin>))
     """
 
     __slots__ = ("__weakref__", "args", "label", "name", "op", "value")
@@ -209,19 +230,6 @@ def register(op: Op) -> None:
         _BY_UFUNC[op.ufunc] = op
 
 
-class Edge(NamedTuple):
-    """One use of a node: `source` is argument number `slot` of `target`."""
-
-    source: Node
-    target: Node
-    slot: int
-
-    @property
-    def partial(self) -> Node:
-        """d target / d source through this slot alone, as a node."""
-        return as_node(self.target.op.partials(self.target, *self.target.args)[self.slot])
-
-
 _constants: WeakValueDictionary[tuple[float, float], Node] = WeakValueDictionary()
 _variables: WeakValueDictionary[str, Node] = WeakValueDictionary()
 
@@ -229,7 +237,28 @@ _variables: WeakValueDictionary[str, Node] = WeakValueDictionary()
 def constant(value: float) -> Node:
     """The node of a number; equal numbers share one node, and 0.0 and -0.0 stay apart.
 
-    Raises TypeError when value is not a real number, ValueError when it is NaN.
+    Parameters
+    ----------
+    value : float
+        A real number, finite or infinite.
+
+    Returns
+    -------
+    Node
+        The constant.
+
+    Raises
+    ------
+    TypeError
+        If it is not a real number.
+    ValueError
+        If it is NaN.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> cg.constant(2)
+    <node 2.0>
     """
     if type(value) is not float:
         if isinstance(value, np.ndarray) and value.ndim == 0:
@@ -247,9 +276,30 @@ def constant(value: float) -> Node:
 
 
 def variable(name: str) -> Node:
-    """The variable of that name; asking twice gives the same node.
+    """The variable of a name; asking twice gives the same node.
 
-    Raises TypeError when name is not a string, ValueError when it is empty or holds white space.
+    Parameters
+    ----------
+    name : str
+        Not empty, without white space.
+
+    Returns
+    -------
+    Node
+        The variable.
+
+    Raises
+    ------
+    TypeError
+        If the name is not a string.
+    ValueError
+        If it is empty or has white space.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> cg.variable("q0")
+    <node variable q0>
     """
     if not isinstance(name, str):
         raise TypeError(f"a variable's name must be a string, got {type(name).__name__}: {name!r:.60}")
@@ -261,24 +311,26 @@ def variable(name: str) -> Node:
     return node
 
 
-def variables(names: str | Sequence[str]) -> list[Node]:
-    """Several variables: `q0, q1 = cg.variables("q0 q1")`; commas may stand for spaces."""
-    split = names.replace(",", " ").split() if isinstance(names, str) else names
-    return [variable(name) for name in split]
-
-
 def as_node(value: Scalar) -> Node:
-    """The node itself, or the constant of a number."""
-    return value if isinstance(value, Node) else constant(value)
+    """The node itself, or the constant of a number.
 
+    Parameters
+    ----------
+    value : Node or float
+        Either.
 
-def with_name(node: Node, name: str) -> Node:
-    """The same operation with a name of its own, for listings, drawings and explanations.
+    Returns
+    -------
+    Node
+        A node.
 
-    Leaves keep what they are: a variable has its name already, and a constant is shared.
+    Examples
+    --------
+    >>> from cgraph.extend import as_node
+    >>> as_node(1.0)
+    <node 1.0>
     """
-    node = as_node(node)
-    return Node(node.op, node.args, node.label, name=name) if node.args else node
+    return value if isinstance(value, Node) else constant(value)
 
 
 def apply(op: Op, *args: Scalar) -> Node:
@@ -289,7 +341,8 @@ def apply(op: Op, *args: Scalar) -> Node:
     scope = current.get()
     if scope.build is None:
         return Node(op, nodes, scope.label)
-    return scope.build(op, nodes, scope.label)
+    node: Node = scope.build(op, nodes, scope.label)
+    return node
 
 
 def _binary(name: str, a: Scalar, b: Scalar) -> Node:

@@ -7,20 +7,29 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from .label import Label, Scope, SourceLine, current
+from .label import Label, SourceLine
 from .node import Node, Op
+from .scope import Scope, current
 
-# Whose lines say nothing to the person who calls: this library, and what calls back from between.
-_PASSED_OVER = frozenset({"cgraph", "dynamics", "functools", "numpy"})
+# Packages whose lines say nothing to the person who calls: this library, and what calls back from between.
+_SKIPPED = frozenset({"cgraph", "dynamics", "functools", "numpy"})
 
 
 @contextmanager
 def recording_lines() -> Iterator[None]:
-    """Let every node written inside the `with` block know its line: `node.lines`, and the texts of `lint` and `why`.
+    """Record the source line of every node written inside the `with` block, for `node.lines`, `lint` and `why`.
 
-    It is the line of the nearest caller outside this library: where an expression stands, or where a model that the
-    library writes, such as an arm, was asked for. Derived nodes take the lines of their origin, as they take its tags.
-    Outside the block nothing is recorded and building costs what it did.
+    It is the line of the nearest caller outside this library: where an expression stands, or where a function of the
+    library that writes a model was called. Derived nodes take the lines of their origin, as they take its tags. Outside
+    the block nothing is recorded, and building costs no more.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> with cg.recording_lines():
+    ...     square = cg.variable("x") ** 2
+    >>> len(square.lines)  # the line `square = ...`
+    1
     """
     scope = current.get()
     build = scope.build or Node
@@ -40,7 +49,7 @@ def recording_lines() -> Iterator[None]:
 def _caller(folder: str) -> SourceLine | None:
     """The line that the nearest frame outside the library is at; its file is relative where it lies in `folder`."""
     frame = sys._getframe(1)
-    while frame.f_globals.get("__name__", "").partition(".")[0] in _PASSED_OVER:
+    while frame.f_globals.get("__name__", "").partition(".")[0] in _SKIPPED:
         if frame.f_back is None:
             return None
         frame = frame.f_back

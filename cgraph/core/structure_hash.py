@@ -13,11 +13,28 @@ _SIZE = 16  # bytes of a digest: equal ones by chance need some 2^64 nodes
 
 
 def structure_hash(graph: Graph) -> str:
-    """32 hexadecimal digits that two graphs share when they compute the same outputs in the same way.
+    """A digest that two graphs share when they compute the same outputs in the same way, in any process and machine.
 
     What counts: the names and order of inputs and outputs, and each output's operations, constants to the last bit
     and variables by name. What does not: tags, roles, names of operations, how often equal nodes are repeated, and the
     order of arguments that commute.
+
+    Parameters
+    ----------
+    graph : Graph
+        Any graph.
+
+    Returns
+    -------
+    str
+        32 hexadecimal digits.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x, y = cg.variables("x y")
+    >>> cg.structure_hash(cg.Graph([x, y], {"f": x * y})) == cg.structure_hash(cg.Graph([x, y], {"f": y * x}))
+    True
     """
     digests = node_hashes(graph.nodes)
     parts = [_text(name) for name in graph.input_names]
@@ -26,9 +43,9 @@ def structure_hash(graph: Graph) -> str:
 
 
 def node_hashes(nodes: Iterable[Node], atoms: Mapping[Node, str] | None = None) -> dict[Node, bytes]:
-    """The digest of each node, given in topological order: of its operation and of its arguments' digests.
+    """The digest of every node, in topological order: of its operation and of its arguments' digests.
 
-    atoms: {node: name} to be taken as a variable of that name, whatever it is made from.
+    atoms: {node: name}, nodes that count as the variable of that name, whatever they compute.
     """
     atoms = atoms or {}
     digests: dict[Node, bytes] = {}

@@ -9,12 +9,33 @@ from .node import Node
 
 
 def topological(outputs: Iterable[Node]) -> list[Node]:
-    """Every node that `outputs` reach, arguments first, in an order that depends on structure alone.
+    """The nodes that `outputs` reach, arguments first, in an order that depends on structure alone.
 
-    Raises GraphError when the nodes form a cycle (impossible through the public interface).
+    Parameters
+    ----------
+    outputs : iterable of Node
+        Where to start.
+
+    Returns
+    -------
+    list of Node
+        The outputs and all that they are made from, every node once.
+
+    Raises
+    ------
+    GraphError
+        If the nodes form a cycle (impossible through the public interface).
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import topological
+    >>> x = cg.variable("x")
+    >>> topological([cg.sin(x) + 1.0])
+    [<node variable x>, <node sin>, <node 1.0>, <node add>]
     """
     order: list[Node] = []
-    closed: dict[Node, bool] = {}  # False while the arguments of the node are being walked
+    closed: dict[Node, bool] = {}  # False while the node's arguments are on the stack
     for output in outputs:
         stack = [] if output in closed else [output]
         while stack:
@@ -39,7 +60,7 @@ def topological(outputs: Iterable[Node]) -> list[Node]:
 def rebuild(
     outputs: Iterable[Node], replace: dict[Node, Node], make: Callable[[Node, tuple[Node, ...]], Node]
 ) -> dict[Node, Node]:
-    """Map every node under `outputs` to its copy: `replace` where given, else `make(node, new_arguments)`."""
+    """{node: copy} of all that `outputs` reach: `replace[node]` if there is one, else `make(node, new_arguments)`."""
     new = dict(replace)
     for node in topological(outputs):
         if node not in new:

@@ -18,8 +18,8 @@ Side = Literal["left", "right"]
 _SHOWN = 12  # classes that the text lists
 
 
-class Together(NamedTuple):
-    """Two graphs in one: common nodes once. To mark in a drawing: what only one of them has."""
+class Overlay(NamedTuple):
+    """Two graphs as one, their common nodes once, and what only one of them has: to be marked in a drawing."""
 
     graph: Graph
     only_left: frozenset[Node]
@@ -28,12 +28,32 @@ class Together(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """The nodes of two graphs, paired by structure; see `compare`. `str` of it is the summary.
+    """The nodes of two graphs, paired by structure; made by `compare`. `str` of it is the summary.
 
-    common: pairs (node of left, node of right) that compute the same; a node is in one pair at most.
-    only_left, only_right: the rest, in the order of each graph's nodes.
-    same_outputs, other_outputs: names that both graphs have, computed alike or not.
-    atoms: {node: name} of the nodes that stand for a variable.
+    Attributes
+    ----------
+    left, right : Graph
+        The two graphs.
+    common : tuple of (Node, Node)
+        Pairs (node of left, node of right) that compute the same; a node is in one pair at most.
+    only_left, only_right : tuple of Node
+        The other nodes, in the order of their graph.
+    same_outputs, other_outputs : tuple of str
+        Names that both graphs have, computed alike or not.
+    atoms : dict of Node to str
+        The nodes that count as a variable of that name.
+    classify : callable
+        Graph -> (node -> name of its class).
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x = cg.variable("x")
+    >>> print(cg.compare(cg.Graph([x], {"y": cg.sin(x)}), cg.Graph([x], {"y": cg.sin(x) + x})))
+    2 nodes left, 3 right: 2 in both, 0 only left, 1 only right.
+    Computed otherwise: y.
+    Only right:
+          1  primal
     """
 
     left: Graph
@@ -47,7 +67,7 @@ class Comparison:
     classify: Classify
 
     def classes(self, side: Side) -> dict[str, int]:
-        """{class: number of nodes} of what only that side has, the largest first."""
+        """{class: number of nodes that only that side has}, the largest first."""
         graph, nodes = (self.left, self.only_left) if side == "left" else (self.right, self.only_right)
         name_of = self.classify(graph)
         counts = Counter([name_of(node) for node in nodes])
@@ -83,36 +103,36 @@ class Comparison:
             "other_outputs": list(self.other_outputs),
         }
 
-    def together(self) -> Together:
-        """Both graphs in one, for a single drawing.
+    def overlay(self) -> Overlay:
+        """Both graphs as one, for a single drawing.
 
         An output that both compute alike keeps its name, any other is `left tau0` or `right tau0`. An atom is drawn as
-        the variable that it stands for; what a graph computes it from ends in an output of its own, `right q0`.
+        the variable of its name; what a graph computes it from ends in a separate output, `right q0`.
         """
         outputs: dict[str, Node] = {}
         marked: list[set[Node]] = []
         inputs: dict[Node, None] = {}
-        given: dict[Node, Node] = {}
+        shared: dict[Node, Node] = {}  # {node of right: its partner in the overlay}
         for side, graph, only in (("left", self.left, self.only_left), ("right", self.right, self.only_right)):
-            into: dict[Node, Node] = {}
+            copies: dict[Node, Node] = {}
             mark = set()
             for node in graph.nodes:
-                args = tuple([into[arg] for arg in node.args])
-                made = node if args == node.args else Node(node.op, args, node.label, name=node.name)
+                args = tuple([copies[arg] for arg in node.args])
+                copy = node if args == node.args else Node(node.op, args, node.label, name=node.name)
                 if node.args and node in self.atoms:
-                    outputs[f"{side} {self.atoms[node]}"] = made
-                    mark.add(made)
-                    made = variable(self.atoms[node])
-                into[node] = given.get(node, made)
+                    outputs[f"{side} {self.atoms[node]}"] = copy
+                    mark.add(copy)
+                    copy = variable(self.atoms[node])
+                copies[node] = shared.get(node, copy)
             for name, node in graph.outputs.items():
-                outputs[name if name in self.same_outputs else f"{side} {name}"] = into[node]
-            inputs |= dict.fromkeys([*graph.inputs, *[node for node in into.values() if node.op is VARIABLE]])
-            marked.append(mark | {into[node] for node in only})
+                outputs[name if name in self.same_outputs else f"{side} {name}"] = copies[node]
+            inputs |= dict.fromkeys([*graph.inputs, *[node for node in copies.values() if node.op is VARIABLE]])
+            marked.append(mark | {copies[node] for node in only})
             if side == "left":
-                given = {b: into[a] for a, b in self.common}
+                shared = {b: copies[a] for a, b in self.common}
         both = Graph(list(inputs), outputs)
         left, right = (frozenset(mark.intersection(both.nodes)) for mark in marked)
-        return Together(both, left, right)
+        return Overlay(both, left, right)
 
 
 def compare(
@@ -121,22 +141,45 @@ def compare(
     """Compare two graphs by structure.
 
     Two nodes are alike when they are the same operation on alike arguments, in any order where they commute, the same
-    constant to the last bit, or variables of one name. Tags, roles and names of operations do not count. A graph may
-    hold several alike nodes; each is paired once.
-    atoms: names that stand for a variable in either graph whatever they are made from there, such as "q0 qd0" where
-        one graph has them as inputs and the other computes them.
-    classify: called with each graph, gives a function from its nodes to the name of a class; by default, the roles
-        and tags of a node.
+    constant to the last bit, or variables of one name. Tags, roles and names of operations do not count. Of several
+    alike nodes in a graph, each is paired at most once.
 
-    Raises GraphError for an atom that neither graph has.
+    Parameters
+    ----------
+    left, right : Graph
+        The two graphs.
+    atoms : str or iterable of str
+        Names that count as variables in either graph, whatever computes them there, such as "q0 qd0" where one graph
+        has them as inputs and the other computes them.
+    classify : callable, optional
+        Called with a graph, it returns a function from nodes to names of classes, by which the summary counts; by
+        default, a node's roles and tags.
+
+    Returns
+    -------
+    Comparison
+        The pairs, and what only one graph has.
+
+    Raises
+    ------
+    GraphError
+        If neither graph has a node of an atom's name.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x = cg.variable("x")
+    >>> found = cg.compare(cg.Graph([x], {"y": cg.sin(x)}), cg.Graph([x], {"y": cg.sin(x) + x}))
+    >>> len(found.common), found.only_right
+    (2, (<node add>,))
     """
     chosen = set(atoms.replace(",", " ").split() if isinstance(atoms, str) else atoms)
     named = {node: node.name for graph in (left, right) for node in graph.nodes if node.name in chosen}
     unused = [name for graph in (left, right) for name in graph.input_names]  # an input that nothing uses is no node
     if missing := chosen.difference(named.values(), unused):
         raise GraphError(f"neither graph has a node called {', '.join(sorted(missing))}")
-    standing = {node: name for node, name in named.items() if name is not None}
-    left_hashes, right_hashes = (node_hashes(graph.nodes, standing) for graph in (left, right))
+    stand_ins = {node: name for node, name in named.items() if name is not None}
+    left_hashes, right_hashes = (node_hashes(graph.nodes, stand_ins) for graph in (left, right))
     common = _paired(left_hashes, right_hashes)
     lefts, rights = {a for a, _ in common}, {b for _, b in common}
     only_left = tuple([node for node in left.nodes if node not in lefts])
@@ -151,13 +194,13 @@ def compare(
         only_right,
         tuple(same),
         tuple([name for name in shared if name not in same]),
-        standing,
+        stand_ins,
         classify or _by_label,
     )
 
 
 def _paired(left: dict[Node, bytes], right: dict[Node, bytes]) -> list[tuple[Node, Node]]:
-    """Pairs of alike nodes, in the order of the right graph: a node that both have with itself, others in order."""
+    """Pairs of alike nodes, in the order of the right graph; a node that is in both graphs goes with itself."""
     partner = {node: node for node, digest in right.items() if left.get(node) == digest}
     free: dict[bytes, list[Node]] = {}
     for node, digest in reversed(left.items()):

@@ -6,15 +6,16 @@ import math
 import numbers
 from collections.abc import Mapping, Sequence
 
+from ..core.edge import Edge
 from ..core.graph import Graph
-from ..core.node import Edge, Node
+from ..core.node import Node
 from ..errors import GraphError
 
 Point = Mapping[str, float]
 
 
 def checked(graph: Graph, at: Point) -> dict[str, float]:
-    """The point as floats. Raises GraphError for a missing or unknown name, ValueError for what is no finite number."""
+    """The point as floats. Raises GraphError for a missing or unknown name, ValueError for what is not finite."""
     for name, value in at.items():
         if isinstance(value, bool) or not isinstance(value, numbers.Real) or not math.isfinite(value):
             raise ValueError(f"at: input {name!r} must be a finite number, got {value!r:.60}")
@@ -27,12 +28,10 @@ def checked(graph: Graph, at: Point) -> dict[str, float]:
 
 def node_values(graph: Graph, nodes: Sequence[Node], at: Point) -> list[float]:
     """The values of nodes of the graph at a point."""
-    found = (
-        Graph(graph.inputs, {str(i): node for i, node in enumerate(nodes)}).evaluate(checked(graph, at))
-        if nodes
-        else {}
-    )
-    return [float(found[str(i)]) for i in range(len(nodes))]
+    if not nodes:
+        return []
+    values = Graph(graph.inputs, {str(i): node for i, node in enumerate(nodes)}).evaluate(checked(graph, at))
+    return [float(values[str(i)]) for i in range(len(nodes))]
 
 
 def edge_slopes(graph: Graph, edges: Sequence[Edge], at: Point) -> list[float]:

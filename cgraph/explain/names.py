@@ -1,4 +1,4 @@
-"""Names in both directions: the nodes that a name means, and a node in a person's words."""
+"""Names in both directions: the nodes of a name, and a node as text."""
 
 from __future__ import annotations
 
@@ -12,69 +12,93 @@ from ..errors import GraphError
 
 Name = str | Node
 LENGTH = 32  # characters up to which a node is written out; a longer one refers to its parts by their %numbers
-DEPTH = 4  # operations that such a text holds within one another at most
+DEPTH = 4  # most operations within one another in such a text
 
 _NEGATION, _WHOLE = SUM, 9  # how strongly a leading minus binds, and a name or a function
 
 
 class Names:
-    """The names of a graph's nodes; %numbers are those of `graph.listing()`."""
+    """The names of a graph's nodes, in both directions: `one`, `all`, `group`, `output`; and `text`, `line`, `short`.
+
+    Parameters
+    ----------
+    graph : Graph
+        Whose nodes.
+
+    Attributes
+    ----------
+    graph : Graph
+        Whose nodes.
+    number : dict of Node to int
+        The %numbers of the operations, as in `graph.listing()`.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Names
+    >>> x, h = cg.variables("x h")
+    >>> names = Names(cg.Graph([x, h], {"y": cg.sin(x * h)}))
+    >>> names.line(names.output("y"))
+    '%2 = sin(%1)'
+    >>> names.text(names.output("y"))
+    'sin(x * h)'
+    """
 
     def __init__(self, graph: Graph) -> None:
         self.graph = graph
         self.number: dict[Node, int] = {}
-        self.called: dict[str, list[Node]] = {}
+        self.by_name: dict[str, list[Node]] = {}
         for node in graph.nodes:
             if node.args:
                 self.number[node] = len(self.number) + 1
         self.known = dict.fromkeys((*graph.inputs, *graph.nodes))
         for node in self.known:
             if node.name is not None:
-                self.called.setdefault(node.name, []).append(node)
+                self.by_name.setdefault(node.name, []).append(node)
 
     # From a name to nodes.
 
     def all(self, who: Name) -> list[Node]:
-        """Every node that a name means: input, named nodes, output. Raises GraphError when there is none."""
+        """The nodes of a name: input, named nodes, output. Raises GraphError if there is none."""
         if isinstance(who, Node):
             if who not in self.known:
                 raise GraphError(f"{who!r} is not a node of the graph")
             return [who]
         if not isinstance(who, str):
             raise TypeError(f"a node is given by its name or itself, got {type(who).__name__}: {who!r:.60}")
-        found = self.called.get(who, []) + ([self.graph.outputs[who]] if who in self.graph.outputs else [])
-        if not found:
+        nodes = self.by_name.get(who, []) + ([self.graph.outputs[who]] if who in self.graph.outputs else [])
+        if not nodes:
             raise GraphError(f"nothing in the graph is called {who!r} ({self._known()})")
-        return list(dict.fromkeys(found))
+        return list(dict.fromkeys(nodes))
 
     def group(self, who: Name | Sequence[Name]) -> list[Node]:
         """The nodes of a group: a name or several in one string, a node, or a sequence of these."""
-        if isinstance(who, str) and who not in self.called and who not in self.graph.outputs:
+        if isinstance(who, str) and who not in self.by_name and who not in self.graph.outputs:
             who = who.replace(",", " ").split()
         if not isinstance(who, (str, Node, Iterable)):
             raise TypeError(f"a group is a name or several, or nodes; got {type(who).__name__}: {who!r:.60}")
         members = [who] if isinstance(who, (str, Node)) else list(who)
         if not members:
             raise ValueError("a group needs at least one name")
-        return list(dict.fromkeys([node for each in members for node in self.all(each)]))
+        return list(dict.fromkeys([node for member in members for node in self.all(member)]))
 
     def one(self, who: Name) -> Node:
-        """The one node of that name. Raises GraphError when there is none, or more than one."""
-        found = self.all(who)
-        if len(found) > 1:
-            raise GraphError(f"{len(found)} nodes are called {who!r}; give the node itself")
-        return found[0]
+        """The one node of a name. Raises GraphError if there is none, or more than one."""
+        nodes = self.all(who)
+        if len(nodes) > 1:
+            raise GraphError(f"{len(nodes)} nodes are called {who!r}; give the node itself")
+        return nodes[0]
 
     def output(self, who: Name) -> Node:
-        """The output of that name, else the one node of it."""
+        """The output of a name, else the one node of that name."""
         return self.graph.outputs[who] if isinstance(who, str) and who in self.graph.outputs else self.one(who)
 
     def _known(self) -> str:
-        named = [name for name, nodes in self.called.items() if any(node.args for node in nodes)]
+        named = [name for name, nodes in self.by_name.items() if any(node.args for node in nodes)]
         parts = (("inputs", self.graph.input_names), ("named nodes", named), ("outputs", tuple(self.graph.outputs)))
         return "; ".join(f"{what} {_listed(names)}" for what, names in parts if names)
 
-    # From a node to words.
+    # From a node to text.
 
     def short(self, node: Node) -> str:
         """A name, a number, or the %number of the listing; a question mark for an operation of no such line."""
@@ -83,7 +107,7 @@ class Names:
         return node.name or (f"%{self.number[node]}" if node in self.number else "?")
 
     def text(self, node: Node, length: int = LENGTH) -> str:
-        """A name, or what the node computes, such as `qd0 * dt`: written out as far as `length` characters allow."""
+        """A name, or the formula, such as `qd0 * dt`, as deep as `length` characters allow."""
         if node.name or not node.args:
             return self.short(node)
         for depth in range(DEPTH, 1, -1):
@@ -99,14 +123,14 @@ class Names:
         if not node.args:
             return self.short(node) + tags
         name = f"  ({node.name})" if node.name else ""
-        return f"%{self.number[node]} = {self.made(node)}{name}{tags}"
+        return f"%{self.number[node]} = {self.formula(node)}{name}{tags}"
 
-    def made(self, node: Node) -> str:
-        """What an operation computes from its arguments, these by name or %number."""
+    def formula(self, node: Node) -> str:
+        """The operation on its arguments, these by name or %number: `qd0 * dt`."""
         return self._written(node, 1)[0]
 
     def _written(self, node: Node, depth: int) -> tuple[str, int]:
-        """Text of an operation with `depth` operations in it at most, and how strongly its last one binds."""
+        """Text with at most `depth` operations within one another, and how strongly the outermost one binds."""
         parts = [
             self._written(arg, depth - 1) if depth > 1 and arg.args and not arg.name else (self.short(arg), _WHOLE)
             for arg in node.args

@@ -1,4 +1,4 @@
-"""Paths through a graph: how many there are, and the k best, without walking them one by one."""
+"""Paths through a graph: their number and the k best, by one sweep over the nodes."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable, Sequence
 from operator import itemgetter
 
-from ..core.node import Edge, Node
+from ..core.edge import Edge
+from ..core.node import Node
 
 
 def path_count(nodes: Sequence[Node], edges: Sequence[Edge], source: Node, sink: Node) -> int:

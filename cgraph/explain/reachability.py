@@ -1,4 +1,4 @@
-"""What a node reaches and what it is made from, as sets of nodes."""
+"""Reachability: the descendants and the ancestors of nodes, and what lies between two groups."""
 
 from __future__ import annotations
 
@@ -7,39 +7,39 @@ from collections.abc import Collection, Iterable, Sequence
 from ..core.node import Node
 
 
-def users(nodes: Sequence[Node], sources: Iterable[Node]) -> set[Node]:
-    """The nodes, among `nodes` in topological order, that depend on `sources`; with the sources themselves."""
-    found = set(sources)
+def descendants(nodes: Sequence[Node], sources: Iterable[Node]) -> set[Node]:
+    """The nodes, among `nodes` in topological order, that depend on `sources`; the sources included."""
+    reached = set(sources)
     for node in nodes:
-        if node not in found and any([arg in found for arg in node.args]):
-            found.add(node)
-    return found
+        if node not in reached and any([arg in reached for arg in node.args]):
+            reached.add(node)
+    return reached
 
 
-def makers(sinks: Iterable[Node], without: Collection[Node] = ()) -> set[Node]:
-    """The nodes that `sinks` are made from; with the sinks themselves, and not through those of `without`."""
-    found: set[Node] = set()
+def ancestors(sinks: Iterable[Node], without: Collection[Node] = ()) -> set[Node]:
+    """The nodes that `sinks` depend on, the sinks included, along paths that pass no node of `without`."""
+    reached: set[Node] = set()
     stack = [node for node in sinks if node not in without]
     while stack:
         node = stack.pop()
-        if node not in found:
-            found.add(node)
+        if node not in reached:
+            reached.add(node)
             stack.extend([arg for arg in node.args if arg not in without])
-    return found
+    return reached
 
 
-def made_of_more(sink: Node, number: int) -> bool:
-    """Whether a node is made from more nodes than that, itself counted; looks at no more than needed."""
-    found = {sink}
+def has_more_ancestors(sink: Node, limit: int) -> bool:
+    """Whether a node has more than `limit` ancestors, itself counted; visits no more than needed to tell."""
+    reached = {sink}
     stack = [sink]
-    while stack and len(found) <= number:
-        new = [arg for arg in stack.pop().args if arg not in found]
-        found.update(new)
+    while stack and len(reached) <= limit:
+        new = [arg for arg in stack.pop().args if arg not in reached]
+        reached.update(new)
         stack.extend(new)
-    return len(found) > number
+    return len(reached) > limit
 
 
 def between(nodes: Sequence[Node], sources: Iterable[Node], sinks: Iterable[Node]) -> list[Node]:
     """The nodes on any path from `sources` to `sinks`, in the order of `nodes`; empty when there is none."""
-    both = users(nodes, sources) & makers(sinks)
-    return [node for node in nodes if node in both]
+    on_path = descendants(nodes, sources) & ancestors(sinks)
+    return [node for node in nodes if node in on_path]

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..core.edge import Edge
 from ..core.graph import Graph
-from ..core.node import Edge, Node
+from ..core.node import Node
 from ..core.source_lines import lines_text
 from ..errors import GraphError
 from .edge_partials import Point, edge_slopes
@@ -17,16 +18,22 @@ from .paths import best_paths, by_target, path_count
 from .reachability import between
 
 EXACT = 10**15  # up to here a number of paths is printed digit by digit
-LENGTH = 90  # characters up to which a path is written out; a longer one is told by the tags that it passes
-STEPS = 12  # neighbours in tags that such a path names; of more, the first and the last
+LENGTH = 90  # characters up to which a path is written out; a longer one is written by its tags
+STEPS = 12  # neighbors in tags that such a path names; of more, the first and the last
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """One way from an input to an output.
+    """One path from an input to an output.
 
-    edges: in order; empty when the output is the input.  value: product of the local partials, None without a point.
-    text: its products and functions by name and tag; sums are passed over.
+    Attributes
+    ----------
+    edges : tuple of Edge
+        In order; empty when the output is the input.
+    value : float or None
+        The product of the partials along it; None without a point.
+    text : str
+        Its products and functions by name and tag; sums are left out.
     """
 
     edges: tuple[Edge, ...]
@@ -36,10 +43,30 @@ class Path:
 
 @dataclass(frozen=True, eq=False)
 class Why:
-    """How an output depends on an input; see `why`. `str` of it is the explanation.
+    """How an output depends on an input; made by `why`. `str` of it is the explanation.
 
-    count: number of paths.  paths: the heaviest, or the shortest where no point was given.
-    With a point: `derivative` is d output / d input, `weight` the sum of |product| over all paths.
+    Attributes
+    ----------
+    graph : Graph
+        Where they are.
+    output, input : str
+        Their names.
+    count : int
+        The number of paths, exact however large.
+    paths : tuple of Path
+        The heaviest, or without a point the shortest.
+    derivative : float or None
+        d output / d input at the point.
+    weight : float or None
+        The sum over all paths of the absolute value of the product of partials.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x = cg.variable("x")
+    >>> answer = cg.why(cg.Graph([x], {"y": x * x}), "y", "x")
+    >>> answer.count
+    2
     """
 
     graph: Graph
@@ -52,7 +79,7 @@ class Why:
 
     @property
     def share(self) -> float | None:
-        """The part of `weight` that the listed paths carry, 0 to 1; None without a point or a weight."""
+        """The part of `weight` in the listed paths, 0 to 1; None without a point, or where no path has any."""
         if not self.weight or not math.isfinite(self.weight):
             return None
         return min(1.0, sum([abs(path.value or 0.0) for path in self.paths]) / self.weight)
@@ -118,19 +145,47 @@ class Why:
 def why(graph: Graph, output: Name, input: Name, at: Point | None = None, k: int = 10) -> Why:  # noqa: A002 (its name)
     """Why `output` depends on `input`: the number of paths, and the k heaviest at the point `at`.
 
-    A path's weight is the product of the local partials along it; over all paths these add up to the derivative. All
-    numbers come from sweeps over the nodes: no list of paths is ever made, so 10^20 of them are no matter.
-    output, input: names of an output and an input, or of a node named by `cg.with_name`, or a node.
-    at: {input: number} for all inputs. Without it, the k shortest paths are listed.
+    The value of a path is the product of the partials along it; over all paths these add up to the derivative. All
+    numbers come from sweeps over the nodes, without a list of paths, so that 10^20 of them are no obstacle.
 
-    Raises GraphError for a name that the graph does not have or that several nodes have, and where the derivative is
-    not finite; ValueError for a value in `at` that is no finite number, or a negative k.
+    Parameters
+    ----------
+    graph : Graph
+        Where they are.
+    output, input : str or Node
+        Names of an output and an input, or of nodes named by `cg.with_name`, or nodes.
+    at : mapping of str to float, optional
+        {input: number} for all inputs. Without it, the k shortest paths are listed.
+    k : int
+        How many paths to list.
+
+    Returns
+    -------
+    Why
+        `print` it for the explanation.
+
+    Raises
+    ------
+    GraphError
+        If the graph has no node or several nodes of a name, or the derivative is not finite.
+    ValueError
+        If a number in `at` is not finite, or k is negative.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x = cg.variable("x")
+    >>> print(cg.why(cg.Graph([x], {"y": x * x + cg.sin(x)}), "y", "x", at={"x": 0.0}))
+    y depends on x along 3 paths.
+    d y / d x = 1, the sum over all of them.
+      +1  x -> sin(x) -> y
+    The 1 heaviest add up to 1 and carry 100.0% of the weight of all.
     """
     names = Names(graph)
     if not isinstance(k, int) or isinstance(k, bool) or k < 0:
         raise ValueError(f"k must be a whole number of paths, at least 0, got {k!r}")
     source, sink = names.one(input), names.output(output)
-    to, origin = _said(names, output), _said(names, input)
+    to, origin = _name_of(names, output), _name_of(names, input)
     nodes = between(graph.nodes, [source], [sink])
     inside = set(nodes)
     edges = [Edge(arg, node, slot) for node in nodes for slot, arg in enumerate(node.args) if arg in inside]
@@ -138,43 +193,47 @@ def why(graph: Graph, output: Name, input: Name, at: Point | None = None, k: int
         edges = [edge for edge in edges if edge.target is not source]
     count = path_count(nodes, edges, source, sink) if nodes else 0
     if at is None:
-        found = best_paths(nodes, edges, source, sink, k, lambda edge: 1.0) if count else []
-        return Why(graph, to, origin, count, tuple([_path(names, to, each, None) for each in found]))
+        shortest = best_paths(nodes, edges, source, sink, k, lambda edge: 1.0) if count else []
+        return Why(graph, to, origin, count, tuple([_path(names, to, path, None) for path in shortest]))
     slopes = dict(zip(edges, edge_slopes(graph, edges, at), strict=True))
-    edges = _alive(names, nodes, edges, slopes, sink)
-    derivative, weight = _sums(nodes, edges, slopes, source, sink)
-    found = best_paths(nodes, edges, source, sink, k, lambda edge: -math.log(abs(slopes[edge]))) if count else []
-    paths = [_path(names, to, each, math.prod([slopes[edge] for edge in each])) for each in found]
+    edges = _contributing(names, nodes, edges, slopes, sink)
+    derivative, weight = _path_sums(nodes, edges, slopes, source, sink)
+    # The largest |product| of partials has the least sum of -log |partial|.
+    heaviest = best_paths(nodes, edges, source, sink, k, lambda edge: -math.log(abs(slopes[edge]))) if count else []
+    paths = [_path(names, to, path, math.prod([slopes[edge] for edge in path])) for path in heaviest]
     return Why(graph, to, origin, count, tuple(paths), derivative, weight)
 
 
-def _alive(
+def _contributing(
     names: Names, nodes: Sequence[Node], edges: Sequence[Edge], slopes: dict[Edge, float], sink: Node
 ) -> list[Edge]:
-    """The edges that matter: with a partial other than zero, and before nothing but such edges on some way.
+    """The edges with a nonzero partial from which a path of such edges leads to the sink.
 
-    What lies behind a zero, such as the branch that `where` leaves out, may have no derivative: zero wins.
+    What lies behind a zero, such as the branch that `where` does not take, may have no derivative: zero wins.
     """
-    alive = {sink}
+    live = {sink}
     kept = []
     incoming = by_target(edges)
     for node in reversed(nodes):
-        for edge in incoming.get(node, ()) if node in alive else ():
+        for edge in incoming.get(node, ()) if node in live else ():
             slope = slopes[edge]
             if slope == 0.0:
                 continue
             if not math.isfinite(slope):
                 raise GraphError(f"the derivative of {names.line(node)} by {names.text(edge.source)} is {slope} here")
-            alive.add(edge.source)
+            live.add(edge.source)
             kept.append(edge)
     chosen = set(kept)
     return [edge for edge in edges if edge in chosen]
 
 
-def _sums(
+def _path_sums(
     nodes: Sequence[Node], edges: Sequence[Edge], slopes: dict[Edge, float], source: Node, sink: Node
 ) -> tuple[float, float]:
-    """The sum over all paths of the product of slopes, and of its absolute value: forward accumulation."""
+    """Sum over all paths of the product of partials, and of its absolute value, by forward accumulation.
+
+    s_source = 1, s_y = sum over edges (x, y) of (dy/dx) s_x; weights with |dy/dx|.
+    """
     sums = dict.fromkeys(nodes, 0.0)
     weights = dict.fromkeys(nodes, 0.0)
     sums[source] = weights[source] = 1.0
@@ -184,7 +243,7 @@ def _sums(
     return sums.get(sink, 0.0), weights.get(sink, 0.0)
 
 
-def _said(names: Names, who: Name) -> str:
+def _name_of(names: Names, who: Name) -> str:
     return who if isinstance(who, str) else names.text(who)
 
 
@@ -204,7 +263,7 @@ def _path(names: Names, output: str, edges: tuple[Edge, ...], value: float | Non
 
 
 def _route(nodes: Sequence[Node]) -> list[str]:
-    """A long path by names, tags and operations: neighbours with the same tags are told as one."""
+    """A long path by names, tags and operations: neighbors with the same tags count as one step."""
     steps: list[tuple[str, list[str]]] = []
     for node in nodes:
         if node.name:
@@ -216,7 +275,7 @@ def _route(nodes: Sequence[Node]) -> list[str]:
             steps[-1][1].append(node.op.name)
     if len(steps) > STEPS:
         steps = [*steps[: STEPS // 2], ("...", []), *steps[-(STEPS // 2) :]]
-    return [" ".join([*(made if len(made) <= 3 else [many(len(made), "operation")]), name]) for name, made in steps]
+    return [" ".join([*(ops if len(ops) <= 3 else [many(len(ops), "operation")]), name]) for name, ops in steps]
 
 
 def digits_of(count: int) -> str:

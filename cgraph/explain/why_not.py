@@ -9,16 +9,36 @@ from ..core.graph import Graph
 from ..core.node import Node
 from ..errors import GraphError
 from .names import Name, Names, joined, many
-from .reachability import makers, users
+from .reachability import ancestors, descendants
 
 
 @dataclass(frozen=True, eq=False)
 class WhyNot:
-    """Where the chain from an input stops that does not reach an output; see `why_not`. `str` of it is the explanation.
+    """Why an output does not depend on an input; made by `why_not`. `str` of it is the explanation.
 
-    reached: what depends on the input.  made_from: what the output is made from; the two have no node in common.
-    meetings: nodes that the input reaches and that use what the output is made from, too: there the two are nearest.
-    outputs: names of outputs that depend on the input.  inputs: names of inputs that the output depends on.
+    Attributes
+    ----------
+    graph : Graph
+        Where they are.
+    output, input : str
+        Their names.
+    reached : frozenset of Node
+        The descendants of the input.
+    made_from : frozenset of Node
+        The ancestors of the output; no node is in both sets.
+    meetings : tuple of Node
+        The first descendants of the input that also use an ancestor of the output: there the two are nearest.
+    outputs : tuple of str
+        Names of the outputs that depend on the input.
+    inputs : tuple of str
+        Names of the inputs that the output depends on.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x, y = cg.variables("x y")
+    >>> cg.why_not(cg.Graph([x, y], {"f": cg.sin(x), "g": x * y}), "f", "y").outputs
+    ('g',)
     """
 
     graph: Graph
@@ -63,13 +83,38 @@ class WhyNot:
 
 
 def why_not(graph: Graph, output: Name, input: Name) -> WhyNot:  # noqa: A002 (its name)
-    """Why `output` does not depend on `input`; both are given as for `why`.
+    """Why `output` does not depend on `input`: how far the input reaches, and what the output is made from.
 
-    Raises GraphError when it does, or for a name that the graph does not have or that several nodes have.
+    Parameters
+    ----------
+    graph : Graph
+        Where they are.
+    output, input : str or Node
+        Names of an output and an input, or of nodes named by `cg.with_name`, or nodes.
+
+    Returns
+    -------
+    WhyNot
+        `print` it for the explanation.
+
+    Raises
+    ------
+    GraphError
+        If the output does depend on the input, or the graph has no node or several nodes of a name.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x, y = cg.variables("x y")
+    >>> print(cg.why_not(cg.Graph([x, y], {"f": cg.sin(x), "g": x * y}), "f", "y"))
+    f does not depend on y.
+    y reaches 1 other node, and of the outputs g.
+    f is made from x.
+    The two meet where f does not look: %2 = x * y.
     """
     names = Names(graph)
     source, sink = names.one(input), names.output(output)
-    reached, made_from = users(graph.nodes, [source]), makers([sink])
+    reached, made_from = descendants(graph.nodes, [source]), ancestors([sink])
     to, origin = (who if isinstance(who, str) else names.text(who) for who in (output, input))
     if sink in reached:
         raise GraphError(f"{to} depends on {origin}; cg.why lists the paths")
@@ -86,7 +131,7 @@ def why_not(graph: Graph, output: Name, input: Name) -> WhyNot:  # noqa: A002 (i
 
 
 def _first_meetings(graph: Graph, reached: set[Node], made_from: set[Node]) -> tuple[Node, ...]:
-    """Nodes of `reached` with an argument (no mere number) in `made_from`, and none of them behind another."""
+    """Nodes of `reached` with an argument, not a constant, in `made_from`; none of them a descendant of another."""
     met: set[Node] = set()
     first = []
     for node in graph.nodes:

@@ -1,30 +1,27 @@
-"""LLVM's text for a program: a function for each graph and layout of its arguments, and one that runs the passes."""
+"""LLVM's text for a program: one function that runs the passes, and those that its statements call."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from ..codegen.llvm_ir import Arithmetic, body, libm_functions, point_arithmetic, preamble
-from ..core.graph import Graph
-from .lu_solve import factor_text, solve_text
+from ..codegen.llvm_ir import Arithmetic, libm_functions, point_arithmetic, preamble
+from .llvm_functions import Functions, Lengths
 from .program import Call, Factor, If, Map, Program, Solve, Statement, Sum, While
-
-_ARGUMENT = {"x": "in", "y": "out"}  # by the names that `body` gives to the two sides of a graph
-_Layout = tuple[int, ...]  # lengths of registers, of a graph's inputs or outputs
 
 
 def program_functions(program: Program) -> dict[str, int]:
     """The functions of the C library that the program's graphs call, {name: number of arguments}."""
-    found: dict[str, int] = {}
+    calls: dict[str, int] = {}
     for graph in program.graphs():
-        found |= libm_functions(graph)
-    return dict(sorted(found.items()))
+        calls |= libm_functions(graph)
+    return dict(sorted(calls.items()))
 
 
 def offsets(program: Program, width: int) -> dict[str, int]:
     """Where each register begins in the memory, and, under "", the size of it all.
 
-    A register of more than one number fills up to a multiple of `width`, so that whole vectors can be read and written.
+    A register of more than one number is padded to a multiple of `width`, so that whole vectors can be read and
+    written.
     """
     at, places = 0, {}
     for name, length in program.registers.items():
@@ -41,34 +38,37 @@ def program_ir(program: Program, flags: str = "", lanes: int = 1, width: int = 1
     after every `every`th pass; the result is how many; the number of passes that were run goes to `done`.
     width: of the vectors in which `Map` goes through its elements.
     """
-    text = _Text(program, point_arithmetic(flags) if lanes == 1 else Arithmetic(flags, lanes), width)
-    main = text.main()
-    return "\n".join([*preamble(program.graphs(), text.arithmetic), *text.definitions, *main, ""])
+    arithmetic = point_arithmetic(flags) if lanes == 1 else Arithmetic(flags, lanes)
+    functions = Functions(arithmetic, width)
+    run = _RunFunction(program, functions).lines()
+    return "\n".join([*preamble(program.graphs(), arithmetic), *functions.definitions, *run, ""])
 
 
-class _Text:
-    def __init__(self, program: Program, arithmetic: Arithmetic, width: int) -> None:
-        self.program, self.arithmetic, self.width = program, arithmetic, width
-        self.type, self.size = arithmetic.type, 8 * arithmetic.lanes
-        self.definitions: list[str] = []
-        self._named: dict[tuple[object, ...], str] = {}
-        self._lines: list[str] = []
-        self._scratch: list[str] = []  # allocations, made once at the start
-        self._count = 0
+class _RunFunction:
+    """The function `run`: the passes, and in each of them the statements, the record and the stop.
 
-    def main(self) -> list[str]:
-        """The function that runs the passes; the definitions that it calls are made on the way."""
-        program, places = self.program, offsets(self.program, self.width)
-        registers = [
-            f"  %r{number} = getelementptr {self.type}, ptr %memory, i64 {places[name]}"
-            for number, name in enumerate(program.registers)
-        ]
-        self._numbers = {name: f"%r{number}" for number, name in enumerate(program.registers)}
-        self._run(program.body)
+    for (done = 0; done < passes;) { statements; done++; if (--until == 0) { until = every; record } if (stop) break }
+    """
+
+    def __init__(self, program: Program, functions: Functions) -> None:
+        self.program, self.functions = program, functions
+        self.type, self.size = functions.arithmetic.type, 8 * functions.arithmetic.lanes  # of a number, in bytes
+        self._pointers = {name: f"%r{number}" for number, name in enumerate(program.registers)}
+        self._lines: list[str] = []  # of the statements
+        self._scratch: list[str] = []  # allocations, which stand once at the start
+        self._count = 0  # of statements so far, for names
+
+    def lines(self) -> list[str]:
+        """The whole function."""
+        places = offsets(self.program, self.functions.width)
+        self._run(self.program.body)
         return [
             "define i64 @run(ptr noalias %memory, ptr noalias %records, i64 %passes, i64 %every, ptr %done) nounwind {",
             "start:",
-            *registers,
+            *(
+                f"  {pointer} = getelementptr {self.type}, ptr %memory, i64 {places[name]}"
+                for name, pointer in self._pointers.items()
+            ),
             *self._scratch,
             "  %row = alloca ptr, align 8",
             "  %until = alloca i64, align 8",
@@ -86,18 +86,18 @@ class _Text:
             "  store i64 %after, ptr %done",
             *self._record(),
             *self._stop(),
-            "end:",
+            "end:",  # rows = (row - records) / bytes of a row
             "  %last = load ptr, ptr %row",
             "  %last.at = ptrtoint ptr %last to i64",
             "  %first.at = ptrtoint ptr %records to i64",
             "  %bytes = sub i64 %last.at, %first.at",
-            f"  %rows = sdiv i64 %bytes, {max(1, program.width) * self.size}",
+            f"  %rows = sdiv i64 %bytes, {max(1, self.program.width) * self.size}",
             "  ret i64 %rows",
             "}",
         ]
 
     def _record(self) -> list[str]:
-        """Count the pass, and write a row when one is due."""
+        """if (--until == 0) { until = every; if (record_if > 0) write a row }."""
         lines = [
             "  %waited = load i64, ptr %until",
             "  %waits = sub i64 %waited, 1",
@@ -116,23 +116,25 @@ class _Text:
         for k, name in enumerate(self.program.record):
             length = self.program.registers[name]
             lines += [
-                _copied(f"%row{k}", self._numbers[name], length * self.size),
+                _copy(f"%row{k}", self._pointers[name], length * self.size),
                 f"  %row{k + 1} = getelementptr {self.type}, ptr %row{k}, i64 {length}",
             ]
         return [*lines, f"  store ptr %row{len(self.program.record)}, ptr %row", "  br label %recorded", "recorded:"]
 
     def _stop(self) -> list[str]:
+        """if (stop != 0) break, where NaN counts as not 0."""
         if self.program.stop is None:
             return ["  br label %top"]
         return [
-            f"  %stop.value = load double, ptr {self._numbers[self.program.stop]}, align 8",
+            f"  %stop.value = load double, ptr {self._pointers[self.program.stop]}, align 8",
             "  %stop = fcmp une double %stop.value, 0.0",
             "  br i1 %stop, label %end, label %top",
         ]
 
     def _positive(self, result: str, register: str) -> list[str]:
+        """result = register > 0, where NaN is not."""
         return [
-            f"  {result}.value = load double, ptr {self._numbers[register]}, align 8",
+            f"  {result}.value = load double, ptr {self._pointers[register]}, align 8",
             f"  {result} = fcmp ogt double {result}.value, 0.0",
         ]
 
@@ -142,20 +144,21 @@ class _Text:
             _WRITERS[type(statement)](self, statement)
 
     def _call(self, call: Call) -> None:
-        name = self._function(call.graph, self._lengths(call.inputs), self._lengths(call.outputs))
+        name = self.functions.call(call.graph, self._lengths(call.inputs), self._lengths(call.outputs))
         self._calls(name, call.inputs, call.outputs)
 
     def _map(self, statement: Map) -> None:
         if count := self.program.elements(statement):
-            name = self._mapped(statement.graph, self._lengths(statement.inputs), count)
+            name = self.functions.map(statement.graph, self._lengths(statement.inputs), count)
             self._calls(name, statement.inputs, statement.outputs)
 
     def _sum(self, statement: Sum) -> None:
         count = self.program.elements(statement)
-        name = self._summed(statement.graph, self._lengths(statement.inputs), count)
+        name = self.functions.sum(statement.graph, self._lengths(statement.inputs), count)
         self._calls(name, statement.inputs, (statement.output,))
 
     def _while(self, statement: While) -> None:
+        """while (register > 0) body."""
         label = f"while{self._count}"
         self._lines += [f"  br label %{label}", f"{label}:"]
         self._lines += self._positive(f"%{label}.on", statement.register)
@@ -164,6 +167,7 @@ class _Text:
         self._lines += [f"  br label %{label}", f"{label}.end:"]
 
     def _if(self, statement: If) -> None:
+        """if (register > 0) body else otherwise."""
         label = f"if{self._count}"
         self._lines += self._positive(f"%{label}.on", statement.register)
         self._lines += [f"  br i1 %{label}.on, label %{label}.yes, label %{label}.no", f"{label}.yes:"]
@@ -173,160 +177,47 @@ class _Text:
         self._lines += [f"  br label %{label}.end", f"{label}.end:"]
 
     def _factor(self, statement: Factor) -> None:
-        name = self._define(("factor",), lambda _: factor_text(self.arithmetic.flags), "lu.factor")
-        at, n = self._numbers, self.program.registers[statement.pivots]
-        self._lines.append(f"  call void @{name}(ptr {at[statement.matrix]}, ptr {at[statement.pivots]}, i64 {n})")
+        at, n = self._pointers, self.program.registers[statement.pivots]
+        arguments = f"ptr {at[statement.matrix]}, ptr {at[statement.pivots]}, i64 {n}"
+        self._lines.append(f"  call void @{self.functions.factor()}({arguments})")
 
     def _solve(self, statement: Solve) -> None:
-        name = self._define(("solve",), lambda _: solve_text(self.arithmetic.flags), "lu.solve")
-        at, n = self._numbers, self.program.registers[statement.pivots]
-        arguments = ", ".join(f"ptr {at[each]}" for each in (statement.matrix, statement.pivots, statement.vector))
-        self._lines.append(f"  call void @{name}({arguments}, i64 {n})")
+        n = self.program.registers[statement.pivots]
+        registers = (statement.matrix, statement.pivots, statement.vector)
+        arguments = ", ".join(f"ptr {self._pointers[name]}" for name in registers)
+        self._lines.append(f"  call void @{self.functions.solve()}({arguments}, i64 {n})")
 
     def _calls(self, name: str, inputs: Sequence[str], outputs: Sequence[str]) -> None:
-        """Call a function of registers. What it both reads and writes is written beside, and copied afterwards."""
+        """Call a function of registers, whose arguments must not overlap.
+
+        A register that it both reads and writes is written to scratch memory, and copied after the call.
+        """
         targets, copies = [], []
         for k, output in enumerate(outputs):
-            target, length = self._numbers[output], self.program.registers[output]
+            target, length = self._pointers[output], self.program.registers[output]
             if output in inputs:
-                beside = f"%beside{self._count}.{k}"
-                self._scratch.append(f"  {beside} = alloca {self.type}, i64 {length + self.width}, align 64")
-                copies.append(_copied(target, beside, length * self.size))
-                target = beside
+                scratch = f"%beside{self._count}.{k}"
+                self._scratch.append(f"  {scratch} = alloca {self.type}, i64 {length + self.functions.width}, align 64")
+                copies.append(_copy(target, scratch, length * self.size))
+                target = scratch
             targets.append(target)
-        arguments = ", ".join(f"ptr {each}" for each in (*(self._numbers[name] for name in inputs), *targets))
-        self._lines += [f"  call void @{name}({arguments})", *copies]
+        pointers = [*(self._pointers[register] for register in inputs), *targets]
+        self._lines += [f"  call void @{name}({', '.join(f'ptr {pointer}' for pointer in pointers)})", *copies]
 
-    def _lengths(self, names: Sequence[str]) -> _Layout:
+    def _lengths(self, names: Sequence[str]) -> Lengths:
         return tuple([self.program.registers[name] for name in names])
-
-    def _define(self, key: tuple[object, ...], make: Callable[[str], list[str]], name: str) -> str:
-        if key not in self._named:
-            self._named[key] = name
-            self.definitions += make(name)
-        return self._named[key]
-
-    def _function(self, graph: Graph, inputs: _Layout, outputs: _Layout) -> str:
-        """`void f(register of inputs, .., register of outputs, ..)`."""
-        places = {
-            base: [(group, k) for group, length in enumerate(lengths) for k in range(length)]
-            for base, lengths in (("x", inputs), ("y", outputs))
-        }
-
-        def address(base: str, name: str, row: int) -> list[str]:
-            group, k = places[base][row]
-            return [f"  {name} = getelementptr {self.type}, ptr %{_ARGUMENT[base]}{group}, i64 {k}"]
-
-        def make(name: str) -> list[str]:
-            head = f"define internal void @{name}({_arguments(len(inputs), len(outputs))}) nounwind {{"
-            return [head, "start:", *body(graph, self.arithmetic, address), "  ret void", "}"]
-
-        return self._define((id(graph), inputs, outputs), make, f"call{len(self._named)}")
-
-    def _mapped(self, graph: Graph, inputs: _Layout, count: int) -> str:
-        """The graph of one element, for each element."""
-
-        def address(base: str, name: str, row: int) -> list[str]:
-            moving = base == "y" or inputs[row] == count
-            return [f"  {name} = getelementptr {self.type}, ptr %{_ARGUMENT[base]}{row}, i64 {'%i' if moving else 0}"]
-
-        def make(name: str) -> list[str]:
-            head = f"define internal void @{name}({_arguments(len(inputs), len(graph.outputs))}) nounwind {{"
-            return [head, "start:", *_each(body(graph, self.arithmetic, address), [], count), "  ret void", "}"]
-
-        vectors = self.arithmetic.lanes == 1 and self.width > 1 and count > 1 and not libm_functions(graph)
-        chosen = self._mapped_by_vectors(graph, inputs, count) if vectors else make
-        return self._define(("map", id(graph), inputs, count), chosen, f"map{len(self._named)}")
-
-    def _mapped_by_vectors(self, graph: Graph, inputs: _Layout, count: int) -> Callable[[str], list[str]]:
-        """As `_mapped`, a vector of elements at a time; what is computed beyond the last stays in the filling."""
-        arithmetic = Arithmetic(self.arithmetic.flags, self.width)
-        t, same = arithmetic.type, [k for k, length in enumerate(inputs) if length != count]
-
-        def address(base: str, name: str, row: int) -> list[str]:
-            if base == "x" and row in same:
-                return [f"  {name} = getelementptr {t}, ptr %same{row}, i64 0"]
-            return [f"  {name} = getelementptr {t}, ptr %{_ARGUMENT[base]}{row}, i64 %i"]
-
-        def make(name: str) -> list[str]:
-            spread = []
-            for k in same:
-                spread += [
-                    f"  %same{k} = alloca {t}, align 64",
-                    f"  %one{k} = load double, ptr %in{k}, align 8",
-                    f"  %first{k} = insertelement {t} poison, double %one{k}, i32 0",
-                    f"  %all{k} = shufflevector {t} %first{k}, {t} poison, <{self.width} x i32> zeroinitializer",
-                    f"  store {t} %all{k}, ptr %same{k}, align 64",
-                ]
-            head = f"define internal void @{name}({_arguments(len(inputs), len(graph.outputs))}) nounwind {{"
-            lines = _each(body(graph, arithmetic, address), [], -(-count // self.width))
-            return [head, "start:", *spread, *lines, "  ret void", "}"]
-
-        return make
-
-    def _summed(self, graph: Graph, inputs: _Layout, count: int) -> str:
-        """The graph's values at all elements, added up."""
-        t = self.type
-
-        def address(base: str, name: str, row: int) -> list[str]:
-            if base == "y":
-                return [f"  {name} = getelementptr {t}, ptr %one, i64 0"]
-            return [f"  {name} = getelementptr {t}, ptr %in{row}, i64 {'%i' if inputs[row] == count else 0}"]
-
-        def make(name: str) -> list[str]:
-            zero = self.arithmetic.number(0.0)
-            add = [
-                f"  %so.far = load {t}, ptr %out0, align 8",
-                f"  %here = load {t}, ptr %one, align 8",
-                f"  %total = fadd {t} %so.far, %here",
-                f"  store {t} %total, ptr %out0, align 8",
-            ]
-            return [
-                f"define internal void @{name}({_arguments(len(inputs), 1)}) nounwind {{",
-                "start:",
-                f"  %one = alloca {t}, align 64",
-                f"  store {t} {zero}, ptr %out0, align 8",
-                *(_each(body(graph, self.arithmetic, address), add, count) if count else []),
-                "  ret void",
-                "}",
-            ]
-
-        return self._define(("sum", id(graph), inputs, count), make, f"sum{len(self._named)}")
 
 
 _WRITERS: dict[type, Callable[..., None]] = {
-    Call: _Text._call,
-    Map: _Text._map,
-    Sum: _Text._sum,
-    While: _Text._while,
-    If: _Text._if,
-    Factor: _Text._factor,
-    Solve: _Text._solve,
+    Call: _RunFunction._call,
+    Map: _RunFunction._map,
+    Sum: _RunFunction._sum,
+    While: _RunFunction._while,
+    If: _RunFunction._if,
+    Factor: _RunFunction._factor,
+    Solve: _RunFunction._solve,
 }
 
 
-def _arguments(inputs: int, outputs: int) -> str:
-    return ", ".join(
-        [*(f"ptr noalias %in{k}" for k in range(inputs)), *(f"ptr noalias %out{k}" for k in range(outputs))]
-    )
-
-
-def _each(lines: list[str], after: list[str], count: int) -> list[str]:
-    """The lines for %i = 0 .. count - 1."""
-    return [
-        "  br label %each",
-        "each:",
-        "  %i = phi i64 [ 0, %start ], [ %next, %last ]",
-        *lines,
-        "  br label %last",
-        "last:",
-        *after,
-        "  %next = add i64 %i, 1",
-        f"  %more = icmp slt i64 %next, {count}",
-        "  br i1 %more, label %each, label %end",
-        "end:",
-    ]
-
-
-def _copied(target: str, source: str, size: int) -> str:
+def _copy(target: str, source: str, size: int) -> str:
     return f"  call void @llvm.memcpy.p0.p0.i64(ptr {target}, ptr {source}, i64 {size}, i1 false)"

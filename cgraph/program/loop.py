@@ -1,4 +1,4 @@
-"""Loop: one graph repeated on its own carry, such as a step of a fixed-step integrator."""
+"""Loop: one graph repeated on its own results, such as a step of a fixed-step integrator."""
 
 from __future__ import annotations
 
@@ -14,15 +14,29 @@ from ..core.node import CONSTANT, Node, variable
 from ..core.traversal import rebuild, topological
 from ..errors import GraphError
 from ..util.real_arrays import real_array
+from .choose_runner import runner
 from .program import Call, Program
-from .runner import runner
 
 
 class Loop:
-    """A graph that runs on its own results, see `loop`.
+    """A graph that is repeated on its own results; made by `loop`.
 
-    graph: one pass.  carry: {input: the output that follows}.  before: what depends on inputs that hold their values
-    alone, which is computed once before the first pass; None where there is nothing of the kind.
+    Attributes
+    ----------
+    graph : Graph
+        One pass.
+    carry : dict of str to str
+        {input: the output whose value it has in the next pass}.
+    invariants : Graph or None
+        The operations on constant inputs alone, which are computed once before the first pass.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x = cg.variable("x")
+    >>> halve = cg.loop(cg.Graph([x], {"next": 0.5 * x}), {"x": "next"})
+    >>> halve([8.0], passes=3).ravel().tolist()
+    [4.0, 2.0, 1.0]
     """
 
     def __init__(self, graph: Graph, carry: Mapping[str, str], backend: str, *, fast: bool, fma: bool) -> None:
@@ -37,41 +51,58 @@ class Loop:
         self._held = [k for k, name in enumerate(graph.input_names) if name not in carry]
         moving, held = ([graph.inputs[k] for k in chosen] for chosen in (self._moving, self._held))
         wanted = [graph.outputs[carry[name]] for name in carry]
-        self.before, still = _still(wanted, held)
-        new = rebuild(wanted, still, lambda n, args: Node(n.op, args, n.label, name=n.name))
+        self.invariants, stand_ins = _loop_invariants(wanted, held)
+        new = rebuild(wanted, stand_ins, lambda n, args: Node(n.op, args, n.label, name=n.name))
         one_pass = Graph(
-            [*moving, *held, *still.values()], dict(zip(carry, [new[node] for node in wanted], strict=True))
+            [*moving, *held, *stand_ins.values()], dict(zip(carry, [new[node] for node in wanted], strict=True))
         )
-        registers = {"carry": len(moving), "held": len(held), "still": len(still)}
-        program = Program(registers, [Call(one_pass, ("carry", "held", "still"), ("carry",))], record=["carry"])
+        registers = {"carry": len(moving), "held": len(held), "invariant": len(stand_ins)}
+        program = Program(registers, [Call(one_pass, ("carry", "held", "invariant"), ("carry",))], record=["carry"])
         self._runner = runner(program, backend, fast=fast, fma=fma)
 
     def __call__(self, x: ArrayLike, passes: int, every: int = 1) -> Array:
-        """The carry after each `every`th pass, (passes // every, carried), from the inputs x (n_in,).
+        """Run the passes from one start.
 
-        Raises GraphError for another shape of x, or `passes` or `every` out of range.
+        Parameters
+        ----------
+        x : array_like, shape (n_in,)
+            Values of the graph's inputs in the first pass.
+        passes : int
+            How many, at least 0.
+        every : int
+            Record the carried values after each `every`th pass.
+
+        Returns
+        -------
+        ndarray, shape (passes // every, n_carry)
+            The carried values, in the order of `carry`.
+
+        Raises
+        ------
+        GraphError
+            If x has another shape, or `passes` or `every` is out of range.
         """
         return self._runner.run(self._memory(x, 1), passes, every).rows
 
     def batch(self, X: ArrayLike, passes: int, every: int = 1) -> Array:
-        """As a call, for N starts X (n_in, N) side by side: (passes // every, carried, N)."""
+        """Run the passes from N starts at once: X (n_in, N) gives (passes // every, n_carry, N)."""
         return self._runner.run_many(self._memory(X, 2), passes, every).rows
 
     def _memory(self, x: ArrayLike, dimensions: int) -> Array:
-        given = real_array("x", x)
+        values = real_array("x", x)
         count = len(self.graph.inputs)
-        if given.ndim != dimensions or given.shape[0] != count:
+        if values.ndim != dimensions or values.shape[0] != count:
             wanted = f"({count},)" if dimensions == 1 else f"({count}, N)"
-            raise GraphError(f"x must have shape {wanted}, one row for each input, got {given.shape}")
-        registers = {"carry": given[self._moving], "held": given[self._held]}
-        if self.before is not None:
-            values = self.before.evaluate(dict(zip(self.before.input_names, given[self._held], strict=True)))
-            registers["still"] = np.array(list(values.values()))
-        return self._runner.memory(registers, None if dimensions == 1 else given.shape[1])
+            raise GraphError(f"x must have shape {wanted}, one row for each input, got {values.shape}")
+        registers = {"carry": values[self._moving], "held": values[self._held]}
+        if self.invariants is not None:
+            held = dict(zip(self.invariants.input_names, values[self._held], strict=True))
+            registers["invariant"] = np.array(list(self.invariants.evaluate(held).values()))
+        return self._runner.memory(registers, None if dimensions == 1 else values.shape[1])
 
 
-def _still(outputs: Sequence[Node], held: Sequence[Node]) -> tuple[Graph | None, dict[Node, Node]]:
-    """What the outputs need of operations on `held` alone: as a graph, and a variable to stand for each."""
+def _loop_invariants(outputs: Sequence[Node], held: Sequence[Node]) -> tuple[Graph | None, dict[Node, Node]]:
+    """The operations on `held` alone that the outputs need: as a graph, and {operation: variable in its place}."""
     nodes = topological(outputs)
     constant = {node for node in nodes if node.op is CONSTANT}
     fixed = constant | set(held)
@@ -80,26 +111,51 @@ def _still(outputs: Sequence[Node], held: Sequence[Node]) -> tuple[Graph | None,
             fixed.add(node)
     used = [arg for node in nodes if node not in fixed for arg in node.args] + list(outputs)
     taken = {node.name for node in nodes}
-    names = (name for name in (f"still{k}" for k in itertools.count()) if name not in taken)
-    found = [node for node in dict.fromkeys(used) if node in fixed and node.args]
-    if not found:
+    names = (name for name in (f"invariant{k}" for k in itertools.count()) if name not in taken)
+    invariants = [node for node in dict.fromkeys(used) if node in fixed and node.args]
+    if not invariants:
         return None, {}
-    return Graph(held, {f"{k}": node for k, node in enumerate(found)}), {node: variable(next(names)) for node in found}
+    graph = Graph(held, {f"{k}": node for k, node in enumerate(invariants)})
+    return graph, {node: variable(next(names)) for node in invariants}
 
 
 def loop(
     graph: Graph, carry: Mapping[str, str], backend: str = "auto", *, fast: bool = False, fma: bool = True
 ) -> Loop:
-    """A function that repeats the graph on its own carry without returning to Python.
+    """A function that repeats a graph on its own results, without returning to Python in between.
 
-    carry: {input: output}: after each pass the input takes the output's value; other inputs hold theirs.
-    `loop(x, passes, every)` gives the carry after each `every`th pass. backend: "llvm", "python" or "auto" (machine
-    code where llvmlite is installed); fast, fma: see `compile`.
+    Parameters
+    ----------
+    graph : Graph
+        One pass.
+    carry : mapping of str to str
+        {input: output}: after each pass the input takes the output's value. Other inputs keep theirs.
+    backend : {"auto", "llvm", "python"}
+        "llvm" is machine code (extra `native`); "auto" takes it where llvmlite is installed.
+    fast, fma : bool
+        Liberties with rounding, as in `compile`.
 
-    Raises GraphError for an input or output that the graph does not have.
+    Returns
+    -------
+    Loop
+        `run(x, passes, every)` gives the carried values after each `every`th pass.
 
+    Raises
+    ------
+    GraphError
+        If the graph lacks an input or output of `carry`, or `carry` is empty.
+    ValueError
+        If the backend is unknown.
+    ImportError
+        If the backend is "llvm" and llvmlite is not installed.
+
+    Examples
+    --------
+    >>> import cgraph as cg
     >>> x, v, h = cg.variables("x v h")
     >>> spring = cg.Graph([x, v, h], {"x_next": x + h * v, "v_next": v - h * (x + h * v)})
-    >>> turns = cg.loop(spring, {"x": "x_next", "v": "v_next"})([1.0, 0.0, 1e-3], passes=6283, every=100)
+    >>> run = cg.loop(spring, {"x": "x_next", "v": "v_next"})
+    >>> run([1.0, 0.0, 0.5], passes=4, every=2).tolist()
+    [[0.75, -0.875], [-0.203125, -0.9296875]]
     """
     return Loop(graph, carry, backend, fast=fast, fma=fma)

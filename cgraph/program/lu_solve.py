@@ -1,4 +1,4 @@
-"""LU factorisation with partial pivoting, as LLVM text and in NumPy: the same operations in the same order."""
+"""LU factorization with partial pivoting, as LLVM text and in NumPy: the same operations in the same order."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def factor(a: Array, pivots: Array) -> None:
-    """LU = PA in place of a (n, n); pivots (n,) receives the row that row k changed places with."""
+    """LU = PA in place of a (n, n), L with a unit diagonal; pivots (n,) receives the row exchanged with row k."""
     n = len(a)
     with np.errstate(all="ignore"):
         for k in range(n):
@@ -22,7 +22,7 @@ def factor(a: Array, pivots: Array) -> None:
                     row = i
             pivots[k] = row
             a[[k, row]] = a[[row, k]]
-            a[k + 1 :, k] /= a[k, k]
+            a[k + 1 :, k] /= a[k, k]  # column k of L; then the Schur complement
             a[k + 1 :, k + 1 :] -= a[k + 1 :, k, None] * a[k, k + 1 :]
 
 
@@ -30,50 +30,50 @@ def solve(a: Array, pivots: Array, b: Array) -> None:
     """The solution of A x = b in place of b (n,)."""
     n = len(a)
     with np.errstate(all="ignore"):
-        for k in range(n):
+        for k in range(n):  # b = P b
             row = int(pivots[k])
             b[k], b[row] = b[row], b[k]
-        for k in range(n):
+        for k in range(n):  # L y = b
             b[k + 1 :] -= a[k + 1 :, k] * b[k]
-        for k in reversed(range(n)):
+        for k in reversed(range(n)):  # U x = y
             b[k] /= a[k, k]
             b[:k] -= a[:k, k] * b[k]
 
 
-class _Text:
-    """Lines of one function, with loops."""
+class _FunctionWriter:
+    """Lines of one function over doubles in memory, with loops; every value has a new name."""
 
     def __init__(self, flags: str) -> None:
         self.lines: list[str] = []
         self.flags = f"{flags} " if flags else ""
         self._block, self._count = "start", 0
 
-    def new(self, instruction: str) -> str:
-        """One more value, and its name."""
+    def value(self, instruction: str) -> str:
+        """Write an instruction; the name of its value."""
         self._count += 1
         self.lines.append(f"  %t{self._count} = {instruction}")
         return f"%t{self._count}"
 
     def do(self, instruction: str) -> None:
-        """An instruction without a value."""
+        """Write an instruction without a value."""
         self.lines.append(f"  {instruction}")
 
     def at(self, base: str, index: str) -> str:
-        """The address of an element."""
-        return self.new(f"getelementptr double, ptr {base}, i64 {index}")
+        """The address of base[index]."""
+        return self.value(f"getelementptr double, ptr {base}, i64 {index}")
 
     def load(self, address: str) -> str:
         """The double at an address."""
-        return self.new(f"load double, ptr {address}, align 8")
+        return self.value(f"load double, ptr {address}, align 8")
 
     def element(self, row: str, column: str) -> str:
-        """The address of a matrix element."""
-        return self.at("%a", self.new(f"add i64 {self.new(f'mul i64 {row}, %n')}, {column}"))
+        """The address of a[row, column] = a[row * n + column]."""
+        return self.at("%a", self.value(f"add i64 {self.value(f'mul i64 {row}, %n')}, {column}"))
 
     def subtract_product(self, target: str, a: str, b: str) -> None:
-        """target -= a * b."""
-        product = self.new(f"fmul {self.flags}double {a}, {b}")
-        self.do(f"store double {self.new(f'fsub {self.flags}double {self.load(target)}, {product}')}, ptr {target}")
+        """*target -= a * b."""
+        product = self.value(f"fmul {self.flags}double {a}, {b}")
+        self.do(f"store double {self.value(f'fsub {self.flags}double {self.load(target)}, {product}')}, ptr {target}")
 
     def swap(self, a: str, b: str) -> None:
         """Exchange the doubles at two addresses."""
@@ -83,7 +83,7 @@ class _Text:
 
     @contextmanager
     def loop(self, first: str, end: str) -> Iterator[str]:
-        """For i from `first` up to `end`, which is left out."""
+        """The lines inside, for i = first .. end - 1."""
         self._count += 1
         i, before = f"%i{self._count}", self._block
         name = i[1:]
@@ -107,45 +107,51 @@ class _Text:
 
 def factor_text(flags: str) -> list[str]:
     """`void lu.factor(double *a, double *p, int64_t n)`, as `factor`."""
-    to = _Text(flags)
-    largest = to.new("alloca i64, align 8")
-    with to.loop("0", "%n") as k:
-        next_k = to.new(f"add i64 {k}, 1")
-        to.do(f"store i64 {k}, ptr {largest}")
-        with to.loop(next_k, "%n") as i:
-            row = to.new(f"load i64, ptr {largest}")
-            here, best = (to.load(to.element(each, k)) for each in (i, row))
-            here, best = (to.new(f"call double @llvm.fabs.f64(double {each})") for each in (here, best))
-            chosen = to.new(f"select i1 {to.new(f'fcmp ogt double {here}, {best}')}, i64 {i}, i64 {row}")
-            to.do(f"store i64 {chosen}, ptr {largest}")
-        row = to.new(f"load i64, ptr {largest}")
-        to.do(f"store double {to.new(f'sitofp i64 {row} to double')}, ptr {to.at('%p', k)}")
-        with to.loop("0", "%n") as j:
-            to.swap(to.element(k, j), to.element(row, j))
-        pivot = to.load(to.element(k, k))
-        with to.loop(next_k, "%n") as i:
-            target = to.element(i, k)
-            gain = to.new(f"fdiv {to.flags}double {to.load(target)}, {pivot}")
-            to.do(f"store double {gain}, ptr {target}")
-            with to.loop(next_k, "%n") as j:
-                to.subtract_product(to.element(i, j), gain, to.load(to.element(k, j)))
-    return to.function("lu.factor", "ptr %a, ptr %p, i64 %n")
+    ir = _FunctionWriter(flags)
+    largest = ir.value("alloca i64, align 8")
+    with ir.loop("0", "%n") as k:
+        # row = argmax over i >= k of |a[i, k]|
+        next_k = ir.value(f"add i64 {k}, 1")
+        ir.do(f"store i64 {k}, ptr {largest}")
+        with ir.loop(next_k, "%n") as i:
+            row = ir.value(f"load i64, ptr {largest}")
+            here, best = (ir.load(ir.element(index, k)) for index in (i, row))
+            here, best = (ir.value(f"call double @llvm.fabs.f64(double {number})") for number in (here, best))
+            chosen = ir.value(f"select i1 {ir.value(f'fcmp ogt double {here}, {best}')}, i64 {i}, i64 {row}")
+            ir.do(f"store i64 {chosen}, ptr {largest}")
+        # p[k] = row; exchange rows k and row
+        row = ir.value(f"load i64, ptr {largest}")
+        ir.do(f"store double {ir.value(f'sitofp i64 {row} to double')}, ptr {ir.at('%p', k)}")
+        with ir.loop("0", "%n") as j:
+            ir.swap(ir.element(k, j), ir.element(row, j))
+        # for i > k:  l = a[i, k] /= a[k, k];  a[i, j] -= l a[k, j] for j > k
+        pivot = ir.load(ir.element(k, k))
+        with ir.loop(next_k, "%n") as i:
+            target = ir.element(i, k)
+            gain = ir.value(f"fdiv {ir.flags}double {ir.load(target)}, {pivot}")
+            ir.do(f"store double {gain}, ptr {target}")
+            with ir.loop(next_k, "%n") as j:
+                ir.subtract_product(ir.element(i, j), gain, ir.load(ir.element(k, j)))
+    return ir.function("lu.factor", "ptr %a, ptr %p, i64 %n")
 
 
 def solve_text(flags: str) -> list[str]:
     """`void lu.solve(double *a, double *p, double *b, int64_t n)`, as `solve`."""
-    to = _Text(flags)
-    with to.loop("0", "%n") as k:
-        row = to.new(f"fptosi double {to.load(to.at('%p', k))} to i64")
-        to.swap(to.at("%b", k), to.at("%b", row))
-    with to.loop("0", "%n") as k:
-        value = to.load(to.at("%b", k))
-        with to.loop(to.new(f"add i64 {k}, 1"), "%n") as i:
-            to.subtract_product(to.at("%b", i), to.load(to.element(i, k)), value)
-    with to.loop("0", "%n") as back:
-        k = to.new(f"sub i64 {to.new('sub i64 %n, 1')}, {back}")
-        value = to.new(f"fdiv {to.flags}double {to.load(to.at('%b', k))}, {to.load(to.element(k, k))}")
-        to.do(f"store double {value}, ptr {to.at('%b', k)}")
-        with to.loop("0", k) as i:
-            to.subtract_product(to.at("%b", i), to.load(to.element(i, k)), value)
-    return to.function("lu.solve", "ptr %a, ptr %p, ptr %b, i64 %n")
+    ir = _FunctionWriter(flags)
+    # b = P b
+    with ir.loop("0", "%n") as k:
+        row = ir.value(f"fptosi double {ir.load(ir.at('%p', k))} to i64")
+        ir.swap(ir.at("%b", k), ir.at("%b", row))
+    # L y = b:  b[i] -= a[i, k] b[k] for i > k, k = 0 .. n - 1
+    with ir.loop("0", "%n") as k:
+        value = ir.load(ir.at("%b", k))
+        with ir.loop(ir.value(f"add i64 {k}, 1"), "%n") as i:
+            ir.subtract_product(ir.at("%b", i), ir.load(ir.element(i, k)), value)
+    # U x = y:  b[k] /= a[k, k], b[i] -= a[i, k] b[k] for i < k, k = n - 1 .. 0
+    with ir.loop("0", "%n") as back:
+        k = ir.value(f"sub i64 {ir.value('sub i64 %n, 1')}, {back}")
+        value = ir.value(f"fdiv {ir.flags}double {ir.load(ir.at('%b', k))}, {ir.load(ir.element(k, k))}")
+        ir.do(f"store double {value}, ptr {ir.at('%b', k)}")
+        with ir.loop("0", k) as i:
+            ir.subtract_product(ir.at("%b", i), ir.load(ir.element(i, k)), value)
+    return ir.function("lu.solve", "ptr %a, ptr %p, ptr %b, i64 %n")

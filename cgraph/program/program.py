@@ -12,7 +12,22 @@ from ..errors import GraphError
 
 @dataclass(frozen=True)
 class Call:
-    """outputs = graph(inputs): the registers, end to end, are the graph's inputs in order, and its outputs."""
+    """outputs = graph(inputs).
+
+    Attributes
+    ----------
+    graph : Graph
+        The function.
+    inputs, outputs : tuple of str
+        Registers which, end to end, are the graph's inputs and outputs in order.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Call
+    >>> a, b = cg.variables("a b")
+    >>> swap = Call(cg.Graph([a, b], {"first": b, "second": a}), ("pair",), ("pair",))
+    """
 
     graph: Graph
     inputs: tuple[str, ...]
@@ -21,9 +36,22 @@ class Call:
 
 @dataclass(frozen=True)
 class Map:
-    """Each output register, element by element: graph(elements of the inputs). Inputs of length 1 serve every element.
+    """outputs[i] = graph(inputs[i]) for every element i.
 
-    One register for each input and each output of the graph.
+    Attributes
+    ----------
+    graph : Graph
+        The function of one element.
+    inputs, outputs : tuple of str
+        A register for each input and each output of the graph, of one common length; an input of length 1 has the same
+        value for every element.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Map
+    >>> x, h = cg.variables("x h")
+    >>> scale = Map(cg.Graph([x, h], {"y": x * h}), ("values", "step"), ("values",))
     """
 
     graph: Graph
@@ -33,7 +61,24 @@ class Map:
 
 @dataclass(frozen=True)
 class Sum:
-    """output (length 1) = the sum of graph(elements of the inputs), from the first element to the last."""
+    """output = sum over i of graph(inputs[i]), from the first element to the last.
+
+    Attributes
+    ----------
+    graph : Graph
+        The function of one element, with one output.
+    inputs : tuple of str
+        A register for each input of the graph, of one common length or of length 1.
+    output : str
+        A register of length 1.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Sum
+    >>> x = cg.variable("x")
+    >>> norm = Sum(cg.Graph([x], {"square": x * x}), ("values",), "total")
+    """
 
     graph: Graph
     inputs: tuple[str, ...]
@@ -42,7 +87,22 @@ class Sum:
 
 @dataclass(frozen=True)
 class While:
-    """The body again and again, as long as the register (length 1) is positive; a NaN is not."""
+    """while (register > 0) body.
+
+    Attributes
+    ----------
+    register : str
+        A register of length 1; NaN is not positive.
+    body : tuple of Statement
+        What is repeated.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Call, While
+    >>> n = cg.variable("n")
+    >>> countdown = While("n", (Call(cg.Graph([n], {"less": n - 1.0}), ("n",), ("n",)),))
+    """
 
     register: str
     body: tuple[Statement, ...]
@@ -50,7 +110,22 @@ class While:
 
 @dataclass(frozen=True)
 class If:
-    """The body when the register (length 1) is positive, else `otherwise`."""
+    """if (register > 0) body else otherwise.
+
+    Attributes
+    ----------
+    register : str
+        A register of length 1; NaN is not positive.
+    body, otherwise : tuple of Statement
+        What is run in either case.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Call, If
+    >>> n = cg.variable("n")
+    >>> not_below_zero = If("n", (), (Call(cg.Graph([], {"zero": 0.0}), (), ("n",)),))
+    """
 
     register: str
     body: tuple[Statement, ...]
@@ -59,9 +134,21 @@ class If:
 
 @dataclass(frozen=True)
 class Factor:
-    """LU = PA in place of the matrix (n * n, row by row), with partial pivoting; its row exchanges go to `pivots` (n).
+    """LU = PA in place of a matrix A, with partial pivoting.
 
     Of a singular matrix a pivot is 0, and `Solve` then gives infinities or NaN.
+
+    Attributes
+    ----------
+    matrix : str
+        A register of length n * n: A, row by row.
+    pivots : str
+        A register of length n, which receives the row exchanges.
+
+    Examples
+    --------
+    >>> from cgraph.extend import Factor, Program, Solve
+    >>> program = Program({"A": 4, "p": 2, "b": 2}, [Factor("A", "p"), Solve("A", "p", "b")], record=["b"])
     """
 
     matrix: str
@@ -70,7 +157,22 @@ class Factor:
 
 @dataclass(frozen=True)
 class Solve:
-    """The solution of A x = b in place of b (n), by what `Factor` left of A."""
+    """The solution of A x = b in place of b.
+
+    Attributes
+    ----------
+    matrix, pivots : str
+        The registers of A and its row exchanges, after `Factor`.
+    vector : str
+        A register of length n: b, then x.
+
+    Examples
+    --------
+    >>> from cgraph.extend import Program, Solve, runner
+    >>> solve = runner(Program({"LU": 1, "p": 1, "b": 1}, [Solve("LU", "p", "b")], record=["b"]))
+    >>> solve.run(solve.memory({"LU": 2.0, "p": 0.0, "b": 6.0}), passes=1).rows.tolist()
+    [[3.0]]
+    """
 
     matrix: str
     pivots: str
@@ -82,14 +184,35 @@ Statement = Call | Map | Sum | While | If | Factor | Solve
 
 @dataclass(frozen=True)
 class Program:
-    """A loop body over named registers; see `runner` for how it is run.
+    """A loop body over named registers of numbers, which `runner` makes ready to run.
 
-    registers: {name: length}, all the numbers there are.  body: what one pass does.
-    record: registers that make a row of the record, end to end.
-    record_if: a register (length 1); a pass at whose end it is not positive records nothing.
-    stop: a register (length 1); the passes end after one at whose end it is not 0.
+    Parameters
+    ----------
+    registers : mapping of str to int
+        {name: length}: all the numbers that a program works on.
+    body : sequence of Statement
+        What one pass does: `Call`, `Map`, `Sum`, `While`, `If`, `Factor`, `Solve`.
+    record : sequence of str
+        Registers which, end to end, make a row of the record.
+    record_if : str, optional
+        A register of length 1; a pass at whose end it is not positive records nothing.
+    stop : str, optional
+        A register of length 1; the passes end after one at whose end it is not 0.
 
-    Raises GraphError, naming the statement, for an unknown register or lengths that do not fit.
+    Raises
+    ------
+    GraphError
+        If a statement names an unknown register, or registers of lengths that do not fit.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Call, Program, runner
+    >>> x = cg.variable("x")
+    >>> halve = Call(cg.Graph([x], {"next": 0.5 * x}), ("x",), ("x",))
+    >>> run = runner(Program({"x": 1}, [halve], record=["x"]))
+    >>> run.run(run.memory({"x": 8.0}), passes=3).rows.ravel().tolist()
+    [4.0, 2.0, 1.0]
     """
 
     registers: Mapping[str, int]
@@ -127,11 +250,11 @@ class Program:
 
     def graphs(self) -> list[Graph]:
         """The graphs that statements run, each once."""
-        found: dict[int, Graph] = {}
+        graphs: dict[int, Graph] = {}
         for statement in self.statements():
             if isinstance(statement, Call | Map | Sum):
-                found.setdefault(id(statement.graph), statement.graph)
-        return list(found.values())
+                graphs.setdefault(id(statement.graph), statement.graph)
+        return list(graphs.values())
 
     def _length(self, where: str, name: str) -> int:
         if name not in self.registers:
@@ -139,15 +262,15 @@ class Program:
         return self.registers[name]
 
     def _need(self, where: str, name: str, length: int) -> None:
-        if (found := self._length(where, name)) != length:
-            raise GraphError(f"{where} needs register {name!r} to have length {length}, got {found}")
+        if (actual := self._length(where, name)) != length:
+            raise GraphError(f"{where} needs register {name!r} to have length {length}, got {actual}")
 
     def _check_call(self, call: Call) -> None:
         where = f"Call of {call.graph!r}"
         sides = (("inputs", call.inputs, len(call.graph.inputs)), ("outputs", call.outputs, len(call.graph.outputs)))
         for what, names, needed in sides:
-            if (found := sum(self._length(where, name) for name in names)) != needed:
-                raise GraphError(f"{where} needs {needed} {what}, the registers {', '.join(names)} hold {found}")
+            if (total := sum(self._length(where, name) for name in names)) != needed:
+                raise GraphError(f"{where} needs {needed} {what}, the registers {', '.join(names)} hold {total}")
         _check_once(where, call.outputs)
 
     def _check_elements(self, statement: Map | Sum) -> None:
@@ -168,7 +291,7 @@ class Program:
         _check_once(where, outputs)
 
     def elements(self, statement: Map | Sum) -> int:
-        """Over how many elements it runs."""
+        """The number of elements that a statement runs over."""
         names = statement.outputs if isinstance(statement, Map) else statement.inputs
         return max([self.registers[name] for name in names], default=1)
 

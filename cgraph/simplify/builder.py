@@ -4,16 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from ..core.label import Label, building
+from ..core.label import Label
 from ..core.node import CONSTANT, Node, Op, constant
+from ..core.scope import building
 from ..core.traversal import rebuild
 
 
 class Builder:
     """Builds nodes folded and shared: the same operation on the same arguments is made once.
 
-    Merging unites labels, and keeps the first name. Only nodes that this builder made are merged, so nobody else's
-    node changes. A node that comes without tags, as a sum at a variable does, takes those of its arguments.
+    Merging unites labels, and keeps the first name. Only nodes that this builder made are merged, so that no other
+    node changes. A node without tags, such as a sum at a variable, takes those of its arguments.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Builder, building
+    >>> x = cg.variable("x")
+    >>> with building(Builder()):
+    ...     print(0.0 + x is x, x * cg.sin(x) is x * cg.sin(x))
+    True True
     """
 
     def __init__(self) -> None:
@@ -51,9 +61,29 @@ class Builder:
 
 
 def folded(nodes: Collection[Node], build: Builder) -> list[Node]:
-    """Copies of nodes, and of all that they reach, made by `build`.
+    """Copies of nodes, and of all that they reach, made by a builder.
 
     Once is enough: a rule sees the very arguments that the copy keeps, so a copy of the copy would come out alike.
+
+    Parameters
+    ----------
+    nodes : collection of Node
+        What to copy.
+    build : Builder
+        What the copies are made by, and shared with.
+
+    Returns
+    -------
+    list of Node
+        The copies, in the order of `nodes`.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Builder, folded
+    >>> x = cg.variable("x")
+    >>> folded([1.0 * x + 0.0], Builder())
+    [<node variable x>]
     """
     with building(build) as labelled:
 

@@ -7,24 +7,49 @@ own, in `core.op_double_double`; an operation without one takes the low parts of
 from __future__ import annotations
 
 from ..core.graph import Graph
-from ..core.label import Label, building
+from ..core.label import Label
 from ..core.node import CONSTANT, Node, Op, apply, as_node, constant
 from ..core.op_double_double import ZERO, Pair, normal
 from ..core.ops import zero_safe_mul
+from ..core.scope import building
 from ..core.traversal import topological
 
 
 def double_double(graph: Graph, *, low: bool = False) -> Graph:
     """The same function, with sums, differences, products, quotients and roots to twice the digits of float64.
 
-    Same inputs and outputs, the outputs rounded to float64; with `low` an output NAME_low for each, what that rounding
-    took off. Tags and roles stay. Inputs and constants count as exact. Functions (sin, exp, ..) are those of
-    float64 with the low part of their argument to first order: to an ulp, which is like a rounding of the data.
+    Tags and roles stay. Inputs and constants count as exact. Functions (sin, exp, ..) are those of float64 with the low
+    part of their argument to first order: to an ulp, which is like a rounding of the data.
 
     For arithmetic that cancels, such as accelerations of chains whose masses differ by 1e12, and to see what rounding
     does to a graph: the difference from it is its error. Sums become some 20 operations, products 30, quotients 50.
     Every back end keeps them, fused multiply-add or not, but `fast=True` and `cg.simplify`, which take sums in another
     order, do not: simplify before. What overflows becomes NaN, from 1e300 on for the operands of a product.
+
+    Parameters
+    ----------
+    graph : Graph
+        Any graph.
+    low : bool
+        Add an output NAME_low for each output: what its rounding to float64 took off.
+
+    Returns
+    -------
+    Graph
+        With the same inputs and outputs, the outputs rounded to float64.
+
+    Raises
+    ------
+    TypeError
+        If it is not a graph.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x = cg.variable("x")
+    >>> graph = cg.Graph([x], {"y": (x + 1e16) - 1e16})
+    >>> graph.evaluate({"x": 1.0}), cg.double_double(graph).evaluate({"x": 1.0})
+    ({'y': 0.0}, {'y': 1.0})
     """
     if not isinstance(graph, Graph):
         raise TypeError(f"double_double takes a Graph, got {type(graph).__name__}: {graph!r:.60}")

@@ -13,27 +13,69 @@ Polynomial = dict[Monomial, float]  # coefficients; terms that cancel are gone
 
 
 def expand(node: Node, atoms: Mapping[Node, str] | None = None) -> Polynomial:
-    """The terms of a node that is built by +, -, * and whole powers from variables, constants and `atoms`.
+    """The terms of a node that is built by +, -, * and whole powers from variables and constants.
 
-    atoms: {inner node: name} to be kept as a symbol of its own. Raises GraphError at any other operation.
+    Parameters
+    ----------
+    node : Node
+        What to expand.
+    atoms : mapping of Node to str, optional
+        {inner node: name}, nodes that are written as one symbol.
+
+    Returns
+    -------
+    dict of tuple to float
+        {monomial: coefficient}, a monomial being ((name, power), ...) in order of names; terms that cancel are absent.
+
+    Raises
+    ------
+    GraphError
+        If the node is made by any other operation.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import expand
+    >>> a, b = cg.variables("a b")
+    >>> expand((a - b) * (a + b))
+    {(('a', 2),): 1.0, (('b', 2),): -1.0}
     """
     atoms = atoms or {}
     value: dict[Node, Polynomial] = {}
-    for each in topological([node]):
-        if each in atoms:
-            value[each] = {((atoms[each], 1),): 1.0}
-        elif each.op is CONSTANT:
-            assert each.value is not None
-            value[each] = {(): each.value} if each.value else {}
-        elif not each.args:
-            value[each] = {((str(each.name), 1),): 1.0}
+    for inner in topological([node]):
+        if inner in atoms:
+            value[inner] = {((atoms[inner], 1),): 1.0}
+        elif inner.op is CONSTANT:
+            assert inner.value is not None
+            value[inner] = {(): inner.value} if inner.value else {}
+        elif not inner.args:
+            value[inner] = {((str(inner.name), 1),): 1.0}
         else:
-            value[each] = _operation(each, [value[arg] for arg in each.args])
+            value[inner] = _operation(inner, [value[arg] for arg in inner.args])
     return value[node]
 
 
 def format_polynomial(terms: Polynomial) -> str:
-    """Text such as `I*qdd0 - 2*dt*k*qd0`, terms in order of degree and name."""
+    """A polynomial as text, terms in order of degree and name.
+
+    Parameters
+    ----------
+    terms : Polynomial
+        {monomial: coefficient}, see `expand`.
+
+    Returns
+    -------
+    str
+        Such as `I*qdd0 - 2*dt*k*qd0`; "0" without terms.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import expand, format_polynomial
+    >>> a, b = cg.variables("a b")
+    >>> format_polynomial(expand((a - b) ** 2))
+    '-2*a*b + a^2 + b^2'
+    """
     text = ""
     for monomial, coefficient in sorted(terms.items(), key=lambda item: (sum(p for _, p in item[0]), item[0])):
         factors = [name if power == 1 else f"{name}^{power}" for name, power in monomial]

@@ -14,10 +14,25 @@ from .builder import Builder, folded
 def simplify(graph: Graph) -> Graph:
     """The same function in fewer nodes: constants folded and collected, equal nodes merged, `1 * x` and the like gone.
 
-    Never grows: the result has at most as many nodes and, for as many nodes, no more edges.
-
     Assumes finite operands and non-zero divisors: `0 * x = 0`, `x - x = 0`, `x / x = 1`, `x + 0 = x` also for -0.0.
     Sums and products may be taken in another order, so values can differ by rounding.
+
+    Parameters
+    ----------
+    graph : Graph
+        Any graph.
+
+    Returns
+    -------
+    Graph
+        With the same inputs and outputs and at most as many nodes; for as many nodes, no more edges.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x = cg.variable("x")
+    >>> cg.simplify(cg.Graph([x], {"y": 1.0 * x + (x - 0.0) * cg.exp(0.0)}))
+    <Graph (x) -> (y): 3 nodes, 2 edges>
     """
     nodes = folded(graph.outputs.values(), Builder())
     candidate = Graph(graph.inputs, dict(zip(graph.outputs, nodes, strict=True)))
@@ -29,10 +44,36 @@ def _size(graph: Graph) -> tuple[int, int]:
 
 
 def specialize(graph: Graph, values: Mapping[str, Scalar], outputs: Sequence[str] | None = None) -> Graph:
-    """The graph with inputs bound to numbers (or nodes over its other inputs), simplified; bound inputs are gone.
+    """The graph with inputs bound to numbers, simplified.
 
-    values: {input name: number}.  outputs: names of those to keep (default: all).
-    Raises GraphError for a name that the graph does not have, ValueError for NaN.
+    Parameters
+    ----------
+    graph : Graph
+        Any graph.
+    values : mapping of str to float or Node
+        {input: number, or a node over the other inputs}.
+    outputs : sequence of str, optional
+        The outputs to keep; by default all.
+
+    Returns
+    -------
+    Graph
+        Without the bound inputs.
+
+    Raises
+    ------
+    GraphError
+        If the graph has no such input or output.
+    ValueError
+        If a number is NaN.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> m, v = cg.variables("m v")
+    >>> energy = cg.Graph([m, v], {"T": 0.5 * m * v * v})
+    >>> cg.specialize(energy, {"m": 2.0}).evaluate({"v": 3.0})
+    {'T': 9.0}
     """
     replace = {}
     for name, value in values.items():

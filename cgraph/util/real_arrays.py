@@ -1,4 +1,4 @@
-"""Real: numbers and arrays of them as callers give them, checked."""
+"""Real numbers, and arrays of them, from what callers pass: checked."""
 
 from __future__ import annotations
 
@@ -12,10 +12,35 @@ _KINDS = {"c": "complex numbers", "U": "text", "S": "text", "M": "dates", "m": "
 
 
 def real_array(what: str, value: Any) -> Array:
-    """The value as an array of float64. Raises TypeError, naming `what`, for what NumPy would make numbers of silently.
+    """The value as an array of float64, but not from what NumPy would silently make numbers of.
 
-    That is complex numbers (their imaginary part would go), text, dates, and arrays with masked values.
-    Raises ValueError for rows of different lengths.
+    Parameters
+    ----------
+    what : str
+        What the value is, for the error's sentence.
+    value : array_like
+        Real numbers.
+
+    Returns
+    -------
+    ndarray of float64
+        The value itself if it is one already, else a copy.
+
+    Raises
+    ------
+    TypeError
+        If there are complex numbers (their imaginary part would be lost), text, dates, or masked values.
+    ValueError
+        If rows have different lengths.
+
+    Examples
+    --------
+    >>> from cgraph.extend import real_array
+    >>> real_array("q", [1, 2])
+    array([1., 2.])
+    >>> real_array("q", [1, 2j])
+    Traceback (most recent call last):
+    TypeError: q must be real numbers, got complex numbers
     """
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value
@@ -26,7 +51,7 @@ def real_array(what: str, value: Any) -> Array:
     except ValueError:
         raise ValueError(f"{what} must be an array of real numbers, got rows of different lengths") from None
     if array.dtype.kind == "O":
-        bad = next((each for each in array.ravel() if not isinstance(each, numbers.Real)), None)
+        bad = next((item for item in array.ravel() if not isinstance(item, numbers.Real)), None)
         if bad is not None or None in array.ravel().tolist():
             raise TypeError(f"{what} must be real numbers, got {type(bad).__name__}: {bad!r:.60}")
     elif array.dtype.kind not in "biuf":
@@ -35,7 +60,31 @@ def real_array(what: str, value: Any) -> Array:
 
 
 def real_number(what: str, value: Any) -> float:
-    """The value as a float. Raises TypeError, naming `what`, for anything but a real number."""
+    """The value as a float.
+
+    Parameters
+    ----------
+    what : str
+        What the value is, for the error's sentence.
+    value : float
+        A real number.
+
+    Returns
+    -------
+    float
+        The number.
+
+    Raises
+    ------
+    TypeError
+        If it is anything but a real number.
+
+    Examples
+    --------
+    >>> from cgraph.extend import real_number
+    >>> real_number("mass", 2)
+    2.0
+    """
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value.item()
     if isinstance(value, bool) or not isinstance(value, numbers.Real):

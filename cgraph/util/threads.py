@@ -1,4 +1,4 @@
-"""Work shared out among threads."""
+"""Work shared among threads."""
 
 from __future__ import annotations
 
@@ -11,7 +11,29 @@ import numpy as np
 
 
 def thread_count(threads: int | None) -> int:
-    """The number of threads asked for; None: one for each core that this process may use."""
+    """The number of threads that an argument `threads` asks for.
+
+    Parameters
+    ----------
+    threads : int or None
+        At least 1; None means one for each core that this process may use.
+
+    Returns
+    -------
+    int
+        At least 1.
+
+    Raises
+    ------
+    ValueError
+        If it is anything else.
+
+    Examples
+    --------
+    >>> from cgraph.extend import thread_count
+    >>> thread_count(3)
+    3
+    """
     if threads is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     if not isinstance(threads, (int, np.integer)) or threads < 1:
@@ -20,9 +42,9 @@ def thread_count(threads: int | None) -> int:
 
 
 def share(work: Callable[[int], None], items: Iterable[int], threads: int) -> None:
-    """`work(item)` for every item, each by whichever thread is free; the caller's is one of them.
+    """Run `work(item)` for every item, in whichever thread is free; the caller's thread is one of them.
 
-    After an exception, Ctrl-C among them, nobody begins another item; it is raised once all have stopped.
+    After an exception, Ctrl-C among them, no thread begins another item; it is raised once all have stopped.
     """
     waiting = deque(items)
 
@@ -44,5 +66,5 @@ def share(work: Callable[[int], None], items: Iterable[int], threads: int) -> No
     with ThreadPoolExecutor(threads - 1) as pool:  # not kept: threads do not survive a fork
         others = [pool.submit(run) for _ in range(threads - 1)]
         run()
-        for each in others:
-            each.result()
+        for other in others:
+            other.result()

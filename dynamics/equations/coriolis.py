@@ -9,7 +9,8 @@ from cgraph.extend import Builder, building, folded, hessian_nodes, tangents, to
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .equations_of_motion import bias
-from .formulations import ONE, ZERO, substituted
+from .formulations import ONE, ZERO
+from .substitute import substitute
 
 
 def coriolis(model: Model) -> Graph:
@@ -20,43 +21,91 @@ def coriolis(model: Model) -> Graph:
     bias. Forces linear in qd (gyroscopic, magnetic) would be halved by that; they count in full, and being skew they
     leave dM/dt - 2 C skew. Where L depends on t, so do they, and dM/dt - 2 C is skew less twice dM/dt at fixed q.
 
-    Inputs q0.., qd0.., t if needed, parameters; outputs C_0_0, C_0_1, .. row by row, (n, n) [N m s or N s].
-    Raises ValueError for an L that is not quadratic in the velocities.
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene with n coordinates.
+
+    Returns
+    -------
+    Graph
+        Inputs q0.., qd0.., t if needed, parameters; outputs C_0_0, C_0_1, .. row by row, (n, n) [N m s or N s].
+
+    Raises
+    ------
+    ValueError
+        For an L that is not quadratic in the velocities.
+    TypeError
+        For what is no model, or has no Lagrangian.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> slider = dyn.System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + (q[0] * qd[1]) ** 2), ["r", "theta"])
+    >>> dyn.coriolis(slider).evaluate({"q0": 2.0, "q1": 0.0, "qd0": 3.0, "qd1": 5.0})
+    {'C_0_0': 0.0, 'C_0_1': -10.0, 'C_1_0': 10.0, 'C_1_1': 6.0}
     """
     system = as_system(model)
-    quadratic(system)
+    require_quadratic(system)
     forces = bias(system).outputs
-    outputs = {
-        f"C_{i}_{j}": entry
-        for i, row in enumerate(matrix(system, list(forces.values()), Builder()))
-        for j, entry in enumerate(row)
-    }
+    rows = coriolis_matrix(system, list(forces.values()), Builder())
+    outputs = {f"C_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row)}
     return cg.simplify(system.graph(outputs, system.q, system.qd))
 
 
-def matrix(system: System, forces: list[Node], build: Builder) -> list[list[Node]]:
-    """Rows of C from the nodes of the bias."""
-    columns = [tangents({velocity: ONE}, forces, build) for velocity in system.qd]
-    slopes = [[column.get(force, ZERO) for column in columns] for force in forces]
-    at_rest = dict.fromkeys(system.qd, ZERO)
-    linear = folded(substituted([entry for row in slopes for entry in row], at_rest), build)
+def coriolis_matrix(system: System, forces: list[Node], build: Builder) -> list[list[Node]]:
+    """Rows of C from the nodes of the bias, b(q, qd) = c(q, qd) + G(q) qd + g(q), c of degree two in qd.
+
+    db/dqd = dc/dqd + G, and at qd = 0 it is G. By Euler's theorem dc/dqd qd = 2 c, so C = (dc/dqd) / 2 + G, which is
+    (db/dqd + db/dqd at qd = 0) / 2.
+    """
+    n = system.n
+    columns = [tangents({velocity: ONE}, forces, build) for velocity in system.qd]  # one sweep gives db/dqd_j
+    partials = [column.get(force, ZERO) for force in forces for column in columns]  # db/dqd, row by row
+    linear = folded(substitute(partials, dict.fromkeys(system.qd, ZERO)), build)  # G
     with building(build):
-        halves = [0.5 * (a + b) for a, b in zip([entry for row in slopes for entry in row], linear, strict=True)]
-    return [halves[i * system.n : (i + 1) * system.n] for i in range(system.n)]
+        entries = [0.5 * (a + b) for a, b in zip(partials, linear, strict=True)]
+    return [entries[i * n : (i + 1) * n] for i in range(n)]
 
 
-def quadratic(system: System) -> None:
+def require_quadratic(system: System) -> None:
     """Raises ValueError unless L is quadratic in the velocities, that is, M does not depend on them."""
     (lagrangian,) = folded([system.lagrangian], Builder())
     rows = hessian_nodes(lagrangian, system.qd)
-    moving = set(topological([entry for row in rows for entry in row])) & set(system.qd)
-    if moving:
-        name = min(str(node.name) for node in moving)
-        raise ValueError(f"the Lagrangian must be quadratic in the velocities, its mass matrix depends on {name}")
+    reached = set(topological([entry for row in rows for entry in row]))
+    for name, velocity in zip(system.coordinates, system.qd, strict=True):
+        if velocity in reached:
+            raise ValueError(
+                "the Lagrangian must be quadratic in the velocities, "
+                f"its mass matrix depends on that of {name!r} ({velocity.name})"
+            )
 
 
 def damping_force(model: Model) -> Graph:
-    """The torque that viscous damping takes, D qd. Inputs q0.., qd0..; outputs damping0.. [N m or N]."""
+    """The force that viscous damping takes, D qd.
+
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene with n coordinates.
+
+    Returns
+    -------
+    Graph
+        Inputs q0.., qd0.., t if needed, parameters; outputs damping0.., (n,) [N m or N].
+
+    Raises
+    ------
+    TypeError
+        For what is no model, or has no Lagrangian.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm(masses=[1.0], lengths=[1.0], damping=0.5)
+    >>> dyn.damping_force(arm).evaluate({"q0": 0.0, "qd0": 3.0})
+    {'damping0': 1.5}
+    """
     system = as_system(model)
     with building(Builder()), cg.tag("damping"):
         taken = [damping * qd for damping, qd in zip(system.damping, system.qd, strict=True)]

@@ -2,40 +2,63 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import (
-    Builder,
-    SingularError,
-    building,
-    cotangents,
-    folded,
-    hessian_nodes,
-    ldl_solve,
-    solve_nodes,
-    tangents,
-)
+from cgraph.extend import Builder, SingularError, building, cotangents, hessian_nodes, ldl_solve, solve_nodes
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
-from .formulations import ONE, ZERO, substituted
-from .velocity_nodes import rates
+from .bias_terms import BiasTerms, bias_terms, bias_terms_of_lagrangian
+from .formulations import ONE, ZERO
+from .substitute import substitute
 
 
 class SingularMassMatrixError(ValueError):
-    """A coordinate that has no inertia, so that its acceleration is not determined."""
+    """A coordinate has no inertia, so that its acceleration is not determined.
+
+    The message names the coordinate. `forward_dynamics` and what is made from it raise it where the mass matrix is
+    singular at every state, `raise_if_singular` where it is singular at one.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> massless = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - q[0] * q[1], ["x", "y"])
+    >>> try:
+    ...     dyn.forward_dynamics(massless)
+    ... except dyn.SingularMassMatrixError as error:
+    ...     print(error)
+    the mass matrix is singular: coordinate 'y' has no inertia, or none that others do not share
+    """
 
 
 def mass_matrix(model: Model) -> Graph:
     """M(q), the part of tau that multiplies qdd: M = d2L/dqd2.
 
-    Inputs q0.., qd0.. (M depends on qd only for a Lagrangian that is not quadratic), t if needed, parameters.
-    Outputs M_0_0, M_0_1, .. row by row, (n, n) symmetric [kg m^2, kg m or kg].
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene with n coordinates.
+
+    Returns
+    -------
+    Graph
+        Inputs q0.., qd0.. (M depends on qd only for a Lagrangian that is not quadratic), t if needed, parameters.
+        Outputs M_0_0, M_0_1, .. row by row, (n, n), symmetric [kg m^2, kg m or kg].
+
+    Raises
+    ------
+    TypeError
+        For what is no model, or has no Lagrangian.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm(masses=[3.0], lengths=[2.0])
+    >>> dyn.mass_matrix(arm).evaluate({"q0": 0.1, "qd0": 0.0})
+    {'M_0_0': 4.0}
     """
     system = as_system(model)
     lower = hessian_nodes(system.lagrangian, system.qd)
@@ -47,25 +70,93 @@ def mass_matrix(model: Model) -> Graph:
 def bias(model: Model) -> Graph:
     """Coriolis, centrifugal and gravity force together: tau at qdd = 0 without damping and applied forces.
 
-    Inputs q0.., qd0.., t if needed, parameters; outputs bias0.. [N m or N].
+    tau + forces - damping * qd = M qdd + bias.
+
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene with n coordinates.
+
+    Returns
+    -------
+    Graph
+        Inputs q0.., qd0.., t if needed, parameters; outputs bias0.., (n,) [N m or N].
+
+    Raises
+    ------
+    TypeError
+        For what is no model, or has no Lagrangian.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm(masses=[1.0], lengths=[2.0], gravity=9.81)
+    >>> dyn.bias(arm).evaluate({"q0": 1.5707963267948966, "qd0": 3.0})
+    {'bias0': 9.81}
     """
     system = as_system(model)
-    outputs = {f"bias{i}": node for i, node in enumerate(_bias(system))}
+    outputs = {f"bias{i}": node for i, node in enumerate(bias_terms(system).bias(system, Builder()))}
     return cg.simplify(system.graph(outputs, system.q, system.qd))
 
 
 def gravity_force(model: Model) -> Graph:
     """The bias at rest: dP/dq, from gravity and springs.
 
-    Inputs q0.., qd0.., t if needed, parameters; outputs gravity0.. [N m or N].
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene with n coordinates.
+
+    Returns
+    -------
+    Graph
+        Inputs q0.., qd0.., t if needed, parameters; outputs gravity0.., (n,) [N m or N].
+
+    Raises
+    ------
+    TypeError
+        For what is no model, or has no Lagrangian.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> print(dyn.gravity_force(dyn.planar_arm(masses=[1.0], lengths=[1.0])).listing(), end="")
+    inputs q0 qd0
+    %1 = sin q0  # adjoint; link 1, potential
+    %2 = mul 4.905 %1  # primal; link 1, potential
+    output gravity0 = %2
     """
     system = as_system(model)
-    at_rest = substituted(_derived(system).bias(system, Builder()), dict.fromkeys(system.qd, ZERO))
+    derived = bias_terms_of_lagrangian(system).bias(system, Builder())
+    at_rest = substitute(derived, dict.fromkeys(system.qd, ZERO))
     return cg.simplify(system.graph({f"gravity{i}": node for i, node in enumerate(at_rest)}, system.q, system.qd))
 
 
 def momentum(model: Model) -> Graph:
-    """Generalized momenta p = dL/dqd. Inputs q0.., qd0.., t if needed, parameters; outputs p0.. ."""
+    """Generalized momenta p = dL/dqd.
+
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene with n coordinates.
+
+    Returns
+    -------
+    Graph
+        Inputs q0.., qd0.., t if needed, parameters; outputs p0.., (n,) [kg m^2/s or kg m/s].
+
+    Raises
+    ------
+    TypeError
+        For what is no model, or has no Lagrangian.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> block = dyn.System(lambda q, qd, t, p: 0.5 * p["m"] * qd[0] ** 2, ["x"], {"m": 2.0})
+    >>> dyn.momentum(block).evaluate({"q0": 0.0, "qd0": 3.0, "m": 2.0})
+    {'p0': 6.0}
+    """
     system = as_system(model)
     bars = cotangents({system.lagrangian: ONE}, system.qd)
     return cg.simplify(system.graph({f"p{i}": bar for i, bar in enumerate(bars)}, system.q, system.qd))
@@ -74,7 +165,27 @@ def momentum(model: Model) -> Graph:
 def energy(model: Model) -> Graph:
     """Total energy E = qd . dL/dqd - L, which is K + P for a kinetic energy quadratic in qd.
 
-    Inputs q0.., qd0.., t if needed, parameters; output E [J].
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene.
+
+    Returns
+    -------
+    Graph
+        Inputs q0.., qd0.., t if needed, parameters; output E [J].
+
+    Raises
+    ------
+    TypeError
+        For what is no model, or has no Lagrangian.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> spring = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 2.0 * q[0] ** 2, ["x"])
+    >>> dyn.energy(spring).evaluate({"q0": 1.0, "qd0": 2.0})
+    {'E': 4.0}
     """
     system = as_system(model)
     build = Builder()
@@ -87,32 +198,56 @@ def energy(model: Model) -> Graph:
     return cg.simplify(system.graph({"E": total}, system.q, system.qd))
 
 
-METHODS = ("auto", "recursive", "dense")
-SHORT = 6  # coordinates; beyond, the dense graph is larger on a tree of bodies, and takes long to build
+SOLUTIONS = ("auto", "recursive", "dense")
+DENSE_UP_TO = 6  # coordinates; beyond, the dense graph is larger on a tree of bodies, and takes long to build
 
 
 def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False) -> Graph:
     """Accelerations: qdd = M^-1 (tau + forces - damping * qd - bias), from the Lagrangian.
 
-    Inputs q0.., qd0.., tau0.., t if needed, parameters; outputs qdd0.. [rad/s^2 or m/s^2].
-    A mechanism gives the bias itself (`System.bias_forces`); of others it is derived.
-    method: "recursive", elimination on the graph of L without forming M (`cg.hessian_solve`): for a tree of bodies the
-    number of nodes is linear in n. "dense", M factored as LDL^T: smaller for very short arms. "auto", the smaller of
-    the two up to 6 coordinates, else recursive.
-    check: one more output, `info`: 0 where M is positive definite, else 1 + the index of the coordinate that was
-    found to have no inertia left, or a negative one; the accelerations mean nothing there. `raise_if_singular`
-    raises on it. Three nodes a coordinate. Without, the result where M is singular is infinite, NaN or meaningless.
+    A mechanism states its bias itself (`System.bias_forces`); of others it is derived.
 
-    Raises SingularMassMatrixError, naming the coordinate, when M is singular at every state; ValueError for an unknown
-    method.
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene with n coordinates.
+    method : {"auto", "recursive", "dense"}
+        "recursive": elimination on the graph of L without forming M (`cg.hessian_solve`); for a tree of bodies the
+        number of nodes is linear in n. "dense": M factored as LDL^T; smaller for very short arms. "auto": the smaller
+        of the two up to 6 coordinates, else recursive.
+    check : bool
+        One more output, `info`: 0 where M is positive definite, else 1 + the index of the coordinate whose inertia
+        is zero or negative after elimination; the accelerations mean nothing there. `raise_if_singular` raises on it.
+        Three nodes a coordinate. Without, the result where M is singular is infinite, NaN or meaningless.
+
+    Returns
+    -------
+    Graph
+        Inputs q0.., qd0.., tau0.., t if needed, parameters; outputs qdd0.., (n,) [rad/s^2 or m/s^2].
+
+    Raises
+    ------
+    SingularMassMatrixError
+        M is singular at every state; the message names the coordinate.
+    ValueError
+        For an unknown method.
+    TypeError
+        For what is no model, or has no Lagrangian.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> block = dyn.System(lambda q, qd, t: 0.5 * 4.0 * qd[0] ** 2, ["x"], damping=0.5)
+    >>> dyn.forward_dynamics(block).evaluate({"q0": 0.0, "qd0": 2.0, "tau0": 9.0})
+    {'qdd0': 2.0}
     """
-    if method not in METHODS:
-        raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
+    if method not in SOLUTIONS:
+        raise ValueError(f"method must be one of {', '.join(SOLUTIONS)}, got {method!r}")
     system = as_system(model)
-    methods = [method] if method != "auto" else ["recursive", "dense"] if system.n <= SHORT else ["recursive"]
-    known = _terms(system)
+    methods = [method] if method != "auto" else ["recursive", "dense"] if system.n <= DENSE_UP_TO else ["recursive"]
+    terms = bias_terms(system)
     try:
-        graphs = [_accelerations(system, known, each, check) for each in methods]
+        graphs = [_accelerations(system, terms, each, check) for each in methods]
     except SingularError as error:
         name = system.coordinates[error.index]
         problem = "not positive definite" if error.pivot else "singular"
@@ -125,7 +260,28 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
 def raise_if_singular(model: Model, info: ArrayLike) -> None:
     """Raise SingularMassMatrixError, naming the coordinate, unless the output `info` of `forward_dynamics` is 0.
 
-    info: a number, or an array of any shape; the first entry that is not 0 is reported, with its index.
+    Parameters
+    ----------
+    model : Model
+        The one that forward dynamics was made from.
+    info : array_like
+        A number, or an array of any shape; the first entry that is not 0 is reported, with its index.
+
+    Raises
+    ------
+    SingularMassMatrixError
+        An entry is not 0: the mass matrix is not positive definite at that state.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> bead = dyn.System(lambda q, qd, t: 0.5 * q[0] * qd[0] ** 2, ["x"])  # its inertia is x
+    >>> values = dyn.forward_dynamics(bead, check=True).evaluate({"q0": -1.0, "qd0": 0.0, "tau0": 1.0})
+    >>> try:
+    ...     dyn.raise_if_singular(bead, values["info"])
+    ... except dyn.SingularMassMatrixError as error:
+    ...     print(error)
+    the mass matrix is not positive definite: coordinate 'x' has an inertia that is not positive
     """
     values = np.asarray(info)
     failed = np.argwhere(values != 0.0)
@@ -138,70 +294,24 @@ def raise_if_singular(model: Model, info: ArrayLike) -> None:
         )
 
 
-def _accelerations(system: System, known: _Terms, method: str, check: bool) -> Graph:
+def _accelerations(system: System, terms: BiasTerms, method: str, check: bool) -> Graph:
+    """M qdd = tau + forces - D qd - bias, solved by one method."""
     build = Builder()
     with building(build):
-        slopes = known.gradient if method == "recursive" else [-bias for bias in known.bias(system, build)]
+        # What stands at the coordinates already. Elimination takes the inertial terms where they are, at their
+        # velocity nodes, and carries them to the coordinates on its way; a dense solve needs the whole bias here.
+        at_rest = terms.gradient if method == "recursive" else [-force for force in terms.bias(system, build)]
         with cg.tag("damping"):
             braking = [damping * qd for damping, qd in zip(system.damping, system.qd, strict=True)]
         rhs = [
-            tau + slope - brake + force
-            for tau, slope, brake, force in zip(system.tau, slopes, braking, known.forces, strict=True)
+            tau + force - brake + applied
+            for tau, force, brake, applied in zip(system.tau, at_rest, braking, terms.forces, strict=True)
         ]
-        inertial = {velocity: -rate for velocity, rate in known.inertial.items()}
-    if method == "recursive":  # carries the inertial terms to the coordinates on its way
-        solved = solve_nodes(known.lagrangian, system.qd, rhs, build, at=inertial, check=check)
+        inertial = {velocity: -force for velocity, force in terms.inertial.items()}
+    if method == "recursive":
+        solved = solve_nodes(terms.lagrangian, system.qd, rhs, build, at=inertial, check=check)
     else:
-        solved = ldl_solve(hessian_nodes(known.lagrangian, system.qd, build), rhs, build, check=check)
+        solved = ldl_solve(hessian_nodes(terms.lagrangian, system.qd, build), rhs, build, check=check)
     names = [f"qdd{i}" for i in range(system.n)] + ["info"] * check
     outputs = dict(zip(names, solved, strict=True))
     return cg.simplify(system.graph(outputs, system.q, system.qd, system.tau))
-
-
-class _Terms(NamedTuple):
-    """Lagrange's equation at qdd = 0 by its rates z: d/dt dL/dqd - dL/dq = (sum of inertial_z dz/dqd) - gradient."""
-
-    lagrangian: Node  # folded and shared
-    forces: list[Node]  # applied ones, the same
-    inertial: dict[Node, Node]  # d/dt dL/dz
-    gradient: list[Node]  # dL/dq at fixed z
-
-    def bias(self, system: System, build: Builder) -> list[Node]:
-        """The terms at the coordinates."""
-        inertial = cotangents(self.inertial, system.qd, build)
-        with building(build):
-            return [rate - slope for rate, slope in zip(inertial, self.gradient, strict=True)]
-
-
-def _terms(system: System) -> _Terms:
-    """As the system gives its bias, or else derived from L."""
-    given = system.bias_forces()
-    if given is None:
-        return _derived(system)
-    pairs = [node for pair in given for node in pair]
-    build = Builder()
-    lagrangian, *nodes = folded([system.lagrangian, *system.forces, *pairs], build)
-    forces, pairs = nodes[: system.n], nodes[system.n :]
-    inertial: dict[Node, Node] = {}
-    with building(build):
-        for velocity, force in zip(pairs[::2], pairs[1::2], strict=True):
-            if velocity.value is None:  # else nothing moves there
-                inertial[velocity] = inertial.get(velocity, ZERO) + force
-    return _Terms(lagrangian, forces, inertial, [ZERO] * system.n)
-
-
-def _derived(system: System) -> _Terms:
-    # Two builders: a term of L must not get the tags of an equal term that derives from it, and hand them on.
-    written, build = Builder(), Builder()
-    lagrangian, *forces = folded([system.lagrangian, *system.forces], written)
-    velocities = rates(lagrangian, system.q, system.qd, system.t, written)
-    bars = cotangents({lagrangian: ONE}, [*system.q, *velocities], build, fixed=set(velocities))
-    gradient, momenta = bars[: system.n], bars[system.n :]
-    x_dot = dict(zip(system.q, system.qd, strict=True)) | ({system.t: ONE} if system.t in system.extra_inputs else {})
-    dots = tangents(x_dot, momenta, build)
-    inertial = {velocity: dots[p] for velocity, p in zip(velocities, momenta, strict=True) if p in dots}
-    return _Terms(lagrangian, forces, inertial, gradient)
-
-
-def _bias(system: System) -> list[Node]:
-    return _terms(system).bias(system, Builder())

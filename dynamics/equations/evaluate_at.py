@@ -13,11 +13,11 @@ from cgraph.extend import real_array
 
 from ..systems.system import TIME, System
 
-STATE = ("q", "qd", "qdd", "tau")
+STATE = ("q", "qd", "qdd", "tau")  # the prefixes of a graph's inputs, each an array of one number a coordinate
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
-def at_state(
+def evaluate_at(
     system: System,
     graph: Graph,
     state: Mapping[str, ArrayLike | None],
@@ -30,17 +30,30 @@ def at_state(
     Raises ValueError for another shape, what is not finite, or a parameter that the system does not have.
     """
     if unknown := set(parameters or {}) - set(system.parameters):
-        raise ValueError(f"the system has no parameter {min(unknown)!r} (it has {', '.join(system.parameters)})")
+        has = ", ".join(system.parameters) or "none"
+        raise ValueError(f"the system has no parameter {min(unknown)!r} (it has {has})")
     values: dict[str, Any] = {TIME: float(t), **system.parameters, **(parameters or {})}
     shape: tuple[int, ...] = ()
     for name in STATE:
-        given = state.get(name)
-        rows = np.zeros(system.n) if given is None else real_array(name, given)
-        if rows.ndim not in (1, 2) or rows.shape[-1] != system.n:
-            raise ValueError(f"{name} must have the shape ({system.n},) or (N, {system.n}), got {rows.shape}")
-        if not np.isfinite(rows).all():
-            raise ValueError(f"{name} must be finite, got {rows[~np.isfinite(rows)][0]}")
+        rows = _rows(system, name, state.get(name))
         shape = np.broadcast_shapes(shape, rows.shape[:-1])
         values |= {f"{name}{i}": column if rows.ndim == 2 else float(column) for i, column in enumerate(rows.T)}
     outputs = graph.evaluate({name: values[name] for name in graph.input_names}).values()
     return np.stack([np.broadcast_to(np.asarray(each, dtype=np.float64), shape) for each in outputs], axis=-1)
+
+
+def _rows(system: System, name: str, values: ArrayLike | None) -> Array:
+    """One part of the state, checked: (n,) or (N, n)."""
+    n = system.n
+    rows = np.zeros(n) if values is None else real_array(name, values)
+    if rows.ndim not in (1, 2) or rows.shape[-1] != n:
+        names = ", ".join(system.coordinates[:8]) + (", ..." if n > 8 else "")
+        raise ValueError(
+            f"{name} must have the shape ({n},) or (N, {n}), one number for each of {names}; got {rows.shape}"
+        )
+    infinite = np.argwhere(~np.isfinite(rows))
+    if len(infinite):
+        at = tuple(infinite[0].tolist())
+        where = f" in row {at[0]}" if rows.ndim == 2 else ""
+        raise ValueError(f"{name} must be finite, got {rows[at]} for {system.coordinates[at[-1]]!r}{where}")
+    return rows

@@ -1,24 +1,28 @@
-"""The formulations of Lagrange's equation as graphs: by definition, kinetic only, and by the chain rule."""
+"""The formulations of Lagrange's equation as graphs: by definition, kinetic only, and by the chain rule.
+
+Equations and figures named here are those of T. Kusaka and T. Tanaka, Robotics 2025, 14(9), 115.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import TANGENT, Builder, building, cotangents, tangents, topological
+from cgraph.extend import TANGENT, Builder, building, cotangents, tangents
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
+from .substitute import substitute
 
 EULER = "euler"  # tag of the embedded relations q = qd dt + q_old and qd = qdd dt + qd_old
 COUPLING = "q of qd"  # tag of the product qd dt in the first of them, through which dL/dqd reaches dL/dq
 ONE, ZERO = cg.constant(1.0), cg.constant(0.0)
 
 
-class Terms(NamedTuple):
-    """What a formulation makes: the two terms of tau = d/dt dL/dqd - dL/dq, and the state they are taken at."""
+class LagrangeTerms(NamedTuple):
+    """The two terms of tau = d/dt dL/dqd - dL/dq as one formulation writes them, and the state they are taken at."""
 
     inputs: list[Node]
     q: list[Node]
@@ -28,46 +32,48 @@ class Terms(NamedTuple):
     gradient: list[Node]  # dL/dq
 
 
-def chain_rule(system: System) -> Terms:
-    """d/dt p = grad_x p . xdot for p = dL/dqd, x = (q, qd), contracted: one reverse sweep, then one forward."""
+def chain_rule(system: System) -> LagrangeTerms:
+    """Section 3: d/dt p = grad_x p . xdot for p = dL/dqd, x = (q, qd), contracted: one reverse sweep, one forward."""
     build = Builder()
     n = system.n
+    # The reverse sweep over L gives both dL/dq and p = dL/dqd; q and qd are independent inputs (Section 2.2).
     bars = cotangents({system.lagrangian: ONE}, [*system.q, *system.qd], build)
     gradient, momentum = bars[:n], bars[n:]
+    # Eq. (4) with y = p: a forward sweep along xdot = (qd, qdd) is the product grad_x p . xdot, never written out.
     dots = tangents(_state_rate(system), momentum, build)
     rate = [dots.get(p, ZERO) for p in momentum]
-    return Terms([*system.q, *system.qd, *system.qdd], system.q, system.qd, momentum, rate, gradient)
+    return LagrangeTerms([*system.q, *system.qd, *system.qdd], system.q, system.qd, momentum, rate, gradient)
 
 
-def chain_rule_literal(system: System) -> Terms:
-    """The chain rule read literally: all 2n gradients of each momentum, one reverse sweep each, then dot products."""
+def chain_rule_literal(system: System) -> LagrangeTerms:
+    """Eq. (4) read literally: the 2n partials of each momentum, a reverse sweep each, then products with xdot."""
     n = system.n
     bars = cotangents({system.lagrangian: ONE}, [*system.q, *system.qd])
     gradient, momentum = bars[:n], bars[n:]
     x_dot = _state_rate(system)
     rate = []
     for p in momentum:
-        slopes = cotangents({p: ONE}, list(x_dot))
+        partials = cotangents({p: ONE}, list(x_dot))  # grad_x p, 2n nodes
         with building(Builder()) as labelled:
             labelled(p.label.derived(TANGENT))
             total = ZERO
-            for slope, dot in zip(slopes, x_dot.values(), strict=True):
-                total = total + slope * dot
+            for partial, dot in zip(partials, x_dot.values(), strict=True):
+                total = total + partial * dot
         rate.append(total)
-    return Terms([*system.q, *system.qd, *system.qdd], system.q, system.qd, momentum, rate, gradient)
+    return LagrangeTerms([*system.q, *system.qd, *system.qdd], system.q, system.qd, momentum, rate, gradient)
 
 
-def euler_embedded(system: System) -> Terms:
-    """By definition, with the Euler relation in the graph: dL/dqd is taken through q = qd dt + q_old (eq. 3: wrong)."""
+def euler_embedded(system: System) -> LagrangeTerms:
+    """By definition, eq. (3) and Figure 1: dL/dqd is taken through q = qd dt + q_old, which is wrong."""
     return _embedded(system, system.lagrangian)
 
 
-def kinetic_only(system: System) -> Terms:
-    """The same embedding with K in place of L in the velocity derivative: right only where K does not depend on q."""
+def kinetic_only(system: System) -> LagrangeTerms:
+    """Figure 2: the same embedding with K in place of L in the velocity derivative; right where K is free of q."""
     return _embedded(system, system.kinetic)
 
 
-def kinetic_only_exact(system: System) -> Terms:
+def kinetic_only_exact(system: System) -> LagrangeTerms:
     """Kinetic only, exact: dK/dqd is taken at independent q and qd, and only then is the relation embedded.
 
     d/dt goes through each embedded quantity at its own rate, qd of q and qdd of qd, not through dt, along which q would
@@ -75,29 +81,58 @@ def kinetic_only_exact(system: System) -> Terms:
     """
     momentum = cotangents({system.kinetic: ONE}, system.qd)
     embedding = _Embedding(system)
-    lagrangian, *embedded = embedding.of(system.lagrangian, *momentum)
+    lagrangian, *embedded = embedding.embed(system.lagrangian, *momentum)
     gradient = cotangents({lagrangian: ONE}, embedding.q)
-    rates = dict(zip([*embedding.q, *embedding.qd], [*embedding.qd, *system.qdd], strict=True))
-    return embedding.terms(embedded, gradient, rates)
+    x_dot = dict(zip([*embedding.q, *embedding.qd], [*embedding.qd, *system.qdd], strict=True))
+    return embedding.terms(embedded, gradient, x_dot)
 
 
-FORMULATIONS: dict[str, Callable[[System], Terms]] = {
-    each.__name__: each for each in (chain_rule, chain_rule_literal, euler_embedded, kinetic_only, kinetic_only_exact)
+FORMULATIONS: dict[str, Callable[[System], LagrangeTerms]] = {
+    formulation.__name__: formulation
+    for formulation in (chain_rule, chain_rule_literal, euler_embedded, kinetic_only, kinetic_only_exact)
 }
+"""Formulations of Lagrange's equation by name, right and wrong ones: what `inverse_dynamics` takes."""
 
 
 def inverse_dynamics(model: Model, formulation: str = "chain_rule", *, simplify: bool = True) -> Graph:
     """tau of the motion: tau = d/dt dL/dqd - dL/dq + damping * qd - forces, by one of the `FORMULATIONS`.
 
-    "chain_rule", "chain_rule_literal": inputs q0.., qd0.., qdd0.., then t if needed and parameters.
-    "euler_embedded", "kinetic_only", "kinetic_only_exact": the state before the step, q0_old.., qd0_old.., then
-    qdd0.., dt, ...; tau is that of the state after the step, qd = qdd dt + qd_old, q = qd dt + q_old.
-    Outputs tau0.. [N m or N]. simplify=False leaves the graph as derived.
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene with n coordinates.
+    formulation : str
+        "chain_rule" is right and the smallest, "chain_rule_literal" the same with every gradient written out.
+        "euler_embedded", "kinetic_only" and "kinetic_only_exact" have the Euler relation in the graph; the first two
+        are wrong, as the paper has them.
+    simplify : bool
+        False leaves the graph as derived.
 
-    Raises ValueError for an unknown formulation.
+    Returns
+    -------
+    Graph
+        Inputs q0.., qd0.., qdd0.., then t if needed and parameters. With the Euler relation: the state before the
+        step, q0_old.., qd0_old.., then qdd0.., dt, ...; tau is that of the state after the step, qd = qdd dt + qd_old,
+        q = qd dt + q_old. Outputs tau0.., (n,) [N m or N].
+
+    Raises
+    ------
+    ValueError
+        For an unknown formulation.
+    TypeError
+        For what is no model, or has no Lagrangian.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> block = dyn.System(lambda q, qd, t: 0.5 * 4.0 * qd[0] ** 2, ["x"], damping=0.5)
+    >>> dyn.inverse_dynamics(block).evaluate({"q0": 0.0, "qd0": 2.0, "qdd0": 3.0})
+    {'tau0': 13.0}
+    >>> list(dyn.FORMULATIONS)
+    ['chain_rule', 'chain_rule_literal', 'euler_embedded', 'kinetic_only', 'kinetic_only_exact']
     """
     system = as_system(model)
-    terms = _terms(system, formulation)
+    terms = _lagrange_terms(system, formulation)
     applied = _forces(system, terms)
     build = Builder()
     outputs = {}
@@ -107,54 +142,94 @@ def inverse_dynamics(model: Model, formulation: str = "chain_rule", *, simplify:
             with cg.tag("damping"):
                 tau = tau + system.damping[i] * terms.qd[i]
             outputs[f"tau{i}"] = tau - applied[i]
-    return _finished(system.graph(outputs, terms.inputs), simplify)
+    graph = system.graph(outputs, terms.inputs)
+    return cg.simplify(graph) if simplify else graph
 
 
 def momentum_rate(
     model: Model, formulation: str = "chain_rule", *, simplify: bool = True, keep_momentum: bool = False
 ) -> Graph:
-    """The inertial term d/dt dL/dqd alone, outputs p0_dot.. : the left side of Eq. (3) and of Figures 1 to 3.
+    """The inertial term d/dt dL/dqd alone: the left side of Eq. (3) and of Figures 1 to 3 of the paper.
 
-    keep_momentum: the momenta p0.. = dL/dqd are outputs too. Inputs, formulations and errors as for `inverse_dynamics`.
+    Parameters
+    ----------
+    model, formulation, simplify
+        As for `inverse_dynamics`.
+    keep_momentum : bool
+        The momenta p0.. = dL/dqd are outputs too.
+
+    Returns
+    -------
+    Graph
+        Inputs as of `inverse_dynamics`; outputs p0_dot.., (n,) [N m or N].
+
+    Raises
+    ------
+    ValueError
+        For an unknown formulation.
+    TypeError
+        For what is no model, or has no Lagrangian.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> spring = dyn.System(lambda q, qd, t: 0.5 * 4.0 * qd[0] ** 2 - 0.5 * 9.0 * q[0] ** 2, ["x"])
+    >>> dyn.momentum_rate(spring).evaluate({"q0": 1.0, "qd0": 2.0, "qdd0": 3.0})  # the spring has no part in it
+    {'p0_dot': 12.0}
     """
     system = as_system(model)
-    terms = _terms(system, formulation)
+    terms = _lagrange_terms(system, formulation)
     outputs = {f"p{i}": p for i, p in enumerate(terms.momentum)} if keep_momentum else {}
     outputs |= {f"p{i}_dot": rate for i, rate in enumerate(terms.momentum_rate)}
-    return _finished(system.graph(outputs, terms.inputs), simplify)
+    graph = system.graph(outputs, terms.inputs)
+    return cg.simplify(graph) if simplify else graph
 
 
 def spurious_nodes(graph: Graph) -> frozenset[Node]:
     """Nodes that are there only because a derivative was taken through the embedded Euler relation.
 
-    They are the adjoints that the product qd dt of q = qd dt + q_old passes on, and all that only these need.
+    They are the adjoints that the product qd dt of q = qd dt + q_old passes on, the "unnecessary terms" of eq. (3), and
+    all that only these need.
+
+    Parameters
+    ----------
+    graph : Graph
+        One of `inverse_dynamics` or `momentum_rate`, by any formulation.
+
+    Returns
+    -------
+    frozenset of Node
+        Empty for a formulation by the chain rule.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> spring = dyn.scenes.load("spring_mass")
+    >>> [len(dyn.spurious_nodes(dyn.momentum_rate(spring, name))) for name in ("chain_rule", "euler_embedded")]
+    [0, 13]
     """
     coupling = {node for node in graph.nodes if COUPLING in node.tags and "adjoint" in node.roles}
-    reached: set[Node] = set()
+    needed: set[Node] = set()
     stack = [node for node in graph.outputs.values() if node not in coupling]
     while stack:
         node = stack.pop()
-        if node not in reached:
-            reached.add(node)
+        if node not in needed:
+            needed.add(node)
             stack.extend(arg for arg in node.args if arg not in coupling)
-    return frozenset(node for node in graph.nodes if node not in reached)
+    return frozenset(node for node in graph.nodes if node not in needed)
 
 
-def _terms(system: System, formulation: str) -> Terms:
+def _lagrange_terms(system: System, formulation: str) -> LagrangeTerms:
     if formulation not in FORMULATIONS:
         raise ValueError(f"formulation must be one of {', '.join(FORMULATIONS)}, got {formulation!r}")
     return FORMULATIONS[formulation](system)
 
 
-def _forces(system: System, terms: Terms) -> list[Node]:
+def _forces(system: System, terms: LagrangeTerms) -> list[Node]:
     """The system's forces at the state of the terms: itself, or the embedded one."""
     if terms.q is system.q:
         return list(system.forces)
-    return substituted(system.forces, dict(zip([*system.q, *system.qd], [*terms.q, *terms.qd], strict=True)))
-
-
-def _finished(graph: Graph, simplify: bool) -> Graph:
-    return cg.simplify(graph) if simplify else graph
+    return substitute(system.forces, dict(zip([*system.q, *system.qd], [*terms.q, *terms.qd], strict=True)))
 
 
 def _state_rate(system: System) -> dict[Node, Node]:
@@ -164,7 +239,7 @@ def _state_rate(system: System) -> dict[Node, Node]:
 
 
 class _Embedding:
-    """The Euler relation as nodes: the state after a step from variables of the state before it."""
+    """The Euler relation of Section 2.1 as nodes: the state after a step from variables of the state before it."""
 
     def __init__(self, system: System) -> None:
         self.system = system
@@ -181,28 +256,24 @@ class _Embedding:
                 moved = [v * self.dt for v in self.qd]
             self.q = [cg.with_name(m + old, f"q{i}") for i, (m, old) in enumerate(zip(moved, q_old, strict=True))]
 
-    def of(self, *nodes: Node) -> list[Node]:
+    def embed(self, *nodes: Node) -> list[Node]:
         """Nodes over (q, qd) as nodes over the embedded state."""
-        return substituted(nodes, dict(zip([*self.system.q, *self.system.qd], [*self.q, *self.qd], strict=True)))
+        return substitute(nodes, dict(zip([*self.system.q, *self.system.qd], [*self.q, *self.qd], strict=True)))
 
-    def terms(self, momentum: Sequence[Node], gradient: list[Node], rates: dict[Node, Node] | None = None) -> Terms:
-        """d/dt as the derivative with respect to dt, or along `rates`; and to t if the Lagrangian has it."""
-        seeds = (rates or {self.dt: ONE}) | ({self.system.t: ONE} if self.system.t in self.system.extra_inputs else {})
-        dots = tangents(seeds, momentum)
+    def terms(
+        self, momentum: Sequence[Node], gradient: list[Node], x_dot: Mapping[Node, Node] | None = None
+    ) -> LagrangeTerms:
+        """d/dt as the derivative with respect to dt, or along `x_dot`; and to t if the Lagrangian has it."""
+        time = {self.system.t: ONE} if self.system.t in self.system.extra_inputs else {}
+        dots = tangents({**(x_dot or {self.dt: ONE}), **time}, momentum)
         rate = [dots.get(p, ZERO) for p in momentum]
-        return Terms(self.inputs, self.q, self.qd, list(momentum), rate, gradient)
+        return LagrangeTerms(self.inputs, self.q, self.qd, list(momentum), rate, gradient)
 
 
-def _embedded(system: System, energy: Node) -> Terms:
+def _embedded(system: System, energy: Node) -> LagrangeTerms:
+    """d/dt of d(energy)/dqd with the Euler relation in the graph, the middle of eq. (3), and dL/dq."""
     embedding = _Embedding(system)
-    lagrangian, energy = embedding.of(system.lagrangian, energy)
+    lagrangian, energy = embedding.embed(system.lagrangian, energy)
     momentum = cotangents({energy: ONE}, embedding.qd)  # through q as well: the unwanted coupling
     gradient = cotangents({lagrangian: ONE}, embedding.q)
     return embedding.terms(momentum, gradient)
-
-
-def substituted(nodes: Sequence[Node], replace: dict[Node, Node]) -> list[Node]:
-    """Copies of nodes with others in place of variables, operations kept as written."""
-    inputs = [node for node in topological(nodes) if node.op.name == "variable"]
-    graph = Graph(inputs, {str(i): node for i, node in enumerate(nodes)})
-    return list(graph(*[replace.get(node, node) for node in inputs]).values())

@@ -1,4 +1,4 @@
-"""Linearisation: the exact derivative of the state equation, as a graph and at a state."""
+"""Linearization: the exact derivative of the state equation, as a graph and at a state."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from cgraph.extend import Builder, building, cotangents, folded, hessian_nodes, 
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
-from .equations_of_motion import SHORT, forward_dynamics
-from .evaluate_at import Array, at_state
+from .equations_of_motion import DENSE_UP_TO, forward_dynamics
+from .evaluate_at import Array, evaluate_at
 from .formulations import ONE, ZERO, inverse_dynamics
 
 
@@ -24,30 +24,54 @@ def state_space(model: Model) -> Graph:
     nodes of differentiating forward dynamics itself. M is factored densely up to 6 coordinates, else eliminated on the
     graph of L, which also keeps the digits of a long chain.
 
-    Inputs q0.., qd0.., tau0.., t if needed, parameters; outputs A_0_0, .., (2n, 2n), and B_0_0, .., (2n, n).
-    Raises SingularMassMatrixError for a coordinate without inertia.
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene with n coordinates.
+
+    Returns
+    -------
+    Graph
+        Inputs q0.., qd0.., tau0.., t if needed, parameters; outputs A_0_0, .., (2n, 2n), and B_0_0, .., (2n, n), row
+        by row.
+
+    Raises
+    ------
+    SingularMassMatrixError
+        For a coordinate without inertia.
+    TypeError
+        For what is no model, or has no Lagrangian.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> spring = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 0.5 * 9.0 * q[0] ** 2, ["x"], damping=0.5)
+    >>> state = {"q0": 0.0, "qd0": 0.0, "tau0": 0.0}
+    >>> {name: value for name, value in dyn.state_space(spring).evaluate(state).items() if name[2] == "1"}
+    {'A_1_0': -9.0, 'A_1_1': -0.5, 'B_1_0': 1.0}
     """
     system = as_system(model)
     n, build = system.n, Builder()
     accelerations = forward_dynamics(system)
     (lagrangian,) = folded([system.lagrangian], Builder())
-    slopes = _slopes(system, list(accelerations.outputs.values()), build)
+    partials = _torque_jacobian(system, list(accelerations.outputs.values()), build)
+    # M dqdd = dtau - (d tau / dx) dx, one column for each of the 2n numbers of x and the n of tau.
     with building(build):
-        sides = [[-row[j] for row in slopes] for j in range(2 * n)]
+        sides = [[-row[j] for row in partials] for j in range(2 * n)]
     sides += [[ONE if i == j else ZERO for i in range(n)] for j in range(n)]
-    if n <= SHORT:
+    if n <= DENSE_UP_TO:
         lower = hessian_nodes(lagrangian, system.qd, build)
         columns = [ldl_solve(lower, side, build) for side in sides]
     else:
         columns = [solve_nodes(lagrangian, system.qd, side, build) for side in sides]
-    rows = [[ONE if j == n + i else ZERO for j in range(3 * n)] for i in range(n)]
+    rows = [[ONE if j == n + i else ZERO for j in range(3 * n)] for i in range(n)]  # dq_dot = dqd
     rows += [[column[i] for column in columns] for i in range(n)]
     outputs = {f"A_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[: 2 * n])}
     outputs |= {f"B_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[2 * n :])}
     return cg.simplify(Graph(accelerations.inputs, outputs))
 
 
-def _slopes(system: System, accelerations: list[Node], build: Builder) -> list[list[Node]]:
+def _torque_jacobian(system: System, accelerations: list[Node], build: Builder) -> list[list[Node]]:
     """Rows of d tau / d(q, qd), (n, 2n), at these accelerations."""
     torques = inverse_dynamics(system)
     state = [*system.q, *system.qd]
@@ -69,12 +93,42 @@ def linearize(
 ) -> tuple[Array, Array]:
     """A, (2n, 2n), and B, (2n, n), of d(xdot) = A dx + B dtau, x = (q, qd), at a state and applied forces (default 0).
 
-    q, qd, tau: (n,).  parameters: {name: value} in place of the model's own. For many states, compile `state_space`.
-    Raises ValueError for arrays of another shape, and as `state_space`.
+    For many states, compile `state_space`.
+
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene with n coordinates.
+    q, qd, tau : array_like, (n,)
+        Coordinates [rad or m], their velocities, and applied forces [N m or N].
+    t : float
+        Time [s], for a model that depends on it.
+    parameters : mapping of str to float
+        Values in place of the model's.
+
+    Returns
+    -------
+    A : ndarray, (2n, 2n)
+    B : ndarray, (2n, n)
+
+    Raises
+    ------
+    ValueError
+        For arrays of another shape, a number that is not finite, or an unknown parameter.
+    SingularMassMatrixError
+        For a coordinate without inertia.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> spring = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 0.5 * 9.0 * q[0] ** 2, ["x"], damping=0.5)
+    >>> A, B = dyn.linearize(spring, [0.0], [0.0])
+    >>> A.tolist(), B.tolist()
+    ([[0.0, 1.0], [-9.0, -0.5]], [[0.0], [1.0]])
     """
     system = as_system(model)
     n = system.n
-    flat = at_state(system, state_space(system), {"q": q, "qd": qd, "tau": tau}, t, parameters)
+    flat = evaluate_at(system, state_space(system), {"q": q, "qd": qd, "tau": tau}, t, parameters)
     if flat.ndim != 1:
-        raise ValueError(f"linearize takes one state, q, qd and tau of the shape ({n},)")
+        raise ValueError(f"linearize takes one state, q, qd and tau of the shape ({n},), got several rows")
     return flat[: 4 * n * n].reshape(2 * n, 2 * n), flat[4 * n * n :].reshape(2 * n, n)

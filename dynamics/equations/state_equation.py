@@ -12,13 +12,33 @@ from .equations_of_motion import forward_dynamics
 
 
 def state_equation(model: Model) -> Graph:
-    """The rates of a model's state.
+    """The time derivative of a model's state, xdot = f(x, tau, t).
 
-    A System, or what has one: inputs q0.., qd0.., tau0.., t if needed, parameters; outputs q0_dot.., qd0_dot.. with
-    q_dot = qd and qd_dot from `forward_dynamics`. An OdeSystem: inputs its states, t if needed, parameters; outputs
-    `<state>_dot`.
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism, a scene, or a first-order system.
 
-    Raises SingularMassMatrixError for a coordinate without inertia, TypeError for what is no model.
+    Returns
+    -------
+    Graph
+        Of a mechanical model: inputs q0.., qd0.., tau0.., t if needed, parameters; outputs q0_dot.., qd0_dot.. with
+        q_dot = qd and qd_dot from `forward_dynamics`. Of an OdeSystem: inputs its states, t if needed, parameters;
+        outputs `<state>_dot`.
+
+    Raises
+    ------
+    SingularMassMatrixError
+        For a coordinate without inertia.
+    TypeError
+        For what is no model.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> block = dyn.System(lambda q, qd, t: 0.5 * 4.0 * qd[0] ** 2, ["x"])
+    >>> dyn.state_equation(block).evaluate({"q0": 0.0, "qd0": 2.0, "tau0": 8.0})
+    {'q0_dot': 2.0, 'qd0_dot': 2.0}
     """
     ode = as_ode(model)
     if ode is not None:
@@ -30,7 +50,7 @@ def state_equation(model: Model) -> Graph:
     return Graph(accelerations.inputs, outputs)
 
 
-class Inputs(NamedTuple):
+class StateInputs(NamedTuple):
     """What the inputs of a state equation are, in the order of the graph."""
 
     states: tuple[str, ...]  # as many as outputs, and in their order
@@ -39,13 +59,13 @@ class Inputs(NamedTuple):
     parameters: dict[str, float]  # with the model's own values
 
 
-def state_inputs(model: Model) -> Inputs:
+def state_inputs(model: Model) -> StateInputs:
     """The names behind `state_equation(model)`, without building it."""
     ode = as_ode(model)
     if ode is not None:
-        return Inputs(ode.states, (), ode.extra_inputs[:1] == [ode.t], dict(ode.parameters))
+        return StateInputs(ode.states, (), ode.extra_inputs[:1] == [ode.t], dict(ode.parameters))
     system = as_system(model)
     states = tuple([str(node.name) for node in (*system.q, *system.qd)])
     applied = tuple([str(node.name) for node in system.tau])
     timed = TIME in [node.name for node in system.extra_inputs[:1]]
-    return Inputs(states, applied, timed, dict(system.parameters))
+    return StateInputs(states, applied, timed, dict(system.parameters))

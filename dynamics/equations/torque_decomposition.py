@@ -1,4 +1,4 @@
-"""Torque by link and torque by motion: tau taken apart by partial Lagrangians, and by the joints that move."""
+"""Torque by link and torque by joint motion: tau taken apart by partial Lagrangians, and by the joints that move."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cgraph.extend import Builder, building, cotangents, folded, hessian_nodes, 
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
-from . import coriolis
+from .coriolis import coriolis_matrix, require_quadratic
 from .equations_of_motion import bias, gravity_force
 from .formulations import ONE, ZERO
 from .torque_table import TorqueTable
@@ -21,77 +21,129 @@ _ENERGIES = {"kinetic", "potential"}
 def torque_by_link(model: Model) -> TorqueTable:
     """Row k, column i: what the partial Lagrangian L_k has of tau_i, d/dt dL_k/dqd_i - dL_k/dq_i.
 
-    Rows of damping and of applied forces follow, where the model has them; columns add up to tau. A link that a joint
-    does not carry has no share of its torque, whatever the state: such cells are zero by structure.
-    Of a mechanism written with base parameters (`base_parameters`) a row is not what its body alone takes.
+    The paper's Section 4.3 (Kusaka and Tanaka): since L = sum of L_k, the rows add up to tau. Rows of damping and of
+    applied forces follow, where the model has them. A link that a joint does not carry has no share of its torque,
+    whatever the state: such cells are zero by structure. Of a mechanism written with base parameters
+    (`base_parameters`) a row is not what its body alone takes.
+
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene with n coordinates.
+
+    Returns
+    -------
+    TorqueTable
+        (links and what follows, n) torques [N m or N]; columns add up to tau.
+
+    Raises
+    ------
+    TypeError
+        For what is no model, or has no Lagrangian.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm(masses=[1.0, 1.0], lengths=[1.0, 1.0], gravity=10.0)
+    >>> print(dyn.torque_by_link(arm).at([1.5707963267948966, 0.0]))  # held straight out
+            joint 1  joint 2
+    link 1        5        ·
+    link 2       15        5
+    tau          20        5
     """
     system = as_system(model)
     build = Builder()
-    rows = [_torques(system, each, build) for each in folded(system.partial_lagrangians, Builder())]
-    names = _names(system)
-    outside = _outside(system, build)
+    rows = [_torque_of(system, partial, build) for partial in folded(system.partial_lagrangians, Builder())]
+    names = _names_of_partials(system)
+    outside = _damping_and_forces(system, build)
     rows += outside.values()
     outputs = {f"tau{i}_{k}": entry for k, row in enumerate(rows) for i, entry in enumerate(row)}
     graph = cg.simplify(system.graph(outputs, system.q, system.qd, system.qdd))
-    return TorqueTable("torque by link", (*names, *outside), system.coordinates, system, graph, True)
+    return TorqueTable("torque by link", (*names, *outside), system.coordinates, system, graph, sum_axis=0)
 
 
 def torque_by_joint_motion(model: Model) -> TorqueTable:
     """Row i, column j: the torque at joint i for the motion of joint j, M_ij qdd_j + C_ij qd_j.
 
     C is that of Christoffel's symbols (`coriolis`): of a Coriolis force, which two velocities make together, each has
-    half. Columns of gravity (all that is there at rest), damping and applied forces follow, where the model has them;
-    rows add up to tau. Raises ValueError for an L that is not quadratic in the velocities.
+    half. Columns of gravity (all that is there at rest), damping and applied forces follow, where the model has them.
+
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene with n coordinates.
+
+    Returns
+    -------
+    TorqueTable
+        (n, n and what follows) torques [N m or N]; rows add up to tau.
+
+    Raises
+    ------
+    ValueError
+        For an L that is not quadratic in the velocities.
+    TypeError
+        For what is no model, or has no Lagrangian.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> slider = dyn.System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + (q[0] * qd[1]) ** 2), ["r", "theta"])
+    >>> print(dyn.torque_by_joint_motion(slider).at([2.0, 0.0], [3.0, 5.0], [1.0, 1.0]))
+            r  theta  tau
+    r       1    -50  -49
+    theta  30     34   64
     """
     system = as_system(model)
-    coriolis.quadratic(system)
+    require_quadratic(system)
     build = Builder()
     (lagrangian,) = folded([system.lagrangian], Builder())
-    lower = hessian_nodes(lagrangian, system.qd, build)
+    mass = hessian_nodes(lagrangian, system.qd, build)  # its lower triangle
     forces = folded(bias(system).outputs.values(), build)
-    rates = coriolis.matrix(system, forces, build)
+    coriolis = coriolis_matrix(system, forces, build)
     n = system.n
     with building(build):
         rows = [
-            [lower[max(i, j)][min(i, j)] * system.qdd[j] + rates[i][j] * system.qd[j] for j in range(n)]
+            [mass[max(i, j)][min(i, j)] * system.qdd[j] + coriolis[i][j] * system.qd[j] for j in range(n)]
             for i in range(n)
         ]
-    outside = {"gravity": folded(gravity_force(system).outputs.values(), build)} | _outside(system, build)
-    columns = {name: column for name, column in outside.items() if any(each.value != 0.0 for each in column)}
+    outside = {"gravity": folded(gravity_force(system).outputs.values(), build)} | _damping_and_forces(system, build)
+    columns = {name: column for name, column in outside.items() if any(entry.value != 0.0 for entry in column)}
     for column in columns.values():
         rows = [[*row, entry] for row, entry in zip(rows, column, strict=True)]
     names = [*system.coordinates, *columns]
     outputs = {f"tau{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row)}
     graph = cg.simplify(system.graph(outputs, system.q, system.qd, system.qdd))
-    return TorqueTable("torque by motion", system.coordinates, tuple(names), system, graph, False)
+    return TorqueTable("torque by joint motion", system.coordinates, tuple(names), system, graph, sum_axis=1)
 
 
-def _torques(system: System, partial: Node, build: Builder) -> list[Node]:
+def _torque_of(system: System, partial: Node, build: Builder) -> list[Node]:
+    """Lagrange's equation of one partial Lagrangian, as the chain rule has it: a reverse sweep, then a forward one."""
     n = system.n
     bars = cotangents({partial: ONE}, [*system.q, *system.qd], build)
-    slopes, momenta = bars[:n], bars[n:]
+    gradient, momenta = bars[:n], bars[n:]
     x_dot = dict(zip([*system.q, *system.qd], [*system.qd, *system.qdd], strict=True))
     dots = tangents(x_dot | ({system.t: ONE} if system.t in system.extra_inputs else {}), momenta, build)
     with building(build):
-        return [dots.get(p, ZERO) - slope for p, slope in zip(momenta, slopes, strict=True)]
+        return [dots.get(p, ZERO) - slope for p, slope in zip(momenta, gradient, strict=True)]
 
 
-def _outside(system: System, build: Builder) -> dict[str, list[Node]]:
-    """Rows of damping and of applied forces, each where there is any."""
+def _damping_and_forces(system: System, build: Builder) -> dict[str, list[Node]]:
+    """Torques against damping and against applied forces, each where there is any."""
     with building(build):
         with cg.tag("damping"):
-            taken = [damping * qd for damping, qd in zip(system.damping, system.qd, strict=True)]
-        given = [-force for force in folded(system.forces, build)]
-    rows = {"damping": taken, "applied": given}
-    return {name: row for name, row in rows.items() if any(each.value != 0.0 for each in row)}
+            damping = [coefficient * qd for coefficient, qd in zip(system.damping, system.qd, strict=True)]
+        applied = [-force for force in folded(system.forces, build)]
+    rows = {"damping": damping, "applied": applied}
+    return {name: row for name, row in rows.items() if any(entry.value != 0.0 for entry in row)}
 
 
-def _names(system: System) -> list[str]:
+def _names_of_partials(system: System) -> list[str]:
     """Of the partial Lagrangians: their one tag, as a link's or a body's; else L1, L2, ..."""
-    names: Sequence[str] = [_only(each.tags - _ENERGIES) for each in system.partial_lagrangians]
+    names: Sequence[str] = [_single_tag(partial.tags - _ENERGIES) for partial in system.partial_lagrangians]
     unique = all(names) and len(set(names)) == len(names)
     return list(names) if unique else [f"L{k + 1}" for k in range(len(names))]
 
 
-def _only(tags: frozenset[str]) -> str:
+def _single_tag(tags: frozenset[str]) -> str:
     return next(iter(tags)) if len(tags) == 1 else ""

@@ -10,21 +10,42 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph, Node
-from cgraph.extend import topological
+from cgraph.extend import Names, topological
 
 from ..systems.system import System
-from .evaluate_at import Array, at_state
+from .evaluate_at import Array, evaluate_at
 
-NONE = "·"  # a cell that is zero by structure, at every state
-LONGEST = 6  # operations up to which a cell without a state is written out
+STRUCTURAL_ZERO = "·"  # a cell that is zero by structure, at every state
+LONGEST_EXPRESSION = 40  # characters of a cell that is written out, with q0 for the coordinate's name
 
 
 @dataclass(frozen=True, eq=False)
 class TorqueTable:
     """Torques [N m or N] in named rows and columns, which add up to tau.
 
-    graph: one output for each cell, row by row.  values: (rows, columns) at a state, or None; see `at`.
-    downwards: columns add up to tau, else rows.
+    Attributes
+    ----------
+    title : str
+    rows, columns : tuple of str
+        Their names: links or coordinates, and damping, applied forces, gravity.
+    system : System
+        The one it was made from.
+    graph : Graph
+        One output for each cell, row by row, to be drawn, compiled or differentiated.
+    sum_axis : int
+        0 where columns add up to tau, 1 where rows do.
+    values : ndarray, (rows, columns), or None
+        Numbers at a state, where `at` has put them.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> table = dyn.torque_by_link(dyn.planar_arm(masses=[3.0], lengths=[2.0], gravity=10.0))
+    >>> print(table)
+                                             joint 1
+    link 1  4 * qdd.joint 1 - (-30 * sin(q.joint 1))
+    >>> table.at([0.0], qdd=[2.0]).total
+    array([8.])
     """
 
     title: str
@@ -32,7 +53,7 @@ class TorqueTable:
     columns: tuple[str, ...]
     system: System
     graph: Graph
-    downwards: bool
+    sum_axis: int
     values: Array | None = None
 
     @property
@@ -43,10 +64,20 @@ class TorqueTable:
 
     @property
     def total(self) -> Array:
-        """tau, (n,), the sum of the cells. Raises ValueError for a table without a state."""
+        """tau, the sum of the cells.
+
+        Returns
+        -------
+        ndarray, (n,)
+
+        Raises
+        ------
+        ValueError
+            For a table without a state.
+        """
         if self.values is None:
             raise ValueError("the table has no state, and so no numbers; give it one by at(q, qd, qdd)")
-        total: Array = self.values.sum(axis=0 if self.downwards else 1)
+        total: Array = self.values.sum(axis=self.sum_axis)
         return total
 
     def at(
@@ -58,14 +89,33 @@ class TorqueTable:
         t: float = 0.0,
         parameters: Mapping[str, float] | None = None,
     ) -> TorqueTable:
-        """The table with its numbers at a state, (n,) each; None is rest. Raises ValueError for another shape."""
-        flat = at_state(self.system, self.graph, {"q": q, "qd": qd, "qdd": qdd}, t, parameters)
+        """The table with its numbers at a state.
+
+        Parameters
+        ----------
+        q, qd, qdd : array_like, (n,)
+            Coordinates [rad or m], velocities and accelerations; None is zero.
+        t : float
+            Time [s], for a model that depends on it.
+        parameters : mapping of str to float
+            Values in place of the model's.
+
+        Returns
+        -------
+        TorqueTable
+
+        Raises
+        ------
+        ValueError
+            For another shape, a number that is not finite, or an unknown parameter.
+        """
+        flat = evaluate_at(self.system, self.graph, {"q": q, "qd": qd, "qdd": qdd}, t, parameters)
         if flat.ndim != 1:
             raise ValueError(f"a table has one state, q, qd and qdd of the shape ({self.system.n},)")
         return replace(self, values=flat.reshape(len(self.rows), len(self.columns)))
 
     def to_text(self, digits: int = 4) -> str:
-        """The table in columns of text, with the sum tau; without a state, each cell's expression or its size."""
+        """The table in columns of text, with the sum tau; without a state, expressions or their sizes."""
         return _aligned(self._cells(digits), "  ")
 
     def __str__(self) -> str:
@@ -85,57 +135,39 @@ class TorqueTable:
         return "\n".join(lines) + "\n"
 
     def _cells(self, digits: int) -> list[list[str]]:
-        cells = self._written() if self.values is None else self._numbers(digits)
+        cells = self._expressions() if self.values is None else self._numbers(digits)
         rows = [[name, *row] for name, row in zip(self.rows, cells, strict=True)]
         head = ["", *self.columns]
         if self.values is not None:
-            sums = [f"{each:.{digits}g}" for each in self.total]
-            if self.downwards:
+            sums = [f"{torque:.{digits}g}" for torque in self.total]
+            if self.sum_axis == 0:
                 rows.append(["tau", *sums])
             else:
                 head.append("tau")
-                rows = [[*row, each] for row, each in zip(rows, sums, strict=True)]
+                rows = [[*row, total] for row, total in zip(rows, sums, strict=True)]
         return [head, *rows]
 
     def _numbers(self, digits: int) -> list[list[str]]:
         assert self.values is not None
         return [
-            [NONE if zero else f"{value:.{digits}g}" for zero, value in zip(*row, strict=True)]
+            [STRUCTURAL_ZERO if zero else f"{value:.{digits}g}" for zero, value in zip(*row, strict=True)]
             for row in zip(self.zeros, self.values, strict=True)
         ]
 
-    def _written(self) -> list[list[str]]:
-        flat = [written(node) for node in self.graph.outputs.values()]
+    def _expressions(self) -> list[list[str]]:
+        names = Names(self.graph)
+        cells = [self._expression(names, node) for node in self.graph.outputs.values()]
         width = len(self.columns)
-        return [flat[i * width : (i + 1) * width] for i in range(len(self.rows))]
+        return [cells[i * width : (i + 1) * width] for i in range(len(self.rows))]
 
-
-def written(node: Node) -> str:
-    """The node's expression where that is short, else the number of its operations."""
-    if node.value == 0.0:
-        return NONE
-    operations = [each for each in topological([node]) if each.args]
-    if len(operations) > LONGEST:
-        return f"{len(operations)} operations"
-    text: dict[Node, str] = {}
-    for each in topological([node]):
-        if each.args:
-            parts = [_part(each, slot, arg, text[arg]) for slot, arg in enumerate(each.args)]
-            text[each] = each.op.python.format(*parts)
-        else:
-            text[each] = str(each.name) if each.value is None else f"{each.value:g}"
-    return text[node]
-
-
-def _part(of: Node, slot: int, arg: Node, text: str) -> str:
-    """An argument's text, in brackets where the operation needs them."""
-    if "(" in of.op.python:
-        return text
-    weak = ("neg", "sub") if of.op.name == "add" and slot else () if of.op.name in ("add", "sub") and not slot else None
-    tight = of.op.name in ("div", "pow", "neg")
-    operator = bool(arg.args) and "(" not in arg.op.python
-    sum_ = arg.op.name in (("add", "sub", "neg") if weak is None else weak)
-    return f"({text})" if (operator and (sum_ or tight)) or (slot and text.startswith("-")) else text
+    def _expression(self, names: Names, node: Node) -> str:
+        """A cell written out, coordinates by name, or the number of its operations where that would be too long."""
+        if node.value == 0.0:
+            return STRUCTURAL_ZERO
+        text = names.text(node, LONGEST_EXPRESSION)
+        if "%" in text:  # it refers to a line of the listing
+            return f"{len([part for part in topological([node]) if part.args])} operations"
+        return re.sub(r"\b(q|qd|qdd)\d+\b", lambda match: self.system.display_names[match[0]], text)
 
 
 def _aligned(rows: Sequence[Sequence[str]], gap: str) -> str:
@@ -153,6 +185,6 @@ def _latex(cell: str) -> str:
     if number := re.fullmatch(r"(-?[\d.]+)(?:e([+-]\d+))?", cell):
         power = rf" \cdot 10^{{{int(number[2])}}}" if number[2] else ""
         return f"${number[1]}{power}$"
-    if cell in (NONE, "tau"):
-        return {NONE: r"$\cdot$", "tau": r"$\tau$"}[cell]
+    if cell in (STRUCTURAL_ZERO, "tau"):
+        return {STRUCTURAL_ZERO: r"$\cdot$", "tau": r"$\tau$"}[cell]
     return re.sub(r"([&%$#_{}])", r"\\\1", cell.replace("\\", r"\textbackslash ").replace("^", r"\^{}"))

@@ -28,13 +28,13 @@ def report(
     effects, lock, regroup: as of `prune`.  values: the same, where the equations have that input.
     """
     kept = tuple(effects)
-    found = []
+    graphs = []
     for title, equations in EQUATIONS.items():
         known = _inputs(equations(scene))
         bound = {name: value for name, value in (values or {}).items() if name in known}
         pruned = prune(scene, equations, effects=kept, lock=lock, values=bound, regroup=regroup)
-        found.append({"equations": title, **_account(pruned)})
-    return {"name": scene.name, "about": scene.about, "effects": list(kept), "graphs": found}
+        graphs.append({"equations": title, **_account(pruned)})
+    return {"name": scene.name, "about": scene.about, "effects": list(kept), "graphs": graphs}
 
 
 def _inputs(graph: Graph) -> set[str]:

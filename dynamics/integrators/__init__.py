@@ -4,39 +4,47 @@ from functools import partial
 
 from .dop853 import DOP853
 from .explicit import explicit
+from .mechanics import Mechanics, mechanics
 from .method import Method
-from .problem import Problem, problem_of
+from .problem import Problem, derive, quantity, quantity_inputs, state_jacobian, time_derivative, total_energy
 from .radau import ORDER as RADAU_ORDER, radau
 from .rosenbrock import RODAS5P, rosenbrock
 from .step_control import embedded
-from .symplectic import GAUSS4, GAUSS6, MIDPOINT, SYMPLECTIC_EULER, VERLET, Partitioned, partitioned
-from .tableau import DOPRI5, EULER, RK4, Tableau
+from .symplectic import PARTITIONED, Partitioned, partitioned
+from .tableau import TABLEAUS, Tableau
 
 
-def _explicit(tableau: Tableau) -> Method:
+def runge_kutta(tableau: Tableau) -> Method:
+    """An explicit Runge-Kutta method: equal steps, or steps by error where the tableau has weights of an estimate."""
+    if tableau.error:
+        return Method(tableau.order, partial(embedded, tableau), adaptive=True, degree=len(tableau.interpolant[0]))
     return Method(tableau.order, lambda problem, _: explicit(tableau, problem), adaptive=False)
 
 
-def _embedded(tableau: Tableau) -> Method:
-    return Method(tableau.order, partial(embedded, tableau), adaptive=True, degree=len(tableau.dense[0]))
-
-
-def _partitioned(method: Partitioned) -> Method:
+def _symplectic(method: Partitioned) -> Method:
     return Method(method.order, lambda problem, _: partitioned(method, problem), adaptive=False)
 
 
 METHODS: dict[str, Method] = {
-    "euler": _explicit(EULER),
-    "rk4": _explicit(RK4),
-    "dopri5": _embedded(DOPRI5),
-    "dop853": _embedded(DOP853),
+    **{name: runge_kutta(tableau) for name, tableau in TABLEAUS.items()},
+    "dop853": runge_kutta(DOP853),
     "rodas": Method(RODAS5P.order, partial(rosenbrock, RODAS5P), adaptive=True, degree=len(RODAS5P.dense) + 1),
     "radau": Method(RADAU_ORDER, radau, adaptive=True, degree=3),
-    "symplectic_euler": _partitioned(SYMPLECTIC_EULER),
-    "verlet": _partitioned(VERLET),
-    "midpoint": _partitioned(MIDPOINT),
-    "gauss4": _partitioned(GAUSS4),
-    "gauss6": _partitioned(GAUSS6),
+    **{name: _symplectic(method) for name, method in PARTITIONED.items()},
 }
 
-__all__ = ["METHODS", "Method", "Problem", "problem_of"]
+__all__ = [
+    "METHODS",
+    "Mechanics",
+    "Method",
+    "Problem",
+    "Tableau",
+    "derive",
+    "mechanics",
+    "quantity",
+    "quantity_inputs",
+    "runge_kutta",
+    "state_jacobian",
+    "time_derivative",
+    "total_energy",
+]

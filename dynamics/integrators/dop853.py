@@ -223,7 +223,7 @@ def _dense() -> tuple[Row, ...]:
     """
     stages = 16
     whole, first, last = np.array(_row(_B, stages)), np.eye(stages)[0], np.eye(stages)[12]
-    parts = [whole, first - whole, 2.0 * whole - first - last, *(np.array(_row(each, stages)) for each in _D)]
+    parts = [whole, first - whole, 2.0 * whole - first - last, *(np.array(_row(weights, stages)) for weights in _D)]
     powers = np.zeros((len(parts) + 1, stages))
     for k, part in reversed(list(enumerate(parts))):
         powers[0] += part

@@ -32,7 +32,7 @@ def scaled(weights: Sequence[float]) -> Graph:
 
 
 def compensated(x: Node, more: Node) -> tuple[Node, Node]:
-    """x + more, and what rounding takes off it, which the next sum may be given back (Kahan)."""
+    """x + more, and what rounding takes off it, which the next sum may add (Kahan)."""
     total = x + more
     return total, more - (total - x)
 

@@ -1,7 +1,7 @@
 """Programs of steps of equal size: the registers that all of them have, and explicit Runge-Kutta methods.
 
-Registers: x the state, t = start + count * h, p the parameters, evaluations of the rate, and `lost`, which is not 0
-after a step that left the numbers.
+Registers: x the state, t = start + count * h, p the parameters, evaluations of the rate, and `nonfinite`, which
+is not 0 after a step whose state is not finite.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from .tableau import Tableau
 
 def registers(problem: Problem) -> dict[str, int]:
     """What every program has."""
-    single = dict.fromkeys(("t", "h", "start", "count", "evaluations", "lost"), 1)
+    single = dict.fromkeys(("t", "h", "start", "count", "evaluations", "nonfinite"), 1)
     return {"x": problem.size, "p": len(problem.parameters), **single}
 
 
 def advance(evaluations: int) -> list[Statement]:
-    """The step is made: the next time, computed from the start so that it does not drift, and a look at the state."""
+    """After a step: the next time, computed from the start so that it does not drift; whether the state is finite."""
     names = ("start", "count", "h", "evaluations")
     start, count, h, done = inputs = cg.variables(names)
     outputs = {"t": start + (count + 1.0) * h, "count": count + 1.0, "evaluations": done + float(evaluations)}
     x = cg.variable("x")
-    return [Call(Graph(inputs, outputs), names, tuple(outputs)), Sum(Graph([x], {"none": x - x}), ("x",), "lost")]
+    return [Call(Graph(inputs, outputs), names, tuple(outputs)), Sum(Graph([x], {"none": x - x}), ("x",), "nonfinite")]
 
 
 def stage(problem: Problem, tableau: Tableau, k: int) -> list[Statement]:
@@ -37,19 +37,19 @@ def stage(problem: Problem, tableau: Tableau, k: int) -> list[Statement]:
     if k == 0:
         return [Call(problem.rate, ("x", "t", "p"), ("slope0",))]
     return [
-        point("at", tableau.a[k]),
-        moment("at_t", tableau.c[k]),
+        stage_state("at", tableau.a[k]),
+        stage_time("at_t", tableau.c[k]),
         Call(problem.rate, ("at", "at_t", "p"), (f"slope{k}",)),
     ]
 
 
-def moment(target: str, c: float) -> Call:
+def stage_time(target: str, c: float) -> Call:
     """target = t + c h."""
     t, h = cg.variables("t h")
     return Call(Graph([t, h], {"y": t + c * h}), ("t", "h"), (target,))
 
 
-def point(target: str, weights: Sequence[float]) -> Map:
+def stage_state(target: str, weights: Sequence[float]) -> Map:
     """target = x + h * (sum of weight * slope)."""
     used = [k for k, weight in enumerate(weights) if weight]
     slopes = tuple([f"slope{k}" for k in used])
@@ -61,7 +61,7 @@ def explicit(tableau: Tableau, problem: Problem) -> Program:
     body: list[Statement] = []
     for k in range(len(tableau.b)):
         body += stage(problem, tableau, k)
-    body += [point("x", tableau.b), *advance(len(tableau.b))]
+    body += [stage_state("x", tableau.b), *advance(len(tableau.b))]
     slopes = {f"slope{k}": problem.size for k in range(len(tableau.b))}
-    own = {"at": problem.size, "at_t": 1, **slopes}
-    return Program({**registers(problem), **own}, body, record=["t", "x"], stop="lost")
+    lengths = {"at": problem.size, "at_t": 1, **slopes}
+    return Program({**registers(problem), **lengths}, body, record=["t", "x"], stop="nonfinite")

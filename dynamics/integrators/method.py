@@ -12,16 +12,59 @@ from .problem import Problem
 
 @dataclass(frozen=True)
 class Method:
-    """An integrator.
+    """An integrator: what `dyn.METHODS` holds, and all that a simulation knows of a method.
 
-    order: of its error in the step (of its error in a run).
-    program(problem, dense): what makes its steps, one pass a step or a trial of one.
-    adaptive: whether it chooses its steps; see `fixed.py` and `adaptive.py` for the registers of each kind.
-    degree: of its dense output, 0 where it has none; the program then has registers dense1, .. of polynomial
-        coefficients: x(t + s h) = x + sum_k dense_k s^k.
+    A method is a function from a problem, xdot = f(x, t, p) as graphs, to a program: graphs called one after another
+    over named registers of float64, which is compiled once and then repeated natively. It holds no state of a run and
+    never calls Python. An explicit Runge-Kutta method needs no code: it is a row of `tableau.TABLEAUS`.
+
+    Parameters
+    ----------
+    order : int
+        p, where the error of a run falls as h^p.
+    program : callable
+        program(problem, dense), the steps as a program. It reads `problem.rate`, and what `state_jacobian`,
+        `time_derivative` and `mechanics` derive. What the program has to keep to depends on `adaptive`; m is the size
+        of a state.
+    adaptive : bool
+        Whether the method chooses its steps by an estimate of their error.
+    degree : int
+        Of the dense output, 0 where there is none.
+
+    A program of equal steps makes one step in a pass. Before each pass its registers (`explicit.registers`) hold
+
+    ======================  =========================================================================================
+    x (m), p                the state, and the values of the problem's parameters
+    t, start, count, h      the time start + count h, where the steps start, how many are done, and the step [s]
+    evaluations             of the rate, so far
+    nonfinite               0; the run ends when a pass leaves another number
+    fresh                   1 before the first pass, where the program has this register
+    ======================  =========================================================================================
+
+    and after it the next state in x, with t, count and evaluations advanced (`explicit.advance` does all but x). It
+    records t and x.
+
+    An adaptive program makes one trial of a step in a pass. Besides x, p, t and evaluations its registers
+    (`step_control.registers`) hold
+
+    ======================  =========================================================================================
+    h, next                 the step tried, and the one to try next [s]; `trial()` sets h, `control()` sets next
+    max_step, end           the longest step, and where to stop [s]
+    rtol, atol (m)          the tolerance, rtol |x| + atol
+    x_new (m), error        where the trial arrived, and its estimated error, 1 at the tolerance (`measured`)
+    accepted, rejected      1 or 0 after a trial, and how many were 0
+    status                  RUNNING, DONE, or TOO_SMALL: the program stops when it is not RUNNING
+    t_old, x_old (m)        of the last accepted step, which `accept_step` makes the state
+    dense1, .. (m)          with `dense`: x(t_old + s h) = x_old + sum_k dense_k s^k, for k up to `degree`
+    ======================  =========================================================================================
+
+    It records `step_control.recorded(dense, degree)` of each accepted step.
     """
 
     order: int
     program: Callable[[Problem, bool], Program]
     adaptive: bool
     degree: int = 0
+
+    def __repr__(self) -> str:
+        return f"<Method of order {self.order}, {'steps by error' if self.adaptive else 'equal steps'}>"

@@ -16,9 +16,9 @@ from cgraph import Graph, Node
 from cgraph.extend import Call, Factor, If, Map, Program, Solve, Statement, Sum, While
 
 from .elementwise import SAME, identity, weighted
-from .explicit import moment
-from .problem import Problem
-from .step_control import commit, control, count, first_pass, measured, recorded, registers, scale, trial
+from .explicit import stage_time
+from .problem import Problem, state_jacobian
+from .step_control import accept_step, control, count, first_pass, measured, recorded, registers, scale, trial
 from .tableau import Row
 
 _R6 = math.sqrt(6.0)
@@ -66,10 +66,10 @@ def radau(problem: Problem, dense: bool) -> Program:
 
     body: list[Statement] = [
         first_pass(identity(m), *[Call(Graph([], {f"{k}": 0.0 for k in range(m)}), (), (name,)) for name in powers]),
-        If("accepted", (evaluated(problem.jacobian, "jacobian"), evaluated(problem.rate, "rate"), count(1))),
+        If("accepted", (evaluated(state_jacobian(problem), "jacobian"), evaluated(problem.rate, "rate"), count(1))),
         trial(),
         *_matrices(m),
-        *[moment(f"time{k}", _C[k]) for k in range(3)],
+        *[stage_time(f"time{k}", _C[k]) for k in range(3)],
         *_guess(z, powers),
         *_combined(_T_INVERSE, z, w),
         _begin(),
@@ -77,13 +77,13 @@ def radau(problem: Problem, dense: bool) -> Program:
         _sum_of("x", z[2:], (1.0,), "x_new"),
         *_estimate(problem, z),
         control(4, 0),
-        commit(*_dense(z, powers), Call(SAME, ("h",), ("h_old",))),
+        accept_step(*_dense(z, powers), Call(SAME, ("h",), ("h_old",))),
     ]
-    own = {"unit": m * m, "jacobian": m * m, "real": m * m, "complex": 4 * m * m, "pivots": m, "pivots2": 2 * m}
-    own |= dict.fromkeys((*z, *w, *f, *powers, "rate", "at", "right0", "error_vector"), m) | {"right12": 2 * m}
+    lengths = {"unit": m * m, "jacobian": m * m, "real": m * m, "complex": 4 * m * m, "pivots": m, "pivots2": 2 * m}
+    lengths |= dict.fromkeys((*z, *w, *f, *powers, "rate", "at", "right0", "error_vector"), m) | {"right12": 2 * m}
     single = "going turns change change_old newton sum converged h_old again time0 time1 time2"
-    own |= dict.fromkeys(single.split(), 1)
-    return Program({**registers(problem), **own}, body, recorded(dense, 3), record_if="accepted", stop="status")
+    lengths |= dict.fromkeys(single.split(), 1)
+    return Program({**registers(problem), **lengths}, body, recorded(dense, 3), record_if="accepted", stop="status")
 
 
 def _matrices(m: int) -> list[Statement]:
@@ -98,13 +98,13 @@ def _matrices(m: int) -> list[Statement]:
 
     rows: list[list[Node | float]] = []
     for row in range(m):
-        same = [a - each if column == row else -each for column, each in enumerate(jacobian[row])]
+        same = [a - entry if column == row else -entry for column, entry in enumerate(jacobian[row])]
         rows.append([*same, *diagonal(b, row)])
     for row in range(m):
-        same = [a - each if column == row else -each for column, each in enumerate(jacobian[row])]
+        same = [a - entry if column == row else -entry for column, entry in enumerate(jacobian[row])]
         rows.append([*diagonal(-b, row), *same])
     entries: dict[str, Node | float] = {f"{k}": entry for k, entry in enumerate(entry for row in rows for entry in row)}
-    both = Graph([*(each for row in jacobian for each in row), h], entries)
+    both = Graph([*(entry for row in jacobian for entry in row), h], entries)
     return [real, Factor("real", "pivots"), Call(both, ("jacobian", "h"), ("complex",)), Factor("complex", "pivots2")]
 
 

@@ -14,9 +14,9 @@ from cgraph import Graph
 from cgraph.extend import Call, Factor, If, Map, Program, Solve, Statement
 
 from .elementwise import SAME, identity, weighted
-from .explicit import moment
-from .problem import Problem
-from .step_control import commit, control, first_pass, measured, recorded, registers, trial
+from .explicit import stage_time
+from .problem import Problem, state_jacobian, time_derivative
+from .step_control import accept_step, control, first_pass, measured, recorded, registers, trial
 from .tableau import Row
 
 
@@ -88,9 +88,9 @@ def rosenbrock(method: Rosenbrock, problem: Problem, dense: bool) -> Program:
     m, stages = problem.size, len(method.c)
     slopes = tuple([f"U{k}" for k in range(stages)])
     timed = problem.timed
-    now: list[Statement] = [Call(problem.jacobian, ("x", "t", "p"), ("jacobian",))]
+    now: list[Statement] = [Call(state_jacobian(problem), ("x", "t", "p"), ("jacobian",))]
     if timed:
-        now.append(Call(problem.time_slope, ("x", "t", "p"), ("time_slope",)))
+        now.append(Call(time_derivative(problem), ("x", "t", "p"), ("time_slope",)))
     body: list[Statement] = [first_pass(identity(m)), If("accepted", tuple(now)), trial()]
     body += [_matrix(method.gamma), Factor("matrix", "pivots")]
     for k in range(stages):
@@ -98,15 +98,17 @@ def rosenbrock(method: Rosenbrock, problem: Problem, dense: bool) -> Program:
     body += [
         *measured(slopes[-1], m),
         control(method.order, stages),
-        commit(*(_dense(method, slopes) if dense else ())),
+        accept_step(*(_dense(method, slopes) if dense else ())),
     ]
     degree = len(method.dense) + 1
-    own = dict.fromkeys(("unit", "jacobian", "matrix"), m * m) | dict.fromkeys(("pivots", "at", "rate", *slopes), m)
-    own |= {"time_slope": m if timed else 0, "at_t": 1, "sum": 1}
+    lengths = dict.fromkeys(("unit", "jacobian", "matrix"), m * m) | dict.fromkeys(("pivots", "at", "rate", *slopes), m)
+    lengths |= {"time_slope": m if timed else 0, "at_t": 1, "sum": 1}
     if dense:
-        own |= {f"{name}{k + 1}": m for name, count in (("h_", degree - 1), ("dense", degree)) for k in range(count)}
+        lengths |= {
+            f"{name}{k + 1}": m for name, count in (("h_", degree - 1), ("dense", degree)) for k in range(count)
+        }
     record = recorded(dense, degree)
-    return Program({**registers(problem), **own}, body, record, record_if="accepted", stop="status")
+    return Program({**registers(problem), **lengths}, body, record, record_if="accepted", stop="status")
 
 
 def _matrix(gamma: float) -> Map:
@@ -124,7 +126,7 @@ def _stage(method: Rosenbrock, problem: Problem, k: int) -> list[Statement]:
         body.append(_sum("at", "x", method.a[k]))
     else:  # on from where the stage before arrived
         body.append(_sum("at", "at", (*[0.0] * (k - 1), 1.0)))
-    body += [moment("at_t", method.c[k]), Call(problem.rate, ("at", "at_t", "p"), ("rate",))]
+    body += [stage_time("at_t", method.c[k]), Call(problem.rate, ("at", "at_t", "p"), ("rate",))]
     weights = method.slopes[k]
     used = [j for j, weight in enumerate(weights) if weight]
     rate, h, slope, *nodes = inputs = cg.variables(["rate", "h", "slope", *(f"u{j}" for j in used)])

@@ -1,7 +1,7 @@
 """Programs that choose their steps: the registers that all of them have, step control, and explicit embedded methods.
 
 A pass is a trial of one step. Registers: x the state, t, p the parameters, evaluations, as with equal steps; `h` the
-step tried, `next` the one to try next and `longest` the longest allowed; `end` where to stop; rtol, and atol for each
+step tried, `next` the one to try next and `max_step` the longest allowed; `end` where to stop; rtol, and atol for each
 component of the state; accepted (1 or 0), status; rejected, a count; `error`, the estimate of the last trial, 1 at the
 tolerance; x_new what the trial arrived at; `fresh`, 1 before the first pass; and of the last accepted step t_old, x_old
 and, for its dense output, dense1, ..
@@ -14,7 +14,7 @@ from cgraph import Graph, Node
 from cgraph.extend import Call, If, Map, Program, Statement, Sum
 
 from .elementwise import SAME, compensated, function, scaled, weighted
-from .explicit import moment, point, stage
+from .explicit import stage, stage_state, stage_time
 from .problem import Problem
 from .tableau import Tableau
 
@@ -26,7 +26,7 @@ RESOLUTION = 4.0 * 2.0**-52  # steps below this share of t hardly move t
 
 def registers(problem: Problem) -> dict[str, int]:
     """What every program has."""
-    names = "t h next longest end fresh rtol accepted status rejected error error_old evaluations t_old t_new"
+    names = "t h next max_step end fresh rtol accepted status rejected error error_old evaluations t_old t_new"
     m = problem.size
     states = dict.fromkeys(("x", "x_new", "x_old", "atol"), m)
     return {**states, "p": len(problem.parameters), **dict.fromkeys(names.split(), 1)}
@@ -39,10 +39,10 @@ def recorded(dense: bool, degree: int) -> list[str]:
 
 def trial() -> Call:
     """The step to try: `next`, or what is left; of a little more than one step, half, so that no sliver remains."""
-    t, wanted, longest, end = inputs = cg.variables("t next longest end")
-    left, most = end - t, cg.minimum(wanted, longest)
+    t, wanted, max_step, end = inputs = cg.variables("t next max_step end")
+    left, most = end - t, cg.minimum(wanted, max_step)
     h = cg.where(most >= left, left, cg.where(2.0 * most > left, 0.5 * left, most))
-    return Call(Graph(inputs, {"h": h}), ("t", "next", "longest", "end"), ("h",))
+    return Call(Graph(inputs, {"h": h}), ("t", "next", "max_step", "end"), ("h",))
 
 
 def scale(x: Node, x_new: Node, rtol: Node, atol: Node) -> Node:
@@ -77,7 +77,7 @@ def control(order: int, evaluations: int) -> Call:
     return Call(Graph(inputs, outputs), names, tuple(outputs))
 
 
-def commit(*after: Statement) -> If:
+def accept_step(*after: Statement) -> If:
     """An accepted step becomes the state; `after` is what the method does besides, with x still the old state."""
     kept = (Map(SAME, ("x",), ("x_old",)), Call(SAME, ("t",), ("t_old",)))
     moved = (Map(SAME, ("x_new",), ("x",)), Call(SAME, ("t_new",), ("t",)))
@@ -103,27 +103,32 @@ def embedded(tableau: Tableau, problem: Problem, dense: bool) -> Program:
     body: list[Statement] = [first_pass(Call(problem.rate, ("x", "t", "p"), ("slope0",)), count(1)), trial()]
     for k in range(1, stages):
         body += stage(problem, tableau, k)
-    body += [_arrival(tableau.b), moment("at_t", 1.0), Call(problem.rate, ("x_new", "at_t", "p"), (last,))]
+    body += [_arrival(tableau.b), stage_time("at_t", 1.0), Call(problem.rate, ("x_new", "at_t", "p"), (last,))]
     body += [_squared(weights, slopes, f"sum{k}") for k, weights in enumerate(tableau.error)]
     body += [_estimate(len(tableau.error), m), control(tableau.estimate, stages)]
-    kept = (Map(SAME, (last,), ("slope0",)), Map(SAME, ("lost_new",), ("lost",)))
-    body.append(commit(*(_dense(tableau, problem) if dense else ()), *kept))
-    degree = len(tableau.dense[0])
-    own = {f"slope{k}": m for k in range(stages + 1 + (len(tableau.extra) if dense else 0))}
-    own |= {f"sum{k}": 1 for k in range(len(tableau.error))} | {"at": m, "at_t": 1, "lost": m, "lost_new": m}
+    kept = (Map(SAME, (last,), ("slope0",)), Map(SAME, ("rounding_new",), ("rounding",)))
+    body.append(accept_step(*(_dense(tableau, problem) if dense else ()), *kept))
+    degree = len(tableau.interpolant[0])
+    lengths = {f"slope{k}": m for k in range(stages + 1 + (len(tableau.extra) if dense else 0))}
+    lengths |= {f"sum{k}": 1 for k in range(len(tableau.error))} | {
+        "at": m,
+        "at_t": 1,
+        "rounding": m,
+        "rounding_new": m,
+    }
     if dense:
-        own |= {f"dense{k + 1}": m for k in range(degree)}
+        lengths |= {f"dense{k + 1}": m for k in range(degree)}
     record = recorded(dense, degree)
-    return Program({**registers(problem), **own}, body, record, record_if="accepted", stop="status")
+    return Program({**registers(problem), **lengths}, body, record, record_if="accepted", stop="status")
 
 
 def _arrival(weights: tuple[float, ...]) -> Map:
-    """x_new = x + h * (sum of weight * slope) with what rounding took off the step before; lost_new, what off this."""
+    """x_new = x + h * (sum of weight * slope) + what rounding took off the step before; rounding_new, what off this."""
     used = [k for k, weight in enumerate(weights) if weight]
-    x, before, h, *slopes = cg.variables(["x", "lost", "h", *(f"s{k}" for k in used)])
-    total, lost = compensated(x, h * weighted(slopes, [weights[k] for k in used]) + before)
-    graph = Graph([x, before, h, *slopes], {"x": total, "lost": lost})
-    return Map(graph, ("x", "lost", "h", *[f"slope{k}" for k in used]), ("x_new", "lost_new"))
+    x, before, h, *slopes = cg.variables(["x", "rounding", "h", *(f"s{k}" for k in used)])
+    total, rounding = compensated(x, h * weighted(slopes, [weights[k] for k in used]) + before)
+    graph = Graph([x, before, h, *slopes], {"x": total, "rounding": rounding})
+    return Map(graph, ("x", "rounding", "h", *[f"slope{k}" for k in used]), ("x_new", "rounding_new"))
 
 
 def measured(error: str, m: int) -> list[Statement]:
@@ -159,11 +164,15 @@ def _dense(tableau: Tableau, problem: Problem) -> tuple[Statement, ...]:
     """The coefficients of the dense output of an accepted step, with the stages that only they need."""
     body: list[Statement] = []
     for k, (c, weights) in enumerate(tableau.extra, start=len(tableau.b) + 1):
-        body += [point("at", weights), moment("at_t", c), Call(problem.rate, ("at", "at_t", "p"), (f"slope{k}",))]
+        body += [
+            stage_state("at", weights),
+            stage_time("at_t", c),
+            Call(problem.rate, ("at", "at_t", "p"), (f"slope{k}",)),
+        ]
     if tableau.extra:
         body.append(count(len(tableau.extra)))
-    for power in range(len(tableau.dense[0])):
-        weights = tuple([row[power] for row in tableau.dense])
+    for power in range(len(tableau.interpolant[0])):
+        weights = tuple([row[power] for row in tableau.interpolant])
         used = [k for k, weight in enumerate(weights) if weight]
         slopes = tuple([f"slope{k}" for k in used])
         body.append(Map(scaled([weights[k] for k in used]), ("h", *slopes), (f"dense{power + 1}",)))

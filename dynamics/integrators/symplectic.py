@@ -2,7 +2,7 @@
 
 Stages Q_i = q + h sum_j a_ij V_j and P_i = p + h sum_j b_ij F(Q_j, V_j), with the velocity V_i that belongs to P_i at
 Q_i; a step adds h sum_i w_i V_i to q and h sum_i w_i F_i to p (Hairer, Lubich and Wanner, sections II.2 and VI.4). The
-stages are found by iterating on the velocities until they no longer come nearer, each turn a Newton step of
+stages are solved for by iterating on the velocities until they no longer come nearer, each turn a Newton step of
 V_i -> P_i(V_i), so that nothing has to be explicit, separable or quadratic. Sums over many steps are compensated, and
 numbers of the method that float64 does not hold are two, the second what rounding took off the first: a method is only
 symplectic as exactly as w_i b_ij + w_j a_ji = w_i w_j, and what is missing adds up to a drift of the energy (Hairer,
@@ -21,7 +21,8 @@ from cgraph import Graph, Node
 from cgraph.extend import Call, Map, Program, Statement, Sum, While
 
 from .elementwise import SAME, compensated, function, weighted
-from .explicit import advance, moment, registers
+from .explicit import advance, registers, stage_time
+from .mechanics import Mechanics, mechanics
 from .problem import Problem
 from .step_control import count, first_pass
 
@@ -50,7 +51,7 @@ def _gauss(order: int, a: tuple[Row, ...], w: Row) -> Partitioned:
 
 
 def _over(denominator: int, *numerators: int) -> Row:
-    return tuple([Fraction(each, denominator) for each in numerators])
+    return tuple([Fraction(numerator, denominator) for numerator in numerators])
 
 
 def _root(n: int) -> Fraction:
@@ -73,6 +74,13 @@ GAUSS6 = _gauss(
     ),
     _over(18, 5, 8, 5),
 )
+PARTITIONED = {
+    "symplectic_euler": SYMPLECTIC_EULER,
+    "verlet": VERLET,
+    "midpoint": MIDPOINT,
+    "gauss4": GAUSS4,
+    "gauss6": GAUSS6,
+}
 
 
 def partitioned(method: Partitioned, problem: Problem) -> Program:
@@ -81,48 +89,49 @@ def partitioned(method: Partitioned, problem: Problem) -> Program:
 
 
 def _of_momenta(method: Partitioned, problem: Problem) -> Program:
-    mechanics, n = problem.mechanics, problem.size // 2
+    graphs, n = mechanics(problem), problem.size // 2
     stages = range(len(method.w))
-    own = {"q": n, "v": n, "momentum": n, "q_lost": n, "momentum_lost": n}
-    own |= {f"{name}{i}": n for name in ("Q", "V", "P", "F", "W") for i in stages}
-    read = Call(mechanics.momentum, ("x", "t", "p"), ("momentum",))
+    lengths = {"q": n, "v": n, "momentum": n, "q_rounding": n, "momentum_rounding": n}
+    lengths |= {f"{name}{i}": n for name in ("Q", "V", "P", "F", "W") for i in stages}
+    read = Call(graphs.momentum, ("x", "t", "p"), ("momentum",))
     start = [_copied(problem.size, ("x",), ("q", "v")), read]
-    if problem.separable and method in (SYMPLECTIC_EULER, VERLET):
-        body = _explicit(method, problem)
+    if graphs.separable and method in (SYMPLECTIC_EULER, VERLET):
+        body = _explicit(method, graphs)
     else:
         turn: list[Statement] = []
         for i in stages:
-            turn += [_stage(method.a[i], "q", "V", f"Q{i}"), _force(problem, f"Q{i}", f"V{i}", f"time{i}", f"F{i}")]
+            turn += [_stage(method.a[i], "q", "V", f"Q{i}"), _force(graphs, f"Q{i}", f"V{i}", f"time{i}", f"F{i}")]
         for i in stages:
             turn.append(_stage(method.b[i], "momentum", "F", f"P{i}"))
-            turn.append(_velocity(problem, f"Q{i}", f"V{i}", f"P{i}", f"time{i}", f"W{i}"))
+            turn.append(_velocity(graphs, f"Q{i}", f"V{i}", f"P{i}", f"time{i}", f"W{i}"))
         body = _iterated(method, turn)
-        body += [_added("q", "q_lost", "V", method.w), _added("momentum", "momentum_lost", "F", method.w)]
-        body += [moment("later", 1.0), *_settled(problem)]
+        body += [_added("q", "q_rounding", "V", method.w), _added("momentum", "momentum_rounding", "F", method.w)]
+        body += [stage_time("later", 1.0), *_settled(graphs)]
     body += [_copied(problem.size, ("q", "v"), ("x",)), *advance(0)]
-    return _program(method, problem, own, [first_pass(*start, *_guess_at_rest(method, "v")), *body])
+    return _program(method, problem, lengths, [first_pass(*start, *_guess_at_rest(method, "v")), *body])
 
 
 def _of_first_order(method: Partitioned, problem: Problem) -> Program:
     if method.a is not method.b:
         raise ValueError("this method advances coordinates and momenta in turn; a system of first order has none")
     m, stages = problem.size, range(len(method.w))
-    own = {"x_lost": m} | {f"{name}{i}": m for name in ("Q", "V", "W") for i in stages}
+    lengths = {"x_rounding": m} | {f"{name}{i}": m for name in ("Q", "V", "W") for i in stages}
     turn: list[Statement] = []
     for i in stages:
         turn.append(_stage(method.a[i], "x", "V", f"Q{i}"))
         turn.append(Call(problem.rate, (f"Q{i}", f"time{i}", "p"), (f"W{i}",)))
-    body = [*_iterated(method, turn), _added("x", "x_lost", "V", method.w), *advance(0)]
+    body = [*_iterated(method, turn), _added("x", "x_rounding", "V", method.w), *advance(0)]
     rate = Call(problem.rate, ("x", "t", "p"), ("W0",))
-    return _program(method, problem, own, [first_pass(rate, *_guess_at_rest(method, "W0")), *body])
+    return _program(method, problem, lengths, [first_pass(rate, *_guess_at_rest(method, "W0")), *body])
 
 
-def _program(method: Partitioned, problem: Problem, own: dict[str, int], body: list[Statement]) -> Program:
+def _program(method: Partitioned, problem: Problem, lengths: dict[str, int], body: list[Statement]) -> Program:
     single = dict.fromkeys(("fresh", "failed", "going", "turns", "change", "speed", "change_old", "later"), 1)
     single |= {f"{name}{i}": 1 for name in ("time", "change", "speed") for i in range(len(method.w))}
-    lost, failed = cg.variables("lost failed")
-    body = [*body, Call(Graph([lost, failed], {"lost": lost + failed}), ("lost", "failed"), ("lost",))]
-    return Program({**registers(problem), **own, **single}, body, record=["t", "x"], stop="lost")
+    nonfinite, failed = names = cg.variables("nonfinite failed")
+    either = Graph(names, {"nonfinite": nonfinite + failed})
+    body = [*body, Call(either, ("nonfinite", "failed"), ("nonfinite",))]
+    return Program({**registers(problem), **lengths, **single}, body, record=["t", "x"], stop="nonfinite")
 
 
 def _stage(weights: Row, base: str, slope: str, target: str) -> Map:
@@ -136,23 +145,23 @@ def _stage(weights: Row, base: str, slope: str, target: str) -> Map:
 
 def _change(h: Node, slopes: Sequence[Node], weights: Sequence[Fraction]) -> tuple[Node, Node | None]:
     """h * (sum of weight * slope), by the weights as float64 holds them, and by what it leaves of them."""
-    held = [float(each) for each in weights]
-    left = [float(each - Fraction(number)) for each, number in zip(weights, held, strict=True)]
+    held = [float(weight) for weight in weights]
+    left = [float(weight - Fraction(number)) for weight, number in zip(weights, held, strict=True)]
     return h * weighted(slopes, held), h * weighted(slopes, left) if any(left) else None
 
 
-def _force(problem: Problem, q: str, v: str, t: str, target: str) -> Call:
-    return Call(problem.mechanics.force, (q, v, t, "p"), (target,))
+def _force(graphs: Mechanics, q: str, v: str, t: str, target: str) -> Call:
+    return Call(graphs.force, (q, v, t, "p"), (target,))
 
 
-def _velocity(problem: Problem, q: str, v: str, momentum: str, t: str, target: str) -> Call:
-    return Call(problem.mechanics.velocity, (q, v, momentum, t, "p"), (target,))
+def _velocity(graphs: Mechanics, q: str, v: str, momentum: str, t: str, target: str) -> Call:
+    return Call(graphs.velocity, (q, v, momentum, t, "p"), (target,))
 
 
 def _iterated(method: Partitioned, turn: list[Statement]) -> list[Statement]:
     """Times and a first guess of the stages, and turns from V to W until W = V to rounding."""
     stages = range(len(method.w))
-    body: list[Statement] = [moment(f"time{i}", float(method.c[i])) for i in stages]
+    body: list[Statement] = [stage_time(f"time{i}", float(method.c[i])) for i in stages]
     begin = Graph([], {"going": 1.0, "turns": 0.0, "change_old": math.inf})
     body.append(Call(begin, (), ("going", "turns", "change_old")))
     difference = function("w v", change=(cg.variable("w") - cg.variable("v")) ** 2.0)
@@ -188,35 +197,35 @@ def _guess_at_rest(method: Partitioned, velocity: str) -> list[Statement]:
     return [Map(SAME, (velocity,), (f"V{i}",)) for i in range(len(method.w))]
 
 
-def _added(base: str, lost: str, slope: str, weights: Row) -> Map:
+def _added(base: str, rounding: str, slope: str, weights: Row) -> Map:
     """base += h * (sum of weight * slope), with what rounding took off kept for the next step."""
-    x, before, h, *slopes = cg.variables(["x", "lost", "h", *(f"s{k}" for k in range(len(weights)))])
+    x, before, h, *slopes = cg.variables(["x", "rounding", "h", *(f"s{k}" for k in range(len(weights)))])
     change, rest = _change(h, slopes, weights)
-    total, lost_next = compensated(x, change + (before if rest is None else before + rest))
-    graph = Graph([x, before, h, *slopes], {"x": total, "lost": lost_next})
-    return Map(graph, (base, lost, "h", *[f"{slope}{k}" for k in range(len(weights))]), (base, lost))
+    total, after = compensated(x, change + (before if rest is None else before + rest))
+    graph = Graph([x, before, h, *slopes], {"x": total, "rounding": after})
+    return Map(graph, (base, rounding, "h", *[f"{slope}{k}" for k in range(len(weights))]), (base, rounding))
 
 
-def _settled(problem: Problem) -> list[Statement]:
+def _settled(graphs: Mechanics) -> list[Statement]:
     """v, the velocity that belongs to the momenta at the end of the step."""
-    once = _velocity(problem, "q", "v", "momentum", "later", "v")
-    return [once] if problem.quadratic else [once] * REPEATS
+    once = _velocity(graphs, "q", "v", "momentum", "later", "v")
+    return [once] if graphs.quadratic else [once] * REPEATS
 
 
-def _explicit(method: Partitioned, problem: Problem) -> list[Statement]:
+def _explicit(method: Partitioned, graphs: Mechanics) -> list[Statement]:
     """Kinetic energy of the velocities alone with a constant mass matrix, forces of the coordinates: no iteration."""
     half = method is VERLET
     kick = _stage(_over(2, 1 if half else 2), "momentum", "F", "momentum")
     body: list[Statement] = [
-        _force(problem, "q", "v", "t", "F0"),
+        _force(graphs, "q", "v", "t", "F0"),
         kick,
-        _velocity(problem, "q", "v", "momentum", "t", "v"),
-        _added("q", "q_lost", "V", (_1,)),
-        moment("later", 1.0),
+        _velocity(graphs, "q", "v", "momentum", "t", "v"),
+        _added("q", "q_rounding", "V", (_1,)),
+        stage_time("later", 1.0),
     ]
     body.insert(3, Map(SAME, ("v",), ("V0",)))
     if half:
-        body += [_force(problem, "q", "v", "later", "F0"), kick, _velocity(problem, "q", "v", "momentum", "later", "v")]
+        body += [_force(graphs, "q", "v", "later", "F0"), kick, _velocity(graphs, "q", "v", "momentum", "later", "v")]
     return [*body, count(2 if half else 1)]
 
 

@@ -9,12 +9,47 @@ Row = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Tableau:
-    """Stage k is taken at t + c_k h and x + h sum_j a_kj slope_j; the step adds h sum_k b_k slope_k.
+    """The numbers of an explicit Runge-Kutta method of s stages.
 
-    Of an embedded method, besides: `error`, weights of h slope_k in its estimates of the error of a step (two in
-    DOP853, which combines them), with the slope at the end of the step as one more; `estimate`, the order of the
-    step's size in the estimate; `dense`, row k the weights of slope k in the coefficients of the dense output.
-    `extra`: stages (c_k, a_k) that only the dense output needs.
+    Stage k is taken at t + c_k h and x + h sum_j a_kj slope_j; the step adds h sum_k b_k slope_k. A tableau with
+    weights of an error estimate is an embedded method, which chooses its steps.
+
+    Parameters
+    ----------
+    order : int
+        p, where the error of a run falls as h^p.
+    c : tuple
+        Times of the stages, s numbers, the first 0.
+    a : tuple of tuples
+        Row k the weights of the slopes before stage k, k numbers.
+    b : tuple
+        Weights of the slopes in the step, s numbers.
+    error : tuple of tuples, optional
+        Weights of h slope_k in an estimate of the error of the step, s + 1 numbers, the last for the slope at the end
+        of the step. DOP853 has two estimates, which are combined.
+    estimate : int, optional
+        q, where the estimate falls as h^q.
+    dense : tuple of tuples, optional
+        Row k the weights of slope k in the coefficients of s, s^2, .. of the dense output; without them the cubic
+        through states and slopes at both ends.
+    extra : tuple of (float, tuple), optional
+        Stages (c_k, a_k) that only the dense output needs.
+
+    Examples
+    --------
+    Kutta's 3/8 rule, as a method of `simulate` from here on:
+
+    >>> import dynamics as dyn
+    >>> from dynamics.integrators import Tableau, runge_kutta
+    >>> a = ((), (1 / 3,), (-1 / 3, 1), (1, -1, 1))
+    >>> rule = Tableau(4, c=(0, 1 / 3, 2 / 3, 1), a=a, b=(1 / 8, 3 / 8, 3 / 8, 1 / 8))
+    >>> dyn.METHODS["kutta38"] = runge_kutta(rule)
+    >>> dyn.METHODS["kutta38"]
+    <Method of order 4, equal steps>
+    >>> decay = dyn.OdeSystem(lambda x, t: [-x[0]], ["x"])
+    >>> dyn.simulate(decay, [1.0], None, 1.0, "kutta38", dt=0.1).q[-1].round(6)
+    array([0.36788])
+    >>> del dyn.METHODS["kutta38"]
     """
 
     order: int
@@ -25,6 +60,18 @@ class Tableau:
     estimate: int = 0
     dense: tuple[Row, ...] = ()
     extra: tuple[tuple[float, Row], ...] = ()
+
+    @property
+    def interpolant(self) -> tuple[Row, ...]:
+        """`dense`, or in its place the weights of Hermite's cubic, a row for each slope, that at the end included.
+
+        x + s h f0 + s^2 (3 D - h (2 f0 + f1)) + s^3 (h (f0 + f1) - 2 D), with D = h sum_k b_k slope_k.
+        """
+        if self.dense:
+            return self.dense
+        first = [1.0, *[0.0] * len(self.b)]
+        step = zip(first, (*self.b, 0.0), reversed(first), strict=True)
+        return tuple([(f0, 3.0 * b - 2.0 * f0 - f1, f0 + f1 - 2.0 * b) for f0, b, f1 in step])
 
 
 EULER = Tableau(1, c=(0.0,), a=((),), b=(1.0,))
@@ -55,3 +102,5 @@ DOPRI5 = Tableau(
         (0, 40617522 / 29380423, -110615467 / 29380423, 69997945 / 29380423),
     ),
 )
+
+TABLEAUS = {"euler": EULER, "rk4": RK4, "dopri5": DOPRI5}  # a new row here is a new method of `simulate`

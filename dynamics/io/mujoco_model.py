@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from cgraph.errors import install
+from cgraph.extend import install
 
 from ..multibody.mechanism import Mechanism
 from ..multibody.planar_arm import PlanarArm

@@ -183,4 +183,5 @@ def planar_arm(
         else Link(mass, length, length, 0.0)
         for mass, length in zip(map(float, masses), map(float, lengths), strict=True)
     ]
-    return PlanarArm(tuple(links), per_coordinate("damping", damping, len(links), minimum=0.0), float(gravity))
+    joints = [f"joint {i + 1}" for i in range(len(links))]
+    return PlanarArm(tuple(links), per_coordinate("damping", damping, joints, minimum=0.0), float(gravity))

@@ -81,7 +81,7 @@ class CasadiPeer(Peer):
     def prepare(self, task: str, mode: str) -> Contender:
         """See Peer."""
         if self.native and self.compiler is None:
-            raise UnavailableError("found no C compiler")
+            raise UnavailableError("there is no C compiler")
         function = self.function(task)
         size = function.n_instructions() if function.is_a("SXFunction") else None
         if mode == "call":

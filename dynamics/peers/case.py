@@ -65,14 +65,14 @@ class Case:
         return (2 if task == "rk4" else 3) * self.n
 
 
-def rk4_step(rate: Callable[[Any], Any], x: Any) -> Any:
-    """The state after one RK4 step of `DT` from x, where xdot = rate(x); x: anything with sums and multiples."""
+def rk4_step(rate: Callable[[Any], Any], x: Any, dt: float = DT) -> Any:
+    """The state after one RK4 step of dt [s] from x, where xdot = rate(x); x: anything with sums and multiples."""
     slopes: list[Any] = []
     for weights in (*RK4.a, RK4.b):
         at = x
         for weight, slope in zip(weights, slopes, strict=True):
             if weight:
-                at = at + (DT * weight) * slope
+                at = at + (dt * weight) * slope
         if len(slopes) < len(RK4.b):
             slopes.append(rate(at))
     return at

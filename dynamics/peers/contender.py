@@ -1,9 +1,9 @@
-"""Contender: what is timed, and what it found."""
+"""Contender: what is timed, and its values."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,19 +45,3 @@ class Peer(ABC):
     @abstractmethod
     def prepare(self, task: str, mode: str) -> Contender:
         """The contender for a task and a mode, compiled. Raises UnavailableError."""
-
-
-def ldl_solve(matrix: Sequence[Sequence[Any]], rhs: Sequence[Any]) -> list[Any]:
-    """x of A x = rhs for symmetric, definite A (its lower rows are read), written out over any numbers with + - * /."""
-    a, x = [list(row[: i + 1]) for i, row in enumerate(matrix)], list(rhs)
-    for k in reversed(range(len(x))):  # from the tip of a chain to its base: the accurate order
-        for i in range(k):
-            gain = a[k][i] / a[k][k]
-            for j in range(i + 1):
-                a[i][j] = a[i][j] - gain * a[k][j]
-            x[i] = x[i] - gain * x[k]
-    for i, row in enumerate(a):
-        for j in range(i):
-            x[i] = x[i] - row[j] * x[j]
-        x[i] = x[i] / row[i]
-    return x

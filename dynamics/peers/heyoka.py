@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from .case import BATCH, Case
-from .contender import Contender, Peer, ldl_solve
+from .contender import Contender, Peer
+from .dense_solve import dense_solve
 from .translate import lagrangian
 
 COMPACT = 15  # coordinates; beyond, code written out takes longer to compile than its `compact_mode`
@@ -59,6 +60,6 @@ def expressions(case: Case, task: str) -> tuple[list[Any], list[Any]]:
     moved = [hy.sum([rows[i, k] * qd[k] for k in range(n)]) for i in range(n)]
     if task == "forward":
         mass = [[rows[i, n + k] for k in range(n)] for i in range(n)]
-        return ldl_solve(mass, [last[i] + known[i] - moved[i] for i in range(n)]), inputs
+        return dense_solve(mass, [last[i] + known[i] - moved[i] for i in range(n)]), inputs
     inertia = [hy.sum([rows[i, n + k] * last[k] for k in range(n)]) for i in range(n)]
     return [inertia[i] + moved[i] - known[i] for i in range(n)], inputs

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from .case import BATCH, NUDGE, PASSES, Array, Case, rk4_step
-from .contender import Contender, Peer, ldl_solve
+from .contender import Contender, Peer
+from .dense_solve import dense_solve
 from .translate import lagrangian
 
 SHORT = 10  # coordinates; beyond, a solve written out takes longer to compile than it gains on LAPACK's Cholesky
@@ -47,12 +48,16 @@ class JaxPeer(Peer):
         _, moved = self.jax.jvp(lambda q: momentum(q, qd), (q,), (qd,))
         mass, rhs = self.jax.jacfwd(momentum, 1)(q, qd), tau + self._known(q, qd) - moved
         if self.case.n <= SHORT:
-            return self.np.stack(ldl_solve(mass, rhs))
+            return self.np.stack(dense_solve(mass, rhs))
         return self.jax.scipy.linalg.solve(mass, rhs, assume_a="pos")
 
-    def _step(self, x: Any) -> Any:
+    def rate(self, x: Any) -> Any:
+        """xdot of a state (q, qd) without applied torque."""
         n, join = self.case.n, self.np.concatenate
-        return rk4_step(lambda x: join([x[n:], self._forward(join([x, self.np.zeros(n)]))]), x)
+        return join([x[n:], self._forward(join([x, self.np.zeros(n)]))])
+
+    def _step(self, x: Any) -> Any:
+        return rk4_step(self.rate, x)
 
     def prepare(self, task: str, mode: str) -> Contender:
         """See Peer."""

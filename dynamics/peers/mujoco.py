@@ -36,6 +36,16 @@ class MujocoPeer(Peer):
         self.order = np.array([model.joint(name).id for name in names])  # of ours, in theirs
         self.at = np.argsort(self.order)
 
+    def quantities(self, q: Array, qd: Array, qdd: Array, tau: Array) -> dict[str, Array]:
+        """tau of a motion, qdd under torques tau, M(q) and the bias at one state, in our order."""
+        at, twin, order = self.at, self.twin, self.order
+        return {
+            "tau": twin.inverse(q[at], qd[at], qdd[at])[order],
+            "qdd": twin.accelerations(q[at], qd[at], tau[at])[order],
+            "M": twin.mass_matrix(q[at])[np.ix_(order, order)],
+            "bias": twin.bias(q[at], qd[at])[order],
+        }
+
     def prepare(self, task: str, mode: str) -> Contender:
         """See Peer."""
         if mode != "call":

@@ -59,6 +59,18 @@ class PinocchioPeer(Peer):
         last = x[2 * n :] - self._passive(x) if task == "forward" else x[2 * n :]
         return x[self.at], x[n + self.at], last[self.at]
 
+    def quantities(self, q: Array, qd: Array, qdd: Array, tau: Array) -> dict[str, Array]:
+        """tau of a motion, qdd under torques tau, M(q) and the bias at one state, in our order."""
+        pinocchio, twin, data, order = self.pinocchio, self.twin, self.data, self.order
+        x = np.concatenate([q, qd, tau])
+        upper = np.triu(pinocchio.crba(twin, data, q[self.at]))
+        return {
+            "tau": pinocchio.rnea(twin, data, *[each[self.at] for each in (q, qd, qdd)])[order] + self._passive(x),
+            "qdd": pinocchio.aba(twin, data, *self._arguments(x, "forward"))[order],
+            "M": (upper + np.triu(upper, 1).T)[np.ix_(order, order)],
+            "bias": pinocchio.nonLinearEffects(twin, data, q[self.at], qd[self.at])[order],
+        }
+
     def prepare(self, task: str, mode: str) -> Contender:
         """See Peer."""
         if task == "rk4":
@@ -82,7 +94,7 @@ class PinocchioPeer(Peer):
         y = np.zeros((self.case.n, BATCH), order="F")
         return Contender(
             lambda: algorithm(1, pool, *columns, y),
-            lambda found: (y if found is None else found)[self.order] + added,
+            lambda result: (y if result is None else result)[self.order] + added,
             BATCH,
         )
 

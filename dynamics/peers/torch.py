@@ -1,10 +1,16 @@
-"""PyTorch eager: inverse dynamics by torch.autograd."""
+"""PyTorch eager: the formulations by torch.autograd, an operation at a time, as Table 1 of the paper has it."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+from typing import Any
+
 import numpy as np
 
-from ..experiments.paper_numbers.torch_eager import eager_evaluations
+from cgraph import Node
+from cgraph.extend import topological
+
+from ..systems.system import System
 from .case import Case
 from .contender import Contender, Peer, UnavailableError
 
@@ -22,3 +28,69 @@ class TorchPeer(Peer):
             raise UnavailableError("is measured on systems without parameters and applied forces")
         x = self.case.point(task)
         return Contender(lambda: self.evaluate(x), lambda taus: np.array([float(tau.detach()) for tau in taus]))
+
+
+def eager_evaluations(system: System, formulations: Iterable[str]) -> dict[str, Callable[[np.ndarray], Any]]:
+    """{formulation: function of its inputs} by torch.autograd on the same Lagrangian; empty without torch."""
+    try:
+        import torch
+    except ImportError:
+        return {}
+    ways = {"euler_embedded": _embedded(torch, system, system.lagrangian), "chain_rule": _chain_rule(torch, system)}
+    ways["kinetic_only"] = _embedded(torch, system, system.kinetic)
+    return {name: ways[name] for name in formulations}
+
+
+def _value(torch: Any, node: Node, env: dict[Node, Any]) -> Any:
+    """The value of a node, each operation a torch call."""
+    env = dict(env)
+    for each in topological([node]):
+        if each not in env:
+            args = [env[arg] for arg in each.args]
+            call = getattr(torch, each.op.name, None)
+            env[each] = torch.tensor(each.value, dtype=torch.float64) if call is None or not args else call(*args)
+    return env[node]
+
+
+def _gradient(torch: Any, y: Any, x: list[Any]) -> list[Any]:
+    slopes = torch.autograd.grad(y, x, create_graph=True, allow_unused=True)
+    return [torch.zeros((), dtype=torch.float64) if slope is None else slope for slope in slopes]
+
+
+def _leaves(torch: Any, x: np.ndarray) -> list[Any]:
+    return [torch.tensor(value, dtype=torch.float64, requires_grad=True) for value in x]
+
+
+def _chain_rule(torch: Any, system: System) -> Callable[[np.ndarray], Any]:
+    n = system.n
+
+    def evaluate(x: np.ndarray) -> Any:
+        leaves = _leaves(torch, x)
+        q, qd, qdd = leaves[:n], leaves[n : 2 * n], leaves[2 * n :]
+        lagrangian = _value(torch, system.lagrangian, dict(zip([*system.q, *system.qd], [*q, *qd], strict=True)))
+        slopes = _gradient(torch, lagrangian, [*q, *qd])
+        taus = []
+        for i in range(n):
+            rows = _gradient(torch, slopes[n + i], [*q, *qd])
+            rate = sum(row * dot for row, dot in zip(rows, [*qd, *qdd], strict=True))
+            taus.append(rate - slopes[i] + system.damping[i] * qd[i])
+        return taus
+
+    return evaluate
+
+
+def _embedded(torch: Any, system: System, energy: Node) -> Callable[[np.ndarray], Any]:
+    n = system.n
+
+    def evaluate(x: np.ndarray) -> Any:
+        leaves = _leaves(torch, x)
+        q_old, qd_old, qdd, dt = leaves[:n], leaves[n : 2 * n], leaves[2 * n : 3 * n], leaves[3 * n]
+        qd = [a * dt + old for a, old in zip(qdd, qd_old, strict=True)]
+        q = [v * dt + old for v, old in zip(qd, q_old, strict=True)]
+        state = dict(zip([*system.q, *system.qd], [*q, *qd], strict=True))
+        momenta = _gradient(torch, _value(torch, energy, state), qd)
+        slopes = _gradient(torch, _value(torch, system.lagrangian, state), q)
+        rates = [_gradient(torch, p, [dt])[0] for p in momenta]
+        return [rates[i] - slopes[i] + system.damping[i] * qd[i] for i in range(n)]
+
+    return evaluate

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from cgraph.errors import install
+from cgraph.extend import install
 
 from .solution import Reference, from_text
 
@@ -21,7 +21,7 @@ def _solution(times: Sequence[float], state: Callable[[Any, Any], Sequence[Any]]
         raise ImportError(f"closed forms need mpmath: {install('reference')}") from None
     mp = mpmath.mp
     with mp.workdps(DIGITS + GUARD):
-        rows = [[mpmath.nstr(mp.mpf(each), DIGITS + 6) for each in state(mp, mp.mpf(t))] for t in map(float, times)]
+        rows = [[mpmath.nstr(mp.mpf(value), DIGITS + 6) for value in state(mp, mp.mpf(t))] for t in map(float, times)]
     return from_text(times, rows, 10.0**-DIGITS, f"closed form: {how}")
 
 
@@ -53,7 +53,7 @@ def free_fall(times: Sequence[float], q: Sequence[float], qd: Sequence[float], q
     """Constant accelerations qdd from (q, qd). States (q, qd)."""
 
     def state(mp: Any, t: Any) -> list[Any]:
-        x, v, a = ([mp.mpf(each) for each in row] for row in (q, qd, qdd))
+        x, v, a = ([mp.mpf(value) for value in row] for row in (q, qd, qdd))
         places = [p + s * t + b * t * t / 2 for p, s, b in zip(x, v, a, strict=True)]
         return [*places, *[s + b * t for s, b in zip(v, a, strict=True)]]
 
@@ -118,7 +118,7 @@ def free_rigid_body(times: Sequence[float], inertia: Sequence[float], omega: Seq
     """
 
     def state(mp: Any, t: Any) -> list[Any]:
-        i, w = [mp.mpf(each) for each in inertia], [mp.mpf(each) for each in omega]
+        i, w = [mp.mpf(value) for value in inertia], [mp.mpf(value) for value in omega]
         energy = sum(a * b * b for a, b in zip(i, w, strict=True))  # twice
         square = sum((a * b) ** 2 for a, b in zip(i, w, strict=True))
         # With L^2 < 2 T I_2 the body turns about axis 1; the roles of axes 1 and 3 change then.
@@ -144,7 +144,7 @@ def cyclotron(times: Sequence[float], start: Sequence[float], frequency: float) 
     """A charge in a uniform field along z: (vx, vy)' = frequency (vy, -vx). States (x, y, vx, vy)."""
 
     def state(mp: Any, t: Any) -> list[Any]:
-        x, y, u, v = (mp.mpf(each) for each in start)
+        x, y, u, v = (mp.mpf(value) for value in start)
         w = mp.mpf(frequency)
         s, c = mp.sin(w * t), mp.cos(w * t)
         return [x + (u * s + v * (1 - c)) / w, y + (v * s - u * (1 - c)) / w, u * c + v * s, v * c - u * s]
@@ -161,7 +161,7 @@ def two_modes(times: Sequence[float], q: Sequence[float], stiffness: Sequence[fl
     """(q0 + q1)'' = -stiffness_0 (q0 + q1) and q1'' = -stiffness_1 q1, from rest at q. States (q0, q1, qd0, qd1)."""
 
     def state(mp: Any, t: Any) -> list[Any]:
-        w, v = (mp.sqrt(mp.mpf(each)) for each in stiffness)
+        w, v = (mp.sqrt(mp.mpf(value)) for value in stiffness)
         both, second = mp.mpf(q[0]) + mp.mpf(q[1]), mp.mpf(q[1])
         place, speed = second * mp.cos(v * t), -second * v * mp.sin(v * t)
         return [both * mp.cos(w * t) - place, place, -both * w * mp.sin(w * t) - speed, speed]

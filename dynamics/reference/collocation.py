@@ -16,13 +16,12 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
+from cgraph.extend import Array
 
 from ..systems.system import TIME
 from .flint_numbers import Number, flint, log2_size, working
 from .taylor_integrator import ReferenceFailedError, step_size
 from .taylor_series import Series
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 GUARD = 40  # digits of arithmetic beyond the tolerance: a stiff rate is a small difference of large terms
 SETTLED = 24  # digits beyond the tolerance to which the stages are solved for: a stiff rate loses most of them
@@ -46,7 +45,7 @@ def radau(stages: int, digits: int) -> Radau:
     # The matrix of Legendre's polynomials at the points is well conditioned: ten digits are more than it loses.
     with working(digits + 10) as number:
         x = [_radau_point(number, stages, guess) for guess in _guesses(stages)]
-        values = [[each.legendre_p(n).mid() for n in range(stages + 1)] for each in x]
+        values = [[point.legendre_p(n).mid() for n in range(stages + 1)] for point in x]
         vandermonde = package.arb_mat([row[:stages] for row in values])
         to_legendre = vandermonde.solve(package.arb_mat(stages, stages, _identity(stages)), algorithm="approx").mid()
         # the integral of P_n from -1 is (P_(n+1) - P_(n-1)) / (2n + 1); a step of 1 is half of [-1, 1]
@@ -55,7 +54,7 @@ def radau(stages: int, digits: int) -> Radau:
             for at, row in zip(x, values, strict=True)
         ]
         integral = (package.arb_mat(primitive) * to_legendre).mid()
-        return Radau([(each + 1) / 2 for each in x], integral, to_legendre)
+        return Radau([(point + 1) / 2 for point in x], integral, to_legendre)
 
 
 def _identity(n: int) -> list[int]:
@@ -64,8 +63,8 @@ def _identity(n: int) -> list[int]:
 
 def _guesses(stages: int) -> list[float]:
     """Radau points on [-1, 1] in float64: zeros of P_s - P_(s-1), the last at 1."""
-    found: Array = np.polynomial.legendre.legroots([0.0] * (stages - 1) + [-1.0, 1.0])
-    return sorted(np.real(found).tolist())[:-1] + [1.0]
+    roots: Array = np.polynomial.legendre.legroots([0.0] * (stages - 1) + [-1.0, 1.0])
+    return sorted(np.real(roots).tolist())[:-1] + [1.0]
 
 
 def _radau_point(number: Any, s: int, guess: float) -> Number:
@@ -85,7 +84,7 @@ def collocation(
     states: Sequence[str],
     start: Sequence[Any],
     times: Sequence[float],
-    given: Mapping[str, Any],
+    values: Mapping[str, Any],
     digits: int,
 ) -> tuple[list[list[Number]], str]:
     """The states at `times` from `start` at t = 0, each step resolved to about a relative 10^-digits.
@@ -95,11 +94,11 @@ def collocation(
     Raises ReferenceFailedError when no step is small enough.
     """
     stages = digits + 4
-    slopes = _jacobian(graph, states, given)
+    slopes = _jacobian(graph, states, values)
     with working(digits + GUARD) as number:
         method = radau(stages, digits + GUARD)
-        series = Series(graph, states, given, number)
-        weights = np.array([[float(each) for each in row] for row in method.integral.tolist()])
+        series = Series(graph, states, values, number)
+        weights = np.array([[float(entry) for entry in row] for row in method.integral.tolist()])
         x, t = [number(value).mid() for value in start], number(0)
         h = step_size(series.expand(x, t, stages), digits, 0.0)
         guess = [series.rate(x, t)] * stages
@@ -143,11 +142,11 @@ def _stages(
     The correction is solved for in float64, with the exact Jacobian: some ten digits an iteration near the solution.
     """
     m, stages = len(x), len(method.c)
-    at = np.array([float(t + h * each) for each in method.c])
+    at = np.array([float(t + h * c) for c in method.c])
     place = _moved(method, x, rates, h)
     smallest = math.inf
     for _ in range(NEWTON):
-        new = [series.rate(row, t + h * each) for row, each in zip(place, method.c, strict=True)]
+        new = [series.rate(row, t + h * c) for row, c in zip(place, method.c, strict=True)]
         target = _moved(method, x, new, h)
         # a scale for each state makes float64 do for states of any size
         scale = np.array([_scale(place, x, i) for i in range(m)])
@@ -204,9 +203,9 @@ def _growth(method: Radau, rates: list[list[Number]], x: list[Number], h: Number
     return math.exp2((-digits * math.log2(10.0) - worst) / len(table))
 
 
-def _jacobian(graph: Graph, states: Sequence[str], given: Mapping[str, Any]) -> Callable[[Array, Array], Array]:
+def _jacobian(graph: Graph, states: Sequence[str], values: Mapping[str, Any]) -> Callable[[Array, Array], Array]:
     """df/dx in float64 at points x, (s, m), and times t, (s,): (s, m, m)."""
-    bound = cg.specialize(graph, {name: float(value) for name, value in given.items()})
+    bound = cg.specialize(graph, {name: float(value) for name, value in values.items()})
     compiled = cg.compile(cg.jacobian(bound, list(states)), "numpy")
     timed = TIME in bound.input_names
     m = len(states)

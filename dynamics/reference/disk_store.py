@@ -1,17 +1,15 @@
-"""A folder of reference solutions: one JSON file each, named by all that the solution depends on."""
+"""A folder of reference solutions: a JSON file for a solution, named by all that the solution depends on."""
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
-import os
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from cgraph import Graph
+from cgraph.extend import atomic_write
 
 from .solution import Reference, from_text
 
@@ -23,7 +21,7 @@ def key(
     states: Sequence[str],
     start: Sequence[float],
     times: Sequence[float],
-    given: Mapping[str, float],
+    values: Mapping[str, float],
     method: str,
     digits: int,
 ) -> str:
@@ -39,13 +37,13 @@ def key(
         for node in graph.nodes
     ]
     rates = [number[node] for node in graph.outputs.values()]
-    numbers = [[float(each).hex() for each in row] for row in (start, times, given.values())]
-    content = [FORMAT, nodes, rates, list(states), list(given), numbers, method, digits]
+    numbers = [[float(value).hex() for value in row] for row in (start, times, values.values())]
+    content = [FORMAT, nodes, rates, list(states), list(values), numbers, method, digits]
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()
 
 
 class Store:
-    """Solutions in a folder, which is made when needed. Several programs may use it at once."""
+    """Solutions in a folder, which is created on demand. Several programs may use it at once."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -53,27 +51,18 @@ class Store:
     def get(self, name: str, times: Sequence[float], width: int, solve: Callable[[], Reference]) -> Reference:
         """The solution of that name, at these times with so many states; computed and kept when it is not there."""
         path = self.folder / f"{name}.json"
-        found = _read(path, times, width)
-        if found is not None:
-            return found
+        kept = _read(path, times, width)
+        if kept is not None:
+            return kept
         solution = solve()
         self.folder.mkdir(parents=True, exist_ok=True)
-        # Written aside and moved into place, so that a reader sees all of it or nothing.
-        handle, aside = tempfile.mkstemp(dir=self.folder, suffix=".part")
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                json.dump(_signed(solution), file)
-            Path(aside).replace(path)
-        except BaseException:
-            with contextlib.suppress(OSError):
-                Path(aside).unlink()
-            raise
+        atomic_write(path, json.dumps(_signed(solution)))  # a reader sees all of it or nothing
         return solution
 
 
 def _signed(solution: Reference) -> dict[str, Any]:
     content = {
-        "t": [each.hex() for each in solution.t],
+        "t": [t.hex() for t in solution.t],
         "x": [list(row) for row in solution.decimal],
         "error": solution.error.hex(),
         "how": solution.how,
@@ -91,7 +80,7 @@ def _read(path: Path, times: Sequence[float], width: int) -> Reference | None:
         content = json.loads(path.read_text(encoding="utf-8"))
         if content.pop("sum") != _sum(content):
             return None
-        t = [float.fromhex(each) for each in content["t"]]
+        t = [float.fromhex(text) for text in content["t"]]
         if t != list(times) or {len(row) for row in content["x"]} != {width}:
             return None
         return from_text(t, content["x"], float.fromhex(content["error"]), content["how"])

@@ -8,8 +8,7 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
-from cgraph.errors import install
-from cgraph.extend import Op
+from cgraph.extend import Op, install
 
 Number = Any  # flint.arb: a midpoint of the working precision with a bound on its rounding error
 

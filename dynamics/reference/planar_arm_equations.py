@@ -1,7 +1,7 @@
 """Torques and accelerations of planar arms to any number of digits, by closed formulas: no graph, no derivative.
 
-With theta_i the angle of link i from the vertical, b_ki link i's share of the way to the centre of mass of link k (its
-length, or for i = k the distance of the centre) and a_ij = sum over k of m_k b_ki b_kj + I_i [i = j], the equations are
+With theta_i the angle of link i from the vertical, b_ki link i's share of the way to the center of mass of link k (its
+length, or for i = k the distance of the center) and a_ij = sum over k of m_k b_ki b_kj + I_i [i = j], the equations are
     sum_j a_ij (cos(theta_i - theta_j) theta_j'' + sin(theta_i - theta_j) theta_j'^2)
         + g sum_k m_k b_ki sin theta_i = Q_i,    Q_i = tau_i - tau_(i+1),
 and damping acts in the joints.
@@ -16,10 +16,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cgraph.extend import Array
+
 from ..multibody.planar_arm import PlanarArm
 from .flint_numbers import Number, flint, working
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 Vector = list[Number]
 DIGITS = 60  # of the first attempt; twice as many until `LOST` is met
 MOST = 2000
@@ -40,7 +41,7 @@ class Pair(NamedTuple):
 def torques(arm: PlanarArm, q: Array, qd: Array, qdd: Array) -> Pair:
     """tau [N m] of a planar arm for accelerations qdd, (n,). Raises ImportError without python-flint."""
 
-    def solved(terms: _Terms, number: Callable[[Any], Number]) -> Vector:
+    def solved(terms: _Equations, number: Callable[[Any], Number]) -> Vector:
         alpha = _running(number, qdd)
         force = [_dot(row, alpha) - right for row, right in zip(terms.matrix, terms.right, strict=True)]
         above = list(itertools.accumulate(reversed(force)))[::-1]
@@ -52,8 +53,8 @@ def torques(arm: PlanarArm, q: Array, qd: Array, qdd: Array) -> Pair:
 def accelerations(arm: PlanarArm, q: Array, qd: Array, tau: Array) -> Pair:
     """qdd [rad/s^2] of a planar arm under torques tau, (n,). Raises ImportError without python-flint."""
 
-    def solved(terms: _Terms, number: Callable[[Any], Number]) -> Vector:
-        torque = [number(each) - c for each, c in zip(tau.tolist(), terms.damping, strict=True)]
+    def solved(terms: _Equations, number: Callable[[Any], Number]) -> Vector:
+        torque = [number(value) - c for value, c in zip(tau.tolist(), terms.damping, strict=True)]
         beyond = [*torque[1:], number(0)]
         right = [[a - b + r] for a, b, r in zip(torque, beyond, terms.right, strict=True)]
         matrix = flint().arb_mat(terms.matrix)
@@ -64,7 +65,7 @@ def accelerations(arm: PlanarArm, q: Array, qd: Array, tau: Array) -> Pair:
     return _bounded(arm, q, qd, solved)
 
 
-class _Terms(NamedTuple):
+class _Equations(NamedTuple):
     """The equations matrix theta'' = Q + right, and the torques that damping takes in the joints."""
 
     matrix: list[Vector]
@@ -72,7 +73,9 @@ class _Terms(NamedTuple):
     damping: Vector
 
 
-def _bounded(arm: PlanarArm, q: Array, qd: Array, solved: Callable[[_Terms, Callable[[Any], Number]], Vector]) -> Pair:
+def _bounded(
+    arm: PlanarArm, q: Array, qd: Array, solved: Callable[[_Equations, Callable[[Any], Number]], Vector]
+) -> Pair:
     """The numbers, computed with so many digits that the bound on their error is at most LOST."""
     digits = DIGITS
     while digits <= MOST:
@@ -81,25 +84,25 @@ def _bounded(arm: PlanarArm, q: Array, qd: Array, solved: Callable[[_Terms, Call
                 x = solved(_terms(number, arm, q, qd), number)
             except ZeroDivisionError:  # flint: the matrix cannot be told from a singular one
                 x = []
-            largest = max([abs(float(each.mid())) for each in x], default=math.nan)
-            if x and max(float(each.rad()) for each in x) <= LOST * largest:
-                high = [float(each.mid()) for each in x]
-                low = [float((each - h).mid()) for each, h in zip(x, high, strict=True)]
+            largest = max([abs(float(value.mid())) for value in x], default=math.nan)
+            if x and max(float(value.rad()) for value in x) <= LOST * largest:
+                high = [float(value.mid()) for value in x]
+                low = [float((value - h).mid()) for value, h in zip(x, high, strict=True)]
                 return Pair(np.array(high), np.array(low))
         digits *= 2
     raise ArithmeticError(f"{MOST} digits are not enough for an arm of {len(arm.links)} links")
 
 
-def _terms(number: Callable[[Any], Number], arm: PlanarArm, q: Array, qd: Array) -> _Terms:
+def _terms(number: Callable[[Any], Number], arm: PlanarArm, q: Array, qd: Array) -> _Equations:
     n = len(arm.links)
     theta, omega = _running(number, q), _running(number, qd)
     mass, length, center, inertia = (
-        [number(each) for each in row]
+        [number(value) for value in row]
         for row in zip(*[(link.mass, link.length, link.center, link.inertia) for link in arm.links], strict=True)
     )
     beyond = [*list(itertools.accumulate(reversed(mass)))[::-1][1:], number(0)]  # mass carried at the far end
     first = [m * c + b * s for m, c, b, s in zip(mass, center, beyond, length, strict=True)]
-    sin, cos = [each.sin() for each in theta], [each.cos() for each in theta]
+    sin, cos = [angle.sin() for angle in theta], [angle.cos() for angle in theta]
     matrix = [[number(0)] * n for _ in range(n)]
     right = [-number(arm.gravity) * f * s for f, s in zip(first, sin, strict=True)]
     for i in range(n):
@@ -111,11 +114,11 @@ def _terms(number: Callable[[Any], Number], arm: PlanarArm, q: Array, qd: Array)
             right[i] = right[i] - turn * omega[j] ** 2
             right[j] = right[j] + turn * omega[i] ** 2
     damping = [number(c) * number(v) for c, v in zip(arm.damping, qd.tolist(), strict=True)]
-    return _Terms(matrix, right, damping)
+    return _Equations(matrix, right, damping)
 
 
 def _running(number: Callable[[Any], Number], values: Array) -> Vector:
-    return list(itertools.accumulate([number(each) for each in values.tolist()]))
+    return list(itertools.accumulate([number(value) for value in values.tolist()]))
 
 
 def _dot(a: Sequence[Number], b: Sequence[Number]) -> Number:

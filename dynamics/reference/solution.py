@@ -1,4 +1,4 @@
-"""A trajectory known to many digits, what it is off by, and how it was come by."""
+"""A trajectory known to many digits, with its error bound and the method that gave it."""
 
 from __future__ import annotations
 
@@ -6,20 +6,34 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
+from cgraph.extend import Array
 
 
 @dataclass(frozen=True)
 class Reference:
-    """States at some times, in decimal.
+    """States at some times, in decimal, as `reference` gives them.
 
-    t: the times [s].  decimal: (T, m) texts, a row for each time: q and qd, or the states of an OdeSystem.
-    error: that of `decimal`, relative to the largest value of the same state; `how` says how it was estimated.
+    Parameters
+    ----------
+    t : tuple of float
+        The times, (T,) [s].
+    decimal : tuple of tuple of str
+        States in decimal, (T, m): q and then qd [rad or m, per second], or the states of an OdeSystem.
+    error : float
+        Error bound of `decimal`, relative to the largest value of the same state.
+    how : str
+        The method, and how the error was estimated.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> exact = dyn.Reference((1.0,), (("0.33333333333333333333",),), 1e-20, "by hand")
+    >>> print(exact.deviation([[1.0 / 3.0]]))
+    [[-1.85003837e-17]]
     """
 
     t: tuple[float, ...]
@@ -30,7 +44,7 @@ class Reference:
     @cached_property
     def x(self) -> Array:
         """The states rounded to float64, (T, m)."""
-        return np.array([[float(each) for each in row] for row in self.decimal]).reshape(len(self.t), -1)
+        return np.array([[float(text) for text in row] for row in self.decimal]).reshape(len(self.t), -1)
 
     @cached_property
     def _rest(self) -> Array:
@@ -46,7 +60,7 @@ class Reference:
         return (values - self.x) - self._rest
 
     def relative_error(self, x: ArrayLike) -> float:
-        """The largest deviation, each relative to the largest value of its state; a state that is zero counts as is."""
+        """The largest deviation relative to the largest value of its state; a state that is zero counts as is."""
         return float(np.max(np.abs(self.deviation(x)) / scale(self.x), initial=0.0))
 
 

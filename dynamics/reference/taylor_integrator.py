@@ -33,7 +33,7 @@ def taylor(
     states: Sequence[str],
     start: Sequence[Any],
     times: Sequence[float],
-    given: Mapping[str, Any],
+    values: Mapping[str, Any],
     digits: int,
 ) -> tuple[list[list[Number]], str]:
     """The states at `times` from `start` at t = 0, with a relative truncation error of 10^-digits a step.
@@ -44,7 +44,7 @@ def taylor(
     """
     order = math.ceil(1.15 * digits) + 2
     with working(digits + GUARD) as number:
-        series = Series(graph, states, given, number)
+        series = Series(graph, states, values, number)
         x, t = [number(value).mid() for value in start], number(0)
         rows: list[list[Number]] = []
         steps = stuck = 0
@@ -62,24 +62,24 @@ def taylor(
                     f"the solution slides along a switch of its equations at t = {float(t):.17g}"
                 )
             while len(rows) < len(times) and times[len(rows)] < t + h:
-                rows.append([_at(each, times[len(rows)] - t) for each in coefficients])
+                rows.append([_at(row, times[len(rows)] - t) for row in coefficients])
             if abs(float(times[-1] - t - h)) == 0.0:
                 h = times[-1] - t
-            x, t = [_at(each, h) for each in coefficients], (t + h).mid()
+            x, t = [_at(row, h) for row in coefficients], (t + h).mid()
             steps += 1
         return rows, f"Taylor series of order {order}, {steps} steps"
 
 
 def _at(coefficients: Sequence[Number], h: Number) -> Number:
     total = coefficients[-1]
-    for each in coefficients[-2::-1]:
-        total = total * h + each
+    for coefficient in coefficients[-2::-1]:
+        total = total * h + coefficient
     return total.mid()
 
 
 def step_size(coefficients: Sequence[Sequence[Number]], digits: int, t: float) -> float:
     """The step at which the last two terms of each state are 10^-digits of what the step moves it."""
-    size = np.array([[log2_size(each) for each in row] for row in coefficients])
+    size = np.array([[log2_size(coefficient) for coefficient in row] for row in coefficients])
     if np.isnan(size).any():
         raise ReferenceFailedError(f"the solution leaves the domain of its equations at t = {t:.17g}")
     size = size[np.isfinite(size[:, 1:]).any(axis=1), 1:]  # what does not move sets no step

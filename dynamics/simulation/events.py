@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from cgraph import Graph, Node
+from cgraph import Node
+from cgraph.extend import Array
 
-from ..integrators import Problem
-from .stepping import Piece
-from .trajectory import Array
+from ..systems.system import sequence
+from .dense_output import StepBlock
 
 LOOKS = 15  # instants inside a step at which events are looked at
 HALVINGS = 60  # of a step: to the last bit of where in it
@@ -19,13 +19,37 @@ HALVINGS = 60  # of a step: to the last bit of where in it
 
 @dataclass(frozen=True)
 class Event:
-    """Where value(q, qd, t) or (q, qd, t, p) passes through zero; of an OdeSystem value(x, t) or (x, t, p).
+    """Where a quantity passes through zero.
 
     It is looked at sixteen times in each step. Of two crossings closer than that both may be missed: limit the steps by
-    `dt` where a quantity changes faster than the motion does.
+    `dt` or `max_step` where a quantity changes faster than the motion does.
 
-    name: by which the trajectory lists it.  direction: 1 upwards only, -1 downwards only, 0 both.
-    terminal: the run ends there.
+    Parameters
+    ----------
+    name : str
+        By which `Trajectory.events` lists it.
+    value : callable
+        The quantity, value(q, qd, t) or value(q, qd, t, p) with nodes for arguments, in any unit; of an OdeSystem
+        value(x, t) or value(x, t, p). p is {parameter name: node}.
+    direction : int
+        1 upwards only, -1 downwards only, 0 both.
+    terminal : bool
+        Whether the run ends there.
+
+    Raises
+    ------
+    TypeError
+        For a name that is no text, a value that is no function, a `terminal` that is neither True nor False.
+    ValueError
+        For another direction.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> ball = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 9.81 * q[0], ["height"])
+    >>> ground = dyn.Event("ground", lambda q, qd, t: q[0], direction=-1, terminal=True)
+    >>> dyn.simulate(ball, [1.0], [0.0], 1.0, events=ground).stats.message
+    "event 'ground' at t = 0.451524 s"
     """
 
     name: str
@@ -43,42 +67,45 @@ class Event:
             raise ValueError(f"event {self.name!r}: direction must be 1, -1 or 0, got {self.direction!r}")
 
 
-def event_graph(events: Sequence[Event], problem: Problem) -> Graph:
-    """The values of events: inputs the states, t and parameters, as of the problem's other graphs."""
-    outputs: dict[str, Node] = {}
-    for event in events:
-        if event.name in outputs:
+def as_events(events: Event | Iterable[Event]) -> tuple[Event, ...]:
+    """One event or several, as a tuple. Raises TypeError for anything else, ValueError for two of one name."""
+    several = (events,) if isinstance(events, Event) else tuple(sequence("events must be", events))
+    names = set()
+    for event in several:
+        if not isinstance(event, Event):
+            raise TypeError(f"events must be of the type Event, got {type(event).__name__}: {event!r:.60}")
+        if event.name in names:
             raise ValueError(f"two events have the name {event.name!r}")
-        outputs[event.name] = problem.value(f"event {event.name!r}", event.value)
-    return problem.bind(problem.states, Graph(problem.inputs, outputs))
+        names.add(event.name)
+    return several
 
 
 def crossings(
-    values: Callable[[Array, Array], Array], events: Sequence[Event], piece: Piece
+    values: Callable[[Array, Array], Array], events: Sequence[Event], block: StepBlock
 ) -> list[tuple[int, float, Array]]:
     """(number of the event, time, state) of each crossing, in order of time. values(t, x): (events, k).
 
     Where the sign differs between two of the ends and `LOOKS` instants inside of a step, halving finds the place.
     """
-    steps = len(piece.t)
+    steps = len(block.t)
     shares = np.linspace(0.0, 1.0, LOOKS + 2)
-    looks = [values(piece.t_old, piece.x_old)]
+    looks = [values(block.t_old, block.x_old)]
     for share in shares[1:-1]:
-        inside = piece.at(np.arange(steps), np.full(steps, share))
-        looks.append(values(piece.t_old + share * piece.h, inside))
-    looks.append(values(piece.t, piece.x))
+        inside = block.states_at(np.arange(steps), np.full(steps, share))
+        looks.append(values(block.t_old + share * block.h, inside))
+    looks.append(values(block.t, block.x))
     signs = np.stack(looks)  # (instants, events, steps)
-    found: list[tuple[int, float, Array]] = []
+    result: list[tuple[int, float, Array]] = []
     for number, event in enumerate(events):
         a, b = signs[:-1, number], signs[1:, number]
         rises, falls = (a < 0.0) & (b >= 0.0), (a > 0.0) & (b <= 0.0)
         part, rows = np.nonzero(rises & (event.direction >= 0) | falls & (event.direction <= 0))
         low, high = shares[part], shares[part + 1]
-        start, t_old, h = np.sign(a[part, rows]), piece.t_old[rows], piece.h[rows]
+        start, t_old, h = np.sign(a[part, rows]), block.t_old[rows], block.h[rows]
         for _ in range(HALVINGS if len(rows) else 0):
             middle = 0.5 * (low + high)
-            same = np.sign(values(t_old + middle * h, piece.at(rows, middle))[number]) == start
+            same = np.sign(values(t_old + middle * h, block.states_at(rows, middle))[number]) == start
             low, high = np.where(same, middle, low), np.where(same, high, middle)
-        times = np.where(high == 1.0, piece.t[rows], t_old + high * h)
-        found += list(zip([number] * len(rows), times.tolist(), piece.at(rows, high), strict=True))
-    return sorted(found, key=lambda each: each[1])
+        times = np.where(high == 1.0, block.t[rows], t_old + high * h)
+        result += list(zip([number] * len(rows), times.tolist(), block.states_at(rows, high), strict=True))
+    return sorted(result, key=lambda crossing: crossing[1])

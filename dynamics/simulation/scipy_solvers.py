@@ -3,94 +3,98 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 import cgraph as cg
-from cgraph.errors import install
+from cgraph.extend import Array, install
 
-from ..integrators import Problem
-from .run_options import Limits
-from .stepping import PIECE, Clock, Piece, Tally
-from .trajectory import Array
+from ..integrators import Problem, state_jacobian
+from .dense_output import StepBlock
+from .run_options import SCIPY, RunOptions
+from .stepping import BLOCK_TIME, Clock, Integration
 
-PREFIX = "scipy:"
-SOLVERS = ("Radau", "BDF", "LSODA", "DOP853", "RK45")
 IMPLICIT = ("Radau", "BDF", "LSODA")
 
 
-class ScipyRun(Tally):
-    """A run by one of SciPy's solvers. With `asked`, its dense output gives rows at those times besides its steps."""
+@dataclass(frozen=True, eq=False)
+class ScipySolver:
+    """One of SciPy's solvers and what it calls."""
 
-    def __init__(
-        self,
-        problem: Problem,
-        solver: str,
-        backend: str,
-        limits: Limits,
-        *,
-        asked: Array | None,
-    ) -> None:
-        super().__init__(problem)
-        try:
-            from scipy import integrate
-        except ImportError:
-            raise ImportError(f"method {PREFIX + solver!r} needs SciPy: {install('scipy')}") from None
-        self.solver, self.make = solver, getattr(integrate, solver)
-        self.limits, self.asked = limits, asked
-        self._rate = cg.compile(problem.rate, backend)
-        self._jacobian: dict[str, Any] = {}
-        if solver in IMPLICIT:
-            slopes, m = cg.compile(problem.jacobian, backend), problem.size
-            self._jacobian["jac"] = lambda t, x: slopes([*x, t]).reshape(m, m)
+    name: str
+    components: tuple[str, ...]
+    make: Any  # SciPy's class
+    rate: Any  # f(t, x) -> (m,)
+    jacobian: dict[str, Any]  # {"jac": f(t, x) -> (m, m)} where the solver takes it
 
-    def pieces(self, x: Array) -> Iterator[Piece]:
-        """See Tally."""
-        limits = self.limits
-        options = {"rtol": limits.rtol, "atol": limits.atol, "max_step": limits.longest, "first_step": limits.first}
-        solver = self.make(lambda t, x: self._rate([*x, t]), 0.0, x, limits.t_end, **options, **self._jacobian)
-        times, states = [0.0], [np.array(x)]
+
+def scipy_solver(problem: Problem, name: str, backend: str) -> ScipySolver:
+    """The solver, with the problem's rate and Jacobian compiled. Raises ImportError without SciPy."""
+    try:
+        from scipy import integrate
+    except ImportError:
+        raise ImportError(f"method {SCIPY + name!r} needs SciPy: {install('scipy')}") from None
+    rate = cg.compile(problem.rate, backend)
+    jacobian: dict[str, Any] = {}
+    if name in IMPLICIT:
+        slopes, m = cg.compile(state_jacobian(problem), backend), problem.size
+        jacobian["jac"] = lambda t, x: slopes([*x, t]).reshape(m, m)
+    return ScipySolver(name, problem.components, getattr(integrate, name), lambda t, x: rate([*x, t]), jacobian)
+
+
+class ScipyIntegration(Integration):
+    """A run by one of SciPy's solvers. Its dense output gives rows at the times of t_eval besides its steps."""
+
+    def __init__(self, solver: ScipySolver, options: RunOptions) -> None:
+        super().__init__(solver.components)
+        self.solver, self.options = solver, options
+
+    def blocks(self, x: Array) -> Iterator[StepBlock]:
+        """The steps from x (m,) on, some at a time."""
+        options, times = self.options, self.options.times
+        limits: dict[str, Any] = {"rtol": options.rtol, "atol": options.absolute}
+        limits |= {"max_step": options.longest_step, "first_step": options.first_step}
+        solver = self.solver.make(self.solver.rate, 0.0, x, options.t_end, **limits, **self.solver.jacobian)
+        t, states = [0.0], [np.array(x)]
         clock = Clock()
         while solver.status == "running":
-            if self.steps >= limits.most:
-                self.status = self.too_many(solver.t, limits.most)
+            if self.steps >= options.max_steps:
+                self.status = self.too_many(solver.t, options.max_steps)
                 break
             message = solver.step()
             self.evaluations = solver.nfev
-            where = self.where(solver.y)
-            if solver.status == "failed" or where:
-                reason = where or f"SciPy's {self.solver} gave up: {message}"
+            reason = self.nonfinite(solver.y)
+            if solver.status == "failed" or reason:
+                reason = reason or f"SciPy's {self.solver.name} gave up: {message}"
                 self.status = f"stopped at t = {solver.t:.6g} s: {reason}"
                 break
             self.steps += 1
             self.largest = max(self.largest, float(solver.t - solver.t_old))
-            if self.asked is not None:
-                first, last = np.searchsorted(self.asked, [solver.t_old, solver.t], side="right")
-                inside = [t for t in self.asked[first:last].tolist() if t < solver.t]
+            if times is not None:
+                first, last = np.searchsorted(times, [solver.t_old, solver.t], side="right")
+                inside = [at for at in times[first:last].tolist() if at < solver.t]
                 if inside:
                     between = solver.dense_output()
-                    times += inside
-                    states += [np.array(between(t)) for t in inside]
-            times.append(float(solver.t))
+                    t += inside
+                    states += [np.array(between(at)) for at in inside]
+            t.append(float(solver.t))
             states.append(np.array(solver.y))
-            if clock.passed(PIECE) and len(times) > 1:
-                yield _piece(times, states)
-                times, states = times[-1:], states[-1:]
-        if len(times) > 1:
-            yield _piece(times, states)
+            if clock.passed(BLOCK_TIME) and len(t) > 1:
+                yield _block(t, states)
+                t, states = t[-1:], states[-1:]
+        if len(t) > 1:
+            yield _block(t, states)
 
 
-def _piece(times: list[float], states: list[Array]) -> Piece:
+def _block(times: list[float], states: list[Array]) -> StepBlock:
     t, x = np.array(times), np.array(states)
-    return Piece(t[1:], x[1:], t[:-1], np.diff(t), x[:-1], None)
+    return StepBlock(t[1:], x[1:], t[:-1], np.diff(t), x[:-1], None)
 
 
-def solver_of(method: str) -> str | None:
-    """The solver that a method names, None for one of ours. Raises ValueError for one that is not known."""
-    if not method.startswith(PREFIX):
-        return None
-    name = method.removeprefix(PREFIX)
-    if name not in SOLVERS:
-        raise ValueError(f"SciPy's methods are {', '.join(PREFIX + each for each in SOLVERS)}, got {method!r}")
-    return name
+def solve_ivp() -> Any:
+    """SciPy's `solve_ivp` itself, to compare with. Raises ImportError without SciPy."""
+    from scipy.integrate import solve_ivp as function
+
+    return function

@@ -39,7 +39,28 @@ class Model(Protocol):
 
 
 def as_system(model: Model) -> System:
-    """The Lagrangian system of a model. Raises TypeError for a first-order system and for what is no model."""
+    """The Lagrangian system of a model.
+
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene.
+
+    Returns
+    -------
+    System
+
+    Raises
+    ------
+    TypeError
+        For a first-order system, and for what is no model.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> dyn.as_system(dyn.planar_arm(masses=[1.0, 0.5], lengths=[1.0, 1.0]))
+    <System of 2 coordinate(s) joint 1, joint 2>
+    """
     system: System | None = getattr(model, "system", None)
     if system is None:
         what = "a first-order system, which has no Lagrangian" if getattr(model, "ode", None) is not None else ""

@@ -9,7 +9,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import topological
 
-from .system import TIME, Parameters, as_node, called, parameter_value, sequence
+from .system import TIME, Parameters, call_user_function, node_or_number, parameter_value, sequence
 
 RESERVED = (TIME, "dt")
 
@@ -17,12 +17,27 @@ RESERVED = (TIME, "dt")
 class OdeSystem:
     """A system of first-order differential equations, xdot = rate(x, t).
 
-    rate(x, t) or (x, t, p): gives one rate for each state, node or number.
-        x: sequence of nodes in the order of `states`; t: a node; p: {parameter name: node}.
-    states: their names, which are the inputs of the graphs, in this order.
-    parameters: {name: value}; each is an input of the graphs, and `simulate` binds it to the value.
+    Parameters
+    ----------
+    rate : callable
+        (x, t) or (x, t, p) to one rate for each state, node or number, in the state's unit per second.
+        x: list of n nodes in the order of `states`; t: a node; p: {parameter name: node}.
+    states : sequence of str
+        The names of the n states, or one string with spaces between them; they are the inputs of the graphs.
+    parameters : mapping of str to float
+        Each is an input of the graphs, and `simulate` binds it to the value.
 
-    Raises TypeError or ValueError, naming what was given and what was needed.
+    Raises
+    ------
+    TypeError, ValueError
+        Say what was given and what was needed.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> decay = dyn.OdeSystem(lambda x, t, p: [-p["k"] * x[0]], ["x"], {"k": 0.5})
+    >>> dyn.simulate(decay, [1.0], None, t_end=2.0, method="dopri5").q[-1].round(6)
+    array([0.367879])
     """
 
     def __init__(
@@ -36,14 +51,18 @@ class OdeSystem:
         if shared := [name for name in self.states if name in self.parameters]:
             raise ValueError(f"{shared[0]!r} is both a state and a parameter; choose another name for one of them")
         p = Parameters(self.parameters)
-        given = sequence("rate must give", called("rate", rate, self.x, self.t, p))
-        if len(given) != self.n:
-            raise ValueError(f"rate must give {self.n} values, one for each state, got {len(given)}")
-        self.rates = tuple([as_node("rate", each) for each in given])
+        values = sequence("rate must give", call_user_function("rate", rate, self.x, self.t, p))
+        if len(values) != self.n:
+            names = ", ".join(self.states)
+            raise ValueError(f"rate must give {self.n} values, one for each of {names}; got {len(values)}")
+        self.rates = tuple(
+            [node_or_number(f"the rate of {name!r}", x) for name, x in zip(self.states, values, strict=True)]
+        )
         known = {*self.x, self.t, *p.values()}
         for node in topological(self.rates):
             if node.op.name == "variable" and node not in known:
-                raise ValueError(f"the rate uses {node.name!r}, which is no state, parameter or t")
+                names = ", ".join((*self.states, *self.parameters))
+                raise ValueError(f"the rate uses {node.name!r}, which is no state, parameter or t (it has {names})")
 
     @property
     def coordinates(self) -> tuple[str, ...]:

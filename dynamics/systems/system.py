@@ -15,7 +15,7 @@ from cgraph import Graph, Node
 from cgraph.extend import real_number, topological
 
 TIME = "t"
-BiasForce = tuple[Node, Node]  # a velocity, and the force that is there
+BiasForce = tuple[Node, Node]  # a velocity, and the force that works on it
 _RESERVED = re.compile(r"(q|qd|qdd|tau)\d+(_old)?|t|dt")
 
 
@@ -33,16 +33,36 @@ class Parameters(dict[str, Node]):
 class System:
     """A mechanical system with Lagrangian L(q, qd, t) = K - P.
 
-    lagrangian(q, qd, t) or (q, qd, t, p): gives L as a node, or a sequence of partial Lagrangians L_i that are summed.
-        q, qd: sequences of nodes in the order of `coordinates`; t: a node; p: {parameter name: node}.
-    coordinates: their names, for messages and drawings; graphs have inputs q0, q1, ... in this order.
-    parameters: {name: value}; each is an input of the graphs, and `simulate` binds it to the value.
-    forces(q, qd, t[, p]): one generalized force for each coordinate, node or number, beside the applied tau.
-    damping: viscous coefficient >= 0 for all coordinates or for each; the force is -damping * qd.
-
     The equation of motion is  d/dt dL/dqd - dL/dq = tau + forces - damping * qd.
 
-    Raises TypeError or ValueError, naming what was given and what was needed.
+    Parameters
+    ----------
+    lagrangian : callable
+        (q, qd, t) or (q, qd, t, p) to L [J], a node or a sequence of partial Lagrangians L_i that are summed.
+        q, qd: lists of n nodes in the order of `coordinates`; t: a node; p: {parameter name: node}.
+    coordinates : sequence of str
+        The names of the n coordinates, or one string with spaces between them. Graphs have inputs q0, q1, ... in this
+        order; messages and tables show the names.
+    parameters : mapping of str to float
+        Each is an input of the graphs, and `simulate` binds it to the value.
+    forces : callable
+        (q, qd, t) or (q, qd, t, p) to one generalized force for each coordinate, node or number [N m or N], beside the
+        applied tau.
+    damping : float or sequence of float
+        Viscous coefficient >= 0 for all coordinates or for each [N m s or N s/m]; the force is -damping * qd.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Say what was given and what was needed.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> def lagrangian(q, qd, t, p):
+    ...     return 0.5 * p["m"] * qd[0] ** 2 - 0.5 * p["k"] * q[0] ** 2
+    >>> dyn.System(lagrangian, ["x"], parameters={"m": 2.0, "k": 8.0})
+    <System of 1 coordinate(s) x, parameters m, k>
     """
 
     def __init__(
@@ -55,24 +75,32 @@ class System:
     ) -> None:
         self.coordinates = _coordinate_names(coordinates)
         self.parameters = {name: parameter_value(name, value) for name, value in (parameters or {}).items()}
-        self.damping = per_coordinate("damping", damping, self.n, minimum=0.0)
+        self.damping = per_coordinate("damping", damping, self.coordinates, minimum=0.0)
         p = Parameters(self.parameters)
-        given = called("lagrangian", lagrangian, self.q, self.qd, self.t, p)
-        partials = [given] if isinstance(given, (Node, numbers.Real)) else sequence("the lagrangian must give", given)
+        energy = call_user_function("lagrangian", lagrangian, self.q, self.qd, self.t, p)
+        single = isinstance(energy, (Node, numbers.Real))
+        partials = [energy] if single else sequence("the lagrangian must give", energy)
         if not partials:
             raise ValueError("the lagrangian gave no partial Lagrangians")
-        self.partial_lagrangians = tuple([as_node("the lagrangian", each) for each in partials])
+        self.partial_lagrangians = tuple([node_or_number("the lagrangian", partial) for partial in partials])
         applied: Sequence[Node | float] = [0.0] * self.n
         if forces is not None:
             with cg.tag("force"):
-                applied = sequence("forces must give", called("forces", forces, self.q, self.qd, self.t, p))
+                value = call_user_function("forces", forces, self.q, self.qd, self.t, p)
+                applied = sequence("forces must give", value)
             if len(applied) != self.n:
-                raise ValueError(f"forces must give {self.n} values, one for each coordinate, got {len(applied)}")
-        self.forces = tuple([as_node("forces", each) for each in applied])
+                names = ", ".join(self.coordinates)
+                raise ValueError(f"forces must give {self.n} values, one for each of {names}; got {len(applied)}")
+        self.forces = tuple(
+            [node_or_number(f"the force on {name!r}", x) for name, x in zip(self.coordinates, applied, strict=True)]
+        )
         known = {*self.q, *self.qd, self.t, *p.values()}
         for node in topological((*self.partial_lagrangians, *self.forces)):
             if node.op.name == "variable" and node not in known:
-                raise ValueError(f"the system uses {node.name!r}, which is no coordinate, parameter or t")
+                names = ", ".join((*self.coordinates, *self.parameters))
+                raise ValueError(
+                    f"the system uses {node.name!r}, which is no coordinate, parameter or t (it has {names})"
+                )
 
     @property
     def system(self) -> System:
@@ -113,6 +141,12 @@ class System:
     def t(self) -> Node:
         """Time."""
         return cg.variable(TIME)
+
+    @cached_property
+    def display_names(self) -> dict[str, str]:
+        """What a person reads in place of q0, qd0, qdd0 and tau0: "q.<coordinate>" and so on, by input."""
+        kinds = ("q", "qd", "qdd", "tau")
+        return {f"{kind}{i}": f"{kind}.{name}" for kind in kinds for i, name in enumerate(self.coordinates)}
 
     @cached_property
     def extra_inputs(self) -> list[Node]:
@@ -187,20 +221,24 @@ class BodySystem(System):
         self._bias_forces = bias_forces
 
     def bias_forces(self) -> Sequence[BiasForce]:
-        """See System."""
+        """The pairs (velocity, force) that the bodies state; see `System.bias_forces`."""
         return self._bias_forces(self.q, self.qd)
 
 
-def per_coordinate(what: str, value: float | Sequence[float], n: int, minimum: float = -math.inf) -> tuple[float, ...]:
-    """One finite number for each coordinate, from one for all or a sequence. Raises ValueError otherwise."""
-    values = [value] * n if isinstance(value, numbers.Real) else sequence(f"{what} must be", value)
-    if len(values) != n:
-        raise ValueError(f"{what} needs one number for each of the {n} coordinates, got {len(values)}")
-    for i, each in enumerate(values):
-        if not math.isfinite(real_number(f"{what} of coordinate {i}", each)) or each < minimum:
+def per_coordinate(
+    what: str, value: float | Sequence[float], names: Sequence[str], minimum: float = -math.inf
+) -> tuple[float, ...]:
+    """One finite number for each of the named coordinates, from one for all or a sequence. Raises ValueError."""
+    n = len(names)
+    entries = [value] * n if isinstance(value, numbers.Real) else sequence(f"{what} must be", value)
+    if len(entries) != n:
+        shown = ", ".join(names[:8]) + (", ..." if n > 8 else "")
+        raise ValueError(f"{what} needs one number for each of the {n} coordinates ({shown}), got {len(entries)}")
+    for name, number in zip(names, entries, strict=True):
+        if not math.isfinite(real_number(f"{what} of {name!r}", number)) or number < minimum:
             bound = f" and at least {minimum:g}" if math.isfinite(minimum) else ""
-            raise ValueError(f"{what} must be finite{bound}, got {each!r} for coordinate {i}")
-    return tuple([float(each) for each in values])
+            raise ValueError(f"{what} must be finite{bound}, got {number!r} for {name!r}")
+    return tuple([float(number) for number in entries])
 
 
 def _coordinate_names(names: Sequence[str]) -> tuple[str, ...]:
@@ -227,7 +265,7 @@ def parameter_value(name: str, value: float) -> float:
     return float(value)
 
 
-def called(what: str, function: Callable[..., Any], *arguments: Any) -> Any:
+def call_user_function(what: str, function: Callable[..., Any], *arguments: Any) -> Any:
     """function(*arguments), or without the last of them, the parameters, where it does not take them.
 
     Raises TypeError, naming `what`, for what is no such function.
@@ -253,12 +291,12 @@ def sequence(what: str, value: Any) -> list[Any]:
         raise TypeError(f"{what} a sequence of nodes or numbers, got {type(value).__name__}: {value!r:.60}") from None
 
 
-def as_node(what: str, value: Any) -> Node:
+def node_or_number(what: str, value: Any) -> Node:
     """The node, or the constant of a number. Raises TypeError or ValueError, naming `what`, for anything else."""
     try:
         return value if isinstance(value, Node) else cg.constant(value)
     except (TypeError, ValueError) as error:
-        raise type(error)(f"{what} must give nodes or numbers: {error}") from None
+        raise type(error)(f"{what} must be a node or a number: {error}") from None
 
 
 def _sum(nodes: Sequence[Node]) -> Node:

@@ -13,9 +13,9 @@ import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Builder, cotangents, tangents
 
-from ..equations.coriolis import coriolis, quadratic
+from ..equations.coriolis import coriolis, require_quadratic
 from ..equations.equations_of_motion import bias, energy, forward_dynamics, gravity_force, mass_matrix
-from ..equations.evaluate_at import Array, at_state
+from ..equations.evaluate_at import Array, evaluate_at
 from ..equations.formulations import ONE, ZERO, inverse_dynamics
 from ..equations.torque_decomposition import torque_by_joint_motion, torque_by_link
 from ..equations.torque_table import TorqueTable
@@ -54,7 +54,7 @@ def certify(model: Model, states: int = 20, seed: int = 0, *, speed: float = 1.0
     checks, left_out = _Checks(system, at, rng), []
     residuals = list(checks.always())
     try:
-        quadratic(system)
+        require_quadratic(system)
     except ValueError as error:
         left_out.append(f"the Coriolis matrix: {error}")
     else:
@@ -77,7 +77,7 @@ class _Checks:
 
     def value(self, graph: Graph, **other: ArrayLike | None) -> Array:
         """Outputs, (N, n_out), at the states, some of them replaced."""
-        return at_state(self.system, graph, {**self.at, **other}, self.t)
+        return evaluate_at(self.system, graph, {**self.at, **other}, self.t)
 
     def matrix(self, graph: Graph) -> Array:
         """Outputs as (N, n, n)."""
@@ -193,7 +193,7 @@ class _Checks:
 
     def _sum(self, equation: str, table: TorqueTable) -> Residual:
         cells = self.value(table.graph).reshape(-1, len(table.rows), len(table.columns))
-        axis = 1 if table.downwards else 2
+        axis = 1 + table.sum_axis
         tau = self.value(self.inverse)
         return Residual(equation, _worst(cells.sum(axis=axis) - tau, np.abs(cells).sum(axis=axis)), ROUNDING)
 

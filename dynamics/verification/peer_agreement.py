@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ..equations.evaluate_at import Array, at_state
+from ..equations.evaluate_at import Array, evaluate_at
 from ..equations.formulations import inverse_dynamics
 from ..io.load import compiled
 from ..io.mujoco_model import mujoco
@@ -225,7 +225,7 @@ def explanation(model: PlanarArm | Mechanism, peer: Asked, at: Mapping[str, Arra
 
 def disagreement(model: PlanarArm | Mechanism, peer: Asked, at: Mapping[str, Array]) -> float:
     """The largest difference of the torques, relative to the largest torque of its state; over all states."""
-    ours = at_state(as_system(model), inverse_dynamics(model), at)
+    ours = evaluate_at(as_system(model), inverse_dynamics(model), at)
     size = np.maximum(np.abs(ours).max(axis=1), np.finfo(float).tiny)
     return float(np.max(np.abs(ours - peer.inverse(at)).max(axis=1) / size))
 

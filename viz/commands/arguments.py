@@ -23,8 +23,8 @@ def takes_a_scene(command: argparse.ArgumentParser) -> None:
 
 
 def may_ignore(command: argparse.ArgumentParser) -> None:
-    """The argument by which what cannot be modelled is left out."""
-    command.add_argument("--ignore", action="store_true", help="leave out what of a model file cannot be modelled")
+    """The argument by which what cannot be modeled is left out."""
+    command.add_argument("--ignore", action="store_true", help="leave out what of a model file cannot be modeled")
 
 
 def scene_of(options: argparse.Namespace) -> scenes.Scene:
@@ -57,20 +57,20 @@ def whole(text: str) -> int:
 def number(text: str) -> float:
     """A finite number, for argparse."""
     try:
-        found = float(text)
+        value = float(text)
     except ValueError:
-        found = math.nan
-    if not math.isfinite(found):
+        value = math.nan
+    if not math.isfinite(value):
         raise argparse.ArgumentTypeError(f"expected a finite number, got {text!r}")
-    return found
+    return value
 
 
 def positive(text: str) -> float:
     """A positive number, for argparse."""
-    found = number(text)
-    if found <= 0.0:
+    value = number(text)
+    if value <= 0.0:
         raise argparse.ArgumentTypeError(f"expected a positive number, got {text!r}")
-    return found
+    return value
 
 
 def may_draw_and_print(command: argparse.ArgumentParser) -> None:

@@ -1,4 +1,4 @@
-"""`cgraph bench`: our speed beside that of other software, on the same tasks in turns."""
+"""`cgraph bench`: our speed beside that of other software, on the same tasks in turns; and other figures."""
 
 from __future__ import annotations
 
@@ -6,22 +6,41 @@ import argparse
 import json
 from dataclasses import asdict
 
+from dynamics.experiments.machine import machine
 from dynamics.experiments.speed.bench import MODES, PEERS, QUICK, SCENES, TASKS, Row, bench
-from dynamics.experiments.speed.bench_table import machine, tables
+from dynamics.experiments.speed.bench_table import tables
+from dynamics.experiments.speed.figures import FIGURES
 
-from .arguments import Commands, may_ignore, positive, say
+from .arguments import Commands, may_ignore, positive, say, whole
+
+SPEED = "speed"
+OF_SPEED = ("ignore", "tasks", "modes", "peers", "quick", "budget", "json")  # options of speed alone
+NUMBERS = {"links": "links of the models", "repeats": "turns", "count": "trajectories, or states"}
 
 
 def add(commands: Commands[argparse.ArgumentParser]) -> None:
     """The command's arguments."""
     parser = commands.add_parser(
-        "bench", help="our speed beside what is installed: CasADi, Pinocchio, MuJoCo, heyoka, JAX, SymPy, PyTorch"
+        "bench",
+        help="our speed beside what is installed: CasADi, Pinocchio, MuJoCo, heyoka, JAX, SymPy, PyTorch",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="\n".join(
+            [
+                "figures:",
+                f"  {SPEED:16} run times of tasks beside other software (default)",
+                *[
+                    f"  {name:16} {each.about}; takes {', '.join(f'--{taken}' for taken in each.takes)}"
+                    for name, each in FIGURES.items()
+                ],
+            ]
+        ),
     )
     parser.add_argument(
-        "scenes",
+        "what",
         nargs="*",
-        metavar="SCENE",
-        help=f"one of {', '.join(SCENES)} (default: all of these), a name that `cgraph scenes` lists, or a model file",
+        metavar="FIGURE | SCENE",
+        help=f"a figure of those below, {SPEED} if none; its scenes: {', '.join(SCENES)} (default: all of these), a "
+        "name that `cgraph scenes` lists, or a model file",
     )
     may_ignore(parser)
     for what, known in (("tasks", TASKS), ("modes", MODES), ("peers", PEERS)):
@@ -31,20 +50,45 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
         "--budget", type=positive, metavar="S", help="seconds a peer may take to make one task (default: 60; quick: 20)"
     )
     parser.add_argument("--json", action="store_true", help="print as JSON")
+    for name, about in NUMBERS.items():
+        parser.add_argument(f"--{name}", type=whole, metavar="N", help=f"of a figure: {about}")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
+    """Print one figure."""
+    figure, scenes = SPEED, options.what
+    if scenes and scenes[0] in (SPEED, *FIGURES):
+        figure, *scenes = scenes
+    takes = FIGURES[figure].takes if figure in FIGURES else (*OF_SPEED, "repeats")
+    for name in (*OF_SPEED, *NUMBERS):
+        if name not in takes and getattr(options, name) not in (None, False):
+            raise ValueError(f"--{name} does not go with {figure}, which takes {', '.join(f'--{x}' for x in takes)}")
+    for name in NUMBERS:
+        if getattr(options, name) == 0:
+            raise ValueError(f"--{name} must be at least 1, got 0")
+    if figure == SPEED:
+        _speed(scenes, options)
+        return
+    if scenes:
+        raise ValueError(f"{figure} has models of its own and takes no scene, got {scenes[0]!r}")
+    print(machine())
+    numbers = {name: getattr(options, name) for name in FIGURES[figure].takes if getattr(options, name) is not None}
+    for text in FIGURES[figure].run(**numbers):
+        print(text, flush=True)
+
+
+def _speed(scenes: list[str], options: argparse.Namespace) -> None:
     """Print the tables; of a run that is interrupted, of what has been measured."""
     chosen = [
-        tuple(given.split(",")) if given else tuple(known)
-        for given, known in ((options.tasks, TASKS), (options.modes, MODES), (options.peers, PEERS))
+        tuple(names.split(",")) if names else tuple(known)
+        for names, known in ((options.tasks, TASKS), (options.modes, MODES), (options.peers, PEERS))
     ]
     rows: list[Row] = []
     measured = bench(
-        options.scenes or (QUICK if options.quick else tuple(SCENES)),
+        scenes or (QUICK if options.quick else tuple(SCENES)),
         *chosen,
-        repeats=5 if options.quick else 15,
+        repeats=options.repeats or (5 if options.quick else 15),
         budget=(20.0 if options.quick else 60.0) if options.budget is None else options.budget,
         ignore=options.ignore,
         say=say,

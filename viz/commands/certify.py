@@ -37,5 +37,5 @@ def run(options: argparse.Namespace) -> None:
     else:
         print(certificate)
     if not certificate.passed:
-        failed = [each.equation for each in certificate.residuals if not each.passed]
+        failed = [residual.equation for residual in certificate.residuals if not residual.passed]
         raise RuntimeError(f"{scene.name}: {len(failed)} residual(s) exceed their bound: {'; '.join(failed)}")

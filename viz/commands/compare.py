@@ -32,25 +32,29 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> int:
     """Print the totals of both sides and the classes of what only one of them has."""
     scene = scene_of(options)
-    left, right = (inverse_dynamics(scene, each) for each in options.formulations)
+    left, right = (inverse_dynamics(scene, name) for name in options.formulations)
     state = [name for graph in (left, right) for names in state_names(graph, scene.system.n) for name in names]
-    found = cg.compare(left, right, atoms=dict.fromkeys(state), classify=formulation_classes)
+    comparison = cg.compare(left, right, atoms=dict.fromkeys(state), classify=formulation_classes)
     if options.json:
         named = dict(zip(("left", "right"), options.formulations, strict=True))
-        sizes = {"left_nodes": len(left.nodes), "right_nodes": len(right.nodes), "in_both": len(found.common)}
-        print(json.dumps({"scene": scene.name} | named | sizes | found.to_dict(), indent=1))
+        sizes = {"left_nodes": len(left.nodes), "right_nodes": len(right.nodes), "in_both": len(comparison.common)}
+        print(json.dumps({"scene": scene.name} | named | sizes | comparison.to_dict(), indent=1))
     else:
-        both = len(found.common)
+        both = len(comparison.common)
         for side, name, graph, only in zip(
-            ("left", "right"), options.formulations, (left, right), (found.only_left, found.only_right), strict=True
+            ("left", "right"),
+            options.formulations,
+            (left, right),
+            (comparison.only_left, comparison.only_right),
+            strict=True,
         ):
             print(f"{side}: {name}, {len(graph.nodes)} nodes = {both} in both + {len(only)} only {side}")
-        print(found)
+        print(comparison)
     if options.svg:
-        together = found.together()
+        together = comparison.overlay()
         marks = dict(
             zip(
-                [f"only {each}" for each in options.formulations],
+                [f"only {name}" for name in options.formulations],
                 (together.only_left, together.only_right),
                 strict=True,
             )

@@ -40,24 +40,28 @@ def run(options: argparse.Namespace) -> None:
     if options.t_end is not None and options.t_end > LONGEST:
         raise ValueError(f"--t-end must be at most {LONGEST:g} s, got {options.t_end:g} s: a page has {FRAMES} times")
     scene = scene_of(options)
-    found = inspection(scene, forward=options.forward, t_end=options.t_end)
-    bones = found.skeleton
+    content = inspection(scene, forward=options.forward, t_end=options.t_end)
+    bones = content.skeleton
     text = page(
-        [Version(each.name.replace("_", " "), *each[1:]) for each in found.versions],
+        [Version(version.name.replace("_", " "), *version[1:]) for version in content.versions],
         title=f"{scene.name}: {'forward' if options.forward else 'inverse'} dynamics",
-        motion=Motion(found.t, bones.points, bones.parents) if bones else Motion(found.t, None, ()),
-        tables=[_torques(scene, found.shares)] if found.shares else [],
+        motion=Motion(content.t, bones.points, bones.parents) if bones else Motion(content.t, None, ()),
+        tables=[_torques(scene, content.shares)] if content.shares else [],
     )
     atomic_write(options.out, text)
     sizes = {
-        each.name: {"nodes": len(each.graph.nodes), "edges": len(each.graph.edges), "spurious": len(each.marked)}
-        for each in found.versions
+        version.name: {
+            "nodes": len(version.graph.nodes),
+            "edges": len(version.graph.edges),
+            "spurious": len(version.marked),
+        }
+        for version in content.versions
     }
     size = len(text.encode())
     if options.json:
         print(json.dumps({"scene": scene.name, "bytes": size, "versions": sizes}, indent=1))
     else:
-        counts = ", ".join(f"{name} {each['nodes']} nodes" for name, each in sizes.items())
+        counts = ", ".join(f"{name} {version['nodes']} nodes" for name, version in sizes.items())
         print(f"{options.out}: {counts}; {size / 1e6:.2f} MB")
 
 

@@ -41,7 +41,8 @@ def lesson() -> Lesson:
     """The graphs of the wheel on a spring, and what they come to."""
     wheel = scenes.load("spring_mass")
     flawed, kinetic, right = (
-        momentum_rate(wheel, each, keep_momentum=True) for each in ("euler_embedded", "kinetic_only", "chain_rule")
+        momentum_rate(wheel, formulation, keep_momentum=True)
+        for formulation in ("euler_embedded", "kinetic_only", "chain_rule")
     )
     state = {"qdd0": 0.0, "qd0_old": 1.0, "I": 1.0, "k": 1.0}
     # The state after the step is the same for every dt: q = 1, qd = 1.
@@ -64,5 +65,5 @@ def _arm() -> tuple[float, float]:
 
 
 def _torques(graph: Graph, values: Mapping[str, float]) -> NDArray[np.float64]:
-    found = graph.evaluate({name: values[name] for name in graph.input_names})
-    return np.array([found[name] for name in graph.outputs])
+    torques = graph.evaluate({name: values[name] for name in graph.input_names})
+    return np.array([torques[name] for name in graph.outputs])

@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> int:
     scene = scene_of(options)
     graph = inverse_dynamics(scene, options.formulation)
     q, qd = state_names(graph, scene.system.n)
-    found = cg.lint(
+    report = cg.lint(
         graph,
         independent=[(q, qd)] if q and qd else [],
         box=options.box,
@@ -47,11 +47,15 @@ def run(options: argparse.Namespace) -> int:
         function="L",
     )
     if options.json:
-        print(json.dumps({"scene": scene.name, "formulation": options.formulation} | found.to_dict(), indent=1))
+        print(json.dumps({"scene": scene.name, "formulation": options.formulation} | report.to_dict(), indent=1))
     else:
-        print(found if q and qd else f"Holds: the equations have no {'coordinates' if qd else 'velocities'}.\n{found}")
+        print(
+            report if q and qd else f"Holds: the equations have no {'coordinates' if qd else 'velocities'}.\n{report}"
+        )
     if options.svg:
         caption = f"{scene.name}: inverse dynamics, {options.formulation.replace('_', ' ')}"
-        drawing = to_dot(graph, marked=found.nodes, marked_label="to blame", marked_edges=found.edges, caption=caption)
+        drawing = to_dot(
+            graph, marked=report.nodes, marked_label="to blame", marked_edges=report.edges, caption=caption
+        )
         draw(options, drawing)
-    return 0 if found.ok else 1
+    return 0 if report.ok else 1

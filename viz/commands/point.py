@@ -28,26 +28,26 @@ def point(text: str) -> dict[str, float]:
 
 def box(text: str) -> dict[str, tuple[float, float]]:
     """`q0=-1:1,qd0=0:2` as intervals by name, for argparse."""
-    found = {}
+    intervals = {}
     for name, value in _pairs(text):
         low, colon, high = value.partition(":")
         if not colon:
             raise argparse.ArgumentTypeError(f"{name} needs an interval such as -1:1, got {value!r}")
-        found[name] = _number(name, low), _number(name, high)
-        if found[name][0] > found[name][1]:
+        intervals[name] = _number(name, low), _number(name, high)
+        if intervals[name][0] > intervals[name][1]:
             raise argparse.ArgumentTypeError(f"{name} needs its lower end first, got {value!r}")
-    return found
+    return intervals
 
 
 def filled(graph: Graph, scene: Scene, given: dict[str, float]) -> dict[str, float]:
     """The given numbers with the rest that the graph's inputs need; names that the graph has not are kept."""
     chosen = np.random.default_rng(SEED)
     parameters = scene.system.parameters
-    found = {}
+    values = {}
     for name in graph.input_names:
-        number = round(chosen.uniform(-1.0, 1.0), DIGITS)
-        found[name] = parameters[name] if name in parameters else {"dt": DT, "t": 0.0}.get(name, number)
-    return found | given
+        drawn = round(chosen.uniform(-1.0, 1.0), DIGITS)
+        values[name] = parameters[name] if name in parameters else {"dt": DT, "t": 0.0}.get(name, drawn)
+    return values | given
 
 
 def point_text(at: dict[str, float]) -> str:

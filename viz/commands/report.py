@@ -1,4 +1,4 @@
-"""`cgraph report`: error beside run time of integrators, as pages; or one of two other reports."""
+"""`cgraph report`: error beside run time of integrators, as pages; or one of three other reports."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ import json
 from pathlib import Path
 
 from dynamics import EFFECTS, scenes
+from dynamics.experiments.machine import machine
 from dynamics.experiments.work_precision import trajectory_scenes, work_precision
 from dynamics.experiments.work_precision.cold_start import STARTS
+from dynamics.experiments.work_precision.comparisons import COMPARISONS
+from dynamics.experiments.work_precision.report import PEERS, to_csv
 from dynamics.integrators import METHODS
 
 from ..pages import work_precision as page
@@ -17,7 +20,7 @@ from ..plots.plot import check_can_plot
 from . import pruning_report, stability_report
 from .arguments import Commands, may_ignore, number, positive, say
 
-CURVES, STABILITY, PRUNING = "a report of run times", "--stability", "--pruning"
+CURVES, STABILITY, PRUNING, COMPARE = "a report of run times", "--stability", "--pruning", "--compare"
 GO_WITH = {  # options that not every kind of report has
     "ignore": (CURVES, PRUNING),
     "t_end": (CURVES,),
@@ -26,6 +29,7 @@ GO_WITH = {  # options that not every kind of report has
     "peers": (CURVES,),
     "budget": (CURVES,),
     "quick": (CURVES, STABILITY),
+    "json": (CURVES, STABILITY, PRUNING),
     "without": (PRUNING,),
     "lock": (PRUNING,),
 }
@@ -49,10 +53,15 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
     parser.add_argument("--t-end", type=positive, metavar="S", help="how long, instead of the scene's own time")
     parser.add_argument("--start", type=_state, metavar="A,B", help="q and then qd, instead of the scene's own start")
     parser.add_argument("--methods", metavar="A,B", help=f"only these of {', '.join(METHODS)}")
-    parser.add_argument("--peers", metavar="A,B", help=f"only these of {', '.join(work_precision.PEERS)}; '' for none")
+    parser.add_argument("--peers", metavar="A,B", help=f"only these of {', '.join(PEERS)}; '' for none")
     parser.add_argument("--quick", action="store_true", help="fewer turns, shorter runs, and no cold starts")
     parser.add_argument(
         "--budget", type=positive, metavar="S", help=f"seconds that a cold start may take (default: {BUDGET:g})"
+    )
+    parser.add_argument(
+        "--compare",
+        metavar="A,B",
+        help=f"instead: print comparisons at equal error, of {', '.join(COMPARISONS)}; minutes, and no scene",
     )
     parser.add_argument("--json", action="store_true", help="print as JSON")
     parser.add_argument("--pruning", action="store_true", help="instead: what the scene's graphs hold and leave out")
@@ -65,15 +74,18 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Write the pages that the arguments ask for."""
-    if options.stability and options.pruning:
-        raise ValueError("--stability and --pruning are two reports: one at a time")
-    kind = STABILITY if options.stability else PRUNING if options.pruning else CURVES
-    if bool(options.scenes) == options.stability:
-        raise ValueError("a report needs a scene, or --stability and none")
-    for name, kinds in GO_WITH.items():
-        if kind not in kinds and getattr(options, name) not in (None, False):
-            raise ValueError(f"--{name.replace('_', '-')} goes with {' or '.join(kinds)}, not with {kind}")
-    {CURVES: _curves, STABILITY: stability_report.run, PRUNING: pruning_report.run}[kind](options)
+    others = {STABILITY: options.stability, PRUNING: options.pruning, COMPARE: options.compare is not None}
+    kinds = [kind for kind, asked in others.items() if asked] or [CURVES]
+    if len(kinds) > 1:
+        raise ValueError(f"{' and '.join(kinds)} are {len(kinds)} reports: one at a time")
+    kind = kinds[0]
+    if bool(options.scenes) == (kind in (STABILITY, COMPARE)):
+        raise ValueError("a report needs a scene, or --stability or --compare and none")
+    for name, with_these in GO_WITH.items():
+        if kind not in with_these and getattr(options, name) not in (None, False):
+            raise ValueError(f"--{name.replace('_', '-')} goes with {' or '.join(with_these)}, not with {kind}")
+    runs = {CURVES: _curves, STABILITY: stability_report.run, PRUNING: pruning_report.run, COMPARE: _comparisons}
+    runs[kind](options)
 
 
 def _state(text: str) -> list[float]:
@@ -87,13 +99,25 @@ def _locked(text: str) -> tuple[str, float]:
     return body, number(at)
 
 
+def _comparisons(options: argparse.Namespace) -> None:
+    """Print comparisons as they are measured; exact motions are kept where reports keep theirs."""
+    names = [name for name in options.compare.split(",") if name]
+    if unknown := [name for name in names if name not in COMPARISONS]:
+        raise ValueError(f"comparisons are {', '.join(COMPARISONS)}, got {unknown[0]!r}")
+    check_writable(options.out)
+    print(machine())
+    for name in names or COMPARISONS:
+        for text in COMPARISONS[name](str(options.out / "exact")):
+            print(f"\n{text}", flush=True)
+
+
 def _curves(options: argparse.Namespace) -> None:
     """A page of run time beside error for each scene."""
     named = {trajectory_scenes.load(name, ignore=options.ignore).name for name in options.scenes}
     if len(named) < len(options.scenes):
         raise ValueError(f"each scene needs a name of its own for its files, got {', '.join(options.scenes)}")
     chosen = {"t_end": options.t_end, "start": options.start, "ignore": options.ignore}
-    peers = work_precision.PEERS if options.peers is None else tuple(filter(None, options.peers.split(",")))
+    peers = tuple(PEERS) if options.peers is None else tuple(filter(None, options.peers.split(",")))
     check_can_plot()
     check_writable(options.out)
     found = []
@@ -112,7 +136,7 @@ def _curves(options: argparse.Namespace) -> None:
         )
         content = report.to_dict()
         found.append(content)
-        document, rows = page.work_precision(content), work_precision.to_csv(report)
+        document, rows = page.work_precision(content), to_csv(report)
         written = write_document(options.out, content["name"], document, content, rows)
         if not options.json:
             points = sum(len(each.points) for each in report.curves)

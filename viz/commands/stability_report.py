@@ -22,8 +22,8 @@ def run(options: argparse.Namespace) -> None:
     check_writable(options.out)
     begin = time.perf_counter()
     found = stability.run(options.quick, say)
-    content = stability.content(found, time.perf_counter() - begin, options.quick)
+    content = stability.to_dict(found, time.perf_counter() - begin, options.quick)
     written = write_document(options.out, NAME, page.document(content), content, stability.to_csv(found))
-    print(json.dumps(content, indent=1) if options.json else f"{stability_table.table(found)}\n{written}")
+    print(json.dumps(content, indent=1) if options.json else f"{stability_table.text(found)}\n{written}")
     if unexplained := [f"{each.case} by {each.method}" for each in found if not each.explained]:
         raise RuntimeError(f"beyond its bound without a known reason: {', '.join(unexplained)}")

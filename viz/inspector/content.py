@@ -18,7 +18,7 @@ UNKNOWN = 0.5  # an input's value where none is given: a product with 0 would sh
 class Version:
     """One of the graphs that the page switches among, and what to see in it.
 
-    about: a sentence or two.  marked: nodes in the one colour of what is wrong.
+    about: a sentence or two.  marked: nodes in the one color of what is wrong.
     at: {input: value (T,) along the motion, or one number}; an input without a value is `UNKNOWN`.
     """
 

@@ -1,4 +1,4 @@
-"""Places of nodes in layers: arguments below their uses, neighbours near one another."""
+"""Places of nodes in layers: arguments below their uses, neighbors near one another."""
 
 from __future__ import annotations
 

@@ -46,10 +46,41 @@ def page(
 ) -> Page:
     """The page on which a graph is looked at: it folds by tags, and shows values, paths, sweeps and equations.
 
-    graph: one graph, or versions to switch among; nodes that compute the same in two versions keep their place.
-    about: what to see.  at, marked: of one graph, as in `Version`.  motion: points that move beside it.
+    Parameters
+    ----------
+    graph : Graph, or sequence of Version
+        One graph, or versions to switch among; nodes that compute the same in two versions keep their place.
+    title : str
+        Heading of the page.
+    about : str
+        What to see, a sentence or two.
+    at : mapping of str to float or array (T,), optional
+        {input: value}, or values along the motion, of one graph. An input without a value is 0.5.
+    marked : collection of Node
+        Nodes of one graph in the color of what is wrong.
+    motion : Motion, optional
+        Instants to play [s], and points that move beside the graph [m].
+    tables : sequence of Table
+        Texts in rows, shown below the graph.
 
-    Raises ValueError for no version, two of one name, at or marked beside versions, and as `Version` and `Motion` do.
+    Returns
+    -------
+    Page
+        The HTML text; a notebook shows it in a frame.
+
+    Raises
+    ------
+    ValueError
+        For no version, two of one name, `at` or `marked` beside versions, a value for a name that is no input, a number
+        that is not finite, a marked node of another graph, or shapes that do not fit the motion.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x = cg.variable("x")
+    >>> text = page(cg.Graph([x], {"y": cg.sin(x)}), title="A sine", at={"x": 0.3})
+    >>> "<title>A sine</title>" in text
+    True
     """
     if isinstance(graph, Graph):
         versions: Sequence[Version] = [Version("graph", graph, about, marked, at or {})]
@@ -65,15 +96,15 @@ def page(
     data = {"title": title, "introduction": "" if isinstance(graph, Graph) else about, **record(versions, motion)}
     script = scripts()
     # "<" in the data could end the element that holds it
-    held = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
-    shown = "".join(html.table(each.caption, each.header, each.rows) for each in tables)
+    text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
+    shown = "".join(html.table(table.caption, table.header, table.rows) for table in tables)
     body = _asset("page.html").replace("{title}", escape(title)).replace("{tables}", shown)
     return Page(
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
-        f"<style>{_colours()}{_asset('page.css')}</style>\n</head>\n<body>\n{body}\n"
-        f'<script id="data" type="application/json">{held}</script>\n'
+        f"<style>{_colors()}{_asset('page.css')}</style>\n</head>\n<body>\n{body}\n"
+        f'<script id="data" type="application/json">{text}</script>\n'
         f'<script>"use strict";\n{script}\nstart();</script>\n'
         "</body>\n</html>\n"
     )
@@ -88,8 +119,8 @@ def _asset(name: str) -> str:
     return files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
-def _colours() -> str:
-    """The theme's colours as the style sheet names them."""
+def _colors() -> str:
+    """The theme's colors as the style sheet names them."""
     roles = {role: paint.line for role, paint in theme.ROLES.items()} | {"input": theme.YELLOW}
     names = roles | {"wrong": theme.SPURIOUS, "up": theme.BLUE, "down": theme.GREEN, "path": theme.PURPLE}
-    return ":root{" + "".join(f"--{name}:{colour};" for name, colour in names.items()) + "}\n"
+    return ":root{" + "".join(f"--{name}:{color};" for name, color in names.items()) + "}\n"

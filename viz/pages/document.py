@@ -28,7 +28,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Picture:
-    """SVG whose ink takes the page's colours, see `plot.to_adaptive_svg`.  name: of its file, without suffix."""
+    """SVG whose ink takes the page's colors, see `plot.to_adaptive_svg`.  name: of its file, without suffix."""
 
     name: str
     svg: str
@@ -63,7 +63,7 @@ class Document:
 
 def to_html(document: Document) -> str:
     """The document as a page that needs no other file."""
-    sections = [(each.anchor, each.heading, _html(each.blocks)) for each in document.sections]
+    sections = [(section.anchor, section.heading, _html(section.blocks)) for section in document.sections]
     return html.page(document.title, _html(document.introduction), sections)
 
 

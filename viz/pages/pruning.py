@@ -14,8 +14,8 @@ HEADER = ["", "why", "nodes", "edges"]
 def document(content: Content) -> Document:
     """The document of one scene."""
     sizes = [
-        [each["equations"], *(f"{each[part][what]}" for what in ("nodes", "edges") for part in ("full", "pruned"))]
-        for each in content["graphs"]
+        [graph["equations"], *(f"{graph[part][what]}" for what in ("nodes", "edges") for part in ("full", "pruned"))]
+        for graph in content["graphs"]
     ]
     introduction: list[Block] = [
         Paragraph(f"{content['about']}. Effects that are on: {', '.join(content['effects']) or 'none'}."),
@@ -23,7 +23,7 @@ def document(content: Content) -> Document:
         Paragraph("All counts are exact; inputs that are used and constants are nodes."),
     ]
     return Document(
-        f"What {content['name']} does not need", introduction, [_section(each) for each in content["graphs"]]
+        f"What {content['name']} does not need", introduction, [_section(graph) for graph in content["graphs"]]
     )
 
 
@@ -43,5 +43,5 @@ def _section(graph: Content) -> Section:
     return Section(graph["equations"].replace(" ", "-"), graph["equations"].capitalize(), blocks)
 
 
-def _rows(found: Sequence[Content]) -> list[list[str]]:
-    return [[each["what"], each["why"], f"{each['nodes']}", f"{each['edges']}"] for each in found]
+def _rows(terms: Sequence[Content]) -> list[list[str]]:
+    return [[term["what"], term["why"], f"{term['nodes']}", f"{term['edges']}"] for term in terms]

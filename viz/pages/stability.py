@@ -25,7 +25,7 @@ NAMES = 34  # letters of a case's name on a line
 
 def document(content: Content) -> Document:
     """The document of one report."""
-    sections = [_limits(content), *[_section(each) for each in content["sections"] if each["rows"]]]
+    sections = [_limits(content), *[_section(section) for section in content["sections"] if section["rows"]]]
     return Document("Stiff and extreme cases", _introduction(content), sections)
 
 
@@ -77,8 +77,8 @@ def _section(section: Mapping[str, Any]) -> Section:
     shown = len(_HEADER) if any(row["steps"] or row["rejected"] for row in rows) else 6
     lines = [line[:shown] for row in rows for line in _lines(row)]
     hard = dict.fromkeys([f"{row['case']}: {row['about']}" for row in rows])
-    figures = [each for row in rows for each in row["figures"]]
-    bounds = dict.fromkeys([f"{each['quantity']}: {each['why']}" for each in figures])
+    figures = [figure for row in rows for figure in row["measurements"]]
+    bounds = dict.fromkeys([f"{figure['quantity']}: {figure['why']}" for figure in figures])
     return Section(
         anchor,
         name,
@@ -86,29 +86,29 @@ def _section(section: Mapping[str, Any]) -> Section:
             Paragraph(section["about"]),
             Picture(anchor, svg, "Figures over their bounds: to the right of the line, a bound is not met."),
             Table("Verdicts", _HEADER[:shown], lines),
-            Table("What is hard", ["case"], [[each] for each in hard], folded=True),
-            Table("Why these bounds", ["figure"], [[each] for each in bounds], folded=True),
+            Table("What is hard", ["case"], [[case] for case in hard], folded=True),
+            Table("Why these bounds", ["figure"], [[bound] for bound in bounds], folded=True),
         ],
     )
 
 
 def _lines(row: Row, missed: bool = False) -> list[list[str]]:
-    """A line of cells for each figure, or for each that is beyond its bound; what they share stands in the first.
+    """A line of cells for each figure, or for those beyond their bounds; what they share stands in the first.
 
     A long name goes on in the lines below.
     """
-    own: list[list[str]] = []
-    for each in row["figures"]:
-        if not (missed and each["meets"]):
-            bound = "" if each["bound"] == "inf" else _number(each["bound"])
-            value = _number(each["value"]) + ("" if each["meets"] else " ✗")
-            own.append([each["quantity"] + _unit(each), value, bound])
+    measured: list[list[str]] = []
+    for figure in row["measurements"]:
+        if not (missed and figure["meets"]):
+            bound = "" if figure["bound"] == "inf" else _number(figure["bound"])
+            value = _number(figure["value"]) + ("" if figure["meets"] else " ✗")
+            measured.append([figure["quantity"] + _unit(figure), value, bound])
     name = textwrap.wrap(row["case"], NAMES)
     shared = [row["method"], row["verdict"]], _run(row)
     lines: list[list[str]] = []
-    for first, figure in itertools.zip_longest(name, own, fillvalue=None):
+    for first, cells in itertools.zip_longest(name, measured, fillvalue=None):
         (method, verdict), run = shared if not lines else (["", ""], ["", ""])
-        lines.append([first or "", method, verdict, *(figure or ["", "", ""]), *run])
+        lines.append([first or "", method, verdict, *(cells or ["", "", ""]), *run])
     return lines
 
 
@@ -130,12 +130,12 @@ def _number(value: float | str) -> str:
 
 
 def shares(rows: Sequence[Row]) -> Figure:
-    """Every figure over its bound, a line for each case, on one logarithmic axis; those beyond 1 in another colour."""
+    """Every figure over its bound, a line for each case, on one logarithmic axis; those beyond 1 in another color."""
     names = list(dict.fromkeys(row["case"] for row in rows))
     points = [
         (_share(each), names.index(row["case"]), each["meets"])
         for row in rows
-        for each in row["figures"]
+        for each in row["measurements"]
         if each["bound"] != "inf"
     ]
     with style():
@@ -143,11 +143,11 @@ def shares(rows: Sequence[Row]) -> Figure:
         axis = figure.subplots()
         axis.set_xscale("log")
         axis.axvline(1.0, color=theme.LINE, linewidth=1.0)
-        axis.hlines(range(len(names)), FROM, TO, color=theme.GREY, linewidth=0.3)
-        for meets, colour, marker in ((True, theme.BLUE, "o"), (False, theme.SPURIOUS, "X")):
+        axis.hlines(range(len(names)), FROM, TO, color=theme.GRAY, linewidth=0.3)
+        for meets, color, marker in ((True, theme.BLUE, "o"), (False, theme.SPURIOUS, "X")):
             chosen = [(x, y) for x, y, met in points if met is meets]
             x, y = ([point[k] for point in chosen] for k in (0, 1))
-            axis.plot(x, y, marker, color=colour, markersize=4.5, clip_on=False)
+            axis.plot(x, y, marker, color=color, markersize=4.5, clip_on=False)
         axis.set_yticks(range(len(names)), names, fontsize=8)
         axis.tick_params(axis="y", length=0)
         axis.set_xlim(FROM, TO)

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..plots.direct_labels import Line, Panel, bars, labelled
+from ..plots.direct_labels import Line, Panel, bars, labeled
 from ..plots.plot import to_adaptive_svg
 from .document import Block, Document, Paragraph, Picture, Section, Table
 
 Content = Mapping[str, Any]  # what `content()` of the report gives, or its JSON file
 EQUAL, CHOSEN = "equal steps", "chosen steps"
 DRAWN = 3.0  # errors above are no motion of this kind any more
-MAKERS = {"scipy:": 1, "heyoka": 2, "CVODES": 3, "MuJoCo": 4}  # a colour for what comes from one maker; ours is 0
+MAKERS = {"scipy:": 1, "heyoka": 2, "CVODES": 3, "MuJoCo": 4}  # a color for what comes from one maker; ours is 0
 
 
 def work_precision(content: Content) -> Document:
@@ -20,9 +20,9 @@ def work_precision(content: Content) -> Document:
     sections = [_fastest(content), _against_time(content), _orders(content)]
     if content["conservative"]:
         sections.append(_energy(content))
-    if any(each["seconds"] is not None for each in content["cold"]):
+    if any(start["seconds"] is not None for start in content["cold"]):
         sections.append(_cold(content))
-    sections += [_points(content), _made(content)]
+    sections += [_points(content), _absent(content)]
     return Document(f"Error and run time: {content['name']}", _introduction(content), sections)
 
 
@@ -43,7 +43,7 @@ def _introduction(content: Content) -> list[Block]:
             "Times are the shortest of runs that take turns, warm, from the start to the end of the motion: nothing is "
             f"derived or compiled in them. {_sentence(content['machine'])} {_busy(content)}"
         ),
-        *[Paragraph(f"Left out of the model: {each}.") for each in content["left_out"]],
+        *[Paragraph(f"Left out of the model: {omitted}.") for omitted in content["left_out"]],
     ]
 
 
@@ -60,10 +60,10 @@ def _busy(content: Content) -> str:
 
 def _fastest(content: Content) -> Section:
     rows: list[list[str]] = []
-    groups = list(dict.fromkeys(each["group"] for each in content["targets"]))
-    for error in dict.fromkeys(each["error"] for each in content["targets"]):
-        found = {each["group"]: each for each in content["targets"] if each["error"] == error}
-        rows.append([_power(error), *[_target(found.get(group)) for group in groups]])
+    groups = list(dict.fromkeys(target["group"] for target in content["targets"]))
+    for error in dict.fromkeys(target["error"] for target in content["targets"]):
+        fastest = {target["group"]: target for target in content["targets"] if target["error"] == error}
+        rows.append([_power(error), *[_target(fastest.get(group)) for group in groups]])
     note = "In brackets: times ours, above 1 where ours is faster. Only knobs that were tried count, see all points."
     if not rows:
         return Section("fastest", "Fastest for an error", [Paragraph("No contender came near the exact motion.")])
@@ -71,16 +71,16 @@ def _fastest(content: Content) -> Section:
     return Section("fastest", "Fastest for an error", [table, Paragraph(note)])
 
 
-def _target(found: Mapping[str, Any] | None) -> str:
-    if found is None:
+def _target(target: Mapping[str, Any] | None) -> str:
+    if target is None:
         return "-"
-    ratio = "" if found["group"] == "ours" or found["ratio"] is None else f" [{_digits(found['ratio'])}]"
-    name = found["name"].removeprefix("MuJoCo ").removeprefix("scipy:").removeprefix("heyoka ")
-    return f"{_time(found['seconds'])} {name}{ratio}"
+    ratio = "" if target["group"] == "ours" or target["ratio"] is None else f" [{_digits(target['ratio'])}]"
+    name = target["name"].removeprefix("MuJoCo ").removeprefix("scipy:").removeprefix("heyoka ")
+    return f"{_time(target['seconds'])} {name}{ratio}"
 
 
 def _against_time(content: Content) -> Section:
-    panels, best = _panels(content, _error, "error at the end")
+    panels, best = _panels(content, "error", "error at the end")
     caption = "Run time against error at the end: lower and further right is better. The same scales in all panels."
     if best:
         caption += f" Dashed among the others: our {' and '.join(best)}, for comparison."
@@ -91,10 +91,10 @@ def _picture(name: str, panels: Sequence[Panel], caption: str, shared: bool = Tr
     """The panels, or words where there is nothing to draw."""
     if not panels:
         return Paragraph("No run gave numbers to draw.")
-    return Picture(name, to_adaptive_svg(labelled(panels, shared=shared)), caption)
+    return Picture(name, to_adaptive_svg(labeled(panels, shared=shared)), caption)
 
 
-def _panels(content: Content, x: Any, name: str) -> tuple[list[Panel], list[str]]:
+def _panels(content: Content, x: str, name: str) -> tuple[list[Panel], list[str]]:
     """Run times against x, which has that name, of ours and the others, of equal and of chosen steps.
 
     Besides, which of ours stand among the others.
@@ -103,73 +103,52 @@ def _panels(content: Content, x: Any, name: str) -> tuple[list[Panel], list[str]
     shown: list[str] = []
     axes = f"{name} (smaller to the right)", "run time [s]"
     for kind in (EQUAL, CHOSEN):
-        of_kind = [each for each in content["curves"] if each["kind"] == kind]
-        ours, others = ([each for each in of_kind if each["ours"] is mine] for mine in (True, False))
+        of_kind = [curve for curve in content["curves"] if curve["kind"] == kind]
+        ours, others = ([curve for curve in of_kind if curve["ours"] is mine] for mine in (True, False))
         if ours:
             panels.append(
                 Panel(
-                    f"ours, {kind}", *axes, [_line(each, x, _seconds, *_look(k, each)) for k, each in enumerate(ours)]
+                    f"ours, {kind}",
+                    *axes,
+                    [_line(curve, x, "seconds", *_look(k, curve)) for k, curve in enumerate(ours)],
                 )
             )
         if others:
             best = _best(ours, content)
-            shown += [each["name"] for each in best]
-            drawn = [_line(each, x, _seconds, *_look(k, each)) for k, each in enumerate(others)]
-            drawn += [_line(each, x, _seconds, 0, True, "ours: ") for each in best]
+            shown += [curve["name"] for curve in best]
+            drawn = [_line(curve, x, "seconds", *_look(k, curve)) for k, curve in enumerate(others)]
+            drawn += [_line(curve, x, "seconds", 0, True, "ours: ") for curve in best]
             panels.append(Panel(f"others, {kind}", *axes, drawn))
-    return [each for each in panels if any(len(line.x) for line in each.lines)], shown
+    return [panel for panel in panels if any(len(line.x) for line in panel.lines)], shown
 
 
 def _maker(name: str) -> int:
-    return next((colour for begin, colour in MAKERS.items() if name.startswith(begin)), 4)
+    return next((color for begin, color in MAKERS.items() if name.startswith(begin)), 4)
 
 
 def _best(ours: Sequence[Mapping[str, Any]], content: Content) -> list[Mapping[str, Any]]:
     """The one of ours that is fastest at the smallest error that any of them reaches within a factor of a hundred."""
-    reached = [(min(p["error"] for p in each["points"]), each) for each in ours if each["points"]]
+    reached = [(min(point["error"] for point in curve["points"]), curve) for curve in ours if curve["points"]]
     if not reached:
         return []
     bound = 100.0 * max(min(error for error, _ in reached), 1e-13)
     times = [
-        (min(p["seconds"] for p in each["points"] if p["error"] <= bound), k)
-        for k, (error, each) in enumerate(reached)
+        (min(point["seconds"] for point in curve["points"] if point["error"] <= bound), k)
+        for k, (error, curve) in enumerate(reached)
         if error <= bound
     ]
     return [reached[min(times)[1]][1]]
 
 
-def _line(curve: Mapping[str, Any], x: Any, y: Any, colour: int, dashed: bool, before: str = "") -> Line:
-    kept = [(x(p), y(p)) for p in curve["points"] if x(p) and y(p) and _drawn(p)]
+def _line(curve: Mapping[str, Any], x: str, y: str, color: int, dashed: bool, before: str = "") -> Line:
+    """A curve's points in two of their columns, those without a number or far off left out."""
+    shown = [(point[x], point[y]) for point in curve["points"] if point[x] and point[y] and _drawn(point)]
     name = before + curve["name"].removeprefix("MuJoCo ")
-    return Line(name, [a for a, _ in kept], [b for _, b in kept], colour, dashed)
-
-
-def _step(point: Mapping[str, Any]) -> Any:
-    return point["step"]
-
-
-def _knob(point: Mapping[str, Any]) -> Any:
-    return point["knob"]
-
-
-def _error(point: Mapping[str, Any]) -> Any:
-    return point["error"]
-
-
-def _largest(point: Mapping[str, Any]) -> Any:
-    return point["largest"]
-
-
-def _seconds(point: Mapping[str, Any]) -> Any:
-    return point["seconds"]
-
-
-def _drift(point: Mapping[str, Any]) -> Any:
-    return point["drift"]
+    return Line(name, [a for a, _ in shown], [b for _, b in shown], color, dashed)
 
 
 def _look(number: int, curve: Mapping[str, Any]) -> tuple[int, bool]:
-    """Colour and dashes of a curve: of ours each has its own, of others each maker."""
+    """Color and dashes of a curve: one for every curve of ours, and for every maker of the others."""
     return (number, number >= 5) if curve["ours"] else (_maker(curve["name"]), False)
 
 
@@ -181,12 +160,12 @@ def _orders(content: Content) -> Section:
     panels = []
     for kind in (EQUAL, CHOSEN):
         for mine in (True, False):
-            curves = [each for each in content["curves"] if each["kind"] == kind and each["ours"] is mine]
+            curves = [curve for curve in content["curves"] if curve["kind"] == kind and curve["ours"] is mine]
             lines = [
-                _line(each, _step if kind == EQUAL else _knob, _largest if kind == EQUAL else _error, *_look(k, each))
-                for k, each in enumerate(curves)
+                _line(curve, *(("step", "largest") if kind == EQUAL else ("knob", "error")), *_look(k, curve))
+                for k, curve in enumerate(curves)
             ]
-            knobs = sorted({p["knob"] for each in curves for p in each["points"]}, reverse=True)
+            knobs = sorted({point["knob"] for curve in curves for point in curve["points"]}, reverse=True)
             if kind == CHOSEN and len(knobs) > 1:
                 lines.append(Line("error = tolerance", knobs, knobs, None))
             if any(len(line.x) for line in lines):
@@ -195,14 +174,14 @@ def _orders(content: Content) -> Section:
                 panels.append(Panel(f"{'ours' if mine else 'others'}, {kind}", x, y, lines))
     rows = [
         [
-            each["name"],
-            each["kind"],
-            "-" if each["order"] is None else str(each["order"]),
-            "-" if each["fitted"] is None else f"{each['fitted']:.2f}",
-            "ours" if each["model_error"] is None else _power(each["model_error"]),
-            each["stopped"],
+            curve["name"],
+            curve["kind"],
+            "-" if curve["order"] is None else str(curve["order"]),
+            "-" if curve["fitted"] is None else f"{curve['fitted']:.2f}",
+            "ours" if curve["model_error"] is None else _power(curve["model_error"]),
+            curve["stopped"],
         ]
-        for each in content["curves"]
+        for curve in content["curves"]
     ]
     header = ["integrator", "steps", "declared order", "fitted", "difference of rates", "no finer because of"]
     words = (
@@ -224,33 +203,37 @@ def _orders(content: Content) -> Section:
 
 
 def _energy(content: Content) -> Section:
-    panels, _ = _panels(content, _drift, "change of energy")
+    panels, _ = _panels(content, "drift", "change of energy")
     caption = "Run time against the largest change of energy over the instants, relative to the largest kinetic energy."
     return Section("energy", "Energy", [_picture("energy", panels, caption)])
 
 
 def _cold(content: Content) -> Section:
-    known = sorted([each for each in content["cold"] if each["seconds"] is not None], key=lambda each: each["seconds"])
-    ours = next((each["seconds"] for each in known if each["name"] == "ours"), None)
-    svg = to_adaptive_svg(bars([each["name"] for each in known], [each["seconds"] for each in known], "cold start [s]"))
+    known = sorted(
+        [start for start in content["cold"] if start["seconds"] is not None], key=lambda start: start["seconds"]
+    )
+    ours = next((start["seconds"] for start in known if start["name"] == "ours"), None)
+    svg = to_adaptive_svg(
+        bars([start["name"] for start in known], [start["seconds"] for start in known], "cold start [s]")
+    )
     rows = [
         [
-            each["name"],
-            each["about"],
-            _time(each["seconds"]),
-            _time(each["median"]),
-            "-" if ours is None else _digits(each["seconds"] / ours),
-            _time(each["loading"]),
-            str(each["turns"]),
+            start["name"],
+            start["about"],
+            _time(start["seconds"]),
+            _time(start["median"]),
+            "-" if ours is None else _digits(start["seconds"] / ours),
+            _time(start["loading"]),
+            str(start["turns"]),
         ]
-        for each in known
+        for start in known
     ]
     header = ["", "what", "shortest", "median", "times ours", "loading", "turns"]
     words = (
         "From a model to the end of its first run, each in a process of its own that finds nothing compiled: deriving, "
         "compiling and running. Loading the packages is apart."
     )
-    failed = [Paragraph(f"{each['name']}: {each['status']}.") for each in content["cold"] if each["status"]]
+    failed = [Paragraph(f"{start['name']}: {start['status']}.") for start in content["cold"] if start["status"]]
     picture = Picture("cold", svg, "Cold starts, on a logarithmic scale.")
     return Section("cold", "Cold start", [Paragraph(words), picture, Table("Cold starts", header, rows), *failed])
 
@@ -259,22 +242,35 @@ def _points(content: Content) -> Section:
     blocks: list[Block] = [Paragraph("The same figures are in the CSV and JSON files.")]
     header = ["steps or tolerance", "steps", "rejected", "evaluations", "shortest", "median", "error at the end"]
     header += ["largest error", *(["change of energy"] if content["conservative"] else [])]
-    for each in content["curves"]:
+    for curve in content["curves"]:
         rows = []
-        for p in each["points"]:
-            knob = str(int(p["knob"])) if each["kind"] == EQUAL else _power(p["knob"])
-            counts = ["-" if p[what] is None else str(p[what]) for what in ("steps", "rejected", "evaluations")]
-            row = [knob, *counts, _time(p["seconds"]), _time(p["median"]), _power(p["error"]), _power(p["largest"])]
-            rows.append([*row, *([_power(p["drift"])] if content["conservative"] else [])])
-        blocks.append(Table(f"{each['name']}: {each['about']}", header, rows, folded=True))
+        for point in curve["points"]:
+            knob = str(int(point["knob"])) if curve["kind"] == EQUAL else _power(point["knob"])
+            counts = ["-" if point[what] is None else str(point[what]) for what in ("steps", "rejected", "evaluations")]
+            row = [
+                knob,
+                *counts,
+                _time(point["seconds"]),
+                _time(point["median"]),
+                _power(point["error"]),
+                _power(point["largest"]),
+            ]
+            rows.append([*row, *([_power(point["drift"])] if content["conservative"] else [])])
+        blocks.append(Table(f"{curve['name']}: {curve['about']}", header, rows, folded=True))
     return Section("points", "All points", blocks)
 
 
-def _made(content: Content) -> Section:
+def _absent(content: Content) -> Section:
     return Section(
         "absent",
         "What is not there",
-        [Table("Contenders without a point", ["contender", "why"], [[*each] for each in content["absent"].items()])]
+        [
+            Table(
+                "Contenders without a point",
+                ["contender", "why"],
+                [[name, why] for name, why in content["absent"].items()],
+            )
+        ]
         if content["absent"]
         else [Paragraph("Every contender that was asked has points.")],
     )

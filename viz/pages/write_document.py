@@ -20,28 +20,29 @@ def check_writable(folder: Path) -> None:
 
     Raises OSError, with the folder in its message.
     """
-    above = [folder, *folder.parents]
-    missing = [each for each in above if not each.exists()]
+    ancestors = [folder, *folder.parents]
+    missing = [path for path in ancestors if not path.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        files = [each for each in above if each.exists() and not each.is_dir()]
+        files = [path for path in ancestors if path.exists() and not path.is_dir()]
         why = f"{files[0]} is a file" if files else error.strerror or str(error)
         raise OSError(error.errno, f"cannot write into the folder {folder}: {why}") from error
     finally:
-        for each in missing:
+        for path in missing:
             with suppress(OSError):  # not made, or somebody else has put something there
-                each.rmdir()
+                path.rmdir()
 
 
 def write_document(
     folder: Path, name: str, document: Document, data: Mapping[str, Any], rows: str | None = None, *, kind: str = ""
 ) -> Path:
-    """Write the files of one document into a folder, made if it is missing, each at once; returns the page.
+    """Write the files of one document into a folder, created if it is missing; returns the path of the page.
 
-    They are called by the name, with `_` for what a file's name should not have, and `-kind` where there is a kind.
+    Each is written whole or not at all. They are called by the name, with `_` for what a file's name should not have,
+    and `-kind` where there is a kind.
     data: what the document was made of.  rows: as CSV; without them that file is left out.
     """
     stem = "-".join(filter(None, [re.sub(r"[^A-Za-z0-9.+-]+", "_", name).strip("_"), kind]))

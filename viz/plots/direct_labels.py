@@ -1,4 +1,4 @@
-"""Log-log plots whose curves carry their names at their ends: no legend, and colours that need not tell them apart."""
+"""Log-log plots whose curves carry their names at their ends: no legend, and colors that need not tell them apart."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLOURS = (theme.BLUE, theme.ORANGE, theme.GREEN, theme.PURPLE, theme.SKY_BLUE)  # seen on white and on black
+COLORS = (theme.BLUE, theme.ORANGE, theme.GREEN, theme.PURPLE, theme.SKY_BLUE)  # seen on white and on black
 GRID: dict[str, Any] = {"color": "#808080", "alpha": 0.25, "linewidth": 0.6}
 LABEL = 8.0  # points
 APART = 1.1  # of a label's height, from one to the next
@@ -29,12 +29,12 @@ ROOM = 0.2  # of the axis, for the names
 
 @dataclass(frozen=True)
 class Line:
-    """A curve.  colour: a number, the same for what belongs together; None: a thin guide in the colour of the text."""
+    """A curve.  color: a number, the same for what belongs together; None: a thin guide in the color of the text."""
 
     name: str
     x: Sequence[float]
     y: Sequence[float]
-    colour: int | None = 0
+    color: int | None = 0
     dashed: bool = False
 
 
@@ -48,7 +48,7 @@ class Panel:
     lines: Sequence[Line]
 
 
-def labelled(panels: Sequence[Panel], *, columns: int = 2, shared: bool = True) -> Figure:
+def labeled(panels: Sequence[Panel], *, columns: int = 2, shared: bool = True) -> Figure:
     """Panels with logarithmic axes, x from large on the left to small on the right.
 
     shared: all panels have the same scales.
@@ -62,8 +62,8 @@ def labelled(panels: Sequence[Panel], *, columns: int = 2, shared: bool = True) 
         for axis, panel in zip(axes.flat, panels, strict=False):
             axis.set_xscale("log")
             axis.set_yscale("log")
-            for each in panel.lines:
-                _draw(axis, each)
+            for line in panel.lines:
+                _draw(axis, line)
             axis.set_title(panel.title, fontsize=10, loc="left")
             axis.set_xlabel(panel.x)
             axis.set_ylabel(panel.y)
@@ -76,8 +76,10 @@ def labelled(panels: Sequence[Panel], *, columns: int = 2, shared: bool = True) 
             axis.set_xlim(high, low * (low / high) ** ROOM)
             axis.set_xticks(_decades(low, high))
             axis.xaxis.minorticks_off()
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")  # the names are placed for axes where they are now
+        layout = figure.get_layout_engine()
+        assert layout is not None
+        layout.execute(figure)
+        figure.set_layout_engine(None)  # the names are placed for axes where they are now
         for axis, panel in zip(axes.flat, panels, strict=False):
             _name(axis, panel.lines)
     return figure
@@ -91,14 +93,14 @@ def _decades(low: float, high: float) -> list[float]:
 
 
 def _draw(axis: Axes, line: Line) -> None:
-    if line.colour is None:
+    if line.color is None:
         axis.plot(line.x, line.y, color=theme.LINE, linewidth=0.8, linestyle=(0, (1, 2)))
         return
     axis.plot(
         line.x,
         line.y,
-        color=COLOURS[line.colour % len(COLOURS)],
-        marker="osD^v"[line.colour // len(COLOURS) % 5],
+        color=COLORS[line.color % len(COLORS)],
+        marker="osD^v"[line.color // len(COLORS) % 5],
         markersize=3.2,
         linewidth=1.4,
         linestyle="--" if line.dashed else "-",
@@ -114,7 +116,7 @@ def _name(axis: Axes, lines: Sequence[Line]) -> None:
     height, letter = APART * LABEL * scale, LETTER * LABEL * scale
     placed: list[Box] = []
     named = [line for line in lines if len(line.x)]
-    for line, path in sorted(zip(named, paths, strict=True), key=lambda each: -each[1][-1, 1]):
+    for line, path in sorted(zip(named, paths, strict=True), key=lambda pair: -pair[1][-1, 1]):
         end = path[-1]
         width = letter * len(line.name)
         left = min(end[0] + GAP * scale, frame.x1 - width)
@@ -124,10 +126,8 @@ def _name(axis: Axes, lines: Sequence[Line]) -> None:
             for dy in range(-REACH, REACH + 1)
             if left + dx * letter + width <= frame.x1 + 1.0
         ]
-        inside = [
-            each for each in choices if frame.y0 < each.middle - height / 2 and each.middle + height / 2 < frame.y1
-        ]
-        best = min(inside or choices, key=lambda each: each.cost(end, placed, inked, letter))
+        inside = [box for box in choices if frame.y0 < box.middle - height / 2 and box.middle + height / 2 < frame.y1]
+        best = min(inside or choices, key=lambda box: box.cost(end, placed, inked, letter))
         placed.append(best)
         moved = abs(best.middle - end[1]) > 0.6 * height or best.left - end[0] > 2.5 * GAP * scale
         arrow: dict[str, Any] = {"arrowstyle": "-", "color": theme.LINE, "linewidth": 0.5, "shrinkA": 1, "shrinkB": 2}
@@ -155,10 +155,10 @@ class Box(NamedTuple):
     def cost(self, end: Points, placed: Sequence[Box], inked: Points, letter: float) -> float:
         """How bad it is there: on another name is worst, then on curves, then far from the end."""
         names = sum(
-            each.left - 2 * letter < self.right
-            and self.left - 2 * letter < each.right
-            and abs(each.middle - self.middle) < self.height
-            for each in placed
+            other.left - 2 * letter < self.right
+            and self.left - 2 * letter < other.right
+            and abs(other.middle - self.middle) < self.height
+            for other in placed
         )
         on = (
             (inked[:, 0] > self.left - 2)

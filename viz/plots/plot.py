@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cgraph.errors import install
+from cgraph.extend import install
 
 from .. import theme
 
@@ -69,14 +69,6 @@ def to_adaptive_svg(figure: Figure) -> str:
     return f"{head}<style>svg {{ color: {theme.TEXT}; fill: currentColor; }} {dark}</style>\n <defs>{rest}"
 
 
-def to_png(figure: Figure, dpi: int = 160) -> bytes:
-    """The figure as PNG."""
-    buffer = io.BytesIO()
-    with style():
-        figure.savefig(buffer, format="png", dpi=dpi)
-    return buffer.getvalue()
-
-
 def snapshots(times: Array, positions: Array, instants: Sequence[float], traces: bool = True) -> Figure:
     """Poses of an arm at `instants`, a panel each, with the way each joint has come.
 
@@ -92,10 +84,10 @@ def snapshots(times: Array, positions: Array, instants: Sequence[float], traces:
         for letter, (axis, instant) in zip("abcdefghijkl", zip(axes.flat, instants, strict=False), strict=False):
             row = int(np.abs(times - instant).argmin())
             for joint in range(1, positions.shape[1]):
-                colour = theme.LINKS[(joint - 1) % len(theme.LINKS)]
+                color = theme.LINKS[(joint - 1) % len(theme.LINKS)]
                 if traces:
-                    axis.plot(*positions[: row + 1, joint].T, color=colour, linewidth=0.9, alpha=0.55)
-                axis.plot(*positions[row, joint - 1 : joint + 1].T, color=colour, linewidth=5, solid_capstyle="round")
+                    axis.plot(*positions[: row + 1, joint].T, color=color, linewidth=0.9, alpha=0.55)
+                axis.plot(*positions[row, joint - 1 : joint + 1].T, color=color, linewidth=5, solid_capstyle="round")
             axis.plot(*positions[row, :-1].T, "o", color="white", markeredgecolor=theme.TEXT, markersize=4.5)
             axis.set_title(f"({letter})  t = {times[row]:.1f} s", fontsize=10, loc="left")
             axis.set_aspect("equal")
@@ -121,10 +113,10 @@ def images(pictures: Sequence[Array], titles: Sequence[str]) -> Figure:
     return figure
 
 
-def bars(groups: Mapping[str, Mapping[str, tuple[float, float]]], colours: Mapping[str, str]) -> Figure:
+def bars(groups: Mapping[str, Mapping[str, tuple[float, float]]], colors: Mapping[str, str]) -> Figure:
     """Means with standard deviations, {panel: {bar: (mean, deviation)}}, a panel with its own scale for each group.
 
-    colours: {bar: colour}.
+    colors: {bar: color}.
     """
     with style():
         figure = empty_figure(9.0, 3.6)
@@ -136,7 +128,7 @@ def bars(groups: Mapping[str, Mapping[str, tuple[float, float]]], colours: Mappi
                 range(len(values)),
                 means,
                 yerr=[[min(mean, deviation) for mean, deviation in values.values()], [d for _, d in values.values()]],
-                color=[colours[name] for name in values],
+                color=[colors[name] for name in values],
                 error_kw={"elinewidth": 1, "capsize": 3, "ecolor": theme.TEXT},
                 width=0.62,
             )
@@ -152,12 +144,12 @@ Curves = Mapping[str, tuple[Sequence[float], Sequence[float]]]  # {name: (x, y)}
 
 
 def powers(
-    panels: Mapping[str, Curves], x: str, y: Sequence[str], kinds: int = 1, colours: Mapping[str, str] | None = None
+    panels: Mapping[str, Curves], x: str, y: Sequence[str], kinds: int = 1, colors: Mapping[str, str] | None = None
 ) -> Figure:
     """Curves on logarithmic axes, {panel: curves}; zeros are left out. One legend serves all panels.
 
-    kinds: curves come in groups of so many, one colour a group and one line style a place in the group.
-    colours: {curve: colour} in place of a colour for each group.
+    kinds: curves come in groups of so many, one color a group and one line style a place in the group.
+    colors: {curve: color} in place of a color for each group.
     """
     with style():
         figure = empty_figure(9.0, 3.9)
@@ -172,7 +164,7 @@ def powers(
                         marker="osD^v"[number // kinds % 5],
                         markersize=4,
                         linestyle=("-", "--", ":")[number % kinds],
-                        color=colours[name] if colours else theme.SERIES[number // kinds % len(theme.SERIES)],
+                        color=colors[name] if colors else theme.SERIES[number // kinds % len(theme.SERIES)],
                         label=name,
                     )
             axis.set_title(title, fontsize=10, loc="left")

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ...core.node import Edge, Node
+from ...core.edge import Edge
+from ...core.node import Node
 from ..edge_partials import Point, edge_slopes, node_values
 from ..names import Names
 from .finding import Finding

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ..names import Name, Names, joined
-from ..reachability import makers
+from ..reachability import ancestors
 from .finding import Finding
 
 
@@ -24,12 +24,13 @@ def missing_dependences(names: Names, depends: Mapping[Name, Name | Sequence[Nam
     findings = []
     for output, declared in depends.items():
         sink = names.output(output)
-        made = makers([sink])
-        inputs = [str(node.name) for node in names.graph.inputs if node in made]
+        reached = ancestors([sink])
+        inputs = [str(node.name) for node in names.graph.inputs if node in reached]
         for node in names.group(declared):
-            if node not in made:
-                said, name = output if isinstance(output, str) else names.text(sink), names.text(node)
-                text = f"{said} does not depend on {name}; it is made from {joined(inputs, 12) or 'numbers'}."
-                data = {"output": said, "input": name, "made_from_inputs": inputs}
+            if node not in reached:
+                output_name = output if isinstance(output, str) else names.text(sink)
+                name = names.text(node)
+                text = f"{output_name} does not depend on {name}; it is made from {joined(inputs, 12) or 'numbers'}."
+                data = {"output": output_name, "input": name, "made_from_inputs": inputs}
                 findings.append(Finding("missing dependence", text, (sink, node), data=data))
     return findings

@@ -1,4 +1,4 @@
-"""What a check of a graph found: one thing that is not as declared, in words, in nodes and edges, and for JSON."""
+"""A finding: one thing in a graph that is not as declared, in words, in nodes and edges, and for JSON."""
 
 from __future__ import annotations
 
@@ -6,16 +6,26 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ...core.node import Edge, Node
+from ...core.edge import Edge
+from ...core.node import Node
 
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """One thing that a check found.
+    """One result of a check.
 
-    kind: "dependence", "missing dependence", "unused input", "singular", "cancellation".
-    text: in the person's names.  nodes, edges: what to mark in a drawing, the blamed ones alone in `edges`.
-    data: what `to_dict` adds to kind and text, for JSON.
+    Attributes
+    ----------
+    kind : str
+        "dependence", "missing dependence", "unused input", "singular" or "cancellation".
+    text : str
+        The sentence, in the person's names.
+    nodes : tuple of Node
+        What to mark in a drawing.
+    edges : tuple of Edge
+        The edges to blame.
+    data : mapping
+        What `to_dict` adds to kind and text.
     """
 
     kind: str

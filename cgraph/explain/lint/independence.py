@@ -6,15 +6,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from ...autodiff.forward import tangents
+from ...core.edge import Edge
 from ...core.graph import Graph
 from ...core.label import ADJOINT
 from ...core.networkx_queries import minimum_cut
-from ...core.node import Edge, Node, constant
+from ...core.node import Node, constant
 from ...core.source_lines import lines_text
 from ...errors import GraphError
 from ...simplify.builder import Builder
 from ..names import Name, Names, joined, many
-from ..reachability import between, made_of_more, makers, users
+from ..reachability import ancestors, between, descendants, has_more_ancestors
 from .finding import Finding
 
 Group = Name | Sequence[Name]
@@ -49,16 +50,16 @@ def check_independence(names: Names, first: Group, second: Group, function: str)
 
 def _proof(names: Names, dependent: list[Node], on: list[Node]) -> str:
     to = _called(names, dependent)
-    said = f"no path leads from {_called(names, on)} to {to}"
+    claim = f"no path leads from {_called(names, on)} to {to}"
     if not any([node.args for node in dependent]):
-        return f"{said}: {to} {'are inputs' if len(dependent) > 1 else 'is an input'}."
-    made = makers(dependent)
-    sources = [str(node.name) for node in names.graph.inputs if node in made]
-    return f"{said}, made from {joined(sources, 12) or 'numbers'} alone."
+        return f"{claim}: {to} {'are inputs' if len(dependent) > 1 else 'is an input'}."
+    reached = ancestors(dependent)
+    sources = [str(node.name) for node in names.graph.inputs if node in reached]
+    return f"{claim}, made from {joined(sources, 12) or 'numbers'} alone."
 
 
 def _blame(names: Names, inside: list[Node], dependent: list[Node], on: list[Node], function: str) -> Finding:
-    """The finding for `dependent`, which depends on `on` through the nodes `inside`."""
+    """The finding for `dependent`, which depends on `on` through the nodes `inside`: a minimum cut of the paths."""
     allowed, sources, sinks = set(inside), set(on), set(dependent)
     edges = [
         Edge(arg, node, slot)
@@ -73,7 +74,7 @@ def _blame(names: Names, inside: list[Node], dependent: list[Node], on: list[Nod
     pairs = dict.fromkeys([(path[0].source, path[-1].target) for path in paths])
     leaks = [_leak(names, *pair, sources | sinks, function) for pair in pairs]
     through = _derivatives_through(names.graph, paths)
-    needed = makers(names.graph.outputs.values(), through or ())
+    needed = ancestors(names.graph.outputs.values(), through or ())
     wrong = [node for node in names.graph.nodes if node not in needed]
     number = {node: i for i, node in enumerate(names.graph.nodes)}
     return Finding(
@@ -122,7 +123,7 @@ def _report(
         if len(path) > 2:
             lines.append(f"    on the path {_path_text(names, path)}")
     if through:
-        affected = users(names.graph.nodes, through)
+        affected = descendants(names.graph.nodes, through)
         outputs = [name for name, node in names.graph.outputs.items() if node in affected]
         alone = f"{many(len(wrong), 'node')} of {len(names.graph.nodes)} {_verb(wrong, 'serve')} nothing else."
         lines.append(f"{joined(outputs)} {_verb(outputs, 'contain')} what was gained; {alone}")
@@ -169,11 +170,11 @@ def _breadth_first(edges: Sequence[Edge], starts: Iterable[Node], near: int, far
 
 
 def _leak(names: Names, source: Node, sink: Node, members: set[Node], function: str) -> Leak:
-    """What the derivative by `source` gains through `sink`: its slope, past no other member of the two groups."""
+    """What the derivative by `source` gains through `sink`: d sink / d source with all other members held fixed."""
     a, b = names.text(source), names.text(sink)
     gained = f"d{function}/d{b}"
     slope = None
-    if not made_of_more(sink, SLOPE_NODES):
+    if not has_more_ancestors(sink, SLOPE_NODES):
         seeds = {node: constant(0.0) for node in members if node not in (source, sink)} | {source: constant(1.0)}
         slope = tangents(seeds, [sink], Builder()).get(sink)
     text = names.text(slope) if slope is not None else "?"
@@ -185,14 +186,14 @@ def _leak(names: Names, source: Node, sink: Node, members: set[Node], function: 
 
 
 def _derivatives_through(graph: Graph, paths: Sequence[Sequence[Edge]]) -> set[Node] | None:
-    """The adjoint nodes that came by these paths, told by the tags that only the paths' inner nodes have.
+    """The adjoint nodes that reverse mode made along these paths, by the tags that only their inner nodes have.
 
-    None where no tag tells them apart.
+    None where no tag sets the inner nodes apart.
     """
     ends = {path[0].source for path in paths} | {path[-1].target for path in paths}
     inner = {edge.target for path in paths for edge in path} - ends
-    own = {tag for node in inner for tag in node.tags} - {tag for node in ends for tag in node.tags}
-    return {node for node in graph.nodes if ADJOINT in node.roles and own & node.tags} if own else None
+    inner_tags = {tag for node in inner for tag in node.tags} - {tag for node in ends for tag in node.tags}
+    return {node for node in graph.nodes if ADJOINT in node.roles and inner_tags & node.tags} if inner_tags else None
 
 
 def _edge_text(names: Names, edge: Edge) -> str:

@@ -1,4 +1,4 @@
-"""Lint: what a person declares of a graph, checked, with a proof or the blame for each."""
+"""Lint: what a person declares of a graph, checked, with a proof or the nodes and edges to blame."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ...core.edge import Edge
 from ...core.graph import Graph
-from ...core.node import Edge, Node
+from ...core.node import Node
 from ..edge_partials import Point
 from ..names import Name, Names, many
 from .cancellation import cancellations, rounded
@@ -22,10 +23,25 @@ Pair = tuple[Group, Group]
 
 @dataclass(frozen=True, eq=False)
 class Lint:
-    """What `lint` found; `str` of it is the report.
+    """The result of `lint`; `str` of it is the report.
 
-    findings: what is not as declared.  notes: what nobody declared but may be a slip, such as an input that nothing
-    uses.  proofs: what was declared and holds.
+    Attributes
+    ----------
+    graph : Graph
+        What was checked.
+    findings : tuple of Finding
+        What is not as declared.
+    notes : tuple of Finding
+        What was not declared but may be a slip, such as an input that nothing uses.
+    proofs : tuple of str
+        What was declared and holds, in sentences.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x, y = cg.variables("x y")
+    >>> cg.lint(cg.Graph([x, y], {"f": x * y}), depends={"f": "x y"}).ok
+    True
     """
 
     graph: Graph
@@ -75,65 +91,94 @@ def lint(
     digits: float = 4.0,
     function: str = "f",
 ) -> Lint:
-    """Check what is declared of a graph; each declaration ends in a proof or in the nodes and edges to blame.
+    """Check what is declared of a graph; a declaration ends in a proof or in the nodes and edges to blame.
 
-    independent: pairs of groups, neither of which may be made from the other, whatever else both are made from:
-        `("q0 q1", "qd0 qd1")` or a list of such pairs. A group is a name or several in one string, or a sequence of
-        names and nodes; inner nodes have names by `cg.with_name`. A violation is blamed on the fewest edges that would
-        have to be cut, those nearest to what should be independent, and tells what a derivative through them counts.
-    function: what the texts call the function that is differentiated, such as "L".
-    depends: {output: inputs or nodes that it should depend on}.
-    box: {input: (low, high)}; finds operations that could have an unbounded slope or no value in it, by interval
-        arithmetic. None found is a proof; one found is a possibility, since intervals are wide.
-    at: {input: number}; finds sums that lose `digits` decimal digits or more there, of the 16 that a float64 has.
+    Parameters
+    ----------
+    graph : Graph
+        What to check.
+    independent : pair of groups, or sequence of such pairs
+        `("q0 q1", "qd0 qd1")`: neither group may depend on the other, whatever else both depend on. A group is a name,
+        several names in one string, or a sequence of names and nodes; inner nodes have names by `cg.with_name`. A
+        violation is blamed on a minimum cut of the paths, the one nearest to what should be independent, and tells what
+        a derivative through it counts.
+    depends : mapping, optional
+        {output: inputs or nodes that it should depend on}.
+    box : mapping of str to (float, float), optional
+        {input: (low, high)}: looks for operations that could have an unbounded slope or no value in it, by interval
+        arithmetic. None is a proof; one is a possibility, since intervals are wide.
+    at : mapping of str to float, optional
+        {input: number}: looks for sums that lose `digits` decimal digits or more there, of the 16 of a float64.
+    digits : float
+        The loss that counts, in decimal digits.
+    function : str
+        What the texts call the function that is differentiated, such as "L".
 
-    Raises GraphError for a name that the graph does not have or a node in both groups; ValueError for a box, point or
-    number of digits that is none.
+    Returns
+    -------
+    Lint
+        Findings, notes and proofs.
+
+    Raises
+    ------
+    GraphError
+        If the graph has no node of a name, or a node is in both groups.
+    ValueError
+        If a box, point or number of digits is none.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x, y = cg.variables("x y")
+    >>> graph = cg.Graph([x, y], {"f": x * y})
+    >>> print(cg.lint(graph, independent=("x", "y")))
+    Holds: no path leads from y to x: x is an input.
+    Holds: no path leads from x to y: y is an input.
     """
     names = Names(graph)
     findings: list[Finding] = []
     proofs: list[str] = []
     for first, second in _pairs(independent):
-        found, proved = check_independence(names, first, second, function)
-        findings += found
-        proofs += proved
+        violations, held = check_independence(names, first, second, function)
+        findings += violations
+        proofs += held
     if depends:
-        found = missing_dependences(names, depends)
-        findings += found
-        if not found:
+        missing = missing_dependences(names, depends)
+        findings += missing
+        if not missing:
             proofs.append("every output depends on what was declared for it.")
     if box is not None:
-        found = singular_nodes(names, box)
-        findings += found
-        if not found:
+        singular = singular_nodes(names, box)
+        findings += singular
+        if not singular:
             proofs.append(f"no slope is unbounded in the box, of {many(len(names.number), 'operation')}.")
     if at is not None:
         if not isinstance(digits, (int, float)) or not digits > 0.0:
             raise ValueError(f"digits must be a positive number, got {digits!r}")
-        found = cancellations(names, at, digits)
-        findings += found
-        if not found:
+        losses = cancellations(names, at, digits)
+        findings += losses
+        if not losses:
             proofs.append(_accuracy(names, at, digits))
     return Lint(graph, tuple(findings), tuple(unused_inputs(names)), tuple(proofs))
 
 
 def _pairs(independent: Pair | Sequence[Pair]) -> list[Pair]:
-    """The pairs, also where one pair of strings or nodes was given alone."""
+    """The pairs; a single pair of strings or nodes counts as one."""
     if isinstance(independent, (str, Node)):
         raise TypeError(f"independent: expected pairs of groups, got {independent!r:.60}")
-    given: list[Any] = list(independent)
-    if len(given) == 2 and all([isinstance(each, (str, Node)) for each in given]):
-        return [(given[0], given[1])]
-    for pair in given:
+    pairs: list[Any] = list(independent)
+    if len(pairs) == 2 and all([isinstance(group, (str, Node)) for group in pairs]):
+        return [(pairs[0], pairs[1])]
+    for pair in pairs:
         if isinstance(pair, (str, Node)) or len(pair) != 2:
             raise ValueError(f"independent: each entry must be a pair of groups, got {pair!r:.60}")
-    return [(first, second) for first, second in given]
+    return [(first, second) for first, second in pairs]
 
 
 def _accuracy(names: Names, at: Point, digits: float) -> str:
-    found = rounded(names, at)
-    certain = {name: found.digits(node) for name, node in names.graph.outputs.items()}
-    name = min(certain, key=lambda each: certain[each])
+    errors = rounded(names, at)
+    certain = {name: errors.digits(node) for name, node in names.graph.outputs.items()}
+    name = min(certain, key=lambda output: certain[output])
     least = certain[name]
     rest = f"; rounding leaves {name} {least:.0f} digits, no output less" if math.isfinite(least) else ""
     return f"no sum loses {digits:g} digits at this point{rest}."

@@ -1,4 +1,4 @@
-"""The law of the embedding: the error of the by-definition and kinetic-only torques against dt, and its limits."""
+"""Embedding error: that of the by-definition and kinetic-only torques against dt, and its limits."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ STEPS = tuple(10.0 ** (-k / 2) for k in range(4, 13))  # s, 1e-2 to 1e-6
 
 
 @dataclass(frozen=True)
-class Law:
+class EmbeddingError:
     """At one state of a model: how far a formulation's torque is from the true one, and from its limit.
 
     error, distance: (len(dt),) largest entries [N m].  limit: (n,), the part of tau + limit that stays as dt -> 0.
@@ -36,8 +36,10 @@ class Law:
     slope: float
 
 
-def law(model: Model, q: Array, qd: Array, qdd: Array, formulation: str, steps: Sequence[float] = STEPS) -> Law:
-    """The law at the state (q, qd, qdd), each (n,), for "euler_embedded" or "kinetic_only"."""
+def embedding_error(
+    model: Model, q: Array, qd: Array, qdd: Array, formulation: str, steps: Sequence[float] = STEPS
+) -> EmbeddingError:
+    """The error at the state (q, qd, qdd), each (n,), for "euler_embedded" or "kinetic_only"."""
     system = as_system(model)
     energy = {"euler_embedded": system.lagrangian, "kinetic_only": system.kinetic}[formulation]
     parameters = list(system.parameters.values())
@@ -51,15 +53,15 @@ def law(model: Model, q: Array, qd: Array, qdd: Array, formulation: str, steps: 
         error.append(np.abs(tau - true).max())
         distance.append(np.abs(tau - true - limit).max())
     fitted = exponent(steps, distance) if min(distance) > 0 else float("nan")
-    return Law(formulation, system.n, np.array(steps), np.array(error), np.array(distance), limit, fitted)
+    return EmbeddingError(formulation, system.n, np.array(steps), np.array(error), np.array(distance), limit, fitted)
 
 
-def law_of_arms(counts: Sequence[int] = (1, 2, 3, 6), seed: int = 0) -> list[Law]:
-    """The law of both flawed formulations at a random state of arms of 1, 2, 3 and 6 links."""
+def embedding_errors(counts: Sequence[int] = (1, 2, 3, 6), seed: int = 0) -> list[EmbeddingError]:
+    """The errors of both flawed formulations at a random state of arms of 1, 2, 3 and 6 links."""
     rng = np.random.default_rng(seed)
-    found = []
+    errors = []
     for n in counts:
         arm = planar_arm(rng.uniform(0.5, 1.5, n).tolist(), rng.uniform(0.5, 1.5, n).tolist())
         q, qd, qdd = rng.uniform(-1.0, 1.0, (3, n))
-        found += [law(arm, q, qd, qdd, formulation) for formulation in ("euler_embedded", "kinetic_only")]
-    return found
+        errors += [embedding_error(arm, q, qd, qdd, formulation) for formulation in ("euler_embedded", "kinetic_only")]
+    return errors

@@ -16,7 +16,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 @dataclass(frozen=True)
-class Fall:
+class FreeFall:
     """One run. positions: (T, n + 1, 2) [m], base, joints and tip."""
 
     scene: Scene
@@ -25,7 +25,7 @@ class Fall:
 
 
 @dataclass(frozen=True)
-class MujocoFall:
+class MujocoFreeFall:
     """MuJoCo's run at the same steps. q: (T, n) [rad].  positions: (T, n + 1, 2) [m], by its own kinematics."""
 
     q: Array
@@ -33,21 +33,21 @@ class MujocoFall:
     version: str
 
 
-def fall(scene: Scene, dt: float = 1e-3) -> Fall:
+def free_fall(scene: Scene, dt: float = 1e-3) -> FreeFall:
     """The scene's motion by RK4 on the graph's forward dynamics."""
     trajectory = simulate(scene, scene.q, scene.qd, scene.t_end, "rk4", dt=dt)
-    return Fall(scene, trajectory, scene.model.joint_positions(trajectory.q))
+    return FreeFall(scene, trajectory, scene.model.joint_positions(trajectory.q))
 
 
-def mujoco_fall(run: Fall) -> MujocoFall:
+def mujoco_free_fall(run: FreeFall) -> MujocoFreeFall:
     """MuJoCo's RK4 on its twin of the arm, from the same start with the same step. Raises ImportError without it."""
     steps = len(run.trajectory.t) - 1
     twin = MujocoTwin(run.scene.model, run.scene.t_end / steps)
     q, _ = twin.trajectory(np.array(run.scene.q), np.array(run.scene.qd), steps)
-    return MujocoFall(q, twin.arm_positions(q), str(twin.mujoco.__version__))
+    return MujocoFreeFall(q, twin.arm_positions(q), str(twin.mujoco.__version__))
 
 
-def largest_differences(run: Fall, other: MujocoFall, windows: int = 6) -> list[tuple[float, float]]:
+def largest_differences(run: FreeFall, other: MujocoFreeFall, windows: int = 6) -> list[tuple[float, float]]:
     """(t, largest |difference in q| up to t [rad]) at the ends of equal stretches of time."""
     difference = np.abs(run.trajectory.q - other.q).max(axis=1)
     ends = np.linspace(0, len(difference) - 1, windows + 1).astype(int)[1:]

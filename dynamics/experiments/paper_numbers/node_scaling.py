@@ -20,7 +20,7 @@ SCALED = ("euler_embedded", "kinetic_only", "chain_rule", "chain_rule_literal")
 
 
 @dataclass(frozen=True)
-class Scaling:
+class NodeScaling:
     """One formulation over chains of n equal rods; exponents are fitted over n >= 6."""
 
     formulation: str
@@ -35,7 +35,9 @@ class Scaling:
         return exponent(*zip(*kept, strict=True))
 
 
-def scaling(counts: Sequence[int] = COUNTS, report: Callable[[float], None] = lambda done: None) -> list[Scaling]:
+def node_scaling(
+    counts: Sequence[int] = COUNTS, report: Callable[[float], None] = lambda done: None
+) -> list[NodeScaling]:
     """Each formulation of `SCALED` over arms of `counts` links. report: called with the share done."""
     rows = []
     total = len(SCALED) * sum(n * n for n in counts)
@@ -49,7 +51,7 @@ def scaling(counts: Sequence[int] = COUNTS, report: Callable[[float], None] = la
             micros.append(_microseconds(graph))
             done += n * n
             report(done / total)
-        rows.append(Scaling(formulation, tuple(counts), tuple(nodes), tuple(edges), tuple(micros)))
+        rows.append(NodeScaling(formulation, tuple(counts), tuple(nodes), tuple(edges), tuple(micros)))
     return rows
 
 

@@ -12,8 +12,8 @@ import cgraph as cg
 from cgraph import Counts
 
 from ...equations.formulations import inverse_dynamics
+from ...peers.torch import eager_evaluations
 from ...scenes.scenes import triple_pendulum
-from .torch_eager import eager_evaluations
 
 # The paper's Table 1: mean and standard deviation over 1000 evaluations, in ms.
 PAPER_MS = {"euler_embedded": (51.7, 9.62), "kinetic_only": (43.8, 8.03), "chain_rule": (6.29, 1.15)}
@@ -37,7 +37,7 @@ class Row:
     timings: dict[str, Timing]  # {"interpreted" | "compiled" | "PyTorch eager": ...}
 
 
-def table1(evaluations: int = 1000, seed: int = 0) -> list[Row]:
+def table_1(evaluations: int = 1000, seed: int = 0) -> list[Row]:
     """The three formulations, each evaluated at random states; formulations take turns, so that drift is shared.
 
     PyTorch eager, which builds its graph anew at every evaluation, is measured beside ours where torch is installed.

@@ -12,7 +12,7 @@ import numpy as np
 from ...peers import PEERS, Case
 from ...peers.case import TASKS, Array
 from ...peers.contender import MODES
-from .bench_scenes import QUICK, SCENES, model
+from .bench_scenes import QUICK, SCENES, load
 from .worker import Load, Prepared, Worker
 
 OURS = "ours"
@@ -68,17 +68,17 @@ def bench(
     have.  say: takes lines of progress.
     Raises ValueError for an unknown name or a budget that is not positive, RuntimeError when ours is not ready in time.
     """
-    for what, given, known in (("task", tasks, TASKS), ("mode", modes, MODES), ("peer", peers, PEERS)):
-        if unknown := [name for name in given if name not in known]:
+    for what, names, known in (("task", tasks, TASKS), ("mode", modes, MODES), ("peer", peers, PEERS)):
+        if unknown := [name for name in names if name not in known]:
             raise ValueError(f"there is no {what} {unknown[0]!r}; the {what}s are {', '.join(known)}")
     if not budget > 0.0:
         raise ValueError(f"the budget must be positive, got {budget!r} s")
-    loads: dict[str, Load] = {name: partial(model, name, ignore) for name in scenes}
+    loads: dict[str, Load] = {name: partial(load, name, ignore) for name in scenes}
     cases = {}
-    for name, load in loads.items():  # a wrong name is told before anything is measured
-        found, left_out = load()
-        cases[name] = Case(name, found)
-        for what in left_out:
+    for name, scene in loads.items():  # a wrong name is told before anything is measured
+        model = scene()
+        cases[name] = Case(name, model)
+        for what in model.left_out:
             say(f"{name}: left out {what}")
     wanted = [name for name, kind in PEERS.items() if name == OURS or (name in peers and kind.installed)]
     asked = {task: [mode for mode in MODES if mode in modes] for task in TASKS if task in tasks}
@@ -98,25 +98,25 @@ def _rows(
         late: dict[str, dict[str, str]] = {}
         for task, modes in asked.items():
             late[task] = dict(late.get(CONTAINS.get(task, ""), {}))
-            crew = Crew(loads[scene], peers, budget, late[task])
+            pool = WorkerPool(loads[scene], peers, budget, late[task])
             try:
                 for mode in modes:
                     say(f"{scene}, {task}, {mode}")
-                    yield _row(case, task, mode, crew, repeats)
+                    yield _row(case, task, mode, pool, repeats)
             finally:
-                crew.end()
+                pool.end()
 
 
-def _row(case: Case, task: str, mode: str, crew: Crew, repeats: int) -> Row:
+def _row(case: Case, task: str, mode: str, pool: WorkerPool, repeats: int) -> Row:
     row = Row(case.name, task, mode, case.n)
-    ready = crew.prepared(task, mode, row.skipped)
+    ready = pool.prepared(task, mode, row.skipped)
     samples: dict[str, list[float]] = {peer: [] for peer in ready}
     used = dict.fromkeys(ready, 0.0)
     for turn in range(repeats):  # in turns, so that all share the machine's moods
         for peer in [each for each in ready if turn < FEWEST or used[each] < LONG]:
             begin = time.perf_counter()
             try:
-                samples[peer].append(1e6 * crew.workers[peer].turn(task, mode))
+                samples[peer].append(1e6 * pool.workers[peer].turn(task, mode))
             except RuntimeError as error:
                 row.skipped[peer] = str(error)
                 del ready[peer]
@@ -125,10 +125,10 @@ def _row(case: Case, task: str, mode: str, crew: Crew, repeats: int) -> Row:
         raise RuntimeError(f"{case.name}, {task}, {mode}: no figures of ours to compare with: {row.skipped[OURS]}")
     start = _start(case, task, mode)
     expected = ready[OURS].values - start
-    for peer, made in ready.items():
+    for peer, prepared in ready.items():
         low, middle, high = np.percentile(samples[peer], (25, 50, 75)).tolist()
-        difference = float(np.abs(made.values - start - expected).max() / np.abs(expected).max())
-        row.cells[peer] = Cell(middle, low, high, made.seconds, difference, made.size)
+        difference = float(np.abs(prepared.values - start - expected).max() / np.abs(expected).max())
+        row.cells[peer] = Cell(middle, low, high, prepared.seconds, difference, prepared.size)
     return row
 
 
@@ -141,7 +141,7 @@ def _start(case: Case, task: str, mode: str) -> Array:
     return np.zeros(1)
 
 
-class Crew:
+class WorkerPool:
     """A worker for each peer on one task of one scene.  late: {peer: why it is not asked any more}."""
 
     def __init__(self, load: Load, peers: Sequence[str], budget: float, late: dict[str, str]) -> None:

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ... import scenes
 from ...multibody.body import WORLD, Body, Joint
 from ...multibody.mechanism import Mechanism
-from ...multibody.planar_arm import planar_arm
+from ...multibody.planar_arm import PlanarArm, planar_arm
 from ...multibody.spatial import rotation
+from ...scenes import Scene
+
+
+def chain(mass: float, length: float, n: int) -> PlanarArm:
+    """A planar chain of n equal rods with damping."""
+    return planar_arm([mass] * n, [length] * n, damping=0.1)
 
 
 def turned_arm(n: int) -> Mechanism:
@@ -42,31 +48,37 @@ def _body(i: int, parent: str, rng: np.random.Generator) -> Body:
     )
 
 
-SCENES: dict[str, Callable[[], Any]] = {
-    "planar 3": lambda: planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7], damping=0.1),
-    "planar 7": lambda: planar_arm([0.5] * 7, [0.5] * 7, damping=0.1),
-    "planar 20": lambda: planar_arm([0.2] * 20, [0.2] * 20, damping=0.1),
-    "planar 50": lambda: planar_arm([0.1] * 50, [0.1] * 50, damping=0.1),
-    "planar 100": lambda: planar_arm([0.1] * 100, [0.1] * 100, damping=0.1),
-    "arm 7": lambda: turned_arm(7),
-    "arm 30": lambda: turned_arm(30),
-    "tree 15": lambda: binary_tree(15),
+def _at_rest(name: str, n: int, build: Callable[[int], PlanarArm | Mechanism]) -> Scene:
+    return Scene(name, f"a mechanism of the bench with {n} joints", build(n), (0.0,) * n, (0.0,) * n, 3.0)
+
+
+_MODELS: dict[str, Callable[[int], PlanarArm | Mechanism]] = {
+    "planar 3": lambda _: planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7], damping=0.1),
+    "planar 7": partial(chain, 0.5, 0.5),
+    "planar 20": partial(chain, 0.2, 0.2),
+    "planar 50": partial(chain, 0.1, 0.1),
+    "planar 100": partial(chain, 0.1, 0.1),
+    "arm 7": turned_arm,
+    "arm 30": turned_arm,
+    "tree 15": binary_tree,
+}
+SCENES: dict[str, Callable[[], Scene]] = {
+    name: partial(_at_rest, name, int(name.split()[1]), build) for name, build in _MODELS.items()
 }
 QUICK = ("planar 3", "planar 7", "arm 7")
 
 
-def model(name: str, ignore: bool = False) -> tuple[Any, tuple[str, ...]]:
-    """The model of that name, of `SCENES` or else of `dynamics.scenes` or a file, and what it leaves out of the file.
+def load(name: str, ignore: bool = False) -> Scene:
+    """The scene of that name, of `SCENES` or else of `dynamics.scenes` or a file.
 
     ignore: leave out what a mechanism cannot have. Raises ValueError for a name that is neither, and as
     `dynamics.scenes.load` does.
     """
     if name in SCENES:
-        return SCENES[name](), ()
+        return SCENES[name]()
     if name not in scenes.names() and not Path(name).suffix:
         raise ValueError(
             f"there is no scene {name!r}; the bench has {', '.join(SCENES)}, the scenes {', '.join(scenes.names())}, "
             "and files are those that end in .xml or .urdf"
         )
-    scene = scenes.load(name, **({"ignore": True} if ignore and name not in scenes.names() else {}))
-    return scene.model, scene.left_out
+    return scenes.load(name, **({"ignore": True} if ignore and name not in scenes.names() else {}))

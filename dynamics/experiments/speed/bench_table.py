@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import math
-import platform
-import re
 import statistics
 import string
 import textwrap
 from collections.abc import Callable, Sequence
-from contextlib import suppress
-from importlib import metadata
-from pathlib import Path
 
-from cgraph.errors import install
+from cgraph.extend import install
 
 from ...peers import PEERS
+from ..text_table import WIDTH, digits, table
 from .bench import AGREES, MODES, OURS, TASKS, Cell, Row
 
-WIDTH = 120  # characters
 HOW = f"{install('bench')}; PyTorch by itself"  # to install what is missing
-GAPS = ("  ", " ")  # between columns: the second where the first is too wide
 
 
 def tables(rows: Sequence[Row], where: str = "") -> str:
@@ -89,13 +82,6 @@ def agrees(cell: Cell) -> bool:
     return cell.difference <= AGREES
 
 
-def digits(value: float, count: int) -> str:
-    """The number with `count` significant digits, without an exponent."""
-    if not (math.isfinite(value) and value > 0.0):
-        return str(value)
-    return f"{value:.{max(0, count - 1 - math.floor(math.log10(value)))}f}"
-
-
 def _table(rows: Sequence[Row], read: Callable[[Row], dict[str, tuple[str, str]]], nodes: bool = False) -> list[str]:
     """Lines of a table; blocks of columns under each other where they do not fit, then its footnotes."""
     cells = {row.scene: read(row) for row in rows}
@@ -109,45 +95,13 @@ def _table(rows: Sequence[Row], read: Callable[[Row], dict[str, tuple[str, str]]
                 cells[row.scene][peer] = "-", letter
             else:
                 unseen[peer] = reason
-    columns = [_column(peer, [cells[row.scene].get(peer, ("", "")) for row in rows]) for peer in shown]
-    if nodes:
-        columns.insert(0, _column("nodes", [(str(row.cells[OURS].size), "") for row in rows]))
-    left = _flush(["scene", *[row.scene for row in rows]])
-    lines: list[str] = []
-    widths, space = [len(column[0]) for column in columns], WIDTH - len(left[0])
-    gap = next((each for each in GAPS if sum(widths) + len(each) * len(widths) <= space), GAPS[-1])
-    for block in _blocks(columns, len(gap), space):
-        lines += [gap.join(parts).rstrip() for parts in zip(left, *block, strict=True)]
+    head = ["scene", *(["nodes"] if nodes else []), *shown]
+    of_ours = {row.scene: [str(row.cells[OURS].size)] if nodes else [] for row in rows}
+    lines = table(
+        head, [[scene, *of_ours[scene], *[of.get(peer, "") for peer in shown]] for scene, of in cells.items()]
+    )
     lines += [f"{letter}: {reason}" for reason, letter in notes.items()]
     return lines + [f"without {peer}: {reason}" for peer, reason in unseen.items()]
-
-
-def _column(head: str, cells: Sequence[tuple[str, str]]) -> list[str]:
-    """Numbers flush right, what follows them flush left, under a head that stands over the numbers."""
-    after = max(len(right) for _, right in cells)
-    before = max([len(left) for left, _ in cells] + [len(head) - (after + 1 if after else 0)])
-    space = " " if after else ""
-    return [head.rjust(before).ljust(before + len(space) + after)] + [
-        f"{left:>{before}}{space}{right:<{after}}" for left, right in cells
-    ]
-
-
-def _flush(texts: Sequence[str]) -> list[str]:
-    width = max(map(len, texts))
-    return [text.ljust(width) for text in texts]
-
-
-def _blocks(columns: Sequence[list[str]], gap: int, width: int) -> list[list[list[str]]]:
-    blocks: list[list[list[str]]] = [[]]
-    used = 0
-    for column in columns:
-        needed = gap + len(column[0])
-        if blocks[-1] and used + needed > width:
-            blocks.append([])
-            used = 0
-        blocks[-1].append(column)
-        used += needed
-    return blocks
 
 
 def _spread(rows: Sequence[Row]) -> list[str]:
@@ -160,22 +114,3 @@ def _spread(rows: Sequence[Row]) -> list[str]:
     worst = max(spreads, key=lambda each: spreads[each])
     usual, most = digits(statistics.median(spreads.values()), 2), digits(spreads[worst], 2)
     return [f"spread between quartiles: {usual} % of the median as a rule, {most} % at most ({', '.join(worst)})"]
-
-
-def machine() -> str:
-    """The processor and the versions that the figures belong to."""
-    packages = []
-    for name in ("numpy", "llvmlite", "casadi", "pin", "mujoco", "heyoka", "jax", "sympy", "torch"):
-        with suppress(metadata.PackageNotFoundError):
-            packages.append(f"{name} {metadata.version(name)}")
-    return f"{_processor()}, Python {platform.python_version()}, {', '.join(packages)}"
-
-
-def _processor() -> str:
-    try:
-        text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
-    except OSError:
-        return platform.processor() or platform.machine()
-    facts = dict(re.findall(r"^(model name|flags)\s*:\s*(.*)$", text, flags=re.MULTILINE))
-    vectors = next((each for each in ("avx512f", "avx2") if each in facts.get("flags", "").split()), "")
-    return " ".join(filter(None, [facts.get("model name", platform.machine()), vectors and f"({vectors})"]))

@@ -20,8 +20,9 @@ from typing import Any
 
 from ...peers import PEERS, Case, Contender, UnavailableError
 from ...peers.case import Array
+from ...scenes import Scene
 
-Load = Callable[[], tuple[Any, tuple[str, ...]]]  # makes the model anew in the worker; lambdas do not travel
+Load = Callable[[], Scene]  # makes the model anew in the worker; lambdas do not travel
 CHUNK = 2e-3  # s, at least, of runs that are timed together
 _ONE_CORE = {
     "OMP_NUM_THREADS": "1",
@@ -117,7 +118,7 @@ def _serve(pipe: Connection, load: Load, name: str) -> None:
         with suppress(Exception):  # loading a package is no part of making a contender; what is wrong shows again there
             import_module(kind.package)
         contenders: dict[tuple[str, str], tuple[Contender, int]] = {}
-        case, peer = Case(name, load()[0]), None
+        case, peer = Case(name, load()), None
         while True:
             asked = pipe.recv()
             if asked in contenders:
@@ -127,10 +128,10 @@ def _serve(pipe: Connection, load: Load, name: str) -> None:
             try:
                 peer = peer or kind.make(case)
                 contender = peer.prepare(*asked)
-                found = contender.run()
+                result = contender.run()
                 seconds = time.perf_counter() - start
                 contenders[asked] = contender, _repetitions(contender)
-                pipe.send(Prepared(seconds, contender.result(found), contender.size))
+                pipe.send(Prepared(seconds, contender.result(result), contender.size))
             except UnavailableError as error:
                 pipe.send(Refused(str(error)))
             except Exception as error:  # noqa: BLE001 (whatever a peer's own code raises is a line in the report)

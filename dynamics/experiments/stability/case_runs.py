@@ -1,4 +1,4 @@
-"""Case runs: every case of the stability table by the methods that suit it, with figures beside the case's bounds."""
+"""Case runs: every case of the stability table by the methods that suit it, measured beside the case's bounds."""
 
 from __future__ import annotations
 
@@ -12,14 +12,11 @@ from ...equations.state_equation import state_inputs
 from ...reference import Reference
 from ...simulation.simulate import simulate
 from ...simulation.trajectory import Trajectory
-from ...systems.model import Model, as_ode
 from ...systems.system import TIME
 from . import cases, solutions
-from .cases import RTOL, Case, Watch
+from .case_result import CaseResult, Measurement
+from .cases import RTOL, Criterion, StabilityCase
 from .known_limits import reason
-from .verdict import Figure, Verdict
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SECTION = "Cases"
 STIFF, SMOOTH = ("radau", "rodas"), ("dop853", "dopri5")
@@ -27,112 +24,84 @@ LONG = ("dop853",)  # of a large case
 EQUAL_STEPS: dict[str, dict[str, float]] = {  # case: method: step [s]
     "angle of 1e+15 rad": {"verlet": 1e-3},
 }
-LARGE = 200  # coordinates; beyond, one method is enough of a wait
+LARGE = 400  # states; beyond, one method is enough of a wait
 MOST_STEPS = 3 * 10**6
 BLOCK = 4096  # rows whose invariants are taken at once
 
 
-def methods_of(case: Case) -> tuple[str, ...]:
+def methods_of(case: StabilityCase) -> tuple[str, ...]:
     """The integrators to run a case with: two that choose their steps, and what `EQUAL_STEPS` has beside them."""
-    if len(case.start) > 2 * LARGE:
+    if len(case.start) > LARGE:
         return LONG
     return (STIFF if case.stiff else SMOOTH) + tuple(EQUAL_STEPS.get(case.name, ()))
 
 
-def verdicts(names: Iterable[str] | None = None, methods: tuple[str, ...] | None = None) -> Iterator[Verdict]:
-    """A verdict for each case (default: all) and method (default: those that suit the case)."""
+def results(names: Iterable[str] | None = None, methods: tuple[str, ...] | None = None) -> Iterator[CaseResult]:
+    """A result for each case (default: all) and method (default: those that suit the case)."""
     for name in cases.names() if names is None else names:
         case = cases.load(name)
         for method in methods or methods_of(case):
-            yield verdict(case, method)
+            yield result(case, method)
 
 
-def verdict(case: Case, method: str) -> Verdict:
+def result(case: StabilityCase, method: str) -> CaseResult:
     """One case by one method, with the relative tolerance that the bounds are for."""
-    model, solution = case.build(), solutions.solution(case)
-    run = trajectory(case, model, method)
-    found = {}
-    if solution is not None and run.stats.success:
-        found = errors(case, run, solution)
-    watched = {watch.quantity for watch in case.watch}
-    found |= changes(case, model, run, {name for name in watched if not name.startswith("error")})
-    figures = tuple([figure(watch, found) for watch in case.watch])
-    return Verdict(
-        SECTION,
-        case.name,
-        case.about,
-        method,
-        figures,
-        run.stats.steps,
-        run.stats.rejected,
-        run.stats.seconds,
-        "" if run.stats.success else run.stats.message,
-        reason(SECTION, case.name, method, figures),
-    )
+    solution, run = solutions.solution(case), trajectory(case, method)
+    values = errors(case, run, solution) if solution is not None and run.stats.success else {}
+    quantities = {criterion.quantity for criterion in case.criteria}
+    values |= changes(case, run, {name for name in quantities if not name.startswith("error")})
+    measurements = tuple([measurement(criterion, values) for criterion in case.criteria])
+    stats = run.stats
+    counts = stats.steps, stats.rejected, stats.seconds, "" if stats.success else stats.message
+    known = reason(SECTION, case.name, method, measurements)
+    return CaseResult(SECTION, case.name, case.about, method, measurements, *counts, known)
 
 
-def trajectory(case: Case, model: Model, method: str) -> Trajectory:
+def trajectory(case: StabilityCase, method: str) -> Trajectory:
     """The run of a case."""
-    half = len(case.start) if as_ode(model) else len(case.start) // 2
-    return simulate(
-        model,
-        case.start[:half],
-        case.start[half:] or None,
-        case.t_end,
-        method,
-        dt=EQUAL_STEPS.get(case.name, {}).get(method),
-        rtol=RTOL,
-        atol=case.atol,
-        max_steps=MOST_STEPS,
-        progress=False,
-    )
+    step = EQUAL_STEPS.get(case.name, {}).get(method)
+    tolerances: dict[str, Any] = {"dt": step, "rtol": RTOL, "atol": case.atol, "max_steps": MOST_STEPS}
+    return simulate(case.model, case.q, case.qd or None, case.t_end, method, progress=False, **tolerances)
 
 
-def sizes(case: Case, solution: Reference | None) -> list[float]:
-    """A size for each state: the case's own, or the larger of the values at the start and at t_end, or 1 for zeros."""
-    if case.size:
-        return list(case.size)
-    end = [0.0] * len(case.start) if solution is None else solution.x[-1].tolist()
-    return [max(abs(a), abs(b)) or 1.0 for a, b in zip(case.start, end, strict=True)]
-
-
-def errors(case: Case, run: Trajectory, solution: Reference) -> dict[str, float]:
+def errors(case: StabilityCase, run: Trajectory, solution: Reference) -> dict[str, float]:
     """The error at t_end by the quantity's name: "error" of all states, "error 0 1" of some, each over its size."""
     end = np.concatenate([run.q[-1], run.qd[-1]])
-    relative = np.abs(solution.deviation(end[None])[0]) / np.array(sizes(case, solution))
-    found = {}
-    for watch in case.watch:
-        what, *states = watch.quantity.split()
+    relative = np.abs(solution.deviation(end[None])[0]) / np.array(case.sizes(solution))
+    values = {}
+    for criterion in case.criteria:
+        what, *states = criterion.quantity.split()
         if what == "error":
-            chosen = relative[[int(each) for each in states]] if states else relative
-            found[watch.quantity] = float(np.max(chosen))  # NaN stays NaN
-    return found
+            chosen = relative[[int(state) for state in states]] if states else relative
+            values[criterion.quantity] = float(np.max(chosen))  # NaN stays NaN
+    return values
 
 
-def changes(case: Case, model: Model, run: Trajectory, wanted: set[str]) -> dict[str, float]:
+def changes(case: StabilityCase, run: Trajectory, wanted: set[str]) -> dict[str, float]:
     """The largest change of these invariants during the run, each in its own unit."""
-    if wanted == {"energy"} and as_ode(model) is None:  # simulate has taken it already
+    if wanted == {"energy"} and case.mechanical:  # simulate has taken it already
         return {"energy": float(np.max(np.abs(run.energy - run.energy[0])))}
     if not wanted or case.invariants is None:
         return {}
-    graph, inputs = case.invariants(model), state_inputs(model)
+    graph, inputs = case.invariants(case.model), state_inputs(case.model)
     states = np.concatenate([run.q, run.qd], axis=1)
-    found = dict.fromkeys(wanted, 0.0)
+    largest = dict.fromkeys(wanted, 0.0)
     first: dict[str, float] = {}
     for start in range(0, len(run.t), BLOCK):
         part = slice(start, start + BLOCK)
-        given: dict[str, Any] = dict(zip(inputs.states, states[part].T, strict=True)) | inputs.parameters
-        given[TIME] = run.t[part]
-        values = graph.evaluate({name: given[name] for name in graph.input_names})
+        values: dict[str, Any] = dict(zip(inputs.states, states[part].T, strict=True)) | inputs.parameters
+        values[TIME] = run.t[part]
+        rows = graph.evaluate({name: values[name] for name in graph.input_names})
         for name in wanted:
-            row = np.atleast_1d(values[name])
+            row = np.atleast_1d(rows[name])
             first.setdefault(name, float(row[0]))
-            found[name] = float(np.maximum(found[name], np.max(np.abs(row - first[name]))))
-    return found
+            largest[name] = float(np.maximum(largest[name], np.max(np.abs(row - first[name]))))
+    return largest
 
 
-def figure(watch: Watch, found: dict[str, float]) -> Figure:
-    """The figure of a watched quantity, relative to its size; NaN where it could not be had."""
-    unit = "of size" if watch.quantity.startswith("error") else "of scale"
-    value = found.get(watch.quantity, math.nan)
-    return Figure(watch.quantity, value if unit == "of size" else value / watch.scale, watch.bound, unit, watch.why)
+def measurement(criterion: Criterion, values: dict[str, float]) -> Measurement:
+    """The measurement of a criterion, relative to its size; NaN where it could not be had."""
+    value, why = values.get(criterion.quantity, math.nan), criterion.why
+    if criterion.quantity.startswith("error"):
+        return Measurement(criterion.quantity, value, criterion.bound, "of size", why)
+    return Measurement(criterion.quantity, value / criterion.scale, criterion.bound, "of scale", why)

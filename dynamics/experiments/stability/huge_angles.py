@@ -11,9 +11,9 @@ import cgraph as cg
 
 from ...reference.flint_numbers import working
 from ...reference.planar_arm_equations import Pair
+from .case_result import CaseResult, Measurement
 from .known_limits import reason
 from .single_evaluations import SEED, available
-from .verdict import Figure, Verdict
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -30,8 +30,8 @@ RANGES: dict[str, tuple[float, float]] = {  # decimal exponents
 }
 
 
-def verdicts(count: int = COUNT, backends: Sequence[str] | None = None) -> Iterator[Verdict]:
-    """A verdict for each backend, at single points and in a batch, with a figure for each range of angles."""
+def results(count: int = COUNT, backends: Sequence[str] | None = None) -> Iterator[CaseResult]:
+    """A result for each backend, at single points and in a batch, with a measurement for each range of angles."""
     x = cg.variable("x")
     graph = cg.Graph([x], {"sin": cg.sin(x), "cos": cg.cos(x)})
     points = {name: angles(low, high, count) for name, (low, high) in RANGES.items()}
@@ -39,21 +39,10 @@ def verdicts(count: int = COUNT, backends: Sequence[str] | None = None) -> Itera
     for backend in backends or available():
         function = cg.compile(graph, backend)
         for way, evaluate in ((backend, _one_by_one), (f"{backend}, batch", _in_a_batch)):
-            figures = tuple(
-                [
-                    Figure(
-                        f"{name} rad",
-                        ulps(evaluate(function, points[name]), known[name]),
-                        BOUND,
-                        "ulp",
-                        "of the exact value",
-                    )
-                    for name in RANGES
-                ]
-            )
+            off = {name: ulps(evaluate(function, points[name]), known[name]) for name in RANGES}
+            rows = tuple([Measurement(f"{name} rad", off[name], BOUND, "ulp", "of the exact value") for name in off])
             about = f"{count} random angles of each range, both signs"
-            known_limit = reason(SECTION, CASE, way, figures)
-            yield Verdict(SECTION, CASE, about, way, figures, reason=known_limit)
+            yield CaseResult(SECTION, CASE, about, way, rows, reason=reason(SECTION, CASE, way, rows))
 
 
 def _one_by_one(function: cg.Compiled, points: Array) -> Array:
@@ -84,6 +73,6 @@ def exact(points: Array) -> Pair:
     return Pair(np.array(high), np.array(low))
 
 
-def ulps(found: Array, known: Pair) -> float:
+def ulps(values: Array, known: Pair) -> float:
     """The largest error."""
-    return float(np.max(np.abs(known.deviation(found)) / np.spacing(np.abs(known.high))))
+    return float(np.max(np.abs(known.deviation(values)) / np.spacing(np.abs(known.high))))

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from .verdict import Figure
+from .case_result import Measurement
 
 
 class Limit(NamedTuple):
-    """Why a bound is not met.  within: the largest figure that the reason accounts for, in bounds."""
+    """Why a bound is not met.  within: the largest measurement that the reason accounts for, in bounds."""
 
     reason: str
     within: float
@@ -34,9 +34,9 @@ LIMITS: dict[tuple[str, str, str], Limit] = {
 }
 
 
-def reason(section: str, case: str, method: str, figures: Sequence[Figure]) -> str:
-    """The known reason why these figures are beyond their bounds; empty if there is none, or they are too far off."""
+def reason(section: str, case: str, method: str, measurements: Sequence[Measurement]) -> str:
+    """The known reason why measurements are beyond their bounds; empty if there is none, or they are too far off."""
     limit = LIMITS.get((section, case, method)) or LIMITS.get((section, case, ""))
-    if limit is None or not all([each.value <= limit.within * each.bound for each in figures]):
+    if limit is None or not all([each.value <= limit.within * each.bound for each in measurements]):
         return ""
     return limit.reason

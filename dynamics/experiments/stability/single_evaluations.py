@@ -28,8 +28,8 @@ from ...equations.formulations import inverse_dynamics
 from ...multibody.planar_arm import PlanarArm, planar_arm
 from ...reference.planar_arm_equations import Pair, accelerations, torques
 from ...systems.system import System
+from .case_result import CaseResult, Measurement
 from .known_limits import reason
-from .verdict import Figure, Verdict
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -88,8 +88,8 @@ FAMILIES = (
 )
 
 
-def verdicts(links: Sequence[int] = LINKS, backends: Sequence[str] | None = None) -> Iterator[Verdict]:
-    """A verdict for each task and family, with a figure for each number of links: the worst of states and backends.
+def results(links: Sequence[int] = LINKS, backends: Sequence[str] | None = None) -> Iterator[CaseResult]:
+    """A result for each task and family, measured at each number of links: the worst of states and backends.
 
     backends: of `cg.compile`; default: Python, and machine code where llvmlite is installed. Each is called at one
     point and for a batch. Raises ImportError without python-flint.
@@ -98,10 +98,10 @@ def verdicts(links: Sequence[int] = LINKS, backends: Sequence[str] | None = None
     for name, task in TASKS.items():
         arms = [Arms(task, n, chosen) for n in links]
         for family in FAMILIES:
-            figures = tuple([figure(family, each) for each in arms])
+            rows = tuple([measurement(family, each) for each in arms])
             case = f"{name}, {family.name}"
-            known = reason(SECTION, case, "", figures)
-            yield Verdict(SECTION, case, family.about, "+".join(chosen), figures, reason=known)
+            known = reason(SECTION, case, "", rows)
+            yield CaseResult(SECTION, case, family.about, "+".join(chosen), rows, reason=known)
 
 
 def available() -> tuple[str, ...]:
@@ -113,7 +113,7 @@ def available() -> tuple[str, ...]:
     return ("python", "llvm")
 
 
-def figure(family: Family, arms: Arms) -> Figure:
+def measurement(family: Family, arms: Arms) -> Measurement:
     """The worst error over some states, one point at a time and in a batch."""
     n = arms.n
     rng = np.random.default_rng([SEED, n])
@@ -125,13 +125,14 @@ def figure(family: Family, arms: Arms) -> Figure:
         qd, third = family.velocity * rng.normal(size=n), 5.0 * rng.normal(size=n)
         exact, point = arms.task.exact(arm, q, qd, third), np.concatenate([q, qd, third])
         size = np.max(np.abs(exact.high) + arms.condition(arm, point))
-        given = arms.with_parameters(arm, point) if arms.task.doubled else point
+        x = arms.with_parameters(arm, point) if arms.task.doubled else point
         for function in functions:
-            lanes = function.batch(np.repeat(given[:, None], LANES, axis=1))
-            for found in (function(given), lanes[:, 0], lanes[:, -1]):
-                error = np.max(np.abs(exact.deviation(found))) / (ULP * size)
+            lanes = function.batch(np.repeat(x[:, None], LANES, axis=1))
+            for values in (function(x), lanes[:, 0], lanes[:, -1]):
+                error = np.max(np.abs(exact.deviation(values))) / (ULP * size)
                 worst = float(np.maximum(worst, error))  # NaN stays NaN
-    return Figure(f"{n} links", worst, BOUND, "ulp", "of the condition: some operations one after another, each an ulp")
+    why = "of the condition: some operations one after another, each an ulp"
+    return Measurement(f"{n} links", worst, BOUND, "ulp", why)
 
 
 def arm_of(family: Family, n: int, rng: np.random.Generator) -> PlanarArm:

@@ -11,15 +11,15 @@ from typing import Any
 from ...reference import Reference
 from ...reference.solution import from_text
 from . import cases
-from .cases import Case
+from .cases import StabilityCase
 
 FILE = Path(__file__).with_name("solutions.json")
 
 
-def solution(case: Case) -> Reference | None:
+def solution(case: StabilityCase) -> Reference | None:
     """The case's motion at its t_end; None for a case without one.
 
-    Kept in a file, because some take a minute to compute; found by name, start and t_end. A test computes them again.
+    Kept in a file, as some take a minute to compute, by name, start and t_end. A test computes them again.
     """
     kept = _kept().get(case.name)
     if kept is None or kept["start"] != _hex(case.start) or kept["t"] != case.t_end.hex():
@@ -29,20 +29,20 @@ def solution(case: Case) -> Reference | None:
 
 def renew(names: Iterable[str] | None = None, say: Callable[[str], None] = lambda line: None) -> None:
     """Compute the solutions of these cases (default: all) and keep them in the file: about a quarter of an hour."""
-    found = dict(_kept())
+    entries = dict(_kept())
     for name in cases.names() if names is None else names:
         case = cases.load(name)
         result = case.solution()
         if result is not None:
-            found[name] = entry(case, result)
+            entries[name] = entry(case, result)
             say(f"{name}: {result.how}")
-    known = [name for name, case in cases.TABLE.items() if name in found and (case.exact or case.method)]
-    ordered = {name: found[name] for name in known}
+    known = [name for name, case in cases.TABLE.items() if name in entries and (case.exact or case.method)]
+    ordered = {name: entries[name] for name in known}
     FILE.write_text(json.dumps(ordered, indent=1) + "\n", encoding="utf-8")
     _kept.cache_clear()
 
 
-def entry(case: Case, result: Reference) -> dict[str, Any]:
+def entry(case: StabilityCase, result: Reference) -> dict[str, Any]:
     """What the file says of a case."""
     return {
         "start": _hex(case.start),
@@ -59,5 +59,5 @@ def _hex(values: Iterable[float]) -> list[str]:
 
 @cache
 def _kept() -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
-    return found
+    entries: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
+    return entries

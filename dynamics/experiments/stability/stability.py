@@ -1,19 +1,15 @@
-"""Stability: the table of stiff and extreme cases, a verdict a row, and its forms as plain data and as CSV."""
+"""Stability: the table of stiff and extreme cases, a result a row, and its forms as plain data and as CSV."""
 
 from __future__ import annotations
 
-import csv
-import io
-import os
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
 from typing import Any
 
-from ..speed.bench_table import machine
-from ..work_precision import energy_drift
-from . import case_runs, huge_angles, single_evaluations
-from .verdict import Verdict
+from ..machine import load, machine
+from ..text_table import csv_text
+from . import case_runs, energy_drift, huge_angles, single_evaluations
+from .case_result import CaseResult
 
 QUICK = (  # cases of a quick run: one of each kind, none that takes a while to compile
     "spring pendulum, k = 1e+12",
@@ -47,59 +43,46 @@ ABOUT = {
 }
 
 
-def run(quick: bool = False, say: Callable[[str], None] = lambda line: None) -> list[Verdict]:
-    """All verdicts. say: told of each section begun, and of each row.
+def run(quick: bool = False, say: Callable[[str], None] = lambda line: None) -> list[CaseResult]:
+    """All results. say: told of each row.
 
     quick: some of the cases, shorter runs, shorter arms: seconds in place of minutes.
     Raises ImportError without python-flint.
     """
-    found = []
-    for verdict in verdicts(quick):
-        found.append(verdict)
-        say(f"{verdict.words:<11} {verdict.case}, {verdict.method}")
-    return found
+    rows = []
+    for row in results(quick):
+        rows.append(row)
+        say(f"{row.verdict:<11} {row.case}, {row.method}")
+    return rows
 
 
-def verdicts(quick: bool = False) -> Iterator[Verdict]:
-    """All verdicts, as they are found."""
-    yield from case_runs.verdicts(QUICK if quick else None)
-    yield from energy_drift.verdicts(energy_drift.QUICK if quick else energy_drift.STEPS)
-    yield from single_evaluations.verdicts(single_evaluations.QUICK if quick else single_evaluations.LINKS)
-    yield from huge_angles.verdicts(huge_angles.QUICK if quick else huge_angles.COUNT)
+def results(quick: bool = False) -> Iterator[CaseResult]:
+    """All results, as they are measured."""
+    yield from case_runs.results(QUICK if quick else None)
+    yield from energy_drift.results(energy_drift.QUICK if quick else energy_drift.STEPS)
+    yield from single_evaluations.results(single_evaluations.QUICK if quick else single_evaluations.LINKS)
+    yield from huge_angles.results(huge_angles.QUICK if quick else huge_angles.COUNT)
 
 
-def content(found: Sequence[Verdict], seconds: float, quick: bool = False) -> dict[str, Any]:
+def to_dict(rows: Sequence[CaseResult], seconds: float, quick: bool = False) -> dict[str, Any]:
     """Everything as plain data, for JSON and for drawing. seconds: of the whole run."""
     return {
         "machine": machine(),
-        "load": _load(),
+        "load": load(),
         "date": time.strftime("%Y-%m-%d"),
         "seconds": seconds,
         "quick": quick,
         "sections": [
-            {"name": name, "about": about, "rows": [each.to_dict() for each in found if each.section == name]}
+            {"name": name, "about": about, "rows": [row.to_dict() for row in rows if row.section == name]}
             for name, about in ABOUT.items()
         ],
     }
 
 
-def _load() -> float | None:
-    """The load of the machine over the last minute; None where it is not told."""
-    with suppress(OSError, AttributeError):
-        return os.getloadavg()[0]
-    return None
-
-
-def to_csv(found: Sequence[Verdict]) -> str:
-    """A line for each figure."""
-    text = io.StringIO()
-    columns = "section case method verdict quantity value bound unit meets".split()
-    columns += "steps rejected seconds stopped reason".split()
-    writer = csv.DictWriter(text, columns, lineterminator="\n")
-    writer.writeheader()
-    for verdict in found:
-        row = verdict.to_dict()
-        for figure in row["figures"]:
-            known = row | figure
-            writer.writerow({name: known[name] for name in columns})
-    return text.getvalue()
+def to_csv(results: Sequence[CaseResult]) -> str:
+    """A line for each measurement."""
+    of_row, of_value = "section case method verdict".split(), "quantity value bound unit meets".split()
+    of_run = "steps rejected seconds stopped reason".split()
+    rows = [row | each for row in [one.to_dict() for one in results] for each in row["measurements"]]
+    columns = [*of_row, *of_value, *of_run]
+    return csv_text(columns, [[row[name] for name in columns] for row in rows])

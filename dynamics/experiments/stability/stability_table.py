@@ -8,79 +8,74 @@ import textwrap
 from collections import Counter
 from collections.abc import Sequence
 
+from ..text_table import GAPS, WIDTH, number, table
+from .case_result import CaseResult, Measurement
 from .stability import ABOUT
-from .verdict import Figure, Verdict
 
-WIDTH = 120  # characters
-GAP = "  "
 NAMES = 34  # characters of a case's name on a line
+INDENT = " " * 13  # of a reason
 
 
-def table(found: Sequence[Verdict]) -> str:
+def text(results: Sequence[CaseResult]) -> str:
     """All sections, with the reason under each limit, and a line of counts."""
     lines = []
     for section, about in ABOUT.items():
-        rows = [each for each in found if each.section == section]
+        rows = [row for row in results if row.section == section]
         if rows:
             lines += [section, *textwrap.wrap(about, WIDTH), "", *_section(rows), ""]
-    return "\n".join([*lines, summary(found)])
+    return "\n".join([*lines, summary(results)])
 
 
-def summary(found: Sequence[Verdict]) -> str:
+def summary(results: Sequence[CaseResult]) -> str:
     """How many of each verdict."""
-    counts = Counter(each.words for each in found)
-    return f"{len(found)} rows: {', '.join(f'{counts[word]} {word}' for word in ('meets', 'limit', 'unexplained'))}"
+    counts = Counter(row.verdict for row in results)
+    return f"{len(results)} rows: {', '.join(f'{counts[word]} {word}' for word in ('meets', 'limit', 'unexplained'))}"
 
 
-def _section(rows: Sequence[Verdict]) -> list[str]:
-    runs = any(each.steps or each.rejected for each in rows)
-    names = min(NAMES, max(len(each.case) for each in rows))
-    methods = max(len(each.method) for each in rows)
-    steps = max([len(_steps(each)) for each in rows] + [len("steps")]) if runs else 0
-    taken = [11, names, methods, *([steps, 8] if runs else [])]
-    figures = WIDTH - sum(taken) - len(taken) * len(GAP)
-    head = ["verdict".ljust(11), "case".ljust(names), "method".ljust(methods)]
-    head += ["steps".rjust(steps), "time".rjust(8)] if runs else []
-    lines = [GAP.join([*head, "figures, and in brackets their bounds"])]
-    for row, after in itertools.zip_longest(rows, rows[1:]):
-        left = textwrap.wrap(row.case, names)
-        right = _packed([_figure(each) for each in row.figures], figures)
-        for k in range(max(len(left), len(right))):
-            cells = [row.words if k == 0 else "", left[k] if k < len(left) else "", row.method if k == 0 else ""]
-            parts = [cells[0].ljust(11), cells[1].ljust(names), cells[2].ljust(methods)]
-            if runs:
-                counted = (_steps(row), f"{row.seconds:.2f} s") if k == 0 else ("", "")
-                parts += [counted[0].rjust(steps), counted[1].rjust(8)]
-            lines.append(GAP.join([*parts, right[k] if k < len(right) else ""]).rstrip())
+def _section(rows: Sequence[CaseResult]) -> list[str]:
+    runs = any(row.steps or row.rejected for row in rows)
+    header = ["verdict", "case", "method", *(["steps", "time"] if runs else [])]
+    left = [_left(row, runs) for row in rows]
+    taken = [max(map(len, column)) for column in zip(header, *[line for lines in left for line in lines], strict=True)]
+    space = WIDTH - sum(taken) - len(taken) * len(GAPS[0])
+    right = [_packed([_measured(each) for each in row.measurements], space) for row in rows]
+    none = [""] * len(header)
+    cells = [
+        [[*(before or none), after or ""] for before, after in itertools.zip_longest(*pair)]
+        for pair in zip(left, right, strict=True)
+    ]
+    header.append("figures, and in brackets their bounds")
+    title, *below = table(header, [line for row in cells for line in row], left=(0, 1, 2, len(none)))
+    lines, rest = [title], iter(below)
+    for row, of_row, after in itertools.zip_longest(rows, cells, rows[1:]):
+        lines += itertools.islice(rest, len(of_row))
         if not row.meets and (after is None or after.meets or _why(after) != _why(row)):  # once for rows that share it
-            lines += textwrap.wrap(_why(row), WIDTH, initial_indent=" " * 13, subsequent_indent=" " * 13)
+            lines += textwrap.wrap(_why(row), WIDTH, initial_indent=INDENT, subsequent_indent=INDENT)
     return lines
 
 
-def _why(row: Verdict) -> str:
+def _why(row: CaseResult) -> str:
     return ": ".join(filter(None, [row.stopped, row.reason or "no reason is known"]))
 
 
-def _steps(row: Verdict) -> str:
-    return f"{row.steps}" + (f"+{row.rejected}" if row.rejected else "")
+def _left(row: CaseResult, runs: bool) -> list[list[str]]:
+    """The cells before the measurements; a long name goes on in the lines below."""
+    run = [f"{row.steps}" + (f"+{row.rejected}" if row.rejected else ""), f"{row.seconds:.2f} s"] if runs else []
+    first, *more = textwrap.wrap(row.case, NAMES)
+    return [[row.verdict, first, row.method, *run], *[["", part, "", *["" for _ in run]] for part in more]]
 
 
-def _figure(figure: Figure) -> str:
-    bound = "" if math.isinf(figure.bound) else f" ({number(figure.bound)})"
-    return f"{figure.quantity} {number(figure.value)}{bound}{'' if figure.meets else ' !'}"
-
-
-def number(value: float) -> str:
-    """Two digits."""
-    return f"{value:.1e}" if value and not 0.01 <= abs(value) < 1000.0 else f"{value:.2g}"
+def _measured(measurement: Measurement) -> str:
+    bound = "" if math.isinf(measurement.bound) else f" ({number(measurement.bound)})"
+    return f"{measurement.quantity} {number(measurement.value)}{bound}{'' if measurement.meets else ' !'}"
 
 
 def _packed(texts: Sequence[str], width: int) -> list[str]:
     """Texts on as few lines as they take, none broken."""
     lines: list[str] = []
-    for text in texts:
-        if lines and len(lines[-1]) + 2 + len(text) <= width:
-            lines[-1] += f", {text}"
+    for part in texts:
+        if lines and len(lines[-1]) + 2 + len(part) <= width:
+            lines[-1] += f", {part}"
         else:
-            lines.append(text)
+            lines.append(part)
     return lines

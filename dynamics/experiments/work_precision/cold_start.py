@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
+import math
 import statistics
 import subprocess
 import sys
@@ -16,15 +16,16 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
 
-from ...equations.state_equation import state_inputs
 from ...peers import Case, UnavailableError
 from ...peers.casadi import CasadiPeer, casadi
 from ...peers.heyoka import heyoka, leave_cache
-from ...simulation.scipy_solvers import PREFIX
+from ...simulation.run_options import SCIPY
 from ...simulation.simulate import simulate
+from ..fresh_process import run_fresh
+from ..setting import Setting
 from .trajectory_peers import MOST, casadi_equations, heyoka_derivatives, heyoka_equations
 from .trajectory_runs import problem_of
-from .trajectory_scenes import Setting, load
+from .trajectory_scenes import load
 
 RTOL = 1e-9  # of all but heyoka, whose default is the resolution of float64
 LONG = 5.0  # s; what takes longer is started once
@@ -55,12 +56,11 @@ class _Start:
 
 
 def _ours(setting: Setting, method: str | None = None) -> None:
-    n = len(state_inputs(setting.model).applied) or len(setting.start)
-    qd = setting.start[n:] if setting.mechanical else None
     method = method or ("radau" if setting.stiff else "dop853")
-    found = simulate(setting.model, setting.start[:n], qd, setting.t_end, method, rtol=RTOL, atol=RTOL, progress=False)
-    if not found.stats.success:
-        raise RuntimeError(found.stats.message)
+    tolerances: dict[str, Any] = {"rtol": RTOL, "atol": RTOL}
+    run = simulate(setting.model, setting.q, setting.qd or None, setting.t_end, method, progress=False, **tolerances)
+    if not run.stats.success:
+        raise RuntimeError(run.stats.message)
 
 
 def _heyoka(setting: Setting, compact: bool = False, cached: bool = False) -> None:
@@ -97,7 +97,7 @@ STARTS = {
     "scipy": _Start(
         "our graph, LLVM, and SciPy's DOP853 (Radau where it is stiff) on it",
         ("llvmlite.binding", "scipy.integrate"),
-        lambda setting: _ours(setting, PREFIX + ("Radau" if setting.stiff else "DOP853")),
+        lambda setting: _ours(setting, SCIPY + ("Radau" if setting.stiff else "DOP853")),
     ),
     "CasADi": _Start("CasADi's own derivatives in its virtual machine, and a run of CVODES", ("casadi",), _casadi),
     "heyoka compact": _Start(
@@ -146,47 +146,42 @@ def cold_starts(
             else:
                 times[each].append(answer["seconds"])
                 loading[each] = answer["loading"]
-    result = []
-    for each in asked:
-        found = times[each] or [float("nan")]
-        about = STARTS[each].about
-        row = (min(found), statistics.median(found), loading[each], len(times[each]), status[each])
-        result.append(ColdStart(each, about, *row))
-    return result
-
-
-def _in_a_process(given: dict[str, Any], budget: float) -> dict[str, float] | str:
-    """What `child` printed, or why it did not."""
-    command = [sys.executable, "-c", f"from {__name__} import child; child()"]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    try:
-        done = subprocess.run(
-            command,
-            input=json.dumps(given),
-            capture_output=True,
-            text=True,
-            timeout=budget,
-            check=False,
-            env=environment,
+    return [
+        ColdStart(
+            name,
+            STARTS[name].about,
+            min(seconds, default=math.nan),
+            statistics.median(seconds or [math.nan]),
+            loading[name],
+            len(seconds),
+            status[name],
         )
+        for name, seconds in times.items()
+    ]
+
+
+def _in_a_process(request: dict[str, Any], budget: float) -> dict[str, float] | str:
+    """What `child` printed, or why it did not."""
+    try:
+        done = run_fresh(__name__, "child()", json.dumps(request), budget)
     except subprocess.TimeoutExpired:
         return f"not ready within {budget:g} s"
     with suppress(ValueError, IndexError):
-        found: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
-        return found
+        answer: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
+        return answer
     lines = done.stderr.strip().splitlines()
     return (lines[-1] if lines else f"its process ended with status {done.returncode}")[:200]
 
 
 def child() -> None:
     """The process's side: what to start comes on standard input, how long it took goes to standard output."""
-    given = json.loads(sys.stdin.read())
-    start = STARTS[given["which"]]
+    request = json.loads(sys.stdin.read())
+    start = STARTS[request["which"]]
     begin = time.perf_counter()
     for package in start.packages:
         import_module(package)
     loading = time.perf_counter() - begin
-    setting = load(given["name"], **given["options"])
+    setting = load(request["name"], **request["options"])
     begin = time.perf_counter()
     start.run(setting)
     sys.stdout.write(json.dumps({"seconds": time.perf_counter() - begin, "loading": loading}))

@@ -1,4 +1,4 @@
-"""Contenders of other software: MuJoCo's integrators, heyoka's Taylor series, CVODES through CasADi."""
+"""Solvers of other software: MuJoCo's integrators, heyoka's Taylor series, CVODES through CasADi."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from cgraph.extend import Array
+
 from ...integrators import Problem
 from ...io.mujoco_model import rollout
 from ...peers import Case, UnavailableError
@@ -17,11 +19,10 @@ from ...peers.casadi import NAMES as CASADI_NAMES, casadi
 from ...peers.heyoka import expressions, heyoka
 from ...peers.mujoco import MujocoPeer
 from ...peers.translate import translated
-from ...simulation.scipy_solvers import PREFIX, SOLVERS
-from ...simulation.trajectory import Array
+from ...simulation.run_options import SCIPY, SCIPY_SOLVERS
 from ...systems.system import TIME
-from .trajectory_runs import EQUAL, Contender, Outcome, Scipy
-from .trajectory_scenes import INTERVALS, Setting
+from ..setting import INTERVALS, Setting
+from .trajectory_runs import EQUAL, Outcome, Scipy, Solver
 
 EPSILON = 2.0**-52
 COMPACT = 300  # nodes of the rate; beyond, heyoka's code written out takes minutes to compile
@@ -33,7 +34,7 @@ CVODES: dict[str, dict[str, Any]] = {
 }
 
 
-class Mujoco(Contender):
+class Mujoco(Solver):
     """One of MuJoCo's integrators in its own native loop (`rollout`), on the model's MJCF, contacts off."""
 
     kind = EQUAL
@@ -51,7 +52,7 @@ class Mujoco(Contender):
         self.begin = np.concatenate([[0.0], self.start[:n][at], self.start[n:][at]])[None]
 
     def ready(self, knob: float) -> Callable[[], Outcome]:
-        """See Contender."""
+        """See Solver."""
         states, run = self._states(int(knob))
 
         def whole() -> Outcome:
@@ -61,13 +62,13 @@ class Mujoco(Contender):
         return whole
 
     def rows(self, knob: float) -> Array:
-        """See Contender."""
+        """See Solver."""
         steps = int(knob)
         states, run = self._states(steps)
         run()
         every = steps // INTERVALS
-        found: Array = np.vstack([self.start, states[0, every - 1 :: every][:, self.taken]])
-        return found
+        ours: Array = np.vstack([self.start, states[0, every - 1 :: every][:, self.taken]])
+        return ours
 
     def _states(self, steps: int) -> tuple[Array, Callable[[], Any]]:
         """Where the states of a run go, (1, steps, ..), and the run."""
@@ -81,24 +82,26 @@ class Mujoco(Contender):
         return states, run
 
     def rates(self, x: Array) -> Array:
-        """See Contender: velocities as they are, accelerations by MuJoCo."""
+        """See Solver: velocities as they are, accelerations by MuJoCo."""
         n, order, at = self.peer.case.n, self.peer.order, self.peer.at
         twin, none = self.peer.twin, np.zeros(self.peer.case.n)
-        found = [twin.accelerations(row[:n][at], row[n:][at], none)[order] for row in x]
-        return np.hstack([x[:, n:], found])
+        accelerations = [twin.accelerations(row[:n][at], row[n:][at], none)[order] for row in x]
+        return np.hstack([x[:, n:], accelerations])
 
 
-class Heyoka(Contender):
-    """heyoka's adaptive Taylor series on our equations, node for node.  compact: its compact mode."""
+class Heyoka(Solver):
+    """heyoka's adaptive Taylor series on our equations, node for node.  derivatives: on its own in their place."""
 
     tolerances = (1e-4, 1e-7, 1e-10, 1e-12, EPSILON)  # each is compiled anew; the last is its default
 
-    def __init__(self, setting: Setting, smallest: float, problem: Problem) -> None:
+    def __init__(self, setting: Setting, smallest: float, problem: Problem, derivatives: bool = False) -> None:
         self.compact = len(problem.rate.nodes) > COMPACT
         how = "compact mode" if self.compact else "written out"
-        super().__init__("heyoka Taylor", f"heyoka's taylor_adaptive on our equations, {how}", setting, smallest)
+        whose = "its own derivatives" if derivatives else "our equations"
+        super().__init__("heyoka Taylor", f"heyoka's taylor_adaptive on {whose}, {how}", setting, smallest)
         self.heyoka = heyoka()
-        self.system = heyoka_equations(self.heyoka, problem)
+        hy = self.heyoka
+        self.system = heyoka_derivatives(hy, setting) if derivatives else heyoka_equations(hy, problem)
         self._made: dict[float, Any] = {}
 
     def integrator(self, knob: float) -> Any:
@@ -108,46 +111,46 @@ class Heyoka(Contender):
             self._made[knob] = self.heyoka.taylor_adaptive(
                 self.system, self.start.tolist(), compact_mode=self.compact, **options
             )
-        made = self._made[knob]
-        made.time = 0.0
-        made.state[:] = self.start
-        return made
+        integrator = self._made[knob]
+        integrator.time = 0.0
+        integrator.state[:] = self.start
+        return integrator
 
     def ready(self, knob: float) -> Callable[[], Outcome]:
-        """See Contender."""
-        made = self.integrator(knob)
+        """See Solver."""
+        integrator = self.integrator(knob)
         t_end, limit = self.setting.t_end, self.heyoka.taylor_outcome.time_limit
 
         def run() -> Outcome:
-            made.time = 0.0
-            made.state[:] = self.start
-            outcome, _, _, steps, *_ = made.propagate_until(t_end, max_steps=MOST)
+            integrator.time = 0.0
+            integrator.state[:] = self.start
+            outcome, _, _, steps, *_ = integrator.propagate_until(t_end, max_steps=MOST)
             status = "" if outcome == limit else f"stopped after {steps} steps"
-            return Outcome(made.state.copy(), steps, None, None, status)
+            return Outcome(integrator.state.copy(), steps, None, None, status)
 
         return run
 
     def rows(self, knob: float) -> Array:
-        """See Contender."""
-        made = self.integrator(knob)
+        """See Solver."""
+        integrator = self.integrator(knob)
         times = self.setting.times
         if times[0] > 0.0:
-            made.propagate_until(times[0], max_steps=MOST)
-        found: Array = made.propagate_grid(times, max_steps=MOST)[-1]
+            integrator.propagate_until(times[0], max_steps=MOST)
+        states: Array = integrator.propagate_grid(times, max_steps=MOST)[-1]
         result = np.full((len(times), len(self.start)), math.nan)
-        result[: len(found)] = found
+        result[: len(states)] = states
         return result
 
     def rates(self, x: Array) -> Array:
-        """See Contender."""
+        """See Solver."""
         variables, expressions = zip(*self.system, strict=True)
         function = self.heyoka.cfunc(list(expressions), list(variables), compact_mode=True)
         times = {"time": np.zeros(len(x))} if function.is_time_dependent else {}
-        found: Array = function(np.ascontiguousarray(x.T), **times).T
-        return found
+        rates: Array = function(np.ascontiguousarray(x.T), **times).T
+        return rates
 
 
-class Cvodes(Contender):
+class Cvodes(Solver):
     """CVODES as CasADi calls it, on our equations, node for node, in CasADi's virtual machine."""
 
     tolerances = tuple([10.0**-k for k in range(3, 13)])
@@ -163,7 +166,7 @@ class Cvodes(Contender):
         return self.casadi.integrator("run", "cvodes", self.equations, 0.0, list(times), options | self.options)
 
     def ready(self, knob: float) -> Callable[[], Outcome]:
-        """See Contender."""
+        """See Solver."""
         function, start = self._function(knob, [self.setting.t_end]), self.start.tolist()
 
         def run() -> Outcome:
@@ -174,17 +177,16 @@ class Cvodes(Contender):
         return run
 
     def rows(self, knob: float) -> Array:
-        """See Contender."""
+        """See Solver."""
         times = self.setting.times
-        found = np.array(self._function(knob, times)(x0=self.start.tolist())["xf"]).T
-        result: Array = found
-        return result
+        states: Array = np.array(self._function(knob, times)(x0=self.start.tolist())["xf"]).T
+        return states
 
     def rates(self, x: Array) -> Array:
-        """See Contender."""
+        """See Solver."""
         ca, parts = self.casadi, self.equations
-        found = ca.Function("rate", [parts["x"], parts["t"]], [parts["ode"]])
-        return np.array([np.array(found(row, 0.0)).ravel() for row in x])
+        rate = ca.Function("rate", [parts["x"], parts["t"]], [parts["ode"]])
+        return np.array([np.array(rate(row, 0.0)).ravel() for row in x])
 
 
 def heyoka_equations(hy: Any, problem: Problem) -> list[tuple[Any, Any]]:
@@ -216,14 +218,14 @@ def casadi_equations(ca: Any, problem: Problem) -> dict[str, Any]:
     return {"x": x, "t": t, "ode": ca.vertcat(*[values[rate] for rate in graph.outputs.values()])}
 
 
-def offers(setting: Setting, smallest: float, problem: Problem, backend: str) -> dict[str, Callable[[], Contender]]:
+def offers(setting: Setting, smallest: float, problem: Problem, backend: str) -> dict[str, Callable[[], Solver]]:
     """The peers that could be asked, by name; making one raises ImportError, UnavailableError or ValueError."""
-    found: dict[str, Callable[[], Contender]] = {}
-    for solver in SOLVERS:
-        found[f"{PREFIX}{solver}"] = partial(Scipy, solver, setting, smallest, problem, backend)
+    makers: dict[str, Callable[[], Solver]] = {}
+    for solver in SCIPY_SOLVERS:
+        makers[f"{SCIPY}{solver}"] = partial(Scipy, solver, setting, smallest, problem, backend)
     for integrator in MUJOCO:
-        found[f"MuJoCo {integrator}"] = partial(Mujoco, integrator, setting, smallest)
-    found["heyoka Taylor"] = partial(Heyoka, setting, smallest, problem)
+        makers[f"MuJoCo {integrator}"] = partial(Mujoco, integrator, setting, smallest)
+    makers["heyoka Taylor"] = partial(Heyoka, setting, smallest, problem)
     for kind in CVODES:
-        found[f"CVODES {kind}"] = partial(Cvodes, kind, setting, smallest, problem)
-    return found
+        makers[f"CVODES {kind}"] = partial(Cvodes, kind, setting, smallest, problem)
+    return makers

@@ -1,25 +1,26 @@
-"""Contenders: ways to integrate a setting, each timed from its start to t_end; ours, and SciPy on our compiled rate."""
+"""Solvers: ways to integrate a setting, timed from its start to t_end; ours, and SciPy on our compiled rate."""
 
 from __future__ import annotations
 
-import copy
 import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from cgraph.extend import Array
+
 from ...equations.state_equation import state_inputs
-from ...integrators import METHODS, Problem
-from ...simulation.recorder import Rows
-from ...simulation.run_options import Limits
-from ...simulation.scipy_solvers import PREFIX, ScipyRun
-from ...simulation.stepping import AdaptiveRun, FixedRun, Tally
-from ...simulation.trajectory import Array
-from .trajectory_scenes import Setting
+from ...integrators import METHODS, Problem, derive
+from ...simulation.recorder import Recorder
+from ...simulation.run_options import SCIPY, RunOptions
+from ...simulation.scipy_solvers import ScipyIntegration, scipy_solver
+from ...simulation.step_program import CompiledSteps, compile_steps, step_program
+from ...simulation.stepping import Integration, integration
+from ..setting import Setting
 
 EQUAL, CHOSEN = "equal steps", "chosen steps"
 TRIAL = 4096  # steps that tell how long many more take
@@ -36,7 +37,7 @@ class Outcome(NamedTuple):
     status: str = ""
 
 
-class Contender(ABC):
+class Solver(ABC):
     """A way to integrate one setting.
 
     kind: `EQUAL`, where the knob is the number of steps, or `CHOSEN`, where it is the relative tolerance.
@@ -72,38 +73,38 @@ class Contender(ABC):
 def problem_of(setting: Setting) -> Problem:
     """The setting's equations, with parameters bound and no force applied."""
     inputs = state_inputs(setting.model)
-    return Problem(setting.model, dict(inputs.parameters) | dict.fromkeys(inputs.applied, 0.0))
+    return derive(setting.model, dict(inputs.parameters) | dict.fromkeys(inputs.applied, 0.0))
 
 
-def finished(run: Tally, start: Array) -> Outcome:
+def finished(run: Integration, start: Array) -> Outcome:
     """The run, to its end or until it has taken too long."""
     begin, last, status = time.perf_counter(), start, ""
     with np.errstate(all="ignore"):
-        for piece in run.pieces(start):
-            if len(piece.x):
-                last = piece.x[-1]
+        for block in run.blocks(start):
+            if len(block.x):
+                last = block.x[-1]
             if time.perf_counter() - begin > LONGEST:
                 status = f"took longer than {LONGEST:g} s"
                 break
     return Outcome(np.array(last), run.steps, run.rejected, run.evaluations, run.status or status)
 
 
-def recorded(run: Tally, start: Array, times: Sequence[float]) -> Array:
+def recorded(run: Integration, start: Array, times: Sequence[float]) -> Array:
     """The states of a run at some times, (T, m)."""
-    rows = Rows(start, np.array(times))
+    recorder = Recorder(start, np.array(times))
     begin = time.perf_counter()
     with np.errstate(all="ignore"):
-        for piece in run.pieces(start):
-            rows.add(piece)
+        for block in run.blocks(start):
+            recorder.add(block)
             if time.perf_counter() - begin > 2 * LONGEST:
                 break
-    found = rows.table()[1]
+    states = recorder.table()[1]
     result = np.full((len(times), len(start)), math.nan)
-    result[: len(found)] = found
+    result[: len(states)] = states
     return result
 
 
-class Ours(Contender):
+class Ours(Solver):
     """One of our methods in its native loop; the program is made once."""
 
     ours = True
@@ -115,71 +116,59 @@ class Ours(Contender):
         self.kind = CHOSEN if self.method.adaptive else EQUAL
 
     @cached_property
-    def _plain(self) -> Tally:
-        return self._template(dense=False)
+    def _plain(self) -> CompiledSteps:
+        return compile_steps(step_program(self.problem, self.method, dense=False), self.backend)
 
     @cached_property
-    def _dense(self) -> Tally:
-        return self._template(dense=True) if self.method.adaptive else self._plain
+    def _dense(self) -> CompiledSteps:
+        program = step_program(self.problem, self.method, dense=self.method.adaptive)
+        return compile_steps(program, self.backend)
 
-    def _template(self, dense: bool) -> Tally:
-        """A run to be copied; its numbers come later."""
-        if self.method.adaptive:
-            return AdaptiveRun(self.problem, self.method, (), self.backend, Limits(), dense=dense)
-        return FixedRun(self.problem, self.method, (), self.backend, instants=(), dt=1.0, each=False, most=math.inf)
-
-    def _run(self, knob: float, template: Tally, instants: Sequence[float]) -> Tally:
-        run = copy.copy(template)
+    def _options(self, knob: float, times: Sequence[float], max_steps: float = math.inf) -> RunOptions:
         t_end = self.setting.t_end
         if self.method.adaptive:
-            plan: dict[str, Any] = {"limits": Limits(t_end, knob, self.absolute(knob))}
-        else:
-            plan = {"instants": instants, "dt": t_end / knob}
-        vars(run).update(plan)
-        return run
+            return RunOptions(t_end, self.name, rtol=knob, atol=self.absolute(knob), t_eval=times)
+        return RunOptions(t_end, self.name, dt=t_end / knob, t_eval=times, max_steps=max_steps)
 
     def ready(self, knob: float) -> Callable[[], Outcome]:
-        """See Contender."""
-        template, ends = self._plain, (0.0, self.setting.t_end)
+        """The run to t_end, without dense output."""
         if self.kind == EQUAL and self._at_least(knob) > LONGEST:  # such a run does not look at the clock on its way
             return lambda: Outcome(self.start, status=f"would take longer than {LONGEST:g} s")
-        return lambda: finished(self._run(knob, template, ends), self.start)
+        compiled, options = self._plain, self._options(knob, [self.setting.t_end])
+        return lambda: finished(integration(compiled, options), self.start)
 
     def _at_least(self, knob: float) -> float:
         """Seconds that so many equal steps take, by the first few of them."""
-        run = self._run(knob, self._plain, (0.0, self.setting.t_end))
-        vars(run)["most"] = TRIAL
+        run = integration(self._plain, self._options(knob, [self.setting.t_end], TRIAL))
         begin = time.perf_counter()
         finished(run, self.start)
         return (time.perf_counter() - begin) * knob / min(knob, TRIAL)
 
     def rows(self, knob: float) -> Array:
-        """See Contender."""
+        """The states at the setting's times, (T, m); NaN from where it stopped."""
         times = self.setting.times
-        return recorded(self._run(knob, self._dense, times), self.start, times)
+        return recorded(integration(self._dense, self._options(knob, times)), self.start, times)
 
 
-class Scipy(Contender):
+class Scipy(Solver):
     """One of SciPy's solvers on our compiled rate and Jacobian. Raises ImportError without SciPy."""
 
     tolerances = tuple([10.0**-k for k in range(3, 14)])  # it takes none smaller than 2e-14
 
     def __init__(self, solver: str, setting: Setting, smallest: float, problem: Problem, backend: str = "auto") -> None:
-        super().__init__(PREFIX + solver, "SciPy's solver on our compiled rate", setting, smallest)
-        self._template = ScipyRun(problem, solver, backend, Limits(), asked=None)
+        super().__init__(SCIPY + solver, "SciPy's solver on our compiled rate", setting, smallest)
+        self._solver = scipy_solver(problem, solver, backend)
         self.order = {"DOP853": 8, "Radau": 5, "RK45": 5}.get(solver)
 
-    def _run(self, knob: float, asked: Array | None) -> Tally:
-        run = copy.copy(self._template)
-        run.limits = Limits(self.setting.t_end, knob, self.absolute(knob))
-        run.asked = asked
-        return run
+    def _options(self, knob: float, times: Sequence[float] | None) -> RunOptions:
+        return RunOptions(self.setting.t_end, self.name, rtol=knob, atol=self.absolute(knob), t_eval=times)
 
     def ready(self, knob: float) -> Callable[[], Outcome]:
-        """See Contender."""
-        return lambda: finished(self._run(knob, None), self.start)._replace(rejected=None)
+        """The run to t_end, which records its steps alone."""
+        solver, options = self._solver, self._options(knob, None)
+        return lambda: finished(ScipyIntegration(solver, options), self.start)._replace(rejected=None)
 
     def rows(self, knob: float) -> Array:
-        """See Contender."""
-        times = np.array(self.setting.times)
-        return recorded(self._run(knob, times), self.start, times.tolist())
+        """The states at the setting's times, (T, m); NaN from where it stopped."""
+        times = self.setting.times
+        return recorded(ScipyIntegration(self._solver, self._options(knob, times)), self.start, times)

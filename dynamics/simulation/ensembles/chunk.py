@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..trajectory import Array
+from cgraph.extend import Array
+
 from .ensemble import Counts
 
 
@@ -28,7 +29,7 @@ class Part:
     steps: Counts
     rejected: Counts
     evaluations: Counts
-    dt: Array  # s, the largest step of each
+    dt: Array  # (k,) s, the largest steps
     status: list[str]  # empty while all is well
 
 

@@ -7,32 +7,71 @@ from typing import Any
 
 import numpy as np
 
-from ..trajectory import Array
+from cgraph.extend import Array
 
 Counts = np.ndarray[Any, np.dtype[np.int64]]
 
 
 @dataclass(frozen=True)
 class EnsembleStats:
-    """How N runs went: `Stats`, with an entry for each trajectory where they differ."""
+    """How N runs went: `Stats`, with an entry for each trajectory where they differ.
+
+    Parameters
+    ----------
+    method : str
+        As `simulate_many` was asked for it.
+    steps, rejected, nfev : ndarray
+        Accepted steps, trials of a step that were not accepted, and evaluations of the rate, (N,) each.
+    dt : ndarray
+        The largest step taken, (N,) [s].
+    seconds : float
+        Run time of all of them together [s], compiling included.
+    success : ndarray
+        Whether it reached t_end, (N,).
+    message : tuple of str
+        N sentences: "reached t_end", or where and why it stopped.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> fan = dyn.simulate_many(dyn.planar_arm([1.0], [1.0]), [[0.1], [0.2]], [0.0], 1.0, dt=0.01)
+    >>> fan.stats.steps.tolist(), fan.stats.message
+    ([100, 100], ('reached t_end', 'reached t_end'))
+    """
 
     method: str
-    steps: Counts  # (N,), accepted
-    rejected: Counts  # (N,), trials of a step that were not accepted
-    nfev: Counts  # (N,), of the rate of the state
-    dt: Array  # (N,) s, the largest step taken
-    seconds: float  # run time of all of them together, making the machine code included
-    success: np.ndarray[Any, np.dtype[np.bool_]]  # (N,), it reached t_end
-    message: tuple[str, ...]  # N sentences: "reached t_end", or where and why it stopped
+    steps: Counts
+    rejected: Counts
+    nfev: Counts
+    dt: Array
+    seconds: float
+    success: np.ndarray[Any, np.dtype[np.bool_]]
+    message: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Ensemble:
-    """Many motions of one model: t (T,) [s]; q and qd (N, T, n) [rad or m, per second]; and how the runs went.
+    """Many motions of one model, as `simulate_many` gives them.
 
-    q[k] is what trajectory k alone would have, (T, n), in one piece of memory; so lie the results of MuJoCo's rollout
-    and of a vmap. From where a trajectory left the numbers on its rows are NaN. Of an OdeSystem q holds the states,
-    and qd has no columns.
+    q[k] is what trajectory k alone would have, (T, n), in one piece of memory, as in MuJoCo's rollout and a vmap. From
+    where a state of a trajectory was not finite on its rows are NaN.
+
+    Parameters
+    ----------
+    t : ndarray
+        Times, (T,) [s].
+    q, qd : ndarray
+        Coordinates and velocities, (N, T, n) [rad or m, per second]. Of an OdeSystem q holds the states, (N, T, m), and
+        qd has no columns.
+    stats : EnsembleStats
+        How the runs went.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> fan = dyn.simulate_many(dyn.planar_arm([1.0], [1.0]), [[0.1], [0.2]], [0.0], 1.0, t_eval=[0.0, 1.0])
+    >>> fan.q.shape, fan.stats.success.tolist()
+    ((2, 2, 1), [True, True])
     """
 
     t: Array

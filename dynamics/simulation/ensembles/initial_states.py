@@ -1,4 +1,4 @@
-"""Starts: what the trajectories of an ensemble begin with, and what of it is their own."""
+"""Starts: what the trajectories of an ensemble begin with, and what of it varies from one to another."""
 
 from __future__ import annotations
 
@@ -8,57 +8,57 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import real_array
+from cgraph.extend import Array, real_array
 
+from ...equations.initial_value import check_names
 from ...equations.state_equation import state_inputs
 from ...systems.model import Model, as_ode
 from ...systems.system import parameter_value, per_coordinate
-from ..trajectory import Array
 
 
 class Starts(NamedTuple):
     """N states, and the other inputs of the state equation: one number for all, or one for each trajectory."""
 
     x: Array  # (N, m)
+    states: tuple[str, ...]  # names of x
     same: dict[str, float]
-    own: dict[str, Array]  # (N,) each
+    varied: dict[str, Array]  # (N,) each
 
 
 def starts(
     model: Model, q: ArrayLike, qd: ArrayLike | None, tau: ArrayLike, parameters: Mapping[str, ArrayLike] | None
 ) -> Starts:
-    """What `simulate_many` was given. Raises ValueError for shapes that do not fit, and for what is not finite."""
+    """The starts of an ensemble. Raises ValueError for shapes that do not fit, and for what is not finite."""
     inputs = state_inputs(model)
     n = len(inputs.applied) or len(inputs.states)
-    given = {"q": _array("q", q, n)}
+    arrays = {"q": _array("q", q, n)}
     if as_ode(model) is None:
         if qd is None:
             raise ValueError(f"qd must have shape (N, {n}) or ({n},), got None")
-        given["qd"] = _array("qd", qd, n)
+        arrays["qd"] = _array("qd", qd, n)
     elif qd is not None or np.any(tau):
         raise ValueError("qd must be None and tau 0 for a system of first order; q holds its whole state")
     same: dict[str, float] = dict(inputs.parameters)
     columns: dict[str, Array] = {}
+    check_names(inputs, parameters or ())
     for name, value in (parameters or {}).items():
-        if name not in inputs.parameters:
-            has = ", ".join(inputs.parameters) or "none"
-            raise ValueError(f"the system has no parameter {name} (it has {has})")
         if np.ndim(value) == 0:
             same[name] = parameter_value(name, np.asarray(value).item())
         else:
             columns[name] = _column(name, value)
             del same[name]
     if np.ndim(tau) == 2:
-        given["tau"] = _array("tau", tau, n)
+        arrays["tau"] = _array("tau", tau, n)
     else:
         values = np.asarray(tau).tolist()
-        same |= zip(inputs.applied, per_coordinate("tau", values, n) if inputs.applied else (), strict=True)
-    counts = {what: len(array) for what, array in given.items() if array.ndim == 2}
+        applied = per_coordinate("tau", values, model.coordinates) if inputs.applied else ()
+        same |= zip(inputs.applied, applied, strict=True)
+    counts = {what: len(array) for what, array in arrays.items() if array.ndim == 2}
     counts |= {f"parameter {name!r}": len(array) for name, array in columns.items()}
     count = _one_count(counts)
-    own = dict(zip(inputs.applied, given.pop("tau").T, strict=True)) if "tau" in given else {}
-    x = np.concatenate([np.broadcast_to(array, (count, n)) for array in given.values()], axis=1)
-    return Starts(x, same, own | columns)
+    varied = dict(zip(inputs.applied, arrays.pop("tau").T, strict=True)) if "tau" in arrays else {}
+    x = np.concatenate([np.broadcast_to(array, (count, n)) for array in arrays.values()], axis=1)
+    return Starts(x, inputs.states, same, varied | columns)
 
 
 def _array(what: str, value: ArrayLike, n: int) -> Array:

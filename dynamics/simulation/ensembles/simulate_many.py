@@ -3,28 +3,27 @@
 from __future__ import annotations
 
 import math
-import pickle
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import closing
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...equations.state_equation import state_inputs
-from ...integrators import METHODS, Problem
+from cgraph.extend import Array
+
+from ...integrators import METHODS, derive
 from ...systems.model import Model
 from ..free_memory import room
 from ..progress_bar import Progress
-from ..recorder import from_start, recorded_times
-from ..run_options import limits_of, step_count
-from ..simulate import DT
-from .chunk import Chunk, Part
-from .ensemble import Ensemble, EnsembleStats
-from .initial_states import starts
-from .serialized import portable
-from .step_grid import Stretch, stretches
+from ..run_options import RunOptions, step_count
+from ..step_program import StepProgram, pickled_steps, step_program
+from .branch_free import branch_free
+from .chunk import Chunk
+from .ensemble import Ensemble
+from .ensemble_rows import EnsembleRows
+from .initial_states import Starts, starts
+from .step_grid import StepGrid, step_grids
 from .task import Task
 from .workers import Map, Workers, checked, finished
 
@@ -42,6 +41,7 @@ def simulate_many(
     method: str = "rk4",
     *,
     dt: float | None = None,
+    max_step: float | None = None,
     rtol: float = 1e-8,
     atol: ArrayLike = 1e-10,
     t_eval: ArrayLike | None = None,
@@ -54,68 +54,148 @@ def simulate_many(
     backend: str = "auto",
     progress: bool | None = None,
 ) -> Ensemble:
-    """The motions of a system from N starts at t = 0 to t_end, by one program that is made once.
+    """The motions of a system from N starts at t = 0 to t_end, by one program that is compiled once.
 
-    q, qd: (N, n), the starts, or (n,) for all; of an OdeSystem q is the state, and qd None.  t_end [s].
-    method, dt, rtol, atol, first_step, max_steps, backend: as in `simulate`, without SciPy's methods.
-    t_eval: increasing times in [0, t_end] to record; by default every step. Methods that choose their steps need it.
-    tau: constant applied force, for all coordinates, for each (n,), or for each trajectory too (N, n).
-    parameters: values in place of the system's own, a number for all or one for each trajectory (N,).
-    workers: how many threads share the work, None for one on each core; or any map, `workers(function, iterable)`,
-        such as that of a pool of processes. The numbers are the same to the last bit.
-    chunk: trajectories that a worker takes at a time; by default some chunks for each, of at most 256. Side by side it
-        is rounded up to whole vectors, multiples of 8.
-    progress: a progress line on standard error; None shows it on a terminal, for runs over a second.
+    Where the steps do not branch on the state (euler, rk4; verlet and symplectic_euler of a constant mass matrix and
+    forces that do not depend on qd), trajectories run side by side, a vector of them at a time; else one by one. One
+    whose state is not finite is NaN from there on, `stats.message` names the time and the coordinate, and the others go
+    on. Ctrl-C keeps the chunks that are done.
 
-    Where every state takes the same course (euler, rk4; verlet and symplectic_euler of a constant mass matrix and
-    forces that do not depend on qd), trajectories run side by side, a vector of them at a time; else one by one.
-    One that leaves the numbers is NaN from there on, `stats.message` names the time and the coordinate, and the others
-    go on. Ctrl-C keeps the chunks that are done.
-    Raises ValueError for arguments out of range or of another shape, MemoryError for a result that would not fit,
-    SingularMassMatrixError for a coordinate without inertia, TypeError for `workers` that give no results.
+    Parameters
+    ----------
+    model : System, OdeSystem, Mechanism or Scene
+        What moves.
+    q, qd : array_like
+        The starts, (N, n) each [rad or m, per second], or (n,) for all; of an OdeSystem q is the state, and qd None.
+    t_end, method, dt, max_step, rtol, atol, first_step, max_steps, backend, progress
+        As in `simulate`, without SciPy's methods.
+    t_eval : array_like, optional
+        Increasing times in [0, t_end] to record, (T,) [s]; by default every step. Methods that choose their steps need
+        it.
+    tau : float or array_like
+        Constant applied force [N m or N], for all coordinates, for each, (n,), or for each trajectory too, (N, n).
+    parameters : mapping, optional
+        {name: value} in place of the model's own, a number for all or one for each trajectory, (N,).
+    workers : int, callable or None
+        How many threads share the work, None for one on each core; or any map, `workers(function, iterable)`, such as
+        that of a pool of processes. The numbers are the same to the last bit.
+    chunk : int, optional
+        Trajectories that a worker takes at a time; by default some chunks for each, of at most 256. Side by side it is
+        rounded up to whole vectors, multiples of 8.
+
+    Returns
+    -------
+    Ensemble
+        t (T,), q and qd (N, T, n), and `stats` with an entry for each trajectory.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For arguments of another type, shape or range, each by name, and for `workers` that give no results.
+    MemoryError
+        For a result that would not fit.
+    SingularMassMatrixError
+        For a coordinate without inertia.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> fan = dyn.simulate_many(dyn.planar_arm([1.0], [1.0]), [[0.1], [0.2], [0.3]], [0.0], 1.0, t_eval=[0.5, 1.0])
+    >>> fan.q[:, -1, 0].round(4).tolist()
+    [-0.077, -0.155, -0.2348]
     """
-    if method not in METHODS:
+    # Check
+    if isinstance(method, str) and method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
-    limits = limits_of(state_inputs(model).states, t_end, dt, first_step, rtol, atol, max_steps)
+    options = RunOptions(t_end, method, dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
+    team = checked(workers)
+    _check_chunk(chunk)
+    start = starts(model, q, qd, tau, parameters)
+    options.check(start.states)
+    count = _row_count(options)
+    _check_room(start.x, count)
+
+    # Derive the equations as graphs, and write the steps of the method over them
+    begin = time.perf_counter()
+    problem = derive(model, start.same)
+    program = step_program(problem, METHODS[method], dense=True)
+
+    # Share out the work: what a worker is sent, and the starts of chunks of trajectories
+    grids = _grids(program, options)
+    task = Task(pickled_steps(program), options, count, tuple(grids))
+    chunks = _chunks(start, problem.parameters, _width(len(start.x), chunk, team, whole=bool(grids)))
+
+    # Integrate, by whoever takes the chunks and compiles the steps
+    result = EnsembleRows(len(start.x), count, problem.size)
+    _run(task, chunks, team, result)
+
+    # Put the result together
+    half = problem.size if problem.system is None else problem.system.n
+    stats, rows = result.stats(method, time.perf_counter() - begin), result.rows
+    return Ensemble(_row_times(options), rows[:, :, :half], rows[:, :, half:], stats)
+
+
+def _row_count(options: RunOptions) -> int:
+    """Rows of a trajectory, T. Raises ValueError where trajectories would not have the same."""
+    if options.times is not None:
+        return len(options.times)
+    if options.adaptive:
+        raise ValueError(
+            f"{options.method!r} chooses the steps of each trajectory: t_eval must say which times to record"
+        )
+    return step_count(options.t_end, options.step) + 1
+
+
+def _row_times(options: RunOptions) -> Array:
+    """The times of the rows, (T,): t_eval, or every equal step."""
+    if options.times is not None:
+        return options.times
+    steps = step_count(options.t_end, options.step)
+    return np.append(options.t_end / steps * np.arange(steps), options.t_end)
+
+
+def _check_chunk(chunk: int | None) -> None:
     if chunk is not None and (not isinstance(chunk, (int, np.integer)) or chunk < 1):
         raise ValueError(f"chunk must be a whole number from 1, got {chunk!r}")
-    crew, adaptive = checked(workers), METHODS[method].adaptive
-    if adaptive and t_eval is None:
-        raise ValueError(f"{method!r} chooses the steps of each trajectory: t_eval must say which times to record")
-    x, same, own = starts(model, q, qd, tau, parameters)
-    asked = None if t_eval is None else recorded_times(t_eval, t_end)
-    size = DT if dt is None else float(dt)
-    steps = step_count(t_end, size)
-    rows = steps + 1 if asked is None else len(asked)
-    taken, free = 8 * len(x) * rows * x.shape[1], room()
-    if taken > free:
+
+
+def _check_room(x: Array, rows: int) -> None:
+    """Raises MemoryError where so many rows for every start (N, m) would not fit."""
+    size, free = 8 * len(x) * rows * x.shape[1], room()
+    if size > free:
         raise MemoryError(
-            f"{len(x)} trajectories of {rows} rows of {x.shape[1]} numbers take {taken / 2**30:.3g} GiB, and "
+            f"{len(x)} trajectories of {rows} rows of {x.shape[1]} numbers take {size / 2**30:.3g} GiB, and "
             f"{free / 2**30:.3g} GiB are free: record fewer times (t_eval) or simulate fewer at once"
         )
 
-    begin = time.perf_counter()
-    problem = Problem(model, same)
-    sent = portable(problem, METHODS[method])
-    course: list[Stretch] = []
-    plan: dict[str, Any]
-    if adaptive:
-        plan = {"limits": limits}
-    else:
-        instants = [0.0, float(t_end)] if asked is None else from_start(asked)
-        plan = {"instants": instants, "dt": size, "each": asked is None, "most": max_steps}
-        course = stretches(instants, size) if asked is not None else [Stretch(0.0, t_end / steps, 1, steps)]
-        if sent.straight() is None or sum(each.each * each.rows for each in course) > max_steps:
-            course = []
-    task = Task(pickle.dumps(sent), backend, asked, rows, plan, tuple(course))
-    width = _width(len(x), chunk, crew, whole=bool(course))
-    p = np.stack([own[name] for name in problem.parameters], axis=1) if own else x[:, :0]
-    chunks = [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)]
-    result = _Result(len(x), rows, x.shape[1])
+
+def _grids(program: StepProgram, options: RunOptions) -> list[StepGrid]:
+    """The equal steps of trajectories side by side; empty where they have to go one after another."""
+    if program.adaptive or branch_free(program) is None:
+        return []
+    grids = step_grids(options)
+    return grids if sum(grid.steps * grid.rows for grid in grids) <= options.max_steps else []
+
+
+def _chunks(start: Starts, parameters: Sequence[str], width: int) -> list[Chunk]:
+    x = start.x
+    p = np.stack([start.varied[name] for name in parameters], axis=1) if parameters else x[:, :0]
+    return [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)]
+
+
+def _width(count: int, chunk: int | None, workers: int | Map, *, whole: bool) -> int:
+    """Trajectories in a chunk; whole: of whole vectors, so that a trajectory has the same neighbors in any chunk."""
+    if chunk is None:
+        chunk = min(LARGEST, math.ceil(count / (SHARES * (UNKNOWN if callable(workers) else workers))))
+    return math.ceil(chunk / VECTOR) * VECTOR if whole else int(chunk)
+
+
+def _run(task: Task, chunks: Sequence[Chunk], workers: int | Map, result: EnsembleRows) -> None:
+    """Run the chunks, by whoever shares them, until all parts have come, or Ctrl-C."""
     try:
         with (
-            Progress("simulate", len(x), progress) as report,
-            closing(finished(task, chunks, crew, result.rows)) as parts,
+            Progress("simulate", len(result.rows), task.options.progress) as report,
+            closing(finished(task, chunks, workers, result.rows)) as parts,
         ):
             for part in parts:
                 result.add(part)
@@ -123,52 +203,3 @@ def simulate_many(
         result.check()
     except KeyboardInterrupt:
         pass
-    seconds = time.perf_counter() - begin
-
-    times = asked if asked is not None else np.append(t_end / steps * np.arange(steps), t_end)
-    half = len(problem.system.coordinates) if problem.system is not None else problem.size
-    stats, table = result.stats(method, seconds), result.rows
-    return Ensemble(times, table[:, :, :half], table[:, :, half:], stats)
-
-
-class _Result:
-    """The parts that have come, put together."""
-
-    def __init__(self, count: int, rows: int, m: int) -> None:
-        self.rows = np.empty((count, rows, m))
-        self.steps, self.rejected, self.evaluations = np.zeros((3, count), dtype=np.int64)
-        self.dt, self.status = np.zeros(count), ["interrupted"] * count
-        self.arrived = np.zeros(count, dtype=bool)
-
-    def add(self, part: Part) -> None:
-        """One more."""
-        here = slice(part.first, part.first + len(part.rows))
-        if not np.may_share_memory(part.rows, self.rows):  # from another process
-            self.rows[here] = part.rows
-        for name in ("steps", "rejected", "evaluations", "dt"):
-            getattr(self, name)[here] = getattr(part, name)
-        self.status[here] = [each or "reached t_end" for each in part.status]
-        self.arrived[here] = True
-
-    def check(self) -> None:
-        """All parts have come. Raises ValueError otherwise."""
-        if not self.arrived.all():
-            raise ValueError(
-                "workers must give a result for each item, as map does: of "
-                f"{len(self.rows)} trajectories came back {self.arrived.sum()}"
-            )
-
-    def stats(self, method: str, seconds: float) -> EnsembleStats:
-        """How it went."""
-        self.rows[~self.arrived] = math.nan
-        complete = np.array([each == "reached t_end" for each in self.status])
-        return EnsembleStats(
-            method, self.steps, self.rejected, self.evaluations, self.dt, seconds, complete, tuple(self.status)
-        )
-
-
-def _width(count: int, chunk: int | None, workers: int | Map, *, whole: bool) -> int:
-    """Trajectories in a chunk; whole: of whole vectors, so that each has the same neighbours in any chunk."""
-    if chunk is None:
-        chunk = min(LARGEST, math.ceil(count / (SHARES * (UNKNOWN if callable(workers) else workers))))
-    return math.ceil(chunk / VECTOR) * VECTOR if whole else int(chunk)

@@ -1,4 +1,4 @@
-"""Stretches: the equal steps, at most dt long, between instants that have to be met."""
+"""StepGrid: equal steps, at most dt long, between instants that have to be met."""
 
 from __future__ import annotations
 
@@ -8,40 +8,48 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..run_options import step_count
+from ..run_options import RunOptions, step_count
 
 SAME = 4.0  # units of the last bit of the time, by which instants may miss an even spacing
 
 
-class Stretch(NamedTuple):
-    """From `begin` on, `rows` instants, each after `each` steps of h [s]."""
+class StepGrid(NamedTuple):
+    """From `begin` on, `rows` evenly spaced instants, each after `steps` steps of h [s]."""
 
     begin: float
     h: float
-    each: int
+    steps: int
     rows: int
 
-    def pieces(self, most_passes: int, most_rows: int) -> Iterator[tuple[int, int, bool]]:
-        """(steps, steps for a row, whether the rows are instants) of pieces with at most so many steps and rows."""
-        if self.each <= most_passes:
-            most = max(1, min(most_passes // self.each, most_rows))
+    def blocks(self, most_passes: int, most_rows: int) -> Iterator[tuple[int, int, bool]]:
+        """(steps, steps for a row, whether the rows are instants) of blocks with at most so many steps and rows."""
+        if self.steps <= most_passes:
+            most = max(1, min(most_passes // self.steps, most_rows))
             for done in range(0, self.rows, most):
-                yield min(most, self.rows - done) * self.each, self.each, True
+                yield min(most, self.rows - done) * self.steps, self.steps, True
             return
         for _ in range(self.rows):
-            for done in range(0, self.each, most_passes):
-                steps = min(most_passes, self.each - done)
-                yield steps, steps, done + steps == self.each
+            for done in range(0, self.steps, most_passes):
+                steps = min(most_passes, self.steps - done)
+                yield steps, steps, done + steps == self.steps
 
 
-def stretches(instants: Sequence[float], dt: float) -> list[Stretch]:
-    """The steps from the first instant through all others; those evenly spaced, to rounding, make one stretch."""
+def step_grids(options: RunOptions) -> list[StepGrid]:
+    """The equal steps of a run: one grid where every step is a row, else those between its instants."""
+    if options.times is not None:
+        return grids_between(options.instants, options.step)
+    steps = step_count(options.t_end, options.step)
+    return [StepGrid(0.0, options.t_end / steps, 1, steps)]
+
+
+def grids_between(instants: Sequence[float], dt: float) -> list[StepGrid]:
+    """The steps from the first instant through all others; those evenly spaced, to rounding, make one grid."""
     if len(instants) < 2:
         return []
     times = np.array(instants)
     gaps, ulps = np.diff(times), np.spacing(times[1:])
     breaks = np.flatnonzero(np.abs(np.diff(gaps)) > SAME * ulps[1:]) + 1
-    found: list[Stretch] = []
+    grids: list[StepGrid] = []
     for first, last in itertools.pairwise([0, *breaks.tolist(), len(gaps)]):
         begin, rows = float(times[first]), last - first
         gap = (float(times[last]) - begin) / rows
@@ -49,5 +57,5 @@ def stretches(instants: Sequence[float], dt: float) -> list[Stretch]:
         parts = [(begin, gap, rows)] if even else [(times[k], gaps[k], 1) for k in range(first, last)]
         for start, length, count in parts:
             steps = step_count(length, dt)
-            found.append(Stretch(float(start), float(length) / steps, steps, count))
-    return found
+            grids.append(StepGrid(float(start), float(length) / steps, steps, count))
+    return grids

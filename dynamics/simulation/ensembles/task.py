@@ -2,60 +2,36 @@
 
 from __future__ import annotations
 
-import copy
 import pickle
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, cast
 
 import numpy as np
 
-from cgraph.extend import Record, Runner, runner
+from cgraph.extend import Array, runner
 
-from ..recorder import Rows
-from ..run_options import Limits
-from ..stepping import AdaptiveRun, FixedRun
-from ..trajectory import Array
+from ..recorder import Recorder
+from ..run_options import RunOptions
+from ..step_program import CompiledSteps, StepProgram, compile_steps
+from ..stepping import StoppedError, integration
+from .branch_free import branch_free
 from .chunk import Chunk, Part, empty
-from .serialized import Portable
-from .step_grid import Stretch
-from .vectorized import SideBySide, Together
+from .step_grid import StepGrid
+from .vectorized import VectorCode, VectorizedIntegration
 
 KEPT = 8  # programs that a process keeps ready
 
 
-class StoppedError(Exception):
-    """Nobody waits for the part any more."""
-
-
-class _Watched:
-    """A runner that looks up before each piece, of which a run makes many between two rows."""
-
-    def __init__(self, runner: Runner, stopped: Callable[[], bool]) -> None:
-        self._runner, self._stopped = runner, stopped
-
-    def run(self, memory: Array, passes: int, every: int = 1) -> Record:
-        """As the runner does. Raises StoppedError."""
-        if self._stopped():
-            raise StoppedError
-        return self._runner.run(memory, passes, every)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._runner, name)
-
-
 @dataclass(frozen=True)
 class Task:
-    """The function that runs chunks. It goes to other processes as it is, and is made ready there once."""
+    """The function that runs chunks. It goes to other processes as it is, and is compiled there once."""
 
-    pickled: bytes  # a Portable; that it is the same as another's is seen without reading it
-    backend: str
-    asked: Array | None  # times of the rows; None: every step
-    count: int  # of the rows
-    plan: Mapping[str, Any]  # what FixedRun or AdaptiveRun takes
-    stretches: tuple[Stretch, ...]  # of trajectories side by side; empty: one after another
+    pickled: bytes  # a StepProgram; that it is the same as another's is seen without reading it
+    options: RunOptions
+    count: int  # of the rows of a trajectory
+    grids: tuple[StepGrid, ...]  # of trajectories side by side; empty: one after another
 
     def __call__(self, chunk: Chunk) -> Part:
         """Run the chunk."""
@@ -65,35 +41,34 @@ class Task:
         """Run the chunk into rows (k, T, m). Raises StoppedError soon after it was stopped."""
         part = empty(chunk, rows)
         with np.errstate(all="ignore"):
-            (self._side_by_side if self.stretches else self._one_by_one)(chunk, part, stopped)
+            (self._side_by_side if self.grids else self._one_by_one)(chunk, part, stopped)
         return part
 
     def _side_by_side(self, chunk: Chunk, part: Part, stopped: Callable[[], bool]) -> None:
         with _lock:
-            code = _together(self.pickled, self.backend)
-        at = int(self.asked is None or self.asked[0] == 0.0)
+            code = _vector_code(self.pickled, self.options.backend)
+        times = self.options.times
+        at = int(times is None or times[0] == 0.0)
         part.rows[:, :at] = chunk.x[:, None]
-        run = SideBySide(code, chunk, part, at)
-        for stretch in self.stretches:
-            run.begin(stretch)
-            for piece in stretch.pieces(*run.limits):
+        run = VectorizedIntegration(code, chunk, part, at)
+        for grid in self.grids:
+            run.begin(grid)
+            for block in grid.blocks(*run.limits):
                 if stopped():
                     raise StoppedError
-                run.advance(*piece)
+                run.advance(*block)
         run.end()
 
     def _one_by_one(self, chunk: Chunk, part: Part, stopped: Callable[[], bool]) -> None:
         with _lock:
-            template = _alone(self.pickled, self.backend)
+            compiled = _compiled(self.pickled, self.options.backend)
         for k, x in enumerate(chunk.x):
-            run = copy.copy(template)  # with the same machine code
-            watched = _Watched(template.runner, stopped)
-            vars(run).update(self.plan, parameters=chunk.p[k].tolist(), runner=watched)
-            rows = Rows(x, self.asked)
-            for piece in run.pieces(x):
-                rows.add(piece)
-            found = rows.table()[1]
-            part.rows[k, : len(found)], part.rows[k, len(found) :] = found, np.nan
+            run = integration(compiled, self.options, chunk.p[k].tolist(), stopped)
+            recorder = Recorder(x, self.options.times)
+            for block in run.blocks(x):
+                recorder.add(block)
+            states = recorder.table()[1]
+            part.rows[k, : len(states)], part.rows[k, len(states) :] = states, np.nan
             part.steps[k], part.rejected[k], part.evaluations[k] = run.steps, run.rejected, run.evaluations
             part.dt[k], part.status[k] = run.largest, run.status
 
@@ -102,22 +77,18 @@ _lock = threading.Lock()  # threads that come at the same time wait for one to m
 
 
 @lru_cache(KEPT)
-def _together(pickled: bytes, backend: str) -> Together:
-    problem: Portable = pickle.loads(pickled)  # noqa: S301  # it came with the task itself
-    programs = problem.straight()
+def _vector_code(pickled: bytes, backend: str) -> VectorCode:
+    program: StepProgram = pickle.loads(pickled)  # noqa: S301  # it came with the task itself
+    programs = branch_free(program)
     assert programs is not None
     start = None if programs.start is None else runner(programs.start, backend)
-    many = runner(programs.one_pass, backend)
-    for each in (start, many):
-        if each is not None:
-            each.run_many(np.zeros((each.size, 0)), 0)  # the code for vectors is made at its first use
-    return Together(problem, start, many)
+    one_pass = runner(programs.one_pass, backend)
+    for code in (start, one_pass):
+        if code is not None:
+            code.run_many(np.zeros((code.size, 0)), 0)  # the code for vectors is compiled at its first use
+    return VectorCode(program, start, one_pass)
 
 
 @lru_cache(KEPT)
-def _alone(pickled: bytes, backend: str) -> FixedRun | AdaptiveRun:
-    """A run to be copied; its numbers come from `plan`."""
-    problem = cast(Any, pickle.loads(pickled))  # noqa: S301  # it came with the task itself
-    if problem.adaptive:
-        return AdaptiveRun(problem, problem, (), backend, Limits(), dense=True)
-    return FixedRun(problem, problem, (), backend, instants=(), dt=1.0, each=False, most=0.0)
+def _compiled(pickled: bytes, backend: str) -> CompiledSteps:
+    return compile_steps(pickle.loads(pickled), backend)  # noqa: S301  # it came with the task itself

@@ -10,9 +10,8 @@ from queue import Empty, SimpleQueue
 
 import numpy as np
 
-from cgraph.extend import thread_count
+from cgraph.extend import Array, thread_count
 
-from ..trajectory import Array
 from .chunk import Chunk, Part
 from .task import Task
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from fractions import Fraction
 from functools import partial
 from itertools import pairwise
 
@@ -12,9 +13,9 @@ import pytest
 
 import cgraph as cg
 from cgraph import GraphError
-from cgraph.autodiff.elimination_order import steps
+from cgraph.autodiff.elimination_order import elimination_steps
 from cgraph.autodiff.hessian_solve import solve_nodes
-from cgraph.autodiff.ldl_solve import SingularError, ldl_solve
+from cgraph.autodiff.ldl_solve import SingularError, ldl_elimination, ldl_solve
 from cgraph.autodiff.rotation_pairs import rotations
 from cgraph.core.traversal import topological
 
@@ -263,7 +264,7 @@ def test_steps_are_those_of_the_order_from_its_end_with_rotations_by_one_angle_a
         for node in order
         if node not in inside
     }
-    plan = steps(arguments, found)
+    plan = elimination_steps(arguments, found)
     assert sorted(len(step) for step in plan if isinstance(step, list)) == [1, 1, 2]
     done: set[cg.Node] = set()
     for step in plan:
@@ -271,7 +272,7 @@ def test_steps_are_those_of_the_order_from_its_end_with_rotations_by_one_angle_a
         assert all(user in done for user, args in arguments.items() if {*taken} & {*args})
         done.update(taken)
     assert done == arguments.keys()
-    assert steps(dict.fromkeys(x, ()), {}) == x[::-1]
+    assert elimination_steps(dict.fromkeys(x, ()), {}) == x[::-1]
 
 
 def test_a_right_hand_side_at_a_product_within_a_rotation_is_carried_too() -> None:
@@ -286,3 +287,13 @@ def test_a_right_hand_side_at_a_product_within_a_rotation_is_carried_too() -> No
     graph = cg.Graph([a, *x, *b], {f"s{i}": node for i, node in enumerate([*carried, *apart])})
     found = cg.compile(graph)(np.random.default_rng(0).uniform(0.2, 0.8, 6))
     assert found[:2] == pytest.approx(found[2:], rel=1e-13)
+
+
+def test_elimination_is_exact_over_fractions() -> None:
+    matrix = [[4, 1, 2], [1, 5, 3], [2, 3, 6]]
+    expected = [Fraction(1, 3), Fraction(-2, 7), Fraction(5)]
+    rhs = [sum(a * x for a, x in zip(row, expected, strict=True)) for row in matrix]
+    lower = [[Fraction(entry) for entry in row[: i + 1]] for i, row in enumerate(matrix)]
+    x, pivots = ldl_elimination(lower, rhs)
+    assert x == expected
+    assert pivots[0] * pivots[1] * pivots[2] == 70  # the determinant

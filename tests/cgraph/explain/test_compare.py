@@ -47,7 +47,7 @@ def test_every_node_is_counted_once_and_pairs_are_alike(one: Case, other: Case):
 @given(cases(max_operations=12), cases(max_operations=12))
 def test_both_graphs_are_in_the_one_of_both(one: Case, other: Case):
     found = compare(one.graph, other.graph)
-    both = found.together()
+    both = found.overlay()
     both.graph.check()
     values = {name: (one.values | other.values)[name] for name in both.graph.input_names}
     together = both.graph.evaluate(values)
@@ -91,7 +91,7 @@ def test_the_chain_rule_and_by_definition_differ_by_the_embedding():
     assert found.classes("right")["spurious adjoint"] == len(dyn.spurious_nodes(embedded))
     assert set(found.classes("left")) == {"needed"}
     assert len(found.common) > 2 * len(compare(chain, embedded).common)  # without atoms, q is never the same
-    both = found.together()
+    both = found.overlay()
     assert {"right q0", "right qd2", "left tau0", "right tau0"} <= set(both.graph.outputs)
     text = json.dumps(found.to_dict(), allow_nan=False)
     assert '"class": "spurious adjoint"' in text
@@ -101,7 +101,7 @@ def test_two_runs_are_byte_for_byte_the_same():
     program = (
         "import json, dynamics as dyn; from cgraph.explain import compare; arm = dyn.planar_arm([1.0] * 2, [1.0] * 2);"
         "d = compare(dyn.inverse_dynamics(arm), dyn.inverse_dynamics(arm, 'kinetic_only'), atoms='q0 q1 qd0 qd1');"
-        "print(d, json.dumps(d.to_dict()), d.together().graph.listing())"
+        "print(d, json.dumps(d.to_dict()), d.overlay().graph.listing())"
     )
     runs = {
         subprocess.run(
@@ -129,7 +129,7 @@ def test_a_graph_does_not_differ_from_itself_however_deep():
     found = compare(graph, cg.Graph([x], graph(x)))
     assert len(found.common) == len(graph.nodes)
     assert str(found).splitlines()[-1] == "Computed alike: f."
-    assert len(found.together().graph.nodes) == len(graph.nodes)
+    assert len(found.overlay().graph.nodes) == len(graph.nodes)
 
 
 def test_a_variable_that_neither_graph_uses_is_an_atom_all_the_same() -> None:

@@ -56,18 +56,18 @@ def test_a_carry_that_trades_places(backend: str) -> None:
 
 
 def test_what_does_not_change_is_computed_before_the_first_pass(backend: str) -> None:
-    x, k, still0 = cg.variables("x k still0")
-    graph = cg.Graph([k, x, still0], {"next": x * cg.exp(-k) + cg.sin(k) * still0, "same": cg.sqrt(k)})
+    x, k, taken = cg.variables("x k invariant0")
+    graph = cg.Graph([k, x, taken], {"next": x * cg.exp(-k) + cg.sin(k) * taken, "same": cg.sqrt(k)})
     run = cg.loop(graph, {"x": "next"}, backend, fma=False)
-    assert run.before is not None
-    assert [len(run.before.outputs), run.before.input_names] == [2, ("k", "still0")]
+    assert run.invariants is not None
+    assert [len(run.invariants.outputs), run.invariants.input_names] == [2, ("k", "invariant0")]
     values = [0.7, 1.0, 2.0]
     expected = 1.0
     for _ in range(3):
-        expected = graph.evaluate({"k": 0.7, "x": expected, "still0": 2.0})["next"]
+        expected = graph.evaluate({"k": 0.7, "x": expected, "invariant0": 2.0})["next"]
     assert run(values, 3)[-1, 0] == expected
     assert run.batch(np.array([values] * 5).T, 3)[-1, 0].tolist() == [expected] * 5
-    assert cg.loop(spring(), {"x": "x_next", "v": "v_next"}, backend).before is None
+    assert cg.loop(spring(), {"x": "x_next", "v": "v_next"}, backend).invariants is None
 
 
 def test_registers_that_are_read_and_written(backend: str) -> None:
@@ -222,7 +222,7 @@ def test_wrong_use_of_a_runner(backend: str) -> None:
         run.run(np.zeros(2), 1)
     with pytest.raises(cg.GraphError, match="passes must be at least 0 and every at least 1, got -1 and 1"):
         run.run(np.zeros(1), -1)
-    with pytest.raises(cg.GraphError, match="runs side by side need the same course for all: no While"):
+    with pytest.raises(cg.GraphError, match="runs side by side need a branch-free program: no While"):
         run.run_many(np.zeros((1, 3)), 1)
 
 

@@ -9,14 +9,15 @@ from pytest import approx
 import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.coriolis import coriolis, damping_force
-from dynamics.equations.evaluate_at import at_state
+from dynamics.equations.evaluate_at import evaluate_at
 from dynamics.systems.model import as_system
 from tests.dynamics.mechanisms import FAMILIES
 from tests.dynamics.models import MODELS, Array, magnetic, random_arm, relativistic, states
 
 STEP = 1e-3  # of differences of fourth order: they are right to some 1e-11
-DIFFERENCES = 1e-9
+DIFFERENCES = 1e-9  # of the largest entry: their rounding, magnified by 1 / STEP
 ROUNDING = 1e-12  # of the largest entry
+EPSILON = 1e-15  # of entries that are zero but for rounding, in units of the problem, which are of the order of one
 
 MECHANISMS = {name: lambda make=make: make(5) for name, make in FAMILIES.items()}
 SCLERONOMIC = {name: MODELS[name] for name in ("arm of 1", "arm of 3", "coupled springs", "cart pendulum", "magnetic")}
@@ -24,7 +25,7 @@ SCLERONOMIC = {name: MODELS[name] for name in ("arm of 1", "arm of 3", "coupled 
 
 def matrix(graph: cg.Graph, model: object, **state: Array) -> Array:
     n = as_system(model).n
-    return at_state(as_system(model), graph, state).reshape(-1, n, n)
+    return evaluate_at(as_system(model), graph, state).reshape(-1, n, n)
 
 
 @pytest.mark.parametrize("name", FAMILIES)
@@ -50,7 +51,7 @@ def test_of_two_links_it_is_the_textbook_s() -> None:
     h = -arm.links[1].mass * arm.links[0].length * arm.links[1].center * np.sin(q[:, 1])
     rows = [[h * qd[:, 1], h * (qd[:, 0] + qd[:, 1])], [-h * qd[:, 0], 0 * h]]
     found = matrix(coriolis(arm), arm, q=q, qd=qd)
-    assert found == approx(np.moveaxis(np.array(rows), 2, 0), rel=ROUNDING, abs=1e-15)
+    assert found == approx(np.moveaxis(np.array(rows), 2, 0), rel=ROUNDING, abs=EPSILON)
 
 
 @pytest.mark.parametrize("name", [*MECHANISMS, *SCLERONOMIC])
@@ -59,7 +60,7 @@ def test_it_gives_the_bias_and_leaves_a_skew_matrix(name: str) -> None:
     system, given = as_system(model), states(model, 10)
     q, qd = given["q"], given["qd"]
     found = matrix(coriolis(model), model, q=q, qd=qd)
-    bias, gravity = (at_state(system, graph, given) for graph in (dyn.bias(model), dyn.gravity_force(model)))
+    bias, gravity = (evaluate_at(system, graph, given) for graph in (dyn.bias(model), dyn.gravity_force(model)))
     assert np.einsum("sij,sj->si", found, qd) + gravity == approx(bias, abs=ROUNDING * abs(bias).max())
     along = cg.jvp(dyn.mass_matrix(model), system.q)
     values = {f"q{i}": q[:, i] for i in range(system.n)} | {f"q{i}_dot": qd[:, i] for i in range(system.n)}
@@ -77,7 +78,7 @@ def test_forces_linear_in_velocity_count_in_full() -> None:
 
 
 def test_a_lagrangian_that_is_not_quadratic_is_refused() -> None:
-    with pytest.raises(ValueError, match="quadratic in the velocities, its mass matrix depends on qd0"):
+    with pytest.raises(ValueError, match=r"quadratic in the velocities, its mass matrix .* of '\w+' \(qd0\)"):
         coriolis(relativistic())
 
 
@@ -85,5 +86,5 @@ def test_damping_takes_its_coefficient_times_the_velocity() -> None:
     arm = random_arm(3)
     graph = damping_force(arm)
     qd = np.array([1.0, -2.0, 3.0])
-    assert at_state(arm.system, graph, {"qd": qd, "q": qd}) == approx(np.array(arm.damping) * qd)
+    assert evaluate_at(arm.system, graph, {"qd": qd, "q": qd}) == approx(np.array(arm.damping) * qd)
     assert {tag for node in graph.nodes for tag in node.tags} == {"damping"}

@@ -13,10 +13,11 @@ import dynamics as dyn
 from dynamics.equations.coriolis import coriolis
 from tests.dynamics.models import Array
 
+OFF = 1e-9  # m, of an error of 0.1 m: RK4's fourth power of the step
 RESIDUAL = 1e-8  # N, of forces of some 10 N: the rounding of the plant's accelerations
 INERTIA, DAMPING, STIFFNESS = 2.0, 20.0, 50.0  # kg, N s/m, N/m of each axis: critically damped, rate 5 /s
 RATE = 5.0
-STEPS, DT = 400, 1e-3
+STEPS, DT = 400, 1e-3  # s
 
 
 def robot() -> dyn.Mechanism:
@@ -99,7 +100,7 @@ def test_on_our_own_plant() -> None:
     forward = cg.compile(dyn.forward_dynamics(robot()), "python")
     residual, off = closed_loop(lambda q, qd, tau: forward(np.concatenate([q, qd, tau])))
     assert residual < RESIDUAL
-    assert off == approx(0.0, abs=1e-9)  # of RK4
+    assert off == approx(0.0, abs=OFF)
 
 
 def test_on_mujoco_s_plant(record_property: Callable[[str, object], None]) -> None:
@@ -110,4 +111,4 @@ def test_on_mujoco_s_plant(record_property: Callable[[str, object], None]) -> No
     record_property("residual [N]", residual)
     print(f"residual {residual:.1e} N, off the solution {off:.1e} m")  # noqa: T201
     assert residual < RESIDUAL
-    assert off < 1e-9
+    assert off < OFF

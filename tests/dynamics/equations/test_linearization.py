@@ -1,4 +1,4 @@
-"""Linearisation against differences of other programs' accelerations, Pinocchio's derivatives, and closed forms."""
+"""Linearization against differences of other programs' accelerations, Pinocchio's derivatives, and closed forms."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ import pytest
 from pytest import approx
 
 import dynamics as dyn
-from dynamics.equations.evaluate_at import at_state
+from dynamics.equations.evaluate_at import evaluate_at
 from dynamics.equations.linearization import linearize, state_space
 from dynamics.systems.model import as_system
 from tests.dynamics.mechanisms import FAMILIES, turned_arm
 from tests.dynamics.models import MODELS, Array, at, random_arm, states
 
-STEP = 1e-3
+STEP = 1e-3  # of the differences, in units of the state
 DIFFERENCES = 1e-7  # fourth order at that step, of what M^-1 magnifies
-ROUNDING = 1e-11
+ROUNDING = 1e-11  # of the largest entry, which M^-1 has magnified
+ONE_BY_ONE = 1e-9  # arrays and floats: sine and cosine of NumPy and of the C library, magnified by M^-1
 
 
 def differences(rate: object, x: Array) -> Array:
@@ -41,7 +42,7 @@ def test_it_is_the_slope_of_forward_dynamics(name: str) -> None:
     n, t, accelerations = system.n, 0.3, dyn.forward_dynamics(model)
 
     def rate(x: Array) -> Array:
-        qdd = at_state(system, accelerations, {"q": x[:n], "qd": x[n : 2 * n], "tau": x[2 * n :]}, t)
+        qdd = evaluate_at(system, accelerations, {"q": x[:n], "qd": x[n : 2 * n], "tau": x[2 * n :]}, t)
         return np.concatenate([x[n : 2 * n], qdd])
 
     expected = differences(rate, np.concatenate([state["q"], state["qd"], state["tau"]]))
@@ -94,9 +95,9 @@ def test_the_graph_takes_many_states_and_is_smaller_than_that_of_forward_dynamic
     graph = state_space(arm)
     assert len(graph.nodes) < 18_000  # 30 000 by reverse mode through forward dynamics
     given = states(arm, 3)
-    rows = at_state(arm.system, graph, given)
+    rows = evaluate_at(arm.system, graph, given)
     one = np.concatenate([each.ravel() for each in linearize(arm, *(given[name][1] for name in ("q", "qd", "tau")))])
-    assert rows[1] == approx(one, rel=1e-9, abs=1e-9)
+    assert rows[1] == approx(one, rel=ONE_BY_ONE, abs=ONE_BY_ONE)
 
 
 def test_one_state_at_a_time() -> None:

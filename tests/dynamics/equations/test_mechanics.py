@@ -14,6 +14,8 @@ from tests.dynamics.models import MODELS, Array, at, cart_pendulum, error, input
 
 STATES = 50
 ROUNDING = 1e-12  # sums of terms that may cancel tenfold
+LARGEST = 100.0  # N m, torques of random arms
+LEFT = 1e-11  # what is left of ROUNDING when a term ten times as large is taken away
 ILL_CONDITIONED = 1e-10  # the same through M and M^-1, whose condition number reaches 3e3 with six links
 QUADRATIC = [name for name in MODELS if name not in ("driven pendulum", "magnetic", "relativistic")]
 
@@ -143,7 +145,7 @@ def test_the_bias_of_an_arm_is_quadratic_in_velocity_beside_gravity(n: int) -> N
     state = states(arm, STATES)
     bias, gravity = dyn.bias(arm), run(dyn.gravity_force(arm), state)
     once, twice = (run(bias, {**state, "qd": factor * state["qd"]}) - gravity for factor in (1.0, 2.0))
-    assert error(twice, 4.0 * once) < 1e-11  # what is left of ROUNDING when gravity is taken away
+    assert error(twice, 4.0 * once) < LEFT
 
 
 @mark.parametrize("n", [2, 5])
@@ -153,7 +155,7 @@ def test_turning_the_whole_arm_changes_gravity_and_nothing_else(n: int) -> None:
     state = states(weightless, STATES)
     turned = {**state, "q": state["q"] + np.eye(n)[0] * 1.1}
     for make in (dyn.inverse_dynamics, dyn.mass_matrix, dyn.bias, dyn.energy):
-        assert run(make(weightless), turned) == approx(run(make(weightless), state), rel=1e-11, abs=1e-11)
+        assert run(make(weightless), turned) == approx(run(make(weightless), state), rel=LEFT, abs=LEFT)
     assert run(dyn.gravity_force(weightless), state) == approx(0.0, abs=0.0)
     assert error(run(dyn.bias(dyn.planar_arm(*links)), turned), run(dyn.bias(dyn.planar_arm(*links)), state)) > 0.1
 
@@ -164,6 +166,6 @@ def test_damping_adds_its_coefficient_times_velocity_to_the_torque(n: int) -> No
     assert [link.mass for link in damped.links] == [link.mass for link in plain.links]
     state = states(damped, STATES)
     more = run(dyn.inverse_dynamics(damped), state) - run(dyn.inverse_dynamics(plain), state)
-    assert more == approx(np.array(damped.damping) * state["qd"], rel=0.0, abs=1e-12)  # N m, of torques of 100 N m
+    assert more == approx(np.array(damped.damping) * state["qd"], rel=0.0, abs=ROUNDING * LARGEST)
     for make in (dyn.bias, dyn.mass_matrix, dyn.energy, dyn.momentum):  # damping is in none of them
         assert (run(make(damped), state) == run(make(plain), state)).all()

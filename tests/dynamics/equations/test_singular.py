@@ -10,9 +10,14 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.equations_of_motion import SingularMassMatrixError, forward_dynamics, raise_if_singular
+from dynamics.equations.equations_of_motion import (
+    SOLUTIONS,
+    SingularMassMatrixError,
+    forward_dynamics,
+    raise_if_singular,
+)
 
-METHODS = ["recursive", "dense"]
+METHODS = [name for name in SOLUTIONS if name != "auto"]
 
 
 def accelerations(system: dyn.System, method: str, **values: float) -> dict[str, float]:

@@ -6,12 +6,13 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics.equations.equations_of_motion import SOLUTIONS
 from tests.dynamics.mechanisms import FAMILIES, turned_arm
 
 MODELS = {name: lambda name=name: dyn.scenes.load(name) for name in dyn.scenes.names()}
 MODELS |= {"turned": lambda: turned_arm(3), "mixed": lambda: FAMILIES["mixed"](3)}
 GRAPHS = {name: lambda model, name=name: dyn.inverse_dynamics(model, name) for name in dyn.FORMULATIONS}
-GRAPHS |= {name: lambda model, name=name: dyn.forward_dynamics(model, name) for name in ("recursive", "dense")}
+GRAPHS |= {name: lambda model, name=name: dyn.forward_dynamics(model, name) for name in SOLUTIONS}
 
 
 def untagged(graph: cg.Graph) -> list[cg.Node]:

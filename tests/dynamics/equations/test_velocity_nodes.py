@@ -1,4 +1,4 @@
-"""Rates among the nodes of a Lagrangian: which are found, that they are rates, and that the bias is what it was."""
+"""Velocity nodes of a Lagrangian: which are recognized, that they are time derivatives, and the bias made of them."""
 
 from __future__ import annotations
 
@@ -10,16 +10,19 @@ import dynamics as dyn
 from cgraph.core.traversal import topological
 from cgraph.simplify.builder import Builder, folded
 from dynamics.equations.equations_of_motion import bias
-from dynamics.equations.velocity_nodes import rates
+from dynamics.equations.velocity_nodes import velocity_nodes
 from tests import high_precision
 
 N = 3
+ZERO = 1e-45  # of numbers of the order of one, in 50 digits
+SEEN = 1e-3  # of the same: a derivative that is not zero
+FOLDED = 1e-14  # constants of a graph are folded in floats, some ten of them one after the other
 q, qd, qdd = ([cg.variable(f"{name}{i}") for i in range(N)] for name in ("q", "qd", "qdd"))
 t, k = cg.variables("t k")
 angle, omega = q[0] + q[1], qd[0] + qd[1]
 swing = k * cg.cos(q[0]) * qd[0] + 0.7 * cg.cos(angle) * omega
 
-RATES = {
+VELOCITIES = {
     "velocity": qd[1],
     "sum": omega,
     "difference": qd[0] - 2.0 * qd[2],
@@ -43,16 +46,16 @@ OTHERS = {
     "a function of its position and of time": cg.cos(q[0] + t) * qd[0],
     "a square": omega * omega,
     "a function of a velocity": cg.sin(qd[0]),
-    "a product with a sum of rates": cg.cos(q[0]) * swing,
-    "one over a rate": 1.0 / omega,
+    "a product with a sum of velocities": cg.cos(q[0]) * swing,
+    "one over a velocity": 1.0 / omega,
 }
 
 
-def found(node: cg.Node) -> tuple[cg.Node, list[cg.Node]]:
-    """The node, folded, and the rates that it is made from."""
+def recognized(node: cg.Node) -> tuple[cg.Node, list[cg.Node]]:
+    """The node, folded, and the velocity nodes that it is made from."""
     build = Builder()
     (copy,) = folded([node], build)
-    return copy, rates(copy, q, qd, t, build)
+    return copy, velocity_nodes(copy, q, qd, t, build)
 
 
 def euler_lagrange(node: cg.Node) -> list[float]:
@@ -66,44 +69,46 @@ def euler_lagrange(node: cg.Node) -> list[float]:
     return [abs(float(x)) for x in high_precision.evaluate(graph, values).values()]
 
 
-@pytest.mark.parametrize("name", RATES)
-def test_a_rate_is_found_and_lagrange_s_equation_makes_nothing_of_it(name):
-    node, velocities = found(RATES[name])
+@pytest.mark.parametrize("name", VELOCITIES)
+def test_a_velocity_node_is_recognized_and_lagrange_s_equation_makes_nothing_of_it(name):
+    node, velocities = recognized(VELOCITIES[name])
     assert velocities == [node]
-    assert max(euler_lagrange(RATES[name])) < 1e-45
+    assert max(euler_lagrange(VELOCITIES[name])) < ZERO
 
 
 @pytest.mark.parametrize("name", OTHERS)
-def test_what_is_no_rate_is_not_taken_for_one(name):
-    node, velocities = found(OTHERS[name])
+def test_what_is_no_time_derivative_is_not_taken_for_one(name):
+    node, velocities = recognized(OTHERS[name])
     assert node not in velocities
-    assert max(euler_lagrange(OTHERS[name])) > 1e-3
+    assert max(euler_lagrange(OTHERS[name])) > SEEN
 
 
-def test_every_node_that_is_taken_for_a_rate_is_one():
-    node, velocities = found(
-        sum([a * b for a in RATES.values() for b in (*RATES.values(), *OTHERS.values())], cg.constant(0.0))
+def test_every_node_that_is_taken_for_a_velocity_node_is_one():
+    node, velocities = recognized(
+        sum([a * b for a in VELOCITIES.values() for b in (*VELOCITIES.values(), *OTHERS.values())], cg.constant(0.0))
     )
-    assert len(velocities) >= len(RATES)
+    assert len(velocities) >= len(VELOCITIES)
     for each in velocities:
-        assert max(euler_lagrange(each)) < 1e-45
+        assert max(euler_lagrange(each)) < ZERO
     assert set(velocities) < set(topological([node]))
 
 
 LAGRANGIANS = {
-    "products of rates": lambda: swing * swing + omega * qd[2] * cg.cos(q[2]) + qd[2] * qd[2],
-    "a rate alone": lambda: swing,
+    "products of velocities": lambda: swing * swing + omega * qd[2] * cg.cos(q[2]) + qd[2] * qd[2],
+    "a sum of velocities alone": lambda: swing,
     "a velocity alone": lambda: qd[0],
     "no velocity": lambda: cg.cos(q[0]) * q[1],
-    "rates and others": lambda: (
+    "velocity nodes and others": lambda: (
         swing * swing * cg.cos(q[1]) + OTHERS["a function of one of two"] * swing + qd[2] * qd[2]
     ),
-    "a rate within a rate and without": lambda: omega * omega + swing * omega + (swing + omega) * (swing + omega),
+    "a velocity node within another and without": lambda: (
+        omega * omega + swing * omega + (swing + omega) * (swing + omega)
+    ),
     "explicit time": lambda: (
         (swing + cg.sin(t)) * (swing * cg.cos(t)) + OTHERS["a function of its position and of time"]
     ),
     "not quadratic": lambda: cg.exp(swing) + cg.sqrt(1.0 + omega * omega) * cg.cos(angle),
-    "all": lambda: sum([a * a for a in (*RATES.values(), *OTHERS.values())], cg.constant(0.0)),
+    "all": lambda: sum([a * a for a in (*VELOCITIES.values(), *OTHERS.values())], cg.constant(0.0)),
 }
 
 
@@ -120,7 +125,7 @@ def test_the_bias_is_what_the_chain_rule_gives_without_accelerations(name):
         result = high_precision.evaluate(graph, {each: values[each] for each in graph.input_names})
         scale = 1.0 + max(abs(x) for x in truth.values())
         for a, b in zip(truth.values(), result.values(), strict=True):
-            assert abs(a - b) < 1e-14 * scale  # constants are folded in floats
+            assert abs(a - b) < FOLDED * scale
 
 
 def test_a_chain_s_bias_needs_fewer_nodes_than_its_inverse_dynamics_at_rest():

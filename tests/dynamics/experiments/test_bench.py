@@ -10,18 +10,22 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
+from dynamics.experiments.machine import machine
 from dynamics.experiments.speed import bench as module
-from dynamics.experiments.speed.bench import MODES, PEERS, TASKS, Cell, Crew, Row, bench
-from dynamics.experiments.speed.bench_scenes import SCENES, model
-from dynamics.experiments.speed.bench_table import digits, machine, tables
+from dynamics.experiments.speed.bench import MODES, PEERS, TASKS, Cell, Row, WorkerPool, bench
+from dynamics.experiments.speed.bench_scenes import SCENES, load
+from dynamics.experiments.speed.bench_table import tables
 from dynamics.experiments.speed.worker import Prepared, Refused, Worker
+from dynamics.experiments.text_table import digits
 from dynamics.io.mujoco_model import MujocoTwin
 from dynamics.peers import Case, UnavailableError
 from dynamics.peers.case import BATCH, DT, NUDGE, PASSES
-from dynamics.peers.contender import ldl_solve
+from dynamics.peers.dense_solve import dense_solve
 from viz import cli
 
 ROUNDING = 1e-10  # of a loop: the motion is that much larger than the last bit of the state it is taken from
+SCALAR = 1e-12  # relative: one coordinate, a few operations
+DENSE = 1e-10  # relative: a solve of six rows, well conditioned
 
 
 def tree() -> dyn.Mechanism:
@@ -100,7 +104,7 @@ OFFERED = [
 
 @pytest.mark.parametrize(("name", "task", "mode"), OFFERED)
 def test_a_peer_finds_what_mujoco_finds(name, task, mode):
-    case = Case("planar 3", model("planar 3")[0])
+    case = Case("planar 3", load("planar 3").model)
     reference, x = Reference(case), case.point(task)
     contender, found = prepared(name, case, task, mode)
     if mode == "batch":
@@ -142,7 +146,7 @@ def test_a_peer_takes_parameters_and_applied_forces(name):
         return
     _, found = prepared(name, case, "forward", mode)
     q, qd, tau = case.points("forward") if mode == "batch" else case.point("forward")
-    assert np.ravel(found) == pytest.approx(np.ravel((tau + 3.0 * qd**2 - 0.5 * qd - 3.0 * q) / 2.0), rel=1e-12)
+    assert np.ravel(found) == pytest.approx(np.ravel((tau + 3.0 * qd**2 - 0.5 * qd - 3.0 * q) / 2.0), rel=SCALAR)
 
 
 def test_a_system_that_depends_on_time_is_refused():
@@ -151,16 +155,16 @@ def test_a_system_that_depends_on_time_is_refused():
         Case("driven", driven)
 
 
-def test_ldl_solves_what_numpy_solves():
+def test_the_dense_solve_finds_what_numpy_finds():
     rng = np.random.default_rng(0)
     a = rng.normal(size=(6, 6))
     a = a @ a.T + np.eye(6)
     b = rng.normal(size=6)
-    assert np.array(ldl_solve(a, b)) == pytest.approx(np.linalg.solve(a, b), rel=1e-10)
+    assert np.array(dense_solve(a, b)) == pytest.approx(np.linalg.solve(a, b), rel=DENSE)
 
 
 def test_a_worker_answers_and_is_timed():
-    worker = Worker(partial(model, "planar 3"), "ours")
+    worker = Worker(partial(load, "planar 3"), "ours")
     try:
         answer = worker.prepare("forward", "call", budget=60.0)
         assert isinstance(answer, Prepared)
@@ -173,19 +177,19 @@ def test_a_worker_answers_and_is_timed():
 
 def test_a_worker_that_is_late_is_ended_and_not_asked_for_what_contains_the_same():
     late: dict[str, str] = {}
-    crew, skipped = Crew(partial(model, "planar 3"), ["ours"], 1e-3, late), {}
+    pool, skipped = WorkerPool(partial(load, "planar 3"), ["ours"], 1e-3, late), {}
     begin = time.perf_counter()
-    assert crew.prepared("forward", "call", skipped) == {}
+    assert pool.prepared("forward", "call", skipped) == {}
     assert time.perf_counter() - begin < 30.0
     assert skipped == late == {"ours": "not ready within 0.001 s"}
-    assert not crew.workers["ours"].alive
-    assert Crew(partial(model, "planar 3"), ["ours"], 60.0, late).prepared("rk4", "call", again := {}) == {}
+    assert not pool.workers["ours"].alive
+    assert WorkerPool(partial(load, "planar 3"), ["ours"], 60.0, late).prepared("rk4", "call", again := {}) == {}
     assert again == skipped
 
 
 @pytest.mark.parametrize("gone", [False, True])  # the pipe breaks at the answer, or already at the question
 def test_a_worker_that_dies_is_told(gone):
-    worker = Worker(partial(model, "planar 3"), "ours")
+    worker = Worker(partial(load, "planar 3"), "ours")
     assert isinstance(worker.prepare("forward", "call", budget=60.0), Prepared)
     worker._process.kill()
     if gone:
@@ -197,7 +201,7 @@ def test_a_worker_that_dies_is_told(gone):
 
 
 def test_what_a_peer_s_own_code_raises_is_a_reason():
-    worker = Worker(partial(model, "spring_mass"), "mujoco")
+    worker = Worker(partial(load, "spring_mass"), "mujoco")
     pytest.importorskip("mujoco")
     try:
         assert worker.prepare("forward", "call", 60.0) == Refused("takes rigid bodies, not a Lagrangian")

@@ -9,18 +9,21 @@ import numpy as np
 from mpmath import mp
 from pytest import approx, mark, param, raises
 
+from dynamics.equations.initial_value import split_state
 from dynamics.equations.state_equation import state_equation, state_inputs
 from dynamics.experiments.stability import cases
-from dynamics.experiments.stability.cases import chains, rotation, sensitivity, stiff
-from dynamics.experiments.stability.cases.case import Case
+from dynamics.experiments.stability.cases import chains, rotation, stiff
+from dynamics.experiments.stability.cases.case import StabilityCase
 from dynamics.reference import reference
 from tests import high_precision
+from tests.dynamics.experiments import sensitivity
 from tests.dynamics.models import Array
 
 Rate = Callable[[Array, float], Any]  # of the state and t, written without the library
 
 STATES = 4
 ROUNDING = 1e-12  # of the largest term
+LAST_BITS = 1e-15  # of numbers about 1
 LARGE = 200  # states; a larger model is measured in the benchmarks, and its family is tested at a hundred links
 
 
@@ -162,15 +165,15 @@ def test_every_case_is_checked_by_hand() -> None:
     assert set(cases.names()) == {*BY_HAND, *BY_TORQUE, *TOO_LARGE}
 
 
-def around(case: Case, seed: int = 0) -> list[Array]:
+def around(case: StabilityCase, seed: int = 0) -> list[Array]:
     """The start, and states near it by a part of their sizes."""
     rng = np.random.default_rng(seed)
     start, size = np.array(case.start), np.array(case.size or [max(abs(x), 0.3) for x in case.start])
     return [start, *[start + 0.1 * size * rng.uniform(-1.0, 1.0, len(start)) for _ in range(STATES)]]
 
 
-def values(case: Case, state: Array, t: float) -> dict[str, float]:
-    given = state_inputs(case.build())
+def values(case: StabilityCase, state: Array, t: float) -> dict[str, float]:
+    given = state_inputs(case.model)
     result = dict(zip(given.states, state.tolist(), strict=True)) | given.parameters | dict.fromkeys(given.applied, 0.0)
     return result | ({"t": t} if given.timed else {})
 
@@ -178,7 +181,7 @@ def values(case: Case, state: Array, t: float) -> dict[str, float]:
 @mark.parametrize("name", [param(name, marks=mark.slow if name == "100 links" else ()) for name in BY_HAND])
 def test_equations_are_those_written_by_hand(name: str) -> None:
     case = cases.load(name)
-    graph = state_equation(case.build())
+    graph = state_equation(case.model)
     lost = condition(name)
     for row, state in enumerate(around(case)[: 2 if len(case.start) == LARGE else None]):
         found = np.array(list(graph.evaluate(values(case, state, 0.3 * row)).values()))
@@ -191,7 +194,7 @@ def test_equations_of_a_chain_are_those_written_by_hand() -> None:
     """Ten links by the builder of the hundred, which take a while by hand."""
     case, by_hand = chains.long_chain(10, 1.0), bodies([0.1] * 10, [0.1] * 10)
     for state in around(case)[:2]:
-        found = np.array(list(state_equation(case.build()).evaluate(values(case, state, 0.0)).values()))
+        found = np.array(list(state_equation(case.model).evaluate(values(case, state, 0.0)).values()))
         expected = np.array(by_hand(state, 0.0))
         assert np.max(np.abs(found - expected)) < ROUNDING * np.max(np.abs(expected))
 
@@ -252,7 +255,7 @@ def test_bodies_in_euler_angles_obey_eulers_equations(name: str) -> None:
     """d/dt L + omega x L = torque, in the body's axes; weight pulls at a point on the third axis."""
     inertia, pull = np.array(BY_TORQUE[name][0]), BY_TORQUE[name][1]
     case = cases.load(name)
-    graph = state_equation(case.build())
+    graph = state_equation(case.model)
     for state in around(case):
         rates = np.array(list(graph.evaluate(values(case, state, 0.0)).values()))
         omega, omega_rate = momentum_rate(inertia, state, rates[3:])
@@ -261,18 +264,18 @@ def test_bodies_in_euler_angles_obey_eulers_equations(name: str) -> None:
         )
         torque = pull * np.cross([0.0, 0.0, 1.0], -up)
         size = np.max(np.abs(inertia * omega)) * np.max(np.abs(omega)) + pull
-        assert inertia * omega_rate + np.cross(omega, inertia * omega) == approx(torque, rel=0.0, abs=1e-12 * size)
+        assert inertia * omega_rate + np.cross(omega, inertia * omega) == approx(torque, rel=0.0, abs=ROUNDING * size)
 
 
 def test_the_free_body_starts_with_its_momentum_along_the_vertical() -> None:
     state = np.array(cases.load("free body about its middle axis, Euler angles").start)
     omega, _ = momentum_rate(rotation.INERTIA, state, np.zeros(3))
-    assert omega == approx(np.array(rotation.OMEGA), abs=1e-15)
+    assert omega == approx(np.array(rotation.OMEGA), abs=LAST_BITS)
     up = np.array(
         [math.sin(state[1]) * math.sin(state[2]), math.sin(state[1]) * math.cos(state[2]), math.cos(state[1])]
     )
     momentum = np.array(rotation.INERTIA) * omega
-    assert momentum / np.linalg.norm(momentum) == approx(up, abs=1e-15)
+    assert momentum / np.linalg.norm(momentum) == approx(up, abs=LAST_BITS)
 
 
 WITH_INVARIANTS = [name for name, case in cases.TABLE.items() if case.invariants and len(case.start) < LARGE]
@@ -283,7 +286,7 @@ def test_invariants_do_not_change_along_the_motion(name: str) -> None:
     """Their derivative along the rates, by differences in fifty digits."""
     case = cases.load(name)
     assert case.invariants is not None
-    model = case.build()
+    model = case.model
     graph, rates = case.invariants(model), state_equation(model)
     for state in around(case, seed=1)[:3]:
         point = values(case, state, 0.0)
@@ -293,27 +296,27 @@ def test_invariants_do_not_change_along_the_motion(name: str) -> None:
         change = high_precision.directional(graph, inside, {k: v for k, v in direction.items() if k in inside})
         size = high_precision.path_size(graph, inside, {k: v for k, v in direction.items() if k in inside})
         for key in graph.outputs:
-            assert abs(float(change[key])) <= 1e-12 * size[key], key  # constants of both graphs are rounded
+            assert abs(float(change[key])) <= ROUNDING * size[key], key  # constants of both graphs are rounded
 
 
 @mark.parametrize("name", cases.names())
 def test_what_is_watched_can_be_measured(name: str) -> None:
     case = cases.load(name)
     invariants = (
-        set(case.invariants(case.build()).outputs) if case.invariants and len(case.start) <= LARGE else {"energy"}
+        set(case.invariants(case.model).outputs) if case.invariants and len(case.start) <= LARGE else {"energy"}
     )
-    assert case.watch
-    for watch in case.watch:
-        what, *states = watch.quantity.split()
-        assert 0.0 <= watch.bound < 1.0 or watch.quantity == "energy", watch
-        assert watch.scale > 0.0
-        assert watch.why
+    assert case.criteria
+    for criterion in case.criteria:
+        what, *states = criterion.quantity.split()
+        assert 0.0 <= criterion.bound < 1.0 or criterion.quantity == "energy", criterion
+        assert criterion.scale > 0.0
+        assert criterion.why
         if what == "error":
             assert case.exact or case.method
             assert all(int(each) < len(case.start) for each in states)
         else:
-            assert watch.quantity in invariants
-    given = state_inputs(case.build())
+            assert criterion.quantity in invariants
+    given = state_inputs(case.model)
     assert len(given.states) == len(case.start) == len(case.size or case.start)
 
 
@@ -333,13 +336,15 @@ def test_closed_form_is_the_motion_of_the_model_to_the_end(name: str) -> None:
     compare(cases.load(name), cases.load(name).t_end)
 
 
-def compare(case: Case, t_end: float) -> None:
+def compare(case: StabilityCase, t_end: float) -> None:
     assert case.exact is not None
     exact = case.exact([t_end])
-    found = reference(case.build(), case.start, [t_end], digits=16, method=case.method or "")
+    model = case.model
+    found = reference(model, *split_state(model, case.start), [t_end], digits=16, method=case.method or "")
     rounded = 1e-15 if "mass matrix" not in case.name else 1e-15 * float(case.name.rsplit(" ", 1)[1])
     growth = case.growth or 1e9
-    assert np.max(np.abs(found.deviation(exact.x)[0]) / np.array(case.sizes())) <= rounded * max(growth, 100.0)
+    size = np.array(case.sizes(case.solution()))
+    assert np.max(np.abs(found.deviation(exact.x)[0]) / size) <= rounded * max(growth, 100.0)
 
 
 MEASURED = [name for name, case in cases.TABLE.items() if case.growth is not None and case.method is not None]
@@ -360,7 +365,8 @@ def test_the_stiffer_the_spring_the_nearer_the_rigid_rod() -> None:
     for k in (1e2, 1e4):
         case = cases.load(f"spring pendulum, k = {k:g}")
         limit = stiff.rigid([2.0])
-        found = reference(case.build(), case.start, [2.0], digits=12)
+        model = case.model
+        found = reference(model, *split_state(model, case.start), [2.0], digits=12)
         distances.append(np.max(np.abs(found.x - limit.x)[0, [1, 3]]))
         assert distances[-1] < 100.0 * 9.81 / k
     assert distances[1] / distances[0] == approx(1e-2, rel=0.5)

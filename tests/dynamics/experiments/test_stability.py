@@ -13,9 +13,11 @@ from pytest import MonkeyPatch, approx, importorskip, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics.experiments import text_table
 from dynamics.experiments.stability import (
     case_runs,
     cases,
+    energy_drift,
     huge_angles,
     known_limits as limits,
     single_evaluations,
@@ -23,8 +25,7 @@ from dynamics.experiments.stability import (
     stability,
     stability_table,
 )
-from dynamics.experiments.stability.verdict import Figure, Verdict
-from dynamics.experiments.work_precision import energy_drift
+from dynamics.experiments.stability.case_result import CaseResult, Measurement
 from dynamics.integrators import METHODS, Method
 from dynamics.integrators.step_control import embedded
 from dynamics.integrators.tableau import DOPRI5
@@ -33,39 +34,43 @@ from tests.dynamics.reference import floats, lagrange
 
 STIFF, SMOOTH = "Robertson, to 1e11", "heavy top"
 EXACT = 1e-13  # of the largest value: differences of 80 digits, and rounding of what is compared
+RECOMPUTED = 1e-6  # relative, of a change of 1e-9: what rounding of the invariant adds to it
+STORED = 1e-14  # relative to a state's size: constants of the graph are rounded, and may be folded otherwise
+NO_ERROR = 1e-12  # of a straight line's drift: rounding of the means
+SLOPES = 1e-5  # relative: central differences with steps of 1e-7
 
 
 # Verdicts
 
 
-def figure(value: float, bound: float = 1.0) -> Figure:
-    return Figure("error", value, bound, "of size", "for the test")
+def measurement(value: float, bound: float = 1.0) -> Measurement:
+    return Measurement("error", value, bound, "of size", "for the test")
 
 
-def verdict(*figures: Figure, **more: Any) -> Verdict:
-    return Verdict("Cases", "a case", "what is hard", "a method", figures, **more)
+def result(*measurements: Measurement, **more: Any) -> CaseResult:
+    return CaseResult("Cases", "a case", "what is hard", "a method", measurements, **more)
 
 
 def test_a_figure_meets_its_bound_up_to_the_bound_and_not_as_nan() -> None:
-    assert figure(1.0).meets
-    assert not figure(1.0 + 2.0**-52).meets
-    assert not figure(math.nan).meets
-    assert figure(0.0, 0.0).meets
+    assert measurement(1.0).meets
+    assert not measurement(1.0 + 2.0**-52).meets
+    assert not measurement(math.nan).meets
+    assert measurement(0.0, 0.0).meets
 
 
 def test_a_verdict_needs_all_figures_and_the_end_of_the_run() -> None:
-    assert verdict(figure(0.5), figure(0.6)).words == "meets"
-    assert verdict(figure(0.5), figure(2.0)).words == "unexplained"
-    assert verdict(figure(0.5), figure(2.0), reason="known").words == "limit"
-    assert verdict(figure(0.5), stopped="at t = 1 s").words == "unexplained"
+    assert result(measurement(0.5), measurement(0.6)).verdict == "meets"
+    assert result(measurement(0.5), measurement(2.0)).verdict == "unexplained"
+    assert result(measurement(0.5), measurement(2.0), reason="known").verdict == "limit"
+    assert result(measurement(0.5), stopped="at t = 1 s").verdict == "unexplained"
 
 
 def test_a_reason_accounts_for_so_much_and_no_more() -> None:
     (section, case, method), limit = next(iter(limits.LIMITS.items()))
-    assert limits.reason(section, case, method, [figure(0.9 * limit.within)]) == limit.reason
-    assert limits.reason(section, case, method, [figure(1.1 * limit.within)]) == ""
-    assert limits.reason(section, case, method, [figure(math.nan)]) == ""
-    assert limits.reason(section, "another case", method, [figure(2.0)]) == ""
+    assert limits.reason(section, case, method, [measurement(0.9 * limit.within)]) == limit.reason
+    assert limits.reason(section, case, method, [measurement(1.1 * limit.within)]) == ""
+    assert limits.reason(section, case, method, [measurement(math.nan)]) == ""
+    assert limits.reason(section, "another case", method, [measurement(2.0)]) == ""
 
 
 def test_every_limit_is_of_a_row_that_exists_and_is_told_in_the_documentation() -> None:
@@ -96,9 +101,9 @@ def kept_is_computed(name: str) -> None:
     kept, computed = solutions.solution(case), case.solution()
     assert kept is not None
     assert computed is not None
-    size = case_runs.sizes(case, computed)
-    grown = max(1.0, case.growth or 1e3)  # constants of the graph are rounded, and may be folded otherwise
-    assert np.max(np.abs(kept.deviation(computed.x)[0]) / size) <= 1e-14 * grown
+    size = case.sizes(computed)
+    grown = max(1.0, case.growth or 1e3)
+    assert np.max(np.abs(kept.deviation(computed.x)[0]) / size) <= STORED * grown
 
 
 @mark.parametrize("name", [*[name for name, case in cases.TABLE.items() if case.exact], "mass ratio 1e-12"])
@@ -135,48 +140,48 @@ def broken() -> Method:
 
 @mark.parametrize("name", [SMOOTH, "next to the upright", "exponential growth", "smallest velocity"])
 def test_a_method_meets_the_bounds_and_a_broken_one_does_not(name: str, monkeypatch: MonkeyPatch) -> None:
-    good = case_runs.verdict(cases.load(name), "dopri5")
-    assert good.words == "meets"
+    good = case_runs.result(cases.load(name), "dopri5")
+    assert good.verdict == "meets"
     assert good.steps > 0
     if name != "smallest velocity":  # without a rate there is nothing to be wrong about
         monkeypatch.setitem(METHODS, "dopri5", broken())
-        assert case_runs.verdict(cases.load(name), "dopri5").words == "unexplained"
+        assert case_runs.result(cases.load(name), "dopri5").verdict == "unexplained"
 
 
 @mark.parametrize("method", ["radau", "rodas"])
 def test_stiff_methods_meet_the_bounds(method: str) -> None:
-    found = case_runs.verdict(cases.load(STIFF), method)
-    assert found.words == "meets"
-    assert [each.quantity for each in found.figures] == [each.quantity for each in cases.load(STIFF).watch]
+    found = case_runs.result(cases.load(STIFF), method)
+    assert found.verdict == "meets"
+    assert [each.quantity for each in found.measurements] == [each.quantity for each in cases.load(STIFF).criteria]
 
 
 def test_a_run_that_stops_meets_nothing(monkeypatch: MonkeyPatch) -> None:
     monkeypatch.setattr(case_runs, "MOST_STEPS", 10)
-    found = case_runs.verdict(cases.load(SMOOTH), "dopri5")
+    found = case_runs.result(cases.load(SMOOTH), "dopri5")
     assert "max_steps" in found.stopped
     assert not found.explained
-    assert {each.quantity for each in found.figures if math.isnan(each.value)} == {"error"}
+    assert {each.quantity for each in found.measurements if math.isnan(each.value)} == {"error"}
 
 
 def test_invariants_are_those_of_the_case_and_errors_those_of_the_state() -> None:
     case = cases.load("Kepler, e = 0.9")
-    model, solution = case.build(), solutions.solution(case)
-    run = case_runs.trajectory(case, model, "dop853")
+    solution = solutions.solution(case)
+    run = case_runs.trajectory(case, "dop853")
     x, y, u, v = np.concatenate([run.q, run.qd], axis=1).T
-    found = case_runs.changes(case, model, run, {"energy", "angular momentum"})
+    found = case_runs.changes(case, run, {"energy", "angular momentum"})
     energy, momentum = 0.5 * (u * u + v * v) - 1.0 / np.hypot(x, y), x * v - y * u
-    assert found["energy"] == approx(np.max(np.abs(energy - energy[0])), rel=1e-6)
-    assert found["angular momentum"] == approx(np.max(np.abs(momentum - momentum[0])), rel=1e-6)
+    assert found["energy"] == approx(np.max(np.abs(energy - energy[0])), rel=RECOMPUTED)
+    assert found["angular momentum"] == approx(np.max(np.abs(momentum - momentum[0])), rel=RECOMPUTED)
     assert solution is not None
     error = np.abs(np.array([x[-1], y[-1], u[-1], v[-1]]) - solution.x[0]) / np.array(case.size)
-    assert case_runs.errors(case, run, solution)["error"] == approx(np.max(error), rel=1e-6)
+    assert case_runs.errors(case, run, solution)["error"] == approx(np.max(error), rel=RECOMPUTED)
 
 
 def test_an_invariant_is_measured_by_its_scale_and_what_is_missing_is_no_number() -> None:
-    energy = cases.Watch("energy", 1.0, "for the test", scale=4.0)
-    assert case_runs.figure(energy, {"energy": 2.0}).value == 0.5
-    assert case_runs.figure(cases.Watch("error", 1.0, "for the test"), {"error": 2.0}).value == 2.0
-    assert math.isnan(case_runs.figure(energy, {}).value)
+    energy = cases.Criterion("energy", 1.0, "for the test", scale=4.0)
+    assert case_runs.measurement(energy, {"energy": 2.0}).value == 0.5
+    assert case_runs.measurement(cases.Criterion("error", 1.0, "for the test"), {"error": 2.0}).value == 2.0
+    assert math.isnan(case_runs.measurement(energy, {}).value)
 
 
 # Long runs
@@ -187,7 +192,7 @@ def test_the_drift_of_a_line_is_its_slope_and_that_of_an_oscillation_is_none() -
     wave = 0.01 * np.sin(2.0 * math.pi * 1234.5 * t)
     straight = energy_drift.drift(5.0 + 1e-6 * t, 5.0)
     assert straight.drift == approx(2e-7, rel=1e-6)
-    assert straight.error < 1e-12
+    assert straight.error < NO_ERROR
     still = energy_drift.drift(5.0 + wave, 5.0)
     assert abs(still.drift) < energy_drift.SIGMAS * still.error < 1e-8
     assert still.band == approx(0.004, rel=1e-3)
@@ -204,15 +209,15 @@ def test_a_noisy_slope_is_within_its_error() -> None:
     assert 0.8 < np.std(scores) < 1.4  # Student's t with 14 degrees of freedom: 1.08
 
 
-@mark.parametrize("model", energy_drift.MODELS, ids=lambda each: each.name)
+@mark.parametrize("motion", energy_drift.MOTIONS)
 @mark.parametrize("method", ["verlet", "gauss6"])
-def test_symplectic_methods_do_not_drift(model: energy_drift.Model, method: str) -> None:
-    assert energy_drift.verdict(model, method, energy_drift.QUICK).words == "meets"
+def test_symplectic_methods_do_not_drift(motion: str, method: str) -> None:
+    assert energy_drift.result(motion, method, energy_drift.QUICK).verdict == "meets"
 
 
-@mark.parametrize("model", energy_drift.MODELS, ids=lambda each: each.name)
-def test_a_method_that_loses_energy_is_seen_to(model: energy_drift.Model) -> None:
-    assert energy_drift.verdict(model, "rk4", energy_drift.QUICK).words == "unexplained"
+@mark.parametrize("motion", energy_drift.MOTIONS)
+def test_a_method_that_loses_energy_is_seen_to(motion: str) -> None:
+    assert energy_drift.result(motion, "rk4", energy_drift.QUICK).verdict == "unexplained"
 
 
 # Single evaluations
@@ -290,7 +295,7 @@ def test_the_condition_is_what_changes_of_the_data_make(task: str) -> None:
         change(*[solve(replace(arm, damping=each), q, qd, third) for each in scaled])
     change(*[solve(replace(arm, gravity=arm.gravity * (1.0 + sign * step)), q, qd, third) for sign in (1, -1)])
     found = single_evaluations.Arms(single_evaluations.TASKS[task], n).condition(arm, point)
-    assert found == approx(expected, rel=1e-5)
+    assert found == approx(expected, rel=SLOPES)
 
 
 @mark.parametrize("family", single_evaluations.FAMILIES[:5], ids=lambda each: each.name)
@@ -298,7 +303,7 @@ def test_the_condition_is_what_changes_of_the_data_make(task: str) -> None:
 def test_single_evaluations_are_within_the_bound(task: str, family: single_evaluations.Family) -> None:
     importorskip("flint")
     arms = single_evaluations.Arms(single_evaluations.TASKS[task], 4, ["python"])
-    assert single_evaluations.figure(family, arms).meets
+    assert single_evaluations.measurement(family, arms).meets
 
 
 HEAVY = next(each for each in single_evaluations.FAMILIES if each.name == "last mass 1e12")
@@ -307,7 +312,7 @@ HEAVY = next(each for each in single_evaluations.FAMILIES if each.name == "last 
 def test_a_heavy_mass_at_the_end_of_a_chain_needs_double_double() -> None:
     importorskip("flint")
     plain, doubled = (
-        single_evaluations.figure(HEAVY, single_evaluations.Arms(single_evaluations.TASKS[task], 8, ["python"]))
+        single_evaluations.measurement(HEAVY, single_evaluations.Arms(single_evaluations.TASKS[task], 8, ["python"]))
         for task in ("forward dynamics", "forward dynamics in double-double")
     )
     assert plain.value > 1e6
@@ -326,7 +331,7 @@ def test_a_constant_that_is_off_is_seen() -> None:
         return task.derive(replace(arm, links=(first, *arm.links[1:])))
 
     arms = single_evaluations.Arms(task._replace(derive=off), 3, ["python"])
-    assert not single_evaluations.figure(single_evaluations.FAMILIES[0], arms).meets
+    assert not single_evaluations.measurement(single_evaluations.FAMILIES[0], arms).meets
 
 
 # Huge angles
@@ -341,9 +346,9 @@ def test_angles_fill_their_range_with_both_signs() -> None:
 
 def test_sine_and_cosine_of_huge_angles_are_reduced_exactly() -> None:
     importorskip("flint")
-    found = list(huge_angles.verdicts(100))
+    found = list(huge_angles.results(100))
     assert len(found) == 2 * len(single_evaluations.available())
-    assert all(each.meets for each in found), [each.figures for each in found]
+    assert all(each.meets for each in found), [each.measurements for each in found]
 
 
 def test_an_angle_that_is_reduced_in_float64_is_seen() -> None:
@@ -368,18 +373,22 @@ def test_sines_are_those_of_mpmath() -> None:
 
 
 ROWS = [
-    verdict(figure(0.5), figure(1e-9), steps=120, rejected=3, seconds=0.25),
-    verdict(figure(2.0), reason="a reason " * 20, steps=10),
-    verdict(figure(math.nan), stopped="stopped at t = 1 s"),
-    Verdict(
-        "Sine and cosine", "a name that is longer than a column of the table has room for", "", "llvm", (figure(0.1),)
+    result(measurement(0.5), measurement(1e-9), steps=120, rejected=3, seconds=0.25),
+    result(measurement(2.0), reason="a reason " * 20, steps=10),
+    result(measurement(math.nan), stopped="stopped at t = 1 s"),
+    CaseResult(
+        "Sine and cosine",
+        "a name longer than a column of the table has room for",
+        "",
+        "llvm",
+        (measurement(0.1),),
     ),
 ]
 
 
 def test_the_table_fits_its_width_and_gives_every_reason_once() -> None:
-    text = stability_table.table([*ROWS[:2], ROWS[1], *ROWS[2:]])
-    assert max(map(len, text.splitlines())) <= stability_table.WIDTH
+    text = stability_table.text([*ROWS[:2], ROWS[1], *ROWS[2:]])
+    assert max(map(len, text.splitlines())) <= text_table.WIDTH
     assert " ".join(text.split()).count("a reason " * 19) == 1
     assert "stopped at t = 1 s: no reason is known" in text
     assert text.endswith("5 rows: 2 meets, 2 limit, 1 unexplained")
@@ -388,10 +397,10 @@ def test_the_table_fits_its_width_and_gives_every_reason_once() -> None:
 
 
 def test_the_data_are_json_without_nan_and_csv_with_a_line_for_each_figure() -> None:
-    content = stability.content(ROWS, 1.5, quick=True)
+    content = stability.to_dict(ROWS, 1.5, quick=True)
     again = json.loads(json.dumps(content, allow_nan=False))
     assert [len(each["rows"]) for each in again["sections"]] == [3, 0, 0, 1]
-    assert again["sections"][0]["rows"][2]["figures"][0]["value"] == "nan"
+    assert again["sections"][0]["rows"][2]["measurements"][0]["value"] == "nan"
     lines = list(csv.DictReader(io.StringIO(stability.to_csv(ROWS))))
     assert [each["meets"] for each in lines] == ["True", "True", "False", "False", "True"]
     assert lines[0]["bound"] == "1.0"
@@ -403,7 +412,7 @@ def test_quick_cases_are_cases() -> None:
 
 def test_an_unknown_case_is_refused() -> None:
     with raises(ValueError, match="there is no case"):
-        list(case_runs.verdicts(["x"]))
+        list(case_runs.results(["x"]))
 
 
 @mark.slow

@@ -15,34 +15,34 @@ import pytest
 from pytest import approx, raises
 
 import dynamics as dyn
-from dynamics.experiments.work_precision import work_precision as module
+from dynamics.experiments.setting import INTERVALS, Setting
+from dynamics.experiments.work_precision import measurement
 from dynamics.experiments.work_precision.cold_start import cold_starts
+from dynamics.experiments.work_precision.measurement import FLOOR, Entry, ErrorMetrics, fitted_order
+from dynamics.experiments.work_precision.report import Curve, Point, WorkPrecision, targets, to_csv
 from dynamics.experiments.work_precision.trajectory_peers import EPSILON, Cvodes, Heyoka, Mujoco, heyoka_derivatives
 from dynamics.experiments.work_precision.trajectory_runs import (
     CHOSEN,
     EQUAL,
-    Contender,
     Ours,
     Outcome,
     Scipy,
+    Solver,
     problem_of,
 )
-from dynamics.experiments.work_precision.trajectory_scenes import INTERVALS, Setting, load, names
-from dynamics.experiments.work_precision.work_precision import (
-    FLOOR,
-    Curve,
-    Judge,
-    Point,
-    WorkPrecision,
-    fitted_order,
-    targets,
-    to_csv,
-    work_precision,
-)
+from dynamics.experiments.work_precision.trajectory_scenes import load, names
+from dynamics.experiments.work_precision.work_precision import work_precision
 from dynamics.integrators import METHODS
+from dynamics.reference import Reference
 
 T_END = 10.0  # s, of the scene spring_mass: q = cos t
 ROUNDING = 1e-9  # a thousand times that of a power of R(i h) in float64
+LEADING = 1e-3  # relative, of an error at least 1e-9: what rounding adds to it
+REPEATED = 1e-4  # relative, of an error: the same steps in another program
+SAME_METHOD = 1e-5  # relative, of an error: MuJoCo's RK4 and ours differ by rounding alone
+SAME_RATES = 1e-12  # relative: rounding of the same equations of three links
+THOUSANDFOLD = 1e3  # an error at the end, in tolerances of a step
+LAST_BITS = 1e-13  # of a series of 25 terms at the resolution of float64
 TIMES = np.linspace(0.0, T_END, INTERVALS + 1)
 
 
@@ -82,8 +82,8 @@ def test_errors_are_those_of_the_method_s_stability_function(report: WorkPrecisi
         assert point.steps == count
         assert point.step == approx(T_END / count)
         if errors[-1] > ROUNDING:
-            assert point.error == approx(errors[-1], rel=1e-3)
-            assert point.largest == approx(errors.max(), rel=1e-3)
+            assert point.error == approx(errors[-1], rel=LEADING)
+            assert point.largest == approx(errors.max(), rel=LEADING)
 
 
 def test_energy_drift_is_that_of_the_stability_function(report: WorkPrecision) -> None:
@@ -92,7 +92,7 @@ def test_energy_drift_is_that_of_the_stability_function(report: WorkPrecision) -
         w = 1j * T_END / count
         energy = np.abs(after(1 + w + w**2 / 2 + w**3 / 6 + w**4 / 24, count)) ** 2 / 2
         if abs(energy[-1] - 0.5) > ROUNDING:
-            assert point.drift == approx(np.abs(energy - 0.5).max() / (np.sin(TIMES) ** 2 / 2).max(), rel=1e-3)
+            assert point.drift == approx(np.abs(energy - 0.5).max() / (np.sin(TIMES) ** 2 / 2).max(), rel=LEADING)
 
 
 def test_counts_are_those_of_a_simulation(report: WorkPrecision) -> None:
@@ -105,7 +105,7 @@ def test_counts_are_those_of_a_simulation(report: WorkPrecision) -> None:
         counts = run.stats.steps, run.stats.rejected, run.stats.nfev
         assert (point.steps, point.rejected, point.evaluations) == counts
         error = max(abs(run.q[-1, 0] - math.cos(T_END)), abs(run.qd[-1, 0] + math.sin(T_END)) / smallest)
-        assert point.error == approx(error, rel=1e-4)
+        assert point.error == approx(error, rel=REPEATED)
         assert point.largest >= point.error
     point = curve(report, "rk4").points[2]
     assert (point.steps, point.evaluations) == (point.knob, 4 * point.knob)
@@ -176,29 +176,35 @@ def test_csv_and_json_hold_the_points(report: WorkPrecision) -> None:
     assert content["targets"][0]["group"] == "ours"
 
 
-def setting(name: str, **options: Any) -> tuple[Setting, Judge, float]:
+def exact_motion(found: Setting, digits: int) -> Reference:
+    """The setting's own, at its times."""
+    exact = found.solution(found.times, digits=digits)
+    assert exact is not None
+    return exact
+
+
+def setting(name: str, **options: Any) -> tuple[Setting, ErrorMetrics, float]:
     """A setting with its exact motion, to twenty digits."""
     pytest.importorskip("flint")
     found = load(name, **options)
-    exact = found.exact(20, None)
-    scales = found.scales(exact)
-    return found, Judge(found, exact, scales), float(scales.min())
+    metrics = ErrorMetrics(found, exact_motion(found, 20))
+    return found, metrics, metrics.smallest
 
 
 @pytest.fixture(scope="module")
-def arm() -> tuple[Setting, Judge, float]:
+def arm() -> tuple[Setting, ErrorMetrics, float]:
     return setting("triple_pendulum", t_end=1.0)
 
 
-def test_mujoco_s_rk4_makes_the_error_that_ours_makes(arm: tuple[Setting, Judge, float]) -> None:
+def test_mujoco_s_rk4_makes_the_error_that_ours_makes(arm: tuple[Setting, ErrorMetrics, float]) -> None:
     pytest.importorskip("mujoco")
-    found, judge, smallest = arm
+    found, metrics, smallest = arm
     theirs, ours = Mujoco("RK4", found, smallest), Ours("rk4", found, smallest, problem_of(found))
     for steps in (64, 256):
-        error = judge.at_end(ours.ready(steps)().x)
-        assert judge.at_end(theirs.ready(steps)().x) == approx(error, rel=1e-5)
-        assert float(judge.errors(theirs.rows(steps)).max()) == approx(
-            float(judge.errors(ours.rows(steps)).max()), rel=1e-5
+        error = metrics.at_end(ours.ready(steps)().x)
+        assert metrics.at_end(theirs.ready(steps)().x) == approx(error, rel=SAME_METHOD)
+        assert float(metrics.errors(theirs.rows(steps)).max()) == approx(
+            float(metrics.errors(ours.rows(steps)).max()), rel=SAME_METHOD
         )
 
 
@@ -210,61 +216,59 @@ def test_mujoco_s_order_of_the_joints_is_undone() -> None:
         dyn.Body(name, dyn.Joint("revolute", (0.0, 1.0, 0.0), (0.1, 0.0, -0.3)), parent, mass, (0.0, 0.0, -0.2))
         for name, parent, mass in (("a", "world", 1.0), ("b", "a", 0.5), ("c", "a", 0.7), ("d", "b", 0.3))
     ]
-    start = (0.1, 0.4, -0.3, 0.8, 0.5, -0.2, 0.7, 0.3)
-    found = Setting("tree", "", dyn.Mechanism(bodies), start, 0.5)
-    exact = found.exact(15)
-    judge, theirs = Judge(found, exact, found.scales(exact)), Mujoco("RK4", found, 1.0)
+    found = Setting("tree", "", dyn.Mechanism(bodies), (0.1, 0.4, -0.3, 0.8), (0.5, -0.2, 0.7, 0.3), 0.5)
+    metrics, theirs = ErrorMetrics(found, exact_motion(found, 15)), Mujoco("RK4", found, 1.0)
     assert list(theirs.peer.order) != [0, 1, 2, 3]
-    assert judge.at_end(theirs.ready(512)().x) < 1e-8
-    assert float(judge.errors(theirs.rows(512)).max()) < 1e-8
-    difference = module.Entry(theirs).curve(judge, problem_of(found)).model_error
+    assert metrics.at_end(theirs.ready(512)().x) < 1e-8
+    assert float(metrics.errors(theirs.rows(512)).max()) < 1e-8
+    difference = Entry(theirs).curve(metrics, problem_of(found)).model_error
     assert difference is not None
     assert difference < 1e-10  # rounding, of a mass matrix of thin rods
 
 
 @pytest.mark.parametrize("kind", ["Euler", "implicit", "implicitfast"])
 def test_mujoco_s_first_order_integrators_come_nearer_with_the_step(
-    arm: tuple[Setting, Judge, float], kind: str
+    arm: tuple[Setting, ErrorMetrics, float], kind: str
 ) -> None:
     pytest.importorskip("mujoco")
-    found, judge, smallest = arm
+    found, metrics, smallest = arm
     theirs = Mujoco(kind, found, smallest)
-    coarse, fine = (judge.at_end(theirs.ready(steps)().x) for steps in (4096, 8192))
+    coarse, fine = (metrics.at_end(theirs.ready(steps)().x) for steps in (4096, 8192))
     assert coarse / fine == approx(2.0, rel=0.02)
 
 
 @pytest.mark.parametrize("damping", [0.1, 0.2])
-def test_the_error_of_a_model_is_told_apart(arm: tuple[Setting, Judge, float], damping: float) -> None:
+def test_the_error_of_a_model_is_told_apart(arm: tuple[Setting, ErrorMetrics, float], damping: float) -> None:
     """MuJoCo's rates are ours to rounding; with another damping they differ by what that damping does."""
     pytest.importorskip("mujoco")
-    found, judge, smallest = arm
+    found, metrics, smallest = arm
     theirs = Mujoco("RK4", found, smallest)
     theirs.model.dof_damping[:] = damping
-    entry = module.Entry(theirs)
-    difference = entry.curve(judge, problem_of(found)).model_error
+    entry = Entry(theirs)
+    difference = entry.curve(metrics, problem_of(found)).model_error
     assert difference is not None
-    assert difference < 1e-12 if damping == 0.1 else 1e-3 < difference < 10.0
+    assert difference < SAME_RATES if damping == 0.1 else 1e-3 < difference < 10.0
 
 
-def test_cvodes_gets_our_equations(arm: tuple[Setting, Judge, float]) -> None:
+def test_cvodes_gets_our_equations(arm: tuple[Setting, ErrorMetrics, float]) -> None:
     pytest.importorskip("casadi")
-    found, judge, smallest = arm
+    found, metrics, smallest = arm
     for kind in ("BDF", "Adams"):
         theirs = Cvodes(kind, found, smallest, problem_of(found))
-        assert judge.at_end(theirs.ready(1e-9)().x) < 1e-6
-        assert float(judge.errors(theirs.rows(1e-9)).max()) < 1e-6
-        entry = module.Entry(theirs).curve(judge, problem_of(found))
+        assert metrics.at_end(theirs.ready(1e-9)().x) < 1e-9 * THOUSANDFOLD
+        assert float(metrics.errors(theirs.rows(1e-9)).max()) < 1e-9 * THOUSANDFOLD
+        entry = Entry(theirs).curve(metrics, problem_of(found))
         assert entry.model_error is not None
-        assert entry.model_error < 1e-12
+        assert entry.model_error < SAME_RATES
 
 
 def test_heyoka_gets_our_equations() -> None:
     pytest.importorskip("heyoka")
-    found, judge, smallest = setting("spring_mass")
+    found, metrics, smallest = setting("spring_mass")
     theirs = Heyoka(found, smallest, problem_of(found))
-    assert judge.at_end(theirs.ready(EPSILON)().x) < 1e-13
-    assert judge.at_end(theirs.ready(1e-4)().x) < 1e-2
-    assert float(judge.errors(theirs.rows(EPSILON)).max()) < 1e-13
+    assert metrics.at_end(theirs.ready(EPSILON)().x) < LAST_BITS
+    assert metrics.at_end(theirs.ready(1e-4)().x) < 1e-2
+    assert float(metrics.errors(theirs.rows(EPSILON)).max()) < LAST_BITS
     x = np.array([[0.3, -0.7], [1.0, 2.0]])
     assert theirs.rates(x) == approx(np.array([[-0.7, -0.3], [2.0, -1.0]]))
 
@@ -287,15 +291,15 @@ def test_heyokas_derivatives_leave_its_cache_as_it_is() -> None:
 
 def test_scipy_runs_on_our_rate() -> None:
     pytest.importorskip("scipy")
-    found, judge, smallest = setting("spring_mass")
+    found, metrics, smallest = setting("spring_mass")
     for solver in ("DOP853", "LSODA", "Radau"):
         theirs = Scipy(solver, found, smallest, problem_of(found))
-        assert judge.at_end(theirs.ready(1e-7)().x) < 1e-4
+        assert metrics.at_end(theirs.ready(1e-7)().x) < 1e-7 * THOUSANDFOLD
         assert theirs.ready(1e-7)().rejected is None  # it does not tell
-        assert float(judge.errors(theirs.rows(1e-7)).max()) < 1e-4
+        assert float(metrics.errors(theirs.rows(1e-7)).max()) < 1e-7 * THOUSANDFOLD
 
 
-class Broken(Contender):
+class Broken(Solver):
     """Raises, gives no numbers, and gets better only at fine knobs."""
 
     tolerances: Sequence[float] = (1e-1, 1e-2, 1e-3, 1e-4)
@@ -316,14 +320,14 @@ class Broken(Contender):
         return np.full((INTERVALS + 1, 2), math.nan)
 
 
-def test_a_contender_that_fails_keeps_its_good_points_and_a_reason() -> None:
-    found, judge, smallest = setting("spring_mass")
-    entry = module._sweep(Broken("broken", "", found, smallest), judge, 1.0)
+def test_a_solver_that_fails_keeps_its_good_points_and_a_reason() -> None:
+    found, metrics, smallest = setting("spring_mass")
+    entry = measurement.sweep(Broken("broken", "", found, smallest), metrics, 1.0)
     assert [each.knob for each in entry.tried] == [1e-2, 1e-3]
-    assert entry.stopped == "left the numbers"
+    assert entry.stopped == "is not finite"
     assert entry.tried[0].error == approx(1e-2, rel=1e-2)
-    module._in_turns(entry.tried, 1)
-    for each in entry.curve(judge, problem_of(found)).points:
+    measurement.in_turns(entry.tried, 1)
+    for each in entry.curve(metrics, problem_of(found)).points:
         assert each.largest == math.inf
         assert each.drift is None
 
@@ -352,7 +356,7 @@ def test_settings() -> None:
 def test_another_start_has_another_exact_motion() -> None:
     pytest.importorskip("flint")
     found = load("spring_mass", start=[0.0, 2.0], t_end=1.0)
-    exact = found.exact(15, None)
+    exact = exact_motion(found, 15)
     assert exact.x[-1] == approx(np.array([2.0 * math.sin(1.0), 2.0 * math.cos(1.0)]), rel=1e-14)
 
 

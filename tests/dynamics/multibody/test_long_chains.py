@@ -10,7 +10,7 @@ import pytest
 
 import dynamics as dyn
 from dynamics.reference.planar_arm_equations import accelerations
-from tests.dynamics.dense_reference import Array, chain_accelerations
+from dynamics.reference.spatial_chain_equations import Array, chain_accelerations
 from tests.dynamics.mechanisms import turned_arm
 
 pytest.importorskip("flint")

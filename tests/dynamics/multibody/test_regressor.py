@@ -7,7 +7,7 @@ import pytest
 from pytest import approx
 
 import dynamics as dyn
-from dynamics.equations.evaluate_at import at_state
+from dynamics.equations.evaluate_at import evaluate_at
 from dynamics.multibody.regressor import inertial_parameters, regressor
 from tests.dynamics.mechanisms import FAMILIES, in_space, turned_arm
 from tests.dynamics.models import Array, at, random_arm, states
@@ -17,7 +17,7 @@ ROUNDING = 1e-12
 
 def value(mechanism: dyn.Mechanism, state: dict[str, Array]) -> Array:
     n = mechanism.system.n
-    return at_state(mechanism.system, regressor(mechanism), state).reshape(-1, n, n, 10)
+    return evaluate_at(mechanism.system, regressor(mechanism), state).reshape(-1, n, n, 10)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -25,8 +25,10 @@ def test_times_the_parameters_it_is_the_torque_of_the_bodies(family: str) -> Non
     mechanism = FAMILIES[family](6)
     given = states(mechanism, 20)
     joints = [body.joint for body in mechanism.moving]
-    armature, damping, stiffness, rest = np.array([(j.armature, j.damping, j.stiffness, j.spring_reference) for j in joints]).T
-    tau = at_state(mechanism.system, dyn.inverse_dynamics(mechanism), given)
+    armature, damping, stiffness, rest = np.array(
+        [(j.armature, j.damping, j.stiffness, j.spring_reference) for j in joints]
+    ).T
+    tau = evaluate_at(mechanism.system, dyn.inverse_dynamics(mechanism), given)
     tau = tau - armature * given["qdd"] - damping * given["qd"] - stiffness * (given["q"] - rest)
     found = np.einsum("sikp,kp->si", value(mechanism, given), inertial_parameters(mechanism))
     assert found == approx(tau, abs=ROUNDING * abs(tau).max())
@@ -72,9 +74,9 @@ def test_pinocchio_s_coriolis_matrix_and_gravity_are_ours(family: str) -> None:
     matrix = pinocchio.computeCoriolisMatrix(twin.model, twin.data, q, qd)[np.ix_(twin.order, twin.order)]
     weight = pinocchio.computeGeneralizedGravity(twin.model, twin.data, q)[twin.order]
     weight = weight + twin.stiffness * (state["q"] - twin.spring_reference)
-    found = at_state(mechanism.system, coriolis(mechanism), state).reshape(n, n)
+    found = evaluate_at(mechanism.system, coriolis(mechanism), state).reshape(n, n)
     assert found == approx(matrix, abs=ROUNDING * abs(matrix).max())
-    gravity = at_state(mechanism.system, dyn.gravity_force(mechanism), state)
+    gravity = evaluate_at(mechanism.system, dyn.gravity_force(mechanism), state)
     assert gravity == approx(weight, abs=ROUNDING * abs(weight).max())
 
 

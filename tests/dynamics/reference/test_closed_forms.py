@@ -14,6 +14,9 @@ from dynamics.systems.system import System
 from tests.dynamics.models import Array, oscillator
 
 TRUNCATION = 1e-10  # of RK4 at dt = 1 ms over 3 s: 3 (1e-3 w)^4 / 120 for w up to 3 rad/s, and rounding beside it
+FASTER = 1e-9  # of the same for w = 4.6 rad/s: it grows with the fifth power
+ROUNDING = 1e-15  # of one division
+ROUNDED_ENERGY = 1e-12  # J, of energies of some tens of joules
 T_END = 3.0  # s
 M, K, C, F, W = 2.0, 3.0, 0.7, 1.5, 2.5  # kg, N/m, N s/m, N, rad/s
 W0 = math.sqrt(K / M)
@@ -46,7 +49,7 @@ def test_parameters_are_inputs_of_the_graphs() -> None:
     system = oscillator()
     assert dyn.forward_dynamics(system).input_names == ("q0", "qd0", "tau0", "m", "k")
     values = {"q0": 0.4, "qd0": 0.0, "tau0": 1.0, "m": 4.0, "k": 5.0}
-    assert dyn.forward_dynamics(system).evaluate(values) == {"qdd0": approx((1.0 - 5.0 * 0.4) / 4.0, rel=1e-15)}
+    assert dyn.forward_dynamics(system).evaluate(values) == {"qdd0": approx((1.0 - 5.0 * 0.4) / 4.0, rel=ROUNDING)}
 
 
 def test_a_torque_s_sensitivity_to_a_parameter_is_a_graph_too() -> None:
@@ -155,8 +158,7 @@ def test_large_swings_of_a_pendulum_by_elliptic_functions(model: str) -> None:
     result = dyn.simulate(dyn.planar_arm([1.3], [length], mass_model=model), [start], [0.0], T_END, dt=1e-3)
     rows = range(0, len(result.t), 100)
     expected = [2 * math.asin(k * float(mp.ellipfun("cd", w * result.t[row], m=k * k))) for row in rows]
-    fast = 1e-9  # w is 4.6 rad/s here: TRUNCATION grows with its fourth power
-    assert result.q[rows, 0] == approx(np.array(expected), rel=0.0, abs=fast)
+    assert result.q[rows, 0] == approx(np.array(expected), rel=0.0, abs=FASTER)
     assert min(expected) < -2.0
     assert max(expected) > 2.0
 
@@ -189,4 +191,4 @@ def test_energy_of_an_undamped_arm_is_conserved_to_the_order_of_the_method(metho
         drifts.append(np.abs(energy - energy[0]).max())
     fitted = np.polyfit(np.log(dts), np.log(drifts), 1)[0]
     assert fitted == approx(order, abs=FINITE_STEP)
-    assert drifts[-1] > 1e-12  # J: it is not rounding that was fitted
+    assert drifts[-1] > ROUNDED_ENERGY  # it is not rounding that was fitted

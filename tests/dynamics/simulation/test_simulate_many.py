@@ -1,12 +1,6 @@
-"""simulate_many: every trajectory is its own, whoever runs it and whatever its neighbours do."""
+"""simulate_many: every trajectory is its own, whoever runs it and whatever its neighbors do."""
 
 import math
-import multiprocessing
-import signal
-import threading
-import time
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -16,24 +10,22 @@ from pytest import approx, mark, raises
 
 import dynamics as dyn
 from dynamics.integrators import METHODS
-from dynamics.simulation.ensembles import task
-from dynamics.simulation.ensembles.ensemble import Ensemble
 from dynamics.simulation.ensembles.simulate_many import simulate_many
-from dynamics.simulation.ensembles.step_grid import stretches
+from dynamics.simulation.ensembles.step_grid import grids_between
 from dynamics.systems.model import as_system
 from dynamics.systems.system import System
+from tests.dynamics.ensembles import arms, same
 from tests.dynamics.models import oscillator, random_arm
+from tests.dynamics.step_options import step
 
 RK4_ERROR = 1e-11  # of a period at dt = 1 ms: (w dt)^4 w t / 120
 VERLET_ERROR = 1e-6  # (w dt)^2 w t / 24
 TOLERANCE_ERROR = 1e-6  # of steps chosen with rtol = 1e-8
 ROUNDING = 1e-12  # of a thousand steps of an arm that swings
+CHAOS = 1e-9  # what chaos makes of rounding in 500 steps of three links
+SPACING = 1e-12  # relative, of differences of rounded times
+INSTANT = 1e-14  # of sums of rounded times, relative
 TIMES = [0.0, 0.1, 0.25, 1.0]
-
-
-def arms(count: int, n: int = 2) -> tuple[Any, np.ndarray, np.ndarray]:
-    rng = np.random.default_rng(count)
-    return random_arm(n), rng.uniform(-2.0, 2.0, (count, n)), rng.normal(size=(count, n))
 
 
 def runaway() -> System:
@@ -43,13 +35,6 @@ def runaway() -> System:
         ["calm", "wild"],
         forces=lambda q, qd, t: [0.0, qd[1] ** 2],
     )
-
-
-def same(a: Ensemble, b: Ensemble) -> bool:
-    """To the last bit, NaN included."""
-    arrays = [(x.t, x.q, x.qd, x.stats.steps, x.stats.nfev, x.stats.rejected, x.stats.dt) for x in (a, b)]
-    equal = all(np.array_equal(x, y, equal_nan=True) for x, y in zip(*arrays, strict=True))
-    return equal and a.stats.message == b.stats.message
 
 
 @mark.parametrize(
@@ -79,7 +64,7 @@ def test_arms_move_as_mujoco_s_do() -> None:
     twin = MujocoTwin(arm)
     for k in range(10):
         expected = np.hstack(twin.trajectory(q[k], qd[k], 500))
-        assert np.hstack([result.q[k], result.qd[k]]) == approx(expected, abs=1e-9)  # rounding, times what chaos makes
+        assert np.hstack([result.q[k], result.qd[k]]) == approx(expected, abs=CHAOS)
 
 
 @mark.parametrize(
@@ -91,13 +76,13 @@ def test_arms_move_as_mujoco_s_do() -> None:
 )
 def test_every_method_gives_what_simulate_gives(model: Any, method: str) -> None:
     q, qd = np.random.default_rng(1).normal(size=(2, 9, len(as_system(model).coordinates)))
-    result = simulate_many(model, q, qd, 0.3, method, dt=0.01, t_eval=[0.1, 0.2, 0.3])
+    result = simulate_many(model, q, qd, 0.3, method, **step(method, 0.01), t_eval=[0.1, 0.2, 0.3])
     for k in range(9):
-        one = dyn.simulate(model, q[k], qd[k], 0.3, method, dt=0.01, t_eval=[0.1, 0.2, 0.3])
+        one = dyn.simulate(model, q[k], qd[k], 0.3, method, **step(method, 0.01), t_eval=[0.1, 0.2, 0.3])
         assert np.hstack([result.q[k], result.qd[k]]) == approx(np.hstack([one.q, one.qd]), abs=ROUNDING)
         found = [int(each[k]) for each in (result.stats.steps, result.stats.rejected, result.stats.nfev)]
         assert found == [one.stats.steps, one.stats.rejected, one.stats.nfev]
-        assert result.stats.dt[k] == approx(one.stats.dt, rel=1e-12)
+        assert result.stats.dt[k] == approx(one.stats.dt, rel=SPACING)
 
 
 def test_a_system_of_first_order_and_time() -> None:
@@ -128,92 +113,12 @@ def test_t_eval_chooses_the_rows(times: Any) -> None:
     assert result.q[1, :, 0] == approx(2.0 * np.cos(math.sqrt(1.5) * result.t), abs=RK4_ERROR)
 
 
-def test_many_steps_come_in_many_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_steps_come_in_many_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = [simulate_many(*arms(9), 0.2, t_eval=times) for times in (None, [0.05, 0.2], [0.15, 0.2])]
     monkeypatch.setattr("dynamics.simulation.ensembles.vectorized.WORK", 5000)
     monkeypatch.setattr("dynamics.simulation.ensembles.vectorized.NUMBERS", 200)
-    pieces = [simulate_many(*arms(9), 0.2, t_eval=times) for times in (None, [0.05, 0.2], [0.15, 0.2])]
-    assert all(map(same, whole, pieces))
-
-
-# Who runs it
-
-
-def case(method: str) -> tuple[tuple[Any, ...], dict[str, Any]]:
-    """Twenty-nine arms, one of which leaves the numbers."""
-    model, q, qd = arms(29)
-    qd[3] = 1e200
-    return (model, q, qd, 0.2, method), {"t_eval": [0.1, 0.2], "tau": np.tanh(q)}
-
-
-@mark.parametrize("method", ["rk4", "midpoint", "dop853"])
-@mark.parametrize("backend", ["llvm", "python"])
-def test_threads_and_chunks_change_nothing(method: str, backend: str) -> None:
-    if backend == "llvm":
-        pytest.importorskip("llvmlite")
-    arguments, options = case(method)
-    options |= {"backend": backend, "dt": 0.02}
-    alone = simulate_many(*arguments, **options)
-    assert same(alone, simulate_many(*arguments, **options, workers=3))
-    assert same(alone, simulate_many(*arguments, **options, workers=None, chunk=7))
-    assert same(alone, simulate_many(*arguments, **options, workers=map, chunk=1))
-
-
-def test_parts_may_come_in_any_order() -> None:
-    arguments, options = case("rk4")
-    alone = simulate_many(*arguments, **options)
-    assert same(alone, simulate_many(*arguments, **options, workers=lambda f, each: [f(x) for x in reversed(each)]))
-
-
-@mark.parametrize("method", ["rk4", "dopri5"])
-def test_processes_change_nothing_and_make_the_code_once(method: str) -> None:
-    arguments, options = case(method)
-    alone = simulate_many(*arguments, **options)
-    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
-        assert same(alone, simulate_many(*arguments, **options, workers=pool.map, chunk=8))
-        assert pool.submit(programs_made).result() == 1
-
-
-def programs_made() -> int:
-    return task._together.cache_info().misses + task._alone.cache_info().misses
-
-
-def test_threads_make_the_code_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = []
-    original = task.runner
-    monkeypatch.setattr(task, "runner", lambda *arguments: made.append(arguments) or original(*arguments))
-    model, q, qd = arms(40, 4)
-    simulate_many(model, q, qd, 0.1, workers=4, chunk=8)
-    simulate_many(model, q, qd, 0.2, workers=4, chunk=8)
-    assert len(made) == 1
-
-
-def drawn(seed: int) -> np.ndarray:
-    """Where an arm from a start drawn here ends."""
-    q, qd = np.random.default_rng(seed).normal(size=(2, 1, 2))
-    return simulate_many(random_arm(2), q, qd, 0.1, t_eval=[0.1]).q
-
-
-@mark.slow  # a scheduler and two processes
-def test_dask_changes_nothing() -> None:
-    distributed = pytest.importorskip("distributed")
-    arguments, options = case("rk4")
-    alone = simulate_many(*arguments, **options)
-    with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, protocol="tcp://", dashboard_address=None
-        ) as cluster,
-        distributed.Client(cluster) as client,
-    ):
-
-        def gathered(function: Callable[..., Any], items: Iterable[Any]) -> list[Any]:
-            return client.gather(client.map(function, items, pure=False))  # type: ignore[no-any-return]
-
-        assert same(alone, simulate_many(*arguments, **options, workers=gathered, chunk=8))
-        executor = client.get_executor(pure=False)
-        assert same(alone, simulate_many(*arguments, **options, workers=executor.map, chunk=8))
-        # Draws that a task makes from its own seed are its own.
-        assert [each.tolist() for each in gathered(drawn, range(4))] == [drawn(seed).tolist() for seed in range(4)]
+    blocks = [simulate_many(*arms(9), 0.2, t_eval=times) for times in (None, [0.05, 0.2], [0.15, 0.2])]
+    assert all(map(same, whole, blocks))
 
 
 # What can go wrong on the way
@@ -223,9 +128,9 @@ def test_dask_changes_nothing() -> None:
 def test_one_that_leaves_the_numbers_is_nan_from_there_and_says_where(method: str) -> None:
     qd = np.zeros((17, 2))
     q = np.random.default_rng(0).normal(size=(17, 2))
-    calm = simulate_many(runaway(), q, qd, 2.0, method, dt=0.01, t_eval=np.linspace(0.0, 2.0, 21))
+    calm = simulate_many(runaway(), q, qd, 2.0, method, **step(method, 0.01), t_eval=np.linspace(0.0, 2.0, 21))
     qd[4, 1], qd[9, 1] = 1.0, 2.0
-    result = simulate_many(runaway(), q, qd, 2.0, method, dt=0.01, t_eval=np.linspace(0.0, 2.0, 21))
+    result = simulate_many(runaway(), q, qd, 2.0, method, **step(method, 0.01), t_eval=np.linspace(0.0, 2.0, 21))
     others = [k for k in range(17) if k not in (4, 9)]
     assert result.stats.success.tolist() == [k in others for k in range(17)]
     assert (result.q[others] == calm.q[others]).all()
@@ -234,14 +139,16 @@ def test_one_that_leaves_the_numbers_is_nan_from_there_and_says_where(method: st
         finite = np.isfinite(np.concatenate([result.q[k], result.qd[k]], axis=1))
         assert finite[result.t < 0.9 / v].all()
         assert not finite[result.t > 1.5 / v].any()
-        one = dyn.simulate(runaway(), q[k], qd[k], 2.0, method, dt=0.01, t_eval=np.linspace(0.0, 2.0, 21)).stats
+        one = dyn.simulate(
+            runaway(), q[k], qd[k], 2.0, method, **step(method, 0.01), t_eval=np.linspace(0.0, 2.0, 21)
+        ).stats
         stats = result.stats
         assert (stats.message[k], stats.steps[k], stats.nfev[k]) == (one.message, one.steps, one.nfev)
         assert ("'wild'" if method != "midpoint" else "did not converge") in one.message
         assert len(result.t) - finite.all(axis=1).sum() == np.isnan(result.q[k, :, 0]).sum()
 
 
-def test_a_neighbour_that_is_lost_is_not_felt_in_an_arm() -> None:
+def test_a_neighbor_that_fails_is_not_felt_in_an_arm() -> None:
     model, q, qd = arms(16)
     calm = simulate_many(model, q, qd, 0.5)
     qd[3], q[11] = 1e200, 1e9
@@ -253,7 +160,7 @@ def test_a_neighbour_that_is_lost_is_not_felt_in_an_arm() -> None:
     assert result.q[3, 0].tolist() == q[3].tolist()
 
 
-def test_all_may_be_lost() -> None:
+def test_all_may_fail() -> None:
     result = simulate_many(runaway(), np.zeros((3, 2)), [0.0, 1.0], 9.0, dt=0.1)
     assert not result.stats.success.any()
     assert len(set(result.stats.message)) == 1
@@ -268,51 +175,6 @@ def test_max_steps() -> None:
         assert result.stats.steps.max() <= 4
 
 
-@mark.usefixtures("ctrl_c")
-@mark.parametrize("workers", [1, 3])
-@mark.parametrize("method", ["rk4", "midpoint"])
-def test_ctrl_c_comes_back_and_leaves_no_thread(workers: int, method: str) -> None:
-    before, main = set(threading.enumerate()), threading.main_thread().ident
-    assert main is not None
-    model, q, qd = arms(64)
-    simulate_many(model, q, qd, 0.01, method, workers=workers)  # the code is made
-    timer = threading.Timer(0.3, lambda: signal.pthread_kill(main, signal.SIGINT))
-    begin = time.perf_counter()
-    timer.start()
-    result = simulate_many(model, q, qd, 1e9, method, t_eval=[0.0, 1e9], workers=workers, chunk=8)
-    timer.join()
-    assert time.perf_counter() - begin < 60.0  # of days
-    assert set(threading.enumerate()) == before
-    assert set(result.stats.message) == {"interrupted"}
-    assert np.isnan(result.q).all()
-
-
-def test_ctrl_c_keeps_what_is_done() -> None:
-    def interrupted(function: Callable[..., Any], items: Iterable[Any]) -> Iterator[Any]:
-        for k, each in enumerate(items):
-            if k == 2:
-                raise KeyboardInterrupt
-            yield function(each)
-
-    whole, result = (simulate_many(*arms(29), 0.1, workers=workers, chunk=8) for workers in (1, interrupted))
-    assert result.stats.success.tolist() == [True] * 16 + [False] * 13
-    assert (result.q[:16] == whole.q[:16]).all()
-    assert np.isnan(result.q[16:]).all()
-    assert result.stats.message[15:17] == ("reached t_end", "interrupted")
-
-
-def test_an_error_in_a_thread_is_raised_and_leaves_no_thread(monkeypatch: pytest.MonkeyPatch) -> None:
-    before = set(threading.enumerate())
-
-    def broken(*_: object) -> None:
-        raise RuntimeError("broken")
-
-    monkeypatch.setattr("dynamics.simulation.ensembles.vectorized.SideBySide.advance", broken)
-    with raises(RuntimeError, match="broken"):
-        simulate_many(*arms(29), 0.1, workers=3, chunk=8)
-    assert set(threading.enumerate()) == before
-
-
 Q = np.zeros((4, 2))
 
 
@@ -324,7 +186,7 @@ Q = np.zeros((4, 2))
         (Q, None, {}, r"qd must have shape \(N, 2\) or \(2,\), got None"),
         (Q, Q[:3], {}, "must have the same number of trajectories, got: q has 4, qd has 3"),
         (Q, Q, {"tau": np.zeros((5, 2))}, "got: q has 4, qd has 4, tau has 5"),
-        (Q, Q, {"tau": [1.0]}, "tau needs one number for each of the 2 coordinates, got 1"),
+        (Q, Q, {"tau": [1.0]}, "tau needs one number for each of the 2 coordinates .*, got 1"),
         (Q, Q, {"tau": np.full((4, 2), math.inf)}, "tau must be finite, got inf at index 0 of trajectory 0"),
         (Q + [0.0, math.nan], Q, {}, "q must be finite, got nan at index 1 of trajectory 0"),
         (Q[0], Q[0], {}, "how many trajectories"),
@@ -361,11 +223,6 @@ def test_a_parameter_that_does_not_fit_is_refused(value: Any, message: str) -> N
         simulate_many(oscillator(), np.zeros((4, 1)), [0.0], 1.0, parameters={"k": value})
 
 
-def test_workers_that_give_no_results_are_refused() -> None:
-    with raises(TypeError, match=r"workers must give the results of the function, as map does, got int: 1"):
-        simulate_many(*arms(9), 0.1, workers=lambda f, each: [1])  # type: ignore[list-item]
-
-
 def test_a_result_that_would_not_fit_is_refused() -> None:
     with raises(
         MemoryError, match=r"100000 trajectories of 100000001 rows of 4 numbers take 2.98e\+05 GiB, and .* free"
@@ -378,18 +235,16 @@ def test_a_result_that_would_not_fit_is_refused() -> None:
     dt=st.floats(1e-2, 3.0),
     limits=st.tuples(st.integers(1, 50), st.integers(1, 5)),
 )
-def test_stretches_meet_every_instant_in_steps_of_at_most_dt(
-    gaps: list[float], dt: float, limits: tuple[int, int]
-) -> None:
+def test_grids_meet_every_instant_in_steps_of_at_most_dt(gaps: list[float], dt: float, limits: tuple[int, int]) -> None:
     instants = [0.0, *np.cumsum(gaps).tolist()]
     met = [0.0]
-    for stretch in stretches(instants, dt):
-        assert stretch.begin == approx(met[-1], rel=1e-14, abs=1e-14)
-        assert stretch.h <= dt * (1 + 1e-11)
-        met += [stretch.begin + (k + 1) * stretch.each * stretch.h for k in range(stretch.rows)]
-        pieces = list(stretch.pieces(*limits))
-        assert sum(steps for steps, _, _ in pieces) == stretch.each * stretch.rows
-        assert sum(steps // every for steps, every, due in pieces if due) == stretch.rows
-        assert all(steps <= limits[0] for steps, _, _ in pieces)
-    assert met == approx(instants, rel=1e-14)
-    assert len(stretches(np.linspace(0.0, 3.0, 1001).tolist(), dt)) == 1
+    for grid in grids_between(instants, dt):
+        assert grid.begin == approx(met[-1], rel=INSTANT, abs=INSTANT)
+        assert grid.h <= dt * (1 + 10.0 * SPACING)
+        met += [grid.begin + (k + 1) * grid.steps * grid.h for k in range(grid.rows)]
+        blocks = list(grid.blocks(*limits))
+        assert sum(steps for steps, _, _ in blocks) == grid.steps * grid.rows
+        assert sum(steps // every for steps, every, due in blocks if due) == grid.rows
+        assert all(steps <= limits[0] for steps, _, _ in blocks)
+    assert met == approx(instants, rel=INSTANT)
+    assert len(grids_between(np.linspace(0.0, 3.0, 1001).tolist(), dt)) == 1

@@ -9,6 +9,8 @@ from dynamics.equations.state_equation import state_equation, state_inputs
 from dynamics.systems.ode_system import OdeSystem
 from tests.dynamics.models import MODELS, at, inputs, states
 
+ROUNDING = 1e-15  # relative: the same three operations in another order
+
 
 def lotka_volterra() -> OdeSystem:
     return OdeSystem(lambda x, t, p: [p["a"] * x[0] - x[0] * x[1], x[0] * x[1] - x[1]], ["hares", "lynxes"], {"a": 1.5})
@@ -62,19 +64,19 @@ def test_a_second_order_system_is_the_same_either_way() -> None:
     spelled = OdeSystem(lambda x, t: [x[1], -9.81 * cg.sin(x[0]) - 0.3 * x[1]], "q0 qd0")
     point = {"q0": 0.7, "qd0": -1.2}
     one = state_equation(pendulum).evaluate({**point, "tau0": 0.0})
-    assert list(spelled.graph.evaluate(point).values()) == approx(list(one.values()), rel=1e-15)
+    assert list(spelled.graph.evaluate(point).values()) == approx(list(one.values()), rel=ROUNDING)
 
 
 @mark.parametrize(
     ("rate", "names", "parameters", "error", "words"),
     [
-        (lambda x, t: [x[0]], "x y", {}, ValueError, "must give 2 values, one for each state, got 1"),
+        (lambda x, t: [x[0]], "x y", {}, ValueError, "must give 2 values, one for each of x, y; got 1"),
         (lambda x, t: x[0], "x", {}, TypeError, "rate must give a sequence"),
-        (lambda x, t: ["1"], "x", {}, TypeError, "rate must give nodes or numbers"),
-        (lambda x, t: [float("nan")], "x", {}, ValueError, "rate must give nodes or numbers"),
+        (lambda x, t: ["1"], "x", {}, TypeError, "the rate of 'x' must be a node or a number"),
+        (lambda x, t: [float("nan")], "x", {}, ValueError, "the rate of 'x' must be a node or a number"),
         (lambda x: [x[0]], "x", {}, TypeError, r"must take \(x, t\) or \(x, t, p\)"),
         (None, "x", {}, TypeError, "must be a function"),
-        (lambda x, t: [cg.variable("z")], "x", {}, ValueError, "'z', which is no state"),
+        (lambda x, t: [cg.variable("z")], "x", {}, ValueError, r"'z', which is no state, parameter or t \(it has x\)"),
         (lambda x, t: [x[0]], "", {}, ValueError, "at least one state"),
         (lambda x, t: [x[0]], [1], {}, TypeError, "non-empty string, got 1"),
         (lambda x, t: [x[0]], "x x", {}, ValueError, "must differ"),

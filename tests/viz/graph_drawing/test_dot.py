@@ -134,32 +134,6 @@ def test_given_names_win_over_prettified_ones() -> None:
     assert {"ω", "Lagrangian", "q₀"} <= labels
 
 
-@pytest.mark.parametrize(
-    ("name", "shown"),
-    [
-        ("q0", "q₀"),
-        ("qd12", "q̇₁₂"),
-        ("qdd1", "q̈₁"),
-        ("tau2", "τ₂"),
-        ("theta", "θ"),
-        ("dL/dqd0", "dL/dq̇₀"),
-        ("q0_dot", "q₀_dot"),
-        ("dt", "dt"),
-        ("x", "x"),
-        ("2q", "2q"),
-    ],
-)
-def test_names_are_shown_in_mathematical_letters(name: str, shown: str) -> None:
-    assert theme.pretty(name) == shown
-
-
-def test_different_names_of_the_dynamics_stay_different() -> None:
-    names = [
-        f"{word}{i}{end}" for word in ("q", "qd", "qdd", "tau", "p") for i in range(12) for end in ("", "_dot", "_bar")
-    ]
-    assert len({theme.pretty(name) for name in names}) == len(names)
-
-
 def test_argument_order_is_written_where_it_matters() -> None:
     a, b = cg.variables("a b")
     marks = {
@@ -169,7 +143,7 @@ def test_argument_order_is_written_where_it_matters() -> None:
     assert marks == {"sub": {"1", "2"}, "add": {None}}
 
 
-def test_a_role_has_its_colour_and_its_line_in_the_legend() -> None:
+def test_a_role_has_its_color_and_its_line_in_the_legend() -> None:
     graph = cg.jvp(cg.gradient(spring()))
     drawn = boxes(graph)
     for i, node in enumerate(graph.nodes):
@@ -184,7 +158,7 @@ def test_the_legend_can_be_left_out() -> None:
     assert "legend" not in to_dot(spring(), legend=False).source
 
 
-def test_marked_nodes_and_the_edges_out_of_them_have_the_one_colour() -> None:
+def test_marked_nodes_and_the_edges_out_of_them_have_the_one_color() -> None:
     graph = spring()
     marked = {node for node in graph.nodes if "potential" in node.tags}
     number = {node: i for i, node in enumerate(graph.nodes)}
@@ -204,12 +178,7 @@ def test_the_legend_names_the_marked_only_when_there_are_some() -> None:
     assert "wrong term" not in to_dot(graph, marked_label="wrong term").source
 
 
-def test_no_role_and_no_tag_has_the_colour_of_the_spurious() -> None:
-    used = {paint.line for paint in theme.ROLES.values()} | {paint.fill for paint in theme.ROLES.values()}
-    assert theme.SPURIOUS not in used | set(theme.SERIES)
-
-
-def test_two_groups_of_marked_nodes_have_a_colour_and_a_line_of_the_legend_each() -> None:
+def test_two_groups_of_marked_nodes_have_a_color_and_a_line_of_the_legend_each() -> None:
     graph = spring()
     groups = {
         name: {node for node in graph.nodes if name in node.tags and node.args} for name in ("kinetic", "potential")
@@ -275,15 +244,6 @@ def test_clusters_follow_the_given_tags_or_function() -> None:
 def test_the_main_tag_is_the_one_with_a_number_or_the_only_one(tags: tuple[str, ...], cluster: str | None) -> None:
     with cg.tag(*tags):
         assert main_tag(cg.variable("x") * 2.0) == cluster
-
-
-def test_link_10_comes_after_link_9() -> None:
-    tags = ["link 10", "link 9", "base", "link 1"]
-    assert sorted(tags, key=theme.natural_order) == ["base", "link 1", "link 9", "link 10"]
-
-
-def test_tag_colours_depend_on_the_set_of_tags_alone() -> None:
-    assert theme.tag_colours(["b", "a", "c"]) == theme.tag_colours(["c", "b", "a", "a"])
 
 
 def test_a_collapsed_tag_is_one_box_that_counts_its_nodes() -> None:

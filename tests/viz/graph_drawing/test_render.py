@@ -1,8 +1,6 @@
-"""Pictures: SVG with a time limit from whichever Graphviz there is, PNG with its letters, files that are never half."""
+"""Pictures: SVG with a time limit from whichever Graphviz there is, PNG with its letters."""
 
-import errno
 import io
-import os
 import stat
 import sys
 import threading
@@ -14,7 +12,6 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from cgraph.util.atomic_write import atomic_write
 from viz import graph_svg, render_png, render_svg, theme, to_dot
 from viz.graph_drawing.render import LARGE, RenderError
 
@@ -99,6 +96,15 @@ def test_drawing_works_from_threads(no_binary: None) -> None:
     assert len(set(found)) == 1
 
 
+def test_without_a_folder_to_keep_machine_code_in_it_draws_all_the_same(
+    no_binary: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("in the way", encoding="utf-8")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    monkeypatch.setenv("HOME", str(tmp_path / "file"))
+    assert "</svg>" in render_svg("digraph { a -> b }")
+
+
 def test_a_drawing_that_takes_too_long_is_stopped(no_binary: None) -> None:
     with pytest.raises(RenderError, match=r"took longer than 0\.001 s"):
         render_svg("digraph { a -> b }", timeout=0.001)
@@ -117,8 +123,8 @@ def test_what_the_binary_says_is_in_the_error(binary: Any) -> None:
 
 def test_a_binary_that_hangs_is_stopped(binary: Any) -> None:
     binary("import time\ntime.sleep(60)")
-    with pytest.raises(RenderError, match=r"took longer than 0\.5 s"):
-        render_svg("digraph {}", timeout=0.5)
+    with pytest.raises(RenderError, match=r"took longer than 0\.1 s"):
+        render_svg("digraph {}", timeout=0.1)
 
 
 def test_a_binary_that_says_nothing_is_an_error(binary: Any) -> None:
@@ -197,57 +203,3 @@ def test_a_notebook_is_spared_a_graph_that_is_too_large() -> None:
         y = cg.sin(y)
     with pytest.raises(RenderError, match=f"{LARGE + 1} nodes are too many"):
         graph_svg(cg.Graph([x], {"y": y}))
-
-
-def test_write_makes_the_file_with_text_or_bytes(tmp_path: Path) -> None:
-    assert atomic_write(tmp_path / "a.svg", "ω₀\n").read_bytes() == "ω₀\n".encode()
-    assert atomic_write(str(tmp_path / "a.png"), b"\x00\xff").read_bytes() == b"\x00\xff"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.png", "a.svg"]
-
-
-def test_write_replaces_a_file_and_keeps_a_link(tmp_path: Path) -> None:
-    atomic_write(tmp_path / "real", "old")
-    (tmp_path / "link").symlink_to("real")
-    atomic_write(tmp_path / "link", "new")
-    assert (tmp_path / "real").read_text() == "new"
-    assert (tmp_path / "link").is_symlink()
-
-
-@pytest.mark.parametrize("step", ["write_bytes", "replace"])
-def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(
-    step: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    atomic_write(tmp_path / "a", "old")
-    original = Path.write_bytes
-
-    def full(self: Path, data: Any) -> int:
-        if step == "write_bytes":
-            original(self, data[:1])
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(Path, step, full)
-    with pytest.raises(OSError, match=r"cannot write .*a: No space left"):
-        atomic_write(tmp_path / "a", "new")
-    assert [path.name for path in tmp_path.iterdir()] == ["a"]
-    assert (tmp_path / "a").read_text() == "old"
-
-
-def test_write_names_the_folder_that_is_missing(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError, match=r"the folder .*nowhere does not exist"):
-        atomic_write(tmp_path / "nowhere" / "a", "x")
-
-
-def test_write_refuses_a_folder(tmp_path: Path) -> None:
-    (tmp_path / "b").mkdir()
-    with pytest.raises(OSError, match="that is a folder"):
-        atomic_write(tmp_path / "b", "x")
-    assert [path.name for path in tmp_path.iterdir()] == ["b"]
-
-
-def test_write_says_that_a_folder_is_read_only(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    def refused(self: Path, data: bytes) -> int:
-        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-
-    monkeypatch.setattr(Path, "write_bytes", refused)  # the superuser may write anywhere, so no real folder refuses
-    with pytest.raises(PermissionError, match=r"cannot write .*a: Permission denied"):
-        atomic_write(tmp_path / "a", "x")

@@ -24,7 +24,7 @@ def row(case: str, verdict: str, *figures: dict[str, Any], reason: str = "", sto
     run = {"steps": 12, "rejected": 3, "seconds": 0.25, "stopped": stopped}
     about = f"what is hard about {case}"
     shared = {"section": "Cases", "case": case, "about": about, "method": "radau", "verdict": verdict, "reason": reason}
-    return {**shared, **run, "figures": list(figures)}
+    return {**shared, **run, "measurements": list(figures)}
 
 
 ROWS = [
@@ -84,7 +84,7 @@ def test_a_share_is_drawn_within_the_picture(value: float | str, bound: float, s
     assert stability._share({"value": value, "bound": bound}) == share
 
 
-def test_what_is_beyond_its_bound_is_drawn_in_the_colour_of_what_is_wrong() -> None:
+def test_what_is_beyond_its_bound_is_drawn_in_the_color_of_what_is_wrong() -> None:
     axis = stability.shares(ROWS).axes[0]
     met, missed = (line for line in axis.lines if line.get_marker() in ("o", "X"))
     assert list(met.get_xdata()) == [1e-9]
@@ -111,7 +111,7 @@ def test_files_are_written_and_the_page_needs_no_other(tmp_path: Path) -> None:
 def test_a_report_of_nothing_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     for arguments in ([], ["chain", "--stability"]):
         assert cli.main(["report", *arguments]) == 1
-        assert "a report needs a scene, or --stability and none" in capsys.readouterr().err
+        assert "a report needs a scene, or --stability or --compare and none" in capsys.readouterr().err
 
 
 def test_the_command_writes_the_table_and_fails_for_an_unexplained_row(
@@ -122,10 +122,10 @@ def test_the_command_writes_the_table_and_fails_for_an_unexplained_row(
 
     def two(quick: bool) -> Any:
         assert quick
-        yield from case_runs.verdicts(["exponential decay"], ("dopri5",))
-        yield from case_runs.verdicts(["Kapitza's pendulum"], methods)
+        yield from case_runs.results(["exponential decay"], ("dopri5",))
+        yield from case_runs.results(["Kapitza's pendulum"], methods)
 
-    monkeypatch.setattr("dynamics.experiments.stability.stability.verdicts", two)
+    monkeypatch.setattr("dynamics.experiments.stability.stability.results", two)
     methods = ("dopri5",)
     assert cli.main(["report", "--stability", "--quick", "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr()

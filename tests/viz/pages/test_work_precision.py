@@ -1,4 +1,4 @@
-"""Reports as pages: names at the ends of curves lie apart, pages need no other file, files are whole or absent."""
+"""Reports of integrators as pages: what was measured is shown, and a mistake costs a line."""
 
 from __future__ import annotations
 
@@ -10,20 +10,15 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import numpy as np
 import pytest
 
-from viz import cli, theme
-from viz.pages.document import Document, Paragraph, Picture, Section, Table, to_html, to_markdown
-from viz.pages.write_document import check_writable, write_document
+from viz import cli
+from viz.pages.document import Table, to_html
 
 pytest.importorskip("matplotlib")
 
-from matplotlib.text import Text
 
 from viz.pages.work_precision import _power, _time, work_precision
-from viz.plots.direct_labels import Line, Panel, bars, labelled
-from viz.plots.plot import to_adaptive_svg
 
 
 def point(knob: float, seconds: float, error: float | None, **others: Any) -> dict[str, Any]:
@@ -115,7 +110,14 @@ def test_the_page_needs_no_other_file(page: str) -> None:
         ElementTree.fromstring(base64.b64decode(picture).decode())
 
 
-def test_a_report_without_results_is_still_a_page() -> None:
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures are empty, where only words and tables are looked at: drawing takes seconds."""
+    monkeypatch.setattr("viz.pages.work_precision.labeled", lambda *_, **__: None)
+    monkeypatch.setattr("viz.pages.work_precision.to_adaptive_svg", lambda _: "<svg/>")
+
+
+def test_a_report_without_results_is_still_a_page(undrawn: None) -> None:
     curves = [curve("euler", True, "equal steps", [point(64.0, 1e-3, 1e6)])]
     empty = content(curves=curves, cold=[], targets=[], absent={}, conservative=True)
     page = shown(to_html(work_precision(empty)))
@@ -123,7 +125,7 @@ def test_a_report_without_results_is_still_a_page() -> None:
     assert "Every contender that was asked has points." in page
 
 
-def test_missing_numbers_are_dashes() -> None:
+def test_missing_numbers_are_dashes(undrawn: None) -> None:
     lost = point(64.0, 1e-3, 1.0, largest=None, drift=None, step=None, steps=None)
     report = content(curves=[curve("rk4", True, "equal steps", [lost])])
     rows = next(s for s in work_precision(report).sections if s.anchor == "points").blocks[1]
@@ -143,68 +145,6 @@ def test_times_have_units(value: float | None, text: str) -> None:
     assert _time(value) == text
 
 
-def test_markdown_has_what_the_page_has() -> None:
-    table = Table("A | B", ["name", "value"], [["x|y", "1"], ["z", "2"]])
-    picture = Picture("curve", "<svg/>", "a curve")
-    document = Document(
-        "Title", [Paragraph("First.")], [Section("s", "Heading", [table, picture, Paragraph("!", True)])]
-    )
-    assert to_markdown(document, "arm-") == (
-        "# Title\n\nFirst.\n\n## Heading\n\n**A | B**\n\n| name | value |\n|:--|--:|\n| x\\|y | 1 |\n| z | 2 |\n\n"
-        "![a curve](arm-curve.svg)\n\n> !\n"
-    )
-    assert document.pictures() == [picture]
-    page = to_html(document)
-    assert "<h2>Heading</h2>" in page
-    assert "<td>x|y</td>" in page
-
-
-def test_files_of_a_document_are_called_by_its_name(tmp_path: Path) -> None:
-    document = Document("Title", [Picture("curve", "<svg/>", "a curve")])
-    page = write_document(tmp_path / "new", "an arm <3>", document, {"a": 1}, kind="kind")
-    assert page == tmp_path / "new" / "an_arm_3-kind.html"
-    assert {each.name: each.read_text(encoding="utf-8") for each in page.parent.iterdir()} == {
-        "an_arm_3-kind.html": to_html(document),
-        "an_arm_3-kind.md": to_markdown(document, "an_arm_3-kind-"),
-        "an_arm_3-kind.json": '{\n "a": 1\n}',
-        "an_arm_3-kind-curve.svg": "<svg/>",
-    }
-
-
-def test_names_lie_apart_and_inside() -> None:
-    """Ten curves that end within a few pixels of each other."""
-    x = np.geomspace(1e-1, 1e-9, 9)
-    lines = [Line(f"contender {k}", x, 1e-3 * (1 + 0.03 * k) * x**-0.2, k) for k in range(10)]
-    figure = labelled([Panel("many", "x", "y", lines)], columns=1)
-    figure.draw_without_rendering()
-    (axis,) = figure.axes
-    boxes = [Text.get_window_extent(text) for text in axis.texts]  # without the lines that lead to them
-    assert len(boxes) == 10
-    for i, a in enumerate(boxes):
-        for b in boxes[:i]:
-            assert not (a.x0 < b.x1 and b.x0 < a.x1 and a.y0 + 1 < b.y1 and b.y0 + 1 < a.y1)
-    frame = axis.get_window_extent()
-    assert all(box.x1 <= frame.x1 + 0.1 * frame.width for box in boxes)
-    assert all(frame.y0 < box.y0 + 2 and box.y1 - 2 < frame.y1 for box in boxes)
-
-
-def test_a_narrow_axis_has_two_powers_of_ten() -> None:
-    figure = labelled([Panel("narrow", "x", "y", [Line("a", [3e-5, 2e-5], [1.0, 2.0])])], columns=1)
-    (axis,) = figure.axes
-    assert [tick for tick in axis.get_xticks() if 1e-6 < tick < 1e-3] == pytest.approx([1e-4, 1e-5])
-
-
-def test_the_ink_of_a_picture_follows_the_page() -> None:
-    svg = to_adaptive_svg(bars(["a", "b"], [0.1, 20.0], "time [s]"))
-    root = ElementTree.fromstring(svg)
-    (style,) = [each for each in root.iter("{http://www.w3.org/2000/svg}style") if "prefers" in (each.text or "")]
-    assert theme.DARK_TEXT in str(style.text)
-    assert "fill: currentColor" in str(style.text)  # of letters, which have no colour of their own
-    drawn = svg.replace(str(style.text), "")
-    for ink in (theme.TEXT, theme.LINE, "#000000", "#FFFFFF"):
-        assert ink.lower() not in drawn.lower()
-
-
 MEASURED = ["report", "spring_mass", "--quick", "--methods", "rk4,dop853", "--peers", ""]
 
 
@@ -222,12 +162,11 @@ def test_the_command_writes_whole_files(tmp_path: Path, capsys: pytest.CaptureFi
 
 def test_an_interrupted_report_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("flint")
-    from dynamics.experiments.work_precision import work_precision as measured
 
     def interrupt(*_: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(measured, "_in_turns", interrupt)
+    monkeypatch.setattr("dynamics.experiments.work_precision.work_precision.in_turns", interrupt)
     assert cli.main([*MEASURED, "--out", str(tmp_path / "r")]) == 130
     left = [path for path in tmp_path.rglob("*") if path.is_file() and path.parent.name != "exact"]
     assert left == []
@@ -248,6 +187,9 @@ def test_an_interrupted_report_leaves_no_file(tmp_path: Path, monkeypatch: pytes
         (["report", "--stability", "--ignore"], "--ignore goes with a report of run times or --pruning"),
         (["report", "--stability", "--pruning"], "one at a time"),
         (["report", "--pruning"], "a report needs a scene"),
+        (["report", "--compare", "speed"], "comparisons are orders, taylor, stiff, loops, energy, got 'speed'"),
+        (["report", "--compare", "orders", "--json"], "--json goes with a report of run times"),
+        (["report", "chain", "--compare", "orders"], "a report needs a scene, or --stability or --compare and none"),
         (["report", "chain", "--pruning", "--lock", "a=1", "--lock", "a=2"], "--lock takes each body once"),
     ],
 )
@@ -303,9 +245,3 @@ def test_without_matplotlib_no_report_is_begun(
     )
     assert cli.main(["report", "spring_mass", "--out", str(tmp_path / "r")]) == 1
     assert "plots need matplotlib" in capsys.readouterr().err
-
-
-def test_trying_a_folder_leaves_nothing(tmp_path: Path) -> None:
-    check_writable(tmp_path / "a" / "b")
-    check_writable(tmp_path)
-    assert list(tmp_path.iterdir()) == []

@@ -3,22 +3,57 @@
 from __future__ import annotations
 
 from . import chains, extremes, fields, orbits, rotation, stiff
-from .case import RTOL, Case, Watch
+from .case import RTOL, Criterion, StabilityCase
 
-__all__ = ["RTOL", "TABLE", "Case", "Watch", "load", "names"]
+__all__ = ["RTOL", "TABLE", "Criterion", "StabilityCase", "load", "names"]
 
-TABLE: dict[str, Case] = {
+TABLE: dict[str, StabilityCase] = {
     case.name: case for rows in (stiff, chains, orbits, rotation, fields, extremes) for case in rows.cases()
 }
 
 
 def names() -> list[str]:
-    """Names of the cases."""
+    """Names of the cases.
+
+    Returns
+    -------
+    list of str
+        In the order of the table.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> dyn.cases.names()[:2]
+    ['spring pendulum, k = 100', 'spring pendulum, k = 10000']
+    """
     return list(TABLE)
 
 
-def load(name: str) -> Case:
-    """The case of that name. Raises ValueError for a name that is not among `names()`."""
+def load(name: str) -> StabilityCase:
+    """The case of that name: a scene with its exact motion, and bounds to meet.
+
+    Parameters
+    ----------
+    name : str
+        One of `names()`.
+
+    Returns
+    -------
+    StabilityCase
+        With the fields of a Scene (`model`, `q`, `qd`, `t_end`), `criteria`, tolerances, and `solution(times)`.
+
+    Raises
+    ------
+    ValueError
+        For a name that is none of them.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> case = dyn.cases.load("exponential decay")
+    >>> case.start, case.t_end, [criterion.quantity for criterion in case.criteria]
+    ((1.0,), 50.0, ['error'])
+    """
     if name not in TABLE:
         raise ValueError(f"there is no case {name!r}; the cases are {', '.join(TABLE)}")
     return TABLE[name]

@@ -1,34 +1,30 @@
-"""A case: a model, its start, how long it runs, what to watch on the way, and the solution to compare with."""
+"""A case: a setting that is hard for arithmetic or for an integrator, what to measure on the way, and bounds."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import cgraph as cg
 from cgraph import Graph, Node
 
 from ....equations.equations_of_motion import energy
-from ....reference import Reference, reference
 from ....systems.model import Model, as_ode, as_system
+from ...setting import Setting
 
 RTOL = 1e-9  # the relative tolerance that the bounds are for
 ATOL = 1e-3 * RTOL  # the absolute one, in the SI unit of each state
 SLACK = 1e3  # steps add their errors up, and a tolerance is met to a factor only
-DIGITS = 20  # of a reference: four more than float64 can tell
 
 GROWN = "an error made on the way grows as the flow makes a small error of the start grow"
 
-Exact = Callable[[Sequence[float]], Reference]
-
 
 @dataclass(frozen=True)
-class Watch:
+class Criterion:
     """A quantity of a run and the bound to meet.
 
-    quantity: "error", the deviation from the case's solution at t_end, each state relative to `Case.size`;
+    quantity: "error", the deviation from the case's solution at t_end, each state relative to `StabilityCase.size`;
         "error 0", "error 0 1", .., the same of those states alone; or the name of an invariant of the case: its largest
         change during the run, relative to `scale`.
     """
@@ -40,61 +36,32 @@ class Watch:
 
 
 @dataclass(frozen=True)
-class Case:
-    """One row of the stability table.
+class StabilityCase(Setting):
+    """One row of the stability table; `about` says what is hard here. `exact` may be of a limit of the motion.
 
-    start: q and then qd, or the states of an OdeSystem.  size: a natural size of each state; empty for the larger of
-    its values at the start and at t_end.
     atol: absolute tolerance, where that of one in a thousand of RTOL in SI units is too much or too little; for all
     states, or for each.
     growth: what the flow makes of a small relative error of the start by t_end (the largest of all states, each
-    relative to its size); `sensitivity.growth` measures it. None where there is no solution to compare with.
+    relative to its size); the tests measure it. None where there is no solution to compare with.
     invariants(model): a graph over the state (and t, parameters) whose outputs do not change along the motion.
     """
 
-    name: str
-    about: str  # one line: what is hard here
-    build: Callable[[], Any]  # the model: a System, OdeSystem, Mechanism or PlanarArm
-    start: tuple[float, ...]
-    t_end: float  # s
-    watch: tuple[Watch, ...]
-    stiff: bool = False  # whether an explicit method needs steps far below what the motion asks for
-    size: tuple[float, ...] = ()
+    method: str | None = None
+    digits: int = 20  # four more than float64 can tell
+    criteria: tuple[Criterion, ...] = ()
     atol: float | tuple[float, ...] = ATOL
     growth: float | None = None
     invariants: Callable[[Any], Graph] | None = None
-    exact: Exact | None = None  # a closed form of the motion, or of a limit of it that the watch then names
-    method: str | None = None  # of `multiprecision.reference`, where it carries the model to t_end in a minute or so
-
-    def solution(self, times: Sequence[float] | None = None, folder: str | Path | None = None) -> Reference | None:
-        """The motion at `times` (default: t_end), from the closed form or else computed; None when there is neither.
-
-        folder: as of `multiprecision.reference`. Raises ImportError without python-flint or mpmath.
-        """
-        at = [self.t_end] if times is None else [float(t) for t in times]
-        if self.exact is not None:
-            return self.exact(at)
-        if self.method is None:
-            return None
-        return reference(self.build(), self.start, at, digits=DIGITS, method=self.method, folder=folder)
-
-    def sizes(self, folder: str | Path | None = None) -> tuple[float, ...]:
-        """A size for each state: `size`, or the larger of the values at the start and at t_end, or 1 for zeros."""
-        if self.size:
-            return self.size
-        solution = self.solution(folder=folder)
-        end = [0.0] * len(self.start) if solution is None else solution.x[-1].tolist()
-        return tuple([max(abs(a), abs(b)) or 1.0 for a, b in zip(self.start, end, strict=True)])
 
 
-def error_watch(growth: float, why: str, quantity: str = "error") -> Watch:
+def error_criterion(growth: float, why: str = GROWN, quantity: str = "error") -> Criterion:
     """The bound of a well-behaved method: local errors of RTOL, grown as the flow grows them."""
-    return Watch(quantity, SLACK * RTOL * max(growth, 1.0), why)
+    return Criterion(quantity, SLACK * RTOL * max(growth, 1.0), why)
 
 
-def energy_watch(scale: float, why: str = "nothing takes energy in or out") -> Watch:
+def energy_criterion(scale: float, why: str = "nothing takes energy in or out") -> Criterion:
     """Energy kept to a thousand times the tolerance. scale: the energy that the motion turns over [J]."""
-    return Watch("energy", SLACK * RTOL, why, scale)
+    return Criterion("energy", SLACK * RTOL, why, scale)
 
 
 def conserved(**others: Callable[..., Node]) -> Callable[[Any], Graph]:
@@ -102,10 +69,10 @@ def conserved(**others: Callable[..., Node]) -> Callable[[Any], Graph]:
 
     def graph(model: Model) -> Graph:
         system = as_system(model)
-        found = energy(system)
-        outputs = {"energy": found.outputs["E"]}
+        of_energy = energy(system)
+        outputs = {"energy": of_energy.outputs["E"]}
         outputs |= {name: function(system.q, system.qd) for name, function in others.items()}
-        return cg.simplify(Graph(found.inputs, outputs))
+        return cg.simplify(Graph(of_energy.inputs, outputs))
 
     return graph
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import cgraph as cg
@@ -13,7 +12,7 @@ from ....multibody.mechanism import Body, Joint, Mechanism
 from ....multibody.planar_arm import PlanarArm, planar_arm
 from ....reference import closed_forms
 from ....systems.system import System
-from .case import GROWN, RTOL, SLACK, Case, Watch, conserved, energy_watch, error_watch
+from .case import GROWN, RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion, error_criterion
 
 GRAVITY = 9.81  # m/s^2
 UNIT = 2.0**-53  # rounding of float64
@@ -22,21 +21,22 @@ UNIT = 2.0**-53  # rounding of float64
 def _two_links(
     name: str,
     about: str,
-    build: Callable[[], PlanarArm],
+    arm: PlanarArm,
     fastest: float,
     bend: float,
-    watch: tuple[Watch, ...],
+    criteria: tuple[Criterion, ...],
     growth: float | None,
-) -> Case:
+) -> StabilityCase:
     """Two links let go straight, at rest, for a hundred radians of the fastest mode [rad/s], at most 2 s."""
-    return Case(
+    return StabilityCase(
         name=name,
         about=about,
-        build=build,
-        start=(1.0, 0.0, 0.0, 0.0),
+        model=arm,
+        q=(1.0, 0.0),
+        qd=(0.0, 0.0),
         size=(1.0, bend, math.sqrt(GRAVITY), bend * fastest),
         t_end=min(2.0, 100.0 / fastest),
-        watch=watch,
+        criteria=criteria,
         stiff=fastest > 1e3,
         growth=growth,
         invariants=conserved(),
@@ -44,40 +44,35 @@ def _two_links(
     )
 
 
-def mass_ratio(ratio: float, growth: float) -> Case:
+def mass_ratio(ratio: float, growth: float) -> StabilityCase:
     """Two points on unit rods without mass, the lower `ratio` times as heavy as the upper."""
-
-    def build() -> PlanarArm:
-        return planar_arm([1.0, ratio], [1.0, 1.0], mass_model="point", gravity=GRAVITY)
-
+    arm = planar_arm([1.0, ratio], [1.0, 1.0], mass_model="point", gravity=GRAVITY)
     about = (
         "a light link under a heavy one" if ratio < 1.0 else "a light link above a heavy one swings fast in its pull"
     )
     fastest = math.sqrt(2.0 * GRAVITY * max(ratio, 1.0))  # of the upper point between the two rods
     bend = 1.0 / max(ratio, 1.0)  # gravity over the square of that
     lost = UNIT * ratio  # the light mass is rounded in the sum with the heavy one
-    watch = (energy_watch(GRAVITY * (1.0 + 2.0 * ratio)), Watch("error", SLACK * max(RTOL * growth, lost), GROWN))
-    return _two_links(f"mass ratio {ratio:g}", about, build, fastest, bend, watch, growth)
+    kept = energy_criterion(GRAVITY * (1.0 + 2.0 * ratio))
+    criteria = (kept, Criterion("error", SLACK * max(RTOL * growth, lost), GROWN))
+    return _two_links(f"mass ratio {ratio:g}", about, arm, fastest, bend, criteria, growth)
 
 
-def length_ratio(ratio: float, growth: float | None) -> Case:
+def length_ratio(ratio: float, growth: float | None) -> StabilityCase:
     """Two rods of equal mass, the lower `ratio` times as long as the upper."""
-
-    def build() -> PlanarArm:
-        return planar_arm([1.0, 1.0], [1.0, ratio], gravity=GRAVITY)
-
+    arm = planar_arm([1.0, 1.0], [1.0, ratio], gravity=GRAVITY)
     about = "a short link under a long one" if ratio < 1.0 else "a long link under a short one"
     fastest = math.sqrt(GRAVITY / min(ratio, 1.0))
     # Of a long link below, the float64 accelerations themselves have a relative error of 2^-53 ratio^2.
     why = "the short link's inertia is rounded in the sum with the long one's, larger by the square of the ratio"
-    lost = Watch("energy", SLACK * max(RTOL, UNIT * ratio**2), why, GRAVITY * (2.0 + ratio))
-    watch: tuple[Watch, ...] = (energy_watch(GRAVITY * (2.0 + ratio)) if ratio < 1.0 else lost,)
+    lost = Criterion("energy", SLACK * max(RTOL, UNIT * ratio**2), why, GRAVITY * (2.0 + ratio))
+    criteria: tuple[Criterion, ...] = (energy_criterion(GRAVITY * (2.0 + ratio)) if ratio < 1.0 else lost,)
     if growth is not None:
-        watch += (error_watch(growth, GROWN),)
-    return _two_links(f"length ratio {ratio:g}", about, build, fastest, 1.0, watch, growth)
+        criteria += (error_criterion(growth),)
+    return _two_links(f"length ratio {ratio:g}", about, arm, fastest, 1.0, criteria, growth)
 
 
-def nearly_singular(small: float) -> Case:
+def nearly_singular(small: float) -> StabilityCase:
     """M = [[1, 1], [1, 1 + small]], and yet slow modes: q0 + q1 and q1 swing by themselves."""
 
     def lagrangian(q: Any, qd: Any, t: Any) -> list[cg.Node]:
@@ -88,15 +83,16 @@ def nearly_singular(small: float) -> Case:
         ]
 
     lost = UNIT / small
-    return Case(
+    return StabilityCase(
         name=f"mass matrix of condition {4 / small:.0e}",
         about="the smallest inertia is lost when it is added to the largest",
-        build=lambda: System(lagrangian, ["first", "second"]),
-        start=(1.0, 0.5, 0.0, 0.0),
+        model=System(lagrangian, ["first", "second"]),
+        q=(1.0, 0.5),
+        qd=(0.0, 0.0),
         t_end=20.0,
-        watch=(
-            Watch("error", max(SLACK * RTOL, 200.0 * lost), "rounding changes the small inertia, and its frequency"),
-            energy_watch(10.0),
+        criteria=(
+            Criterion("error", max(SLACK * RTOL, 200.0 * lost), "rounding changes the small inertia and its frequency"),
+            energy_criterion(10.0),
         ),
         size=(1.0, 1.0, 2.0, 2.0),
         growth=1.8,
@@ -106,76 +102,63 @@ def nearly_singular(small: float) -> Case:
     )
 
 
-def massless_links() -> Case:
+def massless_links() -> StabilityCase:
     """Three hinges, the first two on bodies without mass: their inertia is the motors' armature alone."""
-
-    def build() -> Mechanism:
-        axis, below = (0.0, 1.0, 0.0), (0.0, 0.0, -0.5)
-        bodies = [
-            Body("first", Joint("revolute", axis, armature=1e-3)),
-            Body("second", Joint("revolute", axis, below, armature=1e-3), "first"),
-            Body(
-                "third",
-                Joint("revolute", axis, below, armature=1e-3),
-                "second",
-                mass=1.0,
-                center=(0.0, 0.0, -0.25),
-                inertia=[[0.02, 0.0, 0.0], [0.0, 0.02, 0.0], [0.0, 0.0, 0.001]],
-            ),
-        ]
-        return Mechanism(bodies)
-
+    axis, below = (0.0, 1.0, 0.0), (0.0, 0.0, -0.5)
+    joint = Joint("revolute", axis, below, armature=1e-3)
+    bodies = [
+        Body("first", Joint("revolute", axis, armature=1e-3)),
+        Body("second", joint, "first"),
+        Body("third", joint, "second", mass=1.0, center=(0.0, 0.0, -0.25), inertia=(0.02, 0.02, 0.001)),
+    ]
     growth = 30.0
-    return Case(
+    return StabilityCase(
         name="massless links with armature",
         about="links without mass between motors: inertia only by the armatures",
-        build=build,
-        start=(0.7, 0.4, -0.3, 0.0, 0.0, 0.0),
+        model=Mechanism(bodies),
+        q=(0.7, 0.4, -0.3),
+        qd=(0.0,) * 3,
         t_end=2.0,
-        watch=(energy_watch(10.0), error_watch(growth, GROWN)),
+        criteria=(energy_criterion(10.0), error_criterion(growth)),
         growth=growth,
         invariants=conserved(),
         method="taylor",
     )
 
 
-def long_chain(n: int, t_end: float) -> Case:
+def long_chain(n: int, t_end: float) -> StabilityCase:
     """n equal rods, 1 kg and 1 m in all, let go straight at 45 degrees."""
-
-    def build() -> PlanarArm:
-        return planar_arm([1.0 / n] * n, [1.0 / n] * n, gravity=GRAVITY)
-
-    return Case(
+    return StabilityCase(
         name=f"{n} links",
         about="many links: a dense mass matrix of condition n^4, and a fast whip at the end",
-        build=build,
-        start=(math.pi / 4,) + (0.0,) * (2 * n - 1),
+        model=planar_arm([1.0 / n] * n, [1.0 / n] * n, gravity=GRAVITY),
+        q=(math.pi / 4,) + (0.0,) * (n - 1),
+        qd=(0.0,) * n,
         t_end=t_end,
-        watch=(energy_watch(GRAVITY),),
+        criteria=(energy_criterion(GRAVITY),),
         invariants=conserved(),
     )
 
 
-def zero_gravity() -> Case:
+def zero_gravity() -> StabilityCase:
     """Three rods without gravity, spinning: beside energy, the momentum of the first joint stays."""
-
-    def build() -> PlanarArm:
-        return planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7], gravity=0.0)
+    arm = planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7], gravity=0.0)
 
     def spin(q: Any, qd: Any) -> cg.Node:
-        return momentum(build()).outputs["p0"]
+        return momentum(arm).outputs["p0"]
 
     growth = 110.0
-    return Case(
+    return StabilityCase(
         name="zero gravity",
         about="nothing but inertia: energy and angular momentum stay",
-        build=build,
-        start=(0.3, 0.5, -0.8, 1.0, -2.0, 3.0),
+        model=arm,
+        q=(0.3, 0.5, -0.8),
+        qd=(1.0, -2.0, 3.0),
         t_end=10.0,
-        watch=(
-            energy_watch(1.0),
-            Watch("angular momentum", SLACK * RTOL, "the system may be turned as a whole", 1.0),
-            error_watch(growth, GROWN),
+        criteria=(
+            energy_criterion(1.0),
+            Criterion("angular momentum", SLACK * RTOL, "the system may be turned as a whole", 1.0),
+            error_criterion(growth),
         ),
         growth=growth,
         invariants=conserved(**{"angular momentum": spin}),
@@ -183,7 +166,7 @@ def zero_gravity() -> Case:
     )
 
 
-def cases() -> list[Case]:
+def cases() -> list[StabilityCase]:
     """The rows of this file."""
     masses = {1e-12: 27.0, 1e-8: 27.0, 1e-4: 27.0, 1e4: 30.0, 1e8: 44.0, 1e12: 44.0}
     # None: the reference is not to be had in minutes.

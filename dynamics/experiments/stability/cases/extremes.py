@@ -8,7 +8,7 @@ import cgraph as cg
 
 from ....reference import closed_forms
 from ....systems.system import System
-from .case import GROWN, RTOL, SLACK, Case, Watch, conserved, energy_watch, error_watch
+from .case import RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion, error_criterion
 
 STIFFNESS = 9.81  # 1/s^2, gravity over length
 TINY = 5e-324  # the smallest positive float64
@@ -20,15 +20,16 @@ def simple_pendulum(stiffness: float = STIFFNESS) -> System:
     return System(lambda q, qd, t: [0.5 * qd[0] ** 2, stiffness * cg.cos(q[0])], ["angle"])
 
 
-def upright(angle: float, name: str, t_end: float, growth: float) -> Case:
+def upright(angle: float, name: str, t_end: float, growth: float) -> StabilityCase:
     """Let go at rest, at or next to the upright."""
-    return Case(
+    return StabilityCase(
         name=name,
         about="an unstable equilibrium: what is there at the start grows by e^(3.13 t)",
-        build=simple_pendulum,
-        start=(angle, 0.0),
+        model=simple_pendulum(),
+        q=(angle,),
+        qd=(0.0,),
         t_end=t_end,
-        watch=(energy_watch(2.0 * STIFFNESS), error_watch(growth, GROWN)),
+        criteria=(energy_criterion(2.0 * STIFFNESS), error_criterion(growth)),
         size=(math.pi, math.sqrt(STIFFNESS)),
         growth=growth,
         invariants=conserved(),
@@ -37,18 +38,19 @@ def upright(angle: float, name: str, t_end: float, growth: float) -> Case:
     )
 
 
-def large_angle(angle: float) -> Case:
+def large_angle(angle: float) -> StabilityCase:
     """A pendulum that has turned many times already."""
     ulp = math.ulp(angle)
-    return Case(
+    return StabilityCase(
         name=f"angle of {angle:g} rad",
         about=f"the angle itself can be told to {ulp:.2g} rad only; sine and cosine must reduce it exactly",
-        build=simple_pendulum,
-        start=(angle, 0.0),
+        model=simple_pendulum(),
+        q=(angle,),
+        qd=(0.0,),
         t_end=10.0,
-        watch=(
-            Watch("error 0", SLACK * max(UNIT, RTOL / angle), "the angle relative to its own size"),
-            Watch(
+        criteria=(
+            Criterion("error 0", SLACK * max(UNIT, RTOL / angle), "the angle relative to its own size"),
+            Criterion(
                 "energy",
                 max(SLACK * RTOL, 100.0 * ulp),
                 "a rounding of the angle is a change of the potential"
@@ -64,17 +66,18 @@ def large_angle(angle: float) -> Case:
     )
 
 
-def spinning(velocity: float, growth: float) -> Case:
+def spinning(velocity: float, growth: float) -> StabilityCase:
     """A pendulum at a high speed, for a thousand radians."""
-    return Case(
+    return StabilityCase(
         name=f"velocity of {velocity:g} rad/s",
         about="gravity is a small change of a large speed",
-        build=simple_pendulum,
-        start=(0.5, velocity),
+        model=simple_pendulum(),
+        q=(0.5,),
+        qd=(velocity,),
         t_end=1e3 / velocity,
-        watch=(
-            Watch("energy", SLACK * RTOL, "nothing takes energy in or out", 0.5 * velocity**2),
-            error_watch(growth, GROWN),
+        criteria=(
+            Criterion("energy", SLACK * RTOL, "nothing takes energy in or out", 0.5 * velocity**2),
+            error_criterion(growth),
         ),
         size=(1e3, velocity),
         growth=growth,
@@ -83,15 +86,16 @@ def spinning(velocity: float, growth: float) -> Case:
     )
 
 
-def creeping() -> Case:
+def creeping() -> StabilityCase:
     """The smallest velocity there is, without a force: the angle must neither jump nor be lost."""
-    return Case(
+    return StabilityCase(
         name="smallest velocity",
         about="products of the velocity vanish; the motion must still be uniform",
-        build=lambda: simple_pendulum(0.0),
-        start=(0.0, TINY),
+        model=simple_pendulum(0.0),
+        q=(0.0,),
+        qd=(TINY,),
         t_end=1024.0,
-        watch=(Watch("error 1", 0.0, "no force acts: the velocity is exactly the start's"),),
+        criteria=(Criterion("error 1", 0.0, "no force acts: the velocity is exactly the start's"),),
         size=(1024.0 * TINY, TINY),
         growth=1.0,
         exact=lambda times: closed_forms.free_fall(times, [0.0], [TINY], [0.0]),
@@ -99,15 +103,16 @@ def creeping() -> Case:
     )
 
 
-def hanging() -> Case:
+def hanging() -> StabilityCase:
     """The smallest velocity at the lower equilibrium."""
-    return Case(
+    return StabilityCase(
         name="smallest velocity, hanging",
         about="numbers that underflow everywhere must not become NaN or grow",
-        build=simple_pendulum,
-        start=(0.0, TINY),
+        model=simple_pendulum(),
+        q=(0.0,),
+        qd=(TINY,),
         t_end=10.0,
-        watch=(Watch("error", RTOL, "nothing moves that can be told from rest; sizes are 1 rad and 1 rad/s"),),
+        criteria=(Criterion("error", RTOL, "nothing moves that can be told from rest; sizes are 1 rad and 1 rad/s"),),
         size=(1.0, 1.0),
         growth=1.0,
         exact=lambda times: closed_forms.oscillator(times, 0.0, TINY, 1.0, STIFFNESS),
@@ -115,7 +120,7 @@ def hanging() -> Case:
     )
 
 
-def cases() -> list[Case]:
+def cases() -> list[StabilityCase]:
     """The rows of this file."""
     return [
         upright(math.pi, "at the upright", 3.0, 1.9e4),

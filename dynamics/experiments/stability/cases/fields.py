@@ -10,25 +10,26 @@ import cgraph as cg
 from ....reference import closed_forms
 from ....systems.ode_system import OdeSystem
 from ....systems.system import System
-from .case import GROWN, RTOL, SLACK, Case, Watch, conserved, energy_watch, error_watch
+from .case import RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion, error_criterion
 
 GRAVITY = 9.81  # m/s^2
 
 
-def charged_particle(growth: float) -> Case:
+def charged_particle(growth: float) -> StabilityCase:
     """A charge in a uniform magnetic field: terms linear in the velocity, which do no work."""
     frequency, start = 10.0, (0.0, 0.0, 1.0, 0.5)
 
     def lagrangian(q: Any, qd: Any, t: Any) -> list[cg.Node]:
         return [0.5 * (qd[0] ** 2 + qd[1] ** 2), 0.5 * frequency * (q[0] * qd[1] - q[1] * qd[0])]
 
-    return Case(
+    return StabilityCase(
         name="charge in a magnetic field",
         about="a force across the velocity, from terms linear in it: a thousand radians of circles",
-        build=lambda: System(lagrangian, ["x", "y"]),
-        start=start,
+        model=System(lagrangian, ["x", "y"]),
+        q=start[:2],
+        qd=start[2:],
         t_end=100.0,
-        watch=(energy_watch(0.625, "a magnetic field does no work"), error_watch(growth, GROWN)),
+        criteria=(energy_criterion(0.625, "a magnetic field does no work"), error_criterion(growth)),
         size=(0.1, 0.1, 1.0, 1.0),
         growth=growth,
         invariants=conserved(),
@@ -37,17 +38,18 @@ def charged_particle(growth: float) -> Case:
     )
 
 
-def relativistic_oscillator(growth: float) -> Case:
+def relativistic_oscillator(growth: float) -> StabilityCase:
     """L = -sqrt(1 - v^2) - x^2/2 with m = c = k = 1, from rest where the energy is ten times the rest energy."""
-    return Case(
+    return StabilityCase(
         name="relativistic oscillator",
         about="a kinetic energy that is not quadratic, and speeds up to 0.995 c",
-        build=lambda: System(lambda q, qd, t: [-cg.sqrt(1.0 - qd[0] ** 2), -0.5 * q[0] ** 2], ["x"]),
-        start=(math.sqrt(18.0), 0.0),
+        model=System(lambda q, qd, t: [-cg.sqrt(1.0 - qd[0] ** 2), -0.5 * q[0] ** 2], ["x"]),
+        q=(math.sqrt(18.0),),
+        qd=(0.0,),
         t_end=100.0,
-        watch=(
-            Watch("energy", 1e2 * SLACK * RTOL, "near c an error of the speed counts by the cube of gamma", 10.0),
-            error_watch(growth, GROWN),
+        criteria=(
+            Criterion("energy", 1e2 * SLACK * RTOL, "near c an error of the speed counts by the cube of gamma", 10.0),
+            error_criterion(growth),
         ),
         growth=growth,
         invariants=conserved(),
@@ -55,7 +57,7 @@ def relativistic_oscillator(growth: float) -> Case:
     )
 
 
-def driven_pendulum(growth: float) -> Case:
+def driven_pendulum(growth: float) -> StabilityCase:
     """Kapitza's pendulum, 1 m: its pivot shakes up and down 5 cm at 150 rad/s, which holds it upright."""
     height, frequency = 0.05, 150.0
 
@@ -63,30 +65,30 @@ def driven_pendulum(growth: float) -> Case:
         pivot = -height * frequency * cg.sin(frequency * t)
         return [0.5 * qd[0] ** 2 + qd[0] * pivot * cg.sin(q[0]), GRAVITY * cg.cos(q[0])]
 
-    return Case(
+    return StabilityCase(
         name="Kapitza's pendulum",
         about="explicit time, a fast drive, and a slow motion that exists by it alone",
-        build=lambda: System(lagrangian, ["angle"]),
-        start=(3.0, 0.0),
+        model=System(lagrangian, ["angle"]),
+        q=(3.0,),
+        qd=(0.0,),
         t_end=10.0,
-        watch=(error_watch(growth, GROWN),),
+        criteria=(error_criterion(growth),),
         growth=growth,
         method="taylor",
     )
 
 
-def growing_mass(growth: float) -> Case:
+def growing_mass(growth: float) -> StabilityCase:
     """Caldirola and Kanai's Lagrangian, L = e^(c t) (qd^2 - k q^2) / 2: a damped oscillator without damping."""
     damping, stiffness = 0.5, 4.0
-    return Case(
+    return StabilityCase(
         name="damping by a growing mass",
         about="explicit time in every term; the mass grows to e^20 while the motion dies out",
-        build=lambda: System(
-            lambda q, qd, t: cg.exp(damping * t) * (0.5 * qd[0] ** 2 - 0.5 * stiffness * q[0] ** 2), ["x"]
-        ),
-        start=(1.0, 0.0),
+        model=System(lambda q, qd, t: cg.exp(damping * t) * (0.5 * qd[0] ** 2 - 0.5 * stiffness * q[0] ** 2), ["x"]),
+        q=(1.0,),
+        qd=(0.0,),
         t_end=40.0,
-        watch=(error_watch(growth, "the motion dies out, and its errors with it"),),
+        criteria=(error_criterion(growth, "the motion dies out, and its errors with it"),),
         size=(1.0, 2.0),
         growth=growth,
         exact=lambda times: closed_forms.oscillator(times, 1.0, 0.0, 1.0, stiffness, damping),
@@ -94,15 +96,16 @@ def growing_mass(growth: float) -> Case:
     )
 
 
-def exponential(name: str, rate: float, size: float, why: str) -> Case:
+def exponential(name: str, rate: float, size: float, why: str) -> StabilityCase:
     """xdot = rate x over fifty time constants."""
-    return Case(
+    return StabilityCase(
         name=name,
         about="fifty time constants: the result is of another size than the start",
-        build=lambda: OdeSystem(lambda x, t: [rate * x[0]], ["x"]),
-        start=(1.0,),
+        model=OdeSystem(lambda x, t: [rate * x[0]], ["x"]),
+        q=(1.0,),
+        qd=(),
         t_end=50.0,
-        watch=(Watch("error", SLACK * RTOL, why),),
+        criteria=(Criterion("error", SLACK * RTOL, why),),
         size=(size,),
         growth=1.0,
         exact=lambda times: closed_forms.exponential(times, 1.0, rate),
@@ -110,7 +113,7 @@ def exponential(name: str, rate: float, size: float, why: str) -> Case:
     )
 
 
-def cases() -> list[Case]:
+def cases() -> list[StabilityCase]:
     """The rows of this file."""
     return [
         charged_particle(1.0),

@@ -9,26 +9,27 @@ import cgraph as cg
 
 from ....reference import closed_forms
 from ....systems.system import System
-from .case import GROWN, RTOL, SLACK, Case, Watch, conserved, energy_watch, error_watch
+from .case import RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion, error_criterion
 
 
 def _lagrangian(q: Any, qd: Any, t: Any) -> list[cg.Node]:
     return [0.5 * (qd[0] ** 2 + qd[1] ** 2), 1.0 / cg.hypot(q[0], q[1])]
 
 
-def kepler(eccentricity: float, orbits: float, growth: float) -> Case:
+def kepler(eccentricity: float, orbits: float, growth: float) -> StabilityCase:
     """A unit mass about a unit centre, semi-major axis 1 m, from the pericentre."""
     start = closed_forms.kepler_start(eccentricity)
-    return Case(
+    return StabilityCase(
         name=f"Kepler, e = {eccentricity:g}",
         about=f"{orbits:g} orbits with a close passage each: the step must change by (1 - e)^1.5",
-        build=lambda: System(_lagrangian, ["x", "y"]),
-        start=start,
+        model=System(_lagrangian, ["x", "y"]),
+        q=start[:2],
+        qd=start[2:],
         t_end=2.0 * math.pi * orbits,
-        watch=(
-            energy_watch(0.5),
-            Watch("angular momentum", SLACK * RTOL, "the force is central", math.sqrt(1.0 - eccentricity**2)),
-            error_watch(growth, GROWN),
+        criteria=(
+            energy_criterion(0.5),
+            Criterion("angular momentum", SLACK * RTOL, "the force is central", math.sqrt(1.0 - eccentricity**2)),
+            error_criterion(growth),
         ),
         size=(2.0, 1.0, 1.0, 1.0),
         growth=growth,
@@ -38,6 +39,6 @@ def kepler(eccentricity: float, orbits: float, growth: float) -> Case:
     )
 
 
-def cases() -> list[Case]:
+def cases() -> list[StabilityCase]:
     """The rows of this file. All end near the apocentre, where the phase matters least."""
     return [kepler(0.9, 100.5, 1.0e4), kepler(0.99, 100.5, 9.5e4), kepler(0.999, 20.5, 1.9e5)]

@@ -11,7 +11,16 @@ import cgraph as cg
 from ....reference import closed_forms
 from ....systems.ode_system import OdeSystem
 from ....systems.system import System
-from .case import GROWN, RTOL, SLACK, Case, Watch, conserved, conserved_states, energy_watch, error_watch
+from .case import (
+    RTOL,
+    SLACK,
+    Criterion,
+    StabilityCase,
+    conserved,
+    conserved_states,
+    energy_criterion,
+    error_criterion,
+)
 
 INERTIA = (1.0, 2.0, 3.0)  # kg m^2, principal
 OMEGA = (0.001, 1.0, 0.002)  # rad/s in the body's axes: about the middle axis, and a little aside
@@ -58,7 +67,7 @@ def _total(q: Any, qd: Any) -> cg.Node:
     return x + y + z
 
 
-def euler_equations(growth: float) -> Case:
+def euler_equations(growth: float) -> StabilityCase:
     """Euler's equations alone: angular velocity in the body's axes."""
 
     def rate(w: Any, t: Any) -> list[cg.Node]:
@@ -69,16 +78,17 @@ def euler_equations(growth: float) -> Case:
             ((i[0] - i[1]) / i[2]) * (w[0] * w[1]),
         ]
 
-    return Case(
+    return StabilityCase(
         name="free body about its middle axis, Euler's equations",
         about="long rests next to an unstable rotation, and sudden flips",
-        build=lambda: OdeSystem(rate, ["w1", "w2", "w3"]),
-        start=OMEGA,
+        model=OdeSystem(rate, ["w1", "w2", "w3"]),
+        q=OMEGA,
+        qd=(),
         t_end=100.0,
-        watch=(
-            Watch("energy", SLACK * RTOL, "no torque does work", 1.0),
-            Watch("momentum", SLACK * RTOL, "no torque", 4.0),
-            error_watch(growth, GROWN),
+        criteria=(
+            Criterion("energy", SLACK * RTOL, "no torque does work", 1.0),
+            Criterion("momentum", SLACK * RTOL, "no torque", 4.0),
+            error_criterion(growth),
         ),
         size=(1.0, 1.0, 1.0),
         growth=growth,
@@ -91,18 +101,20 @@ def euler_equations(growth: float) -> Case:
     )
 
 
-def middle_axis(growth: float) -> Case:
+def middle_axis(growth: float) -> StabilityCase:
     """The same motion as a Lagrangian system of three Euler angles."""
-    return Case(
+    start = _start(INERTIA, OMEGA)
+    return StabilityCase(
         name="free body about its middle axis, Euler angles",
         about="the same flips, with a mass matrix that depends on the angles",
-        build=lambda: rotor(INERTIA, 0.0),
-        start=_start(INERTIA, OMEGA),
+        model=rotor(INERTIA, 0.0),
+        q=start[:3],
+        qd=start[3:],
         t_end=100.0,
-        watch=(
-            energy_watch(1.0),
-            Watch("momentum", SLACK * RTOL, "no torque", 4.0),
-            error_watch(growth, GROWN),
+        criteria=(
+            energy_criterion(1.0),
+            Criterion("momentum", SLACK * RTOL, "no torque", 4.0),
+            error_criterion(growth),
         ),
         size=(100.0, 1.0, 10.0, 1.0, 1.0, 1.0),
         growth=growth,
@@ -111,25 +123,26 @@ def middle_axis(growth: float) -> Case:
     )
 
 
-def heavy_top(growth: float) -> Case:
+def heavy_top(growth: float) -> StabilityCase:
     """Lagrange's top, fast, let go without precession: its axis nods with cusps."""
 
     def precession(q: Any, qd: Any) -> cg.Node:
         x, y, z = (moment * omega for moment, omega in zip(HEAVY, spin(q, qd), strict=True))
         return cg.sin(q[1]) * (x * cg.sin(q[2]) + y * cg.cos(q[2])) + z * cg.cos(q[1])
 
-    return Case(
+    return StabilityCase(
         name="heavy top",
         about="a fast spin and a slow nod; three integrals of the motion",
-        build=lambda: rotor(HEAVY, PULL),
-        start=(0.0, 0.5, 0.0, 0.0, 0.0, 50.0),
+        model=rotor(HEAVY, PULL),
+        q=(0.0, 0.5, 0.0),
+        qd=(0.0, 0.0, 50.0),
         t_end=10.0,
         size=(10.0, 0.5, 500.0, 2.0, 1.0, 50.0),
-        watch=(
-            energy_watch(PULL),
-            Watch("spin momentum", SLACK * RTOL, "the top is symmetric", 1.0),
-            Watch("vertical momentum", SLACK * RTOL, "gravity has no moment about the vertical", 1.0),
-            error_watch(growth, GROWN),
+        criteria=(
+            energy_criterion(PULL),
+            Criterion("spin momentum", SLACK * RTOL, "the top is symmetric", 1.0),
+            Criterion("vertical momentum", SLACK * RTOL, "gravity has no moment about the vertical", 1.0),
+            error_criterion(growth),
         ),
         growth=growth,
         invariants=conserved(
@@ -139,6 +152,6 @@ def heavy_top(growth: float) -> Case:
     )
 
 
-def cases() -> list[Case]:
+def cases() -> list[StabilityCase]:
     """The rows of this file."""
     return [euler_equations(1.0), middle_axis(18.0), heavy_top(110.0)]

@@ -12,7 +12,7 @@ from ....reference import Reference, closed_forms
 from ....reference.solution import from_text
 from ....systems.ode_system import OdeSystem
 from ....systems.system import System
-from .case import ATOL, GROWN, Case, Watch, conserved, conserved_states, energy_watch, error_watch
+from .case import ATOL, Criterion, StabilityCase, conserved, conserved_states, energy_criterion, error_criterion
 
 GRAVITY = 9.81  # m/s^2
 RATIO = 10.0  # of damping to the critical one
@@ -31,25 +31,24 @@ def spring_pendulum(stiffness: float, damping: float) -> System:
     return System(lagrangian, ["extension", "angle"], damping=[damping, 0.0])
 
 
-def _undamped(stiffness: float, growth: float | None) -> Case:
+def _undamped(stiffness: float, growth: float | None) -> StabilityCase:
     angle = 1.0
-    start = (GRAVITY * math.cos(angle) / stiffness, angle, 0.0, 0.0)
-    scale = GRAVITY
     limit = 100.0 * GRAVITY / stiffness + 1e-6
-    watch = [energy_watch(scale)]
+    criteria = [energy_criterion(GRAVITY)]
     if growth is None:  # too many oscillations to follow; their mean is known
         why = "the rigid pendulum is the limit: its distance is of the order of the extension, m g / k"
-        watch.append(Watch("error 1 3", limit, why))
+        criteria.append(Criterion("error 1 3", limit, why))
     else:
-        watch.append(error_watch(growth, GROWN))
+        criteria.append(error_criterion(growth))
     stretch = GRAVITY / stiffness
-    return Case(
+    return StabilityCase(
         name=f"spring pendulum, k = {stiffness:g}",
         about="a fast oscillation that nothing damps, hardly excited by the start",
-        build=lambda: spring_pendulum(stiffness, 0.0),
-        start=start,
+        model=spring_pendulum(stiffness, 0.0),
+        q=(GRAVITY * math.cos(angle) / stiffness, angle),
+        qd=(0.0, 0.0),
         t_end=10.0,
-        watch=tuple(watch),
+        criteria=tuple(criteria),
         stiff=stiffness > 1e6,
         size=(stretch, 1.0, math.sqrt(stiffness) * stretch, math.sqrt(GRAVITY)),
         growth=growth,
@@ -66,17 +65,18 @@ def rigid(times: Sequence[float]) -> Reference:
     return from_text(rigid.t, rows, rigid.error, f"{rigid.how}, of the limit of a rigid rod")
 
 
-def _damped(stiffness: float, growth: float) -> Case:
+def _damped(stiffness: float, growth: float) -> StabilityCase:
     angle, stretch = 1.0, GRAVITY / stiffness
     size = (stretch, 1.0, stretch * math.sqrt(GRAVITY), math.sqrt(GRAVITY))
     damping = 2.0 * RATIO * math.sqrt(stiffness)
-    return Case(
+    return StabilityCase(
         name=f"damped spring pendulum, k = {stiffness:g}",
         about="a fast motion that dies out at once: stiff in the sense of implicit methods",
-        build=lambda: spring_pendulum(stiffness, damping),
-        start=(2.0 * stretch, angle, 0.0, 0.0),
+        model=spring_pendulum(stiffness, damping),
+        q=(2.0 * stretch, angle),
+        qd=(0.0, 0.0),
         t_end=10.0,
-        watch=(error_watch(growth, "the flow's growth: the fast error dies out"),),
+        criteria=(error_criterion(growth, "the flow's growth: the fast error dies out"),),
         stiff=True,
         size=size,
         atol=tuple([ATOL * each for each in size]),  # the extension may be as small as ATOL itself
@@ -85,17 +85,18 @@ def _damped(stiffness: float, growth: float) -> Case:
     )
 
 
-def van_der_pol(mu: float, growth: float) -> Case:
+def van_der_pol(mu: float, growth: float) -> StabilityCase:
     """y'' = mu^2 ((1 - y^2) y' - y), time in units of mu (Hairer and Wanner, "Solving ODEs II", section IV.1)."""
-    return Case(
+    return StabilityCase(
         name=f"Van der Pol, mu = {mu:g}",
         about="slow arcs and jumps of width mu^-2, in the scaled time of the test set",
-        build=lambda: OdeSystem(
+        model=OdeSystem(
             lambda x, t, p: [x[1], p["mu"] * p["mu"] * ((1.0 - x[0] * x[0]) * x[1] - x[0])], ["y", "z"], {"mu": mu}
         ),
-        start=(2.0, 0.0),
+        q=(2.0, 0.0),
+        qd=(),
         t_end=2.0,
-        watch=(error_watch(growth, "the flow's growth: errors across a slow arc die out, along it they stay"),),
+        criteria=(error_criterion(growth, "the flow's growth: errors across a slow arc die out, along it they stay"),),
         stiff=True,
         size=(2.0, 1.0),
         growth=growth,
@@ -103,12 +104,12 @@ def van_der_pol(mu: float, growth: float) -> Case:
     )
 
 
-def robertson() -> Case:
+def robertson() -> StabilityCase:
     """The reaction of Robertson (1966), to t = 10^11 as in the Test Set for IVP Solvers."""
-    return Case(
+    return StabilityCase(
         name="Robertson, to 1e11",
         about="rates from 0.04 to 3e7 over sixteen decades of time; a negative concentration runs away",
-        build=lambda: OdeSystem(
+        model=OdeSystem(
             lambda x, t: [
                 -0.04 * x[0] + 1e4 * x[1] * x[2],
                 0.04 * x[0] - 1e4 * x[1] * x[2] - 3e7 * x[1] * x[1],
@@ -116,11 +117,12 @@ def robertson() -> Case:
             ],
             ["a", "b", "c"],
         ),
-        start=(1.0, 0.0, 0.0),
+        q=(1.0, 0.0, 0.0),
+        qd=(),
         t_end=1e11,
-        watch=(
-            error_watch(2.1, "errors die out; sizes are those at the end, 2e-8, 8e-14 and 1"),
-            Watch("mass", 1e-12, "a + b + c is linear, and every Runge-Kutta method keeps it to rounding"),
+        criteria=(
+            error_criterion(2.1, "errors die out; sizes are those at the end, 2e-8, 8e-14 and 1"),
+            Criterion("mass", 1e-12, "a + b + c is linear, and every Runge-Kutta method keeps it to rounding"),
         ),
         stiff=True,
         size=(2e-8, 8e-14, 1.0),
@@ -130,15 +132,16 @@ def robertson() -> Case:
     )
 
 
-def prothero_robinson(rate: float) -> Case:
+def prothero_robinson(rate: float) -> StabilityCase:
     """x' = -rate (x - cos t) - sin t, whose solution from 1 is cos t."""
-    return Case(
+    return StabilityCase(
         name=f"Prothero-Robinson, rate {rate:g}",
         about="a smooth solution beside a fast decay: methods lose order here",
-        build=lambda: OdeSystem(lambda x, t: [-rate * (x[0] - cg.cos(t)) - cg.sin(t)], ["x"]),
-        start=(1.0,),
+        model=OdeSystem(lambda x, t: [-rate * (x[0] - cg.cos(t)) - cg.sin(t)], ["x"]),
+        q=(1.0,),
+        qd=(),
         t_end=10.0,
-        watch=(error_watch(1.0, "errors die out"),),
+        criteria=(error_criterion(1.0, "errors die out"),),
         stiff=True,
         size=(1.0,),
         growth=0.0,
@@ -147,7 +150,7 @@ def prothero_robinson(rate: float) -> Case:
     )
 
 
-def cases() -> list[Case]:
+def cases() -> list[StabilityCase]:
     """The rows of this file."""
     undamped = {1e2: 9.5, 1e4: 4.0, 1e6: 4.0, 1e8: None, 1e10: None, 1e12: None}
     damped = {1e2: 2.6, 1e4: 3.9, 1e6: 6.3, 1e8: 7.4, 1e10: 7.5, 1e12: 7.5}

@@ -1,0 +1,243 @@
+"""Edge pushing with early elimination: the equations W t = b of a Hessian solve, reduced node by node.
+
+The unknowns t are the tangents of all nodes z that depend on the variables w. With the adjoints zbar = df/dz, the
+second-order adjoint W and the right-hand side b, an operation z with partials p_k = dz/da_k leaves the equations by
+
+    t_z = sum_k p_k t_k                                                (its tangent)
+    abar_k += p_k zbar                                                 (adjoints)
+    b_k += p_k b_z                                                     (right-hand side)
+    W_kj += p_k W_zj                for every other node j             (second-order adjoint, off the diagonal)
+    W_kj += p_k p_j W_zz + zbar d2z/(da_k da_j)                        (its diagonal, and the operation's own Hessian)
+
+and a variable w, once all nodes that use it have left, by Gaussian elimination.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from ..core.node import Node, as_node
+from ..simplify.builder import Builder
+from .elimination_order import Step
+from .ldl_solve import SingularError
+from .rotation_pairs import Rotation, rotations
+from .second_order import second_partials
+from .symmetric_matrix import ZERO, SymmetricMatrix
+from .variable_sums import variable_sums
+
+ONE = as_node(1.0)
+
+
+class PivotRow(NamedTuple):
+    """The row of an eliminated unknown i: t_i = constant - sum_j gains_j t_j, after division by the pivot W_ii."""
+
+    pivot: Node
+    constant: Node  # b_i / W_ii
+    gains: dict[Node, Node]  # {j: W_ij / W_ii}
+
+
+class EdgePushing:
+    """The equations W t = b while nodes leave them, from the output down, and the tangents on the way back.
+
+    rhs: {variable: entry of b}.  at: right-hand sides at inner nodes.  order: nodes that depend on the variables,
+    arguments first.
+    """
+
+    def __init__(
+        self, build: Builder, output: Node, rhs: dict[Node, Node], at: Mapping[Node, Node], order: Sequence[Node]
+    ) -> None:
+        self.build = build
+        self.order = order
+        self.depends = set(order)
+        self.position = {node: i for i, node in enumerate(rhs)}
+        self.bars: dict[Node, Node] = {output: ONE}  # adjoints
+        self.rhs = dict(rhs)
+        for node, value in at.items():
+            self.rhs[node] = self.rhs.get(node, ZERO) + value
+        self.matrix = SymmetricMatrix()
+        self.pivot_rows: dict[Node, PivotRow] = {}
+        self.sums = variable_sums(order, self.position)
+        pairs = [r for r in rotations(order, self.depends, at) if not {r.first, r.second} & self.sums.keys()]
+        self.rotations = {r.first: r for r in pairs}
+        self.dots: dict[Node, Node] = {}  # tangents
+        self.partials: dict[Node, dict[Node, Node]] = {}  # of each operation, by argument that depends on w
+
+    def arguments(self) -> dict[Node, list[Node]]:
+        """The nodes that each step's equation passes to; nodes that leave with another are no key."""
+        firsts = {r.second: r.first for r in self.rotations.values()}
+        absorbed = {node for r in self.rotations.values() for node in r.products}
+        absorbed |= {terms.variable for terms in self.sums.values()} | firsts.keys()
+        result = {}
+        for node in self.order:
+            if node not in absorbed:
+                args: Sequence[Node] = node.args
+                if node in self.sums:
+                    args = (self.sums[node].other,)
+                elif node in self.rotations:
+                    args = self.rotations[node].x, self.rotations[node].y
+                result[node] = list(dict.fromkeys([firsts.get(arg, arg) for arg in args if arg in self.depends]))
+        return result
+
+    def reduce(self, step: Step) -> None:
+        """Take the nodes of a step out of W t = b."""
+        if isinstance(step, list):
+            self.push_rotations(step)
+        elif step in self.sums:
+            self.eliminate_sum(step)
+        elif step in self.position:
+            self.eliminate(step, self.rhs[step])
+        else:
+            self.push_adjoint(step)
+
+    def substitute(self, step: Step) -> None:
+        """The tangents of a step's nodes, from those of the steps that were reduced after it."""
+        dots = self.dots
+        if isinstance(step, list):  # (p, q) = R (x, y), R = [[c, s], [-s, c]]
+            for r in step:
+                dots[r.first] = r.sign_x * (r.cos * dots[r.x] + r.sin * dots[r.y])
+                dots[r.second] = r.sign_y * (r.cos * dots[r.y] - r.sin * dots[r.x])
+        elif step in self.pivot_rows:  # t_i = b_i / W_ii - sum_j (W_ij / W_ii) t_j
+            pivot_row = self.pivot_rows[step]
+            dot = pivot_row.constant
+            for other, gain in pivot_row.gains.items():
+                dot = dot - gain * dots[other]
+            dots[step] = dot
+            if step in self.sums:  # z = p w + p' a, so t_w = p (t_z - p' t_a), as p = 1 / p
+                variable, other, p, p_other = self.sums[step]
+                rest = dot if other not in dots else dot - p_other * dots[other]
+                dots[variable] = p * rest
+        else:  # t_z = sum_k p_k t_k
+            dots[step] = _total([p * dots[arg] for arg, p in self.partials[step].items()])
+
+    def eliminate(self, node: Node, rhs: Node) -> None:
+        """Gaussian elimination of unknown i, all uses gone: W_jk -= W_ij W_ik / W_ii, b_j -= W_ij b_i / W_ii.
+
+        Raises SingularError when the pivot W_ii is the constant zero.
+        """
+        pivot, row = self.matrix.pop(node)
+        if pivot.value == 0.0:
+            raise SingularError(self.index(node))
+        gains = {other: value / pivot for other, value in row.items()}
+        others = list(row)
+        for i, a in enumerate(others):
+            for b in others[: i + 1]:
+                self.matrix.add(a, b, -(gains[a] * row[b]))
+            self.rhs[a] = self.rhs.get(a, ZERO) - gains[a] * rhs
+        self.pivot_rows[node] = PivotRow(pivot, rhs / pivot, gains)
+
+    def index(self, node: Node) -> int:
+        """The place among `wrt` of an eliminated variable, or of the one in an eliminated sum."""
+        return self.position[self.sums[node].variable if node in self.sums else node]
+
+    def pivots(self) -> dict[int, Node]:
+        """{index of the variable: pivot}, in the order of elimination."""
+        return {self.index(node): row.pivot for node, row in self.pivot_rows.items()}
+
+    def eliminate_sum(self, node: Node) -> None:
+        """A sum z = p w + p' a with the only use of w, eliminated in place of w: the unknowns (w, a) become (z, a).
+
+        With w = p (z - p' a): b_z += p b_w, b_a -= p' p b_w, abar += p' zbar. Pushed to w and a first, W_zz would be in
+        the rows of both, for the elimination of w to take out of a's again: a difference in which nothing is left
+        where W_zz is much larger than the part of W_aa that does not come from z.
+        """
+        variable, other, p, p_other = self.sums[node]
+        bar, at_sum, at_variable = self.bars.pop(node, ZERO), self.rhs.pop(node, ZERO), p * self.rhs[variable]
+        self.eliminate(node, at_sum + at_variable)
+        if other in self.depends:
+            self.bars[other] = self.bars.get(other, ZERO) + p_other * bar
+            self.rhs[other] = self.rhs.get(other, ZERO) - p_other * at_variable
+
+    def push_rotations(self, group: Sequence[Rotation]) -> None:
+        """Rotations (p, q) = R (x, y) by one angle: R^T to adjoints and b, R^T W R to W, with R = [[c, s], [-s, c]].
+
+        By c^2 + s^2 = 1 a 2 x 2 block of R^T W R takes half of the products that term by term it would.
+        """
+        signs = {r.first: r.sign_x for r in group} | {r.second: r.sign_y for r in group}
+        inner: dict[tuple[Node, Node], Node] = {}  # W between nodes of the group
+        outer: dict[Node, dict[Node, Node]] = {}  # W of other nodes with those of the group
+        for node, sign in signs.items():
+            for other, value in self.matrix.row(node).items():
+                if other in signs:
+                    inner[node, other] = sign * signs[other] * value
+                else:
+                    outer.setdefault(other, {})[node] = sign * value
+        for node in signs:
+            self.matrix.pop(node)
+        for i, r in enumerate(group):
+            p, q, x, y, c, s = r[:6]
+            for table in (self.bars, self.rhs):  # (x, y) += R^T (p, q)
+                a, b = r.sign_x * table.pop(p, ZERO), r.sign_y * table.pop(q, ZERO)
+                table[x] = table.get(x, ZERO) + (c * a - s * b)
+                table[y] = table.get(y, ZERO) + (s * a + c * b)
+            for other, row in outer.items():  # (W_xj, W_yj) += R^T (W_pj, W_qj)
+                a, b = row.get(p, ZERO), row.get(q, ZERO)
+                self.matrix.add_both(x, other, c * a - s * b)
+                self.matrix.add_both(y, other, s * a + c * b)
+            for earlier in group[:i]:
+                self._push_block(r, earlier, inner)
+            self._push_diagonal_block(r, inner)
+
+    def _push_block(self, r: Rotation, r2: Rotation, inner: Mapping[tuple[Node, Node], Node]) -> None:
+        """R^T B R for the block B of W between (p, q) and (p2, q2).
+
+        With u = s (B_pp - B_qq) + c (B_pq + B_qp) it is [[B_pp - s u, c u - B_qp], [c u - B_pq, B_qq + s u]].
+        """
+        p, q, x, y, c, s = r[:6]
+        p2, q2, x2, y2 = r2[:4]
+        pp, pq, qp, qq = (inner.get(pair, ZERO) for pair in ((p, p2), (p, q2), (q, p2), (q, q2)))
+        u = s * (pp - qq) + c * (pq + qp)
+        self.matrix.add_both(x, x2, pp - s * u)
+        self.matrix.add_both(y, y2, qq + s * u)
+        self.matrix.add_both(x, y2, c * u - qp)
+        self.matrix.add_both(y, x2, c * u - pq)
+
+    def _push_diagonal_block(self, r: Rotation, inner: Mapping[tuple[Node, Node], Node]) -> None:
+        """As `_push_block` for the symmetric block of (p, q) with itself."""
+        p, q, x, y, c, s = r[:6]
+        pp, pq, qq = (inner.get(pair, ZERO) for pair in ((p, p), (p, q), (q, q)))
+        u = s * (pp - qq) + 2.0 * c * pq
+        self.matrix.add(x, x, pp - s * u)
+        self.matrix.add(y, y, qq + s * u)
+        self.matrix.add(x, y, c * u - pq)
+
+    def push_adjoint(self, node: Node) -> None:
+        """An operation z leaves W t = b: abar_k += p_k zbar, b_k += p_k b_z, W_kj += p_k W_zj."""
+        diagonal, row = self.matrix.pop(node)
+        bar, rhs = self.bars.pop(node, ZERO), self.rhs.pop(node, ZERO)
+        partials: dict[Node, Node] = {}
+        for arg, partial in zip(node.args, node.op.partials(node, *node.args), strict=True):
+            if arg in self.depends:
+                partials[arg] = partials[arg] + partial if arg in partials else as_node(partial)
+        self.partials[node] = partials
+        for arg, p in partials.items():
+            self.bars[arg] = self.bars.get(arg, ZERO) + bar * p
+            self.rhs[arg] = self.rhs.get(arg, ZERO) + p * rhs
+            for other, value in row.items():
+                self.matrix.add_both(arg, other, p * value)
+        self.push_second_order(partials, diagonal)
+        if bar.value != 0.0:
+            self.add_local_hessian(node, bar)
+
+    def push_second_order(self, partials: Mapping[Node, Node], diagonal: Node) -> None:
+        """W_kj += p_k p_j W_zz."""
+        if diagonal.value != 0.0:
+            args = list(partials)
+            for i, a in enumerate(args):
+                scaled = diagonal * partials[a]
+                for b in args[: i + 1]:
+                    self.matrix.add(a, b, scaled * partials[b])
+
+    def add_local_hessian(self, node: Node, bar: Node) -> None:
+        """W_kj += zbar d2z/(da_k da_j); an argument in two slots gets both mixed terms."""
+        for j, k, second in second_partials(node, self.build):
+            a, b = node.args[j], node.args[k]
+            if a in self.depends and b in self.depends:
+                self.matrix.add(a, b, 2.0 * (bar * second) if a is b and j != k else bar * second)
+
+
+def _total(terms: list[Node]) -> Node:
+    total = terms[0]
+    for term in terms[1:]:
+        total = total + term
+    return total

@@ -1,0 +1,147 @@
+"""LLVM's text for the functions that a program's statements call: a graph once, element by element, or summed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from ..codegen.llvm_ir import Arithmetic, body, libm_functions
+from ..core.graph import Graph
+from .lu_solve import factor_text, solve_text
+
+_ARGUMENT = {"x": "in", "y": "out"}  # by the names that `body` gives to the two sides of a graph
+Lengths = tuple[int, ...]  # of the registers that are a function's arguments
+
+
+class Functions:
+    """The functions of one module, each written once.
+
+    Every function takes pointers to registers, inputs first: `void f(in0, in1, .., out0, out1, ..)`.
+    definitions: the lines of all functions.  width: of the vectors in which `map` goes through its elements.
+    """
+
+    def __init__(self, arithmetic: Arithmetic, width: int) -> None:
+        self.arithmetic, self.width = arithmetic, width
+        self.definitions: list[str] = []
+        self._names: dict[tuple[object, ...], str] = {}
+
+    def call(self, graph: Graph, inputs: Lengths, outputs: Lengths) -> str:
+        """y = graph(x), where the input registers end to end are x, and the output registers y."""
+        places = {
+            base: [(group, k) for group, length in enumerate(lengths) for k in range(length)]
+            for base, lengths in (("x", inputs), ("y", outputs))
+        }
+
+        def address(base: str, name: str, row: int) -> list[str]:
+            group, k = places[base][row]
+            return [f"  {name} = getelementptr {self.arithmetic.type}, ptr %{_ARGUMENT[base]}{group}, i64 {k}"]
+
+        def lines() -> list[str]:
+            return body(graph, self.arithmetic, address)
+
+        return self._define((id(graph), inputs, outputs), "call", lines, len(inputs), len(outputs))
+
+    def map(self, graph: Graph, inputs: Lengths, count: int) -> str:
+        """y[i] = graph(x[i]) for i = 0 .. count - 1; an input of another length holds one number for all i."""
+        t = self.arithmetic.type
+
+        def address(base: str, name: str, row: int) -> list[str]:
+            moves = base == "y" or inputs[row] == count
+            return [f"  {name} = getelementptr {t}, ptr %{_ARGUMENT[base]}{row}, i64 {'%i' if moves else 0}"]
+
+        def lines() -> list[str]:
+            return _loop(body(graph, self.arithmetic, address), [], count)
+
+        in_vectors = self.arithmetic.lanes == 1 and self.width > 1 and count > 1 and not libm_functions(graph)
+        chosen = self._map_in_vectors(graph, inputs, count) if in_vectors else lines
+        return self._define(("map", id(graph), inputs, count), "map", chosen, len(inputs), len(graph.outputs))
+
+    def _map_in_vectors(self, graph: Graph, inputs: Lengths, count: int) -> Callable[[], list[str]]:
+        """As `map`, a vector of elements at a time; results beyond the last element go to the register's padding."""
+        arithmetic = Arithmetic(self.arithmetic.flags, self.width)
+        t, scalars = arithmetic.type, [k for k, length in enumerate(inputs) if length != count]
+
+        def address(base: str, name: str, row: int) -> list[str]:
+            if base == "x" and row in scalars:
+                return [f"  {name} = getelementptr {t}, ptr %same{row}, i64 0"]
+            return [f"  {name} = getelementptr {t}, ptr %{_ARGUMENT[base]}{row}, i64 %i"]
+
+        def lines() -> list[str]:
+            spread = []  # a vector of equal numbers for each input that is the same for all elements
+            for k in scalars:
+                spread += [
+                    f"  %same{k} = alloca {t}, align 64",
+                    f"  %one{k} = load double, ptr %in{k}, align 8",
+                    f"  %first{k} = insertelement {t} poison, double %one{k}, i32 0",
+                    f"  %all{k} = shufflevector {t} %first{k}, {t} poison, <{self.width} x i32> zeroinitializer",
+                    f"  store {t} %all{k}, ptr %same{k}, align 64",
+                ]
+            return [*spread, *_loop(body(graph, arithmetic, address), [], -(-count // self.width))]
+
+        return lines
+
+    def sum(self, graph: Graph, inputs: Lengths, count: int) -> str:
+        """y = sum over i = 0 .. count - 1 of graph(x[i]), added up in this order from 0."""
+        t = self.arithmetic.type
+
+        def address(base: str, name: str, row: int) -> list[str]:
+            if base == "y":
+                return [f"  {name} = getelementptr {t}, ptr %one, i64 0"]
+            return [f"  {name} = getelementptr {t}, ptr %in{row}, i64 {'%i' if inputs[row] == count else 0}"]
+
+        def lines() -> list[str]:
+            add = [  # y += graph(x[i])
+                f"  %so.far = load {t}, ptr %out0, align 8",
+                f"  %here = load {t}, ptr %one, align 8",
+                f"  %total = fadd {t} %so.far, %here",
+                f"  store {t} %total, ptr %out0, align 8",
+            ]
+            return [
+                f"  %one = alloca {t}, align 64",
+                f"  store {t} {self.arithmetic.number(0.0)}, ptr %out0, align 8",
+                *(_loop(body(graph, self.arithmetic, address), add, count) if count else []),
+            ]
+
+        return self._define(("sum", id(graph), inputs, count), "sum", lines, len(inputs), 1)
+
+    def factor(self) -> str:
+        """LU = PA in place, see `lu_solve.factor_text`."""
+        return self._define_text("lu.factor", factor_text)
+
+    def solve(self) -> str:
+        """The solution of A x = b in place of b, see `lu_solve.solve_text`."""
+        return self._define_text("lu.solve", solve_text)
+
+    def _define(
+        self, key: tuple[object, ...], kind: str, lines: Callable[[], list[str]], inputs: int, outputs: int
+    ) -> str:
+        """The name of the function of this key, which is written when it is first asked for."""
+        if key not in self._names:
+            name = self._names[key] = f"{kind}{len(self._names)}"
+            arguments = [*(f"ptr noalias %in{k}" for k in range(inputs))]
+            arguments += [f"ptr noalias %out{k}" for k in range(outputs)]
+            head = f"define internal void @{name}({', '.join(arguments)}) nounwind {{"
+            self.definitions += [head, "start:", *lines(), "  ret void", "}"]
+        return self._names[key]
+
+    def _define_text(self, name: str, text: Callable[[str], Sequence[str]]) -> str:
+        if (name,) not in self._names:
+            self._names[name,] = name
+            self.definitions += text(self.arithmetic.flags)
+        return name
+
+
+def _loop(lines: list[str], after: list[str], count: int) -> list[str]:
+    """The lines, which may hold blocks, and those after them for %i = 0 .. count - 1."""
+    return [
+        "  br label %each",
+        "each:",
+        "  %i = phi i64 [ 0, %start ], [ %next, %last ]",
+        *lines,
+        "  br label %last",
+        "last:",
+        *after,
+        "  %next = add i64 %i, 1",
+        f"  %more = icmp slt i64 %next, {count}",
+        "  br i1 %more, label %each, label %end",
+        "end:",
+    ]

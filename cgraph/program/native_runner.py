@@ -1,0 +1,57 @@
+"""A program as machine code, for one memory or a vector of them."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+import numpy as np
+
+from ..codegen import llvm_engine as llvm
+from ..core.evaluate import Array
+from .llvm_ir import program_functions, program_ir
+from .program import Program
+from .runner import Record, Runner
+
+_RUN = ctypes.CFUNCTYPE(
+    ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p
+)
+
+
+class NativeRunner(Runner):
+    """A program as machine code. Any number of threads may run it at once, on a memory each."""
+
+    def __init__(self, program: Program, flags: str) -> None:
+        host = llvm.host()
+        super().__init__(program, host.lanes)
+        self._flags, self._host = flags, host
+        self.source = program_ir(program, flags, width=host.lanes)
+        self._code = self._host.compile(self.source, program_functions(program))
+        self._entry = _RUN(self._code.address("run"))
+        self._many: tuple[llvm.Code, Any] | None = None
+
+    def _run(self, memory: Array, passes: int, every: int) -> Record:
+        rows = np.empty((passes // every, self.program.width))
+        done = ctypes.c_int64()
+        count = self._entry(memory.ctypes.data, rows.ctypes.data, passes, every, ctypes.addressof(done))
+        return Record(rows[:count], done.value)
+
+    def _run_many(self, memories: Array, passes: int, every: int) -> Record:
+        lanes = self._host.lanes
+        if self._many is None:
+            code = self._host.compile(
+                program_ir(self.program, self._flags, lanes, self.width), program_functions(self.program)
+            )
+            self._many = code, _RUN(code.address("run"))
+        entry, total = self._many[1], memories.shape[1]
+        rows = np.empty((passes // every, self.program.width, total))
+        block, part = np.empty((self.size, lanes)), np.empty((*rows.shape[:2], lanes))
+        done = ctypes.c_int64()
+        # A vector of memories at a time; the last one is filled up with copies of its first memory.
+        for start in range(0, total, lanes):
+            here = slice(start, min(start + lanes, total))
+            width = here.stop - start
+            block[:, :width], block[:, width:] = memories[:, here], memories[:, start : start + 1]
+            entry(block.ctypes.data, part.ctypes.data, passes, every, ctypes.addressof(done))
+            memories[:, here], rows[:, :, here] = block[:, :width], part[:, :, :width]
+        return Record(rows, passes)

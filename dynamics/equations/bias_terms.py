@@ -1,0 +1,64 @@
+"""Lagrange's equation at qdd = 0 as forces on the velocity nodes of L, from which bias and accelerations are made."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from cgraph import Node
+from cgraph.extend import Builder, building, cotangents, folded, tangents
+
+from ..systems.system import System
+from .formulations import ONE, ZERO
+from .velocity_nodes import velocity_nodes
+
+
+class BiasTerms(NamedTuple):
+    """The terms of  bias = d/dt dL/dqd - dL/dq at qdd = 0 = (sum over z of inertial_z dz/dqd) - gradient.
+
+    z are the velocity nodes of L (`velocity_nodes`): the bias is a set of forces, each at the velocity it works on, and
+    the sum is their virtual power. Forward dynamics by elimination takes them as they are, without forming the sum.
+    """
+
+    lagrangian: Node  # folded and shared
+    forces: list[Node]  # applied ones, the same
+    inertial: dict[Node, Node]  # d/dt dL/dz, by z
+    gradient: list[Node]  # dL/dq at fixed z
+
+    def bias(self, system: System, build: Builder) -> list[Node]:
+        """The bias at the coordinates: one reverse sweep carries all inertial terms from their velocities to qd."""
+        inertial = cotangents(self.inertial, system.qd, build)
+        with building(build):
+            return [force - slope for force, slope in zip(inertial, self.gradient, strict=True)]
+
+
+def bias_terms(system: System) -> BiasTerms:
+    """As the system states its bias (`System.bias_forces`), or else derived from its Lagrangian."""
+    stated = system.bias_forces()
+    if stated is None:
+        return bias_terms_of_lagrangian(system)
+    pairs = [node for pair in stated for node in pair]
+    build = Builder()
+    lagrangian, *nodes = folded([system.lagrangian, *system.forces, *pairs], build)
+    forces, pairs = nodes[: system.n], nodes[system.n :]
+    inertial: dict[Node, Node] = {}
+    with building(build):
+        for velocity, force in zip(pairs[::2], pairs[1::2], strict=True):
+            if velocity.value is None:  # a constant velocity does no virtual work
+                inertial[velocity] = inertial.get(velocity, ZERO) + force
+    return BiasTerms(lagrangian, forces, inertial, [ZERO] * system.n)
+
+
+def bias_terms_of_lagrangian(system: System) -> BiasTerms:
+    """Lagrange's equation of L(q, z(q, qd), t), term by term."""
+    # Two builders: a term of L must not get the tags of an equal term that derives from it, and hand them on.
+    written, build = Builder(), Builder()
+    lagrangian, *forces = folded([system.lagrangian, *system.forces], written)
+    velocities = velocity_nodes(lagrangian, system.q, system.qd, system.t, written)
+    # dL/dq at fixed z, and dL/dz: one reverse sweep that stops at z.
+    bars = cotangents({lagrangian: ONE}, [*system.q, *velocities], build, fixed=set(velocities))
+    gradient, momenta = bars[: system.n], bars[system.n :]
+    # d/dt dL/dz at qdd = 0: eq. (4) of the paper with xdot = (qd, 0), and 1 for t, one forward sweep.
+    x_dot = dict(zip(system.q, system.qd, strict=True)) | ({system.t: ONE} if system.t in system.extra_inputs else {})
+    dots = tangents(x_dot, momenta, build)
+    inertial = {velocity: dots[p] for velocity, p in zip(velocities, momenta, strict=True) if p in dots}
+    return BiasTerms(lagrangian, forces, inertial, gradient)

@@ -1,0 +1,110 @@
+"""Initial value problems as a caller states them: the start, constant forces, parameter values and times, checked."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cgraph.extend import Array, real_array
+
+from ..systems.model import Model, as_ode
+from ..systems.system import parameter_value, per_coordinate
+from .state_equation import StateInputs, state_inputs
+
+PAST = 1e-14  # of the end: some roundings, by which a last time may lie past it
+
+
+class InitialValue(NamedTuple):
+    """Where a motion starts, and the numbers of every other input of its state equation."""
+
+    x: Array  # (m,): q and then qd, or the states of an OdeSystem
+    states: tuple[str, ...]  # names of x
+    bound: dict[str, float]  # tau0.., parameters
+
+
+def initial_value(
+    model: Model,
+    q: ArrayLike,
+    qd: ArrayLike | None,
+    tau: float | Sequence[float] = 0.0,
+    parameters: Mapping[str, float] | None = None,
+) -> InitialValue:
+    """The start of a model's motion.
+
+    q, qd: (n,), or the states of an OdeSystem and None.  tau: constant applied force, for all coordinates or for each.
+    parameters: values in place of the model's own.
+
+    Raises TypeError or ValueError, naming the argument, for another shape or what is not finite.
+    """
+    inputs = state_inputs(model)
+    values = _parameters(inputs, parameters)
+    if inputs.applied:
+        values = dict(zip(inputs.applied, per_coordinate("tau", tau, model.coordinates), strict=True)) | values
+    return InitialValue(_state(model, inputs, q, qd), inputs.states, values)
+
+
+def split_state(model: Model, x: Sequence[float]) -> tuple[Sequence[float], Sequence[float] | None]:
+    """A state (m,) as the arguments q and qd; of an OdeSystem the state and None."""
+    half = len(x) // 2
+    return (x, None) if as_ode(model) is not None else (x[:half], x[half:])
+
+
+def check_names(inputs: StateInputs, names: Iterable[str]) -> None:
+    """Raises ValueError for a name that is no parameter."""
+    if unknown := [str(name) for name in names if name not in inputs.parameters]:
+        has = ", ".join(inputs.parameters) or "none"
+        raise ValueError(f"the system has no parameter {', '.join(unknown)} (it has {has})")
+
+
+def increasing_times(t_eval: ArrayLike, t_end: float = math.inf) -> Array:
+    """The times to record, (T,). A last one past t_end by rounding, as that of 0.1 * np.arange(4), becomes t_end.
+
+    Raises ValueError unless they increase and lie in [0, t_end].
+    """
+    times = real_array("t_eval", t_eval).copy()
+    span = f"in [0, t_end = {t_end:g} s]" if math.isfinite(t_end) else "from 0 s on"
+    needed = f"t_eval must be increasing times {span}"
+    if times.ndim != 1 or not len(times):
+        raise ValueError(f"{needed}, got shape {times.shape}")
+    if t_end < times[-1] <= t_end * (1.0 + PAST):
+        times[-1] = t_end
+    listed: list[float] = times.tolist()
+    outside = [t for t in listed if not (0.0 <= t <= t_end and t < math.inf)]
+    if outside:
+        raise ValueError(f"{needed}, got {outside[0]!r}")
+    if order := [pair for pair in itertools.pairwise(listed) if not pair[0] < pair[1]]:
+        raise ValueError(f"{needed}, got {order[0][0]!r} before {order[0][1]!r}")
+    return times
+
+
+def _parameters(inputs: StateInputs, parameters: Mapping[str, float] | None) -> dict[str, float]:
+    if not isinstance(parameters, Mapping | None):
+        raise TypeError(f"parameters must be a mapping of names to numbers, got {parameters!r:.60}")
+    chosen = dict(parameters or {})
+    check_names(inputs, chosen)
+    return inputs.parameters | {name: parameter_value(name, value) for name, value in chosen.items()}
+
+
+def _state(model: Model, inputs: StateInputs, q: ArrayLike, qd: ArrayLike | None) -> Array:
+    if as_ode(model) is not None:
+        if qd is not None:
+            raise ValueError("qd must be None for a system of first order; q holds its whole state")
+        return _row("q", q, len(inputs.states), "state")
+    n = len(inputs.applied)
+    if qd is None:
+        raise ValueError(f"qd must have shape ({n},), one for each coordinate, got None")
+    return np.concatenate([_row("q", q, n, "coordinate"), _row("qd", qd, n, "coordinate")])
+
+
+def _row(what: str, value: ArrayLike, n: int, item: str) -> Array:
+    array = real_array(what, value)
+    if array.shape != (n,):
+        raise ValueError(f"{what} must have shape ({n},), one for each {item}, got {array.shape}")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{what} must be finite, got {array.tolist()}")
+    return array

@@ -1,0 +1,92 @@
+"""Setting: a scene with the exact motion that runs of it are measured against."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cgraph.extend import Array
+
+from ..equations.state_equation import state_inputs
+from ..reference import Reference, reference
+from ..reference.solution import scale
+from ..scenes import Scene
+from ..systems.model import as_ode, as_system
+
+INTERVALS = 64  # between the times at which errors are taken
+DECADES = 12  # of the times, where they are spread by powers of ten
+
+
+@dataclass(frozen=True)
+class Setting(Scene):
+    """A scene and its exact motion.  q, qd: of an OdeSystem the states, and nothing.
+
+    size: a natural size of each state, which errors are relative to; empty for the largest values of the motion.
+    decades: times go up by powers of ten, and errors are relative to the state's value at that time.
+    exact: a closed form of the motion.  method: of `reference` otherwise; None where it does not get to t_end in a
+    minute or so.  digits: of the reference.
+    """
+
+    size: tuple[float, ...] = ()
+    stiff: bool = False  # an explicit method needs steps far below what the motion asks for
+    decades: bool = False
+    exact: Callable[[Sequence[float]], Reference] | None = None
+    method: str | None = "taylor"
+    digits: int = 30
+
+    @property
+    def start(self) -> tuple[float, ...]:
+        """q and then qd, or the states of an OdeSystem."""
+        return (*self.q, *self.qd)
+
+    @property
+    def times(self) -> list[float]:
+        """When errors are taken [s]; the last is t_end."""
+        if self.decades:
+            return [*(self.t_end * 10.0 ** (k / 4) for k in range(-4 * DECADES, 0)), self.t_end]
+        return [self.t_end * k / INTERVALS for k in range(INTERVALS + 1)]
+
+    def solution(
+        self, times: Sequence[float] | None = None, folder: str | Path | None = None, digits: int | None = None
+    ) -> Reference | None:
+        """The motion at `times` (default: t_end), from the closed form or else computed; None when there is neither.
+
+        folder: as of `reference`. Raises ImportError without python-flint or mpmath, and what `reference` raises.
+        """
+        at = [self.t_end] if times is None else [float(t) for t in times]
+        if self.exact is not None:
+            return self.exact(at)
+        if self.method is None:
+            return None
+        return reference(
+            self.model, self.q, self.qd or None, at, digits=digits or self.digits, method=self.method, folder=folder
+        )
+
+    @property
+    def mechanical(self) -> bool:
+        """It has coordinates and velocities."""
+        return as_ode(self.model) is None
+
+    @property
+    def conservative(self) -> bool:
+        """Energy stays: no damping, no forces, and nothing that depends on time."""
+        if not self.mechanical or state_inputs(self.model).timed:
+            return False
+        system = as_system(self.model)
+        return not any(system.damping) and all(force.value == 0.0 for force in system.forces)
+
+    def sizes(self, solution: Reference | None) -> tuple[float, ...]:
+        """A size for each state: `size`, or the larger of the values at the start and at t_end, or 1 for zeros."""
+        if self.size:
+            return self.size
+        end = [0.0] * len(self.start) if solution is None else solution.x[-1].tolist()
+        return tuple([max(abs(a), abs(b)) or 1.0 for a, b in zip(self.start, end, strict=True)])
+
+    def scales(self, exact: Reference) -> Array:
+        """What errors at all times are relative to, (T, m)."""
+        if self.decades:
+            return np.where(exact.x == 0.0, 1.0, np.abs(exact.x))
+        return np.broadcast_to(self.size or scale(exact.x), exact.x.shape)

@@ -1,0 +1,61 @@
+"""Agreement: largest relative differences of planar arms at random states from MuJoCo and from Pinocchio."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+import cgraph as cg
+
+from ...equations.equations_of_motion import bias, forward_dynamics, mass_matrix
+from ...equations.formulations import inverse_dynamics
+from ...multibody.planar_arm import PlanarArm, planar_arm
+from ...peers.case import Case
+from ...peers.mujoco import MujocoPeer
+from ...peers.pinocchio import PinocchioPeer
+from ..text_table import table
+
+LINKS, STATES = 10, 100
+QUANTITIES = {"tau": inverse_dynamics, "qdd": forward_dynamics, "M": mass_matrix, "bias": bias}
+PEERS: dict[str, type[MujocoPeer] | type[PinocchioPeer]] = {"MuJoCo": MujocoPeer, "Pinocchio": PinocchioPeer}
+
+
+def agreement(links: int = LINKS, count: int = STATES) -> Iterator[str]:
+    """A table for each peer and mass model: arms of 1 to `links` links, relative to the largest entry at the state."""
+    for name, make in PEERS.items():
+        for mass_model in ("rod", "point"):
+            title = f"largest relative difference from {name}, {mass_model}s, {count} states"
+            rows = []
+            try:
+                for n in range(1, links + 1):
+                    arm = random_arm(n, mass_model)
+                    worst = differences(arm, make(Case(name, arm)), count)
+                    rows.append([str(n), *[f"{worst[quantity]:.1e}" for quantity in QUANTITIES]])
+            except ImportError as missing:
+                yield f"{title}: not measured, {missing}"
+                break
+            yield "\n".join([title, *table(["links", *QUANTITIES], rows, left=())])
+
+
+def random_arm(n: int, mass_model: str) -> PlanarArm:
+    """An arm of n unlike links with damping."""
+    rng = np.random.default_rng(n)
+    masses, lengths, damping = (rng.uniform(low, 3.0 * low, n).tolist() for low in (0.5, 0.5, 0.15))
+    return planar_arm(masses, lengths, damping, mass_model)
+
+
+def differences(arm: PlanarArm, peer: MujocoPeer | PinocchioPeer, count: int) -> dict[str, float]:
+    """The largest difference of each quantity over random states, relative to its largest entry at the state."""
+    functions = {name: cg.compile(make(arm)) for name, make in QUANTITIES.items()}
+    rng = np.random.default_rng((len(arm.links), 1))
+    worst = dict.fromkeys(QUANTITIES, 0.0)
+    for _ in range(count):
+        state = {"q": rng.uniform(-3.0, 3.0, peer.case.n)}
+        state |= {name: rng.uniform(-0.9, 0.9, peer.case.n) for name in ("qd", "qdd", "tau")}
+        theirs = peer.quantities(**state)
+        for name, function in functions.items():
+            inputs = [x for key, x in state.items() if f"{key}0" in function.graph.input_names]
+            off = np.abs(function(np.concatenate(inputs)) - theirs[name].ravel()).max()
+            worst[name] = max(worst[name], float(off / np.abs(theirs[name]).max()))
+    return worst

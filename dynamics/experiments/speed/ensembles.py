@@ -1,0 +1,139 @@
+"""Ensembles: run time of triple pendulums side by side, beside MuJoCo's rollout and a vmap of JAX, on one core.
+
+All start from the same states and make the same steps of RK4, 1 s at 1 ms, in turns; the states at the end are
+compared. Times are of the process's CPU, which other programs on the machine disturb less than they do the clock, per
+trajectory. Peers run the first of the trajectories.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from ... import scenes
+from ...io.mujoco_model import rollout
+from ...peers.case import Array, Case, rk4_step
+from ...peers.jax import JaxPeer
+from ...peers.mujoco import MujocoPeer
+from ...simulation.ensembles.simulate_many import simulate_many
+from ..machine import load
+from ..text_table import table
+
+SCENE = "triple_pendulum"
+STEPS, DT = 1000, 1e-3  # s
+COUNT, REPEATS = 10_000, 5  # trajectories of ours, and turns
+SHARE = 10  # one in so many trajectories is run by the peers
+BLOCK = 250  # trajectories in a call of rollout: their states, which it records all, stay in the processor's cache
+LANES = 64  # trajectories in a vmap: of 8 to 4096 the quickest number
+
+Run = Callable[[], Array]  # states at the end, (N, 2 n)
+
+
+def ours(q: Array, qd: Array) -> Run:
+    """simulate_many, the states at the end alone."""
+    model, t_end = scenes.load(SCENE).model, STEPS * DT
+
+    def run() -> Array:
+        result = simulate_many(model, q, qd, t_end, dt=DT, t_eval=[t_end])
+        assert result.stats.success.all()
+        return np.hstack([result.q[:, -1], result.qd[:, -1]])
+
+    return run
+
+
+def mujoco(q: Array, qd: Array) -> Run:
+    """MuJoCo's rollout in one thread; contacts and whatever else the pendulum does not need are off."""
+    peer = MujocoPeer(Case(SCENE, scenes.load(SCENE)))
+    model, n = peer.twin.model, q.shape[1]
+    model.opt.timestep = DT
+    starts = np.hstack([np.zeros((len(q), 1)), q[:, peer.at], qd[:, peer.at]])  # time, qpos, qvel
+    states = np.empty((BLOCK, STEPS, 1 + 2 * n))
+    blocks = [starts[k : k + BLOCK] for k in range(0, len(starts), BLOCK)]
+    runs = [rollout(model, some, states[: len(some)]) for some in blocks]
+    ours_in_theirs = np.concatenate([1 + peer.order, 1 + n + peer.order])
+
+    def run() -> Array:
+        ends = []
+        for some, each in zip(blocks, runs, strict=True):
+            each()
+            ends.append(states[: len(some), -1, ours_in_theirs])
+        return np.concatenate(ends)
+
+    return run
+
+
+def jax(q: Array, qd: Array) -> Run:
+    """JAX's own derivatives of the same Lagrangian: jit of vmap of lax.scan, in double precision."""
+    peer = JaxPeer(Case(SCENE, scenes.load(SCENE)))
+
+    def step(x: Any, _: None) -> tuple[Any, None]:
+        return rk4_step(peer.rate, x, DT), None
+
+    many = peer.jax.jit(peer.jax.vmap(lambda x: peer.jax.lax.scan(step, x, None, STEPS)[0]))
+    x = np.hstack([q, qd])
+    return lambda: np.concatenate([np.asarray(many(x[k : k + LANES])) for k in range(0, len(x), LANES)])
+
+
+def ensembles(count: int = COUNT, repeats: int = REPEATS) -> Iterator[str]:
+    """First runs as they are ready, and then the table."""
+    cores = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
+    if cores:
+        os.sched_setaffinity(0, {min(cores)})  # before JAX counts them
+    try:
+        yield from _measured(count, repeats)
+    finally:
+        if cores:
+            os.sched_setaffinity(0, cores)
+
+
+def _measured(count: int, repeats: int) -> Iterator[str]:
+    rng = np.random.default_rng(0)
+    q, qd = rng.uniform(-np.pi, np.pi, (count, 3)), rng.normal(size=(count, 3))
+    few = max(1, count // SHARE)
+    makers = {
+        "simulate_many": (ours, count),
+        "simulate_many, few": (ours, few),
+        "MuJoCo": (mujoco, few),
+        "JAX": (jax, few),
+    }
+    runs: dict[str, Run] = {}
+    ends: dict[str, Array] = {}
+    for name, (make, size) in makers.items():
+        begin = time.process_time()
+        try:
+            run = make(q[:size], qd[:size])
+        except ImportError as missing:
+            yield f"{name} is not measured: {missing}"
+            continue
+        ends[name], runs[name] = run(), run
+        yield f"first run of {name}, compiling included: {time.process_time() - begin:.3g} s of CPU"
+    cpu: dict[str, list[float]] = {name: [] for name in runs}
+    clock: dict[str, list[float]] = {name: [] for name in runs}
+    for _ in range(repeats):
+        for name, run in runs.items():
+            worked, begin = time.process_time(), time.perf_counter()
+            run()
+            cpu[name].append((time.process_time() - worked) / len(ends[name]) * 1e6)
+            clock[name].append((time.perf_counter() - begin) / len(ends[name]) * 1e6)
+    rows = []
+    for name, times in cpu.items():
+        typical, first = np.median(times), np.median(cpu["simulate_many"])
+        apart = np.abs(ends[name] - ends["simulate_many"][: len(ends[name])]).max(axis=1)
+        cells = [typical, min(times), max(times), np.median(clock[name]), typical / first]
+        differences = [f"{np.median(apart):.1e}", f"{apart.max():.1e}"]
+        rows.append([name, *[f"{each:.1f}" for each in cells], *differences])
+    header = [
+        "us a trajectory",
+        "of CPU",
+        "shortest",
+        "longest",
+        "by the clock",
+        "of ours",
+        "ends differ by",
+        "at most",
+    ]
+    yield "\n".join([f"{count} trajectories, peers {few}; load of the machine {load()}", *table(header, rows)])

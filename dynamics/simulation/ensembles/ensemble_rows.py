@@ -1,0 +1,48 @@
+"""EnsembleRows: the parts of an ensemble, put together as they come."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .chunk import Part
+from .ensemble import EnsembleStats
+
+REACHED = "reached t_end"
+
+
+class EnsembleRows:
+    """Rows (N, T, m) and statistics of N trajectories, those of them that have come."""
+
+    def __init__(self, count: int, rows: int, m: int) -> None:
+        self.rows = np.empty((count, rows, m))
+        self.steps, self.rejected, self.evaluations = np.zeros((3, count), dtype=np.int64)
+        self.dt, self.status = np.zeros(count), ["interrupted"] * count
+        self.arrived = np.zeros(count, dtype=bool)
+
+    def add(self, part: Part) -> None:
+        """One more part."""
+        here = slice(part.first, part.first + len(part.rows))
+        if not np.may_share_memory(part.rows, self.rows):  # from another process
+            self.rows[here] = part.rows
+        for name in ("steps", "rejected", "evaluations", "dt"):
+            getattr(self, name)[here] = getattr(part, name)
+        self.status[here] = [status or REACHED for status in part.status]
+        self.arrived[here] = True
+
+    def check(self) -> None:
+        """Raises ValueError unless all parts have come."""
+        if not self.arrived.all():
+            raise ValueError(
+                "workers must give a result for each item, as map does: of "
+                f"{len(self.rows)} trajectories came back {self.arrived.sum()}"
+            )
+
+    def stats(self, method: str, seconds: float) -> EnsembleStats:
+        """How it went. Rows that have not come become NaN."""
+        self.rows[~self.arrived] = math.nan
+        success = np.array([status == REACHED for status in self.status])
+        return EnsembleStats(
+            method, self.steps, self.rejected, self.evaluations, self.dt, seconds, success, tuple(self.status)
+        )

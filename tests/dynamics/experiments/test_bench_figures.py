@@ -1,0 +1,134 @@
+"""The figures of the bench beside speed: variants compute the same, peers agree, and commands say what they take."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import dynamics as dyn
+from dynamics.experiments.speed import ensembles, long_chains, reconfiguration
+from dynamics.experiments.speed.agreement import QUANTITIES, differences, random_arm
+from dynamics.experiments.speed.bench_scenes import turned_arm
+from dynamics.experiments.speed.build_time import build_time
+from dynamics.experiments.speed.figures import FIGURES
+from dynamics.experiments.speed.node_counts import VARIANTS, variant_graph
+from dynamics.experiments.text_table import WIDTH, csv_text, table
+from dynamics.peers import PEERS, Case
+from viz import cli
+
+ROUNDING = 1e-11  # relative, of accelerations of seven bodies by another order of operations
+POINTS = 1e-11  # of point masses, whose inertia MuJoCo's format does not take as exactly zero
+NO_SAVING = {"every idea", "no rates but qd"}  # bodies know their bias, so no rates are looked for
+
+
+def accelerations(graph: Any) -> Any:
+    x = np.random.default_rng(3).normal(size=len(graph.inputs))
+    return np.array(list(graph.evaluate(dict(zip(graph.input_names, x.tolist(), strict=True))).values()))
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_a_variant_computes_the_same_with_more_nodes(variant: str) -> None:
+    base, other = dyn.forward_dynamics(turned_arm(7)), variant_graph(variant, turned_arm(7))
+    assert accelerations(other) == pytest.approx(accelerations(base), rel=ROUNDING)
+    assert (len(other.nodes) > len(base.nodes)) is (variant not in NO_SAVING)
+    assert len(dyn.forward_dynamics(turned_arm(7)).nodes) == len(base.nodes)  # the library is as it was
+
+
+@pytest.mark.parametrize("mass_model", ["rod", "point"])
+@pytest.mark.parametrize("peer", ["mujoco", "pinocchio"])
+def test_arms_agree_with_peers(peer: str, mass_model: str) -> None:
+    pytest.importorskip(PEERS[peer].package)
+    arm = random_arm(4, mass_model)
+    made: Any = PEERS[peer].make(Case(peer, arm))
+    worst = differences(arm, made, 5)
+    assert set(worst) == set(QUANTITIES)
+    assert max(worst.values()) < POINTS
+
+
+def test_pendulums_of_an_ensemble_end_where_those_of_mujoco_and_jax_do() -> None:
+    q, qd = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 3, 3))
+    expected = ensembles.ours(q, qd)()
+    for name in ("mujoco", "jax"):
+        if PEERS[name].installed:
+            assert getattr(ensembles, name)(q, qd)() == pytest.approx(expected, rel=1e-9, abs=1e-9)  # 1000 steps
+
+
+def test_elimination_is_accurate_on_long_chains_and_dense_solves_are_less_so() -> None:
+    pytest.importorskip("flint")
+    errors = long_chains.accuracy("planar", 30, 0.1)
+    assert errors["elimination"] < 1e-13  # some roundings a link
+    assert all(errors[name] > 10.0 * errors["elimination"] for name in errors if name != "elimination")
+
+
+def test_the_cost_of_a_chain_is_told_by_stage(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("resource")
+    long_chains.cost("3D", 3)
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split("  ")[0] for line in lines[2:5]] == ["Lagrangian", "forward dynamics", "evaluate"]
+    assert lines[-1].startswith(f"{len(dyn.forward_dynamics(turned_arm(3)).nodes)} nodes")
+
+
+def test_every_change_of_structure_is_timed_and_its_torques_agree() -> None:
+    lines = "\n".join(reconfiguration.reconfiguration(4, 1)).splitlines()
+    assert [line.split()[0] for line in lines[2:]] == ["detach", "attach", "lock", "unlock"]
+    with pytest.raises(ArithmeticError, match="lock: torques differ by"):
+        reconfiguration.check("lock", np.array([1.0]), np.array([1.1]), 1e-10)
+
+
+def test_the_build_is_of_the_graph() -> None:
+    (text,) = build_time(3, 1)
+    arm = dyn.planar_arm([1.0, 0.9, 0.8], [1.1, 1.1 - 0.4 / 3, 1.1 - 0.8 / 3], damping=0.1)
+    assert text.splitlines()[-1].split()[-2:] == [str(len(each)) for each in _size(dyn.forward_dynamics(arm))]
+
+
+def _size(graph: Any) -> tuple[Any, Any]:
+    return graph.nodes, graph.edges
+
+
+def test_the_command_prints_a_figure(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["bench", "counts", "--links", "3"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[2].split() == ["every", "idea", str(len(dyn.forward_dynamics(_planar(), "recursive").nodes))]
+    assert [line.split("  ")[0] for line in lines[2:]] == list(VARIANTS)
+
+
+def _planar() -> dyn.PlanarArm:
+    return dyn.planar_arm([0.9] * 3, [0.7] * 3, damping=0.1)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["counts", "planar 3"], "counts has models of its own and takes no scene, got 'planar 3'"),
+        (["counts", "--tasks", "forward"], "--tasks does not go with counts, which takes --links"),
+        (["long-chains", "--repeats", "3"], "--repeats does not go with long-chains, which takes --links"),
+        (["speed", "--links", "3"], "--links does not go with speed"),
+        (["build", "--links", "0"], "--links must be at least 1, got 0"),
+        (["planar 4"], "there is no scene 'planar 4'"),
+    ],
+)
+def test_a_wrong_choice_gets_one_line(capsys: pytest.CaptureFixture[str], arguments: list[str], said: str) -> None:
+    assert cli.main(["bench", *arguments]) == 1
+    assert said in capsys.readouterr().err
+
+
+def test_help_names_every_figure(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        cli.main(["bench", "--help"])
+    text = capsys.readouterr().out
+    assert all(f"  {name} " in text for name in ("speed", *FIGURES))
+
+
+def test_columns_that_do_not_fit_go_below_under_the_first_one_again() -> None:
+    header = ["name", *[f"{'column':>30}{k}" for k in range(5)]]
+    lines = table(header, [["a", *"12345"], ["b", *[("67", "!")] * 5]])
+    assert max(map(len, lines)) <= WIDTH
+    assert [line.split()[0] for line in lines] == ["name", "a", "b"] * 2
+    assert [line.split()[1:] for line in lines if line.startswith("b")] == [["67", "!"] * 3, ["67", "!"] * 2]
+    assert table(["n", "x"], []) == ["n  x"]
+
+
+def test_csv_has_empty_cells_for_what_is_not_known() -> None:
+    assert csv_text(["a", "b"], [[1, None], ["x,y", 0.1]]) == 'a,b\n1,\n"x,y",0.1\n'

@@ -1,0 +1,78 @@
+"""Taylor series of every operation, against mpmath."""
+
+from collections.abc import Callable
+from typing import Any
+
+import mpmath
+import pytest
+from pytest import mark, raises
+
+import cgraph as cg
+from cgraph.core.node import OPS, apply
+from dynamics.systems.ode_system import OdeSystem
+from tests.high_precision import OPERATIONS
+
+pytest.importorskip("flint", reason="reference solutions need python-flint")
+from dynamics.reference.flint_numbers import value, working
+from dynamics.reference.taylor_series import Series
+
+ORDER = 12
+TWELVE_ORDERS = 1e-25  # relative, of numbers with 60 digits that mpmath differentiates numerically
+
+
+def paths(point: tuple[float, ...], number: Callable[[Any], Any], t: Any) -> list[Any]:
+    """Arguments that move through the point: of each, series that do not end soon."""
+    turns = [(1.0, 0.25, 0.5), (-0.7, 0.375, 0.25), (0.4, -0.5, 0.125)]
+    if len(point) == 3:  # the condition of `where` stays
+        turns.insert(0, (0.0, 0.0, 0.0))
+    return [
+        number(a) + number(b) * t + number(c) * t * t + number(d) * t * t * t
+        for a, (b, c, d) in zip(point, turns, strict=False)
+    ]
+
+
+def coefficients(build: Callable[[list[cg.Node]], cg.Node], point: tuple[float, ...]) -> list[mpmath.mpf]:
+    """Taylor coefficients of build(arguments), as k times those of its integral."""
+    system = OdeSystem(lambda x, t: [build(paths(point, float, t))], ["y"])
+    with working(60) as number:
+        series = Series(system.graph, ["y"], {}, number)
+        (found,) = series.expand([number(0)], number(0), ORDER + 1)
+        return [mpmath.mpf((k * found[k]).mid().str(55, radius=False)) for k in range(1, ORDER + 2)]
+
+
+@mark.parametrize(("name", "point"), [(op.name, point) for op in OPS.values() for point in op.samples])
+def test_series_of_every_operation_is_that_of_mpmath(name: str, point: tuple[float, ...]) -> None:
+    """An operation without a multiprecision value says so."""
+    try:
+        value(OPS[name])
+    except NotImplementedError:
+        with raises(NotImplementedError, match=f"{name} has no multiprecision value"):
+            coefficients(lambda args: apply(OPS[name], *args), point)
+        return
+    with mpmath.mp.workdps(60):
+        expected = mpmath.taylor(lambda t: OPERATIONS[name](*paths(point, mpmath.mpf, t)), 0, ORDER)
+        found = coefficients(lambda args: apply(OPS[name], *args), point)
+        size = max(map(abs, expected))
+        assert max(abs(a - b) for a, b in zip(found, expected, strict=True)) <= TWELVE_ORDERS * size
+
+
+@mark.parametrize("exponent", [-3.0, -1.0, 0.0, 0.5, 1.0, 2.0, 5.0, 7.5, 100.0])
+def test_series_of_powers(exponent: float) -> None:
+    with mpmath.mp.workdps(60):
+        expected = mpmath.taylor(lambda t: paths((1.3,), mpmath.mpf, t)[0] ** exponent, 0, ORDER)
+        found = coefficients(lambda args: args[0] ** exponent + 0.0 * args[0], (1.3,))
+        assert max(abs(a - b) for a, b in zip(found, expected, strict=True)) < TWELVE_ORDERS * max(map(abs, expected))
+
+
+def test_series_folds_no_constants_in_float64() -> None:
+    """0.1 + 0.2 of the graph is the sum of two float64, not the float64 next to it."""
+    with mpmath.mp.workdps(60):
+        found = coefficients(lambda args: (args[0] * 0.0 + 0.1) + (0.2 + args[0] * 0.0), (1.0,))
+        assert found[0] == mpmath.mpf(0.1) + mpmath.mpf(0.2) != mpmath.mpf(0.1 + 0.2)
+
+
+def test_zero_wins_over_infinity_in_a_zero_safe_product() -> None:
+    with working(40) as number:
+        product, zero, infinite = value(OPS["zero_safe_mul"]), number(0), number("inf")
+        assert product(zero, infinite) == product(infinite, zero) == 0
+        assert product(number(2), number(3)) == 6

@@ -1,0 +1,146 @@
+"""Workers: whoever runs an ensemble, threads, processes or another map, its numbers are the same."""
+
+import multiprocessing
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from typing import Any
+
+import numpy as np
+import pytest
+from pytest import mark, raises
+
+from dynamics.simulation.ensembles import task
+from dynamics.simulation.ensembles.simulate_many import simulate_many
+from tests.dynamics.ensembles import arms, same
+from tests.dynamics.models import random_arm
+from tests.dynamics.step_options import step
+
+
+def case(method: str) -> tuple[tuple[Any, ...], dict[str, Any]]:
+    """Twenty-nine arms, one of which leaves the numbers."""
+    model, q, qd = arms(29)
+    qd[3] = 1e200
+    return (model, q, qd, 0.2, method), {"t_eval": [0.1, 0.2], "tau": np.tanh(q)}
+
+
+@mark.parametrize("method", ["rk4", "midpoint", "dop853"])
+@mark.parametrize("backend", ["llvm", "python"])
+def test_threads_and_chunks_change_nothing(method: str, backend: str) -> None:
+    if backend == "llvm":
+        pytest.importorskip("llvmlite")
+    arguments, options = case(method)
+    options |= {"backend": backend, **step(method, 0.02)}
+    alone = simulate_many(*arguments, **options)
+    assert same(alone, simulate_many(*arguments, **options, workers=3))
+    assert same(alone, simulate_many(*arguments, **options, workers=None, chunk=7))
+    assert same(alone, simulate_many(*arguments, **options, workers=map, chunk=1))
+
+
+def test_parts_may_come_in_any_order() -> None:
+    arguments, options = case("rk4")
+    alone = simulate_many(*arguments, **options)
+    assert same(alone, simulate_many(*arguments, **options, workers=lambda f, each: [f(x) for x in reversed(each)]))
+
+
+@mark.parametrize("method", ["rk4", "dopri5"])
+def test_processes_change_nothing_and_make_the_code_once(method: str) -> None:
+    arguments, options = case(method)
+    alone = simulate_many(*arguments, **options)
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+        assert same(alone, simulate_many(*arguments, **options, workers=pool.map, chunk=8))
+        assert pool.submit(programs_made).result() == 1
+
+
+def programs_made() -> int:
+    return task._vector_code.cache_info().misses + task._compiled.cache_info().misses
+
+
+def test_threads_make_the_code_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = []
+    original = task.runner
+    monkeypatch.setattr(task, "runner", lambda *arguments: made.append(arguments) or original(*arguments))
+    model, q, qd = arms(40, 4)
+    simulate_many(model, q, qd, 0.1, workers=4, chunk=8)
+    simulate_many(model, q, qd, 0.2, workers=4, chunk=8)
+    assert len(made) == 1
+
+
+def drawn(seed: int) -> np.ndarray:
+    """Where an arm from a start drawn here ends."""
+    q, qd = np.random.default_rng(seed).normal(size=(2, 1, 2))
+    return simulate_many(random_arm(2), q, qd, 0.1, t_eval=[0.1]).q
+
+
+@mark.slow  # a scheduler and two processes
+def test_dask_changes_nothing() -> None:
+    distributed = pytest.importorskip("distributed")
+    arguments, options = case("rk4")
+    alone = simulate_many(*arguments, **options)
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, protocol="tcp://", dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+
+        def gathered(function: Callable[..., Any], items: Iterable[Any]) -> list[Any]:
+            return client.gather(client.map(function, items, pure=False))  # type: ignore[no-any-return]
+
+        assert same(alone, simulate_many(*arguments, **options, workers=gathered, chunk=8))
+        executor = client.get_executor(pure=False)
+        assert same(alone, simulate_many(*arguments, **options, workers=executor.map, chunk=8))
+        # Draws that a task makes from its own seed are its own.
+        assert [each.tolist() for each in gathered(drawn, range(4))] == [drawn(seed).tolist() for seed in range(4)]
+
+
+@mark.usefixtures("ctrl_c")
+@mark.parametrize("workers", [1, 3])
+@mark.parametrize("method", ["rk4", "midpoint"])
+def test_ctrl_c_comes_back_and_leaves_no_thread(workers: int, method: str) -> None:
+    before, main = set(threading.enumerate()), threading.main_thread().ident
+    assert main is not None
+    model, q, qd = arms(64)
+    simulate_many(model, q, qd, 0.01, method, workers=workers)  # the code is made
+    timer = threading.Timer(0.3, lambda: signal.pthread_kill(main, signal.SIGINT))
+    begin = time.perf_counter()
+    timer.start()
+    result = simulate_many(model, q, qd, 1e9, method, t_eval=[0.0, 1e9], workers=workers, chunk=8)
+    timer.join()
+    assert time.perf_counter() - begin < 60.0  # of days
+    assert set(threading.enumerate()) == before
+    assert set(result.stats.message) == {"interrupted"}
+    assert np.isnan(result.q).all()
+
+
+def test_ctrl_c_keeps_what_is_done() -> None:
+    def interrupted(function: Callable[..., Any], items: Iterable[Any]) -> Iterator[Any]:
+        for k, each in enumerate(items):
+            if k == 2:
+                raise KeyboardInterrupt
+            yield function(each)
+
+    whole, result = (simulate_many(*arms(29), 0.1, workers=workers, chunk=8) for workers in (1, interrupted))
+    assert result.stats.success.tolist() == [True] * 16 + [False] * 13
+    assert (result.q[:16] == whole.q[:16]).all()
+    assert np.isnan(result.q[16:]).all()
+    assert result.stats.message[15:17] == ("reached t_end", "interrupted")
+
+
+def test_an_error_in_a_thread_is_raised_and_leaves_no_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = set(threading.enumerate())
+
+    def broken(*_: object) -> None:
+        raise RuntimeError("broken")
+
+    monkeypatch.setattr("dynamics.simulation.ensembles.vectorized.VectorizedIntegration.advance", broken)
+    with raises(RuntimeError, match="broken"):
+        simulate_many(*arms(29), 0.1, workers=3, chunk=8)
+    assert set(threading.enumerate()) == before
+
+
+def test_workers_that_give_no_results_are_refused() -> None:
+    with raises(TypeError, match=r"workers must give the results of the function, as map does, got int: 1"):
+        simulate_many(*arms(9), 0.1, workers=lambda f, each: [1])  # type: ignore[list-item]

@@ -1,0 +1,161 @@
+"""Docstrings: every example runs and prints what it shows, and what is public says its parameters."""
+
+import doctest
+import importlib
+import inspect
+import re
+from pathlib import Path
+from types import FunctionType, ModuleType
+
+import numpy as np
+import pytest
+
+import cgraph as cg
+import cgraph.extend
+import dynamics as dyn
+import viz
+from cgraph.core.ops import OPS
+from cgraph.errors import install
+
+ROOT = Path(__file__).parents[1]
+PUBLIC = (cg, cgraph.extend, dyn, viz)
+# What an example may use without importing it, beside the names of its module; in its output `...` is any text.
+NAMES = {"cg": cg, "dyn": dyn, "viz": viz, "np": np}
+FLAGS = doctest.ELLIPSIS
+
+# Public names whose docstrings lack a part that `lacks` asks for, by package. May only shrink.
+INCOMPLETE_BY_PACKAGE = {
+    "cgraph": """
+        CSource Compiled clear_cache compile to_c
+    """,
+    "dynamics": """
+        Attached Body Certificate Crossings Ensemble EnsembleStats Event Force FreeBody Joint Link Mechanism
+        OdeSystem OmittedTerm PlanarArm PruneResult RecursiveInverseDynamics Reference Released Scene Stats Subtree
+        System TorqueTable Trajectory as_system attach_with_impact bias certify coriolis damping_force energy
+        forward_dynamics gravity_force inertial_parameters inverse_dynamics linearize load_mjcf load_urdf
+        mass_matrix momentum momentum_rate planar_arm prune raise_if_singular reference regressor release serial_arm
+        simulate simulate_many spurious_nodes state_equation state_space to_mjcf to_urdf torque_by_joint_motion
+        torque_by_link tree
+    """,
+    "viz": """
+        graph_svg page render_png render_svg to_dot
+    """,
+}
+INCOMPLETE = {f"{package}.{name}" for package, names in INCOMPLETE_BY_PACKAGE.items() for name in names.split()}
+
+
+def modules_with_examples() -> list[ModuleType]:
+    files = [path for package in ("cgraph", "dynamics", "viz") for path in sorted((ROOT / package).rglob("*.py"))]
+    written = [path.relative_to(ROOT) for path in files if ">>> " in path.read_text(encoding="utf-8")]
+    return [importlib.import_module(".".join(path.with_suffix("").parts).removesuffix(".__init__")) for path in written]
+
+
+def examples() -> list[doctest.DocTest]:
+    finder = doctest.DocTestFinder(exclude_empty=True)
+    return [test for module in modules_with_examples() for test in finder.find(module) if test.examples]
+
+
+def run(example: doctest.DocTest) -> None:
+    """Raises AssertionError for another output; skips where an optional package is missing that the error names."""
+    example.globs = NAMES | example.globs
+    try:
+        doctest.DebugRunner(optionflags=FLAGS).run(example)
+    except doctest.DocTestFailure as failure:
+        shown = f"{failure.example.source}Expected:\n{failure.example.want}Got:\n{failure.got}"
+        raise AssertionError(f"{example.filename}, {example.name}:\n{shown}") from None
+    except doctest.UnexpectedException as failure:
+        error = failure.exc_info[1]
+        if isinstance(error, ImportError) and install("").partition("'")[0] in str(error):
+            pytest.skip(str(error))
+        raise error from None
+
+
+@pytest.mark.parametrize("example", examples(), ids=lambda example: example.name)
+def test_an_example_prints_what_is_shown(
+    example: doctest.DocTest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    run(example)
+
+
+def public() -> dict[str, type | FunctionType]:
+    """{dotted name: object} of the public functions and classes, without errors and operations."""
+    named = {f"{module.__name__}.{name}": getattr(module, name) for module in PUBLIC for name in module.__all__}
+    operations = {f"cgraph.{name}" for name in OPS}
+    return {
+        name: value
+        for name, value in named.items()
+        if isinstance(value, FunctionType) or (isinstance(value, type) and not issubclass(value, Exception))
+        if name not in operations
+    }
+
+
+def section(docstring: str, title: str) -> str | None:
+    """The lines of a section in NumPy's style, or None."""
+    match = re.search(rf"^{title}\n-{{{len(title)}}}\n(.*?)(?=^\w[\w ]*\n---|\Z)", docstring, re.MULTILINE | re.DOTALL)
+    return match[1] if match else None
+
+
+def documented(text: str) -> list[str]:
+    """The names that a section explains: of `a, b : int` and `*args : str`, `a`, `b` and `args`."""
+    heads = re.findall(r"^(\*{0,2}\w[\w*, ]*?)(?: : .*)?$", text, re.MULTILINE)
+    return [name.strip().lstrip("*") for head in heads for name in head.split(",")]
+
+
+def lacks(value: type | FunctionType) -> list[str]:
+    """What a docstring should have and has not, in words."""
+    docstring = inspect.getdoc(value) or ""
+    missing = [] if ">>> " in (section(docstring, "Examples") or "") else ["Examples"]
+    explained = section(docstring, "Parameters")
+    if isinstance(value, type):
+        has_fields = any(not name.startswith("_") for name in getattr(value, "__annotations__", ()))
+        if has_fields and explained is None and section(docstring, "Attributes") is None:
+            missing.append("Attributes or Parameters")
+    elif inspect.signature(value).parameters:
+        taken = list(inspect.signature(value).parameters)
+        if explained is None:
+            missing.append("Parameters")
+        elif sorted(documented(explained)) != sorted(taken):
+            missing.append(f"Parameters for {', '.join(taken)} (it has {', '.join(documented(explained))})")
+    return missing
+
+
+@pytest.mark.parametrize("name", public())
+def test_what_is_public_says_its_parameters_and_shows_an_example(name: str) -> None:
+    assert name in INCOMPLETE or not lacks(public()[name])
+
+
+def test_the_list_of_incomplete_docstrings_only_shrinks() -> None:
+    assert public().keys() >= INCOMPLETE
+    assert {name for name in INCOMPLETE if not lacks(public()[name])} == set(), "take these off INCOMPLETE"
+
+
+def test_what_a_docstring_lacks_is_seen() -> None:
+    def bare(a: int, *, b: int) -> None:
+        """One line."""
+
+    def whole(a: int, *, b: int) -> None:
+        """One line.
+
+        Parameters
+        ----------
+        a, b : int
+            Numbers.
+
+        Examples
+        --------
+        >>> 1 + 1
+        2
+        """
+
+    def renamed(a: int, *, c: int) -> None: ...
+
+    renamed.__doc__ = whole.__doc__
+    assert lacks(bare) == ["Examples", "Parameters"]
+    assert lacks(whole) == []
+    assert lacks(renamed) == ["Parameters for a, c (it has a, b)"]
+
+
+def test_an_example_that_prints_something_else_fails() -> None:
+    with pytest.raises(AssertionError, match="Got:\n2"):
+        run(doctest.DocTestParser().get_doctest(">>> 1 + 1\n3\n", {}, "sum", None, 0))

@@ -1,0 +1,45 @@
+"""The theme: names in mathematical letters, an order of tags, and colors that mean one thing."""
+
+import pytest
+
+from viz import theme
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [
+        ("q0", "q₀"),
+        ("qd12", "q̇₁₂"),
+        ("qdd1", "q̈₁"),
+        ("tau2", "τ₂"),
+        ("theta", "θ"),
+        ("dL/dqd0", "dL/dq̇₀"),
+        ("q0_dot", "q₀_dot"),
+        ("dt", "dt"),
+        ("x", "x"),
+        ("2q", "2q"),
+    ],
+)
+def test_names_are_shown_in_mathematical_letters(name: str, shown: str) -> None:
+    assert theme.pretty(name) == shown
+
+
+def test_different_names_of_the_dynamics_stay_different() -> None:
+    names = [
+        f"{word}{i}{end}" for word in ("q", "qd", "qdd", "tau", "p") for i in range(12) for end in ("", "_dot", "_bar")
+    ]
+    assert len({theme.pretty(name) for name in names}) == len(names)
+
+
+def test_no_role_and_no_tag_has_the_color_of_the_spurious() -> None:
+    used = {paint.line for paint in theme.ROLES.values()} | {paint.fill for paint in theme.ROLES.values()}
+    assert theme.SPURIOUS not in used | set(theme.SERIES)
+
+
+def test_link_10_comes_after_link_9() -> None:
+    tags = ["link 10", "link 9", "base", "link 1"]
+    assert sorted(tags, key=theme.natural_order) == ["base", "link 1", "link 9", "link 10"]
+
+
+def test_tag_colors_depend_on_the_set_of_tags_alone() -> None:
+    assert theme.tag_colors(["b", "a", "c"]) == theme.tag_colors(["c", "b", "a", "a"])

@@ -1,0 +1,1 @@
+"""Architecture: which folder imports which, on which floor it stands, and what points the wrong way."""
