@@ -19,10 +19,9 @@ from .functions import Function, function
 from .node import (
     OPS as OPS,  # noqa: PLC0414 (who needs the table imports it from here, filled)
     Node,
-    register,
 )
 from .op_values import ieee
-from .operation import FUNCTION, LEAF, PRODUCT, RELATION, SUM, MathML, Op
+from .operation import FUNCTION, LEAF, PRODUCT, RELATION, SUM, MathML, Op, register
 
 
 # Conventions where there is no derivative: abs'(0) = 0; a tie of minimum or maximum gives one half to each argument;
