@@ -43,8 +43,8 @@ from .autodiff.ldl_solve import SingularError, ldl_elimination, ldl_solve
 from .autodiff.reverse import cotangents
 from .core.evaluate import Array
 from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED
-from .core.node import as_node, register
-from .core.operation import MathML, Op
+from .core.node import as_node
+from .core.operation import MathML, Op, register
 from .core.ops import OPS
 from .core.scope import building
 from .core.traversal import topological

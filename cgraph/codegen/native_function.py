@@ -50,7 +50,7 @@ class Native(Compiled):
         self._batch_lock = threading.Lock()
 
     def __call__(self, x: ArrayLike) -> Array:
-        """See Compiled."""
+        """The outputs at one point, through buffers that a call at a time has for itself."""
         buffers = self._take()
         x_memory, y, _, run = buffers
         point = x if type(x) is np.ndarray else self._point(x)
@@ -64,7 +64,7 @@ class Native(Compiled):
         return result
 
     def values(self, x: list[float]) -> tuple[float, ...]:
-        """See Compiled."""
+        """The outputs as floats at a list of floats."""
         buffers = self._take()
         x_memory, _, y_memory, run = buffers
         self._pack(x_memory, 0, *x)

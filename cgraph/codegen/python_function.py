@@ -35,12 +35,12 @@ class Generated(Compiled):
         self._numpy = _executable(self.source, dialect) if dialect == "numpy" else None
 
     def __call__(self, x: ArrayLike) -> Array:
-        """See Compiled."""
+        """The outputs at one point; by NumPy, as a batch of one."""
         point = self._point(x)
         return self.batch(point[:, None])[:, 0] if self._python is None else np.array(self.values(point.tolist()))
 
     def values(self, x: list[float]) -> tuple[float, ...]:
-        """See Compiled."""
+        """The outputs as floats at a list of floats; IEEE values where a function of `math` raises."""
         if self._python is None:
             return tuple(self(x).tolist())
         try:

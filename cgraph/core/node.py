@@ -10,7 +10,11 @@ from weakref import WeakValueDictionary
 import numpy as np
 
 from .label import INPUT, UNLABELLED, Label, SourceLine, label
-from .operation import Op as Op  # noqa: PLC0414 (beside the nodes that it makes)
+from .operation import (
+    BY_UFUNC,
+    OPS as OPS,  # noqa: PLC0414 (beside the nodes that they make)
+    Op as Op,  # noqa: PLC0414
+)
 from .scope import current
 
 _INPUT = label(roles=frozenset({INPUT}))
@@ -26,7 +30,6 @@ def _leaf(name: str) -> Op:
 
 VARIABLE = _leaf("variable")
 CONSTANT = _leaf("constant")
-OPS: dict[str, Op] = {}  # filled by ops.py, one row an operation
 
 _set = object.__setattr__
 
@@ -133,7 +136,7 @@ class Node:
         """`np.sin(node)`, `np.float64(2) * node`, and element by element for arrays of nodes."""
         if ufunc in _TURNED:
             ufunc, inputs = _TURNED[ufunc], inputs[::-1]
-        op = _BY_UFUNC.get(ufunc)
+        op = BY_UFUNC.get(ufunc)
         if op is None or method != "__call__" or kwargs:
             return NotImplemented
         return _elementwise(op, *inputs)
@@ -192,42 +195,7 @@ class Node:
 
 
 Scalar = Node | float
-_BY_UFUNC: dict[Any, Op] = {}
 _TURNED = {np.greater: np.less, np.greater_equal: np.less_equal}  # a > b is b < a
-
-
-def register(op: Op) -> None:
-    """Add a row to the operation table: from then on every part of the library knows the operation.
-
-    Parameters
-    ----------
-    op : Op
-        The row. `cg.name` is then the function that makes its nodes, and its `ufunc` makes them too.
-
-    Raises
-    ------
-    ValueError
-        When the name is no identifier or in the table already, when parameter names or a sample do not fit the number
-        of arguments, or when there is no sample.
-
-    Examples
-    --------
-    >>> from cgraph.extend import OPS, register
-    >>> register(OPS["sin"])
-    Traceback (most recent call last):
-    ValueError: operation 'sin' is in the table already
-    """
-    if op.name in OPS:
-        raise ValueError(f"operation {op.name!r} is in the table already")
-    if not op.name.isidentifier():
-        raise ValueError(f"an operation's name must be an identifier, got {op.name!r}")
-    if len(op.parameters) != op.arity:
-        raise ValueError(f"operation {op.name!r} takes {op.arity} argument(s), got the names {op.arguments!r}")
-    if not op.samples or any([len(sample) != op.arity for sample in op.samples]):
-        raise ValueError(f"operation {op.name!r} needs samples of {op.arity} number(s) each, got {op.samples!r}")
-    OPS[op.name] = op
-    if op.ufunc is not None:
-        _BY_UFUNC[op.ufunc] = op
 
 
 _constants: WeakValueDictionary[tuple[float, float], Node] = WeakValueDictionary()

@@ -114,7 +114,7 @@ def _meet(a: Interval, low: float, high: float) -> Interval | None:
 def rising(
     name: str, domain: Interval = LINE, bounds: Interval = LINE, ulps: int = ULPS, *, falling: bool = False
 ) -> Callable[[Interval], Interval]:
-    """The interval of a monotonous function on its domain; outside of it there is no number to bound."""
+    """The interval of a monotonic function on its domain; outside of it there is no number to bound."""
 
     def value(a: Interval) -> Interval:
         inside = _meet(a, *domain)

@@ -1,4 +1,4 @@
-"""Op: one row of the operation table, which holds all that any part of the library knows of an operation."""
+"""Op: one row of the operation table, all that any part of the library knows of an operation; and `register`."""
 
 from __future__ import annotations
 
@@ -21,8 +21,21 @@ LIBRARY = 2.0  # units of rounding: libraries promise an ulp or so
 class MathML(NamedTuple):
     """An operation in presentation MathML.
 
-    text: with {0}, {1}, .. where the arguments go.  least: of each argument, what it must bind with to go without
-    parentheses.  binding: what the whole binds with.
+    Parameters
+    ----------
+    text : str
+        MathML with {0}, {1}, .. where the arguments go.
+    least : tuple of int
+        Of each argument, how strongly it must bind to go without parentheses: 0 a relation, 1 a sum, 2 a product, 3 a
+        function, 4 a name or a number.
+    binding : int
+        How strongly the whole binds.
+
+    Examples
+    --------
+    >>> from cgraph.extend import MathML
+    >>> MathML("<msqrt>{0}</msqrt>", (0,), 3).text.format("<mi>x</mi>")
+    '<msqrt><mi>x</mi></msqrt>'
     """
 
     text: str
@@ -112,6 +125,14 @@ class Op:
         Taylor coefficient k of (k, the result's coefficients, each argument's). Default through the partials.
     rewrite : callable
         The same by other operations, for their series. Default none.
+
+    Examples
+    --------
+    >>> import math, numpy as np
+    >>> from cgraph.extend import Op
+    >>> row = Op("cbrt", 1, math.cbrt, np.cbrt, lambda y, x: (1.0 / (3.0 * y * y),), samples=((0.6,),))
+    >>> row.numpy, row.c, row.rounding
+    ('np.cbrt({0})', 'cbrt({0})', 2.0)
     """
 
     name: str
@@ -197,3 +218,41 @@ class Op:
 
     def __repr__(self) -> str:
         return f"<op {self.name}>"
+
+
+OPS: dict[str, Op] = {}  # the table; filled by ops.py
+BY_UFUNC: dict[Any, Op] = {}  # {ufunc of NumPy: the operation that it makes of nodes}
+
+
+def register(op: Op) -> None:
+    """Add a row to the operation table: from then on every part of the library knows the operation.
+
+    Parameters
+    ----------
+    op : Op
+        The row. `cg.name` is then the function that makes its nodes, and its `ufunc` makes them too.
+
+    Raises
+    ------
+    ValueError
+        When the name is no identifier or in the table already, when parameter names or a sample do not fit the number
+        of arguments, or when there is no sample.
+
+    Examples
+    --------
+    >>> from cgraph.extend import OPS, register
+    >>> register(OPS["sin"])
+    Traceback (most recent call last):
+    ValueError: operation 'sin' is in the table already
+    """
+    if op.name in OPS:
+        raise ValueError(f"operation {op.name!r} is in the table already")
+    if not op.name.isidentifier():
+        raise ValueError(f"an operation's name must be an identifier, got {op.name!r}")
+    if len(op.parameters) != op.arity:
+        raise ValueError(f"operation {op.name!r} takes {op.arity} argument(s), got the names {op.arguments!r}")
+    if not op.samples or any([len(sample) != op.arity for sample in op.samples]):
+        raise ValueError(f"operation {op.name!r} needs samples of {op.arity} number(s) each, got {op.samples!r}")
+    OPS[op.name] = op
+    if op.ufunc is not None:
+        BY_UFUNC[op.ufunc] = op

@@ -19,10 +19,9 @@ from .functions import Function, function
 from .node import (
     OPS as OPS,  # noqa: PLC0414 (who needs the table imports it from here, filled)
     Node,
-    register,
 )
 from .op_values import ieee
-from .operation import FUNCTION, LEAF, PRODUCT, RELATION, SUM, MathML, Op
+from .operation import FUNCTION, LEAF, PRODUCT, RELATION, SUM, MathML, Op, register
 
 
 # Conventions where there is no derivative: abs'(0) = 0; a tie of minimum or maximum gives one half to each argument;
@@ -53,9 +52,8 @@ _REAL = (-8.0, 8.0)
 _POSITIVE = (0.4, 2.5)
 _UNIT = (-0.8, 0.8)
 _INF = math.inf
-_BRANCH = "the slope is unbounded where both arguments are 0", "there is no slope where both arguments are 0"
 
-# Columns by place: name, arity, value on floats, value on arrays, partials of (output y, arguments). The others by name.
+# By place: name, arity, value on floats, value on arrays, partials of (output y, arguments), samples. The rest by name.
 # A table is read by columns, so the formatter leaves it alone.
 # fmt: off
 _ROWS = (
@@ -131,10 +129,10 @@ _ROWS = (
        about="The angle between -pi/2 and pi/2 whose tangent is x, in radians.", interval=bounds.rising("atan")),
     Op("atan2", 2, math.atan2, np.arctan2, _atan2_partials, ((0.3, -0.7), (-0.4, 0.2)), arguments="y x",
        about="The angle of the point (x, y) from the x axis, between -pi and pi, in radians.", domain=(_REAL, _POSITIVE),
-       interval=bounds.atan2, singular=bounds.origin(_BRANCH[0])),
+       interval=bounds.atan2, singular=bounds.origin("the slope is unbounded where both arguments are 0")),
     Op("hypot", 2, values.hypot, np.hypot, lambda y, a, b: (where(y, a / y, 0.0), where(y, b / y, 0.0)), ((0.3, -0.7),),
        arguments="x y", about="The length sqrt(x * x + y * y), without overflow on the way.", commutative=True,
-       domain=(_REAL, _POSITIVE), interval=bounds.hypot, singular=bounds.origin(_BRANCH[1]),
+       domain=(_REAL, _POSITIVE), interval=bounds.hypot, singular=bounds.origin("there is no slope where both arguments are 0"),
        precise=lambda a, b: (a * a + b * b) ** 0.5),
     Op("sinh", 1, math.sinh, np.sinh, lambda y, a: (cosh(a),), ((0.3,),), about="The hyperbolic sine of x.",
        domain=((-2.0, 2.0),), interval=bounds.rising("sinh")),

@@ -38,7 +38,7 @@ def outcomes(*arguments: str) -> dict[str, list[str]]:
         env=os.environ | {"PYTHONPATH": str(ROOT)},
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=100,
         check=False,
     )
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-2000:]
@@ -56,7 +56,9 @@ def test_every_part_of_the_library_takes_the_operation() -> None:
 
 def test_the_tests_of_the_table_accept_the_operation() -> None:
     """Without a word about it in any of them."""
-    found = outcomes(*TABLE, "-k", "cbrt or the_script or slopes_are or (random_graph and llvm)")
+    pytest.importorskip("llvmlite")  # without which these files have nothing to run
+    pytest.importorskip("flint")
+    found = outcomes(*TABLE, "-k", "(cbrt and not O3) or the_script_knows or slopes_are")
     assert set(found) == set(TABLE)
 
 
