@@ -40,7 +40,7 @@ def as_subtree(given: Subtree | Body | Iterable[Body]) -> Subtree:
     return Subtree(bodies, bodies[0].parent)
 
 
-def below(bodies: Iterable[Body], root: str) -> set[str]:
+def descendants(bodies: Iterable[Body], root: str) -> set[str]:
     """Names of the body and of all that it carries. Raises MechanismError for an unknown body."""
     bodies = list(bodies)
     names = {body.name for body in bodies}

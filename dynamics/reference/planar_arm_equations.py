@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..multibody.planar_arm import PlanarArm
+from ..multibody.mechanism import Mechanism
+from ..multibody.planar_arm import planar_links
 from .flint_numbers import Number, flint, working
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -37,7 +38,7 @@ class Pair(NamedTuple):
         return (x - self.high) - self.low
 
 
-def torques(arm: PlanarArm, q: Array, qd: Array, qdd: Array) -> Pair:
+def torques(arm: Mechanism, q: Array, qd: Array, qdd: Array) -> Pair:
     """tau [N m] of a planar arm for accelerations qdd, (n,). Raises ImportError without python-flint."""
 
     def solved(terms: _Terms, number: Callable[[Any], Number]) -> Vector:
@@ -49,7 +50,7 @@ def torques(arm: PlanarArm, q: Array, qd: Array, qdd: Array) -> Pair:
     return _bounded(arm, q, qd, solved)
 
 
-def accelerations(arm: PlanarArm, q: Array, qd: Array, tau: Array) -> Pair:
+def accelerations(arm: Mechanism, q: Array, qd: Array, tau: Array) -> Pair:
     """qdd [rad/s^2] of a planar arm under torques tau, (n,). Raises ImportError without python-flint."""
 
     def solved(terms: _Terms, number: Callable[[Any], Number]) -> Vector:
@@ -72,7 +73,7 @@ class _Terms(NamedTuple):
     damping: Vector
 
 
-def _bounded(arm: PlanarArm, q: Array, qd: Array, solved: Callable[[_Terms, Callable[[Any], Number]], Vector]) -> Pair:
+def _bounded(arm: Mechanism, q: Array, qd: Array, solved: Callable[[_Terms, Callable[[Any], Number]], Vector]) -> Pair:
     """The numbers, computed with so many digits that the bound on their error is at most LOST."""
     digits = DIGITS
     while digits <= MOST:
@@ -87,21 +88,24 @@ def _bounded(arm: PlanarArm, q: Array, qd: Array, solved: Callable[[_Terms, Call
                 low = [float((each - h).mid()) for each, h in zip(x, high, strict=True)]
                 return Pair(np.array(high), np.array(low))
         digits *= 2
-    raise ArithmeticError(f"{MOST} digits are not enough for an arm of {len(arm.links)} links")
+    raise ArithmeticError(f"{MOST} digits are not enough for an arm of {len(arm.moving)} links")
 
 
-def _terms(number: Callable[[Any], Number], arm: PlanarArm, q: Array, qd: Array) -> _Terms:
-    n = len(arm.links)
+def _terms(number: Callable[[Any], Number], arm: Mechanism, q: Array, qd: Array) -> _Terms:
+    n = len(arm.moving)
+    gravity = number(np.asarray(arm.gravity)[2])
     theta, omega = _running(number, q), _running(number, qd)
     mass, length, center, inertia = (
         [number(each) for each in row]
-        for row in zip(*[(link.mass, link.length, link.center, link.inertia) for link in arm.links], strict=True)
+        for row in zip(
+            *[(link.mass, link.length, link.center, link.inertia) for link in planar_links(arm)], strict=True
+        )
     )
     beyond = [*list(itertools.accumulate(reversed(mass)))[::-1][1:], number(0)]  # mass carried at the far end
     first = [m * c + b * s for m, c, b, s in zip(mass, center, beyond, length, strict=True)]
     sin, cos = [each.sin() for each in theta], [each.cos() for each in theta]
     matrix = [[number(0)] * n for _ in range(n)]
-    right = [-number(arm.gravity) * f * s for f, s in zip(first, sin, strict=True)]
+    right = [gravity * f * s for f, s in zip(first, sin, strict=True)]
     for i in range(n):
         matrix[i][i] = mass[i] * center[i] ** 2 + beyond[i] * length[i] ** 2 + inertia[i]
         for j in range(i):
@@ -110,7 +114,7 @@ def _terms(number: Callable[[Any], Number], arm: PlanarArm, q: Array, qd: Array)
             turn = a * (sin[i] * cos[j] - cos[i] * sin[j])
             right[i] = right[i] - turn * omega[j] ** 2
             right[j] = right[j] + turn * omega[i] ** 2
-    damping = [number(c) * number(v) for c, v in zip(arm.damping, qd.tolist(), strict=True)]
+    damping = [number(c) * number(v) for c, v in zip(arm.system.damping, qd.tolist(), strict=True)]
     return _Terms(matrix, right, damping)
 
 

@@ -28,7 +28,7 @@ QUANTITIES = {
 Peer = Callable[[dict[str, Any]], dict[str, Any]]
 
 
-def mujoco_peer(arm: dyn.PlanarArm) -> Peer:
+def mujoco_peer(arm: dyn.Mechanism) -> Peer:
     """MuJoCo's values at a state."""
     twin = MujocoTwin(arm)
     return lambda x: {
@@ -39,13 +39,13 @@ def mujoco_peer(arm: dyn.PlanarArm) -> Peer:
     }
 
 
-def pinocchio_peer(arm: dyn.PlanarArm) -> Peer:
+def pinocchio_peer(arm: dyn.Mechanism) -> Peer:
     """Pinocchio's values at a state, its damping added beside it."""
     import pinocchio
 
     from tests.dynamics.pinocchio_twin import pinocchio_model
 
-    model, damping = pinocchio_model(arm), np.array(arm.damping)
+    model, damping = pinocchio_model(arm), np.array(arm.system.damping)
     data = model.createData()
     return lambda x: {
         "tau": pinocchio.rnea(model, data, x["q"], x["qd"], x["qdd"]) + damping * x["qd"],
@@ -58,7 +58,7 @@ def pinocchio_peer(arm: dyn.PlanarArm) -> Peer:
 PEERS = {"MuJoCo": mujoco_peer, "Pinocchio": pinocchio_peer}
 
 
-def differences(arm: dyn.PlanarArm, peer: Peer, count: int) -> dict[str, float]:
+def differences(arm: dyn.Mechanism, peer: Peer, count: int) -> dict[str, float]:
     """The largest relative difference of each quantity over random states."""
     functions = {name: cg.compile(make(arm)) for name, make in QUANTITIES.items()}
     many = states(arm, count)

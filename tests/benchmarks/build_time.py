@@ -20,7 +20,7 @@ def build_times(n: int, repeats: int) -> tuple[list[float], int, int]:
     seconds = []
     for _ in range(repeats):
         start = time.perf_counter()
-        fresh = dyn.PlanarArm(arm.links, arm.damping, arm.gravity)  # its Lagrangian is built anew too
+        fresh = dyn.Mechanism(arm.bodies, arm.gravity)  # its Lagrangian is built anew too
         graph = dyn.forward_dynamics(fresh)
         seconds.append(time.perf_counter() - start)
     return seconds, len(graph.nodes), len(graph.edges)

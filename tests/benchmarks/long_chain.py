@@ -24,7 +24,7 @@ from dynamics.reference.planar_arm_equations import accelerations
 from tests.dynamics.dense_reference import chain_accelerations
 
 
-def planar(n: int) -> dyn.PlanarArm:
+def planar(n: int) -> dyn.Mechanism:
     """A planar chain of unlike rods."""
     return dyn.planar_arm(
         [0.2 + 0.05 * (i % 3) for i in range(n)], [0.2 + 0.1 * (i % 2) for i in range(n)], damping=0.1

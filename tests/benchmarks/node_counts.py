@@ -27,6 +27,7 @@ from dynamics.equations import equations_of_motion as equations
 from dynamics.experiments.paper_numbers.fit import exponent
 from dynamics.experiments.speed.bench_scenes import binary_tree, turned_arm
 from dynamics.multibody import link as links, mechanism, spatial
+from dynamics.multibody.planar_arm import planar_links
 from dynamics.systems.system import BodySystem
 
 solving = sys.modules["cgraph.autodiff.hessian_solve"]  # the module; `cgraph.hessian_solve` is the function
@@ -34,7 +35,7 @@ solve_nodes, rates = solving.solve_nodes, equations.rates
 PLANAR = (3, 10, 20, 50, 100, 200)
 
 
-def planar(n: int) -> dyn.PlanarArm:
+def planar(n: int) -> dyn.Mechanism:
     """A planar chain of equal rods."""
     return dyn.planar_arm([0.9] * n, [0.7] * n, damping=0.1)
 
@@ -46,13 +47,13 @@ MODELS: dict[str, Callable[[], Any]] = {f"planar {n}": lambda n=n: planar(n) for
 }
 
 
-def about_centers(arm: dyn.PlanarArm) -> dyn.System:
+def about_centers(arm: dyn.Mechanism) -> dyn.System:
     """The planar chain with the velocity of each centre of mass: K = m v.v / 2 + I w^2 / 2."""
 
     def lagrangian(q: Sequence[Node], qd: Sequence[Node], t: Node) -> Iterator[Node]:
-        angle, omega = q[0], qd[0]
+        angle, omega, gravity = q[0], qd[0], -float(np.asarray(arm.gravity)[2])
         x, y, height = cg.constant(0.0), cg.constant(0.0), cg.constant(0.0)
-        for i, link in enumerate(arm.links):
+        for i, link in enumerate(planar_links(arm)):
             if i:
                 angle, omega = angle + q[i], omega + qd[i]
             s, c = cg.sin(angle), cg.cos(angle)
@@ -62,10 +63,10 @@ def about_centers(arm: dyn.PlanarArm) -> dyn.System:
 
             u, v, h = along(link.center)
             kinetic = 0.5 * link.mass * (u * u + v * v) + 0.5 * link.inertia * (omega * omega)
-            yield kinetic - link.mass * arm.gravity * h
+            yield kinetic - link.mass * gravity * h
             x, y, height = along(link.length)
 
-    return dyn.System(lagrangian, [f"joint {i + 1}" for i in range(len(arm.links))], damping=arm.damping)
+    return dyn.System(lagrangian, [f"joint {i + 1}" for i in range(len(planar_links(arm)))], damping=arm.system.damping)
 
 
 def body_about_center(motion: Any, link: Any, q: Node, qd: Node) -> Node:
@@ -158,7 +159,7 @@ VARIANTS: dict[str, Variant] = {
 
 def count(variant: str, model: Any) -> int:
     """Nodes of forward dynamics by elimination, or dense where the variant says so."""
-    if variant == "energy by the centre's velocity" and isinstance(model, dyn.PlanarArm):
+    if variant == "energy by the centre's velocity" and model.coordinates[0] == "joint 1":
         model = about_centers(model)
     with VARIANTS[variant][0]():
         return len(dyn.forward_dynamics(model, "dense" if "dense" in variant else "recursive").nodes)

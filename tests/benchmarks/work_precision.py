@@ -28,6 +28,7 @@ from dynamics.experiments.work_precision.trajectory_runs import Contender, Ours,
 from dynamics.experiments.work_precision.trajectory_scenes import load
 from dynamics.experiments.work_precision.work_precision import Judge, work_precision
 from dynamics.integrators import METHODS, Problem
+from dynamics.multibody.planar_arm import planar_links
 
 FIXED = tuple([name for name, method in METHODS.items() if not method.adaptive])
 TURNS = 15
@@ -209,13 +210,15 @@ def stiff(folder: str) -> None:
             show(rows, ours)
 
 
-def numpy_rate(arm: dyn.PlanarArm) -> Callable[[float, Array], Array]:
+def numpy_rate(arm: dyn.Mechanism) -> Callable[[float, Array], Array]:
     """The rates of a planar arm as one writes them in NumPy: angles from the vertical, M and a linear solve."""
-    n = len(arm.links)
-    share = np.array([[k.length if j < i else k.center * (j == i) for j, k in enumerate(arm.links)] for i in range(n)])
-    mass = np.array([link.mass for link in arm.links])
-    pairs = share.T @ (mass[:, None] * share) + np.diag([link.inertia for link in arm.links])
-    weight, damping = arm.gravity * mass @ share, np.array(arm.damping)
+    n = len(arm.moving)
+    share = np.array(
+        [[k.length if j < i else k.center * (j == i) for j, k in enumerate(planar_links(arm))] for i in range(n)]
+    )
+    mass = np.array([link.mass for link in planar_links(arm)])
+    pairs = share.T @ (mass[:, None] * share) + np.diag([link.inertia for link in planar_links(arm)])
+    weight, damping = -np.asarray(arm.gravity)[2] * mass @ share, np.array(arm.system.damping)
 
     def rate(t: float, x: Array) -> Array:
         q, qd = x[:n], x[n:]
@@ -293,7 +296,7 @@ def energy(folder: str, steps: int = 10**6, starts: int = 12) -> None:
         )
 
 
-def rest_energy(arm: dyn.PlanarArm) -> float:
+def rest_energy(arm: dyn.Mechanism) -> float:
     """The energy hanging still [J]."""
     return float(dyn.energy(arm).evaluate({f"{a}{i}": 0.0 for a in ("q", "qd") for i in range(3)})["E"])
 

@@ -19,7 +19,7 @@ from dynamics.experiments.paper_numbers.equation3 import PAPER, equation3
 from dynamics.experiments.paper_numbers.free_fall import fall, largest_differences, mujoco_fall
 from dynamics.experiments.paper_numbers.node_scaling import FITTED_FROM, scaling
 from dynamics.experiments.paper_numbers.table_1 import PAPER_MS, Row, table1
-from dynamics.io.mujoco_model import frames
+from dynamics.io.mujoco_render import frames
 from dynamics.simulation.progress_bar import Progress
 
 from .. import theme

@@ -69,4 +69,4 @@ def model(name: str, ignore: bool = False) -> tuple[Any, tuple[str, ...]]:
             "and files are those that end in .xml or .urdf"
         )
     scene = scenes.load(name, **({"ignore": True} if ignore and name not in scenes.names() else {}))
-    return scene.model, scene.left_out
+    return scene.model, scene.omitted

@@ -104,7 +104,7 @@ def _known(case: Case, times: Sequence[float], folder: str | Path | None) -> Ref
 def _of_scene(name: str, **options: Any) -> Setting:
     scene = scenes.load(name, **options)
     start = (*scene.q, *scene.qd)
-    return Setting(scene.name, scene.about, scene.model, start, scene.t_end, left_out=scene.left_out)
+    return Setting(scene.name, scene.about, scene.model, start, scene.t_end, left_out=scene.omitted)
 
 
 SETTINGS: dict[str, Callable[[], Setting]] = {

@@ -54,7 +54,7 @@ class Case:
 
     name: str
     about: str  # one line: what is hard here
-    build: Callable[[], Any]  # the model: a System, OdeSystem, Mechanism or PlanarArm
+    build: Callable[[], Any]  # the model: a System, OdeSystem or Mechanism
     start: tuple[float, ...]
     t_end: float  # s
     watch: tuple[Watch, ...]

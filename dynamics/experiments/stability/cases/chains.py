@@ -10,7 +10,7 @@ import cgraph as cg
 
 from ....equations.equations_of_motion import momentum
 from ....multibody.mechanism import Body, Joint, Mechanism
-from ....multibody.planar_arm import PlanarArm, planar_arm
+from ....multibody.planar_arm import planar_arm
 from ....reference import closed_forms
 from ....systems.system import System
 from .case import GROWN, RTOL, SLACK, Case, Watch, conserved, energy_watch, error_watch
@@ -22,7 +22,7 @@ UNIT = 2.0**-53  # rounding of float64
 def _two_links(
     name: str,
     about: str,
-    build: Callable[[], PlanarArm],
+    build: Callable[[], Mechanism],
     fastest: float,
     bend: float,
     watch: tuple[Watch, ...],
@@ -47,7 +47,7 @@ def _two_links(
 def mass_ratio(ratio: float, growth: float) -> Case:
     """Two points on unit rods without mass, the lower `ratio` times as heavy as the upper."""
 
-    def build() -> PlanarArm:
+    def build() -> Mechanism:
         return planar_arm([1.0, ratio], [1.0, 1.0], mass_model="point", gravity=GRAVITY)
 
     about = (
@@ -63,7 +63,7 @@ def mass_ratio(ratio: float, growth: float) -> Case:
 def length_ratio(ratio: float, growth: float | None) -> Case:
     """Two rods of equal mass, the lower `ratio` times as long as the upper."""
 
-    def build() -> PlanarArm:
+    def build() -> Mechanism:
         return planar_arm([1.0, 1.0], [1.0, ratio], gravity=GRAVITY)
 
     about = "a short link under a long one" if ratio < 1.0 else "a long link under a short one"
@@ -142,7 +142,7 @@ def massless_links() -> Case:
 def long_chain(n: int, t_end: float) -> Case:
     """n equal rods, 1 kg and 1 m in all, let go straight at 45 degrees."""
 
-    def build() -> PlanarArm:
+    def build() -> Mechanism:
         return planar_arm([1.0 / n] * n, [1.0 / n] * n, gravity=GRAVITY)
 
     return Case(
@@ -159,7 +159,7 @@ def long_chain(n: int, t_end: float) -> Case:
 def zero_gravity() -> Case:
     """Three rods without gravity, spinning: beside energy, the momentum of the first joint stays."""
 
-    def build() -> PlanarArm:
+    def build() -> Mechanism:
         return planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7], gravity=0.0)
 
     def spin(q: Any, qd: Any) -> cg.Node:
