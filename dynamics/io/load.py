@@ -60,10 +60,8 @@ def load_mjcf(source: Any, *, ignore: bool = False) -> Mechanism:
     >>> arm.coordinates
     ('link 1', 'link 2')
     """
-    return _mechanism(
-        source if isinstance(source, mujoco().MjModel) else _compiled(source, _called(source)),
-        ignore,
-    )
+    mj_model = source if isinstance(source, mujoco().MjModel) else _compiled(source, _called(source))
+    return _mechanism(mj_model, ignore)
 
 
 def _mechanism(mj_model: Any, ignore: bool) -> Mechanism:
@@ -109,8 +107,9 @@ def load_urdf(source: Any, *, ignore: bool = False) -> Mechanism:
     Examples
     --------
     >>> import dynamics as dyn
-    >>> dyn.load_urdf(dyn.to_urdf(dyn.planar_arm([1.0, 0.8], [1.0, 0.5]))).coordinates
-    ('link 1', 'link 2')
+    >>> rotor = dyn.Body("rotor", dyn.Joint("revolute"), mass=1.0, inertia=(0.1, 0.1, 0.1))
+    >>> dyn.load_urdf(dyn.to_urdf(dyn.Mechanism([rotor]))).coordinates
+    ('rotor',)
     """
     return _mechanism(_compiled(_without_shapes(source), _called(source)), ignore)
 
@@ -268,9 +267,8 @@ def _joint(mj_model: Any, j: int, position: Array, orientation: Array) -> Joint:
 def _kind(mj_model: Any, j: int) -> str:
     """Our kind of a joint, "" for the kinds that a mechanism has not."""
     types = mujoco().mjtJoint
-    return {int(getattr(types, f"mjJNT_{each.mjcf.upper()}")): each.kind for each in TYPES.values() if each.mjcf}.get(
-        int(mj_model.jnt_type[j]), ""
-    )
+    kinds = {int(getattr(types, f"mjJNT_{each.mjcf.upper()}")): kind for kind, each in TYPES.items() if each.mjcf}
+    return kinds.get(int(mj_model.jnt_type[j]), "")
 
 
 def _disabled(mj_model: Any, *what: str) -> bool:

@@ -65,7 +65,7 @@ def attach_subtree(
     """The structure with a subtree hung on a body or the world; `to` is by default the subtree's own parent."""
     given = as_subtree(subtree)
     back = to is None or to == given.parent
-    bodies = given.hung_on(given.parent if to is None else to)
+    bodies = given.with_parent(given.parent if to is None else to)
     return replace(
         structure,
         bodies=tuple(inserted(tuple(structure.bodies), bodies, given.places if back else ())),

@@ -32,7 +32,22 @@ Equations = Callable[[Any], Graph]
 
 @dataclass(frozen=True)
 class OmittedTerm:
-    """Something that is not in a graph.  nodes, edges: how many more there would be with it."""
+    """Something that is not in a graph.
+
+    Parameters
+    ----------
+    what, why : str
+        What it is, and why it is not there.
+    nodes, edges : int
+        How many more there would be with it.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.5], damping=0.1)
+    >>> print(dyn.prune(arm, effects=["gravity"], regroup=False).left_out[0])
+    damping: switched off (5 nodes, 8 edges)
+    """
 
     what: str
     why: str
@@ -45,7 +60,26 @@ class OmittedTerm:
 
 @dataclass(frozen=True, eq=False)
 class PruneResult:
-    """What `prune` makes: the model that is left and its graph. The accounts are made when they are asked for."""
+    """What is left of a model after `prune`, and accounts of the rest, made on demand.
+
+    Parameters
+    ----------
+    model : Model
+        What is left.
+    graph : Graph
+        Its equations.
+    equations : callable
+        What makes a graph of a model.
+    steps : tuple
+        From the model as given to what is left.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> result = dyn.prune(dyn.planar_arm([1.0, 0.8], [1.0, 0.5]), dyn.mass_matrix)
+    >>> len(result.full.nodes), len(result.graph.nodes)
+    (27, 22)
+    """
 
     model: Model
     graph: Graph
@@ -132,18 +166,47 @@ def prune(
 ) -> PruneResult:
     """The equations of a model with what is asked for and nothing else.
 
-    equations: the function that makes the graph, `inverse_dynamics`, `forward_dynamics`, `mass_matrix`, ...
-    effects: those of gravity, damping, springs, armature, forces that are kept. Of a Lagrangian that is not a
+    Inputs that nothing depends on any more stay inputs, so that callers need not change.
+
+    Parameters
+    ----------
+    model : Model
+        A mechanism, a scene, or a Lagrangian.
+    equations : callable
+        The function that makes the graph: `inverse_dynamics`, `forward_dynamics`, `mass_matrix`, ...
+    effects : iterable of str
+        Those of `EFFECTS` that are kept: gravity, damping, springs, armature, forces. Of a Lagrangian that is not a
         mechanism's, only damping and forces can be told apart.
-    lock: {body: coordinate} of joints to lock, of a mechanism.
-    values: {input: number} of inputs that become constants: parameters, or the state; "q", "qd", "qdd", "tau" stand for
+    lock : mapping, optional
+        {body: coordinate [rad or m]} of joints to lock, of a mechanism.
+    values : mapping, optional
+        {input: number} of inputs that become constants: parameters, or the state; "q", "qd", "qdd", "tau" stand for
         all of their kind, so that {"qd": 0, "qdd": 0} leaves the torques that hold a posture.
-    outputs: names of those to keep.
-    regroup: inertial numbers that no motion shows are given to the bodies further in, where that saves nodes. The graph
+    outputs : sequence of str, optional
+        Names of those to keep.
+    regroup : bool
+        Inertial numbers that no motion shows are given to the bodies further in, where that saves nodes. The graph
         computes the same, in fewer nodes; the tag of a body then no longer stands for its own inertia alone.
 
-    Inputs that nothing depends on any more stay inputs, so that callers need not change.
-    Raises ValueError for an effect that is unknown or cannot be told apart; as `Mechanism.lock`, as `cg.specialize`.
+    Returns
+    -------
+    PruneResult
+        The model that is left, its graph, and what was left out, why, and how many nodes that saved.
+
+    Raises
+    ------
+    ValueError
+        For an effect that is unknown or cannot be told apart, and as `cg.specialize` does.
+    MechanismError
+        As `Mechanism.lock` does.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.5])
+    >>> result = dyn.prune(arm, values={"qd": 0.0, "qdd": 0.0})
+    >>> len(dyn.inverse_dynamics(arm).nodes), len(result.graph.nodes)
+    (82, 12)
     """
     model = as_mechanism(model) or as_system(model)
     kept = list(effects)

@@ -33,7 +33,24 @@ class RecursiveInverseDynamics:
     """tau of the motion of a mechanism, (q, qd, qdd) -> tau, ready at once.
 
     Compared with the compiled graph of `inverse_dynamics`, which knows the numbers of every body, an evaluation takes
-    longer; nothing has to be built before the first. Raises ValueError for a mechanism with external forces.
+    longer; nothing has to be built before the first.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Without external forces.
+
+    Raises
+    ------
+    ValueError
+        For a mechanism with external forces.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> torques = dyn.RecursiveInverseDynamics(dyn.planar_arm([1.0], [1.0], gravity=10.0))
+    >>> torques([0.0], [0.0], [3.0]).round(12).tolist()
+    [1.0]
     """
 
     def __init__(self, mechanism: Mechanism) -> None:

@@ -32,8 +32,26 @@ def regressor(model: Model) -> Graph:
     variables. A column of zeros is a parameter that no motion reveals; which combinations of the others do, the rank
     of stacked Y tells.
 
-    model: a Mechanism, or a scene of one.  Inputs q0.., qd0.., qdd0..; outputs Y_0_0, Y_0_1, .. row by row, (n, 10 n).
-    Raises TypeError for another model.
+    Parameters
+    ----------
+    model : Model
+        A mechanism, or a scene of one.
+
+    Returns
+    -------
+    Graph
+        Inputs q0.., qd0.., qdd0..; outputs Y_0_0, Y_0_1, .. row by row, (n, 10 n).
+
+    Raises
+    ------
+    TypeError
+        For a model without bodies.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> len(dyn.regressor(dyn.planar_arm([1.0, 0.8], [1.0, 0.5])).outputs)
+    40
     """
     mechanism = _mechanism(model)
     names = [f"{each}_{i}" for i in range(len(mechanism.moving)) for each in PARAMETERS]
@@ -49,9 +67,28 @@ def regressor(model: Model) -> Graph:
 
 
 def inertial_parameters(model: Model) -> Array:
-    """(n, 10): of each moving body mass [kg], first moment m c [kg m], and inertia about its joint's origin [kg m^2].
+    """Mass, first moment and inertia about the joint's origin of each moving body, all that is welded to it merged in.
 
-    Rows are as `PARAMETERS`, in the body's axes, all that is welded to it merged in. Raises as `regressor`.
+    Parameters
+    ----------
+    model : Model
+        A mechanism, or a scene of one.
+
+    Returns
+    -------
+    ndarray, (n, 10)
+        In the bodies' axes, columns as `PARAMETERS`: m [kg], m c [kg m], and Ixx, Ixy, Iyy, Ixz, Iyz, Izz [kg m^2].
+
+    Raises
+    ------
+    TypeError
+        For a model without bodies.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> dyn.inertial_parameters(dyn.planar_arm([2.0], [3.0], mass_model="point"))[0, :4].tolist()
+    [2.0, 0.0, 0.0, -6.0]
     """
     rows = []
     for body in _mechanism(model).moving:

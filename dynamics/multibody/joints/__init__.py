@@ -1,10 +1,14 @@
-"""Types of joints: a file each, and the table of them by kind."""
+"""Types of joints: a file each, and the table of them by kind.
 
-from .fixed import Fixed
+A module of this package that has a `JOINT`, a `JointType`, is in the table.
+"""
+
+from importlib import import_module
+from pkgutil import iter_modules
+
 from .joint_type import JointType
-from .prismatic import Prismatic
-from .revolute import Revolute
 
-TYPES: dict[str, JointType] = {each.kind: each for each in (Revolute(), Prismatic(), Fixed())}
+_MODULES = [import_module(f"{__name__}.{module.name}") for module in iter_modules(__path__)]
+TYPES: dict[str, JointType] = {module.JOINT.kind: module.JOINT for module in _MODULES if hasattr(module, "JOINT")}
 
 __all__ = ["TYPES", "JointType"]

@@ -39,3 +39,6 @@ class Fixed:
     def unobservable(self, mass: float, moment: Array, inertia: Array) -> tuple[float, Array, Array]:
         """All of it."""
         return mass, moment, inertia
+
+
+JOINT = Fixed()

@@ -39,3 +39,6 @@ class Prismatic:
     def unobservable(self, mass: float, moment: Array, inertia: Array) -> tuple[float, Array, Array]:
         """The inertia: the body turns as its parent does."""
         return 0.0, np.zeros(3), inertia
+
+
+JOINT = Prismatic()

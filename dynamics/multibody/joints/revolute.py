@@ -40,3 +40,6 @@ class Revolute:
     def unobservable(self, mass: float, moment: Array, inertia: Array) -> tuple[float, Array, Array]:
         """The mass, the first moment along the axis, and the inertia that is alike about every axis across."""
         return mass, moment * (0.0, 0.0, 1.0), inertia[1, 1] * np.diag([1.0, 1.0, 0.0])
+
+
+JOINT = Revolute()

@@ -256,7 +256,7 @@ BAD = [
     param([point("")], "a body needs a name, and not 'world'; got ''", id="no name"),
     param(
         [point("a", joint=Joint("ball"))],
-        "body 'a': joint must be one of revolute, prismatic, fixed, got 'ball'",
+        "body 'a': joint must be one of fixed, prismatic, revolute, got 'ball'",
         id="kind",
     ),
     param(
