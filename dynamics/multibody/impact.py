@@ -109,8 +109,8 @@ def attach_with_impact(
 ) -> Attached:
     """A free body is caught, and hangs from then on as its joint says.
 
-    The impact is inelastic and takes no time: positions stay, no force but its own matters, and velocities jump so
-    that M qd+ = M_old qd- + J^T m v + J_w^T I w, in the coordinates of the mechanism with the body.
+    The impact is inelastic and instantaneous: positions stay, and velocities jump so that
+    M qd+ = M_old qd- + J^T m v + J_w^T I w, in the coordinates of the mechanism with the body.
 
     Parameters
     ----------
@@ -119,8 +119,7 @@ def attach_with_impact(
     q, qd : array_like, (n,)
         Its state just before [rad or m], [rad/s or m/s].
     body : Body
-        With its joint, "fixed" for a firm grip. Where it is has to be where it hangs: see `Mechanism.motion`. A joint
-        that is new stands at 0.
+        With its joint, "fixed" for a firm grip; it has to be where it hangs (`Mechanism.motion`). A new joint is at 0.
     to : str, optional
         What it hangs on, by default its parent.
     velocity, omega : array_like, (3,)
@@ -147,14 +146,14 @@ def attach_with_impact(
     whole = mechanism.attach(body, to)
     v, w = vector("velocity", velocity), vector("omega", omega)
     q_new, qd_old = whole.map_state_from(mechanism, q, qd)
-    coordinates = {each.name: i for i, each in enumerate(whole.moving)}
-    p = np.zeros(len(coordinates))
+    index = {each.name: i for i, each in enumerate(whole.moving)}
+    p = np.zeros(len(index))
     before = _momentum(mechanism, np.asarray(q, dtype=np.float64), np.asarray(qd, dtype=np.float64))
-    p[[coordinates[each.name] for each in mechanism.moving]] = before
+    p[[index[each.name] for each in mechanism.moving]] = before
     given = checked(body)
-    free, along, about = _motion(whole, given, q_new, qd_old)
+    free, linear, angular = _motion(whole, given, q_new, qd_old)
     inertia = free.orientation @ np.asarray(given.inertia) @ free.orientation.T
-    p += given.mass * along.T @ v + about.T @ inertia @ w
+    p += given.mass * linear.T @ v + angular.T @ inertia @ w
     qd_new = _velocities(whole, q_new, p)
     energy = float(np.asarray(qd, dtype=np.float64) @ before + given.mass * v @ v + w @ inertia @ w - qd_new @ p) / 2.0
     return Attached(whole, q_new, qd_new, energy)

@@ -73,17 +73,16 @@ class Mechanism(Structure):
         vector("gravity", self.gravity)
         for what, kind in (("bodies", Body), ("forces", Force)):  # kept, so that an iterator is read once
             object.__setattr__(self, what, _listed(what, kind, getattr(self, what)))
-        bodies = set(self._carriers) - {WORLD}
         for i, name in enumerate(self.coordinates):
             if name in self.coordinates[:i]:
                 raise MechanismError(f"two joints that move have the name {name!r}")
         for force in self.forces:
-            check_force(force, bodies)
+            check_force(force, set(self._carriers) - {WORLD})
         used = {name for force in self.forces for name in force.names}
         for name in self.parameters:
             if name not in used:
                 raise MechanismError(f"the mechanism has no force that uses the parameter {name!r}")
-        for name, value in self._values.items():
+        for name, value in self.parameter_values.items():
             parameter_value(name, value)
 
     def __repr__(self) -> str:
@@ -92,7 +91,7 @@ class Mechanism(Structure):
         parts[0] += ", ..." if len(names) > 6 else ""
         parts += [f"locked {', '.join(list(self.locked)[:6])}"] if self.locked else []
         parts += [f"forces on {', '.join([force.body for force in self.forces[:6]])}"] if self.forces else []
-        parts += [f"parameters {', '.join(self._values)}"] if self._values else []
+        parts += [f"parameters {', '.join(self.parameter_values)}"] if self.parameter_values else []
         parts += [f"gravity {', '.join([f'{each:g}' for each in np.asarray(self.gravity)])}"]
         return f"<Mechanism of {'; '.join(parts)}>"
 
@@ -126,12 +125,6 @@ class Mechanism(Structure):
         moving, carriers = merge_fixed_bodies(parents_first(lock_joints(bodies, self.locked)))
         return require_inertia(moving), carriers
 
-    @property
-    def _values(self) -> dict[str, float]:
-        """Values of the parameters: those that forces name, 0 where nothing else is said."""
-        named = [each for force in self.forces for each in force.components if isinstance(each, str)]
-        return dict.fromkeys(named, 0.0) | dict(self.parameters)
-
     @cached_property
     def _equations(self) -> TreeEquations:
         return TreeEquations(self, self.moving)
@@ -148,7 +141,7 @@ class Mechanism(Structure):
             self._equations.bias_forces,
             lambda q, qd, t: self._equations.partial_lagrangians(q, qd),
             self.coordinates,
-            self._values,
+            self.parameter_values,
             forces=self._generalized_forces if self.forces else None,
             damping=[body.joint.damping for body in self.moving],
         )

@@ -45,7 +45,7 @@ class OmittedTerm:
     --------
     >>> import dynamics as dyn
     >>> arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.5], damping=0.1)
-    >>> print(dyn.prune(arm, effects=["gravity"], regroup=False).left_out[0])
+    >>> print(dyn.prune(arm, effects=["gravity"], regroup=False).omitted[0])
     damping: switched off (5 nodes, 8 edges)
     """
 
@@ -92,7 +92,7 @@ class PruneResult:
         return self.steps[0].graph(self.equations)
 
     @cached_property
-    def left_out(self) -> tuple[OmittedTerm, ...]:
+    def omitted(self) -> tuple[OmittedTerm, ...]:
         """What was in the full graph, in the order in which it was taken out: the nodes add up to the difference."""
         before, result = self.full, []
         for step in self.steps[1:]:
@@ -121,17 +121,16 @@ class PruneResult:
     @cached_property
     def remains(self) -> tuple[OmittedTerm, ...]:
         """What is in the graph though no motion shows it; and the nodes that `regroup` would save."""
-        mechanism = as_mechanism(self.model)
-        if mechanism is None or mechanism.base_parameters:
+        fewer = _regrouped(self.steps[-1])
+        if fewer is None:
             return ()
-        last = self.steps[-1]
-        without = replace(last, model=replace(mechanism, base_parameters=True)).graph(self.equations)
+        without = fewer.graph(self.equations)
         nodes, edges = _saved(self.graph, without)
         return (OmittedTerm(NEVER, "not regrouped", nodes, edges),) if nodes > 0 else ()
 
     def __str__(self) -> str:
         lines = [f"{_size(self.full)} as given, {_size(self.graph)} left."]
-        for title, rows in (("Left out", self.left_out), ("Not there", self.absent), ("Remains", self.remains)):
+        for title, rows in (("Left out", self.omitted), ("Not there", self.absent), ("Remains", self.remains)):
             if rows:
                 lines += [f"{title}:", *(f"  {row}" for row in rows)]
         return "\n".join(lines)
@@ -166,8 +165,6 @@ def prune(
 ) -> PruneResult:
     """The equations of a model with what is asked for and nothing else.
 
-    Inputs that nothing depends on any more stay inputs, so that callers need not change.
-
     Parameters
     ----------
     model : Model
@@ -180,25 +177,23 @@ def prune(
     lock : mapping, optional
         {body: coordinate [rad or m]} of joints to lock, of a mechanism.
     values : mapping, optional
-        {input: number} of inputs that become constants: parameters, or the state; "q", "qd", "qdd", "tau" stand for
-        all of their kind, so that {"qd": 0, "qdd": 0} leaves the torques that hold a posture.
+        {input: number} of inputs that become constants; "q", "qd", "qdd", "tau" stand for all of their kind, so that
+        {"qd": 0, "qdd": 0} leaves the torques that hold a posture.
     outputs : sequence of str, optional
         Names of those to keep.
     regroup : bool
-        Inertial numbers that no motion shows are given to the bodies further in, where that saves nodes. The graph
-        computes the same, in fewer nodes; the tag of a body then no longer stands for its own inertia alone.
+        Give inertial numbers that no motion shows to the bodies further in, where that saves nodes. The graph computes
+        the same; the tag of a body then no longer stands for its own inertia alone.
 
     Returns
     -------
     PruneResult
-        The model that is left, its graph, and what was left out, why, and how many nodes that saved.
+        The model that is left, its graph with all inputs, and what was left out, why, and what that saved.
 
     Raises
     ------
     ValueError
-        For an effect that is unknown or cannot be told apart, and as `cg.specialize` does.
-    MechanismError
-        As `Mechanism.lock` does.
+        For an effect that is unknown or cannot be told apart, and as `cg.specialize` and `Mechanism.lock` do.
 
     Examples
     --------
@@ -212,6 +207,31 @@ def prune(
     kept = list(effects)
     if unknown := [each for each in kept if each not in EFFECTS]:
         raise ValueError(f"effects are {', '.join(EFFECTS)}, got {unknown[0]!r}")
+    steps = _steps(model, kept, lock or {}, values or {}, outputs)
+    graph = steps[-1].graph(equations)
+    fewer = _regrouped(steps[-1]) if regroup else None
+    if fewer is not None and len((candidate := fewer.graph(equations)).nodes) < len(graph.nodes):
+        steps.append(fewer)
+        graph = candidate
+    return PruneResult(steps[-1].model, graph, equations, tuple(steps))
+
+
+def _regrouped(step: _Step) -> _Step | None:
+    """The step with base parameters; None of a model that has them or is no mechanism."""
+    mechanism = as_mechanism(step.model)
+    if mechanism is None or mechanism.base_parameters:
+        return None
+    return replace(step, model=replace(mechanism, base_parameters=True), what=NEVER, why="regrouped")
+
+
+def _steps(
+    model: Model,
+    kept: Collection[str],
+    lock: Mapping[str, float],
+    values: Mapping[str, float],
+    outputs: Sequence[str] | None,
+) -> list[_Step]:
+    """From the model as given, one thing after another taken out."""
     steps = [_Step(model, {}, None)]
 
     def take(what: str, why: str, **changes: Any) -> None:
@@ -220,24 +240,16 @@ def prune(
     for effect in EFFECTS:
         if effect not in kept and _has(steps[-1].model, effect):
             take(effect, "switched off", model=_without(steps[-1].model, effect))
-    for body, at in (lock or {}).items():
+    for body, at in lock.items():
         mechanism = as_mechanism(steps[-1].model)
         if mechanism is None:
             raise ValueError(f"a joint can be locked of a Mechanism, got {type(model).__name__}")
         take(f"joint of {body}", f"locked at {at:g}", model=mechanism.lock(body, at))
-    for name, value in (values or {}).items():
+    for name, value in values.items():
         take(f"input {name}", f"is {value:g}", values={**steps[-1].values, name: value})
     if outputs is not None:
         take("other outputs", f"only {', '.join(outputs)} asked for", outputs=tuple(outputs))
-    last = as_mechanism(steps[-1].model)
-    graph = steps[-1].graph(equations)
-    if regroup and last is not None and not last.base_parameters:
-        fewer = replace(steps[-1], model=replace(last, base_parameters=True), what=NEVER, why="regrouped")
-        candidate = fewer.graph(equations)
-        if len(candidate.nodes) < len(graph.nodes):
-            steps.append(fewer)
-            graph = candidate
-    return PruneResult(steps[-1].model, graph, equations, tuple(steps))
+    return steps
 
 
 def _bound(graph: Graph, values: Mapping[str, float]) -> dict[str, float]:

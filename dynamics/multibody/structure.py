@@ -24,3 +24,9 @@ class Structure:
     base_parameters: bool = False
     omitted: tuple[str, ...] = ()
     shared: SharedParts = field(default_factory=SharedParts, repr=False, kw_only=True)
+
+    @property
+    def parameter_values(self) -> dict[str, float]:
+        """Values of the parameters: those that forces name, 0 where nothing else is said."""
+        names = [each for force in self.forces for each in force.components if isinstance(each, str)]
+        return dict.fromkeys(names, 0.0) | dict(self.parameters)

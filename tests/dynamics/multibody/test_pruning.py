@@ -240,12 +240,12 @@ def test_the_account_adds_up() -> None:
     bodies = [replace(body, joint=replace(body.joint, armature=0.1, stiffness=2.0)) for body in arm(4).bodies]
     model = dyn.Mechanism(bodies, forces=[push], parameters={"push": 2.0})
     pruned = dyn.prune(model, effects=[], lock={"link 4": 0.2}, values={"qd": 0.0}, outputs=["tau1"])
-    assert [each.what for each in pruned.left_out] == [
+    assert [each.what for each in pruned.omitted] == [
         "gravity", "damping", "springs", "armature", "forces", "joint of link 4", "input qd", "other outputs",
         "unobservable inertial numbers"]  # fmt: skip
-    assert all(each.nodes > 0 and each.edges > 0 for each in pruned.left_out)
-    assert sum(each.nodes for each in pruned.left_out) == nodes(pruned.full) - nodes(pruned.graph)
-    assert sum(each.edges for each in pruned.left_out) == len(pruned.full.edges) - len(pruned.graph.edges)
+    assert all(each.nodes > 0 and each.edges > 0 for each in pruned.omitted)
+    assert sum(each.nodes for each in pruned.omitted) == nodes(pruned.full) - nodes(pruned.graph)
+    assert sum(each.edges for each in pruned.omitted) == len(pruned.full.edges) - len(pruned.graph.edges)
     assert list(pruned.graph.outputs) == ["tau1"]
     assert nodes(pruned.full) == nodes(dyn.inverse_dynamics(model))
     assert pruned.absent == ()  # what was switched off has its row above
@@ -288,7 +288,7 @@ def test_damping_and_forces_of_any_lagrangian_can_be_left_out() -> None:
                         forces=lambda q, qd, t: [cg.sin(t)], damping=0.3)  # fmt: skip
     whole = ["gravity", "springs", "armature"]
     pruned = dyn.prune(system, dyn.forward_dynamics, effects=whole)
-    assert [each.what for each in pruned.left_out] == ["damping", "forces"]
+    assert [each.what for each in pruned.omitted] == ["damping", "forces"]
     assert pruned.graph.evaluate({"q0": 0.5, "qd0": 1.0, "tau0": 3.0}) == {"qdd0": approx(1.0)}
     kept = dyn.prune(system, dyn.forward_dynamics, effects=[*whole, "forces"]).graph
     assert kept.evaluate({"q0": 0.5, "qd0": 1.0, "tau0": 3.0, "t": 0.7}) == {"qdd0": approx(1.0 + np.sin(0.7))}
@@ -316,7 +316,7 @@ def test_what_was_switched_off_is_not_said_to_be_missing(effect: str) -> None:
     first = replace(first, joint=replace(first.joint, damping=0.1, stiffness=2.0, armature=0.3))
     model = dyn.Mechanism([first, *others])
     pruned = dyn.prune(model, effects=[each for each in dyn.EFFECTS if each != effect])
-    assert (pruned.left_out[0].what, pruned.left_out[0].why) == (effect, "switched off")
+    assert (pruned.omitted[0].what, pruned.omitted[0].why) == (effect, "switched off")
     rows = {each.what: each.nodes for each in pruned.absent}
     assert list(rows) == [f"{each} of link 2, link 3" for each in ("damping", "springs", "armature")]
     if effect == "springs":  # counted at those two joints alone: one more number, and k (q - 0) in two torques
