@@ -23,12 +23,13 @@ from .io.load import load_mjcf, load_urdf
 from .io.mjcf import to_mjcf
 from .io.urdf import to_urdf
 from .multibody.impact import Attached, FreeBody, Released, attach_with_impact, release
-from .multibody.mechanism import Body, Force, Joint, Mechanism, MechanismError, serial_arm, tree
-from .multibody.planar_arm import Link, PlanarArm, planar_arm
+from .multibody.mechanism import Body, Force, Joint, Mechanism, MechanismError
+from .multibody.planar_arm import planar_arm
 from .multibody.pruning import EFFECTS, OmittedTerm, PruneResult, prune
 from .multibody.recursive_inverse_dynamics import RecursiveInverseDynamics
 from .multibody.regressor import inertial_parameters, regressor
 from .multibody.subtree import Subtree
+from .multibody.tree import serial_arm, tree
 from .reference import Reference, reference
 from .scenes.scenes import Scene
 from .simulation.ensembles import Ensemble, EnsembleStats, simulate_many
@@ -55,12 +56,10 @@ __all__ = [
     "Force",
     "FreeBody",
     "Joint",
-    "Link",
     "Mechanism",
     "MechanismError",
     "OdeSystem",
     "OmittedTerm",
-    "PlanarArm",
     "PruneResult",
     "RecursiveInverseDynamics",
     "Reference",

@@ -47,7 +47,7 @@ def _account(pruned: PruneResult) -> dict[str, Any]:
     return {
         "full": _size(pruned.full),
         "pruned": _size(pruned.graph),
-        "left_out": [_row(each) for each in pruned.left_out],
+        "left_out": [_row(each) for each in pruned.omitted],
         "absent": [_row(each) for each in pruned.absent],
         "remains": [_row(each) for each in pruned.remains],
         "by_tag": {tag: [full.get(tag, 0), left.get(tag, 0)] for tag in sorted({*full, *left})},

@@ -1,11 +1,7 @@
-"""MuJoCo twins: the same arm as an MJCF model, and what MuJoCo computes for it."""
+"""MuJoCo twins: the same mechanism as an MJCF model, and what MuJoCo computes for it."""
 
 from __future__ import annotations
 
-import io
-import os
-import subprocess
-import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -13,11 +9,11 @@ import numpy as np
 
 from cgraph.extend import install
 
-from ..multibody.mechanism import Mechanism
-from ..multibody.planar_arm import PlanarArm
-from .mjcf import CAMERA, to_mjcf
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
+from ..multibody.mechanism import require_mechanism
+from ..multibody.planar_arm import planar_links
+from ..multibody.spatial import Array
+from ..systems.model import Model
+from .mjcf import to_mjcf
 
 
 def mujoco() -> Any:
@@ -29,7 +25,7 @@ def mujoco() -> Any:
     return module
 
 
-def rollout(model: Any, starts: Array, states: Array) -> Callable[[], None]:
+def rollout(mj_model: Any, starts: Array, states: Array) -> Callable[[], None]:
     """A run of MuJoCo's own native loop of steps, one thread, from every start.
 
     starts: (N, 1 + 2n), the time, positions and velocities in MuJoCo's order.  states: (N, steps, 1 + 2n), which each
@@ -38,7 +34,7 @@ def rollout(model: Any, starts: Array, states: Array) -> Callable[[], None]:
     module = mujoco()
     from mujoco.rollout import rollout as native
 
-    models, data = [model] * len(starts), [module.MjData(model)]  # one datum: one thread
+    models, data = [mj_model] * len(starts), [module.MjData(mj_model)]  # one datum: one thread
     steps, sensors = states.shape[1], np.empty((*states.shape[:2], 0))
 
     def run() -> None:
@@ -48,15 +44,15 @@ def rollout(model: Any, starts: Array, states: Array) -> Callable[[], None]:
 
 
 class MujocoTwin:
-    """MuJoCo's model of a planar arm or a mechanism, asked for the quantities that the graphs give.
+    """MuJoCo's model of a mechanism, asked for the quantities that the graphs give.
 
     Damping is in the accelerations and not in `bias`, as in `dynamics`. Raises ImportError without MuJoCo.
     """
 
-    def __init__(self, of: PlanarArm | Mechanism, timestep: float = 1e-3) -> None:
+    def __init__(self, of: Model, timestep: float = 1e-3) -> None:
         self.mujoco = mujoco()
-        self.of = of
-        self.model = self.mujoco.MjModel.from_xml_string(to_mjcf(of, timestep))
+        self.mechanism = require_mechanism(of, "MuJoCo")
+        self.model = self.mujoco.MjModel.from_xml_string(to_mjcf(self.mechanism, timestep))
         self.data = self.mujoco.MjData(self.model)
 
     def _set(self, q: Array, qd: Array) -> None:
@@ -106,56 +102,11 @@ class MujocoTwin:
 
     def arm_positions(self, q: Array) -> Array:
         """Places of base, joints and tip [m] of a planar arm, (T, n + 1, 2), by MuJoCo's kinematics at q, (T, n)."""
-        assert isinstance(self.of, PlanarArm)
-        places = np.empty((len(q), len(self.of.links) + 1, 2))
+        links = planar_links(self.mechanism)
+        places = np.empty((len(q), len(links) + 1, 2))
         for place, pose in zip(places, q, strict=True):
             self.data.qpos[:] = pose
             self.mujoco.mj_kinematics(self.model, self.data)
-            tip = self.data.xpos[-1] - self.of.links[-1].length * self.data.xmat[-1].reshape(3, 3)[:, 2]
+            tip = self.data.xpos[-1] - links[-1].length * self.data.xmat[-1].reshape(3, 3)[:, 2]
             place[:] = np.vstack([self.data.xpos[1:], tip])[:, [0, 2]]
         return places
-
-
-def frames(arm: PlanarArm, poses: Array, timeout: float = 60.0) -> list[np.ndarray] | None:
-    """Pictures by MuJoCo's own renderer at joint angles poses, (k, n); None on a machine without OpenGL.
-
-    Each picture is (height, width, 3), uint8. The renderer runs in a process of its own: where OpenGL is missing, the
-    attempt fails at import and can end the process.
-    """
-    for backend in ("egl", "osmesa"):
-        try:
-            done = subprocess.run(
-                [sys.executable, "-c", f"from {__name__} import _write_frames; _write_frames()"],
-                input=_packed(xml=np.array(to_mjcf(arm)), poses=np.asarray(poses, dtype=np.float64)),
-                capture_output=True,
-                check=False,
-                timeout=timeout,
-                env=os.environ | {"MUJOCO_GL": backend, "PYTHONPATH": os.pathsep.join(sys.path)},
-            )
-        except subprocess.TimeoutExpired:
-            continue
-        if done.returncode == 0 and done.stdout:
-            return list(np.load(io.BytesIO(done.stdout))["frames"])
-    return None
-
-
-def _write_frames() -> None:
-    """The child's half of `frames`: a model and poses from standard input, pictures to standard output."""
-    module = mujoco()
-    given = np.load(io.BytesIO(sys.stdin.buffer.read()))
-    model = module.MjModel.from_xml_string(str(given["xml"]))
-    data = module.MjData(model)
-    pictures = []
-    with module.Renderer(model, 320, 480) as renderer:
-        for pose in given["poses"]:
-            data.qpos[:] = pose
-            module.mj_forward(model, data)
-            renderer.update_scene(data, CAMERA)
-            pictures.append(renderer.render().copy())
-    sys.stdout.buffer.write(_packed(frames=np.array(pictures)))
-
-
-def _packed(**arrays: Any) -> bytes:
-    buffer = io.BytesIO()
-    np.savez(buffer, **arrays)
-    return buffer.getvalue()

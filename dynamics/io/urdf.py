@@ -8,19 +8,42 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..multibody.mechanism import Body, Mechanism, MechanismError
+from ..multibody.mechanism import Body, MechanismError, require_mechanism
 from ..multibody.spatial import Array
+from ..systems.model import Model
 from .mjcf import numbers
 
 _FAR = 1e9  # m, N, m/s: URDF asks each slide for its limits
 
 
-def to_urdf(mechanism: Mechanism) -> str:
-    """The moving bodies as URDF text, those welded to them merged in; the root link is "world".
+def to_urdf(model: Model) -> str:
+    """The moving bodies of a model as URDF text, those welded to them merged in; the root link is "world".
 
-    URDF has no gravity: who reads it chooses. Raises MechanismError for what it has not either: a spring, an
-    armature, a force.
+    URDF has no gravity: who reads it chooses.
+
+    Parameters
+    ----------
+    model : Model
+        A mechanism, or a scene of one.
+
+    Returns
+    -------
+    str
+        The text. Joints have the names of the coordinates.
+
+    Raises
+    ------
+    MechanismError
+        For a model without bodies, and for what URDF has not: a spring, an armature, a force.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> text = dyn.to_urdf(dyn.planar_arm([1.0, 0.8], [1.0, 0.5]))
+    >>> text.count('type="continuous"')
+    2
     """
+    mechanism = require_mechanism(model, "URDF")
     if mechanism.forces:
         raise MechanismError(f"URDF has no forces, there is one on body {mechanism.forces[0].body!r}")
     lines = ['<?xml version="1.0"?>', '<robot name="mechanism">', '  <link name="world"/>']
@@ -47,10 +70,9 @@ def _joint_lines(body: Body) -> list[str]:
     for what in ("stiffness", "armature"):
         if getattr(joint, what):
             raise MechanismError(f"URDF has no {what}, body {body.name!r} has {getattr(joint, what)!r}")
-    kind = "continuous" if joint.kind == "revolute" else "prismatic"
-    limits = f'lower="{-_FAR!r}" upper="{_FAR!r}" ' if joint.kind == "prismatic" else ""
+    limits = f'lower="{-_FAR!r}" upper="{_FAR!r}" ' if joint.type.limited else ""
     return [
-        f'  <joint name={quoteattr(body.name)} type="{kind}">',
+        f'  <joint name={quoteattr(body.coordinate)} type="{joint.type.urdf}">',
         f"    <parent link={quoteattr(body.parent)}/><child link={quoteattr(body.name)}/>",
         f'    <origin xyz="{numbers(joint.position)}" rpy="{numbers(_rpy(joint.orientation))}"/>',
         f'    <axis xyz="{numbers(joint.axis)}"/><dynamics damping="{joint.damping!r}"/>',

@@ -16,14 +16,17 @@ from dataclasses import replace
 import numpy as np
 
 from . import spatial
+from .joints import JointType
 from .link import Link
 from .spatial import SNAP, Array, Triple
 
 
-def regrouped(links: Sequence[Link], kinds: Sequence[str], parents: Sequence[int]) -> tuple[list[Link], Array]:
+def base_parameter_links(
+    links: Sequence[Link], joints: Sequence[JointType], parents: Sequence[int]
+) -> tuple[list[Link], Array]:
     """The links, parents first, with all that moves with the parent given to it; and the world's first moment [kg m].
 
-    kinds: of their joints.  parents: index of each one's parent, -1 for the world.
+    joints: their types.  parents: index of each one's parent, -1 for the world.
     The sum of the links' energies is the same but for the potential energy of what the world is given, a constant;
     each one's own is another. The links may be such as no body can be: without mass, with a negative inertia.
     """
@@ -31,10 +34,7 @@ def regrouped(links: Sequence[Link], kinds: Sequence[str], parents: Sequence[int
     world = np.zeros(3)
     for i in reversed(range(len(links))):
         mass, moment, inertia = _numbers(result[i])
-        if kinds[i] == "prismatic":
-            given = (0.0, np.zeros(3), inertia)
-        else:
-            given = (mass, moment * (0.0, 0.0, 1.0), inertia[1, 1] * np.diag([1.0, 1.0, 0.0]))
+        given = joints[i].unobservable(mass, moment, inertia)
         result[i] = _with(result[i], mass - given[0], moment - given[1], inertia - given[2])
         seen = _seen_by_parent(links[i], *given)
         if parents[i] >= 0:
@@ -52,7 +52,7 @@ def _seen_by_parent(link: Link, mass: float, moment: Array, inertia: Array) -> t
     moment, inertia = turn @ moment, turn @ inertia @ turn.T
     crossed = np.outer(place, moment)
     inertia = inertia + 2.0 * (place @ moment) * np.eye(3) - crossed - crossed.T
-    return mass, moment + mass * place, spatial.about(inertia, mass, place)
+    return mass, moment + mass * place, spatial.parallel_axis(inertia, mass, place)
 
 
 def _numbers(link: Link) -> tuple[float, Array, Array]:

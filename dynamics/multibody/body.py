@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import spatial
+from .joints import TYPES, JointType
 from .spatial import Array
 
-KINDS = ("revolute", "prismatic", "fixed")
 WORLD = "world"
 _ROUNDING = 1e-9  # of the largest entry: what is left of an inertia or a rotation that came through text
 
@@ -24,13 +24,33 @@ class MechanismError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """How a body hangs on its parent.
+    """How a body hangs on its parent; the joint is at the origin of the body's frame.
 
-    kind: "revolute" (turns about `axis`), "prismatic" (slides along it) or "fixed" (welded).
-    axis: (3,) in the body's axes; need not have length 1.
-    position: (3,) [m], orientation: (3, 3): the body's frame in its parent's at q = 0; the joint is at its origin.
-    damping [N m s or N s/m], stiffness [N m/rad or N/m] towards `spring_reference` [rad or m], armature
-        [kg m^2 or kg]: >= 0.
+    Parameters
+    ----------
+    kind : str
+        "revolute" (turns about `axis`), "prismatic" (slides along it) or "fixed" (welded).
+    axis : array_like, (3,)
+        In the body's axes; need not have length 1.
+    position : array_like, (3,)
+        Origin of the body's frame in its parent's at q = 0 [m].
+    orientation : array_like, (3, 3)
+        Axes of the body's frame, as columns in its parent's, at q = 0.
+    damping : float
+        Viscous coefficient, at least 0 [N m s or N s/m].
+    stiffness, spring_reference : float
+        Spring constant, at least 0 [N m/rad or N/m], and the coordinate where it pulls nowhere [rad or m].
+    armature : float
+        Inertia of the coordinate itself, such as a rotor's, at least 0 [kg m^2 or kg].
+    name : str
+        What the coordinate is called; by default as the body.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> hinge = dyn.Joint("revolute", axis=(0.0, -1.0, 0.0), damping=0.1)
+    >>> dyn.Mechanism([dyn.Body("rod", hinge, mass=1.0, center=(0.0, 0.0, -0.5))]).coordinates
+    ('rod',)
     """
 
     kind: str
@@ -41,14 +61,39 @@ class Joint:
     stiffness: float = 0.0
     spring_reference: float = 0.0
     armature: float = 0.0
+    name: str = ""
+
+    @property
+    def type(self) -> JointType:
+        """What the library knows of joints of this kind."""
+        return TYPES[self.kind]
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
     """A rigid body and the joint that carries it.
 
-    parent: another body's name, or "world".  mass [kg].  center: (3,) [m], centre of mass in the body's frame.
-    inertia: (3, 3) or (3,) diagonal [kg m^2], about the centre of mass, in the body's axes.
+    Parameters
+    ----------
+    name : str
+        Unlike any other body's; not "world".
+    joint : Joint
+        How it hangs on its parent.
+    parent : str
+        Another body's name, or "world".
+    mass : float
+        At least 0 [kg].
+    center : array_like, (3,)
+        Center of mass in the body's frame [m].
+    inertia : array_like, (3, 3) or (3,)
+        About the center of mass, in the body's axes, whole or its diagonal [kg m^2].
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> rotor = dyn.Body("rotor", dyn.Joint("revolute"), inertia=(0.1, 0.1, 0.2))
+    >>> dyn.mass_matrix(dyn.Mechanism([rotor])).evaluate({"q0": 0.0, "qd0": 0.0})
+    {'M_0_0': 0.2}
     """
 
     name: str
@@ -57,6 +102,11 @@ class Body:
     mass: float = 0.0
     center: ArrayLike = (0.0, 0.0, 0.0)
     inertia: ArrayLike = (0.0, 0.0, 0.0)
+
+    @property
+    def coordinate(self) -> str:
+        """What the coordinate of its joint is called."""
+        return self.joint.name or self.name
 
 
 def vector(what: str, value: Any, shape: tuple[int, ...] = (3,)) -> Array:
@@ -108,8 +158,10 @@ def checked(body: Body) -> Body:
 def _checked_joint(where: str, joint: Joint) -> Joint:
     if not isinstance(joint, Joint):
         raise MechanismError(f"{where}: joint must be of the type Joint, got {type(joint).__name__}: {joint!r:.60}")
-    if joint.kind not in KINDS:
-        raise MechanismError(f"{where}: joint must be one of {', '.join(KINDS)}, got {joint.kind!r}")
+    if not isinstance(joint.kind, str) or joint.kind not in TYPES:
+        raise MechanismError(f"{where}: joint must be one of {', '.join(TYPES)}, got {joint.kind!r}")
+    if not isinstance(joint.name, str):
+        raise MechanismError(f"{where}: the name of a joint must be a string, got {joint.name!r:.80}")
     axis = vector(f"{where}: axis", joint.axis)
     length = float(np.linalg.norm(axis))
     if not length:
@@ -126,6 +178,7 @@ def _checked_joint(where: str, joint: Joint) -> Joint:
         stiffness=_number(f"{where}: stiffness", joint.stiffness),
         spring_reference=_number(f"{where}: spring_reference", joint.spring_reference, minimum=-math.inf),
         armature=_number(f"{where}: armature", joint.armature),
+        name=joint.name,
     )
 
 

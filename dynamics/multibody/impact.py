@@ -17,7 +17,25 @@ _COMPONENTS = ("x y z", "vx vy vz", "wx wy wz")
 
 
 class FreeBody(NamedTuple):
-    """A rigid body that moves on its own, in the world's axes."""
+    """A rigid body that moves on its own, in the world's axes.
+
+    Parameters
+    ----------
+    position, velocity : ndarray, (3,)
+        Of its center of mass [m], [m/s].
+    omega : ndarray, (3,)
+        Angular velocity [rad/s].
+    orientation : ndarray, (3, 3)
+        Its axes as columns.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.5])
+    >>> body = dyn.release(arm.detach("tip"), [0.0, 0.0], [1.0, 0.0], "link 2").body
+    >>> body.velocity.round(12).tolist()
+    [1.25, 0.0, 0.0]
+    """
 
     position: Array  # (3,) [m] of its centre of mass
     velocity: Array  # (3,) [m/s] of its centre of mass
@@ -26,7 +44,26 @@ class FreeBody(NamedTuple):
 
 
 class Attached(NamedTuple):
-    """mechanism: with the body.  q, qd: its state after the impact.  energy: what the impact took [J]."""
+    """A mechanism that has caught a body.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        With the body.
+    q, qd : ndarray, (n,)
+        Its state after the impact [rad or m], [rad/s or m/s].
+    energy : float
+        What the impact took [J].
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> rotor = dyn.Mechanism([dyn.Body("rotor", dyn.Joint("revolute"), inertia=(1.0, 1.0, 1.0))])
+    >>> ring = dyn.Body("ring", dyn.Joint("fixed"), "rotor", mass=1.0, inertia=(1.0, 1.0, 1.0))
+    >>> caught = dyn.attach_with_impact(rotor, [0.0], [2.0], ring)
+    >>> caught.qd.tolist(), caught.energy
+    ([1.0], 1.0)
+    """
 
     mechanism: Mechanism
     q: Array
@@ -35,7 +72,24 @@ class Attached(NamedTuple):
 
 
 class Released(NamedTuple):
-    """mechanism: without the body.  q, qd: its state.  body: how the body leaves."""
+    """A mechanism that has let a body go.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Without the body.
+    q, qd : ndarray, (n,)
+        Its state [rad or m], [rad/s or m/s].
+    body : FreeBody
+        How the body leaves.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.5]).detach("tip")
+    >>> dyn.release(arm, [0.1, 0.2], [0.0, 0.0], "link 2").q.tolist()
+    [0.1]
+    """
 
     mechanism: Mechanism
     q: Array
@@ -55,25 +109,51 @@ def attach_with_impact(
 ) -> Attached:
     """A free body is caught, and hangs from then on as its joint says.
 
-    The impact is inelastic and takes no time: positions stay, no force but its own matters, and velocities jump so
-    that M qd+ = M_old qd- + J^T m v + J_w^T I w, in the coordinates of the mechanism with the body.
-    q, qd: (n,), just before.  body: with its joint, "fixed" for a firm grip.  to: what it hangs on, by default its
-        parent. Where it is has to be where it hangs: see `Mechanism.motion`. A joint that is new stands at 0.
-    velocity: (3,) [m/s] of its centre of mass, omega: (3,) [rad/s], both in the world's axes.
+    The impact is inelastic and instantaneous: positions stay, and velocities jump so that
+    M qd+ = M_old qd- + J^T m v + J_w^T I w, in the coordinates of the mechanism with the body.
 
-    Raises as `Mechanism.attach` and `Mechanism.map_state_from`.
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Without the body.
+    q, qd : array_like, (n,)
+        Its state just before [rad or m], [rad/s or m/s].
+    body : Body
+        With its joint, "fixed" for a firm grip; it has to be where it hangs (`Mechanism.motion`). A new joint is at 0.
+    to : str, optional
+        What it hangs on, by default its parent.
+    velocity, omega : array_like, (3,)
+        Velocity of its center of mass [m/s] and angular velocity [rad/s] before, in the world's axes.
+
+    Returns
+    -------
+    Attached
+        The mechanism with the body, its state just after, and the energy that the impact took.
+
+    Raises
+    ------
+    MechanismError, ValueError
+        As `Mechanism.attach` and `Mechanism.map_state_from` do.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> cart = dyn.Mechanism([dyn.Body("cart", dyn.Joint("prismatic", (1.0, 0.0, 0.0)), mass=1.0)])
+    >>> ball = dyn.Body("ball", dyn.Joint("fixed"), "cart", mass=3.0)
+    >>> dyn.attach_with_impact(cart, [0.0], [0.0], ball, velocity=(2.0, 0.0, 0.0)).qd.tolist()
+    [1.5]
     """
     whole = mechanism.attach(body, to)
     v, w = vector("velocity", velocity), vector("omega", omega)
     q_new, qd_old = whole.map_state_from(mechanism, q, qd)
-    coordinates = {each.name: i for i, each in enumerate(whole.moving)}
-    p = np.zeros(len(coordinates))
+    index = {each.name: i for i, each in enumerate(whole.moving)}
+    p = np.zeros(len(index))
     before = _momentum(mechanism, np.asarray(q, dtype=np.float64), np.asarray(qd, dtype=np.float64))
-    p[[coordinates[each.name] for each in mechanism.moving]] = before
+    p[[index[each.name] for each in mechanism.moving]] = before
     given = checked(body)
-    free, along, about = _motion(whole, given, q_new, qd_old)
+    free, linear, angular = _motion(whole, given, q_new, qd_old)
     inertia = free.orientation @ np.asarray(given.inertia) @ free.orientation.T
-    p += given.mass * along.T @ v + about.T @ inertia @ w
+    p += given.mass * linear.T @ v + angular.T @ inertia @ w
     qd_new = _velocities(whole, q_new, p)
     energy = float(np.asarray(qd, dtype=np.float64) @ before + given.mass * v @ v + w @ inertia @ w - qd_new @ p) / 2.0
     return Attached(whole, q_new, qd_new, energy)
@@ -82,8 +162,34 @@ def attach_with_impact(
 def release(mechanism: Mechanism, q: ArrayLike, qd: ArrayLike, body: str) -> Released:
     """A body is let go: all velocities stay, and it leaves as the one that held it moved there.
 
-    q, qd: (n,). Raises MechanismError for an unknown body and one that carries others, and as
-    `Mechanism.map_state_from`.
+    Parameters
+    ----------
+    mechanism : Mechanism
+        With the body.
+    q, qd : array_like, (n,)
+        Its state [rad or m], [rad/s or m/s].
+    body : str
+        Name of a body that carries no other.
+
+    Returns
+    -------
+    Released
+        The mechanism without the body, its state, and how the body leaves.
+
+    Raises
+    ------
+    MechanismError
+        For an unknown body and one that carries others.
+    ValueError
+        For states of another shape.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> rotor = dyn.Body("rotor", dyn.Joint("revolute"), inertia=(1.0, 1.0, 1.0))
+    >>> ball = dyn.Body("ball", dyn.Joint("fixed", position=(0.5, 0.0, 0.0)), "rotor", mass=1.0)
+    >>> dyn.release(dyn.Mechanism([rotor, ball]), [0.0], [2.0], "ball").body.velocity[1].tolist()
+    1.0
     """
     bodies = mechanism.subtree(body).bodies
     if len(bodies) > 1:

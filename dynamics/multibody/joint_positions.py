@@ -2,17 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..systems.model import Model
-from .mechanism import Mechanism
-from .planar_arm import PlanarArm
+from cgraph import Graph
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
+from .body import Body
+from .spatial import Array
+
 _FLAT = 1e-9  # of the largest extent: a direction in which nothing moves or lies
+
+
+class Bodies(Protocol):
+    """What a mechanism has that is needed here."""
+
+    @property
+    def bodies(self) -> Sequence[Body]:
+        """All bodies."""
+
+    @property
+    def moving(self) -> Sequence[Body]:
+        """Those that move, parents first."""
+
+    def position(self, body: str, at: ArrayLike = ...) -> Graph:
+        """Where a point of a body is: outputs x, y, z."""
 
 
 class Skeleton(NamedTuple):
@@ -22,39 +38,54 @@ class Skeleton(NamedTuple):
     parents: tuple[int, ...]
 
 
-def skeleton(model: Model, q: ArrayLike) -> Skeleton | None:
-    """Places of joints and tips for q, (T, n); None for a model that has none, such as a bare System.
+def skeleton(mechanism: Bodies, q: ArrayLike) -> Skeleton:
+    """Places of joints and tips for q, (T, n).
 
+    A tip is a body without mass that is welded to the last moving one, or else the center of mass of that one.
     A mechanism that moves in a plane of two axes is seen at a right angle to it, any other from above and one side.
     """
     q = np.atleast_2d(np.asarray(q, dtype=np.float64))
-    if isinstance(model, PlanarArm):
-        joints = model.joint_positions(q)
-        return Skeleton(joints, tuple(range(-1, joints.shape[1] - 1)))
-    if not isinstance(model, Mechanism):
-        return None
     values = {f"q{i}": q[:, i] for i in range(q.shape[1])}
-    bodies = {body.name: body for body in model.bodies}
-    places: dict[str, int] = {}
     points: list[Array] = []
-    parents: list[int] = []
-
-    def add(body: str, parent: int, at: ArrayLike = (0.0, 0.0, 0.0)) -> None:
-        graph = model.position(body, at)
-        found = graph.evaluate({name: values[name] for name in graph.input_names})
-        points.append(np.stack([np.broadcast_to(found[axis], len(q)) for axis in "xyz"], axis=-1))
-        parents.append(parent)
-
-    for body in model.moving:
-        above = body.parent
-        while above in bodies and above not in places:  # welded ones have no joint
-            above = bodies[above].parent
-        add(body.name, places.get(above, -1))
-        places[body.name] = len(points) - 1
-    for body in model.moving:
-        if places[body.name] not in parents:
-            add(body.name, places[body.name], body.center)
+    places: list[tuple[str, ArrayLike]] = [(body.name, (0.0, 0.0, 0.0)) for body in mechanism.moving]
+    for body, at in [*places, *_tips(mechanism)]:
+        graph = mechanism.position(body, at)
+        place = graph.evaluate({name: values[name] for name in graph.input_names})
+        points.append(np.stack([np.broadcast_to(place[axis], len(q)) for axis in "xyz"], axis=-1))
+    index = {body.name: i for i, body in enumerate(mechanism.moving)}
+    above = _above(mechanism)
+    parents = [index.get(above[body.name], -1) for body in mechanism.moving]
+    parents += [index.get(body, index.get(above[body], -1)) for body, _ in _tips(mechanism)]
     return Skeleton(_seen(np.stack(points, axis=1)), tuple(parents))
+
+
+def _above(mechanism: Bodies) -> dict[str, str]:
+    """For each body the nearest one inwards that moves; the world's name where there is none."""
+    parents = {body.name: body.parent for body in mechanism.bodies}
+    moving = {body.name for body in mechanism.moving}
+    result = {}
+    for name, parent in parents.items():
+        while parent in parents and parent not in moving:
+            parent = parents[parent]
+        result[name] = parent
+    return result
+
+
+def _tips(mechanism: Bodies) -> Iterator[tuple[str, ArrayLike]]:
+    """Body and place in it of each tip, in the order of the moving bodies that have them."""
+    above, carrying = _above(mechanism), {body.parent for body in mechanism.bodies}
+    moving = {body.name for body in mechanism.moving}
+    holding = {above[name] for name in moving}
+    marks: dict[str, list[str]] = {}
+    for body in mechanism.bodies:
+        if body.name not in moving | carrying and not body.mass and not np.any(np.asarray(body.inertia)):
+            marks.setdefault(above[body.name], []).append(body.name)
+    for body in mechanism.moving:
+        if body.name not in holding:
+            if body.name not in marks:
+                yield body.name, body.center
+            for name in marks.get(body.name, []):
+                yield name, (0.0, 0.0, 0.0)
 
 
 def _seen(points: Array) -> Array:

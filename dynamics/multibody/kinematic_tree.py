@@ -50,7 +50,7 @@ def parents_first(bodies: Sequence[Body]) -> list[Body]:
     return order
 
 
-def locked(bodies: Sequence[Body], at: Mapping[str, float]) -> list[Body]:
+def lock_joints(bodies: Sequence[Body], at: Mapping[str, float]) -> list[Body]:
     """The bodies, with the joints named in `at` welded where they stand at that coordinate [rad or m].
 
     Raises MechanismError for a body that is not there or has no joint to lock, and a coordinate that is not finite.
@@ -59,7 +59,7 @@ def locked(bodies: Sequence[Body], at: Mapping[str, float]) -> list[Body]:
     for name, value in at.items():
         if name not in by_name:
             raise MechanismError(f"there is no body {name!r:.80} to lock in the mechanism")
-        if by_name[name].joint.kind == "fixed":
+        if not by_name[name].joint.type.moves:
             raise MechanismError(f"body {name!r} is welded on and has no joint to lock")
         if not isinstance(value, numbers.Real) or not math.isfinite(value):
             raise MechanismError(f"joint of body {name!r}: it can be locked at a finite number, got {value!r:.80}")
@@ -70,25 +70,24 @@ def locked(bodies: Sequence[Body], at: Mapping[str, float]) -> list[Body]:
 
 def _standing(joint: Joint, at: float) -> Joint:
     """The weld that holds a joint's body where the joint has it at that coordinate."""
-    turn, axis, position = (np.asarray(each) for each in (joint.orientation, joint.axis, joint.position))
-    if joint.kind == "revolute":
-        return Joint("fixed", position=position, orientation=turn @ spatial.rotation(axis, at))
-    return Joint("fixed", position=position + turn @ axis * at, orientation=turn)
+    orientation, axis, position = (np.asarray(each) for each in (joint.orientation, joint.axis, joint.position))
+    turn, shift = joint.type.placement(axis, at)
+    return Joint("fixed", position=position + orientation @ shift, orientation=orientation @ turn)
 
 
-def welded(bodies: Sequence[Body]) -> tuple[list[Body], dict[str, Carrier]]:
+def merge_fixed_bodies(bodies: Sequence[Body]) -> tuple[list[Body], dict[str, Carrier]]:
     """The bodies that move and what carries each body of all: a welded body's mass and children are its carrier's."""
     carriers = {WORLD: Carrier(WORLD, *_OWN)}
     merged: dict[str, Body] = {}
     for body in bodies:
         parent = carriers[body.parent]
-        if parent.name == body.parent and body.joint.kind != "fixed":
+        if parent.name == body.parent and body.joint.type.moves:
             merged[body.name] = body
             carriers[body.name] = Carrier(body.name, *_OWN)
             continue
         position = parent.position + parent.orientation @ np.asarray(body.joint.position)
         orientation = spatial.snapped(parent.orientation @ np.asarray(body.joint.orientation))
-        if body.joint.kind != "fixed":
+        if body.joint.type.moves:
             joint = replace(body.joint, position=position, orientation=orientation)
             merged[body.name] = replace(body, parent=parent.name, joint=joint)
             carriers[body.name] = Carrier(body.name, *_OWN)
@@ -105,11 +104,11 @@ def _joined(body: Body, mass: float, center: Array, inertia: Array) -> Body:
     """The body with another mass fixed to it, given in its frame."""
     both = body.mass + mass
     middle = (body.mass * np.asarray(body.center) + mass * center) / both if both else np.asarray(body.center)
-    own = spatial.about(np.asarray(body.inertia), body.mass, np.asarray(body.center) - middle)
-    return replace(body, mass=both, center=middle, inertia=own + spatial.about(inertia, mass, center - middle))
+    own = spatial.parallel_axis(np.asarray(body.inertia), body.mass, np.asarray(body.center) - middle)
+    return replace(body, mass=both, center=middle, inertia=own + spatial.parallel_axis(inertia, mass, center - middle))
 
 
-def with_mass_to_move(bodies: Sequence[Body]) -> tuple[Body, ...]:
+def require_inertia(bodies: Sequence[Body]) -> tuple[Body, ...]:
     """The bodies, once each is seen to have inertia along its coordinate: its own, its armature's, or further out.
 
     Masses further out are taken to move; where they lie on an axis in some state, M is singular there.
@@ -126,10 +125,5 @@ def with_mass_to_move(bodies: Sequence[Body]) -> tuple[Body, ...]:
 
 def _resists(body: Body) -> bool:
     """Whether the body alone has inertia along its coordinate."""
-    if body.joint.kind == "prismatic":
-        return body.mass > 0.0
-    axis, inertia = (
-        np.asarray(body.joint.axis),
-        spatial.about(np.asarray(body.inertia), body.mass, np.asarray(body.center)),
-    )
-    return float(axis @ inertia @ axis) > spatial.SNAP * float(np.abs(inertia).max())
+    inertia = spatial.parallel_axis(np.asarray(body.inertia), body.mass, np.asarray(body.center))
+    return body.joint.type.resists(np.asarray(body.joint.axis), body.mass, inertia)

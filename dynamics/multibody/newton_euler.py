@@ -16,81 +16,95 @@ from cgraph import Node
 
 from ..systems.system import BiasForce
 from . import spatial
-from .link import Link, Motion, carrier, placed
-from .spatial import STILL, Triple
+from .body_motion import Motion, carrier_motion, joint_translation
+from .joints import JointType
+from .link import Link
+from .spatial import STILL, ZERO, Triple
 
 KINETIC, POTENTIAL = "kinetic", "potential"
+Tensor = tuple[Triple, Triple, Triple]  # rows
 
 
 class Acceleration(NamedTuple):
-    """How a body's motion changes at qdd = 0, in axes that stand still where those of its motion are just now."""
+    """How a body's motion changes at qdd = 0, in axes that stand still where those of its motion are just now.
+
+    A point of the body, b from its origin, has the acceleration linear + tensor b. For a body that moves in a plane
+    `swept` takes b in the axes of the body and gives it in those of the plane; else it is the tensor.
+    """
 
     angular: Triple
     linear: Triple  # of the origin, against free fall
-    tensor: tuple[Triple, Triple, Triple]  # rows; a point b from the origin has tensor b more
+    tensor: Tensor
+    swept: Tensor
     tags: tuple[str, ...]  # the energies that the linear acceleration comes of
 
 
-def at_rest(ground: Motion) -> Acceleration:
-    """The ground's, which gravity is."""
-    falls = any([each.value != 0.0 for each in ground.up])
-    return Acceleration(STILL, ground.up, (STILL, STILL, STILL), (KINETIC, POTENTIAL) if falls else (KINETIC,))
+def base_acceleration(ground: Motion) -> Acceleration:
+    """Base acceleration: gravity enters as an upward acceleration, as in RNEA."""
+    vertical = spatial.scaled(ground.strength, ground.vertical)
+    falls = any([each.value != 0.0 for each in vertical])
+    still = (STILL, STILL, STILL)
+    return Acceleration(STILL, vertical, still, still, (KINETIC, POTENTIAL) if falls else (KINETIC,))
 
 
-def accelerated(
-    parent: Acceleration, before: Motion, after: Motion, link: Link, kind: str, q: Node, qd: Node
+def propagate_acceleration(
+    parent: Acceleration, before: Motion, after: Motion, link: Link, joint: JointType, q: Node, qd: Node
 ) -> Acceleration:
-    """A link's, from its parent's: `after` is `carried(before, link, kind, q, qd)`."""
+    """A link's acceleration from its parent's: `after` is `propagate_motion(before, link, joint, q, qd)`."""
     linear, (x, y, _) = parent.linear, after.omega
-    on = carrier(before, link)
+    in_plane = carrier_motion(before, link).plane
+    spin, slide = joint.angle(qd), joint.shift(qd)
     with cg.tag(*parent.tags):
-        if before.turned and not on.turned:
-            linear = spatial.turned_about_z(before.turned.cos, before.turned.sin, linear)
-        linear = spatial.plus(linear, _at(parent.tensor, placed(on, link, kind, q)))
-        linear = spatial.turned(link.turn, linear)
+        if before.plane and not in_plane:
+            linear = spatial.rotate_about_z(before.plane.cos, before.plane.sin, linear)
+        tensor = parent.swept if in_plane else parent.tensor
+        linear = spatial.plus(linear, _times(tensor, joint_translation(link, joint, q)))
+        linear = spatial.rotate_transpose(link.turn, linear)
     with cg.tag(KINETIC):
-        angular = spatial.turned(link.turn, parent.angular)
-    if kind == "prismatic":
-        with cg.tag(*parent.tags):  # Coriolis: twice omega x velocity along z
-            linear = linear[0] + 2.0 * qd * y, linear[1] - 2.0 * qd * x, linear[2]
-    elif not after.turned:
-        c, s = cg.cos(q), cg.sin(q)
+        angular = spatial.rotate_transpose(link.turn, parent.angular)
+    if spin.value != 0.0 and not after.plane:
+        c, s = cg.cos(joint.angle(q)), cg.sin(joint.angle(q))
         with cg.tag(*parent.tags):
-            linear = spatial.turned_about_z(c, s, linear)
+            linear = spatial.rotate_about_z(c, s, linear)
         with cg.tag(KINETIC):
-            angular = spatial.turned_about_z(c, s, angular)
-            angular = angular[0] + y * qd, angular[1] - x * qd, angular[2]
+            angular = spatial.rotate_about_z(c, s, angular)
+            angular = angular[0] + y * spin, angular[1] - x * spin, angular[2]
+    if slide.value != 0.0:
+        with cg.tag(*parent.tags):  # Coriolis: twice omega x velocity along z
+            linear = linear[0] + 2.0 * slide * y, linear[1] - 2.0 * slide * x, linear[2]
     with cg.tag(KINETIC):
-        tensor = _tensor(after.omega, angular)
-    return Acceleration(angular, linear, tensor, parent.tags)
+        tensor = swept = _tensor(after.omega, angular)
+        if after.plane:
+            square = after.omega[2] * after.omega[2]
+            c, s = after.plane.cos * square, after.plane.sin * square
+            swept = (-c, s, ZERO), (-s, -c, ZERO), STILL
+    return Acceleration(angular, linear, tensor, swept, parent.tags)
 
 
-def forces(acceleration: Acceleration, motion: Motion, link: Link, q: Node, qd: Node) -> list[BiasForce]:
-    """What moves a link so at qdd = 0: a force at its velocity, a torque at its angular velocity, its spring's at qd.
+def bias_wrench(acceleration: Acceleration, motion: Motion, link: Link, q: Node, qd: Node) -> list[BiasForce]:
+    """Bias wrench, each component paired with the velocity it works on; and the spring's force, with qd.
 
     f = m a + T h, n = J alpha + omega x J omega + h x a, for the tensor T and the first moment h.
     """
     w, alpha, a, tensor = motion.omega, acceleration.angular, acceleration.linear, acceleration.tensor
     inertia = [[link.inertia[max(i, j)][min(i, j)] for j in range(3)] for i in range(3)]
-    moment = link.moment
-    if motion.turned:
-        with cg.tag(KINETIC):
-            moment = spatial.turned_about_z(motion.turned.cos, -motion.turned.sin, moment)
     with cg.tag(KINETIC):
-        force, torque = _at(tensor, moment), []
+        force, torque = _times(acceleration.swept, link.moment), []
         for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
             turn = inertia[i][i] * alpha[i] + (inertia[k][k] - inertia[j][j]) * (w[j] * w[k])
             turn = turn + inertia[j][k] * (w[j] * w[j] - w[k] * w[k])
             torque.append(turn + inertia[i][k] * tensor[j][i] - inertia[i][j] * tensor[k][i])
     with cg.tag(*acceleration.tags):
-        force = spatial.plus((link.mass * a[0], link.mass * a[1], link.mass * a[2]), force)
-        torque = [a + b for a, b in zip(torque, spatial.cross(moment, a), strict=True)]
+        force = spatial.plus(spatial.scaled(link.mass, a), force)
+        if motion.plane:
+            a = spatial.rotate_about_z(motion.plane.cos, motion.plane.sin, a)
+        torque = [a + b for a, b in zip(torque, spatial.cross(link.moment, a), strict=True)]
     with cg.tag(POTENTIAL):
         spring = link.stiffness * (q - link.spring_reference)
     return list(zip((*motion.velocity, *motion.omega, qd), (*force, *torque, spring), strict=True))
 
 
-def _tensor(w: Triple, alpha: Triple) -> tuple[Triple, Triple, Triple]:
+def _tensor(w: Triple, alpha: Triple) -> Tensor:
     """T with T b = alpha x b + w x (w x b)."""
     xx, yy, zz = (each * each for each in w)
     xy, xz, yz = w[0] * w[1], w[0] * w[2], w[1] * w[2]
@@ -98,6 +112,6 @@ def _tensor(w: Triple, alpha: Triple) -> tuple[Triple, Triple, Triple]:
     return (-(yy + zz), xy - z, xz + y), (xy + z, -(xx + zz), yz - x), (xz - y, yz + x, -(xx + yy))
 
 
-def _at(tensor: tuple[Triple, Triple, Triple], point: Triple) -> Triple:
+def _times(tensor: Tensor, point: Triple) -> Triple:
     x, y, z = (spatial.dot(row, point) for row in tensor)
     return x, y, z

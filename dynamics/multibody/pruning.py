@@ -17,8 +17,7 @@ from ..equations.formulations import inverse_dynamics
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .body import Body
-from .mechanism import Mechanism
-from .planar_arm import PlanarArm
+from .mechanism import Mechanism, as_mechanism
 
 EFFECTS = ("gravity", "damping", "springs", "armature", "forces")
 FREE_FALL = (0.0, 0.0, -9.81)  # m/s^2, put in to count what gravity would take
@@ -33,7 +32,22 @@ Equations = Callable[[Any], Graph]
 
 @dataclass(frozen=True)
 class OmittedTerm:
-    """Something that is not in a graph.  nodes, edges: how many more there would be with it."""
+    """Something that is not in a graph.
+
+    Parameters
+    ----------
+    what, why : str
+        What it is, and why it is not there.
+    nodes, edges : int
+        How many more there would be with it.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.5], damping=0.1)
+    >>> print(dyn.prune(arm, effects=["gravity"], regroup=False).omitted[0])
+    damping: switched off (5 nodes, 8 edges)
+    """
 
     what: str
     why: str
@@ -46,7 +60,26 @@ class OmittedTerm:
 
 @dataclass(frozen=True, eq=False)
 class PruneResult:
-    """What `prune` makes: the model that is left and its graph. The accounts are made when they are asked for."""
+    """What is left of a model after `prune`, and accounts of the rest, made on demand.
+
+    Parameters
+    ----------
+    model : Model
+        What is left.
+    graph : Graph
+        Its equations.
+    equations : callable
+        What makes a graph of a model.
+    steps : tuple
+        From the model as given to what is left.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> result = dyn.prune(dyn.planar_arm([1.0, 0.8], [1.0, 0.5]), dyn.mass_matrix)
+    >>> len(result.full.nodes), len(result.graph.nodes)
+    (27, 22)
+    """
 
     model: Model
     graph: Graph
@@ -59,7 +92,7 @@ class PruneResult:
         return self.steps[0].graph(self.equations)
 
     @cached_property
-    def left_out(self) -> tuple[OmittedTerm, ...]:
+    def omitted(self) -> tuple[OmittedTerm, ...]:
         """What was in the full graph, in the order in which it was taken out: the nodes add up to the difference."""
         before, result = self.full, []
         for step in self.steps[1:]:
@@ -76,8 +109,11 @@ class PruneResult:
         1 kg for one without mass; a hinge in place of a weld.
         """
         last = self.steps[-1]
-        result = []
-        for what, why, model in _absent(self.model, self.steps[0].model):
+        result: list[OmittedTerm] = []
+        mechanism, given = as_mechanism(self.model), as_mechanism(self.steps[0].model)
+        if mechanism is None or given is None:
+            return ()
+        for what, why, model in _absent(mechanism, given):
             with_it = replace(last, model=model).graph(self.equations)
             result.append(OmittedTerm(what, why, *_saved(with_it, self.graph)))
         return tuple(result)
@@ -85,16 +121,16 @@ class PruneResult:
     @cached_property
     def remains(self) -> tuple[OmittedTerm, ...]:
         """What is in the graph though no motion shows it; and the nodes that `regroup` would save."""
-        if not isinstance(self.model, Mechanism) or self.model.base_parameters:
+        fewer = _regrouped(self.steps[-1])
+        if fewer is None:
             return ()
-        last = self.steps[-1]
-        without = replace(last, model=replace(self.model, base_parameters=True)).graph(self.equations)
+        without = fewer.graph(self.equations)
         nodes, edges = _saved(self.graph, without)
         return (OmittedTerm(NEVER, "not regrouped", nodes, edges),) if nodes > 0 else ()
 
     def __str__(self) -> str:
         lines = [f"{_size(self.full)} as given, {_size(self.graph)} left."]
-        for title, rows in (("Left out", self.left_out), ("Not there", self.absent), ("Remains", self.remains)):
+        for title, rows in (("Left out", self.omitted), ("Not there", self.absent), ("Remains", self.remains)):
             if rows:
                 lines += [f"{title}:", *(f"  {row}" for row in rows)]
         return "\n".join(lines)
@@ -129,23 +165,73 @@ def prune(
 ) -> PruneResult:
     """The equations of a model with what is asked for and nothing else.
 
-    equations: the function that makes the graph, `inverse_dynamics`, `forward_dynamics`, `mass_matrix`, ...
-    effects: those of gravity, damping, springs, armature, forces that are kept. Of a Lagrangian that is not a
-        mechanism's or an arm's, only damping and forces can be told apart.
-    lock: {body: coordinate} of joints to lock, of a mechanism.
-    values: {input: number} of inputs that become constants: parameters, or the state; "q", "qd", "qdd", "tau" stand for
-        all of their kind, so that {"qd": 0, "qdd": 0} leaves the torques that hold a posture.
-    outputs: names of those to keep.
-    regroup: inertial numbers that no motion shows are given to the bodies further in, where that saves nodes. The graph
-        computes the same, in fewer nodes; the tag of a body then no longer stands for its own inertia alone.
+    Parameters
+    ----------
+    model : Model
+        A mechanism, a scene, or a Lagrangian.
+    equations : callable
+        The function that makes the graph: `inverse_dynamics`, `forward_dynamics`, `mass_matrix`, ...
+    effects : iterable of str
+        Those of `EFFECTS` that are kept: gravity, damping, springs, armature, forces. Of a Lagrangian that is not a
+        mechanism's, only damping and forces can be told apart.
+    lock : mapping, optional
+        {body: coordinate [rad or m]} of joints to lock, of a mechanism.
+    values : mapping, optional
+        {input: number} of inputs that become constants; "q", "qd", "qdd", "tau" stand for all of their kind, so that
+        {"qd": 0, "qdd": 0} leaves the torques that hold a posture.
+    outputs : sequence of str, optional
+        Names of those to keep.
+    regroup : bool
+        Give inertial numbers that no motion shows to the bodies further in, where that saves nodes. The graph computes
+        the same; the tag of a body then no longer stands for its own inertia alone.
 
-    Inputs that nothing depends on any more stay inputs, so that callers need not change.
-    Raises ValueError for an effect that is unknown or cannot be told apart; as `Mechanism.lock`, as `cg.specialize`.
+    Returns
+    -------
+    PruneResult
+        The model that is left, its graph with all inputs, and what was left out, why, and what that saved.
+
+    Raises
+    ------
+    ValueError
+        For an effect that is unknown or cannot be told apart, and as `cg.specialize` and `Mechanism.lock` do.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.5])
+    >>> result = dyn.prune(arm, values={"qd": 0.0, "qdd": 0.0})
+    >>> len(dyn.inverse_dynamics(arm).nodes), len(result.graph.nodes)
+    (82, 12)
     """
-    model = getattr(model, "model", model)  # of a scene
+    model = as_mechanism(model) or as_system(model)
     kept = list(effects)
     if unknown := [each for each in kept if each not in EFFECTS]:
         raise ValueError(f"effects are {', '.join(EFFECTS)}, got {unknown[0]!r}")
+    steps = _steps(model, kept, lock or {}, values or {}, outputs)
+    graph = steps[-1].graph(equations)
+    fewer = _regrouped(steps[-1]) if regroup else None
+    if fewer is not None and len((candidate := fewer.graph(equations)).nodes) < len(graph.nodes):
+        steps.append(fewer)
+        graph = candidate
+    return PruneResult(steps[-1].model, graph, equations, tuple(steps))
+
+
+def _regrouped(step: _Step) -> _Step | None:
+    """The step with base parameters; None of a model that has them or is no mechanism."""
+    mechanism = as_mechanism(step.model)
+    if mechanism is None or mechanism.base_parameters:
+        return None
+    return replace(step, model=replace(mechanism, base_parameters=True), what=NEVER, why="regrouped")
+
+
+def _steps(
+    model: Model,
+    kept: Collection[str],
+    lock: Mapping[str, float],
+    values: Mapping[str, float],
+    outputs: Sequence[str] | None,
+) -> list[_Step]:
+    """From the model as given, one thing after another taken out."""
     steps = [_Step(model, {}, None)]
 
     def take(what: str, why: str, **changes: Any) -> None:
@@ -154,23 +240,16 @@ def prune(
     for effect in EFFECTS:
         if effect not in kept and _has(steps[-1].model, effect):
             take(effect, "switched off", model=_without(steps[-1].model, effect))
-    for body, at in (lock or {}).items():
-        if not isinstance(model, Mechanism):
+    for body, at in lock.items():
+        mechanism = as_mechanism(steps[-1].model)
+        if mechanism is None:
             raise ValueError(f"a joint can be locked of a Mechanism, got {type(model).__name__}")
-        take(f"joint of {body}", f"locked at {at:g}", model=steps[-1].model.lock(body, at))
-    for name, value in (values or {}).items():
+        take(f"joint of {body}", f"locked at {at:g}", model=mechanism.lock(body, at))
+    for name, value in values.items():
         take(f"input {name}", f"is {value:g}", values={**steps[-1].values, name: value})
     if outputs is not None:
         take("other outputs", f"only {', '.join(outputs)} asked for", outputs=tuple(outputs))
-    last = steps[-1].model
-    graph = steps[-1].graph(equations)
-    if regroup and isinstance(last, Mechanism) and not last.base_parameters:
-        fewer = replace(steps[-1], model=replace(last, base_parameters=True), what=NEVER, why="regrouped")
-        candidate = fewer.graph(equations)
-        if len(candidate.nodes) < len(graph.nodes):
-            steps.append(fewer)
-            graph = candidate
-    return PruneResult(steps[-1].model, graph, equations, tuple(steps))
+    return steps
 
 
 def _bound(graph: Graph, values: Mapping[str, float]) -> dict[str, float]:
@@ -192,28 +271,25 @@ def _size(graph: Graph) -> str:
 
 def _has(model: Model, effect: str) -> bool:
     """Whether the model has an effect. Raises ValueError for one that cannot be told apart."""
-    if isinstance(model, Mechanism):
+    mechanism = as_mechanism(model)
+    if mechanism is not None:
         if effect in _JOINT:
-            return any(getattr(body.joint, _JOINT[effect]) for body in model.moving)
-        return bool(np.any(np.asarray(model.gravity))) if effect == "gravity" else bool(model.forces)
+            return any(getattr(body.joint, _JOINT[effect]) for body in mechanism.moving)
+        return bool(np.any(np.asarray(mechanism.gravity))) if effect == "gravity" else bool(mechanism.forces)
     system = as_system(model)
     if effect == "damping":
         return any(system.damping)
     if effect == "forces":
         return any(force.value != 0.0 for force in system.forces)
-    if isinstance(model, PlanarArm):
-        return effect == "gravity" and model.gravity != 0.0
     raise ValueError(f"the Lagrangian of {model!r:.60} is given as a whole: {effect} cannot be told apart in it")
 
 
-def _without(model: Model, effect: str) -> Any:
-    if isinstance(model, Mechanism):
+def _without(model: Model, effect: str) -> Model:
+    mechanism = as_mechanism(model)
+    if mechanism is not None:
         if effect == "gravity":
-            return replace(model, gravity=(0.0, 0.0, 0.0))
-        return replace(model, forces=(), parameters={}) if effect == "forces" else _with(model, effect, 0.0)
-    if isinstance(model, PlanarArm):
-        still = (0.0,) * len(model.damping)
-        return replace(model, gravity=0.0) if effect == "gravity" else replace(model, damping=still)
+            return replace(mechanism, gravity=(0.0, 0.0, 0.0))
+        return replace(mechanism, forces=(), parameters={}) if effect == "forces" else _with(mechanism, effect, 0.0)
     system = as_system(model)
     return System(
         lambda q, qd, t: system.partial_lagrangians,
@@ -229,16 +305,14 @@ def _with(model: Mechanism, effect: str, number: float, among: Collection[str] |
     change: dict[str, Any] = {_JOINT[effect]: number}
 
     def changed(body: Body) -> Body:
-        chosen = body.joint.kind != "fixed" if among is None else body.name in among
+        chosen = body.joint.type.moves if among is None else body.name in among
         return replace(body, joint=replace(body.joint, **change)) if chosen else body
 
     return replace(model, bodies=tuple([changed(body) for body in model.bodies]))
 
 
-def _absent(model: Model, given: Any) -> Iterator[tuple[str, str, Any]]:
+def _absent(model: Mechanism, given: Mechanism) -> Iterator[tuple[str, str, Mechanism]]:
     """What, why, and the model with it. given: the model before anything was switched off, which is not absent."""
-    if not isinstance(model, Mechanism):
-        return
     if not np.any(np.asarray(given.gravity)):
         yield "gravity", "it is zero", replace(model, gravity=FREE_FALL)
     elif np.any(np.asarray(model.gravity)):
@@ -251,10 +325,20 @@ def _absent(model: Model, given: Any) -> Iterator[tuple[str, str, Any]]:
         without = [body.name for body in model.moving if not getattr(body.joint, name) and body.name not in had]
         if without:
             yield f"{effect} of {_listed(without)}", "it is zero", _with(model, effect, NUMBER, without)
-    if massless := [body.name for body in model.bodies if not body.mass and not np.any(np.asarray(body.inertia))]:
+    if massless := [body.name for body in model.bodies if not _frame(model, body) and not _has_inertia(body)]:
         yield f"mass of {_listed(massless)}", "it is zero", _replaced(model, massless, _heavy)
-    if welds := [body.name for body in model.bodies if body.joint.kind == "fixed" and body.mass]:
+    if welds := [body.name for body in model.bodies if not body.joint.type.moves and body.mass]:
         yield f"joint of {_listed(welds)}", "it is welded on", _replaced(model, welds, _hinged)
+
+
+def _has_inertia(body: Body) -> bool:
+    return bool(body.mass or np.any(np.asarray(body.inertia)))
+
+
+def _frame(model: Mechanism, body: Body) -> bool:
+    """Whether a body only marks a place: welded on, without mass, carrying nothing."""
+    carries = any(body.name == other.parent for other in model.bodies)
+    return not (carries or body.joint.type.moves or _has_inertia(body))
 
 
 def _replaced(model: Mechanism, names: Sequence[str], change: Callable[[Body], Body]) -> Mechanism:

@@ -19,7 +19,9 @@ import cgraph as cg
 from cgraph import Compiled, Graph, Node
 from cgraph.extend import Builder, building, cotangents, tangents
 
-from .link import Link, Motion, carried, energy, ground
+from .body_motion import Motion, energy, ground, propagate_motion
+from .joints import TYPES
+from .link import Link
 from .mechanism import Mechanism
 from .spatial import Array
 
@@ -31,7 +33,24 @@ class RecursiveInverseDynamics:
     """tau of the motion of a mechanism, (q, qd, qdd) -> tau, ready at once.
 
     Compared with the compiled graph of `inverse_dynamics`, which knows the numbers of every body, an evaluation takes
-    longer; nothing has to be built before the first. Raises ValueError for a mechanism with external forces.
+    longer; nothing has to be built before the first.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Without external forces.
+
+    Raises
+    ------
+    ValueError
+        For a mechanism with external forces.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> torques = dyn.RecursiveInverseDynamics(dyn.planar_arm([1.0], [1.0], gravity=10.0))
+    >>> torques([0.0], [0.0], [3.0]).round(12).tolist()
+    [1.0]
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -43,7 +62,9 @@ class RecursiveInverseDynamics:
         self._parents = mechanism.parents
         self._links = [each.numbers for each in mechanism.links]
         self._kernels = [_kernels(body.joint.kind) for body in mechanism.moving]
-        self._ground = [float(each) for each in (*rest.omega, *rest.velocity, *rest.up, rest.height)] + [0.0] * MOTION
+        self._ground = [float(each) for each in (*rest.omega, *rest.velocity, *rest.vertical, rest.depth)] + [
+            0.0
+        ] * MOTION
 
     def __call__(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
         """tau (n,) [N m or N] at q, qd, qdd (n,). Raises ValueError for another shape."""
@@ -80,8 +101,8 @@ def _kernels(kind: str) -> _Kernels:
     made_of, numbers = _link_of_nodes()
     build = Builder()
     with building(build):
-        motion = carried(_motion(parent), made_of, kind, q, qd)
-        after = [*motion.omega, *motion.velocity, *motion.up, motion.height]
+        motion = propagate_motion(_motion(parent), made_of, TYPES[kind], q, qd)
+        after = [*motion.omega, *motion.velocity, *motion.vertical, motion.depth]
         lagrangian = energy(motion, made_of, q, qd)
     along = dict(zip(parent, rates, strict=True)) | {q: qd, qd: qdd}
     dots = tangents(along, after, build)
@@ -106,17 +127,17 @@ def _variables(name: str, count: int) -> list[Node]:
 
 
 def _motion(nodes: Sequence[Node]) -> Motion:
-    omega, velocity, up = ((nodes[k], nodes[k + 1], nodes[k + 2]) for k in (0, 3, 6))
-    return Motion(omega, velocity, up, nodes[9])
+    omega, velocity, vertical = ((nodes[k], nodes[k + 1], nodes[k + 2]) for k in (0, 3, 6))
+    return Motion(omega, velocity, vertical, nodes[9])
 
 
 def _link_of_nodes() -> tuple[Link, list[Node]]:
     """A link of variables, and these in the order of its `numbers`."""
     turn, place, moment, inertia = (_variables(*each) for each in (("R", 9), ("r", 3), ("h", 3), ("J", 6)))
-    mass, damping, stiffness, rest, armature = cg.variables("mass damping stiffness rest armature")
+    mass, damping, stiffness, reference, armature = cg.variables("mass damping stiffness spring_reference armature")
     rows = [turn[k : k + 3] for k in (0, 3, 6)]
     lower = [[inertia[0]], inertia[1:3], inertia[3:6]]
-    numbers = [*turn, *place, mass, *moment, *inertia, damping, stiffness, rest, armature]
+    numbers = [*turn, *place, mass, *moment, *inertia, damping, stiffness, reference, armature]
     x, y, z = place
     a, b, c = moment
-    return Link(rows, (x, y, z), mass, (a, b, c), lower, damping, stiffness, rest, armature), numbers
+    return Link(rows, (x, y, z), mass, (a, b, c), lower, damping, stiffness, reference, armature), numbers

@@ -15,8 +15,9 @@ from ..systems.model import Model
 from ..systems.system import System
 from . import spatial
 from .body import WORLD
-from .link import Link, axes_of, carried, energy, ground, link
-from .mechanism import Mechanism
+from .body_motion import energy, ground, propagate_motion
+from .link import Link, axes_of, link
+from .mechanism import Mechanism, as_mechanism
 from .spatial import Array
 
 PARAMETERS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")  # the order of Pinocchio
@@ -31,14 +32,32 @@ def regressor(model: Model) -> Graph:
     variables. A column of zeros is a parameter that no motion reveals; which combinations of the others do, the rank
     of stacked Y tells.
 
-    model: a Mechanism, or a scene of one.  Inputs q0.., qd0.., qdd0..; outputs Y_0_0, Y_0_1, .. row by row, (n, 10 n).
-    Raises TypeError for another model.
+    Parameters
+    ----------
+    model : Model
+        A mechanism, or a scene of one.
+
+    Returns
+    -------
+    Graph
+        Inputs q0.., qd0.., qdd0..; outputs Y_0_0, Y_0_1, .. row by row, (n, 10 n).
+
+    Raises
+    ------
+    TypeError
+        For a model without bodies.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> len(dyn.regressor(dyn.planar_arm([1.0, 0.8], [1.0, 0.5])).outputs)
+    40
     """
     mechanism = _mechanism(model)
     names = [f"{each}_{i}" for i in range(len(mechanism.moving)) for each in PARAMETERS]
     system = System(
         lambda q, qd, t, p: _partial_lagrangians(mechanism, q, qd, [p[name] for name in names]),
-        [body.name for body in mechanism.moving],
+        mechanism.coordinates,
         dict.fromkeys(names, 0.0),
     )
     slopes = cg.jacobian(inverse_dynamics(system), names).outputs.values()
@@ -48,22 +67,41 @@ def regressor(model: Model) -> Graph:
 
 
 def inertial_parameters(model: Model) -> Array:
-    """(n, 10): of each moving body mass [kg], first moment m c [kg m], and inertia about its joint's origin [kg m^2].
+    """Mass, first moment and inertia about the joint's origin of each moving body, all that is welded to it merged in.
 
-    Rows are as `PARAMETERS`, in the body's axes, all that is welded to it merged in. Raises as `regressor`.
+    Parameters
+    ----------
+    model : Model
+        A mechanism, or a scene of one.
+
+    Returns
+    -------
+    ndarray, (n, 10)
+        In the bodies' axes, columns as `PARAMETERS`: m [kg], m c [kg m], and Ixx, Ixy, Iyy, Ixz, Iyz, Izz [kg m^2].
+
+    Raises
+    ------
+    TypeError
+        For a model without bodies.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> dyn.inertial_parameters(dyn.planar_arm([2.0], [3.0], mass_model="point"))[0, :4].tolist()
+    [2.0, 0.0, 0.0, -6.0]
     """
     rows = []
     for body in _mechanism(model).moving:
         center = np.asarray(body.center)
-        inertia = spatial.about(np.asarray(body.inertia), body.mass, center)
+        inertia = spatial.parallel_axis(np.asarray(body.inertia), body.mass, center)
         rows.append([body.mass, *(body.mass * center), *(inertia[i, j] for i, j in _LOWER)])
     return np.array(rows)
 
 
 def _mechanism(model: Model) -> Mechanism:
-    mechanism = getattr(model, "model", model)
-    if not isinstance(mechanism, Mechanism):
-        raise TypeError(f"a regressor needs a Mechanism, got {type(mechanism).__name__}: {mechanism!r:.60}")
+    mechanism = as_mechanism(model)
+    if mechanism is None:
+        raise TypeError(f"a regressor needs a Mechanism, got {type(model).__name__}: {model!r:.60}")
     return mechanism
 
 
@@ -75,7 +113,7 @@ def _partial_lagrangians(mechanism: Mechanism, q: list[Node], qd: list[Node], pi
             axes[body.name] = axes_of(body)
             known = link(body, axes[body.parent])
             with cg.tag(body.name):
-                motions[body.name] = carried(motions[body.parent], known, body.joint.kind, q[i], qd[i])
+                motions[body.name] = propagate_motion(motions[body.parent], known, body.joint.type, q[i], qd[i])
                 unknown = _symbolic(known, axes[body.name], pi[10 * i : 10 * i + 10])
                 partials.append(energy(motions[body.name], unknown, q[i], qd[i]))
     return partials
@@ -86,10 +124,12 @@ def _symbolic(known: Link, axes: Array, pi: list[Node]) -> Link:
     mass, x, y, z, *lower = pi
     entries = dict(zip(_LOWER, lower, strict=True))
     inertia = [[entries[max(i, j), min(i, j)] for j in range(3)] for i in range(3)]
-    half = [spatial.turned(axes.tolist(), (row[0], row[1], row[2])) for row in inertia]  # I axes, as I is symmetric
-    columns = [spatial.turned(axes.tolist(), (half[0][j], half[1][j], half[2][j])) for j in range(3)]
+    half = [
+        spatial.rotate_transpose(axes.tolist(), (row[0], row[1], row[2])) for row in inertia
+    ]  # I axes, as I is symmetric
+    columns = [spatial.rotate_transpose(axes.tolist(), (half[0][j], half[1][j], half[2][j])) for j in range(3)]
     turned = [[columns[j][i] for j in range(3)] for i in range(3)]
-    moment = spatial.turned(axes.tolist(), (x, y, z))
+    moment = spatial.rotate_transpose(axes.tolist(), (x, y, z))
     return replace(
         known, mass=mass, moment=moment, inertia=turned, damping=0.0, stiffness=0.0, spring_reference=0.0, armature=0.0
     )

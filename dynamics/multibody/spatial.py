@@ -32,8 +32,13 @@ def snapped(matrix: Array) -> Array:
     return np.where(np.abs(matrix - near) <= SNAP, near, matrix) + 0.0
 
 
+def cleaned(array: Array) -> Array:
+    """The array with entries that are rounding beside the largest set to zero."""
+    return np.where(np.abs(array) <= SNAP * np.abs(array).max(initial=0.0), 0.0, array) + 0.0
+
+
 def from_quaternion(quaternion: Sequence[float]) -> Array:
-    """The rotation matrix of a quaternion (w, x, y, z), normalised here."""
+    """The rotation matrix of a quaternion (w, x, y, z), normalized here."""
     w, x, y, z = np.asarray(quaternion, dtype=np.float64) / np.linalg.norm(quaternion)
     return snapped(
         np.array(
@@ -64,18 +69,18 @@ def to_quaternion(matrix: Array) -> Array:
 def to_z(axis: Array) -> Array:
     """A rotation whose third column is the unit vector `axis`: the nearest turn of the coordinate axes."""
     seed = np.eye(3)[int(np.abs(axis).argmin())]
-    x = np.cross(seed, axis)
+    x = seed - (seed @ axis) * axis
     x /= np.linalg.norm(x)
     return snapped(np.column_stack([x, np.cross(axis, x), axis]))
 
 
-def hung(outer: Array, orientation: ArrayLike, position: ArrayLike, axes: Array) -> tuple[Array, Triple]:
-    """A joint in its parent's frame: its `axes` as columns, and its origin, both in the parent's axes `outer`."""
+def joint_placement(outer: Array, orientation: ArrayLike, position: ArrayLike, axes: Array) -> tuple[Array, Triple]:
+    """Where a joint is at q = 0: its `axes` as columns and its origin, both in the parent's axes `outer`."""
     turn = snapped(outer.T @ np.asarray(orientation) @ axes)
-    return turn, constant(snapped(outer.T @ np.asarray(position)))
+    return turn, constant(cleaned(outer.T @ np.asarray(position)))
 
 
-def about(inertia: Array, mass: float, offset: Array) -> Array:
+def parallel_axis(inertia: Array, mass: float, offset: Array) -> Array:
     """Inertia about a point `offset` away from the centre of mass (parallel axes)."""
     return inertia + mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
 
@@ -103,19 +108,25 @@ def plus(a: Triple, b: Triple) -> Triple:
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
+def scaled(factor: float | Node, vector: Triple) -> Triple:
+    """Multiple."""
+    x, y, z = (factor * each for each in vector)
+    return x, y, z
+
+
 def constant(vector: Array) -> Triple:
     """A constant vector as nodes."""
     x, y, z = (cg.constant(float(each)) for each in vector)
     return x, y, z
 
 
-def turned(matrix: Matrix, vector: Triple) -> Triple:
+def rotate_transpose(matrix: Matrix, vector: Triple) -> Triple:
     """matrix^T vector: what a parent's vector is in a child's axes, the columns of `matrix`."""
     x, y, z = (total([matrix[i][j] * vector[i] for i in range(3)]) for j in range(3))
     return x, y, z
 
 
-def turned_about_z(c: Node, s: Node, vector: Triple) -> Triple:
-    """The vector in axes turned about z by the angle with cosine c and sine s."""
+def rotate_about_z(c: Node, s: Node, vector: Triple) -> Triple:
+    """R_z^T vector: its components in axes turned about z by the angle with cosine c and sine s."""
     x, y, z = vector
     return c * x + s * y, c * y - s * x, z

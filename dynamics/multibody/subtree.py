@@ -11,10 +11,29 @@ from .external_force import Force
 
 @dataclass(frozen=True, eq=False)
 class Subtree:
-    """Bodies of which the first carries all others.
+    """Bodies of which the first carries all others, as `Mechanism.subtree` takes them off and `attach` hangs them on.
 
-    parent: what the first hung on.  places: where the bodies stood among the mechanism's, which orders coordinates.
-    forces: on these bodies; parameters: the values that they use.  locked: their joints that are locked, and where.
+    Parameters
+    ----------
+    bodies : tuple of Body
+        The first carries the others.
+    parent : str
+        What the first hung on.
+    places : tuple of int
+        Where the bodies stood among the mechanism's, which orders coordinates.
+    forces : tuple of Force
+        On these bodies.
+    parameters : mapping
+        The values that the forces use.
+    locked : mapping
+        {body: coordinate [rad or m]} of their joints that are locked.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.5])
+    >>> [body.name for body in arm.subtree("link 2").bodies]
+    ['link 2', 'tip']
     """
 
     bodies: tuple[Body, ...]
@@ -24,7 +43,7 @@ class Subtree:
     parameters: Mapping[str, float] = field(default_factory=dict)
     locked: Mapping[str, float] = field(default_factory=dict)
 
-    def hung_on(self, parent: str) -> tuple[Body, ...]:
+    def with_parent(self, parent: str) -> tuple[Body, ...]:
         """The bodies, with the first on that parent."""
         first, *others = self.bodies
         return replace(first, parent=parent), *others
@@ -40,7 +59,7 @@ def as_subtree(given: Subtree | Body | Iterable[Body]) -> Subtree:
     return Subtree(bodies, bodies[0].parent)
 
 
-def below(bodies: Iterable[Body], root: str) -> set[str]:
+def descendants(bodies: Iterable[Body], root: str) -> set[str]:
     """Names of the body and of all that it carries. Raises MechanismError for an unknown body."""
     bodies = list(bodies)
     names = {body.name for body in bodies}

@@ -7,20 +7,17 @@ from typing import Any
 import numpy as np
 
 from ..io.mujoco_model import MujocoTwin, rollout
-from ..multibody.mechanism import Mechanism
-from ..multibody.planar_arm import PlanarArm
+from ..multibody.mechanism import Mechanism, as_mechanism
 from .case import BATCH, DT, PASSES, Array, Case
 from .contender import Contender, Peer, UnavailableError
 
 
-def joint_names(case: Case) -> list[str]:
-    """Names of the joints in MJCF, in the order of the coordinates. Raises UnavailableError for a bare Lagrangian."""
-    model = getattr(case.model, "model", case.model)  # of a scene
-    if isinstance(model, Mechanism):
-        return [body.name for body in model.moving]
-    if isinstance(model, PlanarArm):
-        return [f"joint{i + 1}" for i in range(len(model.links))]
-    raise UnavailableError("takes rigid bodies, not a Lagrangian")
+def bodies(case: Case) -> Mechanism:
+    """The bodies of the case's model. Raises UnavailableError for a bare Lagrangian."""
+    mechanism = as_mechanism(case.model)
+    if mechanism is None:
+        raise UnavailableError("takes rigid bodies, not a Lagrangian")
+    return mechanism
 
 
 class MujocoPeer(Peer):
@@ -28,12 +25,12 @@ class MujocoPeer(Peer):
 
     def __init__(self, case: Case) -> None:
         super().__init__(case)
-        names = joint_names(case)
-        self.twin = MujocoTwin(getattr(case.model, "model", case.model), timestep=DT)
+        mechanism = bodies(case)
+        self.twin = MujocoTwin(mechanism, timestep=DT)
         self.mujoco, model = self.twin.mujoco, self.twin.model
         for unused in ("CONSTRAINT", "SENSOR", "ACTUATION", "WARMSTART"):
             model.opt.disableflags |= getattr(self.mujoco.mjtDisableBit, f"mjDSBL_{unused}")
-        self.order = np.array([model.joint(name).id for name in names])  # of ours, in theirs
+        self.order = np.array([model.joint(name).id for name in mechanism.coordinates])  # of ours, in theirs
         self.at = np.argsort(self.order)
 
     def quantities(self, q: Array, qd: Array, qdd: Array, tau: Array) -> dict[str, Array]:

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..io.mjcf import to_mjcf
-from ..multibody.mechanism import Mechanism
 from .case import BATCH, Array, Case, rk4_step
 from .contender import Contender, Peer, UnavailableError
-from .mujoco import joint_names
+from .mujoco import bodies
 
 
 class PinocchioPeer(Peer):
@@ -27,21 +26,19 @@ class PinocchioPeer(Peer):
         import pinocchio
 
         self.pinocchio = pinocchio
-        names = joint_names(case)
-        model = getattr(case.model, "model", case.model)
+        mechanism = bodies(case)
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "model.xml"
-            path.write_text(to_mjcf(model), encoding="utf-8")
+            path.write_text(to_mjcf(mechanism), encoding="utf-8")
             self.twin = pinocchio.buildModelFromMJCF(str(path))
         # Its reader of MJCF leaves gravity at the default.
-        pull = model.gravity if isinstance(model, Mechanism) else (0.0, 0.0, -model.gravity)
-        self.twin.gravity.linear = np.asarray(pull, dtype=np.float64)
+        self.twin.gravity.linear = np.asarray(mechanism.gravity, dtype=np.float64)
         self.data = self.twin.createData()
-        self.order = np.array([self.twin.joints[self.twin.getJointId(name)].idx_v for name in names])
+        self.order = np.array([self.twin.joints[self.twin.getJointId(name)].idx_v for name in mechanism.coordinates])
         self.at = np.argsort(self.order)
-        joints = [body.joint for body in model.moving] if isinstance(model, Mechanism) else []
-        self.stiffness = np.array([joint.stiffness for joint in joints] or np.zeros(case.n))
-        self.spring_reference = np.array([joint.spring_reference for joint in joints] or np.zeros(case.n))
+        joints = [body.joint for body in mechanism.moving]
+        self.stiffness = np.array([joint.stiffness for joint in joints])
+        self.spring_reference = np.array([joint.spring_reference for joint in joints])
         self.damping = np.array(case.system.damping)
 
     def _passive(self, x: Array) -> Array:

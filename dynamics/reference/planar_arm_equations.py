@@ -18,7 +18,8 @@ import numpy as np
 
 from cgraph.extend import Array
 
-from ..multibody.planar_arm import PlanarArm
+from ..multibody.mechanism import Mechanism
+from ..multibody.planar_arm import planar_links
 from .flint_numbers import Number, flint, working
 
 Vector = list[Number]
@@ -38,7 +39,7 @@ class Pair(NamedTuple):
         return (x - self.high) - self.low
 
 
-def torques(arm: PlanarArm, q: Array, qd: Array, qdd: Array) -> Pair:
+def torques(arm: Mechanism, q: Array, qd: Array, qdd: Array) -> Pair:
     """tau [N m] of a planar arm for accelerations qdd, (n,). Raises ImportError without python-flint."""
 
     def solved(terms: _Equations, number: Callable[[Any], Number]) -> Vector:
@@ -50,7 +51,7 @@ def torques(arm: PlanarArm, q: Array, qd: Array, qdd: Array) -> Pair:
     return _bounded(arm, q, qd, solved)
 
 
-def accelerations(arm: PlanarArm, q: Array, qd: Array, tau: Array) -> Pair:
+def accelerations(arm: Mechanism, q: Array, qd: Array, tau: Array) -> Pair:
     """qdd [rad/s^2] of a planar arm under torques tau, (n,). Raises ImportError without python-flint."""
 
     def solved(terms: _Equations, number: Callable[[Any], Number]) -> Vector:
@@ -74,7 +75,7 @@ class _Equations(NamedTuple):
 
 
 def _bounded(
-    arm: PlanarArm, q: Array, qd: Array, solved: Callable[[_Equations, Callable[[Any], Number]], Vector]
+    arm: Mechanism, q: Array, qd: Array, solved: Callable[[_Equations, Callable[[Any], Number]], Vector]
 ) -> Pair:
     """The numbers, computed with so many digits that the bound on their error is at most LOST."""
     digits = DIGITS
@@ -90,21 +91,24 @@ def _bounded(
                 low = [float((value - h).mid()) for value, h in zip(x, high, strict=True)]
                 return Pair(np.array(high), np.array(low))
         digits *= 2
-    raise ArithmeticError(f"{MOST} digits are not enough for an arm of {len(arm.links)} links")
+    raise ArithmeticError(f"{MOST} digits are not enough for an arm of {len(arm.moving)} links")
 
 
-def _terms(number: Callable[[Any], Number], arm: PlanarArm, q: Array, qd: Array) -> _Equations:
-    n = len(arm.links)
+def _terms(number: Callable[[Any], Number], arm: Mechanism, q: Array, qd: Array) -> _Equations:
+    n = len(arm.moving)
+    gravity = number(np.asarray(arm.gravity)[2])
     theta, omega = _running(number, q), _running(number, qd)
     mass, length, center, inertia = (
         [number(value) for value in row]
-        for row in zip(*[(link.mass, link.length, link.center, link.inertia) for link in arm.links], strict=True)
+        for row in zip(
+            *[(link.mass, link.length, link.center, link.inertia) for link in planar_links(arm)], strict=True
+        )
     )
     beyond = [*list(itertools.accumulate(reversed(mass)))[::-1][1:], number(0)]  # mass carried at the far end
     first = [m * c + b * s for m, c, b, s in zip(mass, center, beyond, length, strict=True)]
     sin, cos = [angle.sin() for angle in theta], [angle.cos() for angle in theta]
     matrix = [[number(0)] * n for _ in range(n)]
-    right = [-number(arm.gravity) * f * s for f, s in zip(first, sin, strict=True)]
+    right = [gravity * f * s for f, s in zip(first, sin, strict=True)]
     for i in range(n):
         matrix[i][i] = mass[i] * center[i] ** 2 + beyond[i] * length[i] ** 2 + inertia[i]
         for j in range(i):
@@ -113,7 +117,7 @@ def _terms(number: Callable[[Any], Number], arm: PlanarArm, q: Array, qd: Array)
             turn = a * (sin[i] * cos[j] - cos[i] * sin[j])
             right[i] = right[i] - turn * omega[j] ** 2
             right[j] = right[j] + turn * omega[i] ** 2
-    damping = [number(c) * number(v) for c, v in zip(arm.damping, qd.tolist(), strict=True)]
+    damping = [number(c) * number(v) for c, v in zip(arm.system.damping, qd.tolist(), strict=True)]
     return _Equations(matrix, right, damping)
 
 

@@ -13,7 +13,6 @@ from cgraph import Graph, Node
 from ..equations.equations_of_motion import forward_dynamics
 from ..equations.formulations import inverse_dynamics, spurious_nodes
 from ..multibody.joint_positions import Skeleton, skeleton
-from ..multibody.mechanism import Mechanism
 from ..simulation.simulate import simulate
 from ..systems.system import System
 from .scenes import Scene
@@ -68,7 +67,8 @@ def inspection(scene: Scene, *, forward: bool = False, t_end: float | None = Non
         state |= _named(qdd=qdd) | {"dt": DT}
         state |= {f"{name}{i}_old": table[:, i] for name, table in old.items() for i in range(system.n)}
         versions = [_version(system, name, state) for name in FORMULATIONS]
-    return Inspection(tuple(versions), run.t, skeleton(scene.model, run.q), _shares(scene, state))
+    places = None if scene.mechanism is None else skeleton(scene.mechanism, run.q)
+    return Inspection(tuple(versions), run.t, places, _shares(scene, state))
 
 
 def _version(system: System, name: str, state: Mapping[str, Any]) -> Equations:
@@ -99,9 +99,10 @@ def _shares(scene: Scene, state: Mapping[str, Any]) -> dict[str, Array]:
     """Inverse dynamics of each partial Lagrangian alone, which adds up to the whole but for damping and forces."""
     system = scene.system
     parts = system.partial_lagrangians
-    if len(parts) < 2 or "qdd0" not in state or (isinstance(scene.model, Mechanism) and scene.model.base_parameters):
+    mechanism = scene.mechanism
+    if len(parts) < 2 or "qdd0" not in state or (mechanism is not None and mechanism.base_parameters):
         return {}
-    names = [body.name for body in scene.model.moving] if isinstance(scene.model, Mechanism) else []
+    names = [body.name for body in mechanism.moving] if mechanism is not None else []
     if len(names) != len(parts):
         names = [f"link {i + 1}" for i in range(len(parts))]
 

@@ -16,6 +16,7 @@ import cgraph as cg
 from cgraph import Node
 
 from ..io.load import load_model
+from ..multibody.mechanism import Mechanism, as_mechanism
 from ..multibody.planar_arm import planar_arm
 from ..systems.model import Model, as_ode, as_system
 from ..systems.ode_system import OdeSystem
@@ -32,7 +33,6 @@ class Scene:
     q: tuple[float, ...]  # rad or m
     qd: tuple[float, ...]  # rad/s or m/s
     t_end: float  # s
-    left_out: tuple[str, ...] = ()  # of a file, what the model has not: a sentence each
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -48,6 +48,16 @@ class Scene:
     def system(self) -> System:
         """The Lagrangian system of the model. Raises TypeError where it has none."""
         return as_system(self.model)
+
+    @property
+    def mechanism(self) -> Mechanism | None:
+        """The bodies of the model, if it has any."""
+        return as_mechanism(self.model)
+
+    @property
+    def omitted(self) -> tuple[str, ...]:
+        """Of a model that was read from a file: what the file has and the model has not, a sentence each."""
+        return self.mechanism.omitted if self.mechanism else ()
 
     @property
     def ode(self) -> OdeSystem | None:
@@ -96,13 +106,12 @@ _SUFFIXES = (".xml", ".urdf")
 def of_file(path: str | os.PathLike[str], ignore: bool = False) -> Scene:
     """The mechanism of a file, MJCF or URDF, at rest at q = 0; named as the file is, without its suffix.
 
-    ignore: leave out what a mechanism cannot have; `left_out` says what. Raises as `load_mjcf` does.
+    ignore: leave out what a mechanism cannot have; `omitted` says what. Raises as `load_mjcf` does.
     """
-    left_out: list[str] = []
-    mechanism = load_model(path, ignore=ignore, left_out=left_out)
+    mechanism = load_model(path, ignore=ignore)
     n = mechanism.system.n
     about = f"{len(mechanism.moving)} moving bodies of {os.fspath(path)}"
-    return Scene(Path(path).stem, about, mechanism, (0.0,) * n, (0.0,) * n, 3.0, tuple(left_out))
+    return Scene(Path(path).stem, about, mechanism, (0.0,) * n, (0.0,) * n, 3.0)
 
 
 def names() -> list[str]:

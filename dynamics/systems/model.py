@@ -13,12 +13,12 @@ if TYPE_CHECKING:
 class Model(Protocol):
     """A system, a mechanism or a scene: names, parameters, and the equations behind them.
 
-    `System`, `OdeSystem`, `Mechanism` and `Scene` are models. A class of your own becomes one by these four attributes.
+    `System`, `OdeSystem`, `Mechanism` and `Scene` are models. A class of your own becomes one by these five attributes.
     One of `system` and `ode` is there, the other is None.
 
     coordinates: names, in the order of q0, q1, ...; of a first-order system its states.
     parameters: {name: value}; each is an input of the graphs, and a run binds it to the value.
-    system: the Lagrangian system.  ode: the first-order system.
+    system: the Lagrangian system.  ode: the first-order system.  mechanism: the bodies, None of a model without.
     """
 
     @property
@@ -36,6 +36,10 @@ class Model(Protocol):
     @property
     def ode(self) -> OdeSystem | None:
         """The first-order system."""
+
+    @property
+    def mechanism(self) -> object | None:
+        """The bodies, a `Mechanism`; see `dynamics.multibody.mechanism.as_mechanism`."""
 
 
 def as_system(model: Model) -> System:

@@ -80,6 +80,11 @@ class OdeSystem:
         return self
 
     @property
+    def mechanism(self) -> None:
+        """None: a first-order system has no bodies."""
+        return None
+
+    @property
     def n(self) -> int:
         """Number of states."""
         return len(self.states)

@@ -113,6 +113,11 @@ class System:
         return None
 
     @property
+    def mechanism(self) -> None:
+        """None: a Lagrangian alone has no bodies."""
+        return None
+
+    @property
     def n(self) -> int:
         """Number of coordinates."""
         return len(self.coordinates)

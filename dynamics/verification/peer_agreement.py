@@ -15,13 +15,12 @@ from ..equations.formulations import inverse_dynamics
 from ..io.load import compiled
 from ..io.mujoco_model import mujoco
 from ..multibody.body import Body, MechanismError
-from ..multibody.mechanism import Mechanism
-from ..multibody.planar_arm import Link, PlanarArm
+from ..multibody.mechanism import Mechanism, as_mechanism
 from ..peers.case import Case
 from ..peers.contender import Peer, UnavailableError
 from ..peers.mujoco import MujocoPeer
 from ..peers.pinocchio import PinocchioPeer
-from ..systems.model import as_system
+from ..systems.model import Model, as_system
 from .residual import PEERS, Residual
 
 ASKED = 4  # states at which a disagreement is explained
@@ -36,18 +35,21 @@ class NotComparableError(Exception):
 class Term(NamedTuple):
     """A term of the equations, and how both sides are made alike in it.
 
-    body, link, model: the change to each body of a mechanism, to each link of an arm, to the rest of either.
+    body, rest: the change to each body of a mechanism, and to the rest of it.
     theirs: the change to MuJoCo's model of a file.
     """
 
     body: Callable[[Body], Body]
-    link: Callable[[Link], Link]
-    model: Callable[[Any], Any]
+    rest: Callable[[Mechanism], Mechanism]
     theirs: Callable[[Any], None]
 
 
-def _same(x: Any) -> Any:
-    return x
+def _same(body: Body) -> Body:
+    return body
+
+
+def _all(mechanism: Mechanism) -> Mechanism:
+    return mechanism
 
 
 def _joint(**changes: Any) -> Callable[[Body], Body]:
@@ -57,76 +59,67 @@ def _joint(**changes: Any) -> Callable[[Body], Body]:
 def _zeroed(*fields: str) -> Callable[[Any], None]:
     """MuJoCo's fields to zero, those that its version has."""
 
-    def change(model: Any) -> None:
+    def change(mj_model: Any) -> None:
         for name in fields:
-            if hasattr(model, name):
-                getattr(model, name)[...] = 0.0
+            if hasattr(mj_model, name):
+                getattr(mj_model, name)[...] = 0.0
 
     return change
 
 
-def _still(model: Any) -> Any:
-    return replace(model, gravity=0.0 if isinstance(model, PlanarArm) else (0.0, 0.0, 0.0))
+def _still(mechanism: Mechanism) -> Mechanism:
+    return replace(mechanism, gravity=(0.0, 0.0, 0.0))
 
 
-def _floating(model: Any) -> None:
-    model.opt.gravity[:] = 0.0
+def _floating(mj_model: Any) -> None:
+    mj_model.opt.gravity[:] = 0.0
 
 
-def _alike(model: Any) -> None:
-    model.body_inertia[model.body_mass > _NO_MASS] = 1.0
+def _alike(mj_model: Any) -> None:
+    mj_model.body_inertia[mj_model.body_mass > _NO_MASS] = 1.0
 
 
-def _weightless(model: Any) -> None:
-    model.body_mass[model.body_mass > _NO_MASS] = _NO_MASS
+def _weightless(mj_model: Any) -> None:
+    mj_model.body_mass[mj_model.body_mass > _NO_MASS] = _NO_MASS
 
 
-def _thin(model: Any) -> None:
-    model.opt.density = model.opt.viscosity = 0.0
+def _thin(mj_model: Any) -> None:
+    mj_model.opt.density = mj_model.opt.viscosity = 0.0
 
 
-def _unbound(model: Any) -> None:
-    model.opt.disableflags |= mujoco().mjtDisableBit.mjDSBL_EQUALITY
-
-
-def _undamped(model: Any) -> Any:
-    return replace(model, damping=(0.0,) * len(model.links)) if isinstance(model, PlanarArm) else model
+def _unbound(mj_model: Any) -> None:
+    mj_model.opt.disableflags |= mujoco().mjtDisableBit.mjDSBL_EQUALITY
 
 
 TERMS: dict[str, Term] = {
-    "damping": Term(_joint(damping=0.0), _same, _undamped, _zeroed("dof_damping", "dof_dampingpoly")),
-    "joint springs": Term(_joint(stiffness=0.0), _same, _same, _zeroed("jnt_stiffness", "jnt_stiffnesspoly")),
-    "armature": Term(_joint(armature=0.0), _same, _same, _zeroed("dof_armature")),
-    "gravity": Term(_same, _same, _still, _floating),
-    "inertia about the centres of mass": Term(
+    "damping": Term(_joint(damping=0.0), _all, _zeroed("dof_damping", "dof_dampingpoly")),
+    "joint springs": Term(_joint(stiffness=0.0), _all, _zeroed("jnt_stiffness", "jnt_stiffnesspoly")),
+    "armature": Term(_joint(armature=0.0), _all, _zeroed("dof_armature")),
+    "gravity": Term(_same, _still, _floating),
+    "inertia about the centers of mass": Term(
         lambda body: replace(body, inertia=(1.0, 1.0, 1.0)) if body.mass > _NO_MASS else body,
-        lambda link: replace(link, inertia=1.0),
-        _same,
+        _all,
         _alike,
     ),
     "mass and its place": Term(
         lambda body: replace(body, mass=_NO_MASS) if body.mass > _NO_MASS else body,
-        lambda link: replace(link, mass=_NO_MASS),
-        _same,
+        _all,
         _weightless,
     ),
-    "friction loss": Term(_same, _same, _same, _zeroed("dof_frictionloss", "tendon_frictionloss")),
-    "tendons": Term(_same, _same, _same, _zeroed("tendon_stiffness", "tendon_damping", "tendon_armature")),
-    "equality constraints": Term(_same, _same, _same, _unbound),
-    "fluid": Term(_same, _same, _same, _thin),
+    "friction loss": Term(_same, _all, _zeroed("dof_frictionloss", "tendon_frictionloss")),
+    "tendons": Term(_same, _all, _zeroed("tendon_stiffness", "tendon_damping", "tendon_armature")),
+    "equality constraints": Term(_same, _all, _unbound),
+    "fluid": Term(_same, _all, _thin),
 }
 
 
-def without(model: PlanarArm | Mechanism, terms: Sequence[str]) -> PlanarArm | Mechanism:
-    """The model with these of the `TERMS` taken out, or made alike for all."""
+def without(mechanism: Mechanism, terms: Sequence[str]) -> Mechanism:
+    """The mechanism with these of the `TERMS` taken out, or made alike for all."""
     for name in terms:
         term = TERMS[name]
-        model = term.model(model)
-        if isinstance(model, PlanarArm):
-            model = replace(model, links=tuple([term.link(link) for link in model.links]))
-        else:
-            model = replace(model, bodies=tuple([term.body(body) for body in model.bodies]))
-    return model
+        rest = term.rest(mechanism)
+        mechanism = replace(rest, bodies=tuple([term.body(body) for body in rest.bodies]))
+    return mechanism
 
 
 class Asked(Protocol):
@@ -153,10 +146,10 @@ class _At(Case):
 class Translation:
     """A peer on the model as `to_mjcf` writes it."""
 
-    def __init__(self, kind: Callable[[Case], Peer], model: PlanarArm | Mechanism) -> None:
-        self.kind, self.model = kind, model
-        self.case = _At("the model", model)
-        self.peer = kind(self.case)
+    def __init__(self, make: Callable[[Case], Peer], mechanism: Mechanism) -> None:
+        self.make, self.mechanism = make, mechanism
+        self.case = _At("the model", mechanism)
+        self.peer = make(self.case)
 
     def inverse(self, at: Mapping[str, Array]) -> Array:
         """See Asked."""
@@ -169,34 +162,34 @@ class Translation:
 
     def without(self, terms: Sequence[str]) -> Translation:
         """See Asked."""
-        return Translation(self.kind, without(self.model, terms))
+        return Translation(self.make, without(self.mechanism, terms))
 
 
 class Original:
     """MuJoCo on a model of its own: of a file, say."""
 
-    def __init__(self, model: Any) -> None:
-        self.model = model
+    def __init__(self, mj_model: Any) -> None:
+        self.mj_model = mj_model
 
     def inverse(self, at: Mapping[str, Array]) -> Array:
         """See Asked."""
-        module, data = mujoco(), mujoco().MjData(self.model)
+        module, data = mujoco(), mujoco().MjData(self.mj_model)
         rows = []
         for data.qpos[:], data.qvel[:], data.qacc[:] in zip(at["q"], at["qd"], at["qdd"], strict=True):
-            module.mj_inverse(self.model, data)
+            module.mj_inverse(self.mj_model, data)
             rows.append(np.array(data.qfrc_inverse))
         return np.array(rows)
 
     def without(self, terms: Sequence[str]) -> Original:
         """See Asked."""
-        model = copy.copy(self.model)
+        mj_model = copy.copy(self.mj_model)
         for name in terms:
-            TERMS[name].theirs(model)
-        mujoco().mj_setConst(model, mujoco().MjData(model))
-        return Original(model)
+            TERMS[name].theirs(mj_model)
+        mujoco().mj_setConst(mj_model, mujoco().MjData(mj_model))
+        return Original(mj_model)
 
 
-def peers(model: Any, twin: Original | None = None) -> Iterator[tuple[str, Callable[[], Asked]]]:
+def peers(model: Model, twin: Original | None = None) -> Iterator[tuple[str, Callable[[], Asked]]]:
     """Name of each peer, and what makes it for a model: raises NotComparableError with the reason.
 
     twin: MuJoCo's, in place of the translation.
@@ -205,7 +198,7 @@ def peers(model: Any, twin: Original | None = None) -> Iterator[tuple[str, Calla
     yield "Pinocchio", lambda: _translated(PinocchioPeer, model)
 
 
-def residual(name: str, peer: Asked, model: Any, at: Mapping[str, Array]) -> Residual:
+def residual(name: str, peer: Asked, model: Model, at: Mapping[str, Array]) -> Residual:
     """How far the inverse dynamics of a peer is from ours, with what explains it where that is too far."""
     bodies = bare(model)
     value = disagreement(bodies, peer, at)
@@ -213,7 +206,7 @@ def residual(name: str, peer: Asked, model: Any, at: Mapping[str, Array]) -> Res
     return Residual(f"inverse dynamics = {name}'s", value, PEERS, note)
 
 
-def explanation(model: PlanarArm | Mechanism, peer: Asked, at: Mapping[str, Array]) -> str:
+def explanation(model: Mechanism, peer: Asked, at: Mapping[str, Array]) -> str:
     """The one or two of the `TERMS` without which there is agreement, in words."""
     few = {name: rows[:ASKED] for name, rows in at.items()}
     for count in range(1, TAKEN + 1):
@@ -223,36 +216,34 @@ def explanation(model: PlanarArm | Mechanism, peer: Asked, at: Mapping[str, Arra
     return f"no {TAKEN} terms explain it"
 
 
-def disagreement(model: PlanarArm | Mechanism, peer: Asked, at: Mapping[str, Array]) -> float:
+def disagreement(model: Mechanism, peer: Asked, at: Mapping[str, Array]) -> float:
     """The largest difference of the torques, relative to the largest torque of its state; over all states."""
     ours = evaluate_at(as_system(model), inverse_dynamics(model), at)
     size = np.maximum(np.abs(ours).max(axis=1), np.finfo(float).tiny)
     return float(np.max(np.abs(ours - peer.inverse(at)).max(axis=1) / size))
 
 
-def bare(model: Any) -> PlanarArm | Mechanism:
-    """The arm or mechanism of a model, without forces on its bodies, which the peers do not have.
+def bare(model: Model) -> Mechanism:
+    """The mechanism of a model, without forces on its bodies, which the peers do not have.
 
     Raises NotComparableError for another model.
     """
-    bodies = getattr(model, "model", model)
-    if isinstance(bodies, PlanarArm):
-        return bodies
-    if not isinstance(bodies, Mechanism):
+    bodies = as_mechanism(model)
+    if bodies is None:
         raise NotComparableError("takes rigid bodies, not a Lagrangian")
     return replace(bodies, forces=(), parameters={}) if bodies.forces else bodies
 
 
-def _translated(kind: Callable[[Case], Peer], model: Any) -> Translation:
+def _translated(make: Callable[[Case], Peer], model: Model) -> Translation:
     try:
-        return Translation(kind, bare(model))
+        return Translation(make, bare(model))
     except ImportError:
         raise NotComparableError("is not installed") from None
     except (UnavailableError, MechanismError) as error:
         raise NotComparableError(str(error)) from None
 
 
-def original(twin: Any, model: Any) -> Original:
+def original(twin: Any, model: Model) -> Original:
     """MuJoCo on what `load_model` takes, with the coordinates of the model.
 
     Raises ValueError for a twin that cannot be read or has another number of coordinates, and for a model that is not

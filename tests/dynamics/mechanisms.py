@@ -80,20 +80,3 @@ def turned_tree(n: int) -> Mechanism:
     """n revolute joints, two on each until there are n."""
     rng = np.random.default_rng(n)
     return dyn.tree([(i - 1) // 2 for i in range(n)], [turned_link(i, rng) for i in range(n)])
-
-
-def in_space(arm: dyn.PlanarArm) -> Mechanism:
-    """The planar arm as bodies in space, in the plane of x and z, hinged about -y."""
-    drop = [0.0, *(-link.length for link in arm.links)]
-    return dyn.serial_arm(
-        [
-            {
-                "joint": Joint("revolute", (0.0, -1.0, 0.0), (0.0, 0.0, drop[i]), damping=arm.damping[i]),
-                "mass": link.mass,
-                "center": (0.0, 0.0, -link.center),
-                "inertia": (link.inertia, link.inertia, 0.0),
-            }
-            for i, link in enumerate(arm.links)
-        ],
-        gravity=(0.0, 0.0, -arm.gravity),
-    )

@@ -14,7 +14,7 @@ from dynamics.systems.model import as_system
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
-def random_arm(n: int, seed: int = 0, model: str = "rod", damped: bool = True) -> dyn.PlanarArm:
+def random_arm(n: int, seed: int = 0, model: str = "rod", damped: bool = True) -> dyn.Mechanism:
     """An arm of n unlike links."""
     rng = np.random.default_rng((n, seed))
     masses, lengths = rng.uniform(0.5, 1.5, n).tolist(), rng.uniform(0.5, 1.5, n).tolist()

@@ -7,16 +7,17 @@ import pinocchio
 
 import dynamics as dyn
 from dynamics.multibody.mechanism import WORLD
+from dynamics.multibody.planar_arm import planar_links
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
-def pinocchio_model(arm: dyn.PlanarArm) -> Any:
+def pinocchio_model(arm: dyn.Mechanism) -> Any:
     """The arm joint by joint: hinges about -y, links along -z, so that a positive angle swings it towards +x."""
     model = pinocchio.Model()
-    model.gravity.linear = np.array([0.0, 0.0, -arm.gravity])
+    model.gravity.linear = np.array(arm.gravity)
     joint, drop = 0, 0.0
-    for i, link in enumerate(arm.links):
+    for i, link in enumerate(planar_links(arm)):
         axis = pinocchio.JointModelRevoluteUnaligned(np.array([0.0, -1.0, 0.0]))
         joint = model.addJoint(joint, axis, pinocchio.SE3(np.eye(3), np.array([0.0, 0.0, -drop])), f"joint {i + 1}")
         body = pinocchio.Inertia(link.mass, np.array([0.0, 0.0, -link.center]), link.inertia * np.eye(3))

@@ -14,7 +14,7 @@ from dynamics.experiments.paper_numbers.free_fall import (
     mujoco_free_fall,
 )
 from dynamics.experiments.text_table import csv_text
-from dynamics.io.mujoco_model import frames
+from dynamics.io.mujoco_render import frames
 
 from ..pages import html
 from ..plots import plot

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...io.mujoco_model import MujocoTwin
+from ...multibody.mechanism import require_mechanism
 from ...scenes.scenes import Scene
 from ...simulation.simulate import simulate
 from ...simulation.trajectory import Trajectory
@@ -36,7 +37,7 @@ class MujocoFreeFall:
 def free_fall(scene: Scene, dt: float = 1e-3) -> FreeFall:
     """The scene's motion by RK4 on the graph's forward dynamics."""
     trajectory = simulate(scene, scene.q, scene.qd, scene.t_end, "rk4", dt=dt)
-    return FreeFall(scene, trajectory, scene.model.joint_positions(trajectory.q))
+    return FreeFall(scene, trajectory, require_mechanism(scene, "a fall").joint_positions(trajectory.q))
 
 
 def mujoco_free_fall(run: FreeFall) -> MujocoFreeFall:

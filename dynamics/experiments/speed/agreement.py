@@ -10,7 +10,8 @@ import cgraph as cg
 
 from ...equations.equations_of_motion import bias, forward_dynamics, mass_matrix
 from ...equations.formulations import inverse_dynamics
-from ...multibody.planar_arm import PlanarArm, planar_arm
+from ...multibody.mechanism import Mechanism
+from ...multibody.planar_arm import planar_arm
 from ...peers.case import Case
 from ...peers.mujoco import MujocoPeer
 from ...peers.pinocchio import PinocchioPeer
@@ -38,14 +39,14 @@ def agreement(links: int = LINKS, count: int = STATES) -> Iterator[str]:
             yield "\n".join([title, *table(["links", *QUANTITIES], rows, left=())])
 
 
-def random_arm(n: int, mass_model: str) -> PlanarArm:
+def random_arm(n: int, mass_model: str) -> Mechanism:
     """An arm of n unlike links with damping."""
     rng = np.random.default_rng(n)
     masses, lengths, damping = (rng.uniform(low, 3.0 * low, n).tolist() for low in (0.5, 0.5, 0.15))
     return planar_arm(masses, lengths, damping, mass_model)
 
 
-def differences(arm: PlanarArm, peer: MujocoPeer | PinocchioPeer, count: int) -> dict[str, float]:
+def differences(arm: Mechanism, peer: MujocoPeer | PinocchioPeer, count: int) -> dict[str, float]:
     """The largest difference of each quantity over random states, relative to its largest entry at the state."""
     functions = {name: cg.compile(make(arm)) for name, make in QUANTITIES.items()}
     rng = np.random.default_rng((len(arm.links), 1))

@@ -78,7 +78,7 @@ def bench(
     for name, scene in loads.items():  # a wrong name is told before anything is measured
         model = scene()
         cases[name] = Case(name, model)
-        for what in model.left_out:
+        for what in model.omitted:
             say(f"{name}: left out {what}")
     wanted = [name for name, kind in PEERS.items() if name == OURS or (name in peers and kind.installed)]
     asked = {task: [mode for mode in MODES if mode in modes] for task in TASKS if task in tasks}

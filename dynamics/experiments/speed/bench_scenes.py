@@ -12,12 +12,12 @@ import numpy as np
 from ... import scenes
 from ...multibody.body import WORLD, Body, Joint
 from ...multibody.mechanism import Mechanism
-from ...multibody.planar_arm import PlanarArm, planar_arm
+from ...multibody.planar_arm import planar_arm
 from ...multibody.spatial import rotation
 from ...scenes import Scene
 
 
-def chain(mass: float, length: float, n: int) -> PlanarArm:
+def chain(mass: float, length: float, n: int) -> Mechanism:
     """A planar chain of n equal rods with damping."""
     return planar_arm([mass] * n, [length] * n, damping=0.1)
 
@@ -48,11 +48,11 @@ def _body(i: int, parent: str, rng: np.random.Generator) -> Body:
     )
 
 
-def _at_rest(name: str, n: int, build: Callable[[int], PlanarArm | Mechanism]) -> Scene:
+def _at_rest(name: str, n: int, build: Callable[[int], Mechanism]) -> Scene:
     return Scene(name, f"a mechanism of the bench with {n} joints", build(n), (0.0,) * n, (0.0,) * n, 3.0)
 
 
-_MODELS: dict[str, Callable[[int], PlanarArm | Mechanism]] = {
+_MODELS: dict[str, Callable[[int], Mechanism]] = {
     "planar 3": lambda _: planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7], damping=0.1),
     "planar 7": partial(chain, 0.5, 0.5),
     "planar 20": partial(chain, 0.2, 0.2),

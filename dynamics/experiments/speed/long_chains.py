@@ -12,7 +12,8 @@ import numpy as np
 import cgraph as cg
 
 from ...equations.equations_of_motion import bias, forward_dynamics, mass_matrix
-from ...multibody.planar_arm import PlanarArm, planar_arm
+from ...multibody.mechanism import Mechanism
+from ...multibody.planar_arm import planar_arm
 from ...peers.dense_solve import dense_solve
 from ...reference.planar_arm_equations import accelerations
 from ...reference.spatial_chain_equations import chain_accelerations
@@ -29,7 +30,7 @@ SIZES = (("planar", 10), ("planar", 100), ("planar", 300), ("3D", 10), ("3D", 10
 DENSE = {"planar": 30, "3D": 10}  # links; beyond, the graph of the dense solve, which grows with n^3, takes long
 
 
-def planar(n: int) -> PlanarArm:
+def planar(n: int) -> Mechanism:
     """A planar chain of unlike rods."""
     masses, lengths = [0.2 + 0.05 * (i % 3) for i in range(n)], [0.2 + 0.1 * (i % 2) for i in range(n)]
     return planar_arm(masses, lengths, damping=0.1)

@@ -25,7 +25,8 @@ from cgraph import Compiled, Graph, Node
 
 from ...equations.equations_of_motion import forward_dynamics
 from ...equations.formulations import inverse_dynamics
-from ...multibody.planar_arm import PlanarArm, planar_arm
+from ...multibody.mechanism import Mechanism
+from ...multibody.planar_arm import planar_arm, planar_links
 from ...reference.planar_arm_equations import Pair, accelerations, torques
 from ...systems.system import System
 from ..planar_by_centers import by_centers
@@ -136,7 +137,7 @@ def measurement(family: Family, arms: Arms) -> Measurement:
     return Measurement(f"{n} links", worst, BOUND, "ulp", why)
 
 
-def arm_of(family: Family, n: int, rng: np.random.Generator) -> PlanarArm:
+def arm_of(family: Family, n: int, rng: np.random.Generator) -> Mechanism:
     """A random arm of the family."""
     masses, lengths = rng.uniform(0.5, 1.5, n), rng.uniform(0.5, 1.5, n)
     changed = slice(n - 1, n) if family.last else slice(1, n, 2)
@@ -152,7 +153,7 @@ class Arms:
         self.task, self.n, self.backends = task, n, backends
         self._graph = task.derive(arm_with_parameters(n))
 
-    def functions(self, arm: PlanarArm) -> list[Compiled]:
+    def functions(self, arm: Mechanism) -> list[Compiled]:
         """What evaluates the task, one for each backend; in double-double one for all arms."""
         return self._doubled if self.task.doubled else self._compiled(self.task.derive(arm))
 
@@ -163,16 +164,16 @@ class Arms:
     def _compiled(self, graph: Graph) -> list[Compiled]:
         return [cg.compile(graph, backend) for backend in self.backends]
 
-    def with_parameters(self, arm: PlanarArm, point: Array) -> Array:
+    def with_parameters(self, arm: Mechanism, point: Array) -> Array:
         """The inputs of the graph whose parameters are inputs: the point (3n,), and then those of the arm."""
-        rows = [(each.mass, each.length, each.center, each.inertia) for each in arm.links]
-        return np.array([*point, *np.array(rows).T.ravel(), *arm.damping, arm.gravity])
+        rows = [(each.mass, each.length, each.center, each.inertia) for each in planar_links(arm)]
+        return np.array([*point, *np.array(rows).T.ravel(), *arm.system.damping, -np.asarray(arm.gravity)[2]])
 
     @cached_property
     def _slopes(self) -> Compiled:
         return cg.compile(cg.simplify(cg.jvp(self._graph)), "numpy")
 
-    def condition(self, arm: PlanarArm, point: Array) -> Array:
+    def condition(self, arm: Mechanism, point: Array) -> Array:
         """sum_j |df_i/dx_j| |x_j| over all inputs and parameters, (n,), by the JVP of the graph.
 
         point: (3n,), angles, velocities, and the third.

@@ -10,6 +10,7 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.coriolis import coriolis, damping_force
 from dynamics.equations.evaluate_at import evaluate_at
+from dynamics.multibody.planar_arm import planar_links
 from dynamics.systems.model import as_system
 from tests.dynamics.mechanisms import FAMILIES
 from tests.dynamics.models import MODELS, Array, magnetic, random_arm, relativistic, states
@@ -48,7 +49,8 @@ def test_of_two_links_it_is_the_textbook_s() -> None:
     arm = random_arm(2)
     given = states(arm, 10)
     q, qd = given["q"], given["qd"]
-    h = -arm.links[1].mass * arm.links[0].length * arm.links[1].center * np.sin(q[:, 1])
+    one, two = planar_links(arm)
+    h = -two.mass * one.length * two.center * np.sin(q[:, 1])
     rows = [[h * qd[:, 1], h * (qd[:, 0] + qd[:, 1])], [-h * qd[:, 0], 0 * h]]
     found = matrix(coriolis(arm), arm, q=q, qd=qd)
     assert found == approx(np.moveaxis(np.array(rows), 2, 0), rel=ROUNDING, abs=EPSILON)
@@ -86,5 +88,5 @@ def test_damping_takes_its_coefficient_times_the_velocity() -> None:
     arm = random_arm(3)
     graph = damping_force(arm)
     qd = np.array([1.0, -2.0, 3.0])
-    assert evaluate_at(arm.system, graph, {"qd": qd, "q": qd}) == approx(np.array(arm.damping) * qd)
+    assert evaluate_at(arm.system, graph, {"qd": qd, "q": qd}) == approx(np.array(arm.system.damping) * qd)
     assert {tag for node in graph.nodes for tag in node.tags} == {"damping"}

@@ -10,7 +10,7 @@ import dynamics as dyn
 FROM_6_TO_40 = (6, 8, 10, 13, 17, 22, 30, 40)
 
 
-def equal_links(n: int) -> dyn.PlanarArm:
+def equal_links(n: int) -> dyn.Mechanism:
     return dyn.planar_arm([0.9] * n, [0.7] * n)
 
 

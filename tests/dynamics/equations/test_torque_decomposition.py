@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pytest import approx
@@ -10,6 +12,7 @@ import dynamics as dyn
 from dynamics.equations.evaluate_at import evaluate_at
 from dynamics.equations.torque_decomposition import torque_by_joint_motion, torque_by_link
 from dynamics.equations.torque_table import TorqueTable
+from dynamics.multibody.planar_arm import planar_links
 from dynamics.systems.model import as_system
 from tests.dynamics.mechanisms import FAMILIES, turned_tree
 from tests.dynamics.models import MODELS, Array, at, random_arm, states
@@ -32,13 +35,11 @@ def test_the_cells_add_up_to_inverse_dynamics(name: str, table: str) -> None:
     assert found.total == approx(tau, abs=ROUNDING * abs(tau).max())
 
 
-def lighter(arm: dyn.PlanarArm, without: int) -> dyn.PlanarArm:
+def lighter(arm: dyn.Mechanism, without: int) -> dyn.Mechanism:
     """The arm with next to nothing left of one link but its length."""
-    links = [
-        dyn.Link(NOTHING, link.length, link.center, NOTHING) if i == without else link
-        for i, link in enumerate(arm.links)
-    ]
-    return dyn.PlanarArm(tuple(links), arm.damping, arm.gravity)
+    bodies = list(arm.bodies)
+    bodies[without] = replace(bodies[without], mass=NOTHING, inertia=(NOTHING, NOTHING, 0.0))
+    return dyn.Mechanism(bodies, arm.gravity)
 
 
 @pytest.mark.parametrize("k", range(3))
@@ -70,7 +71,8 @@ def test_half_of_a_coriolis_force_belongs_to_each_of_its_velocities() -> None:
     """Two links: tau_0 has 2 h qd0 qd1 + h qd1^2, of which joint 1 has h qd0 qd1 + h qd1^2; tau_1 has -h qd0^2."""
     arm = random_arm(2, damped=False)
     q, qd = np.array([0.3, 0.7]), np.array([1.1, -0.6])
-    h = -arm.links[1].mass * arm.links[0].length * arm.links[1].center * np.sin(q[1])
+    one, two = planar_links(arm)
+    h = -two.mass * one.length * two.center * np.sin(q[1])
     expected = h * np.array([[qd[0] * qd[1], qd[0] * qd[1] + qd[1] ** 2], [-(qd[0] ** 2), 0.0]])
     assert torque_by_joint_motion(arm).at(q, qd).values[:, :2] == approx(expected)
 

@@ -13,14 +13,13 @@ from dynamics.experiments.speed.agreement import QUANTITIES, differences, random
 from dynamics.experiments.speed.bench_scenes import turned_arm
 from dynamics.experiments.speed.build_time import build_time
 from dynamics.experiments.speed.figures import FIGURES
-from dynamics.experiments.speed.node_counts import VARIANTS, variant_graph
+from dynamics.experiments.speed.node_counts import VARIANTS
 from dynamics.experiments.text_table import WIDTH, csv_text, table
 from dynamics.peers import PEERS, Case
 from viz import cli
 
 ROUNDING = 1e-11  # relative, of accelerations of seven bodies by another order of operations
 POINTS = 1e-11  # of point masses, whose inertia MuJoCo's format does not take as exactly zero
-NO_SAVING = {"every idea", "no rates but qd"}  # bodies know their bias, so no rates are looked for
 
 
 def accelerations(graph: Any) -> Any:
@@ -28,12 +27,13 @@ def accelerations(graph: Any) -> Any:
     return np.array(list(graph.evaluate(dict(zip(graph.input_names, x.tolist(), strict=True))).values()))
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
-def test_a_variant_computes_the_same_with_more_nodes(variant: str) -> None:
-    base, other = dyn.forward_dynamics(turned_arm(7)), variant_graph(variant, turned_arm(7))
+@pytest.mark.parametrize("name", VARIANTS)
+def test_a_variant_computes_the_same_with_more_nodes(name: str) -> None:
+    variant = VARIANTS[name]
+    model = _planar() if variant.planar else turned_arm(7)
+    base, other = dyn.forward_dynamics(model, "recursive"), variant.graph(model)
     assert accelerations(other) == pytest.approx(accelerations(base), rel=ROUNDING)
-    assert (len(other.nodes) > len(base.nodes)) is (variant not in NO_SAVING)
-    assert len(dyn.forward_dynamics(turned_arm(7)).nodes) == len(base.nodes)  # the library is as it was
+    assert (len(other.nodes) > len(base.nodes)) is (name != "every idea")
 
 
 @pytest.mark.parametrize("mass_model", ["rod", "point"])
@@ -94,7 +94,7 @@ def test_the_command_prints_a_figure(capsys: pytest.CaptureFixture[str]) -> None
     assert [line.split("  ")[0] for line in lines[2:]] == list(VARIANTS)
 
 
-def _planar() -> dyn.PlanarArm:
+def _planar() -> dyn.Mechanism:
     return dyn.planar_arm([0.9] * 3, [0.7] * 3, damping=0.1)
 
 

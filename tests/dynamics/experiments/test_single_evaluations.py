@@ -17,7 +17,7 @@ EXACT = 1e-13  # of the largest value: differences of 80 digits, and rounding of
 SLOPES = 1e-5  # relative: central differences with steps of 1e-7
 
 
-def random_arm(n: int) -> tuple[dyn.PlanarArm, Array, Array, Array]:
+def random_arm(n: int) -> tuple[dyn.Mechanism, Array, Array, Array]:
     rng = np.random.default_rng(n)
     arm = dyn.planar_arm(rng.uniform(0.5, 1.5, n).tolist(), rng.uniform(0.5, 1.5, n).tolist(), 0.1)
     q, qd, third = rng.uniform(-3.0, 3.0, n), rng.normal(size=n), rng.normal(size=n)
@@ -119,7 +119,7 @@ def test_a_constant_that_is_off_is_seen() -> None:
     task = single_evaluations.TASKS["forward dynamics"]
 
     def off(arm: Any) -> cg.Graph:
-        if not isinstance(arm, dyn.PlanarArm):
+        if not isinstance(arm, dyn.Mechanism):
             return task.derive(arm)
         first = replace(arm.links[0], mass=arm.links[0].mass * (1.0 + 1e-13))
         return task.derive(replace(arm, links=(first, *arm.links[1:])))

@@ -239,9 +239,8 @@ def test_what_is_not_modelled_is_refused_by_name(text: str, what: str) -> None:
 
 @mark.parametrize(("text", "what"), NOT_MODELLED)
 def test_what_is_not_modelled_is_left_out_on_request(text: str, what: str) -> None:
-    left_out: list[str] = []
-    mechanism = dyn.load_mjcf(text, ignore=True, left_out=left_out)
-    assert left_out == [what]
+    mechanism = dyn.load_mjcf(text, ignore=True)
+    assert mechanism.omitted == (what,)
     assert len(mechanism.system.coordinates) == 1
 
 
@@ -264,21 +263,18 @@ def test_a_free_joint_left_out_is_a_weld() -> None:
     ],
 )
 def test_what_the_options_switch_off_is_not_missed(text: str, flag: str) -> None:
-    left_out: list[str] = []
-    dyn.load_mjcf(text.replace("<mujoco>", f'<mujoco><option><flag {flag}="disable"/></option>'), left_out=left_out)
-    assert left_out == []
+    loaded = dyn.load_mjcf(text.replace("<mujoco>", f'<mujoco><option><flag {flag}="disable"/></option>'))
+    assert loaded.omitted == ()
 
 
 def test_what_acts_from_outside_is_listed_and_no_error() -> None:
-    left_out: list[str] = []
-    dyn.load_mjcf(
+    loaded = dyn.load_mjcf(
         mjcf(
             '<geom type="plane" size="1 1 1"/>'
             '<body><joint name="j" range="-30 30"/><geom size="0.1" pos="0.2 0 0"/></body>'
         ).replace("</mujoco>", '<actuator><motor joint="j"/></actuator></mujoco>'),
-        left_out=left_out,
     )
-    assert left_out == ["contacts", "joint limits (j)", "actuators (1)"]
+    assert loaded.omitted == ("contacts", "joint limits (j)", "actuators (1)")
 
 
 # --- URDF
@@ -304,9 +300,8 @@ def turned(roll: float, pitch: float, yaw: float) -> np.ndarray:
 @recent
 def test_a_urdf_arm_is_what_it_says() -> None:
     """Its numbers put in by hand; the meshes are nowhere."""
-    left_out: list[str] = []
-    loaded = dyn.load_urdf(URDF, left_out=left_out)
-    assert left_out == ["joint limits (j1, j3)"]
+    loaded = dyn.load_urdf(URDF)
+    assert loaded.omitted == ("joint limits (j1, j3)",)
     assert loaded.system.coordinates == ("l1", "l2", "l3")
     principal = turned(0.1, 0.2, 0.3)
     inertia = principal @ np.array([[0.1, 0.01, 0], [0.01, 0.2, 0], [0, 0, 0.15]]) @ principal.T

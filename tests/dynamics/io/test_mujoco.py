@@ -6,6 +6,7 @@ from pytest import approx, fixture, mark
 import cgraph as cg
 import dynamics as dyn
 from dynamics.io.mujoco_model import MujocoTwin, to_mjcf
+from dynamics.multibody.planar_arm import planar_links
 from tests.dynamics.models import Array, at, error, random_arm, states
 
 STATES = 100
@@ -65,8 +66,8 @@ def test_the_flawed_torque_does_not_agree() -> None:
         assert error(ours, pair.twin.inverse(q, qd, qdd)) > 1e-3
 
 
-def motion(arm: dyn.PlanarArm, q: Array, t_end: float, dt: float) -> tuple[dyn.Trajectory, tuple[Array, Array]]:
-    still = np.zeros(len(arm.links))
+def motion(arm: dyn.Mechanism, q: Array, t_end: float, dt: float) -> tuple[dyn.Trajectory, tuple[Array, Array]]:
+    still = np.zeros(len(arm.moving))
     return dyn.simulate(arm, q, still, t_end, dt=dt), MujocoTwin(arm, dt).trajectory(q, still, round(t_end / dt))
 
 
@@ -91,11 +92,11 @@ def test_an_undamped_arm_of_five_moves_as_in_mujoco() -> None:
 def test_the_model_is_the_arm_number_by_number() -> None:
     arm = random_arm(3)
     model = MujocoTwin(arm, timestep=2e-3).model
-    assert model.body_mass[1:].tolist() == [link.mass for link in arm.links]
-    assert model.body_ipos[1:, 2].tolist() == [-link.center for link in arm.links]
-    assert model.body_inertia[1:, 1].tolist() == [link.inertia for link in arm.links]
-    assert model.body_pos[1:, 2].tolist() == [0.0, -arm.links[0].length, -arm.links[1].length]
-    assert model.dof_damping.tolist() == list(arm.damping)
+    assert model.body_mass[1:].tolist() == [link.mass for link in planar_links(arm)]
+    assert model.body_ipos[1:, 2].tolist() == [-link.center for link in planar_links(arm)]
+    assert model.body_inertia[1:, 1].tolist() == [link.inertia for link in planar_links(arm)]
+    assert model.body_pos[1:, 2].tolist() == [0.0, -planar_links(arm)[0].length, -planar_links(arm)[1].length]
+    assert model.dof_damping.tolist() == list(arm.system.damping)
     assert (model.opt.timestep, model.opt.gravity.tolist()) == (2e-3, [0.0, 0.0, -9.81])
 
 

@@ -19,13 +19,13 @@ pytest.importorskip("flint")
 TOLERANCE = {10: 1e-14, 100: 1e-12, 300: 1e-12}
 
 
-def planar(n: int) -> dyn.PlanarArm:
+def planar(n: int) -> dyn.Mechanism:
     return dyn.planar_arm(
         [0.2 + 0.05 * (i % 3) for i in range(n)], [0.2 + 0.1 * (i % 2) for i in range(n)], damping=0.1
     )
 
 
-def planar_accelerations(arm: dyn.PlanarArm, q: Array, qd: Array, tau: Array) -> Array:
+def planar_accelerations(arm: dyn.Mechanism, q: Array, qd: Array, tau: Array) -> Array:
     return accelerations(arm, q, qd, tau).high
 
 

@@ -11,7 +11,7 @@ from pytest import approx, mark
 import dynamics as dyn
 from cgraph import Graph
 from dynamics.multibody.mechanism import WORLD, Body, Joint, Mechanism
-from tests.dynamics.mechanisms import FAMILIES, in_space, random_body, random_mechanism, turned_arm, turned_tree
+from tests.dynamics.mechanisms import FAMILIES, random_body, random_mechanism, turned_arm, turned_tree
 from tests.dynamics.models import Array
 
 AGREEMENT = 1e-12  # of the largest force or acceleration: two ways of rounding
@@ -34,13 +34,10 @@ def in_a_plane_and_out() -> Mechanism:
     ], (1.0, 2.0, -9.0))  # fmt: skip
 
 
-MODELS: dict[str, Callable[[], Mechanism | dyn.PlanarArm]] = {
-    name: lambda make=make: make(6) for name, make in FAMILIES.items()
-} | {
+MODELS: dict[str, Callable[[], Mechanism]] = {name: lambda make=make: make(6) for name, make in FAMILIES.items()} | {
     "slides first": lambda: random_mechanism(7, ["prismatic", "prismatic", "revolute"], 2),
     "quarter turns": lambda: turned_arm(5),
     "tree": lambda: turned_tree(7),
-    "plane": lambda: in_space(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7])),
     "plane and out": in_a_plane_and_out,
     "no gravity": lambda: replace(FAMILIES["mixed"](5), gravity=(0.0, 0.0, 0.0)),
     "regrouped": lambda: replace(FAMILIES["branched"](6), base_parameters=True),
@@ -51,7 +48,7 @@ MODELS: dict[str, Callable[[], Mechanism | dyn.PlanarArm]] = {
 }
 
 
-def by_lagrange(mechanism: Mechanism | dyn.PlanarArm) -> dyn.System:
+def by_lagrange(mechanism: Mechanism) -> dyn.System:
     """The same energy, in a system that knows no more."""
     system = mechanism.system
     return dyn.System(lambda q, qd, t: list(system.partial_lagrangians), system.coordinates, damping=system.damping)

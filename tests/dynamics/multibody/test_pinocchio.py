@@ -21,7 +21,7 @@ def test_torques_accelerations_mass_matrix_and_bias_agree(n: int, model: str) ->
     arm = random_arm(n, seed=2, model=model)
     peer = pinocchio_model(arm)
     data = peer.createData()
-    damping = np.array(arm.damping)
+    damping = np.array(arm.system.damping)
     inverse, forward, inertia, bias = (
         cg.compile(make(arm)) for make in (dyn.inverse_dynamics, dyn.forward_dynamics, dyn.mass_matrix, dyn.bias)
     )

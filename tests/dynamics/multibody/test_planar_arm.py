@@ -8,13 +8,14 @@ from mpmath import mp, mpf
 from pytest import approx, mark
 
 import dynamics as dyn
+from dynamics.multibody.planar_arm import planar_links
 from dynamics.systems.model import as_system
 from tests.dynamics.models import at, random_arm, run, states
 
 ROUNDING = 1e-13
 
 
-def particles(arm: dyn.PlanarArm, model: str, q: list[Any]) -> list[tuple[float, Any, Any]]:
+def particles(arm: dyn.Mechanism, model: str, q: list[Any]) -> list[tuple[float, Any, Any]]:
     """(mass, x, y) of point masses that move as the arm does, from the words of `planar_arm` alone.
 
     A rod is two half masses at its Gauss points: its velocity squared is quadratic along it, so the sum is exact.
@@ -22,7 +23,7 @@ def particles(arm: dyn.PlanarArm, model: str, q: list[Any]) -> list[tuple[float,
     places = [(1.0, 1.0)] if model == "point" else [(0.5, (1 + s / mp.sqrt(3)) / 2) for s in (-1, 1)]
     x, y, angle = mpf(0), mpf(0), mpf(0)
     result = []
-    for link, turn in zip(arm.links, q, strict=True):
+    for link, turn in zip(planar_links(arm), q, strict=True):
         angle += turn
         right, up = link.length * mp.sin(angle), -link.length * mp.cos(angle)
         result += [(share * link.mass, x + part * right, y + part * up) for share, part in places]
@@ -45,7 +46,9 @@ def test_energy_and_lagrangian_are_those_of_the_arm_s_particles(n: int, model: s
         kinetic = float(kinetic / (8 * h * h))
         potential = float(sum(m * mpf(9.81) * y for m, _, y in particles(arm, model, q)))
     system = as_system(arm)
-    size = ROUNDING * (abs(kinetic) + sum(9.81 * link.mass for link in arm.links) * sum(x.length for x in arm.links))
+    size = ROUNDING * (
+        abs(kinetic) + sum(9.81 * link.mass for link in planar_links(arm)) * sum(x.length for x in planar_links(arm))
+    )
     lagrangian = run(system.graph({"L": system.lagrangian}, system.q, system.qd), state)[0]
     assert run(dyn.energy(arm), state)[0] == approx(kinetic + potential, rel=0.0, abs=size)
     assert lagrangian == approx(kinetic - potential, rel=0.0, abs=size)
@@ -79,14 +82,14 @@ def test_gravity_pulls_a_raised_arm_down() -> None:
 
 @mark.parametrize(("model", "center", "inertia"), [("rod", 0.6, 2.0 * 1.2**2 / 12), ("point", 1.2, 0.0)])
 def test_a_link_is_what_its_model_says(model: str, center: float, inertia: float) -> None:
-    (link,) = dyn.planar_arm([2.0], [1.2], mass_model=model).links
+    (link,) = planar_links(dyn.planar_arm([2.0], [1.2], mass_model=model))
     assert (link.mass, link.length, link.center) == (2.0, 1.2, center)
     assert link.inertia == approx(inertia, rel=1e-15)
 
 
 def test_one_damping_is_for_all_joints() -> None:
-    assert dyn.planar_arm([1.0, 1.0], [1.0, 1.0], damping=0.2).damping == (0.2, 0.2)
-    assert dyn.planar_arm([1.0, 1.0], [1.0, 1.0], damping=[0.1, 0.3]).damping == (0.1, 0.3)
+    assert dyn.planar_arm([1.0, 1.0], [1.0, 1.0], damping=0.2).system.damping == (0.2, 0.2)
+    assert dyn.planar_arm([1.0, 1.0], [1.0, 1.0], damping=[0.1, 0.3]).system.damping == (0.1, 0.3)
 
 
 def test_a_graph_has_inputs_in_the_order_of_the_links() -> None:
@@ -110,15 +113,17 @@ def test_a_scene_runs_from_its_start(name: str) -> None:
 
 def test_the_triple_pendulum_is_the_paper_s() -> None:
     scene = dyn.scenes.load("triple_pendulum")
-    assert [(link.mass, link.length) for link in scene.model.links] == [(1.0, 1.0), (0.8, 0.8), (0.7, 0.7)]
-    assert (scene.model.damping, scene.model.gravity) == ((0.1, 0.1, 0.1), 9.81)
+    assert [(link.mass, link.length) for link in planar_links(scene.model)] == [(1.0, 1.0), (0.8, 0.8), (0.7, 0.7)]
+    assert (scene.system.damping, scene.model.gravity) == ((0.1, 0.1, 0.1), (0.0, 0.0, -9.81))
     assert (scene.q, scene.qd) == ((math.pi / 2, 0.0, 0.0), (0.0, 0.0, 0.0))
-    assert {link.inertia for link in dyn.scenes.load("triple_pendulum", mass_model="point").model.links} == {0.0}
+    assert {link.inertia for link in planar_links(dyn.scenes.load("triple_pendulum", mass_model="point").model)} == {
+        0.0
+    }
 
 
 @mark.parametrize("n", [1, 4, 10])
 def test_a_chain_weighs_a_kilogram_and_is_a_metre_long_however_many_links(n: int) -> None:
-    links = dyn.scenes.load("chain", n=n).model.links
+    links = planar_links(dyn.scenes.load("chain", n=n).model)
     assert len(links) == n
     assert (sum(x.mass for x in links), sum(x.length for x in links)) == approx((1.0, 1.0), rel=1e-15)
 

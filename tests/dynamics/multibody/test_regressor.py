@@ -9,8 +9,8 @@ from pytest import approx
 import dynamics as dyn
 from dynamics.equations.evaluate_at import evaluate_at
 from dynamics.multibody.regressor import inertial_parameters, regressor
-from tests.dynamics.mechanisms import FAMILIES, in_space, turned_arm
-from tests.dynamics.models import Array, at, random_arm, states
+from tests.dynamics.mechanisms import FAMILIES, turned_arm
+from tests.dynamics.models import Array, at, states
 
 ROUNDING = 1e-12
 
@@ -36,7 +36,7 @@ def test_times_the_parameters_it_is_the_torque_of_the_bodies(family: str) -> Non
 
 def test_of_a_pendulum_it_is_the_textbook_s() -> None:
     """About -y, hanging down: tau = Iyy qdd + g (mx cos q - mz sin q), and nothing else counts."""
-    arm = in_space(dyn.planar_arm([3.0], [2.0]))
+    arm = dyn.planar_arm([3.0], [2.0])
     q, qdd = 0.4, 1.7
     found = value(arm, {"q": np.array([q]), "qd": np.array([5.0]), "qdd": np.array([qdd])})[0, 0, 0]
     expected = {"mx": 9.81 * np.cos(q), "mz": -9.81 * np.sin(q), "Iyy": qdd}
@@ -87,5 +87,5 @@ def test_it_is_small_and_free_of_the_parameters() -> None:
 
 
 def test_another_model_is_refused() -> None:
-    with pytest.raises(TypeError, match="a regressor needs a Mechanism, got PlanarArm"):
-        regressor(random_arm(2))
+    with pytest.raises(TypeError, match="a regressor needs a Mechanism, got OdeSystem"):
+        regressor(dyn.OdeSystem(lambda x, t: [-x[0]], ["x"]))

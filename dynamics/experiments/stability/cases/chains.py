@@ -9,7 +9,7 @@ import cgraph as cg
 
 from ....equations.equations_of_motion import momentum
 from ....multibody.mechanism import Body, Joint, Mechanism
-from ....multibody.planar_arm import PlanarArm, planar_arm
+from ....multibody.planar_arm import planar_arm
 from ....reference import closed_forms
 from ....systems.system import System
 from .case import GROWN, RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion, error_criterion
@@ -21,7 +21,7 @@ UNIT = 2.0**-53  # rounding of float64
 def _two_links(
     name: str,
     about: str,
-    arm: PlanarArm,
+    arm: Mechanism,
     fastest: float,
     bend: float,
     criteria: tuple[Criterion, ...],

@@ -22,7 +22,7 @@ from tests.strategies import Case, cases
 x, y, z = cg.variables("x y z")
 
 
-def arm(n: int) -> dyn.PlanarArm:
+def arm(n: int) -> dyn.Mechanism:
     return dyn.planar_arm([1.0] * n, [1.0] * n)
 
 

@@ -1,0 +1,146 @@
+"""The motion and the energy of bodies as nodes, each from the motion of the body that carries it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import cgraph as cg
+from cgraph import Node
+
+from . import spatial
+from .joints import JointType
+from .link import Link
+from .spatial import STILL, ZERO, Triple
+
+
+class PlaneAngle(NamedTuple):
+    """How far a body is turned about z from axes that do not turn with it."""
+
+    angle: Node
+    cos: Node
+    sin: Node
+
+
+class Motion(NamedTuple):
+    """How a body's frame moves, in axes whose z is the joint's axis: the body's own.
+
+    vertical, depth, strength: a mass m at r from the origin has the potential energy m strength (depth + vertical . r).
+    plane: of a body that turns about z alone, whose axes are those of the plane it moves in: the body is turned from
+    them. What does not turn with the body is then constant, and velocities are rates of positions.
+    """
+
+    omega: Triple  # angular velocity
+    velocity: Triple  # of the origin
+    vertical: Triple  # upward, as long as gravity is strong; or downward, of length 1
+    depth: Node  # of the origin along it
+    strength: float = 1.0  # 1 in the first case, -g [m/s^2] in the second
+    plane: PlaneAngle | None = None
+
+
+def ground(gravity: ArrayLike, *, in_plane: bool = False) -> Motion:
+    """The world at rest.
+
+    in_plane: all bodies turn about parallel axes. Then g is kept apart from the vertical, so that heights are lengths:
+    fewer nodes. In space the vertical has three components, which had better be scaled once.
+    """
+    pull = np.asarray(gravity, dtype=np.float64)
+    g = float(np.linalg.norm(pull))
+    if not g:
+        return Motion(STILL, STILL, STILL, ZERO)
+    downward = spatial.snapped(pull / g)
+    if in_plane:
+        return Motion(STILL, STILL, spatial.constant(downward), ZERO, -g)
+    return Motion(STILL, STILL, spatial.constant(-g * downward), ZERO)
+
+
+def propagate_motion(parent: Motion, link: Link, joint: JointType, q: Node, qd: Node) -> Motion:
+    """The motion of a link from that of its parent."""
+    along = link.turn[2][2]  # the joint's axis on the parent's
+    parent = carrier_motion(parent, link)
+    offset = joint_translation(link, joint, q)
+    with cg.tag("kinetic"):
+        omega = spatial.rotate_transpose(link.turn, parent.omega)
+        relative = _in_plane_axes(parent, spatial.cross(parent.omega, offset))
+        velocity = spatial.rotate_transpose(link.turn, spatial.plus(parent.velocity, relative))
+    with cg.tag("potential"):
+        vertical = spatial.rotate_transpose(link.turn, parent.vertical)
+        depth = parent.depth + spatial.dot(parent.vertical, _in_plane_axes(parent, offset))
+    angle = joint.angle(q)
+    with cg.tag("kinetic"):
+        velocity = velocity[0], velocity[1], velocity[2] + joint.shift(qd)
+    if angle.value == 0.0:
+        plane = parent.plane and PlaneAngle(along * parent.plane.angle, parent.plane.cos, along * parent.plane.sin)
+        return Motion(omega, velocity, vertical, depth, parent.strength, plane)
+    if parent.plane or all(each.value == 0.0 for each in omega):
+        angle = along * parent.plane.angle + angle if parent.plane else angle
+        if not parent.plane and all(each.value == 0.0 for each in (*velocity, vertical[0], vertical[1])):
+            angle = ZERO  # all is alike about the axis, so the plane may as well turn with the first body
+        with cg.tag("kinetic"):
+            spin = omega[2] + joint.angle(qd)
+        plane = PlaneAngle(angle, cg.cos(angle), cg.sin(angle))
+        return Motion((ZERO, ZERO, spin), velocity, vertical, depth, parent.strength, plane)
+    c, s = cg.cos(angle), cg.sin(angle)
+    with cg.tag("kinetic"):
+        x, y, z = spatial.rotate_about_z(c, s, omega)
+        velocity = spatial.rotate_about_z(c, s, velocity)
+    with cg.tag("potential"):
+        vertical = spatial.rotate_about_z(c, s, vertical)
+    return Motion((x, y, z + joint.angle(qd)), velocity, vertical, depth, parent.strength)
+
+
+def carrier_motion(parent: Motion, link: Link) -> Motion:
+    """The parent's motion in the axes that the link is carried in: those of a plane where it stays in the plane."""
+    return in_body_axes(parent) if parent.plane and abs(link.turn[2][2]) != 1.0 else parent
+
+
+def joint_translation(link: Link, joint: JointType, q: Node) -> Triple:
+    """Where the link's origin is from its parent's, in the parent's axes."""
+    x, y, z = (row[2] * joint.shift(q) for row in link.turn)
+    return spatial.plus(link.place, (x, y, z))
+
+
+def in_body_axes(motion: Motion) -> Motion:
+    """The same motion in axes that turn with the body."""
+    if not motion.plane:
+        return motion
+    _, c, s = motion.plane
+    with cg.tag("kinetic"):
+        velocity = spatial.rotate_about_z(c, s, motion.velocity)
+    with cg.tag("potential"):
+        vertical = spatial.rotate_about_z(c, s, motion.vertical)
+    return Motion(motion.omega, velocity, vertical, motion.depth, motion.strength)
+
+
+def _in_plane_axes(motion: Motion, vector: Triple) -> Triple:
+    """A vector in the body's axes, in those of its motion."""
+    return spatial.rotate_about_z(motion.plane.cos, -motion.plane.sin, vector) if motion.plane else vector
+
+
+def energy(motion: Motion, link: Link, q: Node, qd: Node) -> Node:
+    """L_i = K_i - P_i with the first moment m c and the inertia J about the joint, without the center's velocity.
+
+    K = m v.v / 2 + m c . (v x w) + w . J w / 2,  P = m g h + g u . m c + spring.
+    """
+    own, inertia = in_body_axes(motion), link.inertia
+    omega, v = own.omega, motion.velocity
+    with cg.tag("kinetic"):
+        translation = 0.5 * link.mass * spatial.dot(v, v)
+        coupling = spatial.dot(spatial.cross(own.velocity, omega), link.moment)
+        rotation = 0.5 * spatial.total([inertia[i][i] * (omega[i] * omega[i]) for i in range(3)])
+        # Forward dynamics eliminates from the last term on: in these orders with the fewest and shallowest nodes.
+        if motion.plane:
+            terms = [rotation, translation, coupling]
+        else:
+            terms = [coupling, rotation] if translation.value == 0.0 else [translation, rotation, coupling]
+        terms += [inertia[i][j] * (omega[i] * omega[j]) for i in range(3) for j in range(i)]
+        terms.append(0.5 * link.armature * (qd * qd))
+        kinetic = spatial.total(terms)
+    with cg.tag("potential"):
+        stretch = q - link.spring_reference
+        weight = spatial.scaled(motion.strength, link.moment)
+        potential = link.mass * motion.strength * motion.depth + spatial.dot(own.vertical, weight)
+        potential = potential + 0.5 * link.stiffness * (stretch * stretch)
+    return kinetic - potential

@@ -1,0 +1,96 @@
+"""Modifications of a mechanism: joints locked and freed, subtrees taken off and hung on, states carried over."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .body import Body, MechanismError
+from .external_force import Force
+from .spatial import Array
+from .structure import Structure
+from .subtree import Subtree, as_subtree, descendants, inserted
+
+AnyStructure = TypeVar("AnyStructure", bound=Structure)
+
+
+def lock_joint(structure: AnyStructure, body: str, at: float) -> AnyStructure:
+    """The structure with the joint of a body standing still at a coordinate [rad or m]."""
+    return replace(structure, locked={**structure.locked, body: at})
+
+
+def unlock_joint(structure: AnyStructure, body: str) -> AnyStructure:
+    """The structure with a locked joint free again. Raises MechanismError for one that is not locked."""
+    if body not in structure.locked:
+        raise MechanismError(f"the joint of body {body!r:.80} is not locked")
+    return replace(structure, locked={name: at for name, at in structure.locked.items() if name != body})
+
+
+def subtree_of(structure: Structure, body: str) -> Subtree:
+    """A body and all that it carries. Raises MechanismError for an unknown body."""
+    names = descendants(structure.bodies, body)
+    bodies = {each.name: (place, each) for place, each in enumerate(structure.bodies) if each.name in names}
+    order = [body, *(name for name in bodies if name != body)]
+    forces = tuple([force for force in structure.forces if force.body in names])
+    return Subtree(
+        tuple([bodies[name][1] for name in order]),
+        bodies[body][1].parent,
+        tuple([bodies[name][0] for name in order]),
+        forces,
+        _used(structure, forces),
+        {name: at for name, at in structure.locked.items() if name in names},
+    )
+
+
+def detach_subtree(structure: AnyStructure, body: str) -> AnyStructure:
+    """The structure without a body and all that it carries. Raises MechanismError for an unknown body."""
+    names = descendants(structure.bodies, body)
+    forces = tuple([force for force in structure.forces if force.body not in names])
+    return replace(
+        structure,
+        bodies=tuple([each for each in structure.bodies if each.name not in names]),
+        forces=forces,
+        parameters=_used(structure, forces),
+        locked={name: at for name, at in structure.locked.items() if name not in names},
+    )
+
+
+def attach_subtree(
+    structure: AnyStructure, subtree: Subtree | Body | Iterable[Body], to: str | None = None
+) -> AnyStructure:
+    """The structure with a subtree hung on a body or the world; `to` is by default the subtree's own parent."""
+    given = as_subtree(subtree)
+    back = to is None or to == given.parent
+    bodies = given.with_parent(given.parent if to is None else to)
+    return replace(
+        structure,
+        bodies=tuple(inserted(tuple(structure.bodies), bodies, given.places if back else ())),
+        forces=(*structure.forces, *given.forces),
+        parameters={**structure.parameters, **given.parameters},
+        locked={**structure.locked, **given.locked},
+    )
+
+
+def map_state(
+    moving: Sequence[Body], other: Sequence[Body], other_locked: dict[str, float], q: ArrayLike, qd: ArrayLike
+) -> tuple[Array, Array]:
+    """The state of the other moving bodies as one of these: joints of bodies of the same name keep theirs."""
+    rows = [np.asarray(each, dtype=np.float64) for each in (q, qd)]
+    theirs = [body.name for body in other]
+    for name, row in zip(("q", "qd"), rows, strict=True):
+        if row.shape != (len(theirs),):
+            raise ValueError(f"{name} must have shape ({len(theirs)},), one for each joint, got {row.shape}")
+    positions = {**other_locked, **dict(zip(theirs, rows[0].tolist(), strict=True))}
+    rates = dict(zip(theirs, rows[1].tolist(), strict=True))
+    names = [body.name for body in moving]
+    return np.array([positions.get(n, 0.0) for n in names]), np.array([rates.get(n, 0.0) for n in names])
+
+
+def _used(structure: Structure, forces: Iterable[Force]) -> dict[str, float]:
+    """The parameters that these forces name."""
+    used = {name for force in forces for name in force.names}
+    return {name: value for name, value in structure.parameters.items() if name in used}

@@ -1,0 +1,64 @@
+"""SharedParts: what mechanisms that derive from one another by a change have in common, each computed once."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Node
+
+from .body import Body, checked
+from .body_motion import Motion, energy, propagate_motion
+from .link import Link, axes_of, link
+
+
+class Moved(NamedTuple):
+    """The motions of a body's parent and of the body, and its partial Lagrangian."""
+
+    parent: Motion
+    motion: Motion
+    partial: Node
+
+
+class SharedParts:
+    """Bodies checked, their links, motions and energies. Bodies are not to be altered."""
+
+    def __init__(self) -> None:
+        self._bodies: WeakKeyDictionary[Body, Body] = WeakKeyDictionary()
+        self._links: WeakKeyDictionary[Body, tuple[Body | None, Link]] = WeakKeyDictionary()  # with the parent
+        self._grounds: dict[tuple[Any, ...], Motion] = {}
+        self._moved: dict[tuple[Any, ...], Moved] = {}
+
+    def __reduce__(self) -> tuple[type[SharedParts], tuple[()]]:
+        return SharedParts, ()  # a copy in another process computes its own
+
+    def body(self, body: Body) -> Body:
+        """The body, checked."""
+        known = self._bodies.get(body) if isinstance(body, Body) else None
+        if known is None:
+            known = checked(body)
+            self._bodies[body] = known
+        return known
+
+    def link(self, body: Body, parent: Body | None) -> Link:
+        """The link of a checked body."""
+        known = self._links.get(body)
+        if known is None or known[0] is not parent:
+            known = self._links[body] = parent, link(body, axes_of(parent) if parent else np.eye(3))
+        return known[1]
+
+    def ground(self, rest: Motion) -> Motion:
+        """The world at rest, the same object for equal motions."""
+        return self._grounds.setdefault((rest.strength, *[each.value for each in rest.vertical]), rest)
+
+    def moved(self, parent: Motion, body: Body, link: Link, q: Node, qd: Node) -> Moved:
+        """The motion and energy of a body whose parent moves so. `parent` is one of these motions, or the ground's."""
+        key = (id(parent), body.name, body.joint.kind, q.name, *link.numbers)
+        if key not in self._moved:
+            with cg.tag(body.name):
+                motion = propagate_motion(parent, link, body.joint.type, q, qd)
+                self._moved[key] = Moved(parent, motion, energy(motion, link, q, qd))
+        return self._moved[key]

@@ -1,0 +1,91 @@
+"""The Lagrangian and the bias of a tree of bodies, as nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Node
+from cgraph.extend import Builder, building
+
+from ..systems.system import BiasForce
+from . import newton_euler, spatial
+from .base_parameters import base_parameter_links
+from .body import WORLD, Body
+from .body_motion import Motion, ground
+from .link import Link
+from .shared_parts import Moved
+from .spatial import Array
+from .structure import Structure
+
+
+class TreeEquations:
+    """Nodes of the motion of bodies, parents first, one coordinate each, under a structure's gravity."""
+
+    def __init__(self, structure: Structure, bodies: Sequence[Body]) -> None:
+        self.bodies, self.shared = bodies, structure.shared
+        self.base_parameters = structure.base_parameters
+        self.gravity = structure.gravity
+
+    @cached_property
+    def parents(self) -> list[int]:
+        """For each body the index of the one that carries it, -1 for the world."""
+        index = {body.name: i for i, body in enumerate(self.bodies)}
+        return [index.get(body.parent, -1) for body in self.bodies]
+
+    @cached_property
+    def links(self) -> list[Link]:
+        """What motion and energy of each body are made of."""
+        return self._links[0]
+
+    @cached_property
+    def ground(self) -> Motion:
+        """The world at rest."""
+        inner = [link for link, parent in zip(self.links, self.parents, strict=True) if parent >= 0]
+        in_plane = all([abs(link.turn[2][2]) == 1.0 for link in inner])
+        return self.shared.ground(ground(self.gravity, in_plane=in_plane))
+
+    @cached_property
+    def _links(self) -> tuple[list[Link], Array]:
+        """The links, and the first moment of what of their inertia is the world's."""
+        carriers = [self.bodies[i] if i >= 0 else None for i in self.parents]
+        links = [self.shared.link(body, carrier) for body, carrier in zip(self.bodies, carriers, strict=True)]
+        if self.base_parameters:
+            return base_parameter_links(links, [body.joint.type for body in self.bodies], self.parents)
+        return links, np.zeros(3)
+
+    def partial_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
+        """One for each body, tagged with its name and energy."""
+        with building(Builder()):
+            partials = [each.partial for each in self._moved(q, qd)]
+            if self.base_parameters:
+                with cg.tag("potential"):
+                    moment = spatial.constant(self.ground.strength * self._links[1])
+                    partials[0] = partials[0] - spatial.dot(self.ground.vertical, moment)
+        return partials
+
+    def bias_forces(self, q: Sequence[Node], qd: Sequence[Node]) -> list[BiasForce]:
+        """The bias wrenches of all bodies, with the velocities that they work on."""
+        forces: list[BiasForce] = []
+        with building(Builder()):
+            accelerations = {WORLD: newton_euler.base_acceleration(self.ground)}
+            rows = zip(self.bodies, self.links, self._moved(q, qd), q, qd, strict=True)
+            for body, link, moved, angle, rate in rows:
+                with cg.tag(body.name):
+                    acceleration = accelerations[body.name] = newton_euler.propagate_acceleration(
+                        accelerations[body.parent], moved.parent, moved.motion, link, body.joint.type, angle, rate
+                    )
+                    forces += newton_euler.bias_wrench(acceleration, moved.motion, link, angle, rate)
+        return forces
+
+    def _moved(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Moved]:
+        motions = {WORLD: self.ground}
+        result = []
+        for body, link, angle, rate in zip(self.bodies, self.links, q, qd, strict=True):
+            moved = self.shared.moved(motions[body.parent], body, link, angle, rate)
+            motions[body.name] = moved.motion
+            result.append(moved)
+        return result
