@@ -29,8 +29,8 @@ from dynamics.experiments.stability.case_result import CaseResult, Measurement
 from dynamics.integrators import METHODS, Method
 from dynamics.integrators.step_control import embedded
 from dynamics.integrators.tableau import DOPRI5
+from tests.dynamics.lagrange_by_mpmath import floats, lagrange
 from tests.dynamics.models import Array
-from tests.dynamics.reference import floats, lagrange
 
 STIFF, SMOOTH = "Robertson, to 1e11", "heavy top"
 EXACT = 1e-13  # of the largest value: differences of 80 digits, and rounding of what is compared
