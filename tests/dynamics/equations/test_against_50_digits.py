@@ -6,8 +6,8 @@ from pytest import approx, mark
 import cgraph as cg
 import dynamics as dyn
 from dynamics.systems.model import as_system
+from tests.dynamics.lagrange_by_mpmath import Terms, floats, lagrange
 from tests.dynamics.models import MODELS, Array, at, random_arm, run, states
-from tests.dynamics.reference import Terms, floats, lagrange
 from tests.formulations import CHAIN_RULE
 
 STATES = 20

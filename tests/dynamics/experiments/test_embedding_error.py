@@ -7,8 +7,8 @@ from pytest import approx, fixture, mark
 import dynamics as dyn
 from dynamics.systems.model import as_system
 from tests import high_precision
+from tests.dynamics.lagrange_by_mpmath import floats, lagrange
 from tests.dynamics.models import MODELS, Array, at, before, named, random_arm, run, states
-from tests.dynamics.reference import floats, lagrange
 
 DTS = np.geomspace(1e-4, 1e-6, 5)  # s: the second-order term is then below 1e-3 of the first
 SLOPE = 0.02  # of a line through logarithms, whose curvature over DTS is the second-order term
