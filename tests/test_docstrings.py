@@ -25,9 +25,6 @@ FLAGS = doctest.ELLIPSIS
 
 # Public names whose docstrings lack a part that `lacks` asks for, by package. May only shrink.
 INCOMPLETE_BY_PACKAGE = {
-    "cgraph": """
-        CSource Compiled clear_cache compile to_c
-    """,
     "dynamics": """
         Attached Body Certificate Crossings Ensemble EnsembleStats Event Force FreeBody Joint Link Mechanism
         OdeSystem OmittedTerm PlanarArm PruneResult RecursiveInverseDynamics Reference Released Scene Stats Subtree
