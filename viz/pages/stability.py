@@ -16,7 +16,7 @@ from .document import Block, Document, Paragraph, Picture, Section, Table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Content = Mapping[str, Any]  # what `content()` of the report gives, or its JSON file
+Content = Mapping[str, Any]  # what `to_dict()` of the report gives, or its JSON file
 Row = Mapping[str, Any]
 FROM, TO = 1e-12, 1e13  # shares of a bound that are drawn; what is outside is drawn at the border
 WIDTH, LINE, FRAME = 10.0, 0.17, 1.0  # inches: of a picture, of each case, and for the axis

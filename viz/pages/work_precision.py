@@ -9,7 +9,7 @@ from ..plots.direct_labels import Line, Panel, bars, labeled
 from ..plots.plot import to_adaptive_svg
 from .document import Block, Document, Paragraph, Picture, Section, Table
 
-Content = Mapping[str, Any]  # what `content()` of the report gives, or its JSON file
+Content = Mapping[str, Any]  # what `to_dict()` of the report gives, or its JSON file
 EQUAL, CHOSEN = "equal steps", "chosen steps"
 DRAWN = 3.0  # errors above are no motion of this kind any more
 MAKERS = {"scipy:": 1, "heyoka": 2, "CVODES": 3, "MuJoCo": 4}  # a color for what comes from one maker; ours is 0

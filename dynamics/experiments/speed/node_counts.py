@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import OPS, Builder, building, cotangents, solve_nodes
 
@@ -25,6 +24,7 @@ from ...multibody.planar_arm import PlanarArm
 from ...systems.model import Model
 from ...systems.system import BodySystem, System
 from ..paper_numbers.fit import exponent
+from ..planar_by_centers import by_centers
 from ..text_table import table
 from .bench_scenes import binary_tree, chain, turned_arm
 
@@ -42,27 +42,9 @@ folding, solving = sys.modules["cgraph.simplify.builder"], sys.modules["cgraph.a
 
 
 def about_centers(arm: PlanarArm) -> System:
-    """The planar chain with the velocity of the centers of mass: K = m v.v / 2 + I w^2 / 2."""
-
-    def lagrangian(q: Sequence[Node], qd: Sequence[Node], t: Node) -> list[Node]:
-        partials = []
-        angle, omega = q[0], qd[0]
-        x, y, height = cg.constant(0.0), cg.constant(0.0), cg.constant(0.0)
-        for i, link in enumerate(arm.links):
-            if i:
-                angle, omega = angle + q[i], omega + qd[i]
-            s, c = cg.sin(angle), cg.cos(angle)
-
-            def along(r: float, w: Node = omega, s: Node = s, c: Node = c) -> tuple[Node, Node, Node]:
-                return x + r * w * c, y + r * w * s, height - r * c  # noqa: B023 (called in this turn of the loop)
-
-            u, v, h = along(link.center)
-            kinetic = 0.5 * link.mass * (u * u + v * v) + 0.5 * link.inertia * (omega * omega)
-            partials.append(kinetic - link.mass * arm.gravity * h)
-            x, y, height = along(link.length)
-        return partials
-
-    return System(lagrangian, [f"joint {i + 1}" for i in range(len(arm.links))], damping=arm.damping)
+    """The planar chain with the velocity of the centers of mass."""
+    names = [f"joint {i + 1}" for i in range(len(arm.links))]
+    return System(lambda q, qd, t: by_centers(q, qd, arm.links, arm.gravity), names, damping=arm.damping)
 
 
 def body_about_center(motion: Any, link: Any, q: Node, qd: Node) -> Node:

@@ -28,6 +28,7 @@ from ...equations.formulations import inverse_dynamics
 from ...multibody.planar_arm import PlanarArm, planar_arm
 from ...reference.planar_arm_equations import Pair, accelerations, torques
 from ...systems.system import System
+from ..planar_by_centers import by_centers
 from .case_result import CaseResult, Measurement
 from .known_limits import reason
 
@@ -183,26 +184,23 @@ class Arms:
         return moved
 
 
-def arm_with_parameters(n: int) -> System:
-    """A planar arm whose numbers are parameters, in the order mass0.., length0.., center0.., inertia0.., damping0.., g.
+class LinkParameters(NamedTuple):
+    """A link whose numbers are parameters."""
 
-    Written plainly, by positions and velocities of the centres of mass.
-    """
+    mass: Node
+    length: Node
+    center: Node
+    inertia: Node
+
+
+def arm_with_parameters(n: int) -> System:
+    """A planar arm whose numbers are parameters: mass0.., length0.., center0.., inertia0.., damping0.., g."""
 
     def lagrangian(q: Sequence[Node], qd: Sequence[Node], t: Node, p: dict[str, Node]) -> list[Node]:
-        partials: list[Node] = []
-        angle, omega, u, v, drop = (cg.constant(0.0) for _ in range(5))
-        for i in range(n):
-            angle, omega = angle + q[i], omega + qd[i]
-            s, c, mass, center = cg.sin(angle), cg.cos(angle), p[f"mass{i}"], p[f"center{i}"]
-            across, up = u + center * (omega * c), v + center * (omega * s)
-            kinetic = 0.5 * mass * (across * across + up * up) + 0.5 * p[f"inertia{i}"] * (omega * omega)
-            partials.append(kinetic + mass * p["g"] * (drop + center * c))
-            length = p[f"length{i}"]
-            u, v, drop = u + length * (omega * c), v + length * (omega * s), drop + length * c
-        return partials
+        links = [LinkParameters(*[p[f"{what}{i}"] for what in LinkParameters._fields]) for i in range(n)]
+        return by_centers(q, qd, links, p["g"])
 
-    names = [f"{what}{i}" for what in ("mass", "length", "center", "inertia", "damping") for i in range(n)]
+    names = [f"{what}{i}" for what in (*LinkParameters._fields, "damping") for i in range(n)]
     return System(
         lagrangian,
         [f"joint {i + 1}" for i in range(n)],

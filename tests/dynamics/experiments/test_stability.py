@@ -11,14 +11,11 @@ from typing import Any
 import numpy as np
 from pytest import MonkeyPatch, approx, importorskip, mark, raises
 
-import cgraph as cg
-import dynamics as dyn
 from dynamics.experiments import text_table
 from dynamics.experiments.stability import (
     case_runs,
     cases,
     energy_drift,
-    huge_angles,
     known_limits as limits,
     single_evaluations,
     solutions,
@@ -29,15 +26,11 @@ from dynamics.experiments.stability.case_result import CaseResult, Measurement
 from dynamics.integrators import METHODS, Method
 from dynamics.integrators.step_control import embedded
 from dynamics.integrators.tableau import DOPRI5
-from tests.dynamics.models import Array
-from tests.dynamics.reference import floats, lagrange
 
 STIFF, SMOOTH = "Robertson, to 1e11", "heavy top"
-EXACT = 1e-13  # of the largest value: differences of 80 digits, and rounding of what is compared
 RECOMPUTED = 1e-6  # relative, of a change of 1e-9: what rounding of the invariant adds to it
 STORED = 1e-14  # relative to a state's size: constants of the graph are rounded, and may be folded otherwise
 NO_ERROR = 1e-12  # of a straight line's drift: rounding of the means
-SLOPES = 1e-5  # relative: central differences with steps of 1e-7
 
 
 # Verdicts
@@ -218,155 +211,6 @@ def test_symplectic_methods_do_not_drift(motion: str, method: str) -> None:
 @mark.parametrize("motion", energy_drift.MOTIONS)
 def test_a_method_that_loses_energy_is_seen_to(motion: str) -> None:
     assert energy_drift.result(motion, "rk4", energy_drift.QUICK).verdict == "unexplained"
-
-
-# Single evaluations
-
-
-def random_arm(n: int) -> tuple[dyn.PlanarArm, Array, Array, Array]:
-    rng = np.random.default_rng(n)
-    arm = dyn.planar_arm(rng.uniform(0.5, 1.5, n).tolist(), rng.uniform(0.5, 1.5, n).tolist(), 0.1)
-    q, qd, third = rng.uniform(-3.0, 3.0, n), rng.normal(size=n), rng.normal(size=n)
-    return arm, q, qd, third
-
-
-@mark.parametrize("n", [1, 2, 5])
-def test_exact_torques_are_those_of_lagranges_equation(n: int) -> None:
-    """By differences of L itself in 80 digits: another formula, other arithmetic."""
-    importorskip("flint")
-    from dynamics.reference.planar_arm_equations import torques
-
-    arm, q, qd, qdd = random_arm(n)
-    expected = lagrange(arm, {"q": q, "qd": qd, "qdd": qdd})
-    found = torques(arm, q, qd, qdd).high
-    assert np.max(np.abs(found - floats(expected.tau))) < EXACT * expected.largest
-
-
-@mark.parametrize("n", [1, 2, 5, 20])
-def test_exact_accelerations_give_the_torques_back(n: int) -> None:
-    importorskip("flint")
-    from dynamics.reference.planar_arm_equations import accelerations, torques
-
-    arm, q, qd, tau = random_arm(n)
-    qdd = accelerations(arm, q, qd, tau)
-    back = torques(arm, q, qd, qdd.high)
-    size = np.max(np.abs(torques(arm, q, qd, 2.0 * qdd.high).high - back.high))  # M qdd
-    assert np.max(np.abs(back.high - tau)) < 1e-15 * n * size
-    assert np.max(np.abs(qdd.low)) <= np.spacing(np.max(np.abs(qdd.high)))
-
-
-def test_digits_are_added_until_the_result_has_enough() -> None:
-    """Masses 24 decades apart, for which the first attempt cannot do."""
-    importorskip("flint")
-    from dynamics.reference.planar_arm_equations import accelerations, torques
-
-    _, q, qd, tau = random_arm(6)
-    arm = dyn.planar_arm([1e-24] * 5 + [1.0], [1.0] * 6)
-    qdd = accelerations(arm, q, qd, tau)
-    assert np.isfinite(qdd.high).all()
-    assert np.isfinite(torques(arm, q, qd, qdd.high).high).all()
-
-
-@mark.parametrize("task", single_evaluations.TASKS)
-def test_the_condition_is_what_changes_of_the_data_make(task: str) -> None:
-    """Differences of the exact values, each input and parameter changed by itself."""
-    importorskip("flint")
-    n, step = 3, 1e-7
-    arm, q, qd, third = random_arm(n)
-    solve = single_evaluations.TASKS[task].exact
-    expected = np.zeros(n)
-
-    def change(there: Any, back: Any) -> None:
-        nonlocal expected
-        expected += np.abs(there.high - back.high) / (2.0 * step)
-
-    point = np.concatenate([q, qd, third])
-    for i in range(3 * n):
-        moved = [point * (1.0 + sign * step * (np.arange(3 * n) == i)) for sign in (1, -1)]
-        change(*[solve(arm, *each.reshape(3, n)) for each in moved])
-    for i, link in enumerate(arm.links):
-        for what in ("mass", "length", "center", "inertia"):
-            arms = []
-            for sign in (1, -1):
-                changed = replace(link, **{what: getattr(link, what) * (1.0 + sign * step)})
-                arms.append(replace(arm, links=(*arm.links[:i], changed, *arm.links[i + 1 :])))
-            change(*[solve(each, q, qd, third) for each in arms])
-        scaled = [tuple([c * (1.0 + sign * step * (j == i)) for j, c in enumerate(arm.damping)]) for sign in (1, -1)]
-        change(*[solve(replace(arm, damping=each), q, qd, third) for each in scaled])
-    change(*[solve(replace(arm, gravity=arm.gravity * (1.0 + sign * step)), q, qd, third) for sign in (1, -1)])
-    found = single_evaluations.Arms(single_evaluations.TASKS[task], n).condition(arm, point)
-    assert found == approx(expected, rel=SLOPES)
-
-
-@mark.parametrize("family", single_evaluations.FAMILIES[:5], ids=lambda each: each.name)
-@mark.parametrize("task", single_evaluations.TASKS)
-def test_single_evaluations_are_within_the_bound(task: str, family: single_evaluations.Family) -> None:
-    importorskip("flint")
-    arms = single_evaluations.Arms(single_evaluations.TASKS[task], 4, ["python"])
-    assert single_evaluations.measurement(family, arms).meets
-
-
-HEAVY = next(each for each in single_evaluations.FAMILIES if each.name == "last mass 1e12")
-
-
-def test_a_heavy_mass_at_the_end_of_a_chain_needs_double_double() -> None:
-    importorskip("flint")
-    plain, doubled = (
-        single_evaluations.measurement(HEAVY, single_evaluations.Arms(single_evaluations.TASKS[task], 8, ["python"]))
-        for task in ("forward dynamics", "forward dynamics in double-double")
-    )
-    assert plain.value > 1e6
-    assert doubled.value < 1.0
-
-
-def test_a_constant_that_is_off_is_seen() -> None:
-    """A mass wrong by 1e-13 is some hundred ulps of the condition."""
-    importorskip("flint")
-    task = single_evaluations.TASKS["forward dynamics"]
-
-    def off(arm: Any) -> cg.Graph:
-        if not isinstance(arm, dyn.PlanarArm):
-            return task.derive(arm)
-        first = replace(arm.links[0], mass=arm.links[0].mass * (1.0 + 1e-13))
-        return task.derive(replace(arm, links=(first, *arm.links[1:])))
-
-    arms = single_evaluations.Arms(task._replace(derive=off), 3, ["python"])
-    assert not single_evaluations.measurement(single_evaluations.FAMILIES[0], arms).meets
-
-
-# Huge angles
-
-
-def test_angles_fill_their_range_with_both_signs() -> None:
-    found = huge_angles.angles(6.0, 9.0, 1000)
-    assert np.min(np.abs(found)) >= 1e6
-    assert np.max(np.abs(found)) <= 1e9
-    assert 400 < np.count_nonzero(found > 0.0) < 600
-
-
-def test_sine_and_cosine_of_huge_angles_are_reduced_exactly() -> None:
-    importorskip("flint")
-    found = list(huge_angles.results(100))
-    assert len(found) == 2 * len(single_evaluations.available())
-    assert all(each.meets for each in found), [each.measurements for each in found]
-
-
-def test_an_angle_that_is_reduced_in_float64_is_seen() -> None:
-    importorskip("flint")
-    points = huge_angles.angles(6.0, 9.0, 50)
-    known = huge_angles.exact(points)
-    assert huge_angles.ulps(np.array([np.sin(points), np.cos(points)]), known) <= 1.0
-    short = np.fmod(points, 2.0 * math.pi)
-    assert huge_angles.ulps(np.array([np.sin(short), np.cos(short)]), known) > 1e3
-
-
-def test_sines_are_those_of_mpmath() -> None:
-    importorskip("flint")
-    mpmath = importorskip("mpmath")
-    points = huge_angles.angles(200.0, 308.0, 20)
-    with mpmath.workdps(400):
-        sines = [float(mpmath.sin(mpmath.mpf(x))) for x in points.tolist()]
-    assert huge_angles.exact(points).high[0].tolist() == sines
 
 
 # The table

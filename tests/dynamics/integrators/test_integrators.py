@@ -239,6 +239,8 @@ def test_systems_of_first_order() -> None:
             dyn.simulate(turning, [1.0, 0.0], None, 1.0, method)
     with raises(ValueError, match="qd must be None for a system of first order"):
         dyn.simulate(turning, [1.0, 0.0], [], 1.0)
+    with raises(ValueError, match=r"tau must be 0 for a system of first order, which no force acts on, got 2\.0"):
+        dyn.simulate(turning, [1.0, 0.0], None, 1.0, tau=2.0)
 
 
 def test_a_momentum_that_is_not_linear_in_the_velocity() -> None:

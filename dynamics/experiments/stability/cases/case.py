@@ -46,7 +46,6 @@ class StabilityCase(Setting):
     invariants(model): a graph over the state (and t, parameters) whose outputs do not change along the motion.
     """
 
-    method: str | None = None
     digits: int = 20  # four more than float64 can tell
     criteria: tuple[Criterion, ...] = ()
     atol: float | tuple[float, ...] = ATOL

@@ -40,7 +40,7 @@ def _two_links(
         stiff=fastest > 1e3,
         growth=growth,
         invariants=conserved(),
-        method=None if growth is None else "taylor",
+        method="taylor" if growth else None,
     )
 
 
@@ -98,7 +98,6 @@ def nearly_singular(small: float) -> StabilityCase:
         growth=1.8,
         invariants=conserved(),
         exact=lambda times: closed_forms.two_modes(times, (1.0, 0.5), (4.0, 1.0)),
-        method="taylor",
     )
 
 
@@ -122,7 +121,6 @@ def massless_links() -> StabilityCase:
         criteria=(energy_criterion(10.0), error_criterion(growth)),
         growth=growth,
         invariants=conserved(),
-        method="taylor",
     )
 
 
@@ -137,6 +135,7 @@ def long_chain(n: int, t_end: float) -> StabilityCase:
         t_end=t_end,
         criteria=(energy_criterion(GRAVITY),),
         invariants=conserved(),
+        method=None,
     )
 
 
@@ -162,7 +161,6 @@ def zero_gravity() -> StabilityCase:
         ),
         growth=growth,
         invariants=conserved(**{"angular momentum": spin}),
-        method="taylor",
     )
 
 

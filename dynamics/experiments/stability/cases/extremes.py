@@ -34,7 +34,6 @@ def upright(angle: float, name: str, t_end: float, growth: float) -> StabilityCa
         growth=growth,
         invariants=conserved(),
         exact=lambda times: closed_forms.pendulum(times, angle, STIFFNESS),
-        method="taylor",
     )
 
 
@@ -62,7 +61,6 @@ def large_angle(angle: float) -> StabilityCase:
         size=(angle, math.sqrt(STIFFNESS)),
         invariants=conserved(),
         exact=lambda times: closed_forms.pendulum(times, angle, STIFFNESS),
-        method="taylor",
     )
 
 
@@ -82,7 +80,6 @@ def spinning(velocity: float, growth: float) -> StabilityCase:
         size=(1e3, velocity),
         growth=growth,
         invariants=conserved(),
-        method="taylor",
     )
 
 
@@ -99,7 +96,6 @@ def creeping() -> StabilityCase:
         size=(1024.0 * TINY, TINY),
         growth=1.0,
         exact=lambda times: closed_forms.free_fall(times, [0.0], [TINY], [0.0]),
-        method="taylor",
     )
 
 
@@ -116,7 +112,6 @@ def hanging() -> StabilityCase:
         size=(1.0, 1.0),
         growth=1.0,
         exact=lambda times: closed_forms.oscillator(times, 0.0, TINY, 1.0, STIFFNESS),
-        method="taylor",
     )
 
 

@@ -34,7 +34,6 @@ def charged_particle(growth: float) -> StabilityCase:
         growth=growth,
         invariants=conserved(),
         exact=lambda times: closed_forms.cyclotron(times, start, frequency),
-        method="taylor",
     )
 
 
@@ -53,7 +52,6 @@ def relativistic_oscillator(growth: float) -> StabilityCase:
         ),
         growth=growth,
         invariants=conserved(),
-        method="taylor",
     )
 
 
@@ -74,7 +72,6 @@ def driven_pendulum(growth: float) -> StabilityCase:
         t_end=10.0,
         criteria=(error_criterion(growth),),
         growth=growth,
-        method="taylor",
     )
 
 
@@ -92,7 +89,6 @@ def growing_mass(growth: float) -> StabilityCase:
         size=(1.0, 2.0),
         growth=growth,
         exact=lambda times: closed_forms.oscillator(times, 1.0, 0.0, 1.0, stiffness, damping),
-        method="taylor",
     )
 
 
@@ -109,7 +105,6 @@ def exponential(name: str, rate: float, size: float, why: str) -> StabilityCase:
         size=(size,),
         growth=1.0,
         exact=lambda times: closed_forms.exponential(times, 1.0, rate),
-        method="taylor",
     )
 
 

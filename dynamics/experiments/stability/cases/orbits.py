@@ -35,7 +35,6 @@ def kepler(eccentricity: float, orbits: float, growth: float) -> StabilityCase:
         growth=growth,
         invariants=conserved(**{"angular momentum": lambda q, qd: q[0] * qd[1] - q[1] * qd[0]}),
         exact=lambda times: closed_forms.kepler(times, eccentricity),
-        method="taylor",
     )
 
 

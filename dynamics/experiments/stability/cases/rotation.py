@@ -97,7 +97,6 @@ def euler_equations(growth: float) -> StabilityCase:
             momentum=lambda w: (INERTIA[0] * w[0]) ** 2 + (INERTIA[1] * w[1]) ** 2 + (INERTIA[2] * w[2]) ** 2,
         ),
         exact=lambda times: closed_forms.free_rigid_body(times, INERTIA, OMEGA),
-        method="taylor",
     )
 
 
@@ -119,7 +118,6 @@ def middle_axis(growth: float) -> StabilityCase:
         size=(100.0, 1.0, 10.0, 1.0, 1.0, 1.0),
         growth=growth,
         invariants=conserved(momentum=_total),
-        method="taylor",
     )
 
 
@@ -148,7 +146,6 @@ def heavy_top(growth: float) -> StabilityCase:
         invariants=conserved(
             **{"spin momentum": lambda q, qd: HEAVY[2] * spin(q, qd)[2], "vertical momentum": precession}
         ),
-        method="taylor",
     )
 
 

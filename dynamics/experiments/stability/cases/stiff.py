@@ -54,7 +54,7 @@ def _undamped(stiffness: float, growth: float | None) -> StabilityCase:
         growth=growth,
         invariants=conserved(),
         exact=rigid if growth is None else None,
-        method="taylor" if growth is not None else None,
+        method="taylor" if growth else None,
     )
 
 
