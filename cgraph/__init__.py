@@ -1,6 +1,6 @@
 """cgraph: computational graphs of equations, with forward and reverse automatic differentiation."""
 
-from typing import TYPE_CHECKING as _TYPES
+from typing import TYPE_CHECKING
 
 from .autodiff.forward import jvp
 from .autodiff.hessian_solve import hessian_solve
@@ -10,12 +10,10 @@ from .codegen import Compiled, clear_cache, compile
 from .codegen.c import CSource, to_c
 from .core.counts import Counts
 from .core.edge import Edge
-from .core.functions import function as _function
 from .core.graph import Graph
 from .core.naming import variables, with_name
 from .core.node import Node, constant, variable
 from .core.ops import (
-    OPS as _OPS,
     abs_ as abs,
     acos,
     asin,
@@ -117,10 +115,5 @@ __all__ = [
     "with_name",
 ]
 
-if not _TYPES:
-
-    def __getattr__(name: str) -> object:
-        """The function of a row that was added to the operation table: `cg.cbrt` of the row "cbrt"."""
-        if name in _OPS:
-            return globals().setdefault(name, _function(_OPS[name]))
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+if not TYPE_CHECKING:  # `cg.name` of a row that was added; a checker shall see a misspelt name
+    from .core.functions import of_name as __getattr__  # noqa: F401

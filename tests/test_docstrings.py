@@ -25,9 +25,6 @@ FLAGS = doctest.ELLIPSIS
 
 # Public names whose docstrings lack a part that `lacks` asks for, by package. May only shrink.
 INCOMPLETE_BY_PACKAGE = {
-    "cgraph": """
-        CSource Compiled clear_cache compile to_c
-    """,
     "dynamics": """
         Attached Body Certificate Force FreeBody Joint Link Mechanism OmittedTerm PlanarArm PruneResult
         RecursiveInverseDynamics Released Scene Subtree attach_with_impact certify inertial_parameters load_mjcf

@@ -28,23 +28,52 @@ def compile(
 ) -> Compiled:
     """The graph as a function: `fn(x)` at one point, `fn.batch(X)` at many, `fn.source` to read.
 
-    backend: "llvm", machine code (extra `native`); "python", generated Python over floats; "numpy", generated NumPy
-    over arrays; "auto", machine code where llvmlite is installed, the C library has all functions of the graph and
-    that has at most 100 000 nodes, else generated Python for `fn(x)` and generated NumPy for `fn.batch(X)`. All agree
-    with `graph.evaluate`, on floats and on arrays respectively.
-    fma: machine code may round a product and the sum it goes into once instead of twice, and take sines, cosines,
-    exponentials and logarithms from polynomials (within 2 ulp); without, `fn(x)` agrees with `graph.evaluate` to the
-    last bit.
-    fast: it may also re-associate sums and products, multiply by reciprocals and mistake the sign of a zero; NaN and
-    infinities keep their meaning.
-    cache: keep machine code on disk for the next process, and read it from there: True, in the platform's folder for
-    caches (`$XDG_CACHE_HOME/cgraph`, `~/.cache/cgraph`, ...), or the path of a folder that nobody else can write to.
-    An entry is found by the code's text, the processor and the version of LLVM; a damaged one is made anew. A folder
-    that cannot be written gives a RuntimeWarning. `clear_cache` empties it; nothing else does.
-    These three are for machine code alone.
+    All back ends agree with `graph.evaluate`, on floats and on arrays respectively. `fma`, `fast` and `cache` are for
+    machine code alone.
 
-    Raises TypeError for what is no Graph, ValueError for an unknown backend, ImportError for "llvm" without llvmlite,
-    RuntimeError for "llvm" where an operation is no function of the C library and its row has no instructions.
+    Parameters
+    ----------
+    graph : Graph
+        What to compile.
+    backend : {"auto", "llvm", "python", "numpy"}
+        "llvm": machine code (extra `native`). "python": generated Python over floats. "numpy": generated NumPy over
+        arrays. "auto": machine code where llvmlite is installed, the C library has all functions of the graph and that
+        has at most 100 000 nodes, else generated Python for `fn(x)` and generated NumPy for `fn.batch(X)`.
+    fast : bool
+        May also re-associate sums and products, multiply by reciprocals and mistake the sign of a zero; NaN and
+        infinities keep their meaning.
+    fma : bool
+        May round a product and the sum it goes into once instead of twice, and take sines, cosines, exponentials and
+        logarithms from polynomials (within 2 ulp); without, `fn(x)` agrees with `graph.evaluate` to the last bit.
+    cache : bool or path
+        Keep machine code on disk for the next process, and read it from there: True, in the platform's folder for
+        caches (`$XDG_CACHE_HOME/cgraph`, `~/.cache/cgraph`, ...), or the path of a folder that nobody else can write
+        to. An entry is identified by the code's text, the processor and the version of LLVM; a damaged one is made
+        anew. A folder that cannot be written gives a RuntimeWarning. `clear_cache` empties it; nothing else does.
+
+    Returns
+    -------
+    Compiled
+        The function; inputs and outputs are in the order of the graph's.
+
+    Raises
+    ------
+    TypeError
+        For what is no Graph, or a cache that is neither True, False nor a path.
+    ValueError
+        For an unknown backend.
+    ImportError
+        For "llvm" without llvmlite.
+    RuntimeError
+        For "llvm" where an operation is no function of the C library and its row has no instructions.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x, y = cg.variables("x y")
+    >>> f = cg.compile(cg.Graph([x, y], {"area": x * y}))
+    >>> f([2.0, 3.0]).tolist(), f.batch([[1.0, 2.0], [3.0, 4.0]]).tolist()
+    ([6.0], [[3.0, 8.0]])
     """
     if backend not in BACKENDS:
         raise ValueError(f"backend must be one of {', '.join(BACKENDS)}, got {backend!r}")

@@ -19,8 +19,26 @@ from ..util.threads import share, thread_count
 class Compiled(ABC):
     """A graph compiled by `cg.compile`. Inputs and outputs are in the order of the graph's.
 
-    graph, backend: what was compiled, and how it was asked for.  n_in, n_out: their numbers.
-    options: the keyword arguments of `compile`.  source: the generated text: Python, NumPy or LLVM.
+    Attributes
+    ----------
+    graph : Graph
+        What was compiled.
+    backend : str
+        The back end that was asked for.
+    options : dict
+        The keyword arguments of `compile`.
+    n_in, n_out : int
+        Numbers of inputs and outputs.
+    source : str
+        The generated text: Python, NumPy or LLVM.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x = cg.variable("x")
+    >>> f = cg.compile(cg.Graph([x], {"y": x + 1.0}), "python")
+    >>> f.n_in, f.n_out, f([2.0]).tolist()
+    (1, 1, [3.0])
     """
 
     source: str

@@ -56,7 +56,28 @@ def open_cache(choice: bool | str) -> Cache | None:
 def clear_cache(folder: str | os.PathLike[str] | None = None) -> int:
     """Remove the machine code that `compile(..., cache=True)` has kept, or `cache=folder`; give the number of entries.
 
-    Nothing else in the folder is touched. Raises OSError for an entry that cannot be removed.
+    Nothing else in the folder is touched.
+
+    Parameters
+    ----------
+    folder : path or None
+        The folder that was given to `compile`; None: the platform's for caches.
+
+    Returns
+    -------
+    int
+        The number of entries removed.
+
+    Raises
+    ------
+    OSError
+        For an entry that cannot be removed.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> cg.clear_cache("a folder without code")
+    0
     """
     place = default_folder() if folder is None else Path(folder)
     name = "[0-9a-f]" * 64

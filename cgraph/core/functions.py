@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from functools import cache
 
 from .node import Node, Scalar, apply
-from .operation import Op
+from .operation import OPS, Op
 
 Function = Callable[..., Node]
 
@@ -57,6 +58,14 @@ def function(op: Op) -> Function:
     make.__doc__ = _help(op)
     make.__signature__ = signature  # type: ignore[attr-defined]
     return make
+
+
+@cache
+def of_name(name: str) -> Function:
+    """The function of the row of that name: `cg.cbrt` of a row "cbrt" that was added to the table."""
+    if name not in OPS:
+        raise AttributeError(f"module 'cgraph' has no attribute {name!r}")
+    return function(OPS[name])
 
 
 def _help(op: Op) -> str:

@@ -64,7 +64,22 @@ _ROUNDING = {
 
 
 class CSource(NamedTuple):
-    """A C99 function `void name(const double *x, double *y)`: the texts of name.c and name.h."""
+    """A C99 function `void name(const double *x, double *y)`: the texts of name.c and name.h.
+
+    Parameters
+    ----------
+    name : str
+        Of the function, and of both files.
+    source, header : str
+        The texts of name.c and name.h.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> text = cg.to_c(cg.Graph([cg.variable("x")], {"y": cg.variable("x") + 1.0}), "next")
+    >>> [line for line in text.source.splitlines() if "v1" in line]
+    ['    const double v1 = x[NEXT_IN_x] + 1.0;', '    y[NEXT_OUT_y] = v1;']
+    """
 
     name: str
     source: str
@@ -86,10 +101,34 @@ def to_c(graph: Graph, name: str = "function", *, fma: bool = False) -> CSource:
     of outputs in y, for name "arm" as in `x[ARM_IN_q0]`, `y[ARM_OUT_tau0]`, and their numbers ARM_N_IN, ARM_N_OUT.
     Values are those of `evaluate` to the last bit where both use the same C library (`hypot` to one unit of it),
     unless compiler options such as -ffast-math give that up.
-    fma: let the compiler round a product and the sum that it goes into once.
 
-    Raises TypeError for what is no Graph, ValueError for a name that is no identifier of C, or a word of C, C++ or
-    their library.
+    Parameters
+    ----------
+    graph : Graph
+        What the function computes.
+    name : str
+        Of the function, and of both files.
+    fma : bool
+        Let the compiler round a product and the sum that it goes into once.
+
+    Returns
+    -------
+    CSource
+        The two texts.
+
+    Raises
+    ------
+    TypeError
+        For what is no Graph.
+    ValueError
+        For a name that is no identifier of C, or a word of C, C++ or their library.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> text = cg.to_c(cg.Graph([cg.variable("q0")], {"tau0": cg.sin(cg.variable("q0"))}), "arm")
+    >>> "y[ARM_OUT_tau0] = v1;" in text.source, "ARM_N_IN = 1" in text.header
+    (True, True)
     """
     if not isinstance(graph, Graph):
         raise TypeError(f"to_c takes a Graph, got {type(graph).__name__}: {graph!r:.60}")

@@ -26,7 +26,7 @@ TABLE = (
     "tests/cgraph/explain/lint/test_lint.py",
     "tests/viz/graph_drawing/test_dot.py",
     "tests/viz/inspector/test_page.py",
-    "tests/dynamics/reference/test_reference.py",
+    "tests/dynamics/reference/test_taylor_series.py",
 )
 
 
