@@ -1,4 +1,4 @@
-"""dynamics: equations of motion on computational graphs, from Lagrangians and planar arms."""
+"""dynamics: equations of motion on computational graphs, from Lagrangians and bodies."""
 
 from . import scenes
 from .equations.coriolis import coriolis, damping_force

@@ -37,8 +37,8 @@ class FreeBody(NamedTuple):
     [1.25, 0.0, 0.0]
     """
 
-    position: Array  # (3,) [m] of its centre of mass
-    velocity: Array  # (3,) [m/s] of its centre of mass
+    position: Array  # (3,) [m] of its center of mass
+    velocity: Array  # (3,) [m/s] of its center of mass
     omega: Array  # (3,) [rad/s]
     orientation: Array  # (3, 3), its axes as columns
 
@@ -202,7 +202,7 @@ def release(mechanism: Mechanism, q: ArrayLike, qd: ArrayLike, body: str) -> Rel
 
 
 def _motion(mechanism: Mechanism, body: Body, q: Array, qd: Array) -> tuple[FreeBody, Array, Array]:
-    """How a body of the mechanism moves, and the Jacobians (3, n) of its centre's velocity and of its omega."""
+    """How a body of the mechanism moves, and the Jacobians (3, n) of its center's velocity and of its omega."""
     graph = mechanism.motion(body.name, body.center)
     rates = np.vstack([qd, np.eye(len(qd))])  # the state's own, then each coordinate alone
     found = graph.evaluate(_named(q=q, qd=rates.T))

@@ -64,11 +64,11 @@ def lock_joints(bodies: Sequence[Body], at: Mapping[str, float]) -> list[Body]:
         if not isinstance(value, numbers.Real) or not math.isfinite(value):
             raise MechanismError(f"joint of body {name!r}: it can be locked at a finite number, got {value!r:.80}")
     return [
-        replace(body, joint=_standing(body.joint, float(at[body.name]))) if body.name in at else body for body in bodies
+        replace(body, joint=_weld_at(body.joint, float(at[body.name]))) if body.name in at else body for body in bodies
     ]
 
 
-def _standing(joint: Joint, at: float) -> Joint:
+def _weld_at(joint: Joint, at: float) -> Joint:
     """The weld that holds a joint's body where the joint has it at that coordinate."""
     orientation, axis, position = (np.asarray(each) for each in (joint.orientation, joint.axis, joint.position))
     turn, shift = joint.type.placement(axis, at)

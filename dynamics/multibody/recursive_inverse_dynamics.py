@@ -74,9 +74,9 @@ class RecursiveInverseDynamics:
                 raise ValueError(f"{name} must have shape ({self.n},), one for each coordinate, got {row.shape}")
         states = [list(each) for each in zip(*(row.tolist() for row in rows), strict=True)]
         motions: list[list[float]] = []
-        for parent, made_of, kernel, state in zip(self._parents, self._links, self._kernels, states, strict=True):
+        for parent, link, kernel, state in zip(self._parents, self._links, self._kernels, states, strict=True):
             carrier = motions[parent] if parent >= 0 else self._ground
-            motions.append(list(kernel.forwards.values([*carrier, *state, *made_of])))
+            motions.append(list(kernel.forwards.values([*carrier, *state, *link])))
         bars = [[0.0] * (2 * MOTION) for _ in range(self.n)]
         tau = np.empty(self.n)
         for i in reversed(range(self.n)):
@@ -98,12 +98,12 @@ def _kernels(kind: str) -> _Kernels:
     """What a link with that kind of joint needs, whatever its numbers are."""
     parent, rates, bars, bar_rates = (_variables(name, MOTION) for name in ("s", "s_dot", "bar", "bar_dot"))
     q, qd, qdd = cg.variables("q qd qdd")
-    made_of, numbers = _link_of_nodes()
+    link, numbers = _link_of_nodes()
     build = Builder()
     with building(build):
-        motion = propagate_motion(_motion(parent), made_of, TYPES[kind], q, qd)
+        motion = propagate_motion(_motion(parent), link, TYPES[kind], q, qd)
         after = [*motion.omega, *motion.velocity, *motion.vertical, motion.depth]
-        lagrangian = energy(motion, made_of, q, qd)
+        lagrangian = energy(motion, link, q, qd)
     along = dict(zip(parent, rates, strict=True)) | {q: qd, qd: qdd}
     dots = tangents(along, after, build)
     seeds = dict(zip(after, bars, strict=True)) | {lagrangian: ONE}
@@ -111,7 +111,7 @@ def _kernels(kind: str) -> _Kernels:
     back_dots = tangents(along | dict(zip(bars, bar_rates, strict=True)), back, build)
     zero = cg.constant(0.0)
     with building(build):
-        tau = back_dots.get(back[-1], zero) - back[-2] + made_of.damping * qd
+        tau = back_dots.get(back[-1], zero) - back[-2] + link.damping * qd
     inputs = [*parent, *rates, q, qd, qdd, *numbers]
     forwards = [*after, *(dots.get(node, zero) for node in after)]
     backwards = [*back[:MOTION], *(back_dots.get(node, zero) for node in back[:MOTION]), tau]

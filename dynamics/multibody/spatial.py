@@ -81,7 +81,7 @@ def joint_placement(outer: Array, orientation: ArrayLike, position: ArrayLike, a
 
 
 def parallel_axis(inertia: Array, mass: float, offset: Array) -> Array:
-    """Inertia about a point `offset` away from the centre of mass (parallel axes)."""
+    """Inertia about a point `offset` away from the center of mass (parallel axes)."""
     return inertia + mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
 
 

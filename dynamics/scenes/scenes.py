@@ -25,7 +25,26 @@ from ..systems.system import System
 
 @dataclass(frozen=True)
 class Scene:
-    """A model, the state it starts from, and how long it is watched."""
+    """A model, the state it starts from, and how long it is watched.
+
+    Parameters
+    ----------
+    name, about : str
+        Its name, and one line on it.
+    model : Model
+        A System, a Mechanism or an OdeSystem.
+    q, qd : tuple of float
+        The start [rad or m], [rad/s or m/s].
+    t_end : float
+        How long it is watched [s].
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> scene = dyn.scenes.load("chain", n=2)
+    >>> scene.coordinates, scene.t_end
+    (('joint 1', 'joint 2'), 3.0)
+    """
 
     name: str
     about: str  # one line

@@ -38,7 +38,23 @@ class Residual:
 
 @dataclass(frozen=True)
 class Certificate:
-    """What holds of a model's graphs at random states."""
+    """What holds of a model's graphs at random states, as `certify` makes it.
+
+    Parameters
+    ----------
+    states, seed : int
+        How many random states, and the seed of their generator.
+    residuals : tuple of Residual
+        How far each equation is from holding, with its bound.
+    left_out : tuple of str
+        Equations that say nothing of this model and peers that are not there, a sentence each.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> dyn.certify(dyn.scenes.load("spring_mass"), states=2).passed
+    True
+    """
 
     states: int
     seed: int

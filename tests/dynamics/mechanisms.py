@@ -1,4 +1,4 @@
-"""Mechanisms for tests: random trees and chains, arms with quarter turns, and a plane's arm spelled in space."""
+"""Mechanisms for tests: random trees and chains, and arms with quarter turns."""
 
 from __future__ import annotations
 

@@ -45,10 +45,11 @@ class PinocchioTwin:
             stack += [child for child in mechanism.bodies if child.parent == body.name]
         self.data = self.model.createData()
         moving = [body for body in mechanism.bodies if body.joint.kind != "fixed"]
-        assert sorted(body.name for body in moving) == sorted(mechanism.system.coordinates)
-        self.order = np.array([self.model.joints[self.joints[name]].idx_v for name in mechanism.system.coordinates])
+        names = [body.name for body in mechanism.moving]
+        assert sorted(body.name for body in moving) == sorted(names)
+        self.order = np.array([self.model.joints[self.joints[name]].idx_v for name in names])
         of = {body.name: body.joint for body in moving}
-        joints = [of[name] for name in mechanism.system.coordinates]
+        joints = [of[name] for name in names]
         self.damping, self.stiffness, self.spring_reference, armature = np.array(
             [[joint.damping, joint.stiffness, joint.spring_reference, joint.armature] for joint in joints]
         ).T

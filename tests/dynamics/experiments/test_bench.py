@@ -59,7 +59,7 @@ class Reference:
     def __init__(self, case: Case) -> None:
         pytest.importorskip("mujoco")
         self.n, self.twin = case.n, MujocoTwin(case.model)
-        names = [body.name for body in getattr(case.model, "moving", ())] or [f"joint{i + 1}" for i in range(self.n)]
+        names = case.model.coordinates
         self.order = np.array([self.twin.model.joint(name).id for name in names])
 
     def value(self, task, x):

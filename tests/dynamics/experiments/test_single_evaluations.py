@@ -10,8 +10,8 @@ from pytest import approx, importorskip, mark
 import cgraph as cg
 import dynamics as dyn
 from dynamics.experiments.stability import huge_angles, single_evaluations
-from tests.dynamics.models import Array
 from tests.dynamics.lagrange_by_mpmath import floats, lagrange
+from tests.dynamics.models import Array
 
 EXACT = 1e-13  # of the largest value: differences of 80 digits, and rounding of what is compared
 SLOPES = 1e-5  # relative: central differences with steps of 1e-7
