@@ -14,5 +14,22 @@ class GraphError(ValueError):
 
 
 def install(extra: str) -> str:
-    """How to get the packages of an extra: the end of an error's sentence. Quoted, as some shells expand brackets."""
+    """How to get the packages of an extra, as the end of an error's sentence.
+
+    Parameters
+    ----------
+    extra : str
+        Name of an extra of the distribution, such as "viz".
+
+    Returns
+    -------
+    str
+        The command, its argument quoted, since some shells expand brackets.
+
+    Examples
+    --------
+    >>> from cgraph.extend import install
+    >>> install("viz")
+    "in a checkout of cgraph, pip install '.[viz]'"
+    """
     return f"in a checkout of cgraph, pip install '.[{extra}]'"

@@ -23,16 +23,6 @@ PUBLIC = (cg, cgraph.extend, dyn, viz)
 NAMES = {"cg": cg, "dyn": dyn, "viz": viz, "np": np}
 FLAGS = doctest.ELLIPSIS
 
-# Public names whose docstrings lack a part that `lacks` asks for, by package. May only shrink.
-INCOMPLETE_BY_PACKAGE = {
-    "dynamics": """
-        Attached Body Certificate Force FreeBody Joint Link Mechanism OmittedTerm PlanarArm PruneResult
-        RecursiveInverseDynamics Released Scene Subtree attach_with_impact certify inertial_parameters load_mjcf
-        load_urdf planar_arm prune regressor release serial_arm to_mjcf to_urdf tree
-    """,
-}
-INCOMPLETE = {f"{package}.{name}" for package, names in INCOMPLETE_BY_PACKAGE.items() for name in names.split()}
-
 
 def modules_with_examples() -> list[ModuleType]:
     files = [path for package in ("cgraph", "dynamics", "viz") for path in sorted((ROOT / package).rglob("*.py"))]
@@ -112,12 +102,7 @@ def lacks(value: type | FunctionType) -> list[str]:
 
 @pytest.mark.parametrize("name", public())
 def test_what_is_public_says_its_parameters_and_shows_an_example(name: str) -> None:
-    assert name in INCOMPLETE or not lacks(public()[name])
-
-
-def test_the_list_of_incomplete_docstrings_only_shrinks() -> None:
-    assert public().keys() >= INCOMPLETE
-    assert {name for name in INCOMPLETE if not lacks(public()[name])} == set(), "take these off INCOMPLETE"
+    assert lacks(public()[name]) == []
 
 
 def test_what_a_docstring_lacks_is_seen() -> None:

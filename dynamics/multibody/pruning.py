@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
 import cgraph as cg
 from cgraph import Graph
 
-from ..equations.equations_of_motion import gravity_force
 from ..equations.formulations import inverse_dynamics
 from ..systems.model import Model, as_system
-from ..systems.system import System
-from .body import Body
-from .mechanism import Mechanism, as_mechanism
+from .effects import EFFECTS as EFFECTS, absent_parts, has_effect, without_effect  # noqa: PLC0414 (public with `prune`)
+from .mechanism import as_mechanism
 
-EFFECTS = ("gravity", "damping", "springs", "armature", "forces")
-FREE_FALL = (0.0, 0.0, -9.81)  # m/s^2, put in to count what gravity would take
-SKEW = (-3.0, -5.0, -7.0)  # m/s^2, along no axis
-NUMBER = 0.3  # put in for a damping, stiffness, .. that a model has not
 GROUPS = ("q", "qd", "qdd", "tau")
-_JOINT = {"damping": "damping", "springs": "stiffness", "armature": "armature"}
 NEVER = "unobservable inertial numbers"
 
 Equations = Callable[[Any], Graph]
@@ -113,7 +104,7 @@ class PruneResult:
         mechanism, given = as_mechanism(self.model), as_mechanism(self.steps[0].model)
         if mechanism is None or given is None:
             return ()
-        for what, why, model in _absent(mechanism, given):
+        for what, why, model in absent_parts(mechanism, given):
             with_it = replace(last, model=model).graph(self.equations)
             result.append(OmittedTerm(what, why, *_saved(with_it, self.graph)))
         return tuple(result)
@@ -238,8 +229,8 @@ def _steps(
         steps.append(replace(steps[-1], what=what, why=why, **changes))
 
     for effect in EFFECTS:
-        if effect not in kept and _has(steps[-1].model, effect):
-            take(effect, "switched off", model=_without(steps[-1].model, effect))
+        if effect not in kept and has_effect(steps[-1].model, effect):
+            take(effect, "switched off", model=without_effect(steps[-1].model, effect))
     for body, at in lock.items():
         mechanism = as_mechanism(steps[-1].model)
         if mechanism is None:
@@ -267,91 +258,3 @@ def _saved(before: Graph, after: Graph) -> tuple[int, int]:
 
 def _size(graph: Graph) -> str:
     return f"{len(graph.nodes)} nodes and {len(graph.edges)} edges"
-
-
-def _has(model: Model, effect: str) -> bool:
-    """Whether the model has an effect. Raises ValueError for one that cannot be told apart."""
-    mechanism = as_mechanism(model)
-    if mechanism is not None:
-        if effect in _JOINT:
-            return any(getattr(body.joint, _JOINT[effect]) for body in mechanism.moving)
-        return bool(np.any(np.asarray(mechanism.gravity))) if effect == "gravity" else bool(mechanism.forces)
-    system = as_system(model)
-    if effect == "damping":
-        return any(system.damping)
-    if effect == "forces":
-        return any(force.value != 0.0 for force in system.forces)
-    raise ValueError(f"the Lagrangian of {model!r:.60} is given as a whole: {effect} cannot be told apart in it")
-
-
-def _without(model: Model, effect: str) -> Model:
-    mechanism = as_mechanism(model)
-    if mechanism is not None:
-        if effect == "gravity":
-            return replace(mechanism, gravity=(0.0, 0.0, 0.0))
-        return replace(mechanism, forces=(), parameters={}) if effect == "forces" else _with(mechanism, effect, 0.0)
-    system = as_system(model)
-    return System(
-        lambda q, qd, t: system.partial_lagrangians,
-        system.coordinates,
-        system.parameters,
-        forces=(lambda q, qd, t: system.forces) if effect == "damping" else None,
-        damping=0.0 if effect == "damping" else system.damping,
-    )
-
-
-def _with(model: Mechanism, effect: str, number: float, among: Collection[str] | None = None) -> Mechanism:
-    """The mechanism with that damping, stiffness or armature at the joints of those bodies, or at all that move."""
-    change: dict[str, Any] = {_JOINT[effect]: number}
-
-    def changed(body: Body) -> Body:
-        chosen = body.joint.type.moves if among is None else body.name in among
-        return replace(body, joint=replace(body.joint, **change)) if chosen else body
-
-    return replace(model, bodies=tuple([changed(body) for body in model.bodies]))
-
-
-def _absent(model: Mechanism, given: Mechanism) -> Iterator[tuple[str, str, Mechanism]]:
-    """What, why, and the model with it. given: the model before anything was switched off, which is not absent."""
-    if not np.any(np.asarray(given.gravity)):
-        yield "gravity", "it is zero", replace(model, gravity=FREE_FALL)
-    elif np.any(np.asarray(model.gravity)):
-        forces = gravity_force(replace(model, bodies=_with(model, "springs", 0.0).bodies)).outputs.values()
-        free = [body.name for body, force in zip(model.moving, forces, strict=True) if force.value == 0.0]
-        if free:
-            yield f"gravity at {_listed(free)}", "it does no work there", replace(model, gravity=SKEW)
-    for effect, name in _JOINT.items():
-        had = {body.name for body in given.moving if getattr(body.joint, name)}
-        without = [body.name for body in model.moving if not getattr(body.joint, name) and body.name not in had]
-        if without:
-            yield f"{effect} of {_listed(without)}", "it is zero", _with(model, effect, NUMBER, without)
-    if massless := [body.name for body in model.bodies if not _frame(model, body) and not _has_inertia(body)]:
-        yield f"mass of {_listed(massless)}", "it is zero", _replaced(model, massless, _heavy)
-    if welds := [body.name for body in model.bodies if not body.joint.type.moves and body.mass]:
-        yield f"joint of {_listed(welds)}", "it is welded on", _replaced(model, welds, _hinged)
-
-
-def _has_inertia(body: Body) -> bool:
-    return bool(body.mass or np.any(np.asarray(body.inertia)))
-
-
-def _frame(model: Mechanism, body: Body) -> bool:
-    """Whether a body only marks a place: welded on, without mass, carrying nothing."""
-    carries = any(body.name == other.parent for other in model.bodies)
-    return not (carries or body.joint.type.moves or _has_inertia(body))
-
-
-def _replaced(model: Mechanism, names: Sequence[str], change: Callable[[Body], Body]) -> Mechanism:
-    return replace(model, bodies=tuple([change(body) if body.name in names else body for body in model.bodies]))
-
-
-def _heavy(body: Body) -> Body:
-    return replace(body, mass=1.0, center=(0.1, 0.2, 0.3), inertia=(0.1, 0.2, 0.25))
-
-
-def _hinged(body: Body) -> Body:
-    return replace(body, joint=replace(body.joint, kind="revolute", armature=NUMBER))
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names if len(names) <= 4 else [*names[:3], f"{len(names) - 3} more"])

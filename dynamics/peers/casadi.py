@@ -79,7 +79,7 @@ class CasadiPeer(Peer):
         return self.casadi.Function("moved", [x], [moved])
 
     def prepare(self, task: str, mode: str) -> Contender:
-        """See Peer."""
+        """CasADi's function of the task, in its virtual machine or through gcc."""
         if self.native and self.compiler is None:
             raise UnavailableError("there is no C compiler")
         function = self.function(task)

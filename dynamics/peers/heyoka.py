@@ -24,7 +24,7 @@ class HeyokaPeer(Peer):
         self.functions: dict[str, Any] = {}
 
     def prepare(self, task: str, mode: str) -> Contender:
-        """See Peer."""
+        """heyoka's compiled function of the task."""
         if task not in self.functions:
             outputs, inputs = expressions(self.case, task)
             self.functions[task] = self.heyoka.cfunc(outputs, inputs, compact_mode=self.case.n > COMPACT)

@@ -60,7 +60,7 @@ class JaxPeer(Peer):
         return rk4_step(self.rate, x)
 
     def prepare(self, task: str, mode: str) -> Contender:
-        """See Peer."""
+        """JAX's jitted function of the task."""
         function: Callable[[Any], Any] = {"inverse": self._inverse, "forward": self._forward, "rk4": self._step}[task]
         x = self.np.asarray(self.case.point(task))
         if mode == "call":

@@ -44,7 +44,7 @@ class MujocoPeer(Peer):
         }
 
     def prepare(self, task: str, mode: str) -> Contender:
-        """See Peer."""
+        """MuJoCo's call for the task, at one state, in a loop or over states."""
         if mode != "call":
             return self._rollout(mode)
         m, model, data = self.mujoco, self.twin.model, self.twin.data

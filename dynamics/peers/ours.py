@@ -52,7 +52,7 @@ class Ours(Peer):
         self.function = cache(lambda task: cg.compile(self.graph(task)))
 
     def prepare(self, task: str, mode: str) -> Contender:
-        """See Peer."""
+        """The compiled graph of the task."""
         graph, points = self.graph(task), self.case.points(task)
         size = len(graph.nodes)
         if mode == "loop":
@@ -69,7 +69,7 @@ class OurNumpy(Peer):
     """Our graph as generated NumPy over arrays: what there is without llvmlite. For batches."""
 
     def prepare(self, task: str, mode: str) -> Contender:
-        """See Peer."""
+        """The compiled graph of the task."""
         function, points = cg.compile(task_graph(self.case, task), backend="numpy"), self.case.points(task)
         return Contender(lambda: function.batch(points), _same, points.shape[1], len(function.graph.nodes))
 

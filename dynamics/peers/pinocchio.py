@@ -69,7 +69,7 @@ class PinocchioPeer(Peer):
         }
 
     def prepare(self, task: str, mode: str) -> Contender:
-        """See Peer."""
+        """Pinocchio's rnea or aba, at one state or over states."""
         if task == "rk4":
             return self._step()
         x = self.case.point(task) if mode == "call" else self.case.points(task)

@@ -24,7 +24,7 @@ class SympyPeer(Peer):
         self.functions: dict[str, Any] = {}
 
     def prepare(self, task: str, mode: str) -> Contender:
-        """See Peer."""
+        """SymPy's lambdified function of the task."""
         if task not in self.functions:
             self.functions[task] = self._lambdified(task)
         function, many = self.functions[task], mode == "batch"

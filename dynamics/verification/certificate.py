@@ -13,7 +13,7 @@ import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Builder, cotangents, tangents
 
-from ..equations.coriolis import coriolis
+from ..equations.coriolis import coriolis, require_quadratic
 from ..equations.equations_of_motion import bias, energy, forward_dynamics, gravity_force, mass_matrix
 from ..equations.evaluate_at import Array, evaluate_at
 from ..equations.formulations import ONE, ZERO, inverse_dynamics

@@ -152,7 +152,7 @@ class Translation:
         self.peer = make(self.case)
 
     def inverse(self, at: Mapping[str, Array]) -> Array:
-        """See Asked."""
+        """tau, (N, n), of q, qd, qdd, (N, n) each."""
         rows = []
         for state in np.concatenate([at["q"], at["qd"], at["qdd"]], axis=1):
             self.case.state = state
@@ -161,7 +161,7 @@ class Translation:
         return np.array(rows)
 
     def without(self, terms: Sequence[str]) -> Translation:
-        """See Asked."""
+        """The same model with these of the `TERMS` taken out."""
         return Translation(self.make, without(self.mechanism, terms))
 
 
@@ -172,7 +172,7 @@ class Original:
         self.mj_model = mj_model
 
     def inverse(self, at: Mapping[str, Array]) -> Array:
-        """See Asked."""
+        """tau, (N, n), of q, qd, qdd, (N, n) each."""
         module, data = mujoco(), mujoco().MjData(self.mj_model)
         rows = []
         for data.qpos[:], data.qvel[:], data.qacc[:] in zip(at["q"], at["qd"], at["qdd"], strict=True):
@@ -181,7 +181,7 @@ class Original:
         return np.array(rows)
 
     def without(self, terms: Sequence[str]) -> Original:
-        """See Asked."""
+        """The same model with these of the `TERMS` taken out."""
         mj_model = copy.copy(self.mj_model)
         for name in terms:
             TERMS[name].theirs(mj_model)

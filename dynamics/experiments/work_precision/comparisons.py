@@ -212,11 +212,11 @@ class SolveIvp(Solver):
         self.rate, self.solve = rate, solve_ivp()
 
     def ready(self, knob: float) -> Callable[[], Outcome]:
-        """See Solver."""
+        """The run with that knob, everything before it done: what is timed."""
         return lambda: self._run(knob)[0]
 
     def rows(self, knob: float) -> Array:
-        """See Solver."""
+        """The states at the setting's times, (T, m); NaN from where it stopped."""
         return self._run(knob, self.setting.times)[1]
 
     def _run(self, knob: float, times: list[float] | None = None) -> tuple[Outcome, Array]:

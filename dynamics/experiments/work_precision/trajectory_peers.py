@@ -52,7 +52,7 @@ class Mujoco(Solver):
         self.begin = np.concatenate([[0.0], self.start[:n][at], self.start[n:][at]])[None]
 
     def ready(self, knob: float) -> Callable[[], Outcome]:
-        """See Solver."""
+        """The run with that knob, everything before it done: what is timed."""
         states, run = self._states(int(knob))
 
         def whole() -> Outcome:
@@ -62,7 +62,7 @@ class Mujoco(Solver):
         return whole
 
     def rows(self, knob: float) -> Array:
-        """See Solver."""
+        """The states at the setting's times, (T, m); NaN from where it stopped."""
         steps = int(knob)
         states, run = self._states(steps)
         run()
@@ -82,7 +82,7 @@ class Mujoco(Solver):
         return states, run
 
     def rates(self, x: Array) -> Array:
-        """See Solver: velocities as they are, accelerations by MuJoCo."""
+        """Its rates, (T, m), at states (T, m): velocities as they are, accelerations by MuJoCo."""
         n, order, at = self.peer.case.n, self.peer.order, self.peer.at
         twin, none = self.peer.twin, np.zeros(self.peer.case.n)
         accelerations = [twin.accelerations(row[:n][at], row[n:][at], none)[order] for row in x]
@@ -117,7 +117,7 @@ class Heyoka(Solver):
         return integrator
 
     def ready(self, knob: float) -> Callable[[], Outcome]:
-        """See Solver."""
+        """The run with that knob, everything before it done: what is timed."""
         integrator = self.integrator(knob)
         t_end, limit = self.setting.t_end, self.heyoka.taylor_outcome.time_limit
 
@@ -131,7 +131,7 @@ class Heyoka(Solver):
         return run
 
     def rows(self, knob: float) -> Array:
-        """See Solver."""
+        """The states at the setting's times, (T, m); NaN from where it stopped."""
         integrator = self.integrator(knob)
         times = self.setting.times
         if times[0] > 0.0:
@@ -142,7 +142,7 @@ class Heyoka(Solver):
         return result
 
     def rates(self, x: Array) -> Array:
-        """See Solver."""
+        """Its rates of the states, (T, m), at states (T, m)."""
         variables, expressions = zip(*self.system, strict=True)
         function = self.heyoka.cfunc(list(expressions), list(variables), compact_mode=True)
         times = {"time": np.zeros(len(x))} if function.is_time_dependent else {}
@@ -166,7 +166,7 @@ class Cvodes(Solver):
         return self.casadi.integrator("run", "cvodes", self.equations, 0.0, list(times), options | self.options)
 
     def ready(self, knob: float) -> Callable[[], Outcome]:
-        """See Solver."""
+        """The run with that knob, everything before it done: what is timed."""
         function, start = self._function(knob, [self.setting.t_end]), self.start.tolist()
 
         def run() -> Outcome:
@@ -177,13 +177,13 @@ class Cvodes(Solver):
         return run
 
     def rows(self, knob: float) -> Array:
-        """See Solver."""
+        """The states at the setting's times, (T, m); NaN from where it stopped."""
         times = self.setting.times
         states: Array = np.array(self._function(knob, times)(x0=self.start.tolist())["xf"]).T
         return states
 
     def rates(self, x: Array) -> Array:
-        """See Solver."""
+        """Its rates of the states, (T, m), at states (T, m)."""
         ca, parts = self.casadi, self.equations
         rate = ca.Function("rate", [parts["x"], parts["t"]], [parts["ode"]])
         return np.array([np.array(rate(row, 0.0)).ravel() for row in x])

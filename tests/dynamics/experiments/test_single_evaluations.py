@@ -10,6 +10,7 @@ from pytest import approx, importorskip, mark
 import cgraph as cg
 import dynamics as dyn
 from dynamics.experiments.stability import huge_angles, single_evaluations
+from dynamics.multibody.planar_arm import arm_of_links, planar_links
 from tests.dynamics.lagrange_by_mpmath import floats, lagrange
 from tests.dynamics.models import Array
 
@@ -78,16 +79,17 @@ def test_the_condition_is_what_changes_of_the_data_make(task: str) -> None:
     for i in range(3 * n):
         moved = [point * (1.0 + sign * step * (np.arange(3 * n) == i)) for sign in (1, -1)]
         change(*[solve(arm, *each.reshape(3, n)) for each in moved])
-    for i, link in enumerate(arm.links):
+    links, damping, gravity = planar_links(arm), arm.system.damping, -float(np.asarray(arm.gravity)[2])
+    for i, link in enumerate(links):
         for what in ("mass", "length", "center", "inertia"):
             arms = []
             for sign in (1, -1):
-                changed = replace(link, **{what: getattr(link, what) * (1.0 + sign * step)})
-                arms.append(replace(arm, links=(*arm.links[:i], changed, *arm.links[i + 1 :])))
+                changed = link._replace(**{what: getattr(link, what) * (1.0 + sign * step)})
+                arms.append(arm_of_links([*links[:i], changed, *links[i + 1 :]], damping, gravity))
             change(*[solve(each, q, qd, third) for each in arms])
-        scaled = [tuple([c * (1.0 + sign * step * (j == i)) for j, c in enumerate(arm.damping)]) for sign in (1, -1)]
-        change(*[solve(replace(arm, damping=each), q, qd, third) for each in scaled])
-    change(*[solve(replace(arm, gravity=arm.gravity * (1.0 + sign * step)), q, qd, third) for sign in (1, -1)])
+        scaled = [tuple([c * (1.0 + sign * step * (j == i)) for j, c in enumerate(damping)]) for sign in (1, -1)]
+        change(*[solve(arm_of_links(links, each, gravity), q, qd, third) for each in scaled])
+    change(*[solve(arm_of_links(links, damping, gravity * (1.0 + sign * step)), q, qd, third) for sign in (1, -1)])
     found = single_evaluations.Arms(single_evaluations.TASKS[task], n).condition(arm, point)
     assert found == approx(expected, rel=SLOPES)
 
@@ -121,8 +123,8 @@ def test_a_constant_that_is_off_is_seen() -> None:
     def off(arm: Any) -> cg.Graph:
         if not isinstance(arm, dyn.Mechanism):
             return task.derive(arm)
-        first = replace(arm.links[0], mass=arm.links[0].mass * (1.0 + 1e-13))
-        return task.derive(replace(arm, links=(first, *arm.links[1:])))
+        first = replace(arm.bodies[0], mass=arm.bodies[0].mass * (1.0 + 1e-13))
+        return task.derive(replace(arm, bodies=(first, *arm.bodies[1:])))
 
     arms = single_evaluations.Arms(task._replace(derive=off), 3, ["python"])
     assert not single_evaluations.measurement(single_evaluations.FAMILIES[0], arms).meets
