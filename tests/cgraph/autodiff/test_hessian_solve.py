@@ -18,6 +18,7 @@ from cgraph.autodiff.hessian_solve import solve_nodes
 from cgraph.autodiff.ldl_solve import SingularError, ldl_elimination, ldl_solve
 from cgraph.autodiff.rotation_pairs import rotations
 from cgraph.core.traversal import topological
+from tests.tolerances import LONG_SUM
 
 # Each function runs on nodes and, with mpmath's functions, on high-precision numbers: {name: (function, inputs)}.
 FUNCTIONS = {
@@ -50,7 +51,7 @@ def test_solves_with_the_hessian(name):
                     hessian[i, j] = mpmath.diff(lambda *v: function(mpmath, *v), tuple(map(mpmath.mpf, point)), orders)
         expected = np.linalg.solve(hessian, right)
         found = cg.compile(graph)(np.concatenate([point, right]))
-        assert found == pytest.approx(expected, rel=1e-13, abs=1e-13 * np.abs(expected).max())
+        assert found == pytest.approx(expected, rel=LONG_SUM, abs=LONG_SUM * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("n", [10, 40, 160])
@@ -166,7 +167,7 @@ def test_right_hand_sides_at_inner_nodes_are_carried_to_the_variables():
     apart = cg.hessian_solve(cg.Graph(x, {"f": energy}), x, rhs)
     graph = cg.Graph([*x, *b], {f"s{i}": node for i, node in enumerate([*carried, *apart])})
     found = cg.compile(graph)(np.random.default_rng(0).uniform(0.2, 0.8, 8))
-    assert found[:3] == pytest.approx(found[3:], rel=1e-13)
+    assert found[:3] == pytest.approx(found[3:], rel=LONG_SUM)
 
 
 def turning(m, a, b, x):
@@ -202,7 +203,7 @@ def test_rotations_are_turned_back_as_one() -> None:
                     hessian[i, j] = mpmath.diff(energy, tuple(map(mpmath.mpf, point)), orders)
         expected = np.linalg.solve(hessian, right)
         assert function(np.concatenate([angles, point, right])) == pytest.approx(
-            expected, rel=1e-13, abs=1e-13 * np.abs(expected).max()
+            expected, rel=LONG_SUM, abs=LONG_SUM * np.abs(expected).max()
         )
 
 
@@ -286,7 +287,7 @@ def test_a_right_hand_side_at_a_product_within_a_rotation_is_carried_too() -> No
     apart = cg.hessian_solve(cg.Graph([a, *x], {"f": energy}), x, [b[0] + c * b[2], b[1]])
     graph = cg.Graph([a, *x, *b], {f"s{i}": node for i, node in enumerate([*carried, *apart])})
     found = cg.compile(graph)(np.random.default_rng(0).uniform(0.2, 0.8, 6))
-    assert found[:2] == pytest.approx(found[2:], rel=1e-13)
+    assert found[:2] == pytest.approx(found[2:], rel=LONG_SUM)
 
 
 def test_elimination_is_exact_over_fractions() -> None:

@@ -19,6 +19,7 @@ from cgraph.codegen.c import c_statements as body
 from cgraph.core.node import OPS, apply
 from cgraph.util.atomic_write import atomic_write
 from tests.strategies import cases
+from tests.tolerances import EQUATIONS
 
 CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 CXX = shutil.which("c++") or shutil.which("g++") or shutil.which("clang++")
@@ -185,7 +186,7 @@ def test_fused_multiply_add_only_when_asked(tmp_path):
     macros = run([CC, "-march=native", "-dM", "-E", "-x", "c", "/dev/null"])
     if "__FP_FAST_FMA " in macros:
         assert not same(found[True], found[False])
-    np.testing.assert_allclose(found[True], found[False], rtol=1e-12)
+    np.testing.assert_allclose(found[True], found[False], rtol=EQUATIONS)
 
 
 @needs_cc

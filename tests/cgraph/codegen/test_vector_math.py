@@ -14,6 +14,7 @@ from cgraph.codegen.llvm_ir import TOGETHER, batch_ir, libm_functions
 from cgraph.codegen.schedule import Joined, joined_calls, schedule
 from cgraph.core.node import OPS, apply
 from tests.strategies import cases
+from tests.tolerances import SHORT_SUM
 from tests.ulps import exact, same, ulps_apart
 
 binding = pytest.importorskip("llvmlite.binding")
@@ -260,7 +261,7 @@ def test_a_call_waits_for_the_calls_that_its_arguments_need():
     assert calls[first] is calls[then]
     assert_complete_and_in_order(graph, TOGETHER)
     expected = graph.evaluate({"x": 0.3, "y": 1.2, "z": 0.7})
-    assert cg.compile(graph, "llvm")([0.3, 1.2, 0.7]) == pytest.approx(list(expected.values()), rel=1e-14)
+    assert cg.compile(graph, "llvm")([0.3, 1.2, 0.7]) == pytest.approx(list(expected.values()), rel=SHORT_SUM)
 
 
 def test_the_argument_that_needs_more_registers_is_computed_first():

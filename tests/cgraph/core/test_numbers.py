@@ -9,6 +9,7 @@ import pytest
 
 import cgraph as cg
 from cgraph.core.node import Node
+from tests.tolerances import LAST_BITS
 
 x, y = cg.variables("x y")
 X, Y = 0.7, 0.4  # their values
@@ -100,7 +101,7 @@ def test_a_function_of_numpy_on_a_node_is_a_node(ufunc, expected):
 @pytest.mark.parametrize("ufunc", [np.add, np.arctan2, np.hypot, np.maximum, np.minimum, np.divide, np.power])
 def test_a_function_of_two_arguments_of_numpy_takes_nodes_and_numbers(ufunc):
     for arguments, numbers in (((x, y), (X, Y)), ((x, 0.5), (X, 0.5)), ((np.float64(0.5), y), (0.5, Y))):
-        assert value(ufunc(*arguments)) == pytest.approx(float(ufunc(*numbers)), rel=1e-15)
+        assert value(ufunc(*arguments)) == pytest.approx(float(ufunc(*numbers)), rel=LAST_BITS)
 
 
 def test_what_numpy_cannot_do_with_a_node_is_a_type_error():
@@ -120,7 +121,7 @@ def test_arithmetic_with_an_array_is_element_by_element(operation):
     for nodes, expected in ((operation(x, ARRAY), operation(X, ARRAY)), (operation(ARRAY, x), operation(ARRAY, X))):
         assert nodes.shape == (2, 2)
         found = np.array([[value(node) for node in row] for row in nodes])
-        assert found == pytest.approx(expected, rel=1e-15)
+        assert found == pytest.approx(expected, rel=LAST_BITS)
 
 
 @pytest.mark.parametrize("operation", COMPARISONS)
@@ -144,10 +145,10 @@ def test_arrays_of_nodes_combine_with_nodes_numbers_and_arrays():
 
 def test_matrices_times_vectors_of_nodes():
     nodes = np.array([x, y])
-    assert [value(each) for each in ARRAY @ nodes] == pytest.approx([X + 2 * Y, 3 * X + 4 * Y], rel=1e-15)
+    assert [value(each) for each in ARRAY @ nodes] == pytest.approx([X + 2 * Y, 3 * X + 4 * Y], rel=LAST_BITS)
     assert value(nodes @ nodes) == X * X + Y * Y
     matrix = np.array([[x, y], [y, x]])
-    assert [value(each) for each in matrix @ nodes] == pytest.approx([X * X + Y * Y, 2 * X * Y], rel=1e-15)
+    assert [value(each) for each in matrix @ nodes] == pytest.approx([X * X + Y * Y, 2 * X * Y], rel=LAST_BITS)
 
 
 def test_sum_of_nodes():

@@ -10,6 +10,7 @@ from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
 from cgraph.program import Call, Factor, If, Map, Program, Solve, Sum, While, runner
+from tests.tolerances import LONG_SUM
 
 BACKENDS = ["python", "llvm"]
 
@@ -154,7 +155,7 @@ def test_factor_and_solve(n: int, seed: int) -> None:
             continue
         results.append(run.run(run.memory({"a": a.ravel(), "b": a @ x}), 1).rows)
         residual = a @ results[-1][0, :n] - a @ x
-        assert np.all(np.abs(residual) <= 1e-13 * (np.abs(a) @ np.abs(results[-1][0, :n])))
+        assert np.all(np.abs(residual) <= LONG_SUM * (np.abs(a) @ np.abs(results[-1][0, :n])))
     for one, other in itertools.pairwise(results):
         assert one.tolist() == other.tolist()
 

@@ -9,6 +9,7 @@ from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
 from cgraph.core.traversal import topological
+from tests.tolerances import EQUATIONS, LONG_SUM
 
 ROUND = 2.0**-98  # of an operation, with some to spare; relative to a bound on the terms that went into it
 BACKENDS = {"python": {}, "numpy": {}, "llvm": {}, "llvm without fused multiply-add": {"fma": False}}
@@ -125,7 +126,7 @@ def test_vectors_agree_with_one_point():
     compiled = cg.compile(graph, "llvm")
     columns = [compiled(np.ascontiguousarray(column)) for column in points.T]
     rows = compiled.batch(points).T
-    assert rows == pytest.approx(np.array(columns), rel=1e-13, abs=1e-25)
+    assert rows == pytest.approx(np.array(columns), rel=LONG_SUM, abs=1e-25)
 
 
 @pytest.mark.parametrize(
@@ -147,7 +148,7 @@ def test_vectors_agree_with_one_point():
 )
 def test_choices_see_the_low_part(node, point, expected):
     compiled = cg.compile(cg.double_double(cg.Graph([x, y], {"f": node})), "python")
-    assert compiled(np.array(point))[0] == pytest.approx(expected, rel=1e-13, abs=0.0)
+    assert compiled(np.array(point))[0] == pytest.approx(expected, rel=LONG_SUM, abs=0.0)
 
 
 @pytest.mark.parametrize("function", [cg.sin, cg.cos, cg.exp, cg.atan, cg.tanh, cg.log, cg.cosh])
@@ -156,7 +157,7 @@ def test_functions_take_the_low_part_of_their_argument_to_first_order(function):
     compiled = cg.compile(cg.double_double(graph), "python")
     with mpmath.workdps(40):
         slope = mpmath.diff(getattr(mpmath, function.__name__), 0.7)
-    assert compiled(np.array([0.7, 1e-20]))[0] == pytest.approx(1e-20 * float(slope), rel=1e-12)
+    assert compiled(np.array([0.7, 1e-20]))[0] == pytest.approx(1e-20 * float(slope), rel=EQUATIONS)
 
 
 def test_constants_are_folded_and_tags_and_inputs_stay():

@@ -19,6 +19,7 @@ from dynamics.multibody.mechanism import Body, Joint, Mechanism, MechanismError
 from dynamics.multibody.spatial import rotation
 from tests.dynamics.mechanisms import FAMILIES, turned_arm
 from tests.dynamics.models import error
+from tests.tolerances import EQUATIONS
 
 mujoco = importorskip("mujoco")
 
@@ -49,7 +50,10 @@ def disagreement(model: Any, mechanism: Mechanism, count: int = 10) -> float:
     """The largest error of accelerations and torques against `mj_forward` and `mj_inverse`, with qpos as q."""
     n, data = mechanism.system.n, mujoco.MjData(model)
     assert n == model.nv == model.nq
-    forward, inverse = cg.compile(dyn.forward_dynamics(mechanism)), cg.compile(dyn.inverse_dynamics(mechanism))
+    forward, inverse = (
+        cg.compile(dyn.forward_dynamics(mechanism), "python"),
+        cg.compile(dyn.inverse_dynamics(mechanism), "python"),
+    )
     rng, worst = np.random.default_rng(n), 0.0
     for _ in range(count):
         q, qd, given = rng.uniform(-1.0, 1.0, (3, n))
@@ -65,7 +69,7 @@ def disagreement(model: Any, mechanism: Mechanism, count: int = 10) -> float:
 def agrees(text: str) -> Mechanism:
     """The mechanism of MJCF text, seen to agree with MuJoCo's model of it."""
     mechanism = dyn.load_mjcf(text)
-    assert disagreement(compiled(text), mechanism) < 1e-12
+    assert disagreement(compiled(text), mechanism) < EQUATIONS
     return mechanism
 
 
@@ -91,7 +95,7 @@ def test_a_mechanism_comes_back_from_its_mjcf(family: str, n: int) -> None:
     x = np.random.default_rng(n).uniform(-1.0, 1.0, (3, mechanism.system.n))
     theirs = np.empty_like(x)
     theirs[:, order] = x
-    ours, again = (cg.compile(dyn.forward_dynamics(each)) for each in (mechanism, back))
+    ours, again = (cg.compile(dyn.forward_dynamics(each), "python") for each in (mechanism, back))
     assert error(again(theirs.ravel())[order], ours(x.ravel())) < AGREEMENT
 
 
@@ -318,7 +322,7 @@ def test_a_urdf_arm_is_what_it_says() -> None:
     ]
     x = np.random.default_rng(3).uniform(-1.0, 1.0, 9)
     ours, theirs = (cg.compile(dyn.inverse_dynamics(each))(x) for each in (loaded, Mechanism(bodies)))
-    assert error(ours, theirs) < 1e-12
+    assert error(ours, theirs) < EQUATIONS
 
 
 def test_a_urdf_file_is_its_text(tmp_path: Path) -> None:
@@ -397,7 +401,7 @@ def test_a_mechanism_comes_back_from_its_urdf(family: str) -> None:
     x = np.random.default_rng(4).uniform(-1.0, 1.0, (3, mechanism.system.n))
     theirs = np.empty_like(x)
     theirs[:, order] = x
-    ours, again = (cg.compile(dyn.forward_dynamics(each)) for each in (mechanism, back))
+    ours, again = (cg.compile(dyn.forward_dynamics(each), "python") for each in (mechanism, back))
     assert error(again(theirs.ravel())[order], ours(x.ravel())) < AGREEMENT
 
 
@@ -415,7 +419,7 @@ def test_a_frame_that_looks_straight_up_comes_back(pitch: float) -> None:
     (body,) = dyn.load_urdf(
         dyn.to_urdf(Mechanism([Body("a", joint, mass=1.0, center=(1, 0, 0), inertia=(1, 1, 1))]))
     ).moving
-    assert np.asarray(body.joint.orientation) == approx(orientation, abs=1e-12)
+    assert np.asarray(body.joint.orientation) == approx(orientation, abs=EQUATIONS)
 
 
 @mark.parametrize("what", ["stiffness", "armature"])

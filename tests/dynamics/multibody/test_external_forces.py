@@ -16,6 +16,7 @@ from dynamics import Body, Force, Joint, Mechanism, MechanismError
 from dynamics.multibody.spatial import from_quaternion
 from tests.dynamics.mechanisms import FAMILIES, turned_arm
 from tests.dynamics.models import Array, at, error, inputs, run, states
+from tests.tolerances import EQUATIONS, SHORT_SUM, SOLVED
 
 ROUNDING = 1e-12  # of the largest entry: two orders of summing the same few terms
 DIFFERENCES = 1e-8  # of the largest entry: central differences of positions of size 1 with a step of 1e-5
@@ -90,7 +91,7 @@ def test_a_spring_to_a_fixed_point_has_the_slope_of_its_energy() -> None:
     energy = cg.Graph(arm.system.q, {"V": 0.5 * stiffness * (stretch[0] ** 2 + stretch[1] ** 2 + stretch[2] ** 2)})
     given = at(states(arm, 1), 0)
     slope = run(cg.gradient(energy), given)
-    assert generalized(sprung, given) == approx(-slope, rel=1e-12)
+    assert generalized(sprung, given) == approx(-slope, rel=EQUATIONS)
 
 
 def test_a_drag_takes_the_power_it_says() -> None:
@@ -102,7 +103,7 @@ def test_a_drag_takes_the_power_it_says() -> None:
     dragged = replace(arm, forces=[Force("link 3", [-0.3 * v for v in velocity], HAND)])
     given = at(states(arm, 1), 0)
     speed = run(cg.Graph([*arm.system.q, *arm.system.qd], dict(zip("xyz", velocity, strict=True))), given)
-    assert generalized(dragged, given) @ given["qd"] == approx(-0.3 * speed @ speed, rel=1e-12)
+    assert generalized(dragged, given) @ given["qd"] == approx(-0.3 * speed @ speed, rel=EQUATIONS)
 
 
 def test_a_pendulum_pushed_at_its_tip_by_hand() -> None:
@@ -115,9 +116,9 @@ def test_a_pendulum_pushed_at_its_tip_by_hand() -> None:
     q = 0.4
     free = 0.25 * 1.5 + 9.81 * 0.5 * np.sin(q)
     expected = free - 0.8 * (-3.0 * np.cos(q) + 2.0 * np.sin(q))
-    assert graph.evaluate({"q0": q, "qd0": 0.3, "qdd0": 1.5, "fx": 3.0})["tau0"] == approx(expected, rel=1e-14)
+    assert graph.evaluate({"q0": q, "qd0": 0.3, "qdd0": 1.5, "fx": 3.0})["tau0"] == approx(expected, rel=SHORT_SUM)
     place = pendulum.position("rod", tip).evaluate({"q0": q})
-    assert list(place.values()) == approx([-0.8 * np.sin(q), 0.0, -0.8 * np.cos(q)], rel=1e-14)
+    assert list(place.values()) == approx([-0.8 * np.sin(q), 0.0, -0.8 * np.cos(q)], rel=SHORT_SUM)
 
 
 # --- against MuJoCo
@@ -149,8 +150,8 @@ def test_mujoco_s_applied_force_agrees(body: str, frame: str) -> None:
     free = pushed(mechanism, body, frame, value=("fx", "fy", "fz"), torque=("mx", "my", "mz"))
     centre = replace(free, forces=[replace(free.forces[0], at=_center(mechanism, body))])
     graphs = [dyn.forward_dynamics(each) for each in (free, centre)]
-    compiled = [cg.compile(graph) for graph in graphs]
-    place = cg.compile(mechanism.position(body, HAND))
+    compiled = [cg.compile(graph, "python") for graph in graphs]
+    place = cg.compile(mechanism.position(body, HAND), "python")
     index = model.body(body).id
     for row in range(100):
         state = at(states(mechanism, 100), row)
@@ -162,7 +163,7 @@ def test_mujoco_s_applied_force_agrees(body: str, frame: str) -> None:
         mujoco.mj_forward(model, data)
         axes = data.xmat[index].reshape(3, 3)
         point = data.xpos[index] + axes @ HAND if body != "elbow" else data.xpos[index] + axes @ _shifted(HAND)
-        assert place(state["q"]) == approx(point, abs=1e-12)
+        assert place(state["q"]) == approx(point, abs=EQUATIONS)
         if frame == "body":
             value, torque = axes @ value, axes @ torque
         data.qfrc_applied[:] = state["tau"]
@@ -199,8 +200,8 @@ def test_parameters_are_inputs_that_simulate_binds() -> None:
     assert pushable.system.parameters == {"fx": 2.0, "fz": 0.0}
     start = ([0.1, 0.2], [0.3, 0.4], 0.3)
     default, chosen = (dyn.simulate(pushable, *start, parameters=p).q[-1] for p in ({}, {"fx": 0.0}))
-    assert default == approx(dyn.simulate(fixed, *start).q[-1], rel=1e-12)
-    assert chosen == approx(dyn.simulate(arm, *start).q[-1], rel=1e-12)
+    assert default == approx(dyn.simulate(fixed, *start).q[-1], rel=EQUATIONS)
+    assert chosen == approx(dyn.simulate(arm, *start).q[-1], rel=EQUATIONS)
     assert default != approx(chosen, rel=1e-3)
 
 
@@ -261,7 +262,7 @@ def test_every_formulation_takes_the_force_off(formulation: str) -> None:
     old = {"q_old": given["q"], "qd_old": given["qd"], "dt": 0.0, **given}
     free, ours = (dyn.inverse_dynamics(each, formulation) for each in (arm, pushed(arm, "link 3")))
     difference = np.array(list(free.evaluate(inputs(free, old)).values())) - run(ours, old)
-    assert difference == approx(expected, rel=1e-10)
+    assert difference == approx(expected, rel=SOLVED)
 
 
 def test_a_turned_body_s_axes_turn_its_force() -> None:
@@ -271,9 +272,9 @@ def test_a_turned_body_s_axes_turn_its_force() -> None:
     cart = Mechanism([Body("cart", joint, mass=1.0)])
     given = at(states(cart, 1), 0)
     in_body = generalized(pushed(cart, "cart", "body"), given)
-    assert in_body == approx([VALUE @ (1.0, 1.0, 0.0) / np.sqrt(2.0)], rel=1e-14)
+    assert in_body == approx([VALUE @ (1.0, 1.0, 0.0) / np.sqrt(2.0)], rel=SHORT_SUM)
     in_world = generalized(pushed(cart, "cart"), given)
-    assert in_world == approx([VALUE @ turn @ (1.0, 1.0, 0.0) / np.sqrt(2.0)], rel=1e-14)
+    assert in_world == approx([VALUE @ turn @ (1.0, 1.0, 0.0) / np.sqrt(2.0)], rel=SHORT_SUM)
 
 
 def test_bodies_and_forces_may_come_from_iterators() -> None:
@@ -290,7 +291,7 @@ def test_components_whose_rates_are_one_node_add_up() -> None:
     """Of a slide along x and y alike, both velocities are the same node."""
     cart = Mechanism([Body("cart", Joint("prismatic", (1.0, 1.0, 0.0)), mass=1.0)])
     felt = generalized(pushed(cart, "cart"), at(states(cart, 1), 0))
-    assert felt == approx([(VALUE[0] + VALUE[1]) / np.sqrt(2.0)], rel=1e-14)
+    assert felt == approx([(VALUE[0] + VALUE[1]) / np.sqrt(2.0)], rel=SHORT_SUM)
 
 
 # --- what cannot be

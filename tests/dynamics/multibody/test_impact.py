@@ -8,6 +8,7 @@ from pytest import approx, mark, raises
 
 import dynamics as dyn
 from tests.dynamics.mechanisms import random_body, random_inertia
+from tests.tolerances import CONDITIONED, EQUATIONS, LAST_BITS, LONG_SUM, SHORT_SUM, SOLVED
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 STEP = 1e-5  # of central differences: error about STEP^2
@@ -83,12 +84,12 @@ def test_a_rotor_that_catches_a_point_mass_slows_down_as_the_closed_form_says() 
     rotor = dyn.Mechanism([dyn.Body("rotor", dyn.Joint("revolute"), inertia=(inertia,) * 3)])
     bead = dyn.Body("bead", dyn.Joint("fixed", position=(length, 0.0, 0.0)), "rotor", mass)
     found = dyn.attach_with_impact(rotor, [0.4], [w], bead)
-    assert found.qd[0] == approx(inertia * w / (inertia + mass * length**2), rel=1e-15)
-    assert found.energy == approx(0.5 * inertia * w**2 * mass * length**2 / (inertia + mass * length**2), rel=1e-14)
+    assert found.qd[0] == approx(inertia * w / (inertia + mass * length**2), rel=LAST_BITS)
+    assert found.energy == approx(0.5 * inertia * w**2 * mass * length**2 / (inertia + mass * length**2), rel=SHORT_SUM)
     moving = dyn.attach_with_impact(rotor, [0.0], [w], bead, velocity=(0.0, 3.0, 0.0))
-    assert moving.qd[0] == approx((inertia * w + mass * length * 3.0) / (inertia + mass * length**2), rel=1e-15)
+    assert moving.qd[0] == approx((inertia * w + mass * length * 3.0) / (inertia + mass * length**2), rel=LAST_BITS)
     along = dyn.attach_with_impact(rotor, [0.0], [w], bead, velocity=(0.0, w * length, 0.0), omega=(0.0, 0.0, w))
-    assert (along.qd[0], along.energy) == (approx(w, rel=1e-15), approx(0.0, abs=1e-15))
+    assert (along.qd[0], along.energy) == (approx(w, rel=LAST_BITS), approx(0.0, abs=LAST_BITS))
 
 
 @mark.parametrize("seed", range(4))
@@ -106,10 +107,12 @@ def test_the_energy_lost_is_that_of_an_inelastic_impact(seed: int) -> None:
                     [np.zeros((3, 3)), r @ np.asarray(body.inertia) @ r.T]])  # fmt: skip
     difference = j @ qd - np.concatenate([v, w])
     resists = np.linalg.inv(j @ np.linalg.solve(m, j.T) + np.linalg.inv(own))
-    assert found.energy == approx(difference @ resists @ difference / 2.0, rel=1e-8)
-    assert found.qd == approx(qd - np.linalg.solve(m, j.T @ resists @ difference), rel=1e-8, abs=1e-8)
+    assert found.energy == approx(difference @ resists @ difference / 2.0, rel=CONDITIONED)
+    assert found.qd == approx(qd - np.linalg.solve(m, j.T @ resists @ difference), rel=CONDITIONED, abs=CONDITIONED)
     free = (body.mass * v @ v + w @ own[3:, 3:] @ w) / 2.0
-    assert kinetic(holder, q, qd) + free - kinetic(found.mechanism, q, found.qd) == approx(found.energy, rel=1e-9)
+    assert kinetic(holder, q, qd) + free - kinetic(found.mechanism, q, found.qd) == approx(
+        found.energy, rel=CONDITIONED
+    )
 
 
 @mark.parametrize("seed", range(4))
@@ -125,11 +128,11 @@ def test_angular_momentum_about_the_base_s_axis_is_kept(seed: int) -> None:
     moves = values(found.mechanism.motion("load", body.center), q=q, qd=qd)
     place = np.array([moves[name] for name in "xyz"])
     before = about_z(holder, q, qd) + _spin(body, place, v, w, turn(moves))
-    assert about_z(found.mechanism, q, found.qd) == approx(before, rel=1e-12)
+    assert about_z(found.mechanism, q, found.qd) == approx(before, rel=EQUATIONS)
     later = dyn.simulate(found.mechanism, q, found.qd, 0.5, **TIGHT)
     left = dyn.release(found.mechanism, later.q[-1], later.qd[-1], "load")
     free = _spin(body, left.body.position, left.body.velocity, left.body.omega, left.body.orientation)
-    assert about_z(left.mechanism, left.q, left.qd) + free == approx(before, rel=1e-8)
+    assert about_z(left.mechanism, left.q, left.qd) + free == approx(before, rel=CONDITIONED)
 
 
 def test_a_body_that_is_let_go_leaves_with_the_velocity_of_the_hand() -> None:
@@ -139,12 +142,12 @@ def test_a_body_that_is_let_go_leaves_with_the_velocity_of_the_hand() -> None:
     assert (found.q.tolist(), found.qd.tolist()) == (q.tolist(), qd.tolist())
     assert [body.name for body in found.mechanism.bodies] == ["b0", "b1", "b2"]
     twist = jacobian(holder, "load", load().center, q) @ qd
-    assert np.concatenate([found.body.velocity, found.body.omega]) == approx(twist, abs=1e-8)
+    assert np.concatenate([found.body.velocity, found.body.omega]) == approx(twist, abs=CONDITIONED)
     place, axes = pose(holder, "load", load().center, q)
-    assert found.body.position == approx(place, abs=1e-14)
-    assert found.body.orientation == approx(axes, abs=1e-14)
+    assert found.body.position == approx(place, abs=SHORT_SUM)
+    assert found.body.orientation == approx(axes, abs=SHORT_SUM)
     again = dyn.attach_with_impact(found.mechanism, q, qd, load(), velocity=found.body.velocity, omega=found.body.omega)
-    assert (again.qd, again.energy) == (approx(qd, rel=1e-12), approx(0.0, abs=1e-12))
+    assert (again.qd, again.energy) == (approx(qd, rel=EQUATIONS), approx(0.0, abs=EQUATIONS))
 
 
 def test_a_body_can_be_caught_on_a_hinge_and_by_a_locked_arm() -> None:
@@ -156,7 +159,7 @@ def test_a_body_can_be_caught_on_a_hinge_and_by_a_locked_arm() -> None:
     assert (found.q.shape, found.q[3]) == ((4,), 0.0)
     spin = values(found.mechanism.motion("load"), q=found.q, qd=found.qd)
     axis = turn(values(found.mechanism.motion("load"), q=found.q, qd=found.qd))[:, 2]
-    assert float(axis @ [spin["wx"], spin["wy"], spin["wz"]]) == approx(0.0, abs=1e-13)
+    assert float(axis @ [spin["wx"], spin["wy"], spin["wz"]]) == approx(0.0, abs=LONG_SUM)
     held = dyn.attach_with_impact(holder.lock("b2", 0.3), q[:2], qd[:2], load())
     assert held.qd.shape == (2,)
     assert held.energy > 0.0
@@ -175,12 +178,12 @@ def test_an_arm_picks_up_carries_and_drops_with_all_energy_accounted_for() -> No
     weight = hand.mass * 9.81
     start = first.energy[0] + weight * place[2]  # at rest, waiting
     held = second.energy
-    assert held[0] == approx(start - found.energy, rel=1e-10)
-    assert np.ptp(held) < 1e-8
+    assert held[0] == approx(start - found.energy, rel=SOLVED)
+    assert np.ptp(held) < CONDITIONED
     v, w = left.body.velocity, left.body.omega
     own = (hand.mass * v @ v + 1e-3 * w @ w) / 2.0 + weight * left.body.position[2]
-    assert third.energy[0] + own == approx(held[-1], rel=1e-12)
-    assert third.energy[-1] == approx(third.energy[0], abs=1e-8)
+    assert third.energy[0] + own == approx(held[-1], rel=EQUATIONS)
+    assert third.energy[-1] == approx(third.energy[0], abs=CONDITIONED)
     assert found.energy > 0.1
     assert math.hypot(*v) > 0.5
 

@@ -12,6 +12,7 @@ from dynamics.multibody.joints.revolute import Revolute
 from dynamics.multibody.spatial import Array
 from tests.dynamics.mechanisms import random_mechanism
 from tests.dynamics.models import error, run, states
+from tests.tolerances import LAST_BITS
 
 PITCH = 0.3  # m a radian
 ROUNDING = 1e-11  # of the largest torque
@@ -73,7 +74,7 @@ def test_it_winds_along_its_axis() -> None:
     nut = dyn.Mechanism([dyn.Body("nut", dyn.Joint("screw", (0.0, 0.0, 1.0)), mass=2.0, inertia=(1.0, 1.0, 0.5))])
     place = nut.motion("nut", (1.0, 0.0, 0.0)).evaluate({"q0": math.pi / 2, "qd0": 2.0})
     assert [place[name] for name in ("x", "y", "z")] == approx([0.0, 1.0, PITCH * math.pi / 2])
-    assert [place[name] for name in ("vx", "vy", "vz", "wz")] == approx([-2.0, 0.0, 2.0 * PITCH, 2.0], abs=1e-15)
+    assert [place[name] for name in ("vx", "vy", "vz", "wz")] == approx([-2.0, 0.0, 2.0 * PITCH, 2.0], abs=LAST_BITS)
     falls = dyn.forward_dynamics(nut).evaluate({"q0": 0.3, "qd0": 0.0, "tau0": 0.0})
     assert falls["qdd0"] == approx(-2.0 * 9.81 * PITCH / (0.5 + 2.0 * PITCH**2))
 

@@ -24,6 +24,7 @@ from tests.dynamics.mechanisms import (
     turned_tree,
 )
 from tests.dynamics.models import Array, at, error, run, states
+from tests.tolerances import EQUATIONS, LAST_BITS, SOLVED
 
 AGREEMENT = 1e-10  # of the largest entry: rounding of two codes, times the condition number of M
 RETURN = 1e-9  # of the largest entry, there and back
@@ -66,19 +67,16 @@ def test_random_mechanisms_agree_with_mujoco(family: str, n: int, record_propert
     mechanism = FAMILIES[family](n)
     twin, size = MujocoTwin(mechanism), mechanism.system.n
     order = [twin.model.joint(body.name).id for body in mechanism.moving]  # MuJoCo's: depth first
-    forward, inverse = cg.compile(dyn.forward_dynamics(mechanism)), cg.compile(dyn.inverse_dynamics(mechanism))
-    worst = np.zeros(2)
+    given = states(mechanism, 100, seed=n)
+    ours = [run(graph, given) for graph in (dyn.forward_dynamics(mechanism), dyn.inverse_dynamics(mechanism))]
+    theirs = np.empty((2, 100, size))
     for row in range(100):
-        state = at(states(mechanism, 100, seed=n), row)
-        theirs = {name: np.empty(size) for name in ("q", "qd", "qdd", "tau")}
-        for name, values in theirs.items():
-            values[order] = state[name]
-        qdd = twin.accelerations(theirs["q"], theirs["qd"], theirs["tau"])[order]
-        tau = twin.inverse(theirs["q"], theirs["qd"], theirs["qdd"])[order]
-        q_qd = [*state["q"], *state["qd"]]
-        worst = np.maximum(
-            worst, [error(forward([*q_qd, *state["tau"]]), qdd), error(inverse([*q_qd, *state["qdd"]]), tau)]
-        )
+        state = {name: np.empty(size) for name in ("q", "qd", "qdd", "tau")}
+        for name, values in state.items():
+            values[order] = given[name][row]
+        theirs[0, row] = twin.accelerations(state["q"], state["qd"], state["tau"])[order]
+        theirs[1, row] = twin.inverse(state["q"], state["qd"], state["qdd"])[order]
+    worst = np.array([error(a, b) for a, b in zip(ours, theirs, strict=True)])
     record_property("forward, inverse", worst.tolist())
     assert worst.max() < AGREEMENT
 
@@ -100,7 +98,7 @@ def test_the_order_of_the_bodies_only_orders_the_coordinates() -> None:
     given = states(mechanism, 3)
     shuffled = {name: value[:, order] for name, value in given.items() if isinstance(value, np.ndarray)}
     ours = run(dyn.forward_dynamics(mechanism), given)
-    assert run(dyn.forward_dynamics(turned_round), shuffled) == approx(ours[:, order], rel=1e-10)
+    assert run(dyn.forward_dynamics(turned_round), shuffled) == approx(ours[:, order], rel=SOLVED)
 
 
 def test_the_length_of_an_axis_does_not_matter() -> None:
@@ -137,7 +135,7 @@ def test_a_body_without_mass_passes_on_what_it_carries() -> None:
     )
     twin, given = MujocoTwin(mechanism), at(states(mechanism, 1), 0)
     theirs = twin.inverse(given["q"], given["qd"], given["qdd"])
-    assert error(run(dyn.inverse_dynamics(mechanism), given), theirs) < 1e-12
+    assert error(run(dyn.inverse_dynamics(mechanism), given), theirs) < EQUATIONS
 
 
 def test_without_gravity_there_is_no_potential() -> None:
@@ -406,7 +404,7 @@ def test_a_plate_and_a_rod_are_bodies_however_turned() -> None:
         mechanism = Mechanism([point("a", inertia=turn @ np.diag(moments) @ turn.T)])
         twin, given = MujocoTwin(mechanism), at(states(mechanism, 1), 0)
         theirs = twin.inverse(given["q"], given["qd"], given["qdd"])
-        assert error(run(dyn.inverse_dynamics(mechanism), given), theirs) < 1e-12
+        assert error(run(dyn.inverse_dynamics(mechanism), given), theirs) < EQUATIONS
 
 
 # --- size
@@ -441,14 +439,14 @@ def test_a_chain_of_a_thousand_links_moves(record_property) -> None:
 
 def test_a_rotation_is_one() -> None:
     turn = rotation(np.array([0.6, 0.0, 0.8]), 0.3)
-    assert turn @ turn.T == approx(np.eye(3), abs=1e-15)
+    assert turn @ turn.T == approx(np.eye(3), abs=LAST_BITS)
 
 
 @mark.parametrize("angle", [0.0, 0.3, -1.2, np.pi, 3.0])
 @mark.parametrize("axis", [(0.6, 0.0, 0.8), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)])
 def test_a_rotation_comes_back_from_its_quaternion(axis: tuple[float, ...], angle: float) -> None:
     turn = rotation(np.array(axis), angle)
-    assert from_quaternion(to_quaternion(turn)) == approx(turn, abs=1e-15)
+    assert from_quaternion(to_quaternion(turn)) == approx(turn, abs=LAST_BITS)
 
 
 COUNTS = {

@@ -9,6 +9,7 @@ import dynamics as dyn
 from cgraph.core.structure_hash import structure_hash
 from dynamics.multibody.body import WORLD
 from tests.dynamics.mechanisms import random_mechanism
+from tests.tolerances import EQUATIONS, LONG_SUM, SHORT_SUM, SOLVED
 
 TOOL = dyn.Body("tool", dyn.Joint("fixed", position=(0.1, 0.0, -0.2)), mass=0.4, center=(0.0, 0.05, 0.0),
                 inertia=(2e-3, 3e-3, 4e-3))  # fmt: skip
@@ -41,7 +42,7 @@ def test_a_locked_joint_is_the_limit_of_one_held_by_force(joint: int) -> None:
     others = [i for i in range(5) if i != joint]
     held = free.lock(f"link {joint + 1}", at=float(q[joint]))
     assert [body.name for body in held.moving] == [f"link {i + 1}" for i in others]
-    assert torque(held, q[others], qd[others], qdd[others]) == approx(torque(free, q, qd, qdd)[others], rel=1e-11)
+    assert torque(held, q[others], qd[others], qdd[others]) == approx(torque(free, q, qd, qdd)[others], rel=SOLVED)
 
 
 def test_a_locked_slide_stands_where_it_was() -> None:
@@ -50,7 +51,7 @@ def test_a_locked_slide_stands_where_it_was() -> None:
     free = dyn.Mechanism([rail, swing])
     held = free.lock("rail", 0.7)
     at = free.position("swing", (0.1, 0.2, 0.3)).evaluate({"q0": 0.7, "q1": 0.4})
-    assert held.position("swing", (0.1, 0.2, 0.3)).evaluate({"q0": 0.4}) == approx(at, abs=1e-14)
+    assert held.position("swing", (0.1, 0.2, 0.3)).evaluate({"q0": 0.4}) == approx(at, abs=SHORT_SUM)
 
 
 def test_a_locked_last_joint_leaves_no_more_nodes_than_a_shorter_arm_has() -> None:
@@ -116,7 +117,7 @@ def test_a_tool_in_hand_weighs() -> None:
     q, qd, qdd = np.random.default_rng(3).normal(size=(3, 3))
     tool = dyn.Body("tool", TOOL.joint, "link 3", TOOL.mass, TOOL.center, TOOL.inertia)
     by_hand = dyn.Mechanism([*bare.bodies, tool])
-    assert torque(holding, q, qd, qdd) == approx(torque(by_hand, q, qd, qdd), rel=1e-13)
+    assert torque(holding, q, qd, qdd) == approx(torque(by_hand, q, qd, qdd), rel=LONG_SUM)
     assert np.abs(torque(holding, q, qd, qdd) - torque(bare, q, qd, qdd)).max() > 0.1
     assert structure_hash(dyn.inverse_dynamics(holding.detach("tool"))) == structure_hash(dyn.inverse_dynamics(bare))
 
@@ -159,7 +160,7 @@ def test_torques_body_by_body_are_those_of_the_graph(seed: int) -> None:
     run = dyn.RecursiveInverseDynamics(mechanism)
     for state in np.random.default_rng(seed).normal(size=(5, 3, n)):
         expected = torque(mechanism, *state)
-        assert run(*state) == approx(expected, abs=1e-12 * max(1.0, np.abs(expected).max()))
+        assert run(*state) == approx(expected, abs=EQUATIONS * max(1.0, np.abs(expected).max()))
 
 
 def test_torques_body_by_body_of_a_pendulum_are_the_closed_form() -> None:
@@ -170,7 +171,7 @@ def test_torques_body_by_body_of_a_pendulum_are_the_closed_form() -> None:
     q, qd, qdd = 0.4, 1.1, -0.6
     expected = (mass * length**2 + inertia + 0.05) * qdd + damping * qd + 2.0 * (q - 0.1)
     expected += mass * 9.81 * length * math.sin(q)
-    assert run([q], [qd], [qdd])[0] == approx(expected, rel=1e-14)
+    assert run([q], [qd], [qdd])[0] == approx(expected, rel=SHORT_SUM)
 
 
 @mark.parametrize(

@@ -9,6 +9,7 @@ import dynamics as dyn
 from dynamics.multibody.joint_positions import skeleton
 from dynamics.scenes.inspection import DT, FORMULATIONS, inspection
 from dynamics.scenes.scenes import Scene
+from tests.tolerances import EQUATIONS
 
 INTEGRATED = 1e-9  # N m: the state is one that the equations hold at, whatever the error of the motion
 
@@ -30,16 +31,16 @@ def test_the_embedded_step_ends_in_the_state_of_the_others():
     embedded, _, chain = inspection(dyn.scenes.load("triple_pendulum")).versions
     for i in range(3):
         qd = embedded.at[f"qd{i}_old"] + DT * embedded.at[f"qdd{i}"]
-        assert np.allclose(qd, chain.at[f"qd{i}"], rtol=0, atol=1e-12)
-        assert np.allclose(embedded.at[f"q{i}_old"] + DT * qd, chain.at[f"q{i}"], rtol=0, atol=1e-12)
+        assert np.allclose(qd, chain.at[f"qd{i}"], rtol=0, atol=EQUATIONS)
+        assert np.allclose(embedded.at[f"q{i}_old"] + DT * qd, chain.at[f"q{i}"], rtol=0, atol=EQUATIONS)
 
 
 def test_shares_of_the_torque_add_up():
     shares = dict(inspection(dyn.scenes.load("triple_pendulum")).shares)
     total = shares.pop("all")
     assert set(shares) == {"link 1", "link 2", "link 3", "damping and forces"}
-    assert sum(shares.values()) == pytest.approx(total, abs=1e-12)
-    assert shares["damping and forces"] == pytest.approx(np.zeros(3), abs=1e-12)  # at rest
+    assert sum(shares.values()) == pytest.approx(total, abs=EQUATIONS)
+    assert shares["damping and forces"] == pytest.approx(np.zeros(3), abs=EQUATIONS)  # at rest
     assert shares["link 1"][1:] == pytest.approx([0.0, 0.0])  # the first link does not load the others' joints
 
 

@@ -8,6 +8,7 @@ from html.parser import HTMLParser
 
 import pytest
 
+from tests.tolerances import EQUATIONS
 from viz import cli
 from viz.commands.lesson import ARM_DT, ARM_Q, ARM_QD, lesson
 from viz.pages.lesson import page
@@ -64,7 +65,7 @@ def test_the_page_stands_alone_and_runs_no_script(text):
 
 def test_the_torque_that_should_be_zero_tends_to_the_spring_s():
     for dt, torque in lesson().steps:  # I qdd - k (qdd dt^2 + 2 qd dt + q_old) at q = qd = I = k = 1, qdd = 0
-        assert torque == pytest.approx(-(2.0 * dt + (1.0 - dt)), rel=1e-12)
+        assert torque == pytest.approx(-(2.0 * dt + (1.0 - dt)), rel=EQUATIONS)
 
 
 def test_the_arm_s_error_is_the_gradient_of_its_kinetic_energy(text):

@@ -18,6 +18,7 @@ from cgraph.explain.lint.singular import intervals, value_of
 from cgraph.explain.names import Names
 from tests import high_precision
 from tests.strategies import Case, cases
+from tests.tolerances import EQUATIONS
 
 x, y, z = cg.variables("x y z")
 
@@ -88,7 +89,7 @@ def test_the_gain_is_what_the_derivative_has_too_much():
     apart = cg.Graph([x, y], {"L": energy(x, y)})
     point = {"x": 1.1 * 0.05 + 0.3, "y": 1.1}
     p, g = (high_precision.directional(apart, point, {name: 1.0})["L"] for name in ("y", "x"))
-    assert float(through) == pytest.approx(float(p + 0.05 * g), rel=1e-12)
+    assert float(through) == pytest.approx(float(p + 0.05 * g), rel=EQUATIONS)
     assert "No derivative" not in str(finding)  # no tag tells, so nothing is claimed
     assert "would" not in str(finding)
 
