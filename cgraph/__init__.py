@@ -116,4 +116,4 @@ __all__ = [
 ]
 
 if not TYPE_CHECKING:  # `cg.name` of a row that was added; a checker shall see a misspelt name
-    from .core.functions import of_name as __getattr__  # noqa: F401
+    from .core.function_factory import of_name as __getattr__  # noqa: F401

@@ -20,8 +20,9 @@ from .equations.torque_table import TorqueTable
 from .experiments.stability import cases
 from .integrators import METHODS
 from .io.load import load_mjcf, load_urdf
-from .io.mjcf import to_mjcf
-from .io.urdf import to_urdf
+from .io.write_mjcf import to_mjcf
+from .io.write_urdf import to_urdf
+from .multibody.build_tree import serial_arm, tree
 from .multibody.impact import Attached, FreeBody, Released, attach_with_impact, release
 from .multibody.mechanism import Body, Force, Joint, Mechanism, MechanismError
 from .multibody.planar_arm import planar_arm
@@ -29,11 +30,10 @@ from .multibody.pruning import EFFECTS, OmittedTerm, PruneResult, prune
 from .multibody.recursive_inverse_dynamics import RecursiveInverseDynamics
 from .multibody.regressor import inertial_parameters, regressor
 from .multibody.subtree import Subtree
-from .multibody.tree import serial_arm, tree
 from .reference import Reference, reference
 from .scenes.scenes import Scene
 from .simulation.ensembles import Ensemble, EnsembleStats, simulate_many
-from .simulation.events import Event
+from .simulation.event import Event
 from .simulation.simulate import simulate
 from .simulation.trajectory import Crossings, Stats, Trajectory
 from .systems.model import as_system

@@ -10,9 +10,9 @@ from ..core.node import Node, Scalar, as_node
 from ..core.scope import building
 from ..core.traversal import topological
 from ..simplify.builder import Builder
-from .edge_pushing import EdgePushing
 from .elimination_order import Step, elimination_steps
 from .ldl_solve import first_not_positive
+from .schur_elimination import EdgePushing
 
 
 def hessian_solve(

@@ -15,7 +15,7 @@ from . import (
     op_texts as texts,
     op_values as values,
 )
-from .functions import Function, function
+from .function_factory import Function, function
 from .node import (
     OPS as OPS,  # noqa: PLC0414 (who needs the table imports it from here, filled)
     Node,

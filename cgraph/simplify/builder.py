@@ -1,4 +1,4 @@
-"""Folding and sharing: how derived nodes are built, without `* 1`, `+ 0` or a second copy of the same thing."""
+"""Builder: how derived nodes are made, folded by the rules of the operations' rows, and shared."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Classes of a formulation's nodes: what its equations need, what embedding the Euler relation adds, what is wrong."""
+"""Classes of the nodes of a formulation: needed, Euler edge or spurious."""
 
 from __future__ import annotations
 

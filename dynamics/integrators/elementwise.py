@@ -1,4 +1,4 @@
-"""Graphs of one element, which every component of a state goes through."""
+"""Graphs that act component by component: weighted sums and compensated additions of states."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from ..multibody.mechanism import require_mechanism
 from ..multibody.planar_arm import planar_links
 from ..multibody.spatial import Array
 from ..systems.model import Model
-from .mjcf import to_mjcf
+from .write_mjcf import to_mjcf
 
 
 def mujoco() -> Any:

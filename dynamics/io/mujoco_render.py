@@ -13,8 +13,8 @@ import numpy as np
 from ..multibody.mechanism import require_mechanism
 from ..multibody.spatial import Array
 from ..systems.model import Model
-from .mjcf import mjcf_text, numbers
 from .mujoco_model import mujoco
+from .write_mjcf import mjcf_text, numbers
 
 CAMERA = "side"  # looks along y
 _COLORS = ("0.46 0.24 0.62 1", "0.16 0.38 0.78 1", "0.80 0.20 0.16 1")  # the paper's purple, blue and red

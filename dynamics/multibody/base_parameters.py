@@ -16,8 +16,8 @@ from dataclasses import replace
 import numpy as np
 
 from . import spatial
+from .inertial_numbers import Link
 from .joints import JointType
-from .link import Link
 from .spatial import SNAP, Array, Triple
 
 

@@ -11,8 +11,8 @@ import cgraph as cg
 from cgraph import Node
 
 from . import spatial
+from .inertial_numbers import Link
 from .joints import JointType
-from .link import Link
 from .spatial import STILL, ZERO, Triple
 
 

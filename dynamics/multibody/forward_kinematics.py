@@ -14,9 +14,9 @@ from cgraph import Graph, Node
 
 from . import spatial
 from .body import Body
+from .inertial_numbers import Link, axes_of
 from .joints import JointType
 from .kinematic_tree import Carrier
-from .link import Link, axes_of
 from .spatial import STILL, Array, Triple
 
 

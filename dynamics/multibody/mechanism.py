@@ -19,9 +19,9 @@ from ..systems.system import BodySystem, System, parameter_value
 from .body import WORLD, Body, Joint, MechanismError, vector
 from .external_force import Force, check_force, generalized_forces
 from .forward_kinematics import KinematicChain, kinematic_chain
+from .inertial_numbers import Link
 from .joint_positions import skeleton
 from .kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia
-from .link import Link
 from .modification import attach_subtree, detach_subtree, lock_joint, map_state, subtree_of, unlock_joint
 from .spatial import Array
 from .structure import Structure

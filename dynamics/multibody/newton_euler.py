@@ -17,8 +17,8 @@ from cgraph import Node
 from ..systems.system import BiasForce
 from . import spatial
 from .body_motion import Motion, carrier_motion, joint_translation
+from .inertial_numbers import Link
 from .joints import JointType
-from .link import Link
 from .spatial import STILL, ZERO, Triple
 
 KINETIC, POTENTIAL = "kinetic", "potential"

@@ -12,8 +12,8 @@ from cgraph import Graph
 
 from ..equations.formulations import inverse_dynamics
 from ..systems.model import Model, as_system
-from .effects import EFFECTS as EFFECTS, absent_parts, has_effect, without_effect  # noqa: PLC0414 (public with `prune`)
 from .mechanism import as_mechanism
+from .switched_effects import EFFECTS as EFFECTS, absent_parts, has_effect, without_effect  # noqa: PLC0414 (public with `prune`)
 
 GROUPS = ("q", "qd", "qdd", "tau")
 NEVER = "unobservable inertial numbers"

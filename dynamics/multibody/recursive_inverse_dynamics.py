@@ -20,8 +20,8 @@ from cgraph import Compiled, Graph, Node
 from cgraph.extend import Builder, building, cotangents, tangents
 
 from .body_motion import Motion, energy, ground, propagate_motion
+from .inertial_numbers import Link
 from .joints import TYPES
-from .link import Link
 from .mechanism import Mechanism
 from .spatial import Array
 

@@ -16,7 +16,7 @@ from ..systems.system import System
 from . import spatial
 from .body import WORLD
 from .body_motion import energy, ground, propagate_motion
-from .link import Link, axes_of, link
+from .inertial_numbers import Link, axes_of, link
 from .mechanism import Mechanism, as_mechanism
 from .spatial import Array
 

@@ -12,7 +12,7 @@ from cgraph import Node
 
 from .body import Body, checked
 from .body_motion import Motion, energy, propagate_motion
-from .link import Link, axes_of, link
+from .inertial_numbers import Link, axes_of, link
 
 
 class Moved(NamedTuple):

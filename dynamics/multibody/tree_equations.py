@@ -16,7 +16,7 @@ from . import newton_euler, spatial
 from .base_parameters import base_parameter_links
 from .body import WORLD, Body
 from .body_motion import Motion, ground
-from .link import Link
+from .inertial_numbers import Link
 from .shared_parts import Moved
 from .spatial import Array
 from .structure import Structure

@@ -1,4 +1,4 @@
-"""Contender: what is timed, and its values."""
+"""Peer and Contender: the base class of other software, and one task made ready to be timed."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..io.mjcf import to_mjcf
+from ..io.write_mjcf import to_mjcf
 from .case import BATCH, Array, Case, rk4_step
 from .contender import Contender, Peer, UnavailableError
 from .mujoco import bodies

@@ -1,4 +1,4 @@
-"""Memory: whether a result has a place in what is free."""
+"""Free memory: how many bytes a result may take."""
 
 from __future__ import annotations
 

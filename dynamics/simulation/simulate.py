@@ -16,8 +16,8 @@ from cgraph.extend import Array
 from ..equations.initial_value import initial_value
 from ..integrators import METHODS, Problem, derive, total_energy
 from ..systems.model import Model
-from .event_watch import EventWatch
-from .events import Event, as_events
+from .event import Event, as_events
+from .event_log import EventLog
 from .free_memory import room
 from .progress_bar import Progress
 from .recorder import Recorder
@@ -123,7 +123,7 @@ def simulate(
 
     # Derive the equations, xdot = f(x, t), the energy and the events as graphs
     problem = derive(model, start.bound)
-    energy, watch = total_energy(problem), EventWatch(problem, watched)
+    energy, watch = total_energy(problem), EventLog(problem, watched)
 
     # Write the steps of the method over these graphs, and compile them
     run = _compiled(problem, options, watched=bool(watched))
@@ -150,7 +150,7 @@ def _compiled(problem: Problem, options: RunOptions, *, watched: bool) -> Integr
     return integration(compile_steps(program, options.backend), options, every_step=watched)
 
 
-def _integrate(run: Integration, x: Array, recorder: Recorder, watch: EventWatch, options: RunOptions) -> float:
+def _integrate(run: Integration, x: Array, recorder: Recorder, watch: EventLog, options: RunOptions) -> float:
     """Run from x to t_end, an event, a failure, the end of the memory, or Ctrl-C. The seconds that it took."""
     most = room() / TABLES
     begin = time.perf_counter()

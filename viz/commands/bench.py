@@ -8,8 +8,8 @@ from dataclasses import asdict
 
 from dynamics.experiments.machine import machine
 from dynamics.experiments.speed.bench import MODES, PEERS, QUICK, SCENES, TASKS, Row, bench
+from dynamics.experiments.speed.bench_figures import FIGURES
 from dynamics.experiments.speed.bench_table import tables
-from dynamics.experiments.speed.figures import FIGURES
 
 from .arguments import Commands, may_ignore, positive, say, whole
 

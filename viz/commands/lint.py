@@ -10,7 +10,7 @@ from dynamics import inverse_dynamics
 
 from ..graph_drawing.dot import to_dot
 from .arguments import Commands, draw, may_draw_and_print, scene_of, state_names, takes_a_formulation, takes_a_scene
-from .point import REST, box, filled, point
+from .point_arguments import REST, box, filled, point
 
 
 def add(commands: Commands[argparse.ArgumentParser]) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from dynamics import EFFECTS, scenes
 from dynamics.experiments.machine import machine
-from dynamics.experiments.work_precision import trajectory_scenes, work_precision
+from dynamics.experiments.work_precision import named_settings as trajectory_scenes, work_precision
 from dynamics.experiments.work_precision.cold_start import STARTS
 from dynamics.experiments.work_precision.comparisons import COMPARISONS
 from dynamics.experiments.work_precision.report import PEERS, to_csv

@@ -12,7 +12,7 @@ from dynamics import forward_dynamics, inverse_dynamics
 
 from ..graph_drawing.dot import to_dot
 from .arguments import Commands, draw, may_draw_and_print, scene_of, takes_a_formulation, takes_a_scene, whole
-from .point import REST, filled, point, point_text
+from .point_arguments import REST, filled, point, point_text
 
 
 def add(commands: Commands[argparse.ArgumentParser]) -> None:

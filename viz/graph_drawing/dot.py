@@ -10,8 +10,8 @@ from cgraph import Edge, Graph, Node
 
 from .. import theme
 from ..theme import Paint
+from .boxes_and_arrows import ClusterRule, plan_of
 from .dot_text import digraph, draw_arrows, draw_boxes, draw_legend, literal
-from .plan import ClusterRule, plan_of
 
 if TYPE_CHECKING:
     from graphviz import Digraph

@@ -19,8 +19,8 @@ import numpy as np
 import cgraph as cg
 
 from ...equations.formulations import inverse_dynamics
-from ...io.mjcf import to_mjcf
 from ...io.mujoco_model import mujoco
+from ...io.write_mjcf import to_mjcf
 from ...multibody.body import Body, Joint
 from ...multibody.mechanism import Mechanism
 from ...multibody.recursive_inverse_dynamics import RecursiveInverseDynamics

@@ -23,9 +23,9 @@ from ...simulation.run_options import SCIPY
 from ...simulation.simulate import simulate
 from ..fresh_process import run_fresh
 from ..setting import Setting
+from .named_settings import load
 from .trajectory_peers import MOST, casadi_equations, heyoka_derivatives, heyoka_equations
 from .trajectory_runs import problem_of
-from .trajectory_scenes import load
 
 RTOL = 1e-9  # of all but heyoka, whose default is the resolution of float64
 LONG = 5.0  # s; what takes longer is started once

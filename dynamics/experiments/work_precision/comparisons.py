@@ -27,9 +27,9 @@ from ..stability.energy_drift import SYMPLECTIC, drift
 from ..text_table import table
 from .cold_start import cold_starts
 from .measurement import ErrorMetrics, Tried, in_turns
+from .named_settings import load
 from .trajectory_peers import EPSILON, Cvodes, Heyoka
 from .trajectory_runs import Ours, Outcome, Scipy, Solver, problem_of
-from .trajectory_scenes import load
 from .work_precision import error_metrics, work_precision
 
 FIXED = tuple([name for name, method in METHODS.items() if not method.adaptive])

@@ -14,10 +14,10 @@ from ..machine import load as load_of_machine, machine
 from ..setting import Setting
 from .cold_start import STARTS, cold_starts
 from .measurement import Entry, ErrorMetrics, in_turns, sweep
+from .named_settings import load
 from .report import PEERS, WorkPrecision
 from .trajectory_peers import offers
 from .trajectory_runs import EQUAL, Ours, Solver, problem_of
-from .trajectory_scenes import load
 
 LIMIT = 0.3  # s; no finer knob is tried after a run of this length
 PATIENCE = 3.0  # times as long for the others, most of which need more time for the same error

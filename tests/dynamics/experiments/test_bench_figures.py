@@ -10,9 +10,9 @@ import pytest
 import dynamics as dyn
 from dynamics.experiments.speed import ensembles, long_chains, reconfiguration
 from dynamics.experiments.speed.agreement import QUANTITIES, differences, random_arm
+from dynamics.experiments.speed.bench_figures import FIGURES
 from dynamics.experiments.speed.bench_scenes import turned_arm
 from dynamics.experiments.speed.build_time import build_time
-from dynamics.experiments.speed.figures import FIGURES
 from dynamics.experiments.speed.node_counts import VARIANTS
 from dynamics.experiments.text_table import WIDTH, csv_text, table
 from dynamics.peers import PEERS, Case

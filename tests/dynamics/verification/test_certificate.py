@@ -12,8 +12,8 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from cgraph.core.node import OPS
-from dynamics.io.mjcf import to_mjcf
 from dynamics.io.mujoco_render import drawn_mjcf
+from dynamics.io.write_mjcf import to_mjcf
 from dynamics.verification import certificate
 from dynamics.verification.certificate import certify
 from dynamics.verification.residual import ROUNDING, Certificate, Residual

@@ -1,4 +1,4 @@
-"""Edge pushing with early elimination: the equations W t = b of a Hessian solve, reduced node by node.
+"""Elimination on a Hessian that is never formed: edges are pushed, and variables leave by their Schur complements.
 
 The unknowns t are the tangents of all nodes z that depend on the variables w. With the adjoints zbar = df/dz, the
 second-order adjoint W and the right-hand side b, an operation z with partials p_k = dz/da_k leaves the equations by

@@ -1,4 +1,4 @@
-"""Effects: what acts in a model, and the model without it or with what it has not."""
+"""Gravity, damping, springs, armature and forces switched off in a model, or put in where they are absent."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""EventWatch: the events of a run, noted as its steps come."""
+"""EventLog: the crossings of a run, collected block by block, and whether one ends it."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from cgraph.extend import Array
 
 from ..integrators import Problem, quantity, quantity_inputs
 from .dense_output import StepBlock, with_hermite
-from .events import Event, crossings
+from .event import Event
+from .event_location import crossings
 from .trajectory import Crossings
 
 
-class EventWatch:
+class EventLog:
     """The events of a run: where they happened so far, and, in `status`, whether one has ended it."""
 
     def __init__(self, problem: Problem, events: Sequence[Event]) -> None:

@@ -1,4 +1,4 @@
-"""URDF: the text of a mechanism for other programs."""
+"""URDF written: the text of a mechanism for other programs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..multibody.mechanism import Body, MechanismError, require_mechanism
 from ..multibody.spatial import Array
 from ..systems.model import Model
-from .mjcf import numbers
+from .write_mjcf import numbers
 
 _FAR = 1e9  # m, N, m/s: URDF asks each slide for its limits
 

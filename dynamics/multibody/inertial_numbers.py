@@ -1,4 +1,4 @@
-"""A link: one moving body as the numbers that its motion and energy are made of."""
+"""Inertial numbers: a body's mass, first moment and inertia in the axes of its joint, of which its energy is made."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Trees and serial arms: mechanisms by the indices of their parents."""
+"""Trees of bodies built from the indices of their parents: `tree` and `serial_arm`."""
 
 from __future__ import annotations
 

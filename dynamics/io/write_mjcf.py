@@ -1,4 +1,4 @@
-"""MJCF: the text of a mechanism for MuJoCo."""
+"""MJCF written: the text of a mechanism for MuJoCo."""
 
 from __future__ import annotations
 
