@@ -4,8 +4,8 @@ from functools import partial
 
 from .dop853 import DOP853
 from .explicit import explicit
-from .mechanics import Mechanics, mechanics
 from .method import Method
+from .momentum_graphs import Mechanics, mechanics
 from .problem import Problem, derive, quantity, quantity_inputs, state_jacobian, time_derivative, total_energy
 from .radau import ORDER as RADAU_ORDER, radau
 from .rosenbrock import RODAS5P, rosenbrock

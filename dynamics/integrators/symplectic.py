@@ -22,7 +22,7 @@ from cgraph.extend import Call, Map, Program, Statement, Sum, While
 
 from .elementwise import SAME, compensated, function, weighted
 from .explicit import advance, registers, stage_time
-from .mechanics import Mechanics, mechanics
+from .momentum_graphs import Mechanics, mechanics
 from .problem import Problem
 from .step_control import count, first_pass
 

@@ -16,7 +16,7 @@ from ..multibody import spatial
 from ..multibody.joints import TYPES
 from ..multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
 from ..multibody.spatial import Array
-from .mujoco_model import mujoco
+from .mujoco_twin import mujoco
 
 _BEFORE_XML = "\ufeff \t\r\n"  # what editors leave there
 

@@ -13,7 +13,7 @@ import numpy as np
 from ..multibody.mechanism import require_mechanism
 from ..multibody.spatial import Array
 from ..systems.model import Model
-from .mujoco_model import mujoco
+from .mujoco_twin import mujoco
 from .write_mjcf import mjcf_text, numbers
 
 CAMERA = "side"  # looks along y

@@ -22,9 +22,9 @@ from .forward_kinematics import KinematicChain, kinematic_chain
 from .inertial_numbers import Link
 from .joint_positions import skeleton
 from .kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia
+from .mechanism_fields import Structure
 from .modification import attach_subtree, detach_subtree, lock_joint, map_state, subtree_of, unlock_joint
 from .spatial import Array
-from .structure import Structure
 from .subtree import Subtree
 from .tree_equations import TreeEquations
 

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from .body import Body, MechanismError
 from .external_force import Force
+from .mechanism_fields import Structure
 from .spatial import Array
-from .structure import Structure
 from .subtree import Subtree, as_subtree, descendants, inserted
 
 AnyStructure = TypeVar("AnyStructure", bound=Structure)

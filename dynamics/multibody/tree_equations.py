@@ -17,9 +17,9 @@ from .base_parameters import base_parameter_links
 from .body import WORLD, Body
 from .body_motion import Motion, ground
 from .inertial_numbers import Link
-from .shared_parts import Moved
+from .link_cache import Moved
+from .mechanism_fields import Structure
 from .spatial import Array
-from .structure import Structure
 
 
 class TreeEquations:

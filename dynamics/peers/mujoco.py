@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..io.mujoco_model import MujocoTwin, rollout
+from ..io.mujoco_twin import MujocoTwin, rollout
 from ..multibody.mechanism import Mechanism, as_mechanism
 from .case import BATCH, DT, PASSES, Array, Case
 from .contender import Contender, Peer, UnavailableError

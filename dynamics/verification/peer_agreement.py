@@ -13,7 +13,7 @@ import numpy as np
 from ..equations.evaluate_at import Array, evaluate_at
 from ..equations.formulations import inverse_dynamics
 from ..io.load import compiled
-from ..io.mujoco_model import mujoco
+from ..io.mujoco_twin import mujoco
 from ..multibody.body import Body, MechanismError
 from ..multibody.mechanism import Mechanism, as_mechanism
 from ..peers.case import Case

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from .import_rule import PACKAGES, may_import
 from .imports import Module, modules, uses
-from .layers import PACKAGES, may_import
 
 WHOLE = ("cgraph", "viz")  # each is one room where all packages are seen at once
 

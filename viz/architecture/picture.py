@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from .. import theme
-from ..graph_drawing.dot_text import Arrow, Box, digraph, draw_arrows, draw_boxes
+from ..graph_drawing.draw_shapes import Arrow, Box, digraph, draw_arrows, draw_boxes
 from ..theme import Paint
 from .architecture import Architecture
 

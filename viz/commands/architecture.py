@@ -9,7 +9,7 @@ from pathlib import Path
 from cgraph.extend import atomic_write
 
 from ..architecture.architecture import architecture
-from ..architecture.layers import PACKAGES
+from ..architecture.import_rule import PACKAGES
 from ..architecture.picture import to_dot
 from ..graph_drawing.render import render_png, render_svg
 from .arguments import Commands, say

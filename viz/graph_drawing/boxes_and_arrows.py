@@ -10,7 +10,7 @@ from cgraph import Edge, Graph, Node
 
 from .. import theme
 from ..theme import Paint
-from .dot_text import BOX, LEAF, Arrow, Attributes, Box
+from .draw_shapes import BOX, LEAF, Arrow, Attributes, Box
 
 ClusterRule = Callable[[Node], str | None]
 

@@ -11,7 +11,7 @@ from cgraph import Edge, Graph, Node
 from .. import theme
 from ..theme import Paint
 from .boxes_and_arrows import ClusterRule, plan_of
-from .dot_text import digraph, draw_arrows, draw_boxes, draw_legend, literal
+from .draw_shapes import digraph, draw_arrows, draw_boxes, draw_legend, literal
 
 if TYPE_CHECKING:
     from graphviz import Digraph

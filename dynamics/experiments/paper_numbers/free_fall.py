@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...io.mujoco_model import MujocoTwin
+from ...io.mujoco_twin import MujocoTwin
 from ...multibody.mechanism import require_mechanism
 from ...scenes.scenes import Scene
 from ...simulation.simulate import simulate

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ... import scenes
-from ...io.mujoco_model import rollout
+from ...io.mujoco_twin import rollout
 from ...peers.case import Array, Case, rk4_step
 from ...peers.jax import JaxPeer
 from ...peers.mujoco import MujocoPeer

@@ -19,7 +19,7 @@ import numpy as np
 import cgraph as cg
 
 from ...equations.formulations import inverse_dynamics
-from ...io.mujoco_model import mujoco
+from ...io.mujoco_twin import mujoco
 from ...io.write_mjcf import to_mjcf
 from ...multibody.body import Body, Joint
 from ...multibody.mechanism import Mechanism

@@ -13,7 +13,7 @@ import numpy as np
 from cgraph.extend import Array
 
 from ...integrators import Problem
-from ...io.mujoco_model import rollout
+from ...io.mujoco_twin import rollout
 from ...peers import Case, UnavailableError
 from ...peers.casadi import NAMES as CASADI_NAMES, casadi
 from ...peers.heyoka import expressions, heyoka

@@ -105,7 +105,7 @@ def test_on_our_own_plant() -> None:
 
 def test_on_mujoco_s_plant(record_property: Callable[[str, object], None]) -> None:
     pytest.importorskip("mujoco")
-    from dynamics.io.mujoco_model import MujocoTwin
+    from dynamics.io.mujoco_twin import MujocoTwin
 
     residual, off = closed_loop(MujocoTwin(robot()).accelerations)
     record_property("residual [N]", residual)

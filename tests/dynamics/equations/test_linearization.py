@@ -53,7 +53,7 @@ def test_it_is_the_slope_of_forward_dynamics(name: str) -> None:
 @pytest.mark.parametrize("model", [random_arm(3), turned_arm(4), FAMILIES["mixed"](7)], ids=["planar", "arm", "mixed"])
 def test_it_is_the_slope_of_mujoco_s_accelerations(model: object) -> None:
     pytest.importorskip("mujoco")
-    from dynamics.io.mujoco_model import MujocoTwin
+    from dynamics.io.mujoco_twin import MujocoTwin
 
     twin, n, state = MujocoTwin(model), as_system(model).n, at(states(model, 1, 2), 0)  # type: ignore[arg-type]
     names = [twin.model.joint(i).name for i in range(n)]

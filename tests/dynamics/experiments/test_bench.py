@@ -17,7 +17,7 @@ from dynamics.experiments.speed.bench_scenes import SCENES, load
 from dynamics.experiments.speed.bench_table import tables
 from dynamics.experiments.speed.worker import Prepared, Refused, Worker
 from dynamics.experiments.text_table import digits
-from dynamics.io.mujoco_model import MujocoTwin
+from dynamics.io.mujoco_twin import MujocoTwin
 from dynamics.peers import Case, UnavailableError
 from dynamics.peers.case import BATCH, DT, NUDGE, PASSES
 from dynamics.peers.dense_solve import dense_solve

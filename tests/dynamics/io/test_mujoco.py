@@ -5,7 +5,7 @@ from pytest import approx, fixture, mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.io.mujoco_model import MujocoTwin, to_mjcf
+from dynamics.io.mujoco_twin import MujocoTwin, to_mjcf
 from dynamics.multibody.planar_arm import planar_links
 from tests.dynamics.models import Array, at, error, random_arm, states
 

@@ -12,7 +12,7 @@ from pytest import approx, mark, param, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.io.mujoco_model import MujocoTwin
+from dynamics.io.mujoco_twin import MujocoTwin
 from dynamics.multibody.mechanism import Body, Joint, Mechanism, MechanismError
 from dynamics.multibody.spatial import from_quaternion, rotation, to_quaternion
 from tests.dynamics.mechanisms import (

@@ -57,7 +57,7 @@ def test_starts_forces_and_parameters_are_each_trajectory_s_own(method: str, err
 
 def test_arms_move_as_mujoco_s_do() -> None:
     pytest.importorskip("mujoco")
-    from dynamics.io.mujoco_model import MujocoTwin
+    from dynamics.io.mujoco_twin import MujocoTwin
 
     arm, q, qd = arms(10, 3)
     result = simulate_many(arm, q, qd, 0.5)

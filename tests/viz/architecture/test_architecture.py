@@ -11,8 +11,8 @@ import pytest
 
 from viz import cli
 from viz.architecture.architecture import Architecture, architecture, folder, of_modules
+from viz.architecture.import_rule import PACKAGES, TABLE, may_import
 from viz.architecture.imports import Module, imports_of, modules, uses
-from viz.architecture.layers import PACKAGES, TABLE, may_import
 from viz.architecture.picture import to_dot
 
 PICTURE = Path(__file__).parents[3] / "docs" / "images" / "architecture.svg"

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from .body import Body
 from .external_force import Force
-from .shared_parts import SharedParts
+from .link_cache import SharedParts
 
 
 @dataclass(frozen=True, eq=False)
