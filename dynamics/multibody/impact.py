@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..equations.equations_of_motion import forward_dynamics, momentum
 from .body import Body, MechanismError, checked, vector
-from .mechanism import Mechanism
+from .mechanism import Mechanism, require_mechanism
 from .spatial import Array
 
 _COMPONENTS = ("x y z", "vx vy vz", "wx wy wz")
@@ -143,6 +143,7 @@ def attach_with_impact(
     >>> dyn.attach_with_impact(cart, [0.0], [0.0], ball, velocity=(2.0, 0.0, 0.0)).qd.tolist()
     [1.5]
     """
+    mechanism = require_mechanism(mechanism, "attach_with_impact")
     whole = mechanism.attach(body, to)
     v, w = vector("velocity", velocity), vector("omega", omega)
     q_new, qd_old = whole.map_state_from(mechanism, q, qd)
@@ -191,6 +192,7 @@ def release(mechanism: Mechanism, q: ArrayLike, qd: ArrayLike, body: str) -> Rel
     >>> dyn.release(dyn.Mechanism([rotor, ball]), [0.0], [2.0], "ball").body.velocity[1].tolist()
     1.0
     """
+    mechanism = require_mechanism(mechanism, "release")
     bodies = mechanism.subtree(body).bodies
     if len(bodies) > 1:
         raise MechanismError(f"body {body!r} carries {bodies[1].name!r}; a body that is let go must carry no other")

@@ -231,6 +231,7 @@ class Mechanism(Structure):
         A joint that was locked stands where it was locked, one that is new at 0, both still. Raises ValueError for
         states of another shape.
         """
+        other = require_mechanism(other, "map_state_from")
         return map_state(self.moving, other.moving, dict(other.locked), q, qd)
 
 

@@ -22,7 +22,7 @@ from cgraph.extend import Builder, building, cotangents, tangents
 from .body_motion import Motion, energy, ground, propagate_motion
 from .inertial_numbers import Link
 from .joints import TYPES
-from .mechanism import Mechanism
+from .mechanism import Mechanism, require_mechanism
 from .spatial import Array
 
 ONE = cg.constant(1.0)
@@ -54,6 +54,7 @@ class RecursiveInverseDynamics:
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
+        mechanism = require_mechanism(mechanism, "RecursiveInverseDynamics")
         if mechanism.forces:
             raise ValueError("inverse dynamics body by body does not take external forces; use inverse_dynamics")
         self.mechanism = mechanism

@@ -10,7 +10,7 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS, derive, momentum_graphs as mechanics
+from dynamics.integrators import METHODS, derive, mechanics
 from dynamics.integrators.step_control import LARGEST
 from dynamics.integrators.symplectic import PARTITIONED
 from dynamics.simulation.run_options import SCIPY_SOLVERS
