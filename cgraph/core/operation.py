@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from keyword import iskeyword
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -234,6 +235,8 @@ def register(op: Op) -> None:
 
     Raises
     ------
+    TypeError
+        For what is no Op, and when `scalar`, `array` or `partials` is no function.
     ValueError
         When the name is no identifier or in the table already, when parameter names or a sample do not fit the number
         of arguments, or when there is no sample.
@@ -245,10 +248,15 @@ def register(op: Op) -> None:
     Traceback (most recent call last):
     ValueError: operation 'sin' is in the table already
     """
+    if not isinstance(op, Op):
+        raise TypeError(f"register takes an Op, got {type(op).__name__}: {op!r:.60}")
     if op.name in OPS:
         raise ValueError(f"operation {op.name!r} is in the table already")
-    if not op.name.isidentifier():
-        raise ValueError(f"an operation's name must be an identifier, got {op.name!r}")
+    if not op.name.isidentifier() or iskeyword(op.name):
+        raise ValueError(f"an operation's name must be an identifier of Python, got {op.name!r}")
+    for column in ("scalar", "array", "partials"):
+        if not callable(getattr(op, column)):
+            raise TypeError(f"operation {op.name!r}: {column} must be a function, got {getattr(op, column)!r:.60}")
     if len(op.parameters) != op.arity:
         raise ValueError(f"operation {op.name!r} takes {op.arity} argument(s), got the names {op.arguments!r}")
     if not op.samples or any([len(sample) != op.arity for sample in op.samples]):

@@ -60,23 +60,23 @@ def load_mjcf(source: Any, *, ignore: bool = False) -> Mechanism:
     >>> arm.coordinates
     ('link 1', 'link 2')
     """
-    mj_model = source if isinstance(source, mujoco().MjModel) else _compiled(source, _called(source))
-    return _mechanism(mj_model, ignore)
+    mj = source if isinstance(source, mujoco().MjModel) else _compiled(source, _called(source))
+    return _mechanism(mj, ignore)
 
 
-def _mechanism(mj_model: Any, ignore: bool) -> Mechanism:
-    serious, outside = _not_modelled(mj_model), _acting_from_outside(mj_model)
+def _mechanism(mj: Any, ignore: bool) -> Mechanism:
+    serious, outside = _not_modelled(mj), _acting_from_outside(mj)
     if serious and not ignore:
         raise MechanismError(f"a mechanism cannot have {'; '.join(serious)} (the option ignore leaves this out)")
-    names = _names(mj_model)
+    names = _names(mj)
     bodies: list[Body] = []
     ends = [(WORLD, np.zeros(3))]  # of each MuJoCo body: the last of its chain, and its origin in that one's frame
     with np.errstate(all="ignore"):  # of numbers that are not finite Mechanism says where they stand
-        for body in range(1, mj_model.nbody):
-            chain, origin = _chain(mj_model, body, names, *ends[mj_model.body_parentid[body]])
+        for body in range(1, mj.nbody):
+            chain, origin = _chain(mj, body, names, *ends[mj.body_parentid[body]])
             bodies += chain
             ends.append((chain[-1].name, origin))
-    gravity = mj_model.opt.gravity * (not _disabled(mj_model, "GRAVITY"))
+    gravity = mj.opt.gravity * (not _disabled(mj, "GRAVITY"))
     return Mechanism(bodies, gravity, omitted=(*serious, *outside))
 
 
@@ -190,7 +190,7 @@ def _compiled(source: Any, called: str) -> Any:
     before = mujoco().get_mju_user_warning()
     mujoco().set_mju_user_warning(said.append)
     try:
-        mj_model = models.from_xml_string(given) if _is_text(source) else models.from_xml_path(given)
+        mj = models.from_xml_string(given) if _is_text(source) else models.from_xml_path(given)
     except ValueError as error:
         raise MechanismError(f"MuJoCo cannot read {called}: {' '.join(str(error).split())}") from None
     finally:
@@ -199,12 +199,12 @@ def _compiled(source: Any, called: str) -> Any:
         raise MechanismError(f"{called} has a number that is NaN, and a model needs finite ones")
     for each in said:
         warnings.warn(f"MuJoCo on {called}: {' '.join(each.split())}", stacklevel=4)
-    return mj_model
+    return mj
 
 
-def _names(mj_model: Any) -> list[str]:
+def _names(mj: Any) -> list[str]:
     """Names of MuJoCo's bodies; one without gets one that no other has."""
-    names = [mj_model.body(i).name for i in range(mj_model.nbody)]
+    names = [mj.body(i).name for i in range(mj.nbody)]
     for i, name in enumerate(names):
         names[i] = name or _unused(f"body {i}", names)
     return names
@@ -214,41 +214,41 @@ def _unused(name: str, names: Sequence[str]) -> str:
     return name if name not in names else _unused(name + "'", names)
 
 
-def _chain(mj_model: Any, body: int, names: list[str], parent: str, origin: Array) -> tuple[list[Body], Array]:
+def _chain(mj: Any, body: int, names: list[str], parent: str, origin: Array) -> tuple[list[Body], Array]:
     """One of MuJoCo's bodies as a chain with one joint each, and the origin of its frame in that of the chain's last.
 
     MuJoCo turns a body about a point (its joint's `pos`) other than its origin; here the body's origin is that point.
     names: all that are taken, MuJoCo's bodies first.  origin: of the parent's MuJoCo frame in that of `parent`.
     """
     name = names[body]
-    first = mj_model.body_jntadr[body]
-    joints = [j for j in range(first, first + mj_model.body_jntnum[body]) if _kind(mj_model, j)]
+    first = mj.body_jntadr[body]
+    joints = [j for j in range(first, first + mj.body_jntnum[body]) if _kind(mj, j)]
     chain: list[Body] = []
-    position, orientation = origin + mj_model.body_pos[body], spatial.from_quaternion(mj_model.body_quat[body])
+    position, orientation = origin + mj.body_pos[body], spatial.from_quaternion(mj.body_quat[body])
     for j in joints:
-        anchor = mj_model.jnt_pos[j] if TYPES[_kind(mj_model, j)].turns else np.zeros(3)
-        link = _joint(mj_model, j, position + orientation @ anchor, orientation)
+        anchor = mj.jnt_pos[j] if TYPES[_kind(mj, j)].turns else np.zeros(3)
+        link = _joint(mj, j, position + orientation @ anchor, orientation)
         called = name
         if j != joints[-1]:
-            called = _unused(f"{name} {mj_model.joint(j).name or f'joint {j}'}", names)
+            called = _unused(f"{name} {mj.joint(j).name or f'joint {j}'}", names)
             names.append(called)
         chain.append(Body(called, link, parent))
         parent, position, orientation = called, -anchor, np.eye(3)
     if not joints:
         chain.append(Body(name, Joint("fixed", position=position, orientation=orientation), parent))
         position = np.zeros(3)
-    axes = spatial.from_quaternion(mj_model.body_iquat[body])
-    inertia = axes @ np.diag(mj_model.body_inertia[body]) @ axes.T
-    center = position + mj_model.body_ipos[body]
+    axes = spatial.from_quaternion(mj.body_iquat[body])
+    inertia = axes @ np.diag(mj.body_inertia[body]) @ axes.T
+    center = position + mj.body_ipos[body]
     last = chain[-1]
-    chain[-1] = Body(last.name, last.joint, last.parent, float(mj_model.body_mass[body]), center, inertia)
+    chain[-1] = Body(last.name, last.joint, last.parent, float(mj.body_mass[body]), center, inertia)
     return chain, position
 
 
-def _joint(mj_model: Any, j: int, position: Array, orientation: Array) -> Joint:
+def _joint(mj: Any, j: int, position: Array, orientation: Array) -> Joint:
     """The joint, with the frame where it is at q = 0: MuJoCo's stands at q = qpos0 (`ref`)."""
-    kind, axis, dof = _kind(mj_model, j), np.array(mj_model.jnt_axis[j]), mj_model.jnt_dofadr[j]
-    zero = float(mj_model.qpos0[mj_model.jnt_qposadr[j]])
+    kind, axis, dof = _kind(mj, j), np.array(mj.jnt_axis[j]), mj.jnt_dofadr[j]
+    zero = float(mj.qpos0[mj.jnt_qposadr[j]])
     if zero:
         turn, shift = TYPES[kind].placement(axis, -zero)
         position, orientation = position + orientation @ shift, orientation @ turn
@@ -257,63 +257,61 @@ def _joint(mj_model: Any, j: int, position: Array, orientation: Array) -> Joint:
         axis,
         position,
         orientation,
-        damping=float(mj_model.dof_damping[dof]) * (not _disabled(mj_model, "DAMPER")),
-        stiffness=float(mj_model.jnt_stiffness[j]) * (not _disabled(mj_model, "SPRING")),
-        spring_reference=float(mj_model.qpos_spring[mj_model.jnt_qposadr[j]]),
-        armature=float(mj_model.dof_armature[dof]),
+        damping=float(mj.dof_damping[dof]) * (not _disabled(mj, "DAMPER")),
+        stiffness=float(mj.jnt_stiffness[j]) * (not _disabled(mj, "SPRING")),
+        spring_reference=float(mj.qpos_spring[mj.jnt_qposadr[j]]),
+        armature=float(mj.dof_armature[dof]),
     )
 
 
-def _kind(mj_model: Any, j: int) -> str:
+def _kind(mj: Any, j: int) -> str:
     """Our kind of a joint, "" for the kinds that a mechanism has not."""
     types = mujoco().mjtJoint
     kinds = {int(getattr(types, f"mjJNT_{each.mjcf.upper()}")): kind for kind, each in TYPES.items() if each.mjcf}
-    return kinds.get(int(mj_model.jnt_type[j]), "")
+    return kinds.get(int(mj.jnt_type[j]), "")
 
 
-def _disabled(mj_model: Any, *what: str) -> bool:
+def _disabled(mj: Any, *what: str) -> bool:
     """Whether the model's options switch off any of `what`; older MuJoCo has one switch for all passive force."""
     bits = mujoco().mjtDisableBit.__members__
     names = [*what, *(["PASSIVE"] if set(what) & {"DAMPER", "SPRING"} else [])]
-    return any([mj_model.opt.disableflags & int(bits.get(f"mjDSBL_{name}", 0)) for name in names])
+    return any([mj.opt.disableflags & int(bits.get(f"mjDSBL_{name}", 0)) for name in names])
 
 
-def _not_modelled(mj_model: Any) -> list[str]:
+def _not_modelled(mj: Any) -> list[str]:
     """What the model has and a mechanism cannot have."""
-    free = [j for j in range(mj_model.njnt) if not _kind(mj_model, j)]
-    pulling = sorted(set().union(*(_where(mj_model, f"tendon_{what}") for what in _OF_A_TENDON)))
-    tendons = [mj_model.tendon(i).name or f"number {i}" for i in pulling]
-    equalities = 0 if _disabled(mj_model, "CONSTRAINT", "EQUALITY") else int(np.sum(mj_model.eq_active0))
-    rubbing = _any(mj_model, "dof_frictionloss", "tendon_frictionloss") and not _disabled(
-        mj_model, "CONSTRAINT", "FRICTIONLOSS"
-    )
+    free = [j for j in range(mj.njnt) if not _kind(mj, j)]
+    pulling = sorted(set().union(*(_where(mj, f"tendon_{what}") for what in _OF_A_TENDON)))
+    tendons = [mj.tendon(i).name or f"number {i}" for i in pulling]
+    equalities = 0 if _disabled(mj, "CONSTRAINT", "EQUALITY") else int(np.sum(mj.eq_active0))
+    rubbing = _any(mj, "dof_frictionloss", "tendon_frictionloss") and not _disabled(mj, "CONSTRAINT", "FRICTIONLOSS")
     return _present(
         {
-            f"free or ball joints ({_listed(_joint_names(mj_model, free))})": free,
+            f"free or ball joints ({_listed(_joint_names(mj, free))})": free,
             f"tendons with a spring, damper or mass ({_listed(tendons)})": pulling,
             f"equality constraints ({equalities})": equalities,
             "friction loss": rubbing,
-            "springs or dampers that are not linear": _any(mj_model, *_NOT_LINEAR),
-            "actuators with armature or damping": _any(mj_model, *_OF_AN_ACTUATOR),
-            "a fluid (density or viscosity)": mj_model.opt.density or mj_model.opt.viscosity,
-            "gravity compensation": _any(mj_model, "body_gravcomp") and not _disabled(mj_model, "GRAVITY"),
-            "flexible bodies": getattr(mj_model, "nflex", 0),
-            "plugins": getattr(mj_model, "nplugin", 0),
+            "springs or dampers that are not linear": _any(mj, *_NOT_LINEAR),
+            "actuators with armature or damping": _any(mj, *_OF_AN_ACTUATOR),
+            "a fluid (density or viscosity)": mj.opt.density or mj.opt.viscosity,
+            "gravity compensation": _any(mj, "body_gravcomp") and not _disabled(mj, "GRAVITY"),
+            "flexible bodies": getattr(mj, "nflex", 0),
+            "plugins": getattr(mj, "nplugin", 0),
         }
     )
 
 
-def _acting_from_outside(mj_model: Any) -> list[str]:
+def _acting_from_outside(mj: Any) -> list[str]:
     """What the model has that acts on a mechanism: inputs and one-sided constraints."""
-    limited = not _disabled(mj_model, "CONSTRAINT", "LIMIT")
-    limits = sorted(_where(mj_model, "jnt_limited"))
-    touching = (np.any(mj_model.geom_contype) and np.any(mj_model.geom_conaffinity)) or mj_model.npair
+    limited = not _disabled(mj, "CONSTRAINT", "LIMIT")
+    limits = sorted(_where(mj, "jnt_limited"))
+    touching = (np.any(mj.geom_contype) and np.any(mj.geom_conaffinity)) or mj.npair
     return _present(
         {
-            "contacts": touching and not _disabled(mj_model, "CONSTRAINT", "CONTACT"),
-            f"joint limits ({_listed(_joint_names(mj_model, limits))})": limits and limited,
-            "tendon limits": _any(mj_model, "tendon_limited") and limited,
-            f"actuators ({mj_model.nu})": mj_model.nu and not _disabled(mj_model, "ACTUATION"),
+            "contacts": touching and not _disabled(mj, "CONSTRAINT", "CONTACT"),
+            f"joint limits ({_listed(_joint_names(mj, limits))})": limits and limited,
+            "tendon limits": _any(mj, "tendon_limited") and limited,
+            f"actuators ({mj.nu})": mj.nu and not _disabled(mj, "ACTUATION"),
         }
     )
 
@@ -322,20 +320,20 @@ def _present(found: dict[str, Any]) -> list[str]:
     return [what for what, is_there in found.items() if is_there]
 
 
-def _where(mj_model: Any, field: str) -> set[int]:
+def _where(mj: Any, field: str) -> set[int]:
     """Rows of a model's field that are not all zero; none for a field that this version of MuJoCo has not."""
-    values = np.asarray(getattr(mj_model, field, []))
+    values = np.asarray(getattr(mj, field, []))
     return {int(i) for i in np.flatnonzero(values.reshape(len(values), -1).any(axis=1))} if values.size else set()
 
 
-def _any(mj_model: Any, *fields: str) -> bool:
-    return any([_where(mj_model, field) for field in fields])
+def _any(mj: Any, *fields: str) -> bool:
+    return any([_where(mj, field) for field in fields])
 
 
-def _joint_names(mj_model: Any, joints: Sequence[int]) -> list[str]:
+def _joint_names(mj: Any, joints: Sequence[int]) -> list[str]:
     """Names of joints; of one that has none, the body's."""
-    bodies = _names(mj_model)
-    return [mj_model.joint(j).name or f"of body {bodies[mj_model.jnt_bodyid[j]]!r}" for j in joints]
+    bodies = _names(mj)
+    return [mj.joint(j).name or f"of body {bodies[mj.jnt_bodyid[j]]!r}" for j in joints]
 
 
 def _listed(names: Sequence[str]) -> str:

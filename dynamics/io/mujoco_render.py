@@ -78,13 +78,13 @@ def _write_frames() -> None:
     """The child's half of `frames`: a model and poses from standard input, pictures to standard output."""
     module = mujoco()
     given = np.load(io.BytesIO(sys.stdin.buffer.read()))
-    mj_model = module.MjModel.from_xml_string(str(given["xml"]))
-    data = module.MjData(mj_model)
+    mj = module.MjModel.from_xml_string(str(given["xml"]))
+    data = module.MjData(mj)
     pictures = []
-    with module.Renderer(mj_model, 320, 480) as renderer:
+    with module.Renderer(mj, 320, 480) as renderer:
         for pose in given["poses"]:
             data.qpos[:] = pose
-            module.mj_forward(mj_model, data)
+            module.mj_forward(mj, data)
             renderer.update_scene(data, CAMERA)
             pictures.append(renderer.render().copy())
     sys.stdout.buffer.write(_packed(frames=np.array(pictures)))

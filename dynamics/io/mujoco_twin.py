@@ -25,7 +25,7 @@ def mujoco() -> Any:
     return module
 
 
-def rollout(mj_model: Any, starts: Array, states: Array) -> Callable[[], None]:
+def rollout(mj: Any, starts: Array, states: Array) -> Callable[[], None]:
     """A run of MuJoCo's own native loop of steps, one thread, from every start.
 
     starts: (N, 1 + 2n), the time, positions and velocities in MuJoCo's order.  states: (N, steps, 1 + 2n), which each
@@ -34,7 +34,7 @@ def rollout(mj_model: Any, starts: Array, states: Array) -> Callable[[], None]:
     module = mujoco()
     from mujoco.rollout import rollout as native
 
-    models, data = [mj_model] * len(starts), [module.MjData(mj_model)]  # one datum: one thread
+    models, data = [mj] * len(starts), [module.MjData(mj)]  # one datum: one thread
     steps, sensors = states.shape[1], np.empty((*states.shape[:2], 0))
 
     def run() -> None:

@@ -59,10 +59,10 @@ def _joint(**changes: Any) -> Callable[[Body], Body]:
 def _zeroed(*fields: str) -> Callable[[Any], None]:
     """MuJoCo's fields to zero, those that its version has."""
 
-    def change(mj_model: Any) -> None:
+    def change(mj: Any) -> None:
         for name in fields:
-            if hasattr(mj_model, name):
-                getattr(mj_model, name)[...] = 0.0
+            if hasattr(mj, name):
+                getattr(mj, name)[...] = 0.0
 
     return change
 
@@ -71,24 +71,24 @@ def _still(mechanism: Mechanism) -> Mechanism:
     return replace(mechanism, gravity=(0.0, 0.0, 0.0))
 
 
-def _floating(mj_model: Any) -> None:
-    mj_model.opt.gravity[:] = 0.0
+def _floating(mj: Any) -> None:
+    mj.opt.gravity[:] = 0.0
 
 
-def _alike(mj_model: Any) -> None:
-    mj_model.body_inertia[mj_model.body_mass > _NO_MASS] = 1.0
+def _alike(mj: Any) -> None:
+    mj.body_inertia[mj.body_mass > _NO_MASS] = 1.0
 
 
-def _weightless(mj_model: Any) -> None:
-    mj_model.body_mass[mj_model.body_mass > _NO_MASS] = _NO_MASS
+def _weightless(mj: Any) -> None:
+    mj.body_mass[mj.body_mass > _NO_MASS] = _NO_MASS
 
 
-def _thin(mj_model: Any) -> None:
-    mj_model.opt.density = mj_model.opt.viscosity = 0.0
+def _thin(mj: Any) -> None:
+    mj.opt.density = mj.opt.viscosity = 0.0
 
 
-def _unbound(mj_model: Any) -> None:
-    mj_model.opt.disableflags |= mujoco().mjtDisableBit.mjDSBL_EQUALITY
+def _unbound(mj: Any) -> None:
+    mj.opt.disableflags |= mujoco().mjtDisableBit.mjDSBL_EQUALITY
 
 
 TERMS: dict[str, Term] = {
@@ -168,25 +168,25 @@ class Translation:
 class Original:
     """MuJoCo on a model of its own: of a file, say."""
 
-    def __init__(self, mj_model: Any) -> None:
-        self.mj_model = mj_model
+    def __init__(self, mj: Any) -> None:
+        self.mj = mj
 
     def inverse(self, at: Mapping[str, Array]) -> Array:
         """tau, (N, n), of q, qd, qdd, (N, n) each."""
-        module, data = mujoco(), mujoco().MjData(self.mj_model)
+        module, data = mujoco(), mujoco().MjData(self.mj)
         rows = []
         for data.qpos[:], data.qvel[:], data.qacc[:] in zip(at["q"], at["qd"], at["qdd"], strict=True):
-            module.mj_inverse(self.mj_model, data)
+            module.mj_inverse(self.mj, data)
             rows.append(np.array(data.qfrc_inverse))
         return np.array(rows)
 
     def without(self, terms: Sequence[str]) -> Original:
         """The same model with these of the `TERMS` taken out."""
-        mj_model = copy.copy(self.mj_model)
+        mj = copy.copy(self.mj)
         for name in terms:
-            TERMS[name].theirs(mj_model)
-        mujoco().mj_setConst(mj_model, mujoco().MjData(mj_model))
-        return Original(mj_model)
+            TERMS[name].theirs(mj)
+        mujoco().mj_setConst(mj, mujoco().MjData(mj))
+        return Original(mj)
 
 
 def peers(model: Model, twin: Original | None = None) -> Iterator[tuple[str, Callable[[], Asked]]]:

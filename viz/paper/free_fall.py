@@ -15,6 +15,7 @@ from dynamics.experiments.paper_numbers.free_fall import (
 )
 from dynamics.experiments.text_table import csv_text
 from dynamics.io.mujoco_render import frames
+from dynamics.systems.model import Model
 
 from ..pages import html
 from ..plots import plot
@@ -68,7 +69,7 @@ def figures4_and_5() -> Part:
     return Part("fall", "Figures 4 and 5: the fall", files, data, section)
 
 
-def _mujoco_figure(model: Any, times: Array, other: MujocoFreeFall, instants: Array) -> tuple[Figure, str]:
+def _mujoco_figure(model: Model, times: Array, other: MujocoFreeFall, instants: Array) -> tuple[Figure, str]:
     """MuJoCo's pictures at the instants, drawn here where its renderer finds no OpenGL; and by what they were made."""
     rendered = frames(model, other.q[[int(np.abs(times - instant).argmin()) for instant in instants]])
     if rendered is None:

@@ -62,7 +62,9 @@ def test_a_wrong_number_of_arguments_is_told() -> None:
     ("change", "said"),
     [
         ({}, "'sin' is in the table already"),
-        ({"name": "my sine"}, "must be an identifier, got 'my sine'"),
+        ({"name": "my sine"}, "must be an identifier of Python, got 'my sine'"),
+        ({"name": "lambda"}, "must be an identifier of Python, got 'lambda'"),
+        ({"name": "sine", "partials": None}, "operation 'sine': partials must be a function, got None"),
         ({"name": "sine", "arguments": "x y"}, "takes 1 argument.s., got the names 'x y'"),
         ({"name": "sine", "samples": ()}, "needs samples of 1 number.s. each"),
         ({"name": "sine", "samples": ((1.0, 2.0),)}, "needs samples of 1 number.s. each, got .*2.0"),
@@ -70,7 +72,7 @@ def test_a_wrong_number_of_arguments_is_told() -> None:
 )
 def test_a_row_that_does_not_fit_is_refused(change: dict[str, object], said: str) -> None:
     before = dict(OPS)
-    with pytest.raises(ValueError, match=said):
+    with pytest.raises((TypeError, ValueError), match=said):
         register(replace(OPS["sin"], domain=((0.0, 1.0),), **change))
     assert before == OPS
 
