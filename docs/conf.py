@@ -68,7 +68,13 @@ def name_aliases(app, what, name, obj, options, signature, return_annotation):
     return None
 
 
+def skip_fields(app, what, name, obj, skip, options):
+    """Fields of named tuples stand in the table of the class already."""
+    return True if (getattr(obj, "__doc__", None) or "").startswith("Alias for field number") else None
+
+
 def setup(app):
     """Called by Sphinx."""
+    app.connect("autodoc-skip-member", skip_fields)
     app.connect("autodoc-process-docstring", docstring_to_rst, priority=400)  # before napoleon
     app.connect("autodoc-process-signature", name_aliases)

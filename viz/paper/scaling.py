@@ -1,4 +1,4 @@
-"""NodeScaling: nodes, edges and time of each formulation as links are added."""
+"""Scaling: nodes, edges and time of each formulation as links are added."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .part import COLORS, TITLES, Part, pictures
 
 
 def scaling_of_counts(links: Sequence[int] = COUNTS) -> Part:
-    """NodeScaling: nodes, edges and time over the number of links.
+    """Scaling: nodes, edges and time over the number of links.
 
     links: of the chains, in growing order, with 3 among them.
     """
@@ -45,7 +45,7 @@ def scaling_of_counts(links: Sequence[int] = COUNTS) -> Part:
         row.formulation: {"edges_exponent": row.fitted(row.edges), "nodes_exponent": row.fitted(row.nodes)}
         for row in rows
     }
-    return Part("scaling", "NodeScaling with the number of links", files, data, section)
+    return Part("scaling", "Scaling with the number of links", files, data, section)
 
 
 def _exponents(rows: Sequence[NodeScaling], longest: int) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
