@@ -12,7 +12,7 @@ import dynamics as dyn
 from cgraph.explain import why, why_not
 from tests import high_precision
 from tests.strategies import Case, cases
-from tests.tolerances import CONDITIONED, EQUATIONS, SOLVED
+from tests.tolerances import EQUATIONS, SOLVED, SUMS
 
 x, y, z = cg.variables("x y z")
 TOLERANCE = 1e-9  # relative to the sum of |product| over all paths: partials are taken at rounded arguments
@@ -47,16 +47,14 @@ def test_every_path_is_counted_weighed_and_listed_in_order(case: Case):
         assert found.count == len(paths)
         values = [product(case.graph, path, case.values) for path in paths]
         heaviest = sorted((abs(value) for value in values if value), reverse=True)
-        assert [abs(path.value) for path in found.paths] == pytest.approx(heaviest, rel=CONDITIONED)
+        assert [abs(path.value) for path in found.paths] == pytest.approx(heaviest, rel=SUMS)
         assert {path.edges for path in found.paths} == {
             tuple(path) for path, value in zip(paths, values, strict=True) if value
         }
-        assert found.weight == pytest.approx(math.fsum(heaviest), rel=CONDITIONED)
-        assert found.derivative == pytest.approx(
-            math.fsum(values), rel=CONDITIONED, abs=EQUATIONS * (1.0 + found.weight)
-        )
+        assert found.weight == pytest.approx(math.fsum(heaviest), rel=SUMS)
+        assert found.derivative == pytest.approx(math.fsum(values), rel=SUMS, abs=EQUATIONS * (1.0 + found.weight))
         few = why(case.graph, "f0", str(node.name), case.values, k=2)
-        assert [abs(path.value) for path in few.paths] == pytest.approx(heaviest[:2], rel=CONDITIONED)
+        assert [abs(path.value) for path in few.paths] == pytest.approx(heaviest[:2], rel=SUMS)
         shortest = why(case.graph, "f0", str(node.name), k=len(paths))
         assert [len(path.edges) for path in shortest.paths] == sorted(map(len, paths))
 
@@ -71,7 +69,7 @@ def test_the_derivative_and_the_weight_are_those_at_50_digits(case: Case):
         slope = float(high_precision.directional(case.graph, case.values, {name: 1.0})["f0"])
         assert found.derivative == pytest.approx(slope, rel=TOLERANCE, abs=TOLERANCE * (size + 1e-9))
         if not any(node.op.name in JUMPS and node.args[0] is node.args[1] for node in case.graph.nodes):
-            assert found.weight == pytest.approx(size, rel=TOLERANCE, abs=CONDITIONED)
+            assert found.weight == pytest.approx(size, rel=TOLERANCE, abs=SUMS)
 
 
 def test_paths_are_told_by_names_and_tags():

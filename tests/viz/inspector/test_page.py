@@ -17,7 +17,7 @@ import dynamics as dyn
 import viz
 from cgraph.core.ops import OPS
 from dynamics.scenes.inspection import FORMULATIONS, inspection
-from tests.tolerances import CONDITIONED
+from tests.tolerances import SUMS
 from viz import cli
 from viz.inspector import Motion, Table, Version
 from viz.inspector.page import scripts
@@ -153,7 +153,7 @@ def test_slopes_are_the_differences_of_every_operation():
                 h = 1e-6
                 up, down = [[v + sign * h * (i == slot) for i, v in enumerate(sample)] for sign in (1, -1)]
                 difference = (op.scalar(*up) - op.scalar(*down)) / (2 * h)
-                assert work[result] == pytest.approx(difference, abs=CONDITIONED), op.name
+                assert work[result] == pytest.approx(difference, abs=SUMS), op.name
 
 
 # What the script computes, in Node where it is installed.
@@ -226,7 +226,7 @@ def test_values_adjoints_and_paths_of_the_script_are_those_of_the_library():
             why = cg.why(graph, "tau0", name, at=at, k=3)
             assert int(found["paths"][i]) == why.count
             assert [abs(p) for p in found["heaviest"][i]] == pytest.approx(
-                [abs(path.value) for path in why.paths], rel=CONDITIONED
+                [abs(path.value) for path in why.paths], rel=SUMS
             )
 
 
