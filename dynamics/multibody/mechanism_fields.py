@@ -1,4 +1,4 @@
-"""Structure: what a mechanism is, as plain data."""
+"""The fields of a mechanism, as plain data."""
 
 from __future__ import annotations
 

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from cgraph.extend import ldl_elimination
+
 from .case import BATCH, Case
 from .contender import Contender, Peer
-from .dense_solve import dense_solve
 from .translate import lagrangian
 
 COMPACT = 15  # coordinates; beyond, code written out takes longer to compile than its `compact_mode`
@@ -60,6 +61,6 @@ def expressions(case: Case, task: str) -> tuple[list[Any], list[Any]]:
     moved = [hy.sum([rows[i, k] * qd[k] for k in range(n)]) for i in range(n)]
     if task == "forward":
         mass = [[rows[i, n + k] for k in range(n)] for i in range(n)]
-        return dense_solve(mass, [last[i] + known[i] - moved[i] for i in range(n)]), inputs
+        return ldl_elimination(mass, [last[i] + known[i] - moved[i] for i in range(n)])[0], inputs
     inertia = [hy.sum([rows[i, n + k] * last[k] for k in range(n)]) for i in range(n)]
     return [inertia[i] + moved[i] - known[i] for i in range(n)], inputs

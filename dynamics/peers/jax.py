@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from cgraph.extend import ldl_elimination
+
 from .case import BATCH, NUDGE, PASSES, Array, Case, rk4_step
 from .contender import Contender, Peer
-from .dense_solve import dense_solve
 from .translate import lagrangian
 
 SHORT = 10  # coordinates; beyond, a solve written out takes longer to compile than it gains on LAPACK's Cholesky
@@ -48,7 +49,7 @@ class JaxPeer(Peer):
         _, moved = self.jax.jvp(lambda q: momentum(q, qd), (q,), (qd,))
         mass, rhs = self.jax.jacfwd(momentum, 1)(q, qd), tau + self._known(q, qd) - moved
         if self.case.n <= SHORT:
-            return self.np.stack(dense_solve(mass, rhs))
+            return self.np.stack(ldl_elimination(mass, rhs)[0])
         return self.jax.scipy.linalg.solve(mass, rhs, assume_a="pos")
 
     def rate(self, x: Any) -> Any:

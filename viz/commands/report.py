@@ -8,7 +8,7 @@ from pathlib import Path
 
 from dynamics import EFFECTS, scenes
 from dynamics.experiments.machine import machine
-from dynamics.experiments.work_precision import named_settings as trajectory_scenes, work_precision
+from dynamics.experiments.work_precision import named_settings, work_precision
 from dynamics.experiments.work_precision.cold_start import STARTS
 from dynamics.experiments.work_precision.comparisons import COMPARISONS
 from dynamics.experiments.work_precision.report import PEERS, to_csv
@@ -43,7 +43,7 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
         "scenes",
         nargs="*",
         metavar="SCENE",
-        help=f"{', '.join([*scenes.names(), *trajectory_scenes.names()])}, a model file, MJCF or URDF, or a case",
+        help=f"{', '.join([*scenes.names(), *named_settings.names()])}, a model file, MJCF or URDF, or a case",
     )
     parser.add_argument(
         "--stability", action="store_true", help="the table of stiff and extreme cases; status 1 for an unexplained row"
@@ -113,7 +113,7 @@ def _comparisons(options: argparse.Namespace) -> None:
 
 def _curves(options: argparse.Namespace) -> None:
     """A page of run time beside error for each scene."""
-    named = {trajectory_scenes.load(name, ignore=options.ignore).name for name in options.scenes}
+    named = {named_settings.load(name, ignore=options.ignore).name for name in options.scenes}
     if len(named) < len(options.scenes):
         raise ValueError(f"each scene needs a name of its own for its files, got {', '.join(options.scenes)}")
     chosen = {"t_end": options.t_end, "start": options.start, "ignore": options.ignore}

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 import cgraph as cg
+from cgraph.extend import ldl_elimination
 
 from ...equations.equations_of_motion import bias, forward_dynamics, mass_matrix
 from ...multibody.mechanism import Mechanism
 from ...multibody.planar_arm import planar_arm
-from ...peers.dense_solve import dense_solve
 from ...reference.planar_arm_equations import accelerations
 from ...reference.spatial_chain_equations import chain_accelerations
 from ...systems.model import as_system
@@ -103,7 +103,7 @@ def accuracy(kind: str, n: int, spread: float) -> dict[str, float]:
             rhs = tau - values(biases, state) - np.array(as_system(model).damping) * qd
             solved |= {
                 "numpy.linalg.solve": np.linalg.solve(m, rhs),
-                "LDL of the same, floats": dense_solve(m.tolist(), rhs.tolist()),
+                "LDL of the same, floats": ldl_elimination(m.tolist(), rhs.tolist())[0],
             }
         for name, x in solved.items():
             worst[name] = max(worst.get(name, 0.0), float(np.abs(x - exact).max() / np.abs(exact).max()))

@@ -124,7 +124,7 @@ def cold_starts(
     budget: float = 60.0,
     say: Callable[[str], None] = lambda line: None,
 ) -> list[ColdStart]:
-    """Cold starts of a setting, in turns.  name, options: as of `trajectory_scenes.load`.
+    """Cold starts of a setting, in turns.  name, options: as of `named_settings.load`.
 
     budget: seconds after which one is given up.  What needs a package that is not installed is left out.
     """

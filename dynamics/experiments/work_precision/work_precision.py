@@ -41,7 +41,7 @@ def work_precision(
 ) -> WorkPrecision:
     """The report of a setting.
 
-    name, options: as of `trajectory_scenes.load`.  methods: ours.  peers: of `PEERS`; what is not installed is absent.
+    name, options: as of `named_settings.load`.  methods: ours.  peers: of `PEERS`; what is not installed is absent.
     digits: of the exact motion (default: the setting's).  turns: all solvers run in turns, this often.  limit: seconds
     of a run after which no finer knob is tried, thrice as long for the others.  cold: of `cold_start.STARTS`, with
     `cold_turns` turns and `budget` seconds each.  folder: where exact motions are kept.  backend: see `simulate`.

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
+from cgraph.extend import ldl_elimination
 from dynamics.experiments.machine import machine
 from dynamics.experiments.speed import bench as module
 from dynamics.experiments.speed.bench import MODES, PEERS, TASKS, Cell, Row, WorkerPool, bench
@@ -20,7 +21,6 @@ from dynamics.experiments.text_table import digits
 from dynamics.io.mujoco_twin import MujocoTwin
 from dynamics.peers import Case, UnavailableError
 from dynamics.peers.case import BATCH, DT, NUDGE, PASSES
-from dynamics.peers.dense_solve import dense_solve
 from viz import cli
 
 ROUNDING = 1e-10  # of a loop: the motion is that much larger than the last bit of the state it is taken from
@@ -160,7 +160,7 @@ def test_the_dense_solve_finds_what_numpy_finds():
     a = rng.normal(size=(6, 6))
     a = a @ a.T + np.eye(6)
     b = rng.normal(size=6)
-    assert np.array(dense_solve(a, b)) == pytest.approx(np.linalg.solve(a, b), rel=DENSE)
+    assert np.array(ldl_elimination(a, b)[0]) == pytest.approx(np.linalg.solve(a, b), rel=DENSE)
 
 
 def test_a_worker_answers_and_is_timed():
