@@ -28,6 +28,7 @@ def jacobian(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None)
     -------
     Graph
         With the inputs of `graph` and m * n outputs named `dy_i/dx_j`, row by row; structural zeros are the constant 0.
+        Where two of these names would be alike, all are by place: `d0/d1`.
 
     Raises
     ------
@@ -49,10 +50,10 @@ def jacobian(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None)
         rows = {name: [column.get(y, zero) for column in columns] for name, y in graph.outputs.items()}
     else:
         rows = {name: cotangents({y: one}, chosen, build) for name, y in graph.outputs.items()}
-    return Graph(
-        graph.inputs,
-        {f"d{name}/d{node.name}": entry for name, row in rows.items() for node, entry in zip(chosen, row, strict=True)},
-    )
+    by_name = [f"d{name}/d{node.name}" for name in rows for node in chosen]
+    by_place = [f"d{i}/d{j}" for i in range(len(rows)) for j in range(len(chosen))]
+    entries = [entry for row in rows.values() for entry in row]
+    return Graph(graph.inputs, dict(zip(_distinct(by_name, by_place), entries, strict=True)))
 
 
 def hessian(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Graph:
@@ -70,7 +71,8 @@ def hessian(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) 
     Returns
     -------
     Graph
-        With the inputs of `graph` and n * n outputs named `d2y/dx_idx_j`, row by row.
+        With the inputs of `graph` and n * n outputs named `d2y/dx_idx_j`, row by row. Where two of these names
+        would be alike, as of inputs `x` and `xdx`, all are by place: `d2y/d0d1`.
 
     Raises
     ------
@@ -88,14 +90,16 @@ def hessian(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) 
     (name,) = graph.outputs
     chosen = graph.select_inputs(wrt)
     lower = hessian_nodes(output, chosen)
-    return Graph(
-        graph.inputs,
-        {
-            f"d2{name}/d{a.name}d{b.name}": lower[max(i, j)][min(i, j)]
-            for i, a in enumerate(chosen)
-            for j, b in enumerate(chosen)
-        },
-    )
+    n = range(len(chosen))
+    by_name = [f"d2{name}/d{a.name}d{b.name}" for a in chosen for b in chosen]
+    by_place = [f"d2{name}/d{i}d{j}" for i in n for j in n]
+    entries = [lower[max(i, j)][min(i, j)] for i in n for j in n]
+    return Graph(graph.inputs, dict(zip(_distinct(by_name, by_place), entries, strict=True)))
+
+
+def _distinct(by_name: list[str], by_place: list[str]) -> list[str]:
+    """The names of entries; where joining made two of them alike, such as those of inputs x and xdx, all by place."""
+    return by_name if len(set(by_name)) == len(by_name) else by_place
 
 
 def hessian_nodes(output: Node, wrt: Sequence[Node], build: Builder | None = None) -> list[list[Node]]:

@@ -100,7 +100,7 @@ class Graph:
         Raises
         ------
         GraphError
-            If the graph has no such input.
+            If the graph has no such input, or one is named twice.
         TypeError
             If `wrt` holds anything but strings and nodes.
         """
@@ -113,6 +113,8 @@ class Graph:
                 raise TypeError(f"wrt must name inputs by strings or variables, got {node!r:.60}")
             if node not in self.inputs:
                 raise GraphError(f"the graph has no input {node.name or node!r} (it has {', '.join(self.input_names)})")
+            if node in chosen:
+                raise GraphError(f"wrt names the input {node.name} twice")
             chosen.append(node)
         return tuple(chosen)
 

@@ -1,8 +1,8 @@
-"""Names of nodes: several variables at once, and operations with a name."""
+"""Names of nodes: several variables at once, operations with a name, and names that are not taken."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from .node import Node, as_node, variable
 
@@ -54,3 +54,12 @@ def with_name(node: Node, name: str) -> Node:
     """
     node = as_node(node)
     return Node(node.op, node.args, node.label, name=name) if node.args else node
+
+
+def free_suffix(suffix: str, taken: Collection[str], names: Sequence[str]) -> str:
+    """`suffix`, numbered if need be, so that no name + suffix is taken."""
+    candidate, number = suffix, 1
+    while any(name + candidate in taken for name in names):
+        number += 1
+        candidate = f"{suffix}{number}"
+    return candidate

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from ..core.graph import Graph
 from ..core.label import Label
+from ..core.naming import free_suffix
 from ..core.node import CONSTANT, Node, Op, apply, as_node, constant
 from ..core.op_double_double import ZERO, Pair, normal
 from ..core.ops import zero_safe_mul
@@ -31,7 +32,8 @@ def double_double(graph: Graph, *, low: bool = False) -> Graph:
     graph : Graph
         Any graph.
     low : bool
-        Add an output NAME_low for each output: what its rounding to float64 took off.
+        Add an output NAME_low for each output: what its rounding to float64 took off. Where such a name is taken the
+        suffix is `_low2`, `_low3`, ...
 
     Returns
     -------
@@ -63,7 +65,8 @@ def double_double(graph: Graph, *, low: bool = False) -> Graph:
                 pairs[node] = _pair(node, [pairs[arg] for arg in node.args])
     outputs = {name: pairs[node].hi for name, node in graph.outputs.items()}
     if low:
-        outputs |= {f"{name}_low": pairs[node].lo for name, node in graph.outputs.items()}
+        suffix = free_suffix("_low", graph.outputs, list(graph.outputs))
+        outputs |= {f"{name}{suffix}": pairs[node].lo for name, node in graph.outputs.items()}
     return Graph(graph.inputs, outputs)
 
 

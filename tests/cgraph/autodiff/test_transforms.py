@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from hypothesis import given, strategies as st
 
 import cgraph as cg
 from cgraph.errors import GraphError
@@ -51,6 +52,51 @@ def test_a_tangents_name_that_is_taken_is_numbered():
     pulled = cg.vjp(cg.Graph([x, bar], {"f": x * bar}))
     assert pulled.input_names == ("x", "f_bar", "f_bar2")
     assert pulled.evaluate({"x": 2.0, "f_bar": 3.0, "f_bar2": 5.0}) == {"x_bar2": 15.0, "f_bar_bar2": 10.0}
+
+
+NAMED = st.text("dx/2_", min_size=1, max_size=5)
+
+
+@given(st.lists(NAMED, min_size=1, max_size=4, unique=True), st.lists(NAMED, min_size=1, max_size=3, unique=True))
+def test_no_entry_is_lost_whatever_the_names(inputs, outputs):
+    nodes = cg.variables(inputs)
+    product = math.prod(nodes[1:], start=nodes[0])
+    graph = cg.Graph(nodes, {name: product * product + float(i) * nodes[0] for i, name in enumerate(outputs)})
+    first = cg.Graph(nodes, {outputs[0]: product * product})
+    n, m = len(inputs), len(outputs)
+    jacobian, hessian = cg.jacobian(graph), cg.hessian(first)
+    assert len(jacobian.outputs) == m * n
+    assert len(hessian.outputs) == n * n
+    assert len(cg.gradient(first).outputs) == n
+    assert len(cg.vjp(graph).outputs) == n
+    assert len(cg.jvp(graph).outputs) == m
+    assert len(cg.double_double(graph, low=True).outputs) == 2 * m
+    point = {name: float(k + 2) for k, name in enumerate(inputs)}
+    whole = math.prod(point.values())
+    expected = [2 * whole**2 / point[v] + i * (v == inputs[0]) for i in range(m) for v in inputs]
+    assert list(jacobian.evaluate(point).values()) == expected
+    expected = [whole**2 / (point[v] * point[w]) * (2 if v == w else 4) for v in inputs for w in inputs]
+    assert list(hessian.evaluate(point).values()) == expected
+
+
+def test_entries_whose_joined_names_are_alike_are_named_by_place():
+    u, v = cg.variables("x xdx")
+    hessian = cg.hessian(cg.Graph([u, v], {"f": u * v}))
+    assert hessian.evaluate({"x": 2.0, "xdx": 3.0}) == {
+        "d2f/d0d0": 0.0,
+        "d2f/d0d1": 1.0,
+        "d2f/d1d0": 1.0,
+        "d2f/d1d1": 0.0,
+    }
+    a, b = cg.variables("v u/dv")
+    jacobian = cg.jacobian(cg.Graph([a, b], {"f/du": a, "f": b}))
+    assert list(jacobian.outputs) == ["d0/d0", "d0/d1", "d1/d0", "d1/d1"]
+
+
+@pytest.mark.parametrize("transform", [cg.jvp, cg.vjp, cg.gradient, cg.jacobian, cg.hessian])
+def test_an_input_named_twice_is_refused(transform):
+    with pytest.raises(GraphError, match="wrt names the input x twice"):
+        transform(ONE, ["x", y, x])
 
 
 @pytest.mark.parametrize("wrt", ["y", y, ["y"], (y,)])
