@@ -6,14 +6,21 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from ..core.graph import Graph
 from ..core.label import TANGENT
+from ..core.naming import free_suffix
 from ..core.node import Node, as_node, variable
-from ..core.ops import zero_safe_mul
 from ..core.scope import building
 from ..core.traversal import topological
 from ..simplify.builder import Builder
+from .reached_nodes import ReachedNodes
 
 
-def tangents(seeds: Mapping[Node, Node], outputs: Iterable[Node], build: Builder | None = None) -> dict[Node, Node]:
+def tangents(
+    seeds: Mapping[Node, Node],
+    outputs: Iterable[Node],
+    build: Builder | None = None,
+    *,
+    zero_wins: bool = False,
+) -> dict[Node, Node]:
     """Tangents of nodes by forward mode: y_dot = sum over seeds x of (dy/dx) x_dot.
 
     Parameters
@@ -24,6 +31,8 @@ def tangents(seeds: Mapping[Node, Node], outputs: Iterable[Node], build: Builder
         Where to end.
     build : Builder, optional
         What the nodes are built by; by default a new one.
+    zero_wins : bool
+        Whether a seed that is zero counts for nothing where a slope is infinite or NaN. Default False: NaN.
 
     Returns
     -------
@@ -40,28 +49,29 @@ def tangents(seeds: Mapping[Node, Node], outputs: Iterable[Node], build: Builder
     (<node exp>, <node variable x_dot>)
     """
     dots = dict(seeds)
+    reached = ReachedNodes(seeds if zero_wins else dict.fromkeys(seeds))
     with building(build or Builder()) as labelled:
         for node in topological(outputs):
             if node in dots or not any([arg in dots for arg in node.args]):
                 continue
             labelled(node.label.derived(TANGENT))
             total: Node | None = None
-            for arg, partial in zip(node.args, node.op.partials(node, *node.args), strict=True):
+            for arg, partial in zip(node.args, map(as_node, node.op.partials(node, *node.args)), strict=True):
                 if arg in dots:
-                    term = (zero_safe_mul if node.op.selects else _mul)(partial, dots[arg])
+                    term = reached.product(node.op, arg, partial, dots[arg])
                     total = term if total is None else total + term
+                    if term.value != 0.0:
+                        reached.pass_on(node.op, arg, node, partial)
             assert total is not None
             if total.value != 0.0:
                 dots[node] = total
     return dots
 
 
-def _mul(a: Node | float, b: Node) -> Node:
-    return as_node(a) * b
-
-
 def jvp(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Graph:
     """x -> y becomes (x, x_dot) -> y_dot with y_dot = J(x) x_dot: one forward sweep.
+
+    An entry of x_dot that is zero counts for nothing, also where y has no slope in it.
 
     Parameters
     ----------
@@ -92,16 +102,7 @@ def jvp(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> G
     chosen = graph.select_inputs(wrt)
     suffix = free_suffix("_dot", graph.input_names, [str(node.name) for node in chosen])
     seeds = {node: variable(f"{node.name}{suffix}") for node in chosen}
-    dots = tangents(seeds, graph.outputs.values())
+    dots = tangents(seeds, graph.outputs.values(), zero_wins=len(seeds) > 1)
     zero = as_node(0.0)
     outputs = {f"{name}{suffix}": dots.get(node, zero) for name, node in graph.outputs.items()}
     return Graph((*graph.inputs, *seeds.values()), outputs)
-
-
-def free_suffix(suffix: str, taken: Sequence[str], names: Sequence[str]) -> str:
-    """`suffix`, numbered if need be, so that no name + suffix is taken."""
-    candidate, number = suffix, 1
-    while any(name + candidate in taken for name in names):
-        number += 1
-        candidate = f"{suffix}{number}"
-    return candidate

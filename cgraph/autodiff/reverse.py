@@ -6,16 +6,21 @@ from collections.abc import Collection, Mapping, Sequence
 
 from ..core.graph import Graph
 from ..core.label import ADJOINT, UNLABELLED, Label
+from ..core.naming import free_suffix
 from ..core.node import Node, as_node, variable
-from ..core.ops import zero_safe_mul
 from ..core.scope import building
 from ..core.traversal import topological
 from ..simplify.builder import Builder
-from .forward import free_suffix
+from .reached_nodes import ReachedNodes
 
 
 def cotangents(
-    seeds: Mapping[Node, Node], wrt: Sequence[Node], build: Builder | None = None, *, fixed: Collection[Node] = ()
+    seeds: Mapping[Node, Node],
+    wrt: Sequence[Node],
+    build: Builder | None = None,
+    *,
+    fixed: Collection[Node] = (),
+    zero_wins: bool = False,
 ) -> list[Node]:
     """Cotangents of nodes by reverse mode: x_bar = sum over seeds y of y_bar dy/dx.
 
@@ -30,6 +35,8 @@ def cotangents(
         What the nodes are built by; by default a new one.
     fixed : collection of Node
         Inner nodes that count as independent: nothing goes on to their arguments.
+    zero_wins : bool
+        Whether a seed that is zero counts for nothing where a slope is infinite or NaN. Default False: NaN.
 
     Returns
     -------
@@ -50,8 +57,7 @@ def cotangents(
         if any([arg in active for arg in node.args]):
             active.add(node)
     bars = dict(seeds)
-    # Behind an argument that a selecting operation may leave out, a zero cotangent must win over an infinite partial.
-    guarded: set[Node] = set()
+    reached = ReachedNodes(seeds if zero_wins else dict.fromkeys(seeds))
     # A cotangent that is a constant carries no tags: what is made of it at an argument takes them from the use itself.
     bare: dict[Node, Label] = {}
     with building(build or Builder()) as labelled:
@@ -59,16 +65,15 @@ def cotangents(
             bar = bars.get(node)
             if bar is None or node not in active or not node.args or node in fixed:
                 continue
-            guard = node.op.selects or node in guarded
             labelled(_label(node, bare))
             terms: dict[Node, Node] = {}  # by argument first, so that x * x gives 2 * (bar * x)
-            for arg, partial in zip(node.args, node.op.partials(node, *node.args), strict=True):
+            for arg, partial in zip(node.args, map(as_node, node.op.partials(node, *node.args)), strict=True):
                 if arg in active:
-                    term = zero_safe_mul(bar, partial) if guard else bar * partial
+                    term = reached.product(node.op, node, bar, partial)
                     terms[arg] = terms[arg] + term if arg in terms else term
+                    if term.value != 0.0:
+                        reached.pass_on(node.op, node, arg, partial)
             for arg, term in terms.items():
-                if guard:
-                    guarded.add(arg)
                 if term.value == 0.0:
                     continue
                 if term.value is not None:
@@ -89,6 +94,8 @@ def _label(node: Node, bare: Mapping[Node, Label]) -> Label:
 
 def vjp(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Graph:
     """x -> y becomes (x, y_bar) -> x_bar with x_bar = J(x)^T y_bar: one reverse sweep.
+
+    An entry of y_bar that is zero counts for nothing, also where that output has no slope.
 
     Parameters
     ----------
@@ -122,7 +129,7 @@ def vjp(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> G
     seeds: dict[Node, Node] = {}
     for name, node in graph.outputs.items():  # two names may share a node
         seeds[node] = seeds[node] + bars[name] if node in seeds else bars[name]
-    results = cotangents(seeds, chosen)
+    results = cotangents(seeds, chosen, zero_wins=len(seeds) > 1)
     outputs = {f"{node.name}{suffix}": bar for node, bar in zip(chosen, results, strict=True)}
     return Graph((*graph.inputs, *bars.values()), outputs)
 

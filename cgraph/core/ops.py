@@ -28,7 +28,8 @@ from .operation import FUNCTION, LEAF, PRODUCT, RELATION, SUM, MathML, Op, regis
 # sqrt'(0) = +inf, its limit; hypot'(0, 0) = 0; d(x**y)/dy at x = y = 0 is 0; atan2 at the origin is NaN.
 def _pow_partials(y: Node, a: Node, b: Node) -> tuple[Node, Node]:
     jump = equal(a, 0.0) * equal(b, 0.0)  # 0**b falls from 1 to 0 at b = 0
-    return zero_safe_mul(b, a ** (b - 1.0)), zero_safe_mul(y - jump, log(a))
+    power = y - jump
+    return zero_safe_mul(b, a ** (b - 1.0)), where(power, power * log(a), power)
 
 
 def _atan2_partials(y: Node, a: Node, b: Node) -> tuple[Node, Node]:

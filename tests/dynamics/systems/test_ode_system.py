@@ -59,6 +59,15 @@ def test_state_equation_of_a_mechanical_model_is_velocities_and_accelerations(na
     assert [rates[f"qd{i}_dot"] for i in range(n)] == list(accelerations.evaluate(values).values())
 
 
+@mark.parametrize("method", ["dop853", "rodas", "radau"])
+def test_a_tank_runs_empty_and_stays_so(method: str) -> None:
+    """h = (1 - t/2)^2, then 0. Beyond the kink the slope of the rate is 0, not 0 times infinity."""
+    tank = OdeSystem(lambda x, t: [-cg.sqrt(cg.maximum(x[0], 0.0))], ["h"])
+    run = dyn.simulate(tank, [1.0], None, t_end=4.0, method=method, rtol=1e-8, atol=1e-10)
+    assert run.t[-1] == 4.0
+    assert abs(run.q[-1, 0]) < 1e-8
+
+
 def test_a_second_order_system_is_the_same_either_way() -> None:
     pendulum = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 + 9.81 * cg.cos(q[0]), ["angle"], damping=0.3)
     spelled = OdeSystem(lambda x, t: [x[1], -9.81 * cg.sin(x[0]) - 0.3 * x[1]], "q0 qd0")
