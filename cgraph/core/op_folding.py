@@ -52,7 +52,7 @@ def sub(a: Node, b: Node) -> Node | None:
 
 
 def mul(a: Node, b: Node) -> Node | None:
-    """a * b: 0 and 1 go, constants are joined, signs come out."""
+    """a * b: 0 and 1 go, constants are joined, signs come out, and what a quotient takes on either side."""
     if b.value is not None:
         a, b = b, a
     c = a.value
@@ -67,17 +67,32 @@ def mul(a: Node, b: Node) -> Node | None:
             return constant(-c) * b.args[0]
         if b.op.name == "mul" and (inner := b.args[0].value) is not None and math.isfinite(c * inner) and c * inner:
             return constant(c * inner) * b.args[1]
-        return _cancelled(c, b) if b.op.name == "mul" else None
+        if b.op.name == "mul":
+            return _cancelled(c, b)
+        return _times_quotient(a, *b.args) if b.op.name == "div" else None
     if a.op.name == "neg":
         return a.args[0] * b.args[0] if b.op.name == "neg" else -(a.args[0] * b)
     if b.op.name == "neg":
         return -(a * b.args[0])
+    if b.op.name == "div" and (quotient := _times_quotient(a, *b.args)) is not None:
+        return quotient
+    if a.op.name == "div" and (quotient := _times_quotient(b, *a.args)) is not None:
+        return quotient
     if a.op.name != "mul" or b.op.name != "mul":
         return None
     c, d = a.args[0].value, b.args[0].value
     if c is None or d is None or not math.isfinite(c * d) or not c * d:
         return None
     return constant(c * d) * (a.args[1] * b.args[1])
+
+
+def _times_quotient(a: Node, b: Node, c: Node) -> Node | None:
+    """a * (b / c) where it is a quotient: a * (1 / c) = a / c, and x * (b / (x * y)) = b / y."""
+    if b.value == 1.0:
+        return a / c
+    if c.op.name == "mul" and a in c.args:
+        return b / c.args[c.args[0] is a]
+    return None
 
 
 def _cancelled(c: float, b: Node) -> Node | None:

@@ -37,6 +37,16 @@ def _atan2_partials(y: Node, a: Node, b: Node) -> tuple[Node, Node]:
     return b / h / h, -(a / h / h)
 
 
+def _hypot_partials(y: Node, a: Node, b: Node) -> tuple[Node, Node]:
+    length = y + _LEAST  # what it is, but for 0, and for the last bit of a subnormal number
+    return a / length, b / length
+
+
+def _tanh_partials(y: Node, a: Node) -> tuple[Node]:
+    sech = 1.0 / cosh(a)  # 0 where cosh(a) is infinite, and then so are its derivatives, which would be 0 * inf
+    return (zero_safe_mul(sech, sech),)
+
+
 def _less_partials(y: Node, a: Node, b: Node, above: Node, below: Node) -> tuple[Node, Node]:
     return where(above, 1.0, where(below, 0.0, 0.5)), where(below, 1.0, where(above, 0.0, 0.5))
 
@@ -53,6 +63,7 @@ _REAL = (-8.0, 8.0)
 _POSITIVE = (0.4, 2.5)
 _UNIT = (-0.8, 0.8)
 _INF = math.inf
+_LEAST = math.ulp(0.0)
 
 # By place: name, arity, value on floats, value on arrays, partials of (output y, arguments), samples. The rest by name.
 # A table is read by columns, so the formatter leaves it alone.
@@ -126,12 +137,12 @@ _ROWS = (
     Op("acos", 1, math.acos, np.arccos, lambda y, a: (-1.0 / sqrt((1.0 - a) * (1.0 + a)),), ((0.3,),), domain=(_UNIT,),
        about="The angle between 0 and pi whose cosine is x, in radians.",
        interval=bounds.rising("acos", (-1.0, 1.0), (0.0, _INF), falling=True), singular=bounds.arc),
-    Op("atan", 1, math.atan, np.arctan, lambda y, a: (1.0 / (1.0 + a * a),), ((0.3,),), domain=(_REAL,),
+    Op("atan", 1, math.atan, np.arctan, lambda y, a: (1.0 / hypot(1.0, a) / hypot(1.0, a),), ((0.3,),), domain=(_REAL,),
        about="The angle between -pi/2 and pi/2 whose tangent is x, in radians.", interval=bounds.rising("atan")),
     Op("atan2", 2, math.atan2, np.arctan2, _atan2_partials, ((0.3, -0.7), (-0.4, 0.2)), arguments="y x",
        about="The angle of the point (x, y) from the x axis, between -pi and pi, in radians.", domain=(_REAL, _POSITIVE),
        interval=bounds.atan2, singular=bounds.origin("the slope is unbounded where both arguments are 0")),
-    Op("hypot", 2, values.hypot, np.hypot, lambda y, a, b: (where(y, a / y, 0.0), where(y, b / y, 0.0)), ((0.3, -0.7),),
+    Op("hypot", 2, values.hypot, np.hypot, _hypot_partials, ((0.3, -0.7),),
        arguments="x y", about="The length sqrt(x * x + y * y), without overflow on the way.", commutative=True,
        domain=(_REAL, _POSITIVE), interval=bounds.hypot, singular=bounds.origin("there is no slope where both arguments are 0"),
        precise=lambda a, b: (a * a + b * b) ** 0.5),
@@ -139,7 +150,7 @@ _ROWS = (
        domain=((-2.0, 2.0),), interval=bounds.rising("sinh")),
     Op("cosh", 1, math.cosh, np.cosh, lambda y, a: (sinh(a),), ((0.3,),), about="The hyperbolic cosine of x.",
        domain=((-2.0, 2.0),), interval=bounds.cosh),
-    Op("tanh", 1, math.tanh, np.tanh, lambda y, a: (1.0 / (cosh(a) * cosh(a)),), ((0.3,),),
+    Op("tanh", 1, math.tanh, np.tanh, _tanh_partials, ((0.3,),),
        about="The hyperbolic tangent of x.", domain=((-2.0, 2.0),), interval=bounds.rising("tanh", bounds=(-1.0, 1.0))),
     Op("abs", 1, abs, np.absolute, lambda y, a: (sign(a),), ((0.3,), (-0.7,)), about="The size of x, without its sign.",
        symbol="|x|", mathml=MathML("<mo>|</mo>{0}<mo>|</mo>", (0,), FUNCTION), domain=(_REAL,), double_double=dd.size,

@@ -1,0 +1,84 @@
+"""First and second derivatives of every operation over the whole range of float64: nothing overflows on the way."""
+
+import itertools
+import math
+
+import pytest
+from mpmath import mp, mpf
+
+import cgraph as cg
+from cgraph.core.node import OPS, apply
+from tests import high_precision
+
+ULPS = 16 * 2.0**-53  # a dozen roundings
+SIZES = (5e-324, 1e-310, 1e-300, 1e-155, 1e-20, 1e-3, 0.3, 0.9, 1.0, 1 - 2.0**-53, 1.1, 20.0, 356.0, 709.0, 1e9, 1e80)
+SIZES += (1e155, 1e300, 1.7e308)
+FEWER = (3e-308, 1e-200, 1e-20, 0.3, 1e100, 1e300)
+LARGEST = mpf(1.7e308)
+DIGITS = 700  # what is cancelled in 1 + a * a at the largest numbers
+
+
+def points(op):
+    sizes = {1: SIZES, 2: FEWER}.get(op.arity, (0.3, 1e300))
+    return itertools.product([sign * size for size in sizes for sign in (1.0, -1.0)], repeat=op.arity)
+
+
+def condition(op, point):
+    """By what an error of the last bit in an argument is magnified on the way: in b - 1, for a power."""
+    return 1.0 + abs(point[1] * math.log(abs(point[0]))) if op.name == "pow" else 1.0
+
+
+def wrong(op, point):
+    """What is off at a point by more than its rounding, relative to the largest entry; nothing where that overflows.
+
+    A second derivative also counts by how far it changes the first, over one and over the size of the argument.
+    """
+    inputs = cg.variables(["a", "b", "c"][: op.arity])
+    graph = cg.Graph(inputs, {"y": apply(op, *inputs)})
+    values = dict(zip("abc", point, strict=False))
+    y = graph.evaluate(values)["y"]
+    if not math.isfinite(y):
+        return []
+    if op.name == "pow" and (y == 0.0 or abs(point[1]) < 1e-100):  # it underflows, or a ** (b - 2) alone overflows
+        return []
+    result, floor = [], 0.0
+    for derived in (cg.gradient(graph), cg.hessian(graph)):
+        try:
+            exact = {name: mpf(value) for name, value in high_precision.evaluate(derived, values, DIGITS).items()}
+        except ZeroDivisionError:  # an infinite slope
+            break
+        scale = max(map(abs, exact.values()))
+        if mp.isnan(scale) or scale > LARGEST:
+            break
+        bound = ULPS * condition(op, point) * max(float(scale), floor) + 4 * math.ulp(0.0)
+        found = derived.evaluate(values)
+        result += [(point, k, found[k], float(exact[k])) for k in found if not abs(found[k] - exact[k]) <= bound]
+        floor = float(scale) * min(1.0, 1.0 / max(map(abs, point)))
+    return result
+
+
+@pytest.mark.parametrize("op", [pytest.param(op, id=op.name) for op in OPS.values()])
+def test_derivatives_are_right_wherever_they_are_numbers(op):
+    assert [each for point in points(op) for each in wrong(op, point)] == []
+
+
+x = cg.variable("x")
+SOFTPLUS, ENTROPY = cg.log(1.0 + cg.exp(x)), x * cg.log(x)
+
+
+@pytest.mark.parametrize(
+    ("f", "at", "first", "second"),
+    [
+        (SOFTPLUS, 400.0, 1.0, 0.0),
+        (SOFTPLUS, 700.0, 1.0, 0.0),
+        (SOFTPLUS, -400.0, math.exp(-400.0), math.exp(-400.0)),
+        (ENTROPY, 1e-310, math.log(1e-310) + 1.0, math.inf),
+        (1.0 / (x * x), 1e-100, -2e300, math.inf),
+        (1.0 / (x * x), 1e100, -2e-300, 0.0),
+        (cg.tanh(x), 1e300, 0.0, 0.0),
+    ],
+)
+def test_of_these_nothing_overflows_on_the_way(f, at, first, second):
+    graph = cg.Graph([x], {"f": f})
+    found = [*cg.gradient(graph).evaluate({"x": at}).values(), *cg.hessian(graph).evaluate({"x": at}).values()]
+    assert found == [pytest.approx(first, rel=ULPS, abs=0.0), pytest.approx(second, rel=ULPS, abs=ULPS * abs(first))]
