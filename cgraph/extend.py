@@ -16,7 +16,7 @@ triangle of second derivatives, all as nodes.
 
 **Read**: `expand` and `format_polynomial` write a polynomial out, `Names` tells nodes in a person's words, `OPS` is
 the table of operations, `register` adds a row to it, an `Op`, and `ADJOINT`, `PRIMAL`, `TANGENT` are the roles that a
-label may have.
+label may have. `certain_digits` says what rounding leaves of the outputs.
 
 **Run**: a `Program` is graphs over registers of numbers (`Call`, `Map`, `Sum`, `Factor`, `Solve`, `If`, `While`), and
 `runner` makes it machine code or Python.
@@ -39,8 +39,9 @@ of an array of float64.
 from .autodiff.forward import tangents
 from .autodiff.hessian_solve import solve_nodes
 from .autodiff.jacobian import hessian_nodes
-from .autodiff.ldl_solve import SingularError, ldl_elimination, ldl_solve
+from .autodiff.ldl_solve import ldl_elimination, ldl_solve
 from .autodiff.reverse import cotangents
+from .autodiff.symmetric_elimination import SingularError
 from .core.evaluate import Array
 from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED
 from .core.node import as_node
@@ -49,6 +50,7 @@ from .core.ops import OPS
 from .core.scope import building
 from .core.traversal import topological
 from .errors import install
+from .explain.lint.cancellation import certain_digits
 from .explain.names import Names
 from .program import Call, Factor, If, Map, Program, Record, Runner, Solve, Statement, Sum, While, runner
 from .simplify.builder import Builder, folded
@@ -84,6 +86,7 @@ __all__ = [
     "as_node",
     "atomic_write",
     "building",
+    "certain_digits",
     "cotangents",
     "expand",
     "folded",

@@ -11,7 +11,6 @@ from ..core.scope import building
 from ..core.traversal import topological
 from ..simplify.builder import Builder
 from .elimination_order import Step, elimination_steps
-from .ldl_solve import first_not_positive
 from .schur_elimination import EdgePushing
 
 
@@ -21,7 +20,8 @@ def hessian_solve(
     """Nodes x with (d2f/dw2) x = rhs, for the one output f of `graph` and the inputs w of `wrt`.
 
     The Hessian is not formed: for f summed along a chain or a tree, such as the energy of its bodies, the result has a
-    number of nodes proportional to that of f. There is no pivoting: the Hessian has to be definite.
+    number of nodes proportional to that of f. Variables whose pivots are the constant zero are eliminated last, two at
+    a time if need be, so that f = v w is solved too; there is no other pivoting, so the Hessian should be definite.
 
     Parameters
     ----------
@@ -49,7 +49,8 @@ def hessian_solve(
     ValueError
         If `rhs` has not n entries.
     SingularError
-        With the index of the variable, if a pivot is the constant zero, or with `check` a negative constant.
+        With the index of the variable, if a row has only zeros left, or with `check` a pivot is a constant that is not
+        positive.
 
     Examples
     --------
@@ -106,7 +107,8 @@ def solve_nodes(
     Raises
     ------
     SingularError
-        With the index of the variable, if a pivot is the constant zero, or with `check` a negative constant.
+        With the index of the variable, if a row has only zeros left, or with `check` a pivot is a constant that is not
+        positive.
 
     Examples
     --------
@@ -125,13 +127,14 @@ def solve_nodes(
         for step in plan:
             set_label(_node_of(step).label.derived(ADJOINT))
             equations.reduce(step)
+        equations.finish()
         for step in reversed(plan):
             set_label(_node_of(step).label.derived(TANGENT))
             equations.substitute(step)
         x = [equations.dots[node] for node in wrt]
         if check:
             set_label(output.label.derived(ADJOINT))
-            x.append(first_not_positive(equations.pivots()))
+            x.append(equations.info())
     return x
 
 

@@ -2,41 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
-from ..core.node import Node, as_node
-from ..core.ops import less, where
+from ..core.node import Node, variable
 from ..core.scope import building
-from ..errors import GraphError
 from ..simplify.builder import Builder
-
-
-class SingularError(GraphError):
-    """A pivot is the constant zero, or a negative constant where it has to be positive.
-
-    Attributes
-    ----------
-    index : int
-        The row of the pivot.
-    pivot : float
-        Its value.
-    """
-
-    def __init__(self, index: int, pivot: float = 0.0) -> None:
-        problem = "not positive definite" if pivot else "singular by structure"
-        super().__init__(f"the matrix is {problem}: pivot {index} is {pivot or 'zero'}")
-        self.index = index
-        self.pivot = pivot
+from .symmetric_elimination import SymmetricElimination
 
 
 def ldl_solve(
     lower: Sequence[Sequence[Node]], rhs: Sequence[Node], build: Builder | None = None, *, check: bool = False
 ) -> list[Node]:
-    """Nodes x with A x = rhs for a symmetric, definite A, by an LDL^T factorization without pivoting.
+    """Nodes x with A x = rhs for a symmetric, definite A, by an LDL^T factorization.
 
     Rows are eliminated from the last up: along a chain of bodies that is from the tip to the base, the order in which
-    pivots are articulated inertias. Structural zeros cost nothing.
+    pivots are articulated inertias. Structural zeros cost nothing. A row whose pivot is the constant zero waits, and
+    leaves with another if it has to, so that an indefinite A is solved with, too; other pivots are not looked at.
 
     Parameters
     ----------
@@ -58,7 +40,7 @@ def ldl_solve(
     Raises
     ------
     SingularError
-        If a pivot is the constant zero, or with `check` a negative constant.
+        If a row has only zeros left, or with `check` a pivot is a constant that is not positive.
 
     Examples
     --------
@@ -67,11 +49,19 @@ def ldl_solve(
     >>> ldl_solve([[as_node(4.0)], [as_node(2.0), as_node(2.0)]], [as_node(10.0), as_node(6.0)])
     [<node 2.0>, <node 1.0>]
     """
+    unknowns = [variable(f"unknown{i}#") for i in range(len(rhs))]
     with building(build or Builder()):
-        x, pivots = ldl_elimination(lower, rhs, _require_nonzero)
-        if check:
-            x.append(first_not_positive({i: pivots[i] for i in reversed(range(len(pivots)))}))
-    return x
+        equations = SymmetricElimination(dict(zip(unknowns, rhs, strict=True)), {x: i for i, x in enumerate(unknowns)})
+        for i, row in enumerate(lower):
+            for j in range(i + 1):
+                equations.matrix.add(unknowns[i], unknowns[j], row[j])
+        for unknown in reversed(unknowns):
+            equations.eliminate(unknown)
+        equations.eliminate_waiting()
+        solution: dict[Node, Node] = {}
+        for unknown in reversed(equations.pivot_rows):
+            solution[unknown] = equations.solution(unknown, solution)
+        return [solution[unknown] for unknown in unknowns] + ([equations.info()] if check else [])
 
 
 def ldl_elimination(
@@ -125,22 +115,3 @@ def ldl_elimination(
             total = total - gain * known
         x.append(total)
     return x, [a[i][i] for i in range(n)]
-
-
-def _require_nonzero(index: int, pivot: Node) -> None:
-    if pivot.value == 0.0:
-        raise SingularError(index)
-
-
-def first_not_positive(pivots: Mapping[int, Node]) -> Node:
-    """0 where all pivots are positive, else 1 + the index of the first that is not (NaN is not), as a node.
-
-    pivots: {index: pivot}, in the order of elimination: once one has failed, those after it mean nothing.
-    Two operations for each pivot. Raises SingularError for a constant that is not positive.
-    """
-    info = as_node(0.0)
-    for index, pivot in reversed(list(pivots.items())):
-        if pivot.value is not None and pivot.value <= 0.0:
-            raise SingularError(index, pivot.value)
-        info = where(less(0.0, pivot), info, 1.0 + index)
-    return info

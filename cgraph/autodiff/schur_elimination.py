@@ -15,29 +15,21 @@ and a variable w, once all nodes that use it have left, by Gaussian elimination.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 from ..core.node import Node, as_node
 from ..simplify.builder import Builder
 from .elimination_order import Step
-from .ldl_solve import SingularError
+from .reached_nodes import ReachedNodes
 from .rotation_pairs import Rotation, rotations
 from .second_order import second_partials
-from .symmetric_matrix import ZERO, SymmetricMatrix
+from .symmetric_elimination import SymmetricElimination
+from .symmetric_matrix import ZERO
 from .variable_sums import variable_sums
 
 ONE = as_node(1.0)
 
 
-class PivotRow(NamedTuple):
-    """The row of an eliminated unknown i: t_i = constant - sum_j gains_j t_j, after division by the pivot W_ii."""
-
-    pivot: Node
-    constant: Node  # b_i / W_ii
-    gains: dict[Node, Node]  # {j: W_ij / W_ii}
-
-
-class EdgePushing:
+class EdgePushing(SymmetricElimination):
     """The equations W t = b while nodes leave them, from the output down, and the tangents on the way back.
 
     rhs: {variable: entry of b}.  at: right-hand sides at inner nodes.  order: nodes that depend on the variables,
@@ -51,15 +43,15 @@ class EdgePushing:
         self.order = order
         self.depends = set(order)
         self.position = {node: i for i, node in enumerate(rhs)}
+        self.sums = variable_sums(order, self.position)
+        in_sums = {node: self.position[terms.variable] for node, terms in self.sums.items()}
+        super().__init__(dict(rhs), self.position | in_sums)
         self.bars: dict[Node, Node] = {output: ONE}  # adjoints
-        self.rhs = dict(rhs)
         for node, value in at.items():
             self.rhs[node] = self.rhs.get(node, ZERO) + value
-        self.matrix = SymmetricMatrix()
-        self.pivot_rows: dict[Node, PivotRow] = {}
-        self.sums = variable_sums(order, self.position)
         pairs = [r for r in rotations(order, self.depends, at) if not {r.first, r.second} & self.sums.keys()]
         self.rotations = {r.first: r for r in pairs}
+        self.reached = ReachedNodes(dict.fromkeys([output, *at]))
         self.dots: dict[Node, Node] = {}  # tangents
         self.partials: dict[Node, dict[Node, Node]] = {}  # of each operation, by argument that depends on w
 
@@ -86,7 +78,7 @@ class EdgePushing:
         elif step in self.sums:
             self.eliminate_sum(step)
         elif step in self.position:
-            self.eliminate(step, self.rhs[step])
+            self.eliminate(step)
         else:
             self.push_adjoint(step)
 
@@ -97,42 +89,21 @@ class EdgePushing:
             for r in step:
                 dots[r.first] = r.sign_x * (r.cos * dots[r.x] + r.sin * dots[r.y])
                 dots[r.second] = r.sign_y * (r.cos * dots[r.y] - r.sin * dots[r.x])
-        elif step in self.pivot_rows:  # t_i = b_i / W_ii - sum_j (W_ij / W_ii) t_j
-            pivot_row = self.pivot_rows[step]
-            dot = pivot_row.constant
-            for other, gain in pivot_row.gains.items():
-                dot = dot - gain * dots[other]
-            dots[step] = dot
+        elif step in self.pivot_rows:
+            if step not in dots:  # as is one that waited
+                dots[step] = self.solution(step, dots)
+            dot = dots[step]
             if step in self.sums:  # z = p w + p' a, so t_w = p (t_z - p' t_a), as p = 1 / p
                 variable, other, p, p_other = self.sums[step]
                 rest = dot if other not in dots else dot - p_other * dots[other]
                 dots[variable] = p * rest
         else:  # t_z = sum_k p_k t_k
-            dots[step] = _total([p * dots[arg] for arg, p in self.partials[step].items()])
+            dots[step] = _total([self.product(step, p, dots[arg]) for arg, p in self.partials[step].items()])
 
-    def eliminate(self, node: Node, rhs: Node) -> None:
-        """Gaussian elimination of unknown i, all uses gone: W_jk -= W_ij W_ik / W_ii, b_j -= W_ij b_i / W_ii.
-
-        Raises SingularError when the pivot W_ii is the constant zero.
-        """
-        pivot, row = self.matrix.pop(node)
-        if pivot.value == 0.0:
-            raise SingularError(self.index(node))
-        gains = {other: value / pivot for other, value in row.items()}
-        others = list(row)
-        for i, a in enumerate(others):
-            for b in others[: i + 1]:
-                self.matrix.add(a, b, -(gains[a] * row[b]))
-            self.rhs[a] = self.rhs.get(a, ZERO) - gains[a] * rhs
-        self.pivot_rows[node] = PivotRow(pivot, rhs / pivot, gains)
-
-    def index(self, node: Node) -> int:
-        """The place among `wrt` of an eliminated variable, or of the one in an eliminated sum."""
-        return self.position[self.sums[node].variable if node in self.sums else node]
-
-    def pivots(self) -> dict[int, Node]:
-        """{index of the variable: pivot}, in the order of elimination."""
-        return {self.index(node): row.pivot for node, row in self.pivot_rows.items()}
+    def finish(self) -> None:
+        """Take out the unknowns that wait, and give them their tangents."""
+        for node in self.eliminate_waiting():
+            self.dots[node] = self.solution(node, self.dots)
 
     def eliminate_sum(self, node: Node) -> None:
         """A sum z = p w + p' a with the only use of w, eliminated in place of w: the unknowns (w, a) become (z, a).
@@ -142,8 +113,9 @@ class EdgePushing:
         where W_zz is much larger than the part of W_aa that does not come from z.
         """
         variable, other, p, p_other = self.sums[node]
-        bar, at_sum, at_variable = self.bars.pop(node, ZERO), self.rhs.pop(node, ZERO), p * self.rhs[variable]
-        self.eliminate(node, at_sum + at_variable)
+        bar, at_variable = self.bars.pop(node, ZERO), p * self.rhs[variable]
+        self.rhs[node] = self.rhs.get(node, ZERO) + at_variable
+        self.eliminate(node)
         if other in self.depends:
             self.bars[other] = self.bars.get(other, ZERO) + p_other * bar
             self.rhs[other] = self.rhs.get(other, ZERO) - p_other * at_variable
@@ -206,34 +178,41 @@ class EdgePushing:
         diagonal, row = self.matrix.pop(node)
         bar, rhs = self.bars.pop(node, ZERO), self.rhs.pop(node, ZERO)
         partials: dict[Node, Node] = {}
-        for arg, partial in zip(node.args, node.op.partials(node, *node.args), strict=True):
+        for arg, partial in zip(node.args, map(as_node, node.op.partials(node, *node.args)), strict=True):
             if arg in self.depends:
-                partials[arg] = partials[arg] + partial if arg in partials else as_node(partial)
+                partials[arg] = partials[arg] + partial if arg in partials else partial
+                if partial.value != 0.0:
+                    self.reached.pass_on(node.op, node, arg, partial)
         self.partials[node] = partials
         for arg, p in partials.items():
-            self.bars[arg] = self.bars.get(arg, ZERO) + bar * p
-            self.rhs[arg] = self.rhs.get(arg, ZERO) + p * rhs
+            self.bars[arg] = self.bars.get(arg, ZERO) + self.product(node, bar, p)
+            self.rhs[arg] = self.rhs.get(arg, ZERO) + self.product(node, p, rhs)
             for other, value in row.items():
-                self.matrix.add_both(arg, other, p * value)
-        self.push_second_order(partials, diagonal)
+                self.matrix.add_both(arg, other, self.product(node, p, value))
+        self.push_second_order(node, partials, diagonal)
         if bar.value != 0.0:
             self.add_local_hessian(node, bar)
 
-    def push_second_order(self, partials: Mapping[Node, Node], diagonal: Node) -> None:
+    def product(self, node: Node, a: Node, b: Node) -> Node:
+        """a * b for a partial of the operation `node`; 0 where f does not depend on it, though a slope is infinite."""
+        return self.reached.product(node.op, node, a, b)
+
+    def push_second_order(self, node: Node, partials: Mapping[Node, Node], diagonal: Node) -> None:
         """W_kj += p_k p_j W_zz."""
         if diagonal.value != 0.0:
             args = list(partials)
             for i, a in enumerate(args):
-                scaled = diagonal * partials[a]
+                scaled = self.product(node, diagonal, partials[a])
                 for b in args[: i + 1]:
-                    self.matrix.add(a, b, scaled * partials[b])
+                    self.matrix.add(a, b, self.product(node, scaled, partials[b]))
 
     def add_local_hessian(self, node: Node, bar: Node) -> None:
         """W_kj += zbar d2z/(da_k da_j); an argument in two slots gets both mixed terms."""
         for j, k, second in second_partials(node, self.build):
             a, b = node.args[j], node.args[k]
             if a in self.depends and b in self.depends:
-                self.matrix.add(a, b, 2.0 * (bar * second) if a is b and j != k else bar * second)
+                term = self.product(node, bar, second)
+                self.matrix.add(a, b, 2.0 * term if a is b and j != k else term)
 
 
 def _total(terms: list[Node]) -> Node:

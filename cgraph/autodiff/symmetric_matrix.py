@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from ..core.node import Node, as_node
 
 ZERO = as_node(0.0)
+ROUNDING = 2.0**-50
 
 
 class SymmetricMatrix:
@@ -24,7 +25,7 @@ class SymmetricMatrix:
         if value.value == 0.0:
             return
         row = self._rows.setdefault(a, {})
-        total = row[b] + value if b in row else value
+        total = _sum(row[b], value) if b in row else value
         row[b] = total
         self._rows.setdefault(b, {})[a] = total
 
@@ -39,3 +40,11 @@ class SymmetricMatrix:
         for b in row:
             del self._rows[b][a]
         return diagonal, row
+
+
+def _sum(a: Node, b: Node) -> Node:
+    """a + b; of two constants that cancel to their last bits, which are rounding, zero."""
+    total = a + b
+    if a.value is None or b.value is None or total.value is None:
+        return total
+    return ZERO if abs(total.value) <= ROUNDING * abs(b.value) else total

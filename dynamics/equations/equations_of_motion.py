@@ -10,16 +10,17 @@ from cgraph import Graph, Node
 from cgraph.extend import Builder, SingularError, building, cotangents, hessian_nodes, ldl_solve, solve_nodes
 
 from ..systems.model import Model, as_system
-from ..systems.system import System
+from ..systems.system import BodySystem, System
 from .bias_terms import BiasTerms, bias_terms, bias_terms_of_lagrangian
 from .formulations import ONE, ZERO
+from .inertia_rank import without_inertia
 from .substitute import substitute
 
 
 class SingularMassMatrixError(ValueError):
-    """A coordinate has no inertia, so that its acceleration is not determined.
+    """A coordinate or a motion of several has no inertia, so that its acceleration is not determined.
 
-    The message names the coordinate. `forward_dynamics` and what is made from it raise it where the mass matrix is
+    The message names the coordinates. `forward_dynamics` and what is made from it raise it where the mass matrix is
     singular at every state, `raise_if_singular` where it is singular at one.
 
     Examples
@@ -228,7 +229,8 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
     Raises
     ------
     SingularMassMatrixError
-        M is singular at every state; the message names the coordinate.
+        M is singular at every state, or with `check` not positive definite at any; the message names the coordinates.
+        An indefinite M that is regular is solved with.
     ValueError
         For an unknown method.
     TypeError
@@ -246,15 +248,34 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
     system = as_system(model)
     methods = [method] if method != "auto" else ["recursive", "dense"] if system.n <= DENSE_UP_TO else ["recursive"]
     terms = bias_terms(system)
-    try:
-        graphs = [_accelerations(system, terms, each, check) for each in methods]
-    except SingularError as error:
-        name = system.coordinates[error.index]
-        problem = "not positive definite" if error.pivot else "singular"
+    graphs: list[Graph] = []
+    for each in methods:  # the dense matrix may lose in its entries what elimination keeps
+        try:
+            graphs.append(_accelerations(system, terms, each, check))
+        except SingularError as error:
+            failure = error
+    if not graphs:
+        raise SingularMassMatrixError(_without_inertia(system, failure)) from None
+    smallest = min(graphs, key=lambda graph: len(graph.nodes))
+    if not isinstance(system, BodySystem):  # bodies have masses; of another Lagrangian nobody knows
+        _require_inertia(system, smallest)
+    return smallest
+
+
+def _without_inertia(system: System, error: SingularError) -> str:
+    name = system.coordinates[error.index]
+    if error.regular:
+        return f"the mass matrix is not positive definite: coordinate {name!r} has an inertia that is not positive"
+    return f"the mass matrix is singular: coordinate {name!r} has no inertia, or none that others do not share"
+
+
+def _require_inertia(system: System, accelerations: Graph) -> None:
+    moving = without_inertia(accelerations, lambda: mass_matrix(system), system.n)
+    if moving:
+        names = " and ".join([repr(system.coordinates[i]) for i in moving])
         raise SingularMassMatrixError(
-            f"the mass matrix is {problem}: coordinate {name!r} has no inertia, or none that others do not share"
-        ) from None
-    return min(graphs, key=lambda graph: len(graph.nodes))
+            f"the mass matrix is singular at every state: {'a motion of ' * (len(moving) > 1)}{names} has no inertia"
+        )
 
 
 def raise_if_singular(model: Model, info: ArrayLike) -> None:

@@ -17,6 +17,7 @@ from ..equations.coriolis import coriolis, require_quadratic
 from ..equations.equations_of_motion import bias, energy, forward_dynamics, gravity_force, mass_matrix
 from ..equations.evaluate_at import Array, evaluate_at
 from ..equations.formulations import ONE, ZERO, inverse_dynamics
+from ..equations.inertia_rank import balanced
 from ..equations.torque_decomposition import torque_by_joint_motion, torque_by_link
 from ..equations.torque_table import TorqueTable
 from ..systems.model import Model, as_system
@@ -55,7 +56,8 @@ def certify(model: Model, states: int = 20, seed: int = 0, *, speed: float = 1.0
         For fewer than one state, a seed below 0, and a twin that cannot be read, has another number of coordinates, or
         stands beside a model that is not of rigid bodies.
     SingularMassMatrixError
-        For a coordinate without inertia.
+        For a coordinate or a motion without inertia. A mass matrix that is regular, but indefinite, is a residual that
+        fails, and its note says so.
     ImportError
         For a twin without MuJoCo.
 
@@ -184,10 +186,13 @@ class _Checks:
             ROUNDING,
         )
         yield Residual("M: d2L/dqd2 = columns of inverse dynamics", _worst(columns - self.inertia, terms), ROUNDING)
-        size = np.sqrt(np.maximum(np.einsum("kii->ki", self.inertia), np.finfo(float).tiny))
-        smallest = float(np.linalg.eigvalsh(self.inertia / (size[:, :, None] * size[:, None, :])).min())
-        missing = max(0.0, n * np.finfo(float).eps - smallest)
-        yield Residual("M: positive definite", missing, POSITIVE, f"smallest eigenvalue {smallest:.1e}, scaled")
+        sizes = np.linalg.eigvalsh(balanced(self.inertia))
+        smallest, rounding = float(sizes.min()), n * np.finfo(float).eps
+        kind = "regular, but indefinite, " if smallest < 0.0 < sizes.max() else "negative, " if smallest < 0.0 else ""
+        if np.abs(sizes).min() <= rounding:
+            kind = "singular, "
+        note = f"{kind}smallest eigenvalue {smallest:.1e}, scaled"
+        yield Residual("M: positive definite", max(0.0, rounding - smallest), POSITIVE, note)
 
     def _forward(self) -> Residual:
         tau, qdd = self.at["tau"], self.accelerations

@@ -16,7 +16,7 @@ class Bound:
 
 
 ROUNDING = Bound("rounding", 1e-13, "the same terms summed in another order, some hundred roundings of the largest")
-POSITIVE = Bound("positive", 0.0, "the smallest eigenvalue of M, scaled to a unit diagonal, exceeds its rounding")
+POSITIVE = Bound("positive", 0.0, "the smallest eigenvalue of M, scaled to rows of about 1, exceeds its rounding")
 DIFFERENCES = Bound("differences", 1e-7, "what halving the step of fourth-order differences does not account for")
 PEERS = Bound("peers", 1e-10, "the rounding of two programs, and inertias that pass through principal axes")
 

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from ...core.edge import Edge
+from ...core.graph import Graph
 from ...core.node import Node
 from ..edge_partials import Point, edge_slopes, node_values
 from ..names import Names
@@ -45,6 +46,40 @@ def rounded(names: Names, at: Point) -> Rounded:
         own = UNIT * node.op.rounding if node.args else UNIT if node.value is None else 0.0
         errors[node] = sum(inherited) + own * abs(values[node])
     return Rounded(values, errors)
+
+
+def certain_digits(graph: Graph, at: Point) -> dict[str, float]:
+    """Decimal digits of the outputs that rounding leaves certain at a point, by a running bound to first order.
+
+    Parameters
+    ----------
+    graph : Graph
+        Any graph.
+    at : mapping of str to float
+        A value for every input, taken to be off by half a unit in the last place.
+
+    Returns
+    -------
+    dict of str to float
+        {output: digits}, 0 to 16; infinite where nothing was rounded, NaN where the bound is none.
+
+    Raises
+    ------
+    GraphError
+        For an input that is missing or unknown.
+    ValueError
+        For a value that is not finite.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import certain_digits
+    >>> x, y = cg.variables("x y")
+    >>> {k: round(d) for k, d in certain_digits(cg.Graph([x, y], {"f": x - y}), {"x": 1.0, "y": 0.999999}).items()}
+    {'f': 10}
+    """
+    found = rounded(Names(graph), at)
+    return {name: found.digits(node) for name, node in graph.outputs.items()}
 
 
 def cancellations(names: Names, at: Point, threshold: float) -> list[Finding]:

@@ -15,8 +15,10 @@ import cgraph as cg
 from cgraph import GraphError
 from cgraph.autodiff.elimination_order import elimination_steps
 from cgraph.autodiff.hessian_solve import solve_nodes
-from cgraph.autodiff.ldl_solve import SingularError, ldl_elimination, ldl_solve
+from cgraph.autodiff.jacobian import hessian_nodes
+from cgraph.autodiff.ldl_solve import ldl_elimination, ldl_solve
 from cgraph.autodiff.rotation_pairs import rotations
+from cgraph.autodiff.symmetric_elimination import SingularError
 from cgraph.core.traversal import topological
 from tests.tolerances import LONG_SUM
 
@@ -153,6 +155,34 @@ def test_a_negative_constant_pivot_is_an_error_at_once():
     with pytest.raises(SingularError, match="not positive definite: pivot 1 is -2") as caught:
         cg.hessian_solve(graph, [x, y], [1.0, 1.0], check=True)
     assert caught.value.index == 1
+
+
+@pytest.mark.parametrize("point", [-1.0, 0.25])
+def test_a_branch_that_is_not_taken_counts_nothing(point):
+    x, y = cg.variables("x y")
+    root = cg.where(x > 0, x * cg.sqrt(x), 0.0) + cg.exp(cg.sqrt(cg.maximum(x, 0.0)))
+    graph = cg.Graph([x, y], {"f": x * x + x * y + 3.0 * y * y + root * y})
+    solved = cg.hessian_solve(graph, [x, y], [1.0, 2.0])
+    found = cg.Graph([x, y], {f"s{i}": node for i, node in enumerate(solved)}).evaluate({"x": point, "y": 0.5})
+    hessian = np.reshape(list(cg.hessian(graph).evaluate({"x": point, "y": 0.5}).values()), (2, 2))
+    assert hessian @ list(found.values()) == pytest.approx([1.0, 2.0], rel=LONG_SUM)
+
+
+def test_pivots_that_are_zero_are_taken_in_pairs():
+    names = "v0 v1 v2 v3"
+    v = cg.variables(names)
+    graph = cg.Graph(v, {"f": v[0] * v[1] + cg.exp(v[2]) * v[3] + v[1] * v[3] * 0.5 + v[0] * v[3]})
+    rhs = [1.0, 2.0, 3.0, 4.0]
+    lower = [list(row) for row in hessian_nodes(graph.only_output(), v)]
+    for solved in (cg.hessian_solve(graph, v, rhs), ldl_solve(lower, [cg.constant(b) for b in rhs])):
+        point = dict(zip(names.split(), (0.1, -0.2, 0.3, 0.7), strict=True))
+        found = cg.Graph(v, {f"s{i}": node for i, node in enumerate(solved)}).evaluate(point)
+        hessian = np.reshape(list(cg.hessian(graph).evaluate(point).values()), (4, 4))
+        assert hessian @ list(found.values()) == pytest.approx(rhs, rel=LONG_SUM)
+    with pytest.raises(SingularError, match="not positive definite"):
+        cg.hessian_solve(cg.Graph(v[:2], {"f": v[0] * v[1]}), v[:2], rhs[:2], check=True)
+    with pytest.raises(SingularError, match="singular by structure"):
+        cg.hessian_solve(cg.Graph(v[:3], {"f": v[0] * v[1] + v[1] * v[2]}), v[:3], rhs[:3])
 
 
 def test_right_hand_sides_at_inner_nodes_are_carried_to_the_variables():

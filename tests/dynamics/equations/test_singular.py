@@ -16,6 +16,7 @@ from dynamics.equations.equations_of_motion import (
     forward_dynamics,
     raise_if_singular,
 )
+from tests.tolerances import CONDITIONED, LAST_BITS
 
 METHODS = [name for name in SOLUTIONS if name != "auto"]
 
@@ -127,3 +128,85 @@ def test_a_coordinate_without_inertia_is_an_error_at_once():
     assert len(forward_dynamics(system).outputs) == 2
     with pytest.raises(SingularMassMatrixError, match="not positive definite: coordinate 'bad'"):
         forward_dynamics(system, check=True)
+
+
+def quadratic(rng: np.random.Generator, unit: np.ndarray, signs: list[float]) -> dyn.System:
+    """L = sum of sign_k z_k^2 / 2 with as many random velocities z_k(q, qd), the coordinates in these units."""
+    n = len(unit)
+    a, b = rng.normal(size=(len(signs), n)), rng.normal(size=(len(signs), n))
+
+    def lagrangian(q, qd, t):
+        z = [
+            sum((u + w * cg.sin(q[0] / unit[0])) * v / s for u, w, v, s in zip(*rows, qd, unit, strict=True))
+            for rows in zip(a, b, strict=True)
+        ]
+        return [0.5 * sign * velocity * velocity for sign, velocity in zip(signs, z, strict=True)]
+
+    return dyn.System(lagrangian, [f"x{i}" for i in range(n)])
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_of_random_lagrangians_the_singular_ones_are_refused_and_the_others_solved(seed):
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 4))
+    signs = rng.choice([-1.0, 1.0], n).tolist()
+    unit = 10.0 ** rng.uniform(-8, 8, n)
+    system = quadratic(rng, unit, signs)
+    graph, inverse = forward_dynamics(system), dyn.inverse_dynamics(system)
+    numbers = rng.uniform(0.5, 1.5, (3, n)) * [unit, unit, 1.0 / unit]
+    values = dict(zip(graph.input_names, numbers.ravel().tolist(), strict=True))
+    known = {k: value for k, value in (values | graph.evaluate(values)).items() if k in inverse.input_names}
+    back = np.array(list(inverse.evaluate(known).values()))
+    assert back * unit == pytest.approx(numbers[2] * unit, rel=CONDITIONED, abs=CONDITIONED)
+    with pytest.raises(SingularMassMatrixError, match="singular"):
+        forward_dynamics(quadratic(rng, unit, signs[1:]))
+
+
+def test_an_indefinite_mass_matrix_with_no_diagonal_is_solved_with():
+    def lagrangian(q, qd, t):
+        return [qd[0] * qd[1] - q[0] * q[1], (2.0 + cg.sin(q[0])) * qd[2] * qd[3], qd[1] * qd[3]]
+
+    system = dyn.System(lagrangian, "w x y z".split())
+    for method in SOLUTIONS:
+        graph = forward_dynamics(system, method)
+        values = dict.fromkeys(graph.input_names, 0.0) | {"q0": 0.5, "q1": 0.25, "tau2": 3.0}
+        found = np.array(list(graph.evaluate(values).values()))
+        s = 2.0 + math.sin(0.5)
+        matrix = np.array([[0, 1, 0, 0], [1, 0, 0, 1], [0, 0, 0, s], [0, 1, s, 0]])
+        assert matrix @ found == pytest.approx([-0.25, -0.5, 3.0, 0.0], abs=LAST_BITS)
+        with pytest.raises(SingularMassMatrixError, match="not positive definite: coordinate"):
+            forward_dynamics(system, method, check=True)
+
+
+def test_a_free_particle_of_two_coordinates_that_multiply_moves_as_it_must():
+    """L = vx vy - x y: x'' = -x, y'' = -y."""
+    system = dyn.System(lambda q, qd, t: qd[0] * qd[1] - q[0] * q[1], ["x", "y"])
+    run = dyn.simulate(system, [1.0, 0.0], [0.0, 1.0], t_end=1.0, method="dop853", rtol=1e-10, atol=1e-12)
+    assert run.q[-1] == pytest.approx([math.cos(1.0), math.sin(1.0)], abs=CONDITIONED)
+    assert "indefinite" in str(dyn.certify(system, states=2))
+
+
+@pytest.mark.parametrize(
+    ("lagrangian", "words"),
+    [
+        (lambda q, qd, t: cg.sqrt(qd[0] * qd[0] + qd[1] * qd[1]), "a motion of 'x' and 'y' has no inertia"),
+        (lambda q, qd, t: 0.5 * (3.0 * qd[0] + 0.1 * qd[1]) ** 2, "has no inertia"),
+        (lambda q, qd, t: 0.5 * (cg.sin(q[1]) * qd[0] + q[0] * qd[1]) ** 2, "a motion of 'x' and 'y' has no inertia"),
+        (lambda q, qd, t: qd[0] * q[1], "'y' has no inertia"),
+    ],
+)
+def test_a_motion_without_inertia_is_refused_wherever_accelerations_are_asked_for(lagrangian, words):
+    system = dyn.System(lagrangian, ["x", "y"])
+    for use in (forward_dynamics, dyn.certify, lambda s: dyn.simulate(s, [1.0, 0.3], [0.5, 0.2], t_end=1.0)):
+        with pytest.raises(SingularMassMatrixError, match=words):
+            use(system)
+
+
+def test_masses_far_apart_are_no_lack_of_inertia():
+    """A dense M loses the light mass in the heavy one, 1e-20 of it; elimination does not."""
+
+    def lagrangian(q, qd, t):
+        return [0.5 * qd[0] * qd[0], 0.5e20 * (qd[0] + qd[1]) * (qd[0] + qd[1])]
+
+    graph = forward_dynamics(dyn.System(lagrangian, ["x", "y"]))
+    assert graph.evaluate(dict.fromkeys(graph.input_names, 0.0) | {"tau0": 1.0}) == {"qdd0": 1.0, "qdd1": -1.0}

@@ -1,0 +1,131 @@
+"""Gaussian elimination on a sparse symmetric matrix of nodes, with pivots of one or two unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from ..core.node import Node, as_node
+from ..core.ops import less, where
+from ..errors import GraphError
+from .symmetric_matrix import ZERO, SymmetricMatrix
+
+
+class SingularError(GraphError):
+    """A pivot is the constant zero beside zeros alone, or known not to be positive where it has to be.
+
+    Attributes
+    ----------
+    index : int
+        The row of the pivot.
+    pivot : float
+        Its value.
+    regular : bool
+        Whether the matrix is not singular for all that is known, but not positive definite.
+    """
+
+    def __init__(self, index: int, pivot: float = 0.0, *, regular: bool = False) -> None:
+        regular = regular or pivot != 0.0
+        problem = "not positive definite" if regular else "singular by structure"
+        super().__init__(f"the matrix is {problem}: pivot {index} is {pivot or 'zero'}")
+        self.index = index
+        self.pivot = pivot
+        self.regular = regular
+
+
+class PivotRow(NamedTuple):
+    """The row of an eliminated unknown i: t_i = constant - sum_j gains_j t_j."""
+
+    pivot: Node  # what was divided by
+    constant: Node
+    gains: dict[Node, Node]
+
+
+class SymmetricElimination:
+    """The equations W t = b while unknowns leave them; an unknown is called by a node.
+
+    An unknown whose pivot W_ii is the constant zero waits: those eliminated after it may fill the pivot. What waits to
+    the end leaves two at a time, by pivots [[0, c], [c, 0]].
+
+    rhs: {unknown: entry of b}.  place: {unknown: its number in messages and in `info`}.
+    """
+
+    def __init__(self, rhs: dict[Node, Node], place: Mapping[Node, int]) -> None:
+        self.matrix = SymmetricMatrix()
+        self.rhs = rhs
+        self.place = place
+        self.pivot_rows: dict[Node, PivotRow] = {}  # in the order of elimination
+        self._waiting: list[Node] = []
+        self._pairs: list[tuple[Node, Node]] = []
+
+    def eliminate(self, i: Node) -> None:
+        """Take out unknown i: W_jk -= W_ij W_ik / W_ii, b_j -= W_ij b_i / W_ii; or let it wait."""
+        if self.matrix.row(i).get(i, ZERO).value == 0.0:
+            self._waiting.append(i)
+            return
+        pivot, row = self.matrix.pop(i)
+        rhs = self.rhs[i]
+        gains = {other: value / pivot for other, value in row.items()}
+        others = list(row)
+        for k, a in enumerate(others):
+            for b in others[: k + 1]:
+                self.matrix.add(a, b, -(gains[a] * row[b]))
+            self.rhs[a] = self.rhs.get(a, ZERO) - gains[a] * rhs
+        self.pivot_rows[i] = PivotRow(pivot, rhs / pivot, gains)
+
+    def eliminate_waiting(self) -> list[Node]:
+        """Take out the unknowns that wait, when no others are left, and return them, the last one first.
+
+        Raises SingularError if a row has nothing but zeros.
+        """
+        before = len(self.pivot_rows)
+        while self._waiting:
+            waiting, self._waiting = self._waiting, []
+            for i in waiting:
+                self.eliminate(i)
+            if len(self._waiting) == len(waiting):
+                self._eliminate_pair(waiting[0])
+        return list(self.pivot_rows)[before:][::-1]
+
+    def _eliminate_pair(self, i: Node) -> None:
+        """Take out i and the first j that it stands with, W_ii = W_jj = 0: t_i = (b_j - sum_k W_jk t_k) / W_ij."""
+        j = next((k for k, value in self.matrix.row(i).items() if k is not i and value.value != 0.0), None)
+        if j is None:
+            raise SingularError(self.place[i])
+        _, row_i = self.matrix.pop(i)
+        c = row_i.pop(j)
+        _, row_j = self.matrix.pop(j)
+        rhs_i, rhs_j = self.rhs[i], self.rhs[j]
+        gains_i, gains_j = ({k: value / c for k, value in row.items()} for row in (row_j, row_i))
+        others = list(dict.fromkeys([*row_i, *row_j]))
+        for n, k in enumerate(others):
+            for m in others[: n + 1]:
+                for gains, row in ((gains_i, row_i), (gains_j, row_j)):
+                    self.matrix.add(k, m, -(gains.get(k, ZERO) * row.get(m, ZERO)))
+            self.rhs[k] = self.rhs.get(k, ZERO) - (gains_i.get(k, ZERO) * rhs_i + gains_j.get(k, ZERO) * rhs_j)
+        self.pivot_rows[i] = PivotRow(c, rhs_j / c, gains_i)
+        self.pivot_rows[j] = PivotRow(c, rhs_i / c, gains_j)
+        self._pairs.append((i, j))
+        self._waiting = [k for k in self._waiting if k not in (i, j)]
+
+    def solution(self, i: Node, known: Mapping[Node, Node]) -> Node:
+        """t_i from those eliminated after it."""
+        _, total, gains = self.pivot_rows[i]
+        for other, gain in gains.items():
+            total = total - gain * known[other]
+        return total
+
+    def info(self) -> Node:
+        """0 where all pivots are positive, else 1 + the place of the first that is not (NaN is not), as a node.
+
+        Once one has failed, those after it mean nothing. Two operations for each pivot. Raises SingularError for a
+        constant that is not positive, and for a pair: one of its eigenvalues is negative.
+        """
+        if self._pairs:
+            raise SingularError(self.place[self._pairs[0][0]], regular=True)
+        info = as_node(0.0)
+        for i, row in reversed(self.pivot_rows.items()):
+            if row.pivot.value is not None and row.pivot.value <= 0.0:
+                raise SingularError(self.place[i], row.pivot.value)
+            info = where(less(0.0, row.pivot), info, 1.0 + self.place[i])
+        return info
