@@ -13,7 +13,8 @@ from ..multibody.mechanism import WORLD, Body, Mechanism, MechanismError, requir
 from ..multibody.spatial import Array
 from ..systems.model import Model
 
-_SMALLEST = 1e-14  # kg, kg m^2: MuJoCo wants masses and moments of inertia that are positive
+_SMALLEST = 1e-14  # kg, kg m^2: what stands for zero, since MuJoCo takes nothing up to its mjMINVAL of 1e-15
+_ROUNDING = 2.0**-50  # of the largest moment of inertia: what is left of one that is zero
 
 
 def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
@@ -87,7 +88,7 @@ def _body_lines(body: Body) -> list[str]:
     x, y, _ = np.asarray(joint.orientation).T
     spring = f'stiffness="{joint.stiffness!r}" springref="{joint.spring_reference!r}" armature="{joint.armature!r}"'
     axis = f'axis="{numbers(joint.axis)}" damping="{joint.damping!r}"'
-    mass = max(body.mass, _SMALLEST)
+    mass = body.mass or _SMALLEST  # one that is small stays: if MuJoCo refuses it, it says so
     place = f'pos="{numbers(joint.position)}" xyaxes="{numbers(np.concatenate([x, y]))}"'
     return [
         f"<body name={quoteattr(body.name)} {place}>",
@@ -102,7 +103,7 @@ def _principal(inertia: Array) -> str:
     if np.any(inertia - np.diag(moments)):
         moments, axes = np.linalg.eigh(inertia)
         axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
-    moments = np.maximum(moments, _SMALLEST)
+    moments = np.where(moments > _ROUNDING * moments.max(), moments, _SMALLEST)
     largest = moments.argmax()  # of a plate it is the sum of the others, and may not be more by rounding
     moments[largest] = min(moments[largest], np.delete(moments, largest).sum() * (1.0 - 1e-15))
     return f'diaginertia="{numbers(moments)}" quat="{numbers(spatial.to_quaternion(axes))}"'

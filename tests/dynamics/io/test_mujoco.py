@@ -103,3 +103,11 @@ def test_the_model_is_the_arm_number_by_number() -> None:
 def test_the_mjcf_text_is_the_same_every_time() -> None:
     assert to_mjcf(random_arm(2)) == to_mjcf(random_arm(2))
     assert to_mjcf(random_arm(2)).count("<inertial") == 2
+
+
+def test_small_masses_are_written_as_they_are_and_only_zeros_are_replaced() -> None:
+    small = dyn.Body("small", dyn.Joint("revolute", (0, 1, 0)), mass=3e-15, center=(1, 0, 0), inertia=(2e-15, 2e-15, 0))
+    text = to_mjcf(dyn.Mechanism([small]))
+    assert 'mass="3e-15"' in text
+    assert 'diaginertia="2e-15 2e-15 ' in text
+    assert "2e-15 0" not in text
