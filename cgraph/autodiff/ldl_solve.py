@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from ..core.node import Node, variable
@@ -64,9 +64,7 @@ def ldl_solve(
         return [solution[unknown] for unknown in unknowns] + ([equations.info()] if check else [])
 
 
-def ldl_elimination(
-    lower: Sequence[Sequence[Any]], rhs: Sequence[Any], accept: Callable[[int, Any], None] | None = None
-) -> tuple[list[Any], list[Any]]:
+def ldl_elimination(lower: Sequence[Sequence[Any]], rhs: Sequence[Any]) -> tuple[list[Any], list[Any]]:
     """The solution x of A x = rhs and the pivots of A, over any numbers with + - * /.
 
     For i = n - 1 .. 0:  g_ij = A_ij / A_ii,  A_jk -= g_ij A_ik,  b_j -= g_ij b_i  (j, k < i);
@@ -79,8 +77,6 @@ def ldl_elimination(
         types with arithmetic count as numbers.
     rhs : sequence of n numbers
         The right-hand side.
-    accept : callable, optional
-        Called with the index and the value of every pivot before it divides; may raise.
 
     Returns
     -------
@@ -101,8 +97,6 @@ def ldl_elimination(
     gains: list[list[Any]] = [[] for _ in range(n)]
     for i in reversed(range(n)):
         pivot = a[i][i]
-        if accept is not None:
-            accept(i, pivot)
         gains[i] = [a[i][j] / pivot for j in range(i)]
         for j in range(i):
             for k in range(j + 1):
