@@ -50,7 +50,7 @@ class Arithmetic(NamedTuple):
 
 def libm_functions(graph: Graph) -> dict[str, int]:
     """The functions of the C library that the graph calls, and how many arguments each takes."""
-    calls = {node.op.library: node.op.arity for node in graph.nodes if node.args and not node.op.llvm}
+    calls = {node.op.library: node.op.arity for node in graph.nodes if node.args and node.op.calls_library}
     return dict(sorted(calls.items()))
 
 
@@ -158,7 +158,8 @@ def body(graph: Graph, arithmetic: Arithmetic, address: Address) -> list[str]:
             lines += address("x", f"%x{number}", rows[node])
             lines.append(f"  {r} = load {t}, ptr %x{number}, align 8")
         elif node.op.llvm:
-            lines += [f"  {line.format(*args, r=r, **words)}" for line in node.op.llvm]
+            call = f"@{prefix}{node.op.library}"
+            lines += [f"  {line.format(*args, r=r, call=call, **words)}" for line in node.op.llvm]
         elif node in calls:
             names[node], more = _result(node, calls[node], r, names[calls[node]], arithmetic)
             lines += more
