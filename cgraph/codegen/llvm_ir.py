@@ -26,6 +26,11 @@ class Arithmetic(NamedTuple):
     together: int = 1  # at most so many arguments go into one call of a vector function, where lanes is 1
 
     @property
+    def polynomials(self) -> bool:
+        """Whether vectors have sines, exponentials, .. from polynomials; strict IEEE has libm's bits everywhere."""
+        return bool(self.flags)
+
+    @property
     def type(self) -> str:
         """The type of a value."""
         return "double" if self.lanes == 1 else f"<{self.lanes} x double>"
@@ -55,8 +60,8 @@ def libm_functions(graph: Graph) -> dict[str, int]:
 
 
 def point_arithmetic(flags: str) -> Arithmetic:
-    """One point at a time. Strict IEEE takes its functions from the C library, as `evaluate` does, one by one."""
-    return Arithmetic(flags, together=TOGETHER if flags else 1)
+    """One point at a time."""
+    return Arithmetic(flags, together=TOGETHER)
 
 
 def scalar_ir(graph: Graph, flags: str = "") -> str:
@@ -115,11 +120,13 @@ def preamble(graphs: Iterable[Graph], arithmetic: Arithmetic) -> list[str]:
         if arithmetic.lanes > 1:
             alone = {node.op.library for node in graph.nodes if node not in calls}
             called |= {name: arity for name, arity in libm_functions(graph).items() if name in alone}
-    return [*declarations(libm), *helpers(called, _vector(arithmetic).lanes, arithmetic.flags)]
+    vector = _vector(arithmetic)
+    return [*declarations(libm), *helpers(called, vector.lanes, vector.flags, polynomials=vector.polynomials)]
 
 
 def _joined_calls(graph: Graph, arithmetic: Arithmetic) -> dict[Node, Joined]:
-    return joined_calls(graph, arithmetic.together) if _vector(arithmetic).lanes > 1 else {}
+    joined = arithmetic.polynomials and _vector(arithmetic).lanes > 1
+    return joined_calls(graph, arithmetic.together) if joined else {}
 
 
 def declarations(functions: Mapping[str, int]) -> list[str]:

@@ -34,6 +34,16 @@ def zero_safe_mul_arrays(a: Any, b: Any) -> Any:
     return np.where((a == 0) | (b == 0), 0.0, np.multiply(a, b))
 
 
+def minimum_arrays(a: Any, b: Any) -> Any:
+    """The smaller; of two zeros the first, where np.minimum takes either."""
+    return np.where((a <= b) | (a != a), a, b)
+
+
+def maximum_arrays(a: Any, b: Any) -> Any:
+    """The larger; of two zeros the first."""
+    return np.where((a >= b) | (a != a), a, b)
+
+
 def power_arrays(a: Any, b: Any) -> Any:
     """a ** b, one rule for every exponent."""
     # With one exponent for all, np.power(a, 0.5) would be a square root: -0.0 at -0.0 and NaN at -inf.
