@@ -45,8 +45,9 @@ from .autodiff.symmetric_elimination import SingularError
 from .core.evaluate import Array
 from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED
 from .core.node import as_node
-from .core.operation import MathML, Op, register
+from .core.operation import MathML, Op
 from .core.ops import OPS
+from .core.register import register
 from .core.scope import building
 from .core.traversal import topological
 from .errors import install

@@ -23,6 +23,12 @@ _WRITTEN: dict[str, Callable[..., mpf]] = {
     "equal": lambda a, b: mpf(a == b),
     "not_equal": lambda a, b: mpf(a != b),
     "where": lambda c, a, b: a if c != 0 else b,
+    "cbrt": lambda a: mpmath.sign(a) * mpmath.cbrt(abs(a)),  # mpmath's is the complex one
+    "round": mpmath.nint,
+    "fmod": lambda a, b: mpmath.sign(a) * mpmath.fmod(abs(a), abs(b)),  # mpmath's has the sign of b
+    "logistic": lambda a: 1 / (1 + mpmath.exp(-a)),
+    "log2": lambda a: mpmath.log(a, 2),
+    "exp2": lambda a: mpf(2) ** a,
     "zero_safe_mul": lambda a, b: a * b,  # the zero rule matters for infinities only, which have no place here
 }
 OPERATIONS: dict[str, Callable[..., mpf]] = {
@@ -59,7 +65,13 @@ def kink_distance(graph: cg.Graph, values: Mapping[str, Number]) -> float:
     A node compared with itself and operations on constants alone stay where they are, and do not count.
     """
     env = node_values(graph, values)
-    distances = [
+    jumps = [
+        node.op.jumps(*[env[arg] for arg in node.args])
+        for node in graph.nodes
+        if node.op.jumps is not None and any(arg.op.name != "constant" for arg in node.args)
+    ]
+    distances = [abs(each - mpmath.nint(each)) for each in jumps]
+    distances += [
         abs(env[node.args[0]] - (env[node.args[1]] if node.op.arity == 2 else 0))
         for node in graph.nodes
         if node.op.piece is not None

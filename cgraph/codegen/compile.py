@@ -28,8 +28,8 @@ def compile(
 ) -> Compiled:
     """The graph as a function: `fn(x)` at one point, `fn.batch(X)` at many, `fn.source` to read.
 
-    All back ends agree with `graph.evaluate`, on floats and on arrays respectively. `fma`, `fast` and `cache` are for
-    machine code alone.
+    All back ends agree with `graph.evaluate`, on floats and on arrays respectively. `fast` and `cache` are for machine
+    code alone.
 
     Parameters
     ----------
@@ -44,7 +44,9 @@ def compile(
         infinities keep their meaning.
     fma : bool
         May round a product and the sum it goes into once instead of twice, and take sines, cosines, exponentials and
-        logarithms from polynomials (within 2 ulp); without, `fn(x)` agrees with `graph.evaluate` to the last bit.
+        logarithms from polynomials (within 2 ulp), NumPy its own functions. Without, `fn(x)` and `fn.batch(X)` agree
+        with `graph.evaluate` at a point to the last bit, in every back end; batches then call the C library for each
+        column.
     cache : bool or path
         Keep machine code on disk for the next process, and read it from there: True, in the platform's folder for
         caches (`$XDG_CACHE_HOME/cgraph`, `~/.cache/cgraph`, ...), or the path of a folder that nobody else can write

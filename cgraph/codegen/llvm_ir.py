@@ -26,6 +26,11 @@ class Arithmetic(NamedTuple):
     together: int = 1  # at most so many arguments go into one call of a vector function, where lanes is 1
 
     @property
+    def polynomials(self) -> bool:
+        """Whether vectors have sines, exponentials, .. from polynomials; strict IEEE has libm's bits everywhere."""
+        return bool(self.flags)
+
+    @property
     def type(self) -> str:
         """The type of a value."""
         return "double" if self.lanes == 1 else f"<{self.lanes} x double>"
@@ -50,13 +55,13 @@ class Arithmetic(NamedTuple):
 
 def libm_functions(graph: Graph) -> dict[str, int]:
     """The functions of the C library that the graph calls, and how many arguments each takes."""
-    calls = {node.op.library: node.op.arity for node in graph.nodes if node.args and not node.op.llvm}
+    calls = {node.op.library: node.op.arity for node in graph.nodes if node.args and node.op.calls_library}
     return dict(sorted(calls.items()))
 
 
 def point_arithmetic(flags: str) -> Arithmetic:
-    """One point at a time. Strict IEEE takes its functions from the C library, as `evaluate` does, one by one."""
-    return Arithmetic(flags, together=TOGETHER if flags else 1)
+    """One point at a time."""
+    return Arithmetic(flags, together=TOGETHER)
 
 
 def scalar_ir(graph: Graph, flags: str = "") -> str:
@@ -115,11 +120,13 @@ def preamble(graphs: Iterable[Graph], arithmetic: Arithmetic) -> list[str]:
         if arithmetic.lanes > 1:
             alone = {node.op.library for node in graph.nodes if node not in calls}
             called |= {name: arity for name, arity in libm_functions(graph).items() if name in alone}
-    return [*declarations(libm), *helpers(called, _vector(arithmetic).lanes, arithmetic.flags)]
+    vector = _vector(arithmetic)
+    return [*declarations(libm), *helpers(called, vector.lanes, vector.flags, polynomials=vector.polynomials)]
 
 
 def _joined_calls(graph: Graph, arithmetic: Arithmetic) -> dict[Node, Joined]:
-    return joined_calls(graph, arithmetic.together) if _vector(arithmetic).lanes > 1 else {}
+    joined = arithmetic.polynomials and _vector(arithmetic).lanes > 1
+    return joined_calls(graph, arithmetic.together) if joined else {}
 
 
 def declarations(functions: Mapping[str, int]) -> list[str]:
@@ -158,7 +165,8 @@ def body(graph: Graph, arithmetic: Arithmetic, address: Address) -> list[str]:
             lines += address("x", f"%x{number}", rows[node])
             lines.append(f"  {r} = load {t}, ptr %x{number}, align 8")
         elif node.op.llvm:
-            lines += [f"  {line.format(*args, r=r, **words)}" for line in node.op.llvm]
+            call = f"@{prefix}{node.op.library}"
+            lines += [f"  {line.format(*args, r=r, call=call, **words)}" for line in node.op.llvm]
         elif node in calls:
             names[node], more = _result(node, calls[node], r, names[calls[node]], arithmetic)
             lines += more

@@ -7,13 +7,15 @@ import math
 import sys
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.evaluate import Array
 from ..core.graph import Graph
+from ..core.op_values import by_element
+from ..core.operation import LIBRARY, Op
 from ..core.ops import OPS
 from .compiled import Compiled
 from .python_source import source
@@ -25,14 +27,17 @@ _PLAIN = ("float", "inf", "np")
 
 
 class Generated(Compiled):
-    """Generated Python for one point, generated NumPy for many; with backend "python" or "numpy", that one for both."""
+    """Generated Python for one point, generated NumPy for many; with backend "python" or "numpy", that one for both.
+
+    options: fma; without it NumPy has its functions from the C library, too, one element after another.
+    """
 
     def __init__(self, graph: Graph, backend: str, options: dict[str, Any]) -> None:
         super().__init__(graph, backend, options)
-        dialect = "numpy" if backend == "numpy" else "python"
-        self.source = source(graph, dialect, {*OPS, *_PLAIN})
-        self._python = _executable(self.source, dialect) if dialect == "python" else None
-        self._numpy = _executable(self.source, dialect) if dialect == "numpy" else None
+        dialect = _Dialect("numpy" if backend == "numpy" else "python", exact=not options["fma"])
+        self.source = dialect.source(graph)
+        self._python = dialect.executable(self.source) if dialect.column == "python" else None
+        self._numpy = dialect.executable(self.source) if dialect.column == "numpy" else None
 
     def __call__(self, x: ArrayLike) -> Array:
         """The outputs at one point; by NumPy, as a batch of one."""
@@ -53,7 +58,8 @@ class Generated(Compiled):
         if self.backend == "python":
             return sys.maxsize, self._one_by_one  # the interpreter runs one thread at a time
         if self._numpy is None:
-            self._numpy = _executable(source(self.graph, "numpy", {*OPS, *_PLAIN}), "numpy")
+            numpy = _Dialect("numpy", exact=not self.options["fma"])
+            self._numpy = numpy.executable(numpy.source(self.graph))
         return BLOCK, partial(_sweep, self._numpy)
 
     def _one_by_one(self, points: Array, result: Array) -> None:
@@ -73,10 +79,37 @@ def _sweep(function: _Function, points: Array, result: Array) -> None:
             row[:] = value
 
 
-def _executable(text: str, dialect: str) -> _Function:
-    """The text's function. An operation's name stands for its value on floats, which may raise, or on arrays."""
-    namespace: dict[str, Any] = {name: op.raising if dialect == "python" else op.array for name, op in OPS.items()}
-    namespace |= {"inf": math.inf, "np": np}
-    exec(builtins.compile(text, "<cgraph>", "exec"), namespace)  # noqa: S102 (the text is our own)
-    function: _Function = namespace["function"]
-    return function
+class _Dialect(NamedTuple):
+    """How operations are written, and what their names stand for.
+
+    column: of the operation table, "python" (floats) or "numpy" (arrays).
+    exact: take from floats what NumPy's own functions round otherwise than the C library.
+    """
+
+    column: str
+    exact: bool
+
+    def source(self, graph: Graph) -> str:
+        """The text of a graph's function."""
+        return source(graph, self._text, {*OPS, *_PLAIN})
+
+    def _text(self, op: Op) -> str:
+        if self.column == "numpy" and self._by_element(op):
+            return f"{op.name}({', '.join([f'{{{slot}}}' for slot in range(op.arity)])})"
+        text: str = getattr(op, self.column)
+        return text
+
+    def _by_element(self, op: Op) -> bool:
+        return self.exact and op.rounding >= LIBRARY
+
+    def executable(self, text: str) -> _Function:
+        """The text's function. An operation's name stands for its value on floats, which may raise, or on arrays."""
+        namespace: dict[str, Any] = {"inf": math.inf, "np": np}
+        for name, op in OPS.items():
+            if self.column == "python":
+                namespace[name] = op.raising
+            else:
+                namespace[name] = by_element(op.scalar) if self._by_element(op) else op.array
+        exec(builtins.compile(text, "<cgraph>", "exec"), namespace)  # noqa: S102 (the text is our own)
+        function: _Function = namespace["function"]
+        return function

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import keyword
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from ..core.graph import Graph
-from ..core.node import CONSTANT, VARIABLE, Node
+from ..core.node import CONSTANT, VARIABLE, Node, Op
 
 
-def source(graph: Graph, dialect: str, helpers: Iterable[str]) -> str:
+def source(graph: Graph, text_of: Callable[[Op], str], helpers: Iterable[str]) -> str:
     """Text of `def function(x)` from a sequence of inputs to a tuple of outputs.
 
-    dialect: "python" (floats) or "numpy" (one array for each input), the column of the operation table to write.
+    text_of: the text of an operation, with {0}, {1}, .. for its arguments.
     helpers: names that the text must not use for anything else.
     """
     names = _names(graph, set(helpers))
@@ -23,7 +23,7 @@ def source(graph: Graph, dialect: str, helpers: Iterable[str]) -> str:
         lines.append(f"    {unpacked}{',' if len(graph.inputs) == 1 else ''} = x")
     for node in graph.nodes:
         if node.op is not CONSTANT and node.op is not VARIABLE:
-            text = getattr(node.op, dialect).format(*[names[arg] for arg in node.args])
+            text = text_of(node.op).format(*[names[arg] for arg in node.args])
             lines.append(f"    {names[node]} = {text}")
     results = ", ".join(names[node] for node in graph.outputs.values())
     lines.append(f"    return ({results},)")

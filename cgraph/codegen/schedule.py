@@ -26,7 +26,7 @@ def schedule(graph: Graph, calls: Mapping[Node, Joined]) -> list[Node | Joined]:
     fewest registers, where nothing is shared).
     """
     registers = _registers(graph)
-    early = [calls.get(node, node) for node in graph.nodes if node.args and not node.op.llvm]
+    early = [calls.get(node, node) for node in graph.nodes if node.args and node.op.calls_library]
     order: list[Node | Joined] = []
     done: set[Node | Joined] = set()
     stack: list[Node | Joined] = [*reversed(graph.outputs.values()), *reversed(early)]

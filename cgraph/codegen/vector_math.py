@@ -1,8 +1,9 @@
 """Vector functions as LLVM text: sine, cosine, exp and log by polynomials, every other function of libm lane by lane.
 
-Each polynomial serves where its range reduction is exact enough, with an error below 2 ulp. Lanes outside (too large,
-NaN, infinite, for a logarithm not positive) have their value from libm, so that none depends on its neighbours. Other
-functions have no polynomial: equations of motion take sines and cosines of joint angles and hardly anything else.
+Strict arithmetic calls libm for all, so that a batch has the bits of a single call. Each polynomial serves where its
+range reduction is exact enough, with an error below 2 ulp. Lanes outside (too large, NaN, infinite, for a logarithm not
+positive) have their value from libm, so that none depends on its neighbours. Other functions have no polynomial:
+equations of motion take sines and cosines of joint angles and hardly anything else.
 """
 
 from __future__ import annotations
@@ -94,26 +95,26 @@ INTERVALS = {  # of the arguments that the polynomials serve
 JOINED = {"sincos": ("sin", "cos")}  # a function that gives the results of two
 
 
-def helpers(functions: Mapping[str, int], lanes: int, flags: str) -> list[str]:
+def helpers(functions: Mapping[str, int], lanes: int, flags: str, *, polynomials: bool) -> list[str]:
     """Definitions of `lanesN.name`, N lanes wide, for each function that is named, with its number of arguments.
 
-    They are functions of the C library and "sincos", which gives {sine, cosine}.
+    They are functions of the C library and, with polynomials alone, "sincos", which gives {sine, cosine}.
     """
     of_libm = {part: arity for name, arity in functions.items() for part in JOINED.get(name, (name,))}
     text: list[str] = []
     for name, arity in of_libm.items():
-        text += _lane_by_lane(name, arity, lanes)
-    for name in functions:
+        prefix = "each" if polynomials and name in POLYNOMIAL else "lanes"
+        text += _lane_by_lane(f"{prefix}{lanes}.{name}", name, arity, lanes)
+    for name in functions if polynomials else ():
         parts = JOINED.get(name, (name,))
         if parts[0] in POLYNOMIAL:
             text += _guarded(parts, lanes, flags)
     return text
 
 
-def _lane_by_lane(name: str, arity: int, lanes: int) -> list[str]:
+def _lane_by_lane(inner: str, name: str, arity: int, lanes: int) -> list[str]:
     """The function of libm, called for each lane."""
     vector = f"<{lanes} x double>"
-    inner = f"each{lanes}.{name}" if name in POLYNOMIAL else f"lanes{lanes}.{name}"
     text = [
         f"define internal {vector} @{inner}({', '.join(f'{vector} %a{k}' for k in range(arity))}) nounwind noinline {{"
     ]

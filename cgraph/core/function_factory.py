@@ -60,12 +60,14 @@ def function(op: Op) -> Function:
     return make
 
 
-@cache
 def of_name(name: str) -> Function:
-    """The function of the row of that name: `cg.cbrt` of a row "cbrt" that was added to the table."""
+    """The function of the row of that name: `cg.asinh` of a row "asinh" that was added to the table."""
     if name not in OPS:
         raise AttributeError(f"module 'cgraph' has no attribute {name!r}")
-    return function(OPS[name])
+    return _of_row(OPS[name])
+
+
+_of_row = cache(function)
 
 
 def _help(op: Op) -> str:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import numbers
+from collections.abc import Callable
+from functools import partial
 from typing import Any, NoReturn
 from weakref import WeakValueDictionary
 
@@ -136,7 +138,7 @@ class Node:
         """`np.sin(node)`, `np.float64(2) * node`, and element by element for arrays of nodes."""
         if ufunc in _TURNED:
             ufunc, inputs = _TURNED[ufunc], inputs[::-1]
-        op = BY_UFUNC.get(ufunc)
+        op = BY_UFUNC.get(ufunc) or BY_UFUNC.get(ufunc.__name__)
         if op is None or method != "__call__" or kwargs:
             return NotImplemented
         return _elementwise(op, *inputs)
@@ -192,6 +194,22 @@ class Node:
 
     def __abs__(self) -> Node:
         return apply(OPS["abs"], self)
+
+    def __floor__(self) -> Node:
+        return apply(OPS["floor"], self)
+
+    def __ceil__(self) -> Node:
+        return apply(OPS["ceil"], self)
+
+    def __round__(self) -> Node:
+        return apply(OPS["round"], self)
+
+    def __getattr__(self, name: str) -> Callable[..., Node]:
+        """The method that NumPy asks of each element of an array of objects, as in `np.sqrt(array)`."""
+        op = BY_UFUNC.get(getattr(np, name, None)) if not name.startswith("_") else None
+        if op is None:
+            raise AttributeError(f"a Node has no attribute {name!r}")
+        return partial(apply, op, self)
 
 
 Scalar = Node | float

@@ -181,3 +181,37 @@ def size(a: Pair) -> Pair:
 def sign(a: Pair) -> Pair:
     """The sign of hi, which is never 0 while lo is not."""
     return Pair(_make("sign", a.hi), ZERO)
+
+
+def floor(a: Pair) -> Pair:
+    """The floor of the high part; where that is whole, of the low part too."""
+    hi = _make("floor", a.hi)
+    return Pair(hi, ZERO) if a.lo is ZERO else normal(hi, _where(_equal(hi, a.hi), _make("floor", a.lo), 0.0))
+
+
+def ceil(a: Pair) -> Pair:
+    """-floor(-a)."""
+    return neg(floor(neg(a)))
+
+
+def round(a: Pair) -> Pair:
+    """floor(a + 1/2), and 1 less where that is odd and a is halfway."""
+    if a.lo is ZERO:
+        return Pair(_make("round", a.hi), ZERO)
+    half = Pair(constant(0.5), ZERO)
+    up = floor(add(a, half))
+    halfway = compared("equal")(sub(up, a), half)
+    odd = compared("not_equal")(floor(mul(up, half)), mul(up, half))
+    return sub(up, Pair(halfway.hi * odd.hi, ZERO))
+
+
+def fmod(a: Pair, b: Pair) -> Pair | None:
+    """a - b trunc(a / b), which the rounding of a / b may miss by one b."""
+    if a.lo is ZERO and b.lo is ZERO:
+        return None  # float64's is exact
+    length, width = size(a), size(b)
+    zero, less = Pair(ZERO, ZERO), compared("less")
+    rest = sub(length, mul(width, floor(div(length, width))))
+    rest = choose(less(rest, zero), add(rest, width), rest)
+    rest = choose(less(rest, width), rest, sub(rest, width))
+    return choose(less(a, zero), neg(rest), rest)

@@ -232,6 +232,16 @@ def maximum(a: Interval, b: Interval) -> Interval:
     return max(a[0], b[0]), max(a[1], b[1])
 
 
+def fmod(a: Interval, b: Interval) -> Interval:
+    """Bounds of the remainder of a / b: of the sign of a, not larger than a, and smaller than b."""
+    if b[0] <= 0.0 <= b[1]:
+        return LINE
+    if magnitude(a)[1] < magnitude(b)[0]:
+        return a
+    size = min(magnitude(a)[1], magnitude(b)[1])
+    return (-size if a[0] < 0.0 else 0.0), (size if a[1] > 0.0 else 0.0)
+
+
 def always(value: float) -> Callable[[Interval], Interval]:
     """A value that does not depend on the argument."""
     return lambda a: (value, value)
@@ -272,6 +282,11 @@ def below(limit: float, there: str) -> Callable[[Interval], str | None]:
         return f"{there} at {limit:g}" if a[0] == limit else None
 
     return singular
+
+
+def steep(words: str) -> Callable[[Interval], str | None]:
+    """For a function whose slope is infinite at 0."""
+    return lambda a: words if a[0] <= 0.0 <= a[1] else None
 
 
 def arc(a: Interval) -> str | None:

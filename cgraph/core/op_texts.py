@@ -1,7 +1,7 @@
 """Texts of operations in LLVM's language and in C that are too long for a row.
 
 LLVM: {r} result, {0} {1} {2} arguments, {t} type, {b} type of a comparison, {f} flags, {s} suffix of an intrinsic,
-{zero} {one} {minus} constants. C: {name} the function being written.
+{zero} {one} {minus} constants, {call} the row's function of the C library. C: {name} the function being written.
 """
 
 from __future__ import annotations
@@ -33,6 +33,15 @@ LLVM_ZERO_SAFE_MUL = (
     "{r}.product = fmul {f}{t} {0}, {1}",
     "{r} = select {b} {r}.both, {t} {r}.product, {t} {zero}",
 )
+LLVM_LOGISTIC = (
+    "{r}.size = call {t} @llvm.fabs.{s}({t} {0})",
+    "{r}.minus = fneg {t} {r}.size",
+    "{r}.exp = call {t} {call}({t} {r}.minus)",
+    "{r}.below = fcmp olt {t} {0}, {zero}",
+    "{r}.top = select {b} {r}.below, {t} {r}.exp, {t} {one}",
+    "{r}.bottom = fadd {f}{t} {r}.exp, {one}",
+    "{r} = fdiv {f}{t} {r}.top, {r}.bottom",
+)
 LLVM_WHERE = ("{r}.is = fcmp une {t} {0}, {zero}", "{r} = select {b} {r}.is, {t} {1}, {t} {2}")
 
 
@@ -59,3 +68,39 @@ static double {name}_pow(double a, double b)
     return pow(base, exponent);
 }}
 """
+C_LOGISTIC = """\
+static double {name}_logistic(double a)
+{{
+    const double e = exp(-fabs(a));
+    return (a < 0.0 ? e : 1.0) / (1.0 + e);
+}}
+"""
+MATHML_LOGARITHM = "<msub><mi>log</mi><mn>{}</mn></msub><mrow><mo>(</mo>{{0}}<mo>)</mo></mrow>"
+
+# A browser has neither rounding to even nor error functions.
+JAVASCRIPT_ROUND = """\
+(a) => {
+    const up = Math.round(a);
+    return Math.abs(a % 1) === 0.5 && up % 2 !== 0 ? up - 1 : up;
+  }"""
+# erf a = 2 / sqrt(pi) exp(-a**2) (a + 2 a**3 / 3 + 2**2 a**5 / (3 5) + ...); for a >= 1 the continued fraction
+# erfc a = exp(-a**2) / sqrt(pi) / (a + 1/2 / (a + 1 / (a + 3/2 / (a + ...)))), a**2 in two parts.
+_JAVASCRIPT_ERROR = """\
+(a) => {
+    const series = () => {
+      let term = a, sum = a;
+      for (let k = 1; k < 40; k++) sum += term *= (2 * a * a) / (2 * k + 1);
+      return ((2 * Math.exp(-a * a)) / Math.sqrt(Math.PI)) * sum;
+    };
+    const tail = (x) => {
+      if (x > 28) return 0;
+      const high = Math.fround(x);
+      let bottom = x;
+      for (let k = 200; k > 0; k--) bottom = x + k / 2 / bottom;
+      return (Math.exp(-high * high) * Math.exp((high - x) * (high + x))) / (Math.sqrt(Math.PI) * bottom);
+    };
+    if (!(Math.abs(a) > 1)) return INNER;
+    return OUTER;
+  }"""
+JAVASCRIPT_ERF = _JAVASCRIPT_ERROR.replace("INNER", "series()").replace("OUTER", "a > 0 ? 1 - tail(a) : tail(-a) - 1")
+JAVASCRIPT_ERFC = _JAVASCRIPT_ERROR.replace("INNER", "1 - series()").replace("OUTER", "a > 0 ? tail(a) : 2 - tail(-a)")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import wraps
 from typing import Any
@@ -33,6 +34,16 @@ def zero_safe_mul_arrays(a: Any, b: Any) -> Any:
     return np.where((a == 0) | (b == 0), 0.0, np.multiply(a, b))
 
 
+def minimum_arrays(a: Any, b: Any) -> Any:
+    """The smaller; of two zeros the first, where np.minimum takes either."""
+    return np.where((a <= b) | (a != a), a, b)
+
+
+def maximum_arrays(a: Any, b: Any) -> Any:
+    """The larger; of two zeros the first."""
+    return np.where((a >= b) | (a != a), a, b)
+
+
 def power_arrays(a: Any, b: Any) -> Any:
     """a ** b, one rule for every exponent."""
     # With one exponent for all, np.power(a, 0.5) would be a square root: -0.0 at -0.0 and NaN at -inf.
@@ -49,3 +60,45 @@ def hypot(a: float, b: float) -> float:
 def sign(a: float) -> float:
     """-1.0, 0.0 or 1.0; NaN of NaN."""
     return a if a != a else float((a > 0) - (a < 0))
+
+
+def by_element(function: Callable[..., float]) -> Callable[..., Any]:
+    """A function of floats, on arrays that broadcast, one element after another."""
+    return lambda *args: np.asarray(np.frompyfunc(function, len(args), 1)(*args), dtype=np.float64)
+
+
+# From here on a double has no digits behind the point; infinities and NaN are beyond, too.
+_WHOLE = 2.0**52
+
+
+def floor(a: float) -> float:
+    """The largest whole number that is not above a."""
+    return a // 1.0 if abs(a) < _WHOLE else a
+
+
+def ceil(a: float) -> float:
+    """The smallest whole number that is not below a."""
+    return -(-a // 1.0) if abs(a) < _WHOLE else a
+
+
+def round(a: float) -> float:
+    """The whole number next to a, of two the even one: adding 2**52 rounds so."""
+    return math.copysign((abs(a) + _WHOLE) - _WHOLE, a) if abs(a) < _WHOLE else a
+
+
+def logistic(a: float) -> float:
+    """1 / (1 + exp(-a))."""
+    e = math.exp(-abs(a))
+    return (e if a < 0.0 else 1.0) / (1.0 + e)
+
+
+def logistic_arrays(a: Any) -> Any:
+    """1 / (1 + exp(-a))."""
+    e = np.exp(-np.abs(a))
+    return np.where(a < 0.0, e, 1.0) / (1.0 + e)
+
+
+def precise_cbrt(a: Any) -> Any:
+    """The real cube root of a multiprecision number."""
+    third = type(a)(1) / 3
+    return -((-a) ** third) if a < 0 else a**third if a > 0 else a

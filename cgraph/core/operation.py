@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from keyword import iskeyword
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -69,8 +69,9 @@ class Op:
         Names of the parameters, with spaces. Default "x", or "a b", or "a b c".
     about : str
         A sentence for the help. Default: which node is made.
-    ufunc : numpy.ufunc
-        What makes the node when called on nodes. Default `array`, where it is a ufunc.
+    ufunc : numpy.ufunc or str
+        What makes the node when called on nodes, or its name, if its package need not be there. Default `array`, where
+        it is a ufunc.
     symbol : str
         In drawings. Default the name.
     infix : (str, int)
@@ -105,7 +106,7 @@ class Op:
     library : str
         Its function in the C library. Default of that name.
     llvm : tuple of str
-        LLVM instructions in place of a call, see `op_texts`. Default the call, in vectors lane by lane; where the C
+        LLVM instructions, see `op_texts`. Default the call, in vectors lane by lane; where the C
         library has no such function, `cg.compile` falls back to generated Python.
     vector : str
         The polynomial of `codegen.vector_math` that serves vectors. Default none.
@@ -122,6 +123,8 @@ class Op:
     piece : callable
         Of a piecewise operation: of the sign of the first argument, or of the difference of two, which argument (None:
         the number 1) times which factor is the value. Default: smooth.
+    jumps : callable
+        Of an operation that jumps: of the arguments as numbers, what is whole where it does. Default: it does not.
     series : callable
         Taylor coefficient k of (k, the result's coefficients, each argument's). Default through the partials.
     rewrite : callable
@@ -131,9 +134,10 @@ class Op:
     --------
     >>> import math, numpy as np
     >>> from cgraph.extend import Op
-    >>> row = Op("cbrt", 1, math.cbrt, np.cbrt, lambda y, x: (1.0 / (3.0 * y * y),), samples=((0.6,),))
+    >>> from cgraph import hypot
+    >>> row = Op("asinh", 1, math.asinh, np.arcsinh, lambda y, x: (1.0 / hypot(1.0, x),), samples=((0.6,),))
     >>> row.numpy, row.c, row.rounding
-    ('np.cbrt({0})', 'cbrt({0})', 2.0)
+    ('np.arcsinh({0})', 'asinh({0})', 2.0)
     """
 
     name: str
@@ -174,6 +178,7 @@ class Op:
     operator: Callable[..., Any] | None = None
     precise: Callable[..., Any] | None = None
     piece: Callable[[int], tuple[int | None, int]] | None = None
+    jumps: Callable[..., Any] | None = None
     series: Callable[..., Any] | None = None
     rewrite: Callable[..., Any] | None = None
 
@@ -211,6 +216,11 @@ class Op:
         """Names of the arguments."""
         return self.arguments.split()
 
+    @cached_property
+    def calls_library(self) -> bool:
+        """Whether machine code calls a function of the C library for it."""
+        return not self.llvm or any(["{call}" in line for line in self.llvm])
+
     @property
     def raising(self) -> Callable[..., float]:
         """Value on floats, which may raise outside the domain where it is quicker so."""
@@ -222,45 +232,11 @@ class Op:
 
 
 OPS: dict[str, Op] = {}  # the table; filled by ops.py
-BY_UFUNC: dict[Any, Op] = {}  # {ufunc of NumPy: the operation that it makes of nodes}
+BY_UFUNC: dict[Any, Op] = {}  # {ufunc, or the name of one: the operation that it makes of nodes}
 
 
-def register(op: Op) -> None:
-    """Add a row to the operation table: from then on every part of the library knows the operation.
-
-    Parameters
-    ----------
-    op : Op
-        The row. `cg.name` is then the function that makes its nodes, and its `ufunc` makes them too.
-
-    Raises
-    ------
-    TypeError
-        For what is no Op, and when `scalar`, `array` or `partials` is no function.
-    ValueError
-        When the name is no identifier or in the table already, when parameter names or a sample do not fit the number
-        of arguments, or when there is no sample.
-
-    Examples
-    --------
-    >>> from cgraph.extend import OPS, register
-    >>> register(OPS["sin"])
-    Traceback (most recent call last):
-    ValueError: operation 'sin' is in the table already
-    """
-    if not isinstance(op, Op):
-        raise TypeError(f"register takes an Op, got {type(op).__name__}: {op!r:.60}")
-    if op.name in OPS:
-        raise ValueError(f"operation {op.name!r} is in the table already")
-    if not op.name.isidentifier() or iskeyword(op.name):
-        raise ValueError(f"an operation's name must be an identifier of Python, got {op.name!r}")
-    for column in ("scalar", "array", "partials"):
-        if not callable(getattr(op, column)):
-            raise TypeError(f"operation {op.name!r}: {column} must be a function, got {getattr(op, column)!r:.60}")
-    if len(op.parameters) != op.arity:
-        raise ValueError(f"operation {op.name!r} takes {op.arity} argument(s), got the names {op.arguments!r}")
-    if not op.samples or any([len(sample) != op.arity for sample in op.samples]):
-        raise ValueError(f"operation {op.name!r} needs samples of {op.arity} number(s) each, got {op.samples!r}")
+def enter(op: Op) -> None:
+    """Put a row into the table as it is."""
     OPS[op.name] = op
     if op.ufunc is not None:
         BY_UFUNC[op.ufunc] = op

@@ -21,11 +21,12 @@ from .node import (
     Node,
 )
 from .op_values import ieee
-from .operation import FUNCTION, LEAF, PRODUCT, RELATION, SUM, MathML, Op, register
+from .operation import FUNCTION, LEAF, PRODUCT, RELATION, SUM, MathML, Op, enter
 
 
 # Conventions where there is no derivative: abs'(0) = 0; a tie of minimum or maximum gives one half to each argument;
-# sqrt'(0) = +inf, its limit; hypot'(0, 0) = 0; d(x**y)/dy at x = y = 0 is 0; atan2 at the origin is NaN.
+# sqrt'(0) = cbrt'(0) = +inf, their limit; hypot'(0, 0) = 0; d(x**y)/dy at x = y = 0 is 0; atan2 at the origin is NaN;
+# floor, ceil, round and fmod have where they jump the slope that they have beside it.
 def _pow_partials(y: Node, a: Node, b: Node) -> tuple[Node, Node]:
     jump = equal(a, 0.0) * equal(b, 0.0)  # 0**b falls from 1 to 0 at b = 0
     power = y - jump
@@ -53,6 +54,15 @@ def _less_partials(y: Node, a: Node, b: Node, above: Node, below: Node) -> tuple
 
 def _flat(y: Node, *args: Node) -> tuple[float, ...]:
     return (0.0,) * len(args)
+
+
+def _bell(a: Node) -> Node:
+    """2 / sqrt(pi) exp(-a**2), with a factor that is exact in numbers of any precision."""
+    return 2.0 / sqrt(acos(-1.0)) * exp(-(a * a))
+
+
+def _whole(a: Node) -> Node | None:
+    return a if a.op.name in ("floor", "ceil", "round") else None
 
 
 def _relation(symbol: str) -> MathML:
@@ -129,6 +139,34 @@ _ROWS = (
     Op("cos", 1, math.cos, np.cos, lambda y, a: (-sin(a),), ((0.3,), (-2.0,)), about="The cosine of x, in radians.",
        domain=(_REAL,), interval=bounds.wave("cos", 0.0), vector="angle",
        fold=lambda a: cos(a.args[0]) if a.op.name == "neg" else None),
+    Op("log2", 1, math.log2, np.log2, lambda y, a: (1.0 / log(2.0) / a,), ((0.6,),), about="The logarithm of x > 0 to the base 2.",
+       symbol="log₂", mathml=MathML(texts.MATHML_LOGARITHM.format(2), (0,), FUNCTION), domain=(_POSITIVE,),
+       interval=bounds.rising("log2", (0.0, _INF)), singular=bounds.below(0.0, "value and slope are infinite"),
+       precise=lambda a: a.log() / type(a)(2).log()),
+    Op("log10", 1, math.log10, np.log10, lambda y, a: (1.0 / log(10.0) / a,), ((0.6,),), domain=(_POSITIVE,),
+       about="The logarithm of x > 0 to the base 10.", symbol="log₁₀", mathml=MathML(texts.MATHML_LOGARITHM.format(10), (0,), FUNCTION),
+       interval=bounds.rising("log10", (0.0, _INF)), singular=bounds.below(0.0, "value and slope are infinite"),
+       precise=lambda a: a.log() / type(a)(10).log()),
+    Op("exp2", 1, math.exp2, np.exp2, lambda y, a: (y * log(2.0),), ((0.3,),), about="2 to the power x.", symbol="2ˣ",
+       mathml=MathML("<msup><mn>2</mn>{0}</msup>", (0,), FUNCTION), domain=(_REAL,),
+       interval=bounds.rising("exp2", bounds=(0.0, _INF)), precise=lambda a: type(a)(2) ** a, javascript="(a) => 2 ** a"),
+    Op("cbrt", 1, math.cbrt, np.cbrt, lambda y, a: (1.0 / (3.0 * y * y),), ((0.6,), (-2.0,)), about="The real cube root of x.",
+       symbol="∛", mathml=MathML("<mroot><mrow>{0}</mrow><mn>3</mn></mroot>", (0,), FUNCTION), domain=(_POSITIVE,),
+       fold=lambda a: -cbrt(a.args[0]) if a.op.name == "neg" else None, interval=bounds.rising("cbrt", ulps=8),
+       singular=bounds.steep("the slope is infinite at 0"), precise=values.precise_cbrt),
+    Op("logistic", 1, values.logistic, values.logistic_arrays, lambda y, a: (y * logistic(-a),), ((0.3,), (-1.2,)),
+       about="The logistic function 1 / (1 + exp(-x)), without overflow on the way.", ufunc="expit", domain=(_REAL,),
+       interval=bounds.rising("logistic", bounds=(0.0, 1.0)), rounding=4.0,
+       precise=lambda a: 1 / (1 + (-a).exp()), rewrite=lambda a: 1.0 / (1.0 + exp(-a)),
+       library="exp", llvm=texts.LLVM_LOGISTIC, c="{name}_logistic({0})", c_helper=texts.C_LOGISTIC,
+       javascript="(a) => { const e = Math.exp(-Math.abs(a)); return (a < 0 ? e : 1) / (1 + e); }"),
+    Op("erf", 1, math.erf, values.by_element(math.erf), lambda y, a: (_bell(a),), ((0.3,), (-1.2,)), ufunc="erf",
+       about="The error function, 2 / sqrt(pi) times the integral of exp(-t**2) from 0 to x.", domain=((-2.5, 2.5),),
+       fold=lambda a: -erf(a.args[0]) if a.op.name == "neg" else None, interval=bounds.rising("erf", bounds=(-1.0, 1.0)),
+       javascript=texts.JAVASCRIPT_ERF),
+    Op("erfc", 1, math.erfc, values.by_element(math.erfc), lambda y, a: (-_bell(a),), ((0.3,), (2.5,)), ufunc="erfc",
+       about="1 - erf(x), exact for large x too.", domain=((-2.5, 5.0),),
+       interval=bounds.rising("erfc", bounds=(0.0, 2.0), ulps=8, falling=True), javascript=texts.JAVASCRIPT_ERFC),
     Op("tan", 1, math.tan, np.tan, lambda y, a: (1.0 + y * y,), ((0.3,),), about="The tangent of x, in radians.",
        domain=((-1.2, 1.2),), interval=bounds.tan, singular=bounds.no_tangent),
     Op("asin", 1, math.asin, np.arcsin, lambda y, a: (1.0 / sqrt((1.0 - a) * (1.0 + a)),), ((0.3,),), domain=(_UNIT,),
@@ -156,19 +194,36 @@ _ROWS = (
        symbol="|x|", mathml=MathML("<mo>|</mo>{0}<mo>|</mo>", (0,), FUNCTION), domain=(_REAL,), double_double=dd.size,
        fold=lambda a: abs(a.args[0]) if a.op.name == "neg" else None, piece=lambda side: (0, -1 if side < 0 else 1),
        interval=bounds.magnitude, rounding=0.0, llvm=texts.llvm_intrinsic("fabs"), c="fabs({0})"),
+    Op("floor", 1, values.floor, np.floor, _flat, ((0.3,), (-1.7,)), about="The largest whole number that is not above x.",
+       symbol="⌊x⌋", mathml=MathML("<mo>⌊</mo>{0}<mo>⌋</mo>", (0,), FUNCTION), fold=_whole, double_double=dd.floor,
+       jumps=lambda a: a, domain=(_REAL,), interval=bounds.rising("floor", ulps=0), rounding=0.0,
+       llvm=texts.llvm_intrinsic("floor")),
+    Op("ceil", 1, values.ceil, np.ceil, _flat, ((0.3,), (-1.7,)), about="The smallest whole number that is not below x.",
+       symbol="⌈x⌉", mathml=MathML("<mo>⌈</mo>{0}<mo>⌉</mo>", (0,), FUNCTION), fold=_whole, double_double=dd.ceil,
+       jumps=lambda a: a, domain=(_REAL,), interval=bounds.rising("ceil", ulps=0), rounding=0.0,
+       llvm=texts.llvm_intrinsic("ceil")),
+    Op("round", 1, values.round, np.rint, _flat, ((0.3,), (-1.7,)), about="The whole number next to x; of two, the even one.",
+       mathml=MathML("<mo>⌊</mo>{0}<mo>⌉</mo>", (0,), FUNCTION), fold=_whole, double_double=dd.round,
+       jumps=lambda a: a - 0.5, domain=(_REAL,), interval=bounds.rising("round", ulps=0), rounding=0.0,
+       library="rint", llvm=texts.llvm_intrinsic("rint"), javascript=texts.JAVASCRIPT_ROUND),
+    # The slope in b is -trunc(a / b), from what is exact: a / b may round up to a whole number that it is below.
+    Op("fmod", 2, math.fmod, np.fmod, lambda y, a, b: (1.0, -round_((a - y) / b)), ((5.3, 2.0), (-5.3, 2.0)),
+       about="The remainder of a / b with the sign of a: a - b * trunc(a / b), exactly.", domain=(_REAL, _POSITIVE),
+       double_double=dd.fmod, jumps=lambda a, b: a / b, interval=bounds.fmod, interval_of_same=bounds.always(0.0),
+       singular=bounds.divisor, rounding=0.0, javascript="(a, b) => a % b"),
     Op("sign", 1, values.sign, np.sign, _flat, ((0.3,), (-0.7,)), about="-1, 0 or 1: the sign of x.", domain=(_REAL,),
        double_double=dd.sign, piece=lambda side: (None, side), interval=bounds.rising("sign", bounds=(-1.0, 1.0), ulps=0),
        rounding=0.0, llvm=texts.LLVM_SIGN, c="{0} > 0.0 ? 1.0 : ({0} < 0.0 ? -1.0 : ({0} != {0} ? {0} : 0.0))",
        javascript="(a) => (a !== a ? a : (a > 0) - (a < 0))"),
-    Op("minimum", 2, lambda a, b: a if a <= b or a != a else b, np.minimum,
+    Op("minimum", 2, lambda a, b: a if a <= b or a != a else b, values.minimum_arrays,
        lambda y, a, b: _less_partials(y, a, b, a < b, b < a), ((0.3, -0.7), (-0.7, 0.3)), about="The smaller of a and b.",
-       symbol="min", commutative=True, selects=True, fold=folding.same, double_double=dd.extreme("minimum"),
+       symbol="min", ufunc=np.minimum, commutative=True, selects=True, fold=folding.same, double_double=dd.extreme("minimum"),
        piece=lambda side: (int(side > 0), 1), domain=(_REAL, _REAL), interval=bounds.minimum, rounding=0.0,
        llvm=texts.LLVM_MINIMUM, c="({0} <= {1} || {0} != {0}) ? {0} : {1}",
        javascript="(a, b) => (a <= b || a !== a ? a : b)"),
-    Op("maximum", 2, lambda a, b: a if a >= b or a != a else b, np.maximum,
+    Op("maximum", 2, lambda a, b: a if a >= b or a != a else b, values.maximum_arrays,
        lambda y, a, b: _less_partials(y, a, b, b < a, a < b), ((0.3, -0.7), (-0.7, 0.3)), about="The larger of a and b.",
-       symbol="max", commutative=True, selects=True, fold=folding.same, double_double=dd.extreme("maximum"),
+       symbol="max", ufunc=np.maximum, commutative=True, selects=True, fold=folding.same, double_double=dd.extreme("maximum"),
        piece=lambda side: (int(side < 0), 1), domain=(_REAL, _REAL), interval=bounds.maximum, rounding=0.0,
        llvm=texts.LLVM_MAXIMUM, c="({0} >= {1} || {0} != {0}) ? {0} : {1}",
        javascript="(a, b) => (a >= b || a !== a ? a : b)"),
@@ -207,13 +262,20 @@ _ROWS = (
 # fmt: on
 
 for _row in _ROWS:
-    register(_row)
+    enter(_row)
 
 sqrt: Function = function(OPS["sqrt"])
 exp: Function = function(OPS["exp"])
 expm1: Function = function(OPS["expm1"])
 log: Function = function(OPS["log"])
 log1p: Function = function(OPS["log1p"])
+log2: Function = function(OPS["log2"])
+log10: Function = function(OPS["log10"])
+exp2: Function = function(OPS["exp2"])
+cbrt: Function = function(OPS["cbrt"])
+logistic: Function = function(OPS["logistic"])
+erf: Function = function(OPS["erf"])
+erfc: Function = function(OPS["erfc"])
 sin: Function = function(OPS["sin"])
 cos: Function = function(OPS["cos"])
 tan: Function = function(OPS["tan"])
@@ -224,6 +286,10 @@ sinh: Function = function(OPS["sinh"])
 cosh: Function = function(OPS["cosh"])
 tanh: Function = function(OPS["tanh"])
 abs_: Function = function(OPS["abs"])
+floor: Function = function(OPS["floor"])
+ceil: Function = function(OPS["ceil"])
+round_: Function = function(OPS["round"])
+fmod: Function = function(OPS["fmod"])
 sign: Function = function(OPS["sign"])
 pow: Function = function(OPS["pow"])
 atan2: Function = function(OPS["atan2"])

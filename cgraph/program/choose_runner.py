@@ -55,4 +55,4 @@ def runner(program: Program, backend: str = "auto", *, fast: bool = False, fma: 
         except (ImportError, MissingFunctionError):
             if backend == "llvm":
                 raise
-    return PythonRunner(program)
+    return PythonRunner(program, fma=fma)

@@ -23,8 +23,9 @@ Registers = TypeVar("Registers", list[float], Array)
 class PythonRunner(Runner):
     """A program in Python over lists, and many at once over arrays."""
 
-    def __init__(self, program: Program) -> None:
+    def __init__(self, program: Program, *, fma: bool = True) -> None:
         super().__init__(program)
+        self._fma = fma
         self._functions = {id(graph): compile(graph, "python") for graph in program.graphs()}
         self._arrays: dict[int, Compiled] = {}
 
@@ -109,7 +110,7 @@ class PythonRunner(Runner):
 
     def _batch(self, graph: Graph, points: Array) -> Array:
         if id(graph) not in self._arrays:
-            self._arrays[id(graph)] = compile(graph, "numpy")
+            self._arrays[id(graph)] = compile(graph, "numpy", fma=self._fma)
         return self._arrays[id(graph)].batch(points)
 
 

@@ -145,6 +145,8 @@ class Series:
             return self._append(("constant", node.value), self.number(node.value)) if made is None else made
         if node.op.series or node.op.piece or not any(self._moving[i] for i in args):
             return self.shared(node.op, *args)
+        if node.op.jumps is not None:
+            raise NotImplementedError(f"a reference solution needs Taylor series, and {name} of what moves jumps")
         key = (name, *args)
         if key not in self._number_of:
             if node.op.rewrite is not None:

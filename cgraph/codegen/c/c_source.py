@@ -40,11 +40,13 @@ void {name}(const double *x, double *y);
 #endif
 """
 
-# GCC does not know the standard's pragma and, unless told to be strict (-std=c99), fuses where the processor can.
+# GCC does not know the standard's pragma and, unless told to be strict (-std=c99), fuses where the processor can. Where
+# it can tell an argument, behind a comparison for one, it computes a function itself, and rounds otherwise than the
+# library; not so under rounding-math.
 _CONTRACT = """\
 /* {meaning} */
 #if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC optimize ("fp-contract={gcc}")
+#pragma GCC optimize ("fp-contract={gcc}", "rounding-math")
 #else
 #pragma STDC FP_CONTRACT {standard}
 #endif

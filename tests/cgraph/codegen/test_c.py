@@ -172,6 +172,18 @@ def test_powers_by_a_constant_are_those_of_evaluate(tmp_path):
 
 
 @needs_cc
+def test_an_argument_that_the_compiler_can_tell_goes_to_the_library_as_any_other(tmp_path):
+    """Behind a comparison it knows the argument; its own functions round correctly, the library's do not."""
+    x, y = cg.variables("x y")
+    functions = (cg.cbrt, cg.expm1, cg.erfc, cg.tan, cg.sinh, cg.exp2)
+    chosen = [1.0 + 0.05 * k + 0.1 * cg.less(x, y) for k in range(30)]
+    outputs = {f"{f.__name__}{k}": f(each) for f in functions for k, each in enumerate(chosen)}
+    graph, points = cg.Graph([x, y], outputs), [[0.0, 1.0], [1.0, 0.0]]
+    library = build(tmp_path, [cg.to_c(graph, "told")], ["-O3"])
+    assert same(called(library, "told", graph, points), evaluated(graph, points))
+
+
+@needs_cc
 def test_fused_multiply_add_only_when_asked(tmp_path):
     """Where the processor has it; GCC without -std=c99 would fuse by itself."""
     x, y, z = cg.variables("x y z")

@@ -65,6 +65,16 @@ def test_a_wrong_number_of_arguments_is_told() -> None:
         ({"name": "my sine"}, "must be an identifier of Python, got 'my sine'"),
         ({"name": "lambda"}, "must be an identifier of Python, got 'lambda'"),
         ({"name": "sine", "partials": None}, "operation 'sine': partials must be a function, got None"),
+        ({"name": "compile"}, "cannot be called 'compile', which means something else in cgraph"),
+        ({"name": "errors"}, "cannot be called 'errors'"),
+        ({"name": "np"}, "cannot be called 'np'"),
+        ({"name": "sine", "partials": lambda y, x: ()}, "'sine' takes 1 argument.s., its partials are 0"),
+        ({"name": "sine", "partials": lambda y, x: (x, x)}, "'sine' takes 1 argument.s., its partials are 2"),
+        ({"name": "sine", "partials": lambda y, x: x}, "'sine': partials must give a tuple, got <node variable"),
+        (
+            {"name": "sine", "partials": lambda y, x: (cg.sine(y), 1.0)},
+            "'sine' takes 1 argument.s., its partials are 2",
+        ),
         ({"name": "sine", "arguments": "x y"}, "takes 1 argument.s., got the names 'x y'"),
         ({"name": "sine", "samples": ()}, "needs samples of 1 number.s. each"),
         ({"name": "sine", "samples": ((1.0, 2.0),)}, "needs samples of 1 number.s. each, got .*2.0"),
@@ -75,6 +85,7 @@ def test_a_row_that_does_not_fit_is_refused(change: dict[str, object], said: str
     with pytest.raises((TypeError, ValueError), match=said):
         register(replace(OPS["sin"], domain=((0.0, 1.0),), **change))
     assert before == OPS
+    assert not hasattr(cg, "sine")
 
 
 def test_a_graph_is_not_read_without_the_row_of_its_operation(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -169,6 +169,7 @@ NUMPY: dict[str, Callable[..., float]] = {op.name: getattr(np, op.name, op.array
     "equal": lambda a, b: np.float64(np.equal(a, b)),
     "not_equal": lambda a, b: np.float64(np.not_equal(a, b)),
     "where": lambda c, a, b: np.where(c, a, b)[()],
+    "round": np.rint,
     "zero_safe_mul": lambda a, b: 0.0 if 0.0 in (a, b) else a * b,
 }
 POSITIVE_SPECIALS = (

@@ -1,0 +1,81 @@
+"""With fma=False every back end has the bits of `evaluate` at a point, singly, in batches of any size and in loops."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+import cgraph as cg
+from cgraph.core.node import OPS, apply
+from cgraph.extend import Call, Program, runner
+from tests.strategies import cases
+from tests.ulps import same
+
+BACKENDS = ["auto", "python", "numpy", "llvm"]
+SPECIAL = (0.0, -0.0, 1.0, -1.5, 0.5, 5e-324, 1e300, 800.0, -800.0, math.inf, -math.inf, math.nan)
+
+
+@pytest.fixture(params=BACKENDS)
+def backend(request):
+    if request.param == "llvm":
+        pytest.importorskip("llvmlite")
+    return request.param
+
+
+def evaluated(graph, points):
+    """The outputs column by column, (n_out, N), on floats."""
+    columns = [graph.evaluate(dict(zip(graph.input_names, point, strict=True))) for point in points.T.tolist()]
+    return np.array([list(column.values()) for column in columns]).T.reshape(len(graph.outputs), -1)
+
+
+def wrong(graph, backend, points):
+    """Which ways to the outputs at the columns of points do not have the bits of `evaluate`."""
+    function = cg.compile(graph, backend, fma=False)
+    expected = evaluated(graph, points)
+    sizes = {size: function.batch(points[:, :size]) for size in (0, 1, 2, 3, 4, 7, 8, 9, points.shape[1])}
+    bad = [f"batch of {size}" for size, found in sizes.items() if not same(found, expected[:, :size])]
+    single = np.array([function(point) for point in points.T]).T
+    return bad if same(single, expected) else [*bad, "single"]
+
+
+@given(case=cases(), seed=st.integers(0, 99))
+@settings(max_examples=12, deadline=None)
+def test_random_graphs_have_the_same_bits_in_every_back_end(case, seed):
+    pytest.importorskip("llvmlite")
+    middle = np.array([[case.values[name]] for name in case.graph.input_names])
+    points = middle + np.random.default_rng(seed).uniform(-0.5, 0.5, (len(middle), 19))
+    points[:, :1] = middle
+    assert {backend: wrong(case.graph, backend, points) for backend in BACKENDS} == {
+        backend: [] for backend in BACKENDS
+    }
+
+
+def test_every_operation_has_the_same_bits_where_numbers_are_special(backend):
+    inputs = cg.variables("a b c")
+    graph = cg.Graph(inputs, {name: apply(op, *inputs[: op.arity]) for name, op in OPS.items()})
+    points = np.array(list(itertools.product(SPECIAL, SPECIAL, (0.0, 1.5)))).T
+    assert wrong(graph, backend, points) == []
+
+
+def test_angles_and_exponents_of_many_sizes_have_the_same_bits(backend):
+    """Where polynomials, NumPy and the C library differ in some hundredths of all values."""
+    x = cg.variable("x")
+    graph = cg.Graph([x], {f.__name__: f(x) for f in (cg.sin, cg.cos, cg.exp, cg.log, cg.tanh, cg.cbrt, cg.logistic)})
+    points = np.random.default_rng(0).uniform(0.01, 30.0, (1, 500))
+    assert wrong(graph, backend, points) == []
+    assert not same(cg.compile(graph, backend).batch(points), evaluated(graph, points)) or backend == "python"
+
+
+@pytest.mark.parametrize("backend", ["python", "llvm"])
+def test_a_program_over_many_memories_has_the_bits_of_one(backend):
+    if backend == "llvm":
+        pytest.importorskip("llvmlite")
+    a, b = cg.variables("a b")
+    step = cg.Graph([a, b], {"a": cg.sin(a * 3.0) + cg.exp(-b), "b": cg.log(a * a + 1.0) + cg.cos(b)})
+    run = runner(Program({"s": 2}, [Call(step, ("s",), ("s",))], record=["s"]), backend, fma=False)
+    starts = np.random.default_rng(1).uniform(-2.0, 2.0, (2, 11))
+    together = run.run_many(np.stack([run.memory({"s": s}) for s in starts.T], axis=1), passes=6).rows
+    for k, start in enumerate(starts.T):
+        assert same(together[:, :, k], run.run(run.memory({"s": start}), passes=6).rows)

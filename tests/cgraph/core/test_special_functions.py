@@ -1,0 +1,169 @@
+"""Roots, logarithms, error functions, the logistic function and whole numbers: at their extremes."""
+
+import math
+from fractions import Fraction
+
+import mpmath
+import numpy as np
+import pytest
+from mpmath import mpf
+
+import cgraph as cg
+from cgraph.explain.lint.singular import intervals
+from tests import high_precision
+from tests.tolerances import LONG_SUM
+
+INF = math.inf
+DIGITS = 700  # so that a difference tells 1 - 1e-300 from 1
+x, y = cg.variables("x y")
+
+
+def value(node: cg.Node, at: float, other: float = 0.0) -> float:
+    return cg.Graph([x, y], {"f": node}).evaluate({"x": at, "y": other})["f"]
+
+
+def slope(node: cg.Node, at: float) -> float:
+    return cg.gradient(cg.Graph([x], {"f": node})).evaluate({"x": at})["df/dx"]
+
+
+FAR = {
+    "cbrt": (5e-324, -1e-310, 1e-200, 1e308, -3e200),
+    "log2": (5e-324, 1e-310, 1.0, 1e308),
+    "log10": (5e-324, 1e-310, 1.0, 1e308),
+    "exp2": (-1074.0, -1000.5, 1e-300, 1023.9),
+    "logistic": (-800.0, -700.0, -40.0, 1e-300, 40.0, 700.0, 800.0),
+    "erf": (-30.0, -6.0, 1e-300, 1e-8, 3.0, 6.0, 26.0),
+    "erfc": (-30.0, -6.0, 1e-300, 6.0, 15.0, 26.0, 27.5),
+}
+
+
+@pytest.mark.parametrize("name", FAR)
+def test_values_and_slopes_are_right_far_out(name):
+    """Relative to themselves, to what rounds the argument of an exponential: up to 700 units."""
+    node, exact = getattr(cg, name)(x), high_precision.OPERATIONS[name]
+    for at in FAR[name]:
+        with mpmath.workdps(DIGITS):
+            expected = [float(exact(mpf(at))), float(mpmath.diff(exact, mpf(at)))]
+        for found, right in zip((value(node, at), slope(node, at)), expected, strict=True):
+            assert found == pytest.approx(right, rel=LONG_SUM, abs=5e-324), (name, at)
+
+
+def test_slopes_where_there_is_a_limit():
+    assert slope(cg.cbrt(x), 0.0) == INF
+    assert slope(cg.logistic(x), INF) == slope(cg.logistic(x), -INF) == 0.0
+    assert slope(cg.erf(x), INF) == slope(cg.erfc(x), -INF) == 0.0
+
+
+@pytest.mark.parametrize("backend", ["python", "numpy", "llvm"])
+def test_logarithms_and_powers_of_two_and_ten_are_exact(backend):
+    if backend == "llvm":
+        pytest.importorskip("llvmlite")
+    graph = cg.Graph([x, y], {"2": cg.log2(x), "10": cg.log10(y), "exp2": cg.exp2(cg.log2(x))})
+    powers = np.arange(-300.0, 301.0)
+    tens = np.array([float(f"1e{int(k)}") for k in powers])
+    found = cg.compile(graph, backend).batch(np.array([2.0**powers, tens]))
+    assert np.array_equal(found, [powers, powers, 2.0**powers])
+
+
+HALVES = np.array(
+    [-2.5, -1.5, -0.5, -0.3, -0.0, 0.0, 0.49999999999999994, 0.5, 1.5, 2.5, 4503599627370497.5, 1e300, INF]
+)
+
+
+@pytest.mark.parametrize("backend", ["python", "numpy", "llvm"])
+def test_whole_numbers_are_those_of_numpy_with_the_sign_of_zero(backend):
+    if backend == "llvm":
+        pytest.importorskip("llvmlite")
+    function = cg.compile(cg.Graph([x], {"f": cg.floor(x), "c": cg.ceil(x), "r": cg.round(x)}), backend)
+    expected = np.array([np.floor(HALVES), np.ceil(HALVES), np.rint(HALVES)])
+    for found in (function.batch(HALVES[None]), np.array([function([each]) for each in HALVES]).T):
+        assert np.array_equal(found, expected)
+        assert np.array_equal(np.signbit(found), np.signbit(expected))
+
+
+@pytest.mark.parametrize(("a", "b"), [(5.3, 2.0), (-5.3, 2.0), (5.3, -2.0), (1e300, 0.7), (1.0, 0.1), (0.3, 0.1)])
+def test_fmod_is_exact_and_its_slope_counts_the_whole_parts(a, b):
+    """Also where a / b rounds up to a whole number that it does not reach."""
+    graph = cg.Graph([x, y], {"f": cg.fmod(x, y)})
+    whole = math.trunc(Fraction(a) / Fraction(b))
+    assert graph.evaluate({"x": a, "y": b})["f"] == float(Fraction(a) - whole * Fraction(b))
+    slopes = cg.gradient(graph).evaluate({"x": a, "y": b})
+    assert slopes == {"df/dx": 1.0, "df/dy": float(-whole)}
+
+
+def test_numpy_and_python_make_the_nodes():
+    made = [np.cbrt(x), np.floor(x), np.ceil(x), np.rint(x), np.log2(x), np.log10(x), np.exp2(x), np.fmod(x, y)]
+    assert [node.op.name for node in made] == "cbrt floor ceil round log2 log10 exp2 fmod".split()
+    assert [node.op.name for node in (math.floor(x), math.ceil(x), round(x), np.round(x))] == [
+        "floor",
+        "ceil",
+        "round",
+        "round",
+    ]
+    special = pytest.importorskip("scipy.special")
+    assert [special.erf(x).op.name, special.erfc(x).op.name, special.expit(x).op.name] == ["erf", "erfc", "logistic"]
+
+
+def test_arrays_of_nodes_go_through_ufuncs_element_by_element():
+    nodes = np.array([[x, y]])
+    for ufunc, name in ((np.sqrt, "sqrt"), (np.sin, "sin"), (np.arctan, "atan"), (np.cbrt, "cbrt"), (np.rint, "round")):
+        assert [node.op.name for node in ufunc(nodes)[0]] == [name] * 2
+    turned = np.arctan2(nodes, nodes[:, ::-1])[0]
+    assert [(node.op.name, node.args) for node in turned] == [("atan2", (x, y)), ("atan2", (y, x))]
+    with pytest.raises(AttributeError, match="a Node has no attribute 'spacing'"):
+        x.spacing()
+
+
+def test_folding_of_signs_and_of_whole_numbers():
+    graph = cg.simplify(
+        cg.Graph(
+            [x], {"a": cg.cbrt(-x) + cg.cbrt(x), "b": cg.erf(-x) + cg.erf(x), "c": cg.floor(cg.ceil(x)) - cg.ceil(x)}
+        )
+    )
+    assert [node.value for node in graph.outputs.values()] == [0.0] * 3
+
+
+@pytest.mark.parametrize(
+    ("node", "box", "expected"),
+    [
+        (cg.fmod(x, 3.0), (0.5, 2.5), (0.5, 2.5)),
+        (cg.fmod(x, 3.0), (-25.0, 25.0), (-3.0, 3.0)),
+        (cg.fmod(x, 3.0), (-1.0, 2.0), (-1.0, 2.0)),
+        (cg.fmod(x, -3.0), (1.0, 25.0), (0.0, 3.0)),
+        (cg.floor(x), (-0.5, 2.5), (-1.0, 2.0)),
+        (cg.round(x), (0.5, 2.5), (0.0, 2.0)),
+        (cg.logistic(x), (-INF, INF), (0.0, 1.0)),
+    ],
+)
+def test_bounds(node, box, expected):
+    assert intervals(cg.Graph([x], {"f": node}), {"x": box})[node] == expected
+
+
+@pytest.mark.parametrize("name", ["floor", "ceil", "round"])
+@pytest.mark.parametrize("low", [-0.5, -0.25, -1e-20, 1e-20, 0.25, 0.5])
+def test_a_low_part_decides_in_double_double(name, low):
+    exact = {"floor": math.floor, "ceil": math.ceil, "round": round}[name]
+    graph = cg.double_double(cg.Graph([x, y], {"f": getattr(cg, name)(x + y)}), low=True)
+    for high in (2.0, 2.5, 3.5, -2.5, 2.0**60 + 256.0, 2.0**53 + 2.0):
+        found = graph.evaluate({"x": high, "y": low})
+        assert Fraction(found["f"]) + Fraction(found["f_low"]) == exact(Fraction(high) + Fraction(low)), high
+
+
+@pytest.mark.parametrize(
+    ("a", "low", "b"), [(6.0, -1e-20, 2.0), (6.0, 1e-20, 2.0), (-7.0, 1e-18, 0.5), (0.3, 0.0, 0.1)]
+)
+def test_fmod_in_double_double(a, low, b):
+    graph = cg.double_double(cg.Graph([x, y], {"f": cg.fmod(x + y, cg.constant(b))}), low=True)
+    found = graph.evaluate({"x": a, "y": low})
+    total = Fraction(a) + Fraction(low)
+    exact = total - math.trunc(total / Fraction(b)) * Fraction(b)
+    assert float(abs(Fraction(found["f"]) + Fraction(found["f_low"]) - exact)) <= 1e-31 * abs(a)
+
+
+def test_a_reference_solution_refuses_what_jumps():
+    pytest.importorskip("flint")
+    import dynamics as dyn
+
+    system = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - cg.floor(q[0]) * q[0], ["x"])
+    with pytest.raises(NotImplementedError, match="floor of what moves jumps"):
+        dyn.reference(system, [0.5], [0.0], [0.0, 1.0])
