@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -25,7 +26,7 @@ from .run_options import TABLES, RunOptions
 from .scipy_solvers import ScipyIntegration, scipy_solver
 from .step_program import compile_steps, step_program
 from .stepping import Integration, integration
-from .trajectory import Stats, Trajectory
+from .trajectory import SimulationWarning, Stats, Trajectory
 
 BLOCK = 4096  # rows whose energy is taken at once
 
@@ -136,6 +137,8 @@ def simulate(
     times, states = recorder.table()
     half = len(start.x) if problem.system is None else problem.system.n
     stats = _stats(run, options.method, seconds)
+    for text in stats.warnings:
+        warnings.warn(text, SimulationWarning, stacklevel=2)
     energies = _energies(energy, times, states)
     return Trajectory(times, states[:, :half], states[:, half:], energies, stats, watch.crossings(half))
 
@@ -173,7 +176,8 @@ def _integrate(run: Integration, x: Array, recorder: Recorder, watch: EventLog, 
 
 def _stats(run: Integration, method: str, seconds: float) -> Stats:
     message = run.status or "reached t_end"
-    return Stats(method, run.steps, run.rejected, run.evaluations, run.largest, seconds, not run.status, message)
+    counts = (run.steps, run.rejected, run.evaluations)
+    return Stats(method, *counts, run.largest, seconds, not run.status, message, tuple(run.warnings))
 
 
 def _energies(energy: Graph | None, times: Array, states: Array) -> Array:

@@ -47,6 +47,7 @@ class Integration(ABC):
     """One run. `blocks` makes the steps; the attributes say how far it has come.
 
     status: empty while all is well, else why it stopped before the end.  largest: step [s].
+    warnings: what speaks against the result, a sentence each.
     """
 
     def __init__(self, components: Sequence[str]) -> None:
@@ -54,6 +55,7 @@ class Integration(ABC):
         self.steps = self.rejected = self.evaluations = 0
         self.largest = 0.0
         self.status = ""
+        self.warnings: list[str] = []
 
     @abstractmethod
     def blocks(self, x: Array) -> Iterator[StepBlock]:

@@ -9,6 +9,19 @@ from typing import NamedTuple
 from cgraph.extend import Array
 
 
+class SimulationWarning(UserWarning):
+    """A run that has ended, but whose result should not be trusted as it is; `Stats.warnings` has the same text.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import dynamics as dyn
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("error", dyn.SimulationWarning)  # such a result is no result
+    ...     run = dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.1], [0.0], t_end=1.0)
+    """
+
+
 @dataclass(frozen=True)
 class Stats:
     """How a run went, in SciPy's words where it has them.
@@ -29,6 +42,8 @@ class Stats:
         Whether the run reached t_end.
     message : str
         "reached t_end", or where and why it stopped.
+    warnings : tuple of str
+        What speaks against the result, a sentence each; every one is issued as a `SimulationWarning`, too.
 
     Examples
     --------
@@ -46,6 +61,7 @@ class Stats:
     seconds: float
     success: bool
     message: str
+    warnings: tuple[str, ...] = ()
 
 
 class Crossings(NamedTuple):
