@@ -16,7 +16,10 @@ from ..integrators import METHODS
 from ..integrators.step_control import RESOLUTION
 from .free_memory import room
 
+METHOD = "dop853"  # unless another is asked for
+RTOL, ATOL = 1e-9, 1e-10  # of chosen steps
 STEP = 1e-3  # s, of methods of equal steps
+BOUND = 1e-3  # of the estimated error of equal steps, relative
 TABLES = 3  # that the rows are in at most at once, while they are put together
 SCIPY = "scipy:"
 SCIPY_SOLVERS = ("Radau", "BDF", "LSODA", "DOP853", "RK45")
@@ -38,9 +41,9 @@ class RunOptions:
         most dt, so that the last row is at t_end exactly.
     max_step : float, optional
         The longest step of methods that choose their steps [s]; no limit by default.
-    rtol, atol : float, float or array_like
+    rtol, atol : float, float or array_like, optional
         The error of a chosen step, relative to each component of the state, and absolute: one number for all, or (m,),
-        one for each of q and then qd.
+        one for each of q and then qd; 1e-9 and 1e-10 by default.
     t_eval : array_like, optional
         Increasing times in [0, t_end] to record, (T,) [s]; by default every step. Chosen steps are not changed by it.
     first_step : float, optional
@@ -64,15 +67,15 @@ class RunOptions:
     0.001
     >>> RunOptions(2.0, "dopri5", dt=0.1)
     Traceback (most recent call last):
-    ValueError: method 'dopri5' chooses its steps: limit them by max_step, not by dt (got dt = 0.1 s)
+    ValueError: method 'dopri5' chooses its steps: max_step limits them; equal steps of dt = 0.1 s need method='rk4'
     """
 
     t_end: float
-    method: str = "rk4"
+    method: str = METHOD
     dt: float | None = None
     max_step: float | None = None
-    rtol: float = 1e-8
-    atol: ArrayLike = 1e-10
+    rtol: float | None = None
+    atol: ArrayLike | None = None
     t_eval: ArrayLike | None = None
     first_step: float | None = None
     max_steps: float = math.inf
@@ -87,27 +90,31 @@ class RunOptions:
                 raise ValueError(f"{what} must be positive and finite, got {value!r} s")
         if self.adaptive and self.dt is not None:
             raise ValueError(
-                f"method {self.method!r} chooses its steps: limit them by max_step, not by dt (got dt = {self.dt:g} s)"
+                f"method {self.method!r} chooses its steps: max_step limits them; "
+                f"equal steps of dt = {self.dt:g} s need method='rk4'"
             )
-        if not self.adaptive and self.max_step is not None:
-            raise ValueError(
-                f"method {self.method!r} makes equal steps: set them by dt, not by max_step "
-                f"(got max_step = {self.max_step:g} s)"
-            )
-        rtol, atol = real_number("rtol", self.rtol), real_array("atol", self.atol)
-        if not (rtol >= 0.0 and np.all((atol >= 0.0) & (atol + rtol > 0.0) & (atol + rtol < math.inf))):
-            raise ValueError(
-                f"rtol and atol must be finite, not negative and not both 0, got {self.rtol!r} and {self.atol!r}"
-            )
+        for what in () if self.adaptive else ("max_step", "first_step"):
+            if (value := getattr(self, what)) is not None:
+                raise ValueError(
+                    f"method {self.method!r} makes equal steps: set them by dt, not by {what} "
+                    f"(got {what} = {value:g} s)"
+                )
+        self._check_tolerances()
         most = real_number("max_steps", self.max_steps)
         if not (most >= 1.0 and (most == math.inf or most == int(most))):
             raise ValueError(f"max_steps must be a whole number, at least 1, or infinite, got {self.max_steps!r}")
-        normalized: dict[str, Any] = {"t_end": float(self.t_end), "rtol": rtol, "max_steps": most}
-        normalized["atol"] = atol if atol.ndim else float(atol)
+        normalized: dict[str, Any] = {"t_end": float(self.t_end), "max_steps": most}
         if self.t_eval is not None:
             normalized["t_eval"] = increasing_times(self.t_eval, self.t_end)
         for name, value in normalized.items():
             object.__setattr__(self, name, value)
+
+    def _check_tolerances(self) -> None:
+        rtol, atol = real_number("rtol", self.relative), np.asarray(self.absolute)
+        if not (rtol >= 0.0 and np.all((atol >= 0.0) & (atol + rtol > 0.0) & (atol + rtol < math.inf))):
+            raise ValueError(
+                f"rtol and atol must be finite, not negative and not both 0, got {rtol!r} and {self.absolute!r}"
+            )
 
     @property
     def scipy_solver(self) -> str | None:
@@ -130,9 +137,17 @@ class RunOptions:
         return math.inf if self.max_step is None else float(self.max_step)
 
     @property
+    def relative(self) -> float:
+        """rtol, or what it is by default."""
+        return (RTOL if self.adaptive else BOUND) if self.rtol is None else self.rtol
+
+    @property
     def absolute(self) -> float | Array:
-        """atol, a number or (m,)."""
-        return self.atol if isinstance(self.atol, float) else np.asarray(self.atol)
+        """atol, a number or (m,), or what it is by default."""
+        if self.atol is None:
+            return ATOL if self.adaptive else 0.0
+        atol = real_array("atol", self.atol)
+        return atol if atol.ndim else float(atol)
 
     @property
     def times(self) -> Array | None:

@@ -54,7 +54,7 @@ class ScipyIntegration(Integration):
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
         options, times = self.options, self.options.times
-        limits: dict[str, Any] = {"rtol": options.rtol, "atol": options.absolute}
+        limits: dict[str, Any] = {"rtol": options.relative, "atol": options.absolute}
         limits |= {"max_step": options.longest_step, "first_step": options.first_step}
         solver = self.solver.make(self.solver.rate, 0.0, x, options.t_end, **limits, **self.solver.jacobian)
         t, states = [0.0], [np.array(x)]

@@ -22,7 +22,7 @@ from .event_log import EventLog
 from .free_memory import room
 from .progress_bar import Progress
 from .recorder import Recorder
-from .run_options import TABLES, RunOptions
+from .run_options import METHOD, TABLES, RunOptions
 from .scipy_solvers import ScipyIntegration, scipy_solver
 from .step_program import compile_steps, step_program
 from .stepping import Integration, integration
@@ -36,12 +36,12 @@ def simulate(
     q: ArrayLike,
     qd: ArrayLike | None,
     t_end: float,
-    method: str = "rk4",
+    method: str = METHOD,
     *,
     dt: float | None = None,
     max_step: float | None = None,
-    rtol: float = 1e-8,
-    atol: ArrayLike = 1e-10,
+    rtol: float | None = None,
+    atol: ArrayLike | None = None,
     t_eval: ArrayLike | None = None,
     events: Event | Iterable[Event] = (),
     tau: float | Sequence[float] = 0.0,
@@ -65,17 +65,17 @@ def simulate(
     t_end : float
         Where the run ends [s].
     method : str
-        A name of `dyn.METHODS`. Equal steps: "euler", "rk4" and the symplectic "verlet", "midpoint", "gauss4", ..;
-        steps chosen by error: "dopri5", "dop853", and for stiff systems "rodas", "radau". With SciPy, "scipy:Radau",
+        A name of `dyn.METHODS`. Steps chosen by error: "dop853", "dopri5", and for stiff systems "rodas", "radau";
+        equal steps: "rk4", "euler" and the symplectic "verlet", "midpoint", "gauss4", ... With SciPy, "scipy:Radau",
         "scipy:BDF", "scipy:LSODA", "scipy:DOP853", "scipy:RK45".
     dt : float, optional
         The largest of equal steps [s], 1e-3 by default: the steps between two recorded times are equal, so that the
         last row is at t_end exactly.
     max_step : float, optional
         The longest of chosen steps [s]; no limit by default.
-    rtol, atol : float, float or array_like
+    rtol, atol : float, float or array_like, optional
         The error of a chosen step, relative to each component of the state, and absolute: one number for all, or one
-        for each component, (2 n,) of q and then qd.
+        for each component, (2 n,) of q and then qd; 1e-9 and 1e-10 by default.
     t_eval : array_like, optional
         Increasing times in [0, t_end] to record, (T,) [s]; by default every step. Chosen steps are not changed by it.
     events : Event or iterable of Event

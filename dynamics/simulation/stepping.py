@@ -184,7 +184,7 @@ class AdaptiveIntegration(NativeIntegration):
             "x": x,
             "p": self.parameters,
             "end": options.t_end,
-            "rtol": options.rtol,
+            "rtol": options.relative,
             "atol": options.absolute,
             "next": self._first_step(x) if options.first_step is None else options.first_step,
             "max_step": options.longest_step,
@@ -239,7 +239,7 @@ class AdaptiveIntegration(NativeIntegration):
 
     def _scale(self, x: Array) -> Array:
         """What an error is measured by."""
-        size: Array = self.options.absolute + self.options.rtol * np.abs(x)
+        size: Array = self.options.absolute + self.options.relative * np.abs(x)
         return size
 
     def _first_step(self, x: Array) -> float:

@@ -48,7 +48,7 @@ class Stats:
     Examples
     --------
     >>> import dynamics as dyn
-    >>> stats = dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.1], [0.0], 1.0, dt=0.01).stats
+    >>> stats = dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.1], [0.0], 1.0, "rk4", dt=0.01).stats
     >>> stats.steps, stats.nfev, stats.message
     (100, 400, 'reached t_end')
     """

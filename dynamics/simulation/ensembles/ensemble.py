@@ -34,7 +34,7 @@ class EnsembleStats:
     Examples
     --------
     >>> import dynamics as dyn
-    >>> fan = dyn.simulate_many(dyn.planar_arm([1.0], [1.0]), [[0.1], [0.2]], [0.0], 1.0, dt=0.01)
+    >>> fan = dyn.simulate_many(dyn.planar_arm([1.0], [1.0]), [[0.1], [0.2]], [0.0], 1.0, "rk4", dt=0.01)
     >>> fan.stats.steps.tolist(), fan.stats.message
     ([100, 100], ('reached t_end', 'reached t_end'))
     """

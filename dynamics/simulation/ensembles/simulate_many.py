@@ -16,7 +16,7 @@ from ...integrators import METHODS, derive
 from ...systems.model import Model
 from ..free_memory import room
 from ..progress_bar import Progress
-from ..run_options import RunOptions, step_count
+from ..run_options import METHOD, RunOptions, step_count
 from ..step_program import StepProgram, pickled_steps, step_program
 from .branch_free import branch_free
 from .chunk import Chunk
@@ -38,12 +38,12 @@ def simulate_many(
     q: ArrayLike,
     qd: ArrayLike | None,
     t_end: float,
-    method: str = "rk4",
+    method: str = METHOD,
     *,
     dt: float | None = None,
     max_step: float | None = None,
-    rtol: float = 1e-8,
-    atol: ArrayLike = 1e-10,
+    rtol: float | None = None,
+    atol: ArrayLike | None = None,
     t_eval: ArrayLike | None = None,
     tau: ArrayLike = 0.0,
     parameters: Mapping[str, ArrayLike] | None = None,
@@ -141,7 +141,8 @@ def _row_count(options: RunOptions) -> int:
         return len(options.times)
     if options.adaptive:
         raise ValueError(
-            f"{options.method!r} chooses the steps of each trajectory: t_eval must say which times to record"
+            f"{options.method!r} chooses the steps of each trajectory: t_eval must say which times to record, "
+            "or method='rk4' make equal steps"
         )
     return step_count(options.t_end, options.step) + 1
 

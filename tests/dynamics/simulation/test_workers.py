@@ -63,8 +63,8 @@ def test_threads_make_the_code_once(monkeypatch: pytest.MonkeyPatch) -> None:
     original = task.runner
     monkeypatch.setattr(task, "runner", lambda *arguments: made.append(arguments) or original(*arguments))
     model, q, qd = arms(40, 4)
-    simulate_many(model, q, qd, 0.1, workers=4, chunk=8)
-    simulate_many(model, q, qd, 0.2, workers=4, chunk=8)
+    simulate_many(model, q, qd, 0.1, "rk4", workers=4, chunk=8)
+    simulate_many(model, q, qd, 0.2, "rk4", workers=4, chunk=8)
     assert len(made) == 1
 
 
@@ -122,7 +122,7 @@ def test_ctrl_c_keeps_what_is_done() -> None:
                 raise KeyboardInterrupt
             yield function(each)
 
-    whole, result = (simulate_many(*arms(29), 0.1, workers=workers, chunk=8) for workers in (1, interrupted))
+    whole, result = (simulate_many(*arms(29), 0.1, "rk4", workers=workers, chunk=8) for workers in (1, interrupted))
     assert result.stats.success.tolist() == [True] * 16 + [False] * 13
     assert (result.q[:16] == whole.q[:16]).all()
     assert np.isnan(result.q[16:]).all()
@@ -137,10 +137,10 @@ def test_an_error_in_a_thread_is_raised_and_leaves_no_thread(monkeypatch: pytest
 
     monkeypatch.setattr("dynamics.simulation.ensembles.vectorized.VectorizedIntegration.advance", broken)
     with raises(RuntimeError, match="broken"):
-        simulate_many(*arms(29), 0.1, workers=3, chunk=8)
+        simulate_many(*arms(29), 0.1, "rk4", workers=3, chunk=8)
     assert set(threading.enumerate()) == before
 
 
 def test_workers_that_give_no_results_are_refused() -> None:
     with raises(TypeError, match=r"workers must give the results of the function, as map does, got int: 1"):
-        simulate_many(*arms(9), 0.1, workers=lambda f, each: [1])  # type: ignore[list-item]
+        simulate_many(*arms(9), 0.1, "rk4", workers=lambda f, each: [1])  # type: ignore[list-item]
