@@ -56,8 +56,8 @@ class ScipyIntegration(Integration):
         options, times = self.options, self.options.times
         limits: dict[str, Any] = {"rtol": options.relative, "atol": options.absolute}
         limits |= {"max_step": options.longest_step, "first_step": options.first_step}
-        solver = self.solver.make(self.solver.rate, 0.0, x, options.t_end, **limits, **self.solver.jacobian)
-        t, states = [0.0], [np.array(x)]
+        solver = self.solver.make(self.solver.rate, options.t0, x, options.t_end, **limits, **self.solver.jacobian)
+        t, states = [options.t0], [np.array(x)]
         clock = Clock()
         while solver.status == "running":
             if self.steps >= options.max_steps:
@@ -71,10 +71,11 @@ class ScipyIntegration(Integration):
                 self.status = f"stopped at t = {solver.t:.6g} s: {reason}"
                 break
             self.steps += 1
-            self.largest = max(self.largest, float(solver.t - solver.t_old))
+            self.largest = max(self.largest, abs(float(solver.t - solver.t_old)))
             if times is not None:
-                first, last = np.searchsorted(times, [solver.t_old, solver.t], side="right")
-                inside = [at for at in times[first:last].tolist() if at < solver.t]
+                ends = options.direction * np.array([solver.t_old, solver.t])
+                first, last = np.searchsorted(options.direction * times, ends, side="right")
+                inside = [at for at in times[first:last].tolist() if at != solver.t]
                 if inside:
                     between = solver.dense_output()
                     t += inside

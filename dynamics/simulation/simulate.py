@@ -22,7 +22,7 @@ from .event_log import EventLog
 from .free_memory import room
 from .progress_bar import Progress
 from .recorder import Recorder
-from .run_options import METHOD, TABLES, RunOptions
+from .run_options import METHOD, TABLES, RunOptions, time_span
 from .scipy_solvers import ScipyIntegration, scipy_solver
 from .step_program import compile_steps, step_program
 from .stepping import Integration, integration
@@ -35,9 +35,11 @@ def simulate(
     model: Model,
     q: ArrayLike,
     qd: ArrayLike | None,
-    t_end: float,
+    t_end: float | None = None,
     method: str = METHOD,
     *,
+    t0: float = 0.0,
+    t_span: ArrayLike | None = None,
     dt: float | None = None,
     max_step: float | None = None,
     rtol: float | None = None,
@@ -51,10 +53,11 @@ def simulate(
     backend: str = "auto",
     progress: bool | None = None,
 ) -> Trajectory:
-    """The motion of a system from (q, qd) at t = 0 to t_end.
+    """The motion of a system from (q, qd) at t0 to t_end.
 
     A step whose state is not finite, or that has to be smaller than the resolution of t, ends the run: the trajectory
-    keeps what was computed before it and `stats.message` names the time and the coordinate. Ctrl-C does the same.
+    keeps what was computed before it, the state where it stopped is its last row, and `stats.message` names the time
+    and the coordinate. Ctrl-C does the same.
 
     Parameters
     ----------
@@ -63,11 +66,15 @@ def simulate(
     q, qd : array_like
         The start, (n,) each [rad or m, per second]; of an OdeSystem q is the state, (m,), and qd None.
     t_end : float
-        Where the run ends [s].
+        Where the run ends [s], before t0 for a run back in time.
     method : str
         A name of `dyn.METHODS`. Steps chosen by error: "dop853", "dopri5", and for stiff systems "rodas", "radau";
         equal steps: "rk4", "euler" and the symplectic "verlet", "midpoint", "gauss4", ... With SciPy, "scipy:Radau",
         "scipy:BDF", "scipy:LSODA", "scipy:DOP853", "scipy:RK45".
+    t0 : float
+        Where the run starts [s].
+    t_span : array_like, optional
+        (t0, t_end), as in SciPy, in place of the two.
     dt : float, optional
         The largest of equal steps [s], 1e-3 by default: the steps between two recorded times are equal, so that the
         last row is at t_end exactly.
@@ -77,7 +84,8 @@ def simulate(
         The error of a chosen step, relative to each component of the state, and absolute: one number for all, or one
         for each component, (2 n,) of q and then qd; 1e-9 and 1e-10 by default.
     t_eval : array_like, optional
-        Increasing times in [0, t_end] to record, (T,) [s]; by default every step. Chosen steps are not changed by it.
+        Times from t0 to t_end to record, in this order, (T,) [s]; by default every step. Chosen steps are not changed
+        by it.
     events : Event or iterable of Event
         Instants to look for on the way.
     tau : float or sequence
@@ -116,7 +124,8 @@ def simulate(
     [[1.0, 0.5], [0.31, -0.04], [-0.989, 0.108]]
     """
     # Check
-    options = RunOptions(t_end, method, dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
+    t0, t_end = time_span(t_end, t0, t_span)
+    options = RunOptions(t_end, method, dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress, t0)
     watched = as_events(events)
     start = initial_value(model, q, qd, tau, parameters)
     options.check(start.states)
@@ -130,7 +139,7 @@ def simulate(
     run = _compiled(problem, options, watched=bool(watched))
 
     # Integrate, noting rows and events
-    recorder = Recorder(start.x, options.times)
+    recorder = Recorder(start.x, options.times, options.t0, options.direction)
     seconds = _integrate(run, start.x, recorder, watch, options)
 
     # Put the result together
@@ -158,7 +167,7 @@ def _integrate(run: Integration, x: Array, recorder: Recorder, watch: EventLog, 
     most = room() / TABLES
     begin = time.perf_counter()
     try:
-        with np.errstate(all="ignore"), Progress("simulate", options.t_end, options.progress) as report:
+        with np.errstate(all="ignore"), Progress("simulate", options.length, options.progress) as report:
             for block in run.blocks(x):
                 recorder.add(watch(block))
                 if recorder.size > most:
@@ -168,9 +177,11 @@ def _integrate(run: Integration, x: Array, recorder: Recorder, watch: EventLog, 
                 if watch.status:
                     run.status = watch.status
                     break
-                report(float(block.t[-1]))
+                report(abs(float(block.t[-1]) - options.t0))
     except KeyboardInterrupt:
         run.status = f"interrupted after t = {recorder.last:.6g} s"
+    if run.status:
+        recorder.add_last()
     return time.perf_counter() - begin
 
 

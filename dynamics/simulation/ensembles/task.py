@@ -48,7 +48,7 @@ class Task:
         with _lock:
             code = _vector_code(self.pickled, self.options.backend)
         times = self.options.times
-        at = int(times is None or times[0] == 0.0)
+        at = int(times is None or times[0] == self.options.t0)
         part.rows[:, :at] = chunk.x[:, None]
         run = VectorizedIntegration(code, chunk, part, at)
         for grid in self.grids:
@@ -64,7 +64,7 @@ class Task:
             compiled = _compiled(self.pickled, self.options.backend)
         for k, x in enumerate(chunk.x):
             run = integration(compiled, self.options, chunk.p[k].tolist(), stopped)
-            recorder = Recorder(x, self.options.times)
+            recorder = Recorder(x, self.options.times, self.options.t0, self.options.direction)
             for block in run.blocks(x):
                 recorder.add(block)
             states = recorder.table()[1]

@@ -48,7 +48,7 @@ class VectorizedIntegration:
         """The steps that follow are of this grid."""
         for name, value in (("start", grid.begin), ("t", grid.begin), ("count", 0.0), ("h", grid.h)):
             self.runner.write(self._memories, name, value)
-        self.part.dt[self._live] = np.maximum(self.part.dt[self._live], grid.h)
+        self.part.dt[self._live] = np.maximum(self.part.dt[self._live], abs(grid.h))
 
     def advance(self, steps: int, every: int, due: bool) -> None:
         """Make steps; those after every `every`th are rows if they are due."""
@@ -57,8 +57,9 @@ class VectorizedIntegration:
         before, m = self._memories.copy(), self.program.size
         record = self.runner.run_many(self._memories, steps, every).rows
         if due:
-            self.part.rows[:, self._at : self._at + len(record)] = record[:, 1 : 1 + m].transpose(2, 0, 1)
-            self._at += len(record)
+            kept = record[: self.part.rows.shape[1] - self._at]  # t_end itself may be no row
+            self.part.rows[:, self._at : self._at + len(kept)] = kept[:, 1 : 1 + m].transpose(2, 0, 1)
+            self._at += len(kept)
         failed = self._live & (self.runner.read(self._memories, "nonfinite")[0] != 0.0)
         if failed.any():
             for k in np.flatnonzero(failed).tolist():

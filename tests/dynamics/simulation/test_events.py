@@ -51,7 +51,8 @@ def test_an_event_between_the_times_asked_for() -> None:
     ball = System(lambda q, qd, t, p: 0.5 * qd[0] ** 2 - 9.81 * q[0], ["height"], {"floor": 0.5})
     for method in ("rk4", "dop853"):
         run = dyn.simulate(ball, [1.0], [0.0], 1.0, method, **step(method, 0.01), t_eval=[0.0, 0.3, 0.9], events=ground)
-        assert run.t.tolist() == [0.0, 0.3]
+        assert run.t.tolist() == [0.0, 0.3, run.events["ground"].t[0]]
+        assert run.q[-1].tolist() == run.events["ground"].q[0].tolist()
         assert run.events["ground"].t == approx([math.sqrt(2 * 0.5 / 9.81)], rel=SHARP)
         assert run.events["ground"].qd[0] == approx([-math.sqrt(2 * 9.81 * 0.5)], rel=SHARP)
 
