@@ -44,7 +44,8 @@ class RunOptions:
         The longest step of methods that choose their steps [s]; no limit by default.
     rtol, atol : float, float or array_like, optional
         The error of a chosen step, relative to each component of the state, and absolute: one number for all, or (m,),
-        one for each of q and then qd; 1e-9 and 1e-10 by default.
+        one for each of q and then qd; 1e-9 and 1e-10 by default. Of equal steps the estimated error that is no
+        cause of a warning, relative to the largest of a component over the run; 1e-3 and 0 by default.
     t_eval : array_like, optional
         Times from t0 to t_end to record, in this order, (T,) [s]; by default every step. Chosen steps are not changed
         by it.
@@ -58,6 +59,8 @@ class RunOptions:
         A progress line on standard error; None shows it on a terminal, for runs over a second.
     t0 : float
         Where the run starts [s].
+    estimate_error : bool, optional
+        Whether a second run of other steps estimates the error of equal steps; by default it does.
 
     Raises
     ------
@@ -86,6 +89,7 @@ class RunOptions:
     backend: str = "auto"
     progress: bool | None = None
     t0: float = 0.0
+    estimate_error: bool | None = None
 
     def __post_init__(self) -> None:
         check_method(self.method)
@@ -106,6 +110,7 @@ class RunOptions:
                     f"(got {what} = {value:g} s)"
                 )
         self._check_tolerances()
+        self._check_estimate()
         most = real_number("max_steps", self.max_steps)
         if not (most >= 1.0 and (most == math.inf or most == int(most))):
             raise ValueError(f"max_steps must be a whole number, at least 1, or infinite, got {self.max_steps!r}")
@@ -129,6 +134,24 @@ class RunOptions:
             raise ValueError(
                 f"rtol and atol must be finite, not negative and not both 0, got {rtol!r} and {self.absolute!r}"
             )
+
+    def _check_estimate(self) -> None:
+        if self.estimate_error not in (None, True, False):
+            raise TypeError(f"estimate_error must be True, False or None, got {self.estimate_error!r:.40}")
+        if self.adaptive and self.estimate_error:
+            raise ValueError(
+                f"method {self.method!r} keeps the error of its steps within rtol and atol: "
+                "estimate_error is for equal steps, such as those of method='rk4'"
+            )
+        if not self.adaptive and self.estimate_error is False:
+            for what in ("rtol", "atol"):
+                if getattr(self, what) is not None:
+                    raise ValueError(f"{what} is a bound of the estimated error, which estimate_error=False leaves out")
+
+    @property
+    def estimated(self) -> bool:
+        """Whether a second run estimates the error."""
+        return not self.adaptive and self.estimate_error is not False
 
     @property
     def scipy_solver(self) -> str | None:
@@ -177,6 +200,14 @@ class RunOptions:
     def length(self) -> float:
         """Of the run [s]."""
         return abs(self.t_end - self.t0)
+
+    @property
+    def row_times(self) -> Array:
+        """Of equal steps: the times of the rows, t_eval or every step, (T,)."""
+        if self.times is not None:
+            return self.times
+        steps = step_count(self.length, self.step)
+        return np.append(self.t0 + (self.t_end - self.t0) / steps * np.arange(steps), self.t_end)
 
     @property
     def instants(self) -> list[float]:

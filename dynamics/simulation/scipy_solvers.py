@@ -50,6 +50,17 @@ class ScipyIntegration(Integration):
     def __init__(self, solver: ScipySolver, options: RunOptions) -> None:
         super().__init__(solver.components)
         self.solver, self.options = solver, options
+        self._jacobians = self._factorizations = 0
+
+    @property
+    def jacobians(self) -> int:
+        """Evaluations of the Jacobian, as SciPy counts them."""
+        return self._jacobians
+
+    @property
+    def factorizations(self) -> int:
+        """LU factorizations, as SciPy counts them."""
+        return self._factorizations
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
@@ -64,7 +75,7 @@ class ScipyIntegration(Integration):
                 self.status = self.too_many(solver.t, options.max_steps)
                 break
             message = solver.step()
-            self.evaluations = solver.nfev
+            self.evaluations, self._jacobians, self._factorizations = solver.nfev, solver.njev, solver.nlu
             reason = self.nonfinite(solver.y)
             if solver.status == "failed" or reason:
                 reason = reason or f"SciPy's {self.solver.name} gave up: {message}"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import time
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,7 @@ from cgraph.extend import Array
 from ..equations.initial_value import initial_value
 from ..integrators import METHODS, Problem, derive, total_energy
 from ..systems.model import Model
+from .error_estimate import ErrorEstimate, estimate
 from .event import Event, as_events
 from .event_log import EventLog
 from .free_memory import room
@@ -25,7 +26,7 @@ from .recorder import Recorder
 from .run_options import METHOD, TABLES, RunOptions, time_span
 from .scipy_solvers import ScipyIntegration, scipy_solver
 from .step_program import compile_steps, step_program
-from .stepping import Integration, integration
+from .stepping import FixedStepIntegration, Integration, integration
 from .trajectory import SimulationWarning, Stats, Trajectory
 
 BLOCK = 4096  # rows whose energy is taken at once
@@ -50,6 +51,7 @@ def simulate(
     parameters: Mapping[str, float] | None = None,
     first_step: float | None = None,
     max_steps: float = math.inf,
+    estimate_error: bool | None = None,
     backend: str = "auto",
     progress: bool | None = None,
 ) -> Trajectory:
@@ -82,7 +84,8 @@ def simulate(
         The longest of chosen steps [s]; no limit by default.
     rtol, atol : float, float or array_like, optional
         The error of a chosen step, relative to each component of the state, and absolute: one number for all, or one
-        for each component, (2 n,) of q and then qd; 1e-9 and 1e-10 by default.
+        for each component, (2 n,) of q and then qd; 1e-9 and 1e-10 by default. Of equal steps, the estimated error
+        beyond which the run warns, relative to the largest of a component over the run; 1e-3 and 0 by default.
     t_eval : array_like, optional
         Times from t0 to t_end to record, in this order, (T,) [s]; by default every step. Chosen steps are not changed
         by it.
@@ -96,6 +99,9 @@ def simulate(
         In place of the first step that the method chooses [s].
     max_steps : float
         Steps after which the run stops.
+    estimate_error : bool, optional
+        Of equal steps, whether a second run of steps twice as long estimates their error (`Stats.error`), which takes
+        half as long again; by default it does. The rows are the same without.
     backend : str
         "llvm", "python", or "auto" for machine code where llvmlite is installed; the steps are the same.
     progress : bool, optional
@@ -125,7 +131,8 @@ def simulate(
     """
     # Check
     t0, t_end = time_span(t_end, t0, t_span)
-    options = RunOptions(t_end, method, dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress, t0)
+    arguments = (dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
+    options = RunOptions(t_end, method, *arguments, t0, estimate_error)
     watched = as_events(events)
     start = initial_value(model, q, qd, tau, parameters)
     options.check(start.states)
@@ -140,12 +147,12 @@ def simulate(
 
     # Integrate, noting rows and events
     recorder = Recorder(start.x, options.times, options.t0, options.direction)
-    seconds = _integrate(run, start.x, recorder, watch, options)
+    outcome = _integrate(run, start.x, recorder, watch, options)
 
     # Put the result together
     times, states = recorder.table()
     half = len(start.x) if problem.system is None else problem.system.n
-    stats = _stats(run, options.method, seconds)
+    stats = _stats(run, options.method, outcome)
     for text in stats.warnings:
         warnings.warn(text, SimulationWarning, stacklevel=2)
     energies = _energies(energy, times, states)
@@ -162,33 +169,73 @@ def _compiled(problem: Problem, options: RunOptions, *, watched: bool) -> Integr
     return integration(compile_steps(program, options.backend), options, every_step=watched)
 
 
-def _integrate(run: Integration, x: Array, recorder: Recorder, watch: EventLog, options: RunOptions) -> float:
-    """Run from x to t_end, an event, a failure, the end of the memory, or Ctrl-C. The seconds that it took."""
-    most = room() / TABLES
-    begin = time.perf_counter()
+class _Outcome(NamedTuple):
+    """How a run ended: in the end, at an event, or otherwise; and how large its error is."""
+
+    seconds: float
+    status: int
+    message: str
+    error: ErrorEstimate | None
+
+
+def _integrate(run: Integration, x: Array, recorder: Recorder, watch: EventLog, options: RunOptions) -> _Outcome:
+    """Run from x to t_end, an event, a failure, the end of the memory, or Ctrl-C; then estimate the error."""
+    begin, seconds, error = time.perf_counter(), math.nan, None
+    second = 0.5 * options.estimated  # of the length of the run
+    doing = ""
     try:
-        with np.errstate(all="ignore"), Progress("simulate", options.length, options.progress) as report:
-            for block in run.blocks(x):
-                recorder.add(watch(block))
-                if recorder.size > most:
-                    last = f"{recorder.last:.6g} s"
-                    run.status = f"stopped at t = {last}: the rows fill the memory; t_eval records fewer"
-                    break
-                if watch.status:
-                    run.status = watch.status
-                    break
-                report(abs(float(block.t[-1]) - options.t0))
+        total = (1.0 + second) * options.length
+        with np.errstate(all="ignore"), Progress("simulate", total, options.progress) as report:
+            _run(run, x, recorder, watch, lambda t: report(abs(t - options.t0)))
+            seconds = time.perf_counter() - begin
+            if isinstance(run, FixedStepIntegration) and options.estimated and not run.status:
+                doing = ", while its error was estimated"
+                done = abs(recorder.last - options.t0)
+                error = estimate(run, x, *recorder.table(), lambda t: report(done + second * abs(t - options.t0)))
     except KeyboardInterrupt:
-        run.status = f"interrupted after t = {recorder.last:.6g} s"
+        run.status = f"interrupted after t = {recorder.last:.6g} s{doing}"
     if run.status:
         recorder.add_last()
-    return time.perf_counter() - begin
+    seconds = time.perf_counter() - begin if math.isnan(seconds) else seconds
+    if watch.status and not run.status:
+        return _Outcome(seconds, 1, watch.status, error)
+    return _Outcome(seconds, -1 if run.status else 0, run.status or "reached t_end", error)
 
 
-def _stats(run: Integration, method: str, seconds: float) -> Stats:
-    message = run.status or "reached t_end"
-    counts = (run.steps, run.rejected, run.evaluations)
-    return Stats(method, *counts, run.largest, seconds, not run.status, message, tuple(run.warnings))
+def _run(run: Integration, x: Array, recorder: Recorder, watch: EventLog, report: Callable[[float], None]) -> None:
+    """Note rows and events, block by block. A run that an event ends has it as its last row."""
+    most = room() / TABLES
+    for block in run.blocks(x):
+        recorder.add(watch(block))
+        if watch.status:
+            recorder.add_last()
+            return
+        if recorder.size > most:
+            last = f"{recorder.last:.6g} s"
+            run.status = f"stopped at t = {last}: the rows fill the memory; t_eval records fewer"
+            return
+        report(float(block.t[-1]))
+
+
+def _stats(run: Integration, method: str, outcome: _Outcome) -> Stats:
+    seconds, status, message, error = outcome
+    texts = [*run.warnings, *([error.warning] if error and error.warning else [])]
+    return Stats(
+        method,
+        run.steps,
+        run.rejected,
+        run.evaluations,
+        run.largest,
+        seconds,
+        status >= 0,
+        message,
+        status,
+        run.jacobians,
+        run.factorizations,
+        error.largest if error else None,
+        error.last if error else None,
+        tuple(texts),
+    )
 
 
 def _energies(energy: Graph | None, times: Array, states: Array) -> Array:

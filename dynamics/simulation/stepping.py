@@ -57,6 +57,16 @@ class Integration(ABC):
         self.status = ""
         self.warnings: list[str] = []
 
+    @property
+    @abstractmethod
+    def jacobians(self) -> int:
+        """Evaluations of the Jacobian of the rate."""
+
+    @property
+    @abstractmethod
+    def factorizations(self) -> int:
+        """LU factorizations of matrices."""
+
     @abstractmethod
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
@@ -89,6 +99,17 @@ class NativeIntegration(Integration):
         self.program, self.runner, self.options = compiled.program, compiled.runner, options
         self.parameters, self._stopped = list(parameters), stopped
         self._passes = FIRST_PASSES
+        self._accepted = True
+
+    @property
+    def jacobians(self) -> int:
+        """Evaluations of the Jacobian of the rate: one for every state that steps were tried from."""
+        return self.steps + (not self._accepted) if self.program.factorizations else 0
+
+    @property
+    def factorizations(self) -> int:
+        """LU factorizations of matrices: in every trial of a step of an implicit method."""
+        return self.program.factorizations * (self.steps + self.rejected)
 
     def _run(self, memory: Array, passes: int, every: int = 1) -> tuple[Array, int]:
         if self._stopped():
@@ -101,6 +122,8 @@ class NativeIntegration(Integration):
         begin = time.perf_counter()
         rows, done = self._run(memory, passes, passes if whole else 1)
         spent = time.perf_counter() - begin
+        if self.program.adaptive:
+            self._accepted = self._number(memory, "accepted") != 0.0
         if passes == self._passes:
             self._passes = max(1, int(passes * min(4.0, BLOCK_TIME / max(spent, 1e-9))))
         return rows, done
@@ -110,7 +133,10 @@ class NativeIntegration(Integration):
 
 
 class FixedStepIntegration(NativeIntegration):
-    """Equal steps between the instants, at most dt. Every step is in a block, or of a block the last alone."""
+    """Equal steps between the instants, at most dt. Every step is in a block, or of a block the last alone.
+
+    stretches: other steps than those of the options.
+    """
 
     def __init__(
         self,
@@ -120,9 +146,11 @@ class FixedStepIntegration(NativeIntegration):
         stopped: Callable[[], bool] = lambda: False,
         *,
         every_step: bool,
+        stretches: Sequence[EqualSteps] | None = None,
     ) -> None:
         super().__init__(compiled, options, parameters, stopped)
-        self.every_step, self.stretches = every_step, equal_steps(options.instants, options.step)
+        self.every_step = every_step
+        self.stretches = equal_steps(options.instants, options.step) if stretches is None else stretches
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""

@@ -110,7 +110,7 @@ def test_a_motion_back_in_time_is_the_motion(method: str) -> None:
 )
 def test_many_from_any_time_to_any_other_are_each_the_one(times: list[float], method: str) -> None:
     """The end is no row where one time is left out; all steps are rows where none is asked for."""
-    options: dict[str, Any] = {"t_span": (times[0], times[-1]), "method": method, "dt": 0.05}
+    options: dict[str, Any] = {"t_span": (times[0], times[-1]), "method": method, **step(method, 0.05)}
     for t_eval in (times, times[:-1], times[1:], None):
         many = dyn.simulate_many(driven(), [[1.0], [0.3]], [0.2], t_eval=t_eval, **options)
         for k, q in enumerate((1.0, 0.3)):
