@@ -99,17 +99,18 @@ class Differences:
         self.largest, self.last = np.zeros_like(self.size), np.zeros_like(self.size)
 
     def seen(self, states: Array) -> None:
-        """States (k, r, m) that the second runs passed through: they tell the size."""
-        finite = np.where(np.isfinite(states), np.abs(states), 0.0)
-        self.size = np.maximum(self.size, finite.max(axis=1, initial=0.0))
+        """States (k, r, m) that the second runs passed through between the rows: they tell the size."""
+        if states.shape[1]:
+            size = np.abs(states).max(axis=1)
+            self.size = np.where(np.isfinite(size), np.maximum(self.size, size), self.size)
 
     def add(self, rows: Array, others: Array) -> None:
         """The same instants of both, (k, r, m)."""
         if rows.shape[1]:
-            change = np.abs(others - rows)
-            change[np.isnan(change)] = math.inf
-            self.largest = np.maximum(self.largest, change.max(axis=1))
-            self.last = change[:, -1]
+            change = others - rows
+            np.abs(change, out=change)
+            self.last = _or_infinite(change[:, -1])
+            self.largest = np.maximum(self.largest, _or_infinite(change.max(axis=1)))
 
     @property
     def scale(self) -> Array:
@@ -122,6 +123,11 @@ class Differences:
         scale = self.scale
         largest, last = (np.where(change > 0.0, change / scale, 0.0) for change in (self.largest, self.last))
         return _by_law(largest, ratio), _by_law(last, ratio)
+
+
+def _or_infinite(change: Array) -> Array:
+    """The same, infinite in place of NaN."""
+    return np.where(np.isnan(change), math.inf, change)
 
 
 def _by_law(change: Array, ratio: float) -> Array:
@@ -187,8 +193,9 @@ def estimate(
     differences = Differences(states[None])
     for block in other.blocks(x):
         beyond = options.direction * (block.t - times[-1]) > 0.0
-        differences.seen(block.x[None, ~beyond])
         rows, same = matches(times, block.t)
+        if len(same) < len(block.t):
+            differences.seen(block.x[None, ~beyond])
         differences.add(states[None, rows], block.x[None, same])
         report(float(block.t[-1]))
         if beyond.any():

@@ -15,6 +15,8 @@ from ..stepping import StoppedError
 from .chunk import Chunk, Part
 from .vectorized import VectorCode, block_limits, start_memories
 
+SAMPLES = 64  # states of a stretch, at least, that tell the size of a motion
+
 
 def estimate_side_by_side(
     code: VectorCode, chunk: Chunk, part: Part, options: RunOptions, stopped: Callable[[], bool]
@@ -46,13 +48,22 @@ def _compare(
     runner, m = code.one_pass, code.program.size
     for name, value in (("start", stretch.begin), ("t", stretch.begin), ("count", 0.0), ("h", stretch.h)):
         runner.write(memories, name, value)
+    every = _every(stretch, options.row_times)
     passes, width = block_limits(code, memories.shape[1])
-    most = min(passes, width)
+    most = max(1, min(passes // every, width)) * every
     for done in range(0, stretch.steps, most):
         if stopped():
             raise StoppedError
-        record = runner.run_many(memories, min(most, stretch.steps - done)).rows
+        record = runner.run_many(memories, min(most, stretch.steps - done), every).rows
         times, states = np.ascontiguousarray(record[:, 0, 0]), record[:, 1 : 1 + m].transpose(2, 0, 1)
-        differences.seen(states[:, options.direction * (times - options.row_times[-1]) <= 0.0])
         here, there = matches(options.row_times, times)
+        if len(there) < len(times):
+            differences.seen(states[:, options.direction * (times - options.row_times[-1]) <= 0.0])
         differences.add(rows[:, here], states[:, there])
+
+
+def _every(stretch: EqualSteps, times: Array) -> int:
+    """Of how many steps of a stretch it is enough to see the last, to see it at all of the times and often enough."""
+    after = np.rint((times - stretch.begin) / stretch.h).astype(np.int64)
+    common = int(np.gcd.reduce(after[(after > 0) & (after <= stretch.steps)], initial=stretch.steps))
+    return max(every for every in range(1, max(1, min(stretch.steps // SAMPLES, SAMPLES)) + 1) if common % every == 0)
