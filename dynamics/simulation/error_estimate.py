@@ -97,6 +97,7 @@ class Differences:
         """rows: (k, T, m) of the first runs."""
         self.size = np.abs(rows).max(axis=1, initial=0.0)  # (k, m) of each component over the run
         self.largest, self.last = np.zeros_like(self.size), np.zeros_like(self.size)
+        self.compared = 0  # instants
 
     def seen(self, states: Array) -> None:
         """States (k, r, m) that the second runs passed through between the rows: they tell the size."""
@@ -107,6 +108,7 @@ class Differences:
     def add(self, rows: Array, others: Array) -> None:
         """The same instants of both, (k, r, m)."""
         if rows.shape[1]:
+            self.compared += rows.shape[1]
             change = others - rows
             np.abs(change, out=change)
             self.last = _or_infinite(change[:, -1])
@@ -136,7 +138,7 @@ def _by_law(change: Array, ratio: float) -> Array:
 
 
 class ErrorEstimate(NamedTuple):
-    """Of one run: the largest error over its rows and the one of its last row, relative to the sizes of components."""
+    """Of one run: the largest error and that at the end, relative to the sizes of components."""
 
     largest: float
     last: float
@@ -146,7 +148,9 @@ class ErrorEstimate(NamedTuple):
 def estimates(
     differences: Differences, ratio: float, components: Sequence[str], options: RunOptions
 ) -> list[ErrorEstimate]:
-    """Of each run, whether it is as good as it was asked to be."""
+    """Of each run, whether it is as good as it was asked to be; NaN where nothing could be compared."""
+    if not differences.compared:
+        return [ErrorEstimate(math.nan, math.nan, "")] * len(differences.size)
     largest, last = differences.errors(ratio)
     scale = differences.scale
     beyond = ~(largest * scale <= options.absolute + options.relative * scale)
@@ -182,7 +186,7 @@ def estimate(
     report: Callable[[float], None] = lambda t: None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> ErrorEstimate:
-    """Of a run from x that has these rows.
+    """Of a run from x that came to these states.
 
     report: is told the time [s] that the second run has come to.  stopped: see NativeIntegration.
     """

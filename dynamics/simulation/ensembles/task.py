@@ -64,7 +64,7 @@ class Task:
                         raise StoppedError
                     run.advance(*block)
             if self.options.estimated:
-                estimate_side_by_side(code, chunk, part, self.options, stopped)
+                estimate_side_by_side(code, chunk, part, run.states, self.options, stopped)
         except (KeyboardInterrupt, StoppedError):
             run.interrupt()
         run.end()
@@ -92,7 +92,7 @@ class Task:
             for block in run.blocks(x):
                 recorder.add(block)
             if isinstance(run, FixedStepIntegration) and self.options.estimated and not run.status:
-                error = estimate(run, x, *recorder.table(), stopped=stopped)
+                error = estimate(run, x, *recorder.checkpoints(), stopped=stopped)
                 errors[:] = error.largest, error.last
                 run.warnings += [error.warning] if error.warning else []
         except (KeyboardInterrupt, StoppedError):

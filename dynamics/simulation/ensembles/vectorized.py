@@ -82,6 +82,11 @@ class VectorizedIntegration:
         self._done += steps
         self._reached = float(self.runner.read(self._memories, "t")[0, 0])
 
+    @property
+    def states(self) -> Array:
+        """Where the trajectories are, (k, m)."""
+        return self.runner.read(self._memories, "x").T
+
     def interrupt(self) -> None:
         """Those that have not failed end here, with the rows that they have."""
         for k in np.flatnonzero(self._live).tolist():
