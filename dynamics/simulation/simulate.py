@@ -136,21 +136,8 @@ def simulate(
     """
     # Check
     t0, t_end = time_span(t_end, t0, t_span)
-    options = RunOptions(
-        t_end,
-        method,
-        dt=dt,
-        max_step=max_step,
-        rtol=rtol,
-        atol=atol,
-        t_eval=t_eval,
-        first_step=first_step,
-        max_steps=max_steps,
-        backend=backend,
-        progress=progress,
-        t0=t0,
-        estimate_error=estimate_error,
-    )
+    arguments = (dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
+    options = RunOptions(t_end, method, *arguments, t0, estimate_error)
     watched = as_events(events)
     if not isinstance(dense_output, bool):
         raise TypeError(f"dense_output must be True or False, got {dense_output!r:.40}")

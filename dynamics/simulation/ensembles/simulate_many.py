@@ -114,21 +114,8 @@ def simulate_many(
     if isinstance(method, str) and method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
     t0, t_end = time_span(t_end, t0, t_span)
-    options = RunOptions(
-        t_end,
-        method,
-        dt=dt,
-        max_step=max_step,
-        rtol=rtol,
-        atol=atol,
-        t_eval=t_eval,
-        first_step=first_step,
-        max_steps=max_steps,
-        backend=backend,
-        progress=progress,
-        t0=t0,
-        estimate_error=estimate_error,
-    )
+    arguments = (dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
+    options = RunOptions(t_end, method, *arguments, t0, estimate_error)
     team = checked(workers)
     _check_chunk(chunk)
     start = starts(model, q, qd, tau, parameters)
