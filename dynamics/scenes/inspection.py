@@ -54,7 +54,8 @@ def inspection(scene: Scene, *, forward: bool = False, t_end: float | None = Non
     system, end = scene.system, scene.t_end if t_end is None else t_end
     if not 0.0 < end < np.inf:
         raise ValueError(f"t_end must be positive and finite, got {end!r} s")
-    times = np.linspace(0.0, end, int(min(FRAMES, max(2.0, RATE * end))))
+    frames = int(min(FRAMES, max(2.0, RATE * end))) if np.isfinite(end) else 2
+    times = np.linspace(0.0, end, frames) if end > 0.0 else None
     run = simulate(system, scene.q, scene.qd, end, "dopri5", rtol=1e-6, atol=1e-8, t_eval=times)
     rate = forward_dynamics(system)
     state = _named(q=run.q, qd=run.qd, tau=np.zeros_like(run.q)) | system.parameters | {"t": run.t}
