@@ -35,7 +35,7 @@ from .scenes.scenes import Scene
 from .simulation.ensembles import Ensemble, EnsembleStats, simulate_many
 from .simulation.event import Event
 from .simulation.simulate import simulate
-from .simulation.trajectory import Crossings, Stats, Trajectory
+from .simulation.trajectory import Crossings, SimulationWarning, Stats, Trajectory
 from .systems.model import as_system
 from .systems.ode_system import OdeSystem
 from .systems.system import System
@@ -65,6 +65,7 @@ __all__ = [
     "Reference",
     "Released",
     "Scene",
+    "SimulationWarning",
     "SingularMassMatrixError",
     "Stats",
     "Subtree",

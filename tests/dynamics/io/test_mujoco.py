@@ -68,7 +68,7 @@ def test_the_flawed_torque_does_not_agree() -> None:
 
 def motion(arm: dyn.Mechanism, q: Array, t_end: float, dt: float) -> tuple[dyn.Trajectory, tuple[Array, Array]]:
     still = np.zeros(len(arm.moving))
-    return dyn.simulate(arm, q, still, t_end, dt=dt), MujocoTwin(arm, dt).trajectory(q, still, round(t_end / dt))
+    return dyn.simulate(arm, q, still, t_end, "rk4", dt=dt), MujocoTwin(arm, dt).trajectory(q, still, round(t_end / dt))
 
 
 @mark.parametrize("model", ["rod", "point"])

@@ -78,7 +78,7 @@ def test_a_force_at_every_centre_of_mass_is_gravity(family: str) -> None:
     for make in (dyn.inverse_dynamics, dyn.forward_dynamics, lambda m: dyn.forward_dynamics(m, "dense")):
         assert error(run(make(pulled), given), run(make(heavier), given)) < ROUNDING
     start = np.full((2, mechanism.system.n), 0.1)
-    ours, theirs = (dyn.simulate(each, *start, 0.1, dt=0.01).q[-1] for each in (pulled, heavier))
+    ours, theirs = (dyn.simulate(each, *start, 0.1, "rk4", dt=0.01).q[-1] for each in (pulled, heavier))
     assert error(ours, theirs) < ROUNDING
 
 
@@ -210,7 +210,7 @@ def test_a_force_may_depend_on_time() -> None:
         [Body("rotor", Joint("revolute"), inertia=(1.0, 1.0, 1.0))],
         forces=[Force("rotor", torque=(0.0, 0.0, 2.0 * cg.variable("t")))],
     )
-    run = dyn.simulate(rotor, [0.0], [0.0], 3.0, dt=0.1)
+    run = dyn.simulate(rotor, [0.0], [0.0], 3.0, "rk4", dt=0.1)
     assert run.qd[-1] == approx([9.0])
     assert run.q[-1] == approx([9.0])
 

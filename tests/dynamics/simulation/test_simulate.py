@@ -29,7 +29,7 @@ def runaway() -> System:
 
 
 def test_every_step_is_recorded_by_default() -> None:
-    result = dyn.simulate(oscillator(), [1.0], [0.0], 1.0, dt=0.1)
+    result = dyn.simulate(oscillator(), [1.0], [0.0], 1.0, "rk4", dt=0.1)
     assert result.t == approx(np.linspace(0.0, 1.0, 11), abs=ROUNDING)
     assert (result.t.shape, result.q.shape, result.qd.shape, result.energy.shape) == ((11,), (11, 1), (11, 1), (11,))
     assert (result.q[0, 0], result.qd[0, 0]) == (1.0, 0.0)
@@ -37,7 +37,7 @@ def test_every_step_is_recorded_by_default() -> None:
 
 @mark.parametrize("t_end", [1.0, 0.3, 0.05, 0.7000000000000001, 3.3333])
 def test_the_last_row_is_at_t_end_exactly_whether_or_not_dt_divides_it(t_end: float) -> None:
-    result = dyn.simulate(oscillator(), [1.0], [0.0], t_end, dt=0.1)
+    result = dyn.simulate(oscillator(), [1.0], [0.0], t_end, "rk4", dt=0.1)
     assert result.t[-1] == t_end
     assert result.stats.steps == math.ceil(t_end / 0.1 - SPACING)
     assert np.diff(result.t).max() <= 0.1 * (1 + SPACING)
@@ -46,18 +46,18 @@ def test_the_last_row_is_at_t_end_exactly_whether_or_not_dt_divides_it(t_end: fl
 
 def test_t_eval_chooses_the_rows() -> None:
     times = [0.0, 0.05, 0.5, 0.51, 1.0]
-    result = dyn.simulate(oscillator(), [1.0], [0.0], 1.0, dt=0.01, t_eval=times)
+    result = dyn.simulate(oscillator(), [1.0], [0.0], 1.0, "rk4", dt=0.01, t_eval=times)
     assert result.t.tolist() == times
     assert result.q[:, 0] == approx(np.cos(math.sqrt(1.5) * np.array(times)), abs=RK4_ERROR)
     assert len(result.energy) == len(result.qd) == len(times)
 
 
 def test_t_eval_without_the_start_leaves_it_out() -> None:
-    result = dyn.simulate(oscillator(), [1.0], [0.0], 1.0, dt=0.01, t_eval=[0.25, 0.75])
+    result = dyn.simulate(oscillator(), [1.0], [0.0], 1.0, "rk4", dt=0.01, t_eval=[0.25, 0.75])
     assert result.t.tolist() == [0.25, 0.75]
     assert result.q[:, 0] == approx(np.cos(math.sqrt(1.5) * result.t), abs=RK4_ERROR)
     assert len(result.q) == len(result.energy) == 2
-    assert result.stats.steps == 75
+    assert result.stats.steps == 100  # to t_end
 
 
 def test_t_eval_at_the_start_alone_is_the_start() -> None:
@@ -66,8 +66,9 @@ def test_t_eval_at_the_start_alone_is_the_start() -> None:
 
 
 def test_t_eval_on_the_default_instants_changes_nothing() -> None:
-    plain = dyn.simulate(random_arm(2), [1.0, 0.2], [0.0, 0.0], 0.5, dt=0.125)
-    chosen = dyn.simulate(random_arm(2), [1.0, 0.2], [0.0, 0.0], 0.5, dt=0.125, t_eval=plain.t)
+    options = step("rk4", 0.125)
+    plain = dyn.simulate(random_arm(2), [1.0, 0.2], [0.0, 0.0], 0.5, "rk4", **options)
+    chosen = dyn.simulate(random_arm(2), [1.0, 0.2], [0.0, 0.0], 0.5, "rk4", t_eval=plain.t, **options)
     assert (chosen.q == plain.q).all()
     assert (chosen.qd == plain.qd).all()
     assert (chosen.energy == plain.energy).all()
@@ -75,17 +76,17 @@ def test_t_eval_on_the_default_instants_changes_nothing() -> None:
 
 def test_energy_is_the_energy_graph_at_every_row() -> None:
     system = oscillator()
-    result = dyn.simulate(system, [1.0], [0.3], 0.5, dt=0.1, parameters={"m": 0.5})
+    result = dyn.simulate(system, [1.0], [0.3], 0.5, "rk4", dt=0.1, parameters={"m": 0.5})
     expected = 0.5 * 0.5 * result.qd[:, 0] ** 2 + 0.5 * 3.0 * result.q[:, 0] ** 2
     assert result.energy == approx(expected, rel=ROUNDING)
     driven = System(lambda q, qd, t: 0.5 * qd[0] ** 2 - q[0] * t, ["x"])
-    result = dyn.simulate(driven, [1.0], [0.0], 0.5, dt=0.1)
+    result = dyn.simulate(driven, [1.0], [0.0], 0.5, "rk4", dt=0.1)
     assert result.energy == approx(0.5 * result.qd[:, 0] ** 2 + result.q[:, 0] * result.t, rel=ROUNDING)
 
 
 @mark.parametrize(("method", "stages"), [("euler", 1), ("rk4", 4), ("verlet", 2), ("symplectic_euler", 1)])
 def test_statistics_count_what_was_done(method: str, stages: int) -> None:
-    stats = dyn.simulate(oscillator(), [1.0], [0.0], 1.0, method, dt=0.03).stats
+    stats = dyn.simulate(oscillator(), [1.0], [0.0], 1.0, method, dt=0.03, estimate_error=False).stats
     assert (stats.method, stats.steps, stats.rejected, stats.nfev) == (method, 34, 0, 34 * stages)
     assert stats.dt == approx(1.0 / 34, rel=SPACING)
     assert (stats.success, stats.message) == (True, "reached t_end")
@@ -93,12 +94,12 @@ def test_statistics_count_what_was_done(method: str, stages: int) -> None:
 
 
 def test_one_step_of_euler_is_euler_s_step() -> None:
-    result = dyn.simulate(oscillator(), [1.0], [0.4], 0.1, "euler", dt=0.1)
+    result = dyn.simulate(oscillator(), [1.0], [0.4], 0.1, "euler", dt=0.1, estimate_error=False)
     assert (result.q[-1, 0], result.qd[-1, 0]) == approx((1.0 + 0.1 * 0.4, 0.4 - 0.1 * 1.5), rel=ROUNDING)
 
 
 def test_a_run_that_leaves_the_numbers_keeps_its_rows_and_says_where() -> None:
-    result = dyn.simulate(runaway(), [0.0, 0.0], [0.0, 1.0], 2.0, dt=0.01)
+    result = dyn.simulate(runaway(), [0.0, 0.0], [0.0, 1.0], 2.0, "rk4", dt=0.01)
     assert not result.stats.success
     assert result.stats.message.startswith("stopped at t = 1.0")
     assert "'wild'" in result.stats.message
@@ -110,16 +111,18 @@ def test_a_run_that_leaves_the_numbers_keeps_its_rows_and_says_where() -> None:
     assert result.qd[50, 1] == approx(1.0 / (1.0 - 0.5), rel=10.0 * RK4_ERROR)
 
 
-def test_a_run_that_stops_before_the_first_recorded_instant_has_no_rows() -> None:
-    result = dyn.simulate(runaway(), [0.0, 0.0], [0.0, 1.0], 2.0, dt=0.01, t_eval=[1.5, 2.0])
-    assert (result.stats.success, result.t.shape, result.q.shape, result.energy.shape) == (False, (0,), (0, 2), (0,))
+def test_a_run_that_stops_before_the_first_recorded_instant_has_the_row_where_it_stopped() -> None:
+    result = dyn.simulate(runaway(), [0.0, 0.0], [0.0, 1.0], 2.0, "rk4", dt=0.01, t_eval=[1.5, 2.0])
+    every = dyn.simulate(runaway(), [0.0, 0.0], [0.0, 1.0], 2.0, "rk4", dt=0.01)
+    assert (result.stats.success, result.t.tolist()) == (False, [every.t[-1]])
+    assert (result.q[-1].tolist(), result.qd[-1].tolist()) == (every.q[-1].tolist(), every.qd[-1].tolist())
     assert "stopped at t = 1.0" in result.stats.message
 
 
 @pytest.mark.filterwarnings("error")
 @mark.parametrize("parameters", [{"m": 0.0}, {"m": 1e-300}])
 def test_an_infinite_acceleration_stops_the_run_without_a_warning(parameters: dict[str, float]) -> None:
-    result = dyn.simulate(oscillator(), [1.0], [0.0], 1.0, dt=0.1, parameters=parameters)
+    result = dyn.simulate(oscillator(), [1.0], [0.0], 1.0, "rk4", dt=0.1, parameters=parameters)
     assert (len(result.t), result.stats.success, result.stats.steps) == (1, False, 0)
     assert result.stats.message.startswith("stopped at t = 0.1 s: ")
 
@@ -128,7 +131,7 @@ def test_an_infinite_acceleration_stops_the_run_without_a_warning(parameters: di
 def test_leaving_a_function_s_domain_stops_the_run() -> None:
     """A particle on the potential -sqrt(q) that is thrown at q = 0, beyond which the root is no number."""
     system = System(lambda q, qd, t: 0.5 * qd[0] ** 2 + cg.sqrt(q[0]), ["height"])
-    result = dyn.simulate(system, [1.0], [-3.0], 1.0, dt=0.01)
+    result = dyn.simulate(system, [1.0], [-3.0], 1.0, "rk4", dt=0.01)
     assert not result.stats.success
     assert "'height' is nan" in result.stats.message
     assert 0.2 < result.t[-1] < 0.6
@@ -180,9 +183,9 @@ def test_a_scene_an_arm_and_a_system_are_all_models() -> None:
 
 
 def test_numbers_of_numpy_are_numbers() -> None:
-    plain = dyn.simulate(oscillator(), [1.0], [0.0], 0.1, dt=0.01, tau=2.0)
+    plain = dyn.simulate(oscillator(), [1.0], [0.0], 0.1, "rk4", dt=0.01, tau=2.0)
     for number in (np.float64(2.0), np.float32(2.0), np.int64(2), np.array([2.0])):
-        assert (dyn.simulate(oscillator(), [1.0], [0.0], 0.1, dt=0.01, tau=number).q == plain.q).all()
+        assert (dyn.simulate(oscillator(), [1.0], [0.0], 0.1, "rk4", dt=0.01, tau=number).q == plain.q).all()
 
 
 _ARGUMENTS: dict[str, tuple[dict[str, Any], str]] = {
@@ -195,8 +198,16 @@ _ARGUMENTS: dict[str, tuple[dict[str, Any], str]] = {
     "dt negative": ({"dt": -0.1}, "dt must be positive and finite, got -0.1 s"),
     "dt zero": ({"dt": 0.0}, "dt must be positive and finite, got 0.0 s"),
     "dt NaN": ({"dt": math.nan}, "dt must be positive and finite, got nan s"),
-    "t_end negative": ({"t_end": -1.0}, "t_end must be positive and finite, got -1.0 s"),
-    "t_end infinite": ({"t_end": math.inf}, "t_end must be positive and finite, got inf s"),
+    "t_end infinite": ({"t_end": math.inf}, "t_end must be finite, got inf s"),
+    "t_end the start": ({"t_end": 0.0}, "t_end must be another time than t0, got 0.0 s for both"),
+    "t0 NaN": ({"t0": math.nan}, "t0 must be finite, got nan s"),
+    "t_span beside t_end": ({"t_span": (0.0, 1.0)}, "t_span says where the run starts .*: leave out t0 and t_end"),
+    "t_span beside t0": ({"t_span": (0.0, 1.0), "t_end": None, "t0": 0.5}, "t_span says where the run starts and ends"),
+    "t_span of three": ({"t_span": (0.0, 1.0, 2.0), "t_end": None}, r"t_span must be two times, .* shape \(3,\)"),
+    "no end": ({"t_end": None}, r"where does the run end: t_end, or t_span = \(t0, t_end\), must be given"),
+    "t_eval before t0": ({"t0": 0.5, "t_eval": [0.2, 0.9]}, r"increasing times in \[0.5, t_end = 1 s\], got 0.2"),
+    "t_eval the wrong way": ({"t_end": -1.0, "t_eval": [-0.5, -0.2]}, "t_eval must be decreasing .* got -0.5 before"),
+    "dt at a late start": ({"t0": -1e15, "dt": 0.1}, r"dt = 0.1 s is below the resolution .* at t0 = -1e\+15 s"),
     "method": ({"method": "rk5"}, "method must be one of euler, rk4, .*, got 'rk5'"),
     "t_eval empty": ({"t_eval": []}, r"t_eval must be increasing times in \[0, t_end = 1 s\]"),
     "t_eval falling": ({"t_eval": [0.5, 0.2]}, "t_eval must be increasing"),
@@ -216,7 +227,7 @@ _ARGUMENTS: dict[str, tuple[dict[str, Any], str]] = {
 @mark.parametrize("case", _ARGUMENTS)
 def test_arguments_out_of_range_are_refused(case: str) -> None:
     changed, message = _ARGUMENTS[case]
-    arguments = {"q": [1.0], "qd": [0.0], "t_end": 1.0, "dt": 0.1} | changed
+    arguments = {"q": [1.0], "qd": [0.0], "t_end": 1.0, "method": "rk4", "dt": 0.1} | changed
     with raises(ValueError, match=message):
         dyn.simulate(oscillator(), **arguments)
 
@@ -255,10 +266,11 @@ CALLS: list[tuple[dict[str, Any], type[Exception], str]] = [
     (
         {"method": "dopri5", "dt": 0.1},
         ValueError,
-        r"'dopri5' chooses its steps: .* max_step, not by dt \(got dt = 0.1 s",
+        "'dopri5' chooses its steps: max_step limits them; equal steps of dt = 0.1 s need method='rk4'",
     ),
-    ({"method": "scipy:BDF", "dt": 0.1}, ValueError, "method 'scipy:BDF' chooses its steps: limit them by max_step"),
+    ({"method": "scipy:BDF", "dt": 0.1}, ValueError, "method 'scipy:BDF' chooses its steps: max_step limits them"),
     ({"max_step": 0.1}, ValueError, r"'rk4' makes equal steps: .* dt, not by max_step \(got max_step = 0.1 s\)"),
+    ({"first_step": 0.1}, ValueError, r"'rk4' makes equal steps: .* dt, not by first_step \(got first_step = 0.1 s\)"),
     ({"method": "dopri5", "max_step": 0.0}, ValueError, "max_step must be positive and finite, got 0.0 s"),
     ({"dt": 1e-17}, ValueError, "dt = 1e-17 s is below the resolution of the time at t_end = 1 s"),
     ({"dt": 1e-13}, MemoryError, r"9999999999990 steps of 2 numbers take .* GiB are free: record fewer times"),
@@ -282,7 +294,7 @@ CALLS: list[tuple[dict[str, Any], type[Exception], str]] = [
 
 @mark.parametrize(("given", "error", "message"), CALLS)
 def test_what_cannot_be_is_refused_in_a_sentence(given: dict[str, Any], error: type[Exception], message: str) -> None:
-    arguments: dict[str, Any] = {"q": [1.0], "qd": [0.0], "t_end": 1.0} | given
+    arguments: dict[str, Any] = {"q": [1.0], "qd": [0.0], "t_end": 1.0, "method": "rk4"} | given
     with raises(error, match=message):
         dyn.simulate(oscillator(), arguments.pop("q"), arguments.pop("qd"), arguments.pop("t_end"), **arguments)
 
@@ -311,3 +323,13 @@ def test_a_parameter_that_the_system_has_not_is_named() -> None:
         System(lambda q, qd, t, p: p["m"] * qd[0] ** 2, ["x"])
     with raises(ValueError, match=r"the system has no parameter 'm' \(it has k\)"):
         dyn.OdeSystem(lambda x, t, p: [p["m"] * x[0]], ["x"], {"k": 1.0})
+
+
+def test_steps_are_chosen_by_error_unless_told_otherwise() -> None:
+    """A spring of 300 rad/s, which equal steps of 1 ms resolve to three digits in 10 s."""
+    spring = System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 0.5 * (300.0 * q[0]) ** 2, ["x"])
+    run = dyn.simulate(spring, [1.0], [0.0], 10.0, t_eval=[10.0])
+    many = dyn.simulate_many(spring, [[1.0]], [0.0], 10.0, t_eval=[10.0])
+    assert (run.stats.method, many.stats.method) == ("dop853", "dop853")
+    assert run.q[-1, 0] == approx(math.cos(3000.0), abs=3e-6)  # rtol = 1e-9 of 3000 rad
+    assert many.q[0, -1, 0] == run.q[-1, 0]

@@ -60,7 +60,7 @@ def test_arms_move_as_mujoco_s_do() -> None:
     from dynamics.io.mujoco_twin import MujocoTwin
 
     arm, q, qd = arms(10, 3)
-    result = simulate_many(arm, q, qd, 0.5)
+    result = simulate_many(arm, q, qd, 0.5, "rk4")
     twin = MujocoTwin(arm)
     for k in range(10):
         expected = np.hstack(twin.trajectory(q[k], qd[k], 500))
@@ -91,7 +91,7 @@ def test_a_system_of_first_order_and_time() -> None:
 
     model = dyn.OdeSystem(lambda x, t, p: [-p["a"] * x[0] + cg.cos(t)], ["x"], {"a": 1.0})
     a = np.array([0.5, 1.0, 3.0])
-    result = simulate_many(model, [1.0], None, 2.0, parameters={"a": a})
+    result = simulate_many(model, [1.0], None, 2.0, "rk4", parameters={"a": a})
     t = result.t
     particular = (a[:, None] * np.cos(t) + np.sin(t)) / (1.0 + a[:, None] ** 2)
     expected = particular + (1.0 - a / (1.0 + a**2))[:, None] * np.exp(-a[:, None] * t)
@@ -100,24 +100,24 @@ def test_a_system_of_first_order_and_time() -> None:
 
 
 def test_every_step_is_a_row_by_default() -> None:
-    result = simulate_many(oscillator(), [[1.0], [2.0]], [0.0], 0.7, dt=0.1 + 1e-9)
-    one = dyn.simulate(oscillator(), [2.0], [0.0], 0.7, dt=0.1 + 1e-9)
+    result = simulate_many(oscillator(), [[1.0], [2.0]], [0.0], 0.7, "rk4", dt=0.1 + 1e-9)
+    one = dyn.simulate(oscillator(), [2.0], [0.0], 0.7, "rk4", dt=0.1 + 1e-9)
     assert result.t.tolist() == one.t.tolist()
     assert result.q[1] == approx(one.q, abs=ROUNDING)
 
 
 @mark.parametrize("times", [[0.0], [1e-9], [0.3], [0.2, 0.9], np.linspace(0.0, 1.0, 11), np.geomspace(1e-3, 1.0, 7)])
 def test_t_eval_chooses_the_rows(times: Any) -> None:
-    result = simulate_many(oscillator(), [[1.0], [2.0]], [0.0], 1.0, t_eval=times)
+    result = simulate_many(oscillator(), [[1.0], [2.0]], [0.0], 1.0, "rk4", t_eval=times)
     assert result.t.tolist() == list(times)
     assert result.q[1, :, 0] == approx(2.0 * np.cos(math.sqrt(1.5) * result.t), abs=RK4_ERROR)
 
 
 def test_many_steps_come_in_many_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = [simulate_many(*arms(9), 0.2, t_eval=times) for times in (None, [0.05, 0.2], [0.15, 0.2])]
+    whole = [simulate_many(*arms(9), 0.2, "rk4", t_eval=times) for times in (None, [0.05, 0.2], [0.15, 0.2])]
     monkeypatch.setattr("dynamics.simulation.ensembles.vectorized.WORK", 5000)
     monkeypatch.setattr("dynamics.simulation.ensembles.vectorized.NUMBERS", 200)
-    blocks = [simulate_many(*arms(9), 0.2, t_eval=times) for times in (None, [0.05, 0.2], [0.15, 0.2])]
+    blocks = [simulate_many(*arms(9), 0.2, "rk4", t_eval=times) for times in (None, [0.05, 0.2], [0.15, 0.2])]
     assert all(map(same, whole, blocks))
 
 
@@ -150,9 +150,9 @@ def test_one_that_leaves_the_numbers_is_nan_from_there_and_says_where(method: st
 
 def test_a_neighbor_that_fails_is_not_felt_in_an_arm() -> None:
     model, q, qd = arms(16)
-    calm = simulate_many(model, q, qd, 0.5)
+    calm = simulate_many(model, q, qd, 0.5, "rk4")
     qd[3], q[11] = 1e200, 1e9
-    result = simulate_many(model, q, qd, 0.5)
+    result = simulate_many(model, q, qd, 0.5, "rk4")
     others = [k for k in range(16) if k not in (3, 11)]
     assert (result.q[others] == calm.q[others]).all()
     assert result.stats.message[3].startswith("stopped at t = 0.001 s: coordinate 'joint 1' is")
@@ -161,7 +161,7 @@ def test_a_neighbor_that_fails_is_not_felt_in_an_arm() -> None:
 
 
 def test_all_may_fail() -> None:
-    result = simulate_many(runaway(), np.zeros((3, 2)), [0.0, 1.0], 9.0, dt=0.1)
+    result = simulate_many(runaway(), np.zeros((3, 2)), [0.0, 1.0], 9.0, "rk4", dt=0.1)
     assert not result.stats.success.any()
     assert len(set(result.stats.message)) == 1
     assert np.isnan(result.q[:, -1]).all()
@@ -206,7 +206,7 @@ Q = np.zeros((4, 2))
 )
 def test_what_does_not_fit_is_refused(q: Any, qd: Any, options: dict[str, Any], message: str) -> None:
     with raises(ValueError, match=message):
-        simulate_many(random_arm(2), q, qd, 1.0, **options)
+        simulate_many(random_arm(2), q, qd, 1.0, **{"method": "rk4", **options})
 
 
 @mark.parametrize(
@@ -220,14 +220,14 @@ def test_what_does_not_fit_is_refused(q: Any, qd: Any, options: dict[str, Any], 
 )
 def test_a_parameter_that_does_not_fit_is_refused(value: Any, message: str) -> None:
     with raises(ValueError, match=message):
-        simulate_many(oscillator(), np.zeros((4, 1)), [0.0], 1.0, parameters={"k": value})
+        simulate_many(oscillator(), np.zeros((4, 1)), [0.0], 1.0, "rk4", parameters={"k": value})
 
 
 def test_a_result_that_would_not_fit_is_refused() -> None:
     with raises(
         MemoryError, match=r"100000 trajectories of 100000001 rows of 4 numbers take 2.98e\+05 GiB, and .* free"
     ):
-        simulate_many(random_arm(2), np.zeros((100_000, 2)), [0.0, 0.0], 1e5)
+        simulate_many(random_arm(2), np.zeros((100_000, 2)), [0.0, 0.0], 1e5, "rk4")
 
 
 @given(

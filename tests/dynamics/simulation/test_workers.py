@@ -1,6 +1,7 @@
 """Workers: whoever runs an ensemble, threads, processes or another map, its numbers are the same."""
 
 import multiprocessing
+import re
 import signal
 import threading
 import time
@@ -63,8 +64,8 @@ def test_threads_make_the_code_once(monkeypatch: pytest.MonkeyPatch) -> None:
     original = task.runner
     monkeypatch.setattr(task, "runner", lambda *arguments: made.append(arguments) or original(*arguments))
     model, q, qd = arms(40, 4)
-    simulate_many(model, q, qd, 0.1, workers=4, chunk=8)
-    simulate_many(model, q, qd, 0.2, workers=4, chunk=8)
+    simulate_many(model, q, qd, 0.1, "rk4", workers=4, chunk=8)
+    simulate_many(model, q, qd, 0.2, "rk4", workers=4, chunk=8)
     assert len(made) == 1
 
 
@@ -111,8 +112,13 @@ def test_ctrl_c_comes_back_and_leaves_no_thread(workers: int, method: str) -> No
     timer.join()
     assert time.perf_counter() - begin < 60.0  # of days
     assert set(threading.enumerate()) == before
-    assert set(result.stats.message) == {"interrupted"}
-    assert np.isnan(result.q).all()
+    told = [message for message in result.stats.message if message != "interrupted"]  # the others never began
+    assert len(told) >= (8 if method == "rk4" else 1)
+    assert all(re.fullmatch(r"interrupted after t = \d\S* s", message) for message in told)
+    assert all(float(message.split()[-2]) > 1.0 for message in told)  # s, far from t_end and from the start
+    assert (result.stats.status == -1).all()
+    assert np.isnan(result.q[:, 1]).all()
+    assert [not np.isnan(row).any() for row in result.q[:, 0]] == [k in told for k in result.stats.message]
 
 
 def test_ctrl_c_keeps_what_is_done() -> None:
@@ -122,7 +128,7 @@ def test_ctrl_c_keeps_what_is_done() -> None:
                 raise KeyboardInterrupt
             yield function(each)
 
-    whole, result = (simulate_many(*arms(29), 0.1, workers=workers, chunk=8) for workers in (1, interrupted))
+    whole, result = (simulate_many(*arms(29), 0.1, "rk4", workers=workers, chunk=8) for workers in (1, interrupted))
     assert result.stats.success.tolist() == [True] * 16 + [False] * 13
     assert (result.q[:16] == whole.q[:16]).all()
     assert np.isnan(result.q[16:]).all()
@@ -137,10 +143,10 @@ def test_an_error_in_a_thread_is_raised_and_leaves_no_thread(monkeypatch: pytest
 
     monkeypatch.setattr("dynamics.simulation.ensembles.vectorized.VectorizedIntegration.advance", broken)
     with raises(RuntimeError, match="broken"):
-        simulate_many(*arms(29), 0.1, workers=3, chunk=8)
+        simulate_many(*arms(29), 0.1, "rk4", workers=3, chunk=8)
     assert set(threading.enumerate()) == before
 
 
 def test_workers_that_give_no_results_are_refused() -> None:
     with raises(TypeError, match=r"workers must give the results of the function, as map does, got int: 1"):
-        simulate_many(*arms(9), 0.1, workers=lambda f, each: [1])  # type: ignore[list-item]
+        simulate_many(*arms(9), 0.1, "rk4", workers=lambda f, each: [1])  # type: ignore[list-item]
