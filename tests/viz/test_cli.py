@@ -13,7 +13,7 @@ import pytest
 
 from dynamics import scenes
 from viz import cli
-from viz.commands import COMMANDS
+from viz.commands.parser import COMMANDS
 
 
 def run(*arguments: str, cwd=None) -> subprocess.CompletedProcess[str]:
@@ -56,7 +56,7 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
     assert "arm: inverse dynamics, chain rule" in target.read_text()
     assert capsys.readouterr().err == ""
     model.write_text(MODEL)
-    assert cli.main(["draw", str(model), "--out", str(target)]) == 1
+    assert cli.main(["draw", str(model), "--out", str(target)]) == 2
     said = "cgraph: error: a mechanism cannot have friction loss (the option ignore leaves this out)\n"
     assert capsys.readouterr().err == said
     assert cli.main(["draw", str(model), "--ignore", "--out", str(target)]) == 0
@@ -79,10 +79,10 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
         (["certify", "nowhere.xml"], "there is no file 'nowhere.xml'"),
     ],
 )
-def test_a_mistake_gets_one_line_and_exit_status_1(tmp_path, monkeypatch, capsys, arguments, said):
+def test_a_mistake_gets_one_line_and_exit_status_2(tmp_path, monkeypatch, capsys, arguments, said):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a_file").write_text("in the way")
-    assert cli.main(arguments) == 1
+    assert cli.main(arguments) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1
     assert error.startswith("cgraph: error: ")
@@ -93,7 +93,7 @@ def test_a_mistake_gets_one_line_and_exit_status_1(tmp_path, monkeypatch, capsys
 
 def test_the_exit_status_of_a_process_is_the_command_s():
     done = run("draw", "nowhere.xml", "--out", "x.dot")
-    assert (done.returncode, done.stdout) == (1, "")
+    assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "cgraph: error: there is no file 'nowhere.xml'\n"
 
 
@@ -102,7 +102,7 @@ def test_what_the_system_says_has_no_number(monkeypatch, capsys):
         open("/nowhere/at/all")  # noqa: PTH123, SIM115 - what raises is Python itself
 
     monkeypatch.setattr("viz.commands.scenes.run", fail)
-    assert cli.main(["scenes"]) == 1
+    assert cli.main(["scenes"]) == 2
     assert capsys.readouterr().err == "cgraph: error: /nowhere/at/all: No such file or directory\n"
 
 
@@ -138,7 +138,7 @@ def test_every_file_of_commands_is_listed_or_helps_one_that_is():
     assert runs == set(NAMES)
 
 
-def test_ctrl_c_gives_one_line_and_exit_status_130(monkeypatch, capsys):
+def test_ctrl_c_gives_one_line_and_exit_status_230(monkeypatch, capsys):
     def interrupt(_):
         raise KeyboardInterrupt
 

@@ -1,0 +1,86 @@
+"""Signals: what Ctrl-C and SIGTERM do to a command while the library loads, while it works, and once it has its answer.
+
+A command answers whole or not at all. So the signal is no KeyboardInterrupt here, for which a simulation keeps the rows
+that it has: it is the end of the process, and nothing on the way takes it for an answer.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+ENDING = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
+PATIENCE = (
+    1.0  # s in which a signal that comes again is one with the first: a key held down must not cut the cleaning up
+)
+
+
+class Stopped(SystemExit):
+    """The process is asked to end; its code is 128 and the signal's number."""
+
+
+class _Process:
+    """Where the process stands."""
+
+    loading = False  # nothing is begun, so there is nothing to clean up
+    settled = False  # the answer is complete: what comes now comes too late
+    number = 0  # of the signal that came
+    came = 0.0  # s
+
+
+def stopped() -> int:
+    """The number of the signal that came, 0 for none."""
+    return _Process.number
+
+
+def settled() -> None:
+    """The answer is complete and about to be written: from here on no signal cuts it. Raises Stopped if one came."""
+    if _Process.number:  # and was raised where nothing can be: in a callback
+        raise Stopped(128 + _Process.number)
+    _Process.settled = True
+
+
+def watch_loading() -> None:
+    """Until a command begins, a signal ends the process at once."""
+    _Process.loading = True
+    _watch()
+
+
+@contextmanager
+def stoppable() -> Iterator[None]:
+    """Within, a signal raises Stopped; what was the signals' before is so afterwards, but for a process of ours."""
+    before = {} if _Process.loading else _watch()
+    _Process.loading = _Process.settled = False
+    _Process.number = 0
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _watch() -> dict[signal.Signals, signal._HANDLER]:
+    """Handle the signals that are not ignored, as those of a background job are. The handlers that were there."""
+    if threading.current_thread() is not threading.main_thread():
+        return {}
+    before = {number: signal.getsignal(number) for number in ENDING}
+    watched = {number: handler for number, handler in before.items() if handler is not signal.SIG_IGN}
+    for number in watched:
+        signal.signal(number, _handle)
+    return watched
+
+
+def _handle(number: int, frame: FrameType | None) -> None:
+    now = time.monotonic()
+    if _Process.settled or (_Process.number and now - _Process.came < PATIENCE):
+        return
+    if _Process.loading or _Process.number:
+        os.write(2, f"cgraph: {ENDING[signal.Signals(number)]}\n".encode())
+        os._exit(128 + number)
+    _Process.number, _Process.came = number, now
+    raise Stopped(128 + number)
