@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import select
 import signal
 import sys
 import traceback
@@ -39,7 +40,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 number = stopped() or signal.SIGINT
                 _say(ENDING[signal.Signals(number)])
                 return 128 + number
-            if isinstance(error, BrokenPipeError) and _discard_output():  # the reader, such as `head`, has had enough
+            if isinstance(error, BrokenPipeError) and _nobody_reads():  # the reader, such as `head`, has had enough
+                _discard_output()
                 return 128 + getattr(signal, "SIGPIPE", 13)
             if isinstance(error, ERRORS):
                 _discard_output()
@@ -66,15 +68,22 @@ def _say(line: str) -> None:
         print(f"cgraph: {line}", file=sys.stderr, flush=True)
 
 
-def _discard_output() -> bool:
+def _nobody_reads() -> bool:
+    """Whether it is standard output that broke, and no other pipe."""
+    if not hasattr(select, "poll"):
+        return True
+    output = select.poll()
+    output.register(sys.stdout, 0)
+    return any(event & (select.POLLERR | select.POLLHUP) for _, event in output.poll(0))
+
+
+def _discard_output() -> None:
     """Send standard output nowhere if it takes nothing any more: Python would say so once more at its end."""
     try:
         if sys.stdout is not None:
             sys.stdout.flush()
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return True
-    return False
 
 
 def _sentence(error: BaseException) -> str:

@@ -25,7 +25,8 @@ def run(options: argparse.Namespace) -> None:
     found, lines, files = [], [], dict[Path, str | bytes]()
     for name in options.scenes:
         scene = scenes.load(name, **({"ignore": True} if options.ignore else {}))
-        content = pruning.report(scene, effects=[each for each in EFFECTS if each not in without], lock=lock)
+        effects = [each for each in EFFECTS if each not in without]
+        content = pruning.report(scene, effects=effects, lock=_bodies(scene, lock))
         found.append(content)
         if options.out is not None:
             files |= (
@@ -35,3 +36,13 @@ def run(options: argparse.Namespace) -> None:
                      for each in content["graphs"]]  # fmt: skip
             lines.append(f"{[*written][-1]}: {', '.join(sizes)}")
     answer(unless_json(options, found, "\n".join(lines)), files, folder=options.out)
+
+
+def _bodies(scene: scenes.Scene, lock: dict[str, float]) -> dict[str, float]:
+    """What is to be locked by its body's name, where it may be given by its coordinate's."""
+    bodies = [body.name for body in scene.mechanism.moving] if scene.mechanism else []
+    of = dict(zip(scene.coordinates, bodies, strict=False)) | {name: name for name in bodies}
+    if unknown := [name for name in lock if name not in of]:
+        known = f"its bodies are {', '.join(bodies)}" if bodies else "it has no bodies"
+        raise ValueError(f"{scene.name} has no joint {unknown[0]!r} to lock: {known}")
+    return {of[name]: at for name, at in lock.items()}
