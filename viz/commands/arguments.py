@@ -60,9 +60,11 @@ def answer(text: str, files: Mapping[Path, str | bytes] | None = None, *, folder
     """
     settled()
     if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
+        for place in (folder, *{path.parent for path in files or {}}):
+            place.mkdir(parents=True, exist_ok=True)
     write_files(files or {})
-    print(text)
+    if text:
+        print(text)
 
 
 @contextmanager

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
 
 from dynamics import EFFECTS, scenes
 from dynamics.experiments.machine import machine
@@ -109,15 +113,41 @@ def _locked(text: str) -> tuple[str, float]:
     return body, number(at)
 
 
+class _Exact(NamedTuple):
+    """Exact motions that are there, and those that come: files in a folder of their own until the report is whole."""
+
+    kept: Path | None
+    folder: Path
+
+    def files(self) -> dict[Path, str | bytes]:
+        """Those that came."""
+        if self.kept is None:
+            return {}
+        new = [path for path in self.folder.iterdir() if not (self.kept / path.name).exists()]
+        return {self.kept / path.name: path.read_bytes() for path in new}
+
+
+@contextmanager
+def _exact_motions(out: Path | None) -> Iterator[_Exact]:
+    kept = None if out is None else out / "exact"
+    with TemporaryDirectory() as folder:
+        if kept is not None and kept.is_dir():
+            for path in kept.glob("*.json"):
+                shutil.copy(path, folder)
+        yield _Exact(kept, Path(folder))
+
+
 def _comparisons(options: argparse.Namespace) -> None:
     """Print comparisons as they are measured; exact motions are kept where reports keep theirs."""
     names = [name for name in options.compare.split(",") if name]
     if unknown := [name for name in names if name not in COMPARISONS]:
         raise ValueError(f"comparisons are {', '.join(COMPARISONS)}, got {unknown[0]!r}")
     print(machine())
-    for name in names or COMPARISONS:
-        for text in COMPARISONS[name](str(options.out / "exact")):
-            print(f"\n{text}", flush=True)
+    with _exact_motions(options.out) as exact:
+        for name in names or COMPARISONS:
+            for text in COMPARISONS[name](str(exact.folder)):
+                print(f"\n{text}", flush=True)
+        answer("", exact.files(), folder=options.out)
 
 
 def _curves(options: argparse.Namespace) -> None:
@@ -128,6 +158,15 @@ def _curves(options: argparse.Namespace) -> None:
     chosen = {"t_end": options.t_end, "start": options.start, "ignore": options.ignore}
     peers = tuple(PEERS) if options.peers is None else tuple(filter(None, options.peers.split(",")))
     check_can_plot()
+    with _exact_motions(options.out) as exact:
+        found, lines, files = _measured(options, chosen, peers, exact.folder)
+        answer(unless_json(options, found, "\n".join(lines)), files | exact.files(), folder=options.out)
+
+
+def _measured(
+    options: argparse.Namespace, chosen: dict[str, Any], peers: tuple[str, ...], exact: Path
+) -> tuple[list[dict[str, Any]], list[str], dict[Path, str | bytes]]:
+    """What a report has: its data, what is printed of it, and its files."""
     found, lines, files = [], [], dict[Path, str | bytes]()
     for name in options.scenes:
         report = work_precision.work_precision(
@@ -138,7 +177,7 @@ def _curves(options: argparse.Namespace) -> None:
             limit=0.03 if options.quick else work_precision.LIMIT,
             cold=() if options.quick else tuple(STARTS),
             budget=BUDGET if options.budget is None else options.budget,
-            folder=None if options.out is None else options.out / "exact",
+            folder=exact,
             options=chosen,
             say=say,
         )
@@ -149,4 +188,4 @@ def _curves(options: argparse.Namespace) -> None:
             files |= (written := document_files(options.out, content["name"], document, content, rows))
             points = sum(len(each.points) for each in report.curves)
             lines.append(f"{[*written][-1]}: {len(report.curves)} integrators, {points} points")
-    answer(unless_json(options, found, "\n".join(lines)), files, folder=options.out)
+    return found, lines, files
