@@ -40,7 +40,7 @@ def _words(parser: argparse.ArgumentParser) -> Words:
 def _cases(names: dict[str, Words], command: str, before: str) -> list[str]:
     """Branches of a shell's `case`: the words after an option of a command, or after the command."""
     return [
-        f"    {command.format(name)}{before.format(option) if option else '*'}) words={' '.join(words)!r} ;;"
+        f"    {command.format(name)}{before.format(option) if option else '*'}) choices={' '.join(words)!r} ;;"
         for name, each in names.items()
         for option, words in sorted(each.items(), reverse=True)
     ]
@@ -50,12 +50,12 @@ def _bash(names: dict[str, Words]) -> str:
     """Where no word fits, and after an option that takes a file, files are completed."""
     lines = [
         "_cgraph() {",
-        '  local word="${COMP_WORDS[COMP_CWORD]}" words=""',
+        '  local word="${COMP_WORDS[COMP_CWORD]}" choices=""',
         '  case "$COMP_CWORD ${COMP_WORDS[1]} ${COMP_WORDS[COMP_CWORD-1]}" in',
-        f"    1\\ *) words={' '.join([*names, '--version', '--help'])!r} ;;",
+        f"    1\\ *) choices={' '.join([*names, '--version', '--help'])!r} ;;",
         *_cases(names, "*\\ {}\\ ", "{}"),
         "  esac",
-        '  COMPREPLY=($(compgen -W "$words" -- "$word"))',
+        '  COMPREPLY=($(compgen -W "$choices" -- "$word"))',
         "}",
         "complete -o default -F _cgraph cgraph",
     ]
@@ -65,13 +65,12 @@ def _bash(names: dict[str, Words]) -> str:
 def _zsh(names: dict[str, Words]) -> str:
     lines = [
         "_cgraph() {",
-        '  local words_of_line=("${words[@]}") line="$CURRENT ${words[2]} ${words[CURRENT-1]}"',
-        "  local words=''",
-        '  case "$line" in',
-        f"    2\\ *) words={' '.join([*names, '--version', '--help'])!r} ;;",
+        "  local choices=''",
+        '  case "$CURRENT ${words[2]} ${words[CURRENT-1]}" in',
+        f"    2\\ *) choices={' '.join([*names, '--version', '--help'])!r} ;;",
         *_cases(names, "*\\ {}\\ ", "{}"),
         "  esac",
-        "  compadd -- ${=words}",
+        "  compadd -- ${=choices}",
         "  _files",
         "}",
         "compdef _cgraph cgraph",

@@ -41,6 +41,7 @@ def run(options: argparse.Namespace) -> int:
     if options.t_end is not None and options.t_end > LONGEST:
         raise ValueError(f"--t-end must be at most {LONGEST:g} s, got {options.t_end:g} s: a page has {FRAMES} times")
     check_writable(options.out)
+    say(f"reading {options.scene}")
     scene = scene_of(options)
     content = inspection(scene, forward=options.forward, t_end=options.t_end, say=say)
     bones = content.skeleton

@@ -157,7 +157,8 @@ def _curves(options: argparse.Namespace) -> None:
         raise ValueError(f"each scene needs a name of its own for its files, got {', '.join(options.scenes)}")
     chosen = {"t_end": options.t_end, "start": options.start, "ignore": options.ignore}
     peers = tuple(PEERS) if options.peers is None else tuple(filter(None, options.peers.split(",")))
-    check_can_plot()
+    if options.out is not None:
+        check_can_plot()
     with _exact_motions(options.out) as exact:
         found, lines, files = _measured(options, chosen, peers, exact.folder)
         answer(unless_json(options, found, "\n".join(lines)), files | exact.files(), folder=options.out)

@@ -80,7 +80,9 @@ def _handle(number: int, frame: FrameType | None) -> None:
     if _Process.settled or (_Process.number and now - _Process.came < PATIENCE):
         return
     if _Process.loading or _Process.number:
-        os.write(2, f"cgraph: {ENDING[signal.Signals(number)]}\n".encode())
-        os._exit(128 + number)
+        try:
+            os.write(2, f"cgraph: {ENDING[signal.Signals(number)]}\n".encode())
+        finally:
+            os._exit(128 + number)
     _Process.number, _Process.came = number, now
     raise Stopped(128 + number)
