@@ -1,6 +1,6 @@
 """viz: pictures and pages of computational graphs."""
 
-from typing import TYPE_CHECKING
+TYPE_CHECKING = False  # as a checker knows it; typing takes longer to load than all that awaits Ctrl-C
 
 if TYPE_CHECKING:
     from cgraph import __version__ as __version__

@@ -6,7 +6,6 @@ import os
 import select
 import signal
 import sys
-import traceback
 from collections.abc import Sequence
 
 from .commands.signals import ENDING, settled, stoppable, stopped, watch_loading
@@ -21,7 +20,7 @@ def start() -> int:
     try:
         return main()
     except Exception:  # noqa: BLE001 (a mistake of ours must not look like a finding, which status 1 is)
-        traceback.print_exc()
+        sys.excepthook(*sys.exc_info())
         return ERROR
 
 

@@ -53,7 +53,7 @@ class Module:
             isinstance(line, ast.Import | ast.ImportFrom)
             or (isinstance(line, ast.Expr) and isinstance(line.value, ast.Constant))
             or (isinstance(line, ast.FunctionDef) and line.name in ("__getattr__", "__dir__"))
-            or (isinstance(line, ast.Assign) and ast.unparse(line.targets[0]) == "__all__")
+            or (isinstance(line, ast.Assign) and ast.unparse(line.targets[0]) in ("__all__", "TYPE_CHECKING"))
             for line in body
         )
 
