@@ -8,7 +8,7 @@ import signal
 import sys
 from collections.abc import Sequence
 
-from .commands.signals import ENDING, settled, stoppable, stopped, watch_loading
+from .commands.signals import ENDING, ignore_late, settled, stoppable, stopped, watch_loading
 
 FINE, FINDING, ERROR = 0, 1, 2  # exit statuses, as docs/commands.md has them
 ERRORS = (ValueError, TypeError, OSError, ImportError, RuntimeError, MemoryError, ArithmeticError)
@@ -22,6 +22,8 @@ def start() -> int:
     except Exception:  # noqa: BLE001 (a mistake of ours must not look like a finding, which status 1 is)
         sys.excepthook(*sys.exc_info())
         return ERROR
+    finally:
+        ignore_late()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -175,12 +175,49 @@ def test_a_signal_that_was_swallowed_still_ends_the_command_before_its_answer() 
 
 
 @pytest.mark.usefixtures("ctrl_c")
+@pytest.mark.parametrize("number", signals.ENDING)
+def test_a_signal_that_comes_in_a_callback_is_raised_after_it(number: int, capsys: pytest.CaptureFixture[str]) -> None:
+    """From a finalizer nothing can be raised: Python prints it and goes on."""
+
+    class Finalized:
+        def __del__(self) -> None:
+            send(number)
+
+    def work() -> None:
+        Finalized()
+        for _ in range(1000):
+            time.sleep(0.01)
+
+    with pytest.raises(signals.Stopped) as stop, signals.stoppable():
+        work()
+    assert stop.value.code == 128 + number
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.usefixtures("ctrl_c")
 def test_a_signal_that_comes_after_the_answer_comes_too_late() -> None:
     with signals.stoppable():
         signals.settled()
         send()
         send(signal.SIGTERM)
     assert signals.stopped() == 0
+
+
+def test_a_signal_while_python_ends_does_not_change_the_status() -> None:
+    program = (
+        "import atexit, signal, sys\n"
+        "class Last:\n"
+        "    def __del__(self): signal.raise_signal(signal.SIGINT); signal.raise_signal(signal.SIGTERM)\n"
+        "sys.modules['last'] = last = Last()\n"
+        "from viz import cli\n"
+        "cli.main = lambda: cli.settled() or 1\n"
+        "atexit.register(signal.raise_signal, signal.SIGINT)\n"
+        "sys.exit(cli.start())\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (1, b"")
 
 
 @pytest.mark.usefixtures("ctrl_c")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -30,6 +31,8 @@ class _Process:
     loading = False  # nothing is begun, so there is nothing to clean up
     settled = False  # the answer is complete: what comes now comes too late
     number = 0  # of the signal that came
+    lost = False  # what it raised went nowhere
+    hook = staticmethod(sys.unraisablehook)  # what is told of others that do
     came = 0.0  # s
 
 
@@ -40,9 +43,15 @@ def stopped() -> int:
 
 def settled() -> None:
     """The answer is complete and about to be written: from here on no signal cuts it. Raises Stopped if one came."""
-    if _Process.number:  # and was raised where nothing can be: in a callback
+    if _Process.number:  # and was taken for an error by who called a library
         raise Stopped(128 + _Process.number)
     _Process.settled = True
+
+
+def ignore_late() -> None:
+    """The answer is out: what comes while Python ends, which sets handlers back, must not change the status."""
+    for number in _watch() if _Process.settled else ():
+        signal.signal(number, signal.SIG_IGN)
 
 
 def watch_loading() -> None:
@@ -55,11 +64,13 @@ def watch_loading() -> None:
 def stoppable() -> Iterator[None]:
     """Within, a signal raises Stopped; what was the signals' before is so afterwards, but for a process of ours."""
     before = {} if _Process.loading else _watch()
-    _Process.loading = _Process.settled = False
+    _Process.loading = _Process.settled = _Process.lost = False
     _Process.number = 0
+    _Process.hook, sys.unraisablehook = sys.unraisablehook, _send_again
     try:
         yield
     finally:
+        sys.unraisablehook = _Process.hook
         for number, handler in before.items():
             signal.signal(number, handler)
 
@@ -75,11 +86,21 @@ def _watch() -> dict[signal.Signals, signal._HANDLER]:
     return watched
 
 
+def _send_again(lost: sys.UnraisableHookArgs) -> None:
+    """Of an exception that leaves a callback or a finalizer Python prints that it is ignored: ours must not be."""
+    if issubclass(lost.exc_type, Stopped):
+        _Process.lost = True
+        threading.Timer(0.01, os.kill, (os.getpid(), _Process.number)).start()
+    else:
+        _Process.hook(lost)
+
+
 def _handle(number: int, frame: FrameType | None) -> None:
     now = time.monotonic()
-    if _Process.settled or (_Process.number and now - _Process.came < PATIENCE):
+    again, _Process.lost = _Process.lost, False
+    if _Process.settled or (_Process.number and not again and now - _Process.came < PATIENCE):
         return
-    if _Process.loading or _Process.number:
+    if _Process.loading or (_Process.number and not again):
         try:
             os.write(2, f"cgraph: {ENDING[signal.Signals(number)]}\n".encode())
         finally:
