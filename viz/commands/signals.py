@@ -11,7 +11,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
@@ -32,7 +32,7 @@ class _Process:
     settled = False  # the answer is complete: what comes now comes too late
     number = 0  # of the signal that came
     lost = False  # what it raised went nowhere
-    hook = staticmethod(sys.unraisablehook)  # what is told of others that do
+    hook: Callable[[sys.UnraisableHookArgs], object] = sys.unraisablehook  # what is told of others that do
     came = 0.0  # s
 
 
