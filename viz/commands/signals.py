@@ -16,9 +16,7 @@ from contextlib import contextmanager
 from types import FrameType
 
 ENDING = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
-PATIENCE = (
-    1.0  # s in which a signal that comes again is one with the first: a key held down must not cut the cleaning up
-)
+PATIENCE = 1.0  # s in which a signal that comes again is one with the first: cleaning up is not to be cut
 
 
 class Stopped(SystemExit):
