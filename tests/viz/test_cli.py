@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -346,3 +348,17 @@ def test_the_stages_of_an_inspection_are_told_as_they_begin(tmp_path, capsys):
     assert said[0] == "cgraph: reading spring_mass"
     assert said[1].startswith("cgraph: spring_mass: deriving the equations of 1 coordinates, compiling them, and a")
     assert said[-1].startswith("cgraph: spring_mass: writing the page of ")
+
+
+@pytest.mark.parametrize("arguments", ["report spring_mass --pruning --out a/b", "inspect spring_mass --out a.html"])
+def test_a_disk_that_is_full_leaves_nothing_half(tmp_path, monkeypatch, capsys, arguments):
+    def full(self, data):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(Path, "write_bytes", full)
+    assert cli.main(arguments.split()) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert "No space left on device" in printed.err
+    assert not [*tmp_path.rglob("*")]

@@ -8,7 +8,7 @@ import math
 import sys
 import warnings
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -59,10 +59,17 @@ def answer(text: str, files: Mapping[Path, str | bytes] | None = None, *, folder
     folder: made for the files where it is missing.
     """
     settled()
-    if folder is not None:
-        for place in (folder, *{path.parent for path in files or {}}):
+    places = {} if folder is None else {folder: None} | {path.parent: None for path in files or {}}
+    missing = [each for place in places for each in (place, *place.parents) if not each.exists()]
+    try:
+        for place in places:
             place.mkdir(parents=True, exist_ok=True)
-    write_files(files or {})
+        write_files(files or {})
+    except OSError:
+        for place in sorted(missing, reverse=True):  # what is inside first
+            with suppress(OSError):
+                place.rmdir()
+        raise
     if text:
         print(text)
 

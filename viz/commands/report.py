@@ -123,8 +123,12 @@ class _Exact(NamedTuple):
         """Those that came."""
         if self.kept is None:
             return {}
-        new = [path for path in self.folder.iterdir() if not (self.kept / path.name).exists()]
-        return {self.kept / path.name: path.read_bytes() for path in new}
+        files: dict[Path, str | bytes] = {}
+        for path in self.folder.iterdir():
+            there, content = self.kept / path.name, path.read_bytes()
+            if not there.is_file() or there.read_bytes() != content:
+                files[there] = content
+        return files
 
 
 @contextmanager
