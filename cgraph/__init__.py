@@ -60,6 +60,7 @@ from .explain import Comparison, Lint, Why, WhyNot, compare, lint, why, why_not
 from .program import Loop, loop
 from .simplify.double_double import double_double
 from .simplify.simplify import simplify, specialize
+from .util.version import __version__ as __version__
 
 __all__ = [
     "CSource",

@@ -22,7 +22,8 @@ label may have. `certain_digits` says what rounding leaves of the outputs.
 `runner` makes it machine code or Python.
 
 **At the edges**: `real_array` and `real_number` check what a caller passed, `thread_count` reads `threads=`,
-`atomic_write` writes a file whole or not at all, `install` ends an error about a missing package. `Array` is the type
+`atomic_write` writes a file whole or not at all, `write_files` several, and `check_writable` looks beforehand;
+`install` ends an error about a missing package. `Array` is the type
 of an array of float64.
 
     >>> import cgraph as cg
@@ -56,7 +57,7 @@ from .explain.names import Names
 from .program import Call, Factor, If, Map, Program, Record, Runner, Solve, Statement, Sum, While, runner
 from .simplify.builder import Builder, folded
 from .simplify.polynomial import Polynomial, expand, format_polynomial
-from .util.atomic_write import atomic_write
+from .util.atomic_write import atomic_write, check_writable, write_files
 from .util.real_arrays import real_array, real_number
 from .util.threads import thread_count
 
@@ -88,6 +89,7 @@ __all__ = [
     "atomic_write",
     "building",
     "certain_digits",
+    "check_writable",
     "cotangents",
     "expand",
     "folded",
@@ -104,4 +106,5 @@ __all__ = [
     "tangents",
     "thread_count",
     "topological",
+    "write_files",
 ]

@@ -1,13 +1,14 @@
 """How Sphinx builds these pages; `make docs` runs it with warnings as errors."""
 
 import re
-from importlib.metadata import version as installed_version
 from textwrap import indent
+
+from cgraph import __version__
 
 project = "cgraph"
 author = "the cgraph authors"
 copyright = "2026, the cgraph authors"
-version = release = installed_version("cgraph")
+version = release = __version__
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx.ext.napoleon"]
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]

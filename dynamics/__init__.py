@@ -1,5 +1,7 @@
 """dynamics: equations of motion on computational graphs, from Lagrangians and bodies."""
 
+from cgraph import __version__ as __version__
+
 from . import scenes
 from .equations.coriolis import coriolis, damping_force
 from .equations.equations_of_motion import (

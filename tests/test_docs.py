@@ -4,11 +4,12 @@ import os
 import re
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 from pkgutil import resolve_name
 
 import pytest
+
+import cgraph as cg
 
 ROOT = Path(__file__).parents[1]
 PAGES = {
@@ -94,8 +95,7 @@ def test_the_tests_of_the_paper_s_equations_are_named() -> None:
 
 def test_the_citation_is_of_this_version_and_of_the_paper() -> None:
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     (version,) = re.findall(r"^version: (\S+)$", citation, re.MULTILINE)
     (doi,) = re.findall(r"^ +doi: (\S+)$", citation, re.MULTILINE)
-    assert version == project["version"]
+    assert version == cg.__version__
     assert f"https://doi.org/{doi}" in PAGES["docs/paper.md"]

@@ -163,6 +163,27 @@ def test_nothing_is_too_long(sources: dict[str, Module]) -> None:
     assert set(LONGER) <= set(found)  # an exception that is needed no more goes
 
 
+def test_no_run_is_used_without_a_look_at_how_it_ended(sources: dict[str, Module]) -> None:
+    """Who calls a simulation reads its `stats`, or hands the result on as it is."""
+    found = []
+    for file, module in sources.items():
+        for function in ast.walk(module.tree):
+            if not isinstance(function, ast.FunctionDef) or file.startswith("dynamics/simulation/"):
+                continue
+            handed = {id(node.value) for node in ast.walk(function) if isinstance(node, ast.Return)}
+            calls = [
+                node
+                for node in ast.walk(function)
+                if isinstance(node, ast.Call)
+                and isinstance(node.func, ast.Name)
+                and node.func.id in ("simulate", "simulate_many")
+                and id(node) not in handed
+            ]
+            looks = any([isinstance(node, ast.Attribute) and node.attr == "stats" for node in ast.walk(function)])
+            found += [f"{file}:{call.lineno} {function.name}" for call in calls if not looks]
+    assert found == []
+
+
 def test_a_docstring_says_more_than_where_to_look(sources: dict[str, Module]) -> None:
     pointer = re.compile(r"(See|As in|Like) `*[\w.]+`*\.?")
     found = [
@@ -200,7 +221,7 @@ def test_importing_a_package_loads_numpy_and_the_standard_library(tmp_path: Path
 
 
 def test_drawing_knows_nothing_of_mechanics(tmp_path: Path) -> None:
-    assert "dynamics" not in loaded("import viz; step('viz')", tmp_path)["viz"]
+    assert "dynamics" not in loaded("from viz import *; step('viz')", tmp_path)["viz"]
 
 
 def test_a_command_loads_no_optional_dependency_that_it_does_not_use(tmp_path: Path) -> None:

@@ -1,48 +1,94 @@
-"""The command line `cgraph`."""
+"""The command line `cgraph`: the signals first, then the imports, which take a while, then one command."""
 
 from __future__ import annotations
 
-import argparse
 import os
+import select
+import signal
 import sys
 from collections.abc import Sequence
 
-from .commands import COMMANDS
+from .commands.signals import ENDING, ignore_late, settled, stoppable, stopped, watch_loading
+
+FINE, FINDING, ERROR = 0, 1, 2  # exit statuses, as docs/commands.md has them
+ERRORS = (ValueError, TypeError, OSError, ImportError, RuntimeError, MemoryError, ArithmeticError)
+
+
+def start() -> int:
+    """The process's command: `main` with the signals of the first second, and warnings in a line."""
+    watch_loading()
+    try:
+        return main()
+    except Exception:  # noqa: BLE001 (a mistake of ours must not look like a finding, which status 1 is)
+        sys.excepthook(*sys.exc_info())
+        return ERROR
+    finally:
+        ignore_late()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status.
 
-    0, or what the command returns; 1 for an error (one line on standard error), 2 for wrong usage.
+    0 fine, 1 a finding, 2 an error (one line on standard error), 128 and the number of a signal that ended it:
+    130 Ctrl-C, 143 SIGTERM, 141 where nobody reads standard output any more.
+    Raises SystemExit with status 2, after the usage, for wrong arguments.
     """
-    options = _parser().parse_args(arguments)
-    try:
+    with stoppable():
+        try:
+            return _command(arguments)
+        except BaseException as error:
+            if stopped() or isinstance(error, KeyboardInterrupt):  # whatever became of the exception on its way
+                number = stopped() or signal.SIGINT
+                _say(ENDING[signal.Signals(number)])
+                return 128 + number
+            if isinstance(error, BrokenPipeError) and _nobody_reads():  # the reader, such as `head`, has had enough
+                _discard_output()
+                return 128 + getattr(signal, "SIGPIPE", 13)
+            if isinstance(error, ERRORS):
+                _discard_output()
+                _say(f"error: {' '.join(_sentence(error).split())}")
+                return ERROR
+            raise
+
+
+def _command(arguments: Sequence[str] | None) -> int:
+    from .commands.arguments import show_warnings  # here, where a signal is awaited: with all else it takes a second
+    from .commands.parser import parse
+
+    options = parse(arguments)
+    with show_warnings():
         status: int | None = options.run(options)
+    settled()
+    if sys.stdout is not None:
         sys.stdout.flush()
-    except KeyboardInterrupt:
-        print("cgraph: interrupted", file=sys.stderr)
-        return 130
-    except BrokenPipeError:  # the reader, such as `head`, has had enough
+    return status or FINE
+
+
+def _say(line: str) -> None:
+    if sys.stderr is not None:
+        print(f"cgraph: {line}", file=sys.stderr, flush=True)
+
+
+def _nobody_reads() -> bool:
+    """Whether it is standard output that broke, and no other pipe."""
+    if not hasattr(select, "poll"):
+        return True
+    output = select.poll()
+    output.register(sys.stdout, 0)
+    return any(event & (select.POLLERR | select.POLLHUP) for _, event in output.poll(0))
+
+
+def _discard_output() -> None:
+    """Send standard output nowhere if it takes nothing any more: Python would say so once more at its end."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
-    except (ValueError, TypeError, OSError, ImportError, RuntimeError) as error:
-        print(f"cgraph: error: {' '.join(_sentence(error).split())}", file=sys.stderr)
-        return 1
-    return status or 0
 
 
-def _sentence(error: Exception) -> str:
+def _sentence(error: BaseException) -> str:
     """What an error says, without the number that the system has for it."""
     if isinstance(error, OSError) and error.strerror:
         return error.strerror if error.filename is None else f"{error.filename}: {error.strerror}"
-    return str(error)
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="cgraph", description="Equations of motion as computational graphs: see, count, draw and simulate them."
-    )
-    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    for command in COMMANDS:
-        command.add(commands)
-    return parser
+    return str(error) or type(error).__name__

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import secrets
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 
@@ -38,21 +41,102 @@ def atomic_write(path: str | Path, data: str | bytes, *, mode: int = 0o666) -> P
     ...     atomic_write(Path(folder, "notes.txt"), "done").read_text()
     'done'
     """
-    target = Path(path).resolve()  # through a link, so that the link stays one
+    write_files({Path(path): data}, mode=mode)
+    return Path(path)
+
+
+def write_files(files: Mapping[Path, str | bytes], *, mode: int = 0o666) -> None:
+    """Write several files, all or none: they take their places once all are written beside them.
+
+    Parameters
+    ----------
+    files : mapping of Path to str or bytes
+        {where to: what to write}; text as UTF-8.
+    mode : int
+        Permissions of the files, less the process's umask.
+
+    Raises
+    ------
+    OSError
+        As `atomic_write` does.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from cgraph.extend import write_files
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_files({Path(folder, name): name for name in ("a.txt", "b.txt")})
+    ...     sorted(path.name for path in Path(folder).iterdir())
+    ['a.txt', 'b.txt']
+    """
+    with ExitStack() as temporaries:
+        written = []
+        for path, data in files.items():
+            target = path.resolve()  # through a link, so that the link stays one
+            temporary = temporaries.enter_context(_beside(target, mode))
+            with _named(target):
+                temporary.write_bytes(data.encode() if isinstance(data, str) else data)
+            if target.is_dir():
+                raise _folder(target)
+            written.append((temporary, target))
+        for temporary, target in written:
+            with _named(target):
+                temporary.replace(target)
+
+
+def check_writable(path: str | Path) -> None:
+    """Find out whether a file could be written, before the work of making what goes there. Leaves nothing behind.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of a file that is there or not.
+
+    Raises
+    ------
+    OSError
+        As `atomic_write` would for the place alone.
+
+    Examples
+    --------
+    >>> from cgraph.extend import check_writable
+    >>> check_writable("nowhere/at/all.svg")
+    Traceback (most recent call last):
+    FileNotFoundError: [Errno 2] cannot write .../nowhere/at/all.svg: the folder .../nowhere/at does not exist
+    """
+    target = Path(path).resolve()
+    if target.is_dir():
+        raise _folder(target)
+    with _beside(target, 0o600):
+        pass
+
+
+def _folder(target: Path) -> OSError:
+    return IsADirectoryError(errno.EISDIR, f"cannot write {target}: that is a folder")
+
+
+@contextmanager
+def _beside(target: Path, mode: int) -> Iterator[Path]:
+    """A new empty file beside a file that is to be written; what is left of it goes in the end."""
     temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
     try:
-        try:
+        with _named(target):
             temporary.touch(mode, exist_ok=False)
-            temporary.write_bytes(data.encode() if isinstance(data, str) else data)
-            temporary.replace(target)
-        finally:
+        yield temporary
+    finally:
+        with suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def _named(target: Path) -> Iterator[None]:
+    """Errors of the system within name the file that was to be written, and why it cannot be."""
+    try:
+        yield
     except OSError as error:
         if not target.parent.is_dir():
             why = f"the folder {target.parent} does not exist"
-        elif target.is_dir():
-            why = "that is a folder"
         else:
             why = error.strerror or str(error)
         raise OSError(error.errno, f"cannot write {target}: {why}") from error
-    return Path(path)

@@ -164,6 +164,8 @@ def _path(source: Any) -> Path:
     if not isinstance(source, str | os.PathLike):
         raise MechanismError(f"a model is a path, XML text or an MjModel, got {type(source).__name__}")
     path = Path(source)
+    if path.is_dir():
+        raise MechanismError(f"{os.fspath(source)!r:.200} is a folder, and a model is a file")
     if not path.is_file():
         raise MechanismError(f"there is no file {os.fspath(source)!r:.200}")
     return path
@@ -192,6 +194,8 @@ def _compiled(source: Any, called: str) -> Any:
     try:
         mj = models.from_xml_string(given) if _is_text(source) else models.from_xml_path(given)
     except ValueError as error:
+        if not _root(source):
+            raise MechanismError(f"{called} is not XML, as MJCF and URDF are") from None
         raise MechanismError(f"MuJoCo cannot read {called}: {' '.join(str(error).split())}") from None
     finally:
         mujoco().set_mju_user_warning(before)

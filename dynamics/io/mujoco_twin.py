@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -22,7 +24,15 @@ def mujoco() -> Any:
         import mujoco as module
     except ImportError as error:
         raise ImportError(f"MuJoCo is not installed: {install('mujoco')}") from error
+    if module.get_mju_user_warning() is None:  # by itself it adds a warning to a file in the current folder
+        module.set_mju_user_warning(_warn)
     return module
+
+
+def _warn(text: str) -> None:
+    """MuJoCo's warning as Python's."""
+    with suppress(BaseException):  # an exception that leaves a callback aborts the process
+        warnings.warn(f"MuJoCo: {' '.join(text.split())}", stacklevel=2)
 
 
 def rollout(mj: Any, starts: Array, states: Array) -> Callable[[], None]:

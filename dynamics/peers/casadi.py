@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from cgraph.extend import install
+
 from .case import BATCH, NUDGE, PASSES, Array, Case, rk4_step
 from .contender import Contender, Peer, UnavailableError
 from .ours import task_graph
@@ -127,7 +129,9 @@ class CasadiPeer(Peer):
 
 
 def casadi() -> Any:
-    """The module. Raises ImportError when it is not there."""
-    import casadi as module
-
+    """The module. Raises ImportError naming the extra when it is not installed."""
+    try:
+        import casadi as module
+    except ImportError as error:
+        raise ImportError(f"CasADi is not installed: {install('bench')}") from error
     return module

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cgraph.extend import ldl_elimination
+from cgraph.extend import install, ldl_elimination
 
 from .case import BATCH, Case
 from .contender import Contender, Peer
@@ -36,9 +36,11 @@ class HeyokaPeer(Peer):
 
 
 def heyoka() -> Any:
-    """The module. Raises ImportError when it is not there."""
-    import heyoka as module
-
+    """The module. Raises ImportError naming the extra when it is not installed."""
+    try:
+        import heyoka as module
+    except ImportError as error:
+        raise ImportError(f"heyoka is not installed: {install('bench')}") from error
     return module
 
 

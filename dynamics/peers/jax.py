@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cgraph.extend import ldl_elimination
+from cgraph.extend import install, ldl_elimination
 
 from .case import BATCH, NUDGE, PASSES, Array, Case, rk4_step
 from .contender import Contender, Peer
@@ -22,8 +22,10 @@ class JaxPeer(Peer):
 
     def __init__(self, case: Case) -> None:
         super().__init__(case)
-        import jax
-
+        try:
+            import jax
+        except ImportError as error:
+            raise ImportError(f"JAX is not installed: {install('bench')}") from error
         jax.config.update("jax_platforms", "cpu")
         jax.config.update("jax_enable_x64", True)
         jax.config.update("jax_cpu_enable_async_dispatch", False)  # a queue and a thread more than one core needs

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from cgraph.extend import install
+
 from ..io.write_mjcf import to_mjcf
 from .case import BATCH, Array, Case, rk4_step
 from .contender import Contender, Peer, UnavailableError
@@ -23,8 +25,10 @@ class PinocchioPeer(Peer):
 
     def __init__(self, case: Case) -> None:
         super().__init__(case)
-        import pinocchio
-
+        try:
+            import pinocchio
+        except ImportError as error:
+            raise ImportError(f"Pinocchio is not installed: {install('bench')}") from error
         self.pinocchio = pinocchio
         mechanism = bodies(case)
         with tempfile.TemporaryDirectory() as folder:

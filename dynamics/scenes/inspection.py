@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -38,16 +38,22 @@ class Inspection:
     """versions: the equations.  t: (T,) [s].  skeleton: joints along the motion, None where the model has no places.
 
     shares: {part: torques (n,) [N m or N] at t = 0}, what each partial Lagrangian takes, and the rest; {} for one part.
+    stopped: why the motion ends before its time, empty where it does not.
     """
 
     versions: tuple[Equations, ...]
     t: Array
     skeleton: Skeleton | None
     shares: Mapping[str, Array]
+    stopped: str = ""
 
 
-def inspection(scene: Scene, *, forward: bool = False, t_end: float | None = None) -> Inspection:
+def inspection(
+    scene: Scene, *, forward: bool = False, t_end: float | None = None, say: Callable[[str], None] = lambda line: None
+) -> Inspection:
     """The scene's inverse dynamics by the three formulations, or its forward dynamics, along its free motion.
+
+    say: told of each stage before it begins.
 
     Raises ValueError for t_end out of range, and as `simulate` does.
     """
@@ -56,7 +62,9 @@ def inspection(scene: Scene, *, forward: bool = False, t_end: float | None = Non
         raise ValueError(f"t_end must be positive and finite, got {end!r} s")
     frames = int(min(FRAMES, max(2.0, RATE * end))) if np.isfinite(end) else 2
     times = np.linspace(0.0, end, frames) if end > 0.0 else None
+    say(f"{scene.name}: deriving the equations of {system.n} coordinates, compiling them, and a motion of {end:g} s")
     run = simulate(system, scene.q, scene.qd, end, "dopri5", rtol=1e-6, atol=1e-8, t_eval=times)
+    say(f"{scene.name}: deriving forward dynamics")
     rate = forward_dynamics(system)
     state = _named(q=run.q, qd=run.qd, tau=np.zeros_like(run.q)) | system.parameters | {"t": run.t}
     if forward:
@@ -68,9 +76,13 @@ def inspection(scene: Scene, *, forward: bool = False, t_end: float | None = Non
         old = {"q": run.q - DT * run.qd, "qd": run.qd - DT * qdd}
         state |= _named(qdd=qdd) | {"dt": DT}
         state |= {f"{name}{i}_old": table[:, i] for name, table in old.items() for i in range(system.n)}
-        versions = [_version(system, name, state) for name in FORMULATIONS]
+        versions = []
+        for name in FORMULATIONS:
+            say(f"{scene.name}: deriving inverse dynamics, {name.replace('_', ' ')}")
+            versions.append(_version(system, name, state))
     places = None if scene.mechanism is None else skeleton(scene.mechanism, run.q)
-    return Inspection(tuple(versions), run.t, places, _shares(scene, state))
+    stopped = "" if run.stats.success else run.stats.message
+    return Inspection(tuple(versions), run.t, places, _shares(scene, state), stopped)
 
 
 def _version(system: System, name: str, state: Mapping[str, Any]) -> Equations:

@@ -149,7 +149,7 @@ def load(name: str | os.PathLike[str], /, **options: Any) -> Scene:
     make: Callable[..., Scene]
     if isinstance(name, str) and name in _SCENES:
         make = _SCENES[name]
-    elif isinstance(name, str | os.PathLike) and (Path(name).suffix.lower() in _SUFFIXES or Path(name).is_file()):
+    elif isinstance(name, str | os.PathLike) and (Path(name).suffix.lower() in _SUFFIXES or Path(name).exists()):
         make = partial(of_file, name)
     else:
         raise ValueError(

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import re
+import shutil
 import subprocess
 import sys
+import warnings
 from importlib import import_module
 from pathlib import Path
 
 import pytest
 
+import cgraph as cg
+import dynamics as dyn
+import viz
 from dynamics import scenes
+from dynamics.scenes import scenes as registry
 from viz import cli
-from viz.commands import COMMANDS
+from viz.commands.parser import COMMANDS, parse
 
 
 def run(*arguments: str, cwd=None) -> subprocess.CompletedProcess[str]:
@@ -56,7 +64,7 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
     assert "arm: inverse dynamics, chain rule" in target.read_text()
     assert capsys.readouterr().err == ""
     model.write_text(MODEL)
-    assert cli.main(["draw", str(model), "--out", str(target)]) == 1
+    assert cli.main(["draw", str(model), "--out", str(target)]) == 2
     said = "cgraph: error: a mechanism cannot have friction loss (the option ignore leaves this out)\n"
     assert capsys.readouterr().err == said
     assert cli.main(["draw", str(model), "--ignore", "--out", str(target)]) == 0
@@ -70,7 +78,8 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
         (["draw", "quadruple_pendulum", "--out", "x.dot"], "there is no scene 'quadruple_pendulum'"),
         (["draw", "nowhere.xml", "--out", "x.dot"], "there is no file 'nowhere.xml'"),
         (["draw", "nowhere.urdf", "--out", "x.dot"], "there is no file 'nowhere.urdf'"),
-        (["draw", "a_file", "--out", "x.dot"], "MuJoCo cannot read 'a_file'"),
+        (["draw", "a_file", "--out", "x.dot"], "'a_file' is not XML, as MJCF and URDF are"),
+        (["draw", ".", "--out", "x.dot"], "'.' is a folder, and a model is a file"),
         (["draw", "chain", "--ignore", "--out", "x.dot"], "scene 'chain' has no option 'ignore'"),
         (["draw", "spring_mass", "--out", "x.jpg"], "must end in .svg, .png, .dot or .txt"),
         (["draw", "spring_mass", "--out", "missing/x.dot"], "does not exist"),
@@ -79,10 +88,10 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
         (["certify", "nowhere.xml"], "there is no file 'nowhere.xml'"),
     ],
 )
-def test_a_mistake_gets_one_line_and_exit_status_1(tmp_path, monkeypatch, capsys, arguments, said):
+def test_a_mistake_gets_one_line_and_exit_status_2(tmp_path, monkeypatch, capsys, arguments, said):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a_file").write_text("in the way")
-    assert cli.main(arguments) == 1
+    assert cli.main(arguments) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1
     assert error.startswith("cgraph: error: ")
@@ -93,7 +102,7 @@ def test_a_mistake_gets_one_line_and_exit_status_1(tmp_path, monkeypatch, capsys
 
 def test_the_exit_status_of_a_process_is_the_command_s():
     done = run("draw", "nowhere.xml", "--out", "x.dot")
-    assert (done.returncode, done.stdout) == (1, "")
+    assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "cgraph: error: there is no file 'nowhere.xml'\n"
 
 
@@ -102,7 +111,7 @@ def test_what_the_system_says_has_no_number(monkeypatch, capsys):
         open("/nowhere/at/all")  # noqa: PTH123, SIM115 - what raises is Python itself
 
     monkeypatch.setattr("viz.commands.scenes.run", fail)
-    assert cli.main(["scenes"]) == 1
+    assert cli.main(["scenes"]) == 2
     assert capsys.readouterr().err == "cgraph: error: /nowhere/at/all: No such file or directory\n"
 
 
@@ -138,10 +147,218 @@ def test_every_file_of_commands_is_listed_or_helps_one_that_is():
     assert runs == set(NAMES)
 
 
-def test_ctrl_c_gives_one_line_and_exit_status_130(monkeypatch, capsys):
+def test_ctrl_c_gives_one_line_and_exit_status_230(monkeypatch, capsys):
     def interrupt(_):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("viz.commands.scenes.run", interrupt)
     assert cli.main(["scenes"]) == 130
     assert capsys.readouterr().err == "cgraph: interrupted\n"
+
+
+def test_the_version_is_one(capsys):
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["--version"])
+    assert stop.value.code == 0
+    assert capsys.readouterr().out == f"cgraph {cg.__version__}\n"
+    assert viz.__version__ == dyn.__version__ == cg.__version__
+    assert re.fullmatch(r"\d+\.\d+\.\d+\S*", cg.__version__)
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("cgraph insp", {"inspect"}),
+        ("cgraph draw trip", {"triple_pendulum"}),
+        ("cgraph draw chain --coll", {"--collapse"}),
+        ("cgraph lint chain --formulation chain", {"chain_rule", "chain_rule_literal"}),
+        ("cgraph completion ", {"bash", "zsh", "fish", "-h", "--help"}),
+    ],
+)
+def test_bash_completes(capsys, line, expected):
+    assert cli.main(["completion", "bash"]) == 0
+    script = capsys.readouterr().out
+    words = line.split(" ")
+    program = f'{script}\nCOMP_WORDS=({" ".join(words[:-1])} "{words[-1]}"); COMP_CWORD={len(words) - 1}; _cgraph\n'
+    done = subprocess.run(
+        ["bash", "-c", f'{program}printf "%s\\n" "${{COMPREPLY[@]}}"'], capture_output=True, text=True, check=True
+    )
+    assert (set(done.stdout.split()), done.stderr) == (expected, "")
+
+
+@pytest.mark.parametrize("shell", ["zsh", "fish"])
+def test_every_command_and_option_is_in_the_completion(capsys, shell):
+    assert cli.main(["completion", shell]) == 0
+    script = capsys.readouterr().out
+    for word in (*NAMES, "--formulation", "--collapse", "chain_rule_literal", "triple_pendulum"):
+        assert word.removeprefix("--") in script
+    if shutil.which(shell):
+        subprocess.run([shell, "-n", "-c", script], check=True)
+
+
+def test_words_of_a_list_may_stand_between_options():
+    assert parse(["bench", "speed", "--quick", "spring_mass", "--repeats", "3", "chain"]).what == [
+        "speed",
+        "spring_mass",
+        "chain",
+    ]
+    assert parse(["report", "--quick", "chain", "--json", "spring_mass"]).scenes == ["chain", "spring_mass"]
+
+
+@pytest.mark.parametrize("arguments", [["draw", "chain", "chain", "--out", "a.dot"], ["bench", "--quickly"]])
+def test_what_no_list_takes_is_refused(capsys, arguments):
+    with pytest.raises(SystemExit) as stop:
+        parse(arguments)
+    assert stop.value.code == 2
+    assert "unrecognized arguments: " in capsys.readouterr().err
+
+
+def test_tags_to_collapse_are_given_one_by_one_or_in_a_list(tmp_path, capsys):
+    texts = []
+    for i, tags in enumerate((["kinetic,potential"], ["kinetic", "--collapse", "potential"], [""])):
+        target = tmp_path / f"{i}.dot"
+        assert cli.main(["draw", "spring_mass", "--out", str(target), "--collapse", *tags]) == 0
+        texts.append(target.read_text())
+    assert texts[0] == texts[1]
+    assert "box3d" in texts[0]
+    assert "box3d" not in texts[2]
+
+
+@pytest.mark.parametrize("command", [["draw", "chain", "--out"], ["lint", "chain", "--svg"]])
+def test_a_picture_of_too_many_nodes_has_a_box_for_a_link(tmp_path, monkeypatch, capsys, command):
+    sources = []
+    for module in ("viz.commands.draw", "viz.commands.arguments"):
+        monkeypatch.setattr(f"{module}.render_svg", lambda drawing: sources.append(drawing.source) or "<svg/>")
+    assert cli.main([*command, str(tmp_path / "a.svg")]) == 0
+    assert "nodes are too many for one picture: those of a tag are one box" in capsys.readouterr().err
+    (source,) = sources
+    assert "link 7 (" in source
+    assert source.count("->") < 500
+
+
+def test_a_joint_is_locked_by_its_body_or_its_coordinate(capsys):
+    sizes = []
+    for lock in ("link 3=0.2", "joint 3=0.2"):
+        assert cli.main(["report", "triple_pendulum", "--pruning", "--json", "--lock", lock]) == 0
+        (content,) = json.loads(capsys.readouterr().out)
+        sizes.append([each["pruned"] for each in content["graphs"]])
+    assert sizes[0] == sizes[1]
+    assert sizes[0][0]["nodes"] < 171
+    for scene, said in (("spring_mass", "it has no bodies"), ("chain", "its bodies are link 1, link 2")):
+        assert cli.main(["report", scene, "--pruning", "--json", "--lock", "elbow=1"]) == 2
+        assert f"{scene} has no joint 'elbow' to lock: {said}" in capsys.readouterr().err
+
+
+def test_json_of_a_report_writes_no_file_unless_a_folder_is_named(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["report", "spring_mass", "--pruning", "--json"]) == 0
+    assert not [*tmp_path.iterdir()]
+    printed = capsys.readouterr()
+    assert json.loads(printed.out)
+    assert printed.err == ""
+    assert cli.main(["report", "spring_mass", "--pruning", "--json", "--out", "there"]) == 0
+    assert {path.suffix for path in (tmp_path / "there").iterdir()} == {".json", ".md", ".html"}
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        "lint spring_mass --svg {}",
+        "why spring_mass tau0 q0 --svg {}",
+        "compare spring_mass --svg {}",
+        "architecture viz --out {}",
+        "draw spring_mass --out {}",
+    ],
+)
+@pytest.mark.parametrize("target", ["missing/a.svg", "folder.svg"])
+def test_a_place_that_cannot_be_written_is_told_before_the_work(tmp_path, monkeypatch, capsys, arguments, target):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder.svg").mkdir()
+    assert cli.main(arguments.format(target).split()) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert "cannot write" in printed.err
+    assert [path.name for path in tmp_path.rglob("*")] == ["folder.svg"]
+
+
+@pytest.mark.parametrize(
+    ("module", "extra", "arguments"),
+    [
+        ("graphviz", "viz", "draw spring_mass --out a.dot"),
+        ("graphviz", "viz", "lint spring_mass --svg a.svg"),
+        ("resvg_py", "viz", "draw spring_mass --out a.png"),
+        ("resvg_py", "viz", "paper"),
+        ("flint", "reference", "report --stability --json"),
+        ("mujoco", "mujoco", "draw robot.xml --out a.svg"),
+    ],
+)
+def test_a_missing_package_is_an_error_that_names_its_extra(tmp_path, monkeypatch, capsys, module, extra, arguments):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, module, None)
+    (tmp_path / "robot.xml").write_text(MODEL)
+    assert cli.main(arguments.split()) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert f"pip install '.[{extra}]'" in printed.err.splitlines()[-1]
+    assert [path.name for path in tmp_path.iterdir()] == ["robot.xml"]
+
+
+def test_peers_that_a_figure_does_without_are_named_with_their_extra(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    monkeypatch.setitem(sys.modules, "pinocchio", None)
+    assert cli.main(["bench", "agreement", "--links", "1", "--count", "1"]) == 0
+    printed = capsys.readouterr().out
+    assert "MuJoCo is not installed: in a checkout of cgraph, pip install '.[mujoco]'" in printed
+    assert "Pinocchio is not installed: in a checkout of cgraph, pip install '.[bench]'" in printed
+
+
+def test_a_warning_is_a_line_once(monkeypatch, capsys):
+    def warn(_):
+        for _ in range(3):
+            warnings.warn("this is odd", stacklevel=1)
+
+    monkeypatch.setattr("viz.commands.scenes.run", warn)
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        assert cli.main(["scenes"]) == 0
+    assert capsys.readouterr().err == "cgraph: warning: this is odd\n"
+
+
+def runaway():
+    """A particle whose acceleration grows with its place: it is at infinity before its time."""
+    system = dyn.System(lambda q, qd, t, p: qd[0] ** 2 / 2 + q[0] ** 4, ["x"])
+    return dyn.Scene("runaway", "it ends at infinity", system, (1.0,), (0.0,), 10.0)
+
+
+def test_a_motion_that_ends_before_its_time_is_a_finding_and_the_page_says_so(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(registry._SCENES, "runaway", runaway)
+    page = tmp_path / "a.html"
+    assert cli.main(["inspect", "runaway", "--out", str(page)]) == 1
+    said = capsys.readouterr().err
+    assert "cgraph: The motion is not whole: it " in said
+    sentence = said.splitlines()[-1].removeprefix("cgraph: ")
+    assert page.read_text(encoding="utf-8").count(json.dumps(sentence, ensure_ascii=False)[1:-1]) == 3
+    assert cli.main(["inspect", "spring_mass", "--t-end", "0.2", "--out", str(page)]) == 0
+    assert "not whole" not in page.read_text(encoding="utf-8")
+
+
+def test_the_stages_of_an_inspection_are_told_as_they_begin(tmp_path, capsys):
+    assert cli.main(["inspect", "spring_mass", "--t-end", "0.2", "--out", str(tmp_path / "a.html")]) == 0
+    said = capsys.readouterr().err.splitlines()
+    assert said[0] == "cgraph: reading spring_mass"
+    assert said[1].startswith("cgraph: spring_mass: deriving the equations of 1 coordinates, compiling them, and a")
+    assert said[-1].startswith("cgraph: spring_mass: writing the page of ")
+
+
+@pytest.mark.parametrize("arguments", ["report spring_mass --pruning --out a/b", "inspect spring_mass --out a.html"])
+def test_a_disk_that_is_full_leaves_nothing_half(tmp_path, monkeypatch, capsys, arguments):
+    def full(self, data):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(Path, "write_bytes", full)
+    assert cli.main(arguments.split()) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert "No space left on device" in printed.err
+    assert not [*tmp_path.rglob("*")]

@@ -47,12 +47,13 @@ class Module:
 
     @cached_property
     def is_face(self) -> bool:
-        """It holds nothing but a docstring, imports and `__all__`: what it shows is written elsewhere."""
+        """It holds a docstring, imports, also on demand, and `__all__` alone: what it shows is written elsewhere."""
         body = [inner for line in self.tree.body for inner in (line.body if isinstance(line, ast.If) else [line])]
         return all(
             isinstance(line, ast.Import | ast.ImportFrom)
             or (isinstance(line, ast.Expr) and isinstance(line.value, ast.Constant))
-            or (isinstance(line, ast.Assign) and ast.unparse(line.targets[0]) == "__all__")
+            or (isinstance(line, ast.FunctionDef) and line.name in ("__getattr__", "__dir__"))
+            or (isinstance(line, ast.Assign) and ast.unparse(line.targets[0]) in ("__all__", "TYPE_CHECKING"))
             for line in body
         )
 

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 
-from cgraph.extend import atomic_write
+from cgraph.extend import check_writable
 
 from ..architecture.architecture import architecture
 from ..architecture.import_rule import PACKAGES
 from ..architecture.picture import to_dot
-from ..graph_drawing.render import render_png, render_svg
-from .arguments import Commands, say
+from ..graph_drawing.render import check_can_draw, render_png, render_svg
+from .arguments import Commands, answer, say, unless_json
 
 
 def add(commands: Commands[argparse.ArgumentParser]) -> None:
@@ -30,16 +29,20 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print the rooms by floor, the arrows, and what is wrong; 1 where anything is."""
-    if options.out is not None and options.out.suffix not in (".svg", ".png", ".dot"):
+    kind = None if options.out is None else options.out.suffix
+    if kind not in (None, ".svg", ".png", ".dot"):
         raise ValueError(f"--out must end in .svg, .png or .dot, got {options.out}")
+    if kind is not None:
+        check_writable(options.out)
+    if kind in (".svg", ".png"):
+        check_can_draw(png=kind == ".png")
     plan = architecture(options.package)
-    print(json.dumps(plan.to_dict(), indent=1) if options.json else plan)
-    if options.out is not None:
+    text = unless_json(options, plan.to_dict(), plan)
+    if kind is None:
+        answer(text)
+    else:
         drawing = to_dot(plan)
-        if options.out.suffix == ".dot":
-            atomic_write(options.out, str(drawing.source))
-        else:
-            svg = render_svg(drawing)
-            atomic_write(options.out, svg if options.out.suffix == ".svg" else render_png(svg))
+        picture = str(drawing.source) if kind == ".dot" else render_svg(drawing)
+        answer(text, {options.out: render_png(picture) if kind == ".png" else picture})
         say(f"drawn in {options.out}")
     return 0 if plan.sound else 1

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import sys
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from cgraph import Graph
-from cgraph.extend import atomic_write
+from cgraph.extend import check_writable, write_files
 from dynamics import FORMULATIONS, scenes
 
-from ..graph_drawing.render import Drawing, render_svg
+from ..graph_drawing.dot import to_dot
+from ..graph_drawing.render import check_can_draw, render_svg, tags_to_collapse
+from .signals import settled
 
 Commands = argparse._SubParsersAction  # what `add_subparsers` returns has no public name
 
@@ -37,7 +44,49 @@ def scene_of(options: argparse.Namespace) -> scenes.Scene:
 
 def say(line: str) -> None:
     """A line of progress or of warning, on standard error."""
-    print(f"cgraph: {line}", file=sys.stderr, flush=True)
+    if sys.stderr is not None:
+        print(f"cgraph: {line}", file=sys.stderr, flush=True)
+
+
+def unless_json(options: argparse.Namespace, data: object, text: object) -> str:
+    """What a command prints: its data where `--json` asks for it, else the text."""
+    return json.dumps(data, indent=1) if options.json else str(text)
+
+
+def answer(text: str, files: Mapping[Path, str | bytes] | None = None, *, folder: Path | None = None) -> None:
+    """The end of a command: its files, all or none, and what it prints. No signal comes in between.
+
+    folder: made for the files where it is missing.
+    """
+    settled()
+    places = {} if folder is None else {folder: None} | {path.parent: None for path in files or {}}
+    missing = [each for place in places for each in (place, *place.parents) if not each.exists()]
+    try:
+        for place in places:
+            place.mkdir(parents=True, exist_ok=True)
+        write_files(files or {})
+    except OSError:
+        for place in sorted(missing, reverse=True):  # what is inside first
+            with suppress(OSError):
+                place.rmdir()
+        raise
+    if text:
+        print(text)
+
+
+@contextmanager
+def show_warnings() -> Iterator[None]:
+    """Within, a warning is a line of standard error, once, without the line of our code that gave it."""
+    with warnings.catch_warnings():
+        shown: set[str] = set()
+
+        def show(message: Warning | str, *_: object, **__: object) -> None:
+            if str(message) not in shown:
+                shown.add(str(message))
+                say(f"warning: {message}")
+
+        warnings.showwarning = show
+        yield
 
 
 def takes_a_formulation(command: argparse._ActionsContainer) -> None:
@@ -51,6 +100,13 @@ def whole(text: str) -> int:
     """A whole number, at least 0, for argparse."""
     if not (text.isascii() and text.isdecimal()):
         raise argparse.ArgumentTypeError(f"expected a whole number, at least 0, got {text!r}")
+    return int(text)
+
+
+def counting(text: str) -> int:
+    """A whole number, at least 1, for argparse."""
+    if not (text.isascii() and text.isdecimal() and int(text)):
+        raise argparse.ArgumentTypeError(f"expected a whole number, at least 1, got {text!r}")
     return int(text)
 
 
@@ -79,10 +135,28 @@ def may_draw_and_print(command: argparse.ArgumentParser) -> None:
     command.add_argument("--svg", type=_svg_file, metavar="FILE", help="draw the graph, with the answer marked")
 
 
-def draw(options: argparse.Namespace, drawing: Drawing) -> None:
-    """Write a drawing to the file that `--svg` names."""
-    atomic_write(options.svg, render_svg(drawing))
+def check_picture(options: argparse.Namespace) -> None:
+    """Raise what writing the picture would, before the work."""
+    if options.svg:
+        check_writable(options.svg)
+        check_can_draw(png=False)
+
+
+def answer_and_draw(options: argparse.Namespace, text: str, graph: Graph, **marks: Any) -> None:
+    """The end of a command, with the drawing that `--svg` asks for.  marks: as `to_dot` takes them."""
+    if not options.svg:
+        answer(text)
+        return
+    answer(text, {options.svg: render_svg(to_dot(graph, collapse=collapsed(graph), **marks))})
     say(f"drawn in {options.svg}")
+
+
+def collapsed(graph: Graph) -> list[str]:
+    """The tags to collapse so that the picture is made in seconds; it is said where there are any."""
+    tags = tags_to_collapse(graph)
+    if tags:
+        say(f"{len(graph.nodes)} nodes are too many for one picture: those of a tag are one box")
+    return tags
 
 
 def state_names(graph: Graph, n: int) -> tuple[list[str], list[str]]:

@@ -52,7 +52,7 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
     parser.add_argument("--json", action="store_true", help="print as JSON")
     for name, about in NUMBERS.items():
         parser.add_argument(f"--{name}", type=whole, metavar="N", help=f"of a figure: {about}")
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, words="what")
 
 
 def run(options: argparse.Namespace) -> None:
@@ -85,6 +85,7 @@ def _speed(scenes: list[str], options: argparse.Namespace) -> None:
         for names, known in ((options.tasks, TASKS), (options.modes, MODES), (options.peers, PEERS))
     ]
     rows: list[Row] = []
+    complete = False
     measured = bench(
         scenes or (QUICK if options.quick else tuple(SCENES)),
         *chosen,
@@ -95,8 +96,12 @@ def _speed(scenes: list[str], options: argparse.Namespace) -> None:
     )
     try:
         rows.extend(measured)
+        complete = True
     finally:
+        if not complete and rows:
+            say("the bench did not come to its end; these rows were measured before")
         if options.json and rows:
-            print(json.dumps({"machine": machine(), "rows": [asdict(row) for row in rows]}, indent=1))
+            data = {"machine": machine(), "complete": complete, "rows": [asdict(row) for row in rows]}
+            print(json.dumps(data, indent=1))
         elif rows:
             print(tables(rows, machine()))

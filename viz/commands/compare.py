@@ -3,19 +3,28 @@
 from __future__ import annotations
 
 import argparse
-import json
 
 import cgraph as cg
 from dynamics import FORMULATIONS, inverse_dynamics
 from dynamics.equations.node_classes import formulation_classes
 
-from ..graph_drawing.dot import to_dot
-from .arguments import Commands, draw, may_draw_and_print, scene_of, state_names, takes_a_scene
+from .arguments import (
+    Commands,
+    answer_and_draw,
+    check_picture,
+    may_draw_and_print,
+    scene_of,
+    state_names,
+    takes_a_scene,
+    unless_json,
+)
 
 
 def add(commands: Commands[argparse.ArgumentParser]) -> None:
     """The command's arguments."""
-    parser = commands.add_parser("compare", help="compare two formulations of a scene's equations, node by node")
+    parser = commands.add_parser(
+        "compare", help="compare two formulations of a scene's equations, node by node; status 1 where they differ"
+    )
     takes_a_scene(parser)
     parser.add_argument(
         "--formulations",
@@ -30,35 +39,28 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the totals of both sides and the classes of what only one of them has."""
+    """Print the totals of both sides and the classes of what only one of them has; 1 where one has anything."""
+    check_picture(options)
     scene = scene_of(options)
     left, right = (inverse_dynamics(scene, name) for name in options.formulations)
     state = [name for graph in (left, right) for names in state_names(graph, scene.system.n) for name in names]
     comparison = cg.compare(left, right, atoms=dict.fromkeys(state), classify=formulation_classes)
-    if options.json:
-        named = dict(zip(("left", "right"), options.formulations, strict=True))
-        sizes = {"left_nodes": len(left.nodes), "right_nodes": len(right.nodes), "in_both": len(comparison.common)}
-        print(json.dumps({"scene": scene.name} | named | sizes | comparison.to_dict(), indent=1))
-    else:
-        both = len(comparison.common)
-        for side, name, graph, only in zip(
-            ("left", "right"),
-            options.formulations,
-            (left, right),
-            (comparison.only_left, comparison.only_right),
-            strict=True,
-        ):
-            print(f"{side}: {name}, {len(graph.nodes)} nodes = {both} in both + {len(only)} only {side}")
-        print(comparison)
-    if options.svg:
-        together = comparison.overlay()
-        marks = dict(
-            zip(
-                [f"only {name}" for name in options.formulations],
-                (together.only_left, together.only_right),
-                strict=True,
-            )
-        )
-        caption = f"{scene.name}: {options.formulations[0]} and {options.formulations[1]} in one"
-        draw(options, to_dot(together.graph, marked=marks, caption=caption.replace("_", " ")))
-    return 0
+    named = dict(zip(("left", "right"), options.formulations, strict=True))
+    both = len(comparison.common)
+    sizes = {"left_nodes": len(left.nodes), "right_nodes": len(right.nodes), "in_both": both}
+    only = comparison.only_left, comparison.only_right
+    lines = [
+        f"{side}: {named[side]}, {len(graph.nodes)} nodes = {both} in both + {len(rest)} only {side}"
+        for side, graph, rest in zip(named, (left, right), only, strict=True)
+    ]
+    data = {"scene": scene.name} | named | sizes | comparison.to_dict()
+    together = comparison.overlay()
+    groups = [f"only {name}" for name in options.formulations], (together.only_left, together.only_right)
+    answer_and_draw(
+        options,
+        unless_json(options, data, "\n".join([*lines, str(comparison)])),
+        together.graph,
+        marked=dict(zip(*groups, strict=True)),
+        caption=f"{scene.name}: {' and '.join(options.formulations)} in one".replace("_", " "),
+    )
+    return 1 if any(only) else 0

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
-from cgraph.extend import atomic_write
+from cgraph import Graph
+from cgraph.extend import check_writable
 from dynamics import inverse_dynamics, spurious_nodes
 
 from ..graph_drawing.dot import to_dot
-from ..graph_drawing.render import render_png, render_svg
-from .arguments import Commands, scene_of, takes_a_formulation, takes_a_scene
+from ..graph_drawing.render import check_can_draw, render_png, render_svg
+from .arguments import Commands, answer, collapsed, scene_of, takes_a_formulation, takes_a_scene
+
+PICTURES = (".svg", ".png")
+KINDS = (*PICTURES, ".dot", ".txt")
 
 
 def add(commands: Commands[argparse.ArgumentParser]) -> None:
@@ -22,27 +27,43 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
     takes_a_formulation(parser)
     parser.add_argument("--out", type=Path, required=True, help="file to write: .svg, .png, .dot or .txt")
     parser.add_argument(
-        "--collapse", action="append", default=[], metavar="TAG", help="draw all nodes of a tag as one box"
+        "--collapse",
+        action="append",
+        metavar="A,B",
+        help="draw all nodes of a tag as one box (default: of all tags if a picture needs it); '' for none",
     )
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
     """Write the file."""
+    kind = options.out.suffix
+    if kind not in KINDS:
+        raise ValueError(f"--out must end in {', '.join(KINDS[:-1])} or {KINDS[-1]}, got {options.out}")
+    check_writable(options.out)
+    if kind in PICTURES:
+        check_can_draw(png=kind == ".png")
     scene = scene_of(options)
     graph = inverse_dynamics(scene, options.formulation)
+    caption = f"{scene.name}: inverse dynamics, {options.formulation.replace('_', ' ')}"
+    content = graph.listing() if kind == ".txt" else _drawn(graph, kind, options.collapse, caption)
     counts = graph.counts()
-    kind = options.out.suffix
-    if kind == ".txt":
-        atomic_write(options.out, graph.listing())
-    elif kind in (".dot", ".svg", ".png"):
-        caption = f"{scene.name}: inverse dynamics, {options.formulation.replace('_', ' ')}"
-        drawing = to_dot(graph, marked=spurious_nodes(graph), collapse=options.collapse, caption=caption)
-        if kind == ".dot":
-            atomic_write(options.out, str(drawing.source))
-        else:
-            svg = render_svg(drawing)
-            atomic_write(options.out, svg if kind == ".svg" else render_png(svg))
+    answer(f"{options.out}: {counts.nodes} nodes, {counts.edges} edges", {options.out: content})
+
+
+def _drawn(graph: Graph, kind: str, collapse: Sequence[str] | None, caption: str) -> str | bytes:
+    if collapse is None:
+        tags = collapsed(graph) if kind in PICTURES else []
     else:
-        raise ValueError(f"--out must end in .svg, .png, .dot or .txt, got {options.out}")
-    print(f"{options.out}: {counts.nodes} nodes, {counts.edges} edges")
+        tags = [tag for each in collapse for tag in tags_of(each, graph)]
+    drawing = to_dot(graph, marked=spurious_nodes(graph), collapse=tags, caption=caption)
+    if kind == ".dot":
+        return str(drawing.source)
+    svg = render_svg(drawing)
+    return render_png(svg) if kind == ".png" else svg
+
+
+def tags_of(text: str, graph: Graph) -> list[str]:
+    """The tags in `a,b`; a tag may have a comma itself."""
+    carried = {tag for node in graph.nodes for tag in node.tags}
+    return [text] if text in carried else [tag.strip() for tag in text.split(",") if tag.strip()]

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cgraph import Graph
-from cgraph.extend import atomic_write
+from cgraph.extend import check_writable
 from dynamics import inverse_dynamics, momentum_rate, scenes, spurious_nodes
 from dynamics.experiments.paper_numbers.equation3 import equation3
 
 from ..pages.lesson import Lesson, page
-from .arguments import Commands
+from .arguments import Commands, answer
 
 STEPS = (1.0, 0.1, 0.01, 1e-3, 1e-6)  # s
 ARM_DT = 1e-6  # s
@@ -33,8 +33,8 @@ def run(options: argparse.Namespace) -> None:
     """Write the page."""
     if options.out.suffix != ".html":
         raise ValueError(f"--out must end in .html, got {options.out}")
-    atomic_write(options.out, page(lesson()))
-    print(f"{options.out}: five questions on Figures 1 to 3")
+    check_writable(options.out)
+    answer(f"{options.out}: five questions on Figures 1 to 3", {options.out: page(lesson())})
 
 
 def lesson() -> Lesson:

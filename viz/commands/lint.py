@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import argparse
-import json
 
 import cgraph as cg
 from dynamics import inverse_dynamics
 
-from ..graph_drawing.dot import to_dot
-from .arguments import Commands, draw, may_draw_and_print, scene_of, state_names, takes_a_formulation, takes_a_scene
+from .arguments import (
+    Commands,
+    answer_and_draw,
+    check_picture,
+    may_draw_and_print,
+    scene_of,
+    state_names,
+    takes_a_formulation,
+    takes_a_scene,
+    unless_json,
+)
 from .point_arguments import REST, box, filled, point
 
 
@@ -36,6 +44,7 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print the proof or the blame; 1 where anything is not as declared."""
+    check_picture(options)
     scene = scene_of(options)
     graph = inverse_dynamics(scene, options.formulation)
     q, qd = state_names(graph, scene.system.n)
@@ -46,16 +55,15 @@ def run(options: argparse.Namespace) -> int:
         at=None if options.at is None else filled(graph, scene, options.at),
         function="L",
     )
-    if options.json:
-        print(json.dumps({"scene": scene.name, "formulation": options.formulation} | report.to_dict(), indent=1))
-    else:
-        print(
-            report if q and qd else f"Holds: the equations have no {'coordinates' if qd else 'velocities'}.\n{report}"
-        )
-    if options.svg:
-        caption = f"{scene.name}: inverse dynamics, {options.formulation.replace('_', ' ')}"
-        drawing = to_dot(
-            graph, marked=report.nodes, marked_label="to blame", marked_edges=report.edges, caption=caption
-        )
-        draw(options, drawing)
+    proof = report if q and qd else f"Holds: the equations have no {'coordinates' if qd else 'velocities'}.\n{report}"
+    data = {"scene": scene.name, "formulation": options.formulation} | report.to_dict()
+    answer_and_draw(
+        options,
+        unless_json(options, data, proof),
+        graph,
+        marked=report.nodes,
+        marked_label="to blame",
+        marked_edges=report.edges,
+        caption=f"{scene.name}: inverse dynamics, {options.formulation.replace('_', ' ')}",
+    )
     return 0 if report.ok else 1

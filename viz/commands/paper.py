@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 
-from ..paper.write_paper import write_paper
-from .arguments import Commands
+from ..paper.paper import paper
+from .arguments import Commands, answer, say
 
 
 def add(commands: Commands[argparse.ArgumentParser]) -> None:
@@ -22,6 +21,6 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Write the folder."""
-    data = write_paper(options.out, lambda line: print(line, file=sys.stderr, flush=True), quick=options.quick)
-    if options.json:
-        print(json.dumps(data, indent=1))
+    files, data = paper(options.out, say, quick=options.quick)
+    page = f"All of it on one page: {options.out / 'index.html'}"
+    answer(json.dumps(data, indent=1) if options.json else page, files, folder=options.out)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import json
+from pathlib import Path
 
 from dynamics import EFFECTS, scenes
 from dynamics.experiments import pruning
 
 from ..pages import pruning as page
-from ..pages.write_document import check_writable, write_document
+from ..pages.document_files import document_files
+from .arguments import answer, unless_json
 
 
 def run(options: argparse.Namespace) -> None:
@@ -21,16 +22,27 @@ def run(options: argparse.Namespace) -> None:
     lock = dict(locked)
     if len(lock) < len(locked):
         raise ValueError(f"--lock takes each body once, got {', '.join(body for body, _ in locked)}")
-    check_writable(options.out)
-    found = []
+    found, lines, files = [], [], dict[Path, str | bytes]()
     for name in options.scenes:
         scene = scenes.load(name, **({"ignore": True} if options.ignore else {}))
-        content = pruning.report(scene, effects=[each for each in EFFECTS if each not in without], lock=lock)
+        effects = [each for each in EFFECTS if each not in without]
+        content = pruning.report(scene, effects=effects, lock=_bodies(scene, lock))
         found.append(content)
-        written = write_document(options.out, content["name"], page.document(content), content, kind="pruning")
-        if not options.json:
+        if options.out is not None:
+            files |= (
+                written := document_files(options.out, content["name"], page.document(content), content, kind="pruning")
+            )
             sizes = [f"{each['equations']} {each['full']['nodes']} to {each['pruned']['nodes']} nodes"
                      for each in content["graphs"]]  # fmt: skip
-            print(f"{written}: {', '.join(sizes)}")
-    if options.json:
-        print(json.dumps(found, indent=1))
+            lines.append(f"{[*written][-1]}: {', '.join(sizes)}")
+    answer(unless_json(options, found, "\n".join(lines)), files, folder=options.out)
+
+
+def _bodies(scene: scenes.Scene, lock: dict[str, float]) -> dict[str, float]:
+    """What is to be locked by its body's name, where it may be given by its coordinate's."""
+    bodies = [body.name for body in scene.mechanism.moving] if scene.mechanism else []
+    of = dict(zip(scene.coordinates, bodies, strict=False)) | {name: name for name in bodies}
+    if unknown := [name for name in lock if name not in of]:
+        known = f"its bodies are {', '.join(bodies)}" if bodies else "it has no bodies"
+        raise ValueError(f"{scene.name} has no joint {unknown[0]!r} to lock: {known}")
+    return {of[name]: at for name, at in lock.items()}

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
 
 from dynamics import EFFECTS, scenes
 from dynamics.experiments.machine import machine
@@ -15,10 +19,10 @@ from dynamics.experiments.work_precision.report import PEERS, to_csv
 from dynamics.integrators import METHODS
 
 from ..pages import work_precision as page
-from ..pages.write_document import check_writable, write_document
+from ..pages.document_files import check_folder, document_files
 from ..plots.plot import check_can_plot
 from . import pruning_report, stability_report
-from .arguments import Commands, may_ignore, number, positive, say
+from .arguments import Commands, answer, may_ignore, number, positive, say, unless_json
 
 CURVES, STABILITY, PRUNING, COMPARE = "a report of run times", "--stability", "--pruning", "--compare"
 GO_WITH = {  # options that not every kind of report has
@@ -34,6 +38,7 @@ GO_WITH = {  # options that not every kind of report has
     "lock": (PRUNING,),
 }
 BUDGET = 60.0  # s
+FOLDER = Path("report")
 
 
 def add(commands: Commands[argparse.ArgumentParser]) -> None:
@@ -49,7 +54,7 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
         "--stability", action="store_true", help="the table of stiff and extreme cases; status 1 for an unexplained row"
     )
     may_ignore(parser)
-    parser.add_argument("--out", type=Path, default=Path("report"), help="folder to fill (default: report)")
+    parser.add_argument("--out", type=Path, help=f"folder to fill (default: {FOLDER}; with --json, none)")
     parser.add_argument("--t-end", type=positive, metavar="S", help="how long, instead of the scene's own time")
     parser.add_argument("--start", type=_state, metavar="A,B", help="q and then qd, instead of the scene's own start")
     parser.add_argument("--methods", metavar="A,B", help=f"only these of {', '.join(METHODS)}")
@@ -69,11 +74,13 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
     parser.add_argument(
         "--lock", type=_locked, action="append", metavar="BODY=AT", help="with --pruning: lock a joint there [rad or m]"
     )
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, words="scenes")
 
 
-def run(options: argparse.Namespace) -> None:
-    """Write the pages that the arguments ask for."""
+def run(options: argparse.Namespace) -> int | None:
+    """Write the pages that the arguments ask for; 1 where one of them has a finding."""
+    if options.out is None and not options.json:
+        options.out = FOLDER
     others = {STABILITY: options.stability, PRUNING: options.pruning, COMPARE: options.compare is not None}
     kinds = [kind for kind, asked in others.items() if asked] or [CURVES]
     if len(kinds) > 1:
@@ -84,8 +91,15 @@ def run(options: argparse.Namespace) -> None:
     for name, with_these in GO_WITH.items():
         if kind not in with_these and getattr(options, name) not in (None, False):
             raise ValueError(f"--{name.replace('_', '-')} goes with {' or '.join(with_these)}, not with {kind}")
-    runs = {CURVES: _curves, STABILITY: stability_report.run, PRUNING: pruning_report.run, COMPARE: _comparisons}
-    runs[kind](options)
+    runs: dict[str, Callable[[argparse.Namespace], int | None]] = {
+        CURVES: _curves,
+        STABILITY: stability_report.run,
+        PRUNING: pruning_report.run,
+        COMPARE: _comparisons,
+    }
+    if options.out is not None:
+        check_folder(options.out)
+    return runs[kind](options)
 
 
 def _state(text: str) -> list[float]:
@@ -99,16 +113,45 @@ def _locked(text: str) -> tuple[str, float]:
     return body, number(at)
 
 
+class _Exact(NamedTuple):
+    """Exact motions that are there, and those that come: files in a folder of their own until the report is whole."""
+
+    kept: Path | None
+    folder: Path
+
+    def files(self) -> dict[Path, str | bytes]:
+        """Those that came."""
+        if self.kept is None:
+            return {}
+        files: dict[Path, str | bytes] = {}
+        for path in self.folder.iterdir():
+            there, content = self.kept / path.name, path.read_bytes()
+            if not there.is_file() or there.read_bytes() != content:
+                files[there] = content
+        return files
+
+
+@contextmanager
+def _exact_motions(out: Path | None) -> Iterator[_Exact]:
+    kept = None if out is None else out / "exact"
+    with TemporaryDirectory() as folder:
+        if kept is not None and kept.is_dir():
+            for path in kept.glob("*.json"):
+                shutil.copy(path, folder)
+        yield _Exact(kept, Path(folder))
+
+
 def _comparisons(options: argparse.Namespace) -> None:
     """Print comparisons as they are measured; exact motions are kept where reports keep theirs."""
     names = [name for name in options.compare.split(",") if name]
     if unknown := [name for name in names if name not in COMPARISONS]:
         raise ValueError(f"comparisons are {', '.join(COMPARISONS)}, got {unknown[0]!r}")
-    check_writable(options.out)
     print(machine())
-    for name in names or COMPARISONS:
-        for text in COMPARISONS[name](str(options.out / "exact")):
-            print(f"\n{text}", flush=True)
+    with _exact_motions(options.out) as exact:
+        for name in names or COMPARISONS:
+            for text in COMPARISONS[name](str(exact.folder)):
+                print(f"\n{text}", flush=True)
+        answer("", exact.files(), folder=options.out)
 
 
 def _curves(options: argparse.Namespace) -> None:
@@ -118,9 +161,18 @@ def _curves(options: argparse.Namespace) -> None:
         raise ValueError(f"each scene needs a name of its own for its files, got {', '.join(options.scenes)}")
     chosen = {"t_end": options.t_end, "start": options.start, "ignore": options.ignore}
     peers = tuple(PEERS) if options.peers is None else tuple(filter(None, options.peers.split(",")))
-    check_can_plot()
-    check_writable(options.out)
-    found = []
+    if options.out is not None:
+        check_can_plot()
+    with _exact_motions(options.out) as exact:
+        found, lines, files = _measured(options, chosen, peers, exact.folder)
+        answer(unless_json(options, found, "\n".join(lines)), files | exact.files(), folder=options.out)
+
+
+def _measured(
+    options: argparse.Namespace, chosen: dict[str, Any], peers: tuple[str, ...], exact: Path
+) -> tuple[list[dict[str, Any]], list[str], dict[Path, str | bytes]]:
+    """What a report has: its data, what is printed of it, and its files."""
+    found, lines, files = [], [], dict[Path, str | bytes]()
     for name in options.scenes:
         report = work_precision.work_precision(
             name,
@@ -130,16 +182,15 @@ def _curves(options: argparse.Namespace) -> None:
             limit=0.03 if options.quick else work_precision.LIMIT,
             cold=() if options.quick else tuple(STARTS),
             budget=BUDGET if options.budget is None else options.budget,
-            folder=options.out / "exact",
+            folder=exact,
             options=chosen,
             say=say,
         )
         content = report.to_dict()
         found.append(content)
-        document, rows = page.work_precision(content), to_csv(report)
-        written = write_document(options.out, content["name"], document, content, rows)
-        if not options.json:
+        if options.out is not None:
+            document, rows = page.work_precision(content), to_csv(report)
+            files |= (written := document_files(options.out, content["name"], document, content, rows))
             points = sum(len(each.points) for each in report.curves)
-            print(f"{written}: {len(report.curves)} integrators, {points} points")
-    if options.json:
-        print(json.dumps(found, indent=1))
+            lines.append(f"{[*written][-1]}: {len(report.curves)} integrators, {points} points")
+    return found, lines, files

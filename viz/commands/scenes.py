@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 
 from dynamics import forward_dynamics, inverse_dynamics, scenes
 
-from .arguments import Commands
+from .arguments import Commands, answer, unless_json
 
 
 def add(commands: Commands[argparse.ArgumentParser]) -> None:
@@ -32,11 +31,9 @@ def run(options: argparse.Namespace) -> None:
                 "forward_nodes": forward.nodes,
             }
         )
-    if options.json:
-        print(json.dumps(rows, indent=1))
-        return
-    for row in rows:
-        print(
-            f"{row['name']:16} {row['about']}\n{'':16} {row['coordinates']} coordinate(s), inverse dynamics "
-            f"{row['inverse_nodes']} nodes, forward dynamics {row['forward_nodes']} nodes"
-        )
+    lines = [
+        f"{row['name']:16} {row['about']}\n{'':16} {row['coordinates']} coordinate(s), inverse dynamics "
+        f"{row['inverse_nodes']} nodes, forward dynamics {row['forward_nodes']} nodes"
+        for row in rows
+    ]
+    answer(unless_json(options, rows, "\n".join(lines)))

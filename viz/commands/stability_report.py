@@ -3,27 +3,33 @@
 from __future__ import annotations
 
 import argparse
-import json
 import time
+from pathlib import Path
 
 from dynamics.experiments.stability import stability, stability_table
 
 from ..pages import stability as page
-from ..pages.write_document import check_writable, write_document
+from ..pages.document_files import document_files
 from ..plots.plot import check_can_plot
-from .arguments import say
+from .arguments import answer, say, unless_json
 
 NAME = "stability"  # of the files
 
 
-def run(options: argparse.Namespace) -> None:
-    """Write the page and print the table. Raises RuntimeError for a row beyond its bound without a known reason."""
-    check_can_plot()
-    check_writable(options.out)
+def run(options: argparse.Namespace) -> int:
+    """Write the page and print the table; 1 for a row beyond its bound without a known reason."""
+    if options.out is not None:
+        check_can_plot()
     begin = time.perf_counter()
     found = stability.run(options.quick, say)
     content = stability.to_dict(found, time.perf_counter() - begin, options.quick)
-    written = write_document(options.out, NAME, page.document(content), content, stability.to_csv(found))
-    print(json.dumps(content, indent=1) if options.json else f"{stability_table.text(found)}\n{written}")
-    if unexplained := [f"{each.case} by {each.method}" for each in found if not each.explained]:
-        raise RuntimeError(f"beyond its bound without a known reason: {', '.join(unexplained)}")
+    files: dict[Path, str | bytes] = {}
+    text = stability_table.text(found)
+    if options.out is not None:
+        files |= document_files(options.out, NAME, page.document(content), content, stability.to_csv(found))
+        text = f"{text}\n{[*files][-1]}"
+    answer(unless_json(options, content, text), files, folder=options.out)
+    unexplained = [f"{each.case} by {each.method}" for each in found if not each.explained]
+    if unexplained:
+        say(f"beyond its bound without a known reason: {', '.join(unexplained)}")
+    return 1 if unexplained else 0

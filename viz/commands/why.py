@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import argparse
-import json
 
 import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Names, cotangents
 from dynamics import forward_dynamics, inverse_dynamics
 
-from ..graph_drawing.dot import to_dot
-from .arguments import Commands, draw, may_draw_and_print, scene_of, takes_a_formulation, takes_a_scene, whole
+from .arguments import (
+    Commands,
+    answer_and_draw,
+    check_picture,
+    may_draw_and_print,
+    scene_of,
+    takes_a_formulation,
+    takes_a_scene,
+    unless_json,
+    whole,
+)
 from .point_arguments import REST, filled, point, point_text
 
 
@@ -30,38 +38,46 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
     parser.set_defaults(run=run)
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> None:
     """Print the paths and what they add up to; of two that are not connected, where the chain stops."""
+    check_picture(options)
     scene = scene_of(options)
     graph = forward_dynamics(scene) if options.forward else inverse_dynamics(scene, options.formulation)
     at = filled(graph, scene, options.at)
-    answer = cg.why(graph, options.output, options.input, at=at, k=options.k)
-    if not answer.count:
-        stops = cg.why_not(graph, options.output, options.input)
-        print(json.dumps({"depends": False} | stops.to_dict(), indent=1) if options.json else stops)
-        if options.svg:
-            here = set(graph.nodes)  # an input that nothing uses is none of the graph's nodes
-            marks = {
-                f"made from {stops.input}": stops.reached & here,
-                f"{stops.output} is made from it": stops.made_from & here,
-            }
-            draw(options, to_dot(graph, marked=marks, caption=f"{stops.output} does not depend on {stops.input}"))
-        return 0
-    assert answer.derivative is not None
-    all_listed = len(answer.paths) == answer.count
-    total = sum([path.value or 0.0 for path in answer.paths]) if all_listed else answer.derivative
+    found = cg.why(graph, options.output, options.input, at=at, k=options.k)
+    if not found.count:
+        _not_connected(options, graph)
+        return
+    assert found.derivative is not None
+    all_listed = len(found.paths) == found.count
+    total = sum([path.value or 0.0 for path in found.paths]) if all_listed else found.derivative
     derivative = _by_reverse_sweep(graph, options.output, options.input, at)
     gap = abs(total - derivative)
-    if options.json:
-        balance = {"sum_over_all_paths": total, "derivative_by_reverse_sweep": derivative, "difference": gap}
-        print(json.dumps({"depends": True, "at": at} | answer.to_dict() | balance, indent=1))
-    else:
-        what = "sum of path products" if all_listed else f"sum over all {answer.count} path products"
-        print(f"At {point_text(at)}:\n{answer}\n|{what} - derivative by a reverse sweep| = {gap:.2g}")
-    if options.svg:
-        caption = f"{answer.output} depends on {answer.input}: {len(answer.paths)} of {answer.count} paths"
-        draw(options, to_dot(graph, marked_edges=answer.edges, caption=caption))
-    return 0
+    balance = {"sum_over_all_paths": total, "derivative_by_reverse_sweep": derivative, "difference": gap}
+    what = "sum of path products" if all_listed else f"sum over all {found.count} path products"
+    text = f"At {point_text(at)}:\n{found}\n|{what} - derivative by a reverse sweep| = {gap:.2g}"
+    answer_and_draw(
+        options,
+        unless_json(options, {"depends": True, "at": at} | found.to_dict() | balance, text),
+        graph,
+        marked_edges=found.edges,
+        caption=f"{found.output} depends on {found.input}: {len(found.paths)} of {found.count} paths",
+    )
+
+
+def _not_connected(options: argparse.Namespace, graph: Graph) -> None:
+    stops = cg.why_not(graph, options.output, options.input)
+    here = set(graph.nodes)  # an input that nothing uses is none of the graph's nodes
+    answer_and_draw(
+        options,
+        unless_json(options, {"depends": False} | stops.to_dict(), stops),
+        graph,
+        marked={
+            f"made from {stops.input}": stops.reached & here,
+            f"{stops.output} is made from it": stops.made_from & here,
+        },
+        caption=f"{stops.output} does not depend on {stops.input}",
+    )
 
 
 def _by_reverse_sweep(graph: Graph, output: str, source: str, at: dict[str, float]) -> float:

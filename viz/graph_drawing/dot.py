@@ -40,8 +40,7 @@ def to_dot(
 
     Ids are stable: node i of `graph.nodes` is `n<i>`, a constant's copy `n<i>-<use>-<slot>`, output j `o<j>`, collapsed
     box k `c<k>`; an edge is `e<source>-<target>-<slot>`. The same graph gives the same text in every run.
-    Up to some 500 nodes this draws well. Above, collapse tags, or draw with `legend=False` and render with
-    `engine="sfdp"`, which draws no clusters.
+    Up to some 500 nodes this draws well. Above, collapse tags.
 
     Parameters
     ----------

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Callable
 from importlib.util import find_spec
 from typing import Protocol
@@ -59,7 +60,7 @@ def render_svg(dot_source: str | Drawing, *, engine: str = "dot", timeout: float
     dot_source : str or drawing
         DOT text, or an object whose `source` is DOT text.
     engine : str
-        One of `ENGINES`; "sfdp" suits graphs above some 500 nodes, and draws no clusters.
+        One of `ENGINES`; "sfdp" draws no clusters.
     timeout : float
         Time limit [s].
 
@@ -90,9 +91,7 @@ def render_svg(dot_source: str | Drawing, *, engine: str = "dot", timeout: float
         command = _command(engine)
         done = subprocess.run(command, input=source.encode(), capture_output=True, timeout=timeout, check=False)
     except subprocess.TimeoutExpired:
-        raise RenderError(
-            f"Graphviz engine {engine!r} took longer than {timeout:g} s; collapse tags, or use engine='sfdp'"
-        ) from None
+        raise RenderError(f"Graphviz engine {engine!r} took longer than {timeout:g} s; collapse tags") from None
     except OSError as error:
         raise RenderError(f"Graphviz does not start: {error}") from error
     svg = done.stdout.decode(errors="replace")
@@ -168,11 +167,20 @@ def _resvg() -> Callable[..., bytes]:
     return svg_to_bytes
 
 
-def check_can_draw() -> None:
-    """Raise what drawing a graph as SVG and PNG would for a missing package: before the work, and at no cost."""
+def check_can_draw(png: bool = True) -> None:
+    """Raise what drawing a graph as SVG, and PNG, would for a missing package: before the work, and at no cost."""
     to_dot(Graph([], {"one": constant(1.0)}))
     _command("dot")
-    _resvg()
+    if png:
+        _resvg()
+
+
+def tags_to_collapse(graph: Graph) -> list[str]:
+    """The tags to draw as one box where a graph has too many nodes for a picture: the rarest first, such as a link."""
+    if len(graph.nodes) <= LARGE:
+        return []
+    sizes = Counter([tag for node in graph.nodes for tag in node.tags])
+    return sorted(sizes, key=lambda tag: (sizes[tag], theme.natural_order(tag)))
 
 
 def graph_svg(graph: Graph) -> str:

@@ -37,6 +37,8 @@ class MujocoFreeFall:
 def free_fall(scene: Scene, dt: float = 1e-3) -> FreeFall:
     """The scene's motion by RK4 on the graph's forward dynamics."""
     trajectory = simulate(scene, scene.q, scene.qd, scene.t_end, "rk4", dt=dt)
+    if not trajectory.stats.success:
+        raise RuntimeError(f"the fall of {scene.name} is not whole: it {trajectory.stats.message}")
     return FreeFall(scene, trajectory, require_mechanism(scene, "a fall").joint_positions(trajectory.q))
 
 

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib import import_module
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -24,6 +25,7 @@ from ...scenes import Scene
 
 Load = Callable[[], Scene]  # makes the model anew in the worker; lambdas do not travel
 CHUNK = 2e-3  # s, at least, of runs that are timed together
+GRACE = 1.0  # s for a process that has left its pipe to end
 _ONE_CORE = {
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
@@ -55,7 +57,7 @@ class Worker:
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
         self._process = context.Process(target=_serve, args=(theirs, load, peer), daemon=True)
-        with _single_core():
+        with _single_core(), _interrupts_held():
             self._process.start()
         theirs.close()
 
@@ -91,6 +93,8 @@ class Worker:
             return self._ended()
 
     def _ended(self) -> Refused:
+        self._process.join(GRACE)
+        self._process.kill()  # it answers no more, and may have hung in ending
         self._process.join()
         return Refused(f"its process ended with status {self._process.exitcode}")
 
@@ -113,7 +117,7 @@ def _serve(pipe: Connection, load: Load, name: str) -> None:
     """The process's side: (task, mode) is prepared when it is new, and timed when it is not."""
     with suppress(AttributeError, OSError):
         os.setsid()  # so that a compiler ends with it
-    with suppress(KeyboardInterrupt, EOFError, BrokenPipeError):
+    with suppress(EOFError, BrokenPipeError):
         kind = PEERS[name]
         with suppress(Exception):  # loading a package is no part of making a contender; what is wrong shows again there
             import_module(kind.package)
@@ -158,6 +162,20 @@ def _timed(contender: Contender, repetitions: int) -> float:
         return (time.perf_counter() - start) / (repetitions * contender.evaluations)
     finally:
         gc.enable()
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Processes started within do not hear Ctrl-C: who started them does, once this is over, and ends them."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # which would let signals through again if it were started within
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager

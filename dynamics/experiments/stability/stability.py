@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from ...reference.flint_numbers import flint
 from ..machine import load, machine
 from ..text_table import csv_text
 from . import case_runs, energy_drift, huge_angles, single_evaluations
@@ -58,6 +59,7 @@ def run(quick: bool = False, say: Callable[[str], None] = lambda line: None) -> 
 
 def results(quick: bool = False) -> Iterator[CaseResult]:
     """All results, as they are measured."""
+    flint()  # minutes before it is used
     yield from case_runs.results(QUICK if quick else None)
     yield from energy_drift.results(energy_drift.QUICK if quick else energy_drift.STEPS)
     yield from single_evaluations.results(single_evaluations.QUICK if quick else single_evaluations.LINKS)

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from cgraph.util.atomic_write import atomic_write
+from cgraph.util.atomic_write import atomic_write, check_writable, write_files
 
 
 def test_write_makes_the_file_with_text_or_bytes(tmp_path: Path) -> None:
@@ -62,3 +62,34 @@ def test_write_says_that_a_folder_is_read_only(monkeypatch: pytest.MonkeyPatch, 
     monkeypatch.setattr(Path, "write_bytes", refused)  # the superuser may write anywhere, so no real folder refuses
     with pytest.raises(PermissionError, match=r"cannot write .*a: Permission denied"):
         atomic_write(tmp_path / "a", "x")
+
+
+@pytest.mark.parametrize("bad", ["folder", "missing/c", "full"])
+def test_several_files_are_written_all_or_none(bad: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "b").write_text("old")
+    original = Path.write_bytes
+
+    def full(self: Path, data: bytes) -> int:
+        if data == b"third":
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return original(self, data)
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    third = b"third" if bad == "full" else b"3"
+    with pytest.raises(OSError, match=f"cannot write .*{bad}"):
+        write_files({tmp_path / "a": "first", tmp_path / "b": "new", tmp_path / bad: third})
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["b", "folder"]
+    assert (tmp_path / "b").read_text() == "old"
+
+
+@pytest.mark.parametrize(("place", "said"), [("folder", "that is a folder"), ("missing/c", "does not exist")])
+def test_a_place_is_tried_without_a_trace(place: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "b").write_text("old")
+    check_writable(tmp_path / "b")
+    check_writable(tmp_path / "new")
+    with pytest.raises(OSError, match=said):
+        check_writable(tmp_path / place)
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["b", "folder"]
+    assert (tmp_path / "b").read_text() == "old"

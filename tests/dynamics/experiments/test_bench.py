@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from functools import partial
 
 import numpy as np
@@ -26,6 +25,7 @@ from viz import cli
 ROUNDING = 1e-10  # of a loop: the motion is that much larger than the last bit of the state it is taken from
 SCALAR = 1e-12  # relative: one coordinate, a few operations
 DENSE = 1e-10  # relative: a solve of six rows, well conditioned
+PATIENT = 1e3  # s: a budget that a loaded machine does not exceed; a test has a limit of its own
 
 
 def tree() -> dyn.Mechanism:
@@ -166,7 +166,7 @@ def test_the_dense_solve_finds_what_numpy_finds():
 def test_a_worker_answers_and_is_timed():
     worker = Worker(partial(load, "planar 3"), "ours")
     try:
-        answer = worker.prepare("forward", "call", budget=60.0)
+        answer = worker.prepare("forward", "call", budget=PATIENT)
         assert isinstance(answer, Prepared)
         assert answer.values.shape == (3,)
         assert worker.turn("forward", "call") > 0.0
@@ -178,9 +178,7 @@ def test_a_worker_answers_and_is_timed():
 def test_a_worker_that_is_late_is_ended_and_not_asked_for_what_contains_the_same():
     late: dict[str, str] = {}
     pool, skipped = WorkerPool(partial(load, "planar 3"), ["ours"], 1e-3, late), {}
-    begin = time.perf_counter()
     assert pool.prepared("forward", "call", skipped) == {}
-    assert time.perf_counter() - begin < 30.0
     assert skipped == late == {"ours": "not ready within 0.001 s"}
     assert not pool.workers["ours"].alive
     assert WorkerPool(partial(load, "planar 3"), ["ours"], 60.0, late).prepared("rk4", "call", again := {}) == {}
@@ -190,13 +188,13 @@ def test_a_worker_that_is_late_is_ended_and_not_asked_for_what_contains_the_same
 @pytest.mark.parametrize("gone", [False, True])  # the pipe breaks at the answer, or already at the question
 def test_a_worker_that_dies_is_told(gone):
     worker = Worker(partial(load, "planar 3"), "ours")
-    assert isinstance(worker.prepare("forward", "call", budget=60.0), Prepared)
+    assert isinstance(worker.prepare("forward", "call", budget=PATIENT), Prepared)
     worker._process.kill()
     if gone:
         worker._process.join()
     with pytest.raises(RuntimeError, match="its process ended with status -"):
         worker.turn("forward", "call")
-    assert isinstance(worker.prepare("inverse", "call", budget=60.0), Refused)
+    assert isinstance(worker.prepare("inverse", "call", budget=PATIENT), Refused)
     worker.end()
 
 
@@ -277,7 +275,7 @@ def test_numbers_have_their_digits_and_no_exponent(value, count, said):
 def test_the_bench_sets_ours_beside_its_peers(capsys):
     pytest.importorskip("mujoco")
     command = ["bench", "planar 3", "--tasks", "forward", "--modes", "call,batch", "--peers", "mujoco,ours-numpy"]
-    assert cli.main([*command, "--quick", "--json"]) == 0
+    assert cli.main([*command, "--quick", "--budget", str(PATIENT), "--json"]) == 0
     call, batch = json.loads(capsys.readouterr().out)["rows"]
     assert (call["scene"], call["task"], call["mode"], call["coordinates"]) == ("planar 3", "forward", "call", 3)
     assert set(call["cells"]) == {"ours", "mujoco"}

@@ -110,7 +110,7 @@ def _planar() -> dyn.Mechanism:
     ],
 )
 def test_a_wrong_choice_gets_one_line(capsys: pytest.CaptureFixture[str], arguments: list[str], said: str) -> None:
-    assert cli.main(["bench", *arguments]) == 1
+    assert cli.main(["bench", *arguments]) == 2
     assert said in capsys.readouterr().err
 
 

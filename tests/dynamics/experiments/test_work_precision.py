@@ -380,11 +380,11 @@ def test_mistakes(arguments: dict[str, Any], said: str) -> None:
 
 def test_cold_starts_run_in_processes_of_their_own(tmp_path: Path) -> None:
     pytest.importorskip("llvmlite")
-    (found,) = cold_starts("spring_mass", {}, ["ours"], turns=2)
+    (found,) = cold_starts("spring_mass", {}, ["ours"], turns=2, budget=1e3)
     assert (found.turns, found.status) == (2, "")
     assert 0.0 < found.seconds <= found.median
     (late,) = cold_starts("spring_mass", {}, ["ours"], turns=2, budget=0.01)
     assert (late.turns, late.status) == (0, "not ready within 0.01 s")
     assert math.isnan(late.seconds)
-    (wrong,) = cold_starts("nothing", {}, ["ours"], turns=2)
+    (wrong,) = cold_starts("nothing", {}, ["ours"], turns=2, budget=1e3)
     assert "there is no scene 'nothing'" in wrong.status

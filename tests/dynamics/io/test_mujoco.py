@@ -1,11 +1,13 @@
 """Planar arms against MuJoCo, quantity by quantity, then motion."""
 
+import warnings
+
 import numpy as np
-from pytest import approx, fixture, mark
+from pytest import approx, fixture, mark, warns
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.io.mujoco_twin import MujocoTwin, to_mjcf
+from dynamics.io.mujoco_twin import MujocoTwin, mujoco, to_mjcf
 from dynamics.multibody.planar_arm import planar_links
 from tests.dynamics.models import Array, at, error, random_arm, states
 
@@ -111,3 +113,15 @@ def test_small_masses_are_written_as_they_are_and_only_zeros_are_replaced() -> N
     assert 'mass="3e-15"' in text
     assert 'diaginertia="2e-15 2e-15 ' in text
     assert "2e-15 0" not in text
+
+
+def test_a_warning_while_mujoco_runs_is_python_s_and_leaves_no_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    twin = MujocoTwin(dyn.planar_arm([1.0], [1.0]))
+    with warns(UserWarning, match="^MuJoCo: Nan, Inf or huge value in QVEL at DOF 0"):
+        twin.trajectory(np.zeros(1), np.full(1, np.nan), 1)
+    assert not [*tmp_path.iterdir()]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # an exception that left MuJoCo's callback would abort the process
+        twin.trajectory(np.zeros(1), np.full(1, np.nan), 1)
+    assert mujoco().get_mju_user_warning() is not None

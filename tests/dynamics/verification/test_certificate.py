@@ -233,4 +233,4 @@ def test_the_command_fails_with_the_residual(tmp_path, capsys: pytest.CaptureFix
     assert cli.main(["certify", str(model), "--ignore", "--states", "3"]) == 1
     printed = capsys.readouterr()
     assert "(they agree without friction loss)" in printed.out
-    assert printed.err.endswith("error: model: 1 residual(s) exceed their bound: inverse dynamics = MuJoCo's\n")
+    assert printed.err.endswith("cgraph: model: 1 residual(s) exceed their bound: inverse dynamics = MuJoCo's\n")

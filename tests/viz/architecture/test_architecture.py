@@ -137,7 +137,7 @@ def test_the_command_prints_and_draws(
     monkeypatch.setattr("viz.commands.architecture.architecture", lambda package: library)
     assert cli.main(["architecture", "--json"]) == (0 if library.sound else 1)
     assert json.loads(capsys.readouterr().out) == library.to_dict()
-    assert cli.main(["architecture", "--out", "a.jpg"]) == 1
+    assert cli.main(["architecture", "--out", "a.jpg"]) == 2
     assert "--out must end in .svg, .png or .dot, got a.jpg" in capsys.readouterr().err
 
 

@@ -117,7 +117,7 @@ def test_the_command_tells_sizes(tmp_path, capsys):
 
 
 def test_the_command_refuses_what_is_no_page(tmp_path, capsys):
-    assert cli.main(["inspect", "spring_mass", "--out", str(tmp_path / "page.png")]) == 1
+    assert cli.main(["inspect", "spring_mass", "--out", str(tmp_path / "page.png")]) == 2
     assert capsys.readouterr().err.startswith("cgraph: error: --out must end in .html")
     assert list(tmp_path.iterdir()) == []
 

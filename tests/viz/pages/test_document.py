@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from viz.pages.document import Document, Paragraph, Picture, Section, Table, to_html, to_markdown
-from viz.pages.write_document import check_writable, write_document
+from viz.pages.document_files import check_folder, document_files
 
 
 def test_markdown_has_what_the_page_has() -> None:
@@ -26,9 +26,9 @@ def test_markdown_has_what_the_page_has() -> None:
 
 def test_files_of_a_document_are_called_by_its_name(tmp_path: Path) -> None:
     document = Document("Title", [Picture("curve", "<svg/>", "a curve")])
-    page = write_document(tmp_path / "new", "an arm <3>", document, {"a": 1}, kind="kind")
-    assert page == tmp_path / "new" / "an_arm_3-kind.html"
-    assert {each.name: each.read_text(encoding="utf-8") for each in page.parent.iterdir()} == {
+    files = document_files(tmp_path, "an arm <3>", document, {"a": 1}, kind="kind")
+    assert [*files][-1] == tmp_path / "an_arm_3-kind.html"
+    assert {path.name: text for path, text in files.items()} == {
         "an_arm_3-kind.html": to_html(document),
         "an_arm_3-kind.md": to_markdown(document, "an_arm_3-kind-"),
         "an_arm_3-kind.json": '{\n "a": 1\n}',
@@ -37,6 +37,6 @@ def test_files_of_a_document_are_called_by_its_name(tmp_path: Path) -> None:
 
 
 def test_trying_a_folder_leaves_nothing(tmp_path: Path) -> None:
-    check_writable(tmp_path / "a" / "b")
-    check_writable(tmp_path)
+    check_folder(tmp_path / "a" / "b")
+    check_folder(tmp_path)
     assert list(tmp_path.iterdir()) == []

@@ -36,5 +36,5 @@ def test_the_command_writes_the_page(tmp_path: Path, capsys: pytest.CaptureFixtu
     content = json.loads((tmp_path / "out" / "arm-pruning.json").read_text(encoding="utf-8"))
     assert [each["what"] for each in content["graphs"][0]["left_out"]][:2] == ["gravity", "joint of link 2"]
     assert "joint of link 2" in (tmp_path / "out" / "arm-pruning.md").read_text(encoding="utf-8")
-    assert main(["report", "chain", "--pruning", "--without", "wind", "--out", str(tmp_path)]) == 1
+    assert main(["report", "chain", "--pruning", "--without", "wind", "--out", str(tmp_path)]) == 2
     assert "effects are gravity" in capsys.readouterr().err

@@ -10,7 +10,7 @@ import pytest
 from viz import cli
 from viz.pages import stability
 from viz.pages.document import to_html
-from viz.pages.write_document import write_document
+from viz.pages.document_files import document_files
 
 pytest.importorskip("matplotlib")
 
@@ -94,23 +94,23 @@ def test_what_is_beyond_its_bound_is_drawn_in_the_color_of_what_is_wrong() -> No
 
 
 def test_files_are_written_and_the_page_needs_no_other(tmp_path: Path) -> None:
-    page = write_document(tmp_path / "new", "stability", stability.document(CONTENT), CONTENT, "section,case\n")
-    assert {each.name for each in page.parent.iterdir()} == {
+    files = document_files(tmp_path, "stability", stability.document(CONTENT), CONTENT, "section,case\n")
+    assert {each.name for each in files} == {
         "stability.html",
         "stability.md",
         "stability.csv",
         "stability.json",
         "stability-cases.svg",
     }
-    text = page.read_text(encoding="utf-8")
+    text = files[tmp_path / "stability.html"]
     assert not re.search(r'(src|href)="(?!data:|#)', text)
-    assert json.loads((tmp_path / "new" / "stability.json").read_text(encoding="utf-8")) == CONTENT
-    assert "![Figures over their bounds" in (tmp_path / "new" / "stability.md").read_text(encoding="utf-8")
+    assert json.loads(files[tmp_path / "stability.json"]) == CONTENT
+    assert "![Figures over their bounds" in files[tmp_path / "stability.md"]
 
 
 def test_a_report_of_nothing_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     for arguments in ([], ["chain", "--stability"]):
-        assert cli.main(["report", *arguments]) == 1
+        assert cli.main(["report", *arguments]) == 2
         assert "a report needs a scene, or --stability or --compare and none" in capsys.readouterr().err
 
 

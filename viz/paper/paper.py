@@ -6,13 +6,11 @@ import json
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
-
-from cgraph.extend import atomic_write
+from typing import Any, NamedTuple
 
 from ..graph_drawing.render import check_can_draw
 from ..pages import html
-from ..pages.write_document import check_writable
+from ..pages.document_files import check_folder
 from ..plots import plot
 from .embedding import embedding
 from .free_fall import figures4_and_5
@@ -25,16 +23,21 @@ QUICK_EVALUATIONS = 100  # of each formulation, for Figure 6
 QUICK_LINKS = (1, 2, 3, 6, 10, 20)  # of the chains of the last part
 
 
-def write_paper(folder: Path, say: Callable[[str], None], *, quick: bool = False) -> dict[str, Any]:
-    """Write every figure, table and the page into `folder`, made if it is missing; returns all figures as plain data.
+class Paper(NamedTuple):
+    """files: {path: content}, the page last.  data: all figures as plain data."""
+
+    files: dict[Path, str | bytes]
+    data: dict[str, Any]
+
+
+def paper(folder: Path, say: Callable[[str], None], *, quick: bool = False) -> Paper:
+    """Every figure, table and the page, as they go into `folder`.
 
     say: called with a line before and after each part.  quick: times of fewer evaluations, and shorter chains.
-    Files are written one by one, each whole or not at all.
     """
     check_can_draw()
     plot.check_can_plot()
-    check_writable(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    check_folder(folder)
     makers = {
         "Equation (3), read off the graphs term by term": equations,
         "Figure 1: by definition, with the Euler relation embedded": figure1,
@@ -47,19 +50,17 @@ def write_paper(folder: Path, say: Callable[[str], None], *, quick: bool = False
             partial(scaling_of_counts, QUICK_LINKS) if quick else scaling_of_counts
         ),
     }
-    parts = []
+    parts, files = [], dict[Path, str | bytes]()
     for number, (what, make) in enumerate(makers.items(), start=1):
         say(f"[{number}/{len(makers)}] {what} ...")
         part = make()
-        for name, content in part.files.items():
-            atomic_write(folder / name, content)
-        say(f"      {', '.join(part.files)}")
+        files |= {folder / name: content for name, content in part.files.items()}
+        say(f"[{number}/{len(makers)}] {', '.join(part.files)}: ready")
         parts.append(part)
     data = {part.name: part.data for part in parts}
-    atomic_write(folder / "figures.json", json.dumps(data, indent=1, allow_nan=False) + "\n")
-    atomic_write(folder / "index.html", _page(parts))
-    say(f"All of it on one page: {folder / 'index.html'}")
-    return data
+    files[folder / "figures.json"] = json.dumps(data, indent=1, allow_nan=False) + "\n"
+    files[folder / "index.html"] = _page(parts)
+    return Paper(files, data)
 
 
 def _page(parts: Sequence[Part]) -> str:

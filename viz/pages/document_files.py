@@ -10,12 +10,10 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
-from cgraph.extend import atomic_write
-
 from .document import Document, to_html, to_markdown
 
 
-def check_writable(folder: Path) -> None:
+def check_folder(folder: Path) -> None:
     """Write a file into the folder and leave nothing behind, the folder included: before the work of filling it.
 
     Raises OSError, with the folder in its message.
@@ -36,21 +34,18 @@ def check_writable(folder: Path) -> None:
                 path.rmdir()
 
 
-def write_document(
+def document_files(
     folder: Path, name: str, document: Document, data: Mapping[str, Any], rows: str | None = None, *, kind: str = ""
-) -> Path:
-    """Write the files of one document into a folder, created if it is missing; returns the path of the page.
+) -> dict[Path, str]:
+    """The files of one document in a folder, {path: text}, the page last.
 
-    Each is written whole or not at all. They are called by the name, with `_` for what a file's name should not have,
-    and `-kind` where there is a kind.
+    They are called by the name, with `_` for what a file's name should not have, and `-kind` where there is a kind.
     data: what the document was made of.  rows: as CSV; without them that file is left out.
     """
     stem = "-".join(filter(None, [re.sub(r"[^A-Za-z0-9.+-]+", "_", name).strip("_"), kind]))
-    folder.mkdir(parents=True, exist_ok=True)
-    for picture in document.pictures():
-        atomic_write(folder / f"{stem}-{picture.name}.svg", picture.svg)
-    atomic_write(folder / f"{stem}.json", json.dumps(data, indent=1))
+    files = {f"-{picture.name}.svg": picture.svg for picture in document.pictures()}
+    files[".json"] = json.dumps(data, indent=1)
     if rows is not None:
-        atomic_write(folder / f"{stem}.csv", rows)
-    atomic_write(folder / f"{stem}.md", to_markdown(document, f"{stem}-"))
-    return atomic_write(folder / f"{stem}.html", to_html(document))
+        files[".csv"] = rows
+    files |= {".md": to_markdown(document, f"{stem}-"), ".html": to_html(document)}
+    return {folder / f"{stem}{ending}": text for ending, text in files.items()}

@@ -1,0 +1,107 @@
+"""Signals: what Ctrl-C and SIGTERM do to a command while the library loads, while it works, and once it has its answer.
+
+A command answers whole or not at all. So the signal is no KeyboardInterrupt here, for which a simulation keeps the rows
+that it has: it is the end of the process, and nothing on the way takes it for an answer.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+ENDING = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
+PATIENCE = 1.0  # s in which a signal that comes again is one with the first: cleaning up is not to be cut
+
+
+class Stopped(SystemExit):
+    """The process is asked to end; its code is 128 and the signal's number."""
+
+
+class _Process:
+    """Where the process stands."""
+
+    loading = False  # nothing is begun, so there is nothing to clean up
+    settled = False  # the answer is complete: what comes now comes too late
+    number = 0  # of the signal that came
+    lost = False  # what it raised went nowhere
+    hook: Callable[[sys.UnraisableHookArgs], object] = sys.unraisablehook  # what is told of others that do
+    came = 0.0  # s
+
+
+def stopped() -> int:
+    """The number of the signal that came, 0 for none."""
+    return _Process.number
+
+
+def settled() -> None:
+    """The answer is complete and about to be written: from here on no signal cuts it. Raises Stopped if one came."""
+    if _Process.number:  # and was taken for an error by who called a library
+        raise Stopped(128 + _Process.number)
+    _Process.settled = True
+
+
+def ignore_late() -> None:
+    """The answer is out: what comes while Python ends, which sets handlers back, must not change the status."""
+    for number in _watch() if _Process.settled else ():
+        signal.signal(number, signal.SIG_IGN)
+
+
+def watch_loading() -> None:
+    """Until a command begins, a signal ends the process at once."""
+    _Process.loading = True
+    _watch()
+
+
+@contextmanager
+def stoppable() -> Iterator[None]:
+    """Within, a signal raises Stopped; what was the signals' before is so afterwards, but for a process of ours."""
+    before = {} if _Process.loading else _watch()
+    _Process.loading = _Process.settled = _Process.lost = False
+    _Process.number = 0
+    _Process.hook, sys.unraisablehook = sys.unraisablehook, _send_again
+    try:
+        yield
+    finally:
+        sys.unraisablehook = _Process.hook
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _watch() -> dict[signal.Signals, signal._HANDLER]:
+    """Handle the signals that are not ignored, as those of a background job are. The handlers that were there."""
+    if threading.current_thread() is not threading.main_thread():
+        return {}
+    before = {number: signal.getsignal(number) for number in ENDING}
+    watched = {number: handler for number, handler in before.items() if handler is not signal.SIG_IGN}
+    for number in watched:
+        signal.signal(number, _handle)
+    return watched
+
+
+def _send_again(lost: sys.UnraisableHookArgs) -> None:
+    """Of an exception that leaves a callback or a finalizer Python prints that it is ignored: ours must not be."""
+    if issubclass(lost.exc_type, Stopped):
+        _Process.lost = True
+        threading.Timer(0.01, os.kill, (os.getpid(), _Process.number)).start()
+    else:
+        _Process.hook(lost)
+
+
+def _handle(number: int, frame: FrameType | None) -> None:
+    now = time.monotonic()
+    again, _Process.lost = _Process.lost, False
+    if _Process.settled or (_Process.number and not again and now - _Process.came < PATIENCE):
+        return
+    if _Process.loading or (_Process.number and not again):
+        try:
+            os.write(2, f"cgraph: {ENDING[signal.Signals(number)]}\n".encode())
+        finally:
+            os._exit(128 + number)
+    _Process.number, _Process.came = number, now
+    raise Stopped(128 + number)
