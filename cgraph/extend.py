@@ -52,6 +52,7 @@ from .errors import install
 from .explain.names import Names
 from .program import Call, Factor, If, Map, Program, Record, Runner, Solve, Statement, Sum, While, runner
 from .simplify.builder import Builder, folded
+from .simplify.identities import rewritten, shortened
 from .simplify.polynomial import Polynomial, expand, format_polynomial
 from .util.atomic_write import atomic_write
 from .util.real_arrays import real_array, real_number
@@ -95,7 +96,9 @@ __all__ = [
     "real_array",
     "real_number",
     "register",
+    "rewritten",
     "runner",
+    "shortened",
     "solve_nodes",
     "tangents",
     "thread_count",
