@@ -56,6 +56,7 @@ from .explain.lint.cancellation import certain_digits
 from .explain.names import Names
 from .program import Call, Factor, If, Map, Program, Record, Runner, Solve, Statement, Sum, While, runner
 from .simplify.builder import Builder, folded
+from .simplify.identities import rewritten, shortened
 from .simplify.polynomial import Polynomial, expand, format_polynomial
 from .util.atomic_write import atomic_write, check_writable, write_files
 from .util.real_arrays import real_array, real_number
@@ -101,7 +102,9 @@ __all__ = [
     "real_array",
     "real_number",
     "register",
+    "rewritten",
     "runner",
+    "shortened",
     "solve_nodes",
     "tangents",
     "thread_count",

@@ -14,6 +14,7 @@ from ..systems.system import BodySystem, System
 from .bias_terms import BiasTerms, bias_terms, bias_terms_of_lagrangian
 from .formulations import ONE, ZERO
 from .inertia_rank import without_inertia
+from .shorter_form import shorter_form
 from .substitute import substitute
 
 
@@ -61,11 +62,13 @@ def mass_matrix(model: Model) -> Graph:
     >>> dyn.mass_matrix(arm).evaluate({"q0": 0.1, "qd0": 0.0})
     {'M_0_0': 4.0}
     """
-    system = as_system(model)
-    lower = hessian_nodes(system.lagrangian, system.qd)
-    n = system.n
-    outputs = {f"M_{i}_{j}": lower[max(i, j)][min(i, j)] for i in range(n) for j in range(n)}
-    return cg.simplify(system.graph(outputs, system.q, system.qd))
+
+    def derive(system: System) -> Graph:
+        lower, n = hessian_nodes(system.lagrangian, system.qd), system.n
+        outputs = {f"M_{i}_{j}": lower[max(i, j)][min(i, j)] for i in range(n) for j in range(n)}
+        return cg.simplify(system.graph(outputs, system.q, system.qd))
+
+    return shorter_form(as_system(model), derive)
 
 
 def bias(model: Model) -> Graph:
@@ -95,9 +98,12 @@ def bias(model: Model) -> Graph:
     >>> dyn.bias(arm).evaluate({"q0": 1.5707963267948966, "qd0": 3.0})
     {'bias0': 9.81}
     """
-    system = as_system(model)
-    outputs = {f"bias{i}": node for i, node in enumerate(bias_terms(system).bias(system, Builder()))}
-    return cg.simplify(system.graph(outputs, system.q, system.qd))
+
+    def derive(system: System) -> Graph:
+        outputs = {f"bias{i}": node for i, node in enumerate(bias_terms(system).bias(system, Builder()))}
+        return cg.simplify(system.graph(outputs, system.q, system.qd))
+
+    return shorter_form(as_system(model), derive)
 
 
 def gravity_force(model: Model) -> Graph:
@@ -127,10 +133,13 @@ def gravity_force(model: Model) -> Graph:
     %2 = mul 4.905 %1  # primal; link 1, potential
     output gravity0 = %2
     """
-    system = as_system(model)
-    derived = bias_terms_of_lagrangian(system).bias(system, Builder())
-    at_rest = substitute(derived, dict.fromkeys(system.qd, ZERO))
-    return cg.simplify(system.graph({f"gravity{i}": node for i, node in enumerate(at_rest)}, system.q, system.qd))
+
+    def derive(system: System) -> Graph:
+        derived = bias_terms_of_lagrangian(system).bias(system, Builder())
+        at_rest = substitute(derived, dict.fromkeys(system.qd, ZERO))
+        return cg.simplify(system.graph({f"gravity{i}": node for i, node in enumerate(at_rest)}, system.q, system.qd))
+
+    return shorter_form(as_system(model), derive)
 
 
 def momentum(model: Model) -> Graph:
@@ -158,9 +167,12 @@ def momentum(model: Model) -> Graph:
     >>> dyn.momentum(block).evaluate({"q0": 0.0, "qd0": 3.0, "m": 2.0})
     {'p0': 6.0}
     """
-    system = as_system(model)
-    bars = cotangents({system.lagrangian: ONE}, system.qd)
-    return cg.simplify(system.graph({f"p{i}": bar for i, bar in enumerate(bars)}, system.q, system.qd))
+
+    def derive(system: System) -> Graph:
+        bars = cotangents({system.lagrangian: ONE}, system.qd)
+        return cg.simplify(system.graph({f"p{i}": bar for i, bar in enumerate(bars)}, system.q, system.qd))
+
+    return shorter_form(as_system(model), derive)
 
 
 def energy(model: Model) -> Graph:
@@ -188,15 +200,18 @@ def energy(model: Model) -> Graph:
     >>> dyn.energy(spring).evaluate({"q0": 1.0, "qd0": 2.0})
     {'E': 4.0}
     """
-    system = as_system(model)
-    build = Builder()
-    bars = cotangents({system.lagrangian: ONE}, system.qd, build)
-    with building(build):
-        total: Node = ZERO
-        for p, qd in zip(bars, system.qd, strict=True):
-            total = total + p * qd
-        total = total - system.lagrangian
-    return cg.simplify(system.graph({"E": total}, system.q, system.qd))
+
+    def derive(system: System) -> Graph:
+        build = Builder()
+        bars = cotangents({system.lagrangian: ONE}, system.qd, build)
+        with building(build):
+            total: Node = ZERO
+            for p, qd in zip(bars, system.qd, strict=True):
+                total = total + p * qd
+            total = total - system.lagrangian
+        return cg.simplify(system.graph({"E": total}, system.q, system.qd))
+
+    return shorter_form(as_system(model), derive)
 
 
 SOLUTIONS = ("auto", "recursive", "dense")
@@ -245,21 +260,7 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
     """
     if method not in SOLUTIONS:
         raise ValueError(f"method must be one of {', '.join(SOLUTIONS)}, got {method!r}")
-    system = as_system(model)
-    methods = [method] if method != "auto" else ["recursive", "dense"] if system.n <= DENSE_UP_TO else ["recursive"]
-    terms = bias_terms(system)
-    graphs: list[Graph] = []
-    for each in methods:  # the dense matrix may lose in its entries what elimination keeps
-        try:
-            graphs.append(_accelerations(system, terms, each, check))
-        except SingularError as error:
-            failure = error
-    if not graphs:
-        raise SingularMassMatrixError(_without_inertia(system, failure)) from None
-    smallest = min(graphs, key=lambda graph: len(graph.nodes))
-    if not isinstance(system, BodySystem):  # bodies have masses; of another Lagrangian nobody knows
-        _require_inertia(system, smallest)
-    return smallest
+    return shorter_form(as_system(model), lambda system: accelerations(system, method, check))
 
 
 def _without_inertia(system: System, error: SingularError) -> str:
@@ -315,7 +316,28 @@ def raise_if_singular(model: Model, info: ArrayLike) -> None:
         )
 
 
-def _accelerations(system: System, terms: BiasTerms, method: str, check: bool) -> Graph:
+def accelerations(system: System, method: str = "auto", check: bool = False) -> Graph:
+    """Forward dynamics from the Lagrangian as it is written, by one of `SOLUTIONS`.
+
+    Raises SingularMassMatrixError, see `forward_dynamics`.
+    """
+    methods = [method] if method != "auto" else ["recursive", "dense"] if system.n <= DENSE_UP_TO else ["recursive"]
+    terms = bias_terms(system)
+    graphs: list[Graph] = []
+    for each in methods:  # the dense matrix may lose in its entries what elimination keeps
+        try:
+            graphs.append(_solved(system, terms, each, check))
+        except SingularError as error:
+            failure = error
+    if not graphs:
+        raise SingularMassMatrixError(_without_inertia(system, failure)) from None
+    smallest = min(graphs, key=lambda graph: len(graph.nodes))
+    if not isinstance(system, BodySystem):  # bodies have masses; of another Lagrangian nobody knows
+        _require_inertia(system, smallest)
+    return smallest
+
+
+def _solved(system: System, terms: BiasTerms, method: str, check: bool) -> Graph:
     """M qdd = tau + forces - D qd - bias, solved by one method."""
     build = Builder()
     with building(build):

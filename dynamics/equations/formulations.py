@@ -14,6 +14,7 @@ from cgraph.extend import TANGENT, Builder, building, cotangents, tangents
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
+from .shorter_form import shorter_form
 from .substitute import substitute
 
 EULER = "euler"  # tag of the embedded relations q = qd dt + q_old and qd = qdd dt + qd_old
@@ -132,6 +133,14 @@ def inverse_dynamics(model: Model, formulation: str = "chain_rule", *, simplify:
     ['chain_rule', 'chain_rule_literal', 'euler_embedded', 'kinetic_only', 'kinetic_only_exact']
     """
     system = as_system(model)
+    if simplify and formulation == "chain_rule":
+        return shorter_form(system, lambda form: cg.simplify(torques(form, formulation)))
+    graph = torques(system, formulation)
+    return cg.simplify(graph) if simplify else graph
+
+
+def torques(system: System, formulation: str = "chain_rule") -> Graph:
+    """Inverse dynamics from the Lagrangian as it is written, not simplified. Raises as `inverse_dynamics`."""
     terms = _lagrange_terms(system, formulation)
     applied = _forces(system, terms)
     build = Builder()
@@ -142,8 +151,7 @@ def inverse_dynamics(model: Model, formulation: str = "chain_rule", *, simplify:
             with cg.tag("damping"):
                 tau = tau + system.damping[i] * terms.qd[i]
             outputs[f"tau{i}"] = tau - applied[i]
-    graph = system.graph(outputs, terms.inputs)
-    return cg.simplify(graph) if simplify else graph
+    return system.graph(outputs, terms.inputs)
 
 
 def momentum_rate(

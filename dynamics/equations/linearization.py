@@ -12,9 +12,10 @@ from cgraph.extend import Builder, building, cotangents, folded, hessian_nodes, 
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
-from .equations_of_motion import DENSE_UP_TO, forward_dynamics
+from .equations_of_motion import DENSE_UP_TO, accelerations
 from .evaluate_at import Array, evaluate_at
-from .formulations import ONE, ZERO, inverse_dynamics
+from .formulations import ONE, ZERO, torques
+from .shorter_form import shorter_form
 
 
 def state_space(model: Model) -> Graph:
@@ -50,11 +51,14 @@ def state_space(model: Model) -> Graph:
     >>> {name: value for name, value in dyn.state_space(spring).evaluate(state).items() if name[2] == "1"}
     {'A_1_0': -9.0, 'A_1_1': -0.5, 'B_1_0': 1.0}
     """
-    system = as_system(model)
+    return shorter_form(as_system(model), _state_space)
+
+
+def _state_space(system: System) -> Graph:
     n, build = system.n, Builder()
-    accelerations = forward_dynamics(system)
+    qdd = accelerations(system)
     (lagrangian,) = folded([system.lagrangian], Builder())
-    partials = _torque_jacobian(system, list(accelerations.outputs.values()), build)
+    partials = _torque_jacobian(system, list(qdd.outputs.values()), build)
     # M dqdd = dtau - (d tau / dx) dx, one column for each of the 2n numbers of x and the n of tau.
     with building(build):
         sides = [[-row[j] for row in partials] for j in range(2 * n)]
@@ -68,17 +72,17 @@ def state_space(model: Model) -> Graph:
     rows += [[column[i] for column in columns] for i in range(n)]
     outputs = {f"A_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[: 2 * n])}
     outputs |= {f"B_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[2 * n :])}
-    return cg.simplify(Graph(accelerations.inputs, outputs))
+    return cg.simplify(Graph(qdd.inputs, outputs))
 
 
 def _torque_jacobian(system: System, accelerations: list[Node], build: Builder) -> list[list[Node]]:
     """Rows of d tau / d(q, qd), (n, 2n), at these accelerations."""
-    torques = inverse_dynamics(system)
+    tau = cg.simplify(torques(system))
     state = [*system.q, *system.qd]
-    rows = [cotangents({torque: ONE}, state, build) for torque in torques.outputs.values()]
+    rows = [cotangents({torque: ONE}, state, build) for torque in tau.outputs.values()]
     entries = {str(k): entry for k, entry in enumerate([entry for row in rows for entry in row])}
     at = dict(zip([str(node.name) for node in system.qdd], accelerations, strict=True))
-    flat = list(cg.specialize(Graph([*torques.inputs, *system.tau], entries), at).outputs.values())
+    flat = list(cg.specialize(Graph([*tau.inputs, *system.tau], entries), at).outputs.values())
     return [flat[i * len(state) : (i + 1) * len(state)] for i in range(system.n)]
 
 

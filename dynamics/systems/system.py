@@ -7,12 +7,13 @@ import math
 import numbers
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import copy
 from functools import cached_property
 from typing import Any, NoReturn
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import real_number, topological
+from cgraph.extend import real_number, shortened, topological
 
 TIME = "t"
 BiasForce = tuple[Node, Node]  # a velocity, and the force that works on it
@@ -197,6 +198,22 @@ class System:
                 potential.append(node if sign < 0 else -node)
         return _sum(kinetic), _sum(potential)
 
+    @cached_property
+    def shortened(self) -> System | None:
+        """The system with K, P and the forces written anew by identities such as sin^2 + cos^2 = 1; None where as long.
+
+        P, whose sums could lose digits that a product of differences keeps, only where it then depends on less.
+        """
+        kinetic, potential, forces = (shortened(part) for part in ([self.kinetic], [self.potential], self.forces))
+        if [*kinetic, *potential, *forces] == [self.kinetic, self.potential, *self.forces]:
+            return None
+        other = copy(self)
+        for name in ("lagrangian", "_split", "kinetic", "potential"):
+            other.__dict__.pop(name, None)
+        other.__dict__ |= {"extra_inputs": self.extra_inputs, "shortened": None}
+        other.partial_lagrangians, other.forces = (kinetic[0], -potential[0]), tuple(forces)
+        return other
+
     def bias_forces(self) -> Sequence[BiasForce] | None:
         """The bias as forces f at velocities z, nodes of L: sum of f dz/dqd = d/dt dL/dqd - dL/dq at qdd = 0.
 
@@ -224,6 +241,11 @@ class BodySystem(System):
     ) -> None:
         super().__init__(*of_system, **more)
         self._bias_forces = bias_forces
+
+    @property
+    def shortened(self) -> None:
+        """None: bodies write their energy as short as it is."""
+        return None
 
     def bias_forces(self) -> Sequence[BiasForce]:
         """The pairs (velocity, force) that the bodies state; see `System.bias_forces`."""

@@ -1,0 +1,28 @@
+"""Shorter form: a graph derived from a Lagrangian as written, or as written anew by identities if that is smaller."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import cgraph as cg
+from cgraph import Graph
+from cgraph.extend import shortened
+
+from ..systems.system import System
+
+LONGEST = 200  # nodes of a graph whose outputs are written anew
+
+
+def shorter_form(system: System, derive: Callable[[System], Graph]) -> Graph:
+    """derive(system), or of the system's energies written anew by identities, or its outputs so, if that is smaller."""
+    graph = derive(system)
+    if system.shortened is not None:
+        graph = min(graph, derive(system.shortened), key=_size)
+    if system.bias_forces() is not None or len(graph.nodes) > LONGEST:
+        return graph
+    outputs = dict(zip(graph.outputs, shortened(list(graph.outputs.values())), strict=True))
+    return min(graph, cg.simplify(Graph(graph.inputs, outputs)), key=_size)
+
+
+def _size(graph: Graph) -> int:
+    return len(graph.nodes)
