@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 import cgraph as cg
+from cgraph import Graph
 from cgraph.extend import Array
-
-from ..integrators import Problem
 
 Indices = np.ndarray[Any, np.dtype[np.intp]]
 
@@ -33,21 +33,30 @@ class StepBlock(NamedTuple):
         inside: Array = np.where((s == 1.0)[:, None], self.x[rows], self.x_old[rows] + total)
         return inside
 
-    def until(self, t: float, x: Array) -> StepBlock:
-        """The steps up to an instant inside one, which becomes the last."""
-        keep = int(np.searchsorted(self.t, t)) + 1
-        dense = None if self.dense is None else self.dense[:keep].copy()
-        t_old, h, x_old = (array[:keep].copy() for array in (self.t_old, self.h, self.x_old))
-        cut = StepBlock(self.t[:keep].copy(), self.x[:keep].copy(), t_old, h, x_old, dense)
-        cut.t[-1], cut.x[-1] = t, x
+    def slopes_at(self, rows: Indices, s: Array) -> Array:
+        """Derivatives of the states by the share, (k, m)."""
+        assert self.dense is not None
+        total = np.zeros((len(rows), self.x.shape[1]))
+        for k in reversed(range(self.dense.shape[1])):
+            total = total * s[:, None] + (k + 1.0) * self.dense[rows, k]
+        return total
+
+    def part(self, which: slice) -> StepBlock:
+        """Some of the steps."""
+        return StepBlock(*[None if array is None else array[which] for array in self])
+
+    def ending(self, t: float, x: Array) -> StepBlock:
+        """The steps, the last of which ends at an instant inside it."""
+        cut = self._replace(t=self.t.copy(), x=self.x.copy())
+        cut.t[-1:], cut.x[-1:] = t, x
         return cut
 
 
-def with_hermite(block: StepBlock, problem: Problem) -> StepBlock:
+def with_hermite(block: StepBlock, rate: Graph, parameters: Sequence[float] = ()) -> StepBlock:
     """The steps with dense output where the method has none: the cubic through states and rates at both ends."""
-    f = cg.compile(problem.rate)
-    first = f.batch(np.concatenate([block.x_old.T, block.t_old[None]])).T
-    last = f.batch(np.concatenate([block.x.T, block.t[None]])).T
+    f, p = cg.compile(rate), np.repeat(np.array(parameters)[:, None], len(block.t), axis=1)
+    first = f.batch(np.concatenate([block.x_old.T, block.t_old[None], p])).T
+    last = f.batch(np.concatenate([block.x.T, block.t[None], p])).T
     h, change = block.h[:, None], block.x - block.x_old
     dense = np.stack([h * first, 3 * change - h * (2 * first + last), h * (first + last) - 2 * change], axis=1)
     return block._replace(dense=dense)

@@ -1,46 +1,261 @@
-"""Event location: the instants inside steps at which the sign of a quantity turns, by looks and halvings."""
+"""Event location: the instants inside steps at which a quantity reaches zero, from the cells of the steps."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from cgraph.extend import Array
 
-from .dense_output import StepBlock
-from .event import Event
+from .dense_output import Indices
+from .event_cells import Cells, Flags, WatchedSteps, event_cells
 
-LOOKS = 15  # instants inside a step at which events are looked at
-HALVINGS = 60  # of a step: to the last bit of where in it
+PARTS, AT_ONCE = 32, 8192  # into which a cell is divided again and again, and those of all cells together
+WHILE = 2.0**-20  # of a step
+BITS = 56.0  # of where in a cell
+PROBES = 0.5 ** np.arange(50, 0, -5)  # of a cell: how far from a zero the sign beside it is asked for
 
 
-def crossings(
-    values: Callable[[Array, Array], Array], events: Sequence[Event], block: StepBlock
-) -> list[tuple[int, float, Array]]:
-    """(number of the event, time, state) of each crossing, in order of time. values(t, x): (events, k).
+class Crossing(NamedTuple):
+    """Where an event happens: its number, the step, the share of the step."""
 
-    Where the sign differs between two of the ends and `LOOKS` instants inside of a step, halving finds the place.
+    row: int
+    s: float
+    number: int
+    rising: bool  # where it touches zero and turns back: that it comes from below
+
+
+@dataclass
+class Sides:
+    """On which side of zero each quantity was, between one part of a run and the next.
+
+    side: its last sign, (events,), 0 before it has one.  slope: at the end of the last step; NaN at a start.
+    left: of a run that starts on zero, the sign with which the quantity leaves, 0 if unknown; NaN elsewhere.
+    waiting: whether it is zero at the last instant, and what it does there is for the next step to tell.
     """
-    steps = len(block.t)
-    shares = np.linspace(0.0, 1.0, LOOKS + 2)
-    looks = [values(block.t_old, block.x_old)]
-    for share in shares[1:-1]:
-        inside = block.states_at(np.arange(steps), np.full(steps, share))
-        looks.append(values(block.t_old + share * block.h, inside))
-    looks.append(values(block.t, block.x))
-    signs = np.stack(looks)  # (instants, events, steps)
-    result: list[tuple[int, float, Array]] = []
-    for number, event in enumerate(events):
-        a, b = signs[:-1, number], signs[1:, number]
-        rises, falls = (a < 0.0) & (b >= 0.0), (a > 0.0) & (b <= 0.0)
-        part, rows = np.nonzero(rises & (event.direction >= 0) | falls & (event.direction <= 0))
-        low, high = shares[part], shares[part + 1]
-        start, t_old, h = np.sign(a[part, rows]), block.t_old[rows], block.h[rows]
-        for _ in range(HALVINGS if len(rows) else 0):
-            middle = 0.5 * (low + high)
-            same = np.sign(values(t_old + middle * h, block.states_at(rows, middle))[number]) == start
-            low, high = np.where(same, middle, low), np.where(same, high, middle)
-        times = np.where(high == 1.0, block.t[rows], t_old + high * h)
-        result += list(zip([number] * len(rows), times.tolist(), block.states_at(rows, high), strict=True))
-    return sorted(result, key=lambda crossing: crossing[1])
+
+    side: Array
+    slope: Array
+    left: Array
+    waiting: Flags
+
+
+def start_sides(steps: WatchedSteps, reached: Sequence[tuple[int, float]] = ()) -> Sides:
+    """At the start of these steps. reached: (number, side it came from) of events that have just changed the state.
+
+    A quantity that starts at zero, to rounding, has not passed through it, nor has one that has just been acted on.
+    """
+    row, s = np.zeros(1, dtype=np.intp), np.zeros(1)
+    count = len(steps.program.events)
+    sides = Sides(np.zeros(count), *np.full((2, count), np.nan), np.zeros(count, dtype=bool))
+    if not reached:
+        on_zero = np.abs(steps.values(row, s)[:, 0]) <= steps.rounding(row, s)[:, 0]
+        sides.left[on_zero] = 0.0
+        return sides
+    slopes = steps.slopes(row, s)[:, 0]
+    for number, side in reached:
+        sides.left[number] = np.sign(slopes[number]) or side
+    return sides
+
+
+def crossings(steps: WatchedSteps, sides: Sides) -> tuple[list[Crossing], Flags]:
+    """What happens in these steps, in order, and for which (events, steps) more may have happened; moves `sides` on.
+
+    A quantity crosses zero where its sign turns, and touches it where an extremum is zero to the rounding of its
+    evaluation. One that stays zero does so from where it arrives.
+    """
+    cells, beyond = event_cells(steps)
+    _join(cells, sides)
+    result: list[Crossing] = []
+    for number, event in enumerate(steps.program.events):
+        chain = _Chain(steps, cells, number, sides)
+        for rising, touching, row, s in [*chain.at_signs(sides), *chain.at_extrema()]:
+            if event.direction == 0 if touching else event.counts(rising):
+                result.append(Crossing(row, s, number, rising))
+    return sorted(result), beyond
+
+
+def _join(cells: Cells, sides: Sides) -> None:
+    """Where steps meet, a quantity has the slope that it had at the end of the step before: a turn counts once."""
+    first = np.flatnonzero(np.diff(cells.rows)) + 1
+    last = cells.slope_b[:, -1].copy()
+    cells.slope_a[:, first] = cells.slope_b[:, first - 1]
+    known = ~np.isnan(sides.slope)
+    cells.slope_a[known, 0] = sides.slope[known]
+    sides.slope = last
+
+
+Table = Callable[[Indices, Array], Array]
+_Found = tuple[bool, bool, int, float]  # rising, touching, row, share
+
+
+class _Chain:
+    """One quantity along the cells: looks 0 .. k at their ends, and the signs beside them."""
+
+    def __init__(self, steps: WatchedSteps, cells: Cells, number: int, sides: Sides) -> None:
+        self.steps, self.cells, self.number = steps, cells, number
+        self.rows = np.concatenate([cells.rows[:1], cells.rows])  # of the looks
+        self.shares = np.concatenate([cells.a[:1], cells.b])
+        g = np.concatenate([cells.g_a[number, :1], cells.g_b[number]])
+        self.exact = g == 0.0
+        signs = np.nan_to_num(np.sign(g))
+        self.zero = self._zeros(g, np.concatenate([sides.side[[number]], signs]))
+        left = sides.left[number]
+        if not np.isnan(left):
+            self.zero[0] = True
+        looks = np.flatnonzero(self.zero)
+        before, after = signs.copy(), signs.copy()
+        before[looks], after[looks] = self._beside(looks, -1), self._beside(looks, 1)
+        if left:  # NaN without a start on zero
+            after[0] = after[0] if np.isnan(left) else left
+        sides.left[number] = np.nan
+        # [side before look 0, start of cell 0, its end, start of cell 1, ..]: even entries stand before their look
+        self.signs = np.empty(2 * len(cells.a) + 1)
+        self.signs[0] = sides.side[number]
+        self.signs[1::2], self.signs[2::2] = after[:-1], before[1:]
+
+    def _zeros(self, g: Array, signs: Array) -> Flags:
+        """Which looks are at zero: exactly, or, beside a change of sign or such a look, to rounding.
+
+        signs: from the side before the first look on.
+        """
+        zero, tested = g == 0.0, np.zeros(len(g), dtype=bool)
+        beside = np.flatnonzero(signs[:-1] * signs[1:] < 0.0)
+        while True:
+            looks = np.unique(np.concatenate([beside - 1, beside]))
+            looks = looks[(looks >= 0) & (looks < len(g))]
+            looks = looks[~tested[looks]]
+            if not len(looks):
+                return zero
+            tested[looks] = True
+            rounding = self.steps.rounding(self.rows[looks], self.shares[looks])[self.number]
+            near = looks[np.abs(g[looks]) <= rounding]
+            zero[near] = True
+            beside = np.concatenate([near, near + 1])
+
+    def _beside(self, looks: Indices, direction: int) -> Array:
+        """The signs of the quantity just before or after looks at which it is zero; 0 where it stays zero."""
+        cells, number = self.cells, self.number
+        if not len(looks):
+            return np.zeros(0)
+        cell = np.clip(looks - (direction < 0), 0, len(cells.a) - 1)
+        start, end = (cells.a, cells.b)[::direction]
+        s = np.clip(start[cell, None] + (end - start)[cell, None] * PROBES, 0.0, 1.0)
+        rows = np.repeat(cells.rows[cell], len(PROBES))
+        g, rounding = (
+            table(rows, s.ravel())[number].reshape(s.shape) for table in (self.steps.values, self.steps.rounding)
+        )
+        sure = np.abs(g) > rounding
+        nearest = np.take_along_axis(g, np.argmax(sure, axis=1)[:, None], axis=1)[:, 0]
+        outside = looks == (0 if direction < 0 else len(cells.a))
+        beside: Array = np.where(sure.any(axis=1) & ~outside, np.sign(nearest), 0.0)
+        return beside
+
+    def at_signs(self, sides: Sides) -> list[_Found]:
+        """Where signs turn, and where a quantity that was zero at a look goes back to where it came from."""
+        signs, number = self.signs, self.number
+        known = np.flatnonzero(signs)
+        if not len(known):
+            return []
+        i, j, last = known[:-1], known[1:], int(known[-1])
+        at_zero = (i % 2 == 0) & self.zero[i // 2]
+        pairs = np.flatnonzero((signs[i] != signs[j]) | (j > i + 1) | at_zero)
+        arrivals, touches = [], []
+        for start, end in zip(i[pairs].tolist(), j[pairs].tolist(), strict=True):
+            looks = slice((start + 1) // 2, (end + 1) // 2)  # between
+            if signs[start] != signs[end] or self._stays(looks):
+                arrivals.append(start)
+            else:
+                touches.append((start, end))
+        sides.side[number] = signs[last]
+        if self._stays(slice((last + 1) // 2, None)):
+            arrivals.append(last)
+            sides.side[number] = 0.0
+        sides.waiting[number] = self.zero[-1] and sides.side[number] != 0.0
+        return [*self._touches(touches), *self._arrivals(np.array(arrivals, dtype=np.intp))]
+
+    def _stays(self, looks: slice) -> bool:
+        """Whether the quantity is exactly zero for a while, not only at looks that lie side by side at a touch."""
+        zeros = np.flatnonzero(self.exact[looks]) + looks.start
+        place = self.rows[zeros] + self.shares[zeros]
+        return len(zeros) > 1 and bool(place[-1] - place[0] > WHILE)
+
+    def _touches(self, pairs: Sequence[tuple[int, int]]) -> Iterator[_Found]:
+        """Where the quantity is zero between two entries of the same sign: where its slope turns, or at a look."""
+        for start, end in pairs:
+            sign, first, last = self.signs[start], start // 2, end // 2
+            look = (first + last + start % 2) // 2
+            row, s = self.rows[[look]], self.shares[[look]]
+            low, high = self.shares[[first]], self.shares[[last]]
+            if start % 2 and self.rows[first + 1] == self.rows[last]:
+                low = self.cells.a[[first]]
+                slopes = [self._along(self.steps.slopes, row, at[:, None])[0, 0] * sign for at in (low, high)]
+                if slopes[0] < 0.0 < slopes[1]:
+                    s = _turn(lambda s: self._along(self.steps.slopes, row, s) * sign < 0.0, low, high)[0]
+            yield bool(sign < 0.0), True, int(row[0]), float(s[0])
+
+    def _arrivals(self, entries: Indices) -> list[_Found]:
+        """Where the quantity first is not of the sign that it has at these entries."""
+        signs, looks = self.signs[entries], entries // 2
+        rows, s = self.rows[looks], self.shares[looks]
+        inside = entries % 2 == 1
+        cells, rows[inside] = self.cells.take(looks[inside]), self.cells.rows[looks[inside]]
+        s[inside] = self._turn(cells.rows, cells.a, cells.b, signs[inside])
+        return [(sign < 0.0, False, row, share) for sign, row, share in zip(signs, rows.tolist(), s.tolist(), strict=True)]
+
+    def _turn(self, rows: Indices, low: Array, high: Array, signs: Array) -> Array:
+        """The first shares, to the last bit, at which the quantity has not these signs, which it has at `low`."""
+        return _turn(lambda s: self._along(self.steps.values, rows, s) * signs[:, None] > 0.0, low, high)[1]
+
+    def _along(self, table: Table, rows: Indices, s: Array) -> Array:
+        """The quantity, or its slope, at several shares s (k, parts) of rows (k,)."""
+        return table(np.repeat(rows, s.shape[1]), s.ravel())[self.number].reshape(s.shape)
+
+    def at_extrema(self) -> Iterator[_Found]:
+        """Where it comes near zero and turns back within a cell: two crossings, a touch, or nothing."""
+        cells, number = self.cells, self.number
+        sign = self.signs[1::2]
+        ends = (sign != 0.0) & (sign == self.signs[2::2]) & ~self.zero[:-1] & ~self.zero[1:]
+        dips = (cells.slope_a[number] * sign < 0.0) & (cells.slope_b[number] * sign >= 0.0)
+        dips &= ends & ~cells.clear()[number]
+        if not dips.any():
+            return
+        few = cells.take(dips)
+        rows, signs = few.rows, sign[dips]
+        pair = _turn(lambda s: self._along(self.steps.slopes, rows, s) * signs[:, None] < 0.0, few.a, few.b)
+        at = np.stack(pair)
+        g = np.stack([self.steps.values(rows, s)[number] for s in pair])
+        nearest = np.argmin(g * signs, axis=0)[None]
+        s, value = (np.take_along_axis(table, nearest, axis=0)[0] for table in (at, g))
+        touching = np.abs(value) <= self.steps.rounding(rows, s)[number]
+        through = (value * signs < 0.0) & ~touching
+        out = self._turn(rows, few.a, s, signs)
+        back = self._turn(rows, s, few.b, -signs)
+        for k in np.flatnonzero(touching | through).tolist():
+            below, row = bool(signs[k] < 0.0), int(rows[k])
+            if touching[k]:
+                yield below, True, row, float(s[k])
+            else:
+                yield below, False, row, float(out[k])
+                yield not below, False, row, float(back[k])
+
+
+def _turn(same: Callable[[Array], Flags], low: Array, high: Array) -> tuple[Array, Array]:
+    """The shares (k,) between which `same` first turns, one apart in the last bit. It is true at `low`, false at `high`.
+
+    same: of shares (k, parts) whether it is true.
+    """
+    if not len(low):
+        return low, high
+    parts = max(2, min(PARTS, AT_ONCE // len(low)))
+    for _ in range(math.ceil(BITS / math.log2(parts))):
+        s = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, parts + 1)
+        s[:, -1] = high
+        turned = ~same(s[:, 1:-1])
+        first = np.where(turned.any(axis=1), np.argmax(turned, axis=1) + 1, parts)[:, None]
+        low, high = (np.take_along_axis(s, at, axis=1)[:, 0] for at in (first - 1, first))
+    return low, high

@@ -47,9 +47,9 @@ def scipy_solver(problem: Problem, name: str, backend: str) -> ScipySolver:
 class ScipyIntegration(Integration):
     """A run by one of SciPy's solvers. Its dense output gives rows at the times of t_eval besides its steps."""
 
-    def __init__(self, solver: ScipySolver, options: RunOptions) -> None:
+    def __init__(self, solver: ScipySolver, options: RunOptions, *, watched: bool = False) -> None:
         super().__init__(solver.components)
-        self.solver, self.options = solver, options
+        self.solver, self.options, self.watched = solver, options, watched
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""

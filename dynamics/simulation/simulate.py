@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from ..integrators import METHODS, Problem, derive, total_energy
 from ..systems.model import Model
 from .event import Event, as_events
 from .event_log import EventLog
+from .event_program import event_program
 from .free_memory import room
 from .progress_bar import Progress
 from .recorder import Recorder
@@ -27,6 +28,7 @@ from .scipy_solvers import ScipyIntegration, scipy_solver
 from .step_program import compile_steps, step_program
 from .stepping import Integration, integration
 from .trajectory import SimulationWarning, Stats, Trajectory
+from .watched import WatchedIntegration
 
 BLOCK = 4096  # rows whose energy is taken at once
 
@@ -124,14 +126,15 @@ def simulate(
 
     # Derive the equations, xdot = f(x, t), the energy and the events as graphs
     problem = derive(model, start.bound)
-    energy, watch = total_energy(problem), EventLog(problem, watched)
+    energy, log = total_energy(problem), EventLog(event_program(problem, watched)) if watched else None
 
     # Write the steps of the method over these graphs, and compile them
-    run = _compiled(problem, options, watched=bool(watched))
+    leg = _compiled(problem, options, watched=bool(watched))
 
     # Integrate, noting rows and events
+    run = WatchedIntegration(leg, options, log) if log else leg(options)
     recorder = Recorder(start.x, options.times)
-    seconds = _integrate(run, start.x, recorder, watch, options)
+    seconds = _integrate(run, start.x, recorder, options)
 
     # Put the result together
     times, states = recorder.table()
@@ -140,33 +143,32 @@ def simulate(
     for text in stats.warnings:
         warnings.warn(text, SimulationWarning, stacklevel=2)
     energies = _energies(energy, times, states)
-    return Trajectory(times, states[:, :half], states[:, half:], energies, stats, watch.crossings(half))
+    return Trajectory(times, states[:, :half], states[:, half:], energies, stats, log.crossings(half) if log else {})
 
 
-def _compiled(problem: Problem, options: RunOptions, *, watched: bool) -> Integration:
-    """The run before its first step, compiled. Watched, it needs its dense output, or every equal step."""
-    solver = options.scipy_solver
-    if solver is not None:
-        return ScipyIntegration(scipy_solver(problem, solver, options.backend), options)
+def _compiled(problem: Problem, options: RunOptions, *, watched: bool) -> Callable[[RunOptions], Integration]:
+    """What makes a run, compiled, from options. Watched, it needs its dense output, or every equal step."""
+    name = options.scipy_solver
+    if name is not None:
+        solver = scipy_solver(problem, name, options.backend)
+        return lambda options: ScipyIntegration(solver, options, watched=watched)
     method = METHODS[options.method]
     program = step_program(problem, method, dense=method.adaptive and (watched or options.times is not None))
-    return integration(compile_steps(program, options.backend), options, every_step=watched)
+    compiled = compile_steps(program, options.backend)
+    return lambda options: integration(compiled, options, every_step=watched)
 
 
-def _integrate(run: Integration, x: Array, recorder: Recorder, watch: EventLog, options: RunOptions) -> float:
+def _integrate(run: Integration, x: Array, recorder: Recorder, options: RunOptions) -> float:
     """Run from x to t_end, an event, a failure, the end of the memory, or Ctrl-C. The seconds that it took."""
     most = room() / TABLES
     begin = time.perf_counter()
     try:
         with np.errstate(all="ignore"), Progress("simulate", options.t_end, options.progress) as report:
             for block in run.blocks(x):
-                recorder.add(watch(block))
+                recorder.add(block)
                 if recorder.size > most:
                     last = f"{recorder.last:.6g} s"
                     run.status = f"stopped at t = {last}: the rows fill the memory; t_eval records fewer"
-                    break
-                if watch.status:
-                    run.status = watch.status
                     break
                 report(float(block.t[-1]))
     except KeyboardInterrupt:
