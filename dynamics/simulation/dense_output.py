@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 import cgraph as cg
-from cgraph import Graph
+from cgraph import Compiled, Graph
 from cgraph.extend import Array
+
+KEPT = 16  # compiled rates that stay for another block
 
 Indices = np.ndarray[Any, np.dtype[np.intp]]
 
@@ -20,7 +23,7 @@ class StepBlock(NamedTuple):
     t: Array  # (T,) ends of the steps
     x: Array  # (T, m)
     t_old: Array  # (T,)
-    h: Array  # (T,)
+    h: Array  # (T,), negative in a run back in time
     x_old: Array  # (T, m)
     dense: Array | None  # (T, degree, m)
 
@@ -43,7 +46,9 @@ class StepBlock(NamedTuple):
 
     def part(self, which: slice) -> StepBlock:
         """Some of the steps."""
-        return StepBlock(*[None if array is None else array[which] for array in self])
+        dense = None if self.dense is None else self.dense[which]
+        t, x, t_old, h, x_old = (array[which] for array in (self.t, self.x, self.t_old, self.h, self.x_old))
+        return StepBlock(t, x, t_old, h, x_old, dense)
 
     def ending(self, t: float, x: Array) -> StepBlock:
         """The steps, the last of which ends at an instant inside it."""
@@ -52,9 +57,15 @@ class StepBlock(NamedTuple):
         return cut
 
 
+@lru_cache(KEPT)
+def _compiled(rate: Graph) -> Compiled:
+    """The rate, for states at many times; of the last few, the one compiled before."""
+    return cg.compile(rate)
+
+
 def with_hermite(block: StepBlock, rate: Graph, parameters: Sequence[float] = ()) -> StepBlock:
     """The steps with dense output where the method has none: the cubic through states and rates at both ends."""
-    f, p = cg.compile(rate), np.repeat(np.array(parameters)[:, None], len(block.t), axis=1)
+    f, p = _compiled(rate), np.tile(np.reshape(parameters, (-1, 1)), len(block.t))
     first = f.batch(np.concatenate([block.x_old.T, block.t_old[None], p])).T
     last = f.batch(np.concatenate([block.x.T, block.t[None], p])).T
     h, change = block.h[:, None], block.x - block.x_old

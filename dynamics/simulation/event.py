@@ -20,7 +20,7 @@ class Event:
     before it comes back. A jump by a reset is no crossing.
 
     Value and slope of the quantity are looked at sixteen times in each step, and as often more as it takes until the
-    cubics between looks agree with them, at most 4096 times. Where that is too few, `Stats.warnings` says so: limit the
+    cubics between looks agree with them, at most 1024 times. Where that is too few, `Stats.warnings` says so: limit the
     steps by `max_step` or `dt`.
 
     Parameters
@@ -35,10 +35,10 @@ class Event:
     terminal : bool
         Whether the run ends there.
     reset : callable, optional
-        The state from which the run goes on, reset(q, qd, t) or reset(q, qd, t, p) -> (q, qd) as nodes or numbers; of an
-        OdeSystem reset(x, t) or reset(x, t, p) -> x. Both states are rows of the trajectory, at the same instant. Of
-        resets at the same instant the next takes what the one before left. Where resets follow one another in no time,
-        as the bounces of a ball that comes to rest do, the run stops and says so.
+        The state from which the run goes on, reset(q, qd, t) or reset(q, qd, t, p) -> (q, qd) as nodes or numbers; of
+        an OdeSystem reset(x, t) or reset(x, t, p) -> x. Both states are rows of the trajectory, at the same instant; at
+        a time of `t_eval`, the one before is. Of resets at one instant the next takes what the one before left. Where
+        they follow one another in no time, as the bounces of a ball that comes to rest do, the run stops and says so.
 
     Raises
     ------

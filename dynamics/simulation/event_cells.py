@@ -68,7 +68,8 @@ class Cells(NamedTuple):
 
     def take(self, which: Flags | Indices) -> Cells:
         """Some of them."""
-        return Cells(*[array[..., which] for array in self])
+        columns: list[Any] = [array[..., which] for array in self]
+        return Cells(*columns)
 
     def beside(self, extreme: Callable[[Array, Array], Array], values: Array) -> Array:
         """Of a cell's value and those of its neighbors the smallest or largest."""
@@ -124,7 +125,7 @@ def event_cells(steps: WatchedSteps) -> tuple[Cells, Flags]:
     while True:
         width = cells.b - cells.a
         unresolved = ~cells.resolved() & (width > SHORTEST)
-        split = unresolved.any(axis=0) | cells.beside(np.minimum, width) * COARSER < width
+        split = unresolved.any(axis=0) | (cells.beside(np.minimum, width) * COARSER < width)
         size = np.bincount(cells.rows, minlength=count) + np.bincount(cells.rows[split], minlength=count)
         late = (size > MOST)[cells.rows]
         for event, cell in zip(*np.nonzero(unresolved & late), strict=True):
@@ -133,7 +134,8 @@ def event_cells(steps: WatchedSteps) -> tuple[Cells, Flags]:
         if not split.any():
             return cells, beyond
         parts = cells.take(~split), _split(steps, cells.take(split), bounded=True)
-        cells = Cells(*[np.concatenate(arrays, axis=-1) for arrays in zip(*parts, strict=True)])
+        columns: list[Any] = [np.concatenate(pair, axis=-1) for pair in zip(*parts, strict=True)]
+        cells = Cells(*columns)
         cells = cells.take(np.lexsort((cells.a, cells.rows)))
 
 
@@ -161,8 +163,13 @@ def _split(steps: WatchedSteps, cells: Cells, *, bounded: bool) -> Cells:
     g_off = g - 0.5 * (cells.g_a + cells.g_b) - 0.125 * width * (cells.slope_a - cells.slope_b)
     slope_off = width * (slope + 0.25 * (cells.slope_a + cells.slope_b)) - 1.5 * (cells.g_b - cells.g_a)
     off = np.maximum(np.abs(g_off), 0.25 * np.abs(slope_off))
-    miss = np.maximum(4.0 * cells.beside(np.maximum, cells.beside(np.maximum, off)), cells.miss) / DECAY  # a cubic that is far off may agree by chance
+    miss = (
+        np.maximum(4.0 * cells.beside(np.maximum, cells.beside(np.maximum, off)), cells.miss) / DECAY
+    )  # a cubic that is far off may agree by chance
     rounding = steps.rounding(cells.rows, middle) if bounded else cells.rounding
     left = cells._replace(b=middle, g_b=g, slope_b=slope, miss=miss, rounding=rounding)
     right = cells._replace(a=middle, g_a=g, slope_a=slope, miss=miss, rounding=rounding)
-    return Cells(*[np.stack(pair, axis=-1).reshape(*pair[0].shape[:-1], -1) for pair in zip(left, right, strict=True)])
+    columns: list[Any] = [
+        np.stack(pair, axis=-1).reshape(*pair[0].shape[:-1], -1) for pair in zip(left, right, strict=True)
+    ]
+    return Cells(*columns)

@@ -51,12 +51,14 @@ def start_sides(steps: WatchedSteps, reached: Sequence[tuple[int, float]] = ()) 
     """
     row, s = np.zeros(1, dtype=np.intp), np.zeros(1)
     count = len(steps.program.events)
-    sides = Sides(np.zeros(count), *np.full((2, count), np.nan), np.zeros(count, dtype=bool))
+    unknown = np.full(count, np.nan)
+    sides = Sides(np.zeros(count), unknown, unknown.copy(), np.zeros(count, dtype=bool))
     if not reached:
         on_zero = np.abs(steps.values(row, s)[:, 0]) <= steps.rounding(row, s)[:, 0]
         sides.left[on_zero] = 0.0
         return sides
-    slopes = steps.slopes(row, s)[:, 0]
+    block = steps.block
+    slopes = block.h[0] * steps.program.motion(float(block.t_old[0]), block.x_old[0], steps.parameters)
     for number, side in reached:
         sides.left[number] = np.sign(slopes[number]) or side
     return sides
@@ -123,7 +125,8 @@ class _Chain:
 
         signs: from the side before the first look on.
         """
-        zero, tested = g == 0.0, np.zeros(len(g), dtype=bool)
+        zero: Flags = g == 0.0
+        tested = np.zeros(len(g), dtype=bool)
         beside = np.flatnonzero(signs[:-1] * signs[1:] < 0.0)
         while True:
             looks = np.unique(np.concatenate([beside - 1, beside]))
@@ -176,7 +179,8 @@ class _Chain:
             arrivals.append(last)
             sides.side[number] = 0.0
         sides.waiting[number] = self.zero[-1] and sides.side[number] != 0.0
-        return [*self._touches(touches), *self._arrivals(np.array(arrivals, dtype=np.intp))]
+        found = [self._touch(start, end) for start, end in touches]
+        return found + self._arrivals(np.array(arrivals, dtype=np.intp))
 
     def _stays(self, looks: slice) -> bool:
         """Whether the quantity is exactly zero for a while, not only at looks that lie side by side at a touch."""
@@ -184,19 +188,21 @@ class _Chain:
         place = self.rows[zeros] + self.shares[zeros]
         return len(zeros) > 1 and bool(place[-1] - place[0] > WHILE)
 
-    def _touches(self, pairs: Sequence[tuple[int, int]]) -> Iterator[_Found]:
-        """Where the quantity is zero between two entries of the same sign: where its slope turns, or at a look."""
-        for start, end in pairs:
-            sign, first, last = self.signs[start], start // 2, end // 2
-            look = (first + last + start % 2) // 2
-            row, s = self.rows[[look]], self.shares[[look]]
-            low, high = self.shares[[first]], self.shares[[last]]
-            if start % 2 and self.rows[first + 1] == self.rows[last]:
-                low = self.cells.a[[first]]
-                slopes = [self._along(self.steps.slopes, row, at[:, None])[0, 0] * sign for at in (low, high)]
-                if slopes[0] < 0.0 < slopes[1]:
-                    s = _turn(lambda s: self._along(self.steps.slopes, row, s) * sign < 0.0, low, high)[0]
-            yield bool(sign < 0.0), True, int(row[0]), float(s[0])
+    def _touch(self, start: int, end: int) -> _Found:
+        """Where its slope turns between two entries, or, where that is not seen, at a look between them."""
+        sign, first, last = float(self.signs[start]), start // 2, end // 2
+        look = (first + last + start % 2) // 2
+        row, s = self.rows[[look]], self.shares[[look]]
+        if start % 2 and self.rows[first + 1] == self.rows[last]:
+            low, high = self.cells.a[[first]], self.shares[[last]]
+
+            def toward(s: Array) -> Flags:
+                toward: Flags = self._along(self.steps.slopes, row, s) * sign < 0.0
+                return toward
+
+            if toward(low[:, None])[0, 0] and not toward(high[:, None])[0, 0]:
+                s = _turn(toward, low, high)[0]
+        return sign < 0.0, True, int(row[0]), float(s[0])
 
     def _arrivals(self, entries: Indices) -> list[_Found]:
         """Where the quantity first is not of the sign that it has at these entries."""
@@ -205,7 +211,9 @@ class _Chain:
         inside = entries % 2 == 1
         cells, rows[inside] = self.cells.take(looks[inside]), self.cells.rows[looks[inside]]
         s[inside] = self._turn(cells.rows, cells.a, cells.b, signs[inside])
-        return [(sign < 0.0, False, row, share) for sign, row, share in zip(signs, rows.tolist(), s.tolist(), strict=True)]
+        return [
+            (sign < 0.0, False, row, share) for sign, row, share in zip(signs, rows.tolist(), s.tolist(), strict=True)
+        ]
 
     def _turn(self, rows: Indices, low: Array, high: Array, signs: Array) -> Array:
         """The first shares, to the last bit, at which the quantity has not these signs, which it has at `low`."""
@@ -213,7 +221,8 @@ class _Chain:
 
     def _along(self, table: Table, rows: Indices, s: Array) -> Array:
         """The quantity, or its slope, at several shares s (k, parts) of rows (k,)."""
-        return table(np.repeat(rows, s.shape[1]), s.ravel())[self.number].reshape(s.shape)
+        along: Array = table(np.repeat(rows, s.shape[1]), s.ravel())[self.number].reshape(s.shape)
+        return along
 
     def at_extrema(self) -> Iterator[_Found]:
         """Where it comes near zero and turns back within a cell: two crossings, a touch, or nothing."""
@@ -245,7 +254,7 @@ class _Chain:
 
 
 def _turn(same: Callable[[Array], Flags], low: Array, high: Array) -> tuple[Array, Array]:
-    """The shares (k,) between which `same` first turns, one apart in the last bit. It is true at `low`, false at `high`.
+    """The shares (k,) between which `same`, true at `low` and false at `high`, first turns: one apart in the last bit.
 
     same: of shares (k, parts) whether it is true.
     """

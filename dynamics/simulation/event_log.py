@@ -23,13 +23,14 @@ AT_ONCE = 100  # resets at one instant: more than the impacts of a few bodies th
 class EventLog:
     """The events of a run, (number, t, x) each in `happened`.
 
-    status: why one has ended the run, else empty.  restart: (t, x) to go on from after a reset, else None.
+    ended: the event that has ended the run, in words.  status: why a reset has stopped it.
+    restart: (t, x) to go on from after a reset, else None.
     warnings: a sentence for each event of which some may have been missed.
     """
 
     def __init__(self, program: EventProgram, parameters: Sequence[float] = ()) -> None:
         self.program, self.parameters = program, list(parameters)
-        self.status = ""
+        self.ended = self.status = ""
         self.restart: tuple[float, Array] | None = None
         self.warnings: list[str] = []
         self.happened: list[tuple[int, float, Array]] = []
@@ -83,11 +84,15 @@ class EventLog:
         self.happened += [(number, t, x) for number, _ in events]
         for number, _ in events:
             if self.program.events[number].terminal:
-                self.status = f"event {self.program.events[number].name!r} at t = {t:.6g} s"
+                self.ended = f"event {self.program.events[number].name!r} at t = {t:.6g} s"
                 return True
-        self._reached = [(number, -1.0 if rising else 1.0) for number, rising in events if number in self.program.resets]
-        if not self._reached:
+        before = dict(self._reached)
+        reached = [(number, -1.0 if rising else 1.0) for number, rising in events if number in self.program.resets]
+        if not reached:
             return False
+        self._reached = reached
+        slopes = self.program.motion(t, x, self.parameters)
+        lost = any(number in before and slopes[number] * side > 0.0 for number, side in reached)  # in rounding
         for number, _ in self._reached:
             x = self.program.reset(number, t, x, self.parameters)
         name = self.program.events[self._reached[-1][0]].name
@@ -95,7 +100,7 @@ class EventLog:
             component = self.program.components[bad[0]]
             self.status = f"stopped at t = {t:.6g} s: {component} is {x[bad[0]]} after the reset of event {name!r}"
         self._resets = self._resets + 1 if abs(t - self._reset_at) <= RESOLUTION * abs(t) else 0
-        if self._resets > AT_ONCE:
+        if self._resets > AT_ONCE or lost:
             self.status = (
                 f"stopped at t = {t:.6g} s: event {name!r} resets the state again and again at this instant; "
                 "a contact that stays needs other equations from here on"
@@ -110,9 +115,10 @@ class EventLog:
                 continue
             self._missed.add(number)
             t = part.t_old[np.argmax(beyond[number])]
+            name = self.program.events[number].name
             self.warnings.append(
-                f"event {self.program.events[number].name!r} may have been missed, first after t = {t:.6g} s: its quantity "
-                f"turns too often for {MOST} looks in a step; shorter steps (max_step or dt) find all"
+                f"event {name!r} may have been missed, first after t = {t:.6g} s: its quantity turns too often for "
+                f"{MOST} looks in a step; shorter steps (max_step or dt) find all"
             )
 
     def crossings(self, half: int) -> dict[str, Crossings]:

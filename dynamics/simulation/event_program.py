@@ -1,9 +1,10 @@
-"""EventProgram: the events of a run as graphs, their values, slopes, rounding and resets, as plain data that pickles."""
+"""EventProgram: the events of a run as graphs, their values, slopes, rounding and resets, as data that pickles."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -47,6 +48,11 @@ class EventProgram:
     resets: dict[int, Graph]
     rate: Graph
 
+    def motion(self, t: float, x: Array, p: Sequence[float]) -> Array:
+        """The derivatives of g by the time along the motion, (events,)."""
+        at, state = np.array([t]), x[None]
+        return self.slope(at, state, p, _table(self.rate, [*x, t, *p], 1).T, np.ones(1))[:, 0]
+
     def reset(self, number: int, t: float, x: Array, p: Sequence[float]) -> Array:
         """The state (m,) after event `number`."""
         return _table(self.resets[number], [*x[None].T, np.array([t]), *p], 1)[:, 0]
@@ -69,17 +75,17 @@ def event_program(problem: Problem, events: Sequence[Event]) -> EventProgram:
     nodes = {f"g{k}": quantity(problem, f"event {event.name!r}", event.value) for k, event in enumerate(events)}
     values = problem.bind(problem.states, Graph(quantity_inputs(problem), nodes))
     moving = values.inputs[: problem.size + 1]
-    resets = {k: _reset(problem, event) for k, event in enumerate(events) if event.reset is not None}
+    resets = {k: _reset(problem, event.name, event.reset) for k, event in enumerate(events) if event.reset is not None}
     watched = tuple([WatchedEvent(event.name, event.direction, event.terminal) for event in events])
     slopes = cg.simplify(cg.jvp(values, list(moving)))
     return EventProgram(watched, problem.components, values, slopes, _errors(values, moving), resets, problem.rate)
 
 
-def _reset(problem: Problem, event: Event) -> Graph:
+def _reset(problem: Problem, name: str, function: Callable[..., Any]) -> Graph:
     """The state after an event: inputs the states, t, parameters; outputs the states."""
-    what = f"the reset of event {event.name!r}"
+    what = f"the reset of event {name!r}"
     inputs = quantity_inputs(problem)
-    changed = call_user_function(what, event.reset, *state_arguments(problem))
+    changed = call_user_function(what, function, *state_arguments(problem))
     parts = [changed] if problem.system is None else sequence(f"{what} must be (q, qd),", changed)
     halves = [sequence(f"{what} must be" + (" a pair of" if len(parts) == 2 else ""), part) for part in parts]
     n = problem.size // (1 if problem.system is None else 2)

@@ -31,10 +31,13 @@ class Part:
     evaluations: Counts
     dt: Array  # (k,) s, the largest steps
     status: list[str]  # empty while all is well
+    errors: Array  # (2, k): of equal steps, the largest estimated error and that of the last row; NaN where unknown
+    warnings: list[list[str]]  # what speaks against a trajectory
 
 
 def empty(chunk: Chunk, rows: Array) -> Part:
     """The part of a chunk before its first step."""
     k = len(chunk.x)
     steps, rejected, evaluations = np.zeros((3, k), dtype=np.int64)
-    return Part(chunk.first, rows, steps, rejected, evaluations, np.zeros(k), [""] * k)
+    counts, errors = (steps, rejected, evaluations), np.full((2, k), np.nan)
+    return Part(chunk.first, rows, *counts, np.zeros(k), [""] * k, errors, [[] for _ in range(k)])

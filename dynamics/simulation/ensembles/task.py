@@ -12,14 +12,16 @@ import numpy as np
 
 from cgraph.extend import Array, runner
 
+from ..error_estimate import estimate
 from ..recorder import Recorder
 from ..run_options import RunOptions
 from ..step_program import CompiledSteps, StepProgram, compile_steps
-from ..stepping import StoppedError, integration
+from ..stepping import FixedStepIntegration, StoppedError, integration
 from .branch_free import branch_free
 from .chunk import Chunk, Part, empty
 from .step_grid import StepGrid
 from .vectorized import VectorCode, VectorizedIntegration
+from .vectorized_error import estimate_side_by_side
 
 KEPT = 8  # programs that a process keeps ready
 
@@ -48,7 +50,7 @@ class Task:
         with _lock:
             code = _vector_code(self.pickled, self.options.backend)
         times = self.options.times
-        at = int(times is None or times[0] == 0.0)
+        at = int(times is None or times[0] == self.options.t0)
         part.rows[:, :at] = chunk.x[:, None]
         run = VectorizedIntegration(code, chunk, part, at)
         for grid in self.grids:
@@ -58,19 +60,25 @@ class Task:
                     raise StoppedError
                 run.advance(*block)
         run.end()
+        if self.options.estimated:
+            estimate_side_by_side(code, chunk, part, self.options, stopped)
 
     def _one_by_one(self, chunk: Chunk, part: Part, stopped: Callable[[], bool]) -> None:
         with _lock:
             compiled = _compiled(self.pickled, self.options.backend)
         for k, x in enumerate(chunk.x):
             run = integration(compiled, self.options, chunk.p[k].tolist(), stopped)
-            recorder = Recorder(x, self.options.times)
+            recorder = Recorder(x, self.options.times, self.options.t0, self.options.direction)
             for block in run.blocks(x):
                 recorder.add(block)
-            states = recorder.table()[1]
+            times, states = recorder.table()
+            if isinstance(run, FixedStepIntegration) and self.options.estimated and not run.status:
+                error = estimate(run, x, times, states, stopped=stopped)
+                part.errors[:, k] = error.largest, error.last
+                run.warnings += [error.warning] if error.warning else []
             part.rows[k, : len(states)], part.rows[k, len(states) :] = states, np.nan
             part.steps[k], part.rejected[k], part.evaluations[k] = run.steps, run.rejected, run.evaluations
-            part.dt[k], part.status[k] = run.largest, run.status
+            part.dt[k], part.status[k], part.warnings[k] = run.largest, run.status, run.warnings
 
 
 _lock = threading.Lock()  # threads that come at the same time wait for one to make the code

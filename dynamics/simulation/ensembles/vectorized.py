@@ -24,6 +24,21 @@ class VectorCode(NamedTuple):
     one_pass: Runner
 
 
+def start_memories(code: VectorCode, chunk: Chunk) -> Array:
+    """Memories before the first step, (size, k)."""
+    memories = code.one_pass.memory({"x": chunk.x.T, "p": chunk.p.T}, len(chunk.x))
+    if code.start is not None:
+        code.start.run_many(memories, 1)
+    return memories
+
+
+def block_limits(code: VectorCode, count: int) -> tuple[int, int]:
+    """Steps, and rows, of `count` trajectories in a block."""
+    program = code.one_pass.program
+    nodes = sum(len(graph.nodes) for graph in program.graphs())
+    return max(1, WORK // nodes), max(1, NUMBERS // (program.width * count))
+
+
 class VectorizedIntegration:
     """One run of the trajectories of a chunk, into a part, from its row `at` on.
 
@@ -34,21 +49,17 @@ class VectorizedIntegration:
     def __init__(self, code: VectorCode, chunk: Chunk, part: Part, at: int) -> None:
         self.program, self.runner, self.part = code.program, code.one_pass, part
         count, total = part.rows.shape[:2]
-        self._memories = self.runner.memory({"x": chunk.x.T, "p": chunk.p.T}, count)
-        if code.start is not None:
-            code.start.run_many(self._memories, 1)
+        self._memories = start_memories(code, chunk)
         self._live = np.ones(count, dtype=bool)
         self._good = np.full(count, total)  # rows that count
         self._at, self._done = at, 0  # rows and steps
-        program = self.runner.program
-        nodes = sum(len(graph.nodes) for graph in program.graphs())
-        self.limits = max(1, WORK // nodes), max(1, NUMBERS // (program.width * count))
+        self.limits = block_limits(code, count)
 
     def begin(self, grid: StepGrid) -> None:
         """The steps that follow are of this grid."""
         for name, value in (("start", grid.begin), ("t", grid.begin), ("count", 0.0), ("h", grid.h)):
             self.runner.write(self._memories, name, value)
-        self.part.dt[self._live] = np.maximum(self.part.dt[self._live], grid.h)
+        self.part.dt[self._live] = np.maximum(self.part.dt[self._live], abs(grid.h))
 
     def advance(self, steps: int, every: int, due: bool) -> None:
         """Make steps; those after every `every`th are rows if they are due."""
@@ -57,8 +68,9 @@ class VectorizedIntegration:
         before, m = self._memories.copy(), self.program.size
         record = self.runner.run_many(self._memories, steps, every).rows
         if due:
-            self.part.rows[:, self._at : self._at + len(record)] = record[:, 1 : 1 + m].transpose(2, 0, 1)
-            self._at += len(record)
+            kept = record[: self.part.rows.shape[1] - self._at]  # t_end itself may be no row
+            self.part.rows[:, self._at : self._at + len(kept)] = kept[:, 1 : 1 + m].transpose(2, 0, 1)
+            self._at += len(kept)
         failed = self._live & (self.runner.read(self._memories, "nonfinite")[0] != 0.0)
         if failed.any():
             for k in np.flatnonzero(failed).tolist():
