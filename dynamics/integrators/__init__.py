@@ -9,6 +9,7 @@ from .momentum_graphs import Mechanics, mechanics
 from .problem import (
     Problem,
     derive,
+    force,
     quantity,
     quantity_inputs,
     state_arguments,
@@ -49,6 +50,7 @@ __all__ = [
     "Problem",
     "Tableau",
     "derive",
+    "force",
     "mechanics",
     "quantity",
     "quantity_inputs",

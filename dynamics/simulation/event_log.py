@@ -54,7 +54,7 @@ class EventLog:
                 t, x = self.happened[-1][1:]
                 return dense.part(slice(first + stop.row + (stop.s > 0.0))).ending(t, x)
             self._end = float(part.t[-1]), part.x[-1]
-        return block
+        return dense
 
     def finish(self) -> None:
         """The run is at its end: what is zero there to the last bit has arrived."""

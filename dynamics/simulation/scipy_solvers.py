@@ -62,11 +62,11 @@ class _Step(NamedTuple):
 
 
 class ScipyIntegration(Integration):
-    """A run by one of SciPy's solvers, with its own dense output where it is watched or gives rows inside steps."""
+    """A run by one of SciPy's solvers, with its own dense output where it is asked for states between its steps."""
 
-    def __init__(self, solver: ScipySolver, options: RunOptions, *, watched: bool = False) -> None:
+    def __init__(self, solver: ScipySolver, options: RunOptions, *, between: bool = False) -> None:
         super().__init__(solver.components)
-        self.solver, self.options, self.watched = solver, options, watched
+        self.solver, self.options, self.between = solver, options, between
         self._jacobians = self._factorizations = 0
         self._idle = 0  # steps in a row that hardly moved the time
 
@@ -156,7 +156,7 @@ class ScipyIntegration(Integration):
         t_old, t, x = float(solver.t_old), float(solver.t), np.array(solver.y)
         self.largest = max(self.largest, abs(t - t_old))
         degree, times = DEGREES[self.solver.name], self.options.times
-        if not self.watched and (times is None or not _inside(times, t_old, t)):
+        if not self.between and (times is None or not _inside(times, t_old, t)):
             return _Step(t_old, t, x_old, x, np.full((degree, len(x)), np.nan))
         shares = 0.5 - 0.5 * np.cos(np.pi * np.arange(1, degree + 1) / degree)
         change = solver.dense_output()(t_old + shares * (t - t_old)).T - x_old

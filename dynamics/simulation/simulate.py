@@ -6,7 +6,7 @@ import math
 import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,8 +15,9 @@ from cgraph import Graph
 from cgraph.extend import Array
 
 from ..equations.initial_value import initial_value
-from ..integrators import METHODS, Problem, derive, total_energy
+from ..integrators import METHODS, Problem, derive, force, total_energy
 from ..systems.model import Model
+from .dense_output import StepBlock, with_hermite
 from .error_estimate import ErrorEstimate, estimate
 from .event import Event, as_events
 from .event_log import EventLog
@@ -24,14 +25,14 @@ from .event_program import event_program
 from .free_memory import room
 from .progress_bar import Progress
 from .recorder import Recorder
+from .row_values import row_values
 from .run_options import METHOD, TABLES, RunOptions, time_span
 from .scipy_solvers import ScipyIntegration, scipy_solver
+from .solution import Solution
 from .step_program import compile_steps, step_program
 from .stepping import FixedStepIntegration, Integration, integration
 from .trajectory import SimulationWarning, Stats, Trajectory
 from .watched import WatchedIntegration
-
-BLOCK = 4096  # rows whose energy is taken at once
 
 
 def simulate(
@@ -49,6 +50,7 @@ def simulate(
     atol: ArrayLike | None = None,
     t_eval: ArrayLike | None = None,
     events: Event | Iterable[Event] = (),
+    dense_output: bool = False,
     tau: float | Sequence[float] = 0.0,
     parameters: Mapping[str, float] | None = None,
     first_step: float | None = None,
@@ -93,6 +95,9 @@ def simulate(
         by it.
     events : Event or iterable of Event
         Instants to look for on the way.
+    dense_output : bool
+        Whether to keep what lies between the rows, for `Trajectory.solution(t)`: some numbers a step for every one of
+        the state.
     tau : float or sequence
         Constant applied force [N m or N], for all coordinates or for each, (n,).
     parameters : mapping, optional
@@ -136,6 +141,8 @@ def simulate(
     arguments = (dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
     options = RunOptions(t_end, method, *arguments, t0, estimate_error)
     watched = as_events(events)
+    if not isinstance(dense_output, bool):
+        raise TypeError(f"dense_output must be True or False, got {dense_output!r:.40}")
     start = initial_value(model, q, qd, tau, parameters)
     options.check(start.states)
     options.check_room(len(start.x))
@@ -145,12 +152,13 @@ def simulate(
     energy, log = total_energy(problem), EventLog(event_program(problem, watched)) if watched else None
 
     # Write the steps of the method over these graphs, and compile them
-    leg = _compiled(problem, options, watched=bool(watched))
+    leg = _compiled(problem, options, between=bool(watched) or dense_output)
 
     # Integrate, noting rows and events
     run = WatchedIntegration(leg, options, log) if log else leg(options)
     recorder = Recorder(start.x, options.times, options.t0, options.direction)
-    outcome = _integrate(run, start.x, recorder, options)
+    steps: list[StepBlock] | None = [] if dense_output else None
+    outcome = _integrate(run, start.x, recorder, options, problem.rate, steps)
 
     # Put the result together
     times, states = recorder.table()
@@ -158,20 +166,22 @@ def simulate(
     stats = _stats(run, options.method, outcome)
     for text in stats.warnings:
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    energies = _energies(energy, times, states)
-    return Trajectory(times, states[:, :half], states[:, half:], energies, stats, log.crossings(half) if log else {})
+    energies = np.full(len(times), math.nan) if energy is None else row_values(energy, times, states)[:, 0]
+    dense = None if steps is None else Solution(options.t0, start.x, steps, half)
+    rows = (times, states[:, :half], states[:, half:], energies)
+    return Trajectory(*rows, stats, log.crossings(half) if log else {}, _graphs(problem), dense)
 
 
-def _compiled(problem: Problem, options: RunOptions, *, watched: bool) -> Callable[[RunOptions], Integration]:
-    """What makes a run, compiled, from options. Watched, it needs its dense output, or every equal step."""
+def _compiled(problem: Problem, options: RunOptions, *, between: bool) -> Callable[[RunOptions], Integration]:
+    """What makes a run, compiled, of options. between: with all steps, and the dense output of chosen ones."""
     name = options.scipy_solver
     if name is not None:
         solver = scipy_solver(problem, name, options.backend)
-        return lambda options: ScipyIntegration(solver, options, watched=watched)
+        return lambda options: ScipyIntegration(solver, options, between=between)
     method = METHODS[options.method]
-    program = step_program(problem, method, dense=method.adaptive and (watched or options.times is not None))
+    program = step_program(problem, method, dense=method.adaptive and (between or options.times is not None))
     compiled = compile_steps(program, options.backend)
-    return lambda options: integration(compiled, options, every_step=watched)
+    return lambda options: integration(compiled, options, every_step=between)
 
 
 class _Outcome(NamedTuple):
@@ -183,15 +193,25 @@ class _Outcome(NamedTuple):
     error: ErrorEstimate | None
 
 
-def _integrate(run: Integration, x: Array, recorder: Recorder, options: RunOptions) -> _Outcome:
-    """Run from x to t_end, an event, a failure, the end of the memory, or Ctrl-C; then estimate the error."""
+def _integrate(
+    run: Integration,
+    x: Array,
+    recorder: Recorder,
+    options: RunOptions,
+    rate: Graph,
+    steps: list[StepBlock] | None,
+) -> _Outcome:
+    """Run from x to t_end, an event, a failure, the end of the memory, or Ctrl-C; then estimate the error.
+
+    steps: receives the steps with their dense output.
+    """
     begin, seconds, error = time.perf_counter(), math.nan, None
     second = 0.5 * options.estimated  # of the length of the run
     doing = ""
     try:
         total = (1.0 + second) * options.length
         with np.errstate(all="ignore"), Progress("simulate", total, options.progress) as report:
-            _run(run, x, recorder, lambda t: report(abs(t - options.t0)))
+            _run(run, x, recorder, rate, steps, lambda t: report(abs(t - options.t0)))
             seconds = time.perf_counter() - begin
             plain = run.plain
             if isinstance(plain, FixedStepIntegration) and options.estimated and not run.status:
@@ -208,12 +228,24 @@ def _integrate(run: Integration, x: Array, recorder: Recorder, options: RunOptio
     return _Outcome(seconds, -1 if run.status else 0, run.status or "reached t_end", error)
 
 
-def _run(run: Integration, x: Array, recorder: Recorder, report: Callable[[float], None]) -> None:
+def _run(
+    run: Integration,
+    x: Array,
+    recorder: Recorder,
+    rate: Graph,
+    steps: list[StepBlock] | None,
+    report: Callable[[float], None],
+) -> None:
     """Note rows and events, block by block. A run that an event ends has it as its last row."""
-    most = room() / TABLES
+    most, kept = room() / TABLES, 0
     for block in run.blocks(x):
+        if steps is not None and block.dense is None:
+            block = with_hermite(block, rate)
         recorder.add(block)
-        if recorder.size > most:
+        if steps is not None:
+            steps.append(block)
+            kept += sum(array.nbytes for array in block if array is not None)
+        if recorder.size + kept > most:
             last = f"{recorder.last:.6g} s"
             run.status = f"stopped at t = {last}: the rows fill the memory; t_eval records fewer"
             return
@@ -243,14 +275,7 @@ def _stats(run: Integration, method: str, outcome: _Outcome) -> Stats:
     )
 
 
-def _energies(energy: Graph | None, times: Array, states: Array) -> Array:
-    """The energy of each row; NaN for a system of first order."""
-    result = np.full(len(times), math.nan)
-    if energy is None:
-        return result
-    names = energy.input_names
-    for start in range(0, len(times), BLOCK):
-        part = slice(start, start + BLOCK)
-        values: dict[str, Any] = dict(zip(names, [*states[part].T, times[part]], strict=True))
-        result[part] = energy.evaluate(values)["E"]
-    return result
+def _graphs(problem: Problem) -> dict[str, Graph]:
+    """What a trajectory computes accelerations and forces by."""
+    applied = force(problem)
+    return {"rate": problem.rate} | ({} if applied is None else {"force": applied})

@@ -4,9 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cgraph import Graph
 from cgraph.extend import Array
+
+from .row_values import row_values
+from .solution import Solution
 
 
 class SimulationWarning(UserWarning):
@@ -122,6 +130,11 @@ class Trajectory:
         too, as in SciPy.
     events : mapping
         {name of an event: Crossings}.
+    graphs : mapping
+        {"rate": xdot, "force": tau + forces - damping qd}: graphs over the states and t, with the numbers of the run
+        built in, by which `qdd` and `forces` are computed. "force" is missing of an OdeSystem.
+    dense : Solution, optional
+        The steps with their dense output, which `solution` reads; of a run with `dense_output=True`.
 
     Examples
     --------
@@ -137,6 +150,58 @@ class Trajectory:
     energy: Array
     stats: Stats
     events: Mapping[str, Crossings] = field(default_factory=dict)
+    graphs: Mapping[str, Graph] = field(default_factory=dict)
+    dense: Solution | None = None
+
+    def solution(self, t: ArrayLike) -> tuple[Array, Array]:
+        """The motion at any time of the run, by the dense output of its steps.
+
+        At the end of a step it is that step's state exactly; between, it has the order of the method's own dense
+        output, or of a cubic where the method has none (all equal steps).
+
+        Parameters
+        ----------
+        t : float or array_like
+            A time, or times (k,), between the start and where the run came to [s].
+
+        Returns
+        -------
+        tuple of ndarray
+            q and qd, (n,) or (k, n) each; of an OdeSystem its state and an array without columns.
+
+        Raises
+        ------
+        ValueError
+            For a time outside, and for a run without `dense_output=True`.
+
+        Examples
+        --------
+        >>> import dynamics as dyn
+        >>> run = dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.1], [0.0], t_end=1.0, dense_output=True)
+        >>> q, qd = run.solution(0.25)
+        >>> float(q[0].round(6)), float(qd[0].round(6))
+        (0.057491, -0.313696)
+        """
+        if self.dense is None:
+            raise ValueError("the run kept its rows alone: simulate(.., dense_output=True) keeps what is between them")
+        return self.dense(t)
+
+    @cached_property
+    def qdd(self) -> Array:
+        """Accelerations at the rows, (T, n); of an OdeSystem without columns."""
+        rates = row_values(self.graphs["rate"], self.t, self._states)
+        return rates[:, rates.shape[1] - self.qd.shape[1] :]
+
+    @cached_property
+    def forces(self) -> Array:
+        """Generalized forces besides those of the Lagrangian at the rows, tau + forces - damping qd, (T, n)."""
+        if "force" not in self.graphs:
+            return np.empty_like(self.qd)
+        return row_values(self.graphs["force"], self.t, self._states)
+
+    @property
+    def _states(self) -> Array:
+        return np.concatenate([self.q, self.qd], axis=1)
 
     @property
     def success(self) -> bool:

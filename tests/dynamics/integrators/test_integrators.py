@@ -119,7 +119,7 @@ def test_dense_output_is_as_good_as_the_steps(method: str) -> None:
 @mark.parametrize("method", METHODS)
 def test_both_back_ends_take_the_same_steps(method: str) -> None:
     pytest.importorskip("llvmlite")
-    options: dict[str, Any] = {"dt": 0.05} if method in FIXED else {"rtol": 1e-5}
+    options: dict[str, Any] = step(method, 0.05) if method in FIXED else {"rtol": 1e-5}
     runs = [
         dyn.simulate(cart(), [0.1, 1.0], [0.0, 0.5], 0.5, method, backend=each, **options)
         for each in ("llvm", "python")
