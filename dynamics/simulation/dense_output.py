@@ -36,6 +36,11 @@ class StepBlock(NamedTuple):
         inside: Array = np.where((s == 1.0)[:, None], self.x[rows], self.x_old[rows] + total)
         return inside
 
+    def times_at(self, rows: Indices, s: Array) -> Array:
+        """Times (k,)."""
+        inside: Array = np.where(s == 1.0, self.t[rows], self.t_old[rows] + s * self.h[rows])
+        return inside
+
     def slopes_at(self, rows: Indices, s: Array) -> Array:
         """Derivatives of the states by the share, (k, m)."""
         assert self.dense is not None

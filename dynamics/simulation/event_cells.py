@@ -10,7 +10,7 @@ import numpy as np
 from cgraph.extend import Array
 
 from .dense_output import Indices, StepBlock
-from .event_program import UNIT, EventProgram
+from .event_program import UNIT, WatchedEvent
 
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
@@ -25,36 +25,33 @@ ROUNDINGS = 8.0  # that the interpolation of a state may take
 
 
 class WatchedSteps(NamedTuple):
-    """Consecutive steps with dense output, and the quantities along them: over rows (k,) and shares s (k,)."""
+    """Consecutive steps with dense output, and the quantity of an event along them: at rows (k,) and shares s (k,)."""
 
-    program: EventProgram
+    event: WatchedEvent
     parameters: Sequence[float]
     block: StepBlock
 
-    def times(self, rows: Indices, s: Array) -> Array:
-        """(k,)."""
-        inside: Array = np.where(s == 1.0, self.block.t[rows], self.block.t_old[rows] + s * self.block.h[rows])
-        return inside
-
     def values(self, rows: Indices, s: Array) -> Array:
-        """(events, k)."""
-        return self.program.value(self.times(rows, s), self.block.states_at(rows, s), self.parameters)
+        """(k,)."""
+        return self.event.value(self.block.times_at(rows, s), self.block.states_at(rows, s), self.parameters)
 
     def slopes(self, rows: Indices, s: Array) -> Array:
-        """The derivatives by the share of the step, (events, k)."""
-        block, t, x = self.block, self.times(rows, s), self.block.states_at(rows, s)
-        return self.program.slope(t, x, self.parameters, block.slopes_at(rows, s), block.h[rows])
+        """The derivatives by the share of the step, (k,)."""
+        block = self.block
+        t, x = block.times_at(rows, s), block.states_at(rows, s)
+        return self.event.slope(t, x, self.parameters, block.slopes_at(rows, s), block.h[rows])
 
     def rounding(self, rows: Indices, s: Array) -> Array:
-        """What a value may be off by because numbers are rounded, (events, k)."""
-        block, t, x = self.block, self.times(rows, s), self.block.states_at(rows, s)
+        """What a value may be off by because numbers are rounded, (k,)."""
+        block = self.block
+        t, x = block.times_at(rows, s), block.states_at(rows, s)
         x_error = UNIT * (np.abs(block.x_old[rows]) + np.abs(block.x[rows]) + np.abs(x))
         t_error = UNIT * (np.abs(block.t_old[rows]) + np.abs(t))
-        return ROUNDINGS * self.program.error(t, x, self.parameters, x_error, t_error)
+        return ROUNDINGS * self.event.error(t, x, self.parameters, x_error, t_error)
 
 
 class Cells(NamedTuple):
-    """Parts of steps, from share a to share b. The tables are (events, k)."""
+    """Parts of steps, from share a to share b, with values and slopes of a quantity at both, (k,) each."""
 
     rows: Indices
     a: Array
@@ -68,25 +65,25 @@ class Cells(NamedTuple):
 
     def take(self, which: Flags | Indices) -> Cells:
         """Some of them."""
-        columns: list[Any] = [array[..., which] for array in self]
+        columns: list[Any] = [array[which] for array in self]
         return Cells(*columns)
 
     def beside(self, extreme: Callable[[Array, Array], Array], values: Array) -> Array:
         """Of a cell's value and those of its neighbors the smallest or largest."""
         result = values.copy()
         left = np.flatnonzero((self.rows[:-1] == self.rows[1:]) & (self.b[:-1] == self.a[1:]))
-        result[..., left] = extreme(result[..., left], values[..., left + 1])
-        result[..., left + 1] = extreme(result[..., left + 1], values[..., left])
+        result[left] = extreme(result[left], values[left + 1])
+        result[left + 1] = extreme(result[left + 1], values[left])
         return result
 
     def control_points(self) -> Array:
-        """Of the cubics through values and slopes at the ends, which their hull contains, (4, events, k)."""
+        """Of the cubics through values and slopes at the ends, which their hull contains, (4, k)."""
         third = (self.b - self.a) / 3.0
         inner = self.g_a + self.slope_a * third, self.g_b - self.slope_b * third
         return np.stack([self.g_a, *inner, self.g_b])
 
     def clear(self) -> Flags:
-        """Whether a quantity cannot be zero there, (events, k).
+        """Whether the quantity cannot be zero there, (k,).
 
         It stays in the hull of the control points, and where it turns between the ends, as |x| may do at once, also on
         this side of the point where the tangents at the ends meet.
@@ -100,7 +97,7 @@ class Cells(NamedTuple):
         return clear
 
     def resolved(self) -> Flags:
-        """Whether the ends tell how often a quantity is zero, (events, k).
+        """Whether the ends tell how often it is zero, (k,).
 
         It is not; or it is monotone; or its slope is, so that it has one extremum; or it is zero all over; or it is no
         number, and nothing can be told.
@@ -116,25 +113,24 @@ class Cells(NamedTuple):
 
 
 def event_cells(steps: WatchedSteps) -> tuple[Cells, Flags]:
-    """The cells of all steps in order, and for which steps and events, (events, steps), `MOST` were too few."""
+    """The cells of all steps in order, and for which steps, (steps,), `MOST` were too few."""
     count = len(steps.block.t)
     cells = _split(steps, _whole(steps), bounded=False)
-    worst = cells.miss.reshape(len(cells.miss), count, 2 * CELLS).max(axis=2)
-    cells = cells._replace(miss=np.maximum(cells.miss, worst[:, cells.rows] / DECAY))
-    beyond = np.zeros((len(steps.program.events), count), dtype=bool)
+    worst = cells.miss.reshape(count, 2 * CELLS).max(axis=1)
+    cells = cells._replace(miss=np.maximum(cells.miss, worst[cells.rows] / DECAY))
+    beyond = np.zeros(count, dtype=bool)
     while True:
         width = cells.b - cells.a
         unresolved = ~cells.resolved() & (width > SHORTEST)
-        split = unresolved.any(axis=0) | (cells.beside(np.minimum, width) * COARSER < width)
+        split = unresolved | (cells.beside(np.minimum, width) * COARSER < width)
         size = np.bincount(cells.rows, minlength=count) + np.bincount(cells.rows[split], minlength=count)
         late = (size > MOST)[cells.rows]
-        for event, cell in zip(*np.nonzero(unresolved & late), strict=True):
-            beyond[event, cells.rows[cell]] = True
+        beyond[cells.rows[unresolved & late]] = True
         split &= ~late
         if not split.any():
             return cells, beyond
         parts = cells.take(~split), _split(steps, cells.take(split), bounded=True)
-        columns: list[Any] = [np.concatenate(pair, axis=-1) for pair in zip(*parts, strict=True)]
+        columns: list[Any] = [np.concatenate(pair) for pair in zip(*parts, strict=True)]
         cells = Cells(*columns)
         cells = cells.take(np.lexsort((cells.a, cells.rows)))
 
@@ -143,10 +139,8 @@ def _whole(steps: WatchedSteps) -> Cells:
     """The cells before the first split."""
     count = len(steps.block.t)
     rows, s = np.repeat(np.arange(count), CELLS + 1), np.tile(NODES, count)
-    g, slope = (table.reshape(-1, count, CELLS + 1) for table in (steps.values(rows, s), steps.slopes(rows, s)))
-    g_a, g_b, slope_a, slope_b = (
-        table[:, :, part].reshape(len(table), -1) for table in (g, slope) for part in (slice(-1), slice(1, None))
-    )
+    tables = (steps.values(rows, s).reshape(count, -1), steps.slopes(rows, s).reshape(count, -1))
+    g_a, g_b, slope_a, slope_b = (table[:, part].ravel() for table in tables for part in (slice(-1), slice(1, None)))
     a, b = np.tile(NODES[:-1], count), np.tile(NODES[1:], count)
     none = np.zeros_like(g_a)
     return Cells(np.repeat(np.arange(count), CELLS), a, b, g_a, g_b, slope_a, slope_b, none, none)
@@ -169,7 +163,5 @@ def _split(steps: WatchedSteps, cells: Cells, *, bounded: bool) -> Cells:
     rounding = steps.rounding(cells.rows, middle) if bounded else cells.rounding
     left = cells._replace(b=middle, g_b=g, slope_b=slope, miss=miss, rounding=rounding)
     right = cells._replace(a=middle, g_a=g, slope_a=slope, miss=miss, rounding=rounding)
-    columns: list[Any] = [
-        np.stack(pair, axis=-1).reshape(*pair[0].shape[:-1], -1) for pair in zip(left, right, strict=True)
-    ]
+    columns: list[Any] = [np.stack(pair, axis=1).ravel() for pair in zip(left, right, strict=True)]
     return Cells(*columns)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -21,103 +21,82 @@ PROBES = 0.5 ** np.arange(50, 0, -5)  # of a cell: how far from a zero the sign 
 
 
 class Crossing(NamedTuple):
-    """Where an event happens: its number, the step, the share of the step."""
+    """Where an event happens."""
 
-    row: int
-    s: float
-    number: int
-    rising: bool  # where it touches zero and turns back: that it comes from below
+    row: int  # of the step
+    s: float  # share of the step
+    rising: bool  # whether the quantity comes from below
+    touching: bool  # whether it turns back
 
 
 @dataclass
-class Sides:
-    """On which side of zero each quantity was, between one part of a run and the next.
+class Side:
+    """On which side of zero a quantity is, between one part of a run and the next.
 
-    side: its last sign, (events,), 0 before it has one.  slope: at the end of the last step; NaN at a start.
-    left: of a run that starts on zero, the sign with which the quantity leaves, 0 if unknown; NaN elsewhere.
-    waiting: whether it is zero at the last instant, and what it does there is for the next step to tell.
+    sign: its last, 0 before it has one.  slope: at the end of the last step; NaN at a start.  left: of a run that
+    starts on zero, the sign with which the quantity leaves, 0 if unknown; NaN elsewhere.  waiting: whether it is zero
+    at the last instant, and what it does there is for the next step to tell.
     """
 
-    side: Array
-    slope: Array
-    left: Array
-    waiting: Flags
+    sign: float = 0.0
+    slope: float = math.nan
+    left: float = math.nan
+    waiting: bool = False
 
 
-def start_sides(steps: WatchedSteps, reached: Sequence[tuple[int, float]] = ()) -> Sides:
-    """At the start of these steps. reached: (number, side it came from) of events that have just changed the state.
-
-    A quantity that starts at zero, to rounding, has not passed through it, nor has one that has just been acted on.
-    """
+def start_side(steps: WatchedSteps) -> Side:
+    """At the start of these steps. A quantity that starts at zero, to rounding, has not passed through it."""
     row, s = np.zeros(1, dtype=np.intp), np.zeros(1)
-    count = len(steps.program.events)
-    unknown = np.full(count, np.nan)
-    sides = Sides(np.zeros(count), unknown, unknown.copy(), np.zeros(count, dtype=bool))
-    if not reached:
-        on_zero = np.abs(steps.values(row, s)[:, 0]) <= steps.rounding(row, s)[:, 0]
-        sides.left[on_zero] = 0.0
-        return sides
-    block = steps.block
-    slopes = block.h[0] * steps.program.motion(float(block.t_old[0]), block.x_old[0], steps.parameters)
-    for number, side in reached:
-        sides.left[number] = np.sign(slopes[number]) or side
-    return sides
+    return Side(left=0.0 if np.abs(steps.values(row, s)) <= steps.rounding(row, s) else math.nan)
 
 
-def crossings(steps: WatchedSteps, sides: Sides) -> tuple[list[Crossing], Flags]:
-    """What happens in these steps, in order, and for which (events, steps) more may have happened; moves `sides` on.
+def crossings(steps: WatchedSteps, side: Side) -> tuple[list[Crossing], Flags]:
+    """What happens in these steps, and in which (steps,) more may have happened; moves `side` on.
 
     A quantity crosses zero where its sign turns, and touches it where an extremum is zero to the rounding of its
     evaluation. One that stays zero does so from where it arrives.
     """
     cells, beyond = event_cells(steps)
-    _join(cells, sides)
-    result: list[Crossing] = []
-    for number, event in enumerate(steps.program.events):
-        chain = _Chain(steps, cells, number, sides)
-        for rising, touching, row, s in [*chain.at_signs(sides), *chain.at_extrema()]:
-            if event.direction == 0 if touching else event.counts(rising):
-                result.append(Crossing(row, s, number, rising))
-    return sorted(result), beyond
+    _join(cells, side)
+    chain, event = _Chain(steps, cells, side), steps.event
+    found = [*chain.at_signs(side), *chain.at_extrema()]
+    return [one for one in found if (event.direction == 0 if one.touching else event.counts(one.rising))], beyond
 
 
-def _join(cells: Cells, sides: Sides) -> None:
-    """Where steps meet, a quantity has the slope that it had at the end of the step before: a turn counts once."""
+def _join(cells: Cells, side: Side) -> None:
+    """Where steps meet, the quantity has the slope that it had at the end of the step before: a turn counts once."""
     first = np.flatnonzero(np.diff(cells.rows)) + 1
-    last = cells.slope_b[:, -1].copy()
-    cells.slope_a[:, first] = cells.slope_b[:, first - 1]
-    known = ~np.isnan(sides.slope)
-    cells.slope_a[known, 0] = sides.slope[known]
-    sides.slope = last
+    cells.slope_a[first] = cells.slope_b[first - 1]
+    if not math.isnan(side.slope):
+        cells.slope_a[0] = side.slope
+    side.slope = float(cells.slope_b[-1])
 
 
 Table = Callable[[Indices, Array], Array]
-_Found = tuple[bool, bool, int, float]  # rising, touching, row, share
 
 
 class _Chain:
-    """One quantity along the cells: looks 0 .. k at their ends, and the signs beside them."""
+    """The quantity along the cells: looks 0 .. k at their ends, and the signs beside them."""
 
-    def __init__(self, steps: WatchedSteps, cells: Cells, number: int, sides: Sides) -> None:
-        self.steps, self.cells, self.number = steps, cells, number
+    def __init__(self, steps: WatchedSteps, cells: Cells, side: Side) -> None:
+        self.steps, self.cells = steps, cells
         self.rows = np.concatenate([cells.rows[:1], cells.rows])  # of the looks
         self.shares = np.concatenate([cells.a[:1], cells.b])
-        g = np.concatenate([cells.g_a[number, :1], cells.g_b[number]])
+        g = np.concatenate([cells.g_a[:1], cells.g_b])
         self.exact = g == 0.0
         signs = np.nan_to_num(np.sign(g))
-        self.zero = self._zeros(g, np.concatenate([sides.side[[number]], signs]))
-        left = sides.left[number]
-        if not np.isnan(left):
+        self.zero = self._zeros(g, np.concatenate([[side.sign], signs]))
+        if not math.isnan(side.left):
             self.zero[0] = True
         looks = np.flatnonzero(self.zero)
         before, after = signs.copy(), signs.copy()
         before[looks], after[looks] = self._beside(looks, -1), self._beside(looks, 1)
-        if left:  # NaN without a start on zero
-            after[0] = after[0] if np.isnan(left) else left
-        sides.left[number] = np.nan
-        # [side before look 0, start of cell 0, its end, start of cell 1, ..]: even entries stand before their look
+        if side.left and not math.isnan(side.left):
+            after[0] = side.left
+        side.left = math.nan
+        # [sign before look 0, start of cell 0, its end, start of cell 1, ..]: even entries stand before their look
         self.signs = np.empty(2 * len(cells.a) + 1)
-        self.signs[0] = sides.side[number]
+        self.signs[0] = side.sign
         self.signs[1::2], self.signs[2::2] = after[:-1], before[1:]
 
     def _zeros(self, g: Array, signs: Array) -> Flags:
@@ -135,32 +114,30 @@ class _Chain:
             if not len(looks):
                 return zero
             tested[looks] = True
-            rounding = self.steps.rounding(self.rows[looks], self.shares[looks])[self.number]
+            rounding = self.steps.rounding(self.rows[looks], self.shares[looks])
             near = looks[np.abs(g[looks]) <= rounding]
             zero[near] = True
             beside = np.concatenate([near, near + 1])
 
     def _beside(self, looks: Indices, direction: int) -> Array:
         """The signs of the quantity just before or after looks at which it is zero; 0 where it stays zero."""
-        cells, number = self.cells, self.number
+        cells = self.cells
         if not len(looks):
             return np.zeros(0)
         cell = np.clip(looks - (direction < 0), 0, len(cells.a) - 1)
         start, end = (cells.a, cells.b)[::direction]
         s = np.clip(start[cell, None] + (end - start)[cell, None] * PROBES, 0.0, 1.0)
         rows = np.repeat(cells.rows[cell], len(PROBES))
-        g, rounding = (
-            table(rows, s.ravel())[number].reshape(s.shape) for table in (self.steps.values, self.steps.rounding)
-        )
+        g, rounding = (table(rows, s.ravel()).reshape(s.shape) for table in (self.steps.values, self.steps.rounding))
         sure = np.abs(g) > rounding
         nearest = np.take_along_axis(g, np.argmax(sure, axis=1)[:, None], axis=1)[:, 0]
         outside = looks == (0 if direction < 0 else len(cells.a))
         beside: Array = np.where(sure.any(axis=1) & ~outside, np.sign(nearest), 0.0)
         return beside
 
-    def at_signs(self, sides: Sides) -> list[_Found]:
+    def at_signs(self, side: Side) -> list[Crossing]:
         """Where signs turn, and where a quantity that was zero at a look goes back to where it came from."""
-        signs, number = self.signs, self.number
+        signs = self.signs
         known = np.flatnonzero(signs)
         if not len(known):
             return []
@@ -174,11 +151,11 @@ class _Chain:
                 arrivals.append(start)
             else:
                 touches.append((start, end))
-        sides.side[number] = signs[last]
+        side.sign = float(signs[last])
         if self._stays(slice((last + 1) // 2, None)):
             arrivals.append(last)
-            sides.side[number] = 0.0
-        sides.waiting[number] = self.zero[-1] and sides.side[number] != 0.0
+            side.sign = 0.0
+        side.waiting = bool(self.zero[-1]) and side.sign != 0.0
         found = [self._touch(start, end) for start, end in touches]
         return found + self._arrivals(np.array(arrivals, dtype=np.intp))
 
@@ -188,7 +165,7 @@ class _Chain:
         place = self.rows[zeros] + self.shares[zeros]
         return len(zeros) > 1 and bool(place[-1] - place[0] > WHILE)
 
-    def _touch(self, start: int, end: int) -> _Found:
+    def _touch(self, start: int, end: int) -> Crossing:
         """Where its slope turns between two entries, or, where that is not seen, at a look between them."""
         sign, first, last = float(self.signs[start]), start // 2, end // 2
         look = (first + last + start % 2) // 2
@@ -202,55 +179,50 @@ class _Chain:
 
             if toward(low[:, None])[0, 0] and not toward(high[:, None])[0, 0]:
                 s = _turn(toward, low, high)[0]
-        return sign < 0.0, True, int(row[0]), float(s[0])
+        return Crossing(int(row[0]), float(s[0]), sign < 0.0, touching=True)
 
-    def _arrivals(self, entries: Indices) -> list[_Found]:
+    def _arrivals(self, entries: Indices) -> list[Crossing]:
         """Where the quantity first is not of the sign that it has at these entries."""
         signs, looks = self.signs[entries], entries // 2
         rows, s = self.rows[looks], self.shares[looks]
         inside = entries % 2 == 1
         cells, rows[inside] = self.cells.take(looks[inside]), self.cells.rows[looks[inside]]
         s[inside] = self._turn(cells.rows, cells.a, cells.b, signs[inside])
-        return [
-            (sign < 0.0, False, row, share) for sign, row, share in zip(signs, rows.tolist(), s.tolist(), strict=True)
-        ]
+        places = zip(rows.tolist(), s.tolist(), signs.tolist(), strict=True)
+        return [Crossing(row, share, sign < 0.0, touching=False) for row, share, sign in places]
 
     def _turn(self, rows: Indices, low: Array, high: Array, signs: Array) -> Array:
         """The first shares, to the last bit, at which the quantity has not these signs, which it has at `low`."""
         return _turn(lambda s: self._along(self.steps.values, rows, s) * signs[:, None] > 0.0, low, high)[1]
 
     def _along(self, table: Table, rows: Indices, s: Array) -> Array:
-        """The quantity, or its slope, at several shares s (k, parts) of rows (k,)."""
-        along: Array = table(np.repeat(rows, s.shape[1]), s.ravel())[self.number].reshape(s.shape)
+        """The values, or slopes, at several shares s (k, parts) of rows (k,)."""
+        along: Array = table(np.repeat(rows, s.shape[1]), s.ravel()).reshape(s.shape)
         return along
 
-    def at_extrema(self) -> Iterator[_Found]:
+    def at_extrema(self) -> Iterator[Crossing]:
         """Where it comes near zero and turns back within a cell: two crossings, a touch, or nothing."""
-        cells, number = self.cells, self.number
-        sign = self.signs[1::2]
+        cells, sign = self.cells, self.signs[1::2]
         ends = (sign != 0.0) & (sign == self.signs[2::2]) & ~self.zero[:-1] & ~self.zero[1:]
-        dips = (cells.slope_a[number] * sign < 0.0) & (cells.slope_b[number] * sign >= 0.0)
-        dips &= ends & ~cells.clear()[number]
+        dips = ends & (cells.slope_a * sign < 0.0) & (cells.slope_b * sign >= 0.0) & ~cells.clear()
         if not dips.any():
             return
         few = cells.take(dips)
         rows, signs = few.rows, sign[dips]
         pair = _turn(lambda s: self._along(self.steps.slopes, rows, s) * signs[:, None] < 0.0, few.a, few.b)
-        at = np.stack(pair)
-        g = np.stack([self.steps.values(rows, s)[number] for s in pair])
+        at, g = np.stack(pair), np.stack([self.steps.values(rows, s) for s in pair])
         nearest = np.argmin(g * signs, axis=0)[None]
         s, value = (np.take_along_axis(table, nearest, axis=0)[0] for table in (at, g))
-        touching = np.abs(value) <= self.steps.rounding(rows, s)[number]
+        touching = np.abs(value) <= self.steps.rounding(rows, s)
         through = (value * signs < 0.0) & ~touching
-        out = self._turn(rows, few.a, s, signs)
-        back = self._turn(rows, s, few.b, -signs)
+        out, back = self._turn(rows, few.a, s, signs), self._turn(rows, s, few.b, -signs)
         for k in np.flatnonzero(touching | through).tolist():
             below, row = bool(signs[k] < 0.0), int(rows[k])
             if touching[k]:
-                yield below, True, row, float(s[k])
+                yield Crossing(row, float(s[k]), below, touching=True)
             else:
-                yield below, False, row, float(out[k])
-                yield not below, False, row, float(back[k])
+                yield Crossing(row, float(out[k]), below, touching=False)
+                yield Crossing(row, float(back[k]), not below, touching=False)
 
 
 def _turn(same: Callable[[Array], Flags], low: Array, high: Array) -> tuple[Array, Array]:

@@ -11,8 +11,8 @@ from cgraph.extend import Array
 
 from ..integrators.step_control import RESOLUTION
 from .dense_output import StepBlock, with_hermite
-from .event_cells import MOST, Flags, WatchedSteps
-from .event_location import Crossing, Sides, crossings, start_sides
+from .event_cells import MOST, WatchedSteps
+from .event_location import Side, crossings, start_side
 from .event_program import EventProgram
 from .trajectory import Crossings
 
@@ -34,8 +34,8 @@ class EventLog:
         self.restart: tuple[float, Array] | None = None
         self.warnings: list[str] = []
         self.happened: list[tuple[int, float, Array]] = []
-        self._sides: Sides | None = None  # None before the first step, or the first after a reset
-        self._reached: list[tuple[int, float]] = []  # events that have just reset the state, and where from
+        self._sides: list[Side] = []  # none before the first step, or the first after a reset
+        self._reached: dict[int, float] = {}  # events that have just reset the state, and the side they came from
         self._missed: set[int] = set()
         self._reset_at, self._resets = np.nan, 0  # the instant, to rounding, and how many there in a row
         self._end: tuple[float, Array] | None = None
@@ -45,38 +45,55 @@ class EventLog:
         dense = with_hermite(block, self.program.rate, self.parameters) if block.dense is None else block
         for first in range(0, len(block.t), STEPS):
             part = dense.part(slice(first, first + STEPS))
-            steps = WatchedSteps(self.program, self.parameters, part)
-            if self._sides is None:
-                self._sides = start_sides(steps, self._reached)
-            found, beyond = crossings(steps, self._sides)
-            self._warn(part, beyond)
-            if stop := self._note(steps, found):
+            if stop := self._note(part, self._found(part)):
                 t, x = self.happened[-1][1:]
-                return dense.part(slice(first + stop.row + (stop.s > 0.0))).ending(t, x)
+                return dense.part(slice(first + stop[0] + (stop[1] > 0.0))).ending(t, x)
             self._end = float(part.t[-1]), part.x[-1]
         return dense
 
     def finish(self) -> None:
         """The run is at its end: what is zero there to the last bit has arrived."""
-        if self._sides is None or self._end is None:
+        if self._end is None:
             return
-        t, x = self._end
-        waiting = [
-            (number, bool(self._sides.side[number] < 0.0)) for number in np.flatnonzero(self._sides.waiting).tolist()
-        ]
-        self._happen(t, x, [(k, rising) for k, rising in waiting if self.program.events[k].counts(rising)])
+        waiting = [(number, side.sign < 0.0) for number, side in enumerate(self._sides) if side.waiting]
+        counting = [(number, rising) for number, rising in waiting if self.program.events[number].counts(rising)]
+        self._happen(*self._end, counting)
 
-    def _note(self, steps: WatchedSteps, found: Sequence[Crossing]) -> Crossing | None:
-        """Add these events, and return one after which the run does not go on; those of its instant happen with it."""
+    def _found(self, part: StepBlock) -> list[tuple[int, float, int, bool]]:
+        """(step, share of it, number of the event, whether it comes from below), in order."""
+        found = []
+        watched = [WatchedSteps(event, self.parameters, part) for event in self.program.events]
+        if not self._sides:
+            self._sides = [self._start(number, steps) for number, steps in enumerate(watched)]
+        for number, (steps, side) in enumerate(zip(watched, self._sides, strict=True)):
+            some, beyond = crossings(steps, side)
+            found += [(one.row, one.s, number, one.rising) for one in some]
+            if beyond.any() and number not in self._missed:
+                self._missed.add(number)
+                self._warn(number, float(part.t_old[np.argmax(beyond)]))
+        return sorted(found)
+
+    def _start(self, number: int, steps: WatchedSteps) -> Side:
+        """On which side an event starts: after a reset by it, on the one to which its quantity moves."""
+        if not self._reached:
+            return start_side(steps)
+        if number not in self._reached:
+            return Side()
+        block = steps.block
+        slope = self.program.motion(number, float(block.t_old[0]), block.x_old[0], self.parameters) * block.h[0]
+        return Side(left=float(np.sign(slope)) or self._reached[number])
+
+    def _note(self, part: StepBlock, found: Sequence[tuple[int, float, int, bool]]) -> tuple[int, float] | None:
+        """Add these events. (step, share) of the one after which the run does not go on, with those of its instant."""
         if not found:
             return None
-        rows, s = (np.array([getattr(one, name) for one in found]) for name in ("row", "s"))
-        times, states = steps.times(rows, s).tolist(), steps.block.states_at(rows, s)
-        for _, group in itertools.groupby(range(len(found)), lambda k: (found[k].row, found[k].s)):
+        rows, s = np.array([one[0] for one in found]), np.array([one[1] for one in found])
+        times, states = part.times_at(rows, s).tolist(), part.states_at(rows, s)
+        for _, group in itertools.groupby(range(len(found)), lambda k: found[k][:2]):
             together = list(group)
             first = together[0]
-            if self._happen(times[first], states[first], [(found[k].number, found[k].rising) for k in together]):
-                return found[first]
+            if self._happen(times[first], states[first], [found[k][2:] for k in together]):
+                return found[first][0], found[first][1]
         return None
 
     def _happen(self, t: float, x: Array, events: Sequence[tuple[int, bool]]) -> bool:
@@ -86,16 +103,16 @@ class EventLog:
             if self.program.events[number].terminal:
                 self.ended = f"event {self.program.events[number].name!r} at t = {t:.6g} s"
                 return True
-        before = dict(self._reached)
-        reached = [(number, -1.0 if rising else 1.0) for number, rising in events if number in self.program.resets]
+        before = self._reached
+        reached = {number: -1.0 if rising else 1.0 for number, rising in events if self.program.events[number].reset}
         if not reached:
             return False
+        motions = {number: self.program.motion(number, t, x, self.parameters) for number in reached}
+        lost = any(number in before and motions[number] * side > 0.0 for number, side in reached.items())  # in rounding
         self._reached = reached
-        slopes = self.program.motion(t, x, self.parameters)
-        lost = any(number in before and slopes[number] * side > 0.0 for number, side in reached)  # in rounding
-        for number, _ in self._reached:
+        for number in reached:
             x = self.program.reset(number, t, x, self.parameters)
-        name = self.program.events[self._reached[-1][0]].name
+        name = self.program.events[max(reached)].name
         if len(bad := np.flatnonzero(~np.isfinite(x))):
             component = self.program.components[bad[0]]
             self.status = f"stopped at t = {t:.6g} s: {component} is {x[bad[0]]} after the reset of event {name!r}"
@@ -105,21 +122,15 @@ class EventLog:
                 f"stopped at t = {t:.6g} s: event {name!r} resets the state again and again at this instant; "
                 "a contact that stays needs other equations from here on"
             )
-        self._sides, self._reset_at, self.restart = None, t, (t, x)
+        self._sides, self._reset_at, self.restart = [], t, (t, x)
         return True
 
-    def _warn(self, part: StepBlock, beyond: Flags) -> None:
-        """A sentence for each event that did not have one yet."""
-        for number in np.flatnonzero(beyond.any(axis=1)).tolist():
-            if number in self._missed:
-                continue
-            self._missed.add(number)
-            t = part.t_old[np.argmax(beyond[number])]
-            name = self.program.events[number].name
-            self.warnings.append(
-                f"event {name!r} may have been missed, first after t = {t:.6g} s: its quantity turns too often for "
-                f"{MOST} looks in a step; shorter steps (max_step or dt) find all"
-            )
+    def _warn(self, number: int, t: float) -> None:
+        name = self.program.events[number].name
+        self.warnings.append(
+            f"event {name!r} may have been missed, first after t = {t:.6g} s: its quantity turns too often for "
+            f"{MOST} looks in a step; shorter steps (max_step or dt) find all"
+        )
 
     def crossings(self, half: int) -> dict[str, Crossings]:
         """Of each event by name, with states split after `half` numbers into q and qd."""

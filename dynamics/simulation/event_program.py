@@ -19,66 +19,74 @@ from .event import Event
 UNIT = 2.0**-53  # relative error of one rounding
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WatchedEvent:
-    """What the location of an event reads of it."""
+    """What the location of an event reads of it, with its quantity g over the states x, t and parameters p as graphs.
+
+    values: g.  slopes: g_dot, with the tangents of x and t for inputs besides.  errors: a bound of the rounding of g,
+    with the errors of x and t for inputs besides.  reset: the state after it, if it changes.
+    """
 
     name: str
     direction: int
     terminal: bool
+    values: Graph
+    slopes: Graph
+    errors: Graph
+    reset: Graph | None
 
     def counts(self, rising: bool) -> bool:
         """Whether a crossing in this direction is one of the event."""
         return self.direction in (0, 1 if rising else -1)
 
+    def value(self, t: Array, x: Array, p: Sequence[float]) -> Array:
+        """g, (k,), at times (k,) and states (k, m)."""
+        g: Array = _table(self.values, [*x.T, t, *p], len(t))[0]
+        return g
+
+    def slope(self, t: Array, x: Array, p: Sequence[float], x_dot: Array, t_dot: Array) -> Array:
+        """The derivative of g, (k,), where x and t have the derivatives x_dot (k, m) and t_dot (k,)."""
+        g: Array = _table(self.slopes, [*x.T, t, *p, *x_dot.T, t_dot], len(t))[0]
+        return g
+
+    def error(self, t: Array, x: Array, p: Sequence[float], x_error: Array, t_error: Array) -> Array:
+        """A bound of the rounding error of g, (k,), where x and t are off by x_error (k, m) and t_error (k,)."""
+        g: Array = _table(self.errors, [*x.T, t, *p, *x_error.T, t_error], len(t))[0]
+        return g
+
 
 @dataclass(frozen=True, eq=False)
 class EventProgram:
-    """The quantities g(x, t, p) of some events over the states, t and the parameters that are not built in.
-
-    values: g of each.  slopes: g_dot, with the tangents of x and t for inputs besides.  errors: a bound of the rounding
-    of g, with the errors of x and t for inputs besides.  resets: by number of the event, the state after it.
-    """
+    """The events of a run, the names of the components of its state, and the rate of the state as a graph."""
 
     events: tuple[WatchedEvent, ...]
     components: tuple[str, ...]
-    values: Graph
-    slopes: Graph
-    errors: Graph
-    resets: dict[int, Graph]
     rate: Graph
 
-    def motion(self, t: float, x: Array, p: Sequence[float]) -> Array:
-        """The derivatives of g by the time along the motion, (events,)."""
-        at, state = np.array([t]), x[None]
-        return self.slope(at, state, p, _table(self.rate, [*x, t, *p], 1).T, np.ones(1))[:, 0]
+    def motion(self, number: int, t: float, x: Array, p: Sequence[float]) -> float:
+        """The derivative of the quantity of an event by the time along the motion."""
+        x_dot = _table(self.rate, [*x, t, *p], 1).T
+        return float(self.events[number].slope(np.array([t]), x[None], p, x_dot, np.ones(1))[0])
 
     def reset(self, number: int, t: float, x: Array, p: Sequence[float]) -> Array:
-        """The state (m,) after event `number`."""
-        return _table(self.resets[number], [*x[None].T, np.array([t]), *p], 1)[:, 0]
-
-    def value(self, t: Array, x: Array, p: Sequence[float]) -> Array:
-        """g, (events, k), at times (k,) and states (k, m)."""
-        return _table(self.values, [*x.T, t, *p], len(t))
-
-    def slope(self, t: Array, x: Array, p: Sequence[float], x_dot: Array, t_dot: Array) -> Array:
-        """The derivative of g, (events, k), where x and t have the derivatives x_dot (k, m) and t_dot (k,)."""
-        return _table(self.slopes, [*x.T, t, *p, *x_dot.T, t_dot], len(t))
-
-    def error(self, t: Array, x: Array, p: Sequence[float], x_error: Array, t_error: Array) -> Array:
-        """A bound of the rounding error of g, (events, k), where x and t are off by x_error (k, m) and t_error (k,)."""
-        return _table(self.errors, [*x.T, t, *p, *x_error.T, t_error], len(t))
+        """The state (m,) after an event; the same where it resets nothing."""
+        graph = self.events[number].reset
+        return x if graph is None else _table(graph, [*x, t, *p], 1)[:, 0]
 
 
 def event_program(problem: Problem, events: Sequence[Event]) -> EventProgram:
     """The graphs of these events of a problem. Raises TypeError or ValueError for what is no node of the state."""
-    nodes = {f"g{k}": quantity(problem, f"event {event.name!r}", event.value) for k, event in enumerate(events)}
-    values = problem.bind(problem.states, Graph(quantity_inputs(problem), nodes))
+    return EventProgram(tuple([_watched(problem, event) for event in events]), problem.components, problem.rate)
+
+
+def _watched(problem: Problem, event: Event) -> WatchedEvent:
+    node = quantity(problem, f"event {event.name!r}", event.value)
+    values = problem.bind(problem.states, Graph(quantity_inputs(problem), {"g": node}))
     moving = values.inputs[: problem.size + 1]
-    resets = {k: _reset(problem, event.name, event.reset) for k, event in enumerate(events) if event.reset is not None}
-    watched = tuple([WatchedEvent(event.name, event.direction, event.terminal) for event in events])
     slopes = cg.simplify(cg.jvp(values, list(moving)))
-    return EventProgram(watched, problem.components, values, slopes, _errors(values, moving), resets, problem.rate)
+    reset = None if event.reset is None else _reset(problem, event.name, event.reset)
+    errors = _errors(values, moving)
+    return WatchedEvent(event.name, event.direction, event.terminal, values, slopes, errors, reset)
 
 
 def _reset(problem: Problem, name: str, function: Callable[..., Any]) -> Graph:

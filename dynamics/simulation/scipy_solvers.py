@@ -88,7 +88,7 @@ class ScipyIntegration(Integration):
         while solver is not None and solver.status == "running" and not self.status:
             if self.steps >= self.options.max_steps:
                 self.status = self.too_many(solver.t, self.options.max_steps)
-            elif self._stepped(solver):
+            elif self._stepped(solver) and solver.t != solver.t_old:
                 rows.append(self._step(solver, rows[-1].x if rows else x))
             if rows and clock.passed(BLOCK_TIME):
                 yield _block(rows)
@@ -107,9 +107,10 @@ class ScipyIntegration(Integration):
         if len(bad := np.flatnonzero(options.absolute + options.relative * np.abs(x) == 0.0)):
             self.status = f"{start}{self.components[bad[0]]} is 0, and so is atol: nothing measures its error"
             return None
-        rtol = max(options.relative, FINEST)
-        if rtol > options.relative and np.any(options.relative > 0.0):
-            self.warnings.append(f"rtol = {options.relative:g} is below rounding: SciPy's {name} takes {rtol:.3g}")
+        rtol, asked = max(options.relative, FINEST), options.absolute + options.relative * np.abs(x)
+        if len(fine := np.flatnonzero(asked < FINEST * np.abs(x))):
+            what = f"the tolerance of {self.components[fine[0]]}, {asked[fine[0]]:.3g}, is below rounding"
+            self.warnings.append(f"{what}: SciPy's {name} takes rtol = {rtol:.3g}")
         limits: dict[str, Any] = {"rtol": rtol, "atol": options.absolute, "max_step": options.longest_step}
         limits |= self.solver.jacobian
         arguments = self.solver.rate, options.t0, x, options.t_end
