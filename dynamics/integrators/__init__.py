@@ -6,7 +6,17 @@ from .dop853 import DOP853
 from .explicit import explicit
 from .method import Method
 from .momentum_graphs import Mechanics, mechanics
-from .problem import Problem, derive, force, quantity, quantity_inputs, state_jacobian, time_derivative, total_energy
+from .problem import (
+    Problem,
+    derive,
+    force,
+    quantity,
+    quantity_inputs,
+    state_arguments,
+    state_jacobian,
+    time_derivative,
+    total_energy,
+)
 from .radau import ORDER as RADAU_ORDER, radau
 from .rosenbrock import RODAS5P, rosenbrock
 from .step_control import embedded
@@ -45,6 +55,7 @@ __all__ = [
     "quantity",
     "quantity_inputs",
     "runge_kutta",
+    "state_arguments",
     "state_jacobian",
     "time_derivative",
     "total_energy",

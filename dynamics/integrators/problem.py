@@ -127,18 +127,21 @@ def quantity(problem: Problem, what: str, function: Callable[..., Any]) -> Node:
 
     Raises TypeError for what is no such function, ValueError for a result that is no node of the state.
     """
-    p = Parameters(state_inputs(problem.model).parameters)
-    if problem.system is None:
-        arguments: tuple[Any, ...] = (cg.variables(list(problem.states)), cg.variable(TIME), p)
-    else:
-        arguments = (problem.system.q, problem.system.qd, problem.system.t, p)
-    node = call_user_function(what, function, *arguments)
+    node = call_user_function(what, function, *state_arguments(problem))
     known = set(quantity_inputs(problem))
     if not isinstance(node, Node) or any(
         other.op.name == "variable" and other not in known for other in topological([node])
     ):
         raise ValueError(f"{what} must be a node of the state, t and the parameters, got {node!r:.60}")
     return node
+
+
+def state_arguments(problem: Problem) -> tuple[Any, ...]:
+    """What a function of the state is called with: (q, qd, t, p) as nodes, or (x, t, p) of a first-order system."""
+    p = Parameters(state_inputs(problem.model).parameters)
+    if problem.system is None:
+        return cg.variables(list(problem.states)), cg.variable(TIME), p
+    return problem.system.q, problem.system.qd, problem.system.t, p
 
 
 def quantity_inputs(problem: Problem) -> list[Node]:

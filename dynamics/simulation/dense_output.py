@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -10,8 +11,6 @@ import numpy as np
 import cgraph as cg
 from cgraph import Compiled, Graph
 from cgraph.extend import Array
-
-from ..integrators import Problem
 
 KEPT = 16  # compiled rates that stay for another block
 
@@ -37,14 +36,29 @@ class StepBlock(NamedTuple):
         inside: Array = np.where((s == 1.0)[:, None], self.x[rows], self.x_old[rows] + total)
         return inside
 
-    def until(self, t: float, x: Array) -> StepBlock:
-        """The steps up to an instant inside one, which becomes the last."""
-        direction = np.sign(self.h[0])
-        keep = int(np.searchsorted(direction * self.t, direction * t)) + 1
-        dense = None if self.dense is None else self.dense[:keep].copy()
-        t_old, h, x_old = (array[:keep].copy() for array in (self.t_old, self.h, self.x_old))
-        cut = StepBlock(self.t[:keep].copy(), self.x[:keep].copy(), t_old, h, x_old, dense)
-        cut.t[-1], cut.x[-1] = t, x
+    def times_at(self, rows: Indices, s: Array) -> Array:
+        """Times (k,)."""
+        inside: Array = np.where(s == 1.0, self.t[rows], self.t_old[rows] + s * self.h[rows])
+        return inside
+
+    def slopes_at(self, rows: Indices, s: Array) -> Array:
+        """Derivatives of the states by the share, (k, m)."""
+        assert self.dense is not None
+        total = np.zeros((len(rows), self.x.shape[1]))
+        for k in reversed(range(self.dense.shape[1])):
+            total = total * s[:, None] + (k + 1.0) * self.dense[rows, k]
+        return total
+
+    def part(self, which: slice) -> StepBlock:
+        """Some of the steps."""
+        dense = None if self.dense is None else self.dense[which]
+        t, x, t_old, h, x_old = (array[which] for array in (self.t, self.x, self.t_old, self.h, self.x_old))
+        return StepBlock(t, x, t_old, h, x_old, dense)
+
+    def ending(self, t: float, x: Array) -> StepBlock:
+        """The steps, the last of which ends at an instant inside it."""
+        cut = self._replace(t=self.t.copy(), x=self.x.copy())
+        cut.t[-1:], cut.x[-1:] = t, x
         return cut
 
 
@@ -54,11 +68,11 @@ def _compiled(rate: Graph) -> Compiled:
     return cg.compile(rate)
 
 
-def with_hermite(block: StepBlock, problem: Problem) -> StepBlock:
+def with_hermite(block: StepBlock, rate: Graph, parameters: Sequence[float] = ()) -> StepBlock:
     """The steps with dense output where the method has none: the cubic through states and rates at both ends."""
-    f = _compiled(problem.rate)
-    first = f.batch(np.concatenate([block.x_old.T, block.t_old[None]])).T
-    last = f.batch(np.concatenate([block.x.T, block.t[None]])).T
+    f, p = _compiled(rate), np.tile(np.reshape(parameters, (-1, 1)), len(block.t))
+    first = f.batch(np.concatenate([block.x_old.T, block.t_old[None], p])).T
+    last = f.batch(np.concatenate([block.x.T, block.t[None], p])).T
     h, change = block.h[:, None], block.x - block.x_old
     dense = np.stack([h * first, 3 * change - h * (2 * first + last), h * (first + last) - 2 * change], axis=1)
     return block._replace(dense=dense)

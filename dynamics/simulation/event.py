@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Any
 
 from cgraph import Node
 
@@ -12,10 +13,15 @@ from ..systems.system import sequence
 
 @dataclass(frozen=True)
 class Event:
-    """Where a quantity passes through zero.
+    """Where a quantity passes through zero, and what happens there.
 
-    It is looked at sixteen times in each step. Of two crossings closer than that both may be missed: limit the steps by
-    `dt` or `max_step` where a quantity changes faster than the motion does.
+    A quantity that touches zero and turns back counts too, with direction 0, where its extremum is zero to the rounding
+    of its evaluation. One that stays zero for a while has one event, where it arrives; one that starts there has none
+    before it comes back. A jump by a reset is no crossing.
+
+    Value and slope of the quantity are looked at sixteen times in each step, and as often more as it takes until the
+    cubics between looks agree with them, at most 1024 times. Where that is too few, `Stats.warnings` says so: limit the
+    steps by `max_step` or `dt`.
 
     Parameters
     ----------
@@ -28,13 +34,18 @@ class Event:
         1 upwards only, -1 downwards only, 0 both.
     terminal : bool
         Whether the run ends there.
+    reset : callable, optional
+        The state from which the run goes on, reset(q, qd, t) or reset(q, qd, t, p) -> (q, qd) as nodes or numbers; of
+        an OdeSystem reset(x, t) or reset(x, t, p) -> x. Both states are rows of the trajectory, at the same instant; at
+        a time of `t_eval`, the one before is. Of resets at one instant the next takes what the one before left. Where
+        they follow one another in no time, as the bounces of a ball that comes to rest do, the run stops and says so.
 
     Raises
     ------
     TypeError
-        For a name that is no text, a value that is no function, a `terminal` that is neither True nor False.
+        For a name that is no text, a value or a reset that is no function, a `terminal` that is neither True nor False.
     ValueError
-        For another direction.
+        For another direction, and for an event that ends the run and resets the state.
 
     Examples
     --------
@@ -43,12 +54,16 @@ class Event:
     >>> ground = dyn.Event("ground", lambda q, qd, t: q[0], direction=-1, terminal=True)
     >>> dyn.simulate(ball, [1.0], [0.0], 1.0, events=ground).stats.message
     "event 'ground' at t = 0.451524 s"
+    >>> bounce = dyn.Event("bounce", lambda q, qd, t: q[0], direction=-1, reset=lambda q, qd, t: (q, [-0.5 * qd[0]]))
+    >>> dyn.simulate(ball, [1.0], [0.0], 1.2, events=bounce).events["bounce"].t.round(4)
+    array([0.4515, 0.903 , 1.1288])
     """
 
     name: str
     value: Callable[..., Node]
     direction: int = 0
     terminal: bool = False
+    reset: Callable[..., Any] | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not callable(self.value) or not isinstance(self.terminal, bool):
@@ -58,6 +73,10 @@ class Event:
             )
         if self.direction not in (-1, 0, 1):
             raise ValueError(f"event {self.name!r}: direction must be 1, -1 or 0, got {self.direction!r}")
+        if self.reset is not None and not callable(self.reset):
+            raise TypeError(f"event {self.name!r}: reset must be a function, got {self.reset!r:.40}")
+        if self.reset is not None and self.terminal:
+            raise ValueError(f"event {self.name!r}: a run that ends there goes on from no reset state; leave out one")
 
 
 def as_events(events: Event | Iterable[Event]) -> tuple[Event, ...]:

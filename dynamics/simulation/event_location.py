@@ -1,47 +1,242 @@
-"""Event location: the instants inside steps at which the sign of a quantity turns, by looks and halvings."""
+"""Event location: the instants inside steps at which a quantity reaches zero, from the cells of the steps."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from cgraph.extend import Array
 
-from .dense_output import StepBlock
-from .event import Event
+from .dense_output import Indices
+from .event_cells import Cells, Flags, WatchedSteps, event_cells
 
-LOOKS = 15  # instants inside a step at which events are looked at
-HALVINGS = 60  # of a step: to the last bit of where in it
+PARTS, AT_ONCE = 32, 8192  # into which a cell is divided again and again, and those of all cells together
+WHILE = 2.0**-20  # of a step
+BITS = 56.0  # of where in a cell
+PROBES = 0.5 ** np.arange(50, 0, -5)  # of a cell: how far from a zero the sign beside it is asked for
 
 
-def crossings(
-    values: Callable[[Array, Array], Array], events: Sequence[Event], block: StepBlock
-) -> list[tuple[int, float, Array]]:
-    """(number of the event, time, state) of each crossing, in the order of the run. values(t, x): (events, k).
+class Crossing(NamedTuple):
+    """Where an event happens."""
 
-    Where the sign differs between two of the ends and `LOOKS` instants inside of a step, halving finds the place.
+    row: int  # of the step
+    s: float  # share of the step
+    rising: bool  # whether the quantity comes from below
+    touching: bool  # whether it turns back
+
+
+@dataclass
+class Side:
+    """On which side of zero a quantity is, between one part of a run and the next.
+
+    sign: its last, 0 before it has one.  slope: at the end of the last step; NaN at a start.  left: of a run that
+    starts on zero, the sign with which the quantity leaves, 0 if unknown; NaN elsewhere.  waiting: whether it is zero
+    at the last instant, and what it does there is for the next step to tell.
     """
-    steps = len(block.t)
-    shares = np.linspace(0.0, 1.0, LOOKS + 2)
-    looks = [values(block.t_old, block.x_old)]
-    for share in shares[1:-1]:
-        inside = block.states_at(np.arange(steps), np.full(steps, share))
-        looks.append(values(block.t_old + share * block.h, inside))
-    looks.append(values(block.t, block.x))
-    signs = np.stack(looks)  # (instants, events, steps)
-    result: list[tuple[int, float, Array]] = []
-    for number, event in enumerate(events):
-        a, b = signs[:-1, number], signs[1:, number]
-        rises, falls = (a < 0.0) & (b >= 0.0), (a > 0.0) & (b <= 0.0)
-        part, rows = np.nonzero(rises & (event.direction >= 0) | falls & (event.direction <= 0))
-        low, high = shares[part], shares[part + 1]
-        start, t_old, h = np.sign(a[part, rows]), block.t_old[rows], block.h[rows]
-        for _ in range(HALVINGS if len(rows) else 0):
-            middle = 0.5 * (low + high)
-            same = np.sign(values(t_old + middle * h, block.states_at(rows, middle))[number]) == start
-            low, high = np.where(same, middle, low), np.where(same, high, middle)
-        times = np.where(high == 1.0, block.t[rows], t_old + high * h)
-        result += list(zip([number] * len(rows), times.tolist(), block.states_at(rows, high), strict=True))
-    backward = bool(steps and block.h[0] < 0.0)
-    return sorted(result, key=lambda crossing: crossing[1], reverse=backward)
+
+    sign: float = 0.0
+    slope: float = math.nan
+    left: float = math.nan
+    waiting: bool = False
+
+
+def start_side(steps: WatchedSteps) -> Side:
+    """At the start of these steps. A quantity that starts at zero, to rounding, has not passed through it."""
+    row, s = np.zeros(1, dtype=np.intp), np.zeros(1)
+    return Side(left=0.0 if np.abs(steps.values(row, s)) <= steps.rounding(row, s) else math.nan)
+
+
+def crossings(steps: WatchedSteps, side: Side) -> tuple[list[Crossing], Flags]:
+    """What happens in these steps, and in which (steps,) more may have happened; moves `side` on.
+
+    A quantity crosses zero where its sign turns, and touches it where an extremum is zero to the rounding of its
+    evaluation. One that stays zero does so from where it arrives.
+    """
+    cells, beyond = event_cells(steps)
+    _join(cells, side)
+    chain, event = _Chain(steps, cells, side), steps.event
+    found = [*chain.at_signs(side), *chain.at_extrema()]
+    return [one for one in found if (event.direction == 0 if one.touching else event.counts(one.rising))], beyond
+
+
+def _join(cells: Cells, side: Side) -> None:
+    """Where steps meet, the quantity has the slope that it had at the end of the step before: a turn counts once."""
+    first = np.flatnonzero(np.diff(cells.rows)) + 1
+    cells.slope_a[first] = cells.slope_b[first - 1]
+    if not math.isnan(side.slope):
+        cells.slope_a[0] = side.slope
+    side.slope = float(cells.slope_b[-1])
+
+
+Table = Callable[[Indices, Array], Array]
+
+
+class _Chain:
+    """The quantity along the cells: looks 0 .. k at their ends, and the signs beside them."""
+
+    def __init__(self, steps: WatchedSteps, cells: Cells, side: Side) -> None:
+        self.steps, self.cells = steps, cells
+        self.rows = np.concatenate([cells.rows[:1], cells.rows])  # of the looks
+        self.shares = np.concatenate([cells.a[:1], cells.b])
+        g = np.concatenate([cells.g_a[:1], cells.g_b])
+        self.exact = g == 0.0
+        signs = np.nan_to_num(np.sign(g))
+        self.zero = self._zeros(g, np.concatenate([[side.sign], signs]))
+        if not math.isnan(side.left):
+            self.zero[0] = True
+        looks = np.flatnonzero(self.zero)
+        before, after = signs.copy(), signs.copy()
+        before[looks], after[looks] = self._beside(looks, -1), self._beside(looks, 1)
+        if side.left and not math.isnan(side.left):
+            after[0] = side.left
+        side.left = math.nan
+        # [sign before look 0, start of cell 0, its end, start of cell 1, ..]: even entries stand before their look
+        self.signs = np.empty(2 * len(cells.a) + 1)
+        self.signs[0] = side.sign
+        self.signs[1::2], self.signs[2::2] = after[:-1], before[1:]
+
+    def _zeros(self, g: Array, signs: Array) -> Flags:
+        """Which looks are at zero: exactly, or, beside a change of sign or such a look, to rounding.
+
+        signs: from the side before the first look on.
+        """
+        zero: Flags = g == 0.0
+        tested = np.zeros(len(g), dtype=bool)
+        beside = np.flatnonzero(signs[:-1] * signs[1:] < 0.0)
+        while True:
+            looks = np.unique(np.concatenate([beside - 1, beside]))
+            looks = looks[(looks >= 0) & (looks < len(g))]
+            looks = looks[~tested[looks]]
+            if not len(looks):
+                return zero
+            tested[looks] = True
+            rounding = self.steps.rounding(self.rows[looks], self.shares[looks])
+            near = looks[np.abs(g[looks]) <= rounding]
+            zero[near] = True
+            beside = np.concatenate([near, near + 1])
+
+    def _beside(self, looks: Indices, direction: int) -> Array:
+        """The signs of the quantity just before or after looks at which it is zero; 0 where it stays zero."""
+        cells = self.cells
+        if not len(looks):
+            return np.zeros(0)
+        cell = np.clip(looks - (direction < 0), 0, len(cells.a) - 1)
+        start, end = (cells.a, cells.b)[::direction]
+        s = np.clip(start[cell, None] + (end - start)[cell, None] * PROBES, 0.0, 1.0)
+        rows = np.repeat(cells.rows[cell], len(PROBES))
+        g, rounding = (table(rows, s.ravel()).reshape(s.shape) for table in (self.steps.values, self.steps.rounding))
+        sure = np.abs(g) > rounding
+        nearest = np.take_along_axis(g, np.argmax(sure, axis=1)[:, None], axis=1)[:, 0]
+        outside = looks == (0 if direction < 0 else len(cells.a))
+        beside: Array = np.where(sure.any(axis=1) & ~outside, np.sign(nearest), 0.0)
+        return beside
+
+    def at_signs(self, side: Side) -> list[Crossing]:
+        """Where signs turn, and where a quantity that was zero at a look goes back to where it came from."""
+        signs = self.signs
+        known = np.flatnonzero(signs)
+        if not len(known):
+            return []
+        i, j, last = known[:-1], known[1:], int(known[-1])
+        at_zero = (i % 2 == 0) & self.zero[i // 2]
+        pairs = np.flatnonzero((signs[i] != signs[j]) | (j > i + 1) | at_zero)
+        arrivals, touches = [], []
+        for start, end in zip(i[pairs].tolist(), j[pairs].tolist(), strict=True):
+            looks = slice((start + 1) // 2, (end + 1) // 2)  # between
+            if signs[start] != signs[end] or self._stays(looks):
+                arrivals.append(start)
+            else:
+                touches.append((start, end))
+        side.sign = float(signs[last])
+        if self._stays(slice((last + 1) // 2, None)):
+            arrivals.append(last)
+            side.sign = 0.0
+        side.waiting = bool(self.zero[-1]) and side.sign != 0.0
+        found = [self._touch(start, end) for start, end in touches]
+        return found + self._arrivals(np.array(arrivals, dtype=np.intp))
+
+    def _stays(self, looks: slice) -> bool:
+        """Whether the quantity is exactly zero for a while, not only at looks that lie side by side at a touch."""
+        zeros = np.flatnonzero(self.exact[looks]) + looks.start
+        place = self.rows[zeros] + self.shares[zeros]
+        return len(zeros) > 1 and bool(place[-1] - place[0] > WHILE)
+
+    def _touch(self, start: int, end: int) -> Crossing:
+        """Where its slope turns between two entries, or, where that is not seen, at a look between them."""
+        sign, first, last = float(self.signs[start]), start // 2, end // 2
+        look = (first + last + start % 2) // 2
+        row, s = self.rows[[look]], self.shares[[look]]
+        if start % 2 and self.rows[first + 1] == self.rows[last]:
+            low, high = self.cells.a[[first]], self.shares[[last]]
+
+            def toward(s: Array) -> Flags:
+                toward: Flags = self._along(self.steps.slopes, row, s) * sign < 0.0
+                return toward
+
+            if toward(low[:, None])[0, 0] and not toward(high[:, None])[0, 0]:
+                s = _turn(toward, low, high)[0]
+        return Crossing(int(row[0]), float(s[0]), sign < 0.0, touching=True)
+
+    def _arrivals(self, entries: Indices) -> list[Crossing]:
+        """Where the quantity first is not of the sign that it has at these entries."""
+        signs, looks = self.signs[entries], entries // 2
+        rows, s = self.rows[looks], self.shares[looks]
+        inside = entries % 2 == 1
+        cells, rows[inside] = self.cells.take(looks[inside]), self.cells.rows[looks[inside]]
+        s[inside] = self._turn(cells.rows, cells.a, cells.b, signs[inside])
+        places = zip(rows.tolist(), s.tolist(), signs.tolist(), strict=True)
+        return [Crossing(row, share, sign < 0.0, touching=False) for row, share, sign in places]
+
+    def _turn(self, rows: Indices, low: Array, high: Array, signs: Array) -> Array:
+        """The first shares, to the last bit, at which the quantity has not these signs, which it has at `low`."""
+        return _turn(lambda s: self._along(self.steps.values, rows, s) * signs[:, None] > 0.0, low, high)[1]
+
+    def _along(self, table: Table, rows: Indices, s: Array) -> Array:
+        """The values, or slopes, at several shares s (k, parts) of rows (k,)."""
+        along: Array = table(np.repeat(rows, s.shape[1]), s.ravel()).reshape(s.shape)
+        return along
+
+    def at_extrema(self) -> Iterator[Crossing]:
+        """Where it comes near zero and turns back within a cell: two crossings, a touch, or nothing."""
+        cells, sign = self.cells, self.signs[1::2]
+        ends = (sign != 0.0) & (sign == self.signs[2::2]) & ~self.zero[:-1] & ~self.zero[1:]
+        dips = ends & (cells.slope_a * sign < 0.0) & (cells.slope_b * sign >= 0.0) & ~cells.clear()
+        if not dips.any():
+            return
+        few = cells.take(dips)
+        rows, signs = few.rows, sign[dips]
+        pair = _turn(lambda s: self._along(self.steps.slopes, rows, s) * signs[:, None] < 0.0, few.a, few.b)
+        at, g = np.stack(pair), np.stack([self.steps.values(rows, s) for s in pair])
+        nearest = np.argmin(g * signs, axis=0)[None]
+        s, value = (np.take_along_axis(table, nearest, axis=0)[0] for table in (at, g))
+        touching = np.abs(value) <= self.steps.rounding(rows, s)
+        through = (value * signs < 0.0) & ~touching
+        out, back = self._turn(rows, few.a, s, signs), self._turn(rows, s, few.b, -signs)
+        for k in np.flatnonzero(touching | through).tolist():
+            below, row = bool(signs[k] < 0.0), int(rows[k])
+            if touching[k]:
+                yield Crossing(row, float(s[k]), below, touching=True)
+            else:
+                yield Crossing(row, float(out[k]), below, touching=False)
+                yield Crossing(row, float(back[k]), not below, touching=False)
+
+
+def _turn(same: Callable[[Array], Flags], low: Array, high: Array) -> tuple[Array, Array]:
+    """The shares (k,) between which `same`, true at `low` and false at `high`, first turns: one apart in the last bit.
+
+    same: of shares (k, parts) whether it is true.
+    """
+    if not len(low):
+        return low, high
+    parts = max(2, min(PARTS, AT_ONCE // len(low)))
+    for _ in range(math.ceil(BITS / math.log2(parts))):
+        s = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, parts + 1)
+        s[:, -1] = high
+        turned = ~same(s[:, 1:-1])
+        first = np.where(turned.any(axis=1), np.argmax(turned, axis=1) + 1, parts)[:, None]
+        low, high = (np.take_along_axis(s, at, axis=1)[:, 0] for at in (first - 1, first))
+    return low, high

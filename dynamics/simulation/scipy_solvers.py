@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+import warnings
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,11 +14,16 @@ import cgraph as cg
 from cgraph.extend import Array, install
 
 from ..integrators import Problem, state_jacobian
+from ..integrators.step_control import RESOLUTION
 from .dense_output import StepBlock
 from .run_options import SCIPY, RunOptions
 from .stepping import BLOCK_TIME, Clock, Integration
 
 IMPLICIT = ("Radau", "BDF", "LSODA")
+DEGREES = {"RK45": 4, "DOP853": 7, "Radau": 3, "BDF": 5, "LSODA": 12}  # at most, of the dense output
+FINEST = 100.0 * 2.0**-52  # the smallest rtol that SciPy takes
+LEAP = 1e-6  # of the run: the first step where SciPy finds none
+IDLE = 1000  # steps below the resolution of the time, after which a run ends
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,13 +51,24 @@ def scipy_solver(problem: Problem, name: str, backend: str) -> ScipySolver:
     return ScipySolver(name, problem.components, getattr(integrate, name), lambda t, x: rate([*x, t]), jacobian)
 
 
-class ScipyIntegration(Integration):
-    """A run by one of SciPy's solvers. Its dense output gives rows at the times of t_eval besides its steps."""
+class _Step(NamedTuple):
+    """One step of a solver."""
 
-    def __init__(self, solver: ScipySolver, options: RunOptions) -> None:
+    t_old: float
+    t: float
+    x_old: Array
+    x: Array
+    dense: Array  # (degree, m), see StepBlock; NaN where nobody asks
+
+
+class ScipyIntegration(Integration):
+    """A run by one of SciPy's solvers, with its own dense output where it is asked for states between its steps."""
+
+    def __init__(self, solver: ScipySolver, options: RunOptions, *, between: bool = False) -> None:
         super().__init__(solver.components)
-        self.solver, self.options = solver, options
+        self.solver, self.options, self.between = solver, options, between
         self._jacobians = self._factorizations = 0
+        self._idle = 0  # steps in a row that hardly moved the time
 
     @property
     def jacobians(self) -> int:
@@ -64,45 +82,97 @@ class ScipyIntegration(Integration):
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
-        options, times = self.options, self.options.times
-        limits: dict[str, Any] = {"rtol": options.relative, "atol": options.absolute}
-        limits |= {"max_step": options.longest_step, "first_step": options.first_step}
-        solver = self.solver.make(self.solver.rate, options.t0, x, options.t_end, **limits, **self.solver.jacobian)
-        t, states = [options.t0], [np.array(x)]
+        solver = self._started(x)
+        rows: list[_Step] = []
         clock = Clock()
-        while solver.status == "running":
-            if self.steps >= options.max_steps:
-                self.status = self.too_many(solver.t, options.max_steps)
-                break
-            message = solver.step()
-            self.evaluations, self._jacobians, self._factorizations = solver.nfev, solver.njev, solver.nlu
-            reason = self.nonfinite(solver.y)
-            if solver.status == "failed" or reason:
-                reason = reason or f"SciPy's {self.solver.name} gave up: {message}"
-                self.status = f"stopped at t = {solver.t:.6g} s: {reason}"
-                break
-            self.steps += 1
-            self.largest = max(self.largest, abs(float(solver.t - solver.t_old)))
-            if times is not None:
-                ends = options.direction * np.array([solver.t_old, solver.t])
-                first, last = np.searchsorted(options.direction * times, ends, side="right")
-                inside = [at for at in times[first:last].tolist() if at != solver.t]
-                if inside:
-                    between = solver.dense_output()
-                    t += inside
-                    states += [np.array(between(at)) for at in inside]
-            t.append(float(solver.t))
-            states.append(np.array(solver.y))
-            if clock.passed(BLOCK_TIME) and len(t) > 1:
-                yield _block(t, states)
-                t, states = t[-1:], states[-1:]
-        if len(t) > 1:
-            yield _block(t, states)
+        while solver is not None and solver.status == "running" and not self.status:
+            if self.steps >= self.options.max_steps:
+                self.status = self.too_many(solver.t, self.options.max_steps)
+            elif self._stepped(solver) and solver.t != solver.t_old:
+                rows.append(self._step(solver, rows[-1].x if rows else x))
+            if rows and clock.passed(BLOCK_TIME):
+                yield _block(rows)
+                x, rows = rows[-1].x, []
+        if rows:
+            yield _block(rows)
+
+    def _started(self, x: Array) -> Any:
+        """SciPy's solver at the start; None where it would not come back from there, and then `status` says why."""
+        options, name = self.options, self.solver.name
+        start = f"stopped at t = {options.t0:.6g} s: "
+        rate = self.solver.rate(options.t0, x)
+        if len(bad := np.flatnonzero(~np.isfinite(rate))):
+            self.status = f"{start}the rate of {self.components[bad[0]]} is not finite at the start"
+            return None
+        if len(bad := np.flatnonzero(options.absolute + options.relative * np.abs(x) == 0.0)):
+            self.status = f"{start}{self.components[bad[0]]} is 0, and so is atol: nothing measures its error"
+            return None
+        rtol, asked = max(options.relative, FINEST), options.absolute + options.relative * np.abs(x)
+        if len(fine := np.flatnonzero(asked < FINEST * np.abs(x))):
+            what = f"the tolerance of {self.components[fine[0]]}, {asked[fine[0]]:.3g}, is below rounding"
+            self.warnings.append(f"{what}: SciPy's {name} takes rtol = {rtol:.3g}")
+        limits: dict[str, Any] = {"rtol": rtol, "atol": options.absolute, "max_step": options.longest_step}
+        limits |= self.solver.jacobian
+        arguments = self.solver.rate, options.t0, x, options.t_end
+        solver = self.solver.make(*arguments, first_step=options.first_step, **limits)
+        chosen = getattr(solver, "h_abs", 1.0)  # LSODA chooses in its first step
+        if not (math.isfinite(chosen) and chosen > 0.0):  # by a division by a scale that is next to nothing
+            solver = self.solver.make(*arguments, first_step=LEAP * options.length, **limits)
+        return solver
+
+    def _stepped(self, solver: Any) -> bool:
+        """One step more; False where there is none, and then `status` says why."""
+        where = f"stopped at t = {solver.t:.6g} s: "
+        try:
+            with warnings.catch_warnings(record=True) as said:
+                warnings.simplefilter("always")
+                message = solver.step()
+        except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:  # from SciPy's linear algebra
+            self.status = where + self._gave_up(solver, [str(error)])
+            return False
+        self.evaluations, self._jacobians, self._factorizations = solver.nfev, solver.njev, solver.nlu
+        if reason := self.nonfinite(solver.y):
+            self.status = f"stopped at t = {solver.t:.6g} s: {reason}"
+        elif solver.status == "failed":
+            self.status = where + self._gave_up(solver, [message, *[str(one.message) for one in said]])
+        else:
+            still = abs(solver.t - solver.t_old) <= RESOLUTION * max(abs(self.options.t0), abs(self.options.t_end))
+            self._idle = self._idle + 1 if still else 0
+            if self._idle > IDLE:
+                self.status = f"{where}{IDLE} steps of SciPy's {self.solver.name} have not moved the time"
+        return not self.status
+
+    def _gave_up(self, solver: Any, said: Sequence[str | None]) -> str:
+        """Why the solver has failed: what is not finite at the state that it has come to, or what SciPy says."""
+        rate = self.solver.rate(solver.t, solver.y)
+        if len(bad := np.flatnonzero(~np.isfinite(rate))):
+            return f"the rate of {self.components[bad[0]]} is not finite"
+        jacobian = self.solver.jacobian.get("jac")
+        if jacobian is not None and len(bad := np.flatnonzero(~np.isfinite(jacobian(solver.t, solver.y)).all(axis=1))):
+            return f"the Jacobian of the rate of {self.components[bad[0]]} is not finite"
+        return f"SciPy's {self.solver.name} gave up: " + " ".join([text for text in said if text])
+
+    def _step(self, solver: Any, x_old: Array) -> _Step:
+        self.steps += 1
+        t_old, t, x = float(solver.t_old), float(solver.t), np.array(solver.y)
+        self.largest = max(self.largest, abs(t - t_old))
+        degree, times = DEGREES[self.solver.name], self.options.times
+        if not self.between and (times is None or not _inside(times, t_old, t)):
+            return _Step(t_old, t, x_old, x, np.full((degree, len(x)), np.nan))
+        shares = 0.5 - 0.5 * np.cos(np.pi * np.arange(1, degree + 1) / degree)
+        change = solver.dense_output()(t_old + shares * (t - t_old)).T - x_old
+        change[-1] = x - x_old
+        return _Step(t_old, t, x_old, x, np.linalg.solve(shares[:, None] ** np.arange(1, degree + 1), change))
 
 
-def _block(times: list[float], states: list[Array]) -> StepBlock:
-    t, x = np.array(times), np.array(states)
-    return StepBlock(t[1:], x[1:], t[:-1], np.diff(t), x[:-1], None)
+def _inside(times: Array, t_old: float, t: float) -> bool:
+    """Whether there are times between the ends of a step, in either direction."""
+    return bool(((times > min(t_old, t)) & (times < max(t_old, t))).any())
+
+
+def _block(steps: list[_Step]) -> StepBlock:
+    t_old, t, x_old, x, dense = (np.array(column) for column in zip(*steps, strict=True))
+    return StepBlock(t, x, t_old, t - t_old, x_old, dense)
 
 
 def solve_ivp() -> Any:

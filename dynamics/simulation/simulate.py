@@ -21,6 +21,7 @@ from .dense_output import StepBlock, with_hermite
 from .error_estimate import ErrorEstimate, estimate
 from .event import Event, as_events
 from .event_log import EventLog
+from .event_program import event_program
 from .free_memory import room
 from .progress_bar import Progress
 from .recorder import Recorder
@@ -31,6 +32,7 @@ from .solution import Solution
 from .step_program import compile_steps, step_program
 from .stepping import FixedStepIntegration, Integration, integration
 from .trajectory import SimulationWarning, Stats, Trajectory
+from .watched import WatchedIntegration
 
 
 def simulate(
@@ -147,16 +149,17 @@ def simulate(
 
     # Derive the equations, xdot = f(x, t), the energy and the events as graphs
     problem = derive(model, start.bound)
-    energy, watch = total_energy(problem), EventLog(problem, watched)
+    energy, log = total_energy(problem), EventLog(event_program(problem, watched)) if watched else None
 
     # Write the steps of the method over these graphs, and compile them
-    run = _compiled(problem, options, between=bool(watched) or dense_output)
+    leg = _compiled(problem, options, between=bool(watched) or dense_output)
 
     # Integrate, noting rows and events
+    run = WatchedIntegration(leg, options, log) if log else leg(options)
     ends = 3 if watched else 1  # an event cuts the last step, and of the others one in two is compared
     recorder = Recorder(start.x, options.times, options.t0, options.direction, ends)
     steps: list[StepBlock] | None = [] if dense_output else None
-    outcome = _integrate(run, start.x, recorder, watch, options, steps)
+    outcome = _integrate(run, start.x, recorder, options, problem.rate, steps)
 
     # Put the result together
     times, states = recorder.table()
@@ -167,17 +170,19 @@ def simulate(
     energies = np.full(len(times), math.nan) if energy is None else row_values(energy, times, states)[:, 0]
     dense = None if steps is None else Solution(options.t0, start.x, steps, half)
     rows = (times, states[:, :half], states[:, half:], energies)
-    return Trajectory(*rows, stats, watch.crossings(half), _graphs(problem), dense)
+    return Trajectory(*rows, stats, log.crossings(half) if log else {}, _graphs(problem), dense)
 
 
-def _compiled(problem: Problem, options: RunOptions, *, between: bool) -> Integration:
-    """The run before its first step, compiled. between: with all steps, and the dense output of chosen ones."""
-    solver = options.scipy_solver
-    if solver is not None:
-        return ScipyIntegration(scipy_solver(problem, solver, options.backend), options)
+def _compiled(problem: Problem, options: RunOptions, *, between: bool) -> Callable[[RunOptions], Integration]:
+    """What makes a run, compiled, of options. between: with all steps, and the dense output of chosen ones."""
+    name = options.scipy_solver
+    if name is not None:
+        solver = scipy_solver(problem, name, options.backend)
+        return lambda options: ScipyIntegration(solver, options, between=between)
     method = METHODS[options.method]
     program = step_program(problem, method, dense=method.adaptive and (between or options.times is not None))
-    return integration(compile_steps(program, options.backend), options, every_step=between)
+    compiled = compile_steps(program, options.backend)
+    return lambda options: integration(compiled, options, every_step=between)
 
 
 class _Outcome(NamedTuple):
@@ -193,8 +198,8 @@ def _integrate(
     run: Integration,
     x: Array,
     recorder: Recorder,
-    watch: EventLog,
     options: RunOptions,
+    rate: Graph,
     steps: list[StepBlock] | None,
 ) -> _Outcome:
     """Run from x to t_end, an event, a failure, the end of the memory, or Ctrl-C; then estimate the error.
@@ -207,19 +212,21 @@ def _integrate(
     try:
         total = (1.0 + second) * options.length
         with np.errstate(all="ignore"), Progress("simulate", total, options.progress) as report:
-            _run(run, x, recorder, watch, steps, lambda t: report(abs(t - options.t0)))
+            _run(run, x, recorder, rate, steps, lambda t: report(abs(t - options.t0)))
             seconds = time.perf_counter() - begin
-            if isinstance(run, FixedStepIntegration) and options.estimated and not run.status:
+            plain = run.plain
+            if isinstance(plain, FixedStepIntegration) and options.estimated and not run.status:
                 doing = ", while its error was estimated"
                 done = abs(recorder.last - options.t0)
-                error = estimate(run, x, *recorder.checkpoints(), lambda t: report(done + second * abs(t - options.t0)))
+                at, states = recorder.checkpoints()
+                error = estimate(plain, x, at, states, lambda t: report(done + second * abs(t - options.t0)))
     except KeyboardInterrupt:
         run.status = f"interrupted after t = {recorder.last:.6g} s{doing}"
     if run.status:
         recorder.add_last()
     seconds = time.perf_counter() - begin if math.isnan(seconds) else seconds
-    if watch.status and not run.status:
-        return _Outcome(seconds, 1, watch.status, error)
+    if run.event and not run.status:
+        return _Outcome(seconds, 1, run.event, error)
     return _Outcome(seconds, -1 if run.status else 0, run.status or "reached t_end", error)
 
 
@@ -227,7 +234,7 @@ def _run(
     run: Integration,
     x: Array,
     recorder: Recorder,
-    watch: EventLog,
+    rate: Graph,
     steps: list[StepBlock] | None,
     report: Callable[[float], None],
 ) -> None:
@@ -235,20 +242,18 @@ def _run(
     most, kept = room() / TABLES, 0
     for block in run.blocks(x):
         if steps is not None and block.dense is None:
-            block = with_hermite(block, watch.problem)
-        block = watch(block)
+            block = with_hermite(block, rate)
         recorder.add(block)
         if steps is not None:
             steps.append(block)
             kept += sum(array.nbytes for array in block if array is not None)
-        if watch.status:
-            recorder.add_last()
-            return
         if recorder.size + kept > most:
             last = f"{recorder.last:.6g} s"
             run.status = f"stopped at t = {last}: the rows fill the memory; t_eval records fewer"
             return
         report(float(block.t[-1]))
+    if run.event:
+        recorder.add_last()
 
 
 def _stats(run: Integration, method: str, outcome: _Outcome) -> Stats:

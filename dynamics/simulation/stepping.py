@@ -47,7 +47,7 @@ class Integration(ABC):
     """One run. `blocks` makes the steps; the attributes say how far it has come.
 
     status: empty while all is well, else why it stopped before the end.  largest: step [s].
-    warnings: what speaks against the result, a sentence each.
+    warnings: what speaks against the result, a sentence each.  event: the one that has ended it, in words.
     """
 
     def __init__(self, components: Sequence[str]) -> None:
@@ -56,6 +56,12 @@ class Integration(ABC):
         self.largest = 0.0
         self.status = ""
         self.warnings: list[str] = []
+        self.event = ""
+
+    @property
+    def plain(self) -> Integration | None:
+        """The run without its events; None where they have changed its course."""
+        return self
 
     @property
     @abstractmethod
@@ -212,6 +218,7 @@ class AdaptiveIntegration(NativeIntegration):
         start: Mapping[str, float | Array | list[float]] = {
             "x": x,
             "p": self.parameters,
+            "t": options.t0,
             "end": options.t_end,
             "rtol": options.relative,
             "atol": options.absolute,
