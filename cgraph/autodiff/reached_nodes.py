@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from ..core.node import Node, Op
@@ -30,7 +31,7 @@ class ReachedNodes:
             return zero_safe_mul(a, b)
         flag = self._flags.get(source)
         may_be_infinite = op.singular is not None or source in self._behind_selection
-        if flag is None or not may_be_infinite or a.value is not None or b.value is not None:
+        if flag is None or not may_be_infinite or _is_finite(a) or _is_finite(b):
             return a * b
         return where(flag, a * b, 0.0)
 
@@ -44,3 +45,8 @@ class ReachedNodes:
         other = self._flags.setdefault(target, flag)
         if other is not flag:
             self._flags[target] = None if flag is None or other is None else where(other, 1.0, flag)
+
+
+def _is_finite(a: Node) -> bool:
+    """Whether a factor is a finite constant: a slope that takes 0 to 0, or a cotangent that is nowhere 0."""
+    return a.value is not None and math.isfinite(a.value)

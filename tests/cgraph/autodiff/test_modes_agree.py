@@ -137,6 +137,8 @@ def test_every_mode_gives_it_of_a_gradient_and_the_hessian_is_that(at):
         (cg.acos(cg.minimum(x, 1)), 2.0),
         (cg.sqrt(cg.where(x > 0, x, 0)), -1.0),
         (cg.sign(x) / 0.0, 1.0),
+        (cg.where(x > 0, math.inf * x, 0.0), -1.0),
+        (math.inf * cg.maximum(x, 0) + cg.maximum(x, 0), -1.0),
     ],
 )
 def test_what_is_left_out_counts_nothing_in_any_mode(f, at):
