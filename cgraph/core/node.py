@@ -238,7 +238,7 @@ def constant(value: float) -> Node:
     TypeError
         If it is not a real number.
     ValueError
-        If it is NaN.
+        If it is NaN or too large for float64.
 
     Examples
     --------
@@ -251,7 +251,10 @@ def constant(value: float) -> Node:
             value = value.item()
         if not isinstance(value, numbers.Real):
             raise TypeError(f"expected a Node or a real number, got {type(value).__name__}: {value!r:.60}")
-        value = float(value)
+        try:
+            value = float(value)
+        except OverflowError:
+            raise ValueError(f"a constant must fit float64, got {value!r:.20}...") from None
     if value != value:
         raise ValueError("a constant must not be NaN")
     key = (value, math.copysign(1.0, value))
