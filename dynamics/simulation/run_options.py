@@ -81,6 +81,7 @@ class RunOptions:
     max_steps: float = math.inf
     backend: str = "auto"
     progress: bool | None = None
+    t0: float = 0.0
 
     def __post_init__(self) -> None:
         check_method(self.method)
