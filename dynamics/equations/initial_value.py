@@ -63,23 +63,25 @@ def check_names(inputs: StateInputs, names: Iterable[str]) -> None:
         raise ValueError(f"the system has no parameter {', '.join(unknown)} (it has {has})")
 
 
-def increasing_times(t_eval: ArrayLike, t_end: float = math.inf) -> Array:
+def times_to_record(t_eval: ArrayLike, t_end: float = math.inf, t0: float = 0.0) -> Array:
     """The times to record, (T,). A last one past t_end by rounding, as that of 0.1 * np.arange(4), becomes t_end.
 
-    Raises ValueError unless they increase and lie in [0, t_end].
+    Raises ValueError unless they go from t0 towards t_end, increasing, or decreasing where t_end < t0, and lie between.
     """
     times = real_array("t_eval", t_eval).copy()
-    span = f"in [0, t_end = {t_end:g} s]" if math.isfinite(t_end) else "from 0 s on"
-    needed = f"t_eval must be increasing times {span}"
+    direction, sense = (-1.0, "decreasing") if t_end < t0 else (1.0, "increasing")
+    span = f"in [{t0:g}, t_end = {t_end:g} s]" if math.isfinite(t_end) else f"from {t0:g} s on"
+    needed = f"t_eval must be {sense} times {span}"
     if times.ndim != 1 or not len(times):
         raise ValueError(f"{needed}, got shape {times.shape}")
-    if t_end < times[-1] <= t_end * (1.0 + PAST):
+    if 0.0 < direction * (times[-1] - t_end) <= PAST * max(abs(t0), abs(t_end)):
         times[-1] = t_end
     listed: list[float] = times.tolist()
-    outside = [t for t in listed if not (0.0 <= t <= t_end and t < math.inf)]
+    low, high = min(t0, t_end), max(t0, t_end)
+    outside = [t for t in listed if not (low <= t <= high and math.isfinite(t))]
     if outside:
         raise ValueError(f"{needed}, got {outside[0]!r}")
-    if order := [pair for pair in itertools.pairwise(listed) if not pair[0] < pair[1]]:
+    if order := [pair for pair in itertools.pairwise(listed) if not direction * pair[0] < direction * pair[1]]:
         raise ValueError(f"{needed}, got {order[0][0]!r} before {order[0][1]!r}")
     return times
 

@@ -6,7 +6,7 @@ from .dop853 import DOP853
 from .explicit import explicit
 from .method import Method
 from .momentum_graphs import Mechanics, mechanics
-from .problem import Problem, derive, quantity, quantity_inputs, state_jacobian, time_derivative, total_energy
+from .problem import Problem, derive, force, quantity, quantity_inputs, state_jacobian, time_derivative, total_energy
 from .radau import ORDER as RADAU_ORDER, radau
 from .rosenbrock import RODAS5P, rosenbrock
 from .step_control import embedded
@@ -40,6 +40,7 @@ __all__ = [
     "Problem",
     "Tableau",
     "derive",
+    "force",
     "mechanics",
     "quantity",
     "quantity_inputs",

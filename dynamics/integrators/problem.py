@@ -100,6 +100,17 @@ def total_energy(problem: Problem) -> Graph | None:
 
 
 @lru_cache(KEPT)
+def force(problem: Problem) -> Graph | None:
+    """tau + forces - damping qd: inputs the states, t, parameters. None for a first-order system."""
+    system = problem.system
+    if system is None:
+        return None
+    parts = zip(system.tau, system.forces, system.damping, system.qd, strict=True)
+    outputs = {f"force{i}": tau + forces - damping * qd for i, (tau, forces, damping, qd) in enumerate(parts)}
+    return problem.bind(problem.states, Graph(quantity_inputs(problem), outputs))
+
+
+@lru_cache(KEPT)
 def state_jacobian(problem: Problem) -> Graph:
     """df/dx, row by row: inputs the states, t, parameters."""
     return cg.simplify(cg.jacobian(problem.rate, list(problem.states)))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from numpy.typing import ArrayLike
 
-from ..equations.initial_value import increasing_times, initial_value
+from ..equations.initial_value import initial_value, times_to_record
 from ..equations.state_equation import state_equation, state_inputs
 from ..systems.model import Model
 from .collocation import collocation
@@ -89,7 +89,7 @@ def reference(
     if not (isinstance(digits, int) and 1 <= digits <= MOST // 2):
         raise ValueError(f"digits must be a whole number from 1 to {MOST // 2}, got {digits!r}")
     start, inputs = initial_value(model, q, qd, tau, parameters), state_inputs(model)
-    x, times = start.x.tolist(), increasing_times(t_eval).tolist()
+    x, times = start.x.tolist(), times_to_record(t_eval).tolist()
     values = {name: start.bound[name] for name in (*inputs.parameters, *inputs.applied)}
     graph, solver = state_equation(model), REFERENCE_METHODS[method]
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 import cgraph as cg
+from cgraph import Compiled, Graph
 from cgraph.extend import Array
 
 from ..integrators import Problem
+
+KEPT = 16  # compiled rates that stay for another block
 
 Indices = np.ndarray[Any, np.dtype[np.intp]]
 
@@ -20,7 +24,7 @@ class StepBlock(NamedTuple):
     t: Array  # (T,) ends of the steps
     x: Array  # (T, m)
     t_old: Array  # (T,)
-    h: Array  # (T,)
+    h: Array  # (T,), negative in a run back in time
     x_old: Array  # (T, m)
     dense: Array | None  # (T, degree, m)
 
@@ -35,7 +39,8 @@ class StepBlock(NamedTuple):
 
     def until(self, t: float, x: Array) -> StepBlock:
         """The steps up to an instant inside one, which becomes the last."""
-        keep = int(np.searchsorted(self.t, t)) + 1
+        direction = np.sign(self.h[0])
+        keep = int(np.searchsorted(direction * self.t, direction * t)) + 1
         dense = None if self.dense is None else self.dense[:keep].copy()
         t_old, h, x_old = (array[:keep].copy() for array in (self.t_old, self.h, self.x_old))
         cut = StepBlock(self.t[:keep].copy(), self.x[:keep].copy(), t_old, h, x_old, dense)
@@ -43,9 +48,15 @@ class StepBlock(NamedTuple):
         return cut
 
 
+@lru_cache(KEPT)
+def _compiled(rate: Graph) -> Compiled:
+    """The rate, for states at many times; of the last few, the one compiled before."""
+    return cg.compile(rate)
+
+
 def with_hermite(block: StepBlock, problem: Problem) -> StepBlock:
     """The steps with dense output where the method has none: the cubic through states and rates at both ends."""
-    f = cg.compile(problem.rate)
+    f = _compiled(problem.rate)
     first = f.batch(np.concatenate([block.x_old.T, block.t_old[None]])).T
     last = f.batch(np.concatenate([block.x.T, block.t[None]])).T
     h, change = block.h[:, None], block.x - block.x_old

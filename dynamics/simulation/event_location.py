@@ -18,7 +18,7 @@ HALVINGS = 60  # of a step: to the last bit of where in it
 def crossings(
     values: Callable[[Array, Array], Array], events: Sequence[Event], block: StepBlock
 ) -> list[tuple[int, float, Array]]:
-    """(number of the event, time, state) of each crossing, in order of time. values(t, x): (events, k).
+    """(number of the event, time, state) of each crossing, in the order of the run. values(t, x): (events, k).
 
     Where the sign differs between two of the ends and `LOOKS` instants inside of a step, halving finds the place.
     """
@@ -43,4 +43,5 @@ def crossings(
             low, high = np.where(same, middle, low), np.where(same, high, middle)
         times = np.where(high == 1.0, block.t[rows], t_old + high * h)
         result += list(zip([number] * len(rows), times.tolist(), block.states_at(rows, high), strict=True))
-    return sorted(result, key=lambda crossing: crossing[1])
+    backward = bool(steps and block.h[0] < 0.0)
+    return sorted(result, key=lambda crossing: crossing[1], reverse=backward)

@@ -10,41 +10,60 @@ from .dense_output import StepBlock
 
 
 class Recorder:
-    """The rows of a trajectory: every step, or the states at `times`."""
+    """The rows of a trajectory that starts with x at t0: every step, or the states at `times`.
 
-    def __init__(self, x: Array, times: Array | None) -> None:
-        self.times = times
-        self.last = 0.0  # s, how far the run has come
-        at_start = times is None or times[0] == 0.0
-        self._t = [np.zeros(1 if at_start else 0)]
-        self._x = [x[None] if at_start else x[None][:0]]
-        self._next = int(at_start)  # of `times`
+    direction: 1.0, or -1.0 for a run back in time, whose times decrease.  ends: of how many last steps the end is kept
+    besides.
+    """
+
+    def __init__(self, x: Array, times: Array | None, t0: float = 0.0, direction: float = 1.0, ends: int = 1) -> None:
+        self.times, self.direction = times, direction
+        self.last, self._last_state = t0, x  # how far the run has come [s]
+        at_start = int(times is None or times[0] == t0)
+        self._parts = [(np.full(at_start, t0), np.tile(x, (at_start, 1)))]  # times and states
+        self._ends = [(np.empty(0), np.empty((0, len(x))))] * ends  # of the last steps
+        self._next = at_start  # of `times`
         self.size = 0  # bytes
 
     def add(self, block: StepBlock) -> None:
         """The rows of these steps."""
         if not len(block.t):
             return
-        self.last = float(block.t[-1])
+        last, following = float(block.t[-1]), self._next
         if self.times is None:
             self._append(block.t, block.x)
-            return
-        last = int(np.searchsorted(self.times, self.last, side="right"))
-        times = self.times[self._next : last]
-        self._next = last
-        rows = np.searchsorted(block.t, times)
-        exact = block.t[rows] == times
-        states = block.x[rows]
-        if not exact.all():
-            inside = rows[~exact]
-            states[~exact] = block.states_at(inside, (times[~exact] - block.t_old[inside]) / block.h[inside])
-        self._append(times, states)
+        else:
+            following = int(np.searchsorted(self.direction * self.times, self.direction * last, side="right"))
+            times = self.times[self._next : following]
+            rows = np.searchsorted(self.direction * block.t, self.direction * times)
+            exact = block.t[rows] == times
+            states = block.x[rows]
+            if not exact.all():
+                inside = rows[~exact]
+                states[~exact] = block.states_at(inside, (times[~exact] - block.t_old[inside]) / block.h[inside])
+            self._append(times, states)
+        kept = len(self._ends)
+        ends = [(t[None].copy(), x[None].copy()) for t, x in zip(block.t[-kept:], block.x[-kept:], strict=True)]
+        self._ends = [*self._ends, *ends][-kept:]
+        self._next, self.last, self._last_state = following, last, block.x[-1].copy()
+
+    def add_last(self) -> None:
+        """Where a run stopped becomes its last row, also between the times of t_eval."""
+        recorded = [times[-1] for times, _ in self._parts if len(times)]
+        if not recorded or self.direction * (self.last - recorded[-1]) > 0.0:
+            self._append(np.array([self.last]), self._last_state[None])
 
     def _append(self, times: Array, states: Array) -> None:
-        self._t.append(times)
-        self._x.append(states)
+        self._parts.append((times, states))
         self.size += times.nbytes + states.nbytes
+
+    def checkpoints(self) -> tuple[Array, Array]:
+        """The rows, and the ends of the last steps: times (k,) and states (k, m)."""
+        times, states = (np.concatenate(part) for part in zip(*self._parts, *self._ends, strict=True))
+        order = np.unique(self.direction * times, return_index=True)[1]
+        return times[order], states[order]
 
     def table(self) -> tuple[Array, Array]:
         """Times (T,) and states (T, m)."""
-        return np.concatenate(self._t), np.concatenate(self._x)
+        times, states = zip(*self._parts, strict=True)
+        return np.concatenate(times), np.concatenate(states)

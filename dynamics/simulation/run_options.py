@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import Array, real_array, real_number
 
-from ..equations.initial_value import increasing_times
+from ..equations.initial_value import times_to_record
 from ..integrators import METHODS
 from ..integrators.step_control import RESOLUTION
+from .equal_steps import step_count
 from .free_memory import room
 
 METHOD = "dop853"  # unless another is asked for
@@ -32,7 +33,7 @@ class RunOptions:
     Parameters
     ----------
     t_end : float
-        Where the run ends [s]; it starts at 0.
+        Where the run ends [s], before t0 for a run back in time.
     method : str
         A name of `dyn.METHODS`, or one of SciPy's solvers, "scipy:Radau", "scipy:BDF", "scipy:LSODA",
         "scipy:DOP853", "scipy:RK45".
@@ -43,9 +44,11 @@ class RunOptions:
         The longest step of methods that choose their steps [s]; no limit by default.
     rtol, atol : float, float or array_like, optional
         The error of a chosen step, relative to each component of the state, and absolute: one number for all, or (m,),
-        one for each of q and then qd; 1e-9 and 1e-10 by default.
+        one for each of q and then qd; 1e-9 and 1e-10 by default. Of equal steps the estimated error that is no
+        cause of a warning, relative to the largest of a component over the run; 1e-3 and 0 by default.
     t_eval : array_like, optional
-        Increasing times in [0, t_end] to record, (T,) [s]; by default every step. Chosen steps are not changed by it.
+        Times from t0 to t_end to record, in this order, (T,) [s]; by default every step. Chosen steps are not changed
+        by it.
     first_step : float, optional
         The first chosen step [s], in place of one chosen by trial.
     max_steps : float
@@ -54,6 +57,10 @@ class RunOptions:
         "llvm", "python", or "auto" for machine code where llvmlite is installed; the steps are the same.
     progress : bool, optional
         A progress line on standard error; None shows it on a terminal, for runs over a second.
+    t0 : float
+        Where the run starts [s].
+    estimate_error : bool, optional
+        Whether a second run of other steps estimates the error of equal steps; by default it does.
 
     Raises
     ------
@@ -82,10 +89,12 @@ class RunOptions:
     backend: str = "auto"
     progress: bool | None = None
     t0: float = 0.0
+    estimate_error: bool | None = None
 
     def __post_init__(self) -> None:
         check_method(self.method)
-        for what in ("t_end", "dt", "max_step", "first_step"):
+        self._check_span()
+        for what in ("dt", "max_step", "first_step"):
             value = getattr(self, what)
             if value is not None and not (math.isfinite(real_number(what, value)) and value > 0.0):
                 raise ValueError(f"{what} must be positive and finite, got {value!r} s")
@@ -101,14 +110,23 @@ class RunOptions:
                     f"(got {what} = {value:g} s)"
                 )
         self._check_tolerances()
+        self._check_estimate()
         most = real_number("max_steps", self.max_steps)
         if not (most >= 1.0 and (most == math.inf or most == int(most))):
             raise ValueError(f"max_steps must be a whole number, at least 1, or infinite, got {self.max_steps!r}")
-        normalized: dict[str, Any] = {"t_end": float(self.t_end), "max_steps": most}
+        normalized: dict[str, Any] = {"t0": float(self.t0), "t_end": float(self.t_end), "max_steps": most}
         if self.t_eval is not None:
-            normalized["t_eval"] = increasing_times(self.t_eval, self.t_end)
+            normalized["t_eval"] = times_to_record(self.t_eval, float(self.t_end), float(self.t0))
         for name, value in normalized.items():
             object.__setattr__(self, name, value)
+
+    def _check_span(self) -> None:
+        t0, t_end = real_number("t0", self.t0), real_number("t_end", self.t_end)
+        if not (math.isfinite(t0) and math.isfinite(t_end)):
+            name, value = ("t_end", t_end) if math.isfinite(t0) else ("t0", t0)
+            raise ValueError(f"{name} must be finite, got {value!r} s")
+        if t0 == t_end:
+            raise ValueError(f"t_end must be another time than t0, got {self.t_end!r} s for both")
 
     def _check_tolerances(self) -> None:
         rtol, atol = real_number("rtol", self.relative), np.asarray(self.absolute)
@@ -116,6 +134,24 @@ class RunOptions:
             raise ValueError(
                 f"rtol and atol must be finite, not negative and not both 0, got {rtol!r} and {self.absolute!r}"
             )
+
+    def _check_estimate(self) -> None:
+        if self.estimate_error not in (None, True, False):
+            raise TypeError(f"estimate_error must be True, False or None, got {self.estimate_error!r:.40}")
+        if self.adaptive and self.estimate_error:
+            raise ValueError(
+                f"method {self.method!r} keeps the error of its steps within rtol and atol: "
+                "estimate_error is for equal steps, such as those of method='rk4'"
+            )
+        if not self.adaptive and self.estimate_error is False:
+            for what in ("rtol", "atol"):
+                if getattr(self, what) is not None:
+                    raise ValueError(f"{what} is a bound of the estimated error, which estimate_error=False leaves out")
+
+    @property
+    def estimated(self) -> bool:
+        """Whether a second run estimates the error."""
+        return not self.adaptive and self.estimate_error is not False
 
     @property
     def scipy_solver(self) -> str | None:
@@ -156,10 +192,30 @@ class RunOptions:
         return None if self.t_eval is None else np.asarray(self.t_eval)
 
     @property
+    def direction(self) -> float:
+        """1.0, or -1.0 for a run back in time."""
+        return math.copysign(1.0, self.t_end - self.t0)
+
+    @property
+    def length(self) -> float:
+        """Of the run [s]."""
+        return abs(self.t_end - self.t0)
+
+    @property
+    def row_times(self) -> Array:
+        """Of equal steps: the times of the rows, t_eval or every step, (T,)."""
+        if self.times is not None:
+            return self.times
+        steps = step_count(self.length, self.step)
+        return np.append(self.t0 + (self.t_end - self.t0) / steps * np.arange(steps), self.t_end)
+
+    @property
     def instants(self) -> list[float]:
-        """What equal steps have to meet [s]: 0, and t_eval or t_end."""
-        times: list[float] = [self.t_end] if self.times is None else self.times.tolist()
-        return times if times[0] == 0.0 else [0.0, *times]
+        """What equal steps have to meet [s]: t0, t_eval and t_end."""
+        times: list[float] = [] if self.times is None else self.times.tolist()
+        first = [] if times[:1] == [self.t0] else [self.t0]
+        last = [] if times[-1:] == [self.t_end] else [self.t_end]
+        return [*first, *times, *last]
 
     def check(self, states: tuple[str, ...]) -> None:
         """Raises ValueError where atol has not one number for each state, or equal steps would not move the time."""
@@ -168,14 +224,15 @@ class RunOptions:
             raise ValueError(
                 f"atol must be one number, or have shape ({m},), one for each of {', '.join(states)}; got {shape}"
             )
-        if not self.adaptive and self.step < RESOLUTION * self.t_end:
-            raise ValueError(f"dt = {self.step:g} s is below the resolution of the time at t_end = {self.t_end:g} s")
+        name, latest = ("t0", self.t0) if abs(self.t0) > abs(self.t_end) else ("t_end", self.t_end)
+        if not self.adaptive and self.step < RESOLUTION * abs(latest):
+            raise ValueError(f"dt = {self.step:g} s is below the resolution of the time at {name} = {latest:g} s")
 
     def check_room(self, m: int) -> None:
         """Raises MemoryError where every equal step as a row of m numbers would not fit."""
         if self.adaptive or self.t_eval is not None:
             return
-        steps, free = step_count(self.t_end, self.step), room()
+        steps, free = step_count(self.t_end - self.t0, self.step), room()
         size = 8 * TABLES * steps * m
         if size > free:
             raise MemoryError(
@@ -195,6 +252,15 @@ def check_method(method: str) -> None:
         raise ValueError(f"method must be one of {', '.join(METHODS)} or scipy:..., got {method!r}")
 
 
-def step_count(length: float, dt: float) -> int:
-    """The fewest equal steps of at most dt; a dt too short by rounding is long enough."""
-    return max(1, math.ceil(length / dt * (1.0 - 1e-12)))
+def time_span(t_end: float | None, t0: float, t_span: ArrayLike | None) -> tuple[float, float]:
+    """(t0, t_end), given as such or as t_span. Raises ValueError where neither or both are given."""
+    if t_span is None:
+        if t_end is None:
+            raise ValueError("where does the run end: t_end, or t_span = (t0, t_end), must be given")
+        return t0, t_end
+    if t_end is not None or t0 != 0.0:
+        raise ValueError(f"t_span says where the run starts and ends: leave out t0 and t_end, got {t0!r} and {t_end!r}")
+    span = real_array("t_span", t_span)
+    if span.shape != (2,):
+        raise ValueError(f"t_span must be two times, (t0, t_end), got shape {span.shape}")
+    return float(span[0]), float(span[1])

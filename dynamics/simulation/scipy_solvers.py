@@ -50,31 +50,43 @@ class ScipyIntegration(Integration):
     def __init__(self, solver: ScipySolver, options: RunOptions) -> None:
         super().__init__(solver.components)
         self.solver, self.options = solver, options
+        self._jacobians = self._factorizations = 0
+
+    @property
+    def jacobians(self) -> int:
+        """Evaluations of the Jacobian, as SciPy counts them."""
+        return self._jacobians
+
+    @property
+    def factorizations(self) -> int:
+        """LU factorizations, as SciPy counts them."""
+        return self._factorizations
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
         options, times = self.options, self.options.times
         limits: dict[str, Any] = {"rtol": options.relative, "atol": options.absolute}
         limits |= {"max_step": options.longest_step, "first_step": options.first_step}
-        solver = self.solver.make(self.solver.rate, 0.0, x, options.t_end, **limits, **self.solver.jacobian)
-        t, states = [0.0], [np.array(x)]
+        solver = self.solver.make(self.solver.rate, options.t0, x, options.t_end, **limits, **self.solver.jacobian)
+        t, states = [options.t0], [np.array(x)]
         clock = Clock()
         while solver.status == "running":
             if self.steps >= options.max_steps:
                 self.status = self.too_many(solver.t, options.max_steps)
                 break
             message = solver.step()
-            self.evaluations = solver.nfev
+            self.evaluations, self._jacobians, self._factorizations = solver.nfev, solver.njev, solver.nlu
             reason = self.nonfinite(solver.y)
             if solver.status == "failed" or reason:
                 reason = reason or f"SciPy's {self.solver.name} gave up: {message}"
                 self.status = f"stopped at t = {solver.t:.6g} s: {reason}"
                 break
             self.steps += 1
-            self.largest = max(self.largest, float(solver.t - solver.t_old))
+            self.largest = max(self.largest, abs(float(solver.t - solver.t_old)))
             if times is not None:
-                first, last = np.searchsorted(times, [solver.t_old, solver.t], side="right")
-                inside = [at for at in times[first:last].tolist() if at < solver.t]
+                ends = options.direction * np.array([solver.t_old, solver.t])
+                first, last = np.searchsorted(options.direction * times, ends, side="right")
+                inside = [at for at in times[first:last].tolist() if at != solver.t]
                 if inside:
                     between = solver.dense_output()
                     t += inside

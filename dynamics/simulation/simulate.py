@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import time
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,46 +15,53 @@ from cgraph import Graph
 from cgraph.extend import Array
 
 from ..equations.initial_value import initial_value
-from ..integrators import METHODS, Problem, derive, total_energy
+from ..integrators import METHODS, Problem, derive, force, total_energy
 from ..systems.model import Model
+from .dense_output import StepBlock, with_hermite
+from .error_estimate import ErrorEstimate, estimate
 from .event import Event, as_events
 from .event_log import EventLog
 from .free_memory import room
 from .progress_bar import Progress
 from .recorder import Recorder
-from .run_options import METHOD, TABLES, RunOptions
+from .row_values import row_values
+from .run_options import METHOD, TABLES, RunOptions, time_span
 from .scipy_solvers import ScipyIntegration, scipy_solver
+from .solution import Solution
 from .step_program import compile_steps, step_program
-from .stepping import Integration, integration
+from .stepping import FixedStepIntegration, Integration, integration
 from .trajectory import SimulationWarning, Stats, Trajectory
-
-BLOCK = 4096  # rows whose energy is taken at once
 
 
 def simulate(
     model: Model,
     q: ArrayLike,
     qd: ArrayLike | None,
-    t_end: float,
+    t_end: float | None = None,
     method: str = METHOD,
     *,
+    t0: float = 0.0,
+    t_span: ArrayLike | None = None,
     dt: float | None = None,
     max_step: float | None = None,
     rtol: float | None = None,
     atol: ArrayLike | None = None,
     t_eval: ArrayLike | None = None,
     events: Event | Iterable[Event] = (),
+    dense_output: bool = False,
     tau: float | Sequence[float] = 0.0,
     parameters: Mapping[str, float] | None = None,
     first_step: float | None = None,
     max_steps: float = math.inf,
+    estimate_error: bool | None = None,
     backend: str = "auto",
     progress: bool | None = None,
 ) -> Trajectory:
-    """The motion of a system from (q, qd) at t = 0 to t_end.
+    """The motion of a system from (q, qd) at t0 to t_end.
 
     A step whose state is not finite, or that has to be smaller than the resolution of t, ends the run: the trajectory
-    keeps what was computed before it and `stats.message` names the time and the coordinate. Ctrl-C does the same.
+    keeps what was computed before it, the state where it stopped is its last row, and `stats.message` names the time
+    and the coordinate. Ctrl-C does the same.
 
     Parameters
     ----------
@@ -63,11 +70,15 @@ def simulate(
     q, qd : array_like
         The start, (n,) each [rad or m, per second]; of an OdeSystem q is the state, (m,), and qd None.
     t_end : float
-        Where the run ends [s].
+        Where the run ends [s], before t0 for a run back in time.
     method : str
         A name of `dyn.METHODS`. Steps chosen by error: "dop853", "dopri5", and for stiff systems "rodas", "radau";
         equal steps: "rk4", "euler" and the symplectic "verlet", "midpoint", "gauss4", ... With SciPy, "scipy:Radau",
         "scipy:BDF", "scipy:LSODA", "scipy:DOP853", "scipy:RK45".
+    t0 : float
+        Where the run starts [s].
+    t_span : array_like, optional
+        (t0, t_end), as in SciPy, in place of the two.
     dt : float, optional
         The largest of equal steps [s], 1e-3 by default: the steps between two recorded times are equal, so that the
         last row is at t_end exactly.
@@ -75,11 +86,16 @@ def simulate(
         The longest of chosen steps [s]; no limit by default.
     rtol, atol : float, float or array_like, optional
         The error of a chosen step, relative to each component of the state, and absolute: one number for all, or one
-        for each component, (2 n,) of q and then qd; 1e-9 and 1e-10 by default.
+        for each component, (2 n,) of q and then qd; 1e-9 and 1e-10 by default. Of equal steps, the estimated error
+        beyond which the run warns, relative to the largest of a component over the run; 1e-3 and 0 by default.
     t_eval : array_like, optional
-        Increasing times in [0, t_end] to record, (T,) [s]; by default every step. Chosen steps are not changed by it.
+        Times from t0 to t_end to record, in this order, (T,) [s]; by default every step. Chosen steps are not changed
+        by it.
     events : Event or iterable of Event
         Instants to look for on the way.
+    dense_output : bool
+        Whether to keep what lies between the rows, for `Trajectory.solution(t)`: some numbers a step for every one of
+        the state.
     tau : float or sequence
         Constant applied force [N m or N], for all coordinates or for each, (n,).
     parameters : mapping, optional
@@ -88,6 +104,9 @@ def simulate(
         In place of the first step that the method chooses [s].
     max_steps : float
         Steps after which the run stops.
+    estimate_error : bool, optional
+        Of equal steps, whether a second run of steps twice as long estimates their error (`Stats.error`), which takes
+        half as long again; by default it does. The rows are the same without.
     backend : str
         "llvm", "python", or "auto" for machine code where llvmlite is installed; the steps are the same.
     progress : bool, optional
@@ -116,8 +135,12 @@ def simulate(
     [[1.0, 0.5], [0.31, -0.04], [-0.989, 0.108]]
     """
     # Check
-    options = RunOptions(t_end, method, dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
+    t0, t_end = time_span(t_end, t0, t_span)
+    arguments = (dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
+    options = RunOptions(t_end, method, *arguments, t0, estimate_error)
     watched = as_events(events)
+    if not isinstance(dense_output, bool):
+        raise TypeError(f"dense_output must be True or False, got {dense_output!r:.40}")
     start = initial_value(model, q, qd, tau, parameters)
     options.check(start.states)
     options.check_room(len(start.x))
@@ -127,67 +150,131 @@ def simulate(
     energy, watch = total_energy(problem), EventLog(problem, watched)
 
     # Write the steps of the method over these graphs, and compile them
-    run = _compiled(problem, options, watched=bool(watched))
+    run = _compiled(problem, options, between=bool(watched) or dense_output)
 
     # Integrate, noting rows and events
-    recorder = Recorder(start.x, options.times)
-    seconds = _integrate(run, start.x, recorder, watch, options)
+    ends = 3 if watched else 1  # an event cuts the last step, and of the others one in two is compared
+    recorder = Recorder(start.x, options.times, options.t0, options.direction, ends)
+    steps: list[StepBlock] | None = [] if dense_output else None
+    outcome = _integrate(run, start.x, recorder, watch, options, steps)
 
     # Put the result together
     times, states = recorder.table()
     half = len(start.x) if problem.system is None else problem.system.n
-    stats = _stats(run, options.method, seconds)
+    stats = _stats(run, options.method, outcome)
     for text in stats.warnings:
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    energies = _energies(energy, times, states)
-    return Trajectory(times, states[:, :half], states[:, half:], energies, stats, watch.crossings(half))
+    energies = np.full(len(times), math.nan) if energy is None else row_values(energy, times, states)[:, 0]
+    dense = None if steps is None else Solution(options.t0, start.x, steps, half)
+    rows = (times, states[:, :half], states[:, half:], energies)
+    return Trajectory(*rows, stats, watch.crossings(half), _graphs(problem), dense)
 
 
-def _compiled(problem: Problem, options: RunOptions, *, watched: bool) -> Integration:
-    """The run before its first step, compiled. Watched, it needs its dense output, or every equal step."""
+def _compiled(problem: Problem, options: RunOptions, *, between: bool) -> Integration:
+    """The run before its first step, compiled. between: with all steps, and the dense output of chosen ones."""
     solver = options.scipy_solver
     if solver is not None:
         return ScipyIntegration(scipy_solver(problem, solver, options.backend), options)
     method = METHODS[options.method]
-    program = step_program(problem, method, dense=method.adaptive and (watched or options.times is not None))
-    return integration(compile_steps(program, options.backend), options, every_step=watched)
+    program = step_program(problem, method, dense=method.adaptive and (between or options.times is not None))
+    return integration(compile_steps(program, options.backend), options, every_step=between)
 
 
-def _integrate(run: Integration, x: Array, recorder: Recorder, watch: EventLog, options: RunOptions) -> float:
-    """Run from x to t_end, an event, a failure, the end of the memory, or Ctrl-C. The seconds that it took."""
-    most = room() / TABLES
-    begin = time.perf_counter()
+class _Outcome(NamedTuple):
+    """How a run ended: in the end, at an event, or otherwise; and how large its error is."""
+
+    seconds: float
+    status: int
+    message: str
+    error: ErrorEstimate | None
+
+
+def _integrate(
+    run: Integration,
+    x: Array,
+    recorder: Recorder,
+    watch: EventLog,
+    options: RunOptions,
+    steps: list[StepBlock] | None,
+) -> _Outcome:
+    """Run from x to t_end, an event, a failure, the end of the memory, or Ctrl-C; then estimate the error.
+
+    steps: receives the steps with their dense output.
+    """
+    begin, seconds, error = time.perf_counter(), math.nan, None
+    second = 0.5 * options.estimated  # of the length of the run
+    doing = ""
     try:
-        with np.errstate(all="ignore"), Progress("simulate", options.t_end, options.progress) as report:
-            for block in run.blocks(x):
-                recorder.add(watch(block))
-                if recorder.size > most:
-                    last = f"{recorder.last:.6g} s"
-                    run.status = f"stopped at t = {last}: the rows fill the memory; t_eval records fewer"
-                    break
-                if watch.status:
-                    run.status = watch.status
-                    break
-                report(float(block.t[-1]))
+        total = (1.0 + second) * options.length
+        with np.errstate(all="ignore"), Progress("simulate", total, options.progress) as report:
+            _run(run, x, recorder, watch, steps, lambda t: report(abs(t - options.t0)))
+            seconds = time.perf_counter() - begin
+            if isinstance(run, FixedStepIntegration) and options.estimated and not run.status:
+                doing = ", while its error was estimated"
+                done = abs(recorder.last - options.t0)
+                error = estimate(run, x, *recorder.checkpoints(), lambda t: report(done + second * abs(t - options.t0)))
     except KeyboardInterrupt:
-        run.status = f"interrupted after t = {recorder.last:.6g} s"
-    return time.perf_counter() - begin
+        run.status = f"interrupted after t = {recorder.last:.6g} s{doing}"
+    if run.status:
+        recorder.add_last()
+    seconds = time.perf_counter() - begin if math.isnan(seconds) else seconds
+    if watch.status and not run.status:
+        return _Outcome(seconds, 1, watch.status, error)
+    return _Outcome(seconds, -1 if run.status else 0, run.status or "reached t_end", error)
 
 
-def _stats(run: Integration, method: str, seconds: float) -> Stats:
-    message = run.status or "reached t_end"
-    counts = (run.steps, run.rejected, run.evaluations)
-    return Stats(method, *counts, run.largest, seconds, not run.status, message, tuple(run.warnings))
+def _run(
+    run: Integration,
+    x: Array,
+    recorder: Recorder,
+    watch: EventLog,
+    steps: list[StepBlock] | None,
+    report: Callable[[float], None],
+) -> None:
+    """Note rows and events, block by block. A run that an event ends has it as its last row."""
+    most, kept = room() / TABLES, 0
+    for block in run.blocks(x):
+        if steps is not None and block.dense is None:
+            block = with_hermite(block, watch.problem)
+        block = watch(block)
+        recorder.add(block)
+        if steps is not None:
+            steps.append(block)
+            kept += sum(array.nbytes for array in block if array is not None)
+        if watch.status:
+            recorder.add_last()
+            return
+        if recorder.size + kept > most:
+            last = f"{recorder.last:.6g} s"
+            run.status = f"stopped at t = {last}: the rows fill the memory; t_eval records fewer"
+            return
+        report(float(block.t[-1]))
 
 
-def _energies(energy: Graph | None, times: Array, states: Array) -> Array:
-    """The energy of each row; NaN for a system of first order."""
-    result = np.full(len(times), math.nan)
-    if energy is None:
-        return result
-    names = energy.input_names
-    for start in range(0, len(times), BLOCK):
-        part = slice(start, start + BLOCK)
-        values: dict[str, Any] = dict(zip(names, [*states[part].T, times[part]], strict=True))
-        result[part] = energy.evaluate(values)["E"]
-    return result
+def _stats(run: Integration, method: str, outcome: _Outcome) -> Stats:
+    seconds, status, message, error = outcome
+    if error and math.isnan(error.largest):
+        error = None  # nothing could be compared
+    texts = [*run.warnings, *([error.warning] if error and error.warning else [])]
+    return Stats(
+        method,
+        run.steps,
+        run.rejected,
+        run.evaluations,
+        run.largest,
+        seconds,
+        status >= 0,
+        message,
+        status,
+        run.jacobians,
+        run.factorizations,
+        error.largest if error else None,
+        error.last if error else None,
+        tuple(texts),
+    )
+
+
+def _graphs(problem: Problem) -> dict[str, Graph]:
+    """What a trajectory computes accelerations and forces by."""
+    applied = force(problem)
+    return {"rate": problem.rate} | ({} if applied is None else {"force": applied})

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from cgraph import Graph
-from cgraph.extend import Program, Runner, runner
+from cgraph.extend import Factor, Program, Runner, runner
 
 from ..integrators import Method, Problem
 
@@ -25,6 +25,11 @@ class StepProgram:
     order: int
     adaptive: bool
     dense: bool  # whether its record has dense output
+
+    @property
+    def factorizations(self) -> int:
+        """LU factorizations in a trial of a step."""
+        return sum(isinstance(statement, Factor) for statement in self.steps.statements())
 
     @property
     def size(self) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import time
 from abc import ABC, abstractmethod
@@ -14,7 +13,8 @@ from cgraph.extend import Array
 
 from ..integrators.step_control import COLLAPSE, DONE, RESOLUTION, ROUNDING, SMALLEST_ATOL, TOO_SMALL
 from .dense_output import StepBlock
-from .run_options import RunOptions, step_count
+from .equal_steps import EqualSteps, equal_steps
+from .run_options import RunOptions
 from .step_program import CompiledSteps
 
 BLOCK_TIME = 0.1  # s of run time after which a run comes back to Python: for Ctrl-C, progress and events
@@ -59,6 +59,16 @@ class Integration(ABC):
         self.status = ""
         self.warnings: list[str] = []
 
+    @property
+    @abstractmethod
+    def jacobians(self) -> int:
+        """Evaluations of the Jacobian of the rate."""
+
+    @property
+    @abstractmethod
+    def factorizations(self) -> int:
+        """LU factorizations of matrices."""
+
     @abstractmethod
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
@@ -91,6 +101,17 @@ class NativeIntegration(Integration):
         self.program, self.runner, self.options = compiled.program, compiled.runner, options
         self.parameters, self._stopped = list(parameters), stopped
         self._passes = FIRST_PASSES
+        self._accepted = True
+
+    @property
+    def jacobians(self) -> int:
+        """Evaluations of the Jacobian of the rate: one for every state that steps were tried from."""
+        return self.steps + (not self._accepted) if self.program.factorizations else 0
+
+    @property
+    def factorizations(self) -> int:
+        """LU factorizations of matrices: in every trial of a step of an implicit method."""
+        return self.program.factorizations * (self.steps + self.rejected)
 
     def _run(self, memory: Array, passes: int, every: int = 1) -> tuple[Array, int]:
         if self._stopped():
@@ -103,6 +124,8 @@ class NativeIntegration(Integration):
         begin = time.perf_counter()
         rows, done = self._run(memory, passes, passes if whole else 1)
         spent = time.perf_counter() - begin
+        if self.program.adaptive:
+            self._accepted = self._number(memory, "accepted") != 0.0
         if passes == self._passes:
             self._passes = max(1, int(passes * min(4.0, BLOCK_TIME / max(spent, 1e-9))))
         return rows, done
@@ -112,7 +135,10 @@ class NativeIntegration(Integration):
 
 
 class FixedStepIntegration(NativeIntegration):
-    """Equal steps between the instants, at most dt. Every step is in a block, or only those at instants."""
+    """Equal steps between the instants, at most dt. Every step is in a block, or of a block the last alone.
+
+    stretches: other steps than those of the options.
+    """
 
     def __init__(
         self,
@@ -122,9 +148,11 @@ class FixedStepIntegration(NativeIntegration):
         stopped: Callable[[], bool] = lambda: False,
         *,
         every_step: bool,
+        stretches: Sequence[EqualSteps] | None = None,
     ) -> None:
         super().__init__(compiled, options, parameters, stopped)
         self.every_step = every_step
+        self.stretches = equal_steps(options.instants, options.step) if stretches is None else stretches
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
@@ -132,39 +160,34 @@ class FixedStepIntegration(NativeIntegration):
         if "fresh" in self.runner.program.registers:
             start["fresh"] = 1.0
         memory = self.runner.memory(start)
-        for begin, end in itertools.pairwise(self.options.instants):
-            steps = step_count(end - begin, self.options.step)
-            h = (end - begin) / steps
-            for name, value in (("start", begin), ("t", begin), ("count", 0.0), ("h", h)):
+        for stretch in self.stretches:
+            for name, value in (("start", stretch.begin), ("t", stretch.begin), ("count", 0.0), ("h", stretch.h)):
                 self.runner.write(memory, name, value)
-            yield from self._equal_steps(memory, steps, h, end)
+            yield from self._equal_steps(memory, stretch)
             if self.status:
                 return
 
-    def _equal_steps(self, memory: Array, steps: int, h: float, end: float) -> Iterator[StepBlock]:
-        """So many steps of h from a memory on, the last of which ends at an instant."""
-        m, most, left = self.program.size, self.options.max_steps, steps
+    def _equal_steps(self, memory: Array, stretch: EqualSteps) -> Iterator[StepBlock]:
+        """The steps of a stretch from a memory on."""
+        m, most, left = self.program.size, self.options.max_steps, stretch.steps
         while left:
             if self.steps >= most:
                 self.status = self.too_many(self._number(memory, "t"), most)
                 return
-            x_old = self.runner.read(memory, "x").copy()
+            before = memory.copy()
             rows, done = self._advance(memory, int(min(left, most - self.steps)), whole=not self.every_step)
             left -= done
             failed = self._number(memory, "nonfinite") != 0.0
             self.steps += done - failed
             self.evaluations = int(self._number(memory, "evaluations"))
-            if self.every_step:
-                rows = rows[: len(rows) - failed]
-            elif left or failed:
-                rows = rows[:0]
+            t_old, x_old = self._number(before, "t"), self.runner.read(before, "x").copy()
+            if failed:
+                rows = rows[:-1] if self.every_step else self._run(before, done - 1, max(1, done - 1))[0]
             if len(rows):
-                self.largest = max(self.largest, min(h, self.options.step))
+                self.largest = max(self.largest, min(abs(stretch.h), self.options.step))
                 if not left and not failed:
-                    rows[-1, 0] = end
-                t, states = rows[:, 0], rows[:, 1 : 1 + m]
-                before = np.concatenate([x_old[None], states[:-1]])
-                yield StepBlock(t, states, t - h, np.full(len(t), h), before, None)
+                    rows[-1, 0] = stretch.end
+                yield _block(rows[:, 0], rows[:, 1 : 1 + m], t_old, x_old)
             if failed:
                 self.status = self._failure(memory)
                 return
@@ -174,6 +197,12 @@ class FixedStepIntegration(NativeIntegration):
         if reason := self.nonfinite(self.runner.read(memory, "x")):
             return f"stopped at t = {t:.6g} s: {reason}"
         return f"stopped at t = {t:.6g} s: the equations of the step did not converge; the step is too long"
+
+
+def _block(t: Array, states: Array, t_old: float, x_old: Array) -> StepBlock:
+    """The steps that end at the times t (T,), from x_old at t_old on."""
+    times, before = np.append(t_old, t[:-1]), np.concatenate([x_old[None], states[:-1]])
+    return StepBlock(t, states, times, t - times, before, None)
 
 
 class AdaptiveIntegration(NativeIntegration):

@@ -4,9 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cgraph import Graph
 from cgraph.extend import Array
+
+from .row_values import row_values
+from .solution import Solution
 
 
 class SimulationWarning(UserWarning):
@@ -39,9 +47,21 @@ class Stats:
     seconds : float
         Run time of the steps [s], without deriving and compiling.
     success : bool
-        Whether the run reached t_end.
+        Whether the run reached t_end or ended at a terminal event.
     message : str
         "reached t_end", or where and why it stopped.
+    status : int
+        0: the end was reached; 1: a terminal event; -1: the run failed or was interrupted.
+    njev, nlu : int
+        Evaluations of the Jacobian and LU factorizations, 0 of methods without.
+    error, error_at_end : float, optional
+        Of equal steps, the estimated error of the state, the largest over the rows and the end, and that at the end:
+        in units of the largest value that a component has over the run, of the component where it is largest. It is
+        the difference from a second run, of steps twice as long (whose evaluations are not counted in nfev), divided by
+        2^order - 1, as of a run whose error goes with this power of the step; infinite where the second run fails. The
+        phase of a motion is part of its state: of symplectic methods this error grows, while the energy is kept. None
+        of methods that choose their steps, of runs without `estimate_error`, and of those that fail or end in the first
+        steps.
     warnings : tuple of str
         What speaks against the result, a sentence each; every one is issued as a `SimulationWarning`, too.
 
@@ -61,6 +81,11 @@ class Stats:
     seconds: float
     success: bool
     message: str
+    status: int = 0
+    njev: int = 0
+    nlu: int = 0
+    error: float | None = None
+    error_at_end: float | None = None
     warnings: tuple[str, ...] = ()
 
 
@@ -102,9 +127,15 @@ class Trajectory:
     energy : ndarray
         Kinetic and potential energy, (T,) [J]; NaN for an OdeSystem.
     stats : Stats
-        How the run went.
+        How the run went; its `success`, `status`, `message`, `nfev`, `njev` and `nlu` are attributes of the trajectory
+        too, as in SciPy.
     events : mapping
         {name of an event: Crossings}.
+    graphs : mapping
+        {"rate": xdot, "force": tau + forces - damping qd}: graphs over the states and t, with the numbers of the run
+        built in, by which `qdd` and `forces` are computed. "force" is missing of an OdeSystem.
+    dense : Solution, optional
+        The steps with their dense output, which `solution` reads; of a run with `dense_output=True`.
 
     Examples
     --------
@@ -120,10 +151,93 @@ class Trajectory:
     energy: Array
     stats: Stats
     events: Mapping[str, Crossings] = field(default_factory=dict)
+    graphs: Mapping[str, Graph] = field(default_factory=dict)
+    dense: Solution | None = None
+
+    def solution(self, t: ArrayLike) -> tuple[Array, Array]:
+        """The motion at any time of the run, by the dense output of its steps.
+
+        At the end of a step it is that step's state exactly; between, it has the order of the method's own dense
+        output, or of a cubic where the method has none (all equal steps).
+
+        Parameters
+        ----------
+        t : float or array_like
+            A time, or times (k,), between the start and where the run came to [s].
+
+        Returns
+        -------
+        tuple of ndarray
+            q and qd, (n,) or (k, n) each; of an OdeSystem its state and an array without columns.
+
+        Raises
+        ------
+        ValueError
+            For a time outside, and for a run without `dense_output=True`.
+
+        Examples
+        --------
+        >>> import dynamics as dyn
+        >>> run = dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.1], [0.0], t_end=1.0, dense_output=True)
+        >>> q, qd = run.solution(0.25)
+        >>> float(q[0].round(6)), float(qd[0].round(6))
+        (0.057491, -0.313696)
+        """
+        if self.dense is None:
+            raise ValueError("the run kept its rows alone: simulate(.., dense_output=True) keeps what is between them")
+        return self.dense(t)
+
+    @cached_property
+    def qdd(self) -> Array:
+        """Accelerations at the rows, (T, n); of an OdeSystem without columns."""
+        rates = row_values(self.graphs["rate"], self.t, self._states)
+        return rates[:, rates.shape[1] - self.qd.shape[1] :]
+
+    @cached_property
+    def forces(self) -> Array:
+        """Generalized forces besides those of the Lagrangian at the rows, tau + forces - damping qd, (T, n)."""
+        if "force" not in self.graphs:
+            return np.empty_like(self.qd)
+        return row_values(self.graphs["force"], self.t, self._states)
+
+    @property
+    def _states(self) -> Array:
+        return np.concatenate([self.q, self.qd], axis=1)
+
+    @property
+    def success(self) -> bool:
+        """Whether the run reached t_end or ended at a terminal event."""
+        return self.stats.success
+
+    @property
+    def status(self) -> int:
+        """0: the end was reached; 1: a terminal event; -1: the run failed or was interrupted."""
+        return self.stats.status
+
+    @property
+    def message(self) -> str:
+        """That it reached t_end, or where and why the run stopped."""
+        return self.stats.message
+
+    @property
+    def nfev(self) -> int:
+        """Evaluations of the rate of the state."""
+        return self.stats.nfev
+
+    @property
+    def njev(self) -> int:
+        """Evaluations of its Jacobian."""
+        return self.stats.njev
+
+    @property
+    def nlu(self) -> int:
+        """LU factorizations."""
+        return self.stats.nlu
 
     def __repr__(self) -> str:
         n, stats = self.q.shape[1], self.stats
         what = f"{n} coordinate(s)" if self.qd.shape[1] else f"{n} state(s)"
         rows = f"{len(self.t)} rows, t = {self.t[0]:g} .. {self.t[-1]:g} s" if len(self.t) else "no rows"
         happened = "".join([f", {len(crossings.t)} of event {name}" for name, crossings in self.events.items()])
-        return f"<Trajectory of {what}: {rows}{happened}; {stats.method}, {stats.steps} steps, {stats.message}>"
+        said = "; ".join([stats.message, *[f"warning: {text}" for text in stats.warnings]])
+        return f"<Trajectory of {what}: {rows}{happened}; {stats.method}, {stats.steps} steps, {said}>"

@@ -10,6 +10,8 @@ from cgraph.extend import Array
 
 from .ensemble import Counts
 
+INTERRUPTED = "interrupted"  # what the status of a trajectory that Ctrl-C ended begins with
+
 
 @dataclass(frozen=True)
 class Chunk:
@@ -31,10 +33,24 @@ class Part:
     evaluations: Counts
     dt: Array  # (k,) s, the largest steps
     status: list[str]  # empty while all is well
+    errors: Array  # (2, k): of equal steps, the largest estimated error and that of the last row; NaN where unknown
+    warnings: list[list[str]]  # what speaks against a trajectory
+
+    def interrupt(self, k: int, t: float, rows: int) -> None:
+        """Trajectory k ends at t [s], after so many rows, and those after it did not begin."""
+        self.rows[k, rows:], self.rows[k + 1 :] = np.nan, np.nan
+        self.status[k] = f"{INTERRUPTED} after t = {t:.6g} s"
+        self.status[k + 1 :] = [INTERRUPTED] * (len(self.status) - k - 1)
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether the chunk was not run to its end."""
+        return any(status.startswith(INTERRUPTED) for status in self.status)
 
 
 def empty(chunk: Chunk, rows: Array) -> Part:
     """The part of a chunk before its first step."""
     k = len(chunk.x)
     steps, rejected, evaluations = np.zeros((3, k), dtype=np.int64)
-    return Part(chunk.first, rows, steps, rejected, evaluations, np.zeros(k), [""] * k)
+    counts, errors = (steps, rejected, evaluations), np.full((2, k), np.nan)
+    return Part(chunk.first, rows, *counts, np.zeros(k), [""] * k, errors, [[] for _ in range(k)])

@@ -30,6 +30,12 @@ class EnsembleStats:
         Whether it reached t_end, (N,).
     message : tuple of str
         N sentences: "reached t_end", or where and why it stopped.
+    status : ndarray
+        0: its end was reached; -1: it failed or was interrupted, (N,).
+    error, error_at_end : ndarray
+        Of equal steps, the estimated errors of `Stats`, (N,); NaN of a trajectory that has none.
+    warnings : tuple of tuple of str
+        What speaks against each result, N tuples.
 
     Examples
     --------
@@ -47,6 +53,10 @@ class EnsembleStats:
     seconds: float
     success: np.ndarray[Any, np.dtype[np.bool_]]
     message: tuple[str, ...]
+    status: Counts
+    error: Array
+    error_at_end: Array
+    warnings: tuple[tuple[str, ...], ...]
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from .chunk import Part
+from .chunk import INTERRUPTED, Part
 from .ensemble import EnsembleStats
 
 REACHED = "reached t_end"
@@ -18,7 +18,8 @@ class EnsembleRows:
     def __init__(self, count: int, rows: int, m: int) -> None:
         self.rows = np.empty((count, rows, m))
         self.steps, self.rejected, self.evaluations = np.zeros((3, count), dtype=np.int64)
-        self.dt, self.status = np.zeros(count), ["interrupted"] * count
+        self.dt, self.status = np.zeros(count), [INTERRUPTED] * count
+        self.errors, self.warnings = np.full((2, count), math.nan), [[""][:0] for _ in range(count)]
         self.arrived = np.zeros(count, dtype=bool)
 
     def add(self, part: Part) -> None:
@@ -29,6 +30,7 @@ class EnsembleRows:
         for name in ("steps", "rejected", "evaluations", "dt"):
             getattr(self, name)[here] = getattr(part, name)
         self.status[here] = [status or REACHED for status in part.status]
+        self.errors[:, here], self.warnings[here] = part.errors, part.warnings
         self.arrived[here] = True
 
     def check(self) -> None:
@@ -43,6 +45,7 @@ class EnsembleRows:
         """How it went. Rows that have not come become NaN."""
         self.rows[~self.arrived] = math.nan
         success = np.array([status == REACHED for status in self.status])
-        return EnsembleStats(
-            method, self.steps, self.rejected, self.evaluations, self.dt, seconds, success, tuple(self.status)
-        )
+        counts = (self.steps, self.rejected, self.evaluations)
+        status, texts = np.where(success, 0, -1), tuple([tuple(texts) for texts in self.warnings])
+        said, (largest, last) = tuple(self.status), self.errors
+        return EnsembleStats(method, *counts, self.dt, seconds, success, said, status, largest, last, texts)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 
@@ -14,13 +15,15 @@ from cgraph.extend import Array
 
 from ...integrators import METHODS, derive
 from ...systems.model import Model
+from ..equal_steps import step_count
 from ..free_memory import room
 from ..progress_bar import Progress
-from ..run_options import METHOD, RunOptions, step_count
+from ..run_options import METHOD, RunOptions, time_span
 from ..step_program import StepProgram, pickled_steps, step_program
+from ..trajectory import SimulationWarning
 from .branch_free import branch_free
 from .chunk import Chunk
-from .ensemble import Ensemble
+from .ensemble import Ensemble, EnsembleStats
 from .ensemble_rows import EnsembleRows
 from .initial_states import Starts, starts
 from .step_grid import StepGrid, step_grids
@@ -37,9 +40,11 @@ def simulate_many(
     model: Model,
     q: ArrayLike,
     qd: ArrayLike | None,
-    t_end: float,
+    t_end: float | None = None,
     method: str = METHOD,
     *,
+    t0: float = 0.0,
+    t_span: ArrayLike | None = None,
     dt: float | None = None,
     max_step: float | None = None,
     rtol: float | None = None,
@@ -51,10 +56,11 @@ def simulate_many(
     chunk: int | None = None,
     first_step: float | None = None,
     max_steps: float = math.inf,
+    estimate_error: bool | None = None,
     backend: str = "auto",
     progress: bool | None = None,
 ) -> Ensemble:
-    """The motions of a system from N starts at t = 0 to t_end, by one program that is compiled once.
+    """The motions of a system from N starts at t0 to t_end, by one program that is compiled once.
 
     Where the steps do not branch on the state (euler, rk4; verlet and symplectic_euler of a constant mass matrix and
     forces that do not depend on qd), trajectories run side by side, a vector of them at a time; else one by one. One
@@ -67,11 +73,11 @@ def simulate_many(
         What moves.
     q, qd : array_like
         The starts, (N, n) each [rad or m, per second], or (n,) for all; of an OdeSystem q is the state, and qd None.
-    t_end, method, dt, max_step, rtol, atol, first_step, max_steps, backend, progress
+    t_end, method, t0, t_span, dt, max_step, rtol, atol, first_step, max_steps, estimate_error, backend, progress
         As in `simulate`, without SciPy's methods.
     t_eval : array_like, optional
-        Increasing times in [0, t_end] to record, (T,) [s]; by default every step. Methods that choose their steps need
-        it.
+        Times from t0 to t_end to record, in this order, (T,) [s]; by default every step. Methods that choose their
+        steps need it.
     tau : float or array_like
         Constant applied force [N m or N], for all coordinates, for each, (n,), or for each trajectory too, (N, n).
     parameters : mapping, optional
@@ -107,7 +113,9 @@ def simulate_many(
     # Check
     if isinstance(method, str) and method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
-    options = RunOptions(t_end, method, dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
+    t0, t_end = time_span(t_end, t0, t_span)
+    arguments = (dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
+    options = RunOptions(t_end, method, *arguments, t0, estimate_error)
     team = checked(workers)
     _check_chunk(chunk)
     start = starts(model, q, qd, tau, parameters)
@@ -132,7 +140,9 @@ def simulate_many(
     # Put the result together
     half = problem.size if problem.system is None else problem.system.n
     stats, rows = result.stats(method, time.perf_counter() - begin), result.rows
-    return Ensemble(_row_times(options), rows[:, :, :half], rows[:, :, half:], stats)
+    if text := _warning(stats):
+        warnings.warn(text, SimulationWarning, stacklevel=2)
+    return Ensemble(options.row_times, rows[:, :, :half], rows[:, :, half:], stats)
 
 
 def _row_count(options: RunOptions) -> int:
@@ -144,15 +154,15 @@ def _row_count(options: RunOptions) -> int:
             f"{options.method!r} chooses the steps of each trajectory: t_eval must say which times to record, "
             "or method='rk4' make equal steps"
         )
-    return step_count(options.t_end, options.step) + 1
+    return step_count(options.t_end - options.t0, options.step) + 1
 
 
-def _row_times(options: RunOptions) -> Array:
-    """The times of the rows, (T,): t_eval, or every equal step."""
-    if options.times is not None:
-        return options.times
-    steps = step_count(options.t_end, options.step)
-    return np.append(options.t_end / steps * np.arange(steps), options.t_end)
+def _warning(stats: EnsembleStats) -> str:
+    """What speaks against the first trajectory that something speaks against, and how many there are."""
+    doubtful = [k for k, texts in enumerate(stats.warnings) if texts]
+    if not doubtful:
+        return ""
+    return f"{len(doubtful)} of {len(stats.warnings)} trajectories: of {doubtful[0]}, {stats.warnings[doubtful[0]][0]}"
 
 
 def _check_chunk(chunk: int | None) -> None:

@@ -8,13 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..run_options import RunOptions, step_count
+from ..equal_steps import step_count
+from ..run_options import RunOptions
 
 SAME = 4.0  # units of the last bit of the time, by which instants may miss an even spacing
 
 
 class StepGrid(NamedTuple):
-    """From `begin` on, `rows` evenly spaced instants, each after `steps` steps of h [s]."""
+    """From `begin` on, `rows` evenly spaced instants, each after `steps` steps of h [s], negative back in time."""
 
     begin: float
     h: float
@@ -38,8 +39,9 @@ def step_grids(options: RunOptions) -> list[StepGrid]:
     """The equal steps of a run: one grid where every step is a row, else those between its instants."""
     if options.times is not None:
         return grids_between(options.instants, options.step)
-    steps = step_count(options.t_end, options.step)
-    return [StepGrid(0.0, options.t_end / steps, 1, steps)]
+    length = options.t_end - options.t0
+    steps = step_count(length, options.step)
+    return [StepGrid(options.t0, length / steps, 1, steps)]
 
 
 def grids_between(instants: Sequence[float], dt: float) -> list[StepGrid]:
@@ -47,13 +49,14 @@ def grids_between(instants: Sequence[float], dt: float) -> list[StepGrid]:
     if len(instants) < 2:
         return []
     times = np.array(instants)
-    gaps, ulps = np.diff(times), np.spacing(times[1:])
+    gaps, ulps = np.diff(times), np.spacing(np.maximum(np.abs(times[:-1]), np.abs(times[1:])))
     breaks = np.flatnonzero(np.abs(np.diff(gaps)) > SAME * ulps[1:]) + 1
     grids: list[StepGrid] = []
     for first, last in itertools.pairwise([0, *breaks.tolist(), len(gaps)]):
         begin, rows = float(times[first]), last - first
         gap = (float(times[last]) - begin) / rows
-        even = np.abs(times[first : last + 1] - (begin + gap * np.arange(rows + 1))).max() <= SAME * ulps[last - 1]
+        off = np.abs(times[first : last + 1] - (begin + gap * np.arange(rows + 1))).max()
+        even = off <= SAME * ulps[first:last].max()
         parts = [(begin, gap, rows)] if even else [(times[k], gaps[k], 1) for k in range(first, last)]
         for start, length, count in parts:
             steps = step_count(length, dt)

@@ -27,7 +27,7 @@ def printed(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
     monkeypatch.setattr("dynamics.simulation.progress_bar.time", Clock(tick))
     monkeypatch.setattr("dynamics.simulation.stepping.FIRST_PASSES", 1)
     monkeypatch.setattr("dynamics.simulation.stepping.BLOCK_TIME", 0.0)
-    dyn.simulate(oscillator(), [1.0], [0.0], 1.0, "rk4", dt=0.1, **options)
+    dyn.simulate(oscillator(), [1.0], [0.0], 1.0, "rk4", dt=0.1, **{"estimate_error": False, **options})
     out, err = capsys.readouterr()
     assert out == ""
     return err

@@ -1,0 +1,199 @@
+"""The error of equal steps is told with the result, in every unit, and a warning says where it is too large."""
+
+import math
+import warnings
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+from pytest import approx, mark, raises, warns
+
+import dynamics as dyn
+from dynamics.integrators import METHODS
+from dynamics.simulation.equal_steps import equal_steps
+from dynamics.simulation.error_estimate import second_run
+from dynamics.simulation.stepping import NativeIntegration
+from tests.dynamics.models import random_arm
+
+EQUAL = [name for name, method in METHODS.items() if not method.adaptive]
+LOOSE = 1e6  # a bound that no estimate of these runs exceeds
+FACTOR = 2.0  # of an error, by which an estimate may miss it
+ROUNDING = 1e-15  # below it an error is no power of the step
+GRIDS = [None, [3.0], [1.0, 2.0, 2.001, 10.0], np.linspace(0.0, 10.0, 101), np.geomspace(1e-3, 10.0, 30)]
+
+
+@cache
+def spring() -> dyn.System:
+    return dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 0.5 * q[0] ** 2, ["x"])
+
+
+@mark.parametrize("method", EQUAL)
+@mark.parametrize("grid", range(len(GRIDS)))
+def test_the_estimate_is_the_error(method: str, grid: int) -> None:
+    """Also where the times to record cut steps to all lengths, and in an ensemble."""
+    options: dict[str, Any] = {"dt": 0.02, "t_eval": GRIDS[grid], "rtol": LOOSE}
+    run = dyn.simulate(spring(), [1.0], [0.0], 10.0, method, **options)
+    t, x = run.t, np.hstack([run.q, run.qd])
+    off = np.abs(x - np.stack([np.cos(t), -np.sin(t)], axis=1))
+    assert run.stats.error is not None
+    assert off.max() / FACTOR - ROUNDING <= run.stats.error
+    if t[-1] == 10.0:  # else the end is no row, and its error counts too
+        assert run.stats.error <= off.max() * FACTOR + ROUNDING
+        assert off[-1].max() / FACTOR - ROUNDING <= run.stats.error_at_end <= off[-1].max() * FACTOR + ROUNDING
+    many = dyn.simulate_many(spring(), [[1.0], [-3.0]], [0.0], 10.0, method, **options)
+    assert many.stats.error == approx(run.stats.error, rel=0.01, abs=ROUNDING)
+    assert many.stats.error_at_end == approx(run.stats.error_at_end, rel=0.01, abs=ROUNDING)
+
+
+@mark.parametrize("method", ["rk4", "midpoint"])
+@mark.parametrize("t_eval", [[0.0], [0.05], [0.0, 0.05], [0.05, 0.15, 0.4], [0.35, 0.4]])
+def test_times_that_second_steps_step_over_have_an_estimate(method: str, t_eval: list[float]) -> None:
+    """Whatever is recorded, and whether an event ends the run: 0 is never said where nothing was compared."""
+    options: dict[str, Any] = {"dt": 0.05, "t_eval": t_eval, "rtol": LOOSE, "backend": "python"}
+    late = dyn.Event("late", lambda q, qd, t: t - 2.31, terminal=True)
+    for events in ((), late):
+        run = dyn.simulate(spring(), [1.0], [0.0], 2.5, method, events=events, **options)
+        every = dyn.simulate(spring(), [1.0], [0.0], 2.5, method, events=events, **options | {"t_eval": None})
+        assert run.stats.error_at_end == approx(every.stats.error_at_end, rel=0.2)
+        assert 1.2 * every.stats.error >= run.stats.error >= run.stats.error_at_end > 0.0
+    many = dyn.simulate_many(spring(), [[1.0]], [0.0], 2.5, method, **options)
+    one = dyn.simulate(spring(), [1.0], [0.0], 2.5, method, **options)
+    assert many.stats.error_at_end[0] == approx(one.stats.error_at_end, rel=1e-3)
+    early = dyn.Event("early", lambda q, qd, t: t - 0.07, terminal=True)
+    assert dyn.simulate(spring(), [1.0], [0.0], 2.5, method, events=early, **options).stats.error is None
+
+
+@mark.parametrize("method", EQUAL)
+def test_an_estimate_changes_no_row(method: str) -> None:
+    for t_eval in (None, [0.1, 0.3]):
+        options: dict[str, Any] = {"dt": 0.01, "t_eval": t_eval}
+        plain = dyn.simulate(spring(), [1.0], [0.0], 0.3, method, estimate_error=False, **options)
+        run = dyn.simulate(spring(), [1.0], [0.0], 0.3, method, rtol=LOOSE, **options)
+        assert (run.q == plain.q).all()
+        assert (run.stats.nfev, run.stats.steps) == (plain.stats.nfev, plain.stats.steps)
+        assert (plain.stats.error, plain.stats.error_at_end) == (None, None)
+
+
+@mark.parametrize("seed", range(12))
+def test_no_equal_steps_are_wrong_in_silence(seed: int) -> None:
+    """x' = A x, of rates to far beyond what steps of 1 ms resolve: right to the bound, or not without a word."""
+    rng = np.random.default_rng(seed)
+    a = 10.0 ** rng.uniform(0.0, 4.0) * rng.normal(size=(3, 3))
+    model = dyn.OdeSystem(lambda x, t: [sum(a[i, j] * x[j] for j in range(3)) for i in range(3)], ["x", "y", "z"])
+    values, vectors = np.linalg.eig(a)
+    t_end = min(1.0, 20.0 / max(values.real.max(), 1e-3))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        run = dyn.simulate(model, [1.0, 0.5, -0.5], None, t_end, "rk4")
+    exact = (vectors * np.exp(values * t_end)) @ np.linalg.solve(vectors, [1.0, 0.5, -0.5])
+    right = run.success and np.abs(run.q[-1] - exact).max() <= 1e-2 * np.abs(run.q).max()
+    assert right or not run.success or run.stats.warnings
+    assert [str(warning.message) for warning in caught] == list(run.stats.warnings)
+    assert all(warning.category is dyn.SimulationWarning for warning in caught)
+    assert all(warning.filename == __file__ for warning in caught)
+
+
+def test_what_is_warned_of_is_what_was_asked_for() -> None:
+    dyn.simulate(spring(), [1.0], [0.0], 1.0, "rk4", dt=0.1)  # no warning
+    said = r"the state is off by an estimated 6.7e-07 of the size of velocity of .*; rtol = 1e-08 allows less: .* 0.1 s"
+    with warns(dyn.SimulationWarning, match=said):
+        run = dyn.simulate(spring(), [1.0], [0.0], 1.0, "rk4", dt=0.1, rtol=1e-8)
+    assert len(run.stats.warnings) == 1
+    assert f"reached t_end; warning: {run.stats.warnings[0]}>" in repr(run)
+    dyn.simulate(spring(), [1.0], [0.0], 1.0, "rk4", dt=0.1, rtol=1e-8, atol=[1e-5, 1e-5])
+    with warns(dyn.SimulationWarning, match="coordinate 'x'"):
+        dyn.simulate(spring(), [1.0], [0.0], 1.0, "rk4", dt=0.1, rtol=1e-8, atol=[0.0, 1e-5])
+    with warns(dyn.SimulationWarning, match="1 of 2 trajectories: of 1, the state is off by an estimated"):
+        many = dyn.simulate_many(
+            spring(), [[1e-3], [1.0]], [0.0], 1.0, "rk4", dt=0.1, rtol=1e-12, atol=1e-7, backend="python"
+        )
+    assert [len(texts) for texts in many.stats.warnings] == [0, 1]
+    assert many.stats.status.tolist() == [0, 0]
+
+
+@mark.parametrize("exponent", [-200, -40, 0, 40, 200])
+def test_an_error_has_no_units(exponent: int) -> None:
+    """In other units of length, powers of two, all is the same to the last bit, and rounding is no error."""
+    unit = 2.0**exponent
+    noise = dyn.OdeSystem(lambda x, t: [x[1], -x[0], ((x[0] + 0.3 * x[1]) - x[0]) - 0.3 * x[1]], ["x", "v", "noise"])
+    run = dyn.simulate(noise, [unit, 0.0, 0.0], None, 2.0, "rk4", dt=0.01)
+    assert 0.0 < np.abs(run.q[:, 2]).max() < 1e-14 * unit
+    assert run.stats.error == dyn.simulate(noise, [1.0, 0.0, 0.0], None, 2.0, "rk4", dt=0.01).stats.error
+    assert run.stats.error < 1e-4
+
+
+def test_a_second_run_that_fails_says_that_nothing_is_known() -> None:
+    """Steps that are just short enough to get through, and a pulse that only one of two runs sees."""
+    blow = dyn.OdeSystem(lambda x, t: [x[0] * x[0] * (1.0 - t)], ["x"])
+    with warns(dyn.SimulationWarning, match="the state is off|with steps of another length"):
+        run = dyn.simulate(blow, [1.9], None, 1.0, "rk4", dt=0.25)
+    assert run.stats.error > 1e-3
+    stiff = dyn.OdeSystem(lambda x, t: [-1000.0 * x[0] ** 3], ["x"])
+    with warns(dyn.SimulationWarning, match="with steps of another length the run stopped at .*: its error is unknown"):
+        run = dyn.simulate(stiff, [1.0], None, 1.0, "rk4", dt=1.5e-3)
+    assert (run.stats.error, run.success) == (math.inf, True)
+
+
+@given(
+    gaps=st.lists(st.sampled_from([0.1, 0.1, 0.25, 1e-3, 1e-9, 7.0 / 3.0]), min_size=1, max_size=12),
+    dt=st.floats(1e-2, 3.0),
+    order=st.sampled_from([1, 4, 8]),
+    direction=st.sampled_from([1.0, -1.0]),
+)
+def test_a_second_run_has_other_steps_to_the_same_end(
+    gaps: list[float], dt: float, order: int, direction: float
+) -> None:
+    instants = (direction * np.cumsum([0.0, *gaps])).tolist()
+    first = equal_steps(instants, dt)
+    second, ratio = second_run(first, order)
+    assert second[0].begin == instants[0]
+    assert second[-1].end == instants[-1]
+    for part, after in zip(second, second[1:] + second[-1:], strict=True):
+        assert part.begin + part.steps * part.h == approx(part.end, rel=1e-12, abs=1e-12)
+        assert after is part or after.begin == part.end
+        assert direction * part.h > 0.0
+    longest = max(abs(part.h) for part in first)
+    assert max(abs(part.h) for part in second) <= 3.0 * longest * (1.0 + 1e-9)
+    work = [sum(part.steps for part in run) for run in (first, second)]
+    assert (ratio >= 1.5 and work[1] <= 0.67 * work[0] + 1) or (ratio <= 0.5 and work[1] == 2 * work[0])
+
+
+def test_ctrl_c_in_an_estimate_is_no_success(monkeypatch: pytest.MonkeyPatch) -> None:
+    real, calls = NativeIntegration._advance, []
+
+    def advance(*args: Any, **options: Any) -> Any:
+        calls.append(None)
+        if len(calls) > 1:
+            raise KeyboardInterrupt
+        return real(*args, **options)
+
+    monkeypatch.setattr(NativeIntegration, "_advance", advance)
+    run = dyn.simulate(spring(), [1.0], [0.0], 1.0, "rk4", dt=0.1)
+    assert (run.success, run.status, len(run.t)) == (False, -1, 11)
+    assert run.message == "interrupted after t = 1 s, while its error was estimated"
+    assert run.stats.error is None
+
+
+@mark.parametrize(
+    ("given", "error", "message"),
+    [
+        ({"method": "dop853", "estimate_error": True}, ValueError, "'dop853' keeps the error of its steps within rtol"),
+        ({"method": "rk4", "estimate_error": False, "rtol": 1e-3}, ValueError, "rtol is a bound of the estimated"),
+        ({"method": "rk4", "estimate_error": False, "atol": 1e-3}, ValueError, "atol is a bound of the estimated"),
+        ({"method": "rk4", "estimate_error": "no"}, TypeError, "estimate_error must be True, False or None, got 'no'"),
+    ],
+)
+def test_no_option_of_the_estimate_is_ignored(given: dict[str, Any], error: type[Exception], message: str) -> None:
+    with raises(error, match=message):
+        dyn.simulate(spring(), [1.0], [0.0], 1.0, **given)
+
+
+@mark.parametrize(("method", "jacobians", "factors"), [("dop853", 0, 0), ("rodas", 1, 1), ("radau", 1, 2)])
+def test_jacobians_and_factorizations_are_counted(method: str, jacobians: int, factors: int) -> None:
+    arm, start = random_arm(2), ([1.0, 0.2], [0.0, 0.0])
+    run = dyn.simulate(arm, *start, 2.0, method, rtol=1e-6, atol=1e-6)
+    trials = run.stats.steps + run.stats.rejected
+    assert (run.njev, run.nlu) == (jacobians * run.stats.steps, factors * trials)
+    assert (run.nfev, run.status, run.success) == (run.stats.nfev, 0, True)
