@@ -11,18 +11,15 @@ import numpy as np
 
 from cgraph.extend import Array
 
-from ..integrators.step_control import COLLAPSE, DONE, RESOLUTION, ROUNDING, SMALLEST_ATOL, TOO_SMALL
+from ..integrators.step_control import COLLAPSE, DONE, ROUNDING, SMALLEST_ATOL, TOO_SMALL
 from .dense_output import StepBlock
 from .equal_steps import EqualSteps, equal_steps
+from .first_step import first_step
 from .run_options import RunOptions
 from .step_program import CompiledSteps
 
 BLOCK_TIME = 0.1  # s of run time after which a run comes back to Python: for Ctrl-C, progress and events
 FIRST_PASSES = 32  # of the first block, before it is known how long one takes
-LEAP = 1e-2  # of the whole run: the first step that is tried
-TRIALS = 60  # of a first step
-AHEAD = 3.0  # times the change of a first step: how far its first rate may point
-HUGE = 1e300  # a tolerance that anything meets
 HELD, SHARE = 100, 0.25  # steps at the stability limit, of all, from which on a run is called stiff
 
 
@@ -303,46 +300,14 @@ class AdaptiveIntegration(NativeIntegration):
         values = dict(zip(rate.input_names, [*x.tolist(), t, *self.parameters], strict=True))
         return np.array(list(rate.evaluate(values).values()), dtype=np.float64)
 
+    def _first_step(self, x: Array) -> float:
+        rate, scale = self._rate(self.options.t0, x), self._scale(x)
+        return first_step(self.runner, self.program.order, self.options, {"x": x, "p": self.parameters}, rate, scale)
+
     def _scale(self, x: Array) -> Array:
         """What an error is measured by."""
         size: Array = self.absolute + self.relative * np.abs(x)
         return size
-
-    def _first_step(self, x: Array) -> float:
-        """A step that two half steps confirm, their difference is within the tolerance, and the first rate, too.
-
-        The estimate of an embedded method can vanish by symmetry, such as at a start from rest, and a guess from the
-        first derivatives can be far off; halving cannot be fooled by either. Of an initial layer that a method damps,
-        both the whole and the half steps keep nothing: there the first rate points much farther than the step goes.
-        """
-        options, order, scale = self.options, self.program.order, self._scale(x)
-        span, rate = options.t_end - options.t0, np.abs(self._rate(options.t0, x))
-        anything = {"rtol": HUGE, "atol": HUGE, "max_step": math.inf, "fresh": 1.0, "accepted": 1.0}
-        anything |= {"t": options.t0, "end": math.copysign(math.inf, span), "error_old": 1.0}
-        memory = self.runner.memory({"x": x, "p": self.parameters, **anything})
-        least = min(abs(span), max(2.0 * RESOLUTION * abs(options.t0), math.ulp(0.0)))
-        h = max(min(abs(span), options.longest_step) * LEAP, least)
-        for _ in range(TRIALS):
-            with np.errstate(all="ignore"):
-                whole = self._forced(memory, [h])
-                change = (whole - self._forced(memory, [0.5 * h, 0.5 * h])) / scale
-                difference = float(np.sqrt(np.mean(change * change)))
-                ahead = float(np.max(h * rate / np.maximum(np.abs(whole - x), scale)))
-            if (difference <= 1.0 and ahead <= AHEAD) or h <= least:
-                break
-            factor = 0.9 * difference ** (-1.0 / (order + 1)) if math.isfinite(difference) else 0.0
-            h = max(h * min(0.5, max(1e-3, min(factor, AHEAD / max(ahead, AHEAD)))), least)
-        return h
-
-    def _forced(self, memory: Array, steps: Sequence[float]) -> Array:
-        """The state after these steps from a memory, which is left as it is; NaN where one could not be made."""
-        memory = memory.copy()
-        for h in steps:
-            self.runner.write(memory, "next", h)
-            self._run(memory, 1)
-            if not self._number(memory, "accepted"):
-                return np.full(self.program.size, math.nan)
-        return self.runner.read(memory, "x")
 
 
 def integration(
