@@ -11,17 +11,16 @@ import numpy as np
 
 from cgraph.extend import Array
 
-from ..integrators.step_control import DONE, TOO_SMALL
+from ..integrators.step_control import COLLAPSE, DONE, ROUNDING, SMALLEST_ATOL, TOO_SMALL
 from .dense_output import StepBlock
 from .equal_steps import EqualSteps, equal_steps
+from .first_step import first_step
 from .run_options import RunOptions
 from .step_program import CompiledSteps
 
 BLOCK_TIME = 0.1  # s of run time after which a run comes back to Python: for Ctrl-C, progress and events
 FIRST_PASSES = 32  # of the first block, before it is known how long one takes
-LEAP = 1e-2  # of the whole run: the first step that is tried
-TRIALS = 60  # of a first step
-HUGE = 1e300  # a tolerance that anything meets
+HELD, SHARE = 100, 0.25  # steps at the stability limit, of all, from which on a run is called stiff
 
 
 class StoppedError(Exception):
@@ -212,6 +211,18 @@ def _block(t: Array, states: Array, t_old: float, x_old: Array) -> StepBlock:
 class AdaptiveIntegration(NativeIntegration):
     """Steps chosen by the method."""
 
+    def __init__(
+        self,
+        compiled: CompiledSteps,
+        options: RunOptions,
+        parameters: Sequence[float] = (),
+        stopped: Callable[[], bool] = lambda: False,
+    ) -> None:
+        super().__init__(compiled, options, parameters, stopped)
+        self.relative = max(options.relative, ROUNDING)
+        self.absolute = np.maximum(options.absolute, SMALLEST_ATOL)
+        self._stiff = self._below_rounding = False
+
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
         options = self.options
@@ -220,10 +231,11 @@ class AdaptiveIntegration(NativeIntegration):
             "p": self.parameters,
             "t": options.t0,
             "end": options.t_end,
-            "rtol": options.relative,
-            "atol": options.absolute,
+            "rtol": self.relative,
+            "atol": self.absolute,
             "next": self._first_step(x) if options.first_step is None else options.first_step,
             "max_step": options.longest_step,
+            "min_step": COLLAPSE * abs(options.t_end - options.t0),
             "fresh": 1.0,
             "error_old": 1e-4,
             "accepted": 1.0,
@@ -240,6 +252,7 @@ class AdaptiveIntegration(NativeIntegration):
             self.rejected = int(self._number(memory, "rejected"))
             self.evaluations = int(self._number(memory, "evaluations"))
             if len(rows):
+                self._look(memory, rows)
                 yield self._block(rows)
             if status == TOO_SMALL:
                 self.status = self._too_small(memory)
@@ -249,23 +262,43 @@ class AdaptiveIntegration(NativeIntegration):
     def _block(self, rows: Array) -> StepBlock:
         m = self.program.size
         t, h, x = rows[:, 0], rows[:, 1], rows[:, 2 : 2 + m]
-        self.largest = max(self.largest, float(h.max()))
+        self.largest = max(self.largest, min(float(np.abs(h).max()), self.options.longest_step))
         if not self.program.dense:
             return StepBlock(t, x, t - h, h, np.full_like(x, math.nan), None)
         t_old, x_old, dense = rows[:, 2 + m], rows[:, 3 + m : 3 + 2 * m], rows[:, 3 + 2 * m :]
         return StepBlock(t, x, t_old, h, x_old, dense.reshape(len(t), -1, m))
 
+    def _look(self, memory: Array, rows: Array) -> None:
+        """Note once what a user should know of these steps: stiffness, and tolerances below rounding."""
+        options, held = self.options, int(self._number(memory, "held"))
+        if held >= HELD and held >= SHARE * self.steps and not self._stiff:
+            self._stiff = True
+            t, h = rows[-1, :2]
+            self.warnings.append(
+                f"the system is stiff: at t = {t:.6g} s the step, {abs(h):.3g} s, is held at the stability limit of "
+                f"method {options.method!r}, not by its tolerance; try method='radau'"
+            )
+        if options.relative < self.relative and not self._below_rounding:
+            size = np.abs(rows[:, 2 : 2 + self.program.size])
+            short = (options.absolute + options.relative * size < self.relative * size).any(axis=0)
+            if short.any():
+                self._below_rounding = True
+                self.warnings.append(
+                    f"rtol = {options.relative:g} with the atol of {self.components[int(np.argmax(short))]} is below "
+                    f"the rounding of a step: raised to {self.relative:.3g}"
+                )
+
     def _too_small(self, memory: Array) -> str:
-        t, h = self._number(memory, "t"), self._number(memory, "h")
-        if t == 0.0 and not np.isfinite(rate := self._rate(t, self.runner.read(memory, "x"))).all():
+        t, x = self._number(memory, "t"), self.runner.read(memory, "x")
+        where, rate = f"stopped at t = {t:.6g} s: ", self._rate(t, x)
+        if not np.isfinite(rate).all():
             first = self.components[int(np.flatnonzero(~np.isfinite(rate))[0])]
-            return f"stopped at t = 0 s: the rate of {first} is not finite at the start"
-        text = f"stopped at t = {t:.6g} s: the step, {h:.3g} s, is below the resolution of the time"
+            return f"{where}the rate of {first} is not finite{' at the start' if t == self.options.t0 else ''}"
         if reason := self.nonfinite(self.runner.read(memory, "x_new")):
-            return f"stopped at t = {t:.6g} s: {reason}, however small"
-        x = self.runner.read(memory, "x")
-        speed = np.abs(self._rate(t, x)) / self._scale(x)
-        return f"{text}; fastest is {self.components[int(np.nanargmax(speed))]}"
+            return f"{where}{reason}, however small"
+        fastest = self.components[int(np.argmax(np.abs(rate) / self._scale(x)))]
+        h = self._number(memory, "tried")
+        return f"{where}the step, {h:.3g} s, is below the resolution of the time; fastest is {fastest}"
 
     def _rate(self, t: float, x: Array) -> Array:
         rate = self.program.rate
@@ -273,38 +306,14 @@ class AdaptiveIntegration(NativeIntegration):
         values = dict(zip(rate.input_names, [*x.tolist(), t, *self.parameters], strict=True))
         return np.array(list(rate.evaluate(values).values()), dtype=np.float64)
 
+    def _first_step(self, x: Array) -> float:
+        rate, scale = self._rate(self.options.t0, x), self._scale(x)
+        return first_step(self.runner, self.program.order, self.options, {"x": x, "p": self.parameters}, rate, scale)
+
     def _scale(self, x: Array) -> Array:
         """What an error is measured by."""
-        size: Array = self.options.absolute + self.options.relative * np.abs(x)
+        size: Array = self.absolute + self.relative * np.abs(x)
         return size
-
-    def _first_step(self, x: Array) -> float:
-        """A step that two half steps confirm: their difference is within the tolerance.
-
-        The estimate of an embedded method can vanish by symmetry, such as at a start from rest, and a guess from the
-        first derivatives can be far off; halving cannot be fooled by either.
-        """
-        order, scale = self.program.order, self._scale(x)
-        anything = {"rtol": HUGE, "atol": HUGE, "max_step": math.inf, "end": math.inf, "fresh": 1.0, "accepted": 1.0}
-        memory = self.runner.memory({"x": x, "p": self.parameters, "error_old": 1.0, **anything})
-        h = min(self.options.t_end, self.options.longest_step) * LEAP
-        for _ in range(TRIALS):
-            with np.errstate(all="ignore"):
-                change = (self._forced(memory, [h]) - self._forced(memory, [0.5 * h, 0.5 * h])) / scale
-                difference = float(np.sqrt(np.mean(change * change)))
-            if difference <= 1.0:
-                break
-            factor = 0.9 * difference ** (-1.0 / (order + 1)) if math.isfinite(difference) else 0.0
-            h *= min(0.5, max(1e-3, factor))
-        return h
-
-    def _forced(self, memory: Array, steps: Sequence[float]) -> Array:
-        """The state after these steps from a memory, which is left as it is."""
-        memory = memory.copy()
-        for h in steps:
-            self.runner.write(memory, "next", h)
-            self._run(memory, 1)
-        return self.runner.read(memory, "x")
 
 
 def integration(
