@@ -6,7 +6,9 @@ import math
 
 import numpy as np
 
-from ..event_log import Happening
+from ..event_log import Happening, split_crossings
+from ..event_program import EventProgram
+from ..trajectory import Crossings
 from .chunk import Part
 from .ensemble import EnsembleStats
 
@@ -56,3 +58,8 @@ class EnsembleRows:
         )
         said, (largest, last) = tuple(self.status), self.errors
         return EnsembleStats(method, *counts, self.dt, seconds, success, said, status, largest, last, texts)
+
+    def events(self, program: EventProgram, half: int) -> dict[str, tuple[Crossings, ...]]:
+        """Of each event by name, where it happened in the trajectories; the first `half` numbers of a state are q."""
+        crossings = [split_crossings(program, happened, half) for happened in self.happened]
+        return {event.name: tuple([named[event.name] for named in crossings]) for event in program.events}

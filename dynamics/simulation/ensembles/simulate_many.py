@@ -19,7 +19,6 @@ from ...integrators import METHODS, derive
 from ...systems.model import Model
 from ..equal_steps import step_count
 from ..event import Event, as_events
-from ..event_log import split_crossings
 from ..event_program import event_program
 from ..free_memory import room
 from ..progress_bar import Progress
@@ -135,8 +134,7 @@ def simulate_many(
     # Derive the equations as graphs, and write the steps of the method over them
     begin = time.perf_counter()
     problem = derive(model, start.same)
-    watch = event_program(problem, watched)
-    program = step_program(problem, METHODS[method], dense=True)
+    program, watch = step_program(problem, METHODS[method], dense=True), event_program(problem, watched)
 
     # Share out the work: what a worker is sent, and the starts of chunks of trajectories
     grids = [] if watched else _grids(program, options)
@@ -153,9 +151,7 @@ def simulate_many(
     stats, rows = result.stats(method, time.perf_counter() - begin), result.rows
     if text := _warning(stats):
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    crossings = [split_crossings(watch, happened, half) for happened in result.happened] if watched else []
-    found = {event.name: tuple([named[event.name] for named in crossings]) for event in watched}
-    return Ensemble(options.row_times, rows[:, :, :half], rows[:, :, half:], stats, found)
+    return Ensemble(options.row_times, rows[:, :, :half], rows[:, :, half:], stats, result.events(watch, half))
 
 
 def _row_count(options: RunOptions) -> int:
