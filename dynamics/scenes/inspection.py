@@ -52,6 +52,8 @@ def inspection(scene: Scene, *, forward: bool = False, t_end: float | None = Non
     Raises ValueError for t_end out of range, and as `simulate` does.
     """
     system, end = scene.system, scene.t_end if t_end is None else t_end
+    if not 0.0 < end < np.inf:
+        raise ValueError(f"t_end must be positive and finite, got {end!r} s")
     frames = int(min(FRAMES, max(2.0, RATE * end))) if np.isfinite(end) else 2
     times = np.linspace(0.0, end, frames) if end > 0.0 else None
     run = simulate(system, scene.q, scene.qd, end, "dopri5", rtol=1e-6, atol=1e-8, t_eval=times)

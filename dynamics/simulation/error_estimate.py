@@ -97,19 +97,22 @@ class Differences:
         """rows: (k, T, m) of the first runs."""
         self.size = np.abs(rows).max(axis=1, initial=0.0)  # (k, m) of each component over the run
         self.largest, self.last = np.zeros_like(self.size), np.zeros_like(self.size)
+        self.compared = 0  # instants
 
     def seen(self, states: Array) -> None:
-        """States (k, r, m) that the second runs passed through: they tell the size."""
-        finite = np.where(np.isfinite(states), np.abs(states), 0.0)
-        self.size = np.maximum(self.size, finite.max(axis=1, initial=0.0))
+        """States (k, r, m) that the second runs passed through between the rows: they tell the size."""
+        if states.shape[1]:
+            size = np.abs(states).max(axis=1)
+            self.size = np.where(np.isfinite(size), np.maximum(self.size, size), self.size)
 
     def add(self, rows: Array, others: Array) -> None:
         """The same instants of both, (k, r, m)."""
         if rows.shape[1]:
-            change = np.abs(others - rows)
-            change[np.isnan(change)] = math.inf
-            self.largest = np.maximum(self.largest, change.max(axis=1))
-            self.last = change[:, -1]
+            self.compared += rows.shape[1]
+            change = others - rows
+            np.abs(change, out=change)
+            self.last = _or_infinite(change[:, -1])
+            self.largest = np.maximum(self.largest, _or_infinite(change.max(axis=1)))
 
     @property
     def scale(self) -> Array:
@@ -124,13 +127,18 @@ class Differences:
         return _by_law(largest, ratio), _by_law(last, ratio)
 
 
+def _or_infinite(change: Array) -> Array:
+    """The same, infinite in place of NaN."""
+    return np.where(np.isnan(change), math.inf, change)
+
+
 def _by_law(change: Array, ratio: float) -> Array:
     errors: Array = np.where(change > LAWLESS, change, change / abs(ratio - 1.0))
     return errors
 
 
 class ErrorEstimate(NamedTuple):
-    """Of one run: the largest error over its rows and the one of its last row, relative to the sizes of components."""
+    """Of one run: the largest error and that at the end, relative to the sizes of components."""
 
     largest: float
     last: float
@@ -140,7 +148,9 @@ class ErrorEstimate(NamedTuple):
 def estimates(
     differences: Differences, ratio: float, components: Sequence[str], options: RunOptions
 ) -> list[ErrorEstimate]:
-    """Of each run, whether it is as good as it was asked to be."""
+    """Of each run, whether it is as good as it was asked to be; NaN where nothing could be compared."""
+    if not differences.compared:
+        return [ErrorEstimate(math.nan, math.nan, "")] * len(differences.size)
     largest, last = differences.errors(ratio)
     scale = differences.scale
     beyond = ~(largest * scale <= options.absolute + options.relative * scale)
@@ -176,7 +186,7 @@ def estimate(
     report: Callable[[float], None] = lambda t: None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> ErrorEstimate:
-    """Of a run from x that has these rows.
+    """Of a run from x that came to these states.
 
     report: is told the time [s] that the second run has come to.  stopped: see NativeIntegration.
     """
@@ -187,8 +197,9 @@ def estimate(
     differences = Differences(states[None])
     for block in other.blocks(x):
         beyond = options.direction * (block.t - times[-1]) > 0.0
-        differences.seen(block.x[None, ~beyond])
         rows, same = matches(times, block.t)
+        if len(same) < len(block.t):
+            differences.seen(block.x[None, ~beyond])
         differences.add(states[None, rows], block.x[None, same])
         report(float(block.t[-1]))
         if beyond.any():

@@ -156,7 +156,8 @@ def simulate(
 
     # Integrate, noting rows and events
     run = WatchedIntegration(leg, options, log) if log else leg(options)
-    recorder = Recorder(start.x, options.times, options.t0, options.direction)
+    ends = 3 if watched else 1  # an event cuts the last step, and of the others one in two is compared
+    recorder = Recorder(start.x, options.times, options.t0, options.direction, ends)
     steps: list[StepBlock] | None = [] if dense_output else None
     outcome = _integrate(run, start.x, recorder, options, problem.rate, steps)
 
@@ -217,7 +218,9 @@ def _integrate(
             if isinstance(plain, FixedStepIntegration) and options.estimated and not run.status:
                 doing = ", while its error was estimated"
                 done = abs(recorder.last - options.t0)
-                error = estimate(plain, x, *recorder.table(), lambda t: report(done + second * abs(t - options.t0)))
+                error = estimate(
+                    plain, x, *recorder.checkpoints(), lambda t: report(done + second * abs(t - options.t0))
+                )
     except KeyboardInterrupt:
         run.status = f"interrupted after t = {recorder.last:.6g} s{doing}"
     if run.status:
@@ -256,6 +259,8 @@ def _run(
 
 def _stats(run: Integration, method: str, outcome: _Outcome) -> Stats:
     seconds, status, message, error = outcome
+    if error and math.isnan(error.largest):
+        error = None  # nothing could be compared
     texts = [*run.warnings, *([error.warning] if error and error.warning else [])]
     return Stats(
         method,

@@ -11,6 +11,8 @@ from cgraph.extend import Array
 from ..event_log import Happening
 from .ensemble import Counts
 
+INTERRUPTED = "interrupted"  # what the status of a trajectory that Ctrl-C ended begins with
+
 
 @dataclass(frozen=True)
 class Chunk:
@@ -36,6 +38,17 @@ class Part:
     warnings: list[list[str]]  # what speaks against a trajectory
     ended: list[bool]  # whether an event has ended it; then its status says which
     happened: list[list[Happening]]  # the events of each
+
+    def interrupt(self, k: int, t: float, rows: int) -> None:
+        """Trajectory k ends at t [s], after so many rows, and those after it did not begin."""
+        self.rows[k, rows:], self.rows[k + 1 :] = np.nan, np.nan
+        self.status[k] = f"{INTERRUPTED} after t = {t:.6g} s"
+        self.status[k + 1 :] = [INTERRUPTED] * (len(self.status) - k - 1)
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether the chunk was not run to its end."""
+        return any(status.startswith(INTERRUPTED) for status in self.status)
 
 
 def empty(chunk: Chunk, rows: Array) -> Part:

@@ -9,7 +9,7 @@ import numpy as np
 from ..event_log import Happening, split_crossings
 from ..event_program import EventProgram
 from ..trajectory import Crossings
-from .chunk import Part
+from .chunk import INTERRUPTED, Part
 from .ensemble import EnsembleStats
 
 REACHED = "reached t_end"
@@ -21,7 +21,7 @@ class EnsembleRows:
     def __init__(self, count: int, rows: int, m: int) -> None:
         self.rows = np.empty((count, rows, m))
         self.steps, self.rejected, self.evaluations = np.zeros((3, count), dtype=np.int64)
-        self.dt, self.status = np.zeros(count), ["interrupted"] * count
+        self.dt, self.status = np.zeros(count), [INTERRUPTED] * count
         self.errors, self.warnings = np.full((2, count), math.nan), [[""][:0] for _ in range(count)]
         self.ended = np.zeros(count, dtype=bool)
         self.happened: list[list[Happening]] = [[] for _ in range(count)]

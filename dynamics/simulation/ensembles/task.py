@@ -41,10 +41,13 @@ class Task:
 
     def __call__(self, chunk: Chunk) -> Part:
         """Run the chunk."""
-        return self.run(chunk, np.empty((len(chunk.x), self.count, chunk.x.shape[1])), lambda: False)
+        part = self.run(chunk, np.empty((len(chunk.x), self.count, chunk.x.shape[1])), lambda: False)
+        if part.interrupted:
+            raise KeyboardInterrupt
+        return part
 
     def run(self, chunk: Chunk, rows: Array, stopped: Callable[[], bool]) -> Part:
-        """Run the chunk into rows (k, T, m). Raises StoppedError soon after it was stopped."""
+        """Run the chunk into rows (k, T, m), to its end, or until soon after Ctrl-C or `stopped`: see the part."""
         part = empty(chunk, rows)
         with np.errstate(all="ignore"):
             (self._side_by_side if self.grids else self._one_by_one)(chunk, part, stopped)
@@ -56,35 +59,51 @@ class Task:
         times = self.options.times
         at = int(times is None or times[0] == self.options.t0)
         part.rows[:, :at] = chunk.x[:, None]
-        run = VectorizedIntegration(code, chunk, part, at)
-        for grid in self.grids:
-            run.begin(grid)
-            for block in grid.blocks(*run.limits):
-                if stopped():
-                    raise StoppedError
-                run.advance(*block)
+        run = VectorizedIntegration(code, chunk, part, at, self.options.t0)
+        try:
+            for grid in self.grids:
+                run.begin(grid)
+                for block in grid.blocks(*run.limits):
+                    if stopped():
+                        raise StoppedError
+                    run.advance(*block)
+            if self.options.estimated:
+                estimate_side_by_side(code, chunk, part, run.states, self.options, stopped)
+        except (KeyboardInterrupt, StoppedError):
+            run.interrupt()
         run.end()
-        if self.options.estimated:
-            estimate_side_by_side(code, chunk, part, self.options, stopped)
 
     def _one_by_one(self, chunk: Chunk, part: Part, stopped: Callable[[], bool]) -> None:
         with _lock:
             compiled = _compiled(self.pickled, self.options.backend)
         for k, x in enumerate(chunk.x):
             run = self._run(compiled, chunk.p[k].tolist(), stopped, part.happened[k])
-            recorder = Recorder(x, self.options.times, self.options.t0, self.options.direction)
-            for block in run.blocks(x):
-                recorder.add(block)
-            times, states = recorder.table()
-            plain = run.plain
-            if isinstance(plain, FixedStepIntegration) and self.options.estimated and not run.status:
-                error = estimate(plain, x, times, states, stopped=stopped)
-                part.errors[:, k] = error.largest, error.last
-                run.warnings += [error.warning] if error.warning else []
+            recorder = Recorder(x, self.options.times, self.options.t0, self.options.direction, 3 if self.events else 1)
+            interrupted = not self._finished(run, x, recorder, part.errors[:, k], stopped)
+            states = recorder.table()[1]
             part.rows[k, : len(states)], part.rows[k, len(states) :] = states, np.nan
             part.steps[k], part.rejected[k], part.evaluations[k] = run.steps, run.rejected, run.evaluations
             part.dt[k], part.status[k], part.warnings[k] = run.largest, run.status or run.event, run.warnings
             part.ended[k] = bool(run.event) and not run.status
+            if interrupted:
+                part.interrupt(k, recorder.last, len(states))
+                return
+
+    def _finished(
+        self, run: Integration, x: Array, recorder: Recorder, errors: Array, stopped: Callable[[], bool]
+    ) -> bool:
+        """Run one trajectory and estimate its errors (2,). False where it was interrupted."""
+        try:
+            for block in run.blocks(x):
+                recorder.add(block)
+            plain = run.plain
+            if isinstance(plain, FixedStepIntegration) and self.options.estimated and not run.status:
+                error = estimate(plain, x, *recorder.checkpoints(), stopped=stopped)
+                errors[:] = error.largest, error.last
+                run.warnings += [error.warning] if error.warning else []
+        except (KeyboardInterrupt, StoppedError):
+            return False
+        return True
 
     def _run(
         self,

@@ -9,7 +9,7 @@ import numpy as np
 from cgraph.extend import Array, Runner
 
 from ..step_program import StepProgram
-from .chunk import Chunk, Part
+from .chunk import INTERRUPTED, Chunk, Part
 from .step_grid import StepGrid
 
 WORK = 2**21  # nodes computed in a block: half a millisecond for each vector
@@ -46,13 +46,14 @@ class VectorizedIntegration:
     lane repeats a neighbor, since NaN is slow to compute with, and its rows become NaN in the end.
     """
 
-    def __init__(self, code: VectorCode, chunk: Chunk, part: Part, at: int) -> None:
+    def __init__(self, code: VectorCode, chunk: Chunk, part: Part, at: int, t0: float) -> None:
         self.program, self.runner, self.part = code.program, code.one_pass, part
         count, total = part.rows.shape[:2]
         self._memories = start_memories(code, chunk)
         self._live = np.ones(count, dtype=bool)
         self._good = np.full(count, total)  # rows that count
-        self._at, self._done = at, 0  # rows and steps
+        self._at, self._done, self._reached = at, 0, t0  # rows, steps, and the time [s] of the last block
+        self._interrupted = False
         self.limits = block_limits(code, count)
 
     def begin(self, grid: StepGrid) -> None:
@@ -79,12 +80,25 @@ class VectorizedIntegration:
             if self._live.any():
                 self._memories[:, ~self._live] = self._memories[:, np.flatnonzero(self._live)[:1]]
         self._done += steps
+        self._reached = float(self.runner.read(self._memories, "t")[0, 0])
+
+    @property
+    def states(self) -> Array:
+        """Where the trajectories are, (k, m)."""
+        return self.runner.read(self._memories, "x").T
+
+    def interrupt(self) -> None:
+        """Those that have not failed end here, with the rows that they have."""
+        for k in np.flatnonzero(self._live).tolist():
+            self.part.status[k] = f"{INTERRUPTED} after t = {self._reached:.6g} s"
+        self._good[self._live] = self._at
+        self._interrupted = True
 
     def end(self) -> None:
         """Count the steps, and end what has failed."""
         live, evaluations = self._live, self.runner.read(self._memories, "evaluations")[0]
         self.part.steps[live], self.part.evaluations[live] = self._done, evaluations[live]
-        for k in np.flatnonzero(~live):
+        for k in range(len(live)) if self._interrupted else np.flatnonzero(~live):
             self.part.rows[k, self._good[k] :] = np.nan
 
     def _locate_failure(self, k: int, memory: Array, steps: int) -> None:

@@ -42,7 +42,10 @@ def finished(task: Task, chunks: Sequence[Chunk], workers: int | Map, table: Arr
         yield from _by_map(task, chunks, workers)
     elif workers == 1 or len(chunks) == 1:
         for chunk in chunks:
-            yield task.run(chunk, _rows(table, chunk), lambda: False)
+            part = task.run(chunk, _rows(table, chunk), lambda: False)
+            yield part
+            if part.interrupted:
+                raise KeyboardInterrupt
     else:
         with closing(_by_threads(task, chunks, min(workers, len(chunks)), table)) as parts:
             yield from parts
@@ -66,7 +69,13 @@ def _by_threads(task: Task, chunks: Sequence[Chunk], threads: int, table: Array)
                 future.add_done_callback(ended.put)
             for _ in futures:
                 yield _next(ended).result()
-        except BaseException:  # Ctrl-C, an error in a thread, or nobody wants the rest
+        except KeyboardInterrupt:
+            stop.set()
+            running = [future for future in futures if not future.cancel()]
+            for future in running:
+                yield future.result()
+            raise
+        except BaseException:  # an error in a thread, or nobody wants the rest
             stop.set()
             for future in futures:
                 future.cancel()

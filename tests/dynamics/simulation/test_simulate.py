@@ -10,7 +10,8 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import derive
+from dynamics.integrators import METHODS, derive
+from dynamics.simulation.run_options import RunOptions
 from dynamics.simulation.stepping import NativeIntegration
 from dynamics.systems.system import System
 from tests.dynamics.models import oscillator, random_arm
@@ -333,3 +334,18 @@ def test_steps_are_chosen_by_error_unless_told_otherwise() -> None:
     assert (run.stats.method, many.stats.method) == ("dop853", "dop853")
     assert run.q[-1, 0] == approx(math.cos(3000.0), abs=3e-6)  # rtol = 1e-9 of 3000 rad
     assert many.q[0, -1, 0] == run.q[-1, 0]
+
+
+@mark.parametrize("method", [*METHODS, "scipy:Radau"])
+def test_an_option_is_taken_or_refused_by_name(method: str) -> None:
+    equal = method in METHODS and not METHODS[method].adaptive
+    for name, value in {"dt": 0.1, "max_step": 0.1, "first_step": 0.1, "estimate_error": True}.items():
+        if equal == (name in ("dt", "estimate_error")):
+            RunOptions(1.0, method, **{name: value})
+        else:
+            with raises(ValueError, match=f"'{method}' .*{name}"):
+                RunOptions(1.0, method, **{name: value})
+    for name in ("rtol", "atol"):
+        RunOptions(1.0, method, **{name: 1e-3})
+        with raises(ValueError, match="rtol and atol must be finite"):
+            RunOptions(1.0, method, **{name: -1e-3})

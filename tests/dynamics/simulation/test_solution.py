@@ -28,8 +28,10 @@ def pulled() -> dyn.System:
     )
 
 
-@mark.parametrize("method", [*METHODS, "scipy:DOP853"])
-@mark.parametrize("t_eval", [None, [0.1, 0.5, 1.7]])
+@mark.parametrize(
+    ("method", "t_eval"),
+    [*((method, [0.1, 0.5, 1.7]) for method in (*METHODS, "scipy:DOP853")), ("rk4", None), ("dop853", None)],
+)
 def test_a_solution_is_the_motion(method: str, t_eval: Any) -> None:
     options: dict[str, Any] = {"t_eval": t_eval, "backend": "python", **step(method, 0.02)}
     run = dyn.simulate(oscillator(), [1.0], [0.0], 2.0, method, dense_output=True, **options)
@@ -53,7 +55,7 @@ def test_a_solution_is_the_motion(method: str, t_eval: Any) -> None:
 @mark.parametrize("method", ["rk4", "gauss4"])
 def test_a_solution_ends_where_the_run_did(method: str) -> None:
     cut = dyn.Event("cut", lambda q, qd, t: t - 0.3, terminal=True)
-    options = step(method, 0.02)
+    options = step(method, 0.02) | {"backend": "python"}
     for ends in ((1.0, -1.0), (-1.0, 1.0)):
         run = dyn.simulate(
             oscillator(), [1.0], [0.0], t_span=ends, method=method, events=cut, dense_output=True, **options
@@ -94,8 +96,8 @@ def test_parameters_and_mechanisms_have_accelerations_and_forces() -> None:
     run = dyn.simulate(oscillator(), [1.0], [0.0], 1.0, parameters={"m": 0.5}, tau=2.0, t_eval=[0.0, 1.0])
     assert run.qdd == approx((2.0 - 3.0 * run.q) / 0.5, rel=ROUNDING)
     assert run.forces.tolist() == [[2.0], [2.0]]
-    arm = random_arm(3)
-    run = dyn.simulate(arm, [1.0, 0.2, -0.3], [0.0] * 3, 0.5, t_eval=[0.0, 0.5])
-    assert run.qdd.shape == run.forces.shape == (2, 3)
+    arm = random_arm(2)
+    run = dyn.simulate(arm, [1.0, 0.2], [0.0] * 2, 0.5, t_eval=[0.0, 0.5], backend="python")
+    assert run.qdd.shape == run.forces.shape == (2, 2)
     decay = dyn.simulate(dyn.OdeSystem(lambda x, t: [-x[0]], ["x"]), [1.0], None, 1.0)
     assert decay.qdd.shape == decay.forces.shape == (len(decay.t), 0)

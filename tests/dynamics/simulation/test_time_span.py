@@ -40,7 +40,7 @@ def shifted(by: float) -> dyn.System:
 def test_a_run_goes_to_t_end_whatever_is_recorded(method: str) -> None:
     """What ends the run after the last recorded time is seen, and the run says that it was there."""
     late = dyn.Event("late", lambda q, qd, t: t - 0.8, terminal=True)
-    options: dict[str, Any] = {"t_eval": [0.0, 0.25], **step(method, 0.05)}
+    options: dict[str, Any] = {"t_eval": [0.0, 0.25], "backend": "python", **step(method, 0.05)}
     run = dyn.simulate(oscillator(), [1.0], [0.0], 1.0, method, events=late, **options)
     assert run.stats.message == "event 'late' at t = 0.8 s"
     assert run.t == approx([0.0, 0.25, 0.8], rel=ROUNDING)
@@ -71,7 +71,7 @@ def test_what_goes_wrong_after_the_last_recorded_time_is_said(method: str) -> No
 @mark.parametrize("method", [*EQUAL, "scipy:DOP853"])
 def test_only_the_equations_know_where_time_begins(method: str) -> None:
     times = np.linspace(0.0, 1.0, 5)
-    options = step(method, 0.0625)
+    options = step(method, 0.0625) | {"backend": "python"}
     first = dyn.simulate(shifted(4.0), [1.0], [0.0], 1.0, method, t_eval=times, **options)
     second = dyn.simulate(driven(), [1.0], [0.0], t_span=(4.0, 5.0), method=method, t_eval=4.0 + times, **options)
     third = dyn.simulate(driven(), [1.0], [0.0], 5.0, method, t0=4.0, t_eval=4.0 + times, **options)
