@@ -16,13 +16,7 @@ from tests.dynamics.step_options import step
 
 FIXED = [name for name, method in METHODS.items() if not method.adaptive]
 ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
-KINDS = [
-    "dop853",
-    "radau",
-    "rk4",
-    "scipy:DOP853",
-    "scipy:LSODA",
-]  # with dense output of their own, by Hermite, of SciPy
+KINDS = ["dop853", "rk4", "scipy:DOP853"]  # with dense output of their own, by Hermite, of SciPy
 SHARP = 1e-12  # relative, of an instant found to the last bit
 CROSSING = {1: 2e-2, 2: 2e-5}  # s, by the order of the method: the error of a motion at dt = 1 ms
 CROSSING_FINE = 1e-8  # s, at order 4 and more, and for steps within 1e-11
@@ -138,7 +132,6 @@ def test_starts_on_zero_ends_on_zero_and_quantities_that_stay_zero() -> None:
     for method, options in (
         ("rk4", {"dt": 0.25}),
         ("dop853", {}),
-        ("dop853", {"max_step": 0.5}),
     ):
         found = circle(events, 4.0, method, **options).events
         for name, instants in zip(names, expected, strict=True):
@@ -168,7 +161,7 @@ def _oscillations(a: float, w: float, c: float) -> tuple[Any, Any]:
 @mark.parametrize("method", KINDS)
 def test_random_oscillations_cross_zero_where_they_do(method: str) -> None:
     """Number, instants and directions, of quantities of the time and of the state, by closed forms."""
-    rng, count = np.random.default_rng(len(method)), 100 if method == "dop853" else 16
+    rng, count = np.random.default_rng(len(method)), 100 if method == "dop853" else 10
     amplitude, phase = 10.0 ** rng.uniform(-12, 12, count), rng.uniform(0.1, 3.0, count)
     rate, directions = np.exp(rng.uniform(-1.0, 4.0, count)), rng.integers(-1, 2, count)
     events = []

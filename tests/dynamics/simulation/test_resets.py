@@ -53,8 +53,8 @@ def test_rows_at_t_eval_lie_on_the_bounces() -> None:
         assert run.energy == approx(np.where(since < 0.0, G, 0.25 * G), abs=1e-6)
 
 
-@mark.parametrize("method", METHOD_KINDS)
-@mark.parametrize(("e", "floor"), [(0.0, 0.0), (0.3, 0.0), (0.3, 0.5)])
+@mark.parametrize("method", ["dop853", "rk4", "rodas", "scipy:LSODA"])
+@mark.parametrize(("e", "floor"), [(0.0, 0.0), (0.3, 0.5)])
 def test_infinitely_many_bounces_end_with_a_sentence_above_the_floor(method: str, e: float, floor: float) -> None:
     run = fall(bounce(e, floor), 8.0, method)
     assert "event 'bounce' resets the state again and again at this instant" in run.stats.message
