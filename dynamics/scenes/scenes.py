@@ -155,9 +155,7 @@ def load(name: str | os.PathLike[str], /, **options: Any) -> Scene:
     make: Callable[..., Scene]
     if isinstance(name, str) and name in _SCENES:
         make = _SCENES[name]
-    elif (
-        isinstance(name, str | os.PathLike) and name and (Path(name).suffix.lower() in _SUFFIXES or Path(name).exists())
-    ):
+    elif _is_path(name):
         make = partial(of_file, name)
     else:
         raise ValueError(
