@@ -185,7 +185,7 @@ def test_a_signal_that_comes_in_a_callback_is_raised_after_it(number: int, capsy
 
     def work() -> None:
         Finalized()
-        for _ in range(10**9):
+        for _ in range(10**8):
             pass
 
     with pytest.raises(signals.Stopped) as stop, signals.stoppable():
@@ -202,7 +202,7 @@ def test_a_signal_that_a_library_takes_for_an_error_is_raised_again_but_not_into
         try:
             with suppress(BaseException):
                 send()
-            for _ in range(10**9):
+            for _ in range(10**8):
                 pass
         finally:
             for _ in range(10**7):  # longer than it takes to be sent again
