@@ -21,9 +21,9 @@ label may have.
 **Run**: a `Program` is graphs over registers of numbers (`Call`, `Map`, `Sum`, `Factor`, `Solve`, `If`, `While`), and
 `runner` makes it machine code or Python.
 
-**At the edges**: `real_array` and `real_number` check what a caller passed, `thread_count` reads `threads=`,
-`atomic_write` writes a file whole or not at all, `install` ends an error about a missing package. `Array` is the type
-of an array of float64.
+**At the edges**: `real_array`, `real_number` and `check_name` check what a caller passed, `thread_count` reads
+`threads=`, `atomic_write` writes a file whole or not at all, `install` ends an error about a missing package. `Array`
+is the type of an array of float64.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, building, cotangents
@@ -41,6 +41,7 @@ from .autodiff.hessian_solve import solve_nodes
 from .autodiff.jacobian import hessian_nodes
 from .autodiff.ldl_solve import SingularError, ldl_elimination, ldl_solve
 from .autodiff.reverse import cotangents
+from .core.check_name import check_name
 from .core.evaluate import Array
 from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED
 from .core.node import as_node
@@ -84,6 +85,7 @@ __all__ = [
     "as_node",
     "atomic_write",
     "building",
+    "check_name",
     "cotangents",
     "expand",
     "folded",

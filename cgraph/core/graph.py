@@ -8,6 +8,7 @@ from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any
 
 from ..errors import GraphError
+from .check_name import check_name
 from .counts import Counts, count
 from .edge import Edge
 from .evaluate import Value, evaluate
@@ -46,7 +47,9 @@ class Graph:
     GraphError
         If there are no outputs, an input is repeated, or an output needs a variable that is not an input.
     TypeError
-        If an input is not a variable or an output is not a node.
+        If an input is not a variable, an output is not a node, or its name is not a string.
+    ValueError
+        If an output's name is empty or too long, or has characters that cannot be printed.
 
     Examples
     --------
@@ -232,8 +235,7 @@ def _checked_outputs(outputs: Mapping[str, Scalar]) -> dict[str, Node]:
         raise GraphError("a graph needs at least one output")
     nodes = {}
     for name, value in outputs.items():
-        if not isinstance(name, str) or not name:
-            raise TypeError(f"an output's name must be a non-empty string, got {name!r:.60}")
+        name = check_name("an output", name)
         try:
             nodes[name] = as_node(value)
         except TypeError as error:

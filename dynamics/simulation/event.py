@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from cgraph import Node
+from cgraph.extend import check_name
 
 from ..systems.system import sequence
 
@@ -34,7 +35,7 @@ class Event:
     TypeError
         For a name that is no text, a value that is no function, a `terminal` that is neither True nor False.
     ValueError
-        For another direction.
+        For another direction, and a name that is empty or cannot be printed.
 
     Examples
     --------
@@ -56,6 +57,7 @@ class Event:
                 "an event needs a name, a function, and True or False for `terminal`, got "
                 f"{self.name!r:.40}, {self.value!r:.40} and {self.terminal!r:.40}"
             )
+        check_name("an event", self.name)
         if self.direction not in (-1, 0, 1):
             raise ValueError(f"event {self.name!r}: direction must be 1, -1 or 0, got {self.direction!r}")
 
