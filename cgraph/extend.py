@@ -21,9 +21,9 @@ label may have.
 **Run**: a `Program` is graphs over registers of numbers (`Call`, `Map`, `Sum`, `Factor`, `Solve`, `If`, `While`), and
 `runner` makes it machine code or Python.
 
-**At the edges**: `real_array`, `real_number` and `check_name` check what a caller passed, `thread_count` reads
-`threads=`, `atomic_write` writes a file whole or not at all, `install` ends an error about a missing package. `Array`
-is the type of an array of float64.
+**At the edges**: `real_array`, `real_number`, `check_name` and `require_graph` check what a caller passed,
+`thread_count` reads `threads=`, `atomic_write` writes a file whole or not at all, `install` ends an error about a
+missing package. `Array` is the type of an array of float64.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, building, cotangents
@@ -43,6 +43,7 @@ from .autodiff.ldl_solve import SingularError, ldl_elimination, ldl_solve
 from .autodiff.reverse import cotangents
 from .core.check_name import check_name
 from .core.evaluate import Array
+from .core.graph import require_graph
 from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED
 from .core.node import as_node
 from .core.operation import MathML, Op, register
@@ -97,6 +98,7 @@ __all__ = [
     "real_array",
     "real_number",
     "register",
+    "require_graph",
     "runner",
     "solve_nodes",
     "tangents",

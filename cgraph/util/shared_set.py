@@ -19,7 +19,7 @@ class SharedSet:
 
     def __init__(self, part: frozenset[Any], base: SharedSet | None = None) -> None:
         self.part, self.base = part, base
-        self.size = len(part) + (base.size if base else 0)
+        self.size: int = len(part) + (0 if base is None else base.size)
 
     def __len__(self) -> int:
         return self.size

@@ -12,6 +12,7 @@ from string import Template
 from typing import Any
 
 from cgraph import Graph, Node
+from cgraph.extend import require_graph
 
 from .. import theme
 from ..pages import html
@@ -90,6 +91,8 @@ def page(
     if isinstance(graph, Graph):
         versions: Sequence[Version] = [Version("graph", graph, about, marked, at or {})]
     else:
+        if not isinstance(graph, Sequence) or not all(isinstance(each, Version) for each in graph):
+            require_graph("page", graph)
         versions = list(graph)
         if at is not None or marked:
             raise ValueError("with versions, give each its own at and marked")

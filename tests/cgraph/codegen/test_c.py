@@ -234,7 +234,7 @@ def test_names_that_collide_have_places_of_their_own(tmp_path):
     assert len({name for name, _ in places}) == len(places)
     assert [name for name, _ in places][: len(inputs)] == [
         f"ODD_IN_{word}"
-        for word in "a_b a_b_1 a_b_2 a_b_ double exp y0 theta_ theta Omega N_IN x __evil__ ___ lambda1 _".split()
+        for word in "a_b a_b_1 a_b_2 a_b_ double exp y0 theta_7 theta Omega N_IN x __evil__ ___ lambda1 _".split()
     ]
     point = [list(map(float, range(1, len(inputs) + 1)))]
     assert same(called(build(tmp_path, [source]), "odd", graph, point), evaluated(graph, point))
