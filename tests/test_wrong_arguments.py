@@ -111,7 +111,7 @@ CASES = {
     "wrt empty": (lambda: cg.gradient(GRAPH, wrt=[]), "wrt must name at least one input"),
     "wrt a number": (lambda: cg.jvp(GRAPH, wrt=3), "wrt must name inputs"),
     "a chain too long": (lambda: dyn.scenes.load("chain", n=10**12), "more than can be derived"),
-    "half a link": (lambda: dyn.scenes.load("chain", n=2.5), "whole number of links"),
+    "half a link": (lambda: dyn.scenes.load("chain", n=2.5), "at least one link, got 2.5"),
     "kind of a joint": (lambda: dyn.Joint("screw"), "must be one of fixed, prismatic, revolute, got 'screw'"),
     "start too long": (lambda: dyn.scenes.Scene("s", "", ARM, (0.0, 0.0), (0.0,), 1.0), "q needs 1 finite numbers"),
     "start of text": (lambda: dyn.scenes.Scene("s", "", ARM, ("a",), (0.0,), 1.0), "q"),

@@ -136,7 +136,7 @@ MOST_LINKS = 100_000  # of a chain; its equations take some kilobytes a link
 def chain(n: int = 10) -> Scene:
     """A chain of n equal rods, 1 kg and 1 m in all, let go at 45 degrees."""
     if not isinstance(n, Integral) or n < 1:
-        raise ValueError(f"a chain needs a whole number of links, at least one, got {n!r:.60}")
+        raise ValueError(f"a chain needs at least one link, got {n!r:.60}")
     if n > MOST_LINKS:
         raise ValueError(f"a chain of {n} links is more than can be derived here, {MOST_LINKS}; see `planar_arm`")
     arm = planar_arm([1.0 / n] * n, [1.0 / n] * n)
