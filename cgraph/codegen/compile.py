@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.graph import Graph
+from ..core.graph import Graph, require_graph
 from .compiled import Compiled
 from .llvm_engine import MissingFunctionError
 from .native_function import Native
@@ -82,8 +82,7 @@ def compile(
     """
     if backend not in BACKENDS:
         raise ValueError(f"backend must be one of {', '.join(BACKENDS)}, got {backend!r}")
-    if not isinstance(graph, Graph):
-        raise TypeError(f"compile takes a Graph, got {type(graph).__name__}: {graph!r:.60}")
+    require_graph("compile", graph)
     options = {"fast": _choice("fast", fast), "fma": _choice("fma", fma), "cache": _place(cache)}
     if backend == "llvm" or (backend == "auto" and len(graph.nodes) <= LARGE):
         try:
