@@ -14,6 +14,7 @@ from .rosenbrock import RODAS5P, rosenbrock
 from .step_control import embedded
 from .symplectic import composed, partitioned
 from .tableau import TABLEAUS, Tableau
+from .taylor import ORDER as TAYLOR_ORDER, taylor
 
 MOST_STAGES = 12  # of Gauss's methods: order 24, beyond which float64 gains nothing
 
@@ -60,6 +61,7 @@ METHODS: dict[str, Method] = Methods(
         "dop853": runge_kutta(DOP853),
         "rodas": Method(RODAS5P.order, partial(rosenbrock, RODAS5P), adaptive=True, degree=len(RODAS5P.dense) + 1),
         "radau": Method(RADAU_ORDER, radau, adaptive=True, degree=3),
+        "taylor": Method(TAYLOR_ORDER, partial(taylor, TAYLOR_ORDER), adaptive=True, degree=TAYLOR_ORDER),
         **{name: _symplectic(method) for name, method in PARTITIONED.items()},
         **{name: _composition(composition) for name, composition in COMPOSITIONS.items()},
     }
