@@ -113,6 +113,12 @@ class _Jets:
         if op.name == "sqrt":
             assert at[0] is not None
             return (at[0] - self.sum(node, node)) * self.zero(0.5 / node)
+        if op.name == "hypot":  # y y = a a + b b
+            moving = [(arg, each) for arg, each in zip(args, at, strict=True) if each is not None]
+            total = -0.5 * self.sum(node, node)
+            for arg, each in moving:
+                total = total + 0.5 * self.sum(arg, arg) + self.zero(arg) * each
+            return total * self.zero(1.0 / node)
         if op.name == "pow" and op.rewrite is not None and at[1] is None:
             return self._power(node, at[0])
         self._refuse(node)

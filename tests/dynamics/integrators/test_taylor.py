@@ -21,6 +21,7 @@ SERIES: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {
     "root": (lambda x, t: cg.sqrt(1.0 + x * x + t), lambda x, t: mpmath.sqrt(1 + x * x + t)),
     "power": (lambda x, t: (2.0 + x) ** -1.5, lambda x, t: (2 + x) ** mpmath.mpf(-1.5)),
     "whole": (lambda x, t: 0.1 * x**3.0 + (x + 2.0) ** -3.0, lambda x, t: x**3 / 10 + (x + 2) ** -3),
+    "length": (lambda x, t: cg.hypot(1.0 + x, t), lambda x, t: mpmath.hypot(1 + x, t)),
     "waves": (lambda x, t: cg.sin(x) * cg.cos(3.0 * t), lambda x, t: mpmath.sin(x) * mpmath.cos(3 * t)),
     "exponential": (lambda x, t: cg.exp(-x) + cg.log(2.0 + t), lambda x, t: mpmath.exp(-x) + mpmath.log(2 + t)),
     "tangents": (lambda x, t: cg.tanh(x - t) + cg.atan(x), lambda x, t: mpmath.tanh(x - t) + mpmath.atan(x)),
