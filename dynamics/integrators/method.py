@@ -39,6 +39,8 @@ class Method:
     evaluations             of the rate, so far
     nonfinite               0; the run ends when a pass leaves another number
     fresh                   1 before the first pass, where the program has this register
+    singular                where the program has it, and after a pass that failed: 0, or 1 + the index of a
+                            coordinate without inertia
     ======================  =========================================================================================
 
     and after it the next state in x, with t, count and evaluations advanced (`explicit.advance` does all but x). It

@@ -197,6 +197,8 @@ class FixedStepIntegration(NativeIntegration):
 
     def _failure(self, memory: Array) -> str:
         t = self._number(memory, "t")
+        if "singular" in self.runner.program.registers and (index := int(self._number(memory, "singular"))):
+            return f"stopped at t = {t:.6g} s: {self.components[index - 1]} has an inertia that is not positive"
         if reason := self.nonfinite(self.runner.read(memory, "x")):
             return f"stopped at t = {t:.6g} s: {reason}"
         return f"stopped at t = {t:.6g} s: the equations of the step did not converge; the step is too long"
