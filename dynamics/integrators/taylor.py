@@ -92,7 +92,7 @@ def _wish() -> Call:
     """Register `next`: at most the step at which the last two terms are within the tolerance."""
     last, before, unit, order, wanted = inputs = cg.variables("last before unit highest next")
     share = cg.minimum(before ** (-0.5 / (order - 1.0)), (math.exp(4.0) * last) ** (-0.5 / order))
-    h = unit * share * cg.exp(-0.7 / (order - 1.0))
+    h = abs(unit) * share * cg.exp(-0.7 / (order - 1.0))
     names = ("last", "before", "unit", "highest", "next")
     return Call(Graph(inputs, {"h": cg.where(cg.equal(h, h), cg.minimum(wanted, h), 0.0)}), names, ("next",))
 
@@ -116,8 +116,7 @@ def _checked(m: int) -> list[Statement]:
     part = (slope - h * rate) / ((order + 1.0) * scale)
     names = ("slope", "rate_new", "x", "x_new", "rtol", "atol", "h", "highest")
     total, h, t = cg.variables("error h t")
-    moves = cg.less(t, t + h)
-    error = cg.where(moves, cg.sqrt(total / m), math.inf)
+    error = cg.where(cg.not_equal(t, t + h), cg.sqrt(total / m), math.inf)
     return [
         Sum(Graph(inputs, {"y": part * part}), names, "error"),
         Call(Graph([total, h, t], {"error": error}), ("error", "h", "t"), ("error",)),

@@ -8,18 +8,21 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cgraph.extend import Array
 
 from ..integrators.step_control import COLLAPSE, DONE, ROUNDING, SMALLEST_ATOL, TOO_SMALL
 from .dense_output import StepBlock
 from .equal_steps import EqualSteps, equal_steps
-from .first_step import first_step
+from .first_step import LEAP, first_step
 from .run_options import RunOptions
+from .state_sizes import StateSizes
 from .step_program import CompiledSteps
 
 BLOCK_TIME = 0.1  # s of run time after which a run comes back to Python: for Ctrl-C, progress and events
 FIRST_PASSES = 32  # of the first block, before it is known how long one takes
+ROUNDS = 4  # of a first step, by which the sizes of the states are known
 HELD, SHARE = 100, 0.25  # steps at the stability limit, of all, from which on a run is called stiff
 
 
@@ -222,12 +225,13 @@ class AdaptiveIntegration(NativeIntegration):
     ) -> None:
         super().__init__(compiled, options, parameters, stopped)
         self.relative = max(options.relative, ROUNDING)
-        self.absolute = np.maximum(options.absolute, SMALLEST_ATOL)
+        self.absolute = np.broadcast_to(np.maximum(options.absolute, SMALLEST_ATOL), self.program.size)
+        self.sizes = StateSizes(self.relative, self.program.kinds, SMALLEST_ATOL) if options.atol is None else None
         self._stiff = self._below_rounding = False
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
-        options = self.options
+        options, wanted = self.options, self._first_step(x)
         start: Mapping[str, float | Array | list[float]] = {
             "x": x,
             "p": self.parameters,
@@ -235,7 +239,7 @@ class AdaptiveIntegration(NativeIntegration):
             "end": options.t_end,
             "rtol": self.relative,
             "atol": self.absolute,
-            "next": self._first_step(x) if options.first_step is None else options.first_step,
+            "next": wanted,
             "max_step": options.longest_step,
             "min_step": COLLAPSE * abs(options.t_end - options.t0),
             "fresh": 1.0,
@@ -243,12 +247,14 @@ class AdaptiveIntegration(NativeIntegration):
             "accepted": 1.0,
         }
         memory = self.runner.memory(start)
+        seen = FIRST_PASSES  # so many trials, and then twice as many as before, between two looks at the sizes
         while True:
-            left = options.max_steps - self.steps - self.rejected
+            done = self.steps + self.rejected
+            left = options.max_steps - done
             if left <= 0:
                 self.status = self.too_many(self._number(memory, "t"), options.max_steps)
                 return
-            rows, _ = self._advance(memory, int(min(left, 2**31)), whole=False)
+            rows, _ = self._advance(memory, int(min(left, seen - done if self.sizes else 2**31)), whole=False)
             status = self._number(memory, "status")
             self.steps += len(rows)
             self.rejected = int(self._number(memory, "rejected"))
@@ -256,6 +262,10 @@ class AdaptiveIntegration(NativeIntegration):
             if len(rows):
                 self._look(memory, rows)
                 yield self._block(rows)
+                self._see(rows)
+            if self.sizes and self.steps + self.rejected >= seen:
+                seen *= 2
+                self.runner.write(memory, "atol", self.absolute)
             if status == TOO_SMALL:
                 self.status = self._too_small(memory)
             if status in (TOO_SMALL, DONE):
@@ -282,7 +292,7 @@ class AdaptiveIntegration(NativeIntegration):
             )
         if options.relative < self.relative and not self._below_rounding:
             size = np.abs(rows[:, 2 : 2 + self.program.size])
-            short = (options.absolute + options.relative * size < self.relative * size).any(axis=0)
+            short = (self.absolute + options.relative * size < self.relative * size).any(axis=0)
             if short.any():
                 self._below_rounding = True
                 self.warnings.append(
@@ -308,9 +318,35 @@ class AdaptiveIntegration(NativeIntegration):
         values = dict(zip(rate.input_names, [*x.tolist(), t, *self.parameters], strict=True))
         return np.array(list(rate.evaluate(values).values()), dtype=np.float64)
 
+    def _see(self, rows: Array) -> None:
+        if self.sizes:
+            self.absolute = self.sizes.see(rows[:, 2 : 2 + self.program.size])
+
     def _first_step(self, x: Array) -> float:
-        rate, scale = self._rate(self.options.t0, x), self._scale(x)
-        return first_step(self.runner, self.program.order, self.options, {"x": x, "p": self.parameters}, rate, scale)
+        """The first step; where atol is chosen by the sizes of the states, those that it leads to."""
+        options, rate = self.options, self._rate(self.options.t0, x)
+        start: dict[str, ArrayLike] = {"x": x, "p": self.parameters}
+        if self.sizes is None:
+            if options.first_step is not None:
+                return options.first_step
+            return first_step(self.runner, self.program.order, options, start, rate, self._scale(x))
+        h = min(options.length, options.longest_step) * LEAP if options.first_step is None else options.first_step
+        for _ in range(ROUNDS):
+            self.absolute = self.sizes.see(self._ahead(x, rate, h), anew=True)
+            if options.first_step is not None:
+                break
+            before, h = h, first_step(self.runner, self.program.order, options, start, rate, self._scale(x))
+            if h >= 0.5 * before:
+                break
+        return h
+
+    def _ahead(self, x: Array, rate: Array, h: float) -> Array:
+        """x, and where two of Euler's steps lead to, (3, m)."""
+        options = self.options
+        signed = math.copysign(h, options.t_end - options.t0)
+        with np.errstate(all="ignore"):
+            first = x + signed * rate
+            return np.stack([x, first, first + signed * self._rate(options.t0 + signed, first)])
 
     def _scale(self, x: Array) -> Array:
         """What an error is measured by."""
