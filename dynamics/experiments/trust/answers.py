@@ -3,35 +3,39 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+import cgraph as cg
 from cgraph.extend import Array
 
 from ...reference import Reference, ReferenceFailedError
 from ...reference.solution import from_text
+from ...simulation.scipy_solvers import solve_ivp
 from ..setting import Setting
+from ..work_precision.trajectory_runs import problem_of
 from .random_lagrangians import random_setting
 
 FILE = Path(__file__).with_name("answers.json")
 COUNT = 200
-DIGITS, SHORT = 30, 22  # of the answer, and of the motions beside it
+DIGITS = 30
 PARTS = 8  # of the motion: an error may be made at the start of any
-NUDGE = 2.0**-40  # relative, of a start beside the start
-REGULAR = 1e10  # condition of a flow that is inverted
+RTOL, NUDGE = 1e-7, 2.0**-12  # of motions beside the motion: their errors, and how far they start aside, in sizes
+REGULAR = 1e8  # condition of a flow that is inverted
 
 
 @dataclass(frozen=True)
 class Answer:
     """The end of a motion, or why it has none.
 
-    end: at t_end; None where the motion runs into a singularity before.  size: the largest value of each state, (m,).
+    end: at t_end; None where the motion runs into a singularity before.  size: the largest value of each state at some
+    times, (m,).
     growth: the largest factor by which a small relative error at any time, in the sizes of the states, has grown at
     t_end, at least 1.
     """
@@ -53,7 +57,7 @@ def answer(number: int) -> Answer:
 
 
 def compute(setting: Setting) -> Answer:
-    """The answer to a setting, by `reference`."""
+    """The answer to a setting, by `reference`; the growth by SciPy."""
     times = [setting.t_end * k / PARTS for k in range(PARTS + 1)]
     try:
         motion = setting.solution(times, digits=DIGITS)
@@ -62,29 +66,28 @@ def compute(setting: Setting) -> Answer:
     assert motion is not None
     end = Reference(motion.t[-1:], motion.decimal[-1:], motion.error, motion.how)
     size = np.max(np.abs(motion.x), axis=0)
-    return Answer(end, tuple(size.tolist()), _growth(setting, motion, times, size), motion.how)
+    return Answer(end, tuple(size.tolist()), growth(setting, times, size), motion.how)
 
 
-def _growth(setting: Setting, motion: Reference, times: list[float], size: Array) -> float:
-    """The largest row sum of the flow from any of the times to the last, in units of the sizes."""
+def growth(setting: Setting, times: Sequence[float], size: Array) -> float:
+    """The largest row sum of the flow from any of these times to the last.
+
+    The flow is measured in units of the sizes, by differences of motions of SciPy's solvers.
+    """
+    unit, rate = np.where(size > 0.0, size, 1.0), cg.compile(problem_of(setting).rate)
+    options = {"rtol": RTOL, "atol": RTOL * unit, "method": "Radau" if setting.stiff else "DOP853", "t_eval": times}
+
+    def motion(x: Array) -> Array:
+        return np.asarray(solve_ivp()(lambda t, x: rate([*x, t]), (0.0, setting.t_end), x, **options).y.T)
+
     start = np.array(setting.start)
-    moves = np.where(size > 0.0, size, 1.0) * NUDGE
     columns = []
-    for j, move in enumerate(moves):
-        x = start.copy()
-        x[j] += move
-        half = len(setting.q)
-        beside = replace(setting, q=tuple(x[:half].tolist()), qd=tuple(x[half:].tolist())).solution(times, digits=SHORT)
-        assert beside is not None
-        columns.append((_exact_difference(beside, motion) / moves) / (x[j] - start[j]) * move)
+    for j in range(len(start)):
+        aside = unit * (np.arange(len(start)) == j) * NUDGE
+        columns.append((motion(start + aside) - motion(start - aside)) / (2.0 * NUDGE * unit))
     flows = np.stack(columns, axis=2)  # (T, m, m), from the start
     usable = [flow for flow in flows[:-1] if np.linalg.cond(flow) < REGULAR]
     return max([1.0, *[float(np.abs(flows[-1] @ np.linalg.inv(flow)).sum(axis=1).max()) for flow in usable]])
-
-
-def _exact_difference(a: Reference, b: Reference) -> Array:
-    """a - b, (T, m), from their decimals."""
-    return a.deviation(b.x) * -1.0 + b.deviation(b.x)
 
 
 def renew(numbers: Iterable[int], say: Callable[[str], None] = lambda line: None) -> None:
