@@ -21,10 +21,10 @@ label may have. `certain_digits` says what rounding leaves of the outputs.
 **Run**: a `Program` is graphs over registers of numbers (`Call`, `Map`, `Sum`, `Factor`, `Solve`, `If`, `While`), and
 `runner` makes it machine code or Python.
 
-**At the edges**: `real_array` and `real_number` check what a caller passed, `thread_count` reads `threads=`,
-`atomic_write` writes a file whole or not at all, `write_files` several, and `check_writable` looks beforehand;
-`install` ends an error about a missing package. `Array` is the type
-of an array of float64.
+**At the edges**: `real_array`, `real_number`, `check_name` and `require_graph` check what a caller passed,
+`thread_count` reads `threads=`, `atomic_write` writes a file whole or not at all, `write_files` several, and
+`check_writable` looks beforehand; `install` ends an error about a missing package. `Array` is the type of an array of
+float64.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, building, cotangents
@@ -43,7 +43,9 @@ from .autodiff.jacobian import hessian_nodes
 from .autodiff.ldl_solve import ldl_elimination, ldl_solve
 from .autodiff.reverse import cotangents
 from .autodiff.symmetric_elimination import SingularError
+from .core.check_name import check_name
 from .core.evaluate import Array
+from .core.graph import require_graph
 from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED
 from .core.node import as_node
 from .core.operation import MathML, Op
@@ -90,6 +92,7 @@ __all__ = [
     "atomic_write",
     "building",
     "certain_digits",
+    "check_name",
     "check_writable",
     "cotangents",
     "expand",
@@ -102,6 +105,7 @@ __all__ = [
     "real_array",
     "real_number",
     "register",
+    "require_graph",
     "rewritten",
     "runner",
     "shortened",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from ..core.graph import Graph
+from ..core.graph import Graph, require_graph
 from ..core.label import TANGENT
 from ..core.naming import free_suffix
 from ..core.node import Node, as_node, variable
@@ -99,6 +99,7 @@ def jvp(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> G
     >>> graph.evaluate({"x": 2.0, "y": 3.0, "x_dot": 1.0, "y_dot": 0.0})
     {'f_dot': 3.0}
     """
+    require_graph("jvp", graph)
     chosen = graph.select_inputs(wrt)
     suffix = free_suffix("_dot", graph.input_names, [str(node.name) for node in chosen])
     seeds = {node: variable(f"{node.name}{suffix}") for node in chosen}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ..core.graph import Graph
+from ..core.graph import Graph, require_graph
 from ..core.label import ADJOINT, TANGENT
 from ..core.node import Node, Scalar, as_node
 from ..core.scope import building
@@ -60,6 +60,7 @@ def hessian_solve(
     >>> cg.hessian_solve(energy, "v w".split(), [8.0, 3.0])
     [<node 2.0>, <node 0.5>]
     """
+    require_graph("hessian_solve", graph)
     chosen = graph.select_inputs(wrt)
     if len(rhs) != len(chosen):
         raise ValueError(f"rhs needs one entry for each of the {len(chosen)} variables, got {len(rhs)}")

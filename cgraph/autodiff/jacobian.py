@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..core.graph import Graph
+from ..core.graph import Graph, require_graph
 from ..core.node import Node, as_node
 from ..simplify.builder import Builder
 from .forward import tangents
@@ -43,6 +43,7 @@ def jacobian(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None)
     >>> cg.jacobian(polar).evaluate({"r": 2.0, "a": 0.0})
     {'dx/dr': 1.0, 'dx/da': -0.0, 'dy/dr': 0.0, 'dy/da': 2.0}
     """
+    require_graph("jacobian", graph)
     chosen = graph.select_inputs(wrt)
     zero, one, build = as_node(0.0), as_node(1.0), Builder()
     if len(chosen) <= len(graph.outputs):
@@ -86,6 +87,7 @@ def hessian(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) 
     >>> cg.hessian(cg.Graph([x, y], {"f": x * x * y})).evaluate({"x": 2.0, "y": 3.0})
     {'d2f/dxdx': 6.0, 'd2f/dxdy': 4.0, 'd2f/dydx': 4.0, 'd2f/dydy': 0.0}
     """
+    require_graph("hessian", graph)
     output = graph.only_output()
     (name,) = graph.outputs
     chosen = graph.select_inputs(wrt)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 
-from ..core.graph import Graph
+from ..core.graph import Graph, require_graph
 from ..core.label import ADJOINT, UNLABELLED, Label
 from ..core.naming import free_suffix
 from ..core.node import Node, as_node, variable
@@ -123,6 +123,7 @@ def vjp(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> G
     >>> graph.evaluate({"x": 2.0, "y": 3.0, "f_bar": 1.0})
     {'x_bar': 3.0, 'y_bar': 2.0}
     """
+    require_graph("vjp", graph)
     chosen = graph.select_inputs(wrt)
     suffix = free_suffix("_bar", graph.input_names, list(graph.outputs))
     bars = {name: variable(f"{name}{suffix}") for name in graph.outputs}
@@ -161,6 +162,7 @@ def gradient(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None)
     >>> cg.gradient(cg.Graph([x, y], {"f": x * y})).evaluate({"x": 2.0, "y": 3.0})
     {'df/dx': 3.0, 'df/dy': 2.0}
     """
+    require_graph("gradient", graph)
     output = graph.only_output()
     (name,) = graph.outputs
     chosen = graph.select_inputs(wrt)

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..core.graph import Graph
+from ..core.graph import Graph, require_graph
 from .compiled import Compiled
 from .llvm_engine import MissingFunctionError
 from .native_function import Native
@@ -79,8 +79,7 @@ def compile(
     """
     if backend not in BACKENDS:
         raise ValueError(f"backend must be one of {', '.join(BACKENDS)}, got {backend!r}")
-    if not isinstance(graph, Graph):
-        raise TypeError(f"compile takes a Graph, got {type(graph).__name__}: {graph!r:.60}")
+    require_graph("compile", graph)
     options = {"fast": fast, "fma": fma, "cache": _place(cache)}
     if backend == "llvm" or (backend == "auto" and len(graph.nodes) <= LARGE):
         try:

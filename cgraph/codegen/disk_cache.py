@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 import sys
 import warnings
 from collections.abc import Callable
@@ -12,6 +13,7 @@ from pathlib import Path
 
 FORMAT = "cgraph machine code, 1"  # part of every name: entries of another format are other entries
 SUFFIX, UNFINISHED = ".code", ".unfinished"
+LARGEST = 2**28  # bytes of an entry; the machine code of a million nodes takes a tenth
 
 
 class Cache:
@@ -104,8 +106,9 @@ def default_folder() -> Path:
 def _read(path: Path) -> bytes | None:
     """What an entry keeps; None if there is none to trust: whoever writes an entry decides what this process runs."""
     try:
-        with path.open("rb") as file:
-            if not _ours(os.fstat(file.fileno())):
+        with open(path, "rb", opener=_open_at_once) as file:
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode) or status.st_size > LARGEST or not _ours(status):
                 return None
             checksum, content = file.read(32), file.read()
     except OSError:
@@ -113,7 +116,14 @@ def _read(path: Path) -> bytes | None:
     return content if checksum == _checksum(path, content) else None
 
 
+def _open_at_once(name: str, flags: int) -> int:
+    """A file descriptor, without waiting for somebody who writes where the name is a pipe's."""
+    return os.open(name, flags | getattr(os, "O_NONBLOCK", 0))
+
+
 def _write(path: Path, content: bytes) -> None:
+    if len(content) > LARGEST:
+        raise OSError(f"{len(content)} bytes are more than the {LARGEST} of an entry")
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     unfinished = path.with_suffix(f".{os.urandom(8).hex()}{UNFINISHED}")
     try:

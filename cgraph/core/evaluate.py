@@ -23,6 +23,8 @@ def evaluate(
     Raises GraphError for a missing or unknown name or shapes that do not broadcast, TypeError for a value that is
     not real.
     """
+    if not isinstance(values, Mapping):
+        raise TypeError(f"values must be a mapping {{input: value}}, got {type(values).__name__}: {values!r:.60}")
     read = {name: _as_value(name, value) for name, value in values.items()}
     names = [str(node.name) for node in inputs]
     if missing := [name for name in names if name not in read]:

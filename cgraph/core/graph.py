@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any
 
 from ..errors import GraphError
+from .check_name import check_name
 from .counts import Counts, count
 from .edge import Edge
 from .evaluate import Value, evaluate
@@ -46,7 +47,9 @@ class Graph:
     GraphError
         If there are no outputs, an input is repeated, or an output needs a variable that is not an input.
     TypeError
-        If an input is not a variable or an output is not a node.
+        If an input is not a variable, an output is not a node, or its name is not a string.
+    ValueError
+        If an output's name is empty or too long, or has characters that cannot be printed.
 
     Examples
     --------
@@ -106,6 +109,8 @@ class Graph:
         """
         if wrt is None:
             return self.inputs
+        if not isinstance(wrt, (str, Node, Iterable)):
+            raise TypeError(f"wrt must name inputs by strings or variables, got {type(wrt).__name__}: {wrt!r:.60}")
         chosen = []
         for name in (wrt,) if isinstance(wrt, (str, Node)) else wrt:
             node = variable(name) if isinstance(name, str) else name
@@ -116,6 +121,10 @@ class Graph:
             if node in chosen:
                 raise GraphError(f"wrt names the input {node.name} twice")
             chosen.append(node)
+        if not chosen:
+            raise GraphError(
+                f"wrt must name at least one input (the graph has {', '.join(self.input_names) or 'none'})"
+            )
         return tuple(chosen)
 
     def only_output(self) -> Node:
@@ -213,9 +222,43 @@ class Graph:
         return {name: number[node] for name, node in self.outputs.items()}
 
 
+def require_graph(what: str, graph: object) -> None:
+    """Raise TypeError, saying that the function `what` needs a graph, for anything else.
+
+    Parameters
+    ----------
+    what : str
+        The function that was called.
+    graph : object
+        What it was given.
+
+    Raises
+    ------
+    TypeError
+        For what is no `Graph`.
+
+    Examples
+    --------
+    >>> from cgraph.extend import require_graph
+    >>> require_graph("gradient", 3)
+    Traceback (most recent call last):
+    TypeError: gradient needs a cg.Graph, got int: 3
+    """
+    if isinstance(graph, Graph):
+        return
+    hint = ""
+    if hasattr(type(graph), "coordinates"):  # a model has graphs; see `dynamics.Model`
+        hint = "; forward_dynamics(model) of the package dynamics is one"
+    elif isinstance(graph, Node):
+        hint = "; write cg.Graph(inputs, {name: node})"
+    raise TypeError(f"{what} needs a cg.Graph, got {type(graph).__name__}: {graph!r:.60}{hint}")
+
+
 def _checked_inputs(inputs: Sequence[Node]) -> tuple[Node, ...]:
     if isinstance(inputs, Node):
         raise TypeError("inputs must be a sequence of variables, got a single Node; write [x]")
+    if not isinstance(inputs, Iterable):
+        raise TypeError(f"inputs must be a sequence of variables, got {type(inputs).__name__}: {inputs!r:.60}")
     nodes = tuple(inputs)
     for node in nodes:
         if not isinstance(node, Node) or node.op is not VARIABLE:
@@ -234,8 +277,7 @@ def _checked_outputs(outputs: Mapping[str, Scalar]) -> dict[str, Node]:
         raise GraphError("a graph needs at least one output")
     nodes = {}
     for name, value in outputs.items():
-        if not isinstance(name, str) or not name:
-            raise TypeError(f"an output's name must be a non-empty string, got {name!r:.60}")
+        name = check_name("an output", name)
         try:
             nodes[name] = as_node(value)
         except TypeError as error:

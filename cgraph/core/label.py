@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cache
 from typing import NamedTuple
+
+from ..util.interned import Interned
+from ..util.shared_set import SharedSet
 
 INPUT, PRIMAL, ADJOINT, TANGENT = "input", "primal", "adjoint", "tangent"
 
@@ -19,45 +20,72 @@ class SourceLine(NamedTuple):
         return f"{self.file}:{self.number}"
 
 
-@dataclass(frozen=True, eq=False)
 class Label:
     """What a node means: tags of the person who wrote it, roles from differentiation, and source lines.
 
-    Labels are interned: two equal labels are one object, so comparing them is a pointer comparison.
+    A label lives as long as a node has it. Labels of the same sets are one object, so that most comparisons are a
+    comparison of pointers; of labels with many tags there may be two of the same meaning.
 
     Attributes
     ----------
-    tags : frozenset of str
-        Set by `cg.tag`; a derived node inherits those of its origin.
     roles : frozenset of str
         Among "input", "primal", "adjoint", "tangent".
-    lines : frozenset of SourceLine
-        Where the node was written; empty unless `cg.recording_lines` was on.
+    has_tags : bool
+        Whether there is any tag.
     """
 
-    tags: frozenset[str]
-    roles: frozenset[str]
-    lines: frozenset[SourceLine] = frozenset()
+    __slots__ = ("__weakref__", "_derived", "_lines", "_tags", "has_tags", "roles")
+
+    def __init__(self, tags: SharedSet, roles: frozenset[str], lines: SharedSet) -> None:
+        self._tags, self.roles, self._lines = tags, roles, lines
+        self.has_tags = tags.size > 0
+        self._derived: dict[str, Label] = {}
+
+    @property
+    def tags(self) -> frozenset[str]:
+        """Set by `cg.tag`; a derived node inherits those of its origin."""
+        return self._tags.members
+
+    @property
+    def lines(self) -> frozenset[SourceLine]:
+        """Where the node was written; empty unless `cg.recording_lines` was on."""
+        return self._lines.members
 
     def derived(self, role: str) -> Label:
         """The label of a derivative node: tags and lines of its origin, and the role of the derivative."""
-        return _derived(self, role)
+        found = self._derived.get(role)
+        if found is None:
+            roles = (self.roles - {INPUT, PRIMAL}) | {role}
+            found = self if roles == self.roles else _label(self._tags, roles, self._lines)
+            if found is not self:  # a label that refers to itself would wait for the garbage collector
+                self._derived[role] = found
+        return found
 
     def tagged(self, tags: frozenset[str]) -> Label:
         """This label with more tags."""
-        return label(self.tags | tags, self.roles, self.lines)
+        return _label(self._tags.add(tags), self.roles, self._lines)
 
     def at(self, line: SourceLine) -> Label:
         """This label with a line more."""
-        return _at(self, line)
+        return _label(self._tags, self.roles, self._lines.add(frozenset({line})))
 
     def with_tags_of(self, other: Label) -> Label:
         """This label with the tags of another added, and with the other's lines if it has none."""
-        return _with_tags_of(self, other) if other.tags or other.lines else self
+        if not other.has_tags and not other._lines.size:
+            return self
+        return _label(self._tags | other._tags, self.roles, self._lines if self._lines.size else other._lines)
 
     def union(self, other: Label) -> Label:
         """The label of two nodes merged into one."""
-        return self if self is other else _union(self, other)
+        if self is other:
+            return self
+        return _label(self._tags | other._tags, self.roles | other.roles, self._lines | other._lines)
+
+    def __repr__(self) -> str:
+        return f"<Label {sorted(self.tags)} {sorted(self.roles)} {sorted(self.lines)}>"
+
+
+_labels: Interned[tuple[object, frozenset[str], object], Label] = Interned()
 
 
 def label(
@@ -65,31 +93,13 @@ def label(
     roles: frozenset[str] = frozenset(),
     lines: frozenset[SourceLine] = frozenset(),
 ) -> Label:
-    """The one label with these tags, roles and lines."""
-    return _interned(tags, roles, lines)
+    """The label with these tags, roles and lines."""
+    return _label(SharedSet(tags), roles, SharedSet(lines))
 
 
-_interned = cache(Label)
-
-
-@cache
-def _at(base: Label, line: SourceLine) -> Label:
-    return label(base.tags, base.roles, base.lines | {line})
-
-
-@cache
-def _derived(origin: Label, role: str) -> Label:
-    return label(origin.tags, (origin.roles - {INPUT, PRIMAL}) | {role}, origin.lines)
-
-
-@cache
-def _with_tags_of(base: Label, other: Label) -> Label:
-    return label(base.tags | other.tags, base.roles, base.lines or other.lines)
-
-
-@cache
-def _union(a: Label, b: Label) -> Label:
-    return label(a.tags | b.tags, a.roles | b.roles, a.lines | b.lines)
+def _label(tags: SharedSet, roles: frozenset[str], lines: SharedSet) -> Label:
+    key = (tags.key, roles, lines.key)
+    return _labels.get(key) or _labels.get_or_make(key, lambda: Label(tags, roles, lines))
 
 
 UNLABELLED = label()

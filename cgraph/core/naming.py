@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
+from .check_name import check_name
 from .node import Node, as_node, variable
 
 
@@ -20,14 +21,24 @@ def variables(names: str | Sequence[str]) -> list[Node]:
     list of Node
         The variables, in this order.
 
+    Raises
+    ------
+    TypeError
+        If it is no string and no sequence of strings.
+    ValueError
+        If a name cannot be a variable's, see `variable`.
+
     Examples
     --------
     >>> import cgraph as cg
     >>> cg.variables("q0 q1")
     [<node variable q0>, <node variable q1>]
     """
-    split = names.replace(",", " ").split() if isinstance(names, str) else names
-    return [variable(name) for name in split]
+    if isinstance(names, str):
+        names = names.replace(",", " ").split()
+    elif not isinstance(names, Iterable):
+        raise TypeError(f"variables takes names, in a string or a sequence, got {type(names).__name__}: {names!r:.60}")
+    return [variable(name) for name in names]
 
 
 def with_name(node: Node, name: str) -> Node:
@@ -38,12 +49,19 @@ def with_name(node: Node, name: str) -> Node:
     node : Node
         An operation. A leaf is returned as it is: a variable has its name already, and a constant is shared.
     name : str
-        What to call it.
+        What to call it, up to 1000 printable characters.
 
     Returns
     -------
     Node
         The copy.
+
+    Raises
+    ------
+    TypeError
+        If the node is neither a node nor a number, or the name is not a string.
+    ValueError
+        If the name is empty or too long, or has characters that cannot be printed.
 
     Examples
     --------
@@ -52,7 +70,7 @@ def with_name(node: Node, name: str) -> Node:
     >>> cg.with_name(m * v, "p")
     <node mul p>
     """
-    node = as_node(node)
+    node, name = as_node(node), check_name("a node", name)
     return Node(node.op, node.args, node.label, name=name) if node.args else node
 
 

@@ -7,10 +7,11 @@ import numbers
 from collections.abc import Callable
 from functools import partial
 from typing import Any, NoReturn
-from weakref import WeakValueDictionary
 
 import numpy as np
 
+from ..util.interned import Interned
+from .check_name import check_name
 from .label import INPUT, UNLABELLED, Label, SourceLine, label
 from .operation import (
     BY_UFUNC,
@@ -216,8 +217,8 @@ Scalar = Node | float
 _TURNED = {np.greater: np.less, np.greater_equal: np.less_equal}  # a > b is b < a
 
 
-_constants: WeakValueDictionary[tuple[float, float], Node] = WeakValueDictionary()
-_variables: WeakValueDictionary[str, Node] = WeakValueDictionary()
+_constants: Interned[tuple[float, float], Node] = Interned()
+_variables: Interned[str, Node] = Interned()
 
 
 def constant(value: float) -> Node:
@@ -256,9 +257,7 @@ def constant(value: float) -> Node:
         raise ValueError("a constant must not be NaN")
     key = (value, math.copysign(1.0, value))
     node = _constants.get(key)
-    if node is None:
-        node = _constants[key] = Node(CONSTANT, value=value)
-    return node
+    return _constants.get_or_make(key, lambda: Node(CONSTANT, value=value)) if node is None else node
 
 
 def variable(name: str) -> Node:
@@ -267,7 +266,7 @@ def variable(name: str) -> Node:
     Parameters
     ----------
     name : str
-        Not empty, without white space.
+        Up to 1000 printable characters without white space; a label, which need not be an identifier of any language.
 
     Returns
     -------
@@ -279,7 +278,7 @@ def variable(name: str) -> Node:
     TypeError
         If the name is not a string.
     ValueError
-        If it is empty or has white space.
+        If it is empty or too long, or has white space or characters that cannot be printed.
 
     Examples
     --------
@@ -287,13 +286,10 @@ def variable(name: str) -> Node:
     >>> cg.variable("q0")
     <node variable q0>
     """
-    if not isinstance(name, str):
-        raise TypeError(f"a variable's name must be a string, got {type(name).__name__}: {name!r:.60}")
-    if not name or name.split() != [name]:
-        raise ValueError(f"a variable's name must be non-empty and without white space, got {name!r}")
-    node = _variables.get(name)
+    node = _variables.get(name) if type(name) is str else None
     if node is None:
-        node = _variables[name] = Node(VARIABLE, (), _INPUT, name=name)
+        name = check_name("a variable", name, spaces=False)
+        node = _variables.get_or_make(name, lambda: Node(VARIABLE, (), _INPUT, name=name))
     return node
 
 

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
 
+from .check_name import check_name
 from .label import WRITTEN, Label
 
 # (operation, arguments, label) -> node. Nodes are built by what this module holds, so it cannot name their types.
@@ -45,7 +46,9 @@ def tag(*tags: str) -> Iterator[None]:
     Raises
     ------
     TypeError
-        If a tag is not a non-empty string.
+        If a tag is not a string.
+    ValueError
+        If it is empty or too long, or has characters that cannot be printed.
 
     Examples
     --------
@@ -55,11 +58,9 @@ def tag(*tags: str) -> Iterator[None]:
     >>> sorted(energy.tags)
     ['kinetic', 'link 2']
     """
-    for name in tags:
-        if not isinstance(name, str) or not name:
-            raise TypeError(f"a tag must be a non-empty string, got {name!r}")
+    names = frozenset([check_name("a tag", name) for name in tags])
     scope = current.get()
-    token = current.set(Scope(scope.label.tagged(frozenset(tags)), scope.build))
+    token = current.set(Scope(scope.label.tagged(names), scope.build))
     try:
         yield
     finally:

@@ -6,7 +6,7 @@ import struct
 from collections.abc import Iterable, Mapping
 from hashlib import blake2b
 
-from .graph import Graph
+from .graph import Graph, require_graph
 from .node import CONSTANT, VARIABLE, Node
 
 _SIZE = 16  # bytes of a digest: equal ones by chance need some 2^64 nodes
@@ -36,6 +36,7 @@ def structure_hash(graph: Graph) -> str:
     >>> cg.structure_hash(cg.Graph([x, y], {"f": x * y})) == cg.structure_hash(cg.Graph([x, y], {"f": y * x}))
     True
     """
+    require_graph("structure_hash", graph)
     digests = node_hashes(graph.nodes)
     parts = [_text(name) for name in graph.input_names]
     parts += [_text(name) + digests[node] for name, node in graph.outputs.items()]

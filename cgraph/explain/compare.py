@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
-from ..core.graph import Graph
+from ..core.graph import Graph, require_graph
 from ..core.node import VARIABLE, Node, variable
 from ..core.structure_hash import node_hashes
 from ..errors import GraphError
@@ -173,6 +173,8 @@ def compare(
     >>> len(found.common), found.only_right
     (2, (<node add>,))
     """
+    for graph in (left, right):
+        require_graph("compare", graph)
     chosen = set(atoms.replace(",", " ").split() if isinstance(atoms, str) else atoms)
     named = {node: node.name for graph in (left, right) for node in graph.nodes if node.name in chosen}
     unused = [name for graph in (left, right) for name in graph.input_names]  # an input that nothing uses is no node

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..core.edge import Edge
-from ..core.graph import Graph
+from ..core.graph import Graph, require_graph
 from ..core.node import Node
 from ..core.source_lines import lines_text
 from ..errors import GraphError
@@ -181,6 +181,7 @@ def why(graph: Graph, output: Name, input: Name, at: Point | None = None, k: int
       +1  x -> sin(x) -> y
     The 1 heaviest add up to 1 and carry 100.0% of the weight of all.
     """
+    require_graph("why", graph)
     names = Names(graph)
     if not isinstance(k, int) or isinstance(k, bool) or k < 0:
         raise ValueError(f"k must be a whole number of paths, at least 0, got {k!r}")

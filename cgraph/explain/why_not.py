@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ..core.graph import Graph
+from ..core.graph import Graph, require_graph
 from ..core.node import Node
 from ..errors import GraphError
 from .names import Name, Names, joined, many
@@ -112,6 +112,7 @@ def why_not(graph: Graph, output: Name, input: Name) -> WhyNot:  # noqa: A002 (i
     f is made from x.
     The two meet where f does not look: %2 = x * y.
     """
+    require_graph("why_not", graph)
     names = Names(graph)
     source, sink = names.one(input), names.output(output)
     reached, made_from = descendants(graph.nodes, [source]), ancestors([sink])

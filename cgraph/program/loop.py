@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.evaluate import Array
-from ..core.graph import Graph
+from ..core.graph import Graph, require_graph
 from ..core.node import CONSTANT, Node, variable
 from ..core.traversal import rebuild, topological
 from ..errors import GraphError
@@ -158,4 +158,5 @@ def loop(
     >>> run([1.0, 0.0, 0.5], passes=4, every=2).tolist()
     [[0.75, -0.875], [-0.203125, -0.9296875]]
     """
+    require_graph("loop", graph)
     return Loop(graph, carry, backend, fast=fast, fma=fma)

@@ -48,7 +48,7 @@ class Builder:
         if node is None and op.commutative:
             node = self._made.get((op.name, key[2], key[1]))
         if node is None:
-            if not label.tags:
+            if not label.has_tags:
                 for arg in args:
                     label = label.with_tags_of(arg.label)
             node = self._made[key] = Node(op, args, label, name=name)

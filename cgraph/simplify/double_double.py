@@ -6,7 +6,7 @@ own, in `core.op_double_double`; an operation without one takes the low parts of
 
 from __future__ import annotations
 
-from ..core.graph import Graph
+from ..core.graph import Graph, require_graph
 from ..core.label import Label
 from ..core.naming import free_suffix
 from ..core.node import CONSTANT, Node, Op, apply, as_node, constant
@@ -53,6 +53,7 @@ def double_double(graph: Graph, *, low: bool = False) -> Graph:
     >>> graph.evaluate({"x": 1.0}), cg.double_double(graph).evaluate({"x": 1.0})
     ({'y': 0.0}, {'y': 1.0})
     """
+    require_graph("double_double", graph)
     if not isinstance(graph, Graph):
         raise TypeError(f"double_double takes a Graph, got {type(graph).__name__}: {graph!r:.60}")
     pairs: dict[Node, Pair] = {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ..core.graph import Graph
+from ..core.graph import Graph, require_graph
 from ..core.node import Node, Scalar, constant
 from ..core.traversal import rebuild
 from ..errors import GraphError
@@ -34,6 +34,7 @@ def simplify(graph: Graph) -> Graph:
     >>> cg.simplify(cg.Graph([x], {"y": 1.0 * x + (x - 0.0) * cg.exp(0.0)}))
     <Graph (x) -> (y): 3 nodes, 2 edges>
     """
+    require_graph("simplify", graph)
     nodes = folded(graph.outputs.values(), Builder())
     candidate = Graph(graph.inputs, dict(zip(graph.outputs, nodes, strict=True)))
     return candidate if _size(candidate) < _size(graph) else graph
@@ -75,6 +76,7 @@ def specialize(graph: Graph, values: Mapping[str, Scalar], outputs: Sequence[str
     >>> cg.specialize(energy, {"m": 2.0}).evaluate({"v": 3.0})
     {'T': 9.0}
     """
+    require_graph("specialize", graph)
     replace = {}
     for name, value in values.items():
         (node,) = graph.select_inputs(name)

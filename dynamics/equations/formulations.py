@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import TANGENT, Builder, building, cotangents, tangents
+from cgraph.extend import TANGENT, Builder, building, cotangents, require_graph, tangents
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
@@ -216,6 +216,7 @@ def spurious_nodes(graph: Graph) -> frozenset[Node]:
     >>> [len(dyn.spurious_nodes(dyn.momentum_rate(spring, name))) for name in ("chain_rule", "euler_embedded")]
     [0, 13]
     """
+    require_graph("spurious_nodes", graph)
     coupling = {node for node in graph.nodes if COUPLING in node.tags and "adjoint" in node.roles}
     needed: set[Node] = set()
     stack = [node for node in graph.outputs.values() if node not in coupling]

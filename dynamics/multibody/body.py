@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cgraph.extend import check_name
+
 from . import spatial
 from .joints import TYPES, JointType
 from .spatial import Array
@@ -45,6 +47,11 @@ class Joint:
     name : str
         What the coordinate is called; by default as the body.
 
+    Raises
+    ------
+    MechanismError
+        For an unknown kind; for other fields when a mechanism is made of it.
+
     Examples
     --------
     >>> import dynamics as dyn
@@ -62,6 +69,10 @@ class Joint:
     spring_reference: float = 0.0
     armature: float = 0.0
     name: str = ""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.kind, str) or self.kind not in TYPES:
+            raise MechanismError(f"a joint must be one of {', '.join(TYPES)}, got {self.kind!r:.60}")
 
     @property
     def type(self) -> JointType:
@@ -140,8 +151,9 @@ def checked(body: Body) -> Body:
     """The body with its numbers as arrays and floats, its axis of length 1. Raises MechanismError for what is wrong."""
     if not isinstance(body, Body):
         raise MechanismError(f"bodies must be of the type Body, got {type(body).__name__}: {body!r:.60}")
-    if not isinstance(body.name, str) or not body.name or body.name == WORLD:
-        raise MechanismError(f"a body needs a name, and not {WORLD!r}; got {body.name!r}")
+    _check_name("a body", body.name)
+    if body.name == WORLD:
+        raise MechanismError(f"a body needs a name other than {WORLD!r}")
     where, joint = f"body {body.name!r}", body.joint
     if not isinstance(body.parent, str):
         raise MechanismError(f"{where}: parent must be the name of a body or {WORLD!r}, got {body.parent!r:.80}")
@@ -158,10 +170,8 @@ def checked(body: Body) -> Body:
 def _checked_joint(where: str, joint: Joint) -> Joint:
     if not isinstance(joint, Joint):
         raise MechanismError(f"{where}: joint must be of the type Joint, got {type(joint).__name__}: {joint!r:.60}")
-    if not isinstance(joint.kind, str) or joint.kind not in TYPES:
-        raise MechanismError(f"{where}: joint must be one of {', '.join(TYPES)}, got {joint.kind!r}")
-    if not isinstance(joint.name, str):
-        raise MechanismError(f"{where}: the name of a joint must be a string, got {joint.name!r:.80}")
+    if joint.name != "":
+        _check_name(f"the joint of {where}", joint.name)
     axis = vector(f"{where}: axis", joint.axis)
     length = float(np.linalg.norm(axis))
     if not length:
@@ -180,6 +190,13 @@ def _checked_joint(where: str, joint: Joint) -> Joint:
         armature=_number(f"{where}: armature", joint.armature),
         name=joint.name,
     )
+
+
+def _check_name(what: str, name: str) -> None:
+    try:
+        check_name(what, name)
+    except (TypeError, ValueError) as error:
+        raise MechanismError(str(error)) from None
 
 
 def _inertia(where: str, given: ArrayLike) -> Array:

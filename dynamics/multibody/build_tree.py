@@ -40,6 +40,7 @@ def serial_arm(links: Sequence[dict[str, Any]], gravity: ArrayLike = (0.0, 0.0, 
     >>> dyn.serial_arm([{"joint": hinge, "mass": 1.0, "center": (0.0, 0.0, -0.5)}] * 2).coordinates
     ('link 1', 'link 2')
     """
+    _check_sequence("links", links)
     return tree(range(-1, len(links) - 1), links, gravity=gravity)
 
 
@@ -79,6 +80,9 @@ def tree(
     >>> dyn.tree([-1, 0, 0])
     <Mechanism of 3 bodies, 3 coordinate(s) link 1, link 2, link 3; gravity 0, 0, -9.81>
     """
+    _check_sequence("parents", parents)
+    if links is not None:
+        _check_sequence("links", links)
     n = len(parents)
     for i, parent in enumerate(parents):
         if not isinstance(parent, Integral) or not -1 <= parent < n:
@@ -94,6 +98,11 @@ def tree(
         for name, parent, link in zip(names, parents, given, strict=True)
     ]
     return Mechanism(bodies, gravity)
+
+
+def _check_sequence(what: str, given: object) -> None:
+    if not isinstance(given, Sequence | np.ndarray):
+        raise MechanismError(f"{what} must be a sequence, got {type(given).__name__}: {given!r:.60}")
 
 
 def _rod(axis: Array, parent: int) -> dict[str, Any]:

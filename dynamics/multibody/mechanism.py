@@ -237,7 +237,7 @@ class Mechanism(Structure):
 
 def as_mechanism(model: Model) -> Mechanism | None:
     """The bodies behind a model: a mechanism's own, a scene's; None of a Lagrangian or first-order system alone."""
-    return cast("Mechanism | None", getattr(model, "mechanism", None))
+    return None if isinstance(model, type) else cast("Mechanism | None", getattr(model, "mechanism", None))
 
 
 def require_mechanism(model: Model, what: str) -> Mechanism:

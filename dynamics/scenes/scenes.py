@@ -12,8 +12,11 @@ from numbers import Integral
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import cgraph as cg
 from cgraph import Node
+from cgraph.extend import real_array, real_number
 
 from ..io.load import load_model
 from ..multibody.mechanism import Mechanism, as_mechanism
@@ -38,6 +41,13 @@ class Scene:
     t_end : float
         How long it is watched [s].
 
+    Raises
+    ------
+    TypeError
+        For what is no model.
+    ValueError
+        For a start that is not one finite number for each coordinate, or a time that is not positive and finite.
+
     Examples
     --------
     >>> import dynamics as dyn
@@ -52,6 +62,17 @@ class Scene:
     q: tuple[float, ...]  # rad or m
     qd: tuple[float, ...]  # rad/s or m/s
     t_end: float  # s
+
+    def __post_init__(self) -> None:
+        if not hasattr(self.model, "coordinates") or isinstance(self.model, type):
+            raise TypeError(f"a scene needs a model, got {type(self.model).__name__}: {self.model!r:.60}")
+        n, second_order = len(self.model.coordinates), as_ode(self.model) is None
+        for what, values, needed in (("q", self.q, n), ("qd", self.qd, n if second_order else 0)):
+            array = real_array(f"scene {self.name!r}: {what}", values)
+            if array.shape != (needed,) or not np.isfinite(array).all():
+                raise ValueError(f"scene {self.name!r}: {what} needs {needed} finite numbers, got {values!r:.60}")
+        if not (real_number("t_end", self.t_end) > 0.0 and math.isfinite(self.t_end)):
+            raise ValueError(f"scene {self.name!r}: t_end must be positive and finite, got {self.t_end!r} s")
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -109,10 +130,15 @@ def triple_pendulum(mass_model: str = "rod") -> Scene:
     return Scene("triple_pendulum", about, arm, (math.pi / 2, 0.0, 0.0), (0.0,) * 3, 3.0)
 
 
+MOST_LINKS = 100_000  # of a chain; its equations take some kilobytes a link
+
+
 def chain(n: int = 10) -> Scene:
     """A chain of n equal rods, 1 kg and 1 m in all, let go at 45 degrees."""
     if not isinstance(n, Integral) or n < 1:
         raise ValueError(f"a chain needs at least one link, got {n!r:.60}")
+    if n > MOST_LINKS:
+        raise ValueError(f"a chain of {n} links is more than can be derived here, {MOST_LINKS}; see `planar_arm`")
     arm = planar_arm([1.0 / n] * n, [1.0 / n] * n)
     start = (math.pi / 4,) + (0.0,) * (n - 1)
     return Scene("chain", f"a chain of {n} equal rods, let go at 45 degrees", arm, start, (0.0,) * n, 3.0)

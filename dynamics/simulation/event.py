@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cgraph import Node
+from cgraph.extend import check_name
 
 from ..systems.system import sequence
 
@@ -45,7 +46,8 @@ class Event:
     TypeError
         For a name that is no text, a value or a reset that is no function, a `terminal` that is neither True nor False.
     ValueError
-        For another direction, and for an event that ends the run and resets the state.
+        For another direction, an event that ends the run and resets the state, and a name that is empty or cannot be
+        printed.
 
     Examples
     --------
@@ -71,6 +73,7 @@ class Event:
                 "an event needs a name, a function, and True or False for `terminal`, got "
                 f"{self.name!r:.40}, {self.value!r:.40} and {self.terminal!r:.40}"
             )
+        check_name("an event", self.name)
         if self.direction not in (-1, 0, 1):
             raise ValueError(f"event {self.name!r}: direction must be 1, -1 or 0, got {self.direction!r}")
         if self.reset is not None and not callable(self.reset):

@@ -65,7 +65,7 @@ def as_system(model: Model) -> System:
     >>> dyn.as_system(dyn.planar_arm(masses=[1.0, 0.5], lengths=[1.0, 1.0]))
     <System of 2 coordinate(s) joint 1, joint 2>
     """
-    system: System | None = getattr(model, "system", None)
+    system: System | None = getattr(_made(model), "system", None)
     if system is None:
         what = "a first-order system, which has no Lagrangian" if getattr(model, "ode", None) is not None else ""
         what = what or f"{type(model).__name__}: {model!r:.60}"
@@ -75,4 +75,12 @@ def as_system(model: Model) -> System:
 
 def as_ode(model: Model) -> OdeSystem | None:
     """The first-order system of a model; None for a mechanical one."""
-    return getattr(model, "ode", None)
+    ode: OdeSystem | None = getattr(_made(model), "ode", None)
+    return ode
+
+
+def _made(model: object) -> object:
+    """The model. Raises TypeError for a class of models, which has no coordinates before one is made."""
+    if isinstance(model, type):
+        raise TypeError(f"expected a model, such as a System, a mechanism or a scene, got the class {model.__name__}")
+    return model

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import topological
+from cgraph.extend import check_name, topological
 
 from .system import TIME, Parameters, call_user_function, node_or_number, parameter_value, sequence
 
@@ -119,11 +119,11 @@ class OdeSystem:
 def _state_names(names: Sequence[str]) -> tuple[str, ...]:
     if isinstance(names, str):
         names = names.split()
+    names = sequence("states must be", names)
     if not names:
         raise ValueError("a system needs at least one state")
     for name in names:
-        if not isinstance(name, str) or not name:
-            raise TypeError(f"a state's name must be a non-empty string, got {name!r}")
+        check_name("a state", name, spaces=False)
         if name in RESERVED:
             raise ValueError(f"a state cannot be called {name!r}, which is the name of time; choose another")
     if len(set(names)) < len(names):

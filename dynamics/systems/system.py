@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import real_number, shortened, topological
+from cgraph.extend import check_name, real_number, shortened, topological
 
 TIME = "t"
 BiasForce = tuple[Node, Node]  # a velocity, and the force that works on it
@@ -271,11 +271,11 @@ def per_coordinate(
 def _coordinate_names(names: Sequence[str]) -> tuple[str, ...]:
     if isinstance(names, str):
         names = names.split()
+    names = sequence("coordinates must be", names)
     if not names:
         raise ValueError("a system needs at least one coordinate")
     for name in names:
-        if not isinstance(name, str) or not name:
-            raise TypeError(f"a coordinate's name must be a non-empty string, got {name!r}")
+        check_name("a coordinate", name)
     if len(set(names)) < len(names):
         raise ValueError(f"coordinate names must differ, got {', '.join(names)}")
     return tuple(names)
@@ -283,8 +283,7 @@ def _coordinate_names(names: Sequence[str]) -> tuple[str, ...]:
 
 def parameter_value(name: str, value: float) -> float:
     """The value of a parameter, checked. Raises TypeError or ValueError naming it."""
-    if not isinstance(name, str):
-        raise TypeError(f"a parameter's name must be a string, got {name!r:.60}")
+    check_name("a parameter", name, spaces=False)
     if _RESERVED.fullmatch(name):
         raise ValueError(f"parameter {name!r} has the name of a coordinate, velocity, force or time; choose another")
     if isinstance(value, bool) or not isinstance(value, numbers.Real) or not math.isfinite(value):
@@ -315,7 +314,7 @@ def sequence(what: str, value: Any) -> list[Any]:
     try:
         return list(value)
     except TypeError:
-        raise TypeError(f"{what} a sequence of nodes or numbers, got {type(value).__name__}: {value!r:.60}") from None
+        raise TypeError(f"{what} a sequence, got {type(value).__name__}: {value!r:.60}") from None
 
 
 def node_or_number(what: str, value: Any) -> Node:

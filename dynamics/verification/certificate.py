@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cached_property
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -67,6 +68,9 @@ def certify(model: Model, states: int = 20, seed: int = 0, *, speed: float = 1.0
     >>> dyn.certify(dyn.planar_arm([1.0, 0.8], [1.0, 0.5]), states=2).passed
     True
     """
+    for what, number in (("states", states), ("seed", seed)):
+        if isinstance(number, bool) or not isinstance(number, Integral):
+            raise TypeError(f"{what} must be a whole number, got {type(number).__name__}: {number!r:.60}")
     if states < 1:
         raise ValueError(f"a certificate needs at least one state, got {states!r}")
     if seed < 0:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 from cgraph import Edge, Graph, Node
+from cgraph.extend import require_graph
 
 from .. import theme
 from ..theme import Paint
@@ -88,6 +89,7 @@ def to_dot(
     >>> [line.split("[")[0].strip() for line in drawing.source.splitlines() if "->" in line]
     ['n0 -> n1', 'n1 -> o0']
     """
+    require_graph("to_dot", graph)
     if rankdir not in DIRECTIONS:
         raise ValueError(f"rankdir must be one of {', '.join(DIRECTIONS)}, got {rankdir!r}")
     plan = plan_of(

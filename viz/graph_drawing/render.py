@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from typing import Protocol
 
 from cgraph import Graph, constant
-from cgraph.extend import install
+from cgraph.extend import install, require_graph
 
 from .. import theme
 from .dot import to_dot
@@ -86,7 +86,9 @@ def render_svg(dot_source: str | Drawing, *, engine: str = "dot", timeout: float
         raise ValueError(f"engine must be one of {', '.join(ENGINES)}, got {engine!r}")
     if not timeout > 0:
         raise ValueError(f"timeout must be positive, got {timeout!r} s")
-    source = dot_source if isinstance(dot_source, str) else dot_source.source
+    source = dot_source if isinstance(dot_source, str) else getattr(dot_source, "source", None)
+    if not isinstance(source, str):
+        raise TypeError(f"render_svg needs DOT text or what to_dot returns, got {type(dot_source).__name__}")
     try:
         command = _command(engine)
         done = subprocess.run(command, input=source.encode(), capture_output=True, timeout=timeout, check=False)
@@ -129,8 +131,12 @@ def render_png(svg: str, *, scale: float = 2.0) -> bytes:
 
     Raises
     ------
+    ImportError
+        When resvg is not installed.
     RenderError
-        When resvg is not installed, or the text is not SVG.
+        When the text is not SVG.
+    TypeError
+        When it is no text.
     ValueError
         For a scale that is not positive and finite.
 
@@ -141,6 +147,8 @@ def render_png(svg: str, *, scale: float = 2.0) -> bytes:
     b'PNG'
     """
     svg_to_bytes = _resvg()
+    if not isinstance(svg, str):
+        raise TypeError(f"render_png needs the text of an SVG picture, got {type(svg).__name__}: {svg!r:.60}")
     if not 0 < scale < float("inf"):
         raise ValueError(f"scale must be positive and finite, got {scale!r}")
     fonts = theme.font_folder()  # these alone, where they are: the same picture on every machine
@@ -163,7 +171,7 @@ def _resvg() -> Callable[..., bytes]:
     try:
         from resvg_py import svg_to_bytes
     except ImportError as error:
-        raise RenderError(f"PNG pictures need resvg: {install('viz')}") from error
+        raise ImportError(f"PNG pictures need resvg: {install('viz')}") from error
     return svg_to_bytes
 
 
@@ -208,6 +216,7 @@ def graph_svg(graph: Graph) -> str:
     >>> graph_svg(cg.Graph([x], {"y": cg.sin(x)})).startswith("<svg")
     True
     """
+    require_graph("graph_svg", graph)
     if len(graph.nodes) > LARGE:
         raise RenderError(f"{len(graph.nodes)} nodes are too many for one picture: collapse tags with viz.to_dot")
     return render_svg(to_dot(graph), timeout=20.0)

@@ -4,6 +4,18 @@ const READABLE = 100; // nodes that are drawn one by one at first; of a larger g
 const DRAWABLE = 2500; // more than these are never drawn one by one at once
 const PATHS = 5, DEPTH = 4, FPS = 30;
 
+/** An element around texts and other elements: texts stay texts, whatever is in them. */
+function tag(name, attributes = {}, ...inside) {
+  const made = document.createElement(name);
+  for (const key in attributes) made.setAttribute(key, attributes[key]);
+  made.append(...inside);
+  return made;
+}
+const quiet = (words) => tag("p", { class: "quiet" }, words);
+const rowHead = (words) => tag("th", { scope: "row" }, words);
+const table = (names, rows) => tag("table", {},
+  tag("thead", {}, tag("tr", {}, tag("th"), ...names.map((name) => tag("th", { scope: "col" }, name)))), tag("tbody", {}, ...rows));
+
 function start() {
   const data = JSON.parse(document.getElementById("data").textContent);
   const versions = data.versions.map(prepare);
@@ -22,7 +34,6 @@ function start() {
   const outputs = () => version().outputs;
   const nameOf = (node) => version().names[node]?.[1] ?? outputs().find(([, , out]) => out === node)?.[1] ?? `v${node}`;
   const told = (node) => `${nameOf(node)}${version().args[node].length ? ` (${caption(data, version(), node)})` : ""}`;
-  const html = escaped;
 
   // Values
 
@@ -171,31 +182,33 @@ function start() {
 
   function tell(bars) {
     const node = state.picked;
-    if (node < 0) $("node").innerHTML = '<p class="quiet">Click a node to see its equation and value. Click a box to unfold it.</p>';
+    if (node < 0) $("node").replaceChildren(quiet("Click a node to see its equation and value. Click a box to unfold it."));
     else {
       const [tags, role] = version().labels[version().label[node]];
       const wrong = version().marked.has(node);
       const bar = bars ?? adjoints(version(), partials(), fromNode());
-      $("node").innerHTML = `<div class="scroll">${equation(version(), node, DEPTH)}</div><p>n${node}, ${html(version().ops[node])}, ${html(wrong ? `spurious, ${role}` : role)}`
-        + `${tags.length ? `<br>tags: ${html(tags.join(", "))}` : ""}<br>value ${brief(values[node])}, `
-        + `∂${html(outputs().find(([, , out]) => out === fromNode())[1])} by it ${brief(bar[node])}</p>`;
+      const words = [`n${node}, ${version().ops[node]}, ${wrong ? `spurious, ${role}` : role}`,
+        ...(tags.length ? [tag("br"), `tags: ${tags.join(", ")}`] : []), tag("br"),
+        `value ${brief(values[node])}, ∂${outputs().find(([, , out]) => out === fromNode())[1]} by it ${brief(bar[node])}`];
+      $("node").replaceChildren(tag("div", { class: "scroll" }, equation(version(), node, DEPTH)), tag("p", {}, ...words));
     }
     why();
   }
   function why() {
     let [a, b] = [state.before, state.picked];
     if (a < 0 || b < 0) {
-      $("why").innerHTML = '<p class="quiet">Click two nodes, such as an input and an output: how many paths lead from one to the other, and which weigh most?</p>';
+      $("why").replaceChildren(quiet("Click two nodes, such as an input and an output: how many paths lead from one to the other, and which weigh most?"));
       return;
     }
     if (a > b) [a, b] = [b, a];
     const count = pathCount(version(), a, b);
-    const head = `<p><b>${html(nameOf(a))}</b> → <b>${html(nameOf(b))}</b>: ${digits(count)} path${count === 1n ? "" : "s"}`;
-    if (!count) { $("why").innerHTML = `${head}; the one does not depend on the other.</p>`; return; }
+    const head = tag("p", {}, tag("b", {}, nameOf(a)), " → ", tag("b", {}, nameOf(b)), `: ${digits(count)} path${count === 1n ? "" : "s"}`);
+    $("why").replaceChildren(head);
+    if (!count) { head.append("; the one does not depend on the other."); return; }
     const bars = adjoints(version(), partials(), b);
     const found = heaviest(version(), partials(), a, b, PATHS);
-    $("why").innerHTML = `${head}. The derivative here is ${brief(bars[a])}, the sum of their products of partials.`
-      + ` ${found.length ? "The heaviest:" : "Here a partial on each is zero."}</p>`;
+    head.append(`. The derivative here is ${brief(bars[a])}, the sum of their products of partials.`,
+      ` ${found.length ? "The heaviest:" : "Here a partial on each is zero."}`);
     found.forEach(({ nodes, product }) => {
       const button = document.createElement("button");
       const crossed = nodes.filter((node) => version().marked.has(node)).length;
@@ -218,28 +231,26 @@ function start() {
     });
     const pretty = new Map(versions.flatMap((each) => each.outputs.map(([name, shown]) => [name, shown])));
     const right = versions.findLastIndex((each) => !each.marked.size && versions.some((other) => other.marked.size));
-    const rows = names.map((name) => `<tr><th scope="row">${html(pretty.get(name))}</th>${found.map((each, i) => {
+    const rows = names.map((name) => tag("tr", {}, rowHead(pretty.get(name)), ...found.map((each, i) => {
       const value = each.get(name), truth = right < 0 ? value : found[right].get(name);
       const off = value !== undefined && truth !== undefined && Math.abs(value - truth) > 0.01 * Math.max(0.1, Math.abs(truth));
-      return `<td class="${off ? "off" : ""}">${value === undefined ? "" : (value && Math.abs(value) < 5e-4 ? "≈0" : brief(value))}</td>`;
-    }).join("")}</tr>`);
-    $("results").innerHTML = `<table><thead><tr><th></th>${versions.map((each) => `<th scope="col">${html(each.name)}</th>`).join("")}</tr></thead>`
-      + `<tbody>${rows.join("")}</tbody></table>${right < 0 ? "" : `<p class="quiet">In vermillion: differs from ${html(versions[right].name)}.</p>`}`;
+      return tag("td", { class: off ? "off" : "" }, value === undefined ? "" : (value && Math.abs(value) < 5e-4 ? "≈0" : brief(value)));
+    })));
+    $("results").replaceChildren(table(versions.map((each) => each.name), rows),
+      ...(right < 0 ? [] : [quiet(`In vermillion: differs from ${versions[right].name}.`)]));
   }
   function counts() {
-    const rows = versions.map((each) => `<tr><th scope="row">${html(each.name)}</th><td>${each.counts[0]}</td><td>${each.counts[1]}</td><td>${each.marked.size}</td></tr>`);
-    const ops = {};
-    version().ops.forEach((op) => { ops[op] = (ops[op] ?? 0) + 1; });
-    const kinds = Object.entries(ops).sort((a, b) => b[1] - a[1]).map(([op, many]) => `${html(op)} ${many}`);
-    $("counts").innerHTML = `<table><thead><tr><th></th><th>nodes</th><th>edges</th><th>spurious</th></tr></thead><tbody>${rows.join("")}</tbody></table>`
-      + `<p class="quiet">Constants (${version().constants.size}) are written where they are used. ${kinds.join(", ")}.</p>`;
+    const rows = versions.map((each) => tag("tr", {}, rowHead(each.name),
+      ...[...each.counts, each.marked.size].map((count) => tag("td", {}, String(count)))));
+    const ops = new Map();
+    version().ops.forEach((op) => { ops.set(op, (ops.get(op) ?? 0) + 1); });
+    const kinds = [...ops].sort((a, b) => b[1] - a[1]).map(([op, many]) => `${op} ${many}`);
+    $("counts").replaceChildren(table(["nodes", "edges", "spurious"], rows),
+      quiet(`Constants (${version().constants.size}) are written where they are used. ${kinds.join(", ")}.`));
   }
   function inputs() {
-    $("inputs").innerHTML = "<table><tbody></tbody></table>";
-    version().inputs.forEach(([name], i) => {
-      const row = $("inputs").querySelector("tbody").insertRow();
-      row.innerHTML = `<td>${html(name)}</td><td><input type="number" step="any" aria-label="${html(name)}"></td>`;
-      const field = row.querySelector("input");
+    const rows = version().inputs.map(([name], i) => {
+      const field = tag("input", { type: "number", step: "any", "aria-label": name });
       field.value = +state.rows[state.version][i].toPrecision(6);
       field.onchange = () => {
         if (!Number.isFinite(field.valueAsNumber)) return;
@@ -248,13 +259,15 @@ function start() {
         compute();
         refresh();
       };
+      return tag("tr", {}, tag("td", {}, name), tag("td", {}, field));
     });
+    $("inputs").replaceChildren(tag("table", {}, tag("tbody", {}, ...rows)));
   }
   function legend() {
     const kinds = [["input", "input"], ["primal", "as written"], ["adjoint", "adjoint: reverse"], ["tangent", "tangent: forward"], ["several", "several roles"], ["wrong", "spurious"]];
     const present = new Set(version().labels.map(([, role]) => role));
     if (version().marked.size) present.add("wrong");
-    $("legend").innerHTML = kinds.filter(([kind]) => present.has(kind)).map(([kind, words]) => `<span class="${kind}">${words}</span>`).join("");
+    $("legend").replaceChildren(...kinds.filter(([kind]) => present.has(kind)).map(([kind, words]) => tag("span", { class: kind }, words)));
   }
 
   // Choices
@@ -285,7 +298,7 @@ function start() {
     $("about").hidden = !$("about").textContent;
     $("about").classList.toggle("flawed", version().marked.size > 0);
     $("sweep").max = 2 * version().ops.length;
-    $("from").innerHTML = outputs().map(([name, shown]) => `<option value="${html(name)}">${html(shown)}</option>`).join("");
+    $("from").replaceChildren(...outputs().map(([name, shown]) => tag("option", { value: name }, shown)));
     if (outputs().some(([name]) => name === state.output)) $("from").value = state.output;
     redraw(!state.view);
     legend();
@@ -299,7 +312,7 @@ function start() {
     state.sweep = Math.max(-1, Math.min(2 * n, step));
     $("sweep").value = Math.max(0, state.sweep);
     const node = currentNode();
-    if (state.sweep < 0) $("step").innerHTML = '<span class="quiet">Move the slider: values go up, then adjoints come down.</span>';
+    if (state.sweep < 0) $("step").replaceChildren(tag("span", { class: "quiet" }, "Move the slider: values go up, then adjoints come down."));
     else if (state.sweep === 0) $("step").textContent = "Before the first node.";
     else {
       const forward = state.sweep <= n;

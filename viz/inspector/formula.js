@@ -1,43 +1,61 @@
-// The equation of a node as MathML, down to named nodes or a depth.
+// The equation of a node as MathML elements, down to named nodes or a depth.
 
-const escaped = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
-const number = (value) => `<mn>${escaped(Number.isFinite(value) ? String(+value.toPrecision(4)) : String(value))}</mn>`;
-const sign = (text) => `<mo>${escaped(text)}</mo>`;
-const row = (...parts) => `<mrow>${parts.join("")}</mrow>`;
-const fenced = (text) => row('<mo stretchy="false">(</mo>', text, '<mo stretchy="false">)</mo>');
+const MATHML = "http://www.w3.org/1998/Math/MathML";
 const BINDS = { sum: 1, function: 3, leaf: 4 }; // how strongly a text binds, as in the table of operations
+
+/** An element of MathML around texts and other elements. */
+function math(name, ...inside) {
+  const made = document.createElementNS(MATHML, name);
+  made.append(...inside);
+  return made;
+}
+const number = (value) => math("mn", Number.isFinite(value) ? String(+value.toPrecision(4)) : String(value));
+const parenthesis = (text) => { const made = math("mo", text); made.setAttribute("stretchy", "false"); return made; };
+const fenced = (inside) => math("mrow", parenthesis("("), inside, parenthesis(")"));
 
 /** A node as an identifier: its name, or v with its number. */
 function symbol(version, node) {
   const name = version.names[node];
-  return name ? `<mi>${escaped(name[1])}</mi>` : `<msub><mi>v</mi><mn>${node}</mn></msub>`;
+  return name ? math("mi", name[1]) : math("msub", math("mi", "v"), math("mn", String(node)));
 }
 
 /** The node's equation, `depth` operations deep. */
 function equation(version, node, depth) {
-  const kept = version.args[node].length ? row(symbol(version, node), sign("="), text(version, node, depth, true)[0])
-    : row(symbol(version, node));
-  return `<math display="block">${kept}</math>`;
+  const kept = version.args[node].length
+    ? math("mrow", symbol(version, node), math("mo", "="), formula(version, node, depth, true)[0])
+    : math("mrow", symbol(version, node));
+  const made = math("math", kept);
+  made.setAttribute("display", "block");
+  return made;
 }
 
 /** [MathML, how tightly it binds]. */
-function text(version, node, depth, whole) {
+function formula(version, node, depth, whole) {
   if (version.constants.has(node)) {
     const value = version.constants.get(node);
     return [number(value), value < 0 ? BINDS.sum : BINDS.leaf];
   }
   const args = version.args[node];
   if (!args.length || (!whole && (version.names[node] || depth <= 0))) return [symbol(version, node), BINDS.leaf];
-  const inner = args.map((arg) => text(version, arg, depth - 1, false));
-  const formula = FORMULA[version.ops[node]];
-  if (!formula) {
-    const listed = inner.map(([each]) => each).join(sign(","));
-    return [row(`<mi>${version.ops[node]}</mi>`, fenced(listed)), BINDS.function];
+  const inner = args.map((arg) => formula(version, arg, depth - 1, false));
+  const known = FORMULA.get(version.ops[node]);
+  if (!known) {
+    const listed = inner.flatMap(([each], i) => (i ? [math("mo", ","), each] : [each]));
+    return [math("mrow", math("mi", version.ops[node]), fenced(math("mrow", ...listed))), BINDS.function];
   }
-  const [template, least, binding] = formula;
-  const filled = template.replace(/\{(\d)\}/g, (_, slot) => {
-    const [each, binds] = inner[slot];
-    return binds < least[slot] ? fenced(each) : each;
-  });
-  return [row(filled), binding];
+  const [template, least, binding] = known;
+  const fill = (part) => {
+    if (typeof part === "string") return part;
+    if (typeof part === "number") {
+      const [each, binds] = inner[part];
+      const filled = binds < least[part] ? fenced(each) : each;
+      return used.has(part) ? filled.cloneNode(true) : (used.add(part), filled); // an element has one place
+    }
+    const [name, attributes, ...inside] = part;
+    const made = math(name, ...inside.map(fill));
+    for (const key in attributes) made.setAttribute(key, attributes[key]);
+    return made;
+  };
+  const used = new Set();
+  return [fill(template), binding];
 }

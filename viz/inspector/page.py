@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
 from collections.abc import Collection, Mapping, Sequence
 from html import escape
 from importlib.resources import files
+from string import Template
 from typing import Any
 
 from cgraph import Graph, Node
+from cgraph.extend import require_graph
 
 from .. import theme
 from ..pages import html
@@ -18,8 +22,10 @@ from .record import record
 
 SCRIPTS = ("values.js", "paths.js", "formula.js", "picture.js", "arm.js", "app.js")
 FRAME_HEIGHT = 720  # pixels in a notebook
-# Nothing may be fetched, not even by mistake.
-_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
+# Nothing may be fetched, and no script or style runs but the page's own, known by its digest.
+_POLICY = (
+    "default-src 'none'; script-src {script}; style-src {style}; img-src data:; base-uri 'none'; form-action 'none'"
+)
 
 
 class Page(str):
@@ -85,6 +91,8 @@ def page(
     if isinstance(graph, Graph):
         versions: Sequence[Version] = [Version("graph", graph, about, marked, at or {})]
     else:
+        if not isinstance(graph, Sequence) or not all(isinstance(each, Version) for each in graph):
+            require_graph("page", graph)
         versions = list(graph)
         if at is not None or marked:
             raise ValueError("with versions, give each its own at and marked")
@@ -94,18 +102,20 @@ def page(
     if motion is not None:
         motion.check()
     data = {"title": title, "introduction": "" if isinstance(graph, Graph) else about, **record(versions, motion)}
-    script = scripts()
+    script = f'"use strict";\n{scripts()}\nstart();'
+    style = f"{_colors()}{_asset('page.css')}"
+    policy = _POLICY.format(script=_digest(script), style=_digest(style))
     # "<" in the data could end the element that holds it
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
     shown = "".join(html.table(table.caption, table.header, table.rows) for table in tables)
-    body = _asset("page.html").replace("{title}", escape(title)).replace("{tables}", shown)
+    body = Template(_asset("page.html")).substitute(title=escape(title), tables=shown)
     return Page(
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
-        f"<style>{_colors()}{_asset('page.css')}</style>\n</head>\n<body>\n{body}\n"
+        f"<style>{style}</style>\n</head>\n<body>\n{body}\n"
         f'<script id="data" type="application/json">{text}</script>\n'
-        f'<script>"use strict";\n{script}\nstart();</script>\n'
+        f"<script>{script}</script>\n"
         "</body>\n</html>\n"
     )
 
@@ -113,6 +123,11 @@ def page(
 def scripts() -> str:
     """The page's JavaScript: operations from their table, then the files."""
     return "\n".join([operations(), *[_asset(name) for name in SCRIPTS]])
+
+
+def _digest(text: str) -> str:
+    """How a content security policy names an inline script or style."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
 def _asset(name: str) -> str:

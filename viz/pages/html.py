@@ -8,6 +8,9 @@ from html import escape
 
 from .. import theme
 
+# Nothing is fetched and no script runs; pictures and styles are in the page.
+POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
+
 _STYLE = f"""
 :root {{ color-scheme: light dark; --text: {theme.TEXT}; --back: #FFFFFF; --soft: #F4F4F2; --line: #D8D8D4; }}
 @media (prefers-color-scheme: dark) {{ :root {{ --text: #E8E8E4; --back: #17181A; --soft: #232529; --line: #3A3D42; }} }}
@@ -31,13 +34,14 @@ pre {{ background: var(--soft); padding: 0.8rem 1rem; overflow-x: auto; border-r
 
 def page(title: str, introduction: str, sections: Sequence[tuple[str, str, str]]) -> str:
     """A page of sections (anchor, heading, HTML), with a line of links to them. introduction is HTML."""
-    links = " ".join(f'<a href="#{anchor}">{escape(heading)}</a>' for anchor, heading, _ in sections)
+    links = " ".join(f'<a href="#{escape(anchor)}">{escape(heading)}</a>' for anchor, heading, _ in sections)
     body = "\n".join(
-        f'<section id="{anchor}">\n<h2>{escape(heading)}</h2>\n{content}\n</section>'
+        f'<section id="{escape(anchor)}">\n<h2>{escape(heading)}</h2>\n{content}\n</section>'
         for anchor, heading, content in sections
     )
     return (
-        f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
+        f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n<title>{escape(title)}</title>\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<style>{_STYLE}</style>\n</head>\n<body>\n'
         f"<h1>{escape(title)}</h1>\n{introduction}\n<nav>{links}</nav>\n{body}\n</body>\n</html>\n"
     )

@@ -16,6 +16,7 @@ from cgraph import Graph, Node
 from .. import theme
 from ..graph_drawing.dot import to_dot
 from ..graph_drawing.render import render_svg
+from .html import POLICY
 
 _PAGE = Path(__file__).with_name("lesson.html")
 _LETTER = 1.15  # height of a figure's letters, in those of the page
@@ -47,6 +48,7 @@ def page(lesson: Lesson) -> str:
     nodes = len(lesson.by_definition.nodes)
     return Template(_PAGE.read_text(encoding="utf-8")).substitute(
         text=theme.TEXT,
+        policy=POLICY,
         figure1_plain=_figure("plain", lesson.by_definition, "Figure 1, as it would be drawn. Find the mistake."),
         figure1=_figure(
             "fig1",

@@ -6,28 +6,9 @@ import re
 import unicodedata
 from collections.abc import Sequence
 
-_C = """auto break case char const continue default do double else enum extern float for goto if inline int long
-    register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
-    alignas alignof bool constexpr false nullptr static_assert thread_local true typeof typeof_unqual asm main"""
-_CPP = """and and_eq bitand bitor catch char8_t char16_t char32_t class co_await co_return co_yield compl concept
-    const_cast consteval constinit decltype delete dynamic_cast explicit export friend mutable namespace new noexcept
-    not not_eq operator or or_eq private protected public reinterpret_cast requires static_cast template this throw
-    try typeid typename using virtual wchar_t xor xor_eq"""
-_MATH = """acos asin atan atan2 cos sin tan acosh asinh atanh cosh sinh tanh exp exp2 expm1 frexp ilogb ldexp log log10
-    log1p log2 logb modf scalbn scalbln cbrt fabs hypot pow sqrt erf erfc lgamma tgamma ceil floor nearbyint rint
-    lrint llrint round lround llround trunc fmod remainder remquo copysign nan nextafter nexttoward fdim fmax fmin
-    fma fpclassify isfinite isinf isnan isnormal signbit isgreater isgreaterequal isless islessequal islessgreater
-    isunordered float_t double_t j0 j1 jn y0 y1 yn gamma"""  # the last line: beside the standard, on many systems
-_HEADERS = """assert complex ctype errno fenv inttypes iso646 limits locale math setjmp signal stdarg stdbool stddef
-    stdint stdio stdlib string tgmath time wchar wctype"""
-_MATH_WORDS = _MATH.split()
-_TAKEN = {
-    *_C.split(),
-    *_CPP.split(),
-    *_HEADERS.split(),
-    *_MATH_WORDS,
-    *(f"{word}{s}" for word in _MATH_WORDS for s in "fl"),
-}
+from .c_reserved import is_reserved
+
+LONGEST = 63  # characters of a name that every C compiler looks at
 
 
 def check_function_name(name: str) -> None:
@@ -36,20 +17,24 @@ def check_function_name(name: str) -> None:
         raise TypeError(f"the name of a C function must be a string, got {type(name).__name__}: {name!r:.60}")
     if not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name):
         raise ValueError(f"the name of a C function must be a letter, then letters, digits and _, got {name!r:.60}")
-    if name in _TAKEN:
+    if len(name) > LONGEST:
+        raise ValueError(f"the name of a C function may have {LONGEST} characters, got {len(name)}: {name:.60}")
+    if is_reserved(name):
         raise ValueError(f"the name of a C function must not be a word of C, C++ or their library, got {name!r}")
 
 
 def distinct(names: Sequence[str]) -> list[str]:
     """For each of these different names a different word of ASCII letters, digits and _, to stand behind a prefix.
 
-    A name that is such a word stays; Greek letters are spelled out; other characters become _, and more _ follow
+    A name that is such a word stays; Greek letters are spelled out; other characters become _, and its place follows
     where two names would become one.
     """
     words = [_word(name) for name in names]
     taken = {name for name, word in zip(names, words, strict=True) if word == name}
     for i, name in enumerate(names):
         if words[i] != name:
+            if words[i] in taken:
+                words[i] += f"_{i}"
             while words[i] in taken:
                 words[i] += "_"
             taken.add(words[i])

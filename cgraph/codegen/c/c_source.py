@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from ...core.graph import Graph
+from ...core.graph import Graph, require_graph
 from ...util.atomic_write import atomic_write
 from .c_identifiers import check_function_name, distinct
 from .c_statements import comment, functions
@@ -132,8 +132,7 @@ def to_c(graph: Graph, name: str = "function", *, fma: bool = False) -> CSource:
     >>> "y[ARM_OUT_tau0] = v1;" in text.source, "ARM_N_IN = 1" in text.header
     (True, True)
     """
-    if not isinstance(graph, Graph):
-        raise TypeError(f"to_c takes a Graph, got {type(graph).__name__}: {graph!r:.60}")
+    require_graph("to_c", graph)
     check_function_name(name)
     inputs, outputs, input_names = graph.inputs, graph.outputs, graph.input_names
     places = [f"{name.upper()}_IN_{word}" for word in distinct(input_names)]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...core.edge import Edge
-from ...core.graph import Graph
+from ...core.graph import Graph, require_graph
 from ...core.node import Node
 from ..edge_partials import Point
 from ..names import Name, Names, many
@@ -135,6 +135,7 @@ def lint(
     Holds: no path leads from y to x: x is an input.
     Holds: no path leads from x to y: y is an input.
     """
+    require_graph("lint", graph)
     names = Names(graph)
     findings: list[Finding] = []
     proofs: list[str] = []

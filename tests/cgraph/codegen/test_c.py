@@ -236,8 +236,8 @@ AWKWARD = [
 def test_names_that_collide_have_places_of_their_own(tmp_path):
     inputs = cg.variables(AWKWARD)
     outputs = dict(zip(AWKWARD, inputs, strict=True)) | {
-        "two\nlines \\": cg.with_name(2 * inputs[0], "*/ named /*"),
-        "\ud800\u202e": inputs[1] * 3,
+        "two words \\": cg.with_name(2 * inputs[0], "*/ named /*"),
+        "\U0001d49c": inputs[1] * 3,
     }
     graph = cg.Graph(inputs, outputs)
     source = cg.to_c(graph, "odd")
@@ -246,7 +246,7 @@ def test_names_that_collide_have_places_of_their_own(tmp_path):
     assert len({name for name, _ in places}) == len(places)
     assert [name for name, _ in places][: len(inputs)] == [
         f"ODD_IN_{word}"
-        for word in "a_b a_b__ a_b___ a_b_ double exp y0 theta_ theta Omega N_IN x __evil__ ___ lambda1 _".split()
+        for word in "a_b a_b_1 a_b_2 a_b_ double exp y0 theta_7 theta Omega N_IN x __evil__ ___ lambda1 _".split()
     ]
     point = [list(map(float, range(1, len(inputs) + 1)))]
     assert same(called(build(tmp_path, [source]), "odd", graph, point), evaluated(graph, point))
@@ -333,7 +333,29 @@ def test_a_name_that_is_no_identifier_is_an_error(name):
         cg.to_c(pendulum(), name)
 
 
-@pytest.mark.parametrize("name", ["double", "class", "main", "sin", "sinf", "y0", "math", "restrict"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "double",
+        "class",
+        "main",
+        "sin",
+        "sinf",
+        "y0",
+        "math",
+        "restrict",
+        "printf",
+        "NULL",
+        "size_t",
+        "read",
+        "getc_unlocked",
+        "stdin",
+        "EOF",
+        "atomic_load",
+        "va_arg",
+        "PRIu64",
+    ],
+)
 def test_a_name_that_is_taken_is_an_error(name):
     with pytest.raises(ValueError, match=f"must not be a word of C, C\\+\\+ or their library, got '{name}'"):
         cg.to_c(pendulum(), name)

@@ -247,6 +247,25 @@ def test_a_folder_in_place_of_an_entry_is_a_warning(folder):
     assert list(folder.iterdir()) == [path]
 
 
+@POSIX
+@pytest.mark.parametrize("what", ["pipe", "device", "huge file"])
+def test_what_is_no_entry_is_neither_waited_for_nor_read(what, folder, translations):
+    cg.compile(graph(), "llvm", cache=folder)
+    (path,) = entries(folder)
+    path.unlink()
+    if what == "pipe":
+        os.mkfifo(path, 0o600)  # nobody will write to it
+    elif what == "device":
+        path.symlink_to("/dev/zero")  # without an end
+    else:
+        path.touch(0o600)
+        os.truncate(path, 2**36)  # sparse: it takes no space
+    cg.compile(graph(), "llvm", cache=folder)
+    assert len(translations) == 2
+    assert path.is_file()
+    assert not path.is_symlink()  # an entry has taken its place
+
+
 def test_a_full_disk_is_a_warning_and_leaves_nothing_behind(folder, monkeypatch):
     def replace(path, target):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
@@ -261,8 +280,12 @@ def test_a_full_disk_is_a_warning_and_leaves_nothing_behind(folder, monkeypatch)
 def test_a_folder_that_cannot_be_written_still_gives_what_it_has(folder, translations, monkeypatch):
     cg.compile(graph(), "llvm", cache=folder)
 
-    def read_only(*_):
-        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+    real = os.open
+
+    def read_only(path, flags, *mode):
+        if flags & os.O_CREAT:
+            raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+        return real(path, flags, *mode)
 
     monkeypatch.setattr(os, "open", read_only)
     cg.compile(graph(), "llvm", cache=folder)  # and no warning, which would be an error here

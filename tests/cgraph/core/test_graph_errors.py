@@ -60,7 +60,7 @@ def test_an_output_that_is_not_a_node_is_named(wrong):
 
 @pytest.mark.parametrize("wrong", ["", 1, None, x])
 def test_an_output_needs_a_name(wrong):
-    with pytest.raises(TypeError, match="output's name"):
+    with pytest.raises((TypeError, ValueError), match="the name of an output must"):
         cg.Graph([x], {wrong: x})
 
 

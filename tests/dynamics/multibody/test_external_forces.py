@@ -348,7 +348,7 @@ def test_a_force_that_cannot_be_is_refused(case: str) -> None:
         ("q0", {}, "parameter 'q0' has the name of a coordinate"),
         ("m", {"m": np.nan}, "parameter 'm' must be a finite number, got nan"),
         ("m", {"n": 1.0}, "the mechanism has no force that uses the parameter 'n'"),
-        ("a b", {}, "a variable's name must be non-empty and without white space, got 'a b'"),
+        ("a b", {}, "the name of a parameter must be without white space, got 'a b'"),
     ],
 )
 def test_a_parameter_that_cannot_be_is_refused(name: str, parameters: dict[str, float], message: str) -> None:

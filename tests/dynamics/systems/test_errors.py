@@ -50,8 +50,8 @@ def test_an_arm_that_cannot_be_is_refused(case: str) -> None:
 _SYSTEMS: dict[str, tuple[dict[str, Any], type[Exception], str]] = {
     "no coordinates": ({"coordinates": []}, ValueError, "needs at least one coordinate"),
     "coordinate twice": ({"coordinates": ["x", "y", "x"]}, ValueError, "coordinate names must differ, got x, y, x"),
-    "coordinate empty": ({"coordinates": [""]}, TypeError, "name must be a non-empty string, got ''"),
-    "coordinate a number": ({"coordinates": [3]}, TypeError, "name must be a non-empty string, got 3"),
+    "coordinate empty": ({"coordinates": [""]}, ValueError, "name of a coordinate must not be empty"),
+    "coordinate a number": ({"coordinates": [3]}, TypeError, "name of a coordinate must be a string, got int: 3"),
     "parameter NaN": ({"parameters": {"k": math.nan}}, ValueError, "parameter 'k' must be a finite number, got nan"),
     "parameter text": ({"parameters": {"k": "3"}}, ValueError, "parameter 'k' must be a finite number, got '3'"),
     "damping negative": ({"damping": -1.0}, ValueError, "damping must be finite and at least 0, got -1.0"),

@@ -87,7 +87,7 @@ def test_a_second_order_system_is_the_same_either_way() -> None:
         (None, "x", {}, TypeError, "must be a function"),
         (lambda x, t: [cg.variable("z")], "x", {}, ValueError, r"'z', which is no state, parameter or t \(it has x\)"),
         (lambda x, t: [x[0]], "", {}, ValueError, "at least one state"),
-        (lambda x, t: [x[0]], [1], {}, TypeError, "non-empty string, got 1"),
+        (lambda x, t: [x[0]], [1], {}, TypeError, "name of a state must be a string, got int: 1"),
         (lambda x, t: [x[0]], "x x", {}, ValueError, "must differ"),
         (lambda x, t: [x[0]], "t", {}, ValueError, "name of time"),
         (lambda x, t, p: [x[0]], "x", {"x": 1.0}, ValueError, "both a state and a parameter"),

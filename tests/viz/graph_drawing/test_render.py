@@ -189,7 +189,7 @@ def test_what_is_not_svg_is_refused(text: str) -> None:
 
 def test_without_resvg_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "resvg_py", None)
-    with pytest.raises(RenderError, match=r"pip install '\.\[viz\]'"):
+    with pytest.raises(ImportError, match=r"pip install '\.\[viz\]'"):
         render_png("<svg/>")
 
 

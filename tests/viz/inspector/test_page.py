@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
 import math
 import re
 import shutil
 import subprocess
+from html.parser import HTMLParser
 from itertools import product
 
 import numpy as np
@@ -47,7 +50,10 @@ def pendulum(tmp_path_factory) -> str:
 
 def test_a_page_is_one_small_file_that_loads_nothing(pendulum):
     assert len(pendulum.encode()) < 1.5e6
-    assert set(re.findall(r"https?://[^\s\"'<]+", pendulum)) == {"http://www.w3.org/2000/svg"}  # a name, not an address
+    assert set(re.findall(r"https?://[^\s\"'<]+", pendulum)) == {
+        "http://www.w3.org/2000/svg",
+        "http://www.w3.org/1998/Math/MathML",
+    }  # names, not addresses
     assert "default-src 'none'" in pendulum
     assert re.findall(r'(?:src|href)="([^"]*)"', pendulum) == ["data:,"]
     assert not re.search(r"@import|url\(|fetch\(|XMLHttpRequest|import\(|localStorage", pendulum)
@@ -76,6 +82,83 @@ def test_text_of_a_graph_stays_text():
     assert not any(f"<{letter}>" in text for letter in "iusqac")
     assert "</script><b>" not in text
     assert data_of(text)["versions"][0]["outputs"][0][0] == "<u>"
+
+
+HOSTILE = [
+    "</script><script>alert(1)</script>",
+    'x"onpointerover="alert(1)',
+    "x'onload='alert(1)",
+    "<img/src=x/onerror=alert(1)>",
+    "{tables}",
+    "{title}",
+    "$tables",
+    "<!--",
+    "]]>",
+    "&lt;b&gt;",
+    "javascript:alert(1)",
+]
+
+
+class Elements(HTMLParser):
+    """The elements of a page with their attributes, and the texts inside each kind."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.texts: dict[str, list[str]] = {}
+        self._open: list[str] = []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, name: str, attributes: list[tuple[str, str | None]]) -> None:
+        self.elements.append((name, dict(attributes)))
+        if name not in ("meta", "link", "input", "br", "img"):
+            self._open.append(name)
+            self.texts.setdefault(name, []).append("")
+
+    def handle_endtag(self, name: str) -> None:
+        while self._open and self._open.pop() != name:
+            pass
+
+    def handle_data(self, data: str) -> None:
+        if self._open:
+            self.texts[self._open[-1]][-1] += data
+
+
+def hostile_page(text: str) -> str:
+    name = text.replace(" ", "_")
+    x = cg.variable(name)
+    with cg.tag(text):
+        node = cg.with_name(cg.sin(x) * 2.0, text)
+    graph = cg.Graph([x], {text: node})
+    tables = [Table(text, [text, text], [[text, text]])]
+    return viz.page([Version(text, graph, text, [node]), Version("b", graph)], title=text, about=text, tables=tables)
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_no_text_of_a_graph_becomes_markup_or_script(text):
+    plain = Elements(viz.page(cg.Graph([], {"y": 1.0}), tables=[Table("c", ["a", "b"], [["c", "d"]])]))
+    page = hostile_page(text)
+    found = Elements(page)
+    assert [name for name, _ in found.elements] == [name for name, _ in plain.elements]
+    assert not [key for _, attributes in found.elements for key in attributes if key.startswith("on")]
+    assert found.texts["title"] == found.texts["h1"] == [text]
+    assert found.texts["caption"] == [text]
+    assert found.texts["td"] == [text, text]
+    assert data_of(page)["versions"][0]["names"]["0"][0] == text.replace(" ", "_")
+
+
+def test_the_policy_lets_no_script_and_no_style_run_but_the_page_s_own(pendulum):
+    found = Elements(pendulum)
+    (policy,) = [each["content"] for name, each in found.elements if "http-equiv" in each]
+    assert "unsafe" not in policy
+    run = [text for text in found.texts["script"] if not text.startswith("{")]  # the data are no script
+    assert len(run) == len(found.texts["style"]) == 1
+    for kind, (text,) in (("script", run), ("style", found.texts["style"])):
+        digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+        assert f"{kind}-src 'sha256-{digest}'" in policy
+    assert not re.search(r"(inner|outer|insertAdjacent)HTML|document\.write|\beval\(|new Function", scripts())
+    assert not any(key.startswith("on") or key == "style" for _, attributes in found.elements for key in attributes)
 
 
 def test_a_notebook_shows_it_in_a_frame():
@@ -280,6 +363,32 @@ def test_the_spurious_branch_is_seen_at_once_and_gone_by_the_chain_rule(opened):
     opened.keyboard.press("3")
     assert opened.locator(".item.wrong").count() == 0
     assert opened.locator("#results td.off").count() > 0  # the others' torques, beside it
+
+
+def test_hostile_names_stay_texts_in_the_browser(browser, tmp_path):
+    """Every panel is filled, wide and narrow, light and dark; nothing runs, and the policy has nothing to refuse."""
+    said = []
+    page = browser.new_page()
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("dialog", lambda dialog: (said.append(dialog.message), dialog.dismiss()))
+    for text, width, scheme in ((HOSTILE[0], 1400, "light"), (HOSTILE[1], 390, "dark"), (HOSTILE[3], 390, "light")):
+        (tmp_path / "page.html").write_text(hostile_page(text), encoding="utf-8")
+        page.set_viewport_size({"width": width, "height": 800})
+        page.emulate_media(color_scheme=scheme)
+        page.goto((tmp_path / "page.html").as_uri())
+        page.click("#unfold")
+        for group in page.locator("g.item").all():
+            group.dispatch_event("click")
+            group.dispatch_event("pointerover")
+        assert page.locator("#node math mi, #node math msub").count() > 0
+        assert text in page.locator("#why").text_content() + page.locator("#node").text_content()
+        assert page.locator("#inputs td").first.text_content() == text
+        assert page.locator("#results th").nth(1).text_content() == text
+        assert page.locator("img, body script:not([type]) ~ script, [onpointerover], [onload], [onerror]").count() == 0
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth + 1")
+    page.close()
+    assert said == []
 
 
 def test_clusters_fold_and_unfold(opened):

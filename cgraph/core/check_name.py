@@ -1,0 +1,56 @@
+"""What may be a name: one rule for variables, outputs, operations, tags, and for what models call by a name."""
+
+from __future__ import annotations
+
+LONGEST = 1000  # characters; a derived name, such as that of a second derivative, still fits
+
+
+def check_name(what: str, name: str, *, spaces: bool = True) -> str:
+    r"""The name, if it is one: printable text that a listing, a drawing, a page and a pickle show as it is.
+
+    Names are labels: generated code numbers its identifiers, so a name may be a keyword, a formula or a word of any
+    language. What would change a text around it is refused: line breaks and other control characters, characters
+    without a glyph (which make two names look alike), and halves of surrogate pairs, which no file can hold.
+
+    Parameters
+    ----------
+    what : str
+        Whose name it is, as the error begins: "a joint".
+    name : str
+        From 1 to 1000 printable characters.
+    spaces : bool
+        Whether it may contain spaces.
+
+    Returns
+    -------
+    str
+        The name.
+
+    Raises
+    ------
+    TypeError
+        If it is not a string.
+    ValueError
+        If it is empty, too long, or has a character that is refused.
+
+    Examples
+    --------
+    >>> from cgraph.extend import check_name
+    >>> check_name("a joint", "left elbow")
+    'left elbow'
+    >>> check_name("a joint", "left\nelbow")
+    Traceback (most recent call last):
+    ValueError: the name of a joint must be printable, got '\n' in 'left\nelbow'
+    """
+    if not isinstance(name, str):
+        raise TypeError(f"the name of {what} must be a string, got {type(name).__name__}: {name!r:.60}")
+    if not name:
+        raise ValueError(f"the name of {what} must not be empty")
+    if len(name) > LONGEST:
+        raise ValueError(f"the name of {what} must have at most {LONGEST} characters, got {len(name)}: {name!r:.60}")
+    if not name.isprintable():
+        first = next(character for character in name if not character.isprintable())
+        raise ValueError(f"the name of {what} must be printable, got {first!r} in {name!r:.60}")
+    if not spaces and " " in name:
+        raise ValueError(f"the name of {what} must be without white space, got {name!r:.60}")
+    return str(name)
