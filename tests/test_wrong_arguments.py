@@ -107,7 +107,7 @@ def test_what_needs_a_graph_says_so_and_where_a_model_has_one(function, more):
 GRAPH = cg.Graph([X], {"y": cg.sin(X)})
 SCENE = (ARM, (0.0,), (0.0,), 1.0)
 CASES = {
-    "values no mapping": (lambda: GRAPH.evaluate([1.0]), "values must be a mapping"),
+    "values no mapping": (lambda: GRAPH.evaluate([1.0]), "evaluate takes a mapping"),
     "wrt empty": (lambda: cg.gradient(GRAPH, wrt=[]), "wrt must name at least one input"),
     "wrt a number": (lambda: cg.jvp(GRAPH, wrt=3), "wrt must name inputs"),
     "a chain too long": (lambda: dyn.scenes.load("chain", n=10**12), "more than can be derived"),

@@ -8,6 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..core.graph import Graph, require_graph
 from .compiled import Compiled
 from .llvm_engine import MissingFunctionError
@@ -49,9 +51,10 @@ def compile(
         column.
     cache : bool or path
         Keep machine code on disk for the next process, and read it from there: True, in the platform's folder for
-        caches (`$XDG_CACHE_HOME/cgraph`, `~/.cache/cgraph`, ...), or the path of a folder that nobody else can write
-        to. An entry is identified by the code's text, the processor and the version of LLVM; a damaged one is made
-        anew. A folder that cannot be written gives a RuntimeWarning. `clear_cache` empties it; nothing else does.
+        caches (`$XDG_CACHE_HOME/cgraph`, `~/.cache/cgraph`, ...), or the path of a folder, `~` the home, that nobody
+        else can write to. An entry is identified by the code's text, the processor and the version of LLVM; a damaged
+        one is made anew. A folder that cannot be written gives a RuntimeWarning. `clear_cache` empties it; nothing
+        else does.
 
     Returns
     -------
@@ -61,7 +64,7 @@ def compile(
     Raises
     ------
     TypeError
-        For what is no Graph, or a cache that is neither True, False nor a path.
+        For what is no Graph, `fast` or `fma` that are neither True nor False, or a cache that is no path either.
     ValueError
         For an unknown backend.
     ImportError
@@ -80,7 +83,7 @@ def compile(
     if backend not in BACKENDS:
         raise ValueError(f"backend must be one of {', '.join(BACKENDS)}, got {backend!r}")
     require_graph("compile", graph)
-    options = {"fast": fast, "fma": fma, "cache": _place(cache)}
+    options = {"fast": _choice("fast", fast), "fma": _choice("fma", fma), "cache": _place(cache)}
     if backend == "llvm" or (backend == "auto" and len(graph.nodes) <= LARGE):
         try:
             return Native(graph, backend, options)
@@ -90,13 +93,19 @@ def compile(
     return Generated(graph, backend, options)
 
 
+def _choice(name: str, value: bool) -> bool:
+    if not isinstance(value, (bool, np.bool_)):
+        raise TypeError(f"{name} must be True or False, got {value!r:.60}")
+    return bool(value)
+
+
 def _place(cache: bool | str | os.PathLike[str]) -> bool | str:
     """The choice of a cache in words that hold in another folder and another process."""
-    if isinstance(cache, bool):
-        return cache
+    if isinstance(cache, (bool, np.bool_)):
+        return bool(cache)
     if not isinstance(cache, (str, os.PathLike)) or not os.fspath(cache):
-        raise TypeError(f"cache must be True, False or the path of a folder, got {cache!r}")
-    return str(Path(cache).absolute())
+        raise TypeError(f"cache must be True, False or the path of a folder, got {cache!r:.60}")
+    return str(Path(cache).expanduser().absolute())
 
 
 def _recipe(function: Compiled) -> Any:

@@ -81,7 +81,7 @@ def clear_cache(folder: str | os.PathLike[str] | None = None) -> int:
     >>> cg.clear_cache("a folder without code")
     0
     """
-    place = default_folder() if folder is None else Path(folder)
+    place = default_folder() if folder is None else Path(folder).expanduser()
     name = "[0-9a-f]" * 64
     entries = list(place.glob(f"{name}{SUFFIX}"))
     unfinished = place.glob(f"{name}.*{UNFINISHED}")  # left by a process that was killed

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from ..core.graph import Graph
 from ..core.node import CONSTANT, VARIABLE, Node
-from .schedule import Joined, joined_calls, schedule
+from .parts import Parts
+from .schedule import Joined, joined_calls, needed, schedule
 from .vector_math import helpers
 
-BLOCK = 1024  # nodes in a basic block: some of LLVM's passes cost more than proportionally in the length of one
 TOGETHER = 4  # arguments in a joined call at one point: a vector of them is one register or two on every processor
 
 # Lines that compute, under a name, the address of row k of the inputs ("x") or outputs ("y"): (base, name, k) -> lines
@@ -67,9 +67,10 @@ def point_arithmetic(flags: str) -> Arithmetic:
 def scalar_ir(graph: Graph, flags: str = "") -> str:
     """A module with `void point(double *x, double *y)`: the outputs y at the inputs x."""
     arithmetic = point_arithmetic(flags)
-    lines = ["define void @point(ptr noalias %x, ptr noalias %y) nounwind {", "start:"]
-    lines += body(graph, arithmetic, _element)
-    return "\n".join([*preamble([graph], arithmetic), *lines, "  ret void", "}", ""])
+    written = body(graph, arithmetic, _element, "point", ["ptr %x", "ptr %y"])
+    lines = [*preamble([graph], arithmetic), *written.functions]
+    lines += ["define void @point(ptr noalias %x, ptr noalias %y) nounwind {", "start:"]
+    return "\n".join([*lines, *written.start, *written.lines, "  ret void", "}", ""])
 
 
 def _element(base: str, name: str, row: int) -> list[str]:
@@ -82,13 +83,16 @@ def batch_ir(graph: Graph, lanes: int, flags: str = "") -> str:
     Row i of x begins at x + i * x_stride, and likewise for y; n columns, a positive multiple of `lanes`, are read.
     """
     arithmetic = Arithmetic(flags, lanes)
+    written = body(graph, arithmetic, _row, "batch", ["ptr %x", "ptr %y", "i64 %dx", "i64 %dy", "i64 %i"])
     lines = [
+        *written.functions,
         "define void @batch(ptr noalias %x, ptr noalias %y, i64 %n, i64 %dx, i64 %dy) nounwind {",
         "start:",
+        *written.start,
         "  br label %columns",
         "columns:",
         "  %i = phi i64 [ 0, %start ], [ %next, %last ]",
-        *body(graph, arithmetic, _row),
+        *written.lines,
         "  br label %last",
         "last:",
         f"  %next = add i64 %i, {lanes}",
@@ -138,8 +142,23 @@ def declarations(functions: Mapping[str, int]) -> list[str]:
     ]
 
 
-def body(graph: Graph, arithmetic: Arithmetic, address: Address) -> list[str]:
-    """Every node in the order of `schedule`; an output is stored as soon as it is known."""
+class Body(NamedTuple):
+    """The instructions that compute a graph.
+
+    start: what stands once at the start of the function.  lines: the rest, which may be in a loop.
+    functions: that they call, for a long graph.
+    """
+
+    start: list[str]
+    lines: list[str]
+    functions: list[str]
+
+
+def body(graph: Graph, arithmetic: Arithmetic, address: Address, name: str, scope: Sequence[str]) -> Body:
+    """Every node in the order of `schedule`; an output is stored as soon as it is known.
+
+    name: of the function.  scope: what the addresses are made from, each with its type.
+    """
     words, t = arithmetic.words(), arithmetic.type
     stored: dict[Node, list[int]] = {}
     for row, node in enumerate(graph.outputs.values()):
@@ -147,35 +166,68 @@ def body(graph: Graph, arithmetic: Arithmetic, address: Address) -> list[str]:
     rows = {node: row for row, node in enumerate(graph.inputs)}
     calls = _joined_calls(graph, arithmetic)
     prefix = f"lanes{arithmetic.lanes}." if arithmetic.lanes > 1 else ""
-    names: dict[Node | Joined, str] = {}
-    lines: list[str] = []
+    steps = schedule(graph, calls)
+    parts = Parts(steps, calls, t, 8 * arithmetic.lanes)
+    if parts.starts:
+        steps = list(_results_behind_calls(steps, calls))
+        parts = Parts(steps, calls, t, 8 * arithmetic.lanes)
+    written: list[list[str]] = [[]]
 
-    for number, step in enumerate(schedule(graph, calls)):
-        r = names[step] = f"%v{number}"
-        if number and number % BLOCK == 0:
-            lines += [f"  br label %block{number}", f"block{number}:"]
+    for number, step in enumerate(steps):
+        r, lines = f"%v{number}", written[-1]
+        if number in parts.starts:
+            parts.begin()
+            written.append(lines := [])
+        args, loads = parts.read(needed(step, calls))
+        lines += loads
         if isinstance(step, Joined):
-            lines += _call(step, r, [names[arg] for arg in step.arguments], arithmetic)
-            continue
-        node, args = step, [names[arg] for arg in step.args]
-        if node.op is CONSTANT:
-            assert node.value is not None
-            names[node] = arithmetic.number(node.value)
-        elif node.op is VARIABLE:
-            lines += address("x", f"%x{number}", rows[node])
+            lines += _call(step, r, args, arithmetic)
+        elif step.op is CONSTANT:
+            assert step.value is not None
+            r = arithmetic.number(step.value)
+        elif step.op is VARIABLE:
+            lines += address("x", f"%x{number}", rows[step])
             lines.append(f"  {r} = load {t}, ptr %x{number}, align 8")
-        elif node.op.llvm:
-            call = f"@{prefix}{node.op.library}"
-            lines += [f"  {line.format(*args, r=r, call=call, **words)}" for line in node.op.llvm]
-        elif node in calls:
-            names[node], more = _result(node, calls[node], r, names[calls[node]], arithmetic)
+        elif step in calls:
+            r, more = _result(step, calls[step], r, args[0], arithmetic)
             lines += more
+        elif step.op.llvm:
+            call = f"@{prefix}{step.op.library}"
+            lines += [f"  {line.format(*args, r=r, call=call, **words)}" for line in step.op.llvm]
         else:
-            lines.append(f"  {r} = call {t} @{prefix}{node.op.library}({', '.join(f'{t} {arg}' for arg in args)})")
-        for row in stored.get(node, ()):
+            lines.append(f"  {r} = call {t} @{prefix}{step.op.library}({', '.join(f'{t} {arg}' for arg in args)})")
+        lines += parts.write(number, step, r)
+        for row in stored.get(step, ()) if isinstance(step, Node) else ():
             lines += address("y", f"%y{row}", row)
-            lines.append(f"  store {t} {names[node]}, ptr %y{row}, align 8")
-    return lines
+            lines.append(f"  store {t} {r}, ptr %y{row}, align 8")
+    return _in_functions(written, name, scope, f"[{parts.places} x {t}]")
+
+
+def _in_functions(written: Sequence[list[str]], name: str, scope: Sequence[str], memory: str) -> Body:
+    """The parts as functions, and their calls; one part stays as it is."""
+    if len(written) == 1:
+        return Body([], written[0], [])
+    names = [f"@{name}.part{k}" for k in range(len(written))]
+    values = [*scope, "ptr %w"]
+    parameters = ", ".join([each.replace("ptr ", "ptr noalias ") for each in values])
+    functions: list[str] = []
+    for function, lines in zip(names, written, strict=True):
+        functions += [f"define internal void {function}({parameters}) nounwind noinline {{", "start:"]
+        functions += [*lines, "  ret void", "}"]
+    calls = [f"  call void {function}({', '.join(values)})" for function in names]
+    return Body([f"  %w = alloca {memory}, align 64"], calls, functions)
+
+
+def _results_behind_calls(steps: Sequence[Node | Joined], calls: Mapping[Node, Joined]) -> Iterator[Node | Joined]:
+    """The steps, the nodes that a joined call gives right behind it."""
+    results: dict[Joined, list[Node]] = {}
+    for node, call in calls.items():
+        results.setdefault(call, []).append(node)
+    for step in steps:
+        if step not in calls:
+            yield step
+        if isinstance(step, Joined):
+            yield from results[step]
 
 
 def _vector(arithmetic: Arithmetic) -> Arithmetic:

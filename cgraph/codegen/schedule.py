@@ -32,7 +32,7 @@ def schedule(graph: Graph, calls: Mapping[Node, Joined]) -> list[Node | Joined]:
     stack: list[Node | Joined] = [*reversed(graph.outputs.values()), *reversed(early)]
     while stack:
         step = stack[-1]
-        missing = [each for each in reversed(_needed(step, calls)) if each not in done]
+        missing = [each for each in reversed(needed(step, calls)) if each not in done]
         if missing and step not in done:
             stack += sorted(missing, key=registers.__getitem__) if len(missing) > 1 else missing
             continue
@@ -43,7 +43,8 @@ def schedule(graph: Graph, calls: Mapping[Node, Joined]) -> list[Node | Joined]:
     return order
 
 
-def _needed(step: Node | Joined, calls: Mapping[Node, Joined]) -> tuple[Node | Joined, ...]:
+def needed(step: Node | Joined, calls: Mapping[Node, Joined]) -> tuple[Node | Joined, ...]:
+    """What a step reads: arguments, or the joined call that gives the node."""
     if isinstance(step, Joined):
         return step.arguments
     return (calls[step],) if step in calls else step.args

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import GraphError
+from ..util.real_arrays import real_array
 from .node import CONSTANT, VARIABLE, Node
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -24,13 +25,13 @@ def evaluate(
     not real.
     """
     if not isinstance(values, Mapping):
-        raise TypeError(f"values must be a mapping {{input: value}}, got {type(values).__name__}: {values!r:.60}")
+        raise TypeError(f"evaluate takes a mapping {{input: value}}, got {type(values).__name__}: {values!r:.60}")
     read = {name: _as_value(name, value) for name, value in values.items()}
     names = [str(node.name) for node in inputs]
     if missing := [name for name in names if name not in read]:
         raise GraphError(f"no value for input {', '.join(missing)}")
     if unknown := [name for name in read if name not in set(names)]:
-        raise GraphError(f"the graph has no input {', '.join(unknown)} (it has {', '.join(names) or 'none'})")
+        raise GraphError(f"the graph has no input {', '.join(map(str, unknown))} (it has {', '.join(names) or 'none'})")
     shape = _common_shape(read)
 
     last_use: dict[Node, Node] = {}
@@ -55,16 +56,22 @@ def evaluate(
                     if last_use[arg] is node and arg not in kept:
                         env.pop(arg, None)
     results = {name: env[node] for name, node in outputs.items()}
-    return results if shape is None else {name: _filled(value, shape) for name, value in results.items()}
+    if shape is None:
+        return results
+    taken = {id(value) for value in read.values()}  # arrays of others: inputs, and outputs of the same node
+    filled: dict[str, Value] = {}
+    for name, value in results.items():
+        filled[name] = np.array(value) if id(value) in taken else value
+        filled[name] = _filled(filled[name], shape)
+        taken.add(id(value))
+    return filled
 
 
 def _as_value(name: str, value: Any) -> Value:
     if type(value) is float:
         return value
-    array = np.asarray(value)
-    if array.dtype.kind not in "fiu" or array.dtype.itemsize > 8:
-        raise TypeError(f"input {name!r} must be a real number or an array of them, got {array.dtype}: {value!r:.60}")
-    return array.astype(np.float64) if array.ndim else float(array)
+    array = real_array(f"input {name!r}", value)
+    return array if array.ndim else float(array)
 
 
 def _common_shape(values: Mapping[str, Value]) -> tuple[int, ...] | None:

@@ -23,12 +23,8 @@ from .scope import current
 _INPUT = label(roles=frozenset({INPUT}))
 
 
-def _no_partials(*_: Node) -> tuple[Node | float, ...]:
-    return ()
-
-
 def _leaf(name: str) -> Op:
-    return Op(name, 0, float, float, _no_partials)
+    return Op(name, 0, float, float, lambda *_: ())
 
 
 VARIABLE = _leaf("variable")
@@ -206,11 +202,11 @@ class Node:
         return apply(OPS["round"], self)
 
     def __getattr__(self, name: str) -> Callable[..., Node]:
-        """The method that NumPy asks of each element of an array of objects, as in `np.sqrt(array)`."""
-        op = BY_UFUNC.get(getattr(np, name, None)) if not name.startswith("_") else None
-        if op is None:
-            raise AttributeError(f"a Node has no attribute {name!r}")
-        return partial(apply, op, self)
+        """The method that NumPy asks of the elements of an array of objects, as in `np.sqrt(array)`."""
+        ufunc = getattr(np, name, None)
+        if isinstance(ufunc, np.ufunc) and ufunc in BY_UFUNC:
+            return partial(apply, BY_UFUNC[ufunc], self)
+        raise AttributeError(f"a Node has no attribute {name!r}")
 
 
 Scalar = Node | float
@@ -239,7 +235,7 @@ def constant(value: float) -> Node:
     TypeError
         If it is not a real number.
     ValueError
-        If it is NaN.
+        If it is NaN or too large for float64.
 
     Examples
     --------
@@ -252,7 +248,10 @@ def constant(value: float) -> Node:
             value = value.item()
         if not isinstance(value, numbers.Real):
             raise TypeError(f"expected a Node or a real number, got {type(value).__name__}: {value!r:.60}")
-        value = float(value)
+        try:
+            value = float(value)
+        except OverflowError:
+            raise ValueError(f"a constant must fit float64, got {value!r:.20}...") from None
     if value != value:
         raise ValueError("a constant must not be NaN")
     key = (value, math.copysign(1.0, value))
@@ -340,6 +339,5 @@ def _binary(name: str, a: Scalar, b: Scalar) -> Node:
 def _elementwise(op: Op, *args: Any) -> Any:
     """A node; or an array of nodes, when an argument is an array with dimensions."""
     if any([isinstance(each, np.ndarray) and each.ndim for each in args]):
-        arrays = [np.asarray(each, dtype=object) for each in args]
-        return np.frompyfunc(lambda *each: apply(op, *each), op.arity, 1)(*arrays)
+        return np.frompyfunc(partial(apply, op), op.arity, 1)(*[np.asarray(each, dtype=object) for each in args])
     return apply(op, *[each.item() if isinstance(each, np.ndarray) else each for each in args])

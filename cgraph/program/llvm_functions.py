@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
-from ..codegen.llvm_ir import Arithmetic, body, libm_functions
+from ..codegen.llvm_ir import Address, Arithmetic, Body, body, libm_functions
 from ..core.graph import Graph
 from .lu_solve import factor_text, solve_text
 
@@ -36,8 +36,10 @@ class Functions:
             return [f"  {name} = getelementptr {self.arithmetic.type}, ptr %{_ARGUMENT[base]}{group}, i64 {k}"]
 
         def lines() -> list[str]:
-            return body(graph, self.arithmetic, address)
+            written = self._body(graph, self.arithmetic, address, scope)
+            return [*written.start, *written.lines]
 
+        scope = [*_pointers("in", inputs), *_pointers("out", outputs)]
         return self._define((id(graph), inputs, outputs), "call", lines, len(inputs), len(outputs))
 
     def map(self, graph: Graph, inputs: Lengths, count: int) -> str:
@@ -49,8 +51,9 @@ class Functions:
             return [f"  {name} = getelementptr {t}, ptr %{_ARGUMENT[base]}{row}, i64 {'%i' if moves else 0}"]
 
         def lines() -> list[str]:
-            return _loop(body(graph, self.arithmetic, address), [], count)
+            return _loop(self._body(graph, self.arithmetic, address, scope), [], count)
 
+        scope = [*_pointers("in", inputs), *_pointers("out", graph.outputs), "i64 %i"]
         in_vectors = self.arithmetic.lanes == 1 and self.width > 1 and count > 1 and not libm_functions(graph)
         chosen = self._map_in_vectors(graph, inputs, count) if in_vectors else lines
         return self._define(("map", id(graph), inputs, count), "map", chosen, len(inputs), len(graph.outputs))
@@ -75,8 +78,10 @@ class Functions:
                     f"  %all{k} = shufflevector {t} %first{k}, {t} poison, <{self.width} x i32> zeroinitializer",
                     f"  store {t} %all{k}, ptr %same{k}, align 64",
                 ]
-            return [*spread, *_loop(body(graph, arithmetic, address), [], -(-count // self.width))]
+            return [*spread, *_loop(self._body(graph, arithmetic, address, scope), [], -(-count // self.width))]
 
+        scope = [*_pointers("in", inputs), *_pointers("out", graph.outputs), "i64 %i"]
+        scope += [f"ptr %same{k}" for k in scalars]
         return lines
 
     def sum(self, graph: Graph, inputs: Lengths, count: int) -> str:
@@ -98,9 +103,10 @@ class Functions:
             return [
                 f"  %one = alloca {t}, align 64",
                 f"  store {t} {self.arithmetic.number(0.0)}, ptr %out0, align 8",
-                *(_loop(body(graph, self.arithmetic, address), add, count) if count else []),
+                *(_loop(self._body(graph, self.arithmetic, address, scope), add, count) if count else []),
             ]
 
+        scope = [*_pointers("in", inputs), "ptr %one", "i64 %i"]
         return self._define(("sum", id(graph), inputs, count), "sum", lines, len(inputs), 1)
 
     def factor(self) -> str:
@@ -111,6 +117,12 @@ class Functions:
         """The solution of A x = b in place of b, see `lu_solve.solve_text`."""
         return self._define_text("lu.solve", solve_text)
 
+    def _body(self, graph: Graph, arithmetic: Arithmetic, address: Address, scope: Sequence[str]) -> Body:
+        """The body of the function that is being defined, those that it calls defined before."""
+        written = body(graph, arithmetic, address, next(reversed(self._names.values())), scope)
+        self.definitions += written.functions
+        return written
+
     def _define(
         self, key: tuple[object, ...], kind: str, lines: Callable[[], list[str]], inputs: int, outputs: int
     ) -> str:
@@ -120,7 +132,8 @@ class Functions:
             arguments = [*(f"ptr noalias %in{k}" for k in range(inputs))]
             arguments += [f"ptr noalias %out{k}" for k in range(outputs)]
             head = f"define internal void @{name}({', '.join(arguments)}) nounwind {{"
-            self.definitions += [head, "start:", *lines(), "  ret void", "}"]
+            inner = lines()  # which may define functions of its own
+            self.definitions += [head, "start:", *inner, "  ret void", "}"]
         return self._names[key]
 
     def _define_text(self, name: str, text: Callable[[str], Sequence[str]]) -> str:
@@ -130,13 +143,18 @@ class Functions:
         return name
 
 
-def _loop(lines: list[str], after: list[str], count: int) -> list[str]:
-    """The lines, which may hold blocks, and those after them for %i = 0 .. count - 1."""
+def _pointers(name: str, registers: Iterable[object]) -> list[str]:
+    return [f"ptr %{name}{k}" for k, _ in enumerate(registers)]
+
+
+def _loop(written: Body, after: list[str], count: int) -> list[str]:
+    """The body, which may hold blocks, and the lines after it for %i = 0 .. count - 1."""
     return [
+        *written.start,
         "  br label %each",
         "each:",
         "  %i = phi i64 [ 0, %start ], [ %next, %last ]",
-        *lines,
+        *written.lines,
         "  br label %last",
         "last:",
         *after,

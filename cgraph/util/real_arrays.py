@@ -31,7 +31,7 @@ def real_array(what: str, value: Any) -> Array:
     TypeError
         If there are complex numbers (their imaginary part would be lost), text, dates, or masked values.
     ValueError
-        If rows have different lengths.
+        If rows have different lengths, or a number is too large for float64.
 
     Examples
     --------
@@ -44,19 +44,24 @@ def real_array(what: str, value: Any) -> Array:
     """
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value
-    if np.ma.is_masked(value):
+    if np.ma.is_masked(value) or (isinstance(value, list | tuple) and any([each is np.ma.masked for each in value])):
         raise TypeError(f"{what} must be real numbers, got an array with masked values")
     try:
         array = np.asarray(value)
     except ValueError:
         raise ValueError(f"{what} must be an array of real numbers, got rows of different lengths") from None
+    except OverflowError:
+        raise ValueError(f"{what} must be real numbers, got one that is too large for float64") from None
     if array.dtype.kind == "O":
         bad = next((item for item in array.ravel() if not isinstance(item, numbers.Real)), None)
         if bad is not None or None in array.ravel().tolist():
             raise TypeError(f"{what} must be real numbers, got {type(bad).__name__}: {bad!r:.60}")
     elif array.dtype.kind not in "biuf":
         raise TypeError(f"{what} must be real numbers, got {_KINDS.get(array.dtype.kind, str(array.dtype))}")
-    return array.astype(np.float64)
+    try:
+        return array.astype(np.float64)
+    except OverflowError:
+        raise ValueError(f"{what} must be real numbers, got one that is too large for float64") from None
 
 
 def real_number(what: str, value: Any) -> float:
@@ -78,6 +83,8 @@ def real_number(what: str, value: Any) -> float:
     ------
     TypeError
         If it is anything but a real number.
+    ValueError
+        If it is too large for float64.
 
     Examples
     --------
@@ -89,4 +96,7 @@ def real_number(what: str, value: Any) -> float:
         value = value.item()
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         raise TypeError(f"{what} must be a number, got {type(value).__name__}: {value!r:.60}")
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError:
+        raise ValueError(f"{what} must be a number, got one that is too large for float64") from None

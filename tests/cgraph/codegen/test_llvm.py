@@ -12,9 +12,10 @@ import pytest
 from hypothesis import given, settings
 
 import cgraph as cg
+from cgraph.codegen import parts
+from cgraph.codegen.llvm_ir import scalar_ir
 from cgraph.core.node import OPS, apply
 from tests.strategies import cases
-from tests.tolerances import EQUATIONS
 from tests.ulps import same, ulps_apart
 
 pytest.importorskip("llvmlite")
@@ -137,14 +138,37 @@ def test_a_graph_of_constants_has_no_inputs():
     assert function.batch(np.empty((0, 3))).shape == (2, 3)
 
 
-def test_a_graph_of_several_blocks():
+def long_chain(count):
+    """Calls one behind another, and values that live across all of them."""
     x = node = cg.variable("x")
-    for k in range(2000):
-        node = node * 0.9995 + cg.sin(x) if k % 50 == 0 else node * 0.9995 + 0.01
-    graph = cg.Graph([x], {"y": node})
+    early = [cg.cos(x * float(k)) for k in range(5)]
+    for k in range(count):
+        node = cg.sin(node) * 0.9 + early[k % 5] if k % 2 else node * 0.9995 + cg.exp(-node * node)
+    return cg.Graph([x], {"first": early[0], "y": node, "x": x, "sum": sum(early, node)})
+
+
+def test_a_graph_of_several_parts(monkeypatch):
+    """The bits are those of one function, at a point, in batches and in loops."""
+    graph, points = long_chain(60), np.linspace(0.1, 0.9, 11)[None]
+    whole = {fma: cg.compile(graph, "llvm", fma=fma) for fma in (False, True)}
+    repeated = cg.loop(graph, {"x": "y"}, "llvm")([0.7], 3)
+    monkeypatch.setattr(parts, "STEPS", 7)
+    for fma, function in whole.items():
+        divided = cg.compile(graph, "llvm", fma=fma)
+        assert "part9" in divided.source
+        assert "part9" in divided.batch_source()
+        assert same(divided([0.7]), function([0.7]))
+        assert same(divided.batch(points), function.batch(points))
     assert same(cg.compile(graph, "llvm", fma=False)([0.7]), evaluated(graph, [0.7]))
-    function = cg.compile(graph, "llvm")
-    assert abs(function.batch([[0.7] * 9])[0, 4] / function([0.7])[0] - 1) < EQUATIONS  # 2000 roundings
+    assert same(cg.loop(graph, {"x": "y"}, "llvm")([0.7], 3), repeated)
+
+
+@pytest.mark.parametrize("count", [1000, 4000])
+def test_no_function_grows_with_the_graph(count):
+    """On some graphs LLVM's time is quadratic in the length of a function."""
+    functions = scalar_ir(long_chain(count)).split("define ")[1:]
+    assert max(len(function.splitlines()) for function in functions) < 4 * parts.STEPS
+    assert len(functions) > count // parts.STEPS
 
 
 def test_fast_arithmetic_keeps_infinities_and_nan():

@@ -92,11 +92,9 @@ def test_shapes_that_do_not_broadcast_are_listed():
         GRAPH.evaluate({"x": np.ones(2), "y": np.ones(3)})
 
 
-@pytest.mark.parametrize(
-    "wrong", [1j, np.ones(2) * 1j, "1.0", None, True, [True], np.array(["a"]), [None], x, np.longdouble(1), object()]
-)
+@pytest.mark.parametrize("wrong", [1j, np.ones(2) * 1j, "1.0", None, np.array(["a"]), [None], x, object()])
 def test_a_value_that_is_not_real_is_an_error(wrong):
-    with pytest.raises(TypeError, match="input 'x' must be a real number"):
+    with pytest.raises(TypeError, match="input 'x' must be real numbers, got"):
         GRAPH.evaluate({"x": wrong, "y": 1.0})
 
 
