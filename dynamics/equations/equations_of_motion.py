@@ -7,7 +7,18 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, SingularError, building, cotangents, hessian_nodes, ldl_solve, solve_nodes
+from cgraph.extend import (
+    Builder,
+    SingularError,
+    building,
+    cotangents,
+    hessian_nodes,
+    ldl_solve,
+    real_array,
+    require_choice,
+    require_flag,
+    solve_nodes,
+)
 
 from ..systems.model import Model, as_system
 from ..systems.system import BodySystem, System
@@ -258,8 +269,8 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
     >>> dyn.forward_dynamics(block).evaluate({"q0": 0.0, "qd0": 2.0, "tau0": 9.0})
     {'qdd0': 2.0}
     """
-    if method not in SOLUTIONS:
-        raise ValueError(f"method must be one of {', '.join(SOLUTIONS)}, got {method!r}")
+    require_choice("method", method, SOLUTIONS)
+    require_flag("check", check)
     return shorter_form(as_system(model), lambda system: accelerations(system, method, check))
 
 
@@ -305,11 +316,13 @@ def raise_if_singular(model: Model, info: ArrayLike) -> None:
     ...     print(error)
     the mass matrix is not positive definite: coordinate 'x' has an inertia that is not positive
     """
-    values = np.asarray(info)
+    values, names = real_array("info", info), as_system(model).coordinates
     failed = np.argwhere(values != 0.0)
     if len(failed):
         at = tuple(failed[0].tolist())
-        name = as_system(model).coordinates[int(values[at]) - 1]
+        if values[at] not in range(1, len(names) + 1):
+            raise ValueError(f"info must be 0, or from 1 to {len(names)} for a coordinate, got {values[at]:g}")
+        name = names[int(values[at]) - 1]
         where = f" at state {', '.join(map(str, at))}" if at else ""
         raise SingularMassMatrixError(
             f"the mass matrix is not positive definite{where}: coordinate {name!r} has an inertia that is not positive"

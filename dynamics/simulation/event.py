@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any
 
 from cgraph import Node
@@ -74,7 +75,7 @@ class Event:
                 f"{self.name!r:.40}, {self.value!r:.40} and {self.terminal!r:.40}"
             )
         check_name("an event", self.name)
-        if self.direction not in (-1, 0, 1):
+        if not isinstance(self.direction, Integral) or self.direction not in (-1, 0, 1):
             raise ValueError(f"event {self.name!r}: direction must be 1, -1 or 0, got {self.direction!r}")
         if self.reset is not None and not callable(self.reset):
             raise TypeError(f"event {self.name!r}: reset must be a function, got {self.reset!r:.40}")

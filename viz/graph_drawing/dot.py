@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 from cgraph import Edge, Graph, Node
-from cgraph.extend import require_graph
+from cgraph.extend import require_choice, require_flag, require_graph, require_mapping, require_sequence
 
 from .. import theme
 from ..theme import Paint
@@ -90,15 +90,18 @@ def to_dot(
     ['n0 -> n1', 'n1 -> o0']
     """
     require_graph("to_dot", graph)
-    if rankdir not in DIRECTIONS:
-        raise ValueError(f"rankdir must be one of {', '.join(DIRECTIONS)}, got {rankdir!r}")
+    require_choice("rankdir", rankdir, DIRECTIONS)
+    require_flag("legend", legend)
+    for what, text in (("caption", "" if caption is None else caption), ("marked_label", marked_label)):
+        if not isinstance(text, str):
+            raise TypeError(f"{what} must be text, got {type(text).__name__}: {text!r:.60}")
     plan = plan_of(
         graph,
-        names or {},
+        {} if names is None else require_mapping("names", names, "name: text"),
         _marks(marked, marked_label),
-        frozenset(marked_edges),
+        frozenset(require_sequence("marked_edges", marked_edges, "edges")),
         _cluster_rule(clusters),
-        tuple(collapse),
+        require_sequence("collapse", collapse, "tags"),
     )
     drawing = digraph(rankdir)
     if caption is not None:
@@ -117,7 +120,8 @@ def _marks(marked: Collection[Node] | Mapping[str, Collection[Node]], words: str
     if len(groups) > len(theme.MARKS):
         raise ValueError(f"marked nodes come in at most {len(theme.MARKS)} groups, got {len(groups)}")
     marks: dict[Node, Paint] = {}
-    for paint, (group, nodes) in zip(theme.MARKS, groups.items(), strict=False):
+    for paint, (group, given) in zip(theme.MARKS, groups.items(), strict=False):
+        nodes = require_sequence("marked", given, "nodes")
         if both := [node for node in nodes if node in marks]:
             raise ValueError(f"{len(both)} marked nodes are in both groups, such as {both[0]!r}")
         marks |= dict.fromkeys(nodes, replace(paint, words=group))
@@ -135,9 +139,9 @@ def _only(tags: Collection[str]) -> str | None:
 
 
 def _cluster_rule(clusters: bool | Sequence[str] | ClusterRule) -> ClusterRule:
-    if callable(clusters):
+    if callable(clusters) and not isinstance(clusters, type):
         return clusters
     if isinstance(clusters, bool):
         return main_tag if clusters else lambda node: None
-    chosen = frozenset([clusters] if isinstance(clusters, str) else clusters)
+    chosen = frozenset([clusters] if isinstance(clusters, str) else require_sequence("clusters", clusters, "tags"))
     return lambda node: _only(node.tags & chosen)
