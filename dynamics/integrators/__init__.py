@@ -1,11 +1,13 @@
 """Integrators: methods for xdot = f(x, t), as programs over the graphs of a model."""
 
-from functools import partial
+from functools import cache, partial
 
+from .composition import COMPOSITIONS, Composition
 from .dop853 import DOP853
 from .explicit import explicit
 from .method import Method
 from .momentum_graphs import Mechanics, mechanics
+from .partitioned_tableau import PARTITIONED, Partitioned, gauss
 from .problem import (
     Problem,
     derive,
@@ -20,8 +22,11 @@ from .problem import (
 from .radau import ORDER as RADAU_ORDER, radau
 from .rosenbrock import RODAS5P, rosenbrock
 from .step_control import embedded
-from .symplectic import PARTITIONED, Partitioned, partitioned
+from .symplectic import composed, partitioned
 from .tableau import TABLEAUS, Tableau
+from .taylor import ORDER as TAYLOR_ORDER, taylor
+
+MOST_STAGES = 12  # of Gauss's methods: order 24, beyond which float64 gains nothing
 
 
 def runge_kutta(tableau: Tableau) -> Method:
@@ -35,13 +40,42 @@ def _symplectic(method: Partitioned) -> Method:
     return Method(method.order, lambda problem, _: partitioned(method, problem), adaptive=False)
 
 
-METHODS: dict[str, Method] = {
-    **{name: runge_kutta(tableau) for name, tableau in TABLEAUS.items()},
-    "dop853": runge_kutta(DOP853),
-    "rodas": Method(RODAS5P.order, partial(rosenbrock, RODAS5P), adaptive=True, degree=len(RODAS5P.dense) + 1),
-    "radau": Method(RADAU_ORDER, radau, adaptive=True, degree=3),
-    **{name: _symplectic(method) for name, method in PARTITIONED.items()},
-}
+def _composition(composition: Composition) -> Method:
+    return Method(composition.order, lambda problem, _: composed(composition, problem), adaptive=False)
+
+
+class Methods(dict[str, Method]):
+    """Methods by name: those that are listed, and "gauss<2 s>" for any number s of stages up to `MOST_STAGES`."""
+
+    def __missing__(self, name: str) -> Method:
+        if not _names_gauss(name):
+            raise KeyError(name)
+        return _gauss(int(name.removeprefix("gauss")) // 2)
+
+    def __contains__(self, name: object) -> bool:
+        return super().__contains__(name) or (isinstance(name, str) and _names_gauss(name))
+
+
+@cache
+def _gauss(stages: int) -> Method:
+    return _symplectic(gauss(stages))
+
+
+def _names_gauss(name: str) -> bool:
+    return name in [f"gauss{2 * stages}" for stages in range(1, MOST_STAGES + 1)]
+
+
+METHODS: dict[str, Method] = Methods(
+    {
+        **{name: runge_kutta(tableau) for name, tableau in TABLEAUS.items()},
+        "dop853": runge_kutta(DOP853),
+        "rodas": Method(RODAS5P.order, partial(rosenbrock, RODAS5P), adaptive=True, degree=len(RODAS5P.dense) + 1),
+        "radau": Method(RADAU_ORDER, radau, adaptive=True, degree=3),
+        "taylor": Method(TAYLOR_ORDER, partial(taylor, TAYLOR_ORDER), adaptive=True, degree=TAYLOR_ORDER),
+        **{name: _symplectic(method) for name, method in PARTITIONED.items()},
+        **{name: _composition(composition) for name, composition in COMPOSITIONS.items()},
+    }
+)
 
 __all__ = [
     "METHODS",

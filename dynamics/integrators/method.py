@@ -39,6 +39,8 @@ class Method:
     evaluations             of the rate, so far
     nonfinite               0; the run ends when a pass leaves another number
     fresh                   1 before the first pass, where the program has this register
+    singular                where the program has it, and after a pass that failed: 0, or 1 + the index of a
+                            coordinate without inertia
     ======================  =========================================================================================
 
     and after it the next state in x, with t, count and evaluations advanced (`explicit.advance` does all but x). It
@@ -48,11 +50,13 @@ class Method:
     (`step_control.registers`) hold
 
     ======================  =========================================================================================
-    h, next                 the step tried, and the one to try next [s]; `trial()` sets h, `control()` sets next
-    max_step, end           the longest step, and where to stop [s]
+    h, tried, next          the step (negative back in time), the size tried and the one to try next [s]; `trial()`
+                            sets h and tried, `control()` sets next
+    max_step, min_step, end the longest step, the shortest, and where to stop [s]
     rtol, atol (m)          the tolerance, rtol |x| + atol
     x_new (m), error        where the trial arrived, and its estimated error, 1 at the tolerance (`measured`)
     accepted, rejected      1 or 0 after a trial, and how many were 0
+    held                    accepted steps at the stability limit, where the method counts them
     status                  RUNNING, DONE, or TOO_SMALL: the program stops when it is not RUNNING
     t_old, x_old (m)        of the last accepted step, which `accept_step` makes the state
     dense1, .. (m)          with `dense`: x(t_old + s h) = x_old + sum_k dense_k s^k, for k up to `degree`

@@ -7,8 +7,10 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, building, cotangents, hessian_nodes, solve_nodes
+from cgraph.extend import Builder, SingularError, building, cotangents, hessian_nodes, solve_nodes
 
+from ..equations.equations_of_motion import SingularMassMatrixError
+from ..systems.system import System
 from .problem import KEPT, Problem, reaches
 
 ONE = cg.constant(1.0)
@@ -19,15 +21,20 @@ class Mechanics(NamedTuple):
 
     momentum: Graph  # (q, qd) -> p
     force: Graph  # (q, qd) -> p_dot = dL/dq + tau + forces - damping qd
-    velocity: Graph  # (q, qd, p) -> qd, nearer to the velocity that belongs to p: a step of Newton, exact when K is
-    # quadratic in qd
+    velocity: Graph  # (q, qd, p, t, parameters, singular) -> qd, nearer to the velocity that belongs to p: a step of
+    # Newton, exact when K is quadratic in qd; and singular, if it was 0: 0 where M is positive definite, else
+    # 1 + the index of a coordinate without inertia
     quadratic: bool  # the momenta are linear in the velocities: M does not depend on them
     separable: bool  # p = M qd with a constant M, and the forces do not depend on the velocities
 
 
 @lru_cache(KEPT)
 def mechanics(problem: Problem) -> Mechanics:
-    """The graphs of momenta of a problem. Raises ValueError for a system of first order, which has none."""
+    """The graphs of momenta of a problem.
+
+    Raises ValueError for a system of first order, which has none, SingularMassMatrixError for a coordinate without
+    inertia.
+    """
     system = problem.system
     if system is None:
         raise ValueError("this method keeps momenta, which a system of first order does not have")
@@ -43,14 +50,23 @@ def mechanics(problem: Problem) -> Mechanics:
             )
         ]
         missing = [wanted - here for wanted, here in zip(p, momenta, strict=True)]
-    steps = solve_nodes(system.lagrangian, system.qd, missing, build)
+    before = cg.variable("singular")
+    try:
+        *steps, info = _solved(system, missing, build)
+    except SingularError as error:
+        raise SingularMassMatrixError(
+            f"the mass matrix is singular: coordinate {system.coordinates[error.index]!r} has no inertia, or none that "
+            "others do not share, and a method that steps momenta needs it"
+        ) from None
     with building(build):
         velocity = [qd + step for qd, step in zip(system.qd, steps, strict=True)]
+        singular = cg.where(before, before, info)
 
-    def graph(inputs: list[Node], outputs: list[Node]) -> Graph:
+    def graph(inputs: list[Node], outputs: list[Node], *last: Node) -> Graph:
         numbered = {f"{k}": node for k, node in enumerate(outputs)}
-        whole = Graph([*inputs, *system.tau, *system.extra_inputs], numbered)
-        return problem.bind([str(node.name) for node in inputs], whole)
+        whole = Graph([*inputs, *last, *system.tau, *system.extra_inputs], numbered)
+        bound = problem.bind([str(node.name) for node in (*inputs, *last)], whole)
+        return Graph([node for node in bound.inputs if node not in last] + list(last), bound.outputs)
 
     state = [*system.q, *system.qd]
     momentum, rate = graph(state, momenta), graph(state, force)
@@ -58,4 +74,15 @@ def mechanics(problem: Problem) -> Mechanics:
     quadratic = not reaches(mass_matrix, system.qd)
     free = not reaches(rate.outputs.values(), system.qd)
     constant = not reaches([*mass_matrix, *momentum.outputs.values()], system.q)
-    return Mechanics(momentum, rate, graph([*state, *p], velocity), quadratic, free and constant and quadratic)
+    solved = graph([*state, *p], [*velocity, singular], before)
+    return Mechanics(momentum, rate, solved, quadratic, free and constant and quadratic)
+
+
+def _solved(system: System, rhs: list[Node], build: Builder) -> list[Node]:
+    """M^-1 rhs, and the info of `solve_nodes`: always 0 where a constant of M is negative, which divides as well."""
+    try:
+        return solve_nodes(system.lagrangian, system.qd, rhs, build, check=True)
+    except SingularError as error:
+        if not error.pivot:
+            raise
+    return [*solve_nodes(system.lagrangian, system.qd, rhs, build), cg.constant(0.0)]

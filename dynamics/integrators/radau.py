@@ -18,7 +18,18 @@ from cgraph.extend import Call, Factor, If, Map, Program, Solve, Statement, Sum,
 from .elementwise import SAME, identity, weighted
 from .explicit import stage_time
 from .problem import Problem, state_jacobian
-from .step_control import accept_step, control, count, first_pass, measured, recorded, registers, scale, trial
+from .step_control import (
+    accept_step,
+    control,
+    count,
+    first_pass,
+    lost,
+    measured,
+    recorded,
+    registers,
+    scale,
+    trial,
+)
 from .tableau import Row
 
 _R6 = math.sqrt(6.0)
@@ -74,14 +85,13 @@ def radau(problem: Problem, dense: bool) -> Program:
         *_combined(_T_INVERSE, z, w),
         _begin(),
         While("going", tuple(_turn(problem, z, w, f))),
-        _sum_of("x", z[2:], (1.0,), "x_new"),
         *_estimate(problem, z),
         control(4, 0),
         accept_step(*_dense(z, powers), Call(SAME, ("h",), ("h_old",))),
     ]
     lengths = {"unit": m * m, "jacobian": m * m, "real": m * m, "complex": 4 * m * m, "pivots": m, "pivots2": 2 * m}
     lengths |= dict.fromkeys((*z, *w, *f, *powers, "rate", "at", "right0", "error_vector"), m) | {"right12": 2 * m}
-    single = "going turns change change_old newton sum converged h_old again time0 time1 time2"
+    single = "lost lost2 going turns change change_old newton sum converged h_old again time0 time1 time2"
     lengths |= dict.fromkeys(single.split(), 1)
     return Program({**registers(problem), **lengths}, body, recorded(dense, 3), record_if="accepted", stop="status")
 
@@ -105,7 +115,9 @@ def _matrices(m: int) -> list[Statement]:
         rows.append([*diagonal(-b, row), *same])
     entries: dict[str, Node | float] = {f"{k}": entry for k, entry in enumerate(entry for row in rows for entry in row)}
     both = Graph([*(entry for row in jacobian for entry in row), h], entries)
-    return [real, Factor("real", "pivots"), Call(both, ("jacobian", "h"), ("complex",)), Factor("complex", "pivots2")]
+    body: list[Statement] = [real, Factor("real", "pivots"), lost("real", "lost")]
+    body += [Call(both, ("jacobian", "h"), ("complex",)), Factor("complex", "pivots2"), lost("complex", "lost2")]
+    return body
 
 
 def _guess(z: tuple[str, ...], powers: tuple[str, ...]) -> list[Statement]:
@@ -162,15 +174,16 @@ def _turn(problem: Problem, z: tuple[str, ...], w: tuple[str, ...], f: tuple[str
     parted = Call(joined.graph, ("right12",), ("F1", "F2"))
     body += [rights, Solve("real", "pivots", "right0"), joined, Solve("complex", "pivots2", "right12"), parted]
     steps = ("right0", "F1", "F2")
-    x, rtol, atol, *changes = cg.variables(["x", "rtol", "atol", "d0", "d1", "d2"])
-    size = scale(x, x, rtol, atol)
-    squares = [(change / size) * (change / size) for change in changes]
-    graph = Graph([x, rtol, atol, *changes], {"y": squares[0] + squares[1] + squares[2]})
-    body += [Sum(graph, ("x", "rtol", "atol", *steps), "change"), _judged(3 * m)]
     before, after = cg.variables("before after")
     add = Graph([before, after], {"w": before + after})
     body += [Map(add, (name, step), (name,)) for name, step in zip(w, steps, strict=True)]
-    return [*body, *_combined(_T, w, z)]
+    body += [*_combined(_T, w, z), _sum_of("x", z[2:], (1.0,), "x_new")]
+    names = ("x", "x_new", "rtol", "atol")
+    x, x_new, rtol, atol, *changes = cg.variables([*names, "d0", "d1", "d2"])
+    size = scale(x, x_new, rtol, atol)
+    squares = [(change / size) * (change / size) for change in changes]
+    graph = Graph([x, x_new, rtol, atol, *changes], {"y": squares[0] + squares[1] + squares[2]})
+    return [*body, Sum(graph, (*names, *steps), "change"), _judged(3 * m)]
 
 
 def _judged(numbers: int) -> Call:
@@ -218,12 +231,13 @@ def _estimate(problem: Problem, z: tuple[str, ...]) -> list[Statement]:
         Solve("real", "pivots", "error_vector"),
         *measured("error_vector", m),
     )
-    halved = Graph([error, converged], {"error": cg.where(converged, error, HALVES)})
+    none, none2 = cg.variables("lost lost2")
+    halved = Graph([error, converged, none, none2], {"error": cg.where(converged, error + none + none2, HALVES)})
     return [
         *once,
         Call(doubt, ("error", "accepted", "h_old"), ("again",)),
         If("again", twice),
-        Call(halved, ("error", "converged"), ("error",)),
+        Call(halved, ("error", "converged", "lost", "lost2"), ("error",)),
     ]
 
 

@@ -13,10 +13,10 @@ import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Call, Factor, If, Map, Program, Solve, Statement
 
-from .elementwise import SAME, identity, weighted
+from .elementwise import SAME, function, identity, weighted
 from .explicit import stage_time
 from .problem import Problem, state_jacobian, time_derivative
-from .step_control import accept_step, control, first_pass, measured, recorded, registers, trial
+from .step_control import accept_step, control, first_pass, lost, measured, recorded, registers, trial
 from .tableau import Row
 
 
@@ -92,17 +92,18 @@ def rosenbrock(method: Rosenbrock, problem: Problem, dense: bool) -> Program:
     if timed:
         now.append(Call(time_derivative(problem), ("x", "t", "p"), ("time_slope",)))
     body: list[Statement] = [first_pass(identity(m)), If("accepted", tuple(now)), trial()]
-    body += [_matrix(method.gamma), Factor("matrix", "pivots")]
+    body += [_matrix(method.gamma), Factor("matrix", "pivots"), lost("matrix", "lost")]
     for k in range(stages):
         body += _stage(method, problem, k)
     body += [
         *measured(slopes[-1], m),
+        Call(function("error lost", error=cg.variable("error") + cg.variable("lost")), ("error", "lost"), ("error",)),
         control(method.order, stages),
         accept_step(*(_dense(method, slopes) if dense else ())),
     ]
     degree = len(method.dense) + 1
     lengths = dict.fromkeys(("unit", "jacobian", "matrix"), m * m) | dict.fromkeys(("pivots", "at", "rate", *slopes), m)
-    lengths |= {"time_slope": m if timed else 0, "at_t": 1, "sum": 1}
+    lengths |= {"time_slope": m if timed else 0, "at_t": 1, "sum": 1, "lost": 1}
     if dense:
         lengths |= {
             f"{name}{k + 1}": m for name, count in (("h_", degree - 1), ("dense", degree)) for k in range(count)

@@ -1,13 +1,16 @@
 """Programs that choose their steps: the registers that all of them have, step control, and explicit embedded methods.
 
-A pass is a trial of one step. Registers: x the state, t, p the parameters, evaluations, as with equal steps; `h` the
-step tried, `next` the one to try next and `max_step` the longest allowed; `end` where to stop; rtol, and atol for each
-component of the state; accepted (1 or 0), status; rejected, a count; `error`, the estimate of the last trial, 1 at the
-tolerance; x_new what the trial arrived at; `fresh`, 1 before the first pass; and of the last accepted step t_old, x_old
-and, for its dense output, dense1, ..
+A pass is a trial of one step, from t to t_new = t + h exactly. Registers: x the state, t, p the parameters,
+evaluations, as with equal steps; `h` the step, negative for a run back in time; `tried` its size before t_new was
+rounded, `next` the size to try next, `max_step` and `min_step` their limits; `end` where to stop; rtol, and atol for
+each component of the state; accepted (1 or 0), status; rejected, a count; `error`, the estimate of the last trial, 1
+at the tolerance; x_new what the trial arrived at; `fresh`, 1 before the first pass; `held`, accepted steps at the
+stability limit of an explicit method; and of the last accepted step t_old, x_old and, for its dense output, dense1, ..
 """
 
 from __future__ import annotations
+
+import math
 
 import cgraph as cg
 from cgraph import Graph, Node
@@ -16,17 +19,21 @@ from cgraph.extend import Call, If, Map, Program, Statement, Sum
 from .elementwise import SAME, compensated, function, scaled, weighted
 from .explicit import stage, stage_state, stage_time
 from .problem import Problem
-from .tableau import Tableau
+from .tableau import Tableau, real_stability
 
 RUNNING, DONE, TOO_SMALL = 0.0, 1.0, 2.0  # register `status`
 SAFETY, SMALLEST, LARGEST = 0.9, 0.2, 5.0  # factors from one step to the next
 MEMORY = 0.04  # weight of the estimate before in the choice of the next step (Gustafsson's PI control)
 RESOLUTION = 4.0 * 2.0**-52  # steps below this share of t hardly move t
+COLLAPSE = 2.0**-200  # steps below this share of a run never end it
+ROUNDING = 16.0 * 2.0**-52  # relative tolerances below it ask for more than a step's sums hold
+SMALLEST_ATOL = 2.0**-1022  # in place of 0: a state that is 0 and stays 0 has no error
 
 
 def registers(problem: Problem) -> dict[str, int]:
     """What every program has."""
-    names = "t h next max_step end fresh rtol accepted status rejected error error_old evaluations t_old t_new"
+    names = "t h tried next max_step min_step end fresh rtol accepted status rejected error error_old"
+    names += " evaluations held t_old t_new"
     m = problem.size
     states = dict.fromkeys(("x", "x_new", "x_old", "atol"), m)
     return {**states, "p": len(problem.parameters), **dict.fromkeys(names.split(), 1)}
@@ -38,11 +45,16 @@ def recorded(dense: bool, degree: int) -> list[str]:
 
 
 def trial() -> Call:
-    """The step to try: `next`, or what is left; of a little more than one step, half, so that no sliver remains."""
+    """The step to try: `next`, or what is left; of a little more than one step, half, so that no sliver remains.
+
+    h = t_new - t, so that the clock and the state make the same step.
+    """
     t, wanted, max_step, end = inputs = cg.variables("t next max_step end")
-    left, most = end - t, cg.minimum(wanted, max_step)
-    h = cg.where(most >= left, left, cg.where(2.0 * most > left, 0.5 * left, most))
-    return Call(Graph(inputs, {"h": h}), ("t", "next", "max_step", "end"), ("h",))
+    left, most = abs(end - t), cg.minimum(wanted, max_step)
+    tried = cg.where(most >= left, left, cg.where(2.0 * most > left, 0.5 * left, most))
+    t_new = cg.where(most >= left, end, t + cg.where(end > t, tried, -tried))
+    outputs = {"tried": tried, "t_new": t_new, "h": t_new - t}
+    return Call(Graph(inputs, outputs), ("t", "next", "max_step", "end"), tuple(outputs))
 
 
 def scale(x: Node, x_new: Node, rtol: Node, atol: Node) -> Node:
@@ -53,28 +65,29 @@ def scale(x: Node, x_new: Node, rtol: Node, atol: Node) -> Node:
 def control(order: int, evaluations: int) -> Call:
     """From the estimate of a trial: whether it is accepted, and the next step. A NaN is an error beyond measure.
 
+    A step below the resolution of t, or of the run, is not accepted whatever its error: only one that ends the run may
+    be so short.
+
     order: of the step's size in the estimate.  evaluations: of the rate in a trial.
     """
-    names = ("error", "error_old", "h", "t", "end", "next", "rejected", "evaluations", "accepted")
-    error, old, h, t, end, wanted, rejected, done, before = inputs = cg.variables(names)
-    accepted = error <= 1.0
+    names = "error error_old tried t t_new end next max_step min_step rejected evaluations accepted".split()
+    error, old, tried, t, t_new, end, wanted, max_step, min_step, rejected, done, before = inputs = cg.variables(names)
+    arrives = cg.equal(t_new, end)
+    able = cg.maximum(arrives, cg.minimum(wanted, max_step) > cg.maximum(min_step, RESOLUTION * abs(t)))
+    accepted = able * (error <= 1.0)
     growth = SAFETY * error ** -(1.0 / order - 0.75 * MEMORY) * cg.maximum(old, 1e-4) ** MEMORY
     growth = cg.minimum(cg.maximum(growth, SMALLEST), cg.where(before, LARGEST, 1.0))  # no growth after a rejection
     shrink = cg.where(error < 1e300, cg.maximum(SAFETY * error ** (-1.0 / order), SMALLEST), 0.1)
-    h_next = h * cg.where(accepted, growth, shrink)
-    t_new = cg.where(h >= end - t, end, t + h)
-    too_small = cg.maximum(h <= RESOLUTION * abs(t), h <= 2.0**-1000)
-    running = cg.where(too_small, TOO_SMALL, RUNNING)
+    after = tried * cg.where(accepted, growth, shrink)
     outputs = {
         "accepted": accepted,
-        "next": cg.where(accepted * (h < wanted), cg.maximum(wanted, h_next), h_next),  # a step cut short says less
+        "next": cg.where(accepted * (tried < wanted), cg.maximum(wanted, after), after),  # a step cut short says less
         "error_old": cg.where(accepted, error, old),
-        "t_new": t_new,
-        "status": cg.where(accepted, cg.where(t_new >= end, DONE, RUNNING), running),
+        "status": cg.where(accepted, cg.where(arrives, DONE, RUNNING), cg.where(able, RUNNING, TOO_SMALL)),
         "rejected": rejected + (1.0 - accepted),
         "evaluations": done + float(evaluations),
     }
-    return Call(Graph(inputs, outputs), names, tuple(outputs))
+    return Call(Graph(inputs, outputs), tuple(names), tuple(outputs))
 
 
 def accept_step(*after: Statement) -> If:
@@ -105,17 +118,13 @@ def embedded(tableau: Tableau, problem: Problem, dense: bool) -> Program:
         body += stage(problem, tableau, k)
     body += [_arrival(tableau.b), stage_time("at_t", 1.0), Call(problem.rate, ("x_new", "at_t", "p"), (last,))]
     body += [_squared(weights, slopes, f"sum{k}") for k, weights in enumerate(tableau.error)]
-    body += [_estimate(len(tableau.error), m), control(tableau.estimate, stages)]
+    body += [_whole(last), _estimate(len(tableau.error), m), control(tableau.estimate, stages)]
     kept = (Map(SAME, (last,), ("slope0",)), Map(SAME, ("rounding_new",), ("rounding",)))
-    body.append(accept_step(*(_dense(tableau, problem) if dense else ()), *kept))
+    body.append(accept_step(*_held(tableau), *(_dense(tableau, problem) if dense else ()), *kept))
     degree = len(tableau.interpolant[0])
     lengths = {f"slope{k}": m for k in range(stages + 1 + (len(tableau.extra) if dense else 0))}
-    lengths |= {f"sum{k}": 1 for k in range(len(tableau.error))} | {
-        "at": m,
-        "at_t": 1,
-        "rounding": m,
-        "rounding_new": m,
-    }
+    lengths |= {f"sum{k}": 1 for k in range(len(tableau.error))} | dict.fromkeys(("at_t", "lost", "rise", "reach"), 1)
+    lengths |= dict.fromkeys(("at", "rounding", "rounding_new"), m)
     if dense:
         lengths |= {f"dense{k + 1}": m for k in range(degree)}
     record = recorded(dense, degree)
@@ -132,11 +141,47 @@ def _arrival(weights: tuple[float, ...]) -> Map:
 
 
 def measured(error: str, m: int) -> list[Statement]:
-    """Register `error`: the root mean square over the state of the register's (error / scale)."""
+    """Register `error`: the root mean square over the state of the register's (error / scale).
+
+    NaN where x_new is not finite: its scale would hide any error.
+    """
     x, x_new, rtol, atol, e = inputs = cg.variables("x x_new rtol atol e")
     part = e / scale(x, x_new, rtol, atol)
-    total = Sum(Graph(inputs, {"y": part * part}), ("x", "x_new", "rtol", "atol", error), "sum")
+    total = Sum(Graph(inputs, {"y": part * part + (x_new - x_new)}), ("x", "x_new", "rtol", "atol", error), "sum")
     return [total, Call(function("sum", y=cg.sqrt(cg.variable("sum") / m)), ("sum",), ("error",))]
+
+
+def lost(register: str, target: str) -> Sum:
+    """target = 0 where all numbers of a register are finite, else NaN.
+
+    Divided by an infinite number, an error is 0: that of a step with infinite pivots.
+    """
+    a = cg.variable("a")
+    return Sum(Graph([a], {"none": a - a}), (register,), target)
+
+
+def _whole(last: str) -> Sum:
+    """Register `lost`: 0 where the trial arrived at a finite state with a finite rate, else NaN."""
+    x_new, slope = cg.variables("x_new slope")
+    return Sum(Graph([x_new, slope], {"none": (x_new - x_new) + (slope - slope)}), ("x_new", last), "lost")
+
+
+def _held(tableau: Tableau) -> list[Statement]:
+    """Counts accepted steps beyond the stability limit on the negative real axis (Hairer and Wanner II, section IV.2).
+
+    h |f(x_new) - f(y)| / |x_new - y|, with y the state of the last stage, which like x_new stands at t + h.
+    """
+    if tableau.c[-1] != 1.0:
+        return []
+    stages, limit = len(tableau.b), real_stability(tableau)
+    x, x_new, rtol, atol, a, b = inputs = cg.variables("x x_new rtol atol a b")
+    part = (a - b) / scale(x, x_new, rtol, atol)
+    graph, common = Graph(inputs, {"y": part * part}), ("x", "x_new", "rtol", "atol")
+    rise = Sum(graph, (*common, f"slope{stages}", f"slope{stages - 1}"), "rise")
+    reach = Sum(graph, (*common, "x_new", "at"), "reach")
+    h, up, along, held = inputs = cg.variables("h rise reach held")
+    beyond = h * h * up > (SAFETY * limit) ** 2 * along
+    return [rise, reach, Call(Graph(inputs, {"sum": held + beyond}), ("h", "rise", "reach", "held"), ("held",))]
 
 
 def _squared(weights: tuple[float, ...], slopes: tuple[str, ...], target: str) -> Sum:
@@ -152,12 +197,12 @@ def _squared(weights: tuple[float, ...], slopes: tuple[str, ...], target: str) -
 def _estimate(count: int, m: int) -> Call:
     """The root mean square; of two estimates, that of DOP853 (Hairer, Norsett and Wanner I, section II.10)."""
     if count == 1:
-        total = cg.variable("sum0")
-        return Call(Graph([total], {"error": cg.sqrt(total / m)}), ("sum0",), ("error",))
-    fifth, third = cg.variables("sum0 sum1")
+        total, none = cg.variables("sum0 lost")
+        return Call(Graph([total, none], {"error": cg.sqrt(total / m) + none}), ("sum0", "lost"), ("error",))
+    fifth, third, none = inputs = cg.variables("sum0 sum1 lost")
     both = fifth + 0.01 * third
-    error = cg.where(cg.equal(both, 0.0), 0.0, fifth / cg.sqrt(both * m))
-    return Call(Graph([fifth, third], {"error": error}), ("sum0", "sum1"), ("error",))
+    error = cg.where(cg.equal(both, 0.0), 0.0, cg.where(both < math.inf, fifth / cg.sqrt(both * m), both))
+    return Call(Graph(inputs, {"error": error + none}), ("sum0", "sum1", "lost"), ("error",))
 
 
 def _dense(tableau: Tableau, problem: Problem) -> tuple[Statement, ...]:

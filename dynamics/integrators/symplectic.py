@@ -13,16 +13,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Call, Map, Program, Statement, Sum, While
 
+from .composition import Composition
 from .elementwise import SAME, compensated, function, weighted
 from .explicit import advance, registers, stage_time
 from .momentum_graphs import Mechanics, mechanics
+from .partitioned_tableau import MIDPOINT, SYMPLECTIC_EULER, VERLET, Partitioned, Row, over
 from .problem import Problem
 from .step_control import count, first_pass
 
@@ -30,65 +31,22 @@ TURNS = 60.0  # of the iteration for the stages, at most
 ENOUGH = 2.0**-53  # a change below this, relative, is rounding
 LOOSE = 1e-9  # one above this, when the turns are over, is no convergence: the step is too long
 REPEATS = 8  # Newton steps for the velocity of a momentum that is not linear in it
+ONCE = Composition(2, (1.0,))
 
 
-Row = tuple[Fraction, ...]
+def composed(composition: Composition, problem: Problem) -> Program:
+    """One step a pass, of steps of `verlet` where it is explicit, else of `midpoint`."""
+    explicit = problem.system is not None and mechanics(problem).separable
+    return partitioned(VERLET if explicit else MIDPOINT, problem, composition)
 
 
-@dataclass(frozen=True)
-class Partitioned:
-    """The numbers: q's a_ij, p's b_ij, weights w_i, and the times c_i of the stages. The same a and b: Gauss."""
-
-    order: int
-    a: tuple[Row, ...]
-    b: tuple[Row, ...]
-    w: Row
-    c: Row
-
-
-def _gauss(order: int, a: tuple[Row, ...], w: Row) -> Partitioned:
-    return Partitioned(order, a, a, w, tuple([sum(row, _0) for row in a]))
-
-
-def _over(denominator: int, *numerators: int) -> Row:
-    return tuple([Fraction(numerator, denominator) for numerator in numerators])
-
-
-def _root(n: int) -> Fraction:
-    """Its square root to forty digits."""
-    return Fraction(math.isqrt(n * 10**80), 10**40)
-
-
-_0, _1 = Fraction(0), Fraction(1)
-_R3, _R15 = _root(3), _root(15)
-SYMPLECTIC_EULER = Partitioned(1, a=((_0,),), b=((_1,),), w=(_1,), c=(_0,))
-VERLET = Partitioned(2, a=(_over(2, 0, 0), _over(2, 1, 1)), b=(_over(2, 1, 0),) * 2, w=_over(2, 1, 1), c=(_0, _1))
-MIDPOINT = _gauss(2, (_over(2, 1),), (_1,))
-GAUSS4 = _gauss(4, ((_1 / 4, _1 / 4 - _R3 / 6), (_1 / 4 + _R3 / 6, _1 / 4)), _over(2, 1, 1))
-GAUSS6 = _gauss(
-    6,
-    (
-        (5 * _1 / 36, 2 * _1 / 9 - _R15 / 15, 5 * _1 / 36 - _R15 / 30),
-        (5 * _1 / 36 + _R15 / 24, 2 * _1 / 9, 5 * _1 / 36 - _R15 / 24),
-        (5 * _1 / 36 + _R15 / 30, 2 * _1 / 9 + _R15 / 15, 5 * _1 / 36),
-    ),
-    _over(18, 5, 8, 5),
-)
-PARTITIONED = {
-    "symplectic_euler": SYMPLECTIC_EULER,
-    "verlet": VERLET,
-    "midpoint": MIDPOINT,
-    "gauss4": GAUSS4,
-    "gauss6": GAUSS6,
-}
-
-
-def partitioned(method: Partitioned, problem: Problem) -> Program:
+def partitioned(method: Partitioned, problem: Problem, composition: Composition = ONCE) -> Program:
     """One step a pass, of a mechanical system; of one of first order where the method is one of Gauss's."""
-    return _of_momenta(method, problem) if problem.system is not None else _of_first_order(method, problem)
+    make = _of_momenta if problem.system is not None else _of_first_order
+    return make(method, problem, composition)
 
 
-def _of_momenta(method: Partitioned, problem: Problem) -> Program:
+def _of_momenta(method: Partitioned, problem: Problem, composition: Composition) -> Program:
     graphs, n = mechanics(problem), problem.size // 2
     stages = range(len(method.w))
     lengths = {"q": n, "v": n, "momentum": n, "q_rounding": n, "momentum_rounding": n}
@@ -107,11 +65,11 @@ def _of_momenta(method: Partitioned, problem: Problem) -> Program:
         body = _iterated(method, turn)
         body += [_added("q", "q_rounding", "V", method.w), _added("momentum", "momentum_rounding", "F", method.w)]
         body += [stage_time("later", 1.0), *_settled(graphs)]
-    body += [_copied(problem.size, ("q", "v"), ("x",)), *advance(0)]
+    body = [*_in_turn(composition, body), _copied(problem.size, ("q", "v"), ("x",)), *advance(0)]
     return _program(method, problem, lengths, [first_pass(*start, *_guess_at_rest(method, "v")), *body])
 
 
-def _of_first_order(method: Partitioned, problem: Problem) -> Program:
+def _of_first_order(method: Partitioned, problem: Problem, composition: Composition) -> Program:
     if method.a is not method.b:
         raise ValueError("this method advances coordinates and momenta in turn; a system of first order has none")
     m, stages = problem.size, range(len(method.w))
@@ -120,18 +78,38 @@ def _of_first_order(method: Partitioned, problem: Problem) -> Program:
     for i in stages:
         turn.append(_stage(method.a[i], "x", "V", f"Q{i}"))
         turn.append(Call(problem.rate, (f"Q{i}", f"time{i}", "p"), (f"W{i}",)))
-    body = [*_iterated(method, turn), _added("x", "x_rounding", "V", method.w), *advance(0)]
+    body = [*_iterated(method, turn), _added("x", "x_rounding", "V", method.w)]
+    body = [*_in_turn(composition, body), *advance(0)]
     rate = Call(problem.rate, ("x", "t", "p"), ("W0",))
     return _program(method, problem, lengths, [first_pass(rate, *_guess_at_rest(method, "W0")), *body])
 
 
 def _program(method: Partitioned, problem: Problem, lengths: dict[str, int], body: list[Statement]) -> Program:
-    single = dict.fromkeys(("fresh", "failed", "going", "turns", "change", "speed", "change_old", "later"), 1)
+    names = "fresh singular failed failures whole begin going turns change speed change_old later"
+    single = dict.fromkeys(names.split(), 1)
     single |= {f"{name}{i}": 1 for name in ("time", "change", "speed") for i in range(len(method.w))}
-    nonfinite, failed = names = cg.variables("nonfinite failed")
-    either = Graph(names, {"nonfinite": nonfinite + failed})
-    body = [*body, Call(either, ("nonfinite", "failed"), ("nonfinite",))]
+    nonfinite, failures, singular = inputs = cg.variables("nonfinite failures singular")
+    bad = nonfinite + failures  # of what goes on, an inertia that is negative says nothing
+    either = Graph(inputs, {"nonfinite": bad, "failures": 0.0, "singular": cg.where(bad, singular, 0.0)})
+    body = [*body, Call(either, ("nonfinite", "failures", "singular"), ("nonfinite", "failures", "singular"))]
     return Program({**registers(problem), **lengths, **single}, body, record=["t", "x"], stop="nonfinite")
+
+
+def _in_turn(composition: Composition, body: list[Statement]) -> list[Statement]:
+    """The body, a step of h from t, once for every step of a composition; a step that failed is counted."""
+    whole, begin, failures = cg.variables("whole begin failures")
+    counted = Call(
+        function("failed failures", sum=cg.variable("failed") + failures), ("failed", "failures"), ("failures",)
+    )
+    if composition is ONCE:
+        return [*body, counted]
+    result: list[Statement] = [Map(SAME, ("h",), ("whole",)), Map(SAME, ("t",), ("begin",))]
+    done = 0.0
+    for step in composition.steps:
+        here = Graph([whole, begin], {"h": step * whole, "t": begin + done * whole})
+        result += [Call(here, ("whole", "begin"), ("h", "t")), *body, counted]
+        done += step
+    return [*result, Map(SAME, ("whole",), ("h",))]
 
 
 def _stage(weights: Row, base: str, slope: str, target: str) -> Map:
@@ -155,7 +133,7 @@ def _force(graphs: Mechanics, q: str, v: str, t: str, target: str) -> Call:
 
 
 def _velocity(graphs: Mechanics, q: str, v: str, momentum: str, t: str, target: str) -> Call:
-    return Call(graphs.velocity, (q, v, momentum, t, "p"), (target,))
+    return Call(graphs.velocity, (q, v, momentum, t, "p", "singular"), (target, "singular"))
 
 
 def _iterated(method: Partitioned, turn: list[Statement]) -> list[Statement]:
@@ -215,12 +193,12 @@ def _settled(graphs: Mechanics) -> list[Statement]:
 def _explicit(method: Partitioned, graphs: Mechanics) -> list[Statement]:
     """Kinetic energy of the velocities alone with a constant mass matrix, forces of the coordinates: no iteration."""
     half = method is VERLET
-    kick = _stage(_over(2, 1 if half else 2), "momentum", "F", "momentum")
+    kick = _stage(over(2, 1 if half else 2), "momentum", "F", "momentum")
     body: list[Statement] = [
         _force(graphs, "q", "v", "t", "F0"),
         kick,
         _velocity(graphs, "q", "v", "momentum", "t", "v"),
-        _added("q", "q_rounding", "V", (_1,)),
+        _added("q", "q_rounding", "V", (Fraction(1),)),
         stage_time("later", 1.0),
     ]
     body.insert(3, Map(SAME, ("v",), ("V0",)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 Row = tuple[float, ...]
@@ -102,5 +103,18 @@ DOPRI5 = Tableau(
         (0, 40617522 / 29380423, -110615467 / 29380423, 69997945 / 29380423),
     ),
 )
+
+
+def real_stability(tableau: Tableau) -> float:
+    """Where on the negative real axis stability ends: the smallest z > 0 with |R(-z)| > 1, to a sixty-fourth."""
+    for k in itertools.count(1):
+        slopes: list[float] = []
+        for row in (*tableau.a, tableau.b):
+            x = 1.0 + sum(weight * slope for weight, slope in zip(row, slopes, strict=False))
+            slopes.append(-k / 64.0 * x)
+        if abs(x) > 1.0:
+            break
+    return (k - 1) / 64.0
+
 
 TABLEAUS = {"euler": EULER, "rk4": RK4, "dopri5": DOPRI5}  # a new row here is a new method of `simulate`

@@ -161,6 +161,12 @@ def of_file(path: str | os.PathLike[str], ignore: bool = False) -> Scene:
     return Scene(Path(path).stem, about, mechanism, (0.0,) * n, (0.0,) * n, 3.0)
 
 
+def _is_path(name: object) -> bool:
+    if not (isinstance(name, str | os.PathLike) and name):
+        return False
+    return Path(name).suffix.lower() in _SUFFIXES or Path(name).exists()
+
+
 def names() -> list[str]:
     """Names of the scenes."""
     return list(_SCENES)
@@ -177,7 +183,7 @@ def load(name: str | os.PathLike[str], /, **options: Any) -> Scene:
     make: Callable[..., Scene]
     if isinstance(name, str) and name in _SCENES:
         make = _SCENES[name]
-    elif isinstance(name, str | os.PathLike) and (Path(name).suffix.lower() in _SUFFIXES or Path(name).exists()):
+    elif _is_path(name):
         make = partial(of_file, name)
     else:
         raise ValueError(

@@ -47,8 +47,7 @@ class Event:
     TypeError
         For a name that is no text, a value or a reset that is no function, a `terminal` that is neither True nor False.
     ValueError
-        For another direction, an event that ends the run and resets the state, and a name that is empty or cannot be
-        printed.
+        For another direction, an event that ends the run and resets the state, a name that is empty or not printable.
 
     Examples
     --------

@@ -17,7 +17,10 @@ from .event_program import EventProgram
 from .trajectory import Crossings
 
 STEPS = 512  # looked at together
-AT_ONCE = 100  # resets at one instant: more than the impacts of a few bodies that touch
+AT_ONCE = 32  # resets at one instant: more than the impacts of a few bodies that touch
+
+
+Happening = tuple[int, float, Array]  # number of the event, time, state
 
 
 class EventLog:
@@ -33,7 +36,7 @@ class EventLog:
         self.ended = self.status = ""
         self.restart: tuple[float, Array] | None = None
         self.warnings: list[str] = []
-        self.happened: list[tuple[int, float, Array]] = []
+        self.happened: list[Happening] = []
         self._sides: list[Side] = []  # none before the first step, or the first after a reset
         self._reached: dict[int, float] = {}  # events that have just reset the state, and the side they came from
         self._missed: set[int] = set()
@@ -137,9 +140,7 @@ class EventLog:
         return split_crossings(self.program, self.happened, half)
 
 
-def split_crossings(
-    program: EventProgram, happened: Sequence[tuple[int, float, Array]], half: int
-) -> dict[str, Crossings]:
+def split_crossings(program: EventProgram, happened: Sequence[Happening], half: int) -> dict[str, Crossings]:
     """Of each event by name, (number, t, x) as times and states, split after `half` numbers into q and qd."""
     result = {}
     for number, event in enumerate(program.events):

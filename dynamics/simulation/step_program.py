@@ -25,6 +25,7 @@ class StepProgram:
     order: int
     adaptive: bool
     dense: bool  # whether its record has dense output
+    kinds: tuple[int, ...]  # of the components: coordinates 0, velocities 1; those of an OdeSystem differ
 
     @property
     def factorizations(self) -> int:
@@ -52,6 +53,7 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
     dense: whether a method that chooses its steps records its dense output.
     Raises SingularMassMatrixError for a coordinate without inertia, ValueError for a method that the model has not.
     """
+    n = problem.size // 2
     return StepProgram(
         problem.components,
         problem.parameters,
@@ -60,6 +62,7 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
         method.order,
         method.adaptive,
         dense and method.adaptive,
+        tuple(range(problem.size)) if problem.system is None else (0,) * n + (1,) * n,
     )
 
 

@@ -8,20 +8,22 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cgraph.extend import Array
 
-from ..integrators.step_control import DONE, TOO_SMALL
+from ..integrators.step_control import COLLAPSE, DONE, ROUNDING, SMALLEST_ATOL, TOO_SMALL
 from .dense_output import StepBlock
 from .equal_steps import EqualSteps, equal_steps
+from .first_step import LEAP, first_step
 from .run_options import RunOptions
+from .state_sizes import StateSizes
 from .step_program import CompiledSteps
 
 BLOCK_TIME = 0.1  # s of run time after which a run comes back to Python: for Ctrl-C, progress and events
 FIRST_PASSES = 32  # of the first block, before it is known how long one takes
-LEAP = 1e-2  # of the whole run: the first step that is tried
-TRIALS = 60  # of a first step
-HUGE = 1e300  # a tolerance that anything meets
+ROUNDS = 4  # of a first step, by which the sizes of the states are known
+HELD, SHARE = 100, 0.25  # steps at the stability limit, of all, from which on a run is called stiff
 
 
 class StoppedError(Exception):
@@ -198,6 +200,8 @@ class FixedStepIntegration(NativeIntegration):
 
     def _failure(self, memory: Array) -> str:
         t = self._number(memory, "t")
+        if "singular" in self.runner.program.registers and (index := int(self._number(memory, "singular"))):
+            return f"stopped at t = {t:.6g} s: {self.components[index - 1]} has an inertia that is not positive"
         if reason := self.nonfinite(self.runner.read(memory, "x")):
             return f"stopped at t = {t:.6g} s: {reason}"
         return f"stopped at t = {t:.6g} s: the equations of the step did not converge; the step is too long"
@@ -212,35 +216,56 @@ def _block(t: Array, states: Array, t_old: float, x_old: Array) -> StepBlock:
 class AdaptiveIntegration(NativeIntegration):
     """Steps chosen by the method."""
 
+    def __init__(
+        self,
+        compiled: CompiledSteps,
+        options: RunOptions,
+        parameters: Sequence[float] = (),
+        stopped: Callable[[], bool] = lambda: False,
+    ) -> None:
+        super().__init__(compiled, options, parameters, stopped)
+        self.relative = max(options.relative, ROUNDING)
+        self.absolute = np.broadcast_to(np.maximum(options.absolute, SMALLEST_ATOL), self.program.size)
+        self.sizes = StateSizes(self.relative, self.program.kinds, SMALLEST_ATOL) if options.atol is None else None
+        self._stiff = self._below_rounding = False
+
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
-        options = self.options
+        options, wanted = self.options, self._first_step(x)
         start: Mapping[str, float | Array | list[float]] = {
             "x": x,
             "p": self.parameters,
             "t": options.t0,
             "end": options.t_end,
-            "rtol": options.relative,
-            "atol": options.absolute,
-            "next": self._first_step(x) if options.first_step is None else options.first_step,
+            "rtol": self.relative,
+            "atol": self.absolute,
+            "next": wanted,
             "max_step": options.longest_step,
+            "min_step": COLLAPSE * abs(options.t_end - options.t0),
             "fresh": 1.0,
             "error_old": 1e-4,
             "accepted": 1.0,
         }
         memory = self.runner.memory(start)
+        seen = FIRST_PASSES  # so many trials, and then twice as many as before, between two looks at the sizes
         while True:
-            left = options.max_steps - self.steps - self.rejected
+            done = self.steps + self.rejected
+            left = options.max_steps - done
             if left <= 0:
                 self.status = self.too_many(self._number(memory, "t"), options.max_steps)
                 return
-            rows, _ = self._advance(memory, int(min(left, 2**31)), whole=False)
+            rows, _ = self._advance(memory, int(min(left, seen - done if self.sizes else 2**31)), whole=False)
             status = self._number(memory, "status")
             self.steps += len(rows)
             self.rejected = int(self._number(memory, "rejected"))
             self.evaluations = int(self._number(memory, "evaluations"))
             if len(rows):
+                self._look(memory, rows)
                 yield self._block(rows)
+                self._see(rows)
+            if self.sizes and self.steps + self.rejected >= seen:
+                seen *= 2
+                self.runner.write(memory, "atol", self.absolute)
             if status == TOO_SMALL:
                 self.status = self._too_small(memory)
             if status in (TOO_SMALL, DONE):
@@ -249,23 +274,43 @@ class AdaptiveIntegration(NativeIntegration):
     def _block(self, rows: Array) -> StepBlock:
         m = self.program.size
         t, h, x = rows[:, 0], rows[:, 1], rows[:, 2 : 2 + m]
-        self.largest = max(self.largest, float(h.max()))
+        self.largest = max(self.largest, min(float(np.abs(h).max()), self.options.longest_step))
         if not self.program.dense:
             return StepBlock(t, x, t - h, h, np.full_like(x, math.nan), None)
         t_old, x_old, dense = rows[:, 2 + m], rows[:, 3 + m : 3 + 2 * m], rows[:, 3 + 2 * m :]
         return StepBlock(t, x, t_old, h, x_old, dense.reshape(len(t), -1, m))
 
+    def _look(self, memory: Array, rows: Array) -> None:
+        """Note once what a user should know of these steps: stiffness, and tolerances below rounding."""
+        options, held = self.options, int(self._number(memory, "held"))
+        if held >= HELD and held >= SHARE * self.steps and not self._stiff:
+            self._stiff = True
+            t, h = rows[-1, :2]
+            self.warnings.append(
+                f"the system is stiff: at t = {t:.6g} s the step, {abs(h):.3g} s, is held at the stability limit of "
+                f"method {options.method!r}, not by its tolerance; try method='radau'"
+            )
+        if options.relative < self.relative and not self._below_rounding:
+            size = np.abs(rows[:, 2 : 2 + self.program.size])
+            short = (self.absolute + options.relative * size < self.relative * size).any(axis=0)
+            if short.any():
+                self._below_rounding = True
+                self.warnings.append(
+                    f"rtol = {options.relative:g} with the atol of {self.components[int(np.argmax(short))]} is below "
+                    f"the rounding of a step: raised to {self.relative:.3g}"
+                )
+
     def _too_small(self, memory: Array) -> str:
-        t, h = self._number(memory, "t"), self._number(memory, "h")
-        if t == 0.0 and not np.isfinite(rate := self._rate(t, self.runner.read(memory, "x"))).all():
+        t, x = self._number(memory, "t"), self.runner.read(memory, "x")
+        where, rate = f"stopped at t = {t:.6g} s: ", self._rate(t, x)
+        if not np.isfinite(rate).all():
             first = self.components[int(np.flatnonzero(~np.isfinite(rate))[0])]
-            return f"stopped at t = 0 s: the rate of {first} is not finite at the start"
-        text = f"stopped at t = {t:.6g} s: the step, {h:.3g} s, is below the resolution of the time"
+            return f"{where}the rate of {first} is not finite{' at the start' if t == self.options.t0 else ''}"
         if reason := self.nonfinite(self.runner.read(memory, "x_new")):
-            return f"stopped at t = {t:.6g} s: {reason}, however small"
-        x = self.runner.read(memory, "x")
-        speed = np.abs(self._rate(t, x)) / self._scale(x)
-        return f"{text}; fastest is {self.components[int(np.nanargmax(speed))]}"
+            return f"{where}{reason}, however small"
+        fastest = self.components[int(np.argmax(np.abs(rate) / self._scale(x)))]
+        h = self._number(memory, "tried")
+        return f"{where}the step, {h:.3g} s, is below the resolution of the time; fastest is {fastest}"
 
     def _rate(self, t: float, x: Array) -> Array:
         rate = self.program.rate
@@ -273,38 +318,40 @@ class AdaptiveIntegration(NativeIntegration):
         values = dict(zip(rate.input_names, [*x.tolist(), t, *self.parameters], strict=True))
         return np.array(list(rate.evaluate(values).values()), dtype=np.float64)
 
-    def _scale(self, x: Array) -> Array:
-        """What an error is measured by."""
-        size: Array = self.options.absolute + self.options.relative * np.abs(x)
-        return size
+    def _see(self, rows: Array) -> None:
+        if self.sizes:
+            self.absolute = self.sizes.see(rows[:, 2 : 2 + self.program.size])
 
     def _first_step(self, x: Array) -> float:
-        """A step that two half steps confirm: their difference is within the tolerance.
-
-        The estimate of an embedded method can vanish by symmetry, such as at a start from rest, and a guess from the
-        first derivatives can be far off; halving cannot be fooled by either.
-        """
-        order, scale = self.program.order, self._scale(x)
-        anything = {"rtol": HUGE, "atol": HUGE, "max_step": math.inf, "end": math.inf, "fresh": 1.0, "accepted": 1.0}
-        memory = self.runner.memory({"x": x, "p": self.parameters, "error_old": 1.0, **anything})
-        h = min(self.options.t_end, self.options.longest_step) * LEAP
-        for _ in range(TRIALS):
-            with np.errstate(all="ignore"):
-                change = (self._forced(memory, [h]) - self._forced(memory, [0.5 * h, 0.5 * h])) / scale
-                difference = float(np.sqrt(np.mean(change * change)))
-            if difference <= 1.0:
+        """The first step; where atol is chosen by the sizes of the states, those that it leads to."""
+        options, rate = self.options, self._rate(self.options.t0, x)
+        start: dict[str, ArrayLike] = {"x": x, "p": self.parameters}
+        if self.sizes is None:
+            if options.first_step is not None:
+                return options.first_step
+            return first_step(self.runner, self.program.order, options, start, rate, self._scale(x))
+        h = min(options.length, options.longest_step) * LEAP if options.first_step is None else options.first_step
+        for _ in range(ROUNDS):
+            self.absolute = self.sizes.see(self._ahead(x, rate, h), anew=True)
+            if options.first_step is not None:
                 break
-            factor = 0.9 * difference ** (-1.0 / (order + 1)) if math.isfinite(difference) else 0.0
-            h *= min(0.5, max(1e-3, factor))
+            before, h = h, first_step(self.runner, self.program.order, options, start, rate, self._scale(x))
+            if h >= 0.5 * before:
+                break
         return h
 
-    def _forced(self, memory: Array, steps: Sequence[float]) -> Array:
-        """The state after these steps from a memory, which is left as it is."""
-        memory = memory.copy()
-        for h in steps:
-            self.runner.write(memory, "next", h)
-            self._run(memory, 1)
-        return self.runner.read(memory, "x")
+    def _ahead(self, x: Array, rate: Array, h: float) -> Array:
+        """x, and where two of Euler's steps lead to, (3, m)."""
+        options = self.options
+        signed = math.copysign(h, options.t_end - options.t0)
+        with np.errstate(all="ignore"):
+            first = x + signed * rate
+            return np.stack([x, first, first + signed * self._rate(options.t0 + signed, first)])
+
+    def _scale(self, x: Array) -> Array:
+        """What an error is measured by."""
+        size: Array = self.absolute + self.relative * np.abs(x)
+        return size
 
 
 def integration(

@@ -100,7 +100,8 @@ def test_a_mistake_of_ours_is_no_finding(monkeypatch: pytest.MonkeyPatch, capsys
         raise KeyError("ours")
 
     monkeypatch.setattr("viz.commands.scenes.run", mistake)
-    monkeypatch.setattr(cli, "watch_loading", lambda: None)
+    for of_a_process in ("watch_loading", "ignore_late"):
+        monkeypatch.setattr(cli, of_a_process, lambda: None)
     monkeypatch.setattr(sys, "argv", ["cgraph", "scenes"])
     assert cli.start() == cli.ERROR
     assert "KeyError: 'ours'" in capsys.readouterr().err

@@ -185,13 +185,33 @@ def test_a_signal_that_comes_in_a_callback_is_raised_after_it(number: int, capsy
 
     def work() -> None:
         Finalized()
-        for _ in range(1000):
-            time.sleep(0.01)
+        for _ in range(10**8):
+            pass
 
     with pytest.raises(signals.Stopped) as stop, signals.stoppable():
         work()
     assert stop.value.code == 128 + number
     assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_a_signal_that_a_library_takes_for_an_error_is_raised_again_but_not_into_the_cleaning_up() -> None:
+    done = []
+
+    def work() -> None:
+        try:
+            with suppress(BaseException):
+                send()
+            for _ in range(10**8):
+                pass
+        finally:
+            for _ in range(10**7):  # longer than it takes to be sent again
+                pass
+            done.append(True)
+
+    with pytest.raises(signals.Stopped), signals.stoppable():
+        work()
+    assert done
 
 
 @pytest.mark.usefixtures("ctrl_c")

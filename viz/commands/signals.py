@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from types import FrameType
 
 ENDING = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
+AGAIN = 0.1  # s of work after which what a signal raised should have arrived
 PATIENCE = 1.0  # s in which a signal that comes again is one with the first: cleaning up is not to be cut
 
 
@@ -29,7 +30,6 @@ class _Process:
     loading = False  # nothing is begun, so there is nothing to clean up
     settled = False  # the answer is complete: what comes now comes too late
     number = 0  # of the signal that came
-    lost = False  # what it raised went nowhere
     hook: Callable[[sys.UnraisableHookArgs], object] = sys.unraisablehook  # what is told of others that do
     came = 0.0  # s
 
@@ -48,8 +48,9 @@ def settled() -> None:
 
 def ignore_late() -> None:
     """The answer is out: what comes while Python ends, which sets handlers back, must not change the status."""
-    for number in _watch() if _Process.settled else ():
-        signal.signal(number, signal.SIG_IGN)
+    if _Process.settled:
+        for number in _watch():
+            signal.signal(number, signal.SIG_IGN)
 
 
 def watch_loading() -> None:
@@ -62,12 +63,15 @@ def watch_loading() -> None:
 def stoppable() -> Iterator[None]:
     """Within, a signal raises Stopped; what was the signals' before is so afterwards, but for a process of ours."""
     before = {} if _Process.loading else _watch()
-    _Process.loading = _Process.settled = _Process.lost = False
+    _Process.loading = _Process.settled = False
     _Process.number = 0
-    _Process.hook, sys.unraisablehook = sys.unraisablehook, _send_again
+    _Process.hook, sys.unraisablehook = sys.unraisablehook, _unraisable
     try:
         yield
     finally:
+        _Process.settled = True
+        if hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
         sys.unraisablehook = _Process.hook
         for number, handler in before.items():
             signal.signal(number, handler)
@@ -81,27 +85,41 @@ def _watch() -> dict[signal.Signals, signal._HANDLER]:
     watched = {number: handler for number, handler in before.items() if handler is not signal.SIG_IGN}
     for number in watched:
         signal.signal(number, _handle)
+    if hasattr(signal, "setitimer"):
+        watched[signal.SIGVTALRM] = signal.signal(signal.SIGVTALRM, _insist)
     return watched
 
 
-def _send_again(lost: sys.UnraisableHookArgs) -> None:
-    """Of an exception that leaves a callback or a finalizer Python prints that it is ignored: ours must not be."""
-    if issubclass(lost.exc_type, Stopped):
-        _Process.lost = True
-        threading.Timer(0.01, os.kill, (os.getpid(), _Process.number)).start()
-    else:
+def _unraisable(lost: sys.UnraisableHookArgs) -> None:
+    """Of an exception that leaves a callback or a finalizer Python prints that it is ignored: ours is raised again."""
+    if not issubclass(lost.exc_type, Stopped):
         _Process.hook(lost)
+
+
+def _insist(number: int, frame: FrameType | None) -> None:
+    """Raise again while the command goes on: what the signal raised may go lost in a callback, or be swallowed."""
+    if _Process.number and not (_Process.settled or _cleaning_up()):
+        raise Stopped(128 + _Process.number)
+
+
+def _cleaning_up() -> bool:
+    """Whether what the signal raised is on its way: in a `finally`, or where a `with` ends."""
+    error = sys.exc_info()[1]
+    while error is not None and not isinstance(error, Stopped):
+        error = error.__context__
+    return error is not None
 
 
 def _handle(number: int, frame: FrameType | None) -> None:
     now = time.monotonic()
-    again, _Process.lost = _Process.lost, False
-    if _Process.settled or (_Process.number and not again and now - _Process.came < PATIENCE):
+    if _Process.settled or (_Process.number and now - _Process.came < PATIENCE):
         return
-    if _Process.loading or (_Process.number and not again):
+    if _Process.loading or _Process.number:
         try:
             os.write(2, f"cgraph: {ENDING[signal.Signals(number)]}\n".encode())
         finally:
             os._exit(128 + number)
     _Process.number, _Process.came = number, now
+    if hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_VIRTUAL, AGAIN, AGAIN)
     raise Stopped(128 + number)

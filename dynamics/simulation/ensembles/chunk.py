@@ -8,6 +8,7 @@ import numpy as np
 
 from cgraph.extend import Array
 
+from ..event_log import Happening
 from .ensemble import Counts
 
 INTERRUPTED = "interrupted"  # what the status of a trajectory that Ctrl-C ended begins with
@@ -35,6 +36,8 @@ class Part:
     status: list[str]  # empty while all is well
     errors: Array  # (2, k): of equal steps, the largest estimated error and that of the last row; NaN where unknown
     warnings: list[list[str]]  # what speaks against a trajectory
+    ended: list[bool]  # whether an event has ended it; then its status says which
+    happened: list[list[Happening]]  # the events of each
 
     def interrupt(self, k: int, t: float, rows: int) -> None:
         """Trajectory k ends at t [s], after so many rows, and those after it did not begin."""
@@ -53,4 +56,14 @@ def empty(chunk: Chunk, rows: Array) -> Part:
     k = len(chunk.x)
     steps, rejected, evaluations = np.zeros((3, k), dtype=np.int64)
     counts, errors = (steps, rejected, evaluations), np.full((2, k), np.nan)
-    return Part(chunk.first, rows, *counts, np.zeros(k), [""] * k, errors, [[] for _ in range(k)])
+    return Part(
+        chunk.first,
+        rows,
+        *counts,
+        np.zeros(k),
+        [""] * k,
+        errors,
+        [[] for _ in range(k)],
+        [False] * k,
+        [[] for _ in range(k)],
+    )

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from cgraph.extend import Array
+
+from ..trajectory import Crossings
 
 Counts = np.ndarray[Any, np.dtype[np.int64]]
 
@@ -75,6 +78,8 @@ class Ensemble:
         qd has no columns.
     stats : EnsembleStats
         How the runs went.
+    events : mapping
+        {name of an event: (Crossings, ..)}, N of them, one for each trajectory.
 
     Examples
     --------
@@ -88,6 +93,7 @@ class Ensemble:
     q: Array
     qd: Array
     stats: EnsembleStats
+    events: Mapping[str, tuple[Crossings, ...]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         many, rows, n = self.q.shape

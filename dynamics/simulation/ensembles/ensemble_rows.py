@@ -6,6 +6,9 @@ import math
 
 import numpy as np
 
+from ..event_log import Happening, split_crossings
+from ..event_program import EventProgram
+from ..trajectory import Crossings
 from .chunk import INTERRUPTED, Part
 from .ensemble import EnsembleStats
 
@@ -20,6 +23,8 @@ class EnsembleRows:
         self.steps, self.rejected, self.evaluations = np.zeros((3, count), dtype=np.int64)
         self.dt, self.status = np.zeros(count), [INTERRUPTED] * count
         self.errors, self.warnings = np.full((2, count), math.nan), [[""][:0] for _ in range(count)]
+        self.ended = np.zeros(count, dtype=bool)
+        self.happened: list[list[Happening]] = [[] for _ in range(count)]
         self.arrived = np.zeros(count, dtype=bool)
 
     def add(self, part: Part) -> None:
@@ -31,6 +36,7 @@ class EnsembleRows:
             getattr(self, name)[here] = getattr(part, name)
         self.status[here] = [status or REACHED for status in part.status]
         self.errors[:, here], self.warnings[here] = part.errors, part.warnings
+        self.ended[here], self.happened[here] = part.ended, part.happened
         self.arrived[here] = True
 
     def check(self) -> None:
@@ -44,8 +50,16 @@ class EnsembleRows:
     def stats(self, method: str, seconds: float) -> EnsembleStats:
         """How it went. Rows that have not come become NaN."""
         self.rows[~self.arrived] = math.nan
-        success = np.array([status == REACHED for status in self.status])
+        success = self.ended | np.array([status == REACHED for status in self.status])
         counts = (self.steps, self.rejected, self.evaluations)
-        status, texts = np.where(success, 0, -1), tuple([tuple(texts) for texts in self.warnings])
+        status, texts = (
+            np.where(self.ended, 1, np.where(success, 0, -1)),
+            tuple([tuple(texts) for texts in self.warnings]),
+        )
         said, (largest, last) = tuple(self.status), self.errors
         return EnsembleStats(method, *counts, self.dt, seconds, success, said, status, largest, last, texts)
+
+    def events(self, program: EventProgram, half: int) -> dict[str, tuple[Crossings, ...]]:
+        """Of each event by name, where it happened in the trajectories; the first `half` numbers of a state are q."""
+        crossings = [split_crossings(program, happened, half) for happened in self.happened]
+        return {event.name: tuple([named[event.name] for named in crossings]) for event in program.events}

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import pickle
 import time
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +18,8 @@ from cgraph.extend import Array, require_whole
 from ...integrators import METHODS, derive
 from ...systems.model import Model
 from ..equal_steps import step_count
+from ..event import Event, as_events
+from ..event_program import event_program
 from ..free_memory import room
 from ..progress_bar import Progress
 from ..run_options import METHOD, RunOptions, time_span
@@ -50,6 +54,7 @@ def simulate_many(
     rtol: float | None = None,
     atol: ArrayLike | None = None,
     t_eval: ArrayLike | None = None,
+    events: Event | Iterable[Event] = (),
     tau: ArrayLike = 0.0,
     parameters: Mapping[str, ArrayLike] | None = None,
     workers: Workers = 1,
@@ -78,6 +83,9 @@ def simulate_many(
     t_eval : array_like, optional
         Times from t0 to t_end to record, in this order, (T,) [s]; by default every step. Methods that choose their
         steps need it.
+    events : Event or iterable of Event
+        Instants to look for on the way, as in `simulate`; trajectories then run one by one. One that an event ends is
+        NaN from there on, and `stats.status` is 1. Rows are at the same times as without.
     tau : float or array_like
         Constant applied force [N m or N], for all coordinates, for each, (n,), or for each trajectory too, (N, n).
     parameters : mapping, optional
@@ -116,7 +124,7 @@ def simulate_many(
     t0, t_end = time_span(t_end, t0, t_span)
     arguments = (dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
     options = RunOptions(t_end, method, *arguments, t0, estimate_error)
-    team = checked(workers)
+    watched, team = as_events(events), checked(workers)
     _check_chunk(chunk)
     start = starts(model, q, qd, tau, parameters)
     options.check(start.states)
@@ -126,11 +134,12 @@ def simulate_many(
     # Derive the equations as graphs, and write the steps of the method over them
     begin = time.perf_counter()
     problem = derive(model, start.same)
-    program = step_program(problem, METHODS[method], dense=True)
+    program, watch = step_program(problem, METHODS[method], dense=True), event_program(problem, watched)
 
     # Share out the work: what a worker is sent, and the starts of chunks of trajectories
-    grids = _grids(program, options)
-    task = Task(pickled_steps(program), options, count, tuple(grids))
+    grids = [] if watched else _grids(program, options)
+    sent = replace(options, t_eval=options.row_times) if watched else options
+    task = Task(pickled_steps(program), sent, count, tuple(grids), pickle.dumps(watch) if watched else b"")
     chunks = _chunks(start, problem.parameters, _width(len(start.x), chunk, team, whole=bool(grids)))
 
     # Integrate, by whoever takes the chunks and compiles the steps
@@ -142,7 +151,7 @@ def simulate_many(
     stats, rows = result.stats(method, time.perf_counter() - begin), result.rows
     if text := _warning(stats):
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    return Ensemble(options.row_times, rows[:, :, :half], rows[:, :, half:], stats)
+    return Ensemble(options.row_times, rows[:, :, :half], rows[:, :, half:], stats, result.events(watch, half))
 
 
 def _row_count(options: RunOptions) -> int:

@@ -13,10 +13,13 @@ import numpy as np
 from cgraph.extend import Array, runner
 
 from ..error_estimate import estimate
+from ..event_log import EventLog, Happening
+from ..event_program import EventProgram
 from ..recorder import Recorder
 from ..run_options import RunOptions
 from ..step_program import CompiledSteps, StepProgram, compile_steps
 from ..stepping import FixedStepIntegration, Integration, StoppedError, integration
+from ..watched import WatchedIntegration
 from .branch_free import branch_free
 from .chunk import Chunk, Part, empty
 from .step_grid import StepGrid
@@ -34,6 +37,7 @@ class Task:
     options: RunOptions
     count: int  # of the rows of a trajectory
     grids: tuple[StepGrid, ...]  # of trajectories side by side; empty: one after another
+    events: bytes = b""  # an EventProgram; nothing without events
 
     def __call__(self, chunk: Chunk) -> Part:
         """Run the chunk."""
@@ -73,13 +77,14 @@ class Task:
         with _lock:
             compiled = _compiled(self.pickled, self.options.backend)
         for k, x in enumerate(chunk.x):
-            run = integration(compiled, self.options, chunk.p[k].tolist(), stopped)
-            recorder = Recorder(x, self.options.times, self.options.t0, self.options.direction)
+            run = self._run(compiled, chunk.p[k].tolist(), stopped, part.happened[k])
+            recorder = Recorder(x, self.options.times, self.options.t0, self.options.direction, 3 if self.events else 1)
             interrupted = not self._finished(run, x, recorder, part.errors[:, k], stopped)
             states = recorder.table()[1]
             part.rows[k, : len(states)], part.rows[k, len(states) :] = states, np.nan
             part.steps[k], part.rejected[k], part.evaluations[k] = run.steps, run.rejected, run.evaluations
-            part.dt[k], part.status[k], part.warnings[k] = run.largest, run.status, run.warnings
+            part.dt[k], part.status[k], part.warnings[k] = run.largest, run.status or run.event, run.warnings
+            part.ended[k] = bool(run.event) and not run.status
             if interrupted:
                 part.interrupt(k, recorder.last, len(states))
                 return
@@ -91,13 +96,32 @@ class Task:
         try:
             for block in run.blocks(x):
                 recorder.add(block)
-            if isinstance(run, FixedStepIntegration) and self.options.estimated and not run.status:
-                error = estimate(run, x, *recorder.checkpoints(), stopped=stopped)
+            plain = run.plain
+            if isinstance(plain, FixedStepIntegration) and self.options.estimated and not run.status:
+                error = estimate(plain, x, *recorder.checkpoints(), stopped=stopped)
                 errors[:] = error.largest, error.last
                 run.warnings += [error.warning] if error.warning else []
         except (KeyboardInterrupt, StoppedError):
             return False
         return True
+
+    def _run(
+        self,
+        compiled: CompiledSteps,
+        parameters: list[float],
+        stopped: Callable[[], bool],
+        happened: list[Happening],
+    ) -> Integration:
+        """One trajectory before its first step; its events will be in `happened`."""
+
+        def leg(options: RunOptions) -> Integration:
+            return integration(compiled, options, parameters, stopped, every_step=bool(self.events))
+
+        if not self.events:
+            return leg(self.options)
+        log = EventLog(_event_program(self.events), parameters)
+        log.happened = happened
+        return WatchedIntegration(leg, self.options, log)
 
 
 _lock = threading.Lock()  # threads that come at the same time wait for one to make the code
@@ -119,3 +143,9 @@ def _vector_code(pickled: bytes, backend: str) -> VectorCode:
 @lru_cache(KEPT)
 def _compiled(pickled: bytes, backend: str) -> CompiledSteps:
     return compile_steps(pickle.loads(pickled), backend)  # noqa: S301  # it came with the task itself
+
+
+@lru_cache(KEPT)
+def _event_program(pickled: bytes) -> EventProgram:
+    program: EventProgram = pickle.loads(pickled)  # noqa: S301  # it came with the task itself
+    return program

@@ -13,13 +13,14 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics.integrators import METHODS, runge_kutta
 from dynamics.integrators.dop853 import DOP853
+from dynamics.integrators.partitioned_tableau import PARTITIONED, Partitioned, gauss
 from dynamics.integrators.radau import _A, _POWERS, _T, _T_INVERSE
 from dynamics.integrators.rosenbrock import RODAS5P
-from dynamics.integrators.symplectic import PARTITIONED, Partitioned
 from dynamics.integrators.tableau import TABLEAUS, Tableau
 from tests.dynamics.planet import PERIHELION, planet, position
 
 FITTED_ORDER = 0.05  # of a fitted order: what the next order adds at these steps
+EXACT = Fraction(1, 10**40)
 ROUNDING = 1e-14  # of sums of a dozen numbers of order 1
 INVERTED = 1e-13  # of a 3 x 3 matrix that was inverted: some hundred roundings
 COEFFICIENTS = 1e-11  # of sums of coefficients of dense output, which are as large as 300
@@ -73,12 +74,38 @@ def test_an_embedded_tableau_is_consistent(tableau: Tableau) -> None:
         assert follows == approx(np.eye(len(follows))[power] / (power + 1), abs=COEFFICIENTS)
 
 
-@mark.parametrize("method", PARTITIONED.values(), ids=PARTITIONED)
+@mark.parametrize("method", [*PARTITIONED.values(), *map(gauss, (4, 7, 10))])
 def test_a_partitioned_method_is_symplectic(method: Partitioned) -> None:
     """Hairer, Lubich and Wanner, theorem VI.4.6: w_i b_ij + w_j a_ji = w_i w_j."""
     a, b, w = np.array(method.a), np.array(method.b), np.array(method.w)
     assert abs(w[:, None] * b + (w[:, None] * a).T - np.outer(w, w)).max() < Fraction(1, 10**38)
     assert method.c == tuple(a.sum(axis=1))
+
+
+@mark.parametrize("stages", [1, 2, 5, 10])
+def test_gauss_is_collocation_at_the_nodes_of_the_quadrature(stages: int) -> None:
+    """B(2 s) and C(s) (Hairer and Wanner II, section IV.5), to forty digits, from which its order follows."""
+    method = gauss(stages)
+    for k in range(1, 2 * stages + 1):
+        assert abs(sum(w * c ** (k - 1) for w, c in zip(method.w, method.c, strict=True)) - Fraction(1, k)) < EXACT
+    for row, c in zip(method.a, method.c, strict=True):
+        for k in range(1, stages + 1):
+            assert abs(sum(a * d ** (k - 1) for a, d in zip(row, method.c, strict=True)) - c**k / k) < EXACT
+
+
+def test_gauss_takes_any_even_order() -> None:
+    pytest.importorskip("llvmlite")
+    for order, steps in ((2, 64), (8, 24), (14, 12), (20, 10)):
+        ends = [
+            dyn.simulate(planet(), *PERIHELION, 1.0, f"gauss{order}", dt=1.0 / n).q[-1] for n in (steps // 2, steps)
+        ]
+        errors = [np.abs(end - position(1.0)).max() for end in ends]
+        assert errors[1] < max(errors[0] * 0.6 * 2.0**-order, ROUNDING * 4.0) * 2.0
+    for name in ("gauss", "gauss0", "gauss5", "gauss04", "gauss26", "gauss-2", "gauss²"):
+        assert name not in METHODS
+        with pytest.raises(ValueError, match="method must be one of"):
+            dyn.simulate(planet(), *PERIHELION, 1.0, name)
+    assert "gauss20" not in list(METHODS)  # looked up, not listed
 
 
 def test_the_numbers_of_radau() -> None:

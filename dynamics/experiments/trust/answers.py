@@ -1,0 +1,125 @@
+"""Answers: where the random Lagrangians end, to thirty digits, and how much a small error grows on the way."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import cgraph as cg
+from cgraph.extend import Array
+
+from ...reference import Reference, ReferenceFailedError
+from ...reference.solution import from_text
+from ...simulation.scipy_solvers import solve_ivp
+from ..setting import Setting
+from ..work_precision.trajectory_runs import problem_of
+from .random_lagrangians import random_setting
+
+FILE = Path(__file__).with_name("answers.json")
+COUNT = 200
+DIGITS = 30
+PARTS = 8  # of the motion: an error may be made at the start of any
+RTOL, NUDGE = 1e-7, 2.0**-12  # of motions beside the motion: their errors, and how far they start aside, in sizes
+REGULAR = 1e8  # condition of a flow that is inverted
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The end of a motion, or why it has none.
+
+    end: at t_end; None where the motion runs into a singularity before.  size: the largest value of each state at some
+    times, (m,).
+    growth: the largest factor by which a small relative error at any time, in the sizes of the states, has grown at
+    t_end, at least 1.
+    """
+
+    end: Reference | None
+    size: tuple[float, ...]
+    growth: float
+    how: str
+
+
+def answer(number: int) -> Answer:
+    """The answer to the random Lagrangian of this number, from the file beside this one or computed."""
+    setting = random_setting(number)
+    kept = _kept().get(str(number))
+    if kept is None or kept["start"] != _hex(setting.start) or kept["t"] != setting.t_end.hex():
+        return compute(setting)
+    end = from_text([setting.t_end], [kept["x"]], kept["error"], kept["how"]) if "x" in kept else None
+    return Answer(end, tuple(kept["size"]), kept["growth"], kept["how"])
+
+
+def compute(setting: Setting) -> Answer:
+    """The answer to a setting, by `reference`; the growth by SciPy."""
+    times = [setting.t_end * k / PARTS for k in range(PARTS + 1)]
+    try:
+        motion = setting.solution(times, digits=DIGITS)
+    except ReferenceFailedError as error:
+        return Answer(None, (), 1.0, str(error))
+    assert motion is not None
+    end = Reference(motion.t[-1:], motion.decimal[-1:], motion.error, motion.how)
+    size = np.max(np.abs(motion.x), axis=0)
+    return Answer(end, tuple(size.tolist()), growth(setting, times, size), motion.how)
+
+
+def growth(setting: Setting, times: Sequence[float], size: Array) -> float:
+    """The largest row sum of the flow from any of these times to the last.
+
+    The flow is measured in units of the sizes, by differences of motions of SciPy's solvers.
+    """
+    unit, rate = np.where(size > 0.0, size, 1.0), cg.compile(problem_of(setting).rate)
+    options = {"rtol": RTOL, "atol": RTOL * unit, "method": "Radau" if setting.stiff else "DOP853", "t_eval": times}
+
+    def motion(x: Array) -> Array:
+        return np.asarray(solve_ivp()(lambda t, x: rate([*x, t]), (0.0, setting.t_end), x, **options).y.T)
+
+    start = np.array(setting.start)
+    columns = []
+    for j in range(len(start)):
+        aside = unit * (np.arange(len(start)) == j) * NUDGE
+        columns.append((motion(start + aside) - motion(start - aside)) / (2.0 * NUDGE * unit))
+    flows = np.stack(columns, axis=2)  # (T, m, m), from the start
+    usable = [flow for flow in flows[:-1] if np.linalg.cond(flow) < REGULAR]
+    return max([1.0, *[float(np.abs(flows[-1] @ np.linalg.inv(flow)).sum(axis=1).max()) for flow in usable]])
+
+
+def renew(numbers: Iterable[int], say: Callable[[str], None] = lambda line: None) -> None:
+    """Compute the answers of these numbers and keep them in the file; some take half a minute."""
+    for number in numbers:
+        setting = random_setting(number)
+        result = compute(setting)
+        entry: dict[str, Any] = {"start": _hex(setting.start), "t": setting.t_end.hex()}
+        entry |= {"size": list(result.size), "growth": result.growth, "how": result.how}
+        if result.end is not None:
+            entry |= {"x": list(result.end.decimal[0]), "error": result.end.error}
+        with _changed() as entries:
+            entries[str(number)] = entry
+        say(f"{number} {setting.name}: growth {result.growth:.3g}; {result.how}")
+
+
+@contextmanager
+def _changed() -> Iterator[dict[str, Any]]:
+    entries = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
+    yield entries
+    ordered = {str(number): entries[str(number)] for number in sorted(map(int, entries))}
+    FILE.write_text(json.dumps(ordered, indent=0) + "\n", encoding="utf-8")
+    _kept.cache_clear()
+
+
+def _hex(values: Iterable[float]) -> list[str]:
+    return [float(value).hex() for value in values]
+
+
+@cache
+def _kept() -> dict[str, Any]:
+    if not FILE.exists():
+        return {}
+    entries: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
+    return entries

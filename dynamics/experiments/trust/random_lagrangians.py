@@ -1,0 +1,223 @@
+"""Random Lagrangians: smooth systems of eight families, drawn from a seed, with starts and lengths of run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Node
+from cgraph.extend import Array
+
+from ...systems.system import System
+from ..setting import Setting
+
+Lagrangian = Callable[[list[Node], list[Node], Node], Any]
+FAMILIES: dict[str, Callable[[np.random.Generator, str], Setting]] = {}
+FREQUENCY = 3.0  # rad/s, of what turns with time
+
+
+def random_setting(number: int) -> Setting:
+    """The random Lagrangian of this number, the families in turn; the same number gives the same system."""
+    names = tuple(FAMILIES)
+    family = names[number % len(names)]
+    return FAMILIES[family](np.random.default_rng([number, 20251]), f"{family} {number // len(names)}")
+
+
+def family(make: Callable[[np.random.Generator, str], Setting]) -> Callable[[np.random.Generator, str], Setting]:
+    """Adds a family under the name of its function."""
+    FAMILIES[make.__name__.replace("_", " ")] = make
+    return make
+
+
+@family
+def potential(rng: np.random.Generator, name: str) -> Setting:
+    """Constant masses in a potential of cosines, squares and fourth powers."""
+    n = _size(rng)
+    mass, well = _masses(rng, n), _potential(rng, n)
+    return _setting(name, lambda q, qd, t: _kinetic(mass, qd) - well(q), *_start(rng, n))
+
+
+@family
+def curved(rng: np.random.Generator, name: str) -> Setting:
+    """A mass matrix that depends on q, A + sum_k w_k w_k^T (1 + sin(k . q)) / 2, in a potential."""
+    n = _size(rng)
+    lagrangian = _curved(rng, n)
+    return _setting(name, lagrangian, *_start(rng, n))
+
+
+@family
+def time_dependent(rng: np.random.Generator, name: str) -> Setting:
+    """Masses and forces that swing with time, some with damping."""
+    n = _size(rng)
+    still, push, swing = _curved(rng, n), rng.normal(size=n), rng.uniform(0.0, 0.5)
+    frequency, phase = rng.uniform(0.3, FREQUENCY, size=2), rng.uniform(0.0, 2 * math.pi)
+
+    def lagrangian(q: list[Node], qd: list[Node], t: Node) -> Node:
+        force = _dot(push, q) * cg.sin(frequency[0] * t + phase)
+        return (1.0 + swing * cg.cos(frequency[1] * t)) * still(q, qd, t) + force
+
+    return _setting(name, lagrangian, *_start(rng, n), damping=float(rng.choice([0.0, 0.1])))
+
+
+@family
+def magnetic(rng: np.random.Generator, name: str) -> Setting:
+    """Terms linear in the velocities, A(q, t) . qd: fields that bend the motion without work."""
+    n = 2 + _size(rng) % 2
+    still, field, waves = _curved(rng, n), 2.0 * rng.normal(size=(n, n)), rng.normal(size=(n, n))
+    frequency = rng.uniform(0.3, FREQUENCY)
+
+    def lagrangian(q: list[Node], qd: list[Node], t: Node) -> Node:
+        turns = [_dot(field[i], q) + cg.sin(_dot(waves[i], q) + frequency * t) for i in range(n)]
+        return still(q, qd, t) + _sum([a * v for a, v in zip(turns, qd, strict=True)])
+
+    return _setting(name, lagrangian, *_start(rng, n))
+
+
+@family
+def relativistic(rng: np.random.Generator, name: str) -> Setting:
+    """-m c^2 sqrt(1 - v^2 / c^2) in a potential, at a tenth to 99 hundredths of c."""
+    n = _size(rng)
+    well, c, mass = _potential(rng, n), 10.0 ** rng.uniform(0.0, 2.0), rng.uniform(0.3, 3.0)
+    direction, share = rng.normal(size=n), rng.choice([0.1, 0.5, 0.9, 0.99])
+    speed = c * share * direction / np.linalg.norm(direction)
+
+    def lagrangian(q: list[Node], qd: list[Node], t: Node) -> Node:
+        return -mass * c**2 * cg.sqrt(1.0 - _sum([v * v for v in qd]) / c**2) - well(q)
+
+    return _setting(name, lagrangian, rng.uniform(-1.0, 1.0, size=n), speed, rng.uniform(1.0, 3.0))
+
+
+@family
+def stiff(rng: np.random.Generator, name: str) -> Setting:
+    """A spring of 1e4 to 1e10 N/m with as much damping beside slow motions."""
+    n = 1 + _size(rng)
+    slow = _curved(rng, n - 1) if n > 1 else None
+    rate = 10.0 ** rng.uniform(2.0, 5.0)  # 1/s
+    q, qd, t_end = _start(rng, n)
+
+    def lagrangian(q: list[Node], qd: list[Node], t: Node) -> Node:
+        fast = 0.5 * qd[0] ** 2 - 0.5 * rate**2 * (q[0] - 0.3 * cg.cos(q[1])) ** 2
+        return fast + (0.0 if slow is None else slow(q[1:], qd[1:], t))
+
+    q[0], qd[0] = 0.3 * math.cos(q[1]) + rng.choice([0.0, 0.01]), 0.0
+    damping = [2.0 * rate, *[0.05] * (n - 1)]
+    return _setting(name, lagrangian, q, qd, t_end, damping=damping, stiff=True)
+
+
+@family
+def singular(rng: np.random.Generator, name: str) -> Setting:
+    """Orbits about a center that pulls with 1/r^k or log r; and motions that end: falls, escapes, a mass that ends."""
+    power, strength, far = rng.choice([0.0, 0.5, 1.0, 2.0]), rng.uniform(0.5, 2.0), rng.uniform(0.5, 2.0)
+    kind = rng.choice(["orbit", "orbit", "fall", "escape", "mass"])
+    t_end = rng.uniform(4.0, 10.0)
+
+    def pull(q: list[Node], qd: list[Node], t: Node) -> Node:
+        square = _sum([x * x for x in q])
+        return _kinetic(np.eye(len(q)), qd) + (
+            -0.5 * strength * cg.log(square) if power == 0.0 else strength / square ** (0.5 * power)
+        )
+
+    if kind == "orbit":
+        angle, speed = rng.uniform(0.0, 2 * math.pi), rng.uniform(0.2, 1.0) * math.sqrt(strength / far**power)
+        along, aside = np.array([math.cos(angle), math.sin(angle)]), np.array([-math.sin(angle), math.cos(angle)])
+        return _setting(name, pull, far * along, speed * aside, t_end)
+    n = int(rng.integers(1, 3))
+    q, qd = far * np.eye(n)[0], np.zeros(n)
+    if kind == "fall":
+        return _setting(name, pull, q, qd, t_end)
+    if kind == "escape":  # to infinity, in a time of about 1.9 / (far sqrt(strength))
+        return _setting(name, lambda q, qd, t: _kinetic(np.eye(n), qd) + 0.25 * strength * q[0] ** 4, q, qd, t_end)
+    return _setting(
+        name,
+        lambda q, qd, t: 0.5 * _sum([(x * v) ** 2 for x, v in zip(q, qd, strict=True)]) - strength * q[0],
+        q + 0.1,
+        qd,
+        t_end,
+    )
+
+
+@family
+def small_or_large(rng: np.random.Generator, name: str) -> Setting:
+    """Curved systems in other units of length, mass and time, by powers of ten up to nine."""
+    n = _size(rng)
+    still, (q, qd, t_end) = _curved(rng, n), _start(rng, n)
+    length, mass, second = (10.0 ** rng.integers(-9, 10, size=3)).tolist()
+
+    def lagrangian(q: list[Node], qd: list[Node], t: Node) -> Node:
+        unit = mass * length**2 / second**2
+        return unit * still([x / length for x in q], [v * (second / length) for v in qd], t / second)
+
+    return _setting(name, lagrangian, q * length, qd * (length / second), t_end * second)
+
+
+def _size(rng: np.random.Generator) -> int:
+    return int(rng.integers(1, 4))
+
+
+def _start(rng: np.random.Generator, n: int) -> tuple[Array, Array, float]:
+    """q, qd and t_end; one start in three is at rest."""
+    qd = rng.normal(size=n) if rng.random() < 2 / 3 else np.zeros(n)
+    return rng.uniform(-2.0, 2.0, size=n), qd, float(rng.uniform(1.0, 10.0))
+
+
+def _masses(rng: np.random.Generator, n: int) -> Array:
+    """A positive definite matrix whose condition is up to about a thousand."""
+    basis = np.linalg.qr(rng.normal(size=(n, n)))[0]
+    return np.asarray(basis @ np.diag(10.0 ** rng.uniform(-1.5, 1.5, size=n)) @ basis.T)
+
+
+def _potential(rng: np.random.Generator, n: int) -> Callable[[list[Node]], Node]:
+    waves, phases, heights = rng.normal(size=(n + 1, n)), rng.uniform(0.0, 6.0, size=n + 1), rng.normal(size=n + 1)
+    squares, fourths = rng.uniform(0.0, 3.0, size=n), rng.uniform(0.0, 0.5, size=n)
+
+    def energy(q: list[Node]) -> Node:
+        ripples = [h * cg.cos(_dot(k, q) + a) for h, k, a in zip(heights, waves, phases, strict=True)]
+        return _sum(ripples) + _sum([a * x**2 + b * x**4 for a, b, x in zip(squares, fourths, q, strict=True)])
+
+    return energy
+
+
+def _curved(rng: np.random.Generator, n: int) -> Lagrangian:
+    mass, well = _masses(rng, n), _potential(rng, n)
+    rows, waves = rng.normal(size=(2, n)), rng.normal(size=(2, n))
+
+    def lagrangian(q: list[Node], qd: list[Node], t: Node) -> Node:
+        bends = [_dot(w, qd) ** 2 * (0.25 + 0.25 * cg.sin(_dot(k, q))) for w, k in zip(rows, waves, strict=True)]
+        return _kinetic(mass, qd) + _sum(bends) - well(q)
+
+    return lagrangian
+
+
+def _kinetic(mass: Array, qd: Sequence[Node]) -> Node:
+    return 0.5 * _sum([v * _dot(row, qd) for v, row in zip(qd, mass, strict=True)])
+
+
+def _dot(numbers: Array, nodes: Sequence[Node]) -> Node:
+    return _sum([float(number) * node for number, node in zip(numbers, nodes, strict=True)])
+
+
+def _sum(nodes: Sequence[Node]) -> Node:
+    total = nodes[0]
+    for node in nodes[1:]:
+        total = total + node
+    return total
+
+
+def _setting(
+    name: str,
+    lagrangian: Lagrangian,
+    q: Array,
+    qd: Array,
+    t_end: float,
+    damping: float | list[float] = 0.0,
+    stiff: bool = False,
+) -> Setting:
+    model = System(lagrangian, [f"x{i}" for i in range(len(q))], damping=damping)
+    start = tuple(q.tolist()), tuple(qd.tolist())
+    return Setting(
+        name, "a random Lagrangian", model, *start, float(t_end), stiff=stiff, method="radau" if stiff else "taylor"
+    )

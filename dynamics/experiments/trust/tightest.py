@@ -1,0 +1,87 @@
+"""Tightest: the random Lagrangians as exactly as float64 has them, by one of our methods and by heyoka's, in turns."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from cgraph.extend import Array
+
+from ..text_table import table
+from ..work_precision.measurement import Tried, in_turns
+from ..work_precision.trajectory_peers import EPSILON, Heyoka
+from ..work_precision.trajectory_runs import Ours, Solver, problem_of
+from .answers import COUNT, Answer, answer
+from .random_lagrangians import random_setting
+
+METHOD, TURNS = "taylor", 5
+FLOOR = EPSILON / 4.0  # of an error in a ratio: less is luck
+
+
+@dataclass(frozen=True)
+class Duel:
+    """error: of both at t_end over the sizes of the states.  seconds: of both, the shortest of the turns.
+
+    status: empty, or why there is no figure.
+    """
+
+    name: str
+    error: tuple[float, float]
+    seconds: tuple[float, float]
+    status: str = ""
+
+
+def duel(number: int, method: str = METHOD, tolerance: float = EPSILON) -> Duel | None:
+    """One of our methods at this tolerance, and heyoka at its default; None of a motion that has no end or is stiff."""
+    setting, truth = random_setting(number), answer(number)
+    if truth.end is None or setting.stiff:
+        return None
+    problem, smallest = problem_of(setting), min([size for size in truth.size if size] or [1.0])
+    both: tuple[Solver, Solver] = Ours(method, setting, smallest, problem), Heyoka(setting, smallest, problem)
+    tried = []
+    for solver in both:
+        run = solver.ready(tolerance if solver.ours else EPSILON)
+        outcome = run()
+        if outcome.status:
+            return Duel(setting.name, (math.nan, math.nan), (math.nan, math.nan), f"{solver.name}: {outcome.status}")
+        tried.append(Tried(0.0, run, outcome, _error(truth, outcome.x)))
+    in_turns(tried, TURNS)
+    first, second = tried
+    return Duel(setting.name, (first.error, second.error), (min(first.seconds), min(second.seconds)))
+
+
+def _error(truth: Answer, x: Array) -> float:
+    assert truth.end is not None
+    size = np.array(truth.size)
+    return float(np.max(np.abs(truth.end.deviation(x[None])[0]) / np.where(size > 0.0, size, 1.0)))
+
+
+def tightest(count: int = COUNT) -> Iterator[str]:
+    """Errors and times as ratios to heyoka's, by family and in all."""
+    duels = [result for number in range(count) if (result := duel(number)) is not None]
+    fought = [each for each in duels if not each.status]
+    yield f"{METHOD} at a relative tolerance of {EPSILON:.2g} over heyoka at its default, {len(fought)} motions"
+    names = list(dict.fromkeys([_family(each) for each in fought]))
+    rows = [_row(name, [each for each in fought if _family(each) == name]) for name in names]
+    rows.append(_row("all", fought))
+    yield "\n".join(table(["family", "motions", "error ratio", "largest", "time ratio", "largest"], rows))
+    yield from [f"{each.name}: {each.status}" for each in duels if each.status]
+
+
+def _family(result: Duel) -> str:
+    return result.name.rpartition(" ")[0]
+
+
+def _row(name: str, duels: Iterable[Duel]) -> list[str]:
+    chosen = list(duels)
+    errors = [max(each.error[0], FLOOR) / max(each.error[1], FLOOR) for each in chosen]
+    times = [each.seconds[0] / each.seconds[1] for each in chosen]
+    figures = [f(values) for values in (errors, times) for f in (_geometric_mean, max)]
+    return [name, str(len(chosen)), *[f"{figure:.2g}" for figure in figures]]
+
+
+def _geometric_mean(values: list[float]) -> float:
+    return math.exp(sum([math.log(value) for value in values]) / len(values))

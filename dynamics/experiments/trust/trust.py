@@ -1,0 +1,104 @@
+"""Trust: runs of the random Lagrangians with default arguments, judged by their answers: right, said, or silent."""
+
+from __future__ import annotations
+
+import warnings
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...integrators import METHODS
+from ...simulation.run_options import RunOptions
+from ...simulation.simulate import simulate
+from ...simulation.trajectory import Trajectory
+from ..setting import Setting
+from ..text_table import table
+from .answers import COUNT, Answer, answer
+from .random_lagrangians import random_setting
+
+RIGHT, SAID, SILENT = "right", "said", "silent"
+SLACK = 100.0  # times the tolerance times the growth: an error that is right
+DEFAULT = "default"
+ADAPTIVE = tuple([name for name, method in METHODS.items() if method.adaptive])
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One run judged.
+
+    excess: the error at t_end over the tolerance times the growth, the largest of all states, each over its size; NaN
+    where there is no end, or the run did not get there.  verdict: "right", excess at most `SLACK`, or the motion has no
+    end and the run says so; "said", the run stopped or warns; "silent".  words: what the run said.
+    """
+
+    name: str
+    method: str
+    verdict: str
+    excess: float
+    words: str
+    steps: int
+    seconds: float
+
+
+def judge(number: int, method: str | None = None) -> Verdict:
+    """The verdict on one random Lagrangian by a method with default arguments."""
+    setting, truth = random_setting(number), answer(number)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        arguments: dict[str, Any] = {} if method is None else {"method": method}
+        run = simulate(setting.model, setting.q, setting.qd, setting.t_end, progress=False, **arguments)
+    words = "; ".join([*([] if run.stats.success else [run.stats.message]), *[str(each.message) for each in caught]])
+    excess = _excess(setting, truth, run)
+    if excess <= SLACK or (truth.end is None and not run.stats.success):
+        verdict = RIGHT
+    else:
+        verdict = SAID if words else SILENT
+    return Verdict(setting.name, method or DEFAULT, verdict, excess, words, run.stats.steps, run.stats.seconds)
+
+
+def _excess(setting: Setting, truth: Answer, run: Trajectory) -> float:
+    if truth.end is None or not run.stats.success:
+        return float("nan")
+    size = np.array(truth.size)
+    error = np.abs(truth.end.deviation(np.hstack([run.q[-1:], run.qd[-1:]]))[0])
+    relative = np.divide(error, size, out=np.where(error > 0.0, np.inf, 0.0), where=size > 0.0)
+    tolerance = RunOptions(setting.t_end, run.stats.method).rtol
+    return float(np.max(relative) / (tolerance * truth.growth))
+
+
+def verdicts(
+    numbers: Iterable[int] = range(COUNT), methods: Sequence[str | None] = (None, *ADAPTIVE)
+) -> Iterator[Verdict]:
+    """The verdicts on these random Lagrangians by these methods; None is the default."""
+    for number in numbers:
+        for method in methods:
+            yield judge(number, method)
+
+
+def trust(count: int = COUNT) -> Iterator[str]:
+    """The verdicts counted by method, and in words those that are silent."""
+    judged = list(verdicts(range(count)))
+    methods = list(dict.fromkeys([each.method for each in judged]))
+    rows = []
+    for method in methods:
+        chosen = [each for each in judged if each.method == method]
+        counts = Counter([each.verdict for each in chosen])
+        ends = [each.excess for each in chosen if each.excess == each.excess]
+        rows.append(
+            [
+                method,
+                *[str(counts[verdict]) for verdict in (RIGHT, SAID, SILENT)],
+                f"{np.median(ends):.2g}",
+                f"{max(ends):.2g}",
+                f"{sum(each.seconds for each in chosen):.2f}",
+            ]
+        )
+    head = ["method", RIGHT, SAID, SILENT, "median excess", "largest", "seconds"]
+    yield f"{count} random Lagrangians, default arguments; excess: error over tolerance times growth, right to {SLACK:g}"
+    yield "\n".join(table(head, rows))
+    for each in judged:
+        if each.verdict != RIGHT:
+            yield f"{each.verdict}: {each.name}, {each.method}: excess {each.excess:.3g}; {each.words}"

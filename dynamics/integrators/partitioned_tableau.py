@@ -1,0 +1,88 @@
+"""Partitioned tableaus: the numbers of symplectic Runge-Kutta methods, those of Gauss for any number of stages."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+
+Row = tuple[Fraction, ...]
+
+DIGITS = 50  # of the numbers of Gauss's methods
+NEWTON = 8  # steps that make 50 digits of a guess that has two or three
+_0, _1 = Fraction(0), Fraction(1)
+
+
+@dataclass(frozen=True)
+class Partitioned:
+    """The numbers: q's a_ij, p's b_ij, weights w_i, and the times c_i of the stages. The same a and b: Gauss."""
+
+    order: int
+    a: tuple[Row, ...]
+    b: tuple[Row, ...]
+    w: Row
+    c: Row
+
+
+@cache
+def gauss(stages: int) -> Partitioned:
+    """Gauss's method of s stages, of order 2 s: collocation at the roots x of Legendre's polynomial P_s.
+
+    With c = (1 + x) / 2 and w = 1 / ((1 - x^2) P_s'(x)^2), a_ij, the integral of Lagrange's polynomial j to c_i, is
+    w_j (c_i + sum over 0 < k < s of P_k(x_j) (P_k+1(x_i) - P_k-1(x_i)) / 2)  (Hairer and Wanner II, section IV.5).
+    """
+    roots = [_root(stages, i) for i in reversed(range(stages))]
+    p = [_legendre(stages, x) for x in roots]
+    w = [_rounded(1 / ((1 - x * x) * _slope(values, x) ** 2)) for x, values in zip(roots, p, strict=True)]
+    a = []
+    for x, here in zip(roots, p, strict=True):
+        rises = [(here[k + 1] - here[k - 1]) / 2 for k in range(1, stages)]
+        total = [(1 + x) / 2 + sum([u * v for u, v in zip(there[1:], rises, strict=False)], _0) for there in p]
+        a.append(tuple([_rounded(weight * each) for weight, each in zip(w, total, strict=True)]))
+    rows = tuple(a)
+    return Partitioned(2 * stages, rows, rows, tuple(w), tuple([sum(row, _0) for row in rows]))
+
+
+def _legendre(degree: int, x: Fraction) -> list[Fraction]:
+    """P_0(x) .. P_degree(x)."""
+    p = [_1, x]
+    for k in range(1, degree):
+        p.append(_rounded(((2 * k + 1) * x * p[k] - k * p[k - 1]) / (k + 1)))
+    return p
+
+
+def _slope(p: list[Fraction], x: Fraction) -> Fraction:
+    """P_s'(x) of P_0(x) .. P_s(x)."""
+    s = len(p) - 1
+    return s * (x * p[s] - p[s - 1]) / (x * x - 1)
+
+
+def _root(degree: int, i: int) -> Fraction:
+    """Root i of Legendre's polynomial, from the largest down, by Newton's method."""
+    x = _rounded(Fraction(math.cos(math.pi * (i + 0.75) / (degree + 0.5))))
+    for _ in range(NEWTON):
+        p = _legendre(degree, x)
+        x = _rounded(x - p[degree] / _slope(p, x))
+    return x
+
+
+def _rounded(x: Fraction) -> Fraction:
+    return Fraction(round(x * 10**DIGITS), 10**DIGITS)
+
+
+def over(denominator: int, *numerators: int) -> Row:
+    """The numerators, each over the denominator."""
+    return tuple([Fraction(numerator, denominator) for numerator in numerators])
+
+
+SYMPLECTIC_EULER = Partitioned(1, a=((_0,),), b=((_1,),), w=(_1,), c=(_0,))
+VERLET = Partitioned(2, a=(over(2, 0, 0), over(2, 1, 1)), b=(over(2, 1, 0),) * 2, w=over(2, 1, 1), c=(_0, _1))
+MIDPOINT = gauss(1)
+PARTITIONED = {
+    "symplectic_euler": SYMPLECTIC_EULER,
+    "verlet": VERLET,
+    "midpoint": MIDPOINT,
+    "gauss4": gauss(2),
+    "gauss6": gauss(3),
+}

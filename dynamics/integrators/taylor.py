@@ -1,0 +1,133 @@
+"""Taylor's method: steps by the Taylor series of the solution, of an order by the tolerance.
+
+Order and step follow Jorba and Zou, Experimental Mathematics 14 (2005) 99: order -log(rtol) / 2 + 1, and the step at
+which the last two terms are as small as the tolerance. Coefficients are of the time in units of the step before, so
+that they neither overflow nor depend on the unit of time. What a step missed is seen at its end, where the derivative
+of the polynomial has to be the rate; coefficients 0 of the next step are computed there anyway.
+"""
+
+from __future__ import annotations
+
+import math
+
+import cgraph as cg
+from cgraph import Graph
+from cgraph.extend import Call, If, Map, Program, Statement, Sum
+
+from .elementwise import SAME, compensated, function
+from .explicit import stage_time
+from .jets import Jets, jets
+from .problem import Problem
+from .step_control import accept_step, control, count, first_pass, recorded, registers, trial
+
+ORDER = 20  # of a tolerance of 2^-52
+LEAST = 3  # order
+CHECKED = 2.0**-46  # relative: rounding of the rates, below which a defect says nothing
+
+
+def taylor(order: int, problem: Problem, dense: bool) -> Program:
+    """A trial of one step of at most that order."""
+    m, graphs = problem.size, jets(problem.rate, problem.size)
+    orders = range(1, order + 1)
+    begin = Call(graphs.start, ("x", "t", "p"), ("rate", "zeros"))
+    none = Graph([], {f"order{k}": float(k) for k in orders})
+    numbers = Call(none, (), tuple([f"order{k}" for k in orders]))
+    body: list[Statement] = [first_pass(begin, count(1), numbers, _orders(order), Map(SAME, ("next",), ("unit",)))]
+    series: list[Statement] = [Map(SAME, ("rate",), ("rates0",))]
+    for k in orders:
+        series += [If(f"takes{k}", tuple(_coefficients(k, graphs)))]
+    body.append(If("accepted", (*series, _wish())))
+    body += [trial(), Call(function("h unit", s=cg.variable("h") / cg.variable("unit")), ("h", "unit"), ("s",))]
+    body += [_arrival(order), stage_time("at_t", 1.0)]
+    body += [Call(graphs.start, ("x_new", "at_t", "p"), ("rate_new", "zeros_new")), *_checked(m), control(order, 1)]
+    kept = [Map(SAME, (f"{name}_new",), (name,)) for name in ("rounding", "rate", "zeros")]
+    kept.append(Map(SAME, ("h",), ("unit",)))
+    body.append(accept_step(*((_dense(order),) if dense else ()), *kept))
+    body.append(If("accepted", (Call(Graph([], {"next": math.inf}), (), ("next",)),)))
+    names = [f"{name}{k}" for name in ("c", "dense") for k in orders]
+    lengths = dict.fromkeys([*names, "rates0", "rates1", "rate", "rate_new", "rounding", "rounding_new", "slope"], m)
+    lengths |= {f"{side}{k}": graphs.sums for side in ("left", "right") for k in orders}
+    lengths |= {"sums": graphs.sums, "none": graphs.sums, "zeros": graphs.zeros, "zeros_new": graphs.zeros}
+    single = ["unit", "s", "at_t", "last", "before", "highest"]
+    lengths |= dict.fromkeys([*single, *[f"{name}{k}" for name in ("order", "takes") for k in orders]], 1)
+    record = recorded(dense, order)
+    return Program({**registers(problem), **lengths}, body, record, record_if="accepted", stop="status")
+
+
+def _orders(order: int) -> Call:
+    """From rtol: the order, and which coefficients are computed; all of them where the tolerance asks for nothing."""
+    rtol = cg.variable("rtol")
+    wanted = 1.0 - 0.5 * cg.log(cg.maximum(rtol, 1e-300))
+    highest = cg.where(rtol < 1.0, cg.minimum(cg.maximum(wanted, float(LEAST)), float(order)), float(order))
+    takes = {f"takes{k}": cg.less(k - 1.0, highest) for k in range(1, order + 1)}
+    rounded = sum(takes.values(), cg.constant(0.0))
+    return Call(Graph([rtol], {**takes, "highest": rounded}), ("rtol",), (*takes, "highest"))
+
+
+def _coefficients(k: int, graphs: Jets) -> list[Statement]:
+    """Coefficients k, and the size of the term k of the state in tolerances."""
+    body: list[Statement] = []
+    if k > 1 and graphs.sums:
+        pairs = [(f"left{j}", f"right{k - j}") for j in range(1, k)]
+        nodes = cg.variables([f"v{j}" for j in range(2 * len(pairs))])
+        products = [a * b for a, b in zip(nodes[::2], nodes[1::2], strict=True)]
+        halves = [sum(part[1:], part[0]) for part in (products[::2], products[1::2]) if part]
+        graph = Graph(nodes, {"sum": sum(halves[1:], halves[0])})
+        body.append(Map(graph, tuple([name for pair in pairs for name in pair]), ("sums",)))
+    inputs = (f"rates{(k - 1) % 2}", "unit", f"order{k}", "zeros", "sums" if k > 1 else "none")
+    body.append(Call(graphs.order, inputs, (f"c{k}", f"rates{k % 2}", f"left{k}", f"right{k}")))
+    return [*body, Map(SAME, ("last",), ("before",)), Sum(_SQUARE, (f"c{k}", "x", "rtol", "atol"), "last")]
+
+
+def _square() -> Graph:
+    c, x, rtol, atol = inputs = cg.variables("c x rtol atol")
+    part = c / (atol + rtol * abs(x))
+    return Graph(inputs, {"y": part * part})
+
+
+_SQUARE = _square()
+
+
+def _wish() -> Call:
+    """Register `next`: at most the step at which the last two terms are within the tolerance."""
+    last, before, unit, order, wanted = inputs = cg.variables("last before unit highest next")
+    share = cg.minimum(before ** (-0.5 / (order - 1.0)), (math.exp(4.0) * last) ** (-0.5 / order))
+    h = abs(unit) * share * cg.exp(-0.7 / (order - 1.0))
+    names = ("last", "before", "unit", "highest", "next")
+    return Call(Graph(inputs, {"h": cg.where(cg.equal(h, h), cg.minimum(wanted, h), 0.0)}), names, ("next",))
+
+
+def _arrival(order: int) -> Map:
+    """x_new = x + sum of c_k s^k, with what rounding took off; slope = h times the polynomial's derivative there."""
+    x, before, s, *c = cg.variables(["x", "rounding", "s", *(f"c{k}" for k in range(1, order + 1))])
+    change, slope = c[-1], order * c[-1]
+    for k in range(order - 1, 0, -1):
+        change, slope = c[k - 1] + s * change, k * c[k - 1] + s * slope
+    total, rounding = compensated(x, s * change + before)
+    graph = Graph([x, before, s, *c], {"x": total, "rounding": rounding, "slope": s * slope})
+    registers = ("x", "rounding", "s", *[f"c{k}" for k in range(1, order + 1)])
+    return Map(graph, registers, ("x_new", "rounding_new", "slope"))
+
+
+def _checked(m: int) -> list[Statement]:
+    """Register `error`: what the step misses by its defect, the difference of rate and derivative at its end."""
+    slope, rate, x, x_new, rtol, atol, h, order = inputs = cg.variables("slope rate x x_new rtol atol h order")
+    scale = atol + cg.maximum(rtol, CHECKED) * cg.maximum(abs(x), abs(x_new)) + CHECKED * abs(slope)
+    part = (slope - h * rate) / ((order + 1.0) * scale)
+    names = ("slope", "rate_new", "x", "x_new", "rtol", "atol", "h", "highest")
+    total, h, t = cg.variables("error h t")
+    error = cg.where(cg.not_equal(t, t + h), cg.sqrt(total / m), math.inf)
+    return [
+        Sum(Graph(inputs, {"y": part * part}), names, "error"),
+        Call(Graph([total, h, t], {"error": error}), ("error", "h", "t"), ("error",)),
+    ]
+
+
+def _dense(order: int) -> Map:
+    """dense_k = c_k s^k."""
+    s, *c = cg.variables(["s", *(f"c{k}" for k in range(1, order + 1))])
+    outputs, power = {}, s
+    for k, each in enumerate(c, start=1):
+        outputs[f"dense{k}"] = each * power
+        power = power * s
+    return Map(Graph([s, *c], outputs), ("s", *[f"c{k}" for k in range(1, order + 1)]), tuple(outputs))

@@ -1,0 +1,37 @@
+"""State sizes: how large the components of a state have been, and the absolute tolerance that goes with them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cgraph.extend import Array
+
+SHARE = 0.1  # of rtol times the size of a component: its absolute tolerance
+OTHERS = 1e-6  # of the largest component of its kind, below which one counts as no smaller: it may be rounding
+
+
+class StateSizes:
+    """The absolute tolerance of a run that was given none, in the units of its states.
+
+    A tenth of rtol times the largest value that the component has had so far, or a millionth of the largest of its
+    kind, coordinates or velocities. It grows with the motion.
+
+    kinds: for each component a number, the same for those of one kind, (m,).
+    """
+
+    def __init__(self, rtol: float, kinds: Sequence[int], least: float) -> None:
+        kind = np.array(kinds)
+        self._alike = kind[:, None] == kind[None, :]
+        self._rtol, self._least = rtol, least
+        self._sizes = np.zeros(len(kind))
+
+    def see(self, states: Array, *, anew: bool = False) -> Array:
+        """The tolerance, (m,), with these states seen too, (.., m); anew: as if no others had been."""
+        with np.errstate(invalid="ignore"):
+            largest = np.abs(np.where(np.isfinite(states), states, 0.0)).max(axis=0, initial=0.0)
+        self._sizes = largest if anew else np.maximum(self._sizes, largest)
+        others = np.where(self._alike, self._sizes, 0.0).max(axis=1)
+        tolerance: Array = np.maximum(SHARE * self._rtol * np.maximum(self._sizes, OTHERS * others), self._least)
+        return tolerance

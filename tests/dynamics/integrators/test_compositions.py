@@ -1,0 +1,124 @@
+"""Compositions: they meet the conditions of their orders, and are symmetric, symplectic maps of that order."""
+
+import math
+from fractions import Fraction
+from itertools import accumulate
+
+import numpy as np
+import pytest
+from pytest import approx, mark, raises
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.integrators import METHODS
+from dynamics.integrators.composition import COMPOSITIONS, Composition
+from tests.dynamics.planet import PERIHELION, cart, planet, position
+
+Series = dict[tuple[int, ...], Fraction]  # of words in X_1, X_3, X_5, .., whose weights are their indices
+
+CONDITIONS = 2e-13  # words of up to eight letters: products of numbers as large as two, rounded to float64
+FITTED_ORDER = 0.1  # of an order from two runs: what the next order adds at these steps
+THERE_AND_BACK = 1e-12  # some hundred steps of rounding
+STEPS = {4: 200, 6: 48, 8: 32}
+
+
+def product(left: Series, right: Series, weight: int) -> Series:
+    result: Series = {}
+    for a, x in left.items():
+        for b, y in right.items():
+            if sum(a) + sum(b) <= weight:
+                result[a + b] = result.get(a + b, Fraction(0)) + x * y
+    return result
+
+
+def flow(step: Fraction, weight: int) -> Series:
+    """exp(step X_1 + step^3 X_3 + ..): any symmetric method, with no relation between its X."""
+    letters: Series = {(k,): step**k for k in range(1, weight + 1, 2)}
+    powers = accumulate(
+        range(1, weight + 1),
+        lambda s, k: {w: x / k for w, x in product(s, letters, weight).items()},
+        initial={(): Fraction(1)},
+    )
+    result: Series = {}
+    for power in powers:
+        for word, x in power.items():
+            result[word] = result.get(word, Fraction(0)) + x
+    return result
+
+
+def defect(composition: Composition, weight: int) -> Fraction:
+    """What the product of the flows differs from exp(X_1), in words of that weight at most."""
+    whole: Series = {(): Fraction(1)}
+    for step in composition.steps:
+        whole = product(whole, flow(Fraction(step), weight), weight)
+    return max(abs(x - (Fraction(1, math.factorial(len(w))) if set(w) <= {1} else 0)) for w, x in whole.items())
+
+
+@mark.parametrize("name", COMPOSITIONS)
+def test_a_composition_meets_the_conditions_of_its_order_and_no_more(name: str) -> None:
+    composition = COMPOSITIONS[name]
+    assert composition.steps == composition.steps[::-1]
+    assert defect(composition, composition.order) < CONDITIONS
+    assert defect(composition, composition.order + 1) > 1e-6
+
+
+@mark.parametrize("name", COMPOSITIONS)
+def test_the_measured_order_is_the_declared_one(name: str) -> None:
+    """Of the planet, whose steps are Verlet's; and of the cart, whose are the midpoint's, for one row an order."""
+    pytest.importorskip("llvmlite")
+    order = METHODS[name].order
+    few = STEPS[order]
+    runs = [dyn.simulate(planet(), *PERIHELION, 1.0, name, dt=1.0 / n, t_eval=[1.0]) for n in (few, 2 * few)]
+    errors = [np.abs(run.q[-1] - position(1.0)).max() for run in runs]
+    assert errors[1] < 1e-13 or math.log2(errors[0] / errors[1]) > order - FITTED_ORDER
+    if name.startswith("yoshida"):
+        ends = [dyn.simulate(cart(), [0.1, 1.0], [0.0, 0.5], 0.5, name, dt=0.5 / n).q[-1] for n in (6, 12, 24)]
+        first, second = (np.abs(a - b).max() for a, b in ((ends[0], ends[1]), (ends[1], ends[2])))
+        assert math.log2(first / second) > order - 0.7
+
+
+@mark.parametrize("name", ["yoshida4", "kahan_li8"])
+def test_energy_does_not_drift_and_time_can_be_turned(name: str) -> None:
+    pytest.importorskip("llvmlite")
+    run = dyn.simulate(planet(), *PERIHELION, 200.0, name, dt=0.05)
+    error = np.abs(run.energy - run.energy[0])
+    assert error[-1000:].max() < 1.05 * error[:1000].max() + 1e-13
+    for model, q, qd in ((planet(), *PERIHELION), (dyn.planar_arm([1.0, 0.7], [0.9, 0.6]), [0.1, 1.0], [0.0, 0.5])):
+        there = dyn.simulate(model, q, qd, 2.0, name, dt=0.04)
+        back = dyn.simulate(model, there.q[-1], -there.qd[-1], 2.0, name, dt=0.04)
+        assert back.q[-1] == approx(np.array(q), abs=THERE_AND_BACK)
+        assert -back.qd[-1] == approx(np.array(qd), abs=THERE_AND_BACK)
+
+
+WITHOUT_INERTIA = {  # {name: (L, parameters, start)}; 'slider' has no inertia, at the start or from some time on
+    "by a parameter": (
+        lambda q, qd, t, p: 0.5 * qd[0] ** 2 + 0.5 * p["m"] * qd[1] ** 2 - q[0] * q[1],
+        {"m": 0.0},
+        [1.0, 0.5],
+    ),
+    "at the start": (lambda q, qd, t, p: 0.5 * qd[0] ** 2 + 0.5 * q[0] * qd[1] ** 2 - q[1], {}, [0.0, 0.0]),
+    "on the way": (
+        lambda q, qd, t, p: 0.5 * qd[0] ** 2 + 0.5 * (cg.maximum(1.0 - 4.0 * t, 0.0)) * qd[1] ** 2 - q[1],
+        {},
+        [0.0, 0.0],
+    ),
+}
+
+
+@mark.parametrize("method", ["verlet", "gauss4", "yoshida4"])
+@mark.parametrize("case", WITHOUT_INERTIA)
+def test_a_coordinate_without_inertia_is_named(method: str, case: str) -> None:
+    lagrangian, parameters, start = WITHOUT_INERTIA[case]
+    model = dyn.System(lagrangian, ["cart", "slider"], parameters)
+    run = dyn.simulate(model, start, [0.0, 0.0], 1.0, method, dt=0.01, backend="python")
+    assert not run.stats.success
+    assert run.stats.message.endswith("s: coordinate 'slider' has an inertia that is not positive")
+    assert run.t[-1] == approx(0.25 if case == "on the way" else 0.0, abs=0.011)
+
+
+def test_a_coordinate_that_has_no_inertia_by_structure_is_named() -> None:
+    model = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - q[0] * q[1], ["cart", "slider"])
+    with raises(dyn.SingularMassMatrixError, match="'slider' has no inertia"):
+        dyn.simulate(model, [0.0, 0.0], [0.0, 0.0], 1.0, "verlet")
+    negative = dyn.System(lambda q, qd, t: -0.5 * qd[0] ** 2 + 0.5 * q[0] ** 2, ["x"])
+    assert dyn.simulate(negative, [1.0], [0.0], 1.0, "verlet").q[-1] == approx(math.cos(1.0), abs=1e-6)

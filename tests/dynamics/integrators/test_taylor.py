@@ -1,0 +1,81 @@
+"""The Taylor method: its series against those of mpmath, its runs against 30 digits, and what it refuses."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+from pytest import approx, mark, raises
+
+import cgraph as cg
+import dynamics as dyn
+from cgraph.core.node import apply
+from cgraph.extend import OPS
+from tests.dynamics.planet import PERIHELION, planet, position
+
+ROUNDINGS = 2e-14  # of a few dozen steps
+SERIES: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {
+    "quotient": (lambda x, t: (1.0 + t) / (2.0 + x * x), lambda x, t: (1 + t) / (2 + x * x)),
+    "root": (lambda x, t: cg.sqrt(1.0 + x * x + t), lambda x, t: mpmath.sqrt(1 + x * x + t)),
+    "power": (lambda x, t: (2.0 + x) ** -1.5, lambda x, t: (2 + x) ** mpmath.mpf(-1.5)),
+    "whole": (lambda x, t: 0.1 * x**3.0 + (x + 2.0) ** -3.0, lambda x, t: x**3 / 10 + (x + 2) ** -3),
+    "length": (lambda x, t: cg.hypot(1.0 + x, t), lambda x, t: mpmath.hypot(1 + x, t)),
+    "waves": (lambda x, t: cg.sin(x) * cg.cos(3.0 * t), lambda x, t: mpmath.sin(x) * mpmath.cos(3 * t)),
+    "exponential": (lambda x, t: cg.exp(-x) + cg.log(2.0 + t), lambda x, t: mpmath.exp(-x) + mpmath.log(2 + t)),
+    "tangents": (lambda x, t: cg.tanh(x - t) + cg.atan(x), lambda x, t: mpmath.tanh(x - t) + mpmath.atan(x)),
+}
+
+
+@mark.parametrize("name", SERIES)
+def test_a_run_is_that_of_mpmath(name: str) -> None:
+    ours, theirs = SERIES[name]
+    run = dyn.simulate(
+        dyn.OdeSystem(lambda x, t: [ours(x[0], t)], ["x"]), [0.3], None, 1.0, "taylor", rtol=1e-15, atol=1e-16
+    )
+    with mpmath.workdps(18):
+        exact = mpmath.odefun(lambda t, x: [theirs(x[0], t)], 0, [mpmath.mpf(0.3)])(1)[0]
+    assert run.q[-1, 0] == approx(float(exact), rel=ROUNDINGS)
+    assert run.stats.steps < 60
+
+
+def test_the_order_follows_the_tolerance_and_the_time_has_no_unit() -> None:
+    pytest.importorskip("llvmlite")
+    for unit in (1e-12, 1.0, 1e12):  # s
+        turning = dyn.OdeSystem(lambda x, t, p: [p["w"] * x[1], -p["w"] * x[0]], ["a", "b"], {"w": 1.0 / unit})
+        steps = []
+        for tolerance in (1e-4, 1e-15):
+            run = dyn.simulate(turning, [1.0, 0.0], None, 10.0 * unit, "taylor", rtol=tolerance, atol=tolerance)
+            assert abs(run.q[-1] - [math.cos(10.0), -math.sin(10.0)]).max() < 10.0 * tolerance
+            steps.append(run.stats.steps)
+        assert max(steps) < 3 * min(steps)  # as in Jorba and Zou: a tighter tolerance takes a higher order
+
+
+def test_what_the_series_at_the_start_does_not_show_is_seen_at_the_end_of_the_step() -> None:
+    """A pulse far from the start, where all its coefficients are rounding: the defect cuts the step."""
+    pytest.importorskip("llvmlite")
+    pulse = dyn.OdeSystem(lambda x, t: [cg.exp(-100.0 * (t - 2.0) ** 2.0)], ["x"])
+    run = dyn.simulate(pulse, [0.0], None, 2.0, "taylor", rtol=1e-12, atol=1e-12)
+    assert run.q[-1, 0] == approx(math.sqrt(math.pi / 100.0) / 2.0, rel=1e-9)
+
+
+def test_events_and_times_lie_on_its_polynomials() -> None:
+    pytest.importorskip("llvmlite")
+    times = np.linspace(0.0, 2.5, 40)
+    axis = dyn.Event("axis", lambda q, qd, t: q[1], direction=-1)
+    run = dyn.simulate(planet(), *PERIHELION, 4.0, "taylor", rtol=1e-14, atol=1e-14, t_eval=times, events=[axis])
+    assert run.q == approx(np.array([position(t) for t in times]), abs=5e-14)
+
+
+@mark.parametrize("name", [name for name, row in OPS.items() if row.piece is not None])
+def test_an_operation_without_a_series_is_named(name: str) -> None:
+    row = OPS[name]
+
+    def rate(x: list[cg.Node], t: cg.Node) -> list[cg.Node]:
+        with cg.tag("friction"):
+            arguments = [x[0], 0.2 - x[0], 0.5 * x[0]][: row.arity]
+            return [apply(row, *arguments)]
+
+    with raises(ValueError, match=f"equations that are smooth, and {name} has no Taylor series.*friction"):
+        dyn.simulate(dyn.OdeSystem(rate, ["x"]), [0.3], None, 1.0, "taylor")

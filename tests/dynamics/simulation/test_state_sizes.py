@@ -1,0 +1,72 @@
+"""The default absolute tolerance: it has the units of the state, and rounding noise is no state."""
+
+import numpy as np
+import pytest
+from pytest import mark
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.integrators import METHODS
+
+ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
+AS_WELL = 1e-6  # relative: what another unit may change, runs at rtol 1e-9
+
+
+def cart_pole(length: float, second: float) -> dyn.System:
+    """A pendulum on a cart with a spring, in these units of length and time."""
+
+    def lagrangian(q, qd, t):
+        x, v, turning = q[0], second * qd[0], second * qd[1]
+        swing = length * turning
+        kinetic = 1.0 * v**2 + 0.5 * (v**2 + 2.0 * v * swing * cg.cos(q[1]) + swing**2)
+        return (kinetic + 9.81 * length**2 * cg.cos(q[1]) - 1.5 * x**2) / second**2
+
+    return dyn.System(lagrangian, ["x", "angle"])
+
+
+@mark.parametrize("method", ADAPTIVE)
+def test_results_do_not_depend_on_units(method: str) -> None:
+    ends, steps = [], []
+    for length, second in ((1.0, 1.0), (2.0**-40, 1.0), (2.0**40, 1.0), (1.0, 2.0**-30), (2.0**-20, 2.0**30)):
+        start = [0.1 * length, 1.0], [0.0, 0.0]
+        run = dyn.simulate(cart_pole(length, second), *start, 3.0 * second, method)
+        assert run.success
+        assert not run.stats.warnings
+        ends.append([*run.q[-1] / [length, 1.0], *run.qd[-1] / [length / second, 1.0 / second]])
+        steps.append(run.stats.steps)
+    np.testing.assert_allclose(ends, np.broadcast_to(ends[0], np.shape(ends)), rtol=AS_WELL)
+    assert max(steps) < 1.5 * min(steps)
+
+
+def test_one_unit_of_all_lengths_changes_no_bit() -> None:
+    def end(unit: float) -> list[float]:
+        def lagrangian(q, qd, t):
+            square = (q[0] ** 2 + q[1] ** 2) / unit**2
+            return 0.5 * (qd[0] ** 2 + qd[1] ** 2) + unit**2 / cg.sqrt(square)
+
+        planet = dyn.System(lagrangian, ["x", "y"])
+        return (dyn.simulate(planet, [unit, 0.0], [0.0, 0.8 * unit], 5.0).q[-1] / unit).tolist()
+
+    assert end(1.0) == end(2.0**-60) == end(2.0**60)
+
+
+@mark.parametrize("method", ADAPTIVE)
+def test_a_component_of_rounding_alone_does_not_hold_the_steps(method: str) -> None:
+    def lagrangian(q, qd, t):  # a spherical pendulum, swinging in the plane turned by 0.3 rad: y is 0 but for rounding
+        c, s = np.cos(0.3), np.sin(0.3)
+        x, y = c * q[0] - s * q[1], s * q[0] + c * q[1]
+        vx, vy = c * qd[0] - s * qd[1], s * qd[0] + c * qd[1]
+        height = cg.sqrt(1.0 - x**2 - y**2)
+        return 0.5 * (vx**2 + vy**2 + ((x * vx + y * vy) / height) ** 2) + 9.81 * height
+
+    pendulum = dyn.System(lagrangian, ["x", "y"])
+    run = dyn.simulate(pendulum, [0.5, 0.0], [0.0, 0.0], 3.0, method, max_steps=5000)
+    assert run.success
+    assert np.abs(run.q[:, 1]).max() < 1e-9
+
+
+def test_a_tolerance_that_is_given_stays() -> None:
+    decay = dyn.OdeSystem(lambda x, t: [-x[0]], ["x"])
+    loose = dyn.simulate(decay, [1e-3], None, 5.0, atol=1e-3).stats.steps
+    assert loose < dyn.simulate(decay, [1e-3], None, 5.0).stats.steps
+    assert dyn.simulate(decay, [1e-3], None, 5.0).q[-1, 0] == pytest.approx(1e-3 * np.exp(-5.0), rel=1e-8)
