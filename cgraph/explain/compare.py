@@ -180,7 +180,7 @@ def compare(
     chosen = set(
         atoms.replace(",", " ").split() if isinstance(atoms, str) else require_sequence("atoms", atoms, "names")
     )
-    if classify is not None and not callable(classify):
+    if classify is not None and (not callable(classify) or isinstance(classify, type)):
         raise TypeError(f"classify must be a function of a graph, got {type(classify).__name__}: {classify!r:.60}")
     named = {node: node.name for graph in (left, right) for node in graph.nodes if node.name in chosen}
     unused = [name for graph in (left, right) for name in graph.input_names]  # an input that nothing uses is no node

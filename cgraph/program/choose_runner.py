@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..codegen.llvm_engine import MissingFunctionError
 from ..codegen.native_function import flags_of
-from ..util.require import require_choice
+from ..util.require import require_choice, require_flag
 from .native_runner import NativeRunner
 from .program import Program
 from .python_runner import PythonRunner
@@ -49,6 +49,7 @@ def runner(program: Program, backend: str = "auto", *, fast: bool = False, fma: 
     [4.0, 2.0, 1.0]
     """
     require_choice("backend", backend, BACKENDS)
+    fast, fma = require_flag("fast", fast), require_flag("fma", fma)
     if backend != "python":
         try:
             return NativeRunner(program, flags_of(fast, fma))

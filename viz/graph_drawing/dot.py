@@ -99,7 +99,7 @@ def to_dot(
         graph,
         {} if names is None else require_mapping("names", names, "name: text"),
         _marks(marked, marked_label),
-        frozenset(require_sequence("marked_edges", marked_edges, "edges")),
+        _edges(marked_edges),
         _cluster_rule(clusters),
         require_sequence("collapse", collapse, "tags"),
     )
@@ -112,6 +112,14 @@ def to_dot(
         draw_legend(drawing, plan.kinds, vertical=rankdir in ("BT", "TB"))
     draw_arrows(drawing, plan.arrows)
     return drawing
+
+
+def _edges(marked: Collection[Edge]) -> frozenset[Edge]:
+    edges = require_sequence("marked_edges", marked, "edges")
+    for edge in edges:
+        if not isinstance(edge, tuple):
+            raise TypeError(f"marked_edges must be edges of the graph, got {type(edge).__name__}: {edge!r:.60}")
+    return frozenset(edges)
 
 
 def _marks(marked: Collection[Node] | Mapping[str, Collection[Node]], words: str) -> dict[Node, Paint]:
@@ -144,4 +152,6 @@ def _cluster_rule(clusters: bool | Sequence[str] | ClusterRule) -> ClusterRule:
     if isinstance(clusters, bool):
         return main_tag if clusters else lambda node: None
     chosen = frozenset([clusters] if isinstance(clusters, str) else require_sequence("clusters", clusters, "tags"))
+    if not all([isinstance(tag, str) for tag in chosen]):
+        raise TypeError(f"clusters must be True, False, tags or a function of a node, got {clusters!r:.60}")
     return lambda node: _only(node.tags & chosen)

@@ -99,7 +99,11 @@ def page(
     if isinstance(graph, Graph):
         versions: Sequence[Version] = [Version("graph", graph, about, nodes, at or {})]
     else:
-        if not isinstance(graph, Sequence) or not all(isinstance(each, Version) for each in graph):
+        if (
+            isinstance(graph, str)
+            or not isinstance(graph, Sequence)
+            or not all(isinstance(each, Version) for each in graph)
+        ):
             require_graph("page", graph)
         versions = list(graph)
         if at is not None or nodes:

@@ -137,6 +137,8 @@ def lint(
     Holds: no path leads from x to y: y is an input.
     """
     require_graph("lint", graph)
+    if isinstance(digits, bool) or not isinstance(digits, (int, float)) or not digits > 0.0:
+        raise ValueError(f"digits must be a positive number, got {digits!r:.60}")
     if not isinstance(function, str):
         raise TypeError(f"function must be the name of one, got {type(function).__name__}: {function!r:.60}")
     names = Names(graph)
@@ -157,8 +159,6 @@ def lint(
         if not singular:
             proofs.append(f"no slope is unbounded in the box, of {many(len(names.number), 'operation')}.")
     if at is not None:
-        if isinstance(digits, bool) or not isinstance(digits, (int, float)) or not digits > 0.0:
-            raise ValueError(f"digits must be a positive number, got {digits!r}")
         losses = cancellations(names, at, digits)
         findings += losses
         if not losses:
