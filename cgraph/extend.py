@@ -21,7 +21,8 @@ label may have. `certain_digits` says what rounding leaves of the outputs.
 **Run**: a `Program` is graphs over registers of numbers (`Call`, `Map`, `Sum`, `Factor`, `Solve`, `If`, `While`), and
 `runner` makes it machine code or Python.
 
-**At the edges**: `real_array`, `real_number`, `check_name` and `require_graph` check what a caller passed,
+**At the edges**: `real_array`, `real_number`, `is_finite`, `check_name`, `require_graph`, `require_flag`,
+`require_whole`, `require_choice`, `require_sequence`, `require_mapping` and `require_path` check what a caller passed,
 `thread_count` reads `threads=`, `atomic_write` writes a file whole or not at all, `write_files` several, and
 `check_writable` looks beforehand; `install` ends an error about a missing package. `Array` is the type of an array of
 float64.
@@ -61,7 +62,15 @@ from .simplify.builder import Builder, folded
 from .simplify.identities import rewritten, shortened
 from .simplify.polynomial import Polynomial, expand, format_polynomial
 from .util.atomic_write import atomic_write, check_writable, write_files
-from .util.real_arrays import real_array, real_number
+from .util.real_arrays import is_finite, real_array, real_number
+from .util.require import (
+    require_choice,
+    require_flag,
+    require_mapping,
+    require_path,
+    require_sequence,
+    require_whole,
+)
 from .util.threads import thread_count
 
 __all__ = [
@@ -100,12 +109,19 @@ __all__ = [
     "format_polynomial",
     "hessian_nodes",
     "install",
+    "is_finite",
     "ldl_elimination",
     "ldl_solve",
     "real_array",
     "real_number",
     "register",
+    "require_choice",
+    "require_flag",
     "require_graph",
+    "require_mapping",
+    "require_path",
+    "require_sequence",
+    "require_whole",
     "rewritten",
     "runner",
     "shortened",

@@ -4,18 +4,10 @@ from cgraph import __version__ as __version__
 
 from . import scenes
 from .equations.coriolis import coriolis, damping_force
-from .equations.equations_of_motion import (
-    SingularMassMatrixError,
-    bias,
-    energy,
-    forward_dynamics,
-    gravity_force,
-    mass_matrix,
-    momentum,
-    raise_if_singular,
-)
+from .equations.equations_of_motion import bias, energy, forward_dynamics, gravity_force, mass_matrix, momentum
 from .equations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious_nodes
 from .equations.linearization import linearize, state_space
+from .equations.singular_mass_matrix import SingularMassMatrixError, raise_if_singular
 from .equations.state_equation import state_equation
 from .equations.torque_decomposition import torque_by_joint_motion, torque_by_link
 from .equations.torque_table import TorqueTable

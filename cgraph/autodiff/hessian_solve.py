@@ -10,6 +10,7 @@ from ..core.node import Node, Scalar, as_node
 from ..core.scope import building
 from ..core.traversal import topological
 from ..simplify.builder import Builder
+from ..util.require import require_flag, require_sequence
 from .elimination_order import Step, elimination_steps
 from .schur_elimination import EdgePushing
 
@@ -62,9 +63,12 @@ def hessian_solve(
     """
     require_graph("hessian_solve", graph)
     chosen = graph.select_inputs(wrt)
+    rhs = require_sequence("rhs", rhs, "numbers and nodes")
     if len(rhs) != len(chosen):
         raise ValueError(f"rhs needs one entry for each of the {len(chosen)} variables, got {len(rhs)}")
-    return solve_nodes(graph.only_output(), chosen, [as_node(value) for value in rhs], check=check)
+    return solve_nodes(
+        graph.only_output(), chosen, [as_node(value) for value in rhs], check=require_flag("check", check)
+    )
 
 
 def solve_nodes(

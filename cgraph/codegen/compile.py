@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..core.graph import Graph, require_graph
+from ..util.require import require_choice, require_flag
 from .compiled import Compiled
 from .llvm_engine import MissingFunctionError
 from .native_function import Native
@@ -80,10 +81,9 @@ def compile(
     >>> f([2.0, 3.0]).tolist(), f.batch([[1.0, 2.0], [3.0, 4.0]]).tolist()
     ([6.0], [[3.0, 8.0]])
     """
-    if backend not in BACKENDS:
-        raise ValueError(f"backend must be one of {', '.join(BACKENDS)}, got {backend!r}")
+    require_choice("backend", backend, BACKENDS)
     require_graph("compile", graph)
-    options = {"fast": _choice("fast", fast), "fma": _choice("fma", fma), "cache": _place(cache)}
+    options = {"fast": require_flag("fast", fast), "fma": require_flag("fma", fma), "cache": _place(cache)}
     if backend == "llvm" or (backend == "auto" and len(graph.nodes) <= LARGE):
         try:
             return Native(graph, backend, options)
@@ -91,12 +91,6 @@ def compile(
             if backend == "llvm":
                 raise
     return Generated(graph, backend, options)
-
-
-def _choice(name: str, value: bool) -> bool:
-    if not isinstance(value, (bool, np.bool_)):
-        raise TypeError(f"{name} must be True or False, got {value!r:.60}")
-    return bool(value)
 
 
 def _place(cache: bool | str | os.PathLike[str]) -> bool | str:

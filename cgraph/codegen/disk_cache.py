@@ -11,6 +11,8 @@ from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
 
+from ..util.require import require_path
+
 FORMAT = "cgraph machine code, 1"  # part of every name: entries of another format are other entries
 SUFFIX, UNFINISHED = ".code", ".unfinished"
 LARGEST = 2**28  # bytes of an entry; the machine code of a million nodes takes a tenth
@@ -81,7 +83,7 @@ def clear_cache(folder: str | os.PathLike[str] | None = None) -> int:
     >>> cg.clear_cache("a folder without code")
     0
     """
-    place = default_folder() if folder is None else Path(folder).expanduser()
+    place = default_folder() if folder is None else require_path("folder", folder)
     name = "[0-9a-f]" * 64
     entries = list(place.glob(f"{name}{SUFFIX}"))
     unfinished = place.glob(f"{name}.*{UNFINISHED}")  # left by a process that was killed

@@ -25,7 +25,7 @@ def evaluate(
     not real.
     """
     if not isinstance(values, Mapping):
-        raise TypeError(f"values must be a mapping {{input: value}}, got {type(values).__name__}: {values!r:.60}")
+        raise TypeError(f"evaluate takes a mapping {{input: value}}, got {type(values).__name__}: {values!r:.60}")
     read = {name: _as_value(name, value) for name, value in values.items()}
     names = [str(node.name) for node in inputs]
     if missing := [name for name in names if name not in read]:

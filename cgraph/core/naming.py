@@ -35,7 +35,10 @@ def variables(names: str | Sequence[str]) -> list[Node]:
     [<node variable q0>, <node variable q1>]
     """
     if isinstance(names, str):
-        names = names.replace(",", " ").split()
+        split = names.replace(",", " ").split()
+        if not split:
+            raise ValueError(f"variables needs at least one name, got {names!r}")
+        names = split
     elif not isinstance(names, Iterable):
         raise TypeError(f"variables takes names, in a string or a sequence, got {type(names).__name__}: {names!r:.60}")
     return [variable(name) for name in names]

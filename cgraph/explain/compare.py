@@ -11,6 +11,7 @@ from ..core.graph import Graph, require_graph
 from ..core.node import VARIABLE, Node, variable
 from ..core.structure_hash import node_hashes
 from ..errors import GraphError
+from ..util.require import require_choice, require_sequence
 from .names import Names, joined, many
 
 Classify = Callable[[Graph], Callable[[Node], str]]
@@ -68,6 +69,7 @@ class Comparison:
 
     def classes(self, side: Side) -> dict[str, int]:
         """{class: number of nodes that only that side has}, the largest first."""
+        require_choice("side", side, ("left", "right"))
         graph, nodes = (self.left, self.only_left) if side == "left" else (self.right, self.only_right)
         name_of = self.classify(graph)
         counts = Counter([name_of(node) for node in nodes])
@@ -175,11 +177,15 @@ def compare(
     """
     for graph in (left, right):
         require_graph("compare", graph)
-    chosen = set(atoms.replace(",", " ").split() if isinstance(atoms, str) else atoms)
+    chosen = set(
+        atoms.replace(",", " ").split() if isinstance(atoms, str) else require_sequence("atoms", atoms, "names")
+    )
+    if classify is not None and (not callable(classify) or isinstance(classify, type)):
+        raise TypeError(f"classify must be a function of a graph, got {type(classify).__name__}: {classify!r:.60}")
     named = {node: node.name for graph in (left, right) for node in graph.nodes if node.name in chosen}
     unused = [name for graph in (left, right) for name in graph.input_names]  # an input that nothing uses is no node
     if missing := chosen.difference(named.values(), unused):
-        raise GraphError(f"neither graph has a node called {', '.join(sorted(missing))}")
+        raise GraphError(f"neither graph has a node called {', '.join(sorted(map(str, missing)))}")
     stand_ins = {node: name for node, name in named.items() if name is not None}
     left_hashes, right_hashes = (node_hashes(graph.nodes, stand_ins) for graph in (left, right))
     common = _paired(left_hashes, right_hashes)

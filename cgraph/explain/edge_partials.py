@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
-import math
-import numbers
 from collections.abc import Mapping, Sequence
 
 from ..core.edge import Edge
 from ..core.graph import Graph
 from ..core.node import Node
 from ..errors import GraphError
+from ..util.real_arrays import is_finite
+from ..util.require import require_mapping
 
 Point = Mapping[str, float]
 
 
 def checked(graph: Graph, at: Point) -> dict[str, float]:
     """The point as floats. Raises GraphError for a missing or unknown name, ValueError for what is not finite."""
-    for name, value in at.items():
-        if isinstance(value, bool) or not isinstance(value, numbers.Real) or not math.isfinite(value):
+    for name, value in require_mapping("at", at, "input: value").items():
+        if isinstance(value, bool) or not is_finite(value):
             raise ValueError(f"at: input {name!r} must be a finite number, got {value!r:.60}")
     if missing := [name for name in graph.input_names if name not in at]:
         raise GraphError(f"at: no value for input {', '.join(missing)}")
     if unknown := [name for name in at if name not in graph.input_names]:
-        raise GraphError(f"at: the graph has no input {', '.join(unknown)} (it has {', '.join(graph.input_names)})")
+        raise GraphError(
+            f"at: the graph has no input {', '.join(map(str, unknown))} (it has {', '.join(graph.input_names)})"
+        )
     return {name: float(value) for name, value in at.items()}
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..codegen.llvm_engine import MissingFunctionError
 from ..codegen.native_function import flags_of
+from ..util.require import require_choice, require_flag
 from .native_runner import NativeRunner
 from .program import Program
 from .python_runner import PythonRunner
@@ -47,8 +48,8 @@ def runner(program: Program, backend: str = "auto", *, fast: bool = False, fma: 
     >>> run.run(run.memory({"x": 8.0}), passes=3).rows.ravel().tolist()
     [4.0, 2.0, 1.0]
     """
-    if backend not in BACKENDS:
-        raise ValueError(f"backend must be one of {', '.join(BACKENDS)}, got {backend!r}")
+    require_choice("backend", backend, BACKENDS)
+    fast, fma = require_flag("fast", fast), require_flag("fma", fma)
     if backend != "python":
         try:
             return NativeRunner(program, flags_of(fast, fma))

@@ -14,6 +14,7 @@ from ..core.node import CONSTANT, Node, variable
 from ..core.traversal import rebuild, topological
 from ..errors import GraphError
 from ..util.real_arrays import real_array
+from ..util.require import require_mapping
 from .choose_runner import runner
 from .program import Call, Program
 
@@ -40,10 +41,12 @@ class Loop:
     """
 
     def __init__(self, graph: Graph, carry: Mapping[str, str], backend: str, *, fast: bool, fma: bool) -> None:
-        for name in carry:
+        for name in require_mapping("carry", carry, "input: output"):
             graph.select_inputs(name)
-        if missing := [name for name in carry.values() if name not in graph.outputs]:
-            raise GraphError(f"the graph has no output {', '.join(missing)} (it has {', '.join(graph.outputs)})")
+        if missing := [name for name in carry.values() if not isinstance(name, str) or name not in graph.outputs]:
+            raise GraphError(
+                f"the graph has no output {', '.join(map(str, missing))} (it has {', '.join(graph.outputs)})"
+            )
         if not carry:
             raise GraphError("a loop needs at least one input that an output follows, {input: output}")
         self.graph, self.carry = graph, dict(carry)

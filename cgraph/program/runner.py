@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..core.evaluate import Array
 from ..errors import GraphError
+from ..util.require import require_whole
 from .llvm_ir import offsets
 from .program import Program
 
@@ -39,6 +41,15 @@ class Record(NamedTuple):
 
     rows: Array
     passes: int
+
+
+@contextmanager
+def _fitting(rows: int, width: int) -> Iterator[None]:
+    """Within, memory that does not suffice for the rows of a record is told in a sentence."""
+    try:
+        yield
+    except MemoryError:
+        raise MemoryError(f"{rows} rows of {width} numbers do not fit in memory: record fewer passes (every)") from None
 
 
 class Runner(ABC):
@@ -127,7 +138,8 @@ class Runner(ABC):
             If the memory has another shape or type, or `passes` or `every` is out of range.
         """
         self._check(memory, (self.size,), passes, every)
-        return self._run(memory, passes, every)
+        with _fitting(passes // every, self.program.width):
+            return self._run(memory, passes, every)
 
     def run_many(self, memories: Array, passes: int, every: int = 1) -> Record:
         """As `run`, for N memories at once, in vectors; the program has to be branch-free.
@@ -157,13 +169,14 @@ class Runner(ABC):
         kinds |= {name for name in ("record_if", "stop") if getattr(program, name) is not None}
         if kinds:
             raise GraphError(f"runs side by side need a branch-free program: no {', '.join(sorted(kinds))}")
-        return self._run_many(memories, passes, every)
+        with _fitting(passes // every, self.program.width * memories.shape[1]):
+            return self._run_many(memories, passes, every)
 
     def _check(self, memory: Array, shape: tuple[int, ...], passes: int, every: int) -> None:
         if memory.dtype != np.float64 or memory.shape != shape or not memory.flags.c_contiguous:
             raise GraphError(f"a memory must be contiguous float64 of shape {shape}, got {memory.dtype} {memory.shape}")
-        if passes < 0 or every < 1:
-            raise GraphError(f"passes must be at least 0 and every at least 1, got {passes} and {every}")
+        require_whole("passes", passes)
+        require_whole("every", every, 1)
 
     @abstractmethod
     def _run(self, memory: Array, passes: int, every: int) -> Record: ...

@@ -14,6 +14,7 @@ from ..core.op_double_double import ZERO, Pair, normal
 from ..core.ops import zero_safe_mul
 from ..core.scope import building
 from ..core.traversal import topological
+from ..util.require import require_flag
 
 
 def double_double(graph: Graph, *, low: bool = False) -> Graph:
@@ -54,8 +55,6 @@ def double_double(graph: Graph, *, low: bool = False) -> Graph:
     ({'y': 0.0}, {'y': 1.0})
     """
     require_graph("double_double", graph)
-    if not isinstance(graph, Graph):
-        raise TypeError(f"double_double takes a Graph, got {type(graph).__name__}: {graph!r:.60}")
     pairs: dict[Node, Pair] = {}
     with building(_made) as labelled:
         for node in topological(graph.outputs.values()):
@@ -65,7 +64,7 @@ def double_double(graph: Graph, *, low: bool = False) -> Graph:
             else:
                 pairs[node] = _pair(node, [pairs[arg] for arg in node.args])
     outputs = {name: pairs[node].hi for name, node in graph.outputs.items()}
-    if low:
+    if require_flag("low", low):
         suffix = free_suffix("_low", graph.outputs, list(graph.outputs))
         outputs |= {f"{name}{suffix}": pairs[node].lo for name, node in graph.outputs.items()}
     return Graph(graph.inputs, outputs)

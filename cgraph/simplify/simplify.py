@@ -8,6 +8,7 @@ from ..core.graph import Graph, require_graph
 from ..core.node import Node, Scalar, constant
 from ..core.traversal import rebuild
 from ..errors import GraphError
+from ..util.require import require_mapping, require_sequence
 from .builder import Builder, folded
 
 
@@ -78,14 +79,15 @@ def specialize(graph: Graph, values: Mapping[str, Scalar], outputs: Sequence[str
     """
     require_graph("specialize", graph)
     replace = {}
-    for name, value in values.items():
+    for name, value in require_mapping("values", values, "input: number or node").items():
         (node,) = graph.select_inputs(name)
         try:
             replace[node] = value if isinstance(value, Node) else constant(value)
         except (TypeError, ValueError) as error:
             raise type(error)(f"input {name!r}: {error}") from None
     if outputs is not None:
-        if unknown := [name for name in outputs if name not in graph.outputs]:
+        outputs = require_sequence("outputs", outputs, "names")
+        if unknown := [str(name) for name in outputs if not isinstance(name, str) or name not in graph.outputs]:
             raise GraphError(f"the graph has no output {', '.join(unknown)} (it has {', '.join(graph.outputs)})")
         graph = Graph(graph.inputs, {name: graph.outputs[name] for name in outputs})
     inputs = [node for node in graph.inputs if node not in replace]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import numbers
 from typing import Any
 
@@ -100,3 +101,27 @@ def real_number(what: str, value: Any) -> float:
         return float(value)
     except OverflowError:
         raise ValueError(f"{what} must be a number, got one that is too large for float64") from None
+
+
+def is_finite(value: object) -> bool:
+    """Whether a value is a real number that is finite in float64.
+
+    Parameters
+    ----------
+    value : object
+        Anything.
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> from cgraph.extend import is_finite
+    >>> [is_finite(value) for value in (1, float("nan"), 10**400, "a")]
+    [True, False, False, False]
+    """
+    try:
+        return isinstance(value, numbers.Real) and math.isfinite(value)
+    except OverflowError:
+        return False

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import ArrayLike
-
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, SingularError, building, cotangents, hessian_nodes, ldl_solve, solve_nodes
+from cgraph.extend import (
+    Builder,
+    SingularError,
+    building,
+    cotangents,
+    hessian_nodes,
+    ldl_solve,
+    require_choice,
+    require_flag,
+    solve_nodes,
+)
 
 from ..systems.model import Model, as_system
 from ..systems.system import BodySystem, System
@@ -15,25 +22,8 @@ from .bias_terms import BiasTerms, bias_terms, bias_terms_of_lagrangian
 from .formulations import ONE, ZERO
 from .inertia_rank import without_inertia
 from .shorter_form import shorter_form
+from .singular_mass_matrix import SingularMassMatrixError
 from .substitute import substitute
-
-
-class SingularMassMatrixError(ValueError):
-    """A coordinate or a motion of several has no inertia, so that its acceleration is not determined.
-
-    The message names the coordinates. `forward_dynamics` and what is made from it raise it where the mass matrix is
-    singular at every state, `raise_if_singular` where it is singular at one.
-
-    Examples
-    --------
-    >>> import dynamics as dyn
-    >>> massless = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - q[0] * q[1], ["x", "y"])
-    >>> try:
-    ...     dyn.forward_dynamics(massless)
-    ... except dyn.SingularMassMatrixError as error:
-    ...     print(error)
-    the mass matrix is singular: coordinate 'y' has no inertia, or none that others do not share
-    """
 
 
 def mass_matrix(model: Model) -> Graph:
@@ -258,8 +248,8 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
     >>> dyn.forward_dynamics(block).evaluate({"q0": 0.0, "qd0": 2.0, "tau0": 9.0})
     {'qdd0': 2.0}
     """
-    if method not in SOLUTIONS:
-        raise ValueError(f"method must be one of {', '.join(SOLUTIONS)}, got {method!r}")
+    require_choice("method", method, SOLUTIONS)
+    require_flag("check", check)
     return shorter_form(as_system(model), lambda system: accelerations(system, method, check))
 
 
@@ -276,43 +266,6 @@ def _require_inertia(system: System, accelerations: Graph) -> None:
         names = " and ".join([repr(system.coordinates[i]) for i in moving])
         raise SingularMassMatrixError(
             f"the mass matrix is singular at every state: {'a motion of ' * (len(moving) > 1)}{names} has no inertia"
-        )
-
-
-def raise_if_singular(model: Model, info: ArrayLike) -> None:
-    """Raise SingularMassMatrixError, naming the coordinate, unless the output `info` of `forward_dynamics` is 0.
-
-    Parameters
-    ----------
-    model : Model
-        The one that forward dynamics was made from.
-    info : array_like
-        A number, or an array of any shape; the first entry that is not 0 is reported, with its index.
-
-    Raises
-    ------
-    SingularMassMatrixError
-        An entry is not 0: the mass matrix is not positive definite at that state.
-
-    Examples
-    --------
-    >>> import dynamics as dyn
-    >>> bead = dyn.System(lambda q, qd, t: 0.5 * q[0] * qd[0] ** 2, ["x"])  # its inertia is x
-    >>> values = dyn.forward_dynamics(bead, check=True).evaluate({"q0": -1.0, "qd0": 0.0, "tau0": 1.0})
-    >>> try:
-    ...     dyn.raise_if_singular(bead, values["info"])
-    ... except dyn.SingularMassMatrixError as error:
-    ...     print(error)
-    the mass matrix is not positive definite: coordinate 'x' has an inertia that is not positive
-    """
-    values = np.asarray(info)
-    failed = np.argwhere(values != 0.0)
-    if len(failed):
-        at = tuple(failed[0].tolist())
-        name = as_system(model).coordinates[int(values[at]) - 1]
-        where = f" at state {', '.join(map(str, at))}" if at else ""
-        raise SingularMassMatrixError(
-            f"the mass matrix is not positive definite{where}: coordinate {name!r} has an inertia that is not positive"
         )
 
 

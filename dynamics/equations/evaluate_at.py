@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
-from cgraph.extend import real_array
+from cgraph.extend import real_array, real_number, require_mapping
 
 from ..systems.system import TIME, System
 
@@ -29,10 +29,11 @@ def evaluate_at(
     What of the state is None or missing is zero. Parameters have the system's values unless given.
     Raises ValueError for another shape, what is not finite, or a parameter that the system does not have.
     """
-    if unknown := set(parameters or {}) - set(system.parameters):
+    parameters = {} if parameters is None else require_mapping("parameters", parameters, "name: number")
+    if unknown := sorted(map(str, set(parameters) - set(system.parameters))):
         has = ", ".join(system.parameters) or "none"
-        raise ValueError(f"the system has no parameter {min(unknown)!r} (it has {has})")
-    values: dict[str, Any] = {TIME: float(t), **system.parameters, **(parameters or {})}
+        raise ValueError(f"the system has no parameter {unknown[0]!r} (it has {has})")
+    values: dict[str, Any] = {TIME: real_number("t", t), **system.parameters, **parameters}
     shape: tuple[int, ...] = ()
     for name in STATE:
         rows = _rows(system, name, state.get(name))

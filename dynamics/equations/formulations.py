@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import TANGENT, Builder, building, cotangents, require_graph, tangents
+from cgraph.extend import TANGENT, Builder, building, cotangents, require_choice, require_flag, require_graph, tangents
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
@@ -133,7 +133,8 @@ def inverse_dynamics(model: Model, formulation: str = "chain_rule", *, simplify:
     ['chain_rule', 'chain_rule_literal', 'euler_embedded', 'kinetic_only', 'kinetic_only_exact']
     """
     system = as_system(model)
-    if simplify and formulation == "chain_rule":
+    require_choice("formulation", formulation, FORMULATIONS)
+    if require_flag("simplify", simplify) and formulation == "chain_rule":
         return shorter_form(system, lambda form: cg.simplify(torques(form, formulation)))
     graph = torques(system, formulation)
     return cg.simplify(graph) if simplify else graph
@@ -187,10 +188,10 @@ def momentum_rate(
     """
     system = as_system(model)
     terms = _lagrange_terms(system, formulation)
-    outputs = {f"p{i}": p for i, p in enumerate(terms.momentum)} if keep_momentum else {}
+    outputs = {f"p{i}": p for i, p in enumerate(terms.momentum)} if require_flag("keep_momentum", keep_momentum) else {}
     outputs |= {f"p{i}_dot": rate for i, rate in enumerate(terms.momentum_rate)}
     graph = system.graph(outputs, terms.inputs)
-    return cg.simplify(graph) if simplify else graph
+    return cg.simplify(graph) if require_flag("simplify", simplify) else graph
 
 
 def spurious_nodes(graph: Graph) -> frozenset[Node]:
@@ -229,9 +230,7 @@ def spurious_nodes(graph: Graph) -> frozenset[Node]:
 
 
 def _lagrange_terms(system: System, formulation: str) -> LagrangeTerms:
-    if formulation not in FORMULATIONS:
-        raise ValueError(f"formulation must be one of {', '.join(FORMULATIONS)}, got {formulation!r}")
-    return FORMULATIONS[formulation](system)
+    return FORMULATIONS[require_choice("formulation", formulation, FORMULATIONS)](system)
 
 
 def _forces(system: System, terms: LagrangeTerms) -> list[Node]:

@@ -45,7 +45,7 @@ def initial_value(
     values = _parameters(inputs, parameters)
     if inputs.applied:
         values = dict(zip(inputs.applied, per_coordinate("tau", tau, model.coordinates), strict=True)) | values
-    elif np.any(tau):
+    elif np.any(real_array("tau", tau)):
         raise ValueError(f"tau must be 0 for a system of first order, which no force acts on, got {tau!r:.60}")
     return InitialValue(_state(model, inputs, q, qd), inputs.states, values)
 

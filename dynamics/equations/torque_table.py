@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph, Node
-from cgraph.extend import Names, topological
+from cgraph.extend import Names, require_whole, topological
 
 from ..systems.system import System
 from .evaluate_at import Array, evaluate_at
@@ -135,6 +135,7 @@ class TorqueTable:
         return "\n".join(lines) + "\n"
 
     def _cells(self, digits: int) -> list[list[str]]:
+        require_whole("digits", digits, 1)
         cells = self._expressions() if self.values is None else self._numbers(digits)
         rows = [[name, *row] for name, row in zip(self.rows, cells, strict=True)]
         head = ["", *self.columns]

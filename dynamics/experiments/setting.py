@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph.extend import Array, real_array
 
 from ..equations.state_equation import state_inputs
 from ..reference import Reference, reference
@@ -56,13 +56,20 @@ class Setting(Scene):
 
         folder: as of `reference`. Raises ImportError without python-flint or mpmath, and what `reference` raises.
         """
-        at = [self.t_end] if times is None else [float(t) for t in times]
+        asked = self.digits if digits is None else digits
+        at = [self.t_end] if times is None else real_array("times", times).ravel().tolist()
         if self.exact is not None:
             return self.exact(at)
         if self.method is None:
             return None
         return reference(
-            self.model, self.q, self.qd or None, at, digits=digits or self.digits, method=self.method, folder=folder
+            self.model,
+            self.q,
+            self.qd or None,
+            at,
+            digits=asked,
+            method=self.method,
+            folder=folder,
         )
 
     @property

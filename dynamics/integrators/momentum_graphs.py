@@ -9,7 +9,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Builder, SingularError, building, cotangents, hessian_nodes, solve_nodes
 
-from ..equations.equations_of_motion import SingularMassMatrixError
+from ..equations.singular_mass_matrix import SingularMassMatrixError
 from ..systems.system import System
 from .problem import KEPT, Problem, reaches
 

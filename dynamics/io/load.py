@@ -12,6 +12,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from cgraph.extend import require_flag
+
 from ..multibody import spatial
 from ..multibody.joints import TYPES
 from ..multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
@@ -66,7 +68,7 @@ def load_mjcf(source: Any, *, ignore: bool = False) -> Mechanism:
 
 def _mechanism(mj: Any, ignore: bool) -> Mechanism:
     serious, outside = _not_modelled(mj), _acting_from_outside(mj)
-    if serious and not ignore:
+    if not require_flag("ignore", ignore) and serious:
         raise MechanismError(f"a mechanism cannot have {'; '.join(serious)} (the option ignore leaves this out)")
     names = _names(mj)
     bodies: list[Body] = []

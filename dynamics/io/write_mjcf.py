@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import ArrayLike
+
+from cgraph.extend import real_number
 
 from ..multibody import spatial
 from ..multibody.mechanism import WORLD, Body, Mechanism, MechanismError, require_mechanism
@@ -47,7 +50,10 @@ def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
     >>> text.count("<joint")
     2
     """
-    return mjcf_text(require_mechanism(model, "MJCF"), timestep)
+    mechanism = require_mechanism(model, "MJCF")
+    if not 0.0 < real_number("timestep", timestep) < math.inf:
+        raise ValueError(f"timestep must be positive and finite, got {timestep!r} s")
+    return mjcf_text(mechanism, timestep)
 
 
 def mjcf_text(

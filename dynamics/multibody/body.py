@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import numbers
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import check_name
+from cgraph.extend import check_name, is_finite
 
 from . import spatial
 from .joints import TYPES, JointType
@@ -124,7 +123,7 @@ def vector(what: str, value: Any, shape: tuple[int, ...] = (3,)) -> Array:
     """The value as an array of that shape. Raises MechanismError, naming `what`, unless it is finite numbers."""
     try:
         array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         array = np.empty(0)
     if array.shape != shape or not np.isfinite(array).all():
         given = value.tolist() if isinstance(value, np.ndarray) else value
@@ -141,7 +140,7 @@ def shape_of(value: Any) -> tuple[int, ...]:
 
 
 def _number(what: str, value: Any, unit: str = "", minimum: float = 0.0) -> float:
-    if isinstance(value, numbers.Real) and math.isfinite(value) and float(value) >= minimum:
+    if is_finite(value) and float(value) >= minimum:
         return float(value)
     bound = " and at least 0" if minimum == 0.0 else ""
     raise MechanismError(f"{what} must be finite{bound}, got {value!r:.80}{unit}")

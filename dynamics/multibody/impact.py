@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cgraph.extend import real_array
+
 from ..equations.equations_of_motion import forward_dynamics, momentum
 from .body import Body, MechanismError, checked, vector
 from .mechanism import Mechanism, require_mechanism
@@ -146,17 +148,18 @@ def attach_with_impact(
     mechanism = require_mechanism(mechanism, "attach_with_impact")
     whole = mechanism.attach(body, to)
     v, w = vector("velocity", velocity), vector("omega", omega)
+    q, qd = real_array("q", q), real_array("qd", qd)
     q_new, qd_old = whole.map_state_from(mechanism, q, qd)
     index = {each.name: i for i, each in enumerate(whole.moving)}
     p = np.zeros(len(index))
-    before = _momentum(mechanism, np.asarray(q, dtype=np.float64), np.asarray(qd, dtype=np.float64))
+    before = _momentum(mechanism, q, qd)
     p[[index[each.name] for each in mechanism.moving]] = before
     given = checked(body)
     free, linear, angular = _motion(whole, given, q_new, qd_old)
     inertia = free.orientation @ np.asarray(given.inertia) @ free.orientation.T
     p += given.mass * linear.T @ v + angular.T @ inertia @ w
     qd_new = _velocities(whole, q_new, p)
-    energy = float(np.asarray(qd, dtype=np.float64) @ before + given.mass * v @ v + w @ inertia @ w - qd_new @ p) / 2.0
+    energy = float(qd @ before + given.mass * v @ v + w @ inertia @ w - qd_new @ p) / 2.0
     return Attached(whole, q_new, qd_new, energy)
 
 
@@ -197,7 +200,7 @@ def release(mechanism: Mechanism, q: ArrayLike, qd: ArrayLike, body: str) -> Rel
     if len(bodies) > 1:
         raise MechanismError(f"body {body!r} carries {bodies[1].name!r}; a body that is let go must carry no other")
     rest = mechanism.detach(body)
-    values = [np.asarray(each, dtype=np.float64) for each in (q, qd)]
+    values = real_array("q", q), real_array("qd", qd)
     q_rest, qd_rest = rest.map_state_from(mechanism, *values)
     free, _, _ = _motion(mechanism, checked(bodies[0]), *values)
     return Released(rest, q_rest, qd_rest, free)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
+from cgraph.extend import real_array
 
 from .body import Body
 from .spatial import Array
@@ -44,7 +45,9 @@ def skeleton(mechanism: Bodies, q: ArrayLike) -> Skeleton:
     A tip is a body without mass that is welded to the last moving one, or else the center of mass of that one.
     A mechanism that moves in a plane of two axes is seen at a right angle to it, any other from above and one side.
     """
-    q = np.atleast_2d(np.asarray(q, dtype=np.float64))
+    q, n = np.atleast_2d(real_array("q", q)), len(mechanism.moving)
+    if q.ndim != 2 or q.shape[1] != n:
+        raise ValueError(f"q must have shape (T, {n}) or ({n},), one for each coordinate, got {q.shape}")
     values = {f"q{i}": q[:, i] for i in range(q.shape[1])}
     points: list[Array] = []
     places: list[tuple[str, ArrayLike]] = [(body.name, (0.0, 0.0, 0.0)) for body in mechanism.moving]

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
-import numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+
+from cgraph.extend import is_finite, require_mapping
 
 from . import spatial
 from .body import WORLD, Body, Joint, MechanismError
@@ -56,12 +56,12 @@ def lock_joints(bodies: Sequence[Body], at: Mapping[str, float]) -> list[Body]:
     Raises MechanismError for a body that is not there or has no joint to lock, and a coordinate that is not finite.
     """
     by_name = {body.name: body for body in bodies}
-    for name, value in at.items():
+    for name, value in require_mapping("locked", at, "body: coordinate").items():
         if name not in by_name:
             raise MechanismError(f"there is no body {name!r:.80} to lock in the mechanism")
         if not by_name[name].joint.type.moves:
             raise MechanismError(f"body {name!r} is welded on and has no joint to lock")
-        if not isinstance(value, numbers.Real) or not math.isfinite(value):
+        if not is_finite(value):
             raise MechanismError(f"joint of body {name!r}: it can be locked at a finite number, got {value!r:.80}")
     return [
         replace(body, joint=_weld_at(body.joint, float(at[body.name]))) if body.name in at else body for body in bodies

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, building
+from cgraph.extend import Builder, building, require_flag, require_mapping
 
 from ..systems.model import Model
 from ..systems.system import BodySystem, System, parameter_value
@@ -71,6 +71,7 @@ class Mechanism(Structure):
 
     def __post_init__(self) -> None:
         vector("gravity", self.gravity)
+        require_flag("base_parameters", self.base_parameters)
         for what, kind in (("bodies", Body), ("forces", Force)):  # kept, so that an iterator is read once
             object.__setattr__(self, what, _listed(what, kind, getattr(self, what)))
         for i, name in enumerate(self.coordinates):
@@ -79,7 +80,7 @@ class Mechanism(Structure):
         for force in self.forces:
             check_force(force, set(self._carriers) - {WORLD})
         used = {name for force in self.forces for name in force.names}
-        for name in self.parameters:
+        for name in require_mapping("parameters", self.parameters, "name: value"):
             if name not in used:
                 raise MechanismError(f"the mechanism has no force that uses the parameter {name!r}")
         for name, value in self.parameter_values.items():
@@ -249,6 +250,6 @@ def require_mechanism(model: Model, what: str) -> Mechanism:
 
 
 def _listed(what: str, kind: type, given: Any) -> tuple[Any, ...]:
-    if not isinstance(given, Iterable):
+    if isinstance(given, str) or not isinstance(given, Iterable):
         raise MechanismError(f"{what} must be a sequence of {kind.__name__}, got {type(given).__name__}: {given!r:.60}")
     return tuple(given)

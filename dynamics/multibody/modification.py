@@ -9,6 +9,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cgraph.extend import real_array
+
 from .body import Body, MechanismError
 from .external_force import Force
 from .mechanism_fields import Structure
@@ -20,11 +22,13 @@ AnyStructure = TypeVar("AnyStructure", bound=Structure)
 
 def lock_joint(structure: AnyStructure, body: str, at: float) -> AnyStructure:
     """The structure with the joint of a body standing still at a coordinate [rad or m]."""
+    _check_body(body)
     return replace(structure, locked={**structure.locked, body: at})
 
 
 def unlock_joint(structure: AnyStructure, body: str) -> AnyStructure:
     """The structure with a locked joint free again. Raises MechanismError for one that is not locked."""
+    _check_body(body)
     if body not in structure.locked:
         raise MechanismError(f"the joint of body {body!r:.80} is not locked")
     return replace(structure, locked={name: at for name, at in structure.locked.items() if name != body})
@@ -64,6 +68,8 @@ def attach_subtree(
 ) -> AnyStructure:
     """The structure with a subtree hung on a body or the world; `to` is by default the subtree's own parent."""
     given = as_subtree(subtree)
+    if to is not None:
+        _check_body(to)
     back = to is None or to == given.parent
     bodies = given.with_parent(given.parent if to is None else to)
     return replace(
@@ -79,7 +85,7 @@ def map_state(
     moving: Sequence[Body], other: Sequence[Body], other_locked: dict[str, float], q: ArrayLike, qd: ArrayLike
 ) -> tuple[Array, Array]:
     """The state of the other moving bodies as one of these: joints of bodies of the same name keep theirs."""
-    rows = [np.asarray(each, dtype=np.float64) for each in (q, qd)]
+    rows = [real_array(name, each) for name, each in (("q", q), ("qd", qd))]
     theirs = [body.name for body in other]
     for name, row in zip(("q", "qd"), rows, strict=True):
         if row.shape != (len(theirs),):
@@ -88,6 +94,11 @@ def map_state(
     rates = dict(zip(theirs, rows[1].tolist(), strict=True))
     names = [body.name for body in moving]
     return np.array([positions.get(n, 0.0) for n in names]), np.array([rates.get(n, 0.0) for n in names])
+
+
+def _check_body(body: object) -> None:
+    if not isinstance(body, str):
+        raise MechanismError(f"a body is named by a string, got {type(body).__name__}: {body!r:.60}")
 
 
 def _used(structure: Structure, forces: Iterable[Force]) -> dict[str, float]:

@@ -72,7 +72,7 @@ def planar_arm(
     masses, lengths = sequence("masses must be", masses), sequence("lengths must be", lengths)
     if len(masses) != len(lengths) or not len(masses):
         raise ValueError(f"an arm needs as many masses as lengths, at least one; got {len(masses)} and {len(lengths)}")
-    if mass_model not in ("rod", "point"):
+    if not isinstance(mass_model, str) or mass_model not in ("rod", "point"):
         raise ValueError(f'mass_model must be "rod" or "point", got {mass_model!r}')
     if not math.isfinite(real_number("gravity", gravity)):
         raise ValueError(f"gravity must be finite, got {gravity!r} m/s^2")

@@ -9,6 +9,7 @@ from typing import Any
 
 import cgraph as cg
 from cgraph import Graph
+from cgraph.extend import real_number, require_flag, require_graph, require_mapping, require_sequence
 
 from ..equations.formulations import inverse_dynamics
 from ..systems.model import Model, as_system
@@ -139,6 +140,7 @@ class _Step:
 
     def graph(self, equations: Equations) -> Graph:
         graph = equations(self.model)
+        require_graph("prune, as what equations(model) gives,", graph)
         if not self.values and self.outputs is None:
             return graph
         return cg.specialize(graph, _bound(graph, self.values), self.outputs)
@@ -195,16 +197,24 @@ def prune(
     (82, 12)
     """
     model = as_mechanism(model) or as_system(model)
-    kept = list(effects)
+    kept = require_sequence("effects", effects, "names")
+    if not callable(equations) or isinstance(equations, type):
+        raise TypeError(f"equations must be a function of a model, got {type(equations).__name__}: {equations!r:.60}")
     if unknown := [each for each in kept if each not in EFFECTS]:
         raise ValueError(f"effects are {', '.join(EFFECTS)}, got {unknown[0]!r}")
-    steps = _steps(model, kept, lock or {}, values or {}, outputs)
+    steps = _steps(model, kept, _mapping("lock", lock), _mapping("values", values), outputs)
     graph = steps[-1].graph(equations)
-    fewer = _regrouped(steps[-1]) if regroup else None
+    fewer = _regrouped(steps[-1]) if require_flag("regroup", regroup) else None
     if fewer is not None and len((candidate := fewer.graph(equations)).nodes) < len(graph.nodes):
         steps.append(fewer)
         graph = candidate
     return PruneResult(steps[-1].model, graph, equations, tuple(steps))
+
+
+def _mapping(what: str, given: Mapping[str, float] | None) -> dict[str, float]:
+    """The numbers of a mapping by name; none for None."""
+    chosen = {} if given is None else require_mapping(what, given, "name: number")
+    return {name: real_number(f"{what}: {name!r}", value) for name, value in chosen.items()}
 
 
 def _regrouped(step: _Step) -> _Step | None:
@@ -239,6 +249,7 @@ def _steps(
     for name, value in values.items():
         take(f"input {name}", f"is {value:g}", values={**steps[-1].values, name: value})
     if outputs is not None:
+        outputs = [str(name) for name in require_sequence("outputs", outputs, "names")]
         take("other outputs", f"only {', '.join(outputs)} asked for", outputs=tuple(outputs))
     return steps
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Compiled, Graph, Node
-from cgraph.extend import Builder, building, cotangents, tangents
+from cgraph.extend import Builder, building, cotangents, real_array, tangents
 
 from .body_motion import Motion, energy, ground, propagate_motion
 from .inertial_numbers import Link
@@ -69,7 +69,7 @@ class RecursiveInverseDynamics:
 
     def __call__(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
         """tau (n,) [N m or N] at q, qd, qdd (n,). Raises ValueError for another shape."""
-        rows = [np.asarray(each, dtype=np.float64) for each in (q, qd, qdd)]
+        rows = [real_array(name, each) for name, each in (("q", q), ("qd", qd), ("qdd", qdd))]
         for name, row in zip(("q", "qd", "qdd"), rows, strict=True):
             if row.shape != (self.n,):
                 raise ValueError(f"{name} must have shape ({self.n},), one for each coordinate, got {row.shape}")

@@ -45,6 +45,8 @@ class Subtree:
 
     def with_parent(self, parent: str) -> tuple[Body, ...]:
         """The bodies, with the first on that parent."""
+        if not isinstance(parent, str):
+            raise MechanismError(f"a parent is named by a string, got {type(parent).__name__}: {parent!r:.60}")
         first, *others = self.bodies
         return replace(first, parent=parent), *others
 
@@ -63,7 +65,7 @@ def descendants(bodies: Iterable[Body], root: str) -> set[str]:
     """Names of the body and of all that it carries. Raises MechanismError for an unknown body."""
     bodies = list(bodies)
     names = {body.name for body in bodies}
-    if root not in names:
+    if not isinstance(root, str) or root not in names:
         raise MechanismError(f"there is no body {root!r:.80} in the mechanism")
     children: dict[str, list[str]] = {}
     for body in bodies:

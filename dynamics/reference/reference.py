@@ -8,6 +8,8 @@ from pathlib import Path
 
 from numpy.typing import ArrayLike
 
+from cgraph.extend import require_choice, require_path
+
 from ..equations.initial_value import initial_value, times_to_record
 from ..equations.state_equation import state_equation, state_inputs
 from ..systems.model import Model
@@ -84,9 +86,10 @@ def reference(
     >>> print(dyn.reference(decay, [1.0], None, [1.0], digits=30).decimal[0][0][:32])
     0.367879441171442321595523770161
     """
-    if method not in REFERENCE_METHODS:
-        raise ValueError(f"method must be one of {', '.join(REFERENCE_METHODS)}, got {method!r}")
-    if not (isinstance(digits, int) and 1 <= digits <= MOST // 2):
+    require_choice("method", method, REFERENCE_METHODS)
+    if folder is not None:
+        folder = require_path("folder", folder)
+    if isinstance(digits, bool) or not (isinstance(digits, int) and 1 <= digits <= MOST // 2):
         raise ValueError(f"digits must be a whole number from 1 to {MOST // 2}, got {digits!r}")
     start, inputs = initial_value(model, q, qd, tau, parameters), state_inputs(model)
     x, times = start.x.tolist(), times_to_record(t_eval).tolist()

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array
+from cgraph.extend import Array, real_array
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Reference:
 
     def deviation(self, x: ArrayLike) -> Array:
         """x - reference, (T, m), exact to the last bits of x, where `x - self.x` would end at an ulp of it."""
-        values = np.asarray(x, dtype=np.float64)
+        values = real_array("the states", x)
         if values.shape != self.x.shape:
             raise ValueError(f"the states must have the reference's shape {self.x.shape}, got {values.shape}")
         return (values - self.x) - self._rest

@@ -64,6 +64,8 @@ class Scene:
     t_end: float  # s
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not isinstance(self.about, str):
+            raise TypeError(f"the name and about of a scene must be text, got {self.name!r:.40} and {self.about!r:.40}")
         if not hasattr(self.model, "coordinates") or isinstance(self.model, type):
             raise TypeError(f"a scene needs a model, got {type(self.model).__name__}: {self.model!r:.60}")
         n, second_order = len(self.model.coordinates), as_ode(self.model) is None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any
 
 from cgraph import Node
@@ -67,18 +68,22 @@ class Event:
     reset: Callable[..., Any] | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str) or not callable(self.value) or not isinstance(self.terminal, bool):
+        if not isinstance(self.name, str) or not _is_function(self.value) or not isinstance(self.terminal, bool):
             raise TypeError(
                 "an event needs a name, a function, and True or False for `terminal`, got "
                 f"{self.name!r:.40}, {self.value!r:.40} and {self.terminal!r:.40}"
             )
         check_name("an event", self.name)
-        if self.direction not in (-1, 0, 1):
+        if not isinstance(self.direction, Integral) or self.direction not in (-1, 0, 1):
             raise ValueError(f"event {self.name!r}: direction must be 1, -1 or 0, got {self.direction!r}")
-        if self.reset is not None and not callable(self.reset):
+        if self.reset is not None and not _is_function(self.reset):
             raise TypeError(f"event {self.name!r}: reset must be a function, got {self.reset!r:.40}")
         if self.reset is not None and self.terminal:
             raise ValueError(f"event {self.name!r}: a run that ends there goes on from no reset state; leave out one")
+
+
+def _is_function(value: object) -> bool:
+    return callable(value) and not isinstance(value, type)
 
 
 def as_events(events: Event | Iterable[Event]) -> tuple[Event, ...]:

@@ -95,6 +95,8 @@ class RunOptions:
 
     def __post_init__(self) -> None:
         check_method(self.method)
+        if not isinstance(self.backend, str):
+            raise TypeError(f"backend must be a string, got {type(self.backend).__name__}: {self.backend!r:.40}")
         self._check_span()
         for what in ("dt", "max_step", "first_step"):
             value = getattr(self, what)
@@ -138,8 +140,9 @@ class RunOptions:
             )
 
     def _check_estimate(self) -> None:
-        if self.estimate_error not in (None, True, False):
-            raise TypeError(f"estimate_error must be True, False or None, got {self.estimate_error!r:.40}")
+        for name, value in (("estimate_error", self.estimate_error), ("progress", self.progress)):
+            if value is not None and not isinstance(value, bool):
+                raise TypeError(f"{name} must be True, False or None, got {value!r:.40}")
         if self.adaptive and self.estimate_error:
             raise ValueError(
                 f"method {self.method!r} keeps the error of its steps within rtol and atol: "

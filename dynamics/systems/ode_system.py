@@ -9,7 +9,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import check_name, topological
 
-from .system import TIME, Parameters, call_user_function, node_or_number, parameter_value, sequence
+from .system import TIME, Parameters, call_user_function, node_or_number, parameter_items, parameter_value, sequence
 
 RESERVED = (TIME, "dt")
 
@@ -47,7 +47,7 @@ class OdeSystem:
         parameters: Mapping[str, float] | None = None,
     ) -> None:
         self.states = _state_names(states)
-        self.parameters = {name: parameter_value(name, value) for name, value in (parameters or {}).items()}
+        self.parameters = {name: parameter_value(name, value) for name, value in parameter_items(parameters)}
         if shared := [name for name in self.states if name in self.parameters]:
             raise ValueError(f"{shared[0]!r} is both a state and a parameter; choose another name for one of them")
         p = Parameters(self.parameters)

@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import check_name, real_number, shortened, topological
+from cgraph.extend import check_name, is_finite, real_number, require_mapping, require_sequence, shortened, topological
 
 TIME = "t"
 BiasForce = tuple[Node, Node]  # a velocity, and the force that works on it
@@ -75,7 +75,7 @@ class System:
         damping: float | Sequence[float] = 0.0,
     ) -> None:
         self.coordinates = _coordinate_names(coordinates)
-        self.parameters = {name: parameter_value(name, value) for name, value in (parameters or {}).items()}
+        self.parameters = {name: parameter_value(name, value) for name, value in parameter_items(parameters)}
         self.damping = per_coordinate("damping", damping, self.coordinates, minimum=0.0)
         p = Parameters(self.parameters)
         energy = call_user_function("lagrangian", lagrangian, self.q, self.qd, self.t, p)
@@ -223,7 +223,8 @@ class System:
 
     def graph(self, outputs: Mapping[str, Node], *state: Sequence[Node]) -> Graph:
         """A graph over state variables, then t if needed, then the parameters."""
-        return Graph([node for part in state for node in part] + self.extra_inputs, outputs)
+        parts = [require_sequence("state", part, "variables") for part in state]
+        return Graph([node for part in parts for node in part] + self.extra_inputs, outputs)
 
     def __repr__(self) -> str:
         parameters = f", parameters {', '.join(self.parameters)}" if self.parameters else ""
@@ -281,12 +282,17 @@ def _coordinate_names(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(names)
 
 
+def parameter_items(parameters: Mapping[str, float] | None) -> Iterable[tuple[str, float]]:
+    """Names and values. Raises TypeError for what is no mapping."""
+    return () if parameters is None else require_mapping("parameters", parameters, "name: number").items()
+
+
 def parameter_value(name: str, value: float) -> float:
     """The value of a parameter, checked. Raises TypeError or ValueError naming it."""
     check_name("a parameter", name, spaces=False)
     if _RESERVED.fullmatch(name):
         raise ValueError(f"parameter {name!r} has the name of a coordinate, velocity, force or time; choose another")
-    if isinstance(value, bool) or not isinstance(value, numbers.Real) or not math.isfinite(value):
+    if isinstance(value, bool) or not is_finite(value):
         raise ValueError(f"parameter {name!r} must be a finite number, got {value!r}")
     return float(value)
 

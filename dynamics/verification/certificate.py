@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from functools import cached_property
-from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Builder, cotangents, tangents
+from cgraph.extend import Builder, cotangents, real_number, require_whole, tangents
 
 from ..equations.coriolis import coriolis, require_quadratic
 from ..equations.equations_of_motion import bias, energy, forward_dynamics, gravity_force, mass_matrix
@@ -27,6 +27,9 @@ from . import peer_agreement as agreement
 from .residual import DIFFERENCES, POSITIVE, ROUNDING, Certificate, Residual
 
 STEP = 1e-3  # of differences, in units of the coordinates
+
+
+MOST_STATES = 1_000_000  # of a certificate, some of whose matrices are kept for all states
 
 
 def certify(model: Model, states: int = 20, seed: int = 0, *, speed: float = 1.0, twin: Any = None) -> Certificate:
@@ -68,13 +71,11 @@ def certify(model: Model, states: int = 20, seed: int = 0, *, speed: float = 1.0
     >>> dyn.certify(dyn.planar_arm([1.0, 0.8], [1.0, 0.5]), states=2).passed
     True
     """
-    for what, number in (("states", states), ("seed", seed)):
-        if isinstance(number, bool) or not isinstance(number, Integral):
-            raise TypeError(f"{what} must be a whole number, got {type(number).__name__}: {number!r:.60}")
-    if states < 1:
-        raise ValueError(f"a certificate needs at least one state, got {states!r}")
-    if seed < 0:
-        raise ValueError(f"the seed of a certificate must be at least 0, got {seed!r}")
+    if require_whole("states", states, 1) > MOST_STATES:
+        raise ValueError(f"states must be at most {MOST_STATES}, got {states}")
+    require_whole("seed", seed)
+    if not math.isfinite(real_number("speed", speed)):
+        raise ValueError(f"speed must be finite, got {speed!r}")
     theirs = None if twin is None else agreement.original(twin, model)
     rng = np.random.default_rng(seed)
     system = as_system(model)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 from cgraph import Edge, Graph, Node
-from cgraph.extend import require_graph
+from cgraph.extend import require_choice, require_flag, require_graph, require_mapping, require_sequence
 
 from .. import theme
 from ..theme import Paint
@@ -90,15 +90,18 @@ def to_dot(
     ['n0 -> n1', 'n1 -> o0']
     """
     require_graph("to_dot", graph)
-    if rankdir not in DIRECTIONS:
-        raise ValueError(f"rankdir must be one of {', '.join(DIRECTIONS)}, got {rankdir!r}")
+    require_choice("rankdir", rankdir, DIRECTIONS)
+    require_flag("legend", legend)
+    for what, text in (("caption", "" if caption is None else caption), ("marked_label", marked_label)):
+        if not isinstance(text, str):
+            raise TypeError(f"{what} must be text, got {type(text).__name__}: {text!r:.60}")
     plan = plan_of(
         graph,
-        names or {},
+        {} if names is None else require_mapping("names", names, "name: text"),
         _marks(marked, marked_label),
-        frozenset(marked_edges),
+        _edges(marked_edges),
         _cluster_rule(clusters),
-        tuple(collapse),
+        require_sequence("collapse", collapse, "tags"),
     )
     drawing = digraph(rankdir)
     if caption is not None:
@@ -111,13 +114,22 @@ def to_dot(
     return drawing
 
 
+def _edges(marked: Collection[Edge]) -> frozenset[Edge]:
+    edges = require_sequence("marked_edges", marked, "edges")
+    for edge in edges:
+        if not isinstance(edge, tuple):
+            raise TypeError(f"marked_edges must be edges of the graph, got {type(edge).__name__}: {edge!r:.60}")
+    return frozenset(edges)
+
+
 def _marks(marked: Collection[Node] | Mapping[str, Collection[Node]], words: str) -> dict[Node, Paint]:
     """How each marked node is painted."""
     groups = marked if isinstance(marked, Mapping) else {words: marked}
     if len(groups) > len(theme.MARKS):
         raise ValueError(f"marked nodes come in at most {len(theme.MARKS)} groups, got {len(groups)}")
     marks: dict[Node, Paint] = {}
-    for paint, (group, nodes) in zip(theme.MARKS, groups.items(), strict=False):
+    for paint, (group, given) in zip(theme.MARKS, groups.items(), strict=False):
+        nodes = require_sequence("marked", given, "nodes")
         if both := [node for node in nodes if node in marks]:
             raise ValueError(f"{len(both)} marked nodes are in both groups, such as {both[0]!r}")
         marks |= dict.fromkeys(nodes, replace(paint, words=group))
@@ -135,9 +147,11 @@ def _only(tags: Collection[str]) -> str | None:
 
 
 def _cluster_rule(clusters: bool | Sequence[str] | ClusterRule) -> ClusterRule:
-    if callable(clusters):
+    if callable(clusters) and not isinstance(clusters, type):
         return clusters
     if isinstance(clusters, bool):
         return main_tag if clusters else lambda node: None
-    chosen = frozenset([clusters] if isinstance(clusters, str) else clusters)
+    chosen = frozenset([clusters] if isinstance(clusters, str) else require_sequence("clusters", clusters, "tags"))
+    if not all([isinstance(tag, str) for tag in chosen]):
+        raise TypeError(f"clusters must be True, False, tags or a function of a node, got {clusters!r:.60}")
     return lambda node: _only(node.tags & chosen)

@@ -11,12 +11,13 @@ from importlib.util import find_spec
 from typing import Protocol
 
 from cgraph import Graph, constant
-from cgraph.extend import install, require_graph
+from cgraph.extend import install, real_number, require_choice, require_graph
 
 from .. import theme
 from .dot import to_dot
 
 ENGINES = ("dot", "neato", "fdp", "sfdp", "circo", "twopi", "osage", "patchwork")
+LONGEST = 1e6  # s, that a drawing may be waited for
 LARGE = 500  # nodes; beyond, a layered drawing takes long and shows little
 
 # The WebAssembly Graphviz runs in a process of its own: it has no time limit, it aborts the process when threads use
@@ -82,10 +83,9 @@ def render_svg(dot_source: str | Drawing, *, engine: str = "dot", timeout: float
     >>> svg.startswith("<svg"), svg.count('class="node"')
     (True, 2)
     """
-    if engine not in ENGINES:
-        raise ValueError(f"engine must be one of {', '.join(ENGINES)}, got {engine!r}")
-    if not timeout > 0:
-        raise ValueError(f"timeout must be positive, got {timeout!r} s")
+    require_choice("engine", engine, ENGINES)
+    if not 0.0 < real_number("timeout", timeout) <= LONGEST:
+        raise ValueError(f"timeout must be positive, up to {LONGEST:g} s, got {timeout!r} s")
     source = dot_source if isinstance(dot_source, str) else getattr(dot_source, "source", None)
     if not isinstance(source, str):
         raise TypeError(f"render_svg needs DOT text or what to_dot returns, got {type(dot_source).__name__}")
@@ -149,7 +149,7 @@ def render_png(svg: str, *, scale: float = 2.0) -> bytes:
     svg_to_bytes = _resvg()
     if not isinstance(svg, str):
         raise TypeError(f"render_png needs the text of an SVG picture, got {type(svg).__name__}: {svg!r:.60}")
-    if not 0 < scale < float("inf"):
+    if not 0.0 < real_number("scale", scale) < float("inf"):
         raise ValueError(f"scale must be positive and finite, got {scale!r}")
     fonts = theme.font_folder()  # these alone, where they are: the same picture on every machine
     try:

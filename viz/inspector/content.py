@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from cgraph import Graph, Node
+from cgraph.extend import real_array
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 UNKNOWN = 0.5  # an input's value where none is given: a product with 0 would show nothing
@@ -40,7 +41,7 @@ class Version:
             raise ValueError(f"version {self.name!r}: {next(iter(strange))!r} is marked, but not in its graph")
         table = np.full((length, len(names)), UNKNOWN)
         for i, name in enumerate(names):
-            value = np.asarray(self.at.get(name, UNKNOWN), dtype=np.float64)
+            value = real_array(f"version {self.name!r}: input {name!r}", self.at.get(name, UNKNOWN))
             if value.shape not in ((), (length,)) or not np.isfinite(value).all():
                 raise ValueError(
                     f"version {self.name!r}: input {name!r} needs one finite number or {length} of them, "

@@ -12,7 +12,7 @@ from string import Template
 from typing import Any
 
 from cgraph import Graph, Node
-from cgraph.extend import require_graph
+from cgraph.extend import require_graph, require_mapping, require_sequence
 
 from .. import theme
 from ..pages import html
@@ -88,18 +88,32 @@ def page(
     >>> "<title>A sine</title>" in text
     True
     """
+    for what, text in (("title", title), ("about", about)):
+        if not isinstance(text, str):
+            raise TypeError(f"{what} of a page must be text, got {type(text).__name__}: {text!r:.60}")
+    if at is not None:
+        require_mapping("at", at, "input: value")
+    nodes, tables = frozenset(require_sequence("marked", marked, "nodes")), require_sequence("tables", tables, "Table")
+    if not all([isinstance(table, Table) for table in tables]):
+        raise TypeError(f"tables must be a sequence of Table, got {tables!r:.60}")
     if isinstance(graph, Graph):
-        versions: Sequence[Version] = [Version("graph", graph, about, marked, at or {})]
+        versions: Sequence[Version] = [Version("graph", graph, about, nodes, at or {})]
     else:
-        if not isinstance(graph, Sequence) or not all(isinstance(each, Version) for each in graph):
+        if (
+            isinstance(graph, str)
+            or not isinstance(graph, Sequence)
+            or not all(isinstance(each, Version) for each in graph)
+        ):
             require_graph("page", graph)
         versions = list(graph)
-        if at is not None or marked:
+        if at is not None or nodes:
             raise ValueError("with versions, give each its own at and marked")
     names = [version.name for version in versions]
     if not names or len(set(names)) < len(names):
         raise ValueError(f"a page needs versions with names of their own, got {names}")
     if motion is not None:
+        if not isinstance(motion, Motion):
+            raise TypeError(f"motion must be a Motion, got {type(motion).__name__}: {motion!r:.60}")
         motion.check()
     data = {"title": title, "introduction": "" if isinstance(graph, Graph) else about, **record(versions, motion)}
     script = f'"use strict";\n{scripts()}\nstart();'

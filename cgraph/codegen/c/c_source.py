@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from ...core.graph import Graph, require_graph
 from ...util.atomic_write import atomic_write
+from ...util.require import require_flag, require_path
 from .c_identifiers import check_function_name, distinct
 from .c_statements import comment, functions
 
@@ -92,8 +93,9 @@ class CSource(NamedTuple):
 
         Raises OSError, with the path in its message, when the folder is missing or must not be written to.
         """
-        header = atomic_write(Path(folder) / f"{self.name}.h", self.header)
-        return atomic_write(Path(folder) / f"{self.name}.c", self.source), header
+        place = require_path("folder", folder)
+        header = atomic_write(place / f"{self.name}.h", self.header)
+        return atomic_write(place / f"{self.name}.c", self.source), header
 
 
 def to_c(graph: Graph, name: str = "function", *, fma: bool = False) -> CSource:
@@ -145,7 +147,7 @@ def to_c(graph: Graph, name: str = "function", *, fma: bool = False) -> CSource:
         inputs=_enumerators(places, input_names, f"{name.upper()}_N_IN"),
         outputs=_enumerators(results, list(outputs), f"{name.upper()}_N_OUT"),
     )
-    contract = _CONTRACT.format(**_ROUNDING[fma])
+    contract = _CONTRACT.format(**_ROUNDING[require_flag("fma", fma)])
     text = functions(
         name, graph.nodes, dict(zip(inputs, places, strict=True)), list(zip(results, outputs.values(), strict=True))
     )

@@ -10,6 +10,7 @@ from typing import Any
 from ...core.edge import Edge
 from ...core.graph import Graph, require_graph
 from ...core.node import Node
+from ...util.require import require_mapping, require_sequence
 from ..edge_partials import Point
 from ..names import Name, Names, many
 from .cancellation import cancellations, rounded
@@ -136,6 +137,10 @@ def lint(
     Holds: no path leads from x to y: y is an input.
     """
     require_graph("lint", graph)
+    if isinstance(digits, bool) or not isinstance(digits, (int, float)) or not digits > 0.0:
+        raise ValueError(f"digits must be a positive number, got {digits!r:.60}")
+    if not isinstance(function, str):
+        raise TypeError(f"function must be the name of one, got {type(function).__name__}: {function!r:.60}")
     names = Names(graph)
     findings: list[Finding] = []
     proofs: list[str] = []
@@ -143,7 +148,7 @@ def lint(
         violations, held = check_independence(names, first, second, function)
         findings += violations
         proofs += held
-    if depends:
+    if depends is not None and require_mapping("depends", depends, "output: names"):
         missing = missing_dependences(names, depends)
         findings += missing
         if not missing:
@@ -154,8 +159,6 @@ def lint(
         if not singular:
             proofs.append(f"no slope is unbounded in the box, of {many(len(names.number), 'operation')}.")
     if at is not None:
-        if not isinstance(digits, (int, float)) or not digits > 0.0:
-            raise ValueError(f"digits must be a positive number, got {digits!r}")
         losses = cancellations(names, at, digits)
         findings += losses
         if not losses:
@@ -167,11 +170,11 @@ def _pairs(independent: Pair | Sequence[Pair]) -> list[Pair]:
     """The pairs; a single pair of strings or nodes counts as one."""
     if isinstance(independent, (str, Node)):
         raise TypeError(f"independent: expected pairs of groups, got {independent!r:.60}")
-    pairs: list[Any] = list(independent)
+    pairs: list[Any] = list(require_sequence("independent", independent, "pairs of groups"))
     if len(pairs) == 2 and all([isinstance(group, (str, Node)) for group in pairs]):
         return [(pairs[0], pairs[1])]
     for pair in pairs:
-        if isinstance(pair, (str, Node)) or len(pair) != 2:
+        if not isinstance(pair, Sequence) or isinstance(pair, str) or len(pair) != 2:
             raise ValueError(f"independent: each entry must be a pair of groups, got {pair!r:.60}")
     return [(first, second) for first, second in pairs]
 

@@ -11,6 +11,8 @@ from ...core.node import CONSTANT, VARIABLE, Node, Op
 from ...core.op_intervals import LINE
 from ...core.operation import Interval
 from ...errors import GraphError
+from ...util.real_arrays import real_number
+from ...util.require import require_mapping
 from ..names import Names
 from .finding import Finding
 
@@ -23,8 +25,10 @@ def intervals(graph: Graph, box: Box) -> dict[Node, Interval]:
     box: {input: (low, high) or a number}. The bounds hold, but may be wide: an interval forgets which values belong
     together. Raises GraphError for an unknown input, ValueError for what is no interval.
     """
-    if unknown := [name for name in box if name not in graph.input_names]:
-        raise GraphError(f"box: the graph has no input {', '.join(unknown)} (it has {', '.join(graph.input_names)})")
+    if unknown := [name for name in require_mapping("box", box, "input: interval") if name not in graph.input_names]:
+        raise GraphError(
+            f"box: the graph has no input {', '.join(map(str, unknown))} (it has {', '.join(graph.input_names)})"
+        )
     given = {name: _interval(name, value) for name, value in box.items()}
     found: dict[Node, Interval] = {}
     for node in graph.nodes:
@@ -83,7 +87,11 @@ def _interval(name: str, value: object) -> Interval:
     low, high = ends
     if not all([isinstance(end, numbers.Real) and not isinstance(end, bool) for end in ends]) or not low <= high:
         raise ValueError(f"box: input {name!r} needs numbers low <= high, got {value!r:.60}")
-    return float(low), float(high)
+    return _float(name, low), _float(name, high)
+
+
+def _float(name: str, end: float) -> float:
+    return real_number(f"box: input {name!r}", end)
 
 
 def _shown(bound: Interval) -> str:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, real_array
+from cgraph.extend import Array, real_array, require_mapping
 
 from ...equations.initial_value import check_names
 from ...equations.state_equation import state_inputs
@@ -40,8 +40,9 @@ def starts(
         raise ValueError("qd must be None and tau 0 for a system of first order; q holds its whole state")
     same: dict[str, float] = dict(inputs.parameters)
     columns: dict[str, Array] = {}
-    check_names(inputs, parameters or ())
-    for name, value in (parameters or {}).items():
+    parameters = {} if parameters is None else require_mapping("parameters", parameters, "name: numbers")
+    check_names(inputs, parameters)
+    for name, value in parameters.items():
         if np.ndim(value) == 0:
             same[name] = parameter_value(name, np.asarray(value).item())
         else:

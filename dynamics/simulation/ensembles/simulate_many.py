@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array
+from cgraph.extend import Array, require_whole
 
 from ...integrators import METHODS, derive
 from ...systems.model import Model
@@ -175,8 +175,8 @@ def _warning(stats: EnsembleStats) -> str:
 
 
 def _check_chunk(chunk: int | None) -> None:
-    if chunk is not None and (not isinstance(chunk, (int, np.integer)) or chunk < 1):
-        raise ValueError(f"chunk must be a whole number from 1, got {chunk!r}")
+    if chunk is not None:
+        require_whole("chunk", chunk, 1)
 
 
 def _check_room(x: Array, rows: int) -> None:

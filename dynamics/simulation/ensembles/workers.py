@@ -20,13 +20,19 @@ Workers = int | Map | None
 LOOK = 0.1  # s: not every system interrupts a wait without an end for Ctrl-C
 
 
+MOST = 2**31  # threads
+
+
 def checked(workers: Workers) -> int | Map:
     """The number of threads, or the map. Raises ValueError for what is neither."""
     if callable(workers):
         return workers
-    if workers is not None and (not isinstance(workers, (int, np.integer)) or workers < 1):
+    if workers is None:
+        return thread_count(None)
+    if isinstance(workers, bool) or not isinstance(workers, (int, np.integer)) or not 1 <= workers <= MOST:
         raise ValueError(
-            f"workers must be a whole number from 1, None for one on each core, or a function like map, got {workers!r}"
+            "workers must be a whole number from 1, None for one on each core, or a function like map, got "
+            f"{workers!r:.40}"
         )
     return thread_count(workers)
 
@@ -52,7 +58,10 @@ def finished(task: Task, chunks: Sequence[Chunk], workers: int | Map, table: Arr
 
 
 def _by_map(task: Task, chunks: Sequence[Chunk], workers: Map) -> Generator[Part, None, None]:
-    for part in workers(task, chunks):
+    parts = workers(task, chunks)
+    if not isinstance(parts, Iterable):
+        raise TypeError(f"workers must give the results of the function, as map does, got {parts!r:.60}")
+    for part in parts:
         if not isinstance(part, Part):
             raise TypeError(
                 f"workers must give the results of the function, as map does, got {type(part).__name__}: {part!r:.60}"

@@ -10,12 +10,8 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.equations_of_motion import (
-    SOLUTIONS,
-    SingularMassMatrixError,
-    forward_dynamics,
-    raise_if_singular,
-)
+from dynamics.equations.equations_of_motion import SOLUTIONS, forward_dynamics
+from dynamics.equations.singular_mass_matrix import SingularMassMatrixError, raise_if_singular
 from tests.tolerances import CONDITIONED, LAST_BITS
 
 METHODS = [name for name in SOLUTIONS if name != "auto"]

@@ -54,6 +54,6 @@ def load(name: str) -> StabilityCase:
     >>> case.start, case.t_end, [criterion.quantity for criterion in case.criteria]
     ((1.0,), 50.0, ['error'])
     """
-    if name not in TABLE:
+    if not isinstance(name, str) or name not in TABLE:
         raise ValueError(f"there is no case {name!r}; the cases are {', '.join(TABLE)}")
     return TABLE[name]

@@ -1,0 +1,212 @@
+"""What public functions ask of plain arguments: flags, whole numbers, choices, sequences, mappings and paths."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterable, Mapping
+from numbers import Integral
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+def require_flag(what: str, value: Any) -> bool:
+    """The value as a bool.
+
+    Parameters
+    ----------
+    what : str
+        What the value is, as the error begins.
+    value : bool
+        True or False, also NumPy's.
+
+    Returns
+    -------
+    bool
+
+    Raises
+    ------
+    TypeError
+        For anything else, also what Python counts as true or false.
+
+    Examples
+    --------
+    >>> from cgraph.extend import require_flag
+    >>> require_flag("check", "no")
+    Traceback (most recent call last):
+    TypeError: check must be True or False, got 'no'
+    """
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    raise TypeError(f"{what} must be True or False, got {value!r:.60}")
+
+
+def require_whole(what: str, value: Any, least: int = 0) -> int:
+    """The value as an int.
+
+    Parameters
+    ----------
+    what : str
+        What the value is, as the error begins.
+    value : int
+        A whole number, also NumPy's; no bool.
+    least : int
+        The least that it may be.
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    TypeError
+        If it is no whole number.
+    ValueError
+        If it is less, or does not fit 64 bits.
+
+    Examples
+    --------
+    >>> from cgraph.extend import require_whole
+    >>> require_whole("passes", 2.5)
+    Traceback (most recent call last):
+    TypeError: passes must be a whole number from 0, got float: 2.5
+    """
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise TypeError(f"{what} must be a whole number from {least}, got {type(value).__name__}: {value!r:.60}")
+    number = int(value)
+    if number < least:
+        raise ValueError(f"{what} must be a whole number from {least}, got {value!r:.60}")
+    if number >= 2**63:
+        raise ValueError(f"{what} must be a whole number below 2**63, got {value!r:.20}...")
+    return number
+
+
+def require_choice(what: str, value: Any, choices: Collection[str]) -> str:
+    """The value, if it is one of the choices.
+
+    Parameters
+    ----------
+    what : str
+        What the value is, as the error begins.
+    value : str
+        A name.
+    choices : collection of str
+        The names that there are.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    ValueError
+        For any other value.
+
+    Examples
+    --------
+    >>> from cgraph.extend import require_choice
+    >>> require_choice("backend", "fast", ["llvm", "python"])
+    Traceback (most recent call last):
+    ValueError: backend must be one of llvm, python, got 'fast'
+    """
+    if isinstance(value, str) and value in choices:
+        return value
+    raise ValueError(f"{what} must be one of {', '.join(choices)}, got {value!r:.60}")
+
+
+def require_sequence(what: str, value: Any, of: str) -> tuple[Any, ...]:
+    """The members of a sequence; an iterator is read once.
+
+    Parameters
+    ----------
+    what : str
+        What the value is, as the error begins.
+    value : iterable
+        The members. A string is its characters.
+    of : str
+        What the members are, in the plural.
+
+    Returns
+    -------
+    tuple
+
+    Raises
+    ------
+    TypeError
+        If it cannot be iterated.
+
+    Examples
+    --------
+    >>> from cgraph.extend import require_sequence
+    >>> require_sequence("outputs", 3, "names")
+    Traceback (most recent call last):
+    TypeError: outputs must be a sequence of names, got int: 3
+    """
+    if not isinstance(value, Iterable) or isinstance(value, type):
+        raise TypeError(f"{what} must be a sequence of {of}, got {type(value).__name__}: {value!r:.60}")
+    return tuple(value)
+
+
+def require_mapping(what: str, value: Any, of: str) -> Mapping[Any, Any]:
+    """The value, if it is a mapping.
+
+    Parameters
+    ----------
+    what : str
+        What the value is, as the error begins.
+    value : mapping
+        Such as a dict.
+    of : str
+        From what to what, as "input: value".
+
+    Returns
+    -------
+    mapping
+
+    Raises
+    ------
+    TypeError
+        For anything else.
+
+    Examples
+    --------
+    >>> from cgraph.extend import require_mapping
+    >>> require_mapping("at", [1.0], "input: value")
+    Traceback (most recent call last):
+    TypeError: at must be a mapping {input: value}, got list: [1.0]
+    """
+    if not isinstance(value, Mapping):
+        raise TypeError(f"{what} must be a mapping {{{of}}}, got {type(value).__name__}: {value!r:.60}")
+    return value
+
+
+def require_path(what: str, value: Any) -> Path:
+    """The value as a path, a leading ~ read as the home.
+
+    Parameters
+    ----------
+    what : str
+        What the value is, as the error begins.
+    value : str or os.PathLike
+        A path.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    TypeError
+        For anything else.
+
+    Examples
+    --------
+    >>> from cgraph.extend import require_path
+    >>> require_path("folder", 3)
+    Traceback (most recent call last):
+    TypeError: folder must be a path, got int: 3
+    """
+    if not isinstance(value, (str, os.PathLike)):
+        raise TypeError(f"{what} must be a path, got {type(value).__name__}: {value!r:.60}")
+    return Path(value).expanduser()
