@@ -56,9 +56,12 @@ def _flat(y: Node, *args: Node) -> tuple[float, ...]:
     return (0.0,) * len(args)
 
 
+_LEAST_EXPONENT = 800.0  # exp(-800) is 0; no larger square, whose slope could be infinite
+
+
 def _bell(a: Node) -> Node:
     """2 / sqrt(pi) exp(-a**2), with a factor that is exact in numbers of any precision."""
-    return 2.0 / sqrt(acos(-1.0)) * exp(-(a * a))
+    return 2.0 / sqrt(acos(-1.0)) * exp(-minimum(a * a, _LEAST_EXPONENT))
 
 
 def _whole(a: Node) -> Node | None:

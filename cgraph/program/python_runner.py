@@ -52,8 +52,8 @@ class PythonRunner(Runner):
                     state.update(_split(list(results), statement.outputs, state))
                 case Map():  # y[i] = graph(x[i])
                     columns = self._elements(statement, state)
-                    for name, values in zip(statement.outputs, zip(*columns, strict=True), strict=True):
-                        state[name] = list(values)
+                    for slot, name in enumerate(statement.outputs):
+                        state[name] = [values[slot] for values in columns]
                 case Sum():
                     terms = [values[0] for values in self._elements(statement, state)]
                     state[statement.output] = [functools.reduce(operator.add, terms, 0.0)]  # sum() compensates

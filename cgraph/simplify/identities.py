@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from ..core.label import UNLABELLED, Label
+from ..core.label import UNLABELLED, WRITTEN, Label
 from ..core.node import CONSTANT, OPS, Node, apply, constant
 from ..core.scope import building
 from ..core.traversal import topological
@@ -52,7 +52,7 @@ def rewritten(nodes: Sequence[Node], build: Builder | None = None) -> list[Node]
     >>> import cgraph as cg
     >>> from cgraph.extend import rewritten
     >>> x, y = cg.variables("x y")
-    >>> rewritten([cg.sin(x) ** 2 + cg.cos(x) ** 2, (x + y) ** 2 - x * x - y * y - 2.0 * x * y])
+    >>> rewritten([cg.sin(x) ** 2 + cg.cos(x) ** 2, cg.sin(x + y) - cg.sin(y + x)])
     [<node 1.0>, <node 0.0>]
     """
     build = build or Builder()
@@ -173,22 +173,28 @@ class _Writer:
         total = None
         for product in positive:
             node = self._product(product)
-            total = node if total is None else total + node
+            total = node if total is None else self._untagged(total) + node
         for product in negative:
             node = self._product(product)
-            total = -node if total is None else total - node
+            total = -node if total is None else self._untagged(total) - node
         assert total is not None
         return total
 
     def _total(self, node: Node, others: list[Product]) -> Node:
         if not others:
             return node
-        rest = self._sum(others)
+        rest = self._untagged(self._sum(others))
         if rest.op.name == "neg":
             return node - rest.args[0]
         return rest - node.args[0] if node.op.name == "neg" else node + rest
 
+    def _untagged(self, node: Node) -> Node:
+        """The node as it is, those to come with the tags of their arguments."""
+        self.set_label(WRITTEN)
+        return node
+
     def _times(self, node: Node, factor: Factor, sign: int) -> Node:
+        self.set_label(WRITTEN)
         if node.op.name == "neg":
             return -self._times(node.args[0], factor, sign)
         return self._factor(factor) * node if sign > 0 else node / self._factor(factor)
@@ -196,6 +202,7 @@ class _Writer:
     def _product(self, product: Product) -> Node:
         above = {factor: power for factor, power in product.factors.items() if power > 0}
         below = [factor for factor, power in product.factors.items() for _ in range(-power)]
+        self.set_label(product.label)
         value, node = abs(product.value), self._powers(above)
         node = constant(value) if node is None else node if value == 1.0 else value * node
         for factor in below:

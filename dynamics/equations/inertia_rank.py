@@ -34,8 +34,8 @@ def without_inertia(accelerations: Graph, mass_matrix: Callable[[], Graph], n: i
     """
     rng = np.random.default_rng(0)
     found: set[int] = set()
-    for _ in range(STATES):
-        point = {name: float(rng.uniform(0.5, 1.5)) for name in accelerations.input_names}
+    for k in range(STATES):
+        point = {name: 10.0**-k * float(rng.uniform(0.5, 1.5)) for name in accelerations.input_names}
         point |= {f"tau{i}": TORQUE * point[f"tau{i}"] for i in range(n)}
         inverse = _inverse(accelerations, point, n)
         finite = np.isfinite(inverse).all(axis=1)

@@ -9,6 +9,8 @@ from cgraph.extend import Program
 
 from .problem import Problem
 
+ROUNDING = 16.0 * 2.0**-52  # of the sums of a step
+
 
 @dataclass(frozen=True)
 class Method:
@@ -30,6 +32,8 @@ class Method:
         Whether the method chooses its steps by an estimate of their error.
     degree : int
         Of the dense output, 0 where there is none.
+    finest : float
+        The relative tolerance below which a step's own rounding is larger.
 
     A program of equal steps makes one step in a pass. Before each pass its registers (`explicit.registers`) hold
 
@@ -69,6 +73,7 @@ class Method:
     program: Callable[[Problem, bool], Program]
     adaptive: bool
     degree: int = 0
+    finest: float = ROUNDING
 
     def __repr__(self) -> str:
         return f"<Method of order {self.order}, {'steps by error' if self.adaptive else 'equal steps'}>"

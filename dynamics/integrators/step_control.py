@@ -26,7 +26,6 @@ SAFETY, SMALLEST, LARGEST = 0.9, 0.2, 5.0  # factors from one step to the next
 MEMORY = 0.04  # weight of the estimate before in the choice of the next step (Gustafsson's PI control)
 RESOLUTION = 4.0 * 2.0**-52  # steps below this share of t hardly move t
 COLLAPSE = 2.0**-200  # steps below this share of a run never end it
-ROUNDING = 16.0 * 2.0**-52  # relative tolerances below it ask for more than a step's sums hold
 SMALLEST_ATOL = 2.0**-1022  # in place of 0: a state that is 0 and stays 0 has no error
 
 

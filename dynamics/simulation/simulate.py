@@ -23,6 +23,7 @@ from .event import Event, as_events
 from .event_log import EventLog
 from .event_program import event_program
 from .free_memory import room
+from .integration import integration
 from .progress_bar import Progress
 from .recorder import Recorder
 from .row_values import row_values
@@ -30,7 +31,7 @@ from .run_options import METHOD, TABLES, RunOptions, time_span
 from .scipy_solvers import ScipyIntegration, scipy_solver
 from .solution import Solution
 from .step_program import compile_steps, step_program
-from .stepping import FixedStepIntegration, Integration, integration
+from .stepping import FixedStepIntegration, Integration
 from .trajectory import SimulationWarning, Stats, Trajectory
 from .watched import WatchedIntegration
 

@@ -31,6 +31,11 @@ class StateSizes:
         with np.errstate(invalid="ignore"):
             largest = np.abs(np.where(np.isfinite(states), states, 0.0)).max(axis=0, initial=0.0)
         self._sizes = largest if anew else np.maximum(self._sizes, largest)
-        others = np.where(self._alike, self._sizes, 0.0).max(axis=1)
+        others = self.largest_of_kind(self._sizes)
         tolerance: Array = np.maximum(self._rtol * np.maximum(self._sizes, OTHERS * others), self._least)
         return tolerance
+
+    def largest_of_kind(self, values: Array) -> Array:
+        """For each component the largest size of those of its kind, (m,)."""
+        largest: Array = np.where(self._alike, np.abs(values), 0.0).max(axis=1)
+        return largest

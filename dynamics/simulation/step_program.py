@@ -25,6 +25,7 @@ class StepProgram:
     order: int
     adaptive: bool
     dense: bool  # whether its record has dense output
+    finest: float  # relative tolerance
     kinds: tuple[int, ...]  # of the components: coordinates 0, velocities 1; those of an OdeSystem differ
 
     @property
@@ -62,6 +63,7 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
         method.order,
         method.adaptive,
         dense and method.adaptive,
+        method.finest,
         tuple(range(problem.size)) if problem.system is None else (0,) * n + (1,) * n,
     )
 

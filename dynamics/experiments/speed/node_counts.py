@@ -13,7 +13,7 @@ import numpy as np
 import cgraph as cg
 from cgraph import Graph, Node
 
-from ...equations.equations_of_motion import forward_dynamics
+from ...equations.equations_of_motion import accelerations, forward_dynamics
 from ...multibody.mechanism import Mechanism
 from ...multibody.planar_arm import planar_links
 from ...systems.system import System
@@ -47,7 +47,7 @@ def from_lagrangian(model: Mechanism) -> Graph:
     system = model.system
     partials = system.partial_lagrangians
     plain = System(lambda q, qd, t: partials, system.coordinates, damping=system.damping)
-    return forward_dynamics(plain, "recursive")
+    return accelerations(plain, "recursive")
 
 
 def by_centers(model: Mechanism) -> Graph:
@@ -68,7 +68,7 @@ def by_centers(model: Mechanism) -> Graph:
         return partials
 
     system = model.system
-    return forward_dynamics(System(lagrangian, system.coordinates, damping=system.damping), "recursive")
+    return accelerations(System(lagrangian, system.coordinates, damping=system.damping), "recursive")
 
 
 VARIANTS = {

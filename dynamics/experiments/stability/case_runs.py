@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from ...equations.state_equation import state_inputs
+from ...integrators import METHODS
 from ...reference import Reference
+from ...simulation.run_options import SCIPY
 from ...simulation.simulate import simulate
 from ...simulation.trajectory import Trajectory
 from ...systems.system import TIME
@@ -60,8 +62,8 @@ def result(case: StabilityCase, method: str) -> CaseResult:
 def trajectory(case: StabilityCase, method: str) -> Trajectory:
     """The run of a case."""
     options: dict[str, Any] = {"rtol": RTOL, "atol": case.atol}
-    if (step := EQUAL_STEPS.get(case.name, {}).get(method)) is not None:
-        options = {"dt": step, "estimate_error": False}  # the error is measured
+    if not (method.startswith(SCIPY) or METHODS[method].adaptive):
+        options = {"dt": EQUAL_STEPS.get(case.name, {}).get(method), "estimate_error": False}  # the error is measured
     options |= {"max_steps": MOST_STEPS, "progress": False}
     return simulate(case.model, case.q, case.qd or None, case.t_end, method, **options)
 

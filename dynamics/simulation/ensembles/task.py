@@ -15,10 +15,11 @@ from cgraph.extend import Array, runner
 from ..error_estimate import estimate
 from ..event_log import EventLog, Happening
 from ..event_program import EventProgram
+from ..integration import integration
 from ..recorder import Recorder
 from ..run_options import RunOptions
 from ..step_program import CompiledSteps, StepProgram, compile_steps
-from ..stepping import FixedStepIntegration, Integration, StoppedError, integration
+from ..stepping import FixedStepIntegration, Integration, StoppedError
 from ..watched import WatchedIntegration
 from .branch_free import branch_free
 from .chunk import Chunk, Part, empty

@@ -12,9 +12,9 @@ import dynamics as dyn
 from dynamics.integrators import METHODS, derive
 from dynamics.integrators.dop853 import DOP853
 from dynamics.integrators.tableau import DOPRI5, EULER, real_stability
+from dynamics.simulation.integration import integration
 from dynamics.simulation.run_options import RunOptions
 from dynamics.simulation.step_program import compile_steps, step_program
-from dynamics.simulation.stepping import integration
 
 ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
 EXPLICIT = ["dopri5", "dop853"]

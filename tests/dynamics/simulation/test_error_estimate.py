@@ -20,7 +20,7 @@ from tests.dynamics.models import random_arm
 EQUAL = [name for name, method in METHODS.items() if not method.adaptive]
 LOOSE = 1e6  # a bound that no estimate of these runs exceeds
 FACTOR = 2.0  # of an error, by which an estimate may miss it
-ROUNDING = 1e-15  # below it an error is no power of the step
+ROUNDING = 1e-14  # below it an error is no power of the step
 GRIDS = [None, [3.0], [1.0, 2.0, 2.001, 10.0], np.linspace(0.0, 10.0, 101), np.geomspace(1e-3, 10.0, 30)]
 
 

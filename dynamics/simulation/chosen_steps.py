@@ -1,0 +1,176 @@
+"""Integration by steps chosen by error: the first step, the tolerances, and what a user should know of the steps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cgraph.extend import Array
+
+from ..integrators.step_control import COLLAPSE, DONE, SMALLEST_ATOL, TOO_SMALL
+from .dense_output import StepBlock
+from .first_step import LEAP, first_step
+from .run_options import RunOptions
+from .state_sizes import StateSizes
+from .step_program import CompiledSteps
+from .stepping import FIRST_PASSES, NativeIntegration
+
+ROUNDS = 4  # of a first step, by which the sizes of the states are known
+HALVINGS = 100  # of a look ahead
+HELD, SHARE = 100, 0.25  # steps at the stability limit, of all, from which on a run is called stiff
+
+
+class AdaptiveIntegration(NativeIntegration):
+    """Steps chosen by the method."""
+
+    def __init__(
+        self,
+        compiled: CompiledSteps,
+        options: RunOptions,
+        parameters: Sequence[float] = (),
+        stopped: Callable[[], bool] = lambda: False,
+    ) -> None:
+        super().__init__(compiled, options, parameters, stopped)
+        self.relative = max(options.relative, self.program.finest)
+        self.absolute = np.broadcast_to(np.maximum(options.absolute, SMALLEST_ATOL), self.program.size)
+        self.sizes = StateSizes(self.relative, self.program.kinds, SMALLEST_ATOL) if options.atol is None else None
+        self._stiff = self._below_rounding = False
+
+    def blocks(self, x: Array) -> Iterator[StepBlock]:
+        """The steps from x (m,) on, some at a time."""
+        options, wanted = self.options, self._first_step(x)
+        start: Mapping[str, float | Array | list[float]] = {
+            "x": x,
+            "p": self.parameters,
+            "t": options.t0,
+            "end": options.t_end,
+            "rtol": self.relative,
+            "atol": self.absolute,
+            "next": wanted,
+            "max_step": options.longest_step,
+            "min_step": COLLAPSE * abs(options.t_end - options.t0),
+            "fresh": 1.0,
+            "error_old": 1e-4,
+            "accepted": 1.0,
+        }
+        memory = self.runner.memory(start)
+        seen = FIRST_PASSES  # so many trials, and then twice as many as before, between two looks at the sizes
+        while True:
+            done = self.steps + self.rejected
+            left = options.max_steps - done
+            if left <= 0:
+                self.status = self.too_many(self._number(memory, "t"), options.max_steps)
+                return
+            rows, _ = self._advance(memory, int(min(left, seen - done if self.sizes else 2**31)), whole=False)
+            status = self._number(memory, "status")
+            self.steps += len(rows)
+            self.rejected = int(self._number(memory, "rejected"))
+            self.evaluations = int(self._number(memory, "evaluations"))
+            if len(rows):
+                self._look(memory, rows)
+                yield self._block(rows)
+                self._see(rows)
+            if self.sizes and self.steps + self.rejected >= seen:
+                seen *= 2
+                self.runner.write(memory, "atol", self.absolute)
+            if status == TOO_SMALL:
+                self.status = self._too_small(memory)
+            if status in (TOO_SMALL, DONE):
+                return
+
+    def _block(self, rows: Array) -> StepBlock:
+        m = self.program.size
+        t, h, x = rows[:, 0], rows[:, 1], rows[:, 2 : 2 + m]
+        self.largest = max(self.largest, min(float(np.abs(h).max()), self.options.longest_step))
+        if not self.program.dense:
+            return StepBlock(t, x, t - h, h, np.full_like(x, math.nan), None)
+        t_old, x_old, dense = rows[:, 2 + m], rows[:, 3 + m : 3 + 2 * m], rows[:, 3 + 2 * m :]
+        return StepBlock(t, x, t_old, h, x_old, dense.reshape(len(t), -1, m))
+
+    def _look(self, memory: Array, rows: Array) -> None:
+        """Note once what a user should know of these steps: stiffness, and tolerances below rounding."""
+        options, held = self.options, int(self._number(memory, "held"))
+        if held >= HELD and held >= SHARE * self.steps and not self._stiff:
+            self._stiff = True
+            t, h = rows[-1, :2]
+            self.warnings.append(
+                f"the system is stiff: at t = {t:.6g} s the step, {abs(h):.3g} s, is held at the stability limit of "
+                f"method {options.method!r}, not by its tolerance; try method='radau'"
+            )
+        if options.relative < self.relative and not self._below_rounding:
+            size = np.abs(rows[:, 2 : 2 + self.program.size])
+            short = (self.absolute + options.relative * size < self.relative * size).any(axis=0)
+            if short.any():
+                self._below_rounding = True
+                self.warnings.append(
+                    f"rtol = {options.relative:g} with the atol of {self.components[int(np.argmax(short))]} is below "
+                    f"the rounding of a step: raised to {self.relative:.3g}"
+                )
+
+    def _too_small(self, memory: Array) -> str:
+        t, x = self._number(memory, "t"), self.runner.read(memory, "x")
+        where, rate = f"stopped at t = {t:.6g} s: ", self._rate(t, x)
+        if not np.isfinite(rate).all():
+            first = self.components[int(np.flatnonzero(~np.isfinite(rate))[0])]
+            return f"{where}the rate of {first} is not finite{' at the start' if t == self.options.t0 else ''}"
+        if reason := self.nonfinite(self.runner.read(memory, "x_new")):
+            return f"{where}{reason}, however small"
+        fastest = self.components[int(np.argmax(np.abs(rate) / self._scale(x)))]
+        h = self._number(memory, "tried")
+        return f"{where}the step, {h:.3g} s, is below the resolution of the time; fastest is {fastest}"
+
+    def _rate(self, t: float, x: Array) -> Array:
+        rate = self.program.rate
+        assert rate is not None
+        values = dict(zip(rate.input_names, [*x.tolist(), t, *self.parameters], strict=True))
+        return np.array(list(rate.evaluate(values).values()), dtype=np.float64)
+
+    def _see(self, rows: Array) -> None:
+        if self.sizes:
+            self.absolute = self.sizes.see(rows[:, 2 : 2 + self.program.size])
+
+    def _first_step(self, x: Array) -> float:
+        """The first step; where atol is chosen by the sizes of the states, those that it leads to."""
+        options, rate = self.options, self._rate(self.options.t0, x)
+        start: dict[str, ArrayLike] = {"x": x, "p": self.parameters}
+        if self.sizes is None:
+            if options.first_step is not None:
+                return options.first_step
+            return first_step(self.runner, self.program.order, options, start, rate, self._scale(x))
+        given = options.first_step
+        h = min(options.length, options.longest_step) * LEAP if given is None else given
+        for _ in range(ROUNDS):
+            self.absolute = self.sizes.see(self._ahead(x, rate, h), anew=True)
+            if given is not None:
+                return given
+            before, h = h, first_step(self.runner, self.program.order, options, start, rate, self._scale(x))
+            if h >= 0.5 * before:
+                break
+        return h
+
+    def _ahead(self, x: Array, rate: Array, h: float) -> Array:
+        """x, and where two of Euler's steps lead to, of h or of so much less that they can be trusted, (3, m).
+
+        They move no kind of component by more than its size, and change no kind of rate by more than its size.
+        """
+        assert self.sizes is not None
+        t0, sign = self.options.t0, math.copysign(1.0, self.options.t_end - self.options.t0)
+        largest = self.sizes.largest_of_kind
+        with np.errstate(all="ignore"):
+            for _ in range(HALVINGS):
+                first = x + sign * h * rate
+                second = first + sign * h * self._rate(t0 + sign * h, first)
+                moves, turns = largest(second - x), largest(self._rate(t0 + 2.0 * sign * h, second) - rate)
+                at, fast = largest(x), largest(rate)
+                if ((moves <= at) | (at == 0.0)).all() and ((turns <= fast) | (fast == 0.0)).all():
+                    return np.stack([x, first, second])
+                h *= 0.25
+        return x[None]
+
+    def _scale(self, x: Array) -> Array:
+        """What an error is measured by."""
+        size: Array = self.absolute + self.relative * np.abs(x)
+        return size
