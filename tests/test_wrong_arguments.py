@@ -69,6 +69,7 @@ def lagrangian(q, qd, t):
 
 GRAPH, SQUARES = cg.Graph([X, Y], {"r": X * Y}), cg.Graph([X, Y], {"r": X * X + Y * Y})
 HALVE = cg.Graph([X], {"next": 0.5 * X})
+LOOP = cg.loop(HALVE, {"x": "next"}, "python")
 DECAY = dyn.OdeSystem(lambda x, t: [-x[0]], ["x"])
 RUN = dyn.simulate(ARM, [0.1], [0.0], 0.02, "rk4", dt=0.01, backend="python", dense_output=True)
 TABLE, SYSTEM, SUBTREE = dyn.torque_by_link(ARM), dyn.System(lagrangian, ["a"]), TWO.subtree(TWO.bodies[1].name)
@@ -106,8 +107,8 @@ CALLS = {
     "cg.Graph.select_inputs": call(GRAPH.select_inputs, None),
     "cg.Compiled()": call(cg.compile(GRAPH, "python"), [1.0, 2.0]),
     "cg.Compiled.batch": call(cg.compile(GRAPH, "python").batch, [[1.0], [2.0]], 1),
-    "cg.Loop()": call(cg.loop(HALVE, {"x": "next"}, "python"), [1.0], 2, 1),
-    "cg.Loop.batch": call(cg.loop(HALVE, {"x": "next"}, "python").batch, [[1.0]], 2, 1),
+    "cg.Loop()": call(LOOP, [1.0], 2, 1),
+    "cg.Loop.batch": call(LOOP.batch, [[1.0]], 2, 1),
     "cg.Comparison.classes": call(cg.compare(GRAPH, SQUARES).classes, "left"),
     "cg.CSource.write": call(cg.to_c(GRAPH).write, os.devnull),
     **{f"dyn.{name}": call(getattr(dyn, name), ARM) for name in MODEL_ALONE.split()},
@@ -306,6 +307,17 @@ CASES = {
     "wrt empty": (lambda: cg.gradient(GRAPH, wrt=[]), "wrt must name at least one input"),
     "wrt a number": (lambda: cg.jvp(GRAPH, wrt=3), "wrt must name inputs"),
     "a chain too long": (lambda: dyn.scenes.load("chain", n=10**12), "more than can be derived"),
+    "no names": (lambda: cg.variables(" "), "at least one name"),
+    "point of too large a number": (
+        lambda: cg.why(GRAPH, "r", "x", at={"x": 10**400, "y": 1.0}),
+        "must be a finite number",
+    ),
+    "mass too large": (
+        lambda: dyn.Mechanism([dyn.Body("b", dyn.Joint("revolute"), mass=10**400)]),
+        "mass must be finite",
+    ),
+    "info of no coordinate": (lambda: dyn.raise_if_singular(ARM, 7.0), "from 1 to 1 for a coordinate, got 7"),
+    "rows without room": (lambda: LOOP.batch([[1.0]], 10**12), "do not fit in memory"),
     "half a link": (lambda: dyn.scenes.load("chain", n=2.5), "at least one link, got 2.5"),
     "kind of a joint": (lambda: dyn.Joint("screw"), "must be one of fixed, prismatic, revolute, got 'screw'"),
     "start too long": (lambda: dyn.scenes.Scene("s", "", ARM, (0.0, 0.0), (0.0,), 1.0), "q needs 1 finite numbers"),
