@@ -8,14 +8,13 @@ import numpy as np
 
 from cgraph.extend import Array
 
-SHARE = 0.1  # of rtol times the size of a component: its absolute tolerance
 OTHERS = 1e-6  # of the largest component of its kind, below which one counts as no smaller: it may be rounding
 
 
 class StateSizes:
     """The absolute tolerance of a run that was given none, in the units of its states.
 
-    A tenth of rtol times the largest value that the component has had so far, or a millionth of the largest of its
+    rtol times the largest value that the component has had so far, or a millionth of the largest of its
     kind, coordinates or velocities. It grows with the motion.
 
     kinds: for each component a number, the same for those of one kind, (m,).
@@ -33,5 +32,5 @@ class StateSizes:
             largest = np.abs(np.where(np.isfinite(states), states, 0.0)).max(axis=0, initial=0.0)
         self._sizes = largest if anew else np.maximum(self._sizes, largest)
         others = np.where(self._alike, self._sizes, 0.0).max(axis=1)
-        tolerance: Array = np.maximum(SHARE * self._rtol * np.maximum(self._sizes, OTHERS * others), self._least)
+        tolerance: Array = np.maximum(self._rtol * np.maximum(self._sizes, OTHERS * others), self._least)
         return tolerance

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
+from ..trust.tightest import tightest
+from ..trust.trust import trust
 from .agreement import agreement
 from .build_time import build_time
 from .ensembles import ensembles
@@ -27,5 +29,9 @@ FIGURES = {
     "agreement": BenchFigure("largest differences from MuJoCo and Pinocchio", agreement, ("links", "count")),
     "ensembles": BenchFigure("many pendulums beside MuJoCo's rollout and JAX's vmap", ensembles, ("count", "repeats")),
     "reconfiguration": BenchFigure("first torque after a change of structure", reconfiguration, ("links", "repeats")),
+    "trust": BenchFigure(
+        "random Lagrangians with exact answers: runs right, said to be wrong, silent", trust, ("count",)
+    ),
+    "tightest": BenchFigure("the same as exactly as float64 has them, beside heyoka", tightest, ("count",)),
     "long-chains": BenchFigure("cost of a thousand links, and accuracy of long chains", long_chains, ("links",)),
 }

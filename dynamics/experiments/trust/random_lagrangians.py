@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from cgraph.extend import Array
 from ...systems.system import System
 from ..setting import Setting
 
-Lagrangian = Callable[[list[Node], list[Node], Node], Any]
+Lagrangian = Callable[[list[Node], list[Node], Node], Node]
 FAMILIES: dict[str, Callable[[np.random.Generator, str], Setting]] = {}
 FREQUENCY = 3.0  # rad/s, of what turns with time
 
@@ -58,7 +57,8 @@ def time_dependent(rng: np.random.Generator, name: str) -> Setting:
 
     def lagrangian(q: list[Node], qd: list[Node], t: Node) -> Node:
         force = _dot(push, q) * cg.sin(frequency[0] * t + phase)
-        return (1.0 + swing * cg.cos(frequency[1] * t)) * still(q, qd, t) + force
+        total: Node = (1.0 + swing * cg.cos(frequency[1] * t)) * still(q, qd, t) + force
+        return total
 
     return _setting(name, lagrangian, *_start(rng, n), damping=float(rng.choice([0.0, 0.1])))
 
@@ -72,7 +72,8 @@ def magnetic(rng: np.random.Generator, name: str) -> Setting:
 
     def lagrangian(q: list[Node], qd: list[Node], t: Node) -> Node:
         turns = [_dot(field[i], q) + cg.sin(_dot(waves[i], q) + frequency * t) for i in range(n)]
-        return still(q, qd, t) + _sum([a * v for a, v in zip(turns, qd, strict=True)])
+        total: Node = still(q, qd, t) + _sum([a * v for a, v in zip(turns, qd, strict=True)])
+        return total
 
     return _setting(name, lagrangian, *_start(rng, n))
 
@@ -86,7 +87,8 @@ def relativistic(rng: np.random.Generator, name: str) -> Setting:
     speed = c * share * direction / np.linalg.norm(direction)
 
     def lagrangian(q: list[Node], qd: list[Node], t: Node) -> Node:
-        return -mass * c**2 * cg.sqrt(1.0 - _sum([v * v for v in qd]) / c**2) - well(q)
+        total: Node = -mass * c**2 * cg.sqrt(1.0 - _sum([v * v for v in qd]) / c**2) - well(q)
+        return total
 
     return _setting(name, lagrangian, rng.uniform(-1.0, 1.0, size=n), speed, rng.uniform(1.0, 3.0))
 
@@ -101,7 +103,8 @@ def stiff(rng: np.random.Generator, name: str) -> Setting:
 
     def lagrangian(q: list[Node], qd: list[Node], t: Node) -> Node:
         fast = 0.5 * qd[0] ** 2 - 0.5 * rate**2 * (q[0] - 0.3 * cg.cos(q[1])) ** 2
-        return fast + (0.0 if slow is None else slow(q[1:], qd[1:], t))
+        total: Node = fast + (0.0 if slow is None else slow(q[1:], qd[1:], t))
+        return total
 
     q[0], qd[0] = 0.3 * math.cos(q[1]) + rng.choice([0.0, 0.01]), 0.0
     damping = [2.0 * rate, *[0.05] * (n - 1)]
@@ -149,7 +152,8 @@ def small_or_large(rng: np.random.Generator, name: str) -> Setting:
 
     def lagrangian(q: list[Node], qd: list[Node], t: Node) -> Node:
         unit = mass * length**2 / second**2
-        return unit * still([x / length for x in q], [v * (second / length) for v in qd], t / second)
+        total: Node = unit * still([x / length for x in q], [v * (second / length) for v in qd], t / second)
+        return total
 
     return _setting(name, lagrangian, q * length, qd * (length / second), t_end * second)
 

@@ -20,7 +20,7 @@ from .answers import COUNT, Answer, answer
 from .random_lagrangians import random_setting
 
 RIGHT, SAID, SILENT = "right", "said", "silent"
-SLACK = 100.0  # times the tolerance times the growth: an error that is right
+SLACK = 100.0  # times rtol times the growth: an error that is right
 DEFAULT = "default"
 ADAPTIVE = tuple([name for name, method in METHODS.items() if method.adaptive])
 
@@ -29,7 +29,7 @@ ADAPTIVE = tuple([name for name, method in METHODS.items() if method.adaptive])
 class Verdict:
     """One run judged.
 
-    excess: the error at t_end over the tolerance times the growth, the largest of all states, each over its size; NaN
+    excess: the error at t_end over rtol times the growth, the largest of all states, each over its size; NaN
     where there is no end, or the run did not get there.  verdict: "right", excess at most `SLACK`, or the motion has no
     end and the run says so; "said", the run stopped or warns; "silent".  words: what the run said.
     """
@@ -52,10 +52,8 @@ def judge(number: int, method: str | None = None) -> Verdict:
         run = simulate(setting.model, setting.q, setting.qd, setting.t_end, progress=False, **arguments)
     words = "; ".join([*([] if run.stats.success else [run.stats.message]), *[str(each.message) for each in caught]])
     excess = _excess(setting, truth, run)
-    if excess <= SLACK or (truth.end is None and not run.stats.success):
-        verdict = RIGHT
-    else:
-        verdict = SAID if words else SILENT
+    right = excess <= SLACK or (truth.end is None and not run.stats.success)
+    verdict = RIGHT if right else SAID if words else SILENT
     return Verdict(setting.name, method or DEFAULT, verdict, excess, words, run.stats.steps, run.stats.seconds)
 
 
@@ -65,7 +63,7 @@ def _excess(setting: Setting, truth: Answer, run: Trajectory) -> float:
     size = np.array(truth.size)
     error = np.abs(truth.end.deviation(np.hstack([run.q[-1:], run.qd[-1:]]))[0])
     relative = np.divide(error, size, out=np.where(error > 0.0, np.inf, 0.0), where=size > 0.0)
-    tolerance = RunOptions(setting.t_end, run.stats.method).rtol
+    tolerance = RunOptions(setting.t_end, run.stats.method).relative
     return float(np.max(relative) / (tolerance * truth.growth))
 
 
@@ -97,7 +95,7 @@ def trust(count: int = COUNT) -> Iterator[str]:
             ]
         )
     head = ["method", RIGHT, SAID, SILENT, "median excess", "largest", "seconds"]
-    yield f"{count} random Lagrangians, default arguments; excess: error over tolerance times growth, right to {SLACK:g}"
+    yield f"{count} random Lagrangians, default arguments; excess: error over rtol times growth, right to {SLACK:g}"
     yield "\n".join(table(head, rows))
     for each in judged:
         if each.verdict != RIGHT:

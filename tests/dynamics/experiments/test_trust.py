@@ -1,0 +1,44 @@
+"""Runs with default arguments are right, or say that they are not; the kept answers are what `reference` computes."""
+
+import pytest
+from pytest import mark
+
+from dynamics.experiments.trust.answers import COUNT, answer, compute
+from dynamics.experiments.trust.random_lagrangians import FAMILIES, random_setting
+from dynamics.experiments.trust.trust import ADAPTIVE, RIGHT, SAID, SILENT, judge
+
+QUICK = 16  # of the random Lagrangians: two of each family
+SPREAD = 1e-2  # relative: growth is measured by differences
+
+
+@mark.parametrize("number", range(QUICK))
+def test_a_default_run_is_right_or_says_that_it_is_not(number: int) -> None:
+    verdict = judge(number, "radau" if random_setting(number).stiff else None)
+    assert verdict.verdict in (RIGHT, SAID), verdict
+
+
+@mark.parametrize("number", [4, 6, 7])
+def test_kept_answers_are_computed_again(number: int) -> None:
+    pytest.importorskip("scipy")
+    kept, again = answer(number), compute(random_setting(number))
+    assert (kept.end is None) == (again.end is None)
+    if kept.end is not None:
+        assert again.end is not None
+        assert [text[:28] for text in kept.end.decimal[0]] == [text[:28] for text in again.end.decimal[0]]
+        assert kept.growth == pytest.approx(again.growth, rel=SPREAD)
+
+
+def test_the_same_number_is_the_same_system() -> None:
+    names = [random_setting(number).name for number in range(2 * len(FAMILIES))]
+    assert len(set(names)) == len(names)
+    first, second = random_setting(11), random_setting(11)
+    assert (first.start, first.t_end) == (second.start, second.t_end)
+    assert first.system.lagrangian.op is second.system.lagrangian.op
+
+
+@mark.slow
+@mark.timeout(3600)
+@mark.parametrize("method", [None, *ADAPTIVE])
+def test_no_run_is_wrong_in_silence(method: str | None) -> None:
+    silent = [verdict for number in range(COUNT) if (verdict := judge(number, method)).verdict == SILENT]
+    assert silent == []
