@@ -69,6 +69,7 @@ def lagrangian(q, qd, t):
 
 GRAPH, SQUARES = cg.Graph([X, Y], {"r": X * Y}), cg.Graph([X, Y], {"r": X * X + Y * Y})
 HALVE = cg.Graph([X], {"next": 0.5 * X})
+LOOP = cg.loop(HALVE, {"x": "next"}, "python")
 DECAY = dyn.OdeSystem(lambda x, t: [-x[0]], ["x"])
 RUN = dyn.simulate(ARM, [0.1], [0.0], 0.02, "rk4", dt=0.01, backend="python", dense_output=True)
 TABLE, SYSTEM, SUBTREE = dyn.torque_by_link(ARM), dyn.System(lagrangian, ["a"]), TWO.subtree(TWO.bodies[1].name)
@@ -106,21 +107,21 @@ CALLS = {
     "cg.Graph.select_inputs": call(GRAPH.select_inputs, None),
     "cg.Compiled()": call(cg.compile(GRAPH, "python"), [1.0, 2.0]),
     "cg.Compiled.batch": call(cg.compile(GRAPH, "python").batch, [[1.0], [2.0]], 1),
-    "cg.Loop()": call(cg.loop(HALVE, {"x": "next"}, "python"), [1.0], 2, 1),
-    "cg.Loop.batch": call(cg.loop(HALVE, {"x": "next"}, "python").batch, [[1.0]], 2, 1),
+    "cg.Loop()": call(LOOP, [1.0], 2, 1),
+    "cg.Loop.batch": call(LOOP.batch, [[1.0]], 2, 1),
     "cg.Comparison.classes": call(cg.compare(GRAPH, SQUARES).classes, "left"),
     "cg.CSource.write": call(cg.to_c(GRAPH).write, os.devnull),
     **{f"dyn.{name}": call(getattr(dyn, name), ARM) for name in MODEL_ALONE.split()},
     "dyn.forward_dynamics": call(dyn.forward_dynamics, ARM, "auto", check=False),
     "dyn.inverse_dynamics": call(dyn.inverse_dynamics, ARM, "chain_rule", simplify=True),
     "dyn.momentum_rate": call(dyn.momentum_rate, ARM, "chain_rule", simplify=True, keep_momentum=False),
-    "dyn.linearize": call(dyn.linearize, ARM, [0.0], [0.0], None, t=0.0, parameters=None),
+    "dyn.linearize": call(dyn.linearize, SYSTEM, [0.0], [0.0], None, t=0.0, parameters=None),
     "dyn.raise_if_singular": call(dyn.raise_if_singular, ARM, 0.0),
     "dyn.spurious_nodes": call(dyn.spurious_nodes, GRAPH),
     "dyn.prune": call(
         dyn.prune, ARM, dyn.inverse_dynamics, effects=(), lock=None, values=None, outputs=None, regroup=True
     ),
-    "dyn.certify": call(dyn.certify, ARM, 1, 0, speed=1.0),
+    "dyn.certify": call(dyn.certify, SYSTEM, 1, 0, speed=1.0),
     "dyn.to_mjcf": call(dyn.to_mjcf, ARM, 0.001),
     "dyn.load_mjcf": call(dyn.load_mjcf, dyn.to_mjcf(ARM), ignore=True),
     "dyn.load_urdf": call(dyn.load_urdf, dyn.to_urdf(ARM), ignore=True),
@@ -213,7 +214,17 @@ def test_the_table_has_every_public_function():
     assert [name for name in public() if name not in known] == []
 
 
-def faults(name, place, junk, error):
+def stand_ins(value, junk):
+    """The junk; and the value with junk in place of its first entry."""
+    yield junk
+    if isinstance(value, dict):
+        yield from ({**value, key: junk} for key in list(value)[:1])
+    elif type(value) in (list, tuple) and value:
+        yield type(value)([junk, *value[1:]])
+        yield from (type(value)([entry, *value[1:]]) for entry in list(stand_ins(value[0], junk))[1:])
+
+
+def fault_of(junk, error):
     """What is wrong with the answer to junk, if anything: None is a call that was taken."""
     if error is None:
         return "is taken" if junk in NEVER else None
@@ -229,21 +240,21 @@ def faults(name, place, junk, error):
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", CALLS)
 def test_junk_in_any_place_is_told_in_a_sentence(name, monkeypatch, tmp_path):
-    """Whatever stands in place of a right argument: an answer, or an error that the library itself raises."""
+    """Whatever stands in place of a right argument or entry: an answer, or an error that the library itself raises."""
     monkeypatch.chdir(tmp_path)
     function, args, named = CALLS[name]
     found = []
     for place in (*range(len(args)), *named):
         for label, junk in JUNK.items():
-            positional = [junk if k == place else value for k, value in enumerate(args)]
-            keywords = {key: junk if key == place else value for key, value in named.items()}
-            error = None
-            try:
-                function(*positional, **keywords)
-            except Exception as raised:  # noqa: BLE001 (all kinds are judged)
-                error = raised
-            if fault := faults(name, place, label, error):
-                found.append(f"{place} = {label} {fault}")
+            for stand_in in stand_ins(named[place] if place in named else args[place], junk):
+                positional = [stand_in if k == place else value for k, value in enumerate(args)]
+                error = None
+                try:
+                    function(*positional, **(named | {place: stand_in} if place in named else named))
+                except Exception as raised:  # noqa: BLE001 (all kinds are judged)
+                    error = raised
+                if fault := fault_of(label, error):
+                    found.append(f"{place} = {label} {fault}")
     assert found == []
 
 
@@ -296,6 +307,17 @@ CASES = {
     "wrt empty": (lambda: cg.gradient(GRAPH, wrt=[]), "wrt must name at least one input"),
     "wrt a number": (lambda: cg.jvp(GRAPH, wrt=3), "wrt must name inputs"),
     "a chain too long": (lambda: dyn.scenes.load("chain", n=10**12), "more than can be derived"),
+    "no names": (lambda: cg.variables(" "), "at least one name"),
+    "point of too large a number": (
+        lambda: cg.why(GRAPH, "r", "x", at={"x": 10**400, "y": 1.0}),
+        "must be a finite number",
+    ),
+    "mass too large": (
+        lambda: dyn.Mechanism([dyn.Body("b", dyn.Joint("revolute"), mass=10**400)]),
+        "mass must be finite",
+    ),
+    "info of no coordinate": (lambda: dyn.raise_if_singular(ARM, 7.0), "from 1 to 1 for a coordinate, got 7"),
+    "rows without room": (lambda: LOOP.batch([[1.0]], 10**12), "do not fit in memory"),
     "half a link": (lambda: dyn.scenes.load("chain", n=2.5), "at least one link, got 2.5"),
     "kind of a joint": (lambda: dyn.Joint("screw"), "must be one of fixed, prismatic, revolute, got 'screw'"),
     "start too long": (lambda: dyn.scenes.Scene("s", "", ARM, (0.0, 0.0), (0.0,), 1.0), "q needs 1 finite numbers"),

@@ -76,12 +76,12 @@ def _coefficients(k: int, graphs: Jets) -> list[Statement]:
         body.append(Map(graph, tuple([name for pair in pairs for name in pair]), ("sums",)))
     inputs = (f"rates{(k - 1) % 2}", "unit", f"order{k}", "zeros", "sums" if k > 1 else "none")
     body.append(Call(graphs.order, inputs, (f"c{k}", f"rates{k % 2}", f"left{k}", f"right{k}")))
-    return [*body, Map(SAME, ("last",), ("before",)), Sum(_SQUARE, (f"c{k}", "x", "rtol", "atol"), "last")]
+    return [*body, Map(SAME, ("last",), ("before",)), Sum(_SQUARE, (f"c{k}", "x", "c1", "rtol", "atol"), "last")]
 
 
 def _square() -> Graph:
-    c, x, rtol, atol = inputs = cg.variables("c x rtol atol")
-    part = c / (atol + rtol * abs(x))
+    c, x, first, rtol, atol = inputs = cg.variables("c x first rtol atol")
+    part = c / (atol + rtol * cg.maximum(abs(x), abs(first)))  # what starts at 0 is as large as its first change
     return Graph(inputs, {"y": part * part})
 
 

@@ -88,7 +88,7 @@ class Mechanism(Structure):
 
     def __repr__(self) -> str:
         names = self.coordinates
-        parts = [f"{len(self.bodies)} bodies, {len(names)} coordinate(s) {', '.join(names[:6])}"]
+        parts = [f"{len(self.bodies)} bodies, {len(names)} coordinate(s) {', '.join(names[:6])}".rstrip()]
         parts[0] += ", ..." if len(names) > 6 else ""
         parts += [f"locked {', '.join(list(self.locked)[:6])}"] if self.locked else []
         parts += [f"forces on {', '.join([force.body for force in self.forces[:6]])}"] if self.forces else []

@@ -44,7 +44,8 @@ def first_step(
             ahead = float(np.max(h * np.abs(rate) / np.maximum(np.abs(whole - x), scale)))
         if (difference <= 1.0 and ahead <= AHEAD) or h <= least:
             break
-        factor = 0.9 * max(difference, 1e-300) ** (-1.0 / (order + 1)) if math.isfinite(difference) else 0.0
+        # of tolerances; below a rounding, as of a state that moves evenly, it does not limit the step
+        factor = 0.9 * max(difference, 1e-16) ** (-1.0 / (order + 1)) if math.isfinite(difference) else 0.0
         h = max(h * min(0.5, max(1e-3, min(factor, AHEAD / max(ahead, AHEAD)))), least)
     return h
 
