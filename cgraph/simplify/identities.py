@@ -202,7 +202,7 @@ class _Writer:
     def _product(self, product: Product) -> Node:
         above = {factor: power for factor, power in product.factors.items() if power > 0}
         below = [factor for factor, power in product.factors.items() for _ in range(-power)]
-        self.set_label(product.label)
+        self.set_label(WRITTEN.with_tags_of(product.label))
         value, node = abs(product.value), self._powers(above)
         node = constant(value) if node is None else node if value == 1.0 else value * node
         for factor in below:
