@@ -36,7 +36,7 @@ class AdaptiveIntegration(NativeIntegration):
         super().__init__(compiled, options, parameters, stopped)
         self.relative = max(options.relative, self.program.finest)
         self.absolute = np.broadcast_to(np.maximum(options.absolute, SMALLEST_ATOL), self.program.size)
-        self.sizes = StateSizes(self.relative, self.program.kinds, SMALLEST_ATOL) if options.atol is None else None
+        self.sizes = self._fresh_sizes() if options.atol is None else None
         self._stiff = self._below_rounding = False
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
@@ -72,10 +72,12 @@ class AdaptiveIntegration(NativeIntegration):
             if len(rows):
                 self._look(memory, rows)
                 yield self._block(rows)
-                self._see(rows)
-            if self.sizes and self.steps + self.rejected >= seen:
-                seen *= 2
-                self.runner.write(memory, "atol", self.absolute)
+            if self.sizes:
+                self.sizes.see(rows[:, 2 : 2 + self.program.size])
+                if self.steps + self.rejected >= seen:
+                    seen *= 2
+                    self.absolute = self.sizes.look()
+                    self.runner.write(memory, "atol", self.absolute)
             if status == TOO_SMALL:
                 self.status = self._too_small(memory)
             if status in (TOO_SMALL, DONE):
@@ -128,9 +130,8 @@ class AdaptiveIntegration(NativeIntegration):
         values = dict(zip(rate.input_names, [*x.tolist(), t, *self.parameters], strict=True))
         return np.array(list(rate.evaluate(values).values()), dtype=np.float64)
 
-    def _see(self, rows: Array) -> None:
-        if self.sizes:
-            self.absolute = self.sizes.see(rows[:, 2 : 2 + self.program.size])
+    def _fresh_sizes(self) -> StateSizes:
+        return StateSizes(self.relative, self.program.kinds, SMALLEST_ATOL)
 
     def _first_step(self, x: Array) -> float:
         """The first step; where atol is chosen by the sizes of the states, those that it leads to."""
@@ -143,7 +144,9 @@ class AdaptiveIntegration(NativeIntegration):
         given = options.first_step
         h = min(options.length, options.longest_step) * LEAP if given is None else given
         for _ in range(ROUNDS):
-            self.absolute = self.sizes.see(self._ahead(x, rate, h), anew=True)
+            self.sizes = self._fresh_sizes()
+            self.sizes.see(self._ahead(x, rate, h))
+            self.absolute = self.sizes.look()
             if given is not None:
                 return given
             before, h = h, first_step(self.runner, self.program.order, options, start, rate, self._scale(x))
