@@ -76,7 +76,7 @@ class AdaptiveIntegration(NativeIntegration):
                 self.sizes.see(rows[:, 2 : 2 + self.program.size])
                 if self.steps + self.rejected >= seen:
                     seen *= 2
-                    self.absolute = self.sizes.look()
+                    self.absolute = self.sizes.tolerance()
                     self.runner.write(memory, "atol", self.absolute)
             if status == TOO_SMALL:
                 self.status = self._too_small(memory)
@@ -146,7 +146,7 @@ class AdaptiveIntegration(NativeIntegration):
         for _ in range(ROUNDS):
             self.sizes = self._fresh_sizes()
             self.sizes.see(self._ahead(x, rate, h))
-            self.absolute = self.sizes.look()
+            self.absolute = self.sizes.tolerance()
             if given is not None:
                 return given
             before, h = h, first_step(self.runner, self.program.order, options, start, rate, self._scale(x))

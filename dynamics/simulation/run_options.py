@@ -45,7 +45,7 @@ class RunOptions:
     rtol, atol : float, float or array_like, optional
         The error of a chosen step, relative to each component of the state, and absolute: one number for all, or (m,),
         one for each of q and then qd. By default 1e-9, and for atol rtol times the largest value that the
-        component has had of late, with floors a million times smaller (`state_sizes`), in whatever unit; 1e-10 for
+        component has had so far, or a millionth of the largest coordinate or velocity, in whatever unit; 1e-10 for
         SciPy's solvers. Of equal steps the estimated error that is no cause of a warning, relative to the largest of
         a component over the run; 1e-3 and 0 by default.
     t_eval : array_like, optional

@@ -8,15 +8,14 @@ import numpy as np
 
 from cgraph.extend import Array
 
-SMALL = 1e-6  # of what a component has been, or of the largest of its kind: below, it may be rounding, or done with
+OTHERS = 1e-6  # of the largest component of its kind, below which one counts as no smaller: it may be rounding
 
 
 class StateSizes:
     """The absolute tolerance of a run that was given none, in the units of its states.
 
-    rtol times the largest value that the component has had of late, a millionth of the largest that it ever had, or a
-    millionth of the largest of its kind, coordinates or velocities, of late. Of late is since the last look, and looks
-    are after 32, 64, 128, .. trials of a step.
+    rtol times the largest value that the component has had so far, or a millionth of the largest of its kind,
+    coordinates or velocities. It grows with the motion.
 
     kinds: for each component a number, the same for those of one kind, (m,).
     """
@@ -25,21 +24,19 @@ class StateSizes:
         kind = np.array(kinds)
         self._alike = kind[:, None] == kind[None, :]
         self._rtol, self._least = rtol, least
-        self._lately, self._ever = np.zeros(len(kind)), np.zeros(len(kind))
+        self._sizes = np.zeros(len(kind))
 
     def see(self, states: Array) -> None:
         """Note the sizes of these states, (.., m)."""
         with np.errstate(invalid="ignore"):
             largest = np.abs(np.where(np.isfinite(states), states, 0.0)).max(axis=0, initial=0.0)
-        self._lately = np.maximum(self._lately, largest)
+        self._sizes = np.maximum(self._sizes, largest)
 
-    def look(self) -> Array:
-        """The tolerance, (m,), by the states noted since the last look."""
-        self._ever = np.maximum(self._ever, self._lately)
-        sizes = np.maximum(self._lately, SMALL * np.maximum(self._ever, self.largest_of_kind(self._lately)))
-        self._lately = np.zeros_like(self._lately)
-        tolerance: Array = np.maximum(self._rtol * sizes, self._least)
-        return tolerance
+    def tolerance(self) -> Array:
+        """The tolerance, (m,), by the states noted so far."""
+        sizes = np.maximum(self._sizes, OTHERS * self.largest_of_kind(self._sizes))
+        result: Array = np.maximum(self._rtol * sizes, self._least)
+        return result
 
     def largest_of_kind(self, values: Array) -> Array:
         """For each component the largest size of those of its kind, (m,)."""

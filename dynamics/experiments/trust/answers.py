@@ -34,8 +34,8 @@ REGULAR = 1e8  # condition of a flow that is inverted
 class Answer:
     """The end of a motion, or why it has none.
 
-    end: at t_end; None where the motion runs into a singularity before.  size: the largest value of each state at some
-    times, (m,).
+    end: at t_end; None where the motion runs into a singularity before.  size: the largest value of each state on the
+    way, (m,).
     growth: the largest factor by which a small relative error at any time, in the sizes of the states, has grown at
     t_end, at least 1.
     """
@@ -65,29 +65,32 @@ def compute(setting: Setting) -> Answer:
         return Answer(None, (), 1.0, str(error))
     assert motion is not None
     end = Reference(motion.t[-1:], motion.decimal[-1:], motion.error, motion.how)
-    size = np.max(np.abs(motion.x), axis=0)
-    return Answer(end, tuple(size.tolist()), growth(setting, times, size), motion.how)
+    size, growth = size_and_growth(setting, times, np.max(np.abs(motion.x), axis=0))
+    return Answer(end, tuple(size.tolist()), growth, motion.how)
 
 
-def growth(setting: Setting, times: Sequence[float], size: Array) -> float:
-    """The largest row sum of the flow from any of these times to the last.
+def size_and_growth(setting: Setting, times: Sequence[float], size: Array) -> tuple[Array, float]:
+    """The largest value of each state, (m,), and the largest row sum of the flow from any of these times to the last.
 
-    The flow is measured in units of the sizes, by differences of motions of SciPy's solvers.
+    The flow is measured in units of the sizes, by differences of motions of SciPy's solvers; `size` is a first guess.
     """
-    unit, rate = np.where(size > 0.0, size, 1.0), cg.compile(problem_of(setting).rate)
-    options = {"rtol": RTOL, "atol": RTOL * unit, "method": "Radau" if setting.stiff else "DOP853", "t_eval": times}
+    rate = cg.compile(problem_of(setting).rate)
+    unit = np.where(size > 0.0, size, 1.0)
 
-    def motion(x: Array) -> Array:
+    def motion(x: Array, at: Sequence[float] | None = times) -> Array:
+        options = {"rtol": RTOL, "atol": RTOL * unit, "method": "Radau" if setting.stiff else "DOP853", "t_eval": at}
         return np.asarray(solve_ivp()(lambda t, x: rate([*x, t]), (0.0, setting.t_end), x, **options).y.T)
 
     start = np.array(setting.start)
+    size = np.maximum(size, np.abs(motion(start, None)).max(axis=0))  # of all its steps, layers included
+    unit = np.where(size > 0.0, size, 1.0)
     columns = []
     for j in range(len(start)):
         aside = unit * (np.arange(len(start)) == j) * NUDGE
         columns.append((motion(start + aside) - motion(start - aside)) / (2.0 * NUDGE * unit))
     flows = np.stack(columns, axis=2)  # (T, m, m), from the start
     usable = [flow for flow in flows[:-1] if np.linalg.cond(flow) < REGULAR]
-    return max([1.0, *[float(np.abs(flows[-1] @ np.linalg.inv(flow)).sum(axis=1).max()) for flow in usable]])
+    return size, max([1.0, *[float(np.abs(flows[-1] @ np.linalg.inv(flow)).sum(axis=1).max()) for flow in usable]])
 
 
 def renew(numbers: Iterable[int], say: Callable[[str], None] = lambda line: None) -> None:

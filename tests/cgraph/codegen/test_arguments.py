@@ -82,7 +82,7 @@ def test_threads_that_are_no_number_are_told(engine, threads):
 
 @pytest.mark.parametrize("values", [[1, 2], 3.0, None])
 def test_evaluate_takes_a_mapping(values):
-    with pytest.raises(TypeError, match=r"values must be a mapping \{input: value\}, got"):
+    with pytest.raises(TypeError, match=r"evaluate takes a mapping \{input: value\}, got"):
         GRAPH.evaluate(values)
     with pytest.raises(cg.GraphError, match="the graph has no input 1"):
         GRAPH.evaluate({"x": 1.0, "y": 2.0, 1: 3.0})

@@ -17,7 +17,7 @@ def test_a_default_run_is_right_or_says_that_it_is_not(number: int) -> None:
     assert verdict.verdict in (RIGHT, SAID), verdict
 
 
-@mark.parametrize("number", [4, 6, 7])
+@mark.parametrize("number", [1, 14])
 def test_kept_answers_are_computed_again(number: int) -> None:
     pytest.importorskip("scipy")
     kept, again = answer(number), compute(random_setting(number))
