@@ -15,7 +15,7 @@ from .builder import Builder
 from .canonical import ROUNDING, Angle, Canonical, Powers, Sum, Term, accumulate, without_zeros
 from .rounding_growth import as_accurate
 
-LONGEST = 1000  # nodes; beyond, sums of products would be too long to be of use
+LONGEST = 250  # nodes; beyond, sums of products would be too long to be of use
 
 Factor = int | tuple[str, tuple[Angle, ...]]  # an atom, or the cosine or sine of a sum of angles
 

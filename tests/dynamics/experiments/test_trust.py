@@ -7,7 +7,7 @@ from dynamics.experiments.trust.answers import COUNT, answer, compute
 from dynamics.experiments.trust.random_lagrangians import FAMILIES, random_setting
 from dynamics.experiments.trust.trust import ADAPTIVE, RIGHT, SAID, SILENT, judge
 
-QUICK = 16  # of the random Lagrangians: two of each family
+QUICK = 8  # of the random Lagrangians: one of each family
 SPREAD = 1e-2  # relative: growth is measured by differences
 
 
@@ -17,14 +17,16 @@ def test_a_default_run_is_right_or_says_that_it_is_not(number: int) -> None:
     assert verdict.verdict in (RIGHT, SAID), verdict
 
 
-@mark.parametrize("number", [1, 14])
+@mark.slow
+@mark.timeout(600)
+@mark.parametrize("number", [1, 4, 6, 7])
 def test_kept_answers_are_computed_again(number: int) -> None:
     pytest.importorskip("scipy")
     kept, again = answer(number), compute(random_setting(number))
     assert (kept.end is None) == (again.end is None)
     if kept.end is not None:
         assert again.end is not None
-        assert [text[:28] for text in kept.end.decimal[0]] == [text[:28] for text in again.end.decimal[0]]
+        assert kept.end.x == pytest.approx(again.end.x, rel=1e-14)  # constants of a graph are rounded as it is built
         assert kept.growth == pytest.approx(again.growth, rel=SPREAD)
 
 
