@@ -8,7 +8,7 @@ import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import shortened
 
-from ..systems.system import System
+from ..systems.system import BodySystem, System
 
 LONGEST = 200  # nodes of a graph whose outputs are written anew
 
@@ -16,9 +16,11 @@ LONGEST = 200  # nodes of a graph whose outputs are written anew
 def shorter_form(system: System, derive: Callable[[System], Graph]) -> Graph:
     """derive(system), or of the system's energies written anew by identities, or its outputs so, if that is smaller."""
     graph = derive(system)
+    if isinstance(system, BodySystem):  # bodies write their energy as short as it is
+        return graph
     if system.shortened is not None:
         graph = min(graph, derive(system.shortened), key=_size)
-    if system.bias_forces() is not None or len(graph.nodes) > LONGEST:
+    if len(graph.nodes) > LONGEST:
         return graph
     outputs = dict(zip(graph.outputs, shortened(list(graph.outputs.values())), strict=True))
     return min(graph, cg.simplify(Graph(graph.inputs, outputs)), key=_size)

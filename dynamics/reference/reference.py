@@ -74,6 +74,8 @@ def reference(
     ------
     TypeError, ValueError
         For arguments of another type, shape or range, each by name.
+    NotImplementedError
+        For an operation whose row has no multiprecision value, or that jumps where its argument moves.
     ReferenceFailedError
         At a singularity, or when 400 digits are not enough.
     ImportError

@@ -243,11 +243,6 @@ class BodySystem(System):
         super().__init__(*of_system, **more)
         self._bias_forces = bias_forces
 
-    @property
-    def shortened(self) -> None:
-        """None: bodies write their energy as short as it is."""
-        return None
-
     def bias_forces(self) -> Sequence[BiasForce]:
         """The pairs (velocity, force) that the bodies state; see `System.bias_forces`."""
         return self._bias_forces(self.q, self.qd)
