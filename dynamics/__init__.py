@@ -32,6 +32,7 @@ from .simulation.simulate import simulate
 from .simulation.trajectory import Crossings, SimulationWarning, Stats, Trajectory
 from .systems.model import as_system
 from .systems.ode_system import OdeSystem
+from .systems.quasi_velocities import QuasiVelocities
 from .systems.system import System
 from .verification.certificate import certify
 from .verification.residual import Certificate
@@ -55,6 +56,7 @@ __all__ = [
     "OdeSystem",
     "OmittedTerm",
     "PruneResult",
+    "QuasiVelocities",
     "RecursiveInverseDynamics",
     "Reference",
     "Released",

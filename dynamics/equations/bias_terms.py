@@ -53,12 +53,19 @@ def bias_terms_of_lagrangian(system: System) -> BiasTerms:
     # Two builders: a term of L must not get the tags of an equal term that derives from it, and hand them on.
     written, build = Builder(), Builder()
     lagrangian, *forces = folded([system.lagrangian, *system.forces], written)
-    velocities = velocity_nodes(lagrangian, system.q, system.qd, system.t, written)
+    if system.kinematics.quasi is None:
+        velocities = velocity_nodes(lagrangian, system.q, system.qd, system.t, written)
+    else:  # the identities behind velocity nodes hold of rates of functions of q, which quasi-velocities are not
+        velocities = list(system.qd)
     # dL/dq at fixed z, and dL/dz: one reverse sweep that stops at z.
     bars = cotangents({lagrangian: ONE}, [*system.q, *velocities], build, fixed=set(velocities))
-    gradient, momenta = bars[: system.n], bars[system.n :]
+    gradient, momenta = bars[: system.nq], bars[system.nq :]
+    if system.kinematics.quasi is not None:
+        gradient = system.slopes(gradient, momenta, build)
     # d/dt dL/dz at qdd = 0: eq. (4) of the paper with xdot = (qd, 0), and 1 for t, one forward sweep.
-    x_dot = dict(zip(system.q, system.qd, strict=True)) | ({system.t: ONE} if system.t in system.extra_inputs else {})
+    x_dot = dict(zip(system.q, system.q_dot, strict=True)) | (
+        {system.t: ONE} if system.t in system.extra_inputs else {}
+    )
     dots = tangents(x_dot, momenta, build)
     inertial = {velocity: dots[p] for velocity, p in zip(velocities, momenta, strict=True) if p in dots}
     return BiasTerms(lagrangian, forces, inertial, gradient)

@@ -254,7 +254,7 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
 
 
 def _without_inertia(system: System, error: SingularError) -> str:
-    name = system.coordinates[error.index]
+    name = system.velocities[error.index]
     if error.regular:
         return f"the mass matrix is not positive definite: coordinate {name!r} has an inertia that is not positive"
     return f"the mass matrix is singular: coordinate {name!r} has no inertia, or none that others do not share"
@@ -263,7 +263,7 @@ def _without_inertia(system: System, error: SingularError) -> str:
 def _require_inertia(system: System, accelerations: Graph) -> None:
     moving = without_inertia(accelerations, lambda: mass_matrix(system), system.n)
     if moving:
-        names = " and ".join([repr(system.coordinates[i]) for i in moving])
+        names = " and ".join([repr(system.velocities[i]) for i in moving])
         raise SingularMassMatrixError(
             f"the mass matrix is singular at every state: {'a motion of ' * (len(moving) > 1)}{names} has no inertia"
         )

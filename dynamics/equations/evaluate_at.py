@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from cgraph import Graph
 from cgraph.extend import real_array, real_number, require_mapping
 
-from ..systems.system import TIME, System
+from ..systems.arguments import TIME
+from ..systems.system import System
 
 STATE = ("q", "qd", "qdd", "tau")  # the prefixes of a graph's inputs, each an array of one number a coordinate
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -26,7 +27,7 @@ def evaluate_at(
 ) -> Array:
     """The outputs, (n_out,) or (N, n_out), at a state {"q": .., "qd": .., "qdd": .., "tau": ..}, (n,) or (N, n) each.
 
-    What of the state is None or missing is zero. Parameters have the system's values unless given.
+    What of the state is None or missing is zero, coordinates neutral. Parameters have the system's values unless given.
     Raises ValueError for another shape, what is not finite, or a parameter that the system does not have.
     """
     parameters = {} if parameters is None else require_mapping("parameters", parameters, "name: number")
@@ -45,10 +46,12 @@ def evaluate_at(
 
 def _rows(system: System, name: str, values: ArrayLike | None) -> Array:
     """One part of the state, checked: (n,) or (N, n)."""
-    n = system.n
-    rows = np.zeros(n) if values is None else real_array(name, values)
+    known = system.coordinates if name == "q" else system.velocities
+    n = len(known)
+    missing = np.array(system.kinematics.neutral) if name == "q" else np.zeros(n)
+    rows = missing if values is None else real_array(name, values)
     if rows.ndim not in (1, 2) or rows.shape[-1] != n:
-        names = ", ".join(system.coordinates[:8]) + (", ..." if n > 8 else "")
+        names = ", ".join(known[:8]) + (", ..." if n > 8 else "")
         raise ValueError(
             f"{name} must have the shape ({n},) or (N, {n}), one number for each of {names}; got {rows.shape}"
         )
@@ -56,5 +59,5 @@ def _rows(system: System, name: str, values: ArrayLike | None) -> Array:
     if len(infinite):
         at = tuple(infinite[0].tolist())
         where = f" in row {at[0]}" if rows.ndim == 2 else ""
-        raise ValueError(f"{name} must be finite, got {rows[at]} for {system.coordinates[at[-1]]!r}{where}")
+        raise ValueError(f"{name} must be finite, got {rows[at]} for {known[at[-1]]!r}{where}")
     return rows

@@ -30,16 +30,16 @@ class LagrangeTerms(NamedTuple):
     qd: list[Node]
     momentum: list[Node]  # p = dL/dqd
     momentum_rate: list[Node]  # d/dt dL/dqd
-    gradient: list[Node]  # dL/dq
+    gradient: list[Node]  # dL/dq; of quasi-velocities G^T dL/dq - ad(qd; p)
 
 
 def chain_rule(system: System) -> LagrangeTerms:
     """Section 3: d/dt p = grad_x p . xdot for p = dL/dqd, x = (q, qd), contracted: one reverse sweep, one forward."""
     build = Builder()
-    n = system.n
     # The reverse sweep over L gives both dL/dq and p = dL/dqd; q and qd are independent inputs (Section 2.2).
     bars = cotangents({system.lagrangian: ONE}, [*system.q, *system.qd], build)
-    gradient, momentum = bars[:n], bars[n:]
+    momentum = bars[system.nq :]
+    gradient = system.slopes(bars[: system.nq], momentum, build)
     # Eq. (4) with y = p: a forward sweep along xdot = (qd, qdd) is the product grad_x p . xdot, never written out.
     dots = tangents(_state_rate(system), momentum, build)
     rate = [dots.get(p, ZERO) for p in momentum]
@@ -48,9 +48,9 @@ def chain_rule(system: System) -> LagrangeTerms:
 
 def chain_rule_literal(system: System) -> LagrangeTerms:
     """Eq. (4) read literally: the 2n partials of each momentum, a reverse sweep each, then products with xdot."""
-    n = system.n
     bars = cotangents({system.lagrangian: ONE}, [*system.q, *system.qd])
-    gradient, momentum = bars[:n], bars[n:]
+    momentum = bars[system.nq :]
+    gradient = system.slopes(bars[: system.nq], momentum, Builder())
     x_dot = _state_rate(system)
     rate = []
     for p in momentum:
@@ -84,7 +84,8 @@ def kinetic_only_exact(system: System) -> LagrangeTerms:
     embedding = _Embedding(system)
     lagrangian, *embedded = embedding.embed(system.lagrangian, *momentum)
     gradient = cotangents({lagrangian: ONE}, embedding.q)
-    x_dot = dict(zip([*embedding.q, *embedding.qd], [*embedding.qd, *system.qdd], strict=True))
+    rates = [*embedding.embed(*system.q_dot), *system.qdd]
+    x_dot = dict(zip([*embedding.q, *embedding.qd], rates, strict=True))
     return embedding.terms(embedded, gradient, x_dot)
 
 
@@ -242,7 +243,7 @@ def _forces(system: System, terms: LagrangeTerms) -> list[Node]:
 
 def _state_rate(system: System) -> dict[Node, Node]:
     """xdot for x = (q, qd), and 1 for t if the Lagrangian depends on it."""
-    rate = dict(zip([*system.q, *system.qd], [*system.qd, *system.qdd], strict=True))
+    rate = dict(zip([*system.q, *system.qd], [*system.q_dot, *system.qdd], strict=True))
     return rate | ({system.t: ONE} if system.t in system.extra_inputs else {})
 
 
@@ -252,7 +253,7 @@ class _Embedding:
     def __init__(self, system: System) -> None:
         self.system = system
         self.dt = cg.variable("dt")
-        q_old = cg.variables([f"q{i}_old" for i in range(system.n)])
+        q_old = cg.variables([f"q{i}_old" for i in range(system.nq)])
         qd_old = cg.variables([f"qd{i}_old" for i in range(system.n)])
         self.inputs = [*q_old, *qd_old, *system.qdd, self.dt]
         with cg.tag(EULER):
@@ -260,8 +261,9 @@ class _Embedding:
                 cg.with_name(a * self.dt + old, f"qd{i}")
                 for i, (a, old) in enumerate(zip(system.qdd, qd_old, strict=True))
             ]
+            rates = substitute(system.q_dot, dict(zip([*system.q, *system.qd], [*q_old, *self.qd], strict=True)))
             with cg.tag(COUPLING):
-                moved = [v * self.dt for v in self.qd]
+                moved = [rate * self.dt for rate in rates]
             self.q = [cg.with_name(m + old, f"q{i}") for i, (m, old) in enumerate(zip(moved, q_old, strict=True))]
 
     def embed(self, *nodes: Node) -> list[Node]:
@@ -275,7 +277,10 @@ class _Embedding:
         time = {self.system.t: ONE} if self.system.t in self.system.extra_inputs else {}
         dots = tangents({**(x_dot or {self.dt: ONE}), **time}, momentum)
         rate = [dots.get(p, ZERO) for p in momentum]
-        return LagrangeTerms(self.inputs, self.q, self.qd, list(momentum), rate, gradient)
+        slopes = self.system.slopes(gradient, momentum, Builder())
+        if self.system.kinematics.quasi is not None:
+            slopes = self.embed(*slopes)
+        return LagrangeTerms(self.inputs, self.q, self.qd, list(momentum), rate, slopes)
 
 
 def _embedded(system: System, energy: Node) -> LagrangeTerms:

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import Array, real_array
 
+from ..systems.arguments import parameter_value, per_coordinate
 from ..systems.model import Model, as_ode
-from ..systems.system import parameter_value, per_coordinate
 from .state_equation import StateInputs, state_inputs
 
 PAST = 1e-14  # of the end: some roundings, by which a last time may lie past it

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from cgraph import Graph
 
+from ..systems.arguments import TIME
 from ..systems.model import Model, as_ode, as_system
-from ..systems.system import TIME
 from .equations_of_motion import forward_dynamics
 
 
@@ -23,8 +23,8 @@ def state_equation(model: Model) -> Graph:
     -------
     Graph
         Of a mechanical model: inputs q0.., qd0.., tau0.., t if needed, parameters; outputs q0_dot.., qd0_dot.. with
-        q_dot = qd and qd_dot from `forward_dynamics`. Of an OdeSystem: inputs its states, t if needed, parameters;
-        outputs `<state>_dot`.
+        q_dot = qd, or G(q) qd of `QuasiVelocities`, and qd_dot from `forward_dynamics`. Of an OdeSystem: inputs its
+        states, t if needed, parameters; outputs `<state>_dot`.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def state_equation(model: Model) -> Graph:
         return ode.graph
     system = as_system(model)
     accelerations = forward_dynamics(system)
-    outputs = {f"q{i}_dot": qd for i, qd in enumerate(system.qd)}
+    outputs = {f"q{i}_dot": rate for i, rate in enumerate(system.q_dot)}
     outputs |= {f"qd{i}_dot": accelerations.outputs[f"qdd{i}"] for i in range(system.n)}
     return Graph(accelerations.inputs, outputs)
 

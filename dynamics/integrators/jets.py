@@ -16,7 +16,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Builder, as_node, building, topological
 
-from ..systems.system import TIME
+from ..systems.arguments import TIME
 
 ONE = cg.constant(1.0)
 

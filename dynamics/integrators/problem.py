@@ -13,8 +13,9 @@ from cgraph.extend import topological
 
 from ..equations.equations_of_motion import energy
 from ..equations.state_equation import state_equation, state_inputs
+from ..systems.arguments import TIME, Parameters, call_user_function
 from ..systems.model import Model, as_ode, as_system
-from ..systems.system import TIME, Parameters, System, call_user_function
+from ..systems.system import System
 
 KEPT = 16  # problems whose graphs stay for another run
 

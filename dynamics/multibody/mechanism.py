@@ -14,8 +14,9 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Builder, building, require_flag, require_mapping
 
+from ..systems.arguments import parameter_value
 from ..systems.model import Model
-from ..systems.system import BodySystem, System, parameter_value
+from ..systems.system import BodySystem, System
 from .body import WORLD, Body, Joint, MechanismError, vector
 from .external_force import Force, check_force, generalized_forces
 from .forward_kinematics import KinematicChain, kinematic_chain

@@ -10,7 +10,7 @@ import numpy as np
 
 from cgraph.extend import real_number
 
-from ..systems.system import per_coordinate, sequence
+from ..systems.arguments import per_coordinate, sequence
 from .body import WORLD, Body, Joint
 from .mechanism import Mechanism
 

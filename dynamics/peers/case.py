@@ -13,8 +13,9 @@ from cgraph import Graph, Node
 from cgraph.extend import topological
 
 from ..integrators.tableau import RK4
+from ..systems.arguments import TIME
 from ..systems.model import Model, as_system
-from ..systems.system import TIME, System
+from ..systems.system import System
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

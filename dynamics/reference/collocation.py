@@ -18,7 +18,7 @@ import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Array
 
-from ..systems.system import TIME
+from ..systems.arguments import TIME
 from .flint_numbers import Number, flint, log2_size, working
 from .taylor_integrator import ReferenceFailedError, step_size
 from .taylor_series import Series

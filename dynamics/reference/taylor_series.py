@@ -17,7 +17,7 @@ from typing import Any
 from cgraph import Graph, Node
 from cgraph.extend import OPS, Op, as_node, topological
 
-from ..systems.system import TIME
+from ..systems.arguments import TIME
 from .flint_numbers import Number, sign, value
 
 Push = Callable[[int], None]  # appends coefficient k of one series, those of its arguments being there

@@ -10,7 +10,7 @@ from typing import Any
 from cgraph import Node
 from cgraph.extend import check_name
 
-from ..systems.system import sequence
+from ..systems.arguments import sequence
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from cgraph import Graph, Node
 from cgraph.extend import Array, Builder, building, topological
 
 from ..integrators import Problem, quantity, quantity_inputs, state_arguments
-from ..systems.system import call_user_function, node_or_number, sequence
+from ..systems.arguments import call_user_function, node_or_number, sequence
 from .event import Event
 
 UNIT = 2.0**-53  # relative error of one rounding

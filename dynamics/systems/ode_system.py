@@ -9,7 +9,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import check_name, topological
 
-from .system import TIME, Parameters, call_user_function, node_or_number, parameter_items, parameter_value, sequence
+from .arguments import TIME, Parameters, call_user_function, node_or_number, parameter_items, parameter_value, sequence
 
 RESERVED = (TIME, "dt")
 

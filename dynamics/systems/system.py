@@ -2,33 +2,30 @@
 
 from __future__ import annotations
 
-import inspect
-import math
 import numbers
-import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from functools import cached_property
-from typing import Any, NoReturn
+from typing import Any
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import check_name, is_finite, real_number, require_mapping, require_sequence, shortened, topological
+from cgraph.extend import Builder, building, require_sequence, shortened, topological
 
-TIME = "t"
+from .arguments import (
+    TIME,
+    Parameters,
+    call_user_function,
+    node_or_number,
+    parameter_items,
+    parameter_value,
+    per_coordinate,
+    sequence,
+)
+from .kinematics import Kinematics
+from .quasi_velocities import QuasiVelocities
+
 BiasForce = tuple[Node, Node]  # a velocity, and the force that works on it
-_RESERVED = re.compile(r"(q|qd|qdd|tau)\d+(_old)?|t|dt")
-
-
-class Parameters(dict[str, Node]):
-    """{name: node} of the parameters of a system, as its functions get them."""
-
-    def __init__(self, names: Iterable[str]) -> None:
-        super().__init__({name: cg.variable(name) for name in names})
-
-    def __missing__(self, name: str) -> NoReturn:
-        has = ", ".join(self) or "none"
-        raise ValueError(f"the system has no parameter {name!r} (it has {has}); give it to `parameters`")
 
 
 class System:
@@ -51,6 +48,9 @@ class System:
         applied tau.
     damping : float or sequence of float
         Viscous coefficient >= 0 for all coordinates or for each [N m s or N s/m]; the force is -damping * qd.
+    quasi_velocities : QuasiVelocities
+        Where the velocities qd are no rates of the coordinates, how they move them. L is then L(q, qd, t) of these
+        velocities, and forces, damping and tau belong to them, n of each; of the coordinates there are nq.
 
     Raises
     ------
@@ -73,10 +73,12 @@ class System:
         parameters: Mapping[str, float] | None = None,
         forces: Callable[..., Sequence[Node | float]] | None = None,
         damping: float | Sequence[float] = 0.0,
+        quasi_velocities: QuasiVelocities | None = None,
     ) -> None:
-        self.coordinates = _coordinate_names(coordinates)
+        self.kinematics = Kinematics(coordinates, quasi_velocities)
+        self._require_consistent()
         self.parameters = {name: parameter_value(name, value) for name, value in parameter_items(parameters)}
-        self.damping = per_coordinate("damping", damping, self.coordinates, minimum=0.0)
+        self.damping = per_coordinate("damping", damping, self.velocities, minimum=0.0)
         p = Parameters(self.parameters)
         energy = call_user_function("lagrangian", lagrangian, self.q, self.qd, self.t, p)
         single = isinstance(energy, (Node, numbers.Real))
@@ -90,10 +92,10 @@ class System:
                 value = call_user_function("forces", forces, self.q, self.qd, self.t, p)
                 applied = sequence("forces must give", value)
             if len(applied) != self.n:
-                names = ", ".join(self.coordinates)
+                names = ", ".join(self.velocities)
                 raise ValueError(f"forces must give {self.n} values, one for each of {names}; got {len(applied)}")
         self.forces = tuple(
-            [node_or_number(f"the force on {name!r}", x) for name, x in zip(self.coordinates, applied, strict=True)]
+            [node_or_number(f"the force on {name!r}", x) for name, x in zip(self.velocities, applied, strict=True)]
         )
         known = {*self.q, *self.qd, self.t, *p.values()}
         for node in topological((*self.partial_lagrangians, *self.forces)):
@@ -119,19 +121,39 @@ class System:
         return None
 
     @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates, nq."""
+        return self.kinematics.coordinates
+
+    @property
+    def velocities(self) -> tuple[str, ...]:
+        """Names of the velocities, n: those of the coordinates, unless there are quasi-velocities."""
+        return self.kinematics.velocities
+
+    @property
     def n(self) -> int:
-        """Number of coordinates."""
+        """Number of velocities, the degrees of freedom."""
+        return len(self.velocities)
+
+    @property
+    def nq(self) -> int:
+        """Number of coordinates, which is n unless there are quasi-velocities."""
         return len(self.coordinates)
 
-    @cached_property
+    @property
     def q(self) -> list[Node]:
         """Coordinates, variables q0, q1, ..."""
-        return cg.variables([f"q{i}" for i in range(self.n)])
+        return self.kinematics.q
 
-    @cached_property
+    @property
     def qd(self) -> list[Node]:
         """Velocities, variables qd0, qd1, ..."""
-        return cg.variables([f"qd{i}" for i in range(self.n)])
+        return self.kinematics.u
+
+    @property
+    def q_dot(self) -> list[Node]:
+        """Rates of the coordinates: qd, or G(q) qd of quasi-velocities."""
+        return self.kinematics.q_dot
 
     @cached_property
     def qdd(self) -> list[Node]:
@@ -151,8 +173,9 @@ class System:
     @cached_property
     def display_names(self) -> dict[str, str]:
         """What a person reads in place of q0, qd0, qdd0 and tau0: "q.<coordinate>" and so on, by input."""
-        kinds = ("q", "qd", "qdd", "tau")
-        return {f"{kind}{i}": f"{kind}.{name}" for kind in kinds for i, name in enumerate(self.coordinates)}
+        shown = {f"q{i}": f"q.{name}" for i, name in enumerate(self.coordinates)}
+        kinds = ("qd", "qdd", "tau")
+        return shown | {f"{kind}{i}": f"{kind}.{name}" for kind in kinds for i, name in enumerate(self.velocities)}
 
     @cached_property
     def extra_inputs(self) -> list[Node]:
@@ -221,6 +244,15 @@ class System:
         """
         return None
 
+    def slopes(self, gradient: Sequence[Node], momenta: Sequence[Node], build: Builder) -> list[Node]:
+        """dL/dq as the velocities feel it, less what their brackets take: G^T dL/dq - ad(qd; p), (n,)."""
+        pulled, taken = self.kinematics.pulled_back(gradient, build), self.kinematics.structure(momenta, build)
+        with building(build):
+            return [slope - term for slope, term in zip(pulled, taken, strict=True)]
+
+    def _require_consistent(self) -> None:
+        self.kinematics.require_consistent()
+
     def graph(self, outputs: Mapping[str, Node], *state: Sequence[Node]) -> Graph:
         """A graph over state variables, then t if needed, then the parameters."""
         parts = [require_sequence("state", part, "variables") for part in state]
@@ -228,7 +260,7 @@ class System:
 
     def __repr__(self) -> str:
         parameters = f", parameters {', '.join(self.parameters)}" if self.parameters else ""
-        return f"<System of {self.n} coordinate(s) {', '.join(self.coordinates[:6])}{parameters}>"
+        return f"<System of {self.nq} coordinate(s) {', '.join(self.coordinates[:6])}{parameters}>"
 
 
 class BodySystem(System):
@@ -243,87 +275,12 @@ class BodySystem(System):
         super().__init__(*of_system, **more)
         self._bias_forces = bias_forces
 
+    def _require_consistent(self) -> None:
+        """Nothing: the types of joints are known to be."""
+
     def bias_forces(self) -> Sequence[BiasForce]:
         """The pairs (velocity, force) that the bodies state; see `System.bias_forces`."""
         return self._bias_forces(self.q, self.qd)
-
-
-def per_coordinate(
-    what: str, value: float | Sequence[float], names: Sequence[str], minimum: float = -math.inf
-) -> tuple[float, ...]:
-    """One finite number for each of the named coordinates, from one for all or a sequence. Raises ValueError."""
-    n = len(names)
-    entries = [value] * n if isinstance(value, numbers.Real) else sequence(f"{what} must be", value)
-    if len(entries) != n:
-        shown = ", ".join(names[:8]) + (", ..." if n > 8 else "")
-        raise ValueError(f"{what} needs one number for each of the {n} coordinates ({shown}), got {len(entries)}")
-    for name, number in zip(names, entries, strict=True):
-        if not math.isfinite(real_number(f"{what} of {name!r}", number)) or number < minimum:
-            bound = f" and at least {minimum:g}" if math.isfinite(minimum) else ""
-            raise ValueError(f"{what} must be finite{bound}, got {number!r} for {name!r}")
-    return tuple([float(number) for number in entries])
-
-
-def _coordinate_names(names: Sequence[str]) -> tuple[str, ...]:
-    if isinstance(names, str):
-        names = names.split()
-    names = sequence("coordinates must be", names)
-    if not names:
-        raise ValueError("a system needs at least one coordinate")
-    for name in names:
-        check_name("a coordinate", name)
-    if len(set(names)) < len(names):
-        raise ValueError(f"coordinate names must differ, got {', '.join(names)}")
-    return tuple(names)
-
-
-def parameter_items(parameters: Mapping[str, float] | None) -> Iterable[tuple[str, float]]:
-    """Names and values. Raises TypeError for what is no mapping."""
-    return () if parameters is None else require_mapping("parameters", parameters, "name: number").items()
-
-
-def parameter_value(name: str, value: float) -> float:
-    """The value of a parameter, checked. Raises TypeError or ValueError naming it."""
-    check_name("a parameter", name, spaces=False)
-    if _RESERVED.fullmatch(name):
-        raise ValueError(f"parameter {name!r} has the name of a coordinate, velocity, force or time; choose another")
-    if isinstance(value, bool) or not is_finite(value):
-        raise ValueError(f"parameter {name!r} must be a finite number, got {value!r}")
-    return float(value)
-
-
-def call_user_function(what: str, function: Callable[..., Any], *arguments: Any) -> Any:
-    """function(*arguments), or without the last of them, the parameters, where it does not take them.
-
-    Raises TypeError, naming `what`, for what is no such function.
-    """
-    names = "(q, qd, t) or (q, qd, t, p)" if len(arguments) == 4 else "(x, t) or (x, t, p)"
-    if not callable(function):
-        raise TypeError(f"{what} must be a function of {names}, got {function!r:.60}")
-    signature = inspect.signature(function)
-    for chosen in (arguments, arguments[:-1]):
-        try:
-            signature.bind(*chosen)
-        except TypeError:
-            continue
-        return function(*chosen)
-    raise TypeError(f"{what} must take {names}, got {signature}")
-
-
-def sequence(what: str, value: Any) -> list[Any]:
-    """The values as a list. Raises TypeError, "<what> a sequence ...", for what is none."""
-    try:
-        return list(value)
-    except TypeError:
-        raise TypeError(f"{what} a sequence, got {type(value).__name__}: {value!r:.60}") from None
-
-
-def node_or_number(what: str, value: Any) -> Node:
-    """The node, or the constant of a number. Raises TypeError or ValueError, naming `what`, for anything else."""
-    try:
-        return value if isinstance(value, Node) else cg.constant(value)
-    except (TypeError, ValueError) as error:
-        raise type(error)(f"{what} must be a node or a number: {error}") from None
 
 
 def _sum(nodes: Sequence[Node]) -> Node:

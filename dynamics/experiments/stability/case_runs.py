@@ -14,7 +14,7 @@ from ...reference import Reference
 from ...simulation.run_options import SCIPY
 from ...simulation.simulate import simulate
 from ...simulation.trajectory import Trajectory
-from ...systems.system import TIME
+from ...systems.arguments import TIME
 from . import cases, solutions
 from .case_result import CaseResult, Measurement
 from .cases import RTOL, Criterion, StabilityCase

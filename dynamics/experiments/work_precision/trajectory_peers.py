@@ -20,7 +20,7 @@ from ...peers.heyoka import expressions, heyoka
 from ...peers.mujoco import MujocoPeer
 from ...peers.translate import translated
 from ...simulation.run_options import SCIPY, SCIPY_SOLVERS
-from ...systems.system import TIME
+from ...systems.arguments import TIME
 from ..setting import INTERVALS, Setting
 from .trajectory_runs import EQUAL, Outcome, Scipy, Solver
 

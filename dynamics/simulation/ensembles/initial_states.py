@@ -12,8 +12,8 @@ from cgraph.extend import Array, real_array, require_mapping
 
 from ...equations.initial_value import check_names
 from ...equations.state_equation import state_inputs
+from ...systems.arguments import parameter_value, per_coordinate
 from ...systems.model import Model, as_ode
-from ...systems.system import parameter_value, per_coordinate
 
 
 class Starts(NamedTuple):

@@ -1,0 +1,108 @@
+"""Arguments of systems: names, numbers, parameters and functions, checked."""
+
+from __future__ import annotations
+
+import inspect
+import math
+import numbers
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NoReturn
+
+import cgraph as cg
+from cgraph import Node
+from cgraph.extend import check_name, is_finite, real_number, require_mapping
+
+TIME = "t"
+_RESERVED = re.compile(r"(q|qd|qdd|tau)\d+(_old)?|t|dt")
+
+
+class Parameters(dict[str, Node]):
+    """{name: node} of the parameters of a system, as its functions get them."""
+
+    def __init__(self, names: Iterable[str]) -> None:
+        super().__init__({name: cg.variable(name) for name in names})
+
+    def __missing__(self, name: str) -> NoReturn:
+        has = ", ".join(self) or "none"
+        raise ValueError(f"the system has no parameter {name!r} (it has {has}); give it to `parameters`")
+
+
+def names_of(what: str, kind: str, names: Sequence[str] | str) -> tuple[str, ...]:
+    """Names of that kind, from a sequence or one string with spaces between. Raises TypeError or ValueError."""
+    if isinstance(names, str):
+        names = names.split()
+    kinds = f"{kind[:-1]}ies" if kind.endswith("y") else f"{kind}s"
+    names = sequence(f"{kinds} must be", names)
+    if not names:
+        raise ValueError(f"{what} needs at least one {kind}")
+    for name in names:
+        check_name(f"a {kind}", name)
+    if len(set(names)) < len(names):
+        raise ValueError(f"{kind} names must differ, got {', '.join(names)}")
+    return tuple(names)
+
+
+def per_coordinate(
+    what: str, value: float | Sequence[float], names: Sequence[str], minimum: float = -math.inf
+) -> tuple[float, ...]:
+    """One finite number for each of the named coordinates, from one for all or a sequence. Raises ValueError."""
+    n = len(names)
+    entries = [value] * n if isinstance(value, numbers.Real) else sequence(f"{what} must be", value)
+    if len(entries) != n:
+        shown = ", ".join(names[:8]) + (", ..." if n > 8 else "")
+        raise ValueError(f"{what} needs one number for each of the {n} coordinates ({shown}), got {len(entries)}")
+    for name, number in zip(names, entries, strict=True):
+        if not math.isfinite(real_number(f"{what} of {name!r}", number)) or number < minimum:
+            bound = f" and at least {minimum:g}" if math.isfinite(minimum) else ""
+            raise ValueError(f"{what} must be finite{bound}, got {number!r} for {name!r}")
+    return tuple([float(number) for number in entries])
+
+
+def parameter_items(parameters: Mapping[str, float] | None) -> Iterable[tuple[str, float]]:
+    """Names and values. Raises TypeError for what is no mapping."""
+    return () if parameters is None else require_mapping("parameters", parameters, "name: number").items()
+
+
+def parameter_value(name: str, value: float) -> float:
+    """The value of a parameter, checked. Raises TypeError or ValueError naming it."""
+    check_name("a parameter", name, spaces=False)
+    if _RESERVED.fullmatch(name):
+        raise ValueError(f"parameter {name!r} has the name of a coordinate, velocity, force or time; choose another")
+    if isinstance(value, bool) or not is_finite(value):
+        raise ValueError(f"parameter {name!r} must be a finite number, got {value!r}")
+    return float(value)
+
+
+def call_user_function(what: str, function: Callable[..., Any], *arguments: Any) -> Any:
+    """function(*arguments), or without the last of them, the parameters, where it does not take them.
+
+    Raises TypeError, naming `what`, for what is no such function.
+    """
+    names = "(q, qd, t) or (q, qd, t, p)" if len(arguments) == 4 else "(x, t) or (x, t, p)"
+    if not callable(function):
+        raise TypeError(f"{what} must be a function of {names}, got {function!r:.60}")
+    signature = inspect.signature(function)
+    for chosen in (arguments, arguments[:-1]):
+        try:
+            signature.bind(*chosen)
+        except TypeError:
+            continue
+        return function(*chosen)
+    raise TypeError(f"{what} must take {names}, got {signature}")
+
+
+def sequence(what: str, value: Any) -> list[Any]:
+    """The values as a list. Raises TypeError, "<what> a sequence ...", for what is none."""
+    try:
+        return list(value)
+    except TypeError:
+        raise TypeError(f"{what} a sequence, got {type(value).__name__}: {value!r:.60}") from None
+
+
+def node_or_number(what: str, value: Any) -> Node:
+    """The node, or the constant of a number. Raises TypeError or ValueError, naming `what`, for anything else."""
+    try:
+        return value if isinstance(value, Node) else cg.constant(value)
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"{what} must be a node or a number: {error}") from None

@@ -1,0 +1,145 @@
+"""Kinematics: how the velocities of a system move its coordinates, and what that does to forces."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph.extend import Builder, building, cotangents, folded, is_finite, tangents, topological
+
+from .arguments import names_of, node_or_number, sequence
+from .quasi_velocities import Function, QuasiVelocities
+
+ONE, ZERO = cg.constant(1.0), cg.constant(0.0)
+STATES, TOLERANCE = 3, 1e-9  # random states at which brackets are compared, and their rounding
+
+
+class Kinematics:
+    """qdot = G(q) u of a system, and its transpose.
+
+    coordinates, velocities: names, nq and n.  q, u: variables q0.. and qd0...
+    quasi: None where u are the rates of the coordinates, G = 1.
+    neutral: the coordinates where nothing else is said, (nq,).  groups: see `QuasiVelocities`.
+    """
+
+    def __init__(self, coordinates: Sequence[str] | str, quasi: QuasiVelocities | None = None) -> None:
+        self.coordinates = names_of("a system", "coordinate", coordinates)
+        self.quasi = quasi
+        if quasi is not None and not isinstance(quasi, QuasiVelocities):
+            raise TypeError(f"quasi_velocities must be QuasiVelocities, got {type(quasi).__name__}: {quasi!r:.60}")
+        self.velocities = self.coordinates if quasi is None else names_of("a system", "velocity", quasi.names)
+        if len(self.velocities) > len(self.coordinates):
+            raise ValueError(f"{len(self.coordinates)} coordinates cannot have {len(self.velocities)} velocities")
+        self.neutral = self._numbers("neutral", quasi and quasi.neutral, [0.0] * len(self.coordinates))
+        self.groups = self._numbers("groups", quasi and quasi.groups, range(len(self.coordinates)))
+
+    @cached_property
+    def q(self) -> list[Node]:
+        """Coordinates, variables q0, q1, ..."""
+        return cg.variables([f"q{i}" for i in range(len(self.coordinates))])
+
+    @cached_property
+    def u(self) -> list[Node]:
+        """Velocities, variables qd0, qd1, ..."""
+        return cg.variables([f"qd{i}" for i in range(len(self.velocities))])
+
+    @cached_property
+    def q_dot(self) -> list[Node]:
+        """Rates of the coordinates, G(q) u."""
+        return self.rate(self.u)
+
+    def rate(self, u: Sequence[Node]) -> list[Node]:
+        """G(q) u of any velocities."""
+        return list(u) if self.quasi is None else self._called("rate", self.quasi.rate, len(self.q), self.q, list(u))
+
+    def pulled_back(self, bars: Sequence[Node], build: Builder) -> list[Node]:
+        """G^T bars: cotangents of the coordinates as those of the velocities, (n,)."""
+        if self.quasi is None:
+            return list(bars)
+        seeds: dict[Node, Node] = {}
+        with building(build):
+            for rate, bar in zip(folded(self.q_dot, build), bars, strict=True):
+                seeds[rate] = seeds[rate] + bar if rate in seeds else bar
+        return cotangents(seeds, self.u, build)
+
+    def structure(self, momenta: Sequence[Node], build: Builder) -> list[Node]:
+        """ad(u; p), (n,)."""
+        if self.quasi is None or self.quasi.structure is None:
+            return [ZERO] * len(self.u)
+        with building(build):
+            return self._called("structure", self.quasi.structure, len(self.u), self.u, list(momenta))
+
+    def brackets(self, build: Builder) -> list[list[Node]]:
+        """Rows of C(u), (n, n), with C v = c(u, v): the rate of a small displacement is v + C(u) of it."""
+        p = cg.variables([f"p{j}" for j in range(len(self.u))])
+        terms = self.structure(p, build)
+        columns = [cotangents({term: ONE}, p, build) for term in terms]  # ad_k = p . c(u, e_k)
+        return [list(row) for row in zip(*columns, strict=True)]
+
+    def normalized(self, q: Sequence[Node]) -> list[Node]:
+        """The same configuration with the constraint of the coordinates met."""
+        if self.quasi is None or self.quasi.normalized is None:
+            return list(q)
+        return self._called("normalized", self.quasi.normalized, len(self.q), list(q))
+
+    def require_consistent(self) -> None:
+        """Raises ValueError unless G is linear in u, of full rank, and the structure that of its columns' brackets."""
+        if self.quasi is None:
+            return
+        u, n = self.u, len(self.u)
+        slopes = [cotangents({rate: ONE}, u) for rate in self.q_dot]
+        if set(topological([node for row in slopes for node in row])) & set(u):
+            raise ValueError("rate must be linear in the velocities u")
+        v = cg.variables([f"v{i}" for i in range(n)])
+        along, across = self.rate(u), self.rate(v)
+        build = Builder()
+        first = tangents(dict(zip(self.q, along, strict=True)), across, build)  # D(G v)[G u]
+        second = tangents(dict(zip(self.q, across, strict=True)), along, build)
+        with building(build):
+            bracket = [second.get(b, ZERO) - first.get(a, ZERO) for a, b in zip(across, along, strict=True)]
+            c = [sum([entry * x for entry, x in zip(row, v, strict=True)], ZERO) for row in self.brackets(build)]
+            spanned = self.rate(c)
+        outputs = [*bracket, *spanned, *[node for row in slopes for node in row]]
+        graph = Graph([*self.q, *u, *v], {f"{k}": node for k, node in enumerate(outputs)})
+        self._compare(graph, n)
+
+    def _compare(self, graph: Graph, n: int) -> None:
+        rng, nq = np.random.default_rng(0), len(self.q)
+        for _ in range(STATES):
+            point = dict(zip(graph.input_names, rng.uniform(0.3, 1.2, nq + 2 * n).tolist(), strict=True))
+            values = np.array(list(graph.evaluate(point).values()), dtype=np.float64)
+            if not np.isfinite(values).all():
+                continue  # outside of where the coordinates are defined
+            bracket, spanned, matrix = values[:nq], values[nq : 2 * nq], values[2 * nq :].reshape(nq, n)
+            if np.linalg.matrix_rank(matrix) < n:
+                raise ValueError("rate must tell the velocities apart: two of them move the coordinates alike")
+            if np.abs(bracket - spanned).max() > TOLERANCE * np.abs(values).max():
+                raise ValueError(
+                    "structure does not belong to rate: ad_k(u, p) must be p . c(u, e_k) with "
+                    "G c(u, v) = D(G u)[G v] - D(G v)[G u]"
+                )
+
+    def _called(self, what: str, function: Function, count: int, *arguments: Sequence[Node]) -> list[Node]:
+        if not callable(function):
+            raise TypeError(f"{what} must be a function, got {function!r:.60}")
+        given = sequence(f"{what} must give", function(*arguments))
+        if len(given) != count:
+            raise ValueError(f"{what} must give {count} values, got {len(given)}")
+        nodes = [node_or_number(what, value) for value in given]
+        known = set(topological([node for part in arguments for node in part])) | set(self.q)
+        for node in topological(nodes):
+            if node.op.name == "variable" and node not in known:
+                raise ValueError(f"{what} uses {node.name!r}, which is none of its arguments")
+        return nodes
+
+    def _numbers(self, what: str, given: Any, default: Sequence[float]) -> tuple[float, ...]:
+        values = sequence(f"{what} must be", default if given is None else given)
+        if len(values) != len(self.coordinates) or not all(map(is_finite, values)):
+            raise ValueError(f"{what} must be {len(self.coordinates)} finite numbers, got {values!r:.60}")
+        return tuple([float(value) for value in values if math.isfinite(value)])
