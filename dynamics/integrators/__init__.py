@@ -72,7 +72,12 @@ METHODS: dict[str, Method] = Methods(
         "rodas": Method(RODAS5P.order, partial(rosenbrock, RODAS5P), adaptive=True, degree=len(RODAS5P.dense) + 1),
         "radau": Method(RADAU_ORDER, radau, adaptive=True, degree=3),
         "taylor": Method(
-            TAYLOR_ORDER, partial(taylor, TAYLOR_ORDER), adaptive=True, degree=TAYLOR_ORDER, finest=2.0**-52
+            TAYLOR_ORDER,
+            partial(taylor, TAYLOR_ORDER),
+            adaptive=True,
+            degree=TAYLOR_ORDER,
+            finest=2.0**-52,
+            starts=True,
         ),
         **{name: _symplectic(method) for name, method in PARTITIONED.items()},
         **{name: _composition(composition) for name, composition in COMPOSITIONS.items()},

@@ -34,6 +34,8 @@ class Method:
         Of the dense output, 0 where there is none.
     finest : float
         The relative tolerance below which a step's own rounding is larger.
+    starts : bool
+        Whether the first step needs no search, since a step is at most what the derivatives at its start allow.
 
     A program of equal steps makes one step in a pass. Before each pass its registers (`explicit.registers`) hold
 
@@ -74,6 +76,7 @@ class Method:
     adaptive: bool
     degree: int = 0
     finest: float = ROUNDING
+    starts: bool = False
 
     def __repr__(self) -> str:
         return f"<Method of order {self.order}, {'steps by error' if self.adaptive else 'equal steps'}>"

@@ -135,11 +135,14 @@ class AdaptiveIntegration(NativeIntegration):
 
     def _first_step(self, x: Array) -> float:
         """The first step; where atol is chosen by the sizes of the states, those that it leads to."""
-        options, rate = self.options, self._rate(self.options.t0, x)
+        options = self.options
+        if self.sizes is None and options.first_step is not None:
+            return options.first_step
+        if self.sizes is None and self.program.starts:
+            return options.length
         start: dict[str, ArrayLike] = {"x": x, "p": self.parameters}
+        rate = self._rate(options.t0, x)
         if self.sizes is None:
-            if options.first_step is not None:
-                return options.first_step
             return first_step(self.runner, self.program.order, options, start, rate, self._scale(x))
         given = options.first_step
         h = min(options.length, options.longest_step) * LEAP if given is None else given

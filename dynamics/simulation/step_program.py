@@ -26,6 +26,7 @@ class StepProgram:
     adaptive: bool
     dense: bool  # whether its record has dense output
     finest: float  # relative tolerance
+    starts: bool  # with a first step that the method chooses
     kinds: tuple[int, ...]  # of the components: coordinates 0, velocities 1; those of an OdeSystem differ
 
     @property
@@ -64,6 +65,7 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
         method.adaptive,
         dense and method.adaptive,
         method.finest,
+        method.starts,
         tuple(range(problem.size)) if problem.system is None else (0,) * n + (1,) * n,
     )
 
