@@ -30,9 +30,12 @@ class Joint:
     Parameters
     ----------
     kind : str
-        "revolute" (turns about `axis`), "prismatic" (slides along it) or "fixed" (welded).
+        "revolute" (turns about `axis`), "prismatic" (slides along it), "fixed" (welded), "ball" (turns about a point:
+        a unit quaternion (w, x, y, z), and the angular velocity in the body's axes), "free" (moves as it likes: the
+        place of its origin and a quaternion; the rates of that place, and the angular velocity in the body's axes), or
+        "free (body axes)" (the linear velocity in the body's axes, too).
     axis : array_like, (3,)
-        In the body's axes; need not have length 1.
+        In the body's axes; need not have length 1. Of "ball" and "free" it has no meaning.
     position : array_like, (3,)
         Origin of the body's frame in its parent's at q = 0 [m].
     orientation : array_like, (3, 3)
@@ -40,11 +43,13 @@ class Joint:
     damping : float
         Viscous coefficient, at least 0 [N m s or N s/m].
     stiffness, spring_reference : float
-        Spring constant, at least 0 [N m/rad or N/m], and the coordinate where it pulls nowhere [rad or m].
+        Spring constant, at least 0 [N m/rad or N/m], and the coordinate where it pulls nowhere [rad or m]. Only of
+        joints with one coordinate.
     armature : float
         Inertia of the coordinate itself, such as a rotor's, at least 0 [kg m^2 or kg].
     name : str
-        What the coordinate is called; by default as the body.
+        What the coordinate is called; by default as the body. Of several coordinates it goes before what they are,
+        as in "base.x".
 
     Raises
     ------
@@ -178,13 +183,16 @@ def _checked_joint(where: str, joint: Joint) -> Joint:
     orientation = vector(f"{where}: orientation", joint.orientation, (3, 3))
     if np.abs(orientation.T @ orientation - np.eye(3)).max() > _ROUNDING or np.linalg.det(orientation) < 0:
         raise MechanismError(f"{where}: orientation must be a rotation matrix")
+    stiffness = _number(f"{where}: stiffness", joint.stiffness)
+    if stiffness and len(joint.type.coordinates) > 1:
+        raise MechanismError(f"{where}: a spring needs a joint with one coordinate, got stiffness {stiffness!r}")
     return Joint(
         joint.kind,
         axis=spatial.snapped(axis / length),
         position=vector(f"{where}: position", joint.position),
         orientation=spatial.snapped(orientation),
         damping=_number(f"{where}: damping", joint.damping),
-        stiffness=_number(f"{where}: stiffness", joint.stiffness),
+        stiffness=stiffness,
         spring_reference=_number(f"{where}: spring_reference", joint.spring_reference, minimum=-math.inf),
         armature=_number(f"{where}: armature", joint.armature),
         name=joint.name,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ from cgraph import Node
 
 from . import spatial
 from .inertial_numbers import Link
-from .joints import JointType
+from .joints import AxialJoint, JointType, SpatialJoint
 from .spatial import STILL, ZERO, Triple
 
 
@@ -56,11 +57,37 @@ def ground(gravity: ArrayLike, *, in_plane: bool = False) -> Motion:
     return Motion(STILL, STILL, spatial.constant(-g * downward), ZERO)
 
 
-def propagate_motion(parent: Motion, link: Link, joint: JointType, q: Node, qd: Node) -> Motion:
-    """The motion of a link from that of its parent."""
-    along = link.turn[2][2]  # the joint's axis on the parent's
-    parent = carrier_motion(parent, link)
+def propagate_motion(parent: Motion, link: Link, joint: JointType, q: Sequence[Node], u: Sequence[Node]) -> Motion:
+    """The motion of a link from that of its parent; q and u are the coordinates and velocities of its joint."""
+    parent = carrier_motion(parent, link, joint)
     offset = joint_translation(link, joint, q)
+    if isinstance(joint, AxialJoint):
+        return _about_axis(parent, link, joint, offset, q[0], u[0])
+    assert isinstance(joint, SpatialJoint)
+    return _in_space(parent, link, joint, offset, q, u)
+
+
+def _in_space(
+    parent: Motion, link: Link, joint: SpatialJoint, offset: Triple, q: Sequence[Node], u: Sequence[Node]
+) -> Motion:
+    """omega = R^T omega_parent + omega_joint, v = R^T (v_parent + omega_parent x offset) + v_joint."""
+    turn = joint.rotation(q)
+
+    def turned(vector: Triple) -> Triple:
+        return spatial.rotate_transpose(turn, spatial.rotate_transpose(link.turn, vector))
+
+    with cg.tag("kinetic"):
+        omega = spatial.plus(turned(parent.omega), joint.angular_velocity(q, u))
+        carried = spatial.plus(parent.velocity, spatial.cross(parent.omega, offset))
+        velocity = spatial.plus(turned(carried), joint.linear_velocity(q, u))
+    with cg.tag("potential"):
+        depth = parent.depth + spatial.dot(parent.vertical, offset)
+        vertical = turned(parent.vertical)
+    return Motion(omega, velocity, vertical, depth, parent.strength)
+
+
+def _about_axis(parent: Motion, link: Link, joint: AxialJoint, offset: Triple, q: Node, qd: Node) -> Motion:
+    along = link.turn[2][2]  # the joint's axis on the parent's
     with cg.tag("kinetic"):
         omega = spatial.rotate_transpose(link.turn, parent.omega)
         relative = _in_plane_axes(parent, spatial.cross(parent.omega, offset))
@@ -91,15 +118,19 @@ def propagate_motion(parent: Motion, link: Link, joint: JointType, q: Node, qd: 
     return Motion((x, y, z + joint.angle(qd)), velocity, vertical, depth, parent.strength)
 
 
-def carrier_motion(parent: Motion, link: Link) -> Motion:
+def carrier_motion(parent: Motion, link: Link, joint: JointType) -> Motion:
     """The parent's motion in the axes that the link is carried in: those of a plane where it stays in the plane."""
-    return in_body_axes(parent) if parent.plane and abs(link.turn[2][2]) != 1.0 else parent
+    stays = isinstance(joint, AxialJoint) and abs(link.turn[2][2]) == 1.0
+    return in_body_axes(parent) if parent.plane and not stays else parent
 
 
-def joint_translation(link: Link, joint: JointType, q: Node) -> Triple:
+def joint_translation(link: Link, joint: JointType, q: Sequence[Node]) -> Triple:
     """Where the link's origin is from its parent's, in the parent's axes."""
-    x, y, z = (row[2] * joint.shift(q) for row in link.turn)
-    return spatial.plus(link.place, (x, y, z))
+    if isinstance(joint, AxialJoint):
+        x, y, z = (row[2] * joint.shift(q[0]) for row in link.turn)
+        return spatial.plus(link.place, (x, y, z))
+    assert isinstance(joint, SpatialJoint)
+    return spatial.plus(link.place, spatial.rotate(link.turn, joint.translation(q)))
 
 
 def in_body_axes(motion: Motion) -> Motion:
@@ -119,7 +150,7 @@ def _in_plane_axes(motion: Motion, vector: Triple) -> Triple:
     return spatial.rotate_about_z(motion.plane.cos, -motion.plane.sin, vector) if motion.plane else vector
 
 
-def energy(motion: Motion, link: Link, q: Node, qd: Node) -> Node:
+def energy(motion: Motion, link: Link, q: Sequence[Node], u: Sequence[Node]) -> Node:
     """L_i = K_i - P_i with the first moment m c and the inertia J about the joint, without the center's velocity.
 
     K = m v.v / 2 + m c . (v x w) + w . J w / 2,  P = m g h + g u . m c + spring.
@@ -136,11 +167,20 @@ def energy(motion: Motion, link: Link, q: Node, qd: Node) -> Node:
         else:
             terms = [coupling, rotation] if translation.value == 0.0 else [translation, rotation, coupling]
         terms += [inertia[i][j] * (omega[i] * omega[j]) for i in range(3) for j in range(i)]
-        terms.append(0.5 * link.armature * (qd * qd))
+        terms.append(0.5 * link.armature * spatial.total([velocity * velocity for velocity in u]))
         kinetic = spatial.total(terms)
     with cg.tag("potential"):
-        stretch = q - link.spring_reference
         weight = spatial.scaled(motion.strength, link.moment)
         potential = link.mass * motion.strength * motion.depth + spatial.dot(own.vertical, weight)
-        potential = potential + 0.5 * link.stiffness * (stretch * stretch)
+        for stretch in _stretches(link, q):
+            potential = potential + 0.5 * link.stiffness * (stretch * stretch)
     return kinetic - potential
+
+
+def spring_forces(link: Link, q: Sequence[Node], u: Sequence[Node]) -> list[tuple[Node, Node]]:
+    """The velocity that the joint's spring works on, and its force; of a joint with one coordinate."""
+    return [(velocity, link.stiffness * stretch) for velocity, stretch in zip(u, _stretches(link, q), strict=False)]
+
+
+def _stretches(link: Link, q: Sequence[Node]) -> list[Node]:
+    return [q[0] - link.spring_reference] if len(q) == 1 else []  # other joints have no springs, see `checked`

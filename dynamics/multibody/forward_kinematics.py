@@ -14,19 +14,21 @@ from cgraph import Graph, Node
 
 from . import spatial
 from .body import Body
+from .body_motion import joint_translation
 from .inertial_numbers import Link, axes_of
-from .joints import JointType
+from .joint_coordinates import parts
+from .joints import AxialJoint, JointType, SpatialJoint
 from .kinematic_tree import Carrier
 from .spatial import STILL, Array, Triple
 
 
 class Step(NamedTuple):
-    """One joint on the way from a body to the world: the link that it carries, and its coordinate."""
+    """One joint on the way from a body to the world: the link that it carries, and its coordinates."""
 
     link: Link
     joint: JointType
-    q: Node
-    qd: Node
+    q: Sequence[Node]
+    u: Sequence[Node]
 
 
 class PointMotion(NamedTuple):
@@ -57,10 +59,17 @@ class KinematicChain:
         point = spatial.constant(spatial.cleaned(self.position + self.orientation @ np.asarray(at)))
         velocity, omega = STILL, STILL
         for step in self.steps:
-            (x, y, z), (u, v, w), spin = point, velocity, step.joint.angle(step.qd)
-            velocity = (u - spin * y, v + spin * x, w + step.joint.shift(step.qd))
-            omega = (omega[0], omega[1], omega[2] + spin)
-            point = spatial.plus(step.link.place, _in_parent_axes(step, (x, y, z + step.joint.shift(step.q))))
+            place = joint_translation(step.link, step.joint, step.q)
+            if isinstance(step.joint, AxialJoint):
+                (x, y, _), (u, v, w), spin = point, velocity, step.joint.angle(step.u[0])
+                velocity = (u - spin * y, v + spin * x, w + step.joint.shift(step.u[0]))
+                omega = (omega[0], omega[1], omega[2] + spin)
+            else:
+                assert isinstance(step.joint, SpatialJoint)
+                turning = step.joint.angular_velocity(step.q, step.u)
+                moving = spatial.plus(step.joint.linear_velocity(step.q, step.u), spatial.cross(turning, point))
+                velocity, omega = spatial.plus(velocity, moving), spatial.plus(omega, turning)
+            point = spatial.plus(place, _in_parent_axes(step, point))
             velocity, omega = _in_parent_axes(step, velocity), _in_parent_axes(step, omega)
         return PointMotion(point, velocity, omega)
 
@@ -77,10 +86,14 @@ class KinematicChain:
 
 def _in_parent_axes(step: Step, vector: Triple) -> Triple:
     """A vector in the axes of a step's link, in those of the next."""
-    angle = step.joint.angle(step.q)
-    if angle.value != 0.0:
-        vector = spatial.rotate_about_z(cg.cos(angle), -cg.sin(angle), vector)
-    return spatial.rotate_transpose([list(column) for column in zip(*step.link.turn, strict=True)], vector)
+    if isinstance(step.joint, AxialJoint):
+        angle = step.joint.angle(step.q[0])
+        if angle.value != 0.0:
+            vector = spatial.rotate_about_z(cg.cos(angle), -cg.sin(angle), vector)
+    else:
+        assert isinstance(step.joint, SpatialJoint)
+        vector = spatial.rotate(step.joint.rotation(step.q), vector)
+    return spatial.rotate(step.link.turn, vector)
 
 
 def kinematic_chain(
@@ -90,9 +103,9 @@ def kinematic_chain(
     index: Mapping[str, int] = {body.name: i for i, body in enumerate(moving)}
     axes = axes_of(moving[index[carrier.name]]) if carrier.name in index else np.eye(3)
     steps: list[Step] = []
-    name = carrier.name
+    name, states = carrier.name, parts(moving, q, qd)
     while name in index:
         i = index[name]
-        steps.append(Step(links[i], moving[i].joint.type, q[i], qd[i]))
+        steps.append(Step(links[i], moving[i].joint.type, *states[i]))
         name = moving[i].parent
     return KinematicChain(axes.T @ carrier.position, spatial.snapped(axes.T @ carrier.orientation), tuple(steps))

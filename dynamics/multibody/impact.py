@@ -150,10 +150,10 @@ def attach_with_impact(
     v, w = vector("velocity", velocity), vector("omega", omega)
     q, qd = real_array("q", q), real_array("qd", qd)
     q_new, qd_old = whole.map_state_from(mechanism, q, qd)
-    index = {each.name: i for i, each in enumerate(whole.moving)}
+    index = {name: i for i, name in enumerate(whole.velocities)}
     p = np.zeros(len(index))
     before = _momentum(mechanism, q, qd)
-    p[[index[each.name] for each in mechanism.moving]] = before
+    p[[index[name] for name in mechanism.velocities]] = before
     given = checked(body)
     free, linear, angular = _motion(whole, given, q_new, qd_old)
     inertia = free.orientation @ np.asarray(given.inertia) @ free.orientation.T
@@ -225,7 +225,7 @@ def _momentum(mechanism: Mechanism, q: Array, qd: Array) -> Array:
 
 def _velocities(mechanism: Mechanism, q: Array, p: Array) -> Array:
     """M^-1 p, (n,): the accelerations at rest under p alone."""
-    found = forward_dynamics(_inertia_alone(mechanism)).evaluate(_named(q=q, qd=np.zeros_like(q), tau=p))
+    found = forward_dynamics(_inertia_alone(mechanism)).evaluate(_named(q=q, qd=np.zeros_like(p), tau=p))
     return np.array(list(found.values()))
 
 

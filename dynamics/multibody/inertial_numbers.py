@@ -11,6 +11,7 @@ from cgraph import Node
 
 from . import spatial
 from .body import Body
+from .joints import AxialJoint
 from .spatial import Array, Matrix, Triple
 
 
@@ -42,8 +43,8 @@ class Link:
 
 
 def axes_of(body: Body) -> Array:
-    """The axes of the body's motion, as columns in the body's; the third is the joint's axis."""
-    return spatial.to_z(np.asarray(body.joint.axis))
+    """The axes of the body's motion, as columns in the body's; of an axial joint the third is its axis."""
+    return spatial.to_z(np.asarray(body.joint.axis)) if isinstance(body.joint.type, AxialJoint) else np.eye(3)
 
 
 def link(body: Body, outer: Array) -> Link:

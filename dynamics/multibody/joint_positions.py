@@ -12,6 +12,7 @@ from cgraph import Graph
 from cgraph.extend import real_array
 
 from .body import Body
+from .joint_coordinates import coordinate_names
 from .spatial import Array
 
 _FLAT = 1e-9  # of the largest extent: a direction in which nothing moves or lies
@@ -45,7 +46,7 @@ def skeleton(mechanism: Bodies, q: ArrayLike) -> Skeleton:
     A tip is a body without mass that is welded to the last moving one, or else the center of mass of that one.
     A mechanism that moves in a plane of two axes is seen at a right angle to it, any other from above and one side.
     """
-    q, n = np.atleast_2d(real_array("q", q)), len(mechanism.moving)
+    q, n = np.atleast_2d(real_array("q", q)), len(coordinate_names(mechanism.moving))
     if q.ndim != 2 or q.shape[1] != n:
         raise ValueError(f"q must have shape (T, {n}) or ({n},), one for each coordinate, got {q.shape}")
     values = {f"q{i}": q[:, i] for i in range(q.shape[1])}

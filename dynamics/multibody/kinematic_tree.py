@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cgraph.extend import is_finite, require_mapping
 
 from . import spatial
-from .body import WORLD, Body, Joint, MechanismError
+from .body import WORLD, Body, Joint, MechanismError, vector
 from .spatial import Array
 
 
@@ -50,8 +52,8 @@ def parents_first(bodies: Sequence[Body]) -> list[Body]:
     return order
 
 
-def lock_joints(bodies: Sequence[Body], at: Mapping[str, float]) -> list[Body]:
-    """The bodies, with the joints named in `at` welded where they stand at that coordinate [rad or m].
+def lock_joints(bodies: Sequence[Body], at: Mapping[str, float | ArrayLike]) -> list[Body]:
+    """The bodies, with the joints named in `at` welded where they stand at that coordinate [rad or m], or at several.
 
     Raises MechanismError for a body that is not there or has no joint to lock, and a coordinate that is not finite.
     """
@@ -61,15 +63,32 @@ def lock_joints(bodies: Sequence[Body], at: Mapping[str, float]) -> list[Body]:
             raise MechanismError(f"there is no body {name!r:.80} to lock in the mechanism")
         if not by_name[name].joint.type.moves:
             raise MechanismError(f"body {name!r} is welded on and has no joint to lock")
-        if not is_finite(value):
-            raise MechanismError(f"joint of body {name!r}: it can be locked at a finite number, got {value!r:.80}")
+        locked_at(by_name[name], value)
     return [
-        replace(body, joint=_weld_at(body.joint, float(at[body.name]))) if body.name in at else body for body in bodies
+        replace(body, joint=_weld_at(body.joint, locked_at(body, at[body.name]))) if body.name in at else body
+        for body in bodies
     ]
 
 
-def _weld_at(joint: Joint, at: float) -> Joint:
-    """The weld that holds a joint's body where the joint has it at that coordinate."""
+def locked_at(body: Body, value: Any) -> Array:
+    """Coordinates of a body's joint, (nq,). Raises MechanismError unless it is a finite number, or as many as it has.
+
+    A quaternion needs a length; only its direction counts.
+    """
+    where, count = f"joint of body {body.name!r}", len(body.joint.type.coordinates)
+    if count == 1:
+        if not is_finite(value):
+            raise MechanismError(f"{where}: it can be locked at a finite number, got {value!r:.80}")
+        return np.array([float(value)])
+    at = vector(f"{where}: the coordinates where it is locked", value, (count,))
+    turns = np.array([name.startswith("q") for name in body.joint.type.coordinates])
+    if turns.any() and not np.any(at[turns]):
+        raise MechanismError(f"{where}: a quaternion must not be zero, got {value!r:.80}")
+    return at
+
+
+def _weld_at(joint: Joint, at: Array) -> Joint:
+    """The weld that holds a joint's body where the joint has it at these coordinates."""
     orientation, axis, position = (np.asarray(each) for each in (joint.orientation, joint.axis, joint.position))
     turn, shift = joint.type.placement(axis, at)
     return Joint("fixed", position=position + orientation @ shift, orientation=orientation @ turn)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -54,11 +55,11 @@ class SharedParts:
         """The world at rest, the same object for equal motions."""
         return self._grounds.setdefault((rest.strength, *[each.value for each in rest.vertical]), rest)
 
-    def moved(self, parent: Motion, body: Body, link: Link, q: Node, qd: Node) -> Moved:
+    def moved(self, parent: Motion, body: Body, link: Link, q: Sequence[Node], u: Sequence[Node]) -> Moved:
         """The motion and energy of a body whose parent moves so. `parent` is one of these motions, or the ground's."""
-        key = (id(parent), body.name, body.joint.kind, q.name, *link.numbers)
+        key = (id(parent), body.name, body.joint.kind, *[node.name for node in (*q, *u)], *link.numbers)
         if key not in self._moved:
             with cg.tag(body.name):
-                motion = propagate_motion(parent, link, body.joint.type, q, qd)
-                self._moved[key] = Moved(parent, motion, energy(motion, link, q, qd))
+                motion = propagate_motion(parent, link, body.joint.type, q, u)
+                self._moved[key] = Moved(parent, motion, energy(motion, link, q, u))
         return self._moved[key]

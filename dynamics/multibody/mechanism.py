@@ -21,6 +21,7 @@ from .body import WORLD, Body, Joint, MechanismError, vector
 from .external_force import Force, check_force, generalized_forces
 from .forward_kinematics import KinematicChain, kinematic_chain
 from .inertial_numbers import Link
+from .joint_coordinates import coordinate_names, per_velocity, quasi_velocities, velocity_names
 from .joint_positions import skeleton
 from .kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia
 from .mechanism_fields import Structure
@@ -104,8 +105,13 @@ class Mechanism(Structure):
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """Names of the joints of the moving bodies, which are the bodies' where a joint has none of its own."""
-        return tuple([body.coordinate for body in self.moving])
+        """Names of the coordinates: the joints', which are the bodies' where a joint has none of its own."""
+        return coordinate_names(self.moving)
+
+    @property
+    def velocities(self) -> tuple[str, ...]:
+        """Names of the velocities, which are those of the coordinates but for ball and free joints."""
+        return velocity_names(self.moving)
 
     @property
     def mechanism(self) -> Mechanism:
@@ -145,7 +151,8 @@ class Mechanism(Structure):
             self.coordinates,
             self.parameter_values,
             forces=self._generalized_forces if self.forces else None,
-            damping=[body.joint.damping for body in self.moving],
+            damping=per_velocity(self.moving, [body.joint.damping for body in self.moving]),
+            quasi_velocities=quasi_velocities(self.moving),
         )
 
     def _generalized_forces(self, q: list[Node], qd: list[Node], t: Node, p: dict[str, Node]) -> list[Node]:
@@ -199,9 +206,10 @@ class Mechanism(Structure):
         """
         return skeleton(self, q).points
 
-    def lock(self, body: str, at: float = 0.0) -> Mechanism:
-        """The mechanism with the joint of a body standing still at a coordinate [rad or m].
+    def lock(self, body: str, at: float | ArrayLike | None = None) -> Mechanism:
+        """The mechanism with the joint of a body standing still at a coordinate [rad or m], or several; by default 0.
 
+        Of a ball or free joint the coordinates are as many as it has, by default neutral.
         The body and all that is welded to it become one inertia with its parent. Raises MechanismError for an unknown
         body or one without a joint, and a coordinate that is not finite.
         """

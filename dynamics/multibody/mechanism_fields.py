@@ -20,7 +20,7 @@ class Structure:
     gravity: ArrayLike = (0.0, 0.0, -9.81)
     forces: Sequence[Force] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
-    locked: Mapping[str, float] = field(default_factory=dict)
+    locked: Mapping[str, float | ArrayLike] = field(default_factory=dict)
     base_parameters: bool = False
     omitted: tuple[str, ...] = ()
     shared: SharedParts = field(default_factory=SharedParts, repr=False, kw_only=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
@@ -13,6 +13,7 @@ from cgraph.extend import real_array
 
 from .body import Body, MechanismError
 from .external_force import Force
+from .joint_coordinates import coordinate_names, neutral, parts, places, velocity_names
 from .mechanism_fields import Structure
 from .spatial import Array
 from .subtree import Subtree, as_subtree, descendants, inserted
@@ -20,9 +21,12 @@ from .subtree import Subtree, as_subtree, descendants, inserted
 AnyStructure = TypeVar("AnyStructure", bound=Structure)
 
 
-def lock_joint(structure: AnyStructure, body: str, at: float) -> AnyStructure:
-    """The structure with the joint of a body standing still at a coordinate [rad or m]."""
+def lock_joint(structure: AnyStructure, body: str, at: float | ArrayLike | None) -> AnyStructure:
+    """The structure with the joint of a body standing still at a coordinate [rad or m], or several."""
     _check_body(body)
+    if at is None:
+        kinds = [each.joint.type for each in structure.bodies if each.name == body]
+        at = 0.0 if not kinds or len(kinds[0].neutral) == 1 else kinds[0].neutral
     return replace(structure, locked={**structure.locked, body: at})
 
 
@@ -82,18 +86,26 @@ def attach_subtree(
 
 
 def map_state(
-    moving: Sequence[Body], other: Sequence[Body], other_locked: dict[str, float], q: ArrayLike, qd: ArrayLike
+    moving: Sequence[Body],
+    other: Sequence[Body],
+    other_locked: Mapping[str, float | ArrayLike],
+    q: ArrayLike,
+    qd: ArrayLike,
 ) -> tuple[Array, Array]:
     """The state of the other moving bodies as one of these: joints of bodies of the same name keep theirs."""
     rows = [real_array(name, each) for name, each in (("q", q), ("qd", qd))]
-    theirs = [body.name for body in other]
-    for name, row in zip(("q", "qd"), rows, strict=True):
-        if row.shape != (len(theirs),):
-            raise ValueError(f"{name} must have shape ({len(theirs)},), one for each joint, got {row.shape}")
-    positions = {**other_locked, **dict(zip(theirs, rows[0].tolist(), strict=True))}
-    rates = dict(zip(theirs, rows[1].tolist(), strict=True))
-    names = [body.name for body in moving]
-    return np.array([positions.get(n, 0.0) for n in names]), np.array([rates.get(n, 0.0) for n in names])
+    counts = len(coordinate_names(other)), len(velocity_names(other))
+    for name, row, count in zip(("q", "qd"), rows, counts, strict=True):
+        if row.shape != (count,):
+            raise ValueError(f"{name} must have shape ({count},), one for each joint, got {row.shape}")
+    theirs = {body.name: part for body, part in zip(other, parts(other, *rows), strict=True)}
+    q_new, qd_new = np.array(neutral(moving)), np.zeros(len(velocity_names(moving)))
+    for body, place in zip(moving, places(moving), strict=True):
+        if body.name in theirs:
+            q_new[place.q], qd_new[place.u] = theirs[body.name]
+        elif body.name in other_locked:
+            q_new[place.q] = other_locked[body.name]
+    return q_new, qd_new
 
 
 def _check_body(body: object) -> None:

@@ -9,6 +9,7 @@ C. A. Balafoutis, R. V. Patel, "Dynamic Analysis of Robot Manipulators", 1991.)
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import cgraph as cg
@@ -16,9 +17,9 @@ from cgraph import Node
 
 from ..systems.system import BiasForce
 from . import spatial
-from .body_motion import Motion, carrier_motion, joint_translation
+from .body_motion import Motion, carrier_motion, joint_translation, spring_forces
 from .inertial_numbers import Link
-from .joints import JointType
+from .joints import AxialJoint, JointType, SpatialJoint
 from .spatial import STILL, ZERO, Triple
 
 KINETIC, POTENTIAL = "kinetic", "potential"
@@ -48,12 +49,17 @@ def base_acceleration(ground: Motion) -> Acceleration:
 
 
 def propagate_acceleration(
-    parent: Acceleration, before: Motion, after: Motion, link: Link, joint: JointType, q: Node, qd: Node
+    parent: Acceleration,
+    before: Motion,
+    after: Motion,
+    link: Link,
+    joint: JointType,
+    q: Sequence[Node],
+    u: Sequence[Node],
 ) -> Acceleration:
-    """A link's acceleration from its parent's: `after` is `propagate_motion(before, link, joint, q, qd)`."""
-    linear, (x, y, _) = parent.linear, after.omega
-    in_plane = carrier_motion(before, link).plane
-    spin, slide = joint.angle(qd), joint.shift(qd)
+    """A link's acceleration from its parent's: `after` is `propagate_motion(before, link, joint, q, u)`."""
+    linear = parent.linear
+    in_plane = carrier_motion(before, link, joint).plane
     with cg.tag(*parent.tags):
         if before.plane and not in_plane:
             linear = spatial.rotate_about_z(before.plane.cos, before.plane.sin, linear)
@@ -62,16 +68,12 @@ def propagate_acceleration(
         linear = spatial.rotate_transpose(link.turn, linear)
     with cg.tag(KINETIC):
         angular = spatial.rotate_transpose(link.turn, parent.angular)
-    if spin.value != 0.0 and not after.plane:
-        c, s = cg.cos(joint.angle(q)), cg.sin(joint.angle(q))
-        with cg.tag(*parent.tags):
-            linear = spatial.rotate_about_z(c, s, linear)
-        with cg.tag(KINETIC):
-            angular = spatial.rotate_about_z(c, s, angular)
-            angular = angular[0] + y * spin, angular[1] - x * spin, angular[2]
-    if slide.value != 0.0:
-        with cg.tag(*parent.tags):  # Coriolis: twice omega x velocity along z
-            linear = linear[0] + 2.0 * slide * y, linear[1] - 2.0 * slide * x, linear[2]
+    if isinstance(joint, AxialJoint):
+        linear, angular = _about_axis(parent.tags, after, joint, q[0], u[0], linear, angular)
+    else:
+        assert isinstance(joint, SpatialJoint)
+        omega = spatial.rotate_transpose(link.turn, before.omega)
+        linear, angular = _in_space(parent.tags, joint, q, u, omega, linear, angular)
     with cg.tag(KINETIC):
         tensor = swept = _tensor(after.omega, angular)
         if after.plane:
@@ -81,8 +83,51 @@ def propagate_acceleration(
     return Acceleration(angular, linear, tensor, swept, parent.tags)
 
 
-def bias_wrench(acceleration: Acceleration, motion: Motion, link: Link, q: Node, qd: Node) -> list[BiasForce]:
-    """Bias wrench, each component paired with the velocity it works on; and the spring's force, with qd.
+def _in_space(
+    tags: Sequence[str],
+    joint: SpatialJoint,
+    q: Sequence[Node],
+    u: Sequence[Node],
+    omega: Triple,
+    linear: Triple,
+    angular: Triple,
+) -> tuple[Triple, Triple]:
+    """R^T a + 2 omega_parent x v_joint + a_joint, and R^T alpha + omega_parent x omega_joint, in the body's axes.
+
+    omega, linear, angular: of the parent, in the joint's axes.
+    """
+    turn = joint.rotation(q)
+    with cg.tag(*tags):
+        velocity, omega = joint.linear_velocity(q, u), spatial.rotate_transpose(turn, omega)
+        linear = spatial.plus(spatial.rotate_transpose(turn, linear), joint.linear_acceleration(q, u))
+        linear = spatial.plus(linear, spatial.scaled(2.0, spatial.cross(omega, velocity)))
+    with cg.tag(KINETIC):
+        turned = spatial.rotate_transpose(turn, angular)
+        return linear, spatial.plus(turned, spatial.cross(omega, joint.angular_velocity(q, u)))
+
+
+def _about_axis(
+    tags: Sequence[str], after: Motion, joint: AxialJoint, q: Node, qd: Node, linear: Triple, angular: Triple
+) -> tuple[Triple, Triple]:
+    """The same of a joint with one axis, by the components of the body's angular velocity across it."""
+    (x, y, _), spin, slide = after.omega, joint.angle(qd), joint.shift(qd)
+    if spin.value != 0.0 and not after.plane:
+        c, s = cg.cos(joint.angle(q)), cg.sin(joint.angle(q))
+        with cg.tag(*tags):
+            linear = spatial.rotate_about_z(c, s, linear)
+        with cg.tag(KINETIC):
+            angular = spatial.rotate_about_z(c, s, angular)
+            angular = angular[0] + y * spin, angular[1] - x * spin, angular[2]
+    if slide.value != 0.0:
+        with cg.tag(*tags):  # Coriolis: twice omega x velocity along z
+            linear = linear[0] + 2.0 * slide * y, linear[1] - 2.0 * slide * x, linear[2]
+    return linear, angular
+
+
+def bias_wrench(
+    acceleration: Acceleration, motion: Motion, link: Link, q: Sequence[Node], u: Sequence[Node]
+) -> list[BiasForce]:
+    """Bias wrench, each component paired with the velocity it works on; and the spring's force, with its velocity.
 
     f = m a + T h, n = J alpha + omega x J omega + h x a, for the tensor T and the first moment h.
     """
@@ -100,8 +145,8 @@ def bias_wrench(acceleration: Acceleration, motion: Motion, link: Link, q: Node,
             a = spatial.rotate_about_z(motion.plane.cos, motion.plane.sin, a)
         torque = [a + b for a, b in zip(torque, spatial.cross(link.moment, a), strict=True)]
     with cg.tag(POTENTIAL):
-        spring = link.stiffness * (q - link.spring_reference)
-    return list(zip((*motion.velocity, *motion.omega, qd), (*force, *torque, spring), strict=True))
+        springs = spring_forces(link, q, u)
+    return [*zip((*motion.velocity, *motion.omega), (*force, *torque), strict=True), *springs]
 
 
 def _tensor(w: Triple, alpha: Triple) -> Tensor:

@@ -21,6 +21,7 @@ from cgraph.extend import Builder, building, cotangents, real_array, tangents
 
 from .body_motion import Motion, energy, ground, propagate_motion
 from .inertial_numbers import Link
+from .joint_coordinates import places
 from .joints import TYPES
 from .mechanism import Mechanism, require_mechanism
 from .spatial import Array
@@ -59,33 +60,37 @@ class RecursiveInverseDynamics:
             raise ValueError("inverse dynamics body by body does not take external forces; use inverse_dynamics")
         self.mechanism = mechanism
         rest = ground(mechanism.gravity)
-        self.n = len(mechanism.moving)
+        self.n = len(mechanism.velocities)
         self._parents = mechanism.parents
         self._links = [each.numbers for each in mechanism.links]
         self._kernels = [_kernels(body.joint.kind) for body in mechanism.moving]
+        self._places = places(mechanism.moving)
         self._ground = [float(each) for each in (*rest.omega, *rest.velocity, *rest.vertical, rest.depth)] + [
             0.0
         ] * MOTION
 
     def __call__(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
-        """tau (n,) [N m or N] at q, qd, qdd (n,). Raises ValueError for another shape."""
+        """tau (n,) [N m or N] at q (nq,), qd and qdd (n,). Raises ValueError for another shape."""
         rows = [real_array(name, each) for name, each in (("q", q), ("qd", qd), ("qdd", qdd))]
-        for name, row in zip(("q", "qd", "qdd"), rows, strict=True):
-            if row.shape != (self.n,):
-                raise ValueError(f"{name} must have shape ({self.n},), one for each coordinate, got {row.shape}")
-        states = [list(each) for each in zip(*(row.tolist() for row in rows), strict=True)]
+        counts = (len(self.mechanism.coordinates), self.n, self.n)
+        for name, row, count in zip(("q", "qd", "qdd"), rows, counts, strict=True):
+            if row.shape != (count,):
+                raise ValueError(f"{name} must have shape ({count},), one for each coordinate, got {row.shape}")
+        x, u, a = (row.tolist() for row in rows)
+        states = [[*x[place.q], *u[place.u], *a[place.u]] for place in self._places]
         motions: list[list[float]] = []
         for parent, link, kernel, state in zip(self._parents, self._links, self._kernels, states, strict=True):
             carrier = motions[parent] if parent >= 0 else self._ground
             motions.append(list(kernel.forwards.values([*carrier, *state, *link])))
-        bars = [[0.0] * (2 * MOTION) for _ in range(self.n)]
+        bars = [[0.0] * (2 * MOTION) for _ in states]
         tau = np.empty(self.n)
-        for i in reversed(range(self.n)):
+        for i in reversed(range(len(states))):
             parent = self._parents[i]
             carrier = motions[parent] if parent >= 0 else self._ground
-            *bar, tau[i] = self._kernels[i].backwards.values([*carrier, *states[i], *self._links[i], *bars[i]])
+            values = self._kernels[i].backwards.values([*carrier, *states[i], *self._links[i], *bars[i]])
+            tau[self._places[i].u] = values[2 * MOTION :]
             if parent >= 0:
-                bars[parent] = [a + b for a, b in zip(bars[parent], bar, strict=True)]
+                bars[parent] = [a + b for a, b in zip(bars[parent], values[: 2 * MOTION], strict=True)]
         return tau
 
 
@@ -98,24 +103,30 @@ class _Kernels(NamedTuple):
 def _kernels(kind: str) -> _Kernels:
     """What a link with that kind of joint needs, whatever its numbers are."""
     parent, rates, bars, bar_rates = (_variables(name, MOTION) for name in ("s", "s_dot", "bar", "bar_dot"))
-    q, qd, qdd = cg.variables("q qd qdd")
+    joint = TYPES[kind]
+    q = _variables("q", len(joint.coordinates))
+    qd, qdd = (_variables(name, len(joint.velocities)) for name in ("qd", "qdd"))
     link, numbers = _link_of_nodes()
     build = Builder()
     with building(build):
-        motion = propagate_motion(_motion(parent), link, TYPES[kind], q, qd)
+        motion = propagate_motion(_motion(parent), link, joint, q, qd)
         after = [*motion.omega, *motion.velocity, *motion.vertical, motion.depth]
         lagrangian = energy(motion, link, q, qd)
-    along = dict(zip(parent, rates, strict=True)) | {q: qd, qd: qdd}
+        q_dot = joint.rate(q, qd)
+    along = dict(zip([*parent, *q, *qd], [*rates, *q_dot, *qdd], strict=True))
     dots = tangents(along, after, build)
     seeds = dict(zip(after, bars, strict=True)) | {lagrangian: ONE}
-    back = cotangents(seeds, [*parent, q, qd], build)
+    back = cotangents(seeds, [*parent, *q, *qd], build)
+    momenta = back[MOTION + len(q) :]
+    pulled = cotangents(dict(zip(q_dot, back[MOTION : MOTION + len(q)], strict=True)), qd, build)  # G^T dL/dq
     back_dots = tangents(along | dict(zip(bars, bar_rates, strict=True)), back, build)
     zero = cg.constant(0.0)
     with building(build):
-        tau = back_dots.get(back[-1], zero) - back[-2] + link.damping * qd
-    inputs = [*parent, *rates, q, qd, qdd, *numbers]
+        rows = zip(momenta, pulled, joint.structure(qd, momenta), qd, strict=True)
+        tau = [back_dots.get(p, zero) - slope + term + link.damping * u for p, slope, term, u in rows]
+    inputs = [*parent, *rates, *q, *qd, *qdd, *numbers]
     forwards = [*after, *(dots.get(node, zero) for node in after)]
-    backwards = [*back[:MOTION], *(back_dots.get(node, zero) for node in back[:MOTION]), tau]
+    backwards = [*back[:MOTION], *(back_dots.get(node, zero) for node in back[:MOTION]), *tau]
     return _Kernels(_compiled(inputs, forwards), _compiled([*inputs, *bars, *bar_rates], backwards))
 
 

@@ -17,6 +17,7 @@ from . import spatial
 from .body import WORLD
 from .body_motion import energy, ground, propagate_motion
 from .inertial_numbers import Link, axes_of, link
+from .joint_coordinates import parts, quasi_velocities
 from .mechanism import Mechanism, as_mechanism
 from .spatial import Array
 
@@ -59,6 +60,7 @@ def regressor(model: Model) -> Graph:
         lambda q, qd, t, p: _partial_lagrangians(mechanism, q, qd, [p[name] for name in names]),
         mechanism.coordinates,
         dict.fromkeys(names, 0.0),
+        quasi_velocities=quasi_velocities(mechanism.moving),
     )
     slopes = cg.jacobian(inverse_dynamics(system), names).outputs.values()
     width = len(names)
@@ -109,13 +111,14 @@ def _partial_lagrangians(mechanism: Mechanism, q: list[Node], qd: list[Node], pi
     motions, axes = {WORLD: ground(mechanism.gravity)}, {WORLD: np.eye(3)}
     partials = []
     with building(Builder()):
+        states = parts(mechanism.moving, q, qd)
         for i, body in enumerate(mechanism.moving):
             axes[body.name] = axes_of(body)
             known = link(body, axes[body.parent])
             with cg.tag(body.name):
-                motions[body.name] = propagate_motion(motions[body.parent], known, body.joint.type, q[i], qd[i])
+                motions[body.name] = propagate_motion(motions[body.parent], known, body.joint.type, *states[i])
                 unknown = _symbolic(known, axes[body.name], pi[10 * i : 10 * i + 10])
-                partials.append(energy(motions[body.name], unknown, q[i], qd[i]))
+                partials.append(energy(motions[body.name], unknown, *states[i]))
     return partials
 
 

@@ -126,6 +126,12 @@ def rotate_transpose(matrix: Matrix, vector: Triple) -> Triple:
     return x, y, z
 
 
+def rotate(matrix: Matrix, vector: Triple) -> Triple:
+    """matrix vector: what a child's vector is in its parent's axes."""
+    x, y, z = (total([row[i] * vector[i] for i in range(3)]) for row in matrix)
+    return x, y, z
+
+
 def rotate_about_z(c: Node, s: Node, vector: Triple) -> Triple:
     """R_z^T vector: its components in axes turned about z by the angle with cosine c and sine s."""
     x, y, z = vector

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
+from numpy.typing import ArrayLike
+
 from .body import WORLD, Body, MechanismError
 from .external_force import Force
 
@@ -41,7 +43,7 @@ class Subtree:
     places: tuple[int, ...] = ()
     forces: tuple[Force, ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
-    locked: Mapping[str, float] = field(default_factory=dict)
+    locked: Mapping[str, float | ArrayLike] = field(default_factory=dict)
 
     def with_parent(self, parent: str) -> tuple[Body, ...]:
         """The bodies, with the first on that parent."""

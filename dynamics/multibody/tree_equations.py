@@ -17,13 +17,15 @@ from .base_parameters import base_parameter_links
 from .body import WORLD, Body
 from .body_motion import Motion, ground
 from .inertial_numbers import Link
+from .joint_coordinates import parts
+from .joints import AxialJoint
 from .link_cache import Moved
 from .mechanism_fields import Structure
 from .spatial import Array
 
 
 class TreeEquations:
-    """Nodes of the motion of bodies, parents first, one coordinate each, under a structure's gravity."""
+    """Nodes of the motion of bodies, parents first, under a structure's gravity."""
 
     def __init__(self, structure: Structure, bodies: Sequence[Body]) -> None:
         self.bodies, self.shared = bodies, structure.shared
@@ -45,7 +47,8 @@ class TreeEquations:
     def ground(self) -> Motion:
         """The world at rest."""
         inner = [link for link, parent in zip(self.links, self.parents, strict=True) if parent >= 0]
-        in_plane = all([abs(link.turn[2][2]) == 1.0 for link in inner])
+        axial = all([isinstance(body.joint.type, AxialJoint) for body in self.bodies])
+        in_plane = axial and all([abs(link.turn[2][2]) == 1.0 for link in inner])
         return self.shared.ground(ground(self.gravity, in_plane=in_plane))
 
     @cached_property
@@ -72,20 +75,20 @@ class TreeEquations:
         forces: list[BiasForce] = []
         with building(Builder()):
             accelerations = {WORLD: newton_euler.base_acceleration(self.ground)}
-            rows = zip(self.bodies, self.links, self._moved(q, qd), q, qd, strict=True)
-            for body, link, moved, angle, rate in rows:
+            rows = zip(self.bodies, self.links, self._moved(q, qd), parts(self.bodies, q, qd), strict=True)
+            for body, link, moved, (x, u) in rows:
                 with cg.tag(body.name):
                     acceleration = accelerations[body.name] = newton_euler.propagate_acceleration(
-                        accelerations[body.parent], moved.parent, moved.motion, link, body.joint.type, angle, rate
+                        accelerations[body.parent], moved.parent, moved.motion, link, body.joint.type, x, u
                     )
-                    forces += newton_euler.bias_wrench(acceleration, moved.motion, link, angle, rate)
+                    forces += newton_euler.bias_wrench(acceleration, moved.motion, link, x, u)
         return forces
 
     def _moved(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Moved]:
         motions = {WORLD: self.ground}
         result = []
-        for body, link, angle, rate in zip(self.bodies, self.links, q, qd, strict=True):
-            moved = self.shared.moved(motions[body.parent], body, link, angle, rate)
+        for body, link, (x, u) in zip(self.bodies, self.links, parts(self.bodies, q, qd), strict=True):
+            moved = self.shared.moved(motions[body.parent], body, link, x, u)
             motions[body.name] = moved.motion
             result.append(moved)
         return result

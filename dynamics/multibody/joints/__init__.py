@@ -6,9 +6,9 @@ A module of this package that has a `JOINT`, a `JointType`, is in the table.
 from importlib import import_module
 from pkgutil import iter_modules
 
-from .joint_type import JointType
+from .joint_type import AxialJoint, JointType, SpatialJoint
 
 _MODULES = [import_module(f"{__name__}.{module.name}") for module in iter_modules(__path__)]
 TYPES: dict[str, JointType] = {module.JOINT.kind: module.JOINT for module in _MODULES if hasattr(module, "JOINT")}
 
-__all__ = ["TYPES", "JointType"]
+__all__ = ["TYPES", "AxialJoint", "JointType", "SpatialJoint"]

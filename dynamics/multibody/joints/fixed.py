@@ -4,31 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from cgraph import Node
+from ..spatial import Array
+from .joint_type import AxialJoint
 
-from ..spatial import ZERO, Array
 
-
-class Fixed:
+class Fixed(AxialJoint):
     """A weld. The body is merged into the one that carries it."""
 
     kind = "fixed"
-    mjcf = ""
     urdf = "fixed"
     moves = False
-    unit = ""
     turns = False
-    limited = False
+    coordinates = velocities = units = ()
+    neutral = groups = ()
 
-    def angle(self, x: Node) -> Node:
-        """None."""
-        return ZERO
-
-    def shift(self, x: Node) -> Node:
-        """None."""
-        return ZERO
-
-    def placement(self, axis: Array, at: float) -> tuple[Array, Array]:
+    def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
         """Where it is at 0."""
         return np.eye(3), np.zeros(3)
 

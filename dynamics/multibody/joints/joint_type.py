@@ -1,43 +1,100 @@
-"""JointType: all that the library asks of a type of joint."""
+"""JointType: all that the library asks of a type of joint; of one axis, or of several freedoms."""
 
 from __future__ import annotations
 
-from typing import Protocol
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+
+import numpy as np
 
 from cgraph import Node
 
-from ..spatial import Array
+from ..spatial import STILL, ZERO, Array, Triple
+
+NodeMatrix = Sequence[Sequence[Node]]  # (3, 3), rows
 
 
-class JointType(Protocol):
-    """A type of joint with one coordinate, which turns the body about the joint's axis, slides it along, or both.
+class JointType(ABC):
+    """A type of joint: coordinates q, (nq,), and velocities u, (n,), how they place and how they move the body.
 
     kind: the word for it in `Joint.kind`.  mjcf, urdf: the words for it in those files; "" where they have none.
     moves: whether it has a coordinate; of "fixed" no function below is asked but `placement`.
-    unit: of the coordinate.  turns: whether it turns the body.  limited: whether URDF demands limits of it.
+    turns: whether it turns the body.  limited: whether URDF demands limits of it.
+    coordinates, velocities: what they are called after the joint's name; "" of a single one, which has the joint's.
+    units: of the coordinates.  neutral: the coordinates where the body stands at the joint.
+    groups: for each coordinate a number, the same for those that are one quantity.
+    """
+
+    kind: str
+    mjcf = urdf = ""
+    moves = True
+    turns = True
+    limited = False
+    coordinates: tuple[str, ...] = ("",)
+    velocities: tuple[str, ...] = ("",)
+    units: tuple[str, ...] = ("rad",)
+    neutral: tuple[float, ...] = (0.0,)
+    groups: tuple[int, ...] = (0,)
+
+    def rate(self, q: Sequence[Node], u: Sequence[Node]) -> Sequence[Node]:
+        """Rates of the coordinates, G(q) u."""
+        return u
+
+    def structure(self, u: Sequence[Node], p: Sequence[Node]) -> Sequence[Node]:
+        """ad(u; p) of the momenta p = dL/du, see `QuasiVelocities`; 0 where velocities are rates of coordinates."""
+        return [ZERO] * len(u)
+
+    def normalized(self, q: Sequence[Node]) -> Sequence[Node]:
+        """The same configuration, with a quaternion of length 1."""
+        return q
+
+    @abstractmethod
+    def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
+        """Rotation (3, 3) and displacement (3,) [m] of the body at coordinates (nq,), in its axes at neutral ones."""
+
+    @abstractmethod
+    def resists(self, axis: Array, mass: float, inertia: Array) -> bool:
+        """Whether a body alone has inertia along all velocities; its inertia is about the joint's origin, (3, 3)."""
+
+    def unobservable(self, mass: float, moment: Array, inertia: Array) -> tuple[float, Array, Array]:
+        """The part of mass, first moment (3,) and inertia (3, 3) that moves with the parent whatever the joint does."""
+        return 0.0, np.zeros(3), np.zeros((3, 3))
+
+
+class AxialJoint(JointType):
+    """A joint with one coordinate, which turns the body about the joint's axis, slides it along that, or both.
 
     Nodes are over the child's axes, in which the joint's axis is z, and stand for their z component.
     """
 
-    kind: str
-    mjcf: str
-    urdf: str
-    moves: bool
-    unit: str
-    turns: bool
-    limited: bool
-
     def angle(self, x: Node) -> Node:
         """How far the coordinate turns the body [rad]; of its rate, the angular velocity. Linear in it."""
+        return ZERO
 
     def shift(self, x: Node) -> Node:
         """How far the coordinate moves the body's origin [m]; of its rate, the velocity. Linear in it."""
+        return ZERO
 
-    def placement(self, axis: Array, at: float) -> tuple[Array, Array]:
-        """Rotation (3, 3) and displacement (3,) [m] of the body at a coordinate, in its axes at 0."""
 
-    def resists(self, axis: Array, mass: float, inertia: Array) -> bool:
-        """Whether a body alone has inertia along the coordinate; its inertia is about the joint's origin, (3, 3)."""
+class SpatialJoint(JointType):
+    """A joint of several freedoms. Its motion is in the body's axes where nothing else is said."""
 
-    def unobservable(self, mass: float, moment: Array, inertia: Array) -> tuple[float, Array, Array]:
-        """The part of mass, first moment (3,) and inertia (3, 3) that moves with the parent whatever the joint does."""
+    @abstractmethod
+    def rotation(self, q: Sequence[Node]) -> NodeMatrix:
+        """The body's axes as columns, in those that it has at neutral coordinates: the joint's."""
+
+    def translation(self, q: Sequence[Node]) -> Triple:
+        """Where the body's origin is, in the joint's axes [m]."""
+        return STILL
+
+    @abstractmethod
+    def angular_velocity(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
+        """Of the body against the joint [rad/s]."""
+
+    def linear_velocity(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
+        """Of the body's origin against the joint [m/s]."""
+        return STILL
+
+    def linear_acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
+        """Of the body's origin against the joint, at constant velocities u [m/s^2]. The angular one is 0."""
+        return STILL

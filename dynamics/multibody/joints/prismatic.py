@@ -6,31 +6,27 @@ import numpy as np
 
 from cgraph import Node
 
-from ..spatial import ZERO, Array
+from ..spatial import Array
+from .joint_type import AxialJoint
 
 
-class Prismatic:
+class Prismatic(AxialJoint):
     """A slide. Its coordinate is a length [m]."""
 
     kind = "prismatic"
     mjcf = "slide"
     urdf = "prismatic"
-    moves = True
-    unit = "m"
     turns = False
+    units = ("m",)
     limited = True
-
-    def angle(self, x: Node) -> Node:
-        """None: the body keeps its orientation."""
-        return ZERO
 
     def shift(self, x: Node) -> Node:
         """The coordinate itself."""
         return x
 
-    def placement(self, axis: Array, at: float) -> tuple[Array, Array]:
+    def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
         """A displacement along the axis."""
-        return np.eye(3), axis * at
+        return np.eye(3), axis * at[0]
 
     def resists(self, axis: Array, mass: float, inertia: Array) -> bool:
         """Mass."""

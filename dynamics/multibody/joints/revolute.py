@@ -7,31 +7,24 @@ import numpy as np
 from cgraph import Node
 
 from .. import spatial
-from ..spatial import ZERO, Array
+from ..spatial import Array
+from .joint_type import AxialJoint
 
 
-class Revolute:
+class Revolute(AxialJoint):
     """A hinge. Its coordinate is an angle [rad]."""
 
     kind = "revolute"
     mjcf = "hinge"
     urdf = "continuous"
-    moves = True
-    unit = "rad"
-    turns = True
-    limited = False
 
     def angle(self, x: Node) -> Node:
         """The coordinate itself."""
         return x
 
-    def shift(self, x: Node) -> Node:
-        """None: the origin lies on the axis."""
-        return ZERO
-
-    def placement(self, axis: Array, at: float) -> tuple[Array, Array]:
+    def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
         """A rotation about the axis."""
-        return spatial.rotation(axis, at), np.zeros(3)
+        return spatial.rotation(axis, float(at[0])), np.zeros(3)
 
     def resists(self, axis: Array, mass: float, inertia: Array) -> bool:
         """Inertia about the axis, more than rounding leaves of the others."""

@@ -1,0 +1,83 @@
+"""The coordinates and velocities of the joints of a tree of bodies, one joint after another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple, TypeVar
+
+from cgraph import Node
+
+from ..systems.quasi_velocities import QuasiVelocities
+from .body import Body
+
+Value = TypeVar("Value")
+
+
+class Places(NamedTuple):
+    """Where the coordinates and the velocities of a joint stand among all."""
+
+    q: slice
+    u: slice
+
+
+def places(bodies: Sequence[Body]) -> list[Places]:
+    """Of the joints of moving bodies."""
+    result, q, u = [], 0, 0
+    for body in bodies:
+        kind = body.joint.type
+        q_end, u_end = q + len(kind.coordinates), u + len(kind.velocities)
+        result.append(Places(slice(q, q_end), slice(u, u_end)))
+        q, u = q_end, u_end
+    return result
+
+
+def parts(
+    bodies: Sequence[Body], q: Sequence[Value], u: Sequence[Value]
+) -> list[tuple[Sequence[Value], Sequence[Value]]]:
+    """The coordinates and the velocities of the joint of each body."""
+    return [(q[place.q], u[place.u]) for place in places(bodies)]
+
+
+def coordinate_names(bodies: Sequence[Body]) -> tuple[str, ...]:
+    """Of all joints: the joint's, with a word for the coordinate where it has several."""
+    return tuple([_called(body, name) for body in bodies for name in body.joint.type.coordinates])
+
+
+def velocity_names(bodies: Sequence[Body]) -> tuple[str, ...]:
+    """Of all joints, likewise."""
+    return tuple([_called(body, name) for body in bodies for name in body.joint.type.velocities])
+
+
+def _called(body: Body, name: str) -> str:
+    return f"{body.coordinate}.{name}" if name else body.coordinate
+
+
+def per_velocity(bodies: Sequence[Body], values: Sequence[Value]) -> list[Value]:
+    """A value of each joint for each of its velocities."""
+    return [value for body, value in zip(bodies, values, strict=True) for _ in body.joint.type.velocities]
+
+
+def neutral(bodies: Sequence[Body]) -> list[float]:
+    """The neutral coordinates of all joints."""
+    return [value for body in bodies for value in body.joint.type.neutral]
+
+
+def quasi_velocities(bodies: Sequence[Body]) -> QuasiVelocities | None:
+    """How the joints' velocities move their coordinates; None where they are all rates of coordinates."""
+    types = [body.joint.type for body in bodies]
+    if coordinate_names(bodies) == velocity_names(bodies):
+        return None
+
+    def rate(q: Sequence[Node], u: Sequence[Node]) -> list[Node]:
+        joints = zip(types, parts(bodies, q, u), strict=True)
+        return [node for kind, (x, v) in joints for node in kind.rate(x, v)]
+
+    def structure(u: Sequence[Node], p: Sequence[Node]) -> list[Node]:
+        joints = zip(types, places(bodies), strict=True)
+        return [node for kind, place in joints for node in kind.structure(u[place.u], p[place.u])]
+
+    def normalized(q: Sequence[Node]) -> list[Node]:
+        return [node for kind, place in zip(types, places(bodies), strict=True) for node in kind.normalized(q[place.q])]
+
+    groups = [place.q.start + group for kind, place in zip(types, places(bodies), strict=True) for group in kind.groups]
+    return QuasiVelocities(velocity_names(bodies), rate, structure, neutral(bodies), normalized, groups)

@@ -1,0 +1,62 @@
+"""Ball: a joint that turns the body about a point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cgraph import Node
+
+from .. import spatial
+from ..spatial import Array, Triple
+from . import quaternion
+from .joint_type import NodeMatrix, SpatialJoint
+
+
+class Ball(SpatialJoint):
+    """A ball joint: a unit quaternion, and the angular velocity in the body's axes [rad/s]."""
+
+    kind = mjcf = "ball"
+    coordinates = quaternion.NAMES
+    velocities = ("wx", "wy", "wz")
+    units = ("", "", "", "")
+    neutral = quaternion.NEUTRAL
+    groups = (0, 0, 0, 0)
+
+    def rotation(self, q: Sequence[Node]) -> NodeMatrix:
+        """That of the quaternion."""
+        return quaternion.rotation(q)
+
+    def angular_velocity(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
+        """The velocities themselves."""
+        x, y, z = u
+        return x, y, z
+
+    def rate(self, q: Sequence[Node], u: Sequence[Node]) -> Sequence[Node]:
+        """That of the quaternion."""
+        return quaternion.rate(q, u)
+
+    def structure(self, u: Sequence[Node], p: Sequence[Node]) -> Sequence[Node]:
+        """omega x p."""
+        return quaternion.structure(u, p)
+
+    def normalized(self, q: Sequence[Node]) -> Sequence[Node]:
+        """Of length 1."""
+        return quaternion.normalized(q)
+
+    def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
+        """A rotation."""
+        return spatial.from_quaternion(at), np.zeros(3)
+
+    def resists(self, axis: Array, mass: float, inertia: Array) -> bool:
+        """Inertia about every axis, more than rounding leaves of the largest."""
+        moments = np.linalg.eigvalsh(inertia)
+        return bool(moments[0] > spatial.SNAP * moments[2])
+
+    def unobservable(self, mass: float, moment: Array, inertia: Array) -> tuple[float, Array, Array]:
+        """The mass, taken at the joint."""
+        return mass, np.zeros(3), np.zeros((3, 3))
+
+
+JOINT = Ball()
