@@ -256,7 +256,7 @@ def _joint(mj: Any, j: int, position: Array, orientation: Array) -> Joint:
     kind, axis, dof = _kind(mj, j), np.array(mj.jnt_axis[j]), mj.jnt_dofadr[j]
     zero = float(mj.qpos0[mj.jnt_qposadr[j]])
     if zero:
-        turn, shift = TYPES[kind].placement(axis, -zero)
+        turn, shift = TYPES[kind].placement(axis, np.array([-zero]))
         position, orientation = position + orientation @ shift, orientation @ turn
     return Joint(
         kind,

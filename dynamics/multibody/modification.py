@@ -13,7 +13,7 @@ from cgraph.extend import real_array
 
 from .body import Body, MechanismError
 from .external_force import Force
-from .joint_coordinates import coordinate_names, neutral, parts, places, velocity_names
+from .joint_coordinates import coordinate_names, neutral, places, velocity_names
 from .mechanism_fields import Structure
 from .spatial import Array
 from .subtree import Subtree, as_subtree, descendants, inserted
@@ -98,7 +98,7 @@ def map_state(
     for name, row, count in zip(("q", "qd"), rows, counts, strict=True):
         if row.shape != (count,):
             raise ValueError(f"{name} must have shape ({count},), one for each joint, got {row.shape}")
-    theirs = {body.name: part for body, part in zip(other, parts(other, *rows), strict=True)}
+    theirs = {body.name: (rows[0][place.q], rows[1][place.u]) for body, place in zip(other, places(other), strict=True)}
     q_new, qd_new = np.array(neutral(moving)), np.zeros(len(velocity_names(moving)))
     for body, place in zip(moving, places(moving), strict=True):
         if body.name in theirs:

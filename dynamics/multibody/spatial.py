@@ -37,9 +37,9 @@ def cleaned(array: Array) -> Array:
     return np.where(np.abs(array) <= SNAP * np.abs(array).max(initial=0.0), 0.0, array) + 0.0
 
 
-def from_quaternion(quaternion: Sequence[float]) -> Array:
+def from_quaternion(quaternion: ArrayLike) -> Array:
     """The rotation matrix of a quaternion (w, x, y, z), normalized here."""
-    w, x, y, z = np.asarray(quaternion, dtype=np.float64) / np.linalg.norm(quaternion)
+    w, x, y, z = np.asarray(quaternion, dtype=np.float64) / np.linalg.norm(np.asarray(quaternion))
     return snapped(
         np.array(
             [

@@ -80,7 +80,7 @@ def _torques(scene: scenes.Scene, shares: Mapping[str, NDArray[np.float64]]) -> 
     def text(value: float) -> str:
         return "≈0" if 0.0 < abs(value) <= ROUNDING * largest else f"{value:.4g}".replace("-", "−")
 
-    slides = any(body.joint.type.unit == "m" for body in scene.mechanism.moving) if scene.mechanism else False
+    slides = any("m" in body.joint.type.units for body in scene.mechanism.moving) if scene.mechanism else False
     caption = f"Torques that each part takes at t = 0 [N m{', of slides N' if slides else ''}]"
     rows = [[part, *map(text, torques)] for part, torques in shares.items()]
     return Table(caption, ["part", *(theme.pretty(f"tau{i}") for i in range(scene.system.n))], rows)

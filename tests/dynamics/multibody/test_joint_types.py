@@ -27,9 +27,9 @@ class Screw(Revolute):
     def shift(self, x: Node) -> Node:
         return PITCH * x
 
-    def placement(self, axis: Array, at: float) -> tuple[Array, Array]:
+    def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
         turn, _ = super().placement(axis, at)
-        return turn, PITCH * at * axis
+        return turn, PITCH * at[0] * axis
 
     def resists(self, axis: Array, mass: float, inertia: Array) -> bool:
         return mass > 0.0 or super().resists(axis, mass, inertia)
