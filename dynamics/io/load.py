@@ -39,8 +39,8 @@ def load_mjcf(source: Any, *, ignore: bool = False) -> Mechanism:
     source : str, path or MjModel
         A path, the XML text (it starts with "<"), or MuJoCo's own model.
     ignore : bool
-        Leave out what a mechanism cannot have: free and ball joints, which then are welds; tendons, equality, friction
-        loss, fluid, ... Contacts, limits and actuators, which act on a mechanism and do not belong to it, are always
+        Leave out what a mechanism cannot have: springs of ball joints, tendons, equality, friction loss, fluid, ...
+        Contacts, limits and actuators, which act on a mechanism and do not belong to it, are always
         left out.
 
     Returns
@@ -254,7 +254,10 @@ def _chain(mj: Any, body: int, names: list[str], parent: str, origin: Array) -> 
 def _joint(mj: Any, j: int, position: Array, orientation: Array) -> Joint:
     """The joint, with the frame where it is at q = 0: MuJoCo's stands at q = qpos0 (`ref`)."""
     kind, axis, dof = _kind(mj, j), np.array(mj.jnt_axis[j]), mj.jnt_dofadr[j]
-    zero = float(mj.qpos0[mj.jnt_qposadr[j]])
+    single = len(TYPES[kind].coordinates) == 1
+    zero = float(mj.qpos0[mj.jnt_qposadr[j]]) if single else 0.0
+    if kind == "free":  # its coordinates are the body's place in the world, whatever the file says of its frame
+        position, orientation = np.zeros(3), np.eye(3)
     if zero:
         turn, shift = TYPES[kind].placement(axis, np.array([-zero]))
         position, orientation = position + orientation @ shift, orientation @ turn
@@ -264,8 +267,8 @@ def _joint(mj: Any, j: int, position: Array, orientation: Array) -> Joint:
         position,
         orientation,
         damping=float(mj.dof_damping[dof]) * (not _disabled(mj, "DAMPER")),
-        stiffness=float(mj.jnt_stiffness[j]) * (not _disabled(mj, "SPRING")),
-        spring_reference=float(mj.qpos_spring[mj.jnt_qposadr[j]]),
+        stiffness=float(mj.jnt_stiffness[j]) * single * (not _disabled(mj, "SPRING")),
+        spring_reference=float(mj.qpos_spring[mj.jnt_qposadr[j]]) if single else 0.0,
         armature=float(mj.dof_armature[dof]),
     )
 
@@ -286,14 +289,15 @@ def _disabled(mj: Any, *what: str) -> bool:
 
 def _not_modelled(mj: Any) -> list[str]:
     """What the model has and a mechanism cannot have."""
-    free = [j for j in range(mj.njnt) if not _kind(mj, j)]
+    sprung = [j for j in _where(mj, "jnt_stiffness") if len(TYPES[_kind(mj, j)].coordinates) > 1]
+    sprung = [] if _disabled(mj, "SPRING") else sorted(sprung)
     pulling = sorted(set().union(*(_where(mj, f"tendon_{what}") for what in _OF_A_TENDON)))
     tendons = [mj.tendon(i).name or f"number {i}" for i in pulling]
     equalities = 0 if _disabled(mj, "CONSTRAINT", "EQUALITY") else int(np.sum(mj.eq_active0))
     rubbing = _any(mj, "dof_frictionloss", "tendon_frictionloss") and not _disabled(mj, "CONSTRAINT", "FRICTIONLOSS")
     return _present(
         {
-            f"free or ball joints ({_listed(_joint_names(mj, free))})": free,
+            f"springs of free or ball joints ({_listed(_joint_names(mj, sprung))})": sprung,
             f"tendons with a spring, damper or mass ({_listed(tendons)})": pulling,
             f"equality constraints ({equalities})": equalities,
             "friction loss": rubbing,
