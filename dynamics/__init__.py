@@ -3,6 +3,7 @@
 from cgraph import __version__ as __version__
 
 from . import scenes
+from .equations.constraint_rank import ConstraintWarning
 from .equations.coriolis import coriolis, damping_force
 from .equations.equations_of_motion import bias, energy, forward_dynamics, gravity_force, mass_matrix, momentum
 from .equations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious_nodes
@@ -18,7 +19,7 @@ from .io.write_mjcf import to_mjcf
 from .io.write_urdf import to_urdf
 from .multibody.build_tree import serial_arm, tree
 from .multibody.impact import Attached, FreeBody, Released, attach_with_impact, release
-from .multibody.mechanism import Body, Force, Joint, Mechanism, MechanismError
+from .multibody.mechanism import Body, Force, Joint, Loop, Mechanism, MechanismError
 from .multibody.planar_arm import planar_arm
 from .multibody.pruning import EFFECTS, OmittedTerm, PruneResult, prune
 from .multibody.recursive_inverse_dynamics import RecursiveInverseDynamics
@@ -30,6 +31,7 @@ from .simulation.ensembles import Ensemble, EnsembleStats, simulate_many
 from .simulation.event import Event
 from .simulation.simulate import simulate
 from .simulation.trajectory import Crossings, SimulationWarning, Stats, Trajectory
+from .systems.constraints import ConstraintError
 from .systems.model import as_system
 from .systems.ode_system import OdeSystem
 from .systems.quasi_velocities import QuasiVelocities
@@ -44,6 +46,8 @@ __all__ = [
     "Attached",
     "Body",
     "Certificate",
+    "ConstraintError",
+    "ConstraintWarning",
     "Crossings",
     "Ensemble",
     "EnsembleStats",
@@ -51,6 +55,7 @@ __all__ = [
     "Force",
     "FreeBody",
     "Joint",
+    "Loop",
     "Mechanism",
     "MechanismError",
     "OdeSystem",

@@ -136,6 +136,14 @@ def vector(what: str, value: Any, shape: tuple[int, ...] = (3,)) -> Array:
     return array
 
 
+def checked_rotation(what: str, value: Any) -> Array:
+    """The value as a rotation, (3, 3). Raises MechanismError, naming `what`, unless it is one."""
+    matrix = vector(what, value, (3, 3))
+    if np.abs(matrix.T @ matrix - np.eye(3)).max() > _ROUNDING or np.linalg.det(matrix) < 0:
+        raise MechanismError(f"{what} must be a rotation matrix")
+    return matrix
+
+
 def shape_of(value: Any) -> tuple[int, ...]:
     """The shape of an array or of nested sequences; () for rows of unlike length."""
     try:
@@ -180,9 +188,7 @@ def _checked_joint(where: str, joint: Joint) -> Joint:
     length = float(np.linalg.norm(axis))
     if not length:
         raise MechanismError(f"{where}: axis must not be zero")
-    orientation = vector(f"{where}: orientation", joint.orientation, (3, 3))
-    if np.abs(orientation.T @ orientation - np.eye(3)).max() > _ROUNDING or np.linalg.det(orientation) < 0:
-        raise MechanismError(f"{where}: orientation must be a rotation matrix")
+    orientation = checked_rotation(f"{where}: orientation", joint.orientation)
     stiffness = _number(f"{where}: stiffness", joint.stiffness)
     if stiffness and len(joint.type.coordinates) > 1:
         raise MechanismError(f"{where}: a spring needs a joint with one coordinate, got stiffness {stiffness!r}")

@@ -24,13 +24,25 @@ from .inertial_numbers import Link
 from .joint_coordinates import coordinate_names, per_velocity, quasi_velocities, velocity_names
 from .joint_positions import skeleton
 from .kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia
+from .loops import Loop, check_loop, coupling_row, loop_rows
 from .mechanism_fields import Structure
 from .modification import attach_subtree, detach_subtree, lock_joint, map_state, subtree_of, unlock_joint
+from .relative_placement import relative_placements
 from .spatial import Array
 from .subtree import Subtree
 from .tree_equations import TreeEquations
 
-__all__ = ["WORLD", "Body", "Force", "Joint", "Mechanism", "MechanismError", "as_mechanism", "require_mechanism"]
+__all__ = [
+    "WORLD",
+    "Body",
+    "Force",
+    "Joint",
+    "Loop",
+    "Mechanism",
+    "MechanismError",
+    "as_mechanism",
+    "require_mechanism",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +67,8 @@ class Mechanism(Structure):
         partial Lagrangian is then not the energy of its body.
     omitted : tuple of str
         Of a mechanism that was read from a file: what the file has and the mechanism has not, a sentence each.
+    loops : sequence of Loop
+        What holds bodies of the tree together, beside their joints, and closes it to loops.
 
     Raises
     ------
@@ -74,13 +88,24 @@ class Mechanism(Structure):
     def __post_init__(self) -> None:
         vector("gravity", self.gravity)
         require_flag("base_parameters", self.base_parameters)
-        for what, kind in (("bodies", Body), ("forces", Force)):  # kept, so that an iterator is read once
+        for what, kind in (
+            ("bodies", Body),
+            ("forces", Force),
+            ("loops", Loop),
+        ):  # kept, so that an iterator is read once
             object.__setattr__(self, what, _listed(what, kind, getattr(self, what)))
         for i, name in enumerate(self.coordinates):
             if name in self.coordinates[:i]:
                 raise MechanismError(f"two joints that move have the name {name!r}")
         for force in self.forces:
             check_force(force, set(self._carriers) - {WORLD})
+        bodies = {body.name: body for body in self.bodies}
+        for loop in self.loops:
+            check_loop(loop, bodies)
+        labels = [loop.label for loop in self.loops]
+        if len(set(labels)) < len(labels):
+            twice = next(label for label in labels if labels.count(label) > 1)
+            raise MechanismError(f"two loops have the name {twice!r}")
         used = {name for force in self.forces for name in force.names}
         for name in require_mapping("parameters", self.parameters, "name: value"):
             if name not in used:
@@ -94,6 +119,7 @@ class Mechanism(Structure):
         parts[0] += ", ..." if len(names) > 6 else ""
         parts += [f"locked {', '.join(list(self.locked)[:6])}"] if self.locked else []
         parts += [f"forces on {', '.join([force.body for force in self.forces[:6]])}"] if self.forces else []
+        parts += [f"loops {', '.join([loop.label for loop in self.loops[:6]])}"] if self.loops else []
         parts += [f"parameters {', '.join(self.parameter_values)}"] if self.parameter_values else []
         parts += [f"gravity {', '.join([f'{each:g}' for each in np.asarray(self.gravity)])}"]
         return f"<Mechanism of {'; '.join(parts)}>"
@@ -153,7 +179,20 @@ class Mechanism(Structure):
             forces=self._generalized_forces if self.forces else None,
             damping=per_velocity(self.moving, [body.joint.damping for body in self.moving]),
             quasi_velocities=quasi_velocities(self.moving),
+            constraints=self._loop_rows if self.loops else None,
         )
+
+    def _loop_rows(self, q: list[Node], t: Node) -> dict[str, Node]:
+        bodies = {body.name: body for body in self.bodies}
+        rows: dict[str, Node] = {}
+        for loop in self.loops:
+            if loop.kind == "coupling":
+                phi = [coupling_row(loop, self.moving, bodies, self.locked, q)]
+            else:
+                carriers = [self._carriers[name] for name in (loop.body, loop.to)]
+                phi = loop_rows(loop, *relative_placements(carriers, self.moving, self.links, q))
+            rows |= dict(zip(loop.rows, phi, strict=True))
+        return rows
 
     def _generalized_forces(self, q: list[Node], qd: list[Node], t: Node, p: dict[str, Node]) -> list[Node]:
         return generalized_forces([(force, self._chain(force.body, q, qd)) for force in self.forces], qd, p)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from .body import Body
 from .external_force import Force
 from .link_cache import SharedParts
+from .loops import Loop
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +24,7 @@ class Structure:
     locked: Mapping[str, float | ArrayLike] = field(default_factory=dict)
     base_parameters: bool = False
     omitted: tuple[str, ...] = ()
+    loops: Sequence[Loop] = ()
     shared: SharedParts = field(default_factory=SharedParts, repr=False, kw_only=True)
 
     @property
