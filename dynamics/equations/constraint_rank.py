@@ -166,7 +166,7 @@ class RowNumbers:
     def _point(self, q: Array, shown: Mapping[str, float]) -> dict[str, float]:
         return {f"q{i}": float(x) for i, x in enumerate(q)} | dict(shown)
 
-    def _moved(self, point: Mapping[str, float], step: Array) -> Array:
+    def _moved(self, point: Mapping[str, float], step: Any) -> Array:
         at = {name: point[name] for name in self.moved.input_names if name in point}
         at |= {f"d{i}": float(x) for i, x in enumerate(step)}
         return np.array(list(self.moved.evaluate(at).values()), dtype=np.float64)

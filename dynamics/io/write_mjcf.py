@@ -62,6 +62,8 @@ def mjcf_text(
     """The text of a mechanism with more elements: `head` before the bodies, `shapes` in the bodies of those names."""
     if mechanism.forces:
         raise MechanismError(f"MJCF has no forces, there is one on body {mechanism.forces[0].body!r}")
+    if mechanism.loops:
+        raise MechanismError(f"loops are not written to MJCF; there is {mechanism.loops[0].label!r}")
     children: dict[str, list[Body]] = {}
     for body in mechanism.moving:
         children.setdefault(body.parent, []).append(body)

@@ -46,6 +46,8 @@ def to_urdf(model: Model) -> str:
     mechanism = require_mechanism(model, "URDF")
     if mechanism.forces:
         raise MechanismError(f"URDF has no forces, there is one on body {mechanism.forces[0].body!r}")
+    if mechanism.loops:
+        raise MechanismError(f"loops are not written to URDF; there is {mechanism.loops[0].label!r}")
     lines = ['<?xml version="1.0"?>', '<robot name="mechanism">', '  <link name="world"/>']
     for body in mechanism.moving:
         lines += [*_link_lines(body), *_joint_lines(body)]

@@ -263,7 +263,10 @@ class Mechanism(Structure):
         return subtree_of(self, body)
 
     def detach(self, body: str) -> Mechanism:
-        """The mechanism without a body and all that it carries. Raises MechanismError for an unknown body."""
+        """The mechanism without a body and all that it carries, and without the loops that held these.
+
+        Raises MechanismError for an unknown body.
+        """
         return detach_subtree(self, body)
 
     def attach(self, subtree: Subtree | Body | Iterable[Body], to: str | None = None) -> Mechanism:

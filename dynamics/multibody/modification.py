@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import real_array
 
-from .body import Body, MechanismError
+from .body import WORLD, Body, MechanismError
 from .external_force import Force
 from .joint_coordinates import coordinate_names, neutral, places, velocity_names
 from .mechanism_fields import Structure
@@ -51,6 +51,7 @@ def subtree_of(structure: Structure, body: str) -> Subtree:
         forces,
         _used(structure, forces),
         {name: at for name, at in structure.locked.items() if name in names},
+        tuple([loop for loop in structure.loops if {loop.body, loop.to} <= {*names, WORLD}]),
     )
 
 
@@ -64,6 +65,7 @@ def detach_subtree(structure: AnyStructure, body: str) -> AnyStructure:
         forces=forces,
         parameters=_used(structure, forces),
         locked={name: at for name, at in structure.locked.items() if name not in names},
+        loops=tuple([loop for loop in structure.loops if names.isdisjoint((loop.body, loop.to))]),
     )
 
 
@@ -82,6 +84,7 @@ def attach_subtree(
         forces=(*structure.forces, *given.forces),
         parameters={**structure.parameters, **given.parameters},
         locked={**structure.locked, **given.locked},
+        loops=(*structure.loops, *given.loops),
     )
 
 

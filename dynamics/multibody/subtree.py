@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from .body import WORLD, Body, MechanismError
 from .external_force import Force
+from .loops import Loop
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +30,8 @@ class Subtree:
         The values that the forces use.
     locked : mapping
         {body: coordinate [rad or m]} of their joints that are locked.
+    loops : tuple of Loop
+        Among these bodies, and with the world.
 
     Examples
     --------
@@ -44,6 +47,7 @@ class Subtree:
     forces: tuple[Force, ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     locked: Mapping[str, float | ArrayLike] = field(default_factory=dict)
+    loops: tuple[Loop, ...] = ()
 
     def with_parent(self, parent: str) -> tuple[Body, ...]:
         """The bodies, with the first on that parent."""

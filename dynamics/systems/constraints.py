@@ -50,7 +50,8 @@ class Constraints:
         self.kinematics, self.t, self.parameters = kinematics, t, parameters
         p = Parameters(parameters)
         q, u = kinematics.q, kinematics.u
-        given, self.names = {}, []
+        given: dict[str, tuple[Node, ...]] = {}
+        self.names: list[str] = []
         for what, function, arguments in (
             ("constraints", positions, (q, t, p)),
             ("velocity_constraints", velocities, (q, u, t, p)),
