@@ -165,15 +165,14 @@ def simulate(
     outcome = _integrate(run, start.x, recorder, options, problem.rate, steps)
 
     # Put the result together
-    times, states = recorder.table()
-    half = len(start.x) if problem.system is None else problem.system.n
+    (times, states), nq = recorder.table(), problem.nq
     stats = _stats(run, options.method, outcome)
     for text in stats.warnings:
         warnings.warn(text, SimulationWarning, stacklevel=2)
     energies = np.full(len(times), math.nan) if energy is None else row_values(energy, times, states)[:, 0]
-    dense = None if steps is None else Solution(options.t0, start.x, steps, half)
-    rows = (times, states[:, :half], states[:, half:], energies)
-    return Trajectory(*rows, stats, log.crossings(half) if log else {}, _graphs(problem), dense)
+    dense = None if steps is None else Solution(options.t0, start.x, steps, nq)
+    rows = (times, states[:, :nq], states[:, nq:], energies)
+    return Trajectory(*rows, stats, log.crossings(nq) if log else {}, _graphs(problem), dense)
 
 
 def _compiled(problem: Problem, options: RunOptions, *, between: bool) -> Callable[[RunOptions], Integration]:
@@ -249,7 +248,7 @@ def _run(
         recorder.add(block)
         if steps is not None:
             steps.append(block)
-            kept += sum(array.nbytes for array in block if array is not None)
+            kept += block.nbytes
         if recorder.size + kept > most:
             last = f"{recorder.last:.6g} s"
             run.status = f"stopped at t = {last}: the rows fill the memory; t_eval records fewer"

@@ -147,11 +147,11 @@ def simulate_many(
     _run(task, chunks, team, result)
 
     # Put the result together
-    half = problem.size if problem.system is None else problem.system.n
+    nq = problem.nq
     stats, rows = result.stats(method, time.perf_counter() - begin), result.rows
     if text := _warning(stats):
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    return Ensemble(options.row_times, rows[:, :, :half], rows[:, :, half:], stats, result.events(watch, half))
+    return Ensemble(options.row_times, rows[:, :, :nq], rows[:, :, nq:], stats, result.events(watch, nq))
 
 
 def _row_count(options: RunOptions) -> int:
