@@ -3,6 +3,7 @@
 from cgraph import __version__ as __version__
 
 from . import scenes
+from .equations.consistent_state import consistent_state
 from .equations.constraint_rank import ConstraintWarning
 from .equations.coriolis import coriolis, damping_force
 from .equations.equations_of_motion import bias, energy, forward_dynamics, gravity_force, mass_matrix, momentum
@@ -78,6 +79,7 @@ __all__ = [
     "bias",
     "cases",
     "certify",
+    "consistent_state",
     "coriolis",
     "damping_force",
     "energy",

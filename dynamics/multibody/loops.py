@@ -110,7 +110,7 @@ def check_loop(loop: Loop, bodies: Mapping[str, Body]) -> None:
     if not isinstance(loop, Loop):
         raise MechanismError(f"loops must be of the type Loop, got {type(loop).__name__}: {loop!r:.60}")
     for name in (loop.body, loop.to):
-        if not isinstance(name, str) or name not in bodies and (name != WORLD or name is loop.body):
+        if not isinstance(name, str) or (name not in bodies and (name != WORLD or name is loop.body)):
             raise MechanismError(f"there is a loop on the unknown body {name!r:.80}")
     try:
         check_name("a loop", loop.label)

@@ -146,7 +146,7 @@ def simulate(
     watched = as_events(events)
     if not isinstance(dense_output, bool):
         raise TypeError(f"dense_output must be True or False, got {dense_output!r:.40}")
-    start = initial_value(model, q, qd, tau, parameters)
+    start = initial_value(model, q, qd, tau, parameters, t0)
     options.check(start.states)
     options.check_room(len(start.x))
 

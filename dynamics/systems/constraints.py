@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
-import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Builder, check_name, cotangents, tangents, topological
 
@@ -30,6 +29,12 @@ class ConstraintError(ValueError):
     ...     print(error)
     the constraints cannot be met: no state was seen where 'wall' is 0
     """
+
+
+class SystemWithConstraints(Protocol):
+    """What `require_unconstrained` reads of a system."""
+
+    constraints: Constraints
 
 
 class Constraints:
@@ -100,3 +105,9 @@ def _rows(what: str, given: Any) -> dict[str, Node]:
     for name in given:
         check_name("a constraint", name)
     return {name: node_or_number(f"constraint {name!r}", row) for name, row in given.items()}
+
+
+def require_unconstrained(system: SystemWithConstraints, what: str) -> None:
+    """Raises ValueError, saying that `what` does not know constraints, where a system has any."""
+    if len(system.constraints):
+        raise ValueError(f"{what} does not know constraints yet; {system.constraints.names[0]!r} holds this system")

@@ -126,7 +126,7 @@ def simulate_many(
     options = RunOptions(t_end, method, *arguments, t0, estimate_error)
     watched, team = as_events(events), checked(workers)
     _check_chunk(chunk)
-    start = starts(model, q, qd, tau, parameters)
+    start = starts(model, q, qd, tau, parameters, t0)
     options.check(start.states)
     count = _row_count(options)
     _check_room(start.x, count)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,6 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.multibody.spatial import rotation
 
 from ..mechanisms import random_body
 
