@@ -8,6 +8,7 @@ from .equations.constraint_rank import ConstraintWarning
 from .equations.coriolis import coriolis, damping_force
 from .equations.equations_of_motion import bias, energy, forward_dynamics, gravity_force, mass_matrix, momentum
 from .equations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious_nodes
+from .equations.integrability import integrable_rows
 from .equations.linearization import linearize, state_space
 from .equations.singular_mass_matrix import SingularMassMatrixError, raise_if_singular
 from .equations.state_equation import state_equation
@@ -86,6 +87,7 @@ __all__ = [
     "forward_dynamics",
     "gravity_force",
     "inertial_parameters",
+    "integrable_rows",
     "inverse_dynamics",
     "linearize",
     "load_mjcf",

@@ -52,7 +52,8 @@ def independent_rows(constraints: Constraints) -> tuple[int, ...]:
     numbers = RowNumbers(constraints)
     kept: list[int] = []
     acting = np.zeros(len(constraints), dtype=bool)
-    for matrix in numbers.matrices():
+    for point in numbers.states():
+        matrix = numbers.certain_matrix(point)
         kept = sorted({*kept, *_independent(matrix)})
         acting |= matrix.any(axis=1)
         if len(kept) == len(constraints):
@@ -86,13 +87,13 @@ class RowNumbers:
         ]
         self.inputs = [*kinematics.q, constraints.t, *cg.variables(list(constraints.parameters))]
         numbered = [(f"phi{k}", phi) for k, phi in enumerate(constraints.positions)]
-        self.phi = Graph(self.inputs, dict(numbered))
+        self.phi = Graph(self.inputs, dict(numbered)) if numbered else None
         self.columns = Graph([*self.inputs, *weights], {f"J{i}": bar for i, bar in enumerate(bars)})
         normalized = kinematics.normalized(moved)
         self.moved = Graph([*kinematics.q, *displaced.values()], {f"{i}": node for i, node in enumerate(normalized)})
 
-    def matrices(self) -> Iterator[Array]:
-        """J, (m, n), at some random states that meet the constraints, with 0 for entries that are rounding alone."""
+    def states(self) -> Iterator[dict[str, float]]:
+        """Some random states that meet the constraints: values of q0.., t and parameters."""
         rng, found = np.random.default_rng(0), 0
         nearest: tuple[float, int] | None = None
         neutral = np.array(self.constraints.kinematics.neutral)
@@ -100,7 +101,7 @@ class RowNumbers:
             start = neutral + spread * rng.uniform(-1.0, 1.0, self.nq)
             closing = self.closed(start, float(rng.uniform(0.3, 1.2)))
             if closing.worst is None:
-                yield self.certain_matrix(closing.point)
+                yield closing.point
                 found += 1
                 if found == STATES:
                     return
@@ -158,6 +159,8 @@ class RowNumbers:
 
     def _phi(self, point: Mapping[str, float]) -> tuple[Array, Array]:
         """phi, and the rows that are not 0 to their rounding."""
+        if self.phi is None:
+            return np.zeros(0), np.zeros(0, dtype=int)
         values = self.phi.evaluate(dict(point))
         digits = certain_digits(self.phi, point)
         certain = [k for k, name in enumerate(values) if digits[name] >= 0.5 and values[name] != 0.0]

@@ -14,6 +14,7 @@ from cgraph.extend import Builder, building, check_name, is_finite
 
 from . import spatial
 from .body import WORLD, Body, MechanismError, checked_rotation, vector
+from .forward_kinematics import KinematicChain
 from .joint_coordinates import places
 from .kinematic_tree import locked_at
 from .relative_placement import RelativePlacement
@@ -25,7 +26,9 @@ ROWS = {
     "weld": ("x", "y", "z", "about x", "about y", "about z"),
     "distance": ("",),
     "coupling": ("",),
+    "rolling": ("height",),
 }
+SLIPS = ("slip x", "slip y")  # rows of velocities of a rolling wheel
 ROUNDING = 1e-9  # of the lengths of a loop: what is left of rows that numbers from text close
 
 
@@ -39,16 +42,18 @@ class Loop:
         "point": a point of the body is on a point of the other. "hinge": and an axis along an axis. "weld": and all
         axes. "distance": the points are `length` apart, as by a rod with ball joints. "coupling": the coordinate of the
         body's joint is a polynomial of that of the other's, as in gears (URDF `mimic`, MJCF `equality/joint`).
+        "rolling": a wheel with a thin rim, about `axis` through `at`, of radius `length`, rolls without slip on the
+        plane of the other through `to_at` with the normal `to_axis` (nonholonomic).
     body, to : str
         Names of the bodies; `to` may be "world", except in a coupling without a second joint.
     at, to_at : array_like, (3,)
         The points, each in its body's frame [m].
     axis, to_axis : array_like, (3,)
-        Of a "hinge", each in its body's axes; need not have length 1.
+        Of a "hinge" and a "rolling", each in its body's axes; need not have length 1.
     orientation : array_like, (3, 3)
         Of a "weld": the body's axes as columns in those of the other.
     length : float
-        Of a "distance", positive [m].
+        Of a "distance" and a "rolling", positive [m].
     coefficients : sequence of float
         Of a "coupling": c0, c1, .. of q = c0 + c1 q_to + c2 q_to^2 + ... [rad or m].
     name : str
@@ -63,7 +68,8 @@ class Loop:
     -----
     Rows are in the axes of the body that carries both, or the world's. Their multipliers are the force on `body`
     [N] at the point, and, of a hinge and a weld, the torque on it [N m] about axes of the other: x and y across its
-    axis, or its own. Of a distance it is the force that pushes them apart, of a coupling the force on the coordinate.
+    axis, or its own. Of a distance it is the force that pushes them apart, of a coupling the force on the coordinate,
+    of a rolling wheel the force of the plane across it and along two axes in it.
 
     Examples
     --------
@@ -104,6 +110,11 @@ class Loop:
         """Names of its rows."""
         return tuple([f"{self.label} {row}".rstrip() for row in ROWS[self.kind]])
 
+    @property
+    def velocity_rows(self) -> tuple[str, ...]:
+        """Names of its rows of velocities alone."""
+        return tuple([f"{self.label} {row}" for row in SLIPS]) if self.kind == "rolling" else ()
+
 
 def check_loop(loop: Loop, bodies: Mapping[str, Body]) -> None:
     """Raises MechanismError unless the loop's bodies are there and its numbers are what its kind needs."""
@@ -119,13 +130,13 @@ def check_loop(loop: Loop, bodies: Mapping[str, Body]) -> None:
     where = f"loop {loop.label!r}"
     for what in ("at", "to_at"):
         vector(f"{where}: {what}", getattr(loop, what))
-    if loop.kind == "hinge":
+    if loop.kind in ("hinge", "rolling"):
         for what in ("axis", "to_axis"):
             if not np.any(vector(f"{where}: {what}", getattr(loop, what))):
                 raise MechanismError(f"{where}: {what} must not be zero")
     if loop.kind == "weld":
         checked_rotation(f"{where}: orientation", loop.orientation)
-    if loop.kind == "distance" and not (is_finite(loop.length) and loop.length > 0.0):
+    if loop.kind in ("distance", "rolling") and not (is_finite(loop.length) and loop.length > 0.0):
         raise MechanismError(f"{where}: length must be positive and finite, got {loop.length!r:.60} m")
     if loop.kind == "coupling":
         _check_coupling(loop, where, bodies)
@@ -149,9 +160,13 @@ def loop_rows(loop: Loop, body: RelativePlacement, to: RelativePlacement) -> lis
         if loop.kind == "distance":
             length = float(loop.length)
             return [(0.5 / length) * (spatial.dot(gap, gap) - length * length)]
+        axis, target = (spatial.to_z(_unit(each)) for each in (loop.axis, loop.to_axis))
+        if loop.kind == "rolling":
+            normal = to.direction(target[:, 2])
+            tilt = spatial.dot(body.direction(axis[:, 2]), normal)
+            return [spatial.dot(gap, normal) - float(loop.length) * cg.sqrt(1.0 - tilt * tilt)]
         rows = list(gap)
         if loop.kind == "hinge":
-            axis, target = (spatial.to_z(_unit(each)) for each in (loop.axis, loop.to_axis))
             along = body.direction(axis[:, 2])
             rows += [-spatial.dot(to.direction(target[:, 1]), along), spatial.dot(to.direction(target[:, 0]), along)]
         if loop.kind == "weld":
@@ -159,6 +174,23 @@ def loop_rows(loop: Loop, body: RelativePlacement, to: RelativePlacement) -> lis
             x_to, y_to, z_to = (to.direction(column) for column in np.eye(3))
             rows += [spatial.dot(y, z_to), spatial.dot(z, x_to), spatial.dot(x, y_to)]
     return _without_rounding(rows, [*body.lengths(loop.at), *to.lengths(loop.to_at)])
+
+
+def slip_rows(loop: Loop, body: KinematicChain, to: KinematicChain) -> list[Node]:
+    """The velocity of a rolling wheel's lowest point against the plane, along two axes of it; in the world's axes."""
+    with building(Builder()), cg.tag(loop.label):
+        axis, target = (spatial.to_z(_unit(each)) for each in (loop.axis, loop.to_axis))
+        x, y, normal = (to.direction(spatial.constant(column)) for column in target.T)
+        along = body.direction(spatial.constant(axis[:, 2]))
+        tilt = spatial.dot(along, normal)
+        down = spatial.plus(spatial.scaled(tilt, along), spatial.scaled(-1.0, normal))
+        arm = spatial.scaled(float(loop.length) / cg.sqrt(1.0 - tilt * tilt), down)
+        wheel, ground = body.motion(loop.at), to.motion(loop.to_at)
+        slip = spatial.plus(wheel.velocity, spatial.cross(wheel.omega, arm))
+        reach = spatial.plus(spatial.plus(wheel.position, arm), spatial.scaled(-1.0, ground.position))
+        moving = spatial.plus(ground.velocity, spatial.cross(ground.omega, reach))
+        slip = spatial.plus(slip, spatial.scaled(-1.0, moving))
+        return [spatial.dot(x, slip), spatial.dot(y, slip)]
 
 
 def coupling_row(loop: Loop, bodies: Sequence[Body], all_bodies: Mapping[str, Body], locked: Mapping[str, ArrayLike],

@@ -24,7 +24,7 @@ from .inertial_numbers import Link
 from .joint_coordinates import coordinate_names, per_velocity, quasi_velocities, velocity_names
 from .joint_positions import skeleton
 from .kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia
-from .loops import Loop, check_loop, coupling_row, loop_rows
+from .loops import Loop, check_loop, coupling_row, loop_rows, slip_rows
 from .mechanism_fields import Structure
 from .modification import attach_subtree, detach_subtree, lock_joint, map_state, subtree_of, unlock_joint
 from .relative_placement import relative_placements
@@ -180,6 +180,7 @@ class Mechanism(Structure):
             damping=per_velocity(self.moving, [body.joint.damping for body in self.moving]),
             quasi_velocities=quasi_velocities(self.moving),
             constraints=self._loop_rows if self.loops else None,
+            velocity_constraints=self._slip_rows if any(loop.velocity_rows for loop in self.loops) else None,
         )
 
     def _loop_rows(self, q: list[Node], t: Node) -> dict[str, Node]:
@@ -192,6 +193,14 @@ class Mechanism(Structure):
                 carriers = [self._carriers[name] for name in (loop.body, loop.to)]
                 phi = loop_rows(loop, *relative_placements(carriers, self.moving, self.links, q))
             rows |= dict(zip(loop.rows, phi, strict=True))
+        return rows
+
+    def _slip_rows(self, q: list[Node], qd: list[Node], t: Node) -> dict[str, Node]:
+        rows: dict[str, Node] = {}
+        for loop in self.loops:
+            if loop.velocity_rows:
+                slips = slip_rows(loop, self._chain(loop.body, q, qd), self._chain(loop.to, q, qd))
+                rows |= dict(zip(loop.velocity_rows, slips, strict=True))
         return rows
 
     def _generalized_forces(self, q: list[Node], qd: list[Node], t: Node, p: dict[str, Node]) -> list[Node]:

@@ -10,6 +10,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 
+from ..linkages import ACROSS, bar, four_bar, squeezer
 from ..mechanisms import random_body
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -74,7 +75,7 @@ def velocity_rows(model: dyn.Mechanism, loop: dyn.Loop) -> cg.Graph:
 
 
 def closed_tree(kind: str, seed: int = 0) -> tuple[dyn.Mechanism, dyn.Loop, dict[str, float]]:
-    """Two chains of 4 and 3 joints on the second of 2 others, held together by a loop; and a state where it is closed."""
+    """Two chains, of 3 and 4 joints, on one of 2, held together by a loop; and a state where it is closed."""
     rng, parents = np.random.default_rng(seed), ["world", "b0", "b1", "b2", "b3", "b1", "b5", "b6", "b7"]
     kinds = ["revolute", "revolute", "prismatic"] * 3
     bodies = [random_body(f"b{i}", kinds[i], parent, rng) for i, parent in enumerate(parents)]
@@ -112,7 +113,7 @@ def test_accelerations_and_loop_forces_solve_the_defining_equations(kind: str) -
     model, loop, at = closed_tree(kind)
     tree = dyn.Mechanism(model.bodies, model.gravity)
     expected, forces = dense_kkt(tree, at, velocity_rows(tree, loop))
-    for method in ("recursive", "dense"):
+    for method in ("recursive", "dense") if kind == "point" else ("recursive",):
         graph = dyn.forward_dynamics(model, method)
         found = graph.evaluate(at)
         udot = np.array([found[f"qdd{i}"] for i in range(9)])
@@ -126,3 +127,158 @@ def values_of_row(model: dyn.Mechanism, k: int, at: dict[str, float]) -> Array:
     system = model.system
     rate = cg.Graph([*system.q, *system.qd], {"z": system.constraints.rates[k]})
     return values(cg.gradient(rate, [f"qd{i}" for i in range(system.n)]), at)
+
+
+def node_count(n: int) -> int:
+    arm = dyn.planar_arm([1.0] * n, [0.8] * n)
+    pinned = dyn.Mechanism(arm.bodies, arm.gravity, loops=[dyn.Loop("point", "tip", to_at=(1.0, 0.0, 0.0))])
+    return len(dyn.forward_dynamics(pinned, "recursive").nodes)
+
+
+def test_a_pinned_chain_grows_linearly() -> None:
+    counts = [node_count(n) for n in (3, 4, 10, 16)]
+    assert counts == [259, 399, 1233, 2067]
+    assert [counts[0] <= 270, counts[2] <= 1290] == [True, True]
+
+
+def ladder(rungs: int) -> dyn.Mechanism:
+    """Four-bars on one another: every coupler carries the next."""
+    bodies, loops, base = [], [], "world"
+    for k in range(rungs):
+        left, right, top = f"left {k}", f"right {k}", f"top {k}"
+        bodies += [
+            bar(left, base, 0.3, (0, 0, 0.1)),
+            bar(top, left, 0.7, (0.3, 0, 0)),
+            bar(right, base, 0.4, (0.9, 0, 0)),
+        ]
+        loops.append(dyn.Loop("point", top, right, at=(0.7, 0, 0), to_at=(0.4, 0, 0)))
+        base = top
+    return dyn.Mechanism(bodies, loops=loops)
+
+
+def test_each_of_many_loops_is_eliminated_where_it_closes() -> None:
+    counts = [len(dyn.forward_dynamics(ladder(k), "recursive").nodes) for k in (2, 3, 4, 5)]
+    growth = np.diff(counts)
+    assert growth.max() - growth.min() <= 0.02 * growth.max()
+
+
+def test_andrews_squeezer_has_the_published_accelerations_forces_and_motion() -> None:
+    model = squeezer()
+    q = [-0.0617138900142764496, 0.0, 0.455279819163070380, 0.487364979543842550, 0.222668390165885885]
+    q += [1.23054744454982119, -0.222668390165885885]
+    at = {f"{kind}{i}": 0.0 for kind in ("qd", "tau") for i in range(7)} | {f"q{i}": x for i, x in enumerate(q)}
+    found = dyn.forward_dynamics(model).evaluate(at | {"tau0": 0.033})
+    assert found["qdd0"] == pytest.approx(14222.4439199541138705911625887, rel=1e-13)
+    assert found["qdd1"] == pytest.approx(-10666.8329399655854029433719415, rel=1e-13)
+    assert max(abs(found[f"qdd{i}"]) for i in range(2, 7)) < 1e-13 * found["qdd0"]
+    assert found["lambda0"] == pytest.approx(-98.5668703962410896057654982170, rel=1e-13)
+    assert found["lambda1"] == pytest.approx(6.12268834425566265503114393122, rel=1e-12)
+    run = dyn.simulate(model, q, [0.0] * 7, 0.03, rtol=1e-11, tau=[0.033] + [0.0] * 6)
+    final = [15.81077119629904, -15.75637105984298, 0.04082224013073101, 0.5244099658805304, -0.5347301163226948]
+    assert run.q[-1] == pytest.approx([*final, 1.048080741042263, 0.5347301163226948], rel=1e-9)
+
+
+def residuals(model: dyn.Mechanism, run: dyn.Trajectory) -> tuple[float, float]:
+    """The largest phi and the largest rate of a motion."""
+    system = model.system
+    rows = {"phi": system.constraints.positions, "rate": system.constraints.rates}
+    state = {f"q{i}": column for i, column in enumerate(run.q.T)} | {f"qd{i}": x for i, x in enumerate(run.qd.T)}
+    largest = []
+    for nodes in rows.values():
+        graph = cg.Graph([*system.q, *system.qd], {f"{k}": node for k, node in enumerate(nodes)})
+        largest.append(max(float(np.abs(value).max()) for value in graph.evaluate(state).values()))
+    return largest[0], largest[1]
+
+
+@pytest.mark.parametrize(("method", "options"), [("dop853", {"rtol": 1e-9}), ("rk4", {})])
+def test_a_motion_of_50_s_stays_on_its_constraints(method: str, options: dict[str, float]) -> None:
+    model = four_bar()
+    q, qd = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    times = np.linspace(0.0, 50.0, 301)  # between steps, too
+    run = dyn.simulate(model, q, qd, 50.0, method, t_eval=times, **options)  # type: ignore[arg-type]
+    position, velocity = residuals(model, run)
+    assert position < 1e-12
+    assert velocity < 1e-13
+
+
+def test_a_loop_cut_elsewhere_moves_alike() -> None:
+    one, other = four_bar(), four_bar(cut=4)
+    q, qd = dyn.consistent_state(one, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    relative = [*q[:2], q[2] - q[0] - q[1]], [*qd[:2], qd[2] - qd[0] - qd[1]]
+    first = dyn.simulate(one, q, qd, 2.0, rtol=1e-11, t_eval=[2.0])
+    second = dyn.simulate(other, *dyn.consistent_state(other, *relative), 2.0, rtol=1e-11, t_eval=[2.0])
+    assert second.q[0, :2] == pytest.approx(first.q[0, :2], abs=1e-8)
+    assert second.q[0].sum() == pytest.approx(first.q[0, 2], abs=1e-8)
+
+
+def test_a_slider_crank_moves_as_its_closed_form_says() -> None:
+    """Of a rod without mass but at the slider: a crank of inertia I and a slider m at x(a), one freedom."""
+    r, rod, inertia, m = 0.2, 0.7, 0.05, 1.3
+    crank = dyn.Body("crank", dyn.Joint("revolute", ACROSS), inertia=(0.0, inertia, inertia))
+    slider = dyn.Body("slider", dyn.Joint("prismatic", (1.0, 0.0, 0.0)), mass=m)
+    hold = dyn.Loop("distance", "crank", "slider", at=(r, 0.0, 0.0), length=rod)
+    model = dyn.Mechanism([crank, slider], loops=[hold])
+    (a,) = cg.variables("q0")
+    place = r * cg.cos(a) + cg.sqrt(rod**2 - (r * cg.sin(a)) ** 2)
+    known = dyn.System(lambda q, qd, t: 0.5 * inertia * qd[0] ** 2 + 0.5 * m * (slope(place, q[0]) * qd[0]) ** 2, ["a"])
+    x, slopes = (cg.Graph([a], {"x": node}).evaluate({"q0": 0.7})["x"] for node in (place, slope(place, a)))
+    state = {"q0": 0.7, "q1": x, "qd0": 3.0, "qd1": 3.0 * slopes, "tau0": 0.4, "tau1": 0.0}
+    expected = dyn.forward_dynamics(known).evaluate({"q0": 0.7, "qd0": 3.0, "tau0": 0.4})["qdd0"]
+    assert dyn.forward_dynamics(model).evaluate(state)["qdd0"] == pytest.approx(expected, rel=1e-12)
+
+
+def slope(node: cg.Node, a: cg.Node) -> cg.Node:
+    return next(iter(cg.gradient(cg.Graph([a], {"y": node})).outputs.values()))
+
+
+def test_a_hinge_in_a_plane_holds_what_a_point_does() -> None:
+    """Three of its rows say nothing about a planar linkage, and cost nothing."""
+    graphs = [dyn.forward_dynamics(four_bar(kind)) for kind in ("point", "hinge")]
+    at = {f"{kind}{i}": 0.3 * i + 0.2 for kind in ("q", "qd", "tau") for i in range(3)}
+    values_ = [graph.evaluate(at) for graph in graphs]
+    assert {name: values_[1][name] for name in values_[0]} == values_[0]
+    assert [values_[1][f"lambda{k}"] for k in (1, 3, 4)] == [0.0, 0.0, 0.0]
+    assert len(graphs[0].nodes) == len(graphs[1].nodes)
+
+
+def test_a_redundant_loop_is_named_and_left_out() -> None:
+    bars = four_bar()
+    again = dyn.Loop("point", "rocker", "coupler", at=(0.6, 0, 0), to_at=(0.8, 0, 0), name="again")
+    twice = dyn.Mechanism(bars.bodies, bars.gravity, loops=[*bars.loops, again])
+    with pytest.warns(dyn.ConstraintWarning, match="constraints 'again x' and 'again z' follow from the others"):
+        graph = dyn.forward_dynamics(twice)
+    at = {f"{kind}{i}": 0.3 * i + 0.2 for kind in ("q", "qd", "tau") for i in range(3)}
+    once = dyn.forward_dynamics(bars).evaluate(at)
+    assert {name: value for name, value in graph.evaluate(at).items() if name in once} == once
+
+
+def test_a_loop_that_cannot_close_is_named() -> None:
+    long = dyn.Mechanism(
+        [bar("crank", "world", 0.1, (0, 0, 0)), bar("rod", "crank", 0.2, (0.1, 0, 0))],
+        loops=[dyn.Loop("point", "rod", at=(0.2, 0, 0), to_at=(0.9, 0, 0), name="far")],
+    )
+    with pytest.raises(dyn.ConstraintError, match="no state was seen where 'far x' is 0"):
+        dyn.forward_dynamics(long)
+    with pytest.raises(dyn.ConstraintError, match="cannot be moved onto the constraints: 'coupler to rocker"):
+        dyn.simulate(four_bar(), [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 1.0)
+
+
+def test_a_start_off_the_constraints_is_moved_and_said_to_be() -> None:
+    model = four_bar()
+    q, qd = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    with pytest.warns(dyn.ConstraintWarning, match="was moved onto them: coordinate 'coupler' by 0.00"):
+        run = dyn.simulate(model, q + 1e-3, qd, 0.01)
+    assert residuals(model, run)[0] < 1e-15
+
+
+def test_a_loop_among_locked_joints_is_a_weld() -> None:
+    model = four_bar()
+    q, _ = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    free = bar("load", "coupler", 0.2, (0.4, 0, 0))
+    loaded = dyn.Mechanism([*model.bodies, free], model.gravity, loops=model.loops)
+    stiff = loaded
+    for name, at in zip(("crank", "coupler", "rocker"), q.tolist(), strict=True):
+        stiff = stiff.lock(name, at)
+    welded = dyn.Mechanism(stiff.bodies, stiff.gravity, locked=stiff.locked)
+    at = {"q0": 0.3, "qd0": 0.5, "tau0": 0.7}
+    assert dyn.forward_dynamics(stiff).evaluate(at)["qdd0"] == dyn.forward_dynamics(welded).evaluate(at)["qdd0"]

@@ -1,0 +1,67 @@
+"""Linkages for tests: four-bars, a slider-crank and Andrews' squeezer."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cgraph as cg
+import dynamics as dyn
+
+ACROSS = (0.0, 1.0, 0.0)
+
+
+def bar(name: str, parent: str, length: float, place: Any, mass: float = 1.0, kind: str = "revolute") -> dyn.Body:
+    """A uniform rod along x, on a hinge about y."""
+    inertia = mass * length**2 / 12.0
+    joint = dyn.Joint(kind, ACROSS, place)
+    return dyn.Body(name, joint, parent, mass, (0.5 * length, 0.0, 0.0), (0.0, inertia, inertia))
+
+
+def four_bar(kind: str = "point", *, cut: int = 3, weights: float = 1.0) -> dyn.Mechanism:
+    """Bars of 0.3, 0.8 and 0.6 m on hinges 0.9 m apart, closed between the second and the third, or at the ground."""
+    loop = dyn.Loop(kind, "coupler", "rocker", at=(0.8, 0, 0), to_at=(0.6, 0, 0), axis=ACROSS, to_axis=ACROSS)
+    bars = [bar("crank", "world", 0.3, (0, 0, 0), weights), bar("coupler", "crank", 0.8, (0.3, 0, 0), weights)]
+    if cut == 3:
+        bars.append(bar("rocker", "world", 0.6, (0.9, 0, 0), weights))
+    else:  # the rocker hangs on the coupler, by its other end
+        inertia = weights * 0.6**2 / 12.0
+        joint = dyn.Joint("revolute", ACROSS, (0.8, 0, 0))
+        bars.append(dyn.Body("rocker", joint, "coupler", weights, (-0.3, 0, 0), (0.0, inertia, inertia)))
+        loop = dyn.Loop(kind, "rocker", at=(-0.6, 0, 0), to_at=(0.9, 0, 0), axis=ACROSS, to_axis=ACROSS)
+    return dyn.Mechanism(bars, loops=[loop])
+
+
+def squeezer() -> dyn.Mechanism:
+    """Andrews' squeezing mechanism: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section VI.9.
+
+    Coordinates in this order: beta, theta, gamma, delta, phi, epsilon, omega.
+    """
+    about_z = (0.0, 0.0, 1.0)
+
+    def link(name: str, parent: str, place: Any, mass: float, center: Any, inertia: float) -> dyn.Body:
+        joint = dyn.Joint("revolute", about_z, (*place, 0.0))
+        return dyn.Body(name, joint, parent, mass, (*center, 0.0), (inertia, inertia, inertia))
+
+    a, b, c = (-0.06934, -0.00227), (-0.03635, 0.03273), (0.014, 0.072)
+    links = [
+        link("K1", "world", (0.0, 0.0), 0.04325, (0.00092, 0.0), 2.194e-6),
+        link("K2", "K1", (0.007, 0.0), 0.00365, (-0.0115, 0.0), 4.410e-7),
+        link("K3", "world", b, 0.02373, (0.01043, -0.01874), 5.255e-6),
+        link("K5", "world", a, 0.07050, (0.02308, 0.00916), 1.169e-5),
+        link("K4", "K5", (0.04, 0.0), 0.00706, (0.0, 0.01421 - 0.02), 5.667e-7),
+        link("K7", "world", a, 0.05498, (0.00449, -0.01228), 1.912e-5),
+        link("K6", "K7", (0.0, -0.04), 0.00706, (0.02 - 0.01421, 0.0), 5.667e-7),
+    ]
+    (gamma,) = cg.variables("q2")
+    sine, cosine = cg.sin(gamma), cg.cos(gamma)
+    x = 0.02 * cosine + 0.018 * sine + b[0] - c[0]
+    y = 0.02 * sine - 0.018 * cosine + b[1] - c[1]
+    length = cg.sqrt(x * x + y * y)
+    pull = -4530.0 * (length - 0.07785) / length
+    spring = dyn.Force("K3", (pull * x, pull * y, 0.0), (0.02, -0.018, 0.0))
+    meeting = dyn.Loop("point", "K2", "K3", at=(-0.028, 0, 0), to_at=(0.0, -0.035, 0), name="with K3")
+    others = [
+        dyn.Loop("point", "K2", "K4", at=(-0.028, 0, 0), to_at=(0.0, -0.02, 0), name="with K4"),
+        dyn.Loop("point", "K2", "K6", at=(-0.028, 0, 0), to_at=(0.02, 0.0, 0), name="with K6"),
+    ]
+    return dyn.Mechanism(links, (0.0, 0.0, 0.0), [spring], loops=[meeting, *others])
