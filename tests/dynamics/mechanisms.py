@@ -40,7 +40,7 @@ def random_joint(kind: str, rng: np.random.Generator, **others: Any) -> Joint:
 
 def random_body(name: str, kind: str, parent: str, rng: np.random.Generator, **others: Any) -> Body:
     given = {"mass": rng.uniform(0.5, 2.0), "center": 0.2 * rng.normal(size=3), "inertia": random_inertia(rng)}
-    return Body(name, random_joint(kind, rng), parent, **(given | others))
+    return Body(name, others.pop("joint", None) or random_joint(kind, rng), parent, **(given | others))
 
 
 def random_mechanism(n: int, kinds: Sequence[str], reach: int, seed: int = 0) -> Mechanism:
