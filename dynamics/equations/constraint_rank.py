@@ -20,7 +20,11 @@ STATES = 3  # states that meet the constraints, at which rows are compared
 SPREADS = (0.3, 1.0, 0.1, 3.0, 0.01, 0.001, 10.0, 0.0001) * 2  # of random starts about the neutral coordinates
 ITERATIONS, HALVINGS = 50, 12  # of Newton's method for such a state
 DEPENDENT = 1e-9  # a row of length 1 is one of the others if this much of it is left without them
+SMALL = 1e-6  # of the first gap: what Newton's method closes to rounding in a step or two
 KEPT = 16  # constraints whose rank stays known
+
+
+Indices = np.ndarray[Any, np.dtype[np.intp]]
 
 
 class ConstraintWarning(UserWarning):
@@ -119,24 +123,25 @@ class RowNumbers:
         shown: Any = {"t": t} | dict(self.constraints.parameters)
         with np.errstate(all="ignore"):
             point = self._point(q, shown)
-            size = np.inf
-            for _ in range(ITERATIONS):
-                phi, open_rows = self._phi(point)
-                if not len(open_rows):
+            size, looked = np.inf, 0.0  # at the rounding of phi, which takes longer than a step, once a gap is so small
+            for k in range(ITERATIONS):
+                phi = self._phi(point)
+                if (not k or size <= looked) and not len(self._open_rows(point)):
                     return Closing(point, 0.0, None)
                 matrix = self.matrix(point)[: len(phi)]
                 scale = np.abs(matrix).max(axis=1)
                 scale = np.where(scale > 0.0, scale, 1.0)
                 step = -np.linalg.lstsq(matrix / scale[:, None], phi / scale, rcond=1e-10)[0]
                 size = float(np.abs(phi / scale).max())
+                looked = looked or SMALL * size
                 for halved in range(HALVINGS):
                     trial = self._point(self._moved(point, step * 0.5**halved), shown)
-                    if np.abs(self._phi(trial)[0] / scale).max() < size:
+                    if np.abs(self._phi(trial) / scale).max() < size:
                         point = trial
                         break
                 else:
                     break
-            phi, open_rows = self._phi(point)
+            phi, open_rows = self._phi(point), self._open_rows(point)
         if not len(open_rows):
             return Closing(point, 0.0, None)
         return Closing(point, size, int(open_rows[np.abs(phi[open_rows]).argmax()]))
@@ -157,14 +162,14 @@ class RowNumbers:
             matrix[k] = np.where(np.array(list(digits.values())) >= 1.0, matrix[k], 0.0)
         return matrix
 
-    def _phi(self, point: Mapping[str, float]) -> tuple[Array, Array]:
-        """phi, and the rows that are not 0 to their rounding."""
-        if self.phi is None:
-            return np.zeros(0), np.zeros(0, dtype=int)
-        values = self.phi.evaluate(dict(point))
-        digits = certain_digits(self.phi, point)
-        certain = [k for k, name in enumerate(values) if digits[name] >= 0.5 and values[name] != 0.0]
-        return np.array(list(values.values()), dtype=np.float64), np.array(certain, dtype=int)
+    def _phi(self, point: Mapping[str, float]) -> Array:
+        return np.zeros(0) if self.phi is None else np.array(list(self.phi.evaluate(dict(point)).values()))
+
+    def _open_rows(self, point: Mapping[str, float]) -> Indices:
+        """The rows of phi that are not 0 to their rounding."""
+        digits = {} if self.phi is None else certain_digits(self.phi, point)
+        values = zip(self._phi(point), digits.values(), strict=True)
+        return np.array([k for k, (value, left) in enumerate(values) if left >= 0.5 and value != 0.0], dtype=np.intp)
 
     def _point(self, q: Array, shown: Mapping[str, float]) -> dict[str, float]:
         return {f"q{i}": float(x) for i, x in enumerate(q)} | dict(shown)

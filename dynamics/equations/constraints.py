@@ -1,7 +1,7 @@
 """Constraints in the equations of motion: multipliers as further unknowns of the same elimination.
 
-Rows of velocities z(q, u, t) = 0 hold the motion by forces J^T lambda, J = dz/du. The scalar F(q, u, s) = L + s . z has,
-in w = (u, s), the Hessian [[M, J^T], [J, 0]], so that
+Rows of velocities z(q, u, t) = 0 hold the motion by forces J^T lambda, J = dz/du. The scalar F(q, u, s) = L + s . z
+has, in w = (u, s), the Hessian [[M, J^T], [J, 0]], so that
 
     M udot - J^T lambda = tau + forces - damping * u - bias
     J udot = -(dz/dt at udot = 0)

@@ -217,7 +217,8 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
         One more output, `info`: 0 where M is positive definite, else 1 + the index of the coordinate whose inertia
         is zero or negative after elimination; the accelerations mean nothing there. `raise_if_singular` raises on it.
         Three nodes a coordinate. Beyond the coordinates it counts the independent constraints: that one says nothing
-        new at this state. Not by "dense" where there are constraints. Without, the result where M is singular is infinite, NaN or meaningless.
+        new at this state. Not by "dense" where there are constraints. Without `check`, the result where M is singular
+        is infinite, NaN or meaningless.
 
     Returns
     -------
@@ -328,5 +329,5 @@ def _solved(system: System, terms: BiasTerms, method: str, check: bool) -> Graph
     end = system.n + len(rows.kept)
     outputs = {f"qdd{i}": node for i, node in enumerate(solved[: system.n])}
     outputs |= multiplier_outputs(system, rows, solved[system.n : end], build)
-    outputs |= {"info": node for node in solved[end:]}
+    outputs |= dict(zip(("info",), solved[end:], strict=False))
     return cg.simplify(system.graph(outputs, system.q, system.qd, system.tau))

@@ -196,7 +196,7 @@ def slip_rows(loop: Loop, body: KinematicChain, to: KinematicChain) -> list[Node
 def coupling_row(loop: Loop, bodies: Sequence[Body], all_bodies: Mapping[str, Body], locked: Mapping[str, ArrayLike],
                  q: Sequence[Node]) -> Node:  # fmt: skip
     """q - (c0 + c1 q_to + ..) of a coupling; a locked joint is a number."""
-    index = {body.name: place.q.start for body, place in zip(bodies, places(bodies), strict=True)}
+    index: dict[str, int] = {body.name: place.q.start for body, place in zip(bodies, places(bodies), strict=True)}
 
     def coordinate(name: str) -> Node:
         if name in index:
@@ -207,7 +207,7 @@ def coupling_row(loop: Loop, bodies: Sequence[Body], all_bodies: Mapping[str, Bo
         value = ZERO
         for coefficient in reversed(loop.coefficients[1:]):
             value = (value + float(coefficient)) * coordinate(loop.to)
-        row: Node = coordinate(loop.body) - (value + float(loop.coefficients[0]))
+        return coordinate(loop.body) - (value + float(loop.coefficients[0]))
         return row
 
 
