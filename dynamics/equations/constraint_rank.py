@@ -50,8 +50,9 @@ def independent_rows(constraints: Constraints) -> tuple[int, ...]:
     """Indices of the rows that do not follow from those before them, at all states seen.
 
     The states are random ones that meet the constraints, since rows may depend on one another only there. Warns of
-    rows that are left out, unless they hold nothing, as the third of a point in a plane. Raises ConstraintError where no
-    state is seen that meets them all.
+    rows that are left out, unless they hold nothing, as the third of a point in a plane.
+
+    Raises ConstraintError where no state is seen that meets all.
     """
     numbers = RowNumbers(constraints)
     kept: list[int] = []

@@ -208,7 +208,6 @@ def coupling_row(loop: Loop, bodies: Sequence[Body], all_bodies: Mapping[str, Bo
         for coefficient in reversed(loop.coefficients[1:]):
             value = (value + float(coefficient)) * coordinate(loop.to)
         return coordinate(loop.body) - (value + float(loop.coefficients[0]))
-        return row
 
 
 def _unit(axis: ArrayLike) -> Array:
