@@ -21,12 +21,12 @@ from cgraph.extend import Array, Builder, building, certain_digits, folded, real
 from ..systems.constraints import ConstraintError
 from ..systems.model import Model, as_system
 from ..systems.system import System
-from .constraint_rank import ConstraintWarning, independent_rows
+from .constraint_rank import ConstraintWarning, RowNumbers, independent_rows
 from .constraints import Rows
 from .formulations import ZERO
 from .substitute import substitute
 
-ITERATIONS = 50
+ITERATIONS = 20  # of Newton's method
 SPARE = 1.5  # certain digits of a row that is not 0: a start that is off by 30 roundings is moved and said to be
 
 
@@ -130,13 +130,14 @@ def projected(system: System, x: Array, t: float, parameters: Mapping[str, float
     others = {"t": t, **parameters}
     fixed = {name: others[name] for name in graph.input_names if name in others}
     start, names = x, graph.input_names[: len(x)]
-    for _ in range(ITERATIONS):
+    for k in range(2 * ITERATIONS):
+        if k == ITERATIONS:  # Newton's method may need shorter steps on its way from afar
+            point = RowNumbers(system.constraints).closed(start[: system.nq], t, parameters).point
+            x = np.array([*[point[f"q{i}"] for i in range(system.nq)], *start[system.nq :]])
         with np.errstate(all="ignore"):
             values = graph.evaluate(dict(zip(names, x.tolist(), strict=True)) | fixed)
         x = np.array(list(values.values()), dtype=np.float64)
-        if not np.isfinite(x).all():
-            break
-        if not (left := _open_rows(system, x, t, parameters)):
+        if np.isfinite(x).all() and not (left := _open_rows(system, x, t, parameters)):
             return x
     raise ConstraintError(
         f"the start cannot be moved onto the constraints: {system.constraints.names[left[0]]!r} stays open from "

@@ -119,9 +119,12 @@ class RowNumbers:
             f"the constraints cannot be met: no state was seen where {self.constraints.names[row]!r} is 0"
         )
 
-    def closed(self, q: Array, t: float) -> Closing:
-        """A state that meets phi = 0, by Newton's method with halved steps from q."""
-        shown: Any = {"t": t} | dict(self.constraints.parameters)
+    def closed(self, q: Array, t: float, parameters: Mapping[str, float] | None = None) -> Closing:
+        """A state that meets phi = 0, by Newton's method with halved steps from q.
+
+        parameters: in place of the constraints' own.
+        """
+        shown = {"t": t} | dict(self.constraints.parameters if parameters is None else parameters)
         with np.errstate(all="ignore"):
             point = self._point(q, shown)
             size, looked = np.inf, 0.0  # at the rounding of phi, which takes longer than a step, once a gap is so small
