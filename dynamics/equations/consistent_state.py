@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,9 +28,11 @@ from .formulations import ZERO
 from .substitute import substitute
 
 ITERATIONS = 20  # of Newton's method
+KEPT = 16  # systems whose graphs stay for another state
 SPARE = 1.5  # certain digits of a row that is not 0: a start that is off by 30 roundings is moved and said to be
 
 
+@lru_cache(KEPT)
 def projection(system: System) -> Graph | None:
     """A state nearer to one that meets the constraints, by one step of Newton; None without constraints.
 
@@ -162,12 +165,17 @@ def projected_start(system: System, x: Array, t: float, parameters: Mapping[str,
     return moved
 
 
+@lru_cache(KEPT)
+def _all_rows(system: System) -> Graph:
+    """phi and the rates of all constraints; inputs the states, t if needed, parameters."""
+    outputs = {f"phi{k}": phi for k, phi in enumerate(system.constraints.positions)}
+    outputs |= {f"rate{k}": rate for k, rate in enumerate(system.constraints.rates)}
+    return Graph([*system.q, *system.qd, *system.extra_inputs], outputs)
+
+
 def _open_rows(system: System, x: Array, t: float, parameters: Mapping[str, float]) -> list[int]:
     """Constraints that are not 0 at a state, or whose rate is not, beyond rounding."""
-    constraints = system.constraints
-    outputs = {f"phi{k}": phi for k, phi in enumerate(constraints.positions)}
-    outputs |= {f"rate{k}": rate for k, rate in enumerate(constraints.rates)}
-    graph = Graph([*system.q, *system.qd, *system.extra_inputs], outputs)
+    graph = _all_rows(system)
     others = {"t": t, **parameters}
     point = dict(zip(graph.input_names, x.tolist(), strict=False))
     point |= {name: others[name] for name in graph.input_names if name in others}

@@ -112,7 +112,8 @@ def attach_with_impact(
     """A free body is caught, and hangs from then on as its joint says.
 
     The impact is inelastic and instantaneous: positions stay, and velocities jump so that
-    M qd+ = M_old qd- + J^T m v + J_w^T I w, in the coordinates of the mechanism with the body.
+    M qd+ = M_old qd- + J^T m v + J_w^T I w, in the coordinates of the mechanism with the body; with loops, by their
+    impulses too, to velocities that keep them closed.
 
     Parameters
     ----------
@@ -224,9 +225,9 @@ def _momentum(mechanism: Mechanism, q: Array, qd: Array) -> Array:
 
 
 def _velocities(mechanism: Mechanism, q: Array, p: Array) -> Array:
-    """M^-1 p, (n,): the accelerations at rest under p alone."""
+    """M^-1 p, (n,): the accelerations at rest under p alone; with loops those that they let through."""
     found = forward_dynamics(_inertia_alone(mechanism)).evaluate(_named(q=q, qd=np.zeros_like(p), tau=p))
-    return np.array(list(found.values()))
+    return np.array([found[f"qdd{i}"] for i in range(len(p))])
 
 
 def _inertia_alone(mechanism: Mechanism) -> Mechanism:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 import cgraph as cg
 import dynamics as dyn
 
@@ -17,16 +19,58 @@ def bar(name: str, parent: str, length: float, place: Any, mass: float = 1.0, ki
     return dyn.Body(name, joint, parent, mass, (0.5 * length, 0.0, 0.0), (0.0, inertia, inertia))
 
 
-def four_bar(kind: str = "point", *, cut: int = 3, weights: float = 1.0) -> dyn.Mechanism:
+def scaled_four_bar(length: float, mass: float) -> dyn.Mechanism:
+    """The four-bar with all lengths and masses so many times larger."""
+    sizes = {"crank": 0.3 * length, "coupler": 0.8 * length, "rocker": 0.6 * length}
+    places = {"crank": 0.0, "coupler": sizes["crank"], "rocker": 0.9 * length}
+    bars = [
+        bar(name, "crank" if name == "coupler" else "world", size, (places[name], 0, 0), mass)
+        for name, size in sizes.items()
+    ]
+    loop = dyn.Loop("point", "coupler", "rocker", at=(sizes["coupler"], 0, 0), to_at=(sizes["rocker"], 0, 0))
+    return dyn.Mechanism(bars, (0.0, 0.0, -9.81 * length), loops=[loop])
+
+
+def peaucellier() -> dyn.Mechanism:
+    """Peaucellier's linkage: long bars of 0.5 m from the world, a rhombus of 0.2 m, and a crank of 0.3 m at 0.3 m."""
+    places = {"long 1": "world", "side 1": "long 1", "long 2": "world", "side 2": "long 2"}
+    bars = [bar(name, on, 0.5 if on == "world" else 0.2, (0.5 * (on != "world"), 0, 0)) for name, on in places.items()]
+    bars += [bar("crank", "world", 0.3, (0.3, 0, 0)), bar("side 3", "crank", 0.2, (0.3, 0, 0))]
+    bars.append(bar("side 4", "crank", 0.2, (0.3, 0, 0)))
+    ends = [("side 1", "side 2", 0.2), ("side 3", "long 1", 0.5), ("side 4", "long 2", 0.5)]
+    loops = [dyn.Loop("point", name, to, at=(0.2, 0, 0), to_at=(end, 0, 0)) for name, to, end in ends]
+    return dyn.Mechanism(bars, loops=loops)
+
+
+def stewart_platform() -> dyn.Mechanism:
+    """A free platform of 2 kg on six legs: a universal joint on the ground, a slide, and a ball in the platform."""
+    plate = dyn.Body("plate", dyn.Joint("free", position=(0.0, 0.0, 0.8)), "world", 2.0, (0, 0, 0), (0.1, 0.1, 0.2))
+    bodies, loops = [plate], []
+    for k in range(6):
+        foot, hand = (
+            np.array([r * np.cos(a), r * np.sin(a), 0.0]) for r, a in ((0.6, k * 1.05), (0.4, k * 1.05 + 0.3))
+        )
+        bodies += [
+            dyn.Body(f"yoke {k}", dyn.Joint("revolute", (1.0, 0.0, 0.0), foot), "world", 0.1, inertia=(1e-3,) * 3),
+            dyn.Body(f"barrel {k}", dyn.Joint("revolute", ACROSS), f"yoke {k}", 0.5, (0, 0, 0.2), (1e-2, 1e-2, 1e-3)),
+            dyn.Body(
+                f"rod {k}", dyn.Joint("prismatic", (0, 0, 1.0)), f"barrel {k}", 0.3, (0, 0, 0.5), (1e-2, 1e-2, 1e-3)
+            ),
+        ]
+        loops.append(dyn.Loop("point", f"rod {k}", "plate", at=(0.0, 0.0, 0.7), to_at=hand, name=f"leg {k}"))
+    return dyn.Mechanism(bodies, loops=loops)
+
+
+def four_bar(kind: str = "point", *, cut: int = 3) -> dyn.Mechanism:
     """Bars of 0.3, 0.8 and 0.6 m on hinges 0.9 m apart, closed between the second and the third, or at the ground."""
     loop = dyn.Loop(kind, "coupler", "rocker", at=(0.8, 0, 0), to_at=(0.6, 0, 0), axis=ACROSS, to_axis=ACROSS)
-    bars = [bar("crank", "world", 0.3, (0, 0, 0), weights), bar("coupler", "crank", 0.8, (0.3, 0, 0), weights)]
+    bars = [bar("crank", "world", 0.3, (0, 0, 0)), bar("coupler", "crank", 0.8, (0.3, 0, 0))]
     if cut == 3:
-        bars.append(bar("rocker", "world", 0.6, (0.9, 0, 0), weights))
+        bars.append(bar("rocker", "world", 0.6, (0.9, 0, 0)))
     else:  # the rocker hangs on the coupler, by its other end
-        inertia = weights * 0.6**2 / 12.0
+        inertia = 0.6**2 / 12.0
         joint = dyn.Joint("revolute", ACROSS, (0.8, 0, 0))
-        bars.append(dyn.Body("rocker", joint, "coupler", weights, (-0.3, 0, 0), (0.0, inertia, inertia)))
+        bars.append(dyn.Body("rocker", joint, "coupler", 1.0, (-0.3, 0, 0), (0.0, inertia, inertia)))
         loop = dyn.Loop(kind, "rocker", at=(-0.6, 0, 0), to_at=(0.9, 0, 0), axis=ACROSS, to_axis=ACROSS)
     return dyn.Mechanism(bars, loops=[loop])
 

@@ -10,7 +10,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 
-from ..linkages import ACROSS, bar, four_bar, squeezer
+from ..linkages import ACROSS, bar, four_bar, peaucellier, scaled_four_bar, squeezer, stewart_platform
 from ..mechanisms import random_body, random_joint
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -283,3 +283,66 @@ def test_a_loop_among_locked_joints_is_a_weld() -> None:
     welded = dyn.Mechanism(stiff.bodies, stiff.gravity, locked=stiff.locked)
     at = {"q0": 0.3, "qd0": 0.5, "tau0": 0.7}
     assert dyn.forward_dynamics(stiff).evaluate(at)["qdd0"] == dyn.forward_dynamics(welded).evaluate(at)["qdd0"]
+
+
+def test_a_body_caught_by_a_closed_chain_leaves_it_closed() -> None:
+    """Impulses of the loop are J^T s: what is left of M qd+ - p does no work on any motion that the loop lets through."""
+    model = four_bar()
+    q, qd = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    load = dyn.Body("load", dyn.Joint("fixed", position=(0.4, 0.0, 0.1)), "coupler", 0.7, inertia=(0.01, 0.02, 0.01))
+    caught = dyn.attach_with_impact(model, q, qd, load, velocity=(1.0, 0.0, -2.0))
+    assert len(caught.mechanism.loops) == 1
+    at = {f"q{i}": x for i, x in enumerate(q)} | {f"qd{i}": x for i, x in enumerate(caught.qd)}
+    rows = np.array([values_of_row(caught.mechanism, k, at) for k in (0, 2)])
+    assert np.abs(rows @ caught.qd).max() < 1e-14 * np.abs(caught.qd).max()
+    assert caught.energy > 0.0
+    whole = dyn.Mechanism(caught.mechanism.bodies, (0.0, 0.0, 0.0))
+    free, spin = (
+        np.linalg.svd(rows)[2][2],
+        dyn.attach_with_impact(dyn.Mechanism(model.bodies, (0.0, 0.0, 0.0)), q, qd, load, velocity=(1.0, 0.0, -2.0)),
+    )
+    mass = values(dyn.mass_matrix(whole), at).reshape(3, 3)
+    assert free @ mass @ caught.qd == pytest.approx(free @ mass @ spin.qd, rel=1e-12)  # of the tree: M qd = p
+
+
+@pytest.mark.parametrize("length", [1e-9, 1e9])
+@pytest.mark.parametrize("mass", [1e-12, 1e12])
+def test_a_loop_has_no_units(length: float, mass: float) -> None:
+    graphs = [
+        dyn.forward_dynamics(model, "recursive") for model in (scaled_four_bar(1, 1), scaled_four_bar(length, mass))
+    ]
+    at = {f"{kind}{i}": 0.3 * i + 0.2 for kind in ("q", "qd") for i in range(3)} | {f"tau{i}": 0.0 for i in range(3)}
+    one, other = (graph.evaluate(at) for graph in graphs)
+    for name, value in one.items():
+        unit = mass * length if name.startswith("lambda") else 1.0
+        assert other[name] == pytest.approx(value * unit, rel=1e-13)
+
+
+def test_peaucelliers_linkage_draws_a_straight_line() -> None:
+    """One freedom of seven bars, and no row too many."""
+    model = peaucellier()
+    q, qd = dyn.consistent_state(model, [-0.35, 0.7, 0.35, -0.7, 0.1, -0.6, 0.4], [0.3] * 7)
+    run = dyn.simulate(model, q, qd, 0.2, rtol=1e-10)
+    tip = model.position("side 1", (0.2, 0.0, 0.0))
+    state = {f"q{i}": column for i, column in enumerate(run.q.T)}
+    x = np.asarray(tip.evaluate(state)["x"])
+    z = np.asarray(tip.evaluate(state)["z"])
+    assert np.ptp(z) > 1e-3
+    assert np.ptp(x) < 1e-13
+
+
+def test_a_stewart_platform_obeys_the_defining_equations() -> None:
+    model = stewart_platform()
+    tree = dyn.Mechanism(model.bodies, model.gravity)
+    start = np.zeros(model.system.nq)
+    start[[0, 1, 2, 3]] = 0.02, 0.01, 0.0, 1.0
+    q, u = dyn.consistent_state(model, start, np.random.default_rng(0).normal(size=model.system.n))
+    at = {f"q{i}": x for i, x in enumerate(q.tolist())} | {f"qd{i}": x for i, x in enumerate(u.tolist())}
+    at |= {f"tau{i}": 0.1 * i for i in range(model.system.n)}
+    rates = [velocity_rows(tree, loop).outputs for loop in model.loops]
+    rows = {f"{k} {name}": node for k, rate in enumerate(rates) for name, node in rate.items()}
+    expected, _ = dense_kkt(tree, at, cg.Graph([*tree.system.q, *tree.system.qd], rows))
+    found = dyn.forward_dynamics(model).evaluate(at)
+    assert np.array([found[f"qdd{i}"] for i in range(model.system.n)]) == pytest.approx(
+        expected, abs=TIGHT * np.abs(expected).max()
+    )
