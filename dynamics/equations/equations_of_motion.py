@@ -278,6 +278,16 @@ def _require_inertia(system: System, accelerations: Graph) -> None:
         )
 
 
+def _require_inertia_without_constraints(system: System) -> None:
+    """A coordinate whose inertia is the constant zero may leave with a constraint; one that is rounding must not."""
+    free = system.without_constraints
+    try:
+        graph = _solved(free, bias_terms(free), "recursive", check=False)
+    except SingularError:
+        return
+    _require_inertia(free, graph)
+
+
 def accelerations(system: System, method: str = "auto", check: bool = False) -> Graph:
     """Forward dynamics from the Lagrangian as it is written, by one of `SOLUTIONS`.
 
@@ -301,8 +311,11 @@ def accelerations(system: System, method: str = "auto", check: bool = False) -> 
     if not graphs:
         raise SingularMassMatrixError(_without_inertia(system, failure)) from None
     smallest = min(graphs, key=lambda graph: len(graph.nodes))
-    if not isinstance(system, BodySystem) and not held:  # bodies have masses; of another Lagrangian nobody knows
-        _require_inertia(system, smallest)
+    if not isinstance(system, BodySystem):  # bodies have masses; of another Lagrangian nobody knows
+        if held:
+            _require_inertia_without_constraints(system)
+        else:
+            _require_inertia(system, smallest)
     return smallest
 
 

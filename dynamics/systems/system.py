@@ -258,6 +258,13 @@ class System:
         other.partial_lagrangians, other.forces = (kinetic[0], -potential[0]), tuple(forces)
         return other
 
+    @cached_property
+    def without_constraints(self) -> System:
+        """The system without what holds it."""
+        other = copy(self)
+        other.constraints = Constraints(self.kinematics, self.t, self.parameters, None, None)
+        return other
+
     def bias_forces(self) -> Sequence[BiasForce] | None:
         """The bias as forces f at velocities z, nodes of L: sum of f dz/dqd = d/dt dL/dqd - dL/dq at qdd = 0.
 

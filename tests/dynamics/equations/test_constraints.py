@@ -122,6 +122,28 @@ def test_info_names_the_constraint_that_says_nothing_new_at_a_state() -> None:
         dyn.raise_if_singular(held, info)
 
 
+def test_a_coordinate_without_inertia_may_be_held_by_a_constraint() -> None:
+    """A rope over two pulleys: the hook y between masses has none, and 2 y = x - z."""
+
+    def energy(q: Any, qd: Any, t: Any) -> Any:
+        return 0.5 * (2.0 * qd[0] ** 2 + 3.0 * qd[2] ** 2) - 9.81 * (2.0 * q[0] + 3.0 * q[2])
+
+    rope = dyn.System(energy, "x hook z", constraints=lambda q, t: {"rope": 2.0 * q[1] - q[0] + q[2]})
+    at = {f"{kind}{i}": 0.0 for kind in ("q", "qd", "tau") for i in range(3)}
+    found = dyn.forward_dynamics(rope).evaluate(at | {"tau1": 4.0})
+    assert [found[name] for name in ("qdd0", "qdd2", "lambda0")] == pytest.approx([-8.81, -9.81 - 2.0 / 3.0, -2.0])
+    assert found["qdd1"] == pytest.approx(0.5 * (found["qdd0"] - found["qdd2"]))
+    hidden = dyn.System(
+        lambda q, qd, t: (
+            (0.1 * qd[0] + 0.3 * qd[1]) ** 2 + cg.exp(q[2]) * (0.7 * qd[0] + 2.1 * qd[1]) ** 2 + qd[2] ** 2
+        ),
+        "x y z",
+        constraints=lambda q, t: {"row": q[0] - q[2]},
+    )
+    with pytest.raises(dyn.SingularMassMatrixError, match="a motion of 'x' and 'y' has no inertia"):
+        dyn.forward_dynamics(hidden)
+
+
 def test_what_constraints_cannot_be_is_said() -> None:
     cases: list[tuple[dict[str, Any], type[Exception], str]] = [
         ({"constraints": 3.0}, TypeError, r"constraints must be a function of \(q, t\) or \(q, t, p\)"),

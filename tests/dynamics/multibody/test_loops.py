@@ -286,7 +286,7 @@ def test_a_loop_among_locked_joints_is_a_weld() -> None:
 
 
 def test_a_body_caught_by_a_closed_chain_leaves_it_closed() -> None:
-    """Impulses of the loop are J^T s: what is left of M qd+ - p does no work on any motion that the loop lets through."""
+    """Impulses of the loop are J^T s: M qd+ - p does no work on a motion that the loop lets through."""
     model = four_bar()
     q, qd = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
     load = dyn.Body("load", dyn.Joint("fixed", position=(0.4, 0.0, 0.1)), "coupler", 0.7, inertia=(0.01, 0.02, 0.01))
