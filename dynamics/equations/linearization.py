@@ -10,7 +10,6 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Builder, building, cotangents, folded, hessian_nodes, ldl_solve, solve_nodes
 
-from ..systems.constraints import require_unconstrained
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .equations_of_motion import DENSE_UP_TO, accelerations
@@ -56,7 +55,7 @@ def state_space(model: Model) -> Graph:
 
 
 def _state_space(system: System) -> Graph:
-    require_unconstrained(system, "state_space")
+    system.constraints.require_none("state_space")
     n, build = system.n, Builder()
     qdd = accelerations(system)
     (lagrangian,) = folded([system.lagrangian], Builder())

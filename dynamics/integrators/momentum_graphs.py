@@ -10,7 +10,6 @@ from cgraph import Graph, Node
 from cgraph.extend import Builder, SingularError, building, cotangents, hessian_nodes, solve_nodes
 
 from ..equations.singular_mass_matrix import SingularMassMatrixError
-from ..systems.constraints import require_unconstrained
 from ..systems.system import System
 from .problem import KEPT, Problem, reaches
 
@@ -39,7 +38,7 @@ def mechanics(problem: Problem) -> Mechanics:
     system = problem.system
     if system is None or not problem.canonical:
         raise ValueError("this method steps momenta dL/dqd of coordinates, which the model does not have")
-    require_unconstrained(system, "a method that steps momenta")
+    system.constraints.require_none("a method that steps momenta")
     build = Builder()
     p = cg.variables([f"p{i}" for i in range(system.n)])
     bars = cotangents({system.lagrangian: ONE}, [*system.q, *system.qd], build)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 from cgraph import Node
 from cgraph.extend import Builder, check_name, cotangents, tangents, topological
@@ -29,12 +29,6 @@ class ConstraintError(ValueError):
     ...     print(error)
     the constraints cannot be met: no state was seen where 'wall' is 0
     """
-
-
-class SystemWithConstraints(Protocol):
-    """What `require_unconstrained` reads of a system."""
-
-    constraints: Constraints
 
 
 class Constraints:
@@ -86,6 +80,11 @@ class Constraints:
         dots = tangents(dict(zip(k.q, k.q_dot, strict=True)) | {self.t: ONE}, rates, build)
         return [dots.get(z, ZERO) for z in rates]
 
+    def require_none(self, what: str) -> None:
+        """Raises ValueError, saying that `what` does not know constraints, where there are any."""
+        if self.names:
+            raise ValueError(f"{what} does not know constraints yet; {self.names[0]!r} holds this system")
+
     def _check(self) -> None:
         u = set(self.kinematics.u)
         if u & set(topological(self.positions)):
@@ -105,9 +104,3 @@ def _rows(what: str, given: Any) -> dict[str, Node]:
     for name in given:
         check_name("a constraint", name)
     return {name: node_or_number(f"constraint {name!r}", row) for name, row in given.items()}
-
-
-def require_unconstrained(system: SystemWithConstraints, what: str) -> None:
-    """Raises ValueError, saying that `what` does not know constraints, where a system has any."""
-    if len(system.constraints):
-        raise ValueError(f"{what} does not know constraints yet; {system.constraints.names[0]!r} holds this system")

@@ -21,7 +21,6 @@ from ..equations.formulations import ONE, ZERO, inverse_dynamics
 from ..equations.inertia_rank import balanced
 from ..equations.torque_decomposition import torque_by_joint_motion, torque_by_link
 from ..equations.torque_table import TorqueTable
-from ..systems.constraints import require_unconstrained
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from . import peer_agreement as agreement
@@ -80,7 +79,7 @@ def certify(model: Model, states: int = 20, seed: int = 0, *, speed: float = 1.0
     theirs = None if twin is None else agreement.original(twin, model)
     rng = np.random.default_rng(seed)
     system = as_system(model)
-    require_unconstrained(system, "certify")
+    system.constraints.require_none("certify")
     shape = (states, system.n)
     at = {"q": rng.uniform(-np.pi, np.pi, shape)} | {
         name: speed * rng.normal(size=shape) for name in ("qd", "qdd", "tau")

@@ -35,3 +35,27 @@ def test_random_mechanisms_agree_with_pinocchio(family: str, n: int, record_prop
         record_property(name, worst)
     print(f"{family} {n}:", *(f"{name} {worst:.0e}" for name, worst in errors.items()))  # noqa: T201
     assert max(errors.values()) < AGREEMENT
+
+
+@mark.parametrize("n", [3, 10])
+def test_pinned_chains_agree_with_pinocchio(n: int) -> None:
+    """constraintDynamics of a chain whose tip is held at a point, without its stabilisation."""
+    import pinocchio as pin
+
+    arm = dyn.planar_arm([1.0] * n, [0.8] * n)
+    pinned = dyn.Mechanism(arm.bodies, arm.gravity, loops=[dyn.Loop("point", "tip", to_at=(1.0, 0.0, 0.0))])
+    rng = np.random.default_rng(n)
+    q, qd = dyn.consistent_state(pinned, 0.6 * rng.normal(size=n), rng.normal(size=n))
+    tau = rng.normal(size=n)
+    model = pin.buildModelFromXML(dyn.to_urdf(arm))
+    data, models, datas = model.createData(), pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
+    tip, post = pin.SE3(np.eye(3), np.array([0.0, 0.0, -0.8])), pin.SE3(np.eye(3), np.array([1.0, 0.0, 0.0]))
+    models.append(
+        pin.RigidConstraintModel(pin.ContactType.CONTACT_3D, model, model.njoints - 1, tip, 0, post, pin.LOCAL)
+    )
+    datas.append(models[0].createData())
+    pin.initConstraintDynamics(model, data, models, datas)
+    turns = np.column_stack([np.cos(q), np.sin(q)]).ravel()
+    theirs = pin.constraintDynamics(model, data, turns, qd, tau, models, datas, pin.ProximalSettings(1e-12, 1e-12, 20))
+    ours = run(dyn.forward_dynamics(pinned), {"q": q, "qd": qd, "tau": tau})[:n]
+    assert error(ours, np.array(theirs)) < AGREEMENT
