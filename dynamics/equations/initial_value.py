@@ -14,7 +14,7 @@ from cgraph.extend import Array, real_array
 
 from ..systems.arguments import parameter_value, per_coordinate
 from ..systems.model import Model, as_ode, as_system
-from .consistent_state import projected_start
+from .projection import projected_start
 from .state_equation import StateInputs, normalization, state_inputs
 
 PAST = 1e-14  # of the end: some roundings, by which a last time may lie past it
@@ -44,6 +44,18 @@ def initial_value(
 
     Raises TypeError or ValueError, naming the argument, for another shape or what is not finite.
     """
+    start = given_start(model, q, qd, tau, parameters)
+    return start._replace(x=on_constraints(model, start.x, t, start.bound))
+
+
+def given_start(
+    model: Model,
+    q: ArrayLike,
+    qd: ArrayLike | None,
+    tau: float | Sequence[float] = 0.0,
+    parameters: Mapping[str, float] | None = None,
+) -> InitialValue:
+    """The start as it is given, whether or not it meets the constraints of the model."""
     inputs = state_inputs(model)
     values = _parameters(inputs, parameters)
     if inputs.applied:
@@ -51,7 +63,7 @@ def initial_value(
         values = dict(zip(inputs.applied, applied, strict=True)) | values
     elif np.any(real_array("tau", tau)):
         raise ValueError(f"tau must be 0 for a system of first order, which no force acts on, got {tau!r:.60}")
-    return InitialValue(on_constraints(model, _state(model, inputs, q, qd), t, values), inputs.states, values)
+    return InitialValue(_state(model, inputs, q, qd), inputs.states, values)
 
 
 def split_state(model: Model, x: Sequence[float]) -> tuple[Sequence[float], Sequence[float] | None]:

@@ -11,8 +11,8 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import topological
 
-from ..equations.consistent_state import projection
 from ..equations.equations_of_motion import energy
+from ..equations.projection import projection
 from ..equations.state_equation import normalization, state_equation, state_inputs
 from ..systems.arguments import TIME, Parameters, call_user_function
 from ..systems.model import Model, as_ode, as_system

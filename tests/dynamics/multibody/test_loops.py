@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +13,7 @@ import cgraph as cg
 import dynamics as dyn
 
 from ..linkages import ACROSS, bar, four_bar, peaucellier, scaled_four_bar, squeezer, stewart_platform
-from ..mechanisms import random_body, random_joint
+from ..mechanisms import random_body, random_joint, random_rotation
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 TIGHT = 1e-12  # of the largest entry: what a dense solve of the same equations leaves
@@ -240,6 +242,28 @@ def test_a_hinge_in_a_plane_holds_what_a_point_does() -> None:
     assert {name: values_[1][name] for name in values_[0]} == values_[0]
     assert [values_[1][f"lambda{k}"] for k in (1, 3, 4)] == [0.0, 0.0, 0.0]
     assert len(graphs[0].nodes) == len(graphs[1].nodes)
+
+
+@pytest.mark.parametrize("kind", ["point", "hinge"])
+def test_a_planar_loop_in_any_plane_moves_alike(kind: str) -> None:
+    """Of rows across the plane only rounding is left, or sums of others: they are told by their digits."""
+    flat, turn = four_bar(kind), random_rotation(np.random.default_rng(1))
+    bars = [
+        replace(each, joint=replace(each.joint, position=turn @ each.joint.position, orientation=turn))
+        if each.parent == "world"
+        else each
+        for each in flat.bodies
+    ]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", dyn.ConstraintWarning)
+        tilted = dyn.Mechanism(bars, turn @ np.array(flat.gravity), loops=flat.loops)
+        graph = dyn.forward_dynamics(tilted)
+    q, qd = dyn.consistent_state(flat, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    at = {f"q{i}": x for i, x in enumerate(q)} | {f"qd{i}": x for i, x in enumerate(qd)}
+    at |= {f"tau{i}": 0.3 * i for i in range(3)}
+    expected, found = (each.evaluate(at) for each in (dyn.forward_dynamics(flat), graph))
+    for i in range(3):
+        assert found[f"qdd{i}"] == pytest.approx(expected[f"qdd{i}"], rel=1e-11)
 
 
 def test_a_redundant_loop_is_named_and_left_out() -> None:
