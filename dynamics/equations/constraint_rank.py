@@ -21,6 +21,7 @@ SPREADS = (0.3, 1.0, 0.1, 3.0, 0.01, 0.001, 10.0, 0.0001) * 2  # of random start
 ITERATIONS, HALVINGS = 50, 12  # of Newton's method for such a state
 DEPENDENT = 1e-9  # a row of length 1 is one of the others if this much of it is left without them
 SMALL = 1e-6  # of the first gap: what Newton's method closes to rounding in a step or two
+OPEN = 0.5  # certain digits of a row that is not 0
 KEPT = 16  # constraints whose rank stays known
 
 
@@ -59,7 +60,7 @@ def independent_rows(constraints: Constraints) -> tuple[int, ...]:
     acting = np.zeros(len(constraints), dtype=bool)
     for point in numbers.states():
         matrix = numbers.certain_matrix(point)
-        kept = sorted({*kept, *_independent(matrix)})
+        kept = max(kept, _independent(matrix), key=len)
         acting |= matrix.any(axis=1)
         if len(kept) == len(constraints):
             break
@@ -133,6 +134,8 @@ class RowNumbers:
                 if (not k or size <= looked) and not len(self._open_rows(point)):
                     return Closing(point, 0.0, None)
                 matrix = self.matrix(point)[: len(phi)]
+                if not (np.isfinite(phi).all() and np.isfinite(matrix).all()):
+                    return Closing(point, np.inf, int(np.argmin(np.isfinite(phi))))
                 scale = np.abs(matrix).max(axis=1)
                 scale = np.where(scale > 0.0, scale, 1.0)
                 step = -np.linalg.lstsq(matrix / scale[:, None], phi / scale, rcond=1e-10)[0]
@@ -173,7 +176,8 @@ class RowNumbers:
         """The rows of phi that are not 0 to their rounding."""
         digits = {} if self.phi is None else certain_digits(self.phi, point)
         values = zip(self._phi(point), digits.values(), strict=True)
-        return np.array([k for k, (value, left) in enumerate(values) if left >= 0.5 and value != 0.0], dtype=np.intp)
+        wrong = [value != 0.0 and not (left < OPEN and np.isfinite(value)) for value, left in values]
+        return np.flatnonzero(wrong)
 
     def _point(self, q: Array, shown: Mapping[str, float]) -> dict[str, float]:
         return {f"q{i}": float(x) for i, x in enumerate(q)} | dict(shown)

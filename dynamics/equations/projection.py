@@ -131,5 +131,7 @@ def _open_rows(system: System, x: Array, t: float, parameters: Mapping[str, floa
     point = dict(zip(graph.input_names, x.tolist(), strict=False))
     point |= {name: others[name] for name in graph.input_names if name in others}
     values, digits = graph.evaluate(point), certain_digits(graph, point)
-    left = [name for name, value in values.items() if value != 0.0 and not digits[name] < SPARE]
+    left = [
+        name for name, value in values.items() if value != 0.0 and not (digits[name] < SPARE and np.isfinite(value))
+    ]
     return sorted({int(name.removeprefix("phi").removeprefix("rate")) for name in left})

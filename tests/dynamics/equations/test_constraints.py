@@ -106,6 +106,16 @@ def test_an_ensemble_keeps_its_constraints() -> None:
     assert np.hypot(many.q[:, -1, 0], many.q[:, -1, 1]) == pytest.approx(lengths, rel=1e-14)
 
 
+def test_constraints_may_have_a_domain() -> None:
+    """Some of the states at which rows are compared are outside of it."""
+    ring = dyn.System(plane, "x y a", constraints=lambda q, t: {"ring": cg.sqrt(q[0]) + cg.log(q[1]) - 1.0})
+    q, _ = dyn.consistent_state(ring, [1.5, 1.2, 0.0], [0.0] * 3)
+    assert math.sqrt(q[0]) + math.log(q[1]) == pytest.approx(1.0, abs=1e-15)
+    nowhere = dyn.System(plane, "x y a", constraints=lambda q, t: {"bad": cg.sqrt(-1.0 - q[0] ** 2)})
+    with pytest.raises(dyn.ConstraintError, match="no state was seen where 'bad' is 0"):
+        dyn.forward_dynamics(nowhere)
+
+
 def test_info_names_the_constraint_that_says_nothing_new_at_a_state() -> None:
     """Two rods to one particle in a plane hold it, unless they are in line."""
     posts = ((-1.0, 0.0), (1.0, 0.0))
