@@ -230,6 +230,24 @@ def test_a_slider_crank_moves_as_its_closed_form_says() -> None:
     assert dyn.forward_dynamics(model).evaluate(state)["qdd0"] == pytest.approx(expected, rel=1e-12)
 
 
+def test_a_coordinate_follows_another_as_a_polynomial() -> None:
+    """q_b = 0.2 + 0.5 q_a + 0.3 q_a^2, against the Lagrangian with q_b written so; and with q_a locked."""
+    wheels = [
+        dyn.Body(name, dyn.Joint("revolute"), inertia=(1.0, 1.0, size)) for name, size in (("a", 1.0), ("b", 1.5))
+    ]
+    follow = dyn.Loop("coupling", "b", "a", coefficients=[0.2, 0.5, 0.3])
+    model = dyn.Mechanism(wheels, loops=[follow])
+    known = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 + 0.75 * ((0.5 + 0.6 * q[0]) * qd[0]) ** 2, ["a"])
+    a, rate, ratio = 0.7, 1.1, 0.5 + 0.6 * 0.7
+    state = {"q0": a, "q1": 0.2 + 0.5 * a + 0.3 * a * a, "qd0": rate, "qd1": ratio * rate, "tau0": 0.4, "tau1": 0.0}
+    expected = dyn.forward_dynamics(known).evaluate({"q0": a, "qd0": rate, "tau0": 0.4})["qdd0"]
+    assert dyn.forward_dynamics(model).evaluate(state)["qdd0"] == pytest.approx(expected, rel=1e-14)
+    stopped = model.lock("a", a)
+    with pytest.warns(dyn.ConstraintWarning, match="coordinate 'b' by 0.697"):
+        run = dyn.simulate(stopped, [0.0], [0.0], 0.1)
+    assert run.q[-1, 0] == pytest.approx(state["q1"], rel=1e-14)
+
+
 def slope(node: cg.Node, a: cg.Node) -> cg.Node:
     return next(iter(cg.gradient(cg.Graph([a], {"y": node})).outputs.values()))
 
