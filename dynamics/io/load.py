@@ -40,8 +40,7 @@ def load_mjcf(source: Any, *, ignore: bool = False) -> Mechanism:
         A path, the XML text (it starts with "<"), or MuJoCo's own model.
     ignore : bool
         Leave out what a mechanism cannot have: springs of ball joints, tendons, equality, friction loss, fluid, ...
-        Contacts, limits and actuators, which act on a mechanism and do not belong to it, are always
-        left out.
+        Contacts, limits and actuators, which act on a mechanism and do not belong to it, are always left out.
 
     Returns
     -------

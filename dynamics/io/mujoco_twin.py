@@ -85,7 +85,7 @@ class MujocoTwin:
 
     def mass_matrix(self, q: Array) -> Array:
         """M(q), (n, n)."""
-        self._set(q, np.zeros_like(q))
+        self._set(q, np.zeros(self.model.nv))
         self.mujoco.mj_forward(self.model, self.data)
         columns = np.empty((self.model.nv, self.model.nv))
         for column, unit in zip(columns, np.eye(self.model.nv), strict=True):  # mj_fullM differs between versions
@@ -102,13 +102,13 @@ class MujocoTwin:
         """q and qd, (steps + 1, n) each, from the start on, by MuJoCo's RK4."""
         self.mujoco.mj_resetData(self.model, self.data)
         self._set(q, qd)
-        n = self.model.nv
-        states = np.empty((steps + 1, 2 * n))
+        nq = self.model.nq
+        states = np.empty((steps + 1, nq + self.model.nv))
         for k in range(steps + 1):
             states[k] = np.concatenate([self.data.qpos, self.data.qvel])
             if k < steps:
                 self.mujoco.mj_step(self.model, self.data)
-        return states[:, :n], states[:, n:]
+        return states[:, :nq], states[:, nq:]
 
     def arm_positions(self, q: Array) -> Array:
         """Places of base, joints and tip [m] of a planar arm, (T, n + 1, 2), by MuJoCo's kinematics at q, (T, n)."""

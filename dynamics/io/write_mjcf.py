@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from cgraph.extend import real_number
 
 from ..multibody import spatial
+from ..multibody.joints import AxialJoint
 from ..multibody.mechanism import WORLD, Body, Mechanism, MechanismError, require_mechanism
 from ..multibody.spatial import Array
 from ..systems.model import Model
@@ -91,16 +92,31 @@ def mjcf_text(
 
 def _body_lines(body: Body) -> list[str]:
     joint = body.joint
+    _require_joint(body)
     x, y, _ = np.asarray(joint.orientation).T
-    spring = f'stiffness="{joint.stiffness!r}" springref="{joint.spring_reference!r}" armature="{joint.armature!r}"'
-    axis = f'axis="{numbers(joint.axis)}" damping="{joint.damping!r}"'
+    spring = f'damping="{joint.damping!r}" armature="{joint.armature!r}"'
+    if isinstance(joint.type, AxialJoint):
+        spring = f'stiffness="{joint.stiffness!r}" springref="{joint.spring_reference!r}" {spring}'
+        spring = f'axis="{numbers(joint.axis)}" {spring}'
     mass = body.mass or _SMALLEST  # one that is small stays: if MuJoCo refuses it, it says so
     place = f'pos="{numbers(joint.position)}" xyaxes="{numbers(np.concatenate([x, y]))}"'
     return [
         f"<body name={quoteattr(body.name)} {place}>",
-        f'  <joint name={quoteattr(body.coordinate)} type="{joint.type.mjcf}" {axis} {spring}/>',
+        f'  <joint name={quoteattr(body.coordinate)} type="{joint.type.mjcf}" {spring}/>',
         f'  <inertial pos="{numbers(body.center)}" mass="{mass!r}" {_principal(np.asarray(body.inertia))}/>',
     ]
+
+
+def _require_joint(body: Body) -> None:
+    """Raises MechanismError for a joint that MJCF does not have, or has with other coordinates."""
+    joint, where = body.joint, f"the joint of body {body.name!r}"
+    if not joint.type.mjcf:
+        raise MechanismError(f"MJCF has no joint of the kind {joint.kind!r}, as is {where}")
+    if joint.type.mjcf == "free":
+        if body.parent != WORLD:
+            raise MechanismError(f"in MJCF a free body hangs on the world, and body {body.name!r} on {body.parent!r}")
+        if np.any(joint.position) or np.any(np.asarray(joint.orientation) != np.eye(3)):
+            raise MechanismError(f"in MJCF a free joint has the axes and the origin of the world, and {where} has not")
 
 
 def _principal(inertia: Array) -> str:

@@ -186,6 +186,9 @@ def _checked_joint(where: str, joint: Joint) -> Joint:
     stiffness = _number(f"{where}: stiffness", joint.stiffness)
     if stiffness and len(joint.type.coordinates) > 1:
         raise MechanismError(f"{where}: a spring needs a joint with one coordinate, got stiffness {stiffness!r}")
+    armature = _number(f"{where}: armature", joint.armature)
+    if armature and not joint.type.geared:
+        raise MechanismError(f"{where}: a joint of the kind {joint.kind!r} has no armature, got {armature!r}")
     return Joint(
         joint.kind,
         axis=spatial.snapped(axis / length),
@@ -194,7 +197,7 @@ def _checked_joint(where: str, joint: Joint) -> Joint:
         damping=_number(f"{where}: damping", joint.damping),
         stiffness=stiffness,
         spring_reference=_number(f"{where}: spring_reference", joint.spring_reference, minimum=-math.inf),
-        armature=_number(f"{where}: armature", joint.armature),
+        armature=armature,
         name=joint.name,
     )
 

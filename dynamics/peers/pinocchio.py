@@ -31,6 +31,8 @@ class PinocchioPeer(Peer):
             raise ImportError(f"Pinocchio is not installed: {install('bench')}") from error
         self.pinocchio = pinocchio
         mechanism = bodies(case)
+        if case.nq != case.n:
+            raise UnavailableError("has other coordinates of ball and free joints")
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "model.xml"
             path.write_text(to_mjcf(mechanism), encoding="utf-8")

@@ -251,11 +251,11 @@ def original(twin: Any, model: Model) -> Original:
     """
     module, theirs = mujoco(), copy.copy(compiled(twin))
     try:
-        n = as_system(bare(model)).n
+        system = as_system(bare(model))
     except NotComparableError as error:
         raise ValueError(f"a twin is compared with rigid bodies: MuJoCo {error}") from None
-    if (theirs.nq, theirs.nv) != (n, n):
-        raise ValueError(f"the twin has {theirs.nv} degrees of freedom, the model {n}")
+    if (theirs.nq, theirs.nv) != (system.nq, system.n):
+        raise ValueError(f"the twin has {theirs.nv} degrees of freedom, the model {system.n}")
     for unused in ("CONTACT", "LIMIT", "ACTUATION"):
         theirs.opt.disableflags |= getattr(module.mjtDisableBit, f"mjDSBL_{unused}")
     return Original(theirs)

@@ -19,7 +19,8 @@ class JointType(ABC):
 
     kind: the word for it in `Joint.kind`.  mjcf, urdf: the words for it in those files; "" where they have none.
     moves: whether it has a coordinate; of "fixed" no function below is asked but `placement`.
-    turns: whether it turns the body.  limited: whether URDF demands limits of it.
+    turns: whether it turns the body.  limited: whether URDF demands limits of it.  geared: whether its velocities can
+    have an inertia of their own, an armature.
     coordinates, velocities: what they are called after the joint's name; "" of a single one, which has the joint's.
     units: of the coordinates.  neutral: the coordinates where the body stands at the joint.
     groups: for each coordinate a number, the same for those that are one quantity.
@@ -30,6 +31,7 @@ class JointType(ABC):
     moves = True
     turns = True
     limited = False
+    geared = True
     coordinates: tuple[str, ...] = ("",)
     velocities: tuple[str, ...] = ("",)
     units: tuple[str, ...] = ("rad",)

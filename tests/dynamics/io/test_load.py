@@ -211,13 +211,11 @@ def test_bad_mjcf_is_one_sentence(text: str, tmp_path: Path) -> None:
 
 # --- what is not modelled
 
-BALL = f'<body name="b"><joint name="ball" type="ball"/>{INERTIAL}</body>'
+BALL = f'<body name="b"><joint name="ball" type="ball" stiffness="2"/>{INERTIAL}</body>'
 FREE = f'<body name="f" pos="0 0 2"><freejoint name="root"/>{INERTIAL}{HINGE}</body>'
 TENDON = '<tendon><fixed name="string" stiffness="3"><joint joint="j" coef="1"/></fixed></tendon>'
 NOT_MODELLED = [
-    param(mjcf(HINGE + BALL), "free or ball joints (ball)", id="ball"),
-    param(mjcf(FREE), "free or ball joints (root)", id="free"),
-    param(mjcf(FREE.replace(' name="root"', "")), "free or ball joints (of body 'f')", id="nameless"),
+    param(mjcf(BALL), "springs of free or ball joints (ball)", id="ball"),
     param(
         mjcf(HINGE).replace("</mujoco>", TENDON + "</mujoco>"),
         "tendons with a spring, damper or mass (string)",
@@ -245,16 +243,16 @@ def test_what_is_not_modelled_is_refused_by_name(text: str, what: str) -> None:
 def test_what_is_not_modelled_is_left_out_on_request(text: str, what: str) -> None:
     mechanism = dyn.load_mjcf(text, ignore=True)
     assert mechanism.omitted == (what,)
-    assert len(mechanism.system.coordinates) == 1
+    assert len(mechanism.moving) == 1
 
 
-def test_a_free_joint_left_out_is_a_weld() -> None:
-    floating, fixed = (
-        dyn.load_mjcf(mjcf(FREE), ignore=True),
-        dyn.load_mjcf(mjcf(FREE.replace('<freejoint name="root"/>', ""))),
-    )
-    state = {"q0": 0.3, "qd0": 0.2, "qdd0": 0.1}
-    assert dyn.inverse_dynamics(floating).evaluate(state) == dyn.inverse_dynamics(fixed).evaluate(state)
+def test_free_and_ball_joints_move_as_mujoco_s() -> None:
+    """At the place that the file gives the free body, and anywhere else: its coordinates are its place in the world."""
+    text = mjcf(FREE.replace(HINGE, HINGE + BALL.replace(' stiffness="2"', "")))
+    mechanism = dyn.load_mjcf(text)
+    assert mechanism.coordinates[:4] == ("f.x", "f.y", "f.z", "f.qw")
+    assert (mechanism.system.nq, mechanism.system.n) == (12, 10)
+    assert dyn.certify(mechanism, 5, twin=text).passed
 
 
 @mark.parametrize(
