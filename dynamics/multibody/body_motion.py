@@ -47,13 +47,12 @@ def ground(gravity: ArrayLike, *, in_plane: bool = False) -> Motion:
     fewer nodes. In space the vertical has three components, which had better be scaled once.
     """
     pull = np.asarray(gravity, dtype=np.float64)
-    g = float(np.linalg.norm(pull))
-    if not g:
+    if not pull.any():
         return Motion(STILL, STILL, STILL, ZERO)
-    downward = spatial.snapped(pull / g)
     if in_plane:
-        return Motion(STILL, STILL, spatial.constant(downward), ZERO, -g)
-    return Motion(STILL, STILL, spatial.constant(-g * downward), ZERO)
+        downward = spatial.unit(pull)
+        return Motion(STILL, STILL, spatial.constant(downward + 0.0), ZERO, -float(downward @ pull))
+    return Motion(STILL, STILL, spatial.constant(0.0 - pull), ZERO)
 
 
 def propagate_motion(parent: Motion, link: Link, joint: JointType, q: Node, qd: Node) -> Motion:
@@ -93,7 +92,7 @@ def propagate_motion(parent: Motion, link: Link, joint: JointType, q: Node, qd: 
 
 def carrier_motion(parent: Motion, link: Link) -> Motion:
     """The parent's motion in the axes that the link is carried in: those of a plane where it stays in the plane."""
-    return in_body_axes(parent) if parent.plane and abs(link.turn[2][2]) != 1.0 else parent
+    return in_body_axes(parent) if parent.plane and not link.parallel else parent
 
 
 def joint_translation(link: Link, joint: JointType, q: Node) -> Triple:

@@ -45,7 +45,7 @@ class TreeEquations:
     def ground(self) -> Motion:
         """The world at rest."""
         inner = [link for link, parent in zip(self.links, self.parents, strict=True) if parent >= 0]
-        in_plane = all([abs(link.turn[2][2]) == 1.0 for link in inner])
+        in_plane = all([link.parallel for link in inner])
         return self.shared.ground(ground(self.gravity, in_plane=in_plane))
 
     @cached_property

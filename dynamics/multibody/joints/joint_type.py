@@ -36,8 +36,11 @@ class JointType(Protocol):
     def placement(self, axis: Array, at: float) -> tuple[Array, Array]:
         """Rotation (3, 3) and displacement (3,) [m] of the body at a coordinate, in its axes at 0."""
 
-    def resists(self, axis: Array, mass: float, inertia: Array) -> bool:
-        """Whether a body alone has inertia along the coordinate; its inertia is about the joint's origin, (3, 3)."""
+    def resists(self, mass: float, inertia: Array) -> bool:
+        """Whether a body alone has inertia along the coordinate; its inertia is about the joint's origin, (3, 3).
+
+        In the axes in which the joint's axis is z.
+        """
 
     def unobservable(self, mass: float, moment: Array, inertia: Array) -> tuple[float, Array, Array]:
         """The part of mass, first moment (3,) and inertia (3, 3) that moves with the parent whatever the joint does."""

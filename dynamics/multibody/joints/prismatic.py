@@ -32,7 +32,7 @@ class Prismatic:
         """A displacement along the axis."""
         return np.eye(3), axis * at
 
-    def resists(self, axis: Array, mass: float, inertia: Array) -> bool:
+    def resists(self, mass: float, inertia: Array) -> bool:
         """Mass."""
         return mass > 0.0
 
