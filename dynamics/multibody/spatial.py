@@ -36,13 +36,14 @@ def unit(vector: Array) -> Array:
 
 
 def snapped(columns: Array) -> Array:
-    """Columns of length 1, or one, without components of a rounding, and those along an axis along it exactly.
+    """Columns of length 1, or one, without components that are rounding; 1 where the others leave no other number.
 
-    A component near 1 beside others stays: the cosine of a small angle belongs to its sine.
+    So a component near 1 stays where the others say that it is the cosine of a small angle.
     """
     result = np.where(np.abs(columns) <= SNAP, 0.0, columns)
-    along = np.count_nonzero(result, axis=0) == 1
-    return np.where(along, np.sign(result), result) + 0.0
+    along = np.abs(result) > 0.9  # one component of a column at most
+    across = np.sum(np.where(along, 0.0, result) ** 2, axis=0)
+    return np.where(along & (across <= 2.0**-53), np.sign(result), result) + 0.0
 
 
 def without_rounding(total: Array, terms: Array) -> Array:
