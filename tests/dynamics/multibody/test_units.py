@@ -125,7 +125,7 @@ def worst(seed: int, most: int) -> float:
     n = len(mechanism.moving)
     found = results(mechanism, random_units(np.random.default_rng(seed), binary=False))
     plain = results(mechanism, Units())
-    sizes = {name: np.abs(values).max() for name, values in plain.items()}
+    sizes = {name: np.abs(values).max() or 1.0 for name, values in plain.items()}
     sizes["forward dynamics"] *= np.linalg.cond(balanced(plain["mass matrix"].reshape(-1, n, n))).max()
     return max([float(np.abs(found[name] - plain[name]).max() / size) for name, size in sizes.items()])
 
