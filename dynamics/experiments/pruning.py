@@ -21,7 +21,7 @@ def report(
     effects: Iterable[str] = EFFECTS,
     lock: Mapping[str, float] | None = None,
     values: Mapping[str, float] | None = None,
-    regroup: bool = True,
+    regroup: bool = False,
 ) -> dict[str, Any]:
     """What `prune` makes of a scene's inverse and forward dynamics, for JSON.
 

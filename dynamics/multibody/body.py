@@ -177,8 +177,7 @@ def _checked_joint(where: str, joint: Joint) -> Joint:
     if joint.name != "":
         _check_name(f"the joint of {where}", joint.name)
     axis = vector(f"{where}: axis", joint.axis)
-    length = float(np.linalg.norm(axis))
-    if not length:
+    if not axis.any():
         raise MechanismError(f"{where}: axis must not be zero")
     orientation = vector(f"{where}: orientation", joint.orientation, (3, 3))
     if np.abs(orientation.T @ orientation - np.eye(3)).max() > _ROUNDING or np.linalg.det(orientation) < 0:
@@ -191,7 +190,7 @@ def _checked_joint(where: str, joint: Joint) -> Joint:
         raise MechanismError(f"{where}: a joint of the kind {joint.kind!r} has no armature, got {armature!r}")
     return Joint(
         joint.kind,
-        axis=spatial.snapped(axis / length),
+        axis=spatial.snapped(spatial.unit(axis)),
         position=vector(f"{where}: position", joint.position),
         orientation=spatial.snapped(orientation),
         damping=_number(f"{where}: damping", joint.damping),

@@ -55,8 +55,11 @@ class JointType(ABC):
         """Rotation (3, 3) and displacement (3,) [m] of the body at coordinates (nq,), in its axes at neutral ones."""
 
     @abstractmethod
-    def resists(self, axis: Array, mass: float, inertia: Array) -> bool:
-        """Whether a body alone has inertia along all velocities; its inertia is about the joint's origin, (3, 3)."""
+    def resists(self, mass: float, inertia: Array) -> bool:
+        """Whether a body alone has inertia along all velocities; its inertia is about the joint's origin, (3, 3).
+
+        In the axes of the body's motion, in which the axis of an axial joint is z.
+        """
 
     def unobservable(self, mass: float, moment: Array, inertia: Array) -> tuple[float, Array, Array]:
         """The part of mass, first moment (3,) and inertia (3, 3) that moves with the parent whatever the joint does."""

@@ -6,6 +6,8 @@ import numpy as np
 from pytest import approx, fixture, mark
 
 import dynamics as dyn
+from cgraph.core.structure_hash import structure_hash
+from tests.dynamics.mechanisms import FAMILIES, turned_arm
 
 FROM_6_TO_40 = (6, 8, 10, 13, 17, 22, 30, 40)
 
@@ -97,3 +99,17 @@ def test_the_literal_form_costs_more_from_two_links_on() -> None:
     ratios = [b / a for a, b in zip(edges("chain_rule", sizes), edges("chain_rule_literal", sizes), strict=True)]
     assert ratios[0] == 1.0
     assert (np.diff(ratios) > 0).all()
+
+
+@mark.parametrize("model", [dyn.tree([-1, 0, 0]), turned_arm(2), turned_arm(3)], ids=["tree", "arm of 2", "arm of 3"])
+def test_near_ties_of_nodes_go_to_elimination_which_keeps_more_digits(model: dyn.Mechanism) -> None:
+    auto, recursive, dense = (dyn.forward_dynamics(model, method) for method in ("auto", "recursive", "dense"))
+    assert 0.9 * len(recursive.nodes) < len(dense.nodes) < len(recursive.nodes)
+    assert structure_hash(auto) == structure_hash(recursive)
+
+
+def test_a_dense_solve_that_saves_more_than_a_tenth_of_the_nodes_is_taken() -> None:
+    skew = FAMILIES["serial"](2)
+    auto, recursive, dense = (dyn.forward_dynamics(skew, method) for method in ("auto", "recursive", "dense"))
+    assert len(dense.nodes) < 0.9 * len(recursive.nodes)
+    assert structure_hash(auto) == structure_hash(dense)
