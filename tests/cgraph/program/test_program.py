@@ -10,6 +10,7 @@ from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
 from cgraph.program import Call, Factor, If, Map, Program, Solve, Sum, While, runner
+from tests.strategies import examples
 from tests.tolerances import LONG_SUM
 
 BACKENDS = ["python", "llvm"]
@@ -140,7 +141,7 @@ def test_a_run_goes_on_where_the_last_one_ended(backend: str) -> None:
     assert np.concatenate(parts).tolist() == whole.tolist()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(n=st.integers(1, 9), seed=st.integers(0, 10_000))
 def test_factor_and_solve(n: int, seed: int) -> None:
     generator = np.random.default_rng(seed)

@@ -13,7 +13,7 @@ import cgraph as cg
 import dynamics as dyn
 from tests import high_precision
 from tests.dynamics.mechanisms import random_mechanism
-from tests.strategies import cases
+from tests.strategies import cases, examples
 
 FOUR_ULPS = 4 * 2.0**-52
 KINK_DISTANCE = 1e-6
@@ -40,7 +40,7 @@ def assert_same_values(after: cg.Graph, before: cg.Graph, values: dict[str, floa
         assert abs(mpf(found) - exact[name]) <= FOUR_ULPS * (sizes[name] + more[name])
 
 
-@settings(max_examples=300, derandomize=True, database=None)
+@settings(max_examples=examples(300), derandomize=True, database=None)
 @given(cases(max_operations=30), st.data())
 def test_on_random_graphs(case, data):
     graph = case.graph
