@@ -23,14 +23,16 @@ def test_random_graphs_use_every_operation_and_share_nodes():
     """Test the tests: the properties below are tried on all that the table offers."""
     seen: list[cg.Graph] = []
 
-    @settings(max_examples=examples(300))
+    @settings(max_examples=300)
     @given(cases())
     def draw(case: Case) -> None:
         seen.append(case.graph)
 
     draw()
     assert {node.op.name for graph in seen for node in graph.nodes} >= set(OPS)
-    assert sum(len({e.source for e in graph.edges if e.source.args}) < len(graph.edges) for graph in seen) > 50
+    assert (
+        sum(len({e.source for e in graph.edges if e.source.args}) < len(graph.edges) for graph in seen) > 50
+    )
     assert sum(len(graph.nodes) > 20 for graph in seen) > 15
 
 

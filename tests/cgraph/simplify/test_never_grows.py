@@ -13,6 +13,7 @@ import cgraph as cg
 import dynamics as dyn
 from tests import high_precision
 from tests.dynamics.mechanisms import random_mechanism
+from tests.slow import slow
 from tests.strategies import cases, examples
 
 FOUR_ULPS = 4 * 2.0**-52
@@ -61,7 +62,7 @@ def scene(seed: int) -> tuple[dyn.Mechanism, np.random.Generator]:
     return (dyn.Mechanism(found.bodies, (0.0, 0.0, -9.81)) if seed % 2 else found), generator
 
 
-@pytest.mark.parametrize("seed", range(SCENES))
+@pytest.mark.parametrize("seed", [*range(30), *slow(*range(30, SCENES))])
 def test_on_random_scenes(seed):
     model, generator = scene(seed)
     raw = dyn.inverse_dynamics(model, simplify=False)
