@@ -30,9 +30,7 @@ def test_random_graphs_use_every_operation_and_share_nodes():
 
     draw()
     assert {node.op.name for graph in seen for node in graph.nodes} >= set(OPS)
-    assert (
-        sum(len({e.source for e in graph.edges if e.source.args}) < len(graph.edges) for graph in seen) > 50
-    )
+    assert sum(len({e.source for e in graph.edges if e.source.args}) < len(graph.edges) for graph in seen) > 50
     assert sum(len(graph.nodes) > 20 for graph in seen) > 15
 
 

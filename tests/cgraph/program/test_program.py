@@ -245,7 +245,7 @@ def test_wrong_use_of_a_loop() -> None:
 def test_code_in_a_cycle_of_garbage_is_let_go_in_order() -> None:
     """Python ends the objects of a cycle in any order; LLVM's context must outlive what was made in it."""
     pytest.importorskip("llvmlite")
-    for _ in range(20):
+    for _ in range(6):
         held: list[object] = [cg.compile(ONE, "llvm"), cg.loop(spring(), {"x": "x_next"}, "llvm")]
         held.append(held)
         del held
