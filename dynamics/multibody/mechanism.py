@@ -76,11 +76,14 @@ class Mechanism(Structure):
         require_flag("base_parameters", self.base_parameters)
         for what, kind in (("bodies", Body), ("forces", Force)):  # kept, so that an iterator is read once
             object.__setattr__(self, what, _listed(what, kind, getattr(self, what)))
-        for i, name in enumerate(self.coordinates):
-            if name in self.coordinates[:i]:
+        seen: set[str] = set()
+        for name in self.coordinates:
+            if name in seen:
                 raise MechanismError(f"two joints that move have the name {name!r}")
+            seen.add(name)
+        carried = set(self._carriers) - {WORLD}
         for force in self.forces:
-            check_force(force, set(self._carriers) - {WORLD})
+            check_force(force, carried)
         used = {name for force in self.forces for name in force.names}
         for name in require_mapping("parameters", self.parameters, "name: value"):
             if name not in used:
@@ -103,7 +106,7 @@ class Mechanism(Structure):
         """The bodies that move, parents first, with all that is welded to them merged into their inertia."""
         return self._merged[0]
 
-    @property
+    @cached_property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the coordinates: the joints', which are the bodies' where a joint has none of its own."""
         return coordinate_names(self.moving)

@@ -30,9 +30,10 @@ class StepBlock(NamedTuple):
     def states_at(self, rows: Indices, s: Array) -> Array:
         """States (k, m) at the shares s (k,) of the steps `rows` (k,)."""
         assert self.dense is not None
-        total = np.zeros((len(rows), self.x.shape[1]))
-        for k in reversed(range(self.dense.shape[1])):
-            total = (total + self.dense[rows, k]) * s[:, None]
+        total, share = np.zeros((len(rows), self.x.shape[1])), s[:, None]
+        for coefficients in self.dense[rows].swapaxes(0, 1)[::-1]:
+            total += coefficients
+            total *= share
         inside: Array = np.where((s == 1.0)[:, None], self.x[rows], self.x_old[rows] + total)
         return inside
 
@@ -44,9 +45,10 @@ class StepBlock(NamedTuple):
     def slopes_at(self, rows: Indices, s: Array) -> Array:
         """Derivatives of the states by the share, (k, m)."""
         assert self.dense is not None
-        total = np.zeros((len(rows), self.x.shape[1]))
-        for k in reversed(range(self.dense.shape[1])):
-            total = total * s[:, None] + (k + 1.0) * self.dense[rows, k]
+        total, share = np.zeros((len(rows), self.x.shape[1])), s[:, None]
+        for k, coefficients in reversed(list(enumerate(self.dense[rows].swapaxes(0, 1), 1))):
+            total *= share
+            total += k * coefficients
         return total
 
     def part(self, which: slice) -> StepBlock:

@@ -77,7 +77,7 @@ def graph_of(op):
 def points_of(op):
     """Samples, points of the domain, and every combination of IEEE specials."""
     source = random.Random(op.name)
-    drawn = [tuple(source.uniform(*interval) for interval in op.domain) for _ in range(200)]
+    drawn = [tuple(source.uniform(*interval) for interval in op.domain) for _ in range(50)]
     return [*op.samples, *drawn, *itertools.product(SPECIAL, repeat=op.arity)]
 
 

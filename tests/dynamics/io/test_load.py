@@ -19,6 +19,7 @@ from dynamics.multibody.mechanism import Body, Joint, Mechanism, MechanismError
 from dynamics.multibody.spatial import rotation
 from tests.dynamics.mechanisms import FAMILIES, turned_arm
 from tests.dynamics.models import error
+from tests.slow import slow
 from tests.tolerances import EQUATIONS
 
 mujoco = importorskip("mujoco")
@@ -83,7 +84,7 @@ HINGE = f'<body name="a"><joint name="j"/>{INERTIAL}</body>'
 # --- there and back
 
 
-@mark.parametrize("n", [1, 7, 15])
+@mark.parametrize("n", [1, 5, *slow(15)])
 @mark.parametrize("family", FAMILIES)
 def test_a_mechanism_comes_back_from_its_mjcf(family: str, n: int) -> None:
     mechanism = FAMILIES[family](n)

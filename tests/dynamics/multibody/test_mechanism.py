@@ -27,6 +27,7 @@ from tests.dynamics.mechanisms import (
     turned_tree,
 )
 from tests.dynamics.models import Array, at, error, run, states
+from tests.slow import slow
 from tests.tolerances import EQUATIONS, LAST_BITS, SOLVED
 
 AGREEMENT = 1e-10  # of the largest entry: rounding of two codes, times the condition number of M
@@ -64,7 +65,7 @@ def point(name: str, parent: str = "world", **given: Any) -> Body:
 # --- agreement
 
 
-@mark.parametrize("n", [1, 2, 7, 20, 40])
+@mark.parametrize("n", [1, 2, 7, 20, *slow(40)])
 @mark.parametrize("family", FAMILIES)
 def test_random_mechanisms_agree_with_mujoco(family: str, n: int, record_property) -> None:
     mechanism = FAMILIES[family](n)
@@ -84,7 +85,7 @@ def test_random_mechanisms_agree_with_mujoco(family: str, n: int, record_propert
     assert worst.max() < AGREEMENT
 
 
-@mark.parametrize("n", [1, 3, 10, 30])
+@mark.parametrize("n", [1, 3, 10, *slow(30)])
 @mark.parametrize("family", FAMILIES)
 def test_the_torque_of_a_torque_s_acceleration_is_that_torque(family: str, n: int) -> None:
     mechanism = FAMILIES[family](n)

@@ -77,7 +77,7 @@ def test_arms_move_as_mujoco_s_do() -> None:
 def test_every_method_gives_what_simulate_gives(model: Any, method: str) -> None:
     q, qd = np.random.default_rng(1).normal(size=(2, 9, len(as_system(model).coordinates)))
     result = simulate_many(model, q, qd, 0.3, method, **step(method, 0.01), t_eval=[0.1, 0.2, 0.3])
-    for k in range(9):
+    for k in (0, 4, 8):  # the first and the last vector, and what is over
         one = dyn.simulate(model, q[k], qd[k], 0.3, method, **step(method, 0.01), t_eval=[0.1, 0.2, 0.3])
         assert np.hstack([result.q[k], result.qd[k]]) == approx(np.hstack([one.q, one.qd]), abs=ROUNDING)
         found = [int(each[k]) for each in (result.stats.steps, result.stats.rejected, result.stats.nfev)]

@@ -118,7 +118,7 @@ def twins() -> dict[str, tuple[str, str]]:
 def test_the_term_that_a_twin_differs_in_is_named(what: str, mass: float) -> None:
     """However light the bodies are, down to what MuJoCo can hold."""
     pytest.importorskip("mujoco")
-    mechanism = in_units(FAMILIES["mixed"](4), Units(mass=mass))
+    mechanism = in_units(FAMILIES["mixed"](2), Units(mass=mass))
     changed, term = twins()[what]
     found = failed(certify(mechanism, FEW, twin=to_mjcf(mechanism).replace(what, changed, 1)))
     assert found == {"inverse dynamics = MuJoCo's": f"they agree without {term}"}
@@ -126,7 +126,7 @@ def test_the_term_that_a_twin_differs_in_is_named(what: str, mass: float) -> Non
 
 def test_two_terms_are_named_together() -> None:
     pytest.importorskip("mujoco")
-    mechanism = FAMILIES["mixed"](4)
+    mechanism = FAMILIES["mixed"](2)
     text = to_mjcf(mechanism).replace('armature="', 'armature="1', 1).replace('damping="', 'damping="1', 1)
     found = failed(certify(mechanism, FEW, twin=text))
     assert found == {"inverse dynamics = MuJoCo's": "they agree without damping and armature"}
