@@ -243,16 +243,11 @@ def _chain(mj: Any, body: int, names: list[str], parent: str, origin: Array) -> 
         chain.append(Body(name, Joint("fixed", position=position, orientation=orientation), parent))
         position = np.zeros(3)
     axes = spatial.from_quaternion(mj.body_iquat[body])
-    inertia = _of_shapes(axes @ np.diag(mj.body_inertia[body]) @ axes.T)
-    center = position + _of_shapes(mj.body_ipos[body])
+    inertia = spatial.cleaned(axes @ np.diag(mj.body_inertia[body]) @ axes.T)
+    center = position + spatial.cleaned(mj.body_ipos[body])
     last = chain[-1]
     chain[-1] = Body(last.name, last.joint, last.parent, float(mj.body_mass[body]), center, inertia)
     return chain, position
-
-
-def _of_shapes(array: Array) -> Array:
-    """Numbers that MuJoCo computed from shapes, without those that are its rounding beside the largest."""
-    return np.where(np.abs(array) <= spatial.SNAP * np.abs(array).max(), 0.0, array)
 
 
 def _joint(mj: Any, j: int, position: Array, orientation: Array) -> Joint:

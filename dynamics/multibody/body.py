@@ -39,7 +39,8 @@ class Joint:
     position : array_like, (3,)
         Origin of the body's frame in its parent's at q = 0 [m].
     orientation : array_like, (3, 3)
-        Axes of the body's frame, as columns in its parent's, at q = 0.
+        Axes of the body's frame, as columns in its parent's, at q = 0. Entries up to 1e-14 are zero: a quarter turn in
+        text, or by the cosine of pi / 2, is one.
     damping : float
         Viscous coefficient, at least 0 [N m s or N s/m].
     stiffness, spring_reference : float
