@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
 from typing import Any, NamedTuple, Protocol
@@ -106,7 +107,6 @@ TERMS: dict[str, Term] = {
         _all,
         _weightless,
     ),
-    "friction loss": Term(_same, _all, _zeroed("dof_frictionloss", "tendon_frictionloss")),
     "tendons": Term(_same, _all, _zeroed("tendon_stiffness", "tendon_damping", "tendon_armature")),
     "equality constraints": Term(_same, _all, _unbound),
     "fluid": Term(_same, _all, _thin),
@@ -211,8 +211,9 @@ def explanation(model: Mechanism, peer: Asked, at: Mapping[str, Array]) -> str:
     few = {name: rows[:ASKED] for name, rows in at.items()}
     for count in range(1, TAKEN + 1):
         for terms in combinations(TERMS, count):
-            if disagreement(without(model, terms), peer.without(terms), few) <= PEERS.value:
-                return f"they agree without {' and '.join(terms)}"
+            with suppress(MechanismError):  # what is left may be a model that a peer cannot have
+                if disagreement(without(model, terms), peer.without(terms), few) <= PEERS.value:
+                    return f"they agree without {' and '.join(terms)}"
     return f"no {TAKEN} terms explain it"
 
 
@@ -256,6 +257,6 @@ def original(twin: Any, model: Model) -> Original:
         raise ValueError(f"a twin is compared with rigid bodies: MuJoCo {error}") from None
     if (theirs.nq, theirs.nv) != (n, n):
         raise ValueError(f"the twin has {theirs.nv} degrees of freedom, the model {n}")
-    for unused in ("CONTACT", "LIMIT", "ACTUATION"):
+    for unused in ("CONTACT", "LIMIT", "FRICTIONLOSS", "ACTUATION"):
         theirs.opt.disableflags |= getattr(module.mjtDisableBit, f"mjDSBL_{unused}")
     return Original(theirs)

@@ -43,7 +43,7 @@ def _introduction(content: Content) -> list[Block]:
             "Times are the shortest of runs that take turns, warm, from the start to the end of the motion: nothing is "
             f"derived or compiled in them. {_sentence(content['machine'])} {_busy(content)}"
         ),
-        *[Paragraph(f"Left out of the model: {omitted}.") for omitted in content["omitted"]],
+        *[Paragraph(f"Left out of the model: {what}.") for what in content["left_out"]],
     ]
 
 
