@@ -58,8 +58,8 @@ def load_urdf(source: Any, *, ignore: bool = False) -> Mechanism:
     """The mechanism of a URDF file, with the numbers of the file; it stands on its root link.
 
     Every link is a body of its name, those without mass and those on fixed joints too, so that `position("tool0")` is
-    where that frame is. Coordinates have the names of the joints, in the order of the file, each with all that it
-    carries before the next. Shapes are not read, so their meshes need not be there. A link whose moments no rigid body
+    where that frame is. Coordinates have the names of the joints, in the order of the file, those that carry
+    others first. Shapes are not read, so their meshes need not be there. A link whose moments no rigid body
     can have is taken as it is, with a warning.
 
     Parameters
@@ -110,7 +110,9 @@ def _for_mujoco(robot: ElementTree.Element) -> str:
     for link in robot.iter("link"):
         for shape in [each for each in link if each.tag in ("visual", "collision")]:
             link.remove(shape)
-    for extension in robot.findall("mujoco"):
-        robot.remove(extension)
-    ElementTree.SubElement(ElementTree.SubElement(robot, "mujoco"), "compiler", fusestatic="false")
+    extension = robot.find("mujoco")
+    extension = ElementTree.SubElement(robot, "mujoco") if extension is None else extension
+    for compiler in extension.findall("compiler"):
+        extension.remove(compiler)
+    ElementTree.SubElement(extension, "compiler", fusestatic="false")
     return ElementTree.tostring(robot, encoding="unicode")

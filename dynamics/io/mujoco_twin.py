@@ -15,7 +15,7 @@ from ..multibody.mechanism import require_mechanism
 from ..multibody.planar_arm import planar_links
 from ..multibody.spatial import Array
 from ..systems.model import Model
-from .write_mjcf import to_mjcf
+from .write_mjcf import moving_alone, to_mjcf
 
 
 def mujoco() -> Any:
@@ -62,7 +62,7 @@ class MujocoTwin:
     def __init__(self, of: Model, timestep: float = 1e-3) -> None:
         self.mujoco = mujoco()
         self.mechanism = require_mechanism(of, "MuJoCo")
-        self.model = self.mujoco.MjModel.from_xml_string(to_mjcf(self.mechanism, timestep))
+        self.model = self.mujoco.MjModel.from_xml_string(to_mjcf(moving_alone(self.mechanism), timestep))
         self.data = self.mujoco.MjData(self.model)
 
     def _set(self, q: Array, qd: Array) -> None:

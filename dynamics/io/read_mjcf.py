@@ -16,6 +16,7 @@ from ..multibody.spatial import Array
 from .left_out import listed, present, refused_or_left_out
 from .mujoco_twin import mujoco
 from .source import is_text, path_of, root_of, text_of
+from .stand_ins import zeros_again
 
 # Fields of MuJoCo's model that say so when they are not zero.
 _OF_A_TENDON = ("stiffness", "stiffnesspoly", "damping", "dampingpoly", "armature")
@@ -107,11 +108,14 @@ def _chain(mj: Any, body: int, names: _Names, parent: str, origin: Array) -> tup
     if not joints:
         chain.append(Body(name, Joint("fixed", position=position, orientation=orientation), parent))
         position = np.zeros(3)
+    mass, moments = mj.body_mass[body], mj.body_inertia[body]
+    if joints:
+        mass, moments = zeros_again(mass), zeros_again(moments)
     axes = spatial.from_quaternion(mj.body_iquat[body])
-    inertia = axes @ np.diag(mj.body_inertia[body]) @ axes.T
+    inertia = axes @ np.diag(moments) @ axes.T
     center = position + mj.body_ipos[body]
     last = chain[-1]
-    chain[-1] = Body(last.name, last.joint, last.parent, float(mj.body_mass[body]), center, inertia)
+    chain[-1] = Body(last.name, last.joint, last.parent, float(mass), center, inertia)
     return chain, position
 
 

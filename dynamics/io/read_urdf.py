@@ -15,6 +15,7 @@ from ..multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
 from ..multibody.spatial import Array
 from .left_out import listed, present, refused_or_left_out
 
+GRAVITY = (0.0, 0.0, -9.81)  # m/s^2, where the file says nothing
 FAR = 1e9  # m: a limit of a slide that `to_urdf` writes because URDF asks for one; it stands for none
 _WITH_LIMITS = {"revolute": "revolute"}  # URDF's word for a hinge with limits, beside those of the joint types
 _KNOWN = {
@@ -28,15 +29,14 @@ def read_urdf(robot: Element, called: str, ignore: bool) -> Mechanism:
     """The mechanism of a robot, which stands on its root link. Raises MechanismError with one sentence."""
     try:
         links, joints = _by_name(robot, "link"), _by_name(robot, "joint")
-        root, tree = _tree(links, joints)
+        root = _root(links, joints)
         left_out = refused_or_left_out(_mimics(joints), _outside(robot, joints), ignore)
         with np.errstate(all="ignore"):  # of numbers that are not finite Mechanism says where they stand
             bodies = [] if root == WORLD else [Body(root, Joint("fixed"), **_inertial(links[root], root))]
-            for name in tree:
-                parent, child = _end(joints[name], name, "parent"), _end(joints[name], name, "child")
-                joint = _joint(joints[name], name, child)
-                bodies.append(Body(child, joint, parent, **_inertial(links[child], child)))
-        return Mechanism(bodies, left_out=left_out)
+            for name, element in joints.items():
+                parent, child = _end(element, name, "parent"), _end(element, name, "child")
+                bodies.append(Body(child, _joint(element, name, child), parent, **_inertial(links[child], child)))
+        return Mechanism(bodies, _gravity(robot), left_out=left_out)
     except MechanismError as error:
         raise MechanismError(f"URDF, {called}: {error}") from None
 
@@ -56,10 +56,9 @@ def _by_name(robot: Element, tag: str) -> dict[str, Element]:
     return found
 
 
-def _tree(links: Mapping[str, Element], joints: Mapping[str, Element]) -> tuple[str, list[str]]:
-    """The root link, and the joints in the order of the file, each with all that it carries before the next."""
+def _root(links: Mapping[str, Element], joints: Mapping[str, Element]) -> str:
+    """The link that is no joint's child."""
     above: dict[str, str] = {}
-    below: dict[str, list[str]] = {}
     for name, joint in joints.items():
         parent, child = _end(joint, name, "parent"), _end(joint, name, "child")
         for end in (parent, child):
@@ -68,18 +67,18 @@ def _tree(links: Mapping[str, Element], joints: Mapping[str, Element]) -> tuple[
         if child in above:
             raise MechanismError(f"link {child!r} is the child of two joints, {above[child]!r} and {name!r}")
         above[child] = name
-        below.setdefault(parent, []).append(name)
     roots = [name for name in links if name not in above]
+    if not roots:
+        raise MechanismError("a robot is one tree with a root, and every link is a joint's child")
     if len(roots) > 1:
         raise MechanismError(f"a robot is one tree, and {len(roots)} links are no joint's child: {listed(roots)}")
-    order: list[str] = []
-    waiting = list(reversed(below.get(roots[0], []))) if roots else []
-    while waiting:
-        order.append(waiting.pop())
-        waiting += reversed(below.get(_end(joints[order[-1]], order[-1], "child"), []))
-    if len(order) < len(joints):
-        raise MechanismError(f"joints go in a circle: {listed([name for name in joints if name not in order])}")
-    return roots[0], order
+    return roots[0]
+
+
+def _gravity(robot: Element) -> list[float]:
+    """Gravity as MuJoCo's extension of URDF has it [m/s^2], else the usual one."""
+    option = robot.find("mujoco/option")
+    return [*GRAVITY] if option is None else _numbers(option, "<mujoco>", "gravity", 3, " ".join(map(repr, GRAVITY)))
 
 
 def _end(joint: Element, name: str, which: str) -> str:
@@ -133,7 +132,7 @@ def _origin(element: Element, where: str) -> tuple[Array, Array]:
     if origin is None:
         return np.zeros(3), np.eye(3)
     position = np.array(_numbers(origin, where, "xyz", 3, "0 0 0"))
-    if "quat_xyzw" in origin.keys():  # noqa: SIM118 - an element is no mapping
+    if origin.get("quat_xyzw") is not None:
         x, y, z, w = _numbers(origin, where, "quat_xyzw", 4)
         return position, spatial.from_quaternion((w, x, y, z))
     return position, from_rpy(*_numbers(origin, where, "rpy", 3, "0 0 0"))
@@ -206,4 +205,7 @@ def _friction(joint: Element, name: str) -> float:
 def _extensions(robot: Element) -> Iterator[str]:
     """Elements of the robot, its links and its joints that are not URDF's own."""
     for parent in (robot, *robot.findall("link"), *robot.findall("joint")):
-        yield from (f"<{each.tag}>" for each in parent if each.tag not in _KNOWN[parent.tag])
+        for each in parent:
+            alone = [[(inner.tag, *inner.keys()) for inner in each]] == [[("option", "gravity")]]
+            if each.tag not in _KNOWN[parent.tag] and not (each.tag == "mujoco" and alone):
+                yield f"<{each.tag}>"

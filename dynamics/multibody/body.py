@@ -230,4 +230,4 @@ def _inertia(where: str, given: ArrayLike, beside: float) -> Array:
     if moments[2] > moments[0] + moments[1] + rounding:
         text = f"{where}: no body has principal moments {moments.tolist()}: the largest exceeds the sum of the others"
         warnings.warn(text, MechanismWarning, stacklevel=2)
-    return inertia
+    return 0.5 * (inertia + inertia.T)

@@ -166,18 +166,19 @@ class Translation:
 
 
 class Original:
-    """MuJoCo on a model of its own: of a file, say."""
+    """MuJoCo on a model of its own: of a file, say.  order: of our coordinates in its."""
 
-    def __init__(self, mj: Any) -> None:
-        self.mj = mj
+    def __init__(self, mj: Any, order: Sequence[int]) -> None:
+        self.mj, self.order = mj, list(order)
 
     def inverse(self, at: Mapping[str, Array]) -> Array:
         """tau, (N, n), of q, qd, qdd, (N, n) each."""
         module, data = mujoco(), mujoco().MjData(self.mj)
         rows = []
-        for data.qpos[:], data.qvel[:], data.qacc[:] in zip(at["q"], at["qd"], at["qdd"], strict=True):
+        for q, qd, qdd in zip(at["q"], at["qd"], at["qdd"], strict=True):
+            data.qpos[self.order], data.qvel[self.order], data.qacc[self.order] = q, qd, qdd
             module.mj_inverse(self.mj, data)
-            rows.append(np.array(data.qfrc_inverse))
+            rows.append(data.qfrc_inverse[self.order])
         return np.array(rows)
 
     def without(self, terms: Sequence[str]) -> Original:
@@ -186,7 +187,7 @@ class Original:
         for name in terms:
             TERMS[name].theirs(mj)
         mujoco().mj_setConst(mj, mujoco().MjData(mj))
-        return Original(mj)
+        return Original(mj, self.order)
 
 
 def peers(model: Model, twin: Original | None = None) -> Iterator[tuple[str, Callable[[], Asked]]]:
@@ -252,11 +253,12 @@ def original(twin: Any, model: Model) -> Original:
     """
     module, theirs = mujoco(), copy.copy(compiled(twin))
     try:
-        n = as_system(bare(model)).n
+        coordinates = as_system(bare(model)).coordinates
     except NotComparableError as error:
         raise ValueError(f"a twin is compared with rigid bodies: MuJoCo {error}") from None
+    n, names = len(coordinates), [theirs.joint(i).name for i in range(theirs.njnt)]
     if (theirs.nq, theirs.nv) != (n, n):
         raise ValueError(f"the twin has {theirs.nv} degrees of freedom, the model {n}")
     for unused in ("CONTACT", "LIMIT", "FRICTIONLOSS", "ACTUATION"):
         theirs.opt.disableflags |= getattr(module.mjtDisableBit, f"mjDSBL_{unused}")
-    return Original(theirs)
+    return Original(theirs, [names.index(name) for name in coordinates] if {*coordinates} == {*names} else range(n))
