@@ -176,6 +176,15 @@ def test_a_urdf_file_is_a_twin(tmp_path) -> None:
     assert "inverse dynamics = MuJoCo's" in [each.equation for each in found.residuals]
 
 
+def test_a_twin_may_have_its_joints_in_another_order() -> None:
+    """MuJoCo goes down each branch before the next, whatever the order of a URDF is."""
+    pytest.importorskip("mujoco")
+    joint = dyn.Joint("revolute", (0.0, 1.0, 0.2), (0.1, 0.0, -1.0))
+    link = {"joint": joint, "mass": 1.0, "center": (0.0, 0.1, -0.5), "inertia": (0.2, 0.2, 0.1)}
+    mechanism = dyn.tree([-1, 0, 0, 1, 2, 1], [link] * 6)
+    assert failed(certify(mechanism, FEW, twin=dyn.to_urdf(mechanism))) == {}
+
+
 def test_a_seed_is_not_negative() -> None:
     with pytest.raises(ValueError, match="seed must be a whole number from 0, got -1"):
         certify(dyn.scenes.load("spring_mass"), FEW, -1)
