@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -21,6 +22,18 @@ _ROUNDING = 1e-9  # of the largest entry: what is left of an inertia or a rotati
 
 class MechanismError(ValueError):
     """A mechanism that cannot be: which body, what was given, and what was needed."""
+
+
+class MechanismWarning(UserWarning):
+    """What a mechanism has not of the file that it was read from, or a body that cannot be, but can be calculated with.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import dynamics as dyn
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("error", dyn.MechanismWarning)  # a model that lacks something is no model
+    """
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,12 +175,12 @@ def checked(body: Body) -> Body:
     where, joint = f"body {body.name!r}", body.joint
     if not isinstance(body.parent, str):
         raise MechanismError(f"{where}: parent must be the name of a body or {WORLD!r}, got {body.parent!r:.80}")
-    inertia = _inertia(where, body.inertia)
+    mass, center = _number(f"{where}: mass", body.mass, " kg"), vector(f"{where}: center", body.center)
     return replace(
         body,
-        mass=_number(f"{where}: mass", body.mass, " kg"),
-        center=vector(f"{where}: center", body.center),
-        inertia=inertia,
+        mass=mass,
+        center=center,
+        inertia=_inertia(where, body.inertia, mass * float(center @ center)),
         joint=_checked_joint(where, joint),
     )
 
@@ -209,8 +222,12 @@ def _check_name(what: str, name: str) -> None:
         raise MechanismError(str(error)) from None
 
 
-def _inertia(where: str, given: ArrayLike) -> Array:
-    """Symmetric, and with principal moments that are not negative and obey the triangle inequality."""
+def _inertia(where: str, given: ArrayLike, beside: float) -> Array:
+    """Symmetric, and with principal moments that are not negative; a warning where no rigid body has them.
+
+    Kinetic energy is positive all the same, so that all equations of a tree hold.
+    beside: the inertia of the mass about the joint, beside which a moment may be rounding.
+    """
     diagonal = shape_of(given) == (3,)
     inertia = vector(f"{where}: inertia", given, (3,) if diagonal else (3, 3))
     inertia = np.diag(inertia) if diagonal else inertia
@@ -218,10 +235,10 @@ def _inertia(where: str, given: ArrayLike) -> Array:
     if np.abs(inertia - inertia.T).max() > _ROUNDING * scale:
         raise MechanismError(f"{where}: inertia must be symmetric")
     moments = np.linalg.eigvalsh(inertia)
-    if moments[0] < -_ROUNDING * scale:
+    rounding = _ROUNDING * scale + spatial.SNAP * beside
+    if moments[0] < -rounding:
         raise MechanismError(f"{where}: inertia must not be negative, its principal moments are {moments.tolist()}")
-    if moments[2] > moments[0] + moments[1] + _ROUNDING * scale:
-        raise MechanismError(
-            f"{where}: no body has principal moments {moments.tolist()}: the largest exceeds the sum of the others"
-        )
-    return inertia
+    if moments[2] > moments[0] + moments[1] + rounding:
+        text = f"{where}: no body has principal moments {moments.tolist()}: the largest exceeds the sum of the others"
+        warnings.warn(text, MechanismWarning, stacklevel=2)
+    return 0.5 * (inertia + inertia.T)
