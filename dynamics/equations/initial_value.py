@@ -75,9 +75,7 @@ def normalized(model: Model, x: Array) -> Array:
         bad = [k for k, fine in enumerate(good[*row]) if not fine]
         names, values = ", ".join([repr(model.coordinates[k]) for k in bad]), x[*row, bad].tolist()
         of = f" of trajectory {row[0]}" if row else ""
-        raise ValueError(
-            f"q must have a length of {names} that is not 0, nor its square beyond float64; got {values}{of}"
-        )
+        raise ValueError(f"{names} need a length whose square is neither 0 nor beyond float64, got {values}{of}")
     return result
 
 

@@ -211,5 +211,5 @@ def test_masses_far_apart_are_no_lack_of_inertia():
 def test_an_inertia_that_is_not_positive_is_named_by_its_velocity() -> None:
     """Of a free body there are more coordinates than velocities: the last of these has no fellow among them."""
     flat = dyn.Body("flat", dyn.Joint("free"), mass=1.0, inertia=np.diag([1.0, 1.0, 2.0]))
-    with raises(dyn.SingularMassMatrixError, match=r"'flat.wz' has an inertia that is not positive"):
+    with pytest.raises(dyn.SingularMassMatrixError, match=r"'flat.wz' has an inertia that is not positive"):
         dyn.raise_if_singular(dyn.Mechanism([flat]), 6)
