@@ -1,16 +1,34 @@
-"""Hypothesis profiles: the default run is reproducible; HYPOTHESIS_PROFILE=explore looks for new examples."""
+"""Hypothesis profiles: the default run is reproducible and short; HYPOTHESIS_PROFILE=full or explore tries more."""
 
+import atexit
+import gc
 import os
 import signal
+import sys
 from collections.abc import Iterator
+from tempfile import TemporaryDirectory
 
 import pytest
 from hypothesis import HealthCheck, settings
 
+if sys.dont_write_bytecode:  # else every process that a test starts would compile the library anew
+    _bytecode = TemporaryDirectory(prefix="cgraph-bytecode-")
+    atexit.register(_bytecode.cleanup)
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # python -B sets none
+    os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix = _bytecode.name
+    sys.dont_write_bytecode = False
+
 _slow_is_fine = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow, HealthCheck.data_too_large]}
-settings.register_profile("reproducible", derandomize=True, database=None, **_slow_is_fine)
+settings.register_profile("reproducible", max_examples=25, derandomize=True, database=None, **_slow_is_fine)
+settings.register_profile("full", max_examples=100, derandomize=True, database=None, **_slow_is_fine)
 settings.register_profile("explore", max_examples=2000, print_blob=True, **_slow_is_fine)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "reproducible"))
+
+
+def pytest_collection_finish() -> None:
+    """Modules and tests stay to the end: the garbage collector need not walk through them again and again."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture

@@ -5,11 +5,16 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from hypothesis import strategies as st
+from hypothesis import settings, strategies as st
 
 import cgraph as cg
 from cgraph.core.node import OPS, apply
 from tests import high_precision
+
+
+def examples(count: int) -> int:
+    """How many examples the profile tries of a property that deserves `count`: all in "full", a quarter by default."""
+    return max(1, count * settings().max_examples // 100)
 
 
 class Case(NamedTuple):

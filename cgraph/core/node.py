@@ -318,17 +318,24 @@ def apply(op: Op, *args: Scalar) -> Node:
     """A new node of this operation, built as the current scope says."""
     if len(args) != op.arity:
         raise TypeError(f"{op.name} takes {op.arity} argument(s), got {len(args)}")
-    nodes = tuple([each if isinstance(each, Node) else constant(each) for each in args])
+    return _built(op, tuple([each if isinstance(each, Node) else constant(each) for each in args]))
+
+
+def _built(op: Op, args: tuple[Node, ...]) -> Node:
     scope = current.get()
     if scope.build is None:
-        return Node(op, nodes, scope.label)
-    node: Node = scope.build(op, nodes, scope.label)
+        return Node(op, args, scope.label)
+    node: Node = scope.build(op, args, scope.label)
     return node
 
 
 def _binary(name: str, a: Scalar, b: Scalar) -> Node:
+    if type(b) is float:
+        b = constant(b)
+    elif type(a) is float:
+        a = constant(a)
     if isinstance(a, Node) and isinstance(b, Node):
-        return apply(OPS[name], a, b)
+        return _built(OPS[name], (a, b))
     for each in (a, b):
         if not isinstance(each, (Node, numbers.Real, np.ndarray)):
             return NotImplemented  # type: ignore[no-any-return]  # Python then asks the other operand, or raises

@@ -35,25 +35,32 @@ def topological(outputs: Iterable[Node]) -> list[Node]:
     [<node variable x>, <node sin>, <node 1.0>, <node add>]
     """
     order: list[Node] = []
-    closed: dict[Node, bool] = {}  # False while the node's arguments are on the stack
+    closed: set[Node] = set()
+    waiting: set[Node] = set()  # for an argument that is not closed
     for output in outputs:
-        stack = [] if output in closed else [output]
-        while stack:
-            node = stack[-1]
-            for arg in node.args:
-                if arg not in closed:
-                    if arg.args:
-                        closed[node] = False
-                        stack.append(arg)
-                        break
-                    closed[arg] = True
-                    order.append(arg)
-                elif not closed[arg]:
-                    raise GraphError(f"the graph has a cycle through {arg!r}")
+        if output in closed:
+            continue
+        node, rest = output, iter(output.args)
+        stack = []
+        while True:
+            for arg in rest:
+                if arg in closed:
+                    continue
+                if arg.args:
+                    stack.append((node, rest))
+                    waiting.add(node)
+                    if arg in waiting:
+                        raise GraphError(f"the graph has a cycle through {arg!r}")
+                    node, rest = arg, iter(arg.args)
+                    break
+                closed.add(arg)
+                order.append(arg)
             else:
-                stack.pop()
-                closed[node] = True
+                closed.add(node)
                 order.append(node)
+                if not stack:
+                    break
+                node, rest = stack.pop()
     return order
 
 

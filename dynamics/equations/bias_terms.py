@@ -64,7 +64,7 @@ def bias_terms_of_lagrangian(system: System) -> BiasTerms:
     bars = cotangents({lagrangian: ONE}, [*system.q, *velocities], build, fixed=set(velocities))
     gradient, momenta = bars[: system.nq], bars[system.nq :]
     if system.kinematics.quasi is not None:
-        gradient = system.slopes(gradient, momenta, build)
+        gradient = system.kinematics.slopes(gradient, momenta, build)
     # d/dt dL/dz at qdd = 0: eq. (4) of the paper with xdot = (qd, 0), and 1 for t, one forward sweep.
     x_dot = dict(zip(system.q, system.q_dot, strict=True)) | (
         {system.t: ONE} if system.t in system.extra_inputs else {}

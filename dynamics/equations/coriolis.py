@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Builder, building, folded, hessian_nodes, tangents, topological
@@ -20,6 +22,8 @@ def coriolis(model: Model) -> Graph:
     and these are symmetric in j and k. So C = (d bias / d qd) / 2: one forward sweep a column over the graph of the
     bias. Forces linear in qd (gyroscopic, magnetic) would be halved by that; they count in full, and being skew they
     leave dM/dt - 2 C skew. Where L depends on t, so do they, and dM/dt - 2 C is skew less twice dM/dt at fixed q.
+    Quasi-velocities bring the brackets of their columns, C = (d bias / d qd) / 2 - M c(qd, .) / 2, without which
+    dM/dt - 2 C would not be skew.
 
     Parameters
     ----------
@@ -47,14 +51,20 @@ def coriolis(model: Model) -> Graph:
     """
     system = as_system(model)
     require_quadratic(system)
-    forces = bias(system).outputs
-    rows = coriolis_matrix(system, list(forces.values()), Builder())
+    build = Builder()
+    (lagrangian,) = folded([system.lagrangian], Builder())
+    mass = [] if system.kinematics.quasi is None else hessian_nodes(lagrangian, system.qd, build)
+    rows = coriolis_matrix(system, folded(bias(system).outputs.values(), build), build, mass)
     outputs = {f"C_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row)}
     return cg.simplify(system.graph(outputs, system.q, system.qd))
 
 
-def coriolis_matrix(system: System, forces: list[Node], build: Builder) -> list[list[Node]]:
+def coriolis_matrix(
+    system: System, forces: list[Node], build: Builder, mass: Sequence[Sequence[Node]]
+) -> list[list[Node]]:
     """Rows of C from the nodes of the bias, b(q, qd) = c(q, qd) + G(q) qd + g(q), c of degree two in qd.
+
+    mass: the lower triangle of M, which quasi-velocities need.
 
     db/dqd = dc/dqd + G, and at qd = 0 it is G. By Euler's theorem dc/dqd qd = 2 c, so C = (dc/dqd) / 2 + G, which is
     (db/dqd + db/dqd at qd = 0) / 2.
@@ -65,7 +75,16 @@ def coriolis_matrix(system: System, forces: list[Node], build: Builder) -> list[
     linear = folded(substitute(partials, dict.fromkeys(system.qd, ZERO)), build)  # G
     with building(build):
         entries = [0.5 * (a + b) for a, b in zip(partials, linear, strict=True)]
-    return [entries[i * n : (i + 1) * n] for i in range(n)]
+    rows = [entries[i * n : (i + 1) * n] for i in range(n)]
+    if system.kinematics.quasi is None:
+        return rows
+    brackets = system.kinematics.brackets(build)
+    with building(build):
+        for i in range(n):
+            for j in range(n):
+                taken = sum([mass[max(i, k)][min(i, k)] * brackets[k][j] for k in range(n)], ZERO)
+                rows[i][j] = rows[i][j] - 0.5 * taken
+    return rows
 
 
 def require_quadratic(system: System) -> None:
@@ -73,7 +92,7 @@ def require_quadratic(system: System) -> None:
     (lagrangian,) = folded([system.lagrangian], Builder())
     rows = hessian_nodes(lagrangian, system.qd)
     reached = set(topological([entry for row in rows for entry in row]))
-    for name, velocity in zip(system.coordinates, system.qd, strict=True):
+    for name, velocity in zip(system.velocities, system.qd, strict=True):
         if velocity in reached:
             raise ValueError(
                 "the Lagrangian must be quadratic in the velocities, "

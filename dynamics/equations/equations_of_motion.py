@@ -198,6 +198,7 @@ def energy(model: Model) -> Graph:
 
 SOLUTIONS = ("auto", "recursive", "dense")
 DENSE_UP_TO = 6  # coordinates; beyond, the dense graph is larger on a tree of bodies, and takes long to build
+WORTH = 0.9  # of the recursive graph's nodes, at most, for the dense one: elimination keeps more digits
 
 
 def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False) -> Graph:
@@ -211,8 +212,9 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
         A system, a mechanism or a scene with n coordinates.
     method : {"auto", "recursive", "dense"}
         "recursive": elimination on the graph of L without forming M (`cg.hessian_solve`); for a tree of bodies the
-        number of nodes is linear in n. "dense": M factored as LDL^T; smaller for very short arms. "auto": the smaller
-        of the two up to 6 coordinates, else recursive.
+        number of nodes is linear in n. "dense": M factored as LDL^T; smaller for some short arms, and less accurate
+        where masses or lengths differ by decades. "auto": recursive, but up to 6 coordinates dense where that saves
+        more than a tenth of the nodes.
     check : bool
         One more output, `info`: 0 where M is positive definite, else 1 + the index of the coordinate whose inertia
         is zero or negative after elimination; the accelerations mean nothing there. `raise_if_singular` raises on it.
@@ -310,13 +312,13 @@ def accelerations(system: System, method: str = "auto", check: bool = False) -> 
         ) from None
     if not graphs:
         raise SingularMassMatrixError(_without_inertia(system, failure)) from None
-    smallest = min(graphs, key=lambda graph: len(graph.nodes))
+    chosen = graphs[-1] if len(graphs[-1].nodes) < WORTH * len(graphs[0].nodes) else graphs[0]
     if not isinstance(system, BodySystem):  # bodies have masses; of another Lagrangian nobody knows
         if held:
             _require_inertia_without_constraints(system)
         else:
-            _require_inertia(system, smallest)
-    return smallest
+            _require_inertia(system, chosen)
+    return chosen
 
 
 def _solved(system: System, terms: BiasTerms, method: str, check: bool) -> Graph:

@@ -39,7 +39,7 @@ def chain_rule(system: System) -> LagrangeTerms:
     # The reverse sweep over L gives both dL/dq and p = dL/dqd; q and qd are independent inputs (Section 2.2).
     bars = cotangents({system.lagrangian: ONE}, [*system.q, *system.qd], build)
     momentum = bars[system.nq :]
-    gradient = system.slopes(bars[: system.nq], momentum, build)
+    gradient = system.kinematics.slopes(bars[: system.nq], momentum, build)
     # Eq. (4) with y = p: a forward sweep along xdot = (qd, qdd) is the product grad_x p . xdot, never written out.
     dots = tangents(_state_rate(system), momentum, build)
     rate = [dots.get(p, ZERO) for p in momentum]
@@ -50,7 +50,7 @@ def chain_rule_literal(system: System) -> LagrangeTerms:
     """Eq. (4) read literally: the 2n partials of each momentum, a reverse sweep each, then products with xdot."""
     bars = cotangents({system.lagrangian: ONE}, [*system.q, *system.qd])
     momentum = bars[system.nq :]
-    gradient = system.slopes(bars[: system.nq], momentum, Builder())
+    gradient = system.kinematics.slopes(bars[: system.nq], momentum, Builder())
     x_dot = _state_rate(system)
     rate = []
     for p in momentum:
@@ -277,7 +277,7 @@ class _Embedding:
         time = {self.system.t: ONE} if self.system.t in self.system.extra_inputs else {}
         dots = tangents({**(x_dot or {self.dt: ONE}), **time}, momentum)
         rate = [dots.get(p, ZERO) for p in momentum]
-        slopes = self.system.slopes(gradient, momentum, Builder())
+        slopes = self.system.kinematics.slopes(gradient, momentum, Builder())
         if self.system.kinematics.quasi is not None:
             slopes = self.embed(*slopes)
         return LagrangeTerms(self.inputs, self.q, self.qd, list(momentum), rate, slopes)

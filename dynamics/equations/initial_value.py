@@ -87,9 +87,10 @@ def normalized(model: Model, x: Array) -> Array:
     result = np.stack(np.broadcast_arrays(*columns), axis=-1)
     if not (good := np.isfinite(result)).all():
         *row, _ = np.argwhere(~good)[0].tolist()
-        bad = [name for name, fine in zip(model.coordinates, good[*row], strict=False) if not fine]
+        bad = [k for k, fine in enumerate(good[*row]) if not fine]
+        names, values = ", ".join([repr(model.coordinates[k]) for k in bad]), x[*row, bad].tolist()
         of = f" of trajectory {row[0]}" if row else ""
-        raise ValueError(f"q must have a direction at {', '.join(map(repr, bad))}: their length cannot be made 1{of}")
+        raise ValueError(f"{names} need a length whose square is neither 0 nor beyond float64, got {values}{of}")
     return result
 
 

@@ -21,6 +21,9 @@ from .shorter_form import shorter_form
 def state_space(model: Model) -> Graph:
     """A and B of d(xdot) = A dx + B dtau, x = (q, qd), at any state.
 
+    Of quasi-velocities, qdot = G(q) qd, dx = (xi, dqd) has small displacements xi with dq = G xi, such as a rotation
+    vector in the body's axes, so that A and B have no row or column more than there are freedoms.
+
     From tau(q, qd, qdd) = const: M dqdd = dtau - (d tau / dx) dx, at the qdd of forward dynamics. That takes half the
     nodes of differentiating forward dynamics itself. M is factored densely up to 6 coordinates, else eliminated on the
     graph of L, which also keeps the digits of a long chain.
@@ -69,7 +72,8 @@ def _state_space(system: System) -> Graph:
         columns = [ldl_solve(lower, side, build) for side in sides]
     else:
         columns = [solve_nodes(lagrangian, system.qd, side, build) for side in sides]
-    rows = [[ONE if j == n + i else ZERO for j in range(3 * n)] for i in range(n)]  # dq_dot = dqd
+    brackets = system.kinematics.brackets(build)  # xi_dot = dqd + C(qd) xi
+    rows = [[*row, *[ONE if i == j else ZERO for j in range(n)], *[ZERO] * n] for i, row in enumerate(brackets)]
     rows += [[column[i] for column in columns] for i in range(n)]
     outputs = {f"A_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[: 2 * n])}
     outputs |= {f"B_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[2 * n :])}
@@ -77,14 +81,17 @@ def _state_space(system: System) -> Graph:
 
 
 def _torque_jacobian(system: System, accelerations: list[Node], build: Builder) -> list[list[Node]]:
-    """Rows of d tau / d(q, qd), (n, 2n), at these accelerations."""
+    """Rows of d tau / d(q, qd), (n, 2n), at these accelerations; of quasi-velocities by displacements xi, dq = G xi."""
     tau = cg.simplify(torques(system))
     state = [*system.q, *system.qd]
-    rows = [cotangents({torque: ONE}, state, build) for torque in tau.outputs.values()]
+    bars = [cotangents({torque: ONE}, state, build) for torque in tau.outputs.values()]
+    split = system.nq
+    rows = [[*system.kinematics.pulled_back(row[:split], build), *row[split:]] for row in bars]
     entries = {str(k): entry for k, entry in enumerate([entry for row in rows for entry in row])}
     at = dict(zip([str(node.name) for node in system.qdd], accelerations, strict=True))
     flat = list(cg.specialize(Graph([*tau.inputs, *system.tau], entries), at).outputs.values())
-    return [flat[i * len(state) : (i + 1) * len(state)] for i in range(system.n)]
+    width = 2 * system.n
+    return [flat[i * width : (i + 1) * width] for i in range(system.n)]
 
 
 def linearize(
@@ -97,6 +104,8 @@ def linearize(
     parameters: Mapping[str, float] | None = None,
 ) -> tuple[Array, Array]:
     """A, (2n, 2n), and B, (2n, n), of d(xdot) = A dx + B dtau, x = (q, qd), at a state and applied forces (default 0).
+
+    Of quasi-velocities dx is of displacements, see `state_space`.
 
     For many states, compile `state_space`.
 

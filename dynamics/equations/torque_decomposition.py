@@ -59,7 +59,7 @@ def torque_by_link(model: Model) -> TorqueTable:
     rows += outside.values()
     outputs = {f"tau{i}_{k}": entry for k, row in enumerate(rows) for i, entry in enumerate(row)}
     graph = cg.simplify(system.graph(outputs, system.q, system.qd, system.qdd))
-    return TorqueTable("torque by link", (*names, *outside), system.coordinates, system, graph, sum_axis=0)
+    return TorqueTable("torque by link", (*names, *outside), system.velocities, system, graph, sum_axis=0)
 
 
 def torque_by_joint_motion(model: Model) -> TorqueTable:
@@ -100,7 +100,7 @@ def torque_by_joint_motion(model: Model) -> TorqueTable:
     (lagrangian,) = folded([system.lagrangian], Builder())
     mass = hessian_nodes(lagrangian, system.qd, build)  # its lower triangle
     forces = folded(bias(system).outputs.values(), build)
-    coriolis = coriolis_matrix(system, forces, build)
+    coriolis = coriolis_matrix(system, forces, build, mass)
     n = system.n
     with building(build):
         rows = [
@@ -111,18 +111,18 @@ def torque_by_joint_motion(model: Model) -> TorqueTable:
     columns = {name: column for name, column in outside.items() if any(entry.value != 0.0 for entry in column)}
     for column in columns.values():
         rows = [[*row, entry] for row, entry in zip(rows, column, strict=True)]
-    names = [*system.coordinates, *columns]
+    names = [*system.velocities, *columns]
     outputs = {f"tau{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row)}
     graph = cg.simplify(system.graph(outputs, system.q, system.qd, system.qdd))
-    return TorqueTable("torque by joint motion", system.coordinates, tuple(names), system, graph, sum_axis=1)
+    return TorqueTable("torque by joint motion", system.velocities, tuple(names), system, graph, sum_axis=1)
 
 
 def _torque_of(system: System, partial: Node, build: Builder) -> list[Node]:
     """Lagrange's equation of one partial Lagrangian, as the chain rule has it: a reverse sweep, then a forward one."""
-    n = system.n
     bars = cotangents({partial: ONE}, [*system.q, *system.qd], build)
-    gradient, momenta = bars[:n], bars[n:]
-    x_dot = dict(zip([*system.q, *system.qd], [*system.qd, *system.qdd], strict=True))
+    momenta = bars[system.nq :]
+    gradient = system.kinematics.slopes(bars[: system.nq], momenta, build)
+    x_dot = dict(zip([*system.q, *system.qd], [*system.q_dot, *system.qdd], strict=True))
     dots = tangents(x_dot | ({system.t: ONE} if system.t in system.extra_inputs else {}), momenta, build)
     with building(build):
         return [dots.get(p, ZERO) - slope for p, slope in zip(momenta, gradient, strict=True)]

@@ -7,6 +7,10 @@ V_i -> P_i(V_i), so that nothing has to be explicit, separable or quadratic. Sum
 numbers of the method that float64 does not hold are two, the second what rounding took off the first: a method is only
 symplectic as exactly as w_i b_ij + w_j a_ji = w_i w_j, and what is missing adds up to a drift of the energy (Hairer,
 McLachlan and Razakarivony, BIT Numerical Mathematics 2008).
+
+Quasi-velocities have no such momenta. Methods of Gauss, and compositions of `midpoint`, step the state (q, qd) there,
+as that of a system of first order. They keep every quadratic invariant, as |q| of a quaternion, and the energy and the
+size of the momentum of a free rotor; and being symmetric, they leave the energy of reversible motions without drift.
 """
 
 from __future__ import annotations

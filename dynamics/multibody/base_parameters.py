@@ -18,7 +18,7 @@ import numpy as np
 from . import spatial
 from .inertial_numbers import Link
 from .joints import JointType
-from .spatial import SNAP, Array, Triple
+from .spatial import Array, Triple
 
 
 def base_parameter_links(
@@ -35,12 +35,10 @@ def base_parameter_links(
     for i in reversed(range(len(links))):
         mass, moment, inertia = _numbers(result[i])
         given = joints[i].unobservable(mass, moment, inertia)
-        result[i] = _with(result[i], mass - given[0], moment - given[1], inertia - given[2])
+        result[i] = _with(result[i], -given[0], -given[1], -given[2])
         seen = _seen_by_parent(links[i], *given)
         if parents[i] >= 0:
-            carrier = result[parents[i]]
-            mass, moment, inertia = _numbers(carrier)
-            result[parents[i]] = _with(carrier, mass + seen[0], moment + seen[1], inertia + seen[2])
+            result[parents[i]] = _with(result[parents[i]], *seen)
         else:
             world += seen[1]
     return result, world
@@ -49,10 +47,10 @@ def base_parameter_links(
 def _seen_by_parent(link: Link, mass: float, moment: Array, inertia: Array) -> tuple[float, Array, Array]:
     """Mass, first moment and inertia at the link's joint, about the parent's origin and in its axes."""
     turn, place = np.array(link.turn, dtype=np.float64), _array(link.place)
-    moment, inertia = turn @ moment, turn @ inertia @ turn.T
+    moment, inertia = spatial.product(turn, moment), spatial.product(turn, inertia, turn.T)
     crossed = np.outer(place, moment)
-    inertia = inertia + 2.0 * (place @ moment) * np.eye(3) - crossed - crossed.T
-    return mass, moment + mass * place, spatial.parallel_axis(inertia, mass, place)
+    inertia = spatial.added(inertia, 2.0 * np.trace(crossed) * np.eye(3) - crossed - crossed.T)
+    return mass, spatial.added(moment, mass * place), spatial.parallel_axis(inertia, mass, place)
 
 
 def _numbers(link: Link) -> tuple[float, Array, Array]:
@@ -61,15 +59,10 @@ def _numbers(link: Link) -> tuple[float, Array, Array]:
 
 
 def _with(link: Link, mass: float, moment: Array, inertia: Array) -> Link:
-    """The link with these; what is left of an entry by rounding is none."""
-    _, old_moment, old_inertia = _numbers(link)
-    moment, inertia = _cleaned(moment, old_moment), _cleaned(inertia, old_inertia)
-    return replace(link, mass=mass, moment=spatial.constant(moment), inertia=inertia.tolist())
-
-
-def _cleaned(new: Array, old: Array) -> Array:
-    scale = max(np.abs(new).max(), np.abs(old).max())
-    return np.where(np.abs(new) <= SNAP * scale, 0.0, new)
+    """The link with these added."""
+    old_mass, old_moment, old_inertia = _numbers(link)
+    moment, inertia = spatial.added(old_moment, moment), spatial.added(old_inertia, inertia)
+    return replace(link, mass=old_mass + mass, moment=spatial.constant(moment), inertia=inertia.tolist())
 
 
 def _array(triple: Triple) -> Array:

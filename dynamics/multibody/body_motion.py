@@ -48,13 +48,12 @@ def ground(gravity: ArrayLike, *, in_plane: bool = False) -> Motion:
     fewer nodes. In space the vertical has three components, which had better be scaled once.
     """
     pull = np.asarray(gravity, dtype=np.float64)
-    g = float(np.linalg.norm(pull))
-    if not g:
+    if not pull.any():
         return Motion(STILL, STILL, STILL, ZERO)
-    downward = spatial.snapped(pull / g)
     if in_plane:
-        return Motion(STILL, STILL, spatial.constant(downward), ZERO, -g)
-    return Motion(STILL, STILL, spatial.constant(-g * downward), ZERO)
+        downward = spatial.unit(pull)
+        return Motion(STILL, STILL, spatial.constant(downward + 0.0), ZERO, -float(downward @ pull))
+    return Motion(STILL, STILL, spatial.constant(0.0 - pull), ZERO)
 
 
 def propagate_motion(parent: Motion, link: Link, joint: JointType, q: Sequence[Node], u: Sequence[Node]) -> Motion:
@@ -120,8 +119,9 @@ def _about_axis(parent: Motion, link: Link, joint: AxialJoint, offset: Triple, q
 
 def carrier_motion(parent: Motion, link: Link, joint: JointType) -> Motion:
     """The parent's motion in the axes that the link is carried in: those of a plane where it stays in the plane."""
-    stays = isinstance(joint, AxialJoint) and abs(link.turn[2][2]) == 1.0
-    return in_body_axes(parent) if parent.plane and not stays else parent
+    if parent.plane and isinstance(joint, AxialJoint) and link.parallel:
+        return parent
+    return in_body_axes(parent)
 
 
 def joint_translation(link: Link, joint: JointType, q: Sequence[Node]) -> Triple:

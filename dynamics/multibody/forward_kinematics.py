@@ -56,7 +56,7 @@ class KinematicChain:
 
     def motion(self, at: ArrayLike) -> PointMotion:
         """How the point `at`, (3,) in the body's frame, moves: summed from the body to the world."""
-        point = spatial.constant(spatial.cleaned(self.position + self.orientation @ np.asarray(at)))
+        point = spatial.constant(spatial.placed(self.position, self.orientation, at))
         velocity, omega = STILL, STILL
         for step in self.steps:
             place = joint_translation(step.link, step.joint, step.q)
@@ -108,4 +108,5 @@ def kinematic_chain(
         i = index[name]
         steps.append(Step(links[i], moving[i].joint.type, *states[i]))
         name = moving[i].parent
-    return KinematicChain(axes.T @ carrier.position, spatial.snapped(axes.T @ carrier.orientation), tuple(steps))
+    position = spatial.product(axes.T, carrier.position)
+    return KinematicChain(position, spatial.snapped(axes.T @ carrier.orientation), tuple(steps))

@@ -34,6 +34,12 @@ class Link:
     armature: float | Node
 
     @cached_property
+    def parallel(self) -> bool:
+        """Whether the joint's axis is along that of the parent's joint, or against it."""
+        across = (self.turn[0][2], self.turn[1][2], self.turn[2][0], self.turn[2][1])
+        return all([float(each) == 0.0 for each in across])
+
+    @cached_property
     def numbers(self) -> list[float]:
         """Turn, place, mass, moment, inertia (lower triangle), damping, stiffness, spring reference, armature."""
         turn = [each for row in self.turn for each in row]
@@ -47,13 +53,18 @@ def axes_of(body: Body) -> Array:
     return spatial.to_z(np.asarray(body.joint.axis)) if isinstance(body.joint.type, AxialJoint) else np.eye(3)
 
 
+def inertia_in(axes: Array, body: Body) -> tuple[float, Array, Array]:
+    """Mass, center of mass (3,), and inertia about the joint (3, 3) of a body, in these axes of it."""
+    center = spatial.product(axes.T, np.asarray(body.center))
+    about_center = spatial.product(axes.T, np.asarray(body.inertia), axes)
+    return body.mass, center, spatial.parallel_axis(about_center, body.mass, center)
+
+
 def link(body: Body, outer: Array) -> Link:
     """The link of a body whose parent moves in the axes `outer`."""
     axes, joint = axes_of(body), body.joint
     turn, place = spatial.joint_placement(outer, joint.orientation, joint.position, axes)
-    center = axes.T @ np.asarray(body.center)
-    inertia = spatial.parallel_axis(axes.T @ np.asarray(body.inertia) @ axes, body.mass, center)
-    inertia = spatial.cleaned(inertia)
-    moment = spatial.constant(spatial.cleaned(body.mass * center))
+    mass, center, inertia = inertia_in(axes, body)
+    moment = spatial.constant(mass * center)
     numbers = (joint.damping, joint.stiffness, joint.spring_reference, joint.armature)
-    return Link(turn.tolist(), place, body.mass, moment, inertia.tolist(), *numbers)
+    return Link(turn.tolist(), place, mass, moment, inertia.tolist(), *numbers)

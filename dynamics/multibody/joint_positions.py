@@ -95,7 +95,7 @@ def _tips(mechanism: Bodies) -> Iterator[tuple[str, ArrayLike]]:
 def _seen(points: Array) -> Array:
     """Points (T, k, 3) as (T, k, 2)."""
     extent = np.ptp(points.reshape(-1, 3), axis=0)
-    flat = extent <= _FLAT * max(extent.max(), 1e-300)
+    flat = extent <= _FLAT * extent.max()
     x, y, z = np.moveaxis(points, -1, 0)
     if flat[1]:
         return np.stack([x, z], axis=-1)

@@ -13,6 +13,7 @@ from cgraph.extend import is_finite, require_mapping
 
 from . import spatial
 from .body import WORLD, Body, Joint, MechanismError, vector
+from .inertial_numbers import axes_of, inertia_in
 from .spatial import Array
 
 
@@ -91,7 +92,8 @@ def _weld_at(joint: Joint, at: Array) -> Joint:
     """The weld that holds a joint's body where the joint has it at these coordinates."""
     orientation, axis, position = (np.asarray(each) for each in (joint.orientation, joint.axis, joint.position))
     turn, shift = joint.type.placement(axis, at)
-    return Joint("fixed", position=position + orientation @ shift, orientation=orientation @ turn)
+    place = spatial.placed(position, orientation, shift)
+    return Joint("fixed", position=place, orientation=spatial.snapped(orientation @ turn))
 
 
 def merge_fixed_bodies(bodies: Sequence[Body]) -> tuple[list[Body], dict[str, Carrier]]:
@@ -104,7 +106,7 @@ def merge_fixed_bodies(bodies: Sequence[Body]) -> tuple[list[Body], dict[str, Ca
             merged[body.name] = body
             carriers[body.name] = Carrier(body.name, *_OWN)
             continue
-        position = parent.position + parent.orientation @ np.asarray(body.joint.position)
+        position = spatial.placed(parent.position, parent.orientation, np.asarray(body.joint.position))
         orientation = spatial.snapped(parent.orientation @ np.asarray(body.joint.orientation))
         if body.joint.type.moves:
             joint = replace(body.joint, position=position, orientation=orientation)
@@ -113,18 +115,19 @@ def merge_fixed_bodies(bodies: Sequence[Body]) -> tuple[list[Body], dict[str, Ca
             continue
         carriers[body.name] = Carrier(parent.name, position, orientation)
         if parent.name != WORLD and (body.mass or np.any(body.inertia)):
-            center = position + orientation @ np.asarray(body.center)
-            inertia = orientation @ np.asarray(body.inertia) @ orientation.T
+            center = spatial.placed(position, orientation, np.asarray(body.center))
+            inertia = spatial.product(orientation, np.asarray(body.inertia), orientation.T)
             merged[parent.name] = _joined(merged[parent.name], body.mass, center, inertia)
     return list(merged.values()), carriers
 
 
 def _joined(body: Body, mass: float, center: Array, inertia: Array) -> Body:
     """The body with another mass fixed to it, given in its frame."""
-    both = body.mass + mass
-    middle = (body.mass * np.asarray(body.center) + mass * center) / both if both else np.asarray(body.center)
-    own = spatial.parallel_axis(np.asarray(body.inertia), body.mass, np.asarray(body.center) - middle)
-    return replace(body, mass=both, center=middle, inertia=own + spatial.parallel_axis(inertia, mass, center - middle))
+    both, here = body.mass + mass, np.asarray(body.center)
+    reduced = body.mass * (mass / both) if both else 0.0
+    inertia = spatial.parallel_axis(spatial.added(np.asarray(body.inertia), inertia), reduced, center - here)
+    middle = spatial.added(body.mass * here, mass * center) / both if both else here
+    return replace(body, mass=both, center=middle, inertia=inertia)
 
 
 def require_inertia(bodies: Sequence[Body]) -> tuple[Body, ...]:
@@ -144,5 +147,5 @@ def require_inertia(bodies: Sequence[Body]) -> tuple[Body, ...]:
 
 def _resists(body: Body) -> bool:
     """Whether the body alone has inertia along its coordinate."""
-    inertia = spatial.parallel_axis(np.asarray(body.inertia), body.mass, np.asarray(body.center))
-    return body.joint.type.resists(np.asarray(body.joint.axis), body.mass, inertia)
+    mass, _, inertia = inertia_in(axes_of(body), body)
+    return body.joint.type.resists(mass, inertia)

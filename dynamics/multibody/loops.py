@@ -160,7 +160,7 @@ def loop_rows(loop: Loop, body: RelativePlacement, to: RelativePlacement) -> lis
         if loop.kind == "distance":
             length = float(loop.length)
             return [(0.5 / length) * (spatial.dot(gap, gap) - length * length)]
-        axis, target = (spatial.to_z(_unit(each)) for each in (loop.axis, loop.to_axis))
+        axis, target = _axes(loop)
         if loop.kind == "rolling":
             normal = to.direction(target[:, 2])
             tilt = spatial.dot(body.direction(axis[:, 2]), normal)
@@ -179,7 +179,7 @@ def loop_rows(loop: Loop, body: RelativePlacement, to: RelativePlacement) -> lis
 def slip_rows(loop: Loop, body: KinematicChain, to: KinematicChain) -> list[Node]:
     """The velocity of a rolling wheel's lowest point against the plane, along two axes of it; in the world's axes."""
     with building(Builder()), cg.tag(loop.label):
-        axis, target = (spatial.to_z(_unit(each)) for each in (loop.axis, loop.to_axis))
+        axis, target = _axes(loop)
         x, y, normal = (to.direction(spatial.constant(column)) for column in target.T)
         along = body.direction(spatial.constant(axis[:, 2]))
         tilt = spatial.dot(along, normal)
@@ -210,9 +210,10 @@ def coupling_row(loop: Loop, bodies: Sequence[Body], all_bodies: Mapping[str, Bo
         return coordinate(loop.body) - (value + float(loop.coefficients[0]))
 
 
-def _unit(axis: ArrayLike) -> Array:
-    given = np.asarray(axis, dtype=np.float64)
-    return spatial.snapped(given / np.linalg.norm(given))
+def _axes(loop: Loop) -> list[Array]:
+    """Axes whose third column is that of the loop, (3, 3), of each of its bodies."""
+    given = [np.asarray(axis, dtype=np.float64) for axis in (loop.axis, loop.to_axis)]
+    return [spatial.to_z(spatial.snapped(spatial.unit(axis))) for axis in given]
 
 
 def _without_rounding(rows: Sequence[Node], lengths: Sequence[float]) -> list[Node]:

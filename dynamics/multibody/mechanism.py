@@ -1,4 +1,4 @@
-"""Mechanisms: trees of rigid bodies joined by hinges, slides and welds."""
+"""Mechanisms: trees of rigid bodies, on joints of one axis or several freedoms, or free."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cgraph.extend import Builder, building, require_flag, require_mapping
 from ..systems.arguments import parameter_value
 from ..systems.model import Model
 from ..systems.system import BodySystem, System
-from .body import WORLD, Body, Joint, MechanismError, vector
+from .body import WORLD, Body, Joint, MechanismError, MechanismWarning, vector
 from .external_force import Force, check_force, generalized_forces
 from .forward_kinematics import KinematicChain, kinematic_chain
 from .inertial_numbers import Link
@@ -40,6 +40,7 @@ __all__ = [
     "Loop",
     "Mechanism",
     "MechanismError",
+    "MechanismWarning",
     "as_mechanism",
     "require_mechanism",
 ]
@@ -65,7 +66,7 @@ class Mechanism(Structure):
     base_parameters : bool
         Written with the fewest inertial numbers (`base_parameters.py`). Smaller graphs of the same motion; but a
         partial Lagrangian is then not the energy of its body.
-    omitted : tuple of str
+    left_out : tuple of str
         Of a mechanism that was read from a file: what the file has and the mechanism has not, a sentence each.
     loops : sequence of Loop
         What holds bodies of the tree together, beside their joints, and closes it to loops.
@@ -73,9 +74,10 @@ class Mechanism(Structure):
     Raises
     ------
     MechanismError
-        For an unknown parent, a cycle, a repeated name, numbers that are not finite or out of range, an inertia that
-        no body can have, a coordinate that moves no mass and has no armature, a force on an unknown body, and a
-        parameter that no force uses.
+        For an unknown parent, a cycle, a repeated name, numbers that are not finite or out of range, a negative
+        moment of inertia, a coordinate that moves no mass and has no armature, a force on an unknown body, and a
+        parameter that no force uses. Positive moments that no rigid body can have, the largest above the sum of the
+        others, are a `MechanismWarning`: the equations hold with them.
 
     Examples
     --------
@@ -94,11 +96,14 @@ class Mechanism(Structure):
             ("loops", Loop),
         ):  # kept, so that an iterator is read once
             object.__setattr__(self, what, _listed(what, kind, getattr(self, what)))
-        for i, name in enumerate(self.coordinates):
-            if name in self.coordinates[:i]:
+        seen: set[str] = set()
+        for name in self.coordinates:
+            if name in seen:
                 raise MechanismError(f"two joints that move have the name {name!r}")
+            seen.add(name)
+        carried = set(self._carriers) - {WORLD}
         for force in self.forces:
-            check_force(force, set(self._carriers) - {WORLD})
+            check_force(force, carried)
         bodies = {body.name: body for body in self.bodies}
         for loop in self.loops:
             check_loop(loop, bodies)
@@ -129,7 +134,7 @@ class Mechanism(Structure):
         """The bodies that move, parents first, with all that is welded to them merged into their inertia."""
         return self._merged[0]
 
-    @property
+    @cached_property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the coordinates: the joints', which are the bodies' where a joint has none of its own."""
         return coordinate_names(self.moving)

@@ -37,16 +37,16 @@ class RelativePlacement:
 
     def point(self, at: ArrayLike) -> Triple:
         """Where a point of the frame is, in the carrying body's frame [m]."""
-        point = spatial.constant(spatial.cleaned(self.position + self.orientation @ np.asarray(at, dtype=np.float64)))
+        point = spatial.constant(spatial.placed(self.position, self.orientation, at))
         return self._outwards(point, points=True)
 
     def direction(self, vector: Array) -> Triple:
         """A vector in the frame's axes, in the carrying body's."""
-        return self._outwards(spatial.constant(spatial.cleaned(self.orientation @ vector)), points=False)
+        return self._outwards(spatial.constant(spatial.product(self.orientation, vector)), points=False)
 
     def lengths(self, at: ArrayLike) -> list[float]:
         """Lengths [m] that the place of a point is made of."""
-        last = self.position + self.orientation @ np.asarray(at, dtype=np.float64)
+        last = spatial.placed(self.position, self.orientation, at)
         links = [np.array([each.value for each in step.link.place]) for step in self.steps]
         return [float(np.linalg.norm(each)) for each in (last, *links)]
 
@@ -108,7 +108,9 @@ def relative_placements(
         steps = [Step(links[index[each]], moving[index[each]].joint.type, states[index[each]][0], ()) for each in names]
         own = axes_of(moving[index[carrier.name]]) if carrier.name in index else np.eye(3)
         orientation = spatial.snapped(own.T @ carrier.orientation)
-        result.append(RelativePlacement(own.T @ carrier.position, orientation, tuple(steps[::-1]), axes))
+        result.append(
+            RelativePlacement(spatial.product(own.T, carrier.position), orientation, tuple(steps[::-1]), axes)
+        )
     return result
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,8 @@ Triple = tuple[Node, Node, Node]
 Matrix = Sequence[Sequence[float | Node]]  # (3, 3)
 ZERO = cg.constant(0.0)
 STILL: Triple = (ZERO, ZERO, ZERO)
-SNAP = 1e-14  # an entry of a rotation this near to 0 or 1 is that: a quarter turn must not leave nodes behind
+SNAP = 1e-14  # of length 1: a component of a rotation that is no more comes from a quarter turn, or one in text
+ROUNDING = 2.0**-48  # of the terms of a sum: what is left is their rounding if it is no more
 
 
 def rotation(axis: Array, angle: float) -> Array:
@@ -26,15 +28,52 @@ def rotation(axis: Array, angle: float) -> Array:
     return snapped(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross))
 
 
-def snapped(matrix: Array) -> Array:
-    """The array with entries within rounding of -1, 0 and 1 set to them."""
-    near = np.round(matrix)
-    return np.where(np.abs(matrix - near) <= SNAP, near, matrix) + 0.0
+def unit(vector: Array) -> Array:
+    """The vector, which is not zero, at length 1."""
+    vector = np.ldexp(vector, -int(np.frexp(np.abs(vector).max())[1]))  # else squares of small numbers vanish
+    result: Array = vector / np.linalg.norm(vector)
+    return result
+
+
+def snapped(columns: Array) -> Array:
+    """Columns of length 1, or one, without components that are rounding; 1 where the others leave no other number.
+
+    So a component near 1 stays where the others say that it is the cosine of a small angle.
+    """
+    result = np.where(np.abs(columns) <= SNAP, 0.0, columns)
+    along = np.abs(result) > 0.9  # one component of a column at most
+    across = np.sum(np.where(along, 0.0, result) ** 2, axis=0)
+    return np.where(along & (across <= 2.0**-53), np.sign(result), result) + 0.0
 
 
 def cleaned(array: Array) -> Array:
-    """The array with entries that are rounding beside the largest set to zero."""
-    return np.where(np.abs(array) <= SNAP * np.abs(array).max(initial=0.0), 0.0, array) + 0.0
+    """Numbers that another program computed from shapes, without those that are its rounding beside the largest."""
+    return np.where(np.abs(array) <= SNAP * np.abs(array).max(), 0.0, array) + 0.0
+
+
+def without_rounding(total: Array, terms: Array) -> Array:
+    """The sums, with those that are the rounding of their terms set to zero.  terms: the sum of their absolute values.
+
+    Entry by entry: one that is small beside other entries has a meaning of its own.
+    """
+    return np.where(np.abs(total) <= ROUNDING * terms, 0.0, total) + 0.0
+
+
+def added(a: Array, b: Array) -> Array:
+    """a + b, where they cancel zero."""
+    return without_rounding(a + b, np.abs(a) + np.abs(b))
+
+
+def product(*factors: Array) -> Array:
+    """The matrix product, with entries whose terms cancel zero."""
+    return without_rounding(reduce(np.matmul, factors), reduce(np.matmul, [np.abs(each) for each in factors]))
+
+
+def placed(position: Array, orientation: Array, at: ArrayLike) -> Array:
+    """A point of a frame in the axes that the frame is placed in, with components whose terms cancel zero."""
+    at = np.asarray(at)
+    terms = np.abs(position) + np.abs(orientation) @ np.abs(at)
+    return without_rounding(position + orientation @ at, terms)
 
 
 def from_quaternion(quaternion: ArrayLike) -> Array:
@@ -76,13 +115,15 @@ def to_z(axis: Array) -> Array:
 
 def joint_placement(outer: Array, orientation: ArrayLike, position: ArrayLike, axes: Array) -> tuple[Array, Triple]:
     """Where a joint is at q = 0: its `axes` as columns and its origin, both in the parent's axes `outer`."""
-    turn = snapped(outer.T @ np.asarray(orientation) @ axes)
-    return turn, constant(cleaned(outer.T @ np.asarray(position)))
+    return snapped(outer.T @ np.asarray(orientation) @ axes), constant(product(outer.T, np.asarray(position)))
 
 
 def parallel_axis(inertia: Array, mass: float, offset: Array) -> Array:
     """Inertia about a point `offset` away from the center of mass (parallel axes)."""
-    return inertia + mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
+    x, y, z = offset
+    return added(inertia, mass * np.array([[y * y + z * z, -x * y, -x * z],
+                                           [-x * y, x * x + z * z, -y * z],
+                                           [-x * z, -y * z, x * x + y * y]]))  # fmt: skip
 
 
 def total(terms: Sequence[Node]) -> Node:

@@ -48,7 +48,7 @@ class TreeEquations:
         """The world at rest."""
         inner = [link for link, parent in zip(self.links, self.parents, strict=True) if parent >= 0]
         axial = all([isinstance(body.joint.type, AxialJoint) for body in self.bodies])
-        in_plane = axial and all([abs(link.turn[2][2]) == 1.0 for link in inner])
+        in_plane = axial and all([link.parallel for link in inner])
         return self.shared.ground(ground(self.gravity, in_plane=in_plane))
 
     @cached_property

@@ -40,7 +40,7 @@ class Case:
     def __init__(self, name: str, model: Model) -> None:
         self.name, self.model = name, model
         self.system: System = as_system(model)
-        self.n = self.system.n
+        self.nq, self.n = self.system.nq, self.system.n
         if TIME in [str(node.name) for node in self.system.extra_inputs]:
             raise ValueError(f"{name} depends on time, and the bench compares systems that do not")
 
@@ -63,7 +63,7 @@ class Case:
 
     def width(self, task: str) -> int:
         """How many numbers go into a task."""
-        return (2 if task == "rk4" else 3) * self.n
+        return self.nq + (1 if task == "rk4" else 2) * self.n
 
 
 def rk4_step(rate: Callable[[Any], Any], x: Any, dt: float = DT) -> Any:

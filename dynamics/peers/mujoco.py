@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..io.mujoco_twin import MujocoTwin, rollout
+from ..io.mujoco_twin import MujocoTwin, joint_order, rollout
 from ..multibody.mechanism import Mechanism, as_mechanism
 from .case import BATCH, DT, PASSES, Array, Case
 from .contender import Contender, Peer, UnavailableError
@@ -30,17 +30,17 @@ class MujocoPeer(Peer):
         self.mujoco, model = self.twin.mujoco, self.twin.model
         for unused in ("CONSTRAINT", "SENSOR", "ACTUATION", "WARMSTART"):
             model.opt.disableflags |= getattr(self.mujoco.mjtDisableBit, f"mjDSBL_{unused}")
-        self.order = np.array([model.joint(name).id for name in mechanism.coordinates])  # of ours, in theirs
-        self.at = np.argsort(self.order)
+        self.q_order, self.order = (np.array(each) for each in joint_order(model, mechanism))
+        self.q_at, self.at = np.argsort(self.q_order), np.argsort(self.order)
 
     def quantities(self, q: Array, qd: Array, qdd: Array, tau: Array) -> dict[str, Array]:
         """tau of a motion, qdd under torques tau, M(q) and the bias at one state, in our order."""
-        at, twin, order = self.at, self.twin, self.order
+        at, twin, order, place = self.at, self.twin, self.order, q[self.q_at]
         return {
-            "tau": twin.inverse(q[at], qd[at], qdd[at])[order],
-            "qdd": twin.accelerations(q[at], qd[at], tau[at])[order],
-            "M": twin.mass_matrix(q[at])[np.ix_(order, order)],
-            "bias": twin.bias(q[at], qd[at])[order],
+            "tau": twin.inverse(place, qd[at], qdd[at])[order],
+            "qdd": twin.accelerations(place, qd[at], tau[at])[order],
+            "M": twin.mass_matrix(place)[np.ix_(order, order)],
+            "bias": twin.bias(place, qd[at])[order],
         }
 
     def prepare(self, task: str, mode: str) -> Contender:
@@ -48,13 +48,13 @@ class MujocoPeer(Peer):
         if mode != "call":
             return self._rollout(mode)
         m, model, data = self.mujoco, self.twin.model, self.twin.data
-        n, x = self.case.n, self.case.point(task)
-        data.qpos[:], data.qvel[:] = x[self.at], x[n + self.at]
+        nq, n, x = self.case.nq, self.case.n, self.case.point(task)
+        data.qpos[:], data.qvel[:] = x[self.q_at], x[nq + self.at]
         if task == "forward":
-            data.qfrc_applied[:] = x[2 * n + self.at]
+            data.qfrc_applied[:] = x[nq + n + self.at]
             return Contender(lambda: m.mj_forward(model, data), lambda _: np.array(data.qacc[self.order]))
         if task == "inverse":
-            data.qacc[:] = x[2 * n + self.at]
+            data.qacc[:] = x[nq + n + self.at]
             return Contender(lambda: m.mj_inverse(model, data), lambda _: np.array(data.qfrc_inverse[self.order]))
         q, qd = data.qpos.copy(), data.qvel.copy()
         data.qfrc_applied[:] = 0.0
@@ -62,18 +62,18 @@ class MujocoPeer(Peer):
         def step(_: Any) -> Array:  # the timed steps have gone on from the start
             data.qpos[:], data.qvel[:] = q, qd
             m.mj_step(model, data)
-            return np.concatenate([data.qpos[self.order], data.qvel[self.order]])
+            return np.concatenate([data.qpos[self.q_order], data.qvel[self.order]])
 
         return Contender(lambda: m.mj_step(model, data), step)
 
     def _rollout(self, mode: str) -> Contender:
         """A thousand steps of one state, or one step of each of many, by MuJoCo's own loop in one thread."""
-        n = self.case.n
+        nq = self.case.nq
         steps = PASSES if mode == "loop" else 1
         x = self.case.points("rk4") if mode == "batch" else self.case.point("rk4")[:, None]
-        starts = np.hstack([np.zeros((x.shape[1], 1)), x[self.at].T, x[n + self.at].T])  # time, qpos, qvel
+        starts = np.hstack([np.zeros((x.shape[1], 1)), x[self.q_at].T, x[nq + self.at].T])  # time, qpos, qvel
         states = np.empty((len(starts), steps, starts.shape[1]))
-        taken = np.concatenate([1 + self.order, 1 + n + self.order])
+        taken = np.concatenate([1 + self.q_order, 1 + nq + self.order])
 
         def result(_: Any) -> Array:
             last: Array = states[:, -1, taken].T

@@ -14,6 +14,7 @@ from ..equations.equations_of_motion import forward_dynamics
 from ..equations.formulations import inverse_dynamics, spurious_nodes
 from ..multibody.joint_positions import Skeleton, skeleton
 from ..simulation.simulate import simulate
+from ..simulation.trajectory import Trajectory
 from ..systems.system import System
 from .scenes import Scene
 
@@ -63,19 +64,19 @@ def inspection(
     frames = int(min(FRAMES, max(2.0, RATE * end))) if np.isfinite(end) else 2
     times = np.linspace(0.0, end, frames) if end > 0.0 else None
     say(f"{scene.name}: deriving the equations of {system.n} coordinates, compiling them, and a motion of {end:g} s")
-    run = simulate(system, scene.q, scene.qd, end, "dopri5", rtol=1e-6, atol=1e-8, t_eval=times)
+    run = simulate(system, scene.q, scene.qd, end, "dopri5", rtol=1e-6, t_eval=times)
     say(f"{scene.name}: deriving forward dynamics")
     rate = forward_dynamics(system)
-    state = _named(q=run.q, qd=run.qd, tau=np.zeros_like(run.q)) | system.parameters | {"t": run.t}
+    state = _named(q=run.q, qd=run.qd, tau=np.zeros_like(run.qd)) | system.parameters | {"t": run.t}
     if forward:
         about = "Accelerations from torques: solved joint by joint from the tip to the base, then back out to the tip."
         versions = [Equations("forward dynamics", rate, about, frozenset(), _needed(rate, state))]
     else:
         found = rate.evaluate(_needed(rate, state))
         qdd = np.stack([np.broadcast_to(found[f"qdd{i}"], len(run.t)) for i in range(system.n)], axis=1)
-        old = {"q": run.q - DT * run.qd, "qd": run.qd - DT * qdd}
+        old = {"q": run.q - DT * _coordinate_rates(system, run), "qd": run.qd - DT * qdd}
         state |= _named(qdd=qdd) | {"dt": DT}
-        state |= {f"{name}{i}_old": table[:, i] for name, table in old.items() for i in range(system.n)}
+        state |= {f"{name}{i}_old": column for name, table in old.items() for i, column in enumerate(table.T)}
         versions = []
         for name in FORMULATIONS:
             say(f"{scene.name}: deriving inverse dynamics, {name.replace('_', ' ')}")
@@ -99,6 +100,15 @@ def _version(system: System, name: str, state: Mapping[str, Any]) -> Equations:
         about = f"No spurious branch: {len(graph.nodes)} nodes, and the torques that the motion takes."
     moving = " Nothing drives the joints here, so the torques should be 0." if not wrong else ""
     return Equations(name, graph, about + moving, wrong, _needed(graph, state))
+
+
+def _coordinate_rates(system: System, run: Trajectory) -> Array:
+    """Rates of the coordinates along a motion, (T, nq)."""
+    if system.kinematics.quasi is None:
+        return run.qd
+    rates = Graph([*system.q, *system.qd], {str(i): node for i, node in enumerate(system.q_dot)})
+    values = rates.evaluate(_named(q=run.q, qd=run.qd)).values()
+    return np.stack([np.broadcast_to(value, len(run.t)) for value in values], axis=1)
 
 
 def _named(**tables: Array) -> dict[str, Any]:
@@ -127,7 +137,14 @@ def _shares(scene: Scene, state: Mapping[str, Any]) -> dict[str, Array]:
 
     # the parts are nodes over the system's own variables, so a function that gives one makes a system of it
     shares = {
-        name: torques(System(lambda *_, part=part: part, system.coordinates, system.parameters))
+        name: torques(
+            System(
+                lambda *_, part=part: part,
+                system.coordinates,
+                system.parameters,
+                quasi_velocities=system.kinematics.quasi,
+            )
+        )
         for name, part in zip(names, parts, strict=True)
     }
     total = torques(system)

@@ -68,8 +68,8 @@ class Scene:
             raise TypeError(f"the name and about of a scene must be text, got {self.name!r:.40} and {self.about!r:.40}")
         if not hasattr(self.model, "coordinates") or isinstance(self.model, type):
             raise TypeError(f"a scene needs a model, got {type(self.model).__name__}: {self.model!r:.60}")
-        n, second_order = len(self.model.coordinates), as_ode(self.model) is None
-        for what, values, needed in (("q", self.q, n), ("qd", self.qd, n if second_order else 0)):
+        counts = len(self.model.coordinates), len(self.model.velocities)
+        for what, values, needed in (("q", self.q, counts[0]), ("qd", self.qd, counts[1])):
             array = real_array(f"scene {self.name!r}: {what}", values)
             if array.shape != (needed,) or not np.isfinite(array).all():
                 raise ValueError(f"scene {self.name!r}: {what} needs {needed} finite numbers, got {values!r:.60}")
@@ -80,6 +80,11 @@ class Scene:
     def coordinates(self) -> tuple[str, ...]:
         """Those of the model."""
         return self.model.coordinates
+
+    @property
+    def velocities(self) -> tuple[str, ...]:
+        """Those of the model."""
+        return self.model.velocities
 
     @property
     def parameters(self) -> Mapping[str, float]:
@@ -97,9 +102,9 @@ class Scene:
         return as_mechanism(self.model)
 
     @property
-    def omitted(self) -> tuple[str, ...]:
+    def left_out(self) -> tuple[str, ...]:
         """Of a model that was read from a file: what the file has and the model has not, a sentence each."""
-        return self.mechanism.omitted if self.mechanism else ()
+        return self.mechanism.left_out if self.mechanism else ()
 
     @property
     def ode(self) -> OdeSystem | None:
@@ -153,12 +158,12 @@ _SUFFIXES = (".xml", ".urdf")
 def of_file(path: str | os.PathLike[str], ignore: bool = False) -> Scene:
     """The mechanism of a file, MJCF or URDF, at rest at q = 0; named as the file is, without its suffix.
 
-    ignore: leave out what a mechanism cannot have; `omitted` says what. Raises as `load_mjcf` does.
+    ignore: leave out what a mechanism cannot have; `left_out` says what. Raises as `load_mjcf` does.
     """
     mechanism = load_model(path, ignore=ignore)
     n = mechanism.system.n
     about = f"{len(mechanism.moving)} moving bodies of {os.fspath(path)}"
-    return Scene(Path(path).stem, about, mechanism, (0.0,) * n, (0.0,) * n, 3.0)
+    return Scene(Path(path).stem, about, mechanism, mechanism.system.kinematics.neutral, (0.0,) * n, 3.0)
 
 
 def _is_path(name: object) -> bool:

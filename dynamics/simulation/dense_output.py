@@ -37,9 +37,10 @@ class StepBlock(NamedTuple):
     def states_at(self, rows: Indices, s: Array) -> Array:
         """States (k, m) at the shares s (k,) of the steps `rows` (k,)."""
         assert self.dense is not None
-        total = np.zeros((len(rows), self.x.shape[1]))
-        for k in reversed(range(self.dense.shape[1])):
-            total = (total + self.dense[rows, k]) * s[:, None]
+        total, share = np.zeros((len(rows), self.x.shape[1])), s[:, None]
+        for coefficients in self.dense[rows].swapaxes(0, 1)[::-1]:
+            total += coefficients
+            total *= share
         inside = normalized(self.normalization, self.x_old[rows] + total, self.times_at(rows, s))
         states: Array = np.where((s == 1.0)[:, None], self.x[rows], inside)
         return states
@@ -52,9 +53,10 @@ class StepBlock(NamedTuple):
     def slopes_at(self, rows: Indices, s: Array) -> Array:
         """Derivatives of the states by the share, (k, m)."""
         assert self.dense is not None
-        total = np.zeros((len(rows), self.x.shape[1]))
-        for k in reversed(range(self.dense.shape[1])):
-            total = total * s[:, None] + (k + 1.0) * self.dense[rows, k]
+        total, share = np.zeros((len(rows), self.x.shape[1])), s[:, None]
+        for k, coefficients in reversed(list(enumerate(self.dense[rows].swapaxes(0, 1), 1))):
+            total *= share
+            total += k * coefficients
         if self.normalization is None:
             return total
         between = self._replace(normalization=None).states_at(rows, s)

@@ -75,6 +75,12 @@ class Kinematics:
         with building(build):
             return self._called("structure", self.quasi.structure, len(self.u), self.u, list(momenta))
 
+    def slopes(self, gradient: Sequence[Node], momenta: Sequence[Node], build: Builder) -> list[Node]:
+        """dL/dq as the velocities feel it, less what their brackets take: G^T dL/dq - ad(u; p), (n,)."""
+        pulled, taken = self.pulled_back(gradient, build), self.structure(momenta, build)
+        with building(build):
+            return [slope - term for slope, term in zip(pulled, taken, strict=True)]
+
     def brackets(self, build: Builder) -> list[list[Node]]:
         """Rows of C(u), (n, n), with C v = c(u, v): the rate of a small displacement is v + C(u) of it."""
         p = cg.variables([f"p{j}" for j in range(len(self.u))])

@@ -13,10 +13,12 @@ if TYPE_CHECKING:
 class Model(Protocol):
     """A system, a mechanism or a scene: names, parameters, and the equations behind them.
 
-    `System`, `OdeSystem`, `Mechanism` and `Scene` are models. A class of your own becomes one by these five attributes.
+    `System`, `OdeSystem`, `Mechanism` and `Scene` are models. A class of your own becomes one by these six attributes.
     One of `system` and `ode` is there, the other is None.
 
     coordinates: names, in the order of q0, q1, ...; of a first-order system its states.
+    velocities: names, in the order of qd0, qd1, ...: those of the coordinates, unless there are quasi-velocities; none
+    of a first-order system.
     parameters: {name: value}; each is an input of the graphs, and a run binds it to the value.
     system: the Lagrangian system.  ode: the first-order system.  mechanism: the bodies, None of a model without.
     """
@@ -24,6 +26,10 @@ class Model(Protocol):
     @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the coordinates, or of the states."""
+
+    @property
+    def velocities(self) -> tuple[str, ...]:
+        """Names of the velocities."""
 
     @property
     def parameters(self) -> Mapping[str, float]:

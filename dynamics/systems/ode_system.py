@@ -70,6 +70,11 @@ class OdeSystem:
         return self.states
 
     @property
+    def velocities(self) -> tuple[str, ...]:
+        """None: the rates of the states are no states."""
+        return ()
+
+    @property
     def system(self) -> None:
         """None: no Lagrangian."""
         return None

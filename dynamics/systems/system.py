@@ -10,7 +10,7 @@ from typing import Any
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, building, require_sequence, shortened, topological
+from cgraph.extend import require_sequence, shortened, topological
 
 from .arguments import (
     TIME,
@@ -271,12 +271,6 @@ class System:
         None where nobody knows better than to derive it from L, as here.
         """
         return None
-
-    def slopes(self, gradient: Sequence[Node], momenta: Sequence[Node], build: Builder) -> list[Node]:
-        """dL/dq as the velocities feel it, less what their brackets take: G^T dL/dq - ad(qd; p), (n,)."""
-        pulled, taken = self.kinematics.pulled_back(gradient, build), self.kinematics.structure(momenta, build)
-        with building(build):
-            return [slope - term for slope, term in zip(pulled, taken, strict=True)]
 
     def _require_consistent(self) -> None:
         self.kinematics.require_consistent()

@@ -48,7 +48,8 @@ def certify(model: Model, states: int = 20, seed: int = 0, *, speed: float = 1.0
         Standard deviation of qd, qdd and tau, which are normal.
     twin : str, path or MjModel, optional
         What MuJoCo compares with in place of the model's own translation: a path or text of MJCF or URDF, with the
-        same joints in the same order. Its contacts, joint limits and actuators are left out.
+        joints of the same names, or in the same order. Its contacts, joint limits, friction loss and actuators are left
+        out.
 
     Returns
     -------
@@ -80,9 +81,8 @@ def certify(model: Model, states: int = 20, seed: int = 0, *, speed: float = 1.0
     rng = np.random.default_rng(seed)
     system = as_system(model)
     system.constraints.require_none("certify")
-    shape = (states, system.n)
-    at = {"q": rng.uniform(-np.pi, np.pi, shape)} | {
-        name: speed * rng.normal(size=shape) for name in ("qd", "qdd", "tau")
+    at = {"q": _configurations(system, states, rng)} | {
+        name: speed * rng.normal(size=(states, system.n)) for name in ("qd", "qdd", "tau")
     }
     residuals, left_out = _among_graphs(_Checks(system, at, rng))
     for name, peer in agreement.peers(model, theirs):
@@ -125,7 +125,7 @@ class _Checks:
     def rate(self, graph: Graph) -> Graph:
         """d/dt of the outputs along (qd, qdd)."""
         system = self.system
-        x_dot = dict(zip([*system.q, *system.qd], [*system.qd, *system.qdd], strict=True))
+        x_dot = dict(zip([*system.q, *system.qd], [*system.q_dot, *system.qdd], strict=True))
         dots = tangents(x_dot | ({system.t: ONE} if self.timed else {}), graph.outputs.values())
         return self.graph({name: dots.get(node, ZERO) for name, node in graph.outputs.items()})
 
@@ -258,7 +258,8 @@ class _Checks:
         """Catches what no comparison of derivatives with derivatives can: a rule of differentiation that is wrong."""
         system = self.system
         names = ("q", "qd", "qdd")
-        line = {name: self.rng.normal(size=system.n) for name in names}
+        sizes = {"q": system.nq, "qd": system.n, "qdd": system.n}
+        line = {name: self.rng.normal(size=sizes[name]) for name in names}
         given = [cg.constant(float(each)) for name in names for each in line[name]]
         dots = tangents(dict(zip([*system.q, *system.qd, *system.qdd], given, strict=True)), graph.outputs.values())
         slope = self.value(self.graph({name: dots.get(node, ZERO) for name, node in graph.outputs.items()}))
@@ -273,6 +274,16 @@ class _Checks:
         unexplained = np.maximum(np.abs(slope - narrow) - np.abs(wide - narrow), 0.0)
         scale = np.abs(slope) + np.max([np.abs(each) for each in around.values()], axis=0)
         return Residual(equation, _worst(unexplained, scale), DIFFERENCES)
+
+
+def _configurations(system: System, count: int, rng: np.random.Generator) -> Array:
+    """Random coordinates, (count, nq), uniform in -pi .. pi; quaternions of length 1."""
+    q = rng.uniform(-np.pi, np.pi, (count, system.nq))
+    if system.kinematics.quasi is None:
+        return q
+    normalized = Graph(system.q, {str(i): node for i, node in enumerate(system.kinematics.normalized(system.q))})
+    values = normalized.evaluate({f"q{i}": column for i, column in enumerate(q.T)}).values()
+    return np.stack([np.broadcast_to(value, count) for value in values], axis=1)
 
 
 def _worst(difference: Array, terms: Array) -> float:

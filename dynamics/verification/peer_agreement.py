@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
 from typing import Any, NamedTuple, Protocol
@@ -13,7 +14,7 @@ import numpy as np
 from ..equations.evaluate_at import Array, evaluate_at
 from ..equations.formulations import inverse_dynamics
 from ..io.load import compiled
-from ..io.mujoco_twin import mujoco
+from ..io.mujoco_twin import joint_order, mujoco
 from ..multibody.body import Body, MechanismError
 from ..multibody.mechanism import Mechanism, as_mechanism
 from ..peers.case import Case
@@ -25,11 +26,25 @@ from .residual import PEERS, Residual
 
 ASKED = 4  # states at which a disagreement is explained
 TAKEN = 2  # terms at most that are taken out together
-_NO_MASS = 1e-13  # kg, so little that it weighs nothing beside what is left
+TINY = 2.0**-40  # of the heaviest body: a mass that weighs nothing beside what is left
 
 
 class NotComparableError(Exception):
     """Why a peer has nothing to say of a model."""
+
+
+class Sizes(NamedTuple):
+    """What is put in place of masses and inertias that differ: little mass, and the inertia of a body of the model."""
+
+    mass: float  # kg; bodies that have no more are without mass
+    inertia: float  # kg m^2
+
+
+def sizes_of(mechanism: Mechanism) -> Sizes:
+    """The sizes that go with a mechanism."""
+    bodies = [(body.mass, np.asarray(body.center), np.asarray(body.inertia)) for body in mechanism.moving]
+    inertia = max(float(np.abs(moments).max() + mass * center @ center) for mass, center, moments in bodies)
+    return Sizes(TINY * max(body.mass for body in mechanism.bodies), inertia)
 
 
 class Term(NamedTuple):
@@ -39,12 +54,12 @@ class Term(NamedTuple):
     theirs: the change to MuJoCo's model of a file.
     """
 
-    body: Callable[[Body], Body]
+    body: Callable[[Body, Sizes], Body]
     rest: Callable[[Mechanism], Mechanism]
-    theirs: Callable[[Any], None]
+    theirs: Callable[[Any, Sizes], None]
 
 
-def _same(body: Body) -> Body:
+def _same(body: Body, sizes: Sizes) -> Body:
     return body
 
 
@@ -52,14 +67,14 @@ def _all(mechanism: Mechanism) -> Mechanism:
     return mechanism
 
 
-def _joint(**changes: Any) -> Callable[[Body], Body]:
-    return lambda body: replace(body, joint=replace(body.joint, **changes))
+def _joint(**changes: Any) -> Callable[[Body, Sizes], Body]:
+    return lambda body, sizes: replace(body, joint=replace(body.joint, **changes))
 
 
-def _zeroed(*fields: str) -> Callable[[Any], None]:
+def _zeroed(*fields: str) -> Callable[[Any, Sizes], None]:
     """MuJoCo's fields to zero, those that its version has."""
 
-    def change(mj: Any) -> None:
+    def change(mj: Any, sizes: Sizes) -> None:
         for name in fields:
             if hasattr(mj, name):
                 getattr(mj, name)[...] = 0.0
@@ -71,23 +86,31 @@ def _still(mechanism: Mechanism) -> Mechanism:
     return replace(mechanism, gravity=(0.0, 0.0, 0.0))
 
 
-def _floating(mj: Any) -> None:
+def _floating(mj: Any, sizes: Sizes) -> None:
     mj.opt.gravity[:] = 0.0
 
 
-def _alike(mj: Any) -> None:
-    mj.body_inertia[mj.body_mass > _NO_MASS] = 1.0
+def _alike(body: Body, sizes: Sizes) -> Body:
+    return replace(body, inertia=(sizes.inertia,) * 3) if body.mass > sizes.mass else body
 
 
-def _weightless(mj: Any) -> None:
-    mj.body_mass[mj.body_mass > _NO_MASS] = _NO_MASS
+def _alike_there(mj: Any, sizes: Sizes) -> None:
+    mj.body_inertia[mj.body_mass > sizes.mass] = sizes.inertia
 
 
-def _thin(mj: Any) -> None:
+def _weightless(body: Body, sizes: Sizes) -> Body:
+    return replace(body, mass=sizes.mass) if body.mass > sizes.mass else body
+
+
+def _weightless_there(mj: Any, sizes: Sizes) -> None:
+    mj.body_mass[mj.body_mass > sizes.mass] = sizes.mass
+
+
+def _thin(mj: Any, sizes: Sizes) -> None:
     mj.opt.density = mj.opt.viscosity = 0.0
 
 
-def _unbound(mj: Any) -> None:
+def _unbound(mj: Any, sizes: Sizes) -> None:
     mj.opt.disableflags |= mujoco().mjtDisableBit.mjDSBL_EQUALITY
 
 
@@ -96,29 +119,20 @@ TERMS: dict[str, Term] = {
     "joint springs": Term(_joint(stiffness=0.0), _all, _zeroed("jnt_stiffness", "jnt_stiffnesspoly")),
     "armature": Term(_joint(armature=0.0), _all, _zeroed("dof_armature")),
     "gravity": Term(_same, _still, _floating),
-    "inertia about the centers of mass": Term(
-        lambda body: replace(body, inertia=(1.0, 1.0, 1.0)) if body.mass > _NO_MASS else body,
-        _all,
-        _alike,
-    ),
-    "mass and its place": Term(
-        lambda body: replace(body, mass=_NO_MASS) if body.mass > _NO_MASS else body,
-        _all,
-        _weightless,
-    ),
-    "friction loss": Term(_same, _all, _zeroed("dof_frictionloss", "tendon_frictionloss")),
+    "inertia about the centers of mass": Term(_alike, _all, _alike_there),
+    "mass and its place": Term(_weightless, _all, _weightless_there),
     "tendons": Term(_same, _all, _zeroed("tendon_stiffness", "tendon_damping", "tendon_armature")),
     "equality constraints": Term(_same, _all, _unbound),
     "fluid": Term(_same, _all, _thin),
 }
 
 
-def without(mechanism: Mechanism, terms: Sequence[str]) -> Mechanism:
+def without(mechanism: Mechanism, terms: Sequence[str], sizes: Sizes) -> Mechanism:
     """The mechanism with these of the `TERMS` taken out, or made alike for all."""
     for name in terms:
         term = TERMS[name]
         rest = term.rest(mechanism)
-        mechanism = replace(rest, bodies=tuple([term.body(body) for body in rest.bodies]))
+        mechanism = replace(rest, bodies=tuple([term.body(body, sizes) for body in rest.bodies]))
     return mechanism
 
 
@@ -129,7 +143,7 @@ class Asked(Protocol):
         """tau, (N, n), of q, qd, qdd, (N, n) each."""
         ...
 
-    def without(self, terms: Sequence[str]) -> Asked:
+    def without(self, terms: Sequence[str], sizes: Sizes) -> Asked:
         """The same, with these of the `TERMS` taken out."""
         ...
 
@@ -160,33 +174,34 @@ class Translation:
             rows.append(asked.result(asked.run()))
         return np.array(rows)
 
-    def without(self, terms: Sequence[str]) -> Translation:
+    def without(self, terms: Sequence[str], sizes: Sizes) -> Translation:
         """The same model with these of the `TERMS` taken out."""
-        return Translation(self.make, without(self.mechanism, terms))
+        return Translation(self.make, without(self.mechanism, terms, sizes))
 
 
 class Original:
-    """MuJoCo on a model of its own: of a file, say."""
+    """MuJoCo on a model of its own: of a file, say.  q_order, order: of our coordinates and velocities in its."""
 
-    def __init__(self, mj: Any) -> None:
-        self.mj = mj
+    def __init__(self, mj: Any, q_order: Sequence[int], order: Sequence[int]) -> None:
+        self.mj, self.q_order, self.order = mj, list(q_order), list(order)
 
     def inverse(self, at: Mapping[str, Array]) -> Array:
         """tau, (N, n), of q, qd, qdd, (N, n) each."""
         module, data = mujoco(), mujoco().MjData(self.mj)
         rows = []
-        for data.qpos[:], data.qvel[:], data.qacc[:] in zip(at["q"], at["qd"], at["qdd"], strict=True):
+        for q, qd, qdd in zip(at["q"], at["qd"], at["qdd"], strict=True):
+            data.qpos[self.q_order], data.qvel[self.order], data.qacc[self.order] = q, qd, qdd
             module.mj_inverse(self.mj, data)
-            rows.append(np.array(data.qfrc_inverse))
+            rows.append(data.qfrc_inverse[self.order])
         return np.array(rows)
 
-    def without(self, terms: Sequence[str]) -> Original:
+    def without(self, terms: Sequence[str], sizes: Sizes) -> Original:
         """The same model with these of the `TERMS` taken out."""
         mj = copy.copy(self.mj)
         for name in terms:
-            TERMS[name].theirs(mj)
+            TERMS[name].theirs(mj, sizes)
         mujoco().mj_setConst(mj, mujoco().MjData(mj))
-        return Original(mj)
+        return Original(mj, self.q_order, self.order)
 
 
 def peers(model: Model, twin: Original | None = None) -> Iterator[tuple[str, Callable[[], Asked]]]:
@@ -208,11 +223,12 @@ def residual(name: str, peer: Asked, model: Model, at: Mapping[str, Array]) -> R
 
 def explanation(model: Mechanism, peer: Asked, at: Mapping[str, Array]) -> str:
     """The one or two of the `TERMS` without which there is agreement, in words."""
-    few = {name: rows[:ASKED] for name, rows in at.items()}
+    few, sizes = {name: rows[:ASKED] for name, rows in at.items()}, sizes_of(model)
     for count in range(1, TAKEN + 1):
         for terms in combinations(TERMS, count):
-            if disagreement(without(model, terms), peer.without(terms), few) <= PEERS.value:
-                return f"they agree without {' and '.join(terms)}"
+            with suppress(MechanismError):  # what is left may be a model that a peer cannot have
+                if disagreement(without(model, terms, sizes), peer.without(terms, sizes), few) <= PEERS.value:
+                    return f"they agree without {' and '.join(terms)}"
     return f"no {TAKEN} terms explain it"
 
 
@@ -251,11 +267,15 @@ def original(twin: Any, model: Model) -> Original:
     """
     module, theirs = mujoco(), copy.copy(compiled(twin))
     try:
-        n = as_system(bare(model)).n
+        bodies = bare(model)
     except NotComparableError as error:
         raise ValueError(f"a twin is compared with rigid bodies: MuJoCo {error}") from None
-    if (theirs.nq, theirs.nv) != (n, n):
+    nq, n = len(bodies.coordinates), len(bodies.velocities)
+    if (theirs.nq, theirs.nv) != (nq, n):
         raise ValueError(f"the twin has {theirs.nv} degrees of freedom, the model {n}")
-    for unused in ("CONTACT", "LIMIT", "ACTUATION"):
+    for unused in ("CONTACT", "LIMIT", "FRICTIONLOSS", "ACTUATION"):
         theirs.opt.disableflags |= getattr(module.mjtDisableBit, f"mjDSBL_{unused}")
-    return Original(theirs)
+    names = {theirs.joint(i).name for i in range(theirs.njnt)}
+    if names != {body.coordinate for body in bodies.moving}:
+        return Original(theirs, range(nq), range(n))
+    return Original(theirs, *joint_order(theirs, bodies))

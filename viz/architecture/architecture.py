@@ -45,7 +45,7 @@ class Architecture:
         """Whether a longer way leads from the arrow's importer to what it imports."""
         importer, imported = arrow
         return any(
-            imported in _reach(self.arrows, step)
+            imported in _reach(_heads(self.arrows), step)
             for start, step in self.arrows
             if start == importer != step != imported
         )
@@ -136,11 +136,15 @@ def _listed(what: str, lines: Sequence[str]) -> list[str]:
 Arrows = Mapping[tuple[str, str], Any] | Sequence[tuple[str, str]]
 
 
-def _reach(arrows: Arrows, start: str) -> set[str]:
-    """All that can be reached from `start` along one arrow or more."""
+def _heads(arrows: Arrows) -> dict[str, list[str]]:
     heads: dict[str, list[str]] = {}
     for tail, head in arrows:
         heads.setdefault(tail, []).append(head)
+    return heads
+
+
+def _reach(heads: Mapping[str, Sequence[str]], start: str) -> set[str]:
+    """All that can be reached from `start` along one arrow or more."""
     reached: set[str] = set()
     waiting = [start]
     while waiting:
@@ -152,7 +156,8 @@ def _reach(arrows: Arrows, start: str) -> set[str]:
 
 def _circles(arrows: Arrows) -> tuple[tuple[str, ...], ...]:
     """Groups of those that reach one another."""
-    reach = {name: _reach(arrows, name) for name in sorted({tail for tail, _ in arrows})}
+    heads = _heads(arrows)
+    reach = {name: _reach(heads, name) for name in sorted(heads)}
     groups = {
         tuple(sorted(other for other in reached if name in reach.get(other, ())))
         for name, reached in reach.items()

@@ -36,7 +36,7 @@ def renew(names: Iterable[str] | None = None, say: Callable[[str], None] = lambd
         if result is not None:
             entries[name] = entry(case, result)
             say(f"{name}: {result.how}")
-    known = [name for name, case in cases.TABLE.items() if name in entries and (case.exact or case.method)]
+    known = [name for name, case in cases.table().items() if name in entries and (case.exact or case.method)]
     ordered = {name: entries[name] for name in known}
     FILE.write_text(json.dumps(ordered, indent=1) + "\n", encoding="utf-8")
     _kept.cache_clear()

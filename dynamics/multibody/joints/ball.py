@@ -49,10 +49,10 @@ class Ball(SpatialJoint):
         """A rotation."""
         return spatial.from_quaternion(at), np.zeros(3)
 
-    def resists(self, axis: Array, mass: float, inertia: Array) -> bool:
+    def resists(self, mass: float, inertia: Array) -> bool:
         """Inertia about every axis, more than rounding leaves of the largest."""
         moments = np.linalg.eigvalsh(inertia)
-        return bool(moments[0] > spatial.SNAP * moments[2])
+        return bool(moments[0] > spatial.ROUNDING * moments[2])
 
     def unobservable(self, mass: float, moment: Array, inertia: Array) -> tuple[float, Array, Array]:
         """The mass, taken at the joint."""

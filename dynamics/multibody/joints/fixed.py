@@ -22,7 +22,7 @@ class Fixed(AxialJoint):
         """Where it is at 0."""
         return np.eye(3), np.zeros(3)
 
-    def resists(self, axis: Array, mass: float, inertia: Array) -> bool:
+    def resists(self, mass: float, inertia: Array) -> bool:
         """False: nothing moves."""
         return False
 

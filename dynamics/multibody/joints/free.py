@@ -59,10 +59,10 @@ class Free(SpatialJoint):
         """A rotation and a displacement."""
         return spatial.from_quaternion(at[3:]), at[:3]
 
-    def resists(self, axis: Array, mass: float, inertia: Array) -> bool:
+    def resists(self, mass: float, inertia: Array) -> bool:
         """Mass, and inertia about every axis through the center of mass; see `require_inertia`."""
         moments = np.linalg.eigvalsh(inertia)
-        return mass > 0.0 and bool(moments[0] > spatial.SNAP * moments[2])
+        return mass > 0.0 and bool(moments[0] > spatial.ROUNDING * moments[2])
 
 
 JOINT = Free()

@@ -19,7 +19,8 @@ class JointType(ABC):
 
     kind: the word for it in `Joint.kind`.  mjcf, urdf: the words for it in those files; "" where they have none.
     moves: whether it has a coordinate; of "fixed" no function below is asked but `placement`.
-    turns: whether it turns the body.  limited: whether URDF demands limits of it.
+    turns: whether it turns the body.  limited: whether URDF demands limits of it.  geared: whether its velocities can
+    have an inertia of their own, an armature.
     coordinates, velocities: what they are called after the joint's name; "" of a single one, which has the joint's.
     units: of the coordinates.  neutral: the coordinates where the body stands at the joint.
     groups: for each coordinate a number, the same for those that are one quantity.
@@ -30,6 +31,7 @@ class JointType(ABC):
     moves = True
     turns = True
     limited = False
+    geared = True
     coordinates: tuple[str, ...] = ("",)
     velocities: tuple[str, ...] = ("",)
     units: tuple[str, ...] = ("rad",)
@@ -53,8 +55,11 @@ class JointType(ABC):
         """Rotation (3, 3) and displacement (3,) [m] of the body at coordinates (nq,), in its axes at neutral ones."""
 
     @abstractmethod
-    def resists(self, axis: Array, mass: float, inertia: Array) -> bool:
-        """Whether a body alone has inertia along all velocities; its inertia is about the joint's origin, (3, 3)."""
+    def resists(self, mass: float, inertia: Array) -> bool:
+        """Whether a body alone has inertia along all velocities; its inertia is about the joint's origin, (3, 3).
+
+        In the axes of the body's motion, in which the axis of an axial joint is z.
+        """
 
     def unobservable(self, mass: float, moment: Array, inertia: Array) -> tuple[float, Array, Array]:
         """The part of mass, first moment (3,) and inertia (3, 3) that moves with the parent whatever the joint does."""

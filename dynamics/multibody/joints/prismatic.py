@@ -28,7 +28,7 @@ class Prismatic(AxialJoint):
         """A displacement along the axis."""
         return np.eye(3), axis * at[0]
 
-    def resists(self, axis: Array, mass: float, inertia: Array) -> bool:
+    def resists(self, mass: float, inertia: Array) -> bool:
         """Mass."""
         return mass > 0.0
 

@@ -26,9 +26,9 @@ class Revolute(AxialJoint):
         """A rotation about the axis."""
         return spatial.rotation(axis, float(at[0])), np.zeros(3)
 
-    def resists(self, axis: Array, mass: float, inertia: Array) -> bool:
-        """Inertia about the axis, more than rounding leaves of the others."""
-        return float(axis @ inertia @ axis) > spatial.SNAP * float(np.abs(inertia).max())
+    def resists(self, mass: float, inertia: Array) -> bool:
+        """Inertia about the axis."""
+        return float(inertia[2, 2]) > 0.0
 
     def unobservable(self, mass: float, moment: Array, inertia: Array) -> tuple[float, Array, Array]:
         """The mass, the first moment along the axis, and the inertia that is alike about every axis across."""

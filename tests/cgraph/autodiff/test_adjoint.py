@@ -10,7 +10,7 @@ from mpmath import mpf
 import cgraph as cg
 from cgraph.core.node import OPS, apply
 from tests import high_precision
-from tests.strategies import Case, cases, numbers
+from tests.strategies import Case, cases, examples, numbers
 
 ADJOINT_TOLERANCE = 1e-12  # relative to the sum of the absolute values of all terms
 DERIVATIVE_TOLERANCE = 1e-9  # relative to the same sum: partials are taken at arguments that were rounded
@@ -46,7 +46,7 @@ def adjoint_defect(case: Case, x_dot: dict[str, float], y_bar: dict[str, float])
     return abs(left - right) / max(size, 1e-300)
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 @given(cases(), weights, weights)
 def test_jvp_and_vjp_are_adjoint(case, v, w):
     assume(high_precision.kink_distance(case.graph, case.values) > KINK_DISTANCE)  # for the size of terms alone
@@ -70,14 +70,14 @@ def derivative_error(case: Case, x_dot: dict[str, float]) -> float:
     return max(errors)
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 @given(cases(), weights)
 def test_first_derivatives_are_central_differences(case, v):
     assume(high_precision.kink_distance(case.graph, case.values) > KINK_DISTANCE)
     assert derivative_error(case, dict(zip(case.graph.input_names, v, strict=False))) <= DERIVATIVE_TOLERANCE
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 @given(cases(max_operations=8, max_outputs=1), weights)
 def test_second_derivatives_are_central_differences_of_the_first(case, v):
     """The graph of the gradient, itself a random graph, is differentiated once more by both modes."""
@@ -87,7 +87,7 @@ def test_second_derivatives_are_central_differences_of_the_first(case, v):
     assert derivative_error(first, dict(zip(case.graph.input_names, v, strict=False))) <= DERIVATIVE_TOLERANCE
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 @given(cases(max_operations=8, max_outputs=1))
 def test_hessian_is_the_jacobian_of_the_gradient_by_central_differences(case):
     assume(high_precision.kink_distance(case.graph, case.values) > KINK_DISTANCE)
@@ -102,7 +102,7 @@ def test_hessian_is_the_jacobian_of_the_gradient_by_central_differences(case):
             assert error <= DERIVATIVE_TOLERANCE * max(1.0, paths[f"df0/d{row}"])
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 @given(cases(max_operations=12))
 def test_values_are_those_of_mpmath(case):
     assume(high_precision.kink_distance(case.graph, case.values) > KINK_DISTANCE)

@@ -15,7 +15,7 @@ import cgraph as cg
 from cgraph.codegen import parts
 from cgraph.codegen.llvm_ir import scalar_ir
 from cgraph.core.node import OPS, apply
-from tests.strategies import cases
+from tests.strategies import cases, examples
 from tests.ulps import same, ulps_apart
 
 pytest.importorskip("llvmlite")
@@ -74,7 +74,7 @@ def test_an_operation_on_vectors_is_that_on_floats(op):
 
 
 @given(case=cases())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 def test_a_random_graph_agrees_with_evaluate_to_the_last_bit(case):
     graph, values = case
     function = cg.compile(graph, "llvm", fma=False)
@@ -84,7 +84,7 @@ def test_a_random_graph_agrees_with_evaluate_to_the_last_bit(case):
 
 
 @given(case=cases(max_operations=8))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=examples(30), deadline=None)
 def test_a_random_graph_in_a_batch_agrees_in_every_lane_with_every_other(case):
     graph, values = case
     function = cg.compile(graph, "llvm")

@@ -13,7 +13,7 @@ from cgraph.codegen import llvm_engine as llvm
 from cgraph.codegen.llvm_ir import TOGETHER, batch_ir, libm_functions
 from cgraph.codegen.schedule import Joined, joined_calls, schedule
 from cgraph.core.node import OPS, apply
-from tests.strategies import cases
+from tests.strategies import cases, examples
 from tests.tolerances import SHORT_SUM
 from tests.ulps import exact, same, ulps_apart
 
@@ -247,7 +247,7 @@ def assert_complete_and_in_order(graph, together):
 
 
 @given(case=cases(max_operations=30))
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=examples(80), deadline=None)
 def test_a_schedule_has_every_node_once_and_after_what_it_needs(case):
     for together in (1, TOGETHER):
         assert_complete_and_in_order(case.graph, together)

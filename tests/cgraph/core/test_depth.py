@@ -10,7 +10,7 @@ import pytest
 import cgraph as cg
 from tests.tolerances import SOLVED, SUMS
 
-DEEP = 100_000
+DEEP = 20_000
 
 
 def chain(length: int) -> cg.Graph:

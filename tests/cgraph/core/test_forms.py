@@ -14,7 +14,7 @@ from hypothesis import given, settings
 
 import cgraph as cg
 from cgraph.core.node import OPS
-from tests.strategies import cases
+from tests.strategies import cases, examples
 
 x, y = cg.variables("x y")
 
@@ -156,7 +156,7 @@ def test_unused_inputs_are_nodes_in_networkx():
     assert found.degree(2) == 0
 
 
-@settings(max_examples=50)
+@settings(max_examples=examples(50))
 @given(cases())
 def test_degrees_in_networkx_add_up_to_the_edges(case):
     import networkx
@@ -171,7 +171,7 @@ def test_degrees_in_networkx_add_up_to_the_edges(case):
     assert all(in_degrees[i] == node.op.arity for i, node in enumerate(case.graph.nodes))
 
 
-@settings(max_examples=100)
+@settings(max_examples=examples(100))
 @given(cases())
 def test_counts_are_those_of_the_listing(case):
     counts = case.graph.counts()
@@ -183,7 +183,7 @@ def test_counts_are_those_of_the_listing(case):
     assert counts.edges == sum(OPS[words[2]].arity for words in lines)
 
 
-@settings(max_examples=100)
+@settings(max_examples=examples(100))
 @given(cases())
 def test_a_pickle_and_a_copy_are_the_same_graph(case):
     for graph in (case.graph, cg.jvp(case.graph)):

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 
 import cgraph as cg
 from cgraph.errors import GraphError
-from tests.strategies import cases
+from tests.strategies import cases, examples
 
 x, y = cg.variables("x y")
 
@@ -89,7 +89,7 @@ def test_tags_around_a_transform_do_not_stick_to_derivatives():
             assert set().union(*(node.tags for node in transform(graph).nodes)) == set()
 
 
-@settings(max_examples=50)
+@settings(max_examples=examples(50))
 @given(cases())
 def test_a_derivative_has_no_tag_that_the_graph_has_not(case):
     written = set().union(*(node.tags for node in case.graph.nodes))

@@ -14,7 +14,7 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph.explain import compare
 from dynamics.equations.node_classes import formulation_classes
-from tests.strategies import Case, cases
+from tests.strategies import Case, cases, examples
 
 x, y, z = cg.variables("x y z")
 
@@ -27,7 +27,7 @@ def spelled(node: cg.Node) -> str:
     return f"{node.op.name}({', '.join(sorted(args) if node.op.commutative else args)})"
 
 
-@settings(max_examples=100)
+@settings(max_examples=examples(100))
 @given(cases(max_operations=10), cases(max_operations=10))
 def test_every_node_is_counted_once_and_pairs_are_alike(one: Case, other: Case):
     for left, right in ((one.graph, other.graph), (one.graph, one.graph), (one.graph, cg.simplify(one.graph))):
@@ -43,7 +43,7 @@ def test_every_node_is_counted_once_and_pairs_are_alike(one: Case, other: Case):
             assert sum(found.classes(side).values()) == len(only)
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(cases(max_operations=12), cases(max_operations=12))
 def test_both_graphs_are_in_the_one_of_both(one: Case, other: Case):
     found = compare(one.graph, other.graph)

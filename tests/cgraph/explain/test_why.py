@@ -11,7 +11,7 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph.explain import why, why_not
 from tests import high_precision
-from tests.strategies import Case, cases
+from tests.strategies import Case, cases, examples
 from tests.tolerances import EQUATIONS, SOLVED, SUMS
 
 x, y, z = cg.variables("x y z")
@@ -36,7 +36,7 @@ def product(graph: cg.Graph, path: list[cg.Edge], values: dict[str, float]) -> f
     return result
 
 
-@settings(max_examples=150)
+@settings(max_examples=examples(150))
 @given(cases(max_operations=10, max_outputs=1))
 def test_every_path_is_counted_weighed_and_listed_in_order(case: Case):
     (output,) = case.graph.outputs.values()
@@ -59,7 +59,7 @@ def test_every_path_is_counted_weighed_and_listed_in_order(case: Case):
         assert [len(path.edges) for path in shortest.paths] == sorted(map(len, paths))
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(cases(max_outputs=1))
 def test_the_derivative_and_the_weight_are_those_at_50_digits(case: Case):
     assume(high_precision.kink_distance(case.graph, case.values) > KINK_DISTANCE)
@@ -212,7 +212,7 @@ def test_why_not_tells_how_far_the_input_reaches_and_where_the_two_meet():
     assert "f does not depend on z" in str(why(graph, "f", "z", dict.fromkeys("xyz", 1.0)))
 
 
-@settings(max_examples=100)
+@settings(max_examples=examples(100))
 @given(cases(max_operations=12))
 def test_exactly_one_of_why_and_why_not_has_an_answer(case: Case):
     for output, node in case.graph.outputs.items():

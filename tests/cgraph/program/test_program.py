@@ -10,6 +10,7 @@ from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
 from cgraph.program import Call, Factor, If, Map, Program, Solve, Sum, While, runner
+from tests.strategies import examples
 from tests.tolerances import LONG_SUM
 
 BACKENDS = ["python", "llvm"]
@@ -140,7 +141,7 @@ def test_a_run_goes_on_where_the_last_one_ended(backend: str) -> None:
     assert np.concatenate(parts).tolist() == whole.tolist()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(n=st.integers(1, 9), seed=st.integers(0, 10_000))
 def test_factor_and_solve(n: int, seed: int) -> None:
     generator = np.random.default_rng(seed)
@@ -244,7 +245,7 @@ def test_wrong_use_of_a_loop() -> None:
 def test_code_in_a_cycle_of_garbage_is_let_go_in_order() -> None:
     """Python ends the objects of a cycle in any order; LLVM's context must outlive what was made in it."""
     pytest.importorskip("llvmlite")
-    for _ in range(20):
+    for _ in range(6):
         held: list[object] = [cg.compile(ONE, "llvm"), cg.loop(spring(), {"x": "x_next"}, "llvm")]
         held.append(held)
         del held

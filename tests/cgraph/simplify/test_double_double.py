@@ -9,6 +9,7 @@ from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
 from cgraph.core.traversal import topological
+from tests.strategies import examples
 from tests.tolerances import EQUATIONS, LONG_SUM
 
 ROUND = 2.0**-98  # of an operation, with some to spare; relative to a bound on the terms that went into it
@@ -79,7 +80,7 @@ def _apply(a, b, symbol):
 
 
 @given(nodes, st.tuples(numbers, numbers, numbers))
-@settings(max_examples=300)
+@settings(max_examples=examples(300))
 def test_random_arithmetic_keeps_twice_the_digits(node, point):
     graph = cg.Graph(cg.variables("x y z"), {"f": node, "g": (node + 1e10) - node})
     with mpmath.workdps(80):

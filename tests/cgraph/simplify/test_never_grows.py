@@ -13,7 +13,8 @@ import cgraph as cg
 import dynamics as dyn
 from tests import high_precision
 from tests.dynamics.mechanisms import random_mechanism
-from tests.strategies import cases
+from tests.slow import slow
+from tests.strategies import cases, examples
 
 FOUR_ULPS = 4 * 2.0**-52
 KINK_DISTANCE = 1e-6
@@ -40,7 +41,7 @@ def assert_same_values(after: cg.Graph, before: cg.Graph, values: dict[str, floa
         assert abs(mpf(found) - exact[name]) <= FOUR_ULPS * (sizes[name] + more[name])
 
 
-@settings(max_examples=300, derandomize=True, database=None)
+@settings(max_examples=examples(300), derandomize=True, database=None)
 @given(cases(max_operations=30), st.data())
 def test_on_random_graphs(case, data):
     graph = case.graph
@@ -61,7 +62,7 @@ def scene(seed: int) -> tuple[dyn.Mechanism, np.random.Generator]:
     return (dyn.Mechanism(found.bodies, (0.0, 0.0, -9.81)) if seed % 2 else found), generator
 
 
-@pytest.mark.parametrize("seed", range(SCENES))
+@pytest.mark.parametrize("seed", [*range(30), *slow(*range(30, SCENES))])
 def test_on_random_scenes(seed):
     model, generator = scene(seed)
     raw = dyn.inverse_dynamics(model, simplify=False)

@@ -9,7 +9,7 @@ from mpmath import mpf
 import cgraph as cg
 from cgraph.errors import GraphError
 from tests import high_precision
-from tests.strategies import Case, cases
+from tests.strategies import Case, cases, examples
 from tests.tolerances import LAST_BITS
 
 x, y, z = cg.variables("x y z")
@@ -35,7 +35,7 @@ def assert_same_function(graph: cg.Graph, other: cg.Graph, values: dict[str, flo
         assert abs(mpf(found) - exact[name]) <= ROUNDINGS * (before[name] + after[name])
 
 
-@settings(max_examples=400)
+@settings(max_examples=examples(400))
 @given(cases())
 def test_simplify_never_grows_and_keeps_the_function(case):
     simple = cg.simplify(case.graph)
@@ -47,7 +47,7 @@ def test_simplify_never_grows_and_keeps_the_function(case):
     assert_same_function(case.graph, simple, case.values)
 
 
-@settings(max_examples=150)
+@settings(max_examples=examples(150))
 @given(cases(max_operations=10))
 def test_simplify_keeps_derivatives_and_never_grows_them(case):
     jacobian = cg.jacobian(case.graph)
@@ -57,14 +57,14 @@ def test_simplify_keeps_derivatives_and_never_grows_them(case):
     assert_same_function(jacobian, simple, case.values)
 
 
-@settings(max_examples=150)
+@settings(max_examples=examples(150))
 @given(cases())
 def test_simplify_is_done_when_it_is_done(case):
     simple = cg.simplify(case.graph)
     assert cg.simplify(simple).listing() == simple.listing()
 
 
-@settings(max_examples=150)
+@settings(max_examples=examples(150))
 @given(cases())
 def test_specialize_binds_an_input_and_keeps_the_function(case):
     bound = case.graph.input_names[0]
@@ -75,7 +75,7 @@ def test_specialize_binds_an_input_and_keeps_the_function(case):
     assert_same_function(case.graph, special, case.values)
 
 
-@settings(max_examples=150)
+@settings(max_examples=examples(150))
 @given(cases())
 def test_specialize_never_grows(case):
     bound = case.graph.input_names[0]

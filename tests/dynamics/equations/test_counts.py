@@ -6,6 +6,8 @@ import numpy as np
 from pytest import approx, fixture, mark
 
 import dynamics as dyn
+from cgraph.core.structure_hash import structure_hash
+from tests.dynamics.mechanisms import FAMILIES, turned_arm
 
 FROM_6_TO_40 = (6, 8, 10, 13, 17, 22, 30, 40)
 
@@ -18,9 +20,9 @@ def edges(formulation: str, sizes: Sequence[int]) -> list[int]:
     return [dyn.inverse_dynamics(equal_links(n), formulation).counts().edges for n in sizes]
 
 
-def exponent(formulation: str) -> float:
+def exponent(formulation: str, sizes: Sequence[int]) -> float:
     """The slope of log edges over log n."""
-    return float(np.polyfit(np.log(FROM_6_TO_40), np.log(edges(formulation, FROM_6_TO_40)), 1)[0])
+    return float(np.polyfit(np.log(sizes), np.log(edges(formulation, sizes)), 1)[0])
 
 
 def test_inverse_dynamics_of_the_paper_s_arm_is_small() -> None:
@@ -54,7 +56,9 @@ def test_each_further_equal_link_adds_93_nodes_to_forward_dynamics(n: int) -> No
 
 @fixture(scope="module")
 def exponents() -> dict[str, float]:
-    return {name: exponent(name) for name in ("chain_rule", "chain_rule_literal", "euler_embedded")}
+    few = (6, 10, 17, 30)  # of the graphs that grow quadratically
+    found = {name: exponent(name, FROM_6_TO_40) for name in ("chain_rule", "euler_embedded")}
+    return found | {"chain_rule_literal": exponent("chain_rule_literal", few)}
 
 
 def test_contracted_the_chain_rule_grows_linearly(exponents: dict[str, float], record_property) -> None:
@@ -97,3 +101,17 @@ def test_the_literal_form_costs_more_from_two_links_on() -> None:
     ratios = [b / a for a, b in zip(edges("chain_rule", sizes), edges("chain_rule_literal", sizes), strict=True)]
     assert ratios[0] == 1.0
     assert (np.diff(ratios) > 0).all()
+
+
+@mark.parametrize("model", [dyn.tree([-1, 0, 0]), turned_arm(2), turned_arm(3)], ids=["tree", "arm of 2", "arm of 3"])
+def test_near_ties_of_nodes_go_to_elimination_which_keeps_more_digits(model: dyn.Mechanism) -> None:
+    auto, recursive, dense = (dyn.forward_dynamics(model, method) for method in ("auto", "recursive", "dense"))
+    assert 0.9 * len(recursive.nodes) < len(dense.nodes) < len(recursive.nodes)
+    assert structure_hash(auto) == structure_hash(recursive)
+
+
+def test_a_dense_solve_that_saves_more_than_a_tenth_of_the_nodes_is_taken() -> None:
+    skew = FAMILIES["serial"](2)
+    auto, recursive, dense = (dyn.forward_dynamics(skew, method) for method in ("auto", "recursive", "dense"))
+    assert len(dense.nodes) < 0.9 * len(recursive.nodes)
+    assert structure_hash(auto) == structure_hash(dense)

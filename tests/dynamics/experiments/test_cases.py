@@ -278,7 +278,7 @@ def test_the_free_body_starts_with_its_momentum_along_the_vertical() -> None:
     assert momentum / np.linalg.norm(momentum) == approx(up, abs=LAST_BITS)
 
 
-WITH_INVARIANTS = [name for name, case in cases.TABLE.items() if case.invariants and len(case.start) < LARGE]
+WITH_INVARIANTS = [name for name, case in cases.table().items() if case.invariants and len(case.start) < LARGE]
 
 
 @mark.parametrize("name", WITH_INVARIANTS)
@@ -320,8 +320,8 @@ def test_what_is_watched_can_be_measured(name: str) -> None:
     assert len(given.states) == len(case.start) == len(case.size or case.start)
 
 
-LIMITS = [name for name, case in cases.TABLE.items() if case.exact is not None and case.method is None]
-CLOSED = [name for name, case in cases.TABLE.items() if case.exact is not None and case.method is not None]
+LIMITS = [name for name, case in cases.table().items() if case.exact is not None and case.method is None]
+CLOSED = [name for name, case in cases.table().items() if case.exact is not None and case.method is not None]
 
 
 @mark.parametrize("name", CLOSED)
@@ -347,7 +347,7 @@ def compare(case: StabilityCase, t_end: float) -> None:
     assert np.max(np.abs(found.deviation(exact.x)[0]) / size) <= rounded * max(growth, 100.0)
 
 
-MEASURED = [name for name, case in cases.TABLE.items() if case.growth is not None and case.method is not None]
+MEASURED = [name for name, case in cases.table().items() if case.growth is not None and case.method is not None]
 QUICK = {"next to the upright", "at the upright", "mass matrix of condition 4e+08", "damping by a growing mass"}
 TO_BE_LARGE = 1e-4  # below it errors die out, and how far says nothing about a method
 

@@ -36,18 +36,23 @@ def generalized(mechanism: Mechanism, state: dict[str, Any]) -> Array:
     return run(dyn.inverse_dynamics(free), state) - run(dyn.inverse_dynamics(mechanism), state)
 
 
-def pose(mechanism: Mechanism, body: str, q: Array) -> tuple[Array, Array]:
-    """Where HAND is on the body, (3,), and the body's axes, as columns (3, 3), from positions alone."""
-    places = [run(mechanism.position(body, point), {"q": q}) for point in (HAND, (0, 0, 0), *np.eye(3))]
+def points(mechanism: Mechanism, body: str) -> list[cg.Graph]:
+    """Where HAND is on the body, its origin, and the tips of its axes."""
+    return [mechanism.position(body, point) for point in (HAND, (0, 0, 0), *np.eye(3))]
+
+
+def pose(graphs: list[cg.Graph], q: Array) -> tuple[Array, Array]:
+    """Where HAND is, (3,), and the body's axes, as columns (3, 3), from positions alone."""
+    places = [run(graph, {"q": q}) for graph in graphs]
     return places[0], np.column_stack([tip - places[1] for tip in places[2:]])
 
 
-def work(mechanism: Mechanism, body: str, q: Array, value: Array, torque: Array, step: float = 1e-5) -> Array:
+def work(graphs: list[cg.Graph], q: Array, value: Array, torque: Array, step: float = 1e-5) -> Array:
     """Virtual work along each coordinate, (n,), by central differences: f . dp + torque . dtheta, both in the world."""
-    rates = []
+    rates, turned = [], pose(graphs, q)[1]
     for unit in np.eye(len(q)):
-        (before, old), (after, new) = (pose(mechanism, body, q + sign * step * unit) for sign in (-1.0, 1.0))
-        spin = (new - old) @ pose(mechanism, body, q)[1].T  # skew: dR R^T
+        (before, old), (after, new) = (pose(graphs, q + sign * step * unit) for sign in (-1.0, 1.0))
+        spin = (new - old) @ turned.T  # skew: dR R^T
         turn = 0.5 * np.array([spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]])
         rates.append((value @ (after - before) + torque @ turn) / (2.0 * step))
     return np.array(rates)
@@ -62,8 +67,9 @@ def test_a_force_does_the_virtual_work_of_its_point(family: str, frame: str) -> 
     mechanism = FAMILIES[family](7)
     q = states(mechanism, 1)["q"][0]
     for body in ("b0", "b4", mechanism.bodies[-1].name):
-        axes = pose(mechanism, body, q)[1] if frame == "body" else np.eye(3)
-        expected = work(mechanism, body, q, axes @ VALUE, axes @ TORQUE)
+        graphs = points(mechanism, body)
+        axes = pose(graphs, q)[1] if frame == "body" else np.eye(3)
+        expected = work(graphs, q, axes @ VALUE, axes @ TORQUE)
         ours = generalized(pushed(mechanism, body, frame), at(states(mechanism, 1), 0))
         assert np.abs(ours - expected).max() < DIFFERENCES * np.abs(expected).max()
 
@@ -71,7 +77,7 @@ def test_a_force_does_the_virtual_work_of_its_point(family: str, frame: str) -> 
 @mark.parametrize("family", FAMILIES)
 def test_a_force_at_every_centre_of_mass_is_gravity(family: str) -> None:
     """m a at the centre of each body, welded ones too, is what a further gravity a does; in every function."""
-    mechanism, extra = FAMILIES[family](6), np.array([1.0, -2.0, 3.0])
+    mechanism, extra = FAMILIES[family](4), np.array([1.0, -2.0, 3.0])
     heavier = replace(mechanism, gravity=np.asarray(mechanism.gravity) + extra)
     pulled = replace(mechanism, forces=[Force(b.name, b.mass * extra, b.center) for b in mechanism.bodies])
     given = states(mechanism, 5)

@@ -31,8 +31,8 @@ class Screw(Revolute):
         turn, _ = super().placement(axis, at)
         return turn, PITCH * at[0] * axis
 
-    def resists(self, axis: Array, mass: float, inertia: Array) -> bool:
-        return mass > 0.0 or super().resists(axis, mass, inertia)
+    def resists(self, mass: float, inertia: Array) -> bool:
+        return mass > 0.0 or super().resists(mass, inertia)
 
     def unobservable(self, mass: float, moment: Array, inertia: Array) -> tuple[float, Array, Array]:
         return 0.0, 0.0 * moment, 0.0 * inertia

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from pytest import approx, mark, raises
+from pytest import approx, importorskip, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
@@ -13,8 +13,10 @@ from cgraph.core.structure_hash import structure_hash
 from dynamics.equations.equations_of_motion import accelerations
 from dynamics.equations.formulations import torques
 from tests.dynamics.mechanisms import FAMILIES, random_inertia, random_rotation, turned_arm
+from tests.dynamics.models import error, run
 from tests.dynamics.multibody.test_reconfiguration import arm
-from tests.tolerances import EQUATIONS
+from tests.slow import slow
+from tests.tolerances import EQUATIONS, SHORT_SUM
 
 BOTH = (dyn.inverse_dynamics, dyn.forward_dynamics)
 PAPER = dyn.scenes.load("triple_pendulum").model
@@ -76,7 +78,7 @@ def energies_in_the_world(mechanism: dyn.Mechanism, state: dict[str, float]) -> 
     return kinetic, potential
 
 
-@mark.parametrize("seed", range(18))
+@mark.parametrize("seed", [*range(6), *slow(*range(6, 18))])
 @mark.parametrize("regrouped", [False, True])
 def test_the_lagrangian_is_the_energy_in_the_world_s_axes(seed: int, regrouped: bool) -> None:
     mechanism = replace(in_planes(seed), base_parameters=regrouped)
@@ -91,7 +93,7 @@ def test_the_lagrangian_is_the_energy_in_the_world_s_axes(seed: int, regrouped: 
         assert energy.evaluate(state)["E"] == approx(kinetic + potential, abs=AGREEMENT * scale)
 
 
-@mark.parametrize("seed", range(12))
+@mark.parametrize("seed", [*range(6), *slow(*range(6, 12))])
 def test_torques_in_planes_are_those_body_by_body(seed: int) -> None:
     mechanism = in_planes(seed)
     n = len(mechanism.moving)
@@ -105,18 +107,35 @@ def test_torques_in_planes_are_those_body_by_body(seed: int) -> None:
 @mark.parametrize("family", FAMILIES)
 @mark.parametrize("equations", BOTH)
 def test_regrouped_inertia_moves_alike_in_no_more_nodes(family: str, equations: Equations) -> None:
-    mechanism = FAMILIES[family](6)
-    pruned = dyn.prune(mechanism, equations)
-    assert_alike(pruned.graph, equations(mechanism))
-    assert nodes(pruned.graph) <= nodes(equations(mechanism))
-    kept = dyn.prune(mechanism, equations, regroup=False)
-    assert structure_hash(kept.graph) == structure_hash(equations(mechanism))
+    mechanism = FAMILIES[family](5)
+    whole, pruned = equations(mechanism), dyn.prune(mechanism, equations, regroup=True)
+    assert_alike(pruned.graph, whole)
+    assert nodes(pruned.graph) <= nodes(whole)
+    kept = dyn.prune(mechanism, equations)
+    assert structure_hash(kept.graph) == structure_hash(whole)
     assert sum(each.nodes for each in kept.remains) == nodes(kept.graph) - nodes(pruned.graph)
+
+
+@mark.parametrize("n", [10, 40])
+def test_by_default_pruning_costs_no_digit(n: int) -> None:
+    """Nothing is switched off, so the graph is that of the model; regrouped, it has lost some."""
+    importorskip("flint")
+    from dynamics.reference.planar_arm_equations import accelerations
+
+    rng = np.random.default_rng(n)
+    model = dyn.planar_arm(rng.uniform(0.5, 1.5, n).tolist(), rng.uniform(0.5, 1.5, n).tolist())
+    q, qd, tau = rng.uniform(-3.0, 3.0, n), rng.normal(size=n), 5.0 * rng.normal(size=n)
+    exact = accelerations(model, q, qd, tau).high
+    kept, regrouped = (dyn.prune(model, dyn.forward_dynamics, regroup=each).graph for each in (False, True))
+    assert structure_hash(dyn.prune(model, dyn.forward_dynamics).graph) == structure_hash(kept)
+    errors = [error(run(graph, {"q": q, "qd": qd, "tau": tau}), exact) for graph in (kept, regrouped)]
+    assert errors[0] < SHORT_SUM
+    assert errors[0] < errors[1]
 
 
 def test_what_regrouping_saves() -> None:
     """Seven numbers of a body in place of ten; in a plane two in place of three. No mass, where all joints turn."""
-    counts = {name: [(nodes(equations(model)), nodes(dyn.prune(model, equations).graph)) for equations in BOTH]
+    counts = {name: [(nodes(each(model)), nodes(dyn.prune(model, each, regroup=True).graph)) for each in BOTH]
               for name, model in (("paper", PAPER), ("arm of 7", turned_arm(7)))}  # fmt: skip
     assert counts == {"paper": [(171, 154), (167, 141)], "arm of 7": [(1411, 1228), (1825, 1650)]}
     assert all(link.mass == 0.0 for link in replace(turned_arm(7), base_parameters=True).links)
@@ -141,7 +160,7 @@ def test_without_gravity_and_damping_the_kinetic_energy_is_all(model: Any, equat
     system = model.system
     kinetic = dyn.System(lambda q, qd, t: system.kinetic, system.coordinates)
     by_hand = cg.simplify(torques(kinetic)) if equations is BOTH[0] else accelerations(kinetic)  # as written
-    pruned = dyn.prune(model, equations, effects=["springs"], regroup=False)
+    pruned = dyn.prune(model, equations, effects=["springs"])
     if equations is BOTH[0]:
         assert nodes(pruned.graph) <= nodes(by_hand)
     else:  # the bias that bodies give themselves takes fewer
@@ -152,12 +171,12 @@ def test_without_gravity_and_damping_the_kinetic_energy_is_all(model: Any, equat
 
 def test_without_gravity_the_base_s_angle_is_gone() -> None:
     """The paper's arm: 109 nodes, where a Lagrangian in angles from the vertical has 158."""
-    counts = [nodes(dyn.prune(PAPER, each, effects=[], regroup=False).graph) for each in BOTH]
-    regrouped = [nodes(dyn.prune(PAPER, each, effects=[]).graph) for each in BOTH]
+    counts = [nodes(dyn.prune(PAPER, each, effects=[]).graph) for each in BOTH]
+    regrouped = [nodes(dyn.prune(PAPER, each, effects=[], regroup=True).graph) for each in BOTH]
     assert (counts, regrouped) == ([109, 108], [100, 91])
-    graph = dyn.prune(PAPER, effects=[]).graph
+    graph = dyn.prune(PAPER, effects=[], regroup=True).graph
     assert "q0" not in {node.name for node in graph.nodes}
-    assert_alike(graph, dyn.prune(PAPER, effects=[], regroup=False).graph)
+    assert_alike(graph, dyn.prune(PAPER, effects=[]).graph)
 
 
 def test_a_base_about_the_vertical_has_no_gravity() -> None:
@@ -176,7 +195,7 @@ def test_a_base_about_the_vertical_has_no_gravity() -> None:
 )
 def test_at_rest_the_gravity_force_is_all(model: Any, found: int, hand: int) -> None:
     """tau at qd = qdd = 0, of springs and gravity, is -dL/dq of the Lagrangian at rest, node for node."""
-    pruned = dyn.prune(model, values={"qd": 0.0, "qdd": 0.0}, regroup=False)
+    pruned = dyn.prune(model, values={"qd": 0.0, "qdd": 0.0})
     system = model.system
     rest = cg.specialize(
         cg.Graph([*system.q, *system.qd], {"L": system.lagrangian}), {qd.name: 0.0 for qd in system.qd}
@@ -191,7 +210,7 @@ def test_at_rest_the_gravity_force_is_all(model: Any, found: int, hand: int) -> 
 
 def test_each_effect_that_a_joint_has_not_leaves_no_node() -> None:
     """Of one joint with an effect and two without, the nodes are those of the one."""
-    base = dyn.prune(arm(3), effects=["gravity"], regroup=False)
+    base = dyn.prune(arm(3), effects=["gravity"])
     tags = {"damping": "damping", "stiffness": "link 2", "armature": "link 2"}
     for number in tags:
         bodies = [replace(body, joint=replace(body.joint, damping=0.0)) for body in arm(3).bodies]
@@ -231,9 +250,7 @@ def test_bodies_without_mass_and_welds_leave_nothing() -> None:
 def test_a_locked_joint_leaves_the_shorter_arm_s_nodes() -> None:
     """Of ten links, the last, one in the middle, and the first: as many as the arm of nine has, within 1.02."""
     for equations, ten, nine, first in ((BOTH[0], 3934, 3477, 3492), (BOTH[1], 6504, 5731, 5735)):
-        counts = [
-            nodes(dyn.prune(arm(10), equations, lock={f"link {k}": 0.3}, regroup=False).graph) for k in (10, 5, 1)
-        ]
+        counts = [nodes(dyn.prune(arm(10), equations, lock={f"link {k}": 0.3}).graph) for k in (10, 5, 1)]
         assert (nodes(equations(arm(10))), nodes(equations(arm(9)))) == (ten, nine)
         assert counts == [nine, nine, first]
         assert first <= 1.02 * nine
@@ -243,7 +260,8 @@ def test_the_account_adds_up() -> None:
     push = dyn.Force("link 3", (1.0, "push", 0.0))
     bodies = [replace(body, joint=replace(body.joint, armature=0.1, stiffness=2.0)) for body in arm(4).bodies]
     model = dyn.Mechanism(bodies, forces=[push], parameters={"push": 2.0})
-    pruned = dyn.prune(model, effects=[], lock={"link 4": 0.2}, values={"qd": 0.0}, outputs=["tau1"])
+    asked = {"lock": {"link 4": 0.2}, "values": {"qd": 0.0}, "outputs": ["tau1"]}
+    pruned = dyn.prune(model, effects=[], regroup=True, **asked)
     assert [each.what for each in pruned.omitted] == [
         "gravity", "damping", "springs", "armature", "forces", "joint of link 4", "input qd", "other outputs",
         "unobservable inertial numbers"]  # fmt: skip
@@ -260,7 +278,7 @@ def test_the_account_adds_up() -> None:
         forces=(),
         parameters={},
     )
-    never = dyn.prune(bare, lock={"link 4": 0.2}, values={"qd": 0.0}, outputs=["tau1"])
+    never = dyn.prune(bare, regroup=True, **asked)
     assert [each.what for each in never.absent] == [
         "gravity", "damping of link 1, link 2, link 3", "springs of link 1, link 2, link 3",
         "armature of link 1, link 2, link 3"]  # fmt: skip

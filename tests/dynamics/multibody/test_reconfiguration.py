@@ -9,6 +9,7 @@ import dynamics as dyn
 from cgraph.core.structure_hash import structure_hash
 from dynamics.multibody.body import WORLD
 from tests.dynamics.mechanisms import random_mechanism
+from tests.slow import slow
 from tests.tolerances import EQUATIONS, LONG_SUM, SHORT_SUM, TORQUES
 
 TOOL = dyn.Body("tool", dyn.Joint("fixed", position=(0.1, 0.0, -0.2)), mass=0.4, center=(0.0, 0.05, 0.0),
@@ -82,10 +83,11 @@ def test_unlock_gives_the_free_mechanism_back() -> None:
     assert structure_hash(dyn.inverse_dynamics(again)) == structure_hash(dyn.inverse_dynamics(free))
 
 
-@mark.parametrize("seed", range(6))
+@mark.parametrize("seed", [*range(3), *slow(*range(3, 6))])
 def test_detach_then_attach_gives_the_same_graph(seed: int) -> None:
     whole = random_mechanism(9, ("revolute", "prismatic"), 3, seed)
     rng = np.random.default_rng(seed)
+    hashes = [structure_hash(make(whole)) for make in (dyn.inverse_dynamics, dyn.mass_matrix)]
     for _ in range(3):
         name = whole.bodies[int(rng.integers(1, len(whole.bodies)))].name
         try:
@@ -95,8 +97,7 @@ def test_detach_then_attach_gives_the_same_graph(seed: int) -> None:
             continue  # what is left would move no mass
         again = without.attach(whole.subtree(name))
         assert [body.name for body in again.bodies] == [body.name for body in whole.bodies]
-        for make in (dyn.inverse_dynamics, dyn.mass_matrix):
-            assert structure_hash(make(again)) == structure_hash(make(whole))
+        assert [structure_hash(make(again)) for make in (dyn.inverse_dynamics, dyn.mass_matrix)] == hashes
 
 
 def test_untouched_partial_lagrangians_are_shared() -> None:
@@ -153,7 +154,7 @@ def test_the_state_of_untouched_joints_carries_over() -> None:
         held.map_state_from(old, q, [0.0])
 
 
-@mark.parametrize("seed", range(8))
+@mark.parametrize("seed", [*range(4), *slow(*range(4, 8))])
 def test_torques_body_by_body_are_those_of_the_graph(seed: int) -> None:
     mechanism = random_mechanism(3 + 2 * seed, ("revolute", "prismatic"), 3, seed)
     n = len(mechanism.moving)

@@ -13,6 +13,7 @@ from dynamics.integrators import METHODS
 from dynamics.systems.system import System
 from tests.dynamics.planet import ECCENTRICITY, PERIHELION, planet, position
 from tests.dynamics.step_options import step
+from tests.slow import slow
 
 FIXED = [name for name, method in METHODS.items() if not method.adaptive]
 ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
@@ -34,7 +35,7 @@ def circle(events: list[dyn.Event], t_end: float = 10.0, method: str = "dop853",
     return dyn.simulate(CIRCLE, [1.0, 0.0], None, t_end, method, events=events, **{**chosen, **options})
 
 
-@mark.parametrize("method", [*ADAPTIVE, "rk4", "verlet"])
+@mark.parametrize("method", ["dop853", "taylor", "radau", "verlet", *slow("dopri5", "rodas", "rk4")])
 def test_events_are_found_where_they_are(method: str) -> None:
     pytest.importorskip("llvmlite")
     crossing = dyn.Event("axis", lambda q, qd, t: q[1])

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from pytest import mark
 
-import cgraph as cg
 import dynamics as dyn
 from dynamics.integrators import METHODS
 from dynamics.integrators.composition import COMPOSITIONS
@@ -18,7 +17,7 @@ METHODS_OF_STATES = [
     for name in METHODS
     if name not in IN_TURN
 ]
-SCIPY = ("scipy:Radau", "scipy:DOP853")
+SCIPY = ("scipy:DOP853", "scipy:Radau")
 UNIT = 4.0 * 2.0**-53  # roundings of a quotient by a length
 AS_WELL = 2e-8  # of runs at rtol 1e-9, and of equal steps of 0.01 s of order 4 and more
 COARSE = {"euler": 0.05, "midpoint": 3e-4, "yoshida4": 1e-7}  # as accurate as these are at steps of 0.01 s
@@ -50,7 +49,7 @@ def _arrival() -> np.ndarray:
     return dyn.simulate(top(), TURN, [0.3, 0.2, 4.0], 1.0, rtol=1e-13).q[-1]
 
 
-@mark.parametrize("method", [*METHODS_OF_STATES, *SCIPY])
+@mark.parametrize("method", [*METHODS_OF_STATES, SCIPY[0], pytest.param(SCIPY[1], marks=mark.slow)])
 def test_every_method_keeps_quaternions_unit_and_arrives_where_others_do(method: str) -> None:
     if method in SCIPY:
         pytest.importorskip("scipy")
@@ -128,7 +127,7 @@ def test_the_entries_of_a_quaternion_share_a_tolerance_which_a_place_does_not() 
     turned = dyn.simulate(top(0.0), [0.5, -0.5, 0.5, 0.5], spin, 5.0)
     assert abs(plain.stats.steps - turned.stats.steps) <= 0.1 * plain.stats.steps
     ends = []
-    for unit in (1.0, 2.0**-30, 2.0**30):
+    for unit in (1.0, 2.0**-30):
         inertia = np.diag([1.0, 1.5, 2.0]) * unit**2
         stone = dyn.Mechanism(
             [dyn.Body("stone", dyn.Joint("free"), mass=2.0, center=[0.1 * unit, 0.0, 0.0], inertia=inertia)],
@@ -136,35 +135,51 @@ def test_the_entries_of_a_quaternion_share_a_tolerance_which_a_place_does_not() 
         )
         run = dyn.simulate(stone, [0.0, 0.0, unit, *TURN], [0.1 * unit, 0.0, 0.0, *spin], 1.0)
         ends.append([*run.q[-1, :3] / unit, *run.q[-1, 3:], run.stats.steps])
-    np.testing.assert_allclose(ends[1:], [ends[0]] * 2, rtol=1e-7)
+    np.testing.assert_allclose(ends[1], ends[0], rtol=1e-7)
 
 
-def test_a_drive_that_feeds_a_quaternions_length_does_no_harm() -> None:
-    """A system of one's own whose L depends on |q| off the constraint is held on it."""
+def pendulum() -> dyn.System:
+    """A system of one's own on a ball joint, whose L depends on |q| off the constraint; parameter k."""
     joint = dyn.Joint("ball").type
 
-    def lagrangian(e, w, t):
-        return 0.5 * (w[0] ** 2 + 2.0 * w[1] ** 2 + 3.0 * w[2] ** 2) - 5.0 * (1.0 - 2.0 * (e[1] ** 2 + e[2] ** 2))
+    def lagrangian(e, w, t, p):
+        height = 1.0 - 2.0 * (e[1] ** 2 + e[2] ** 2)
+        return 0.5 * (w[0] ** 2 + 2.0 * w[1] ** 2 + 3.0 * w[2] ** 2) - p["k"] * height
 
     moving = dyn.QuasiVelocities("wx wy wz", joint.rate, joint.structure, joint.neutral, joint.normalized, joint.groups)
-    pendulum = dyn.System(lagrangian, "w x y z", quasi_velocities=moving)
-    run = dyn.simulate(pendulum, TURN, [0.1, 0.2, 0.3], 20.0)
+    return dyn.System(lagrangian, "w x y z", {"k": 5.0}, quasi_velocities=moving)
+
+
+@mark.parametrize("method", ["dopri5", "gauss6"])
+def test_a_system_of_ones_own_is_held_on_its_constraint(method: str) -> None:
+    options = {} if method == "dopri5" else {"dt": 0.02}
+    run = dyn.simulate(pendulum(), TURN, [0.1, 0.2, 0.3], 20.0, method, **options)
     assert np.abs(lengths(run.q) - 1.0).max() <= UNIT
-    assert np.ptp(run.energy) < 1e-7
+    assert np.ptp(run.energy) < 1e-6
+
+
+def test_parameters_vary_from_one_run_to_another() -> None:
+    many = dyn.simulate_many(pendulum(), TURN, [0.1, 0.2, 0.3], 1.0, parameters={"k": [5.0, 0.0, 7.0]}, t_eval=[1.0])
+    one = dyn.simulate(pendulum(), TURN, [0.1, 0.2, 0.3], 1.0, parameters={"k": 7.0}, t_eval=[1.0])
+    np.testing.assert_allclose(many.q[2], one.q, rtol=0, atol=AS_WELL)
+    assert np.abs(many.q[0] - many.q[2]).max() > 0.01
 
 
 @mark.parametrize(
     ("call", "words"),
     [
-        (lambda: dyn.simulate(top(), [0.0] * 4, [0.0] * 3, 1.0), "q must have a direction at 'top.qw', 'top.qx'"),
+        (
+            lambda: dyn.simulate(top(), [0.0] * 4, [0.0] * 3, 1.0),
+            r"'top.qw', .*'top.qz' need a length .*, got \[0.0, 0.0, 0.0, 0.0\]$",
+        ),
         (lambda: dyn.simulate(top(), [1.0, 0.0, 0.0], [0.0] * 3, 1.0), r"q must have shape \(4,\)"),
         (lambda: dyn.simulate(top(), TURN, [0.0] * 4, 1.0), r"qd must have shape \(3,\), one for each velocity"),
         (lambda: dyn.simulate(top(), TURN, None, 1.0), r"qd must have shape \(3,\), one for each velocity, got None"),
-        (lambda: dyn.simulate(top(), TURN, [0.0] * 3, 1.0, tau=[1.0] * 4), r"\(top.wx, top.wy, top.wz\), got 4"),
+        (lambda: dyn.simulate(top(), TURN, [0.0] * 3, 1.0, tau=[1.0] * 4), "each of top.wx, top.wy, top.wz: 3, got 4"),
         (lambda: dyn.simulate(top(), TURN, [0.0] * 3, 1.0, atol=[1.0] * 6), r"shape \(7,\)"),
         (
             lambda: dyn.simulate_many(top(), [TURN, [0.0] * 4], [0.0] * 3, 1.0, t_eval=[1.0]),
-            "q must have a direction at 'top.qw'.*of trajectory 1",
+            "'top.qw', .* need a length .* of trajectory 1",
         ),
         (lambda: dyn.simulate_many(top(), TURN, [[0.0] * 4], 1.0, t_eval=[1.0]), r"qd must have shape \(N, 3\)"),
         *[
@@ -200,24 +215,3 @@ def test_a_failed_run_names_the_velocity() -> None:
         run = dyn.simulate(blowing, TURN, [1e200, 1e200, 1e200], 1.0, "rk4", dt=0.1)
     assert not run.success
     assert "kite." in run.message
-
-
-def test_c_of_the_state_equation_is_that_of_evaluation(tmp_path) -> None:
-    import ctypes
-    import shutil
-    import subprocess
-
-    compiler = shutil.which("cc") or shutil.which("gcc")
-    if compiler is None:
-        pytest.skip("no C compiler")
-    graph = dyn.state_equation(drone())
-    file = cg.to_c(graph, "drone").write(tmp_path)[0]
-    library = tmp_path / "drone.so"
-    subprocess.run([compiler, "-O2", "-shared", "-fPIC", str(file), "-o", str(library), "-lm"], check=True)
-    x = np.random.default_rng(1).normal(size=len(graph.inputs))
-    found = np.zeros(len(graph.outputs))
-    function = ctypes.CDLL(str(library)).drone
-    function.argtypes, function.restype = [ctypes.c_void_p, ctypes.c_void_p], None
-    function(x.ctypes.data, found.ctypes.data)
-    expected = graph.evaluate(dict(zip(graph.input_names, x.tolist(), strict=True)))
-    assert found.tolist() == list(expected.values())

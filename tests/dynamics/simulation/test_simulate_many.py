@@ -77,7 +77,7 @@ def test_arms_move_as_mujoco_s_do() -> None:
 def test_every_method_gives_what_simulate_gives(model: Any, method: str) -> None:
     q, qd = np.random.default_rng(1).normal(size=(2, 9, len(as_system(model).coordinates)))
     result = simulate_many(model, q, qd, 0.3, method, **step(method, 0.01), t_eval=[0.1, 0.2, 0.3])
-    for k in range(9):
+    for k in (0, 4, 8):  # the first and the last vector, and what is over
         one = dyn.simulate(model, q[k], qd[k], 0.3, method, **step(method, 0.01), t_eval=[0.1, 0.2, 0.3])
         assert np.hstack([result.q[k], result.qd[k]]) == approx(np.hstack([one.q, one.qd]), abs=ROUNDING)
         found = [int(each[k]) for each in (result.stats.steps, result.stats.rejected, result.stats.nfev)]
@@ -186,7 +186,7 @@ Q = np.zeros((4, 2))
         (Q, None, {}, r"qd must have shape \(N, 2\) or \(2,\), got None"),
         (Q, Q[:3], {}, "must have the same number of trajectories, got: q has 4, qd has 3"),
         (Q, Q, {"tau": np.zeros((5, 2))}, "got: q has 4, qd has 4, tau has 5"),
-        (Q, Q, {"tau": [1.0]}, "tau needs one number for each of the 2 coordinates .*, got 1"),
+        (Q, Q, {"tau": [1.0]}, "tau needs one number for each of .*: 2, got 1"),
         (Q, Q, {"tau": np.full((4, 2), math.inf)}, "tau must be finite, got inf at index 0 of trajectory 0"),
         (Q + [0.0, math.nan], Q, {}, "q must be finite, got nan at index 1 of trajectory 0"),
         (Q[0], Q[0], {}, "how many trajectories"),

@@ -18,6 +18,7 @@ from dynamics.simulation.ensembles.simulate_many import simulate_many
 from tests.dynamics.ensembles import arms, same
 from tests.dynamics.models import random_arm
 from tests.dynamics.step_options import step
+from tests.slow import slow
 
 
 def case(method: str) -> tuple[tuple[Any, ...], dict[str, Any]]:
@@ -27,9 +28,12 @@ def case(method: str) -> tuple[tuple[Any, ...], dict[str, Any]]:
     return (model, q, qd, 0.2, method), {"t_eval": [0.1, 0.2], "tau": np.tanh(q)}
 
 
-@mark.parametrize("method", ["rk4", "midpoint", "dop853"])
-@mark.parametrize("backend", ["llvm", "python"])
-def test_threads_and_chunks_change_nothing(method: str, backend: str) -> None:
+@mark.parametrize(
+    ("backend", "method"),
+    [("llvm", "rk4"), ("llvm", "midpoint"), ("llvm", "dop853"), ("python", "rk4")]
+    + slow(("python", "midpoint"), ("python", "dop853")),
+)
+def test_threads_and_chunks_change_nothing(backend: str, method: str) -> None:
     if backend == "llvm":
         pytest.importorskip("llvmlite")
     arguments, options = case(method)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 from . import chains, extremes, fields, orbits, rotation, stiff
 from .case import RTOL, Criterion, StabilityCase
 
-__all__ = ["RTOL", "TABLE", "Criterion", "StabilityCase", "load", "names"]
+__all__ = ["RTOL", "Criterion", "StabilityCase", "load", "names", "table"]
 
-TABLE: dict[str, StabilityCase] = {
-    case.name: case for rows in (stiff, chains, orbits, rotation, fields, extremes) for case in rows.cases()
-}
+
+@cache
+def table() -> dict[str, StabilityCase]:
+    """{name: case}, made when first asked for: to import the package need not build a chain of a thousand links."""
+    return {case.name: case for rows in (stiff, chains, orbits, rotation, fields, extremes) for case in rows.cases()}
 
 
 def names() -> list[str]:
@@ -26,7 +30,7 @@ def names() -> list[str]:
     >>> dyn.cases.names()[:2]
     ['spring pendulum, k = 100', 'spring pendulum, k = 10000']
     """
-    return list(TABLE)
+    return list(table())
 
 
 def load(name: str) -> StabilityCase:
@@ -54,6 +58,6 @@ def load(name: str) -> StabilityCase:
     >>> case.start, case.t_end, [criterion.quantity for criterion in case.criteria]
     ((1.0,), 50.0, ['error'])
     """
-    if not isinstance(name, str) or name not in TABLE:
-        raise ValueError(f"there is no case {name!r}; the cases are {', '.join(TABLE)}")
-    return TABLE[name]
+    if not isinstance(name, str) or name not in table():
+        raise ValueError(f"there is no case {name!r}; the cases are {', '.join(table())}")
+    return table()[name]

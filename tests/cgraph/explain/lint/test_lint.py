@@ -17,7 +17,7 @@ from cgraph.explain.lint.cancellation import rounded
 from cgraph.explain.lint.singular import intervals, value_of
 from cgraph.explain.names import Names
 from tests import high_precision
-from tests.strategies import Case, cases
+from tests.strategies import Case, cases, examples
 from tests.tolerances import EQUATIONS
 
 x, y, z = cg.variables("x y z")
@@ -109,7 +109,7 @@ def reaches(edges: set[cg.Edge], sources: set[cg.Node], sinks: set[cg.Node]) -> 
     return bool(seen & sinks)
 
 
-@settings(max_examples=100)
+@settings(max_examples=examples(100))
 @given(cases(max_operations=9), st.data())
 def test_the_cut_is_one_of_the_smallest(case: Case, data):
     """Against all sets of edges, tried one by one."""
@@ -208,7 +208,7 @@ def boxes(draw: st.DrawFn, domains: tuple[tuple[float, float], ...]) -> list[tup
 
 
 @pytest.mark.parametrize("name", sorted(OPS))
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(data=st.data())
 def test_a_value_lies_within_its_bounds(name, data):
     """In floats, and at 50 digits, which is where the outward rounding is needed."""
@@ -234,7 +234,7 @@ def test_a_zero_of_either_sign_bounds_a_domain():
         assert high == math.inf
 
 
-@settings(max_examples=150)
+@settings(max_examples=examples(150))
 @given(cases(), st.data())
 def test_every_value_of_a_graph_in_a_box_lies_within_its_bounds_and_no_slope_is_infinite_without_a_finding(case, data):
     graph = case.graph
@@ -321,7 +321,7 @@ def test_what_is_no_interval_is_refused(box):
 # A point.
 
 
-@settings(max_examples=100)
+@settings(max_examples=examples(100))
 @given(cases(max_operations=15))
 def test_the_error_bound_holds_at_50_digits(case: Case):
     """Of inputs moved by half a unit in the last place, one of the points that the bound allows for."""
