@@ -160,13 +160,14 @@ def loop_rows(loop: Loop, body: RelativePlacement, to: RelativePlacement) -> lis
         if loop.kind == "distance":
             length = float(loop.length)
             return [(0.5 / length) * (spatial.dot(gap, gap) - length * length)]
-        axis, target = _axes(loop)
         if loop.kind == "rolling":
+            axis, target = _axes(loop)
             normal = to.direction(target[:, 2])
             tilt = spatial.dot(body.direction(axis[:, 2]), normal)
             return [spatial.dot(gap, normal) - float(loop.length) * cg.sqrt(1.0 - tilt * tilt)]
         rows = list(gap)
         if loop.kind == "hinge":
+            axis, target = _axes(loop)
             along = body.direction(axis[:, 2])
             rows += [-spatial.dot(to.direction(target[:, 1]), along), spatial.dot(to.direction(target[:, 0]), along)]
         if loop.kind == "weld":
