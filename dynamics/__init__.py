@@ -3,7 +3,9 @@
 from cgraph import __version__ as __version__
 
 from . import scenes
+from .equations.arrays_at import arrays_at
 from .equations.coriolis import coriolis, damping_force
+from .equations.energies import kinetic_energy, potential_energy
 from .equations.equations_of_motion import bias, energy, forward_dynamics, gravity_force, mass_matrix, momentum
 from .equations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious_nodes
 from .equations.linearization import linearize, state_space
@@ -17,6 +19,14 @@ from .io.load import load_mjcf, load_urdf
 from .io.write_mjcf import to_mjcf
 from .io.write_urdf import to_urdf
 from .multibody.build_tree import serial_arm, tree
+from .multibody.frames import (
+    frame_acceleration,
+    frame_bias_acceleration,
+    frame_jacobian,
+    frame_jacobian_rate,
+    frame_placement,
+    frame_velocity,
+)
 from .multibody.impact import Attached, FreeBody, Released, attach_with_impact, release
 from .multibody.mechanism import Body, Force, Joint, Mechanism, MechanismError
 from .multibody.planar_arm import planar_arm
@@ -24,6 +34,7 @@ from .multibody.pruning import EFFECTS, OmittedTerm, PruneResult, prune
 from .multibody.recursive_inverse_dynamics import RecursiveInverseDynamics
 from .multibody.regressor import inertial_parameters, regressor
 from .multibody.subtree import Subtree
+from .multibody.whole_body import center_of_mass, center_of_mass_jacobian, spatial_momentum
 from .reference import Reference, reference
 from .scenes.scenes import Scene
 from .simulation.ensembles import Ensemble, EnsembleStats, simulate_many
@@ -68,18 +79,28 @@ __all__ = [
     "System",
     "TorqueTable",
     "Trajectory",
+    "arrays_at",
     "as_system",
     "attach_with_impact",
     "bias",
     "cases",
+    "center_of_mass",
+    "center_of_mass_jacobian",
     "certify",
     "coriolis",
     "damping_force",
     "energy",
     "forward_dynamics",
+    "frame_acceleration",
+    "frame_bias_acceleration",
+    "frame_jacobian",
+    "frame_jacobian_rate",
+    "frame_placement",
+    "frame_velocity",
     "gravity_force",
     "inertial_parameters",
     "inverse_dynamics",
+    "kinetic_energy",
     "linearize",
     "load_mjcf",
     "load_urdf",
@@ -87,6 +108,7 @@ __all__ = [
     "momentum",
     "momentum_rate",
     "planar_arm",
+    "potential_energy",
     "prune",
     "raise_if_singular",
     "reference",
@@ -96,6 +118,7 @@ __all__ = [
     "serial_arm",
     "simulate",
     "simulate_many",
+    "spatial_momentum",
     "spurious_nodes",
     "state_equation",
     "state_space",

@@ -179,9 +179,9 @@ class Mechanism(Structure):
 
         at: (3,) [m], the point, in the body's frame. Raises MechanismError for an unknown body.
         """
-        point = self._checked_point(body, at)
+        chain, point = self.chain(body), _point(body, at)
         with building(Builder()), cg.tag(body):
-            place = self._chain(body, self.system.q, self.system.qd).motion(point).position
+            place = chain.motion(point).position
         return cg.simplify(Graph(self.system.q, dict(zip("xyz", place, strict=True))))
 
     def motion(self, body: str, at: ArrayLike = (0.0, 0.0, 0.0)) -> Graph:
@@ -191,15 +191,15 @@ class Mechanism(Structure):
         row by row, its axes as columns.
         at: (3,) [m], the point, in the body's frame. Raises MechanismError for an unknown body.
         """
-        point = self._checked_point(body, at)
-        q, qd = self.system.q, self.system.qd
+        chain, point = self.chain(body), _point(body, at)
         with building(Builder()), cg.tag(body):
-            return self._chain(body, q, qd).graph(point, q, qd)
+            return chain.graph(point, self.system.q, self.system.qd)
 
-    def _checked_point(self, body: str, at: ArrayLike) -> Array:
+    def chain(self, body: str) -> KinematicChain:
+        """The joints between a body and the world, at q0.. and qd0... Raises MechanismError for an unknown body."""
         if not isinstance(body, str) or body not in self._carriers:
             raise MechanismError(f"there is no body {body!r:.80} in the mechanism")
-        return vector(f"position on body {body!r}: at", at)
+        return self._chain(body, self.system.q, self.system.qd)
 
     def joint_positions(self, q: ArrayLike) -> Array:
         """Places of joints and tips [m] in a drawing, (T, k, 2), x to the right and y up, for q, (T, n) [rad or m].
@@ -259,6 +259,10 @@ def require_mechanism(model: Model, what: str) -> Mechanism:
     if mechanism is None:
         raise MechanismError(f"{what} takes rigid bodies, a Mechanism or a scene of one, got {model!r:.80}")
     return mechanism
+
+
+def _point(body: str, at: ArrayLike) -> Array:
+    return vector(f"position on body {body!r}: at", at)
 
 
 def _listed(what: str, kind: type, given: Any) -> tuple[Any, ...]:
