@@ -28,7 +28,7 @@ from .multibody.frames import (
     frame_velocity,
 )
 from .multibody.impact import Attached, FreeBody, Released, attach_with_impact, release
-from .multibody.mechanism import Body, Force, Joint, Mechanism, MechanismError
+from .multibody.mechanism import Body, Force, Joint, Mechanism, MechanismError, MechanismWarning
 from .multibody.planar_arm import planar_arm
 from .multibody.pruning import EFFECTS, OmittedTerm, PruneResult, prune
 from .multibody.recursive_inverse_dynamics import RecursiveInverseDynamics
@@ -64,6 +64,7 @@ __all__ = [
     "Joint",
     "Mechanism",
     "MechanismError",
+    "MechanismWarning",
     "OdeSystem",
     "OmittedTerm",
     "PruneResult",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -23,6 +24,18 @@ class MechanismError(ValueError):
     """A mechanism that cannot be: which body, what was given, and what was needed."""
 
 
+class MechanismWarning(UserWarning):
+    """What a mechanism has not of the file that it was read from, or a body that cannot be, but can be calculated with.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import dynamics as dyn
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("error", dyn.MechanismWarning)  # a model that lacks something is no model
+    """
+
+
 @dataclass(frozen=True, eq=False)
 class Joint:
     """How a body hangs on its parent; the joint is at the origin of the body's frame.
@@ -39,7 +52,8 @@ class Joint:
     position : array_like, (3,)
         Origin of the body's frame in its parent's at q = 0 [m].
     orientation : array_like, (3, 3)
-        Axes of the body's frame, as columns in its parent's, at q = 0.
+        Axes of the body's frame, as columns in its parent's, at q = 0. Entries up to 1e-14 are zero: a quarter turn in
+        text, or by the cosine of pi / 2, is one.
     damping : float
         Viscous coefficient, at least 0 [N m s or N s/m].
     stiffness, spring_reference : float
@@ -161,12 +175,12 @@ def checked(body: Body) -> Body:
     where, joint = f"body {body.name!r}", body.joint
     if not isinstance(body.parent, str):
         raise MechanismError(f"{where}: parent must be the name of a body or {WORLD!r}, got {body.parent!r:.80}")
-    inertia = _inertia(where, body.inertia)
+    mass, center = _number(f"{where}: mass", body.mass, " kg"), vector(f"{where}: center", body.center)
     return replace(
         body,
-        mass=_number(f"{where}: mass", body.mass, " kg"),
-        center=vector(f"{where}: center", body.center),
-        inertia=inertia,
+        mass=mass,
+        center=center,
+        inertia=_inertia(where, body.inertia, mass * float(center @ center)),
         joint=_checked_joint(where, joint),
     )
 
@@ -208,8 +222,12 @@ def _check_name(what: str, name: str) -> None:
         raise MechanismError(str(error)) from None
 
 
-def _inertia(where: str, given: ArrayLike) -> Array:
-    """Symmetric, and with principal moments that are not negative and obey the triangle inequality."""
+def _inertia(where: str, given: ArrayLike, beside: float) -> Array:
+    """Symmetric, and with principal moments that are not negative; a warning where no rigid body has them.
+
+    Kinetic energy is positive all the same, so that all equations of a tree hold.
+    beside: the inertia of the mass about the joint, beside which a moment may be rounding.
+    """
     diagonal = shape_of(given) == (3,)
     inertia = vector(f"{where}: inertia", given, (3,) if diagonal else (3, 3))
     inertia = np.diag(inertia) if diagonal else inertia
@@ -217,10 +235,10 @@ def _inertia(where: str, given: ArrayLike) -> Array:
     if np.abs(inertia - inertia.T).max() > _ROUNDING * scale:
         raise MechanismError(f"{where}: inertia must be symmetric")
     moments = np.linalg.eigvalsh(inertia)
-    if moments[0] < -_ROUNDING * scale:
+    rounding = _ROUNDING * scale + spatial.SNAP * beside
+    if moments[0] < -rounding:
         raise MechanismError(f"{where}: inertia must not be negative, its principal moments are {moments.tolist()}")
-    if moments[2] > moments[0] + moments[1] + _ROUNDING * scale:
-        raise MechanismError(
-            f"{where}: no body has principal moments {moments.tolist()}: the largest exceeds the sum of the others"
-        )
-    return inertia
+    if moments[2] > moments[0] + moments[1] + rounding:
+        text = f"{where}: no body has principal moments {moments.tolist()}: the largest exceeds the sum of the others"
+        warnings.warn(text, MechanismWarning, stacklevel=2)
+    return 0.5 * (inertia + inertia.T)
