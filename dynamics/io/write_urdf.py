@@ -82,6 +82,8 @@ def _joint_name(body: Body, names: set[str]) -> str:
 
 def _joint_lines(body: Body, name: str) -> list[str]:
     joint = body.joint
+    if not joint.type.urdf:
+        raise MechanismError(f"URDF has no joint of the kind {joint.kind!r}, as is the joint of body {body.name!r}")
     place = f'    <origin xyz="{numbers(joint.position)}" rpy="{numbers(_rpy(joint.orientation))}"/>'
     ends = f"    <parent link={quoteattr(body.parent)}/><child link={quoteattr(body.name)}/>"
     opened = f'  <joint name={quoteattr(name)} type="{joint.type.urdf}">'

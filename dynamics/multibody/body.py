@@ -43,7 +43,8 @@ class Joint:
     Parameters
     ----------
     kind : str
-        "revolute" (turns about `axis`), "prismatic" (slides along it), "fixed" (welded), "ball" (turns about a point:
+        "revolute" (turns about `axis`), "prismatic" (slides along it), "screw" (turns about it and slides
+        by `pitch`), "fixed" (welded), "ball" (turns about a point:
         a unit quaternion (w, x, y, z), and the angular velocity in the body's axes), "free" (moves as it likes: the
         place of its origin and a quaternion; the rates of that place, and the angular velocity in the body's axes), or
         "free (body axes)" (the linear velocity in the body's axes, too).
@@ -61,6 +62,8 @@ class Joint:
         joints with one coordinate.
     armature : float
         Inertia of the coordinate itself, such as a rotor's, at least 0 [kg m^2 or kg].
+    pitch : float
+        Of "screw", how far a radian moves the body along the axis, positive for a right-handed thread [m/rad].
     name : str
         What the coordinate is called; by default as the body. Of several coordinates it goes before what they are,
         as in "base.x".
@@ -86,6 +89,7 @@ class Joint:
     stiffness: float = 0.0
     spring_reference: float = 0.0
     armature: float = 0.0
+    pitch: float = 0.0
     name: str = ""
 
     def __post_init__(self) -> None:
@@ -94,8 +98,8 @@ class Joint:
 
     @property
     def type(self) -> JointType:
-        """What the library knows of joints of this kind."""
-        return TYPES[self.kind]
+        """What the library knows of joints of this kind, and of this pitch."""
+        return TYPES[self.kind].with_pitch(self.pitch)
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,6 +200,14 @@ def _checked_joint(where: str, joint: Joint) -> Joint:
     orientation = vector(f"{where}: orientation", joint.orientation, (3, 3))
     if np.abs(orientation.T @ orientation - np.eye(3)).max() > _ROUNDING or np.linalg.det(orientation) < 0:
         raise MechanismError(f"{where}: orientation must be a rotation matrix")
+    pitch = _number(f"{where}: pitch", joint.pitch, " m/rad", minimum=-math.inf)
+    if bool(pitch) != TYPES[joint.kind].pitched:
+        needs = (
+            "a joint of the kind 'screw' needs a pitch"
+            if not pitch
+            else f"only a screw has a pitch, not {joint.kind!r}"
+        )
+        raise MechanismError(f"{where}: {needs}, got {pitch!r} m/rad")
     stiffness = _number(f"{where}: stiffness", joint.stiffness)
     if stiffness and len(joint.type.coordinates) > 1:
         raise MechanismError(f"{where}: a spring needs a joint with one coordinate, got stiffness {stiffness!r}")
@@ -211,6 +223,7 @@ def _checked_joint(where: str, joint: Joint) -> Joint:
         stiffness=stiffness,
         spring_reference=_number(f"{where}: spring_reference", joint.spring_reference, minimum=-math.inf),
         armature=armature,
+        pitch=pitch,
         name=joint.name,
     )
 

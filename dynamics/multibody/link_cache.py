@@ -57,7 +57,7 @@ class SharedParts:
 
     def moved(self, parent: Motion, body: Body, link: Link, q: Sequence[Node], u: Sequence[Node]) -> Moved:
         """The motion and energy of a body whose parent moves so. `parent` is one of these motions, or the ground's."""
-        key = (id(parent), body.name, body.joint.kind, *[node.name for node in (*q, *u)], *link.numbers)
+        key = (id(parent), body.name, body.joint.type, *[node.name for node in (*q, *u)], *link.numbers)
         if key not in self._moved:
             with cg.tag(body.name):
                 motion = propagate_motion(parent, link, body.joint.type, q, u)
