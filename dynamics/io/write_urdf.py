@@ -12,7 +12,7 @@ from ..multibody.mechanism import WORLD, Body, MechanismError, require_mechanism
 from ..multibody.spatial import Array
 from ..systems.model import Model
 from .read_urdf import FAR, GRAVITY
-from .write_mjcf import all_bodies, numbers
+from .write_mjcf import numbers
 
 
 def to_urdf(model: Model) -> str:
@@ -53,7 +53,7 @@ def to_urdf(model: Model) -> str:
         lines.append(f'  <mujoco><option gravity="{gravity}"/></mujoco>')
     lines.append(f'  <link name="{WORLD}"/>')
     names = set(mechanism.coordinates)
-    for body in all_bodies(mechanism):
+    for body in mechanism.parts:
         lines += [*_link_lines(body), *_joint_lines(body, _joint_name(body, names))]
     return "\n".join([*lines, "</robot>"]) + "\n"
 

@@ -18,6 +18,7 @@ from ..systems.arguments import parameter_value
 from ..systems.model import Model
 from ..systems.system import BodySystem, System
 from .body import WORLD, Body, Joint, MechanismError, MechanismWarning, vector
+from .composed_joints import locked_parts, require_outer_parents
 from .external_force import Force, check_force, generalized_forces
 from .forward_kinematics import KinematicChain, kinematic_chain
 from .inertial_numbers import Link
@@ -92,7 +93,7 @@ class Mechanism(Structure):
             if name in seen:
                 raise MechanismError(f"two joints that move have the name {name!r}")
             seen.add(name)
-        carried = set(self._carriers) - {WORLD}
+        carried = {body.name for body in self.bodies}
         for force in self.forces:
             check_force(force, carried)
         used = {name for force in self.forces for name in force.names}
@@ -111,6 +112,13 @@ class Mechanism(Structure):
         parts += [f"parameters {', '.join(self.parameter_values)}"] if self.parameter_values else []
         parts += [f"gravity {', '.join([f'{each:g}' for each in np.asarray(self.gravity)])}"]
         return f"<Mechanism of {'; '.join(parts)}>"
+
+    @cached_property
+    def parts(self) -> tuple[Body, ...]:
+        """All bodies as the equations have them, parents first: a locked joint a weld, those of several parts apart."""
+        parts = [part for body in self.bodies for part in self.shared.parts(body)]
+        require_outer_parents(self.bodies)
+        return tuple(parents_first(lock_joints(parts, locked_parts(self.bodies, self.locked))))
 
     @property
     def moving(self) -> tuple[Body, ...]:
@@ -143,8 +151,7 @@ class Mechanism(Structure):
 
     @cached_property
     def _merged(self) -> tuple[tuple[Body, ...], dict[str, Carrier]]:
-        bodies = [self.shared.body(body) for body in self.bodies]
-        moving, carriers = merge_fixed_bodies(parents_first(lock_joints(bodies, self.locked)))
+        moving, carriers = merge_fixed_bodies(self.parts)
         return require_inertia(moving), carriers
 
     @cached_property
@@ -256,7 +263,7 @@ class Mechanism(Structure):
         states of another shape.
         """
         other = require_mechanism(other, "map_state_from")
-        return map_state(self.moving, other.moving, dict(other.locked), q, qd)
+        return map_state(self.moving, other.moving, locked_parts(other.bodies, other.locked), q, qd)
 
 
 def as_mechanism(model: Model) -> Mechanism | None:

@@ -25,7 +25,7 @@ STATES = 5
 
 
 def random_tree(seed: int, most: int) -> dyn.Mechanism:
-    """Hinges, slides, screws and welds in a tree, in space or by quarter turns, with springs, armature, massless links."""
+    """Hinges, slides, screws and welds, in space or by quarter turns, with springs, armature, links without mass."""
     rng = np.random.default_rng(seed)
     bodies: list[dyn.Body] = []
     for i in range(int(rng.integers(2, most + 1))):
