@@ -1,4 +1,4 @@
-"""Mechanisms: trees of rigid bodies joined by hinges, slides and welds."""
+"""Mechanisms: trees of rigid bodies, on joints of one axis or several freedoms, or free."""
 
 from __future__ import annotations
 
