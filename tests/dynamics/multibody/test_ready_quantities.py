@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from pytest import importorskip, mark, raises
 
+import cgraph as cg
 import dynamics as dyn
-from dynamics.systems.kinematics import Kinematics
 from tests.dynamics.models import Array
 from tests.dynamics.multibody.test_ball_and_free import near, random_tree
 from tests.slow import slow
@@ -27,10 +27,8 @@ def state(mechanism: dyn.Mechanism, seed: int) -> dict[str, Array]:
 
 def moved(mechanism: dyn.Mechanism, at: dict[str, Array], h: float) -> dict[str, Array]:
     """The state h later, to second order, at constant qdd."""
-    kinematics: Kinematics = mechanism.system.kinematics
-    import cgraph as cg
-
-    graph = cg.Graph([*kinematics.q, *kinematics.u], {f"r{i}": x for i, x in enumerate(kinematics.q_dot)})
+    system = mechanism.system
+    graph = cg.Graph([*system.q, *system.qd], {f"r{i}": x for i, x in enumerate(system.q_dot)})
 
     def rate(q: Array, qd: Array) -> Array:
         return dyn.arrays_at(mechanism, graph, q, qd)["r"]
@@ -111,24 +109,23 @@ def test_mujoco_finds_the_same(seed: int) -> None:
     assert near(momentum[3:], data.subtree_angmom[0])
 
 
-@mark.parametrize("base", BASES[:1] + BASES[2:3])
+@mark.parametrize("base", ["free", "free (body axes)"])
 def test_momentum_of_a_free_tree_changes_by_weight_alone(base: str) -> None:
     """dp/dt = m g and dL/dt = c x m g, whatever the joints do inside; about the center of mass L is constant."""
     tree = random_tree(8, base)
     bodies = [replace(body, joint=replace(body.joint, armature=0.0, damping=0.0)) for body in tree.bodies]
     mechanism = dyn.Mechanism(bodies, tree.gravity)
     at = state(mechanism, 3)
-    base_free = [max(i, 6) for i in range(mechanism.system.n)]
-    tau = np.where(np.array(base_free) == 6, 0.0, np.random.default_rng(4).normal(size=mechanism.system.n))
-    qdd = dyn.arrays_at(mechanism, dyn.forward_dynamics(mechanism), at["q"], at["qd"], tau=tau)["qdd"]
-    at["qdd"] = qdd
+    tau = np.random.default_rng(4).normal(size=mechanism.system.n)
+    tau[:6] = 0.0  # of the base
+    at["qdd"] = dyn.arrays_at(mechanism, dyn.forward_dynamics(mechanism), at["q"], at["qd"], tau=tau)["qdd"]
     ahead = [moved(mechanism, at, h) for h in (-STEP, STEP)]
     weight = sum([body.mass for body in bodies]) * np.asarray(mechanism.gravity)
     center = dyn.arrays_at(mechanism, dyn.center_of_mass(mechanism), at["q"])["c"]
     for about, torque in (("origin", np.cross(center, weight)), ("center of mass", np.zeros(3))):
         graph = dyn.spatial_momentum(mechanism, about)
         rate = slope([dyn.arrays_at(mechanism, graph, **each)["h"] for each in ahead])
-        size = np.abs(qdd).max() + np.abs(weight).max()
+        size = np.abs(at["qdd"]).max() + np.abs(weight).max()
         assert np.abs(rate - [*weight, *torque]).max() < CONDITIONED * size
 
 
@@ -189,7 +186,7 @@ def test_what_is_wrong_is_said() -> None:
     arm = random_tree(1, "revolute")
     with raises(dyn.MechanismError, match="there is no body 'hand'"):
         dyn.frame_velocity(arm, "hand")
-    with raises(ValueError, match=r"axes must be one of world, body|axes"):
+    with raises(ValueError, match="axes must be"):
         dyn.frame_velocity(arm, "b0", axes="local")
     with raises(dyn.MechanismError, match=r"the point of body 'b0': at must be \(3,\) finite numbers"):
         dyn.frame_jacobian(arm, "b0", (0.0, 1.0))
