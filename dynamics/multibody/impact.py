@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from cgraph.extend import real_array
 
 from ..equations.equations_of_motion import forward_dynamics, momentum
-from .body import Body, MechanismError, checked, vector
+from .body import Body, MechanismError, vector
 from .mechanism import Mechanism, require_mechanism
 from .spatial import Array
 
@@ -155,7 +155,7 @@ def attach_with_impact(
     p = np.zeros(len(index))
     before = _momentum(mechanism, q, qd)
     p[[index[name] for name in mechanism.velocities]] = before
-    given = checked(body)
+    given = whole.shared.parts(body)[-1]
     free, linear, angular = _motion(whole, given, q_new, qd_old)
     inertia = free.orientation @ np.asarray(given.inertia) @ free.orientation.T
     p += given.mass * linear.T @ v + angular.T @ inertia @ w
@@ -203,7 +203,7 @@ def release(mechanism: Mechanism, q: ArrayLike, qd: ArrayLike, body: str) -> Rel
     rest = mechanism.detach(body)
     values = real_array("q", q), real_array("qd", qd)
     q_rest, qd_rest = rest.map_state_from(mechanism, *values)
-    free, _, _ = _motion(mechanism, checked(bodies[0]), *values)
+    free, _, _ = _motion(mechanism, mechanism.shared.parts(bodies[0])[-1], *values)
     return Released(rest, q_rest, qd_rest, free)
 
 

@@ -18,6 +18,7 @@ from ..systems.arguments import parameter_value
 from ..systems.model import Model
 from ..systems.system import BodySystem, System
 from .body import WORLD, Body, Joint, MechanismError, MechanismWarning, vector
+from .composed_joints import locked_parts, require_outer_parents
 from .external_force import Force, check_force, generalized_forces
 from .forward_kinematics import KinematicChain, kinematic_chain
 from .inertial_numbers import Link
@@ -101,7 +102,7 @@ class Mechanism(Structure):
             if name in seen:
                 raise MechanismError(f"two joints that move have the name {name!r}")
             seen.add(name)
-        carried = set(self._carriers) - {WORLD}
+        carried = {body.name for body in self.bodies}
         for force in self.forces:
             check_force(force, carried)
         bodies = {body.name: body for body in self.bodies}
@@ -128,6 +129,13 @@ class Mechanism(Structure):
         parts += [f"parameters {', '.join(self.parameter_values)}"] if self.parameter_values else []
         parts += [f"gravity {', '.join([f'{each:g}' for each in np.asarray(self.gravity)])}"]
         return f"<Mechanism of {'; '.join(parts)}>"
+
+    @cached_property
+    def parts(self) -> tuple[Body, ...]:
+        """All bodies as the equations have them, parents first: a locked joint a weld, those of several parts apart."""
+        parts = [part for body in self.bodies for part in self.shared.parts(body)]
+        require_outer_parents(self.bodies)
+        return tuple(parents_first(lock_joints(parts, locked_parts(self.bodies, self.locked))))
 
     @property
     def moving(self) -> tuple[Body, ...]:
@@ -160,8 +168,7 @@ class Mechanism(Structure):
 
     @cached_property
     def _merged(self) -> tuple[tuple[Body, ...], dict[str, Carrier]]:
-        bodies = [self.shared.body(body) for body in self.bodies]
-        moving, carriers = merge_fixed_bodies(parents_first(lock_joints(bodies, self.locked)))
+        moving, carriers = merge_fixed_bodies(self.parts)
         return require_inertia(moving), carriers
 
     @cached_property
@@ -229,9 +236,9 @@ class Mechanism(Structure):
 
         at: (3,) [m], the point, in the body's frame. Raises MechanismError for an unknown body.
         """
-        point = self._checked_point(body, at)
+        chain, point = self.chain(body), _point(body, at)
         with building(Builder()), cg.tag(body):
-            place = self._chain(body, self.system.q, self.system.qd).motion(point).position
+            place = chain.motion(point).position
         return cg.simplify(Graph(self.system.q, dict(zip("xyz", place, strict=True))))
 
     def motion(self, body: str, at: ArrayLike = (0.0, 0.0, 0.0)) -> Graph:
@@ -241,15 +248,15 @@ class Mechanism(Structure):
         row by row, its axes as columns.
         at: (3,) [m], the point, in the body's frame. Raises MechanismError for an unknown body.
         """
-        point = self._checked_point(body, at)
-        q, qd = self.system.q, self.system.qd
+        chain, point = self.chain(body), _point(body, at)
         with building(Builder()), cg.tag(body):
-            return self._chain(body, q, qd).graph(point, q, qd)
+            return chain.graph(point, self.system.q, self.system.qd)
 
-    def _checked_point(self, body: str, at: ArrayLike) -> Array:
+    def chain(self, body: str) -> KinematicChain:
+        """The joints between a body and the world, at q0.. and qd0... Raises MechanismError for an unknown body."""
         if not isinstance(body, str) or body not in self._carriers:
             raise MechanismError(f"there is no body {body!r:.80} in the mechanism")
-        return vector(f"position on body {body!r}: at", at)
+        return self._chain(body, self.system.q, self.system.qd)
 
     def joint_positions(self, q: ArrayLike) -> Array:
         """Places of joints and tips [m] in a drawing, (T, k, 2), x to the right and y up, for q, (T, n) [rad or m].
@@ -298,7 +305,7 @@ class Mechanism(Structure):
         states of another shape.
         """
         other = require_mechanism(other, "map_state_from")
-        return map_state(self.moving, other.moving, dict(other.locked), q, qd)
+        return map_state(self.moving, other.moving, locked_parts(other.bodies, other.locked), q, qd)
 
 
 def as_mechanism(model: Model) -> Mechanism | None:
@@ -312,6 +319,10 @@ def require_mechanism(model: Model, what: str) -> Mechanism:
     if mechanism is None:
         raise MechanismError(f"{what} takes rigid bodies, a Mechanism or a scene of one, got {model!r:.80}")
     return mechanism
+
+
+def _point(body: str, at: ArrayLike) -> Array:
+    return vector(f"position on body {body!r}: at", at)
 
 
 def _listed(what: str, kind: type, given: Any) -> tuple[Any, ...]:

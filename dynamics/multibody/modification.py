@@ -25,8 +25,8 @@ def lock_joint(structure: AnyStructure, body: str, at: float | ArrayLike | None)
     """The structure with the joint of a body standing still at a coordinate [rad or m], or several."""
     _check_body(body)
     if at is None:
-        kinds = [each.joint.type for each in structure.bodies if each.name == body]
-        at = 0.0 if not kinds or len(kinds[0].neutral) == 1 else kinds[0].neutral
+        known = [each.joint.neutral for each in structure.bodies if each.name == body]
+        at = known[0] if known and len(known[0]) != 1 else 0.0
     return replace(structure, locked={**structure.locked, body: at})
 
 

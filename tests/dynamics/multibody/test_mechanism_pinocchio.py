@@ -7,7 +7,7 @@ import pytest
 from pytest import mark
 
 import dynamics as dyn
-from tests.dynamics.mechanisms import FAMILIES
+from tests.dynamics.mechanisms import FAMILIES, random_mechanism
 from tests.dynamics.models import at, error, run, states
 
 pytest.importorskip("pinocchio", reason="the bench extra has it")
@@ -17,11 +17,14 @@ STATES = 100
 AGREEMENT = 1e-10  # of the largest entry: rounding of two codes, times the condition number of M
 
 
+SCREWS = {"screws": lambda n: random_mechanism(n, ["screw", "revolute", "prismatic"], 2)}
+
+
 @mark.parametrize("n", [1, 2, 7, 20, 40])
-@mark.parametrize("family", FAMILIES)
+@mark.parametrize("family", [*FAMILIES, *SCREWS])
 def test_random_mechanisms_agree_with_pinocchio(family: str, n: int, record_property) -> None:
-    """aba, rnea and crba: hinges and slides about any axis, branches, welds, springs, damping and armature."""
-    mechanism = FAMILIES[family](n)
+    """aba, rnea and crba: hinges, slides and screws about any axis, branches, welds, springs, damping and armature."""
+    mechanism = (FAMILIES | SCREWS)[family](n)
     peer, given = PinocchioTwin(mechanism), states(mechanism, STATES, seed=n)
     rows = [at(given, row) for row in range(STATES)]
     theirs = {
