@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from cgraph.extend import Array, real_array
 
 from ..systems.arguments import parameter_value, per_coordinate
-from ..systems.model import Model, as_ode
+from ..systems.model import Model, as_ode, as_system
 from .state_equation import StateInputs, state_inputs
 
 PAST = 1e-14  # of the end: some roundings, by which a last time may lie past it
@@ -43,6 +43,8 @@ def initial_value(
     """
     inputs = state_inputs(model)
     values = _parameters(inputs, parameters)
+    if as_ode(model) is None:
+        as_system(model).require_values(values)
     if inputs.applied:
         values = dict(zip(inputs.applied, per_coordinate("tau", tau, model.coordinates), strict=True)) | values
     elif np.any(real_array("tau", tau)):

@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from cgraph.extend import real_number
 
 from ..multibody import spatial
 from ..multibody.joints import AxialJoint
 from ..multibody.mechanism import WORLD, Body, Mechanism, MechanismError, require_mechanism
+from ..multibody.parameters import Quantities
 from ..multibody.spatial import Array
 from ..systems.model import Model
 
@@ -24,7 +24,8 @@ _ROUNDING = 2.0**-50  # of the largest moment of inertia: what is left of one th
 def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
     """The bodies of a model as MJCF text: masses and inertias explicit, RK4, contacts off.
 
-    Bodies that are welded on are merged into those that carry them; joints have the names of the coordinates.
+    Bodies that are welded on are merged into those that carry them; joints have the names of the coordinates, and of
+    parameters there are the values.
 
     Parameters
     ----------
@@ -63,6 +64,7 @@ def mjcf_text(
     """The text of a mechanism with more elements: `head` before the bodies, `shapes` in the bodies of those names."""
     if mechanism.forces:
         raise MechanismError(f"MJCF has no forces, there is one on body {mechanism.forces[0].body!r}")
+    mechanism = mechanism.bind()
     children: dict[str, list[Body]] = {}
     for body in mechanism.moving:
         children.setdefault(body.parent, []).append(body)
@@ -115,7 +117,7 @@ def _require_joint(body: Body) -> None:
     if joint.type.mjcf == "free":
         if body.parent != WORLD:
             raise MechanismError(f"in MJCF a free body hangs on the world, and body {body.name!r} on {body.parent!r}")
-        if np.any(joint.position) or np.any(np.asarray(joint.orientation) != np.eye(3)):
+        if np.any(np.asarray(joint.position)) or np.any(np.asarray(joint.orientation) != np.eye(3)):
             raise MechanismError(f"in MJCF a free joint has the axes and the origin of the world, and {where} has not")
 
 
@@ -131,6 +133,6 @@ def _principal(inertia: Array) -> str:
     return f'diaginertia="{numbers(moments)}" quat="{numbers(spatial.to_quaternion(axes))}"'
 
 
-def numbers(values: ArrayLike) -> str:
+def numbers(values: Quantities) -> str:
     """Numbers as XML attributes have them, each exact."""
     return " ".join([repr(float(value)) for value in np.asarray(values)])

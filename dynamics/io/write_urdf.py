@@ -19,7 +19,7 @@ _FAR = 1e9  # m, N, m/s: URDF asks each slide for its limits
 def to_urdf(model: Model) -> str:
     """The moving bodies of a model as URDF text, those welded to them merged in; the root link is "world".
 
-    URDF has no gravity: who reads it chooses.
+    URDF has no gravity: who reads it chooses. Of parameters the values are written.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def to_urdf(model: Model) -> str:
     if mechanism.forces:
         raise MechanismError(f"URDF has no forces, there is one on body {mechanism.forces[0].body!r}")
     lines = ['<?xml version="1.0"?>', '<robot name="mechanism">', '  <link name="world"/>']
-    for body in mechanism.moving:
+    for body in mechanism.bind().moving:
         lines += [*_link_lines(body), *_joint_lines(body)]
     return "\n".join([*lines, "</robot>"]) + "\n"
 
@@ -55,7 +55,7 @@ def to_urdf(model: Model) -> str:
 def _link_lines(body: Body) -> list[str]:
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = np.asarray(body.inertia).tolist()
     moments = f'ixx="{xx!r}" ixy="{xy!r}" ixz="{xz!r}" iyy="{yy!r}" iyz="{yz!r}" izz="{zz!r}"'
-    if not body.mass and not np.any(body.inertia):
+    if not body.mass and not np.any(np.asarray(body.inertia)):
         return [f"  <link name={quoteattr(body.name)}/>"]
     mass = f'<origin xyz="{numbers(body.center)}"/><mass value="{body.mass!r}"/><inertia {moments}/>'
     return [

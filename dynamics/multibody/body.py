@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cgraph import Node
 from cgraph.extend import check_name, is_finite
 
 from . import spatial
 from .joints import TYPES, JointType
+from .parameters import Quantities, Quantity, entries, evaluated, names_in, symbol, vanishes
 from .spatial import Array
 
 WORLD = "world"
@@ -26,6 +29,8 @@ class MechanismError(ValueError):
 @dataclass(frozen=True, eq=False)
 class Joint:
     """How a body hangs on its parent; the joint is at the origin of the body's frame.
+
+    `position` and all that is said to be a float may have parameters in place of numbers, see `Body`.
 
     Parameters
     ----------
@@ -66,12 +71,12 @@ class Joint:
 
     kind: str
     axis: ArrayLike = (0.0, 0.0, 1.0)
-    position: ArrayLike = (0.0, 0.0, 0.0)
+    position: Quantities = (0.0, 0.0, 0.0)
     orientation: ArrayLike = field(default_factory=lambda: np.eye(3))
-    damping: float = 0.0
-    stiffness: float = 0.0
-    spring_reference: float = 0.0
-    armature: float = 0.0
+    damping: Quantity = 0.0
+    stiffness: Quantity = 0.0
+    spring_reference: Quantity = 0.0
+    armature: Quantity = 0.0
     name: str = ""
 
     def __post_init__(self) -> None:
@@ -87,6 +92,9 @@ class Joint:
 @dataclass(frozen=True, eq=False)
 class Body:
     """A rigid body and the joint that carries it.
+
+    In place of a number of mass, center and inertia may stand a parameter: its name, or a node over `cg.variable`s.
+    Its value is in the mechanism's `parameters`, and it is an input of the graphs.
 
     Parameters
     ----------
@@ -109,14 +117,17 @@ class Body:
     >>> rotor = dyn.Body("rotor", dyn.Joint("revolute"), inertia=(0.1, 0.1, 0.2))
     >>> dyn.mass_matrix(dyn.Mechanism([rotor])).evaluate({"q0": 0.0, "qd0": 0.0})
     {'M_0_0': 0.2}
+    >>> load = dyn.Body("load", dyn.Joint("prismatic"), mass="m")
+    >>> dyn.mass_matrix(dyn.Mechanism([load], parameters={"m": 3.0})).evaluate({"q0": 0.0, "qd0": 0.0, "m": 4.0})
+    {'M_0_0': 4.0}
     """
 
     name: str
     joint: Joint
     parent: str = WORLD
-    mass: float = 0.0
-    center: ArrayLike = (0.0, 0.0, 0.0)
-    inertia: ArrayLike = (0.0, 0.0, 0.0)
+    mass: Quantity = 0.0
+    center: Quantities = (0.0, 0.0, 0.0)
+    inertia: Quantities = (0.0, 0.0, 0.0)
 
     @property
     def coordinate(self) -> str:
@@ -144,15 +155,52 @@ def shape_of(value: Any) -> tuple[int, ...]:
         return ()
 
 
-def _number(what: str, value: Any, unit: str = "", minimum: float = 0.0) -> float:
+def quantities(what: str, value: Any, shape: tuple[int, ...] = (3,)) -> Array:
+    """As `vector`, or an array of objects: floats, and nodes where there are parameters."""
+    known = entries(value)
+    if not any([isinstance(each, str | Node) for each in known]):
+        return vector(what, value, shape)
+    if np.shape(np.asarray(value, dtype=object)) != shape:
+        raise MechanismError(f"{what} must be {shape} finite numbers, got {value!r:.80}")
+    array = np.empty(len(known), dtype=object)
+    array[:] = [_number(what, each, minimum=-math.inf) for each in known]
+    return array.reshape(shape) if names_in(known) else array.astype(np.float64).reshape(shape)
+
+
+def _number(what: str, value: Any, unit: str = "", minimum: float = 0.0) -> float | Node:
+    """The number, or the node of a parameter."""
+    if isinstance(value, Node) and not names_in([value]):
+        value = evaluated(value, {}).item()
+    if isinstance(value, str | Node):
+        _check_names(what, value)
+        return symbol(value)
     if is_finite(value) and float(value) >= minimum:
         return float(value)
     bound = " and at least 0" if minimum == 0.0 else ""
     raise MechanismError(f"{what} must be finite{bound}, got {value!r:.80}{unit}")
 
 
+def _check_names(what: str, value: str | Node) -> None:
+    for name in names_in([value]):
+        try:
+            check_name(f"a parameter of {what}", name, spaces=False)
+        except (TypeError, ValueError) as error:
+            raise MechanismError(str(error)) from None
+
+
+def _mass(what: str, value: Any) -> float | Node:
+    return _number(what, value, " kg")
+
+
+def _any_number(what: str, value: Any) -> float | Node:
+    return _number(what, value, minimum=-math.inf)
+
+
 def checked(body: Body) -> Body:
-    """The body with its numbers as arrays and floats, its axis of length 1. Raises MechanismError for what is wrong."""
+    """The body with its numbers as arrays and floats, its axis of length 1. Raises MechanismError for what is wrong.
+
+    Parameters are nodes, among the floats of arrays of objects; what their values must be is not seen here.
+    """
     if not isinstance(body, Body):
         raise MechanismError(f"bodies must be of the type Body, got {type(body).__name__}: {body!r:.60}")
     _check_name("a body", body.name)
@@ -161,14 +209,8 @@ def checked(body: Body) -> Body:
     where, joint = f"body {body.name!r}", body.joint
     if not isinstance(body.parent, str):
         raise MechanismError(f"{where}: parent must be the name of a body or {WORLD!r}, got {body.parent!r:.80}")
-    inertia = _inertia(where, body.inertia)
-    return replace(
-        body,
-        mass=_number(f"{where}: mass", body.mass, " kg"),
-        center=vector(f"{where}: center", body.center),
-        inertia=inertia,
-        joint=_checked_joint(where, joint),
-    )
+    given = {name: check(f"{where}: {name}", getattr(body, name)) for name, check in BODY_QUANTITIES.items()}
+    return replace(body, joint=_checked_joint(where, joint), **given)
 
 
 def _checked_joint(where: str, joint: Joint) -> Joint:
@@ -182,23 +224,13 @@ def _checked_joint(where: str, joint: Joint) -> Joint:
     orientation = vector(f"{where}: orientation", joint.orientation, (3, 3))
     if np.abs(orientation.T @ orientation - np.eye(3)).max() > _ROUNDING or np.linalg.det(orientation) < 0:
         raise MechanismError(f"{where}: orientation must be a rotation matrix")
-    stiffness = _number(f"{where}: stiffness", joint.stiffness)
-    if stiffness and len(joint.type.coordinates) > 1:
-        raise MechanismError(f"{where}: a spring needs a joint with one coordinate, got stiffness {stiffness!r}")
-    armature = _number(f"{where}: armature", joint.armature)
-    if armature and not joint.type.geared:
-        raise MechanismError(f"{where}: a joint of the kind {joint.kind!r} has no armature, got {armature!r}")
-    return Joint(
-        joint.kind,
-        axis=spatial.snapped(spatial.unit(axis)),
-        position=vector(f"{where}: position", joint.position),
-        orientation=spatial.snapped(orientation),
-        damping=_number(f"{where}: damping", joint.damping),
-        stiffness=stiffness,
-        spring_reference=_number(f"{where}: spring_reference", joint.spring_reference, minimum=-math.inf),
-        armature=armature,
-        name=joint.name,
-    )
+    given = {name: check(f"{where}: {name}", getattr(joint, name)) for name, check in JOINT_QUANTITIES.items()}
+    if not vanishes(given["stiffness"]) and len(joint.type.coordinates) > 1:
+        raise MechanismError(f"{where}: a spring needs a joint with one coordinate, got stiffness {joint.stiffness!r}")
+    if not vanishes(given["armature"]) and not joint.type.geared:
+        raise MechanismError(f"{where}: a joint of the kind {joint.kind!r} has no armature, got {joint.armature!r}")
+    axis, orientation = spatial.snapped(spatial.unit(axis)), spatial.snapped(orientation)
+    return Joint(joint.kind, axis=axis, orientation=orientation, name=joint.name, **given)
 
 
 def _check_name(what: str, name: str) -> None:
@@ -208,19 +240,36 @@ def _check_name(what: str, name: str) -> None:
         raise MechanismError(str(error)) from None
 
 
-def _inertia(where: str, given: ArrayLike) -> Array:
+def _inertia(what: str, given: Any) -> Array:
     """Symmetric, and with principal moments that are not negative and obey the triangle inequality."""
     diagonal = shape_of(given) == (3,)
-    inertia = vector(f"{where}: inertia", given, (3,) if diagonal else (3, 3))
-    inertia = np.diag(inertia) if diagonal else inertia
+    inertia = quantities(what, given, (3,) if diagonal else (3, 3))
+    inertia = np.where(np.eye(3, dtype=bool), inertia, 0.0) if diagonal else inertia
+    if inertia.dtype == object:
+        return inertia
     scale = np.abs(inertia).max()
     if np.abs(inertia - inertia.T).max() > _ROUNDING * scale:
-        raise MechanismError(f"{where}: inertia must be symmetric")
+        raise MechanismError(f"{what} must be symmetric")
     moments = np.linalg.eigvalsh(inertia)
     if moments[0] < -_ROUNDING * scale:
-        raise MechanismError(f"{where}: inertia must not be negative, its principal moments are {moments.tolist()}")
+        raise MechanismError(f"{what} must not be negative, its principal moments are {moments.tolist()}")
     if moments[2] > moments[0] + moments[1] + _ROUNDING * scale:
         raise MechanismError(
-            f"{where}: no body has principal moments {moments.tolist()}: the largest exceeds the sum of the others"
+            f"{what.removesuffix(': inertia')}: no body has principal moments {moments.tolist()}: "
+            "the largest exceeds the sum of the others"
         )
     return inertia
+
+
+BODY_QUANTITIES: dict[str, Callable[[str, Any], Any]] = {
+    "mass": _mass,
+    "center": quantities,
+    "inertia": _inertia,
+}
+JOINT_QUANTITIES: dict[str, Callable[[str, Any], Any]] = {
+    "position": quantities,
+    "damping": _number,
+    "stiffness": _number,
+    "spring_reference": _any_number,
+    "armature": _number,
+}

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, cast
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 import cgraph as cg
@@ -17,15 +16,17 @@ from cgraph.extend import Builder, building, require_flag, require_mapping
 from ..systems.arguments import parameter_value
 from ..systems.model import Model
 from ..systems.system import BodySystem, System
-from .body import WORLD, Body, Joint, MechanismError, vector
+from .body import WORLD, Body, Joint, MechanismError, quantities, vector
 from .external_force import Force, check_force, generalized_forces
 from .forward_kinematics import KinematicChain, kinematic_chain
 from .inertial_numbers import Link
 from .joint_coordinates import coordinate_names, per_velocity, quasi_velocities, velocity_names
 from .joint_positions import skeleton
 from .kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia
-from .mechanism_fields import Structure
+from .mechanism_fields import Structure, changed
 from .modification import attach_subtree, detach_subtree, lock_joint, map_state, subtree_of, unlock_joint
+from .parameter_values import bound_body, bound_force, require_values, used_names
+from .parameters import Quantity, bound, entries, names_in, symbol
 from .spatial import Array
 from .subtree import Subtree
 from .tree_equations import TreeEquations
@@ -42,12 +43,13 @@ class Mechanism(Structure):
     bodies : sequence of Body
         In any order.
     gravity : array_like, (3,)
-        In the world's axes [m/s^2].
+        In the world's axes [m/s^2]. In place of a number may stand a parameter, as in a `Body`.
     forces : sequence of Force
         On bodies from outside, beside the joint forces tau; they enter the equations as J^T f.
     parameters : mapping
-        {name: value} of the parameters that forces name; one without a value is 0. They are inputs of the graphs, and
-        `simulate` binds them.
+        {name: value} of the parameters that bodies, joints, gravity and forces have. They are inputs of the graphs, and
+        `simulate` binds them. Each needs a value with which the mechanism can be; only one that forces alone name is 0
+        without.
     locked : mapping
         {body: coordinate [rad or m]} of joints that stand still: their bodies are welded on, see `lock`.
     base_parameters : bool
@@ -60,8 +62,8 @@ class Mechanism(Structure):
     ------
     MechanismError
         For an unknown parent, a cycle, a repeated name, numbers that are not finite or out of range, an inertia that
-        no body can have, a coordinate that moves no mass and has no armature, a force on an unknown body, and a
-        parameter that no force uses.
+        no body can have, a coordinate that moves no mass and has no armature, a force on an unknown body, a parameter
+        that nothing uses, one without value, and a value that makes any of this.
 
     Examples
     --------
@@ -69,13 +71,17 @@ class Mechanism(Structure):
     >>> rod = dyn.Body("rod", dyn.Joint("revolute", (0.0, 1.0, 0.0)), mass=1.0, center=(0.0, 0.0, -0.5))
     >>> dyn.Mechanism([rod])
     <Mechanism of 1 bodies, 1 coordinate(s) rod; gravity 0, 0, -9.81>
+    >>> rod = dyn.Body("rod", dyn.Joint("revolute", (0.0, 1.0, 0.0)), mass="m", center=(0.0, 0.0, -0.5))
+    >>> dyn.Mechanism([rod], (0.0, 0.0, -10.0), parameters={"m": 1.0}).parameters
+    {'m': 1.0}
     """
 
     def __post_init__(self) -> None:
-        vector("gravity", self.gravity)
+        quantities("gravity", self.gravity)
         require_flag("base_parameters", self.base_parameters)
         for what, kind in (("bodies", Body), ("forces", Force)):  # kept, so that an iterator is read once
             object.__setattr__(self, what, _listed(what, kind, getattr(self, what)))
+        self._check_parameters([self.shared.body(body) for body in self.bodies])
         seen: set[str] = set()
         for name in self.coordinates:
             if name in seen:
@@ -84,12 +90,15 @@ class Mechanism(Structure):
         carried = set(self._carriers) - {WORLD}
         for force in self.forces:
             check_force(force, carried)
-        used = {name for force in self.forces for name in force.names}
-        for name in require_mapping("parameters", self.parameters, "name: value"):
+        used = used_names(self.bodies, self.gravity, self.forces)
+        for name in self.parameters:
             if name not in used:
-                raise MechanismError(f"the mechanism has no force that uses the parameter {name!r}")
-        for name, value in self.parameter_values.items():
+                raise MechanismError(f"the mechanism has no body, joint or force that uses the parameter {name!r}")
+
+    def _check_parameters(self, bodies: Sequence[Body]) -> None:
+        for name, value in require_mapping("parameters", self.parameters, "name: value").items():
             parameter_value(name, value)
+        require_values(bodies, self.gravity, self.parameters)
 
     def __repr__(self) -> str:
         names = self.coordinates
@@ -98,7 +107,7 @@ class Mechanism(Structure):
         parts += [f"locked {', '.join(list(self.locked)[:6])}"] if self.locked else []
         parts += [f"forces on {', '.join([force.body for force in self.forces[:6]])}"] if self.forces else []
         parts += [f"parameters {', '.join(self.parameter_values)}"] if self.parameter_values else []
-        parts += [f"gravity {', '.join([f'{each:g}' for each in np.asarray(self.gravity)])}"]
+        parts += [f"gravity {', '.join([_shown(each) for each in entries(self.gravity)])}"]
         return f"<Mechanism of {'; '.join(parts)}>"
 
     @property
@@ -133,8 +142,19 @@ class Mechanism(Structure):
     @cached_property
     def _merged(self) -> tuple[tuple[Body, ...], dict[str, Carrier]]:
         bodies = [self.shared.body(body) for body in self.bodies]
-        moving, carriers = merge_fixed_bodies(parents_first(lock_joints(bodies, self.locked)))
-        return require_inertia(moving), carriers
+        numbers = [bound_body(body, self.parameters) for body in bodies]
+        moving, carriers = self._merge(bodies)
+        known = moving if numbers == bodies else self._merge([self.shared.body(body) for body in numbers])[0]
+        require_inertia(known)
+        return tuple(moving), carriers
+
+    def _merge(self, bodies: Sequence[Body]) -> tuple[list[Body], dict[str, Carrier]]:
+        with building(Builder()):
+            return merge_fixed_bodies(parents_first(lock_joints(bodies, self.locked)))
+
+    @cached_property
+    def _bound(self) -> Mechanism:
+        return self.bind(self.parameter_values)
 
     @cached_property
     def _equations(self) -> TreeEquations:
@@ -154,9 +174,13 @@ class Mechanism(Structure):
             self.coordinates,
             self.parameter_values,
             forces=self._generalized_forces if self.forces else None,
-            damping=per_velocity(self.moving, [body.joint.damping for body in self.moving]),
+            damping=per_velocity(self.moving, [symbol(body.joint.damping) for body in self.moving]),
             quasi_velocities=quasi_velocities(self.moving),
+            require_values=self._require_values,
         )
+
+    def _require_values(self, values: Mapping[str, ArrayLike]) -> None:
+        require_values(self.bodies, self.gravity, values)
 
     def _generalized_forces(self, q: list[Node], qd: list[Node], t: Node, p: dict[str, Node]) -> list[Node]:
         return generalized_forces([(force, self._chain(force.body, q, qd)) for force in self.forces], qd, p)
@@ -175,17 +199,17 @@ class Mechanism(Structure):
         return self._equations.parents
 
     def position(self, body: str, at: ArrayLike = (0.0, 0.0, 0.0)) -> Graph:
-        """Where a point of a body is in the world. Inputs q0.., outputs x, y, z [m].
+        """Where a point of a body is in the world. Inputs q0.. and parameters of positions; outputs x, y, z [m].
 
         at: (3,) [m], the point, in the body's frame. Raises MechanismError for an unknown body.
         """
         point = self._checked_point(body, at)
         with building(Builder()), cg.tag(body):
             place = self._chain(body, self.system.q, self.system.qd).motion(point).position
-        return cg.simplify(Graph(self.system.q, dict(zip("xyz", place, strict=True))))
+        return cg.simplify(Graph([*self.system.q, *self._lengths], dict(zip("xyz", place, strict=True))))
 
     def motion(self, body: str, at: ArrayLike = (0.0, 0.0, 0.0)) -> Graph:
-        """How a body moves in the world: inputs q0.., qd0.., outputs in the world's axes.
+        """How a body moves in the world: inputs q0.., qd0.., parameters of positions; outputs in the world's axes.
 
         x, y, z [m] and vx, vy, vz [m/s] of a point; wx, wy, wz [rad/s], the body's angular velocity; R_0_0, R_0_1, ..
         row by row, its axes as columns.
@@ -194,7 +218,12 @@ class Mechanism(Structure):
         point = self._checked_point(body, at)
         q, qd = self.system.q, self.system.qd
         with building(Builder()), cg.tag(body):
-            return self._chain(body, q, qd).graph(point, q, qd)
+            return self._chain(body, q, qd).graph(point, q, [*qd, *self._lengths])
+
+    @property
+    def _lengths(self) -> list[Node]:
+        """The parameters of where joints are."""
+        return cg.variables(list(names_in([each for body in self.bodies for each in entries(body.joint.position)])))
 
     def _checked_point(self, body: str, at: ArrayLike) -> Array:
         if not isinstance(body, str) or body not in self._carriers:
@@ -207,7 +236,25 @@ class Mechanism(Structure):
         Joints come in the order of the coordinates, then the tips. See `joint_positions.skeleton`, which says how they
         are connected and from where a motion in space is seen.
         """
-        return skeleton(self, q).points
+        return skeleton(self._bound, q).points
+
+    def bind(self, values: Mapping[str, float] | None = None) -> Mechanism:
+        """The mechanism with numbers in place of parameters; of all at their values, or of those in `values`.
+
+        Raises MechanismError as a Mechanism does, and for a parameter that there is not.
+        """
+        if values is None:
+            return self._bound
+        chosen = {name: parameter_value(name, value) for name, value in values.items()}
+        if unknown := [name for name in chosen if name not in self.parameter_values]:
+            has = ", ".join(self.parameter_values) or "none"
+            raise MechanismError(f"the mechanism has no parameter {unknown[0]!r} (it has {has})")
+        if not chosen:
+            return self
+        require_values(self.bodies, self.gravity, {**self.parameter_values, **chosen})
+        bodies = tuple([bound_body(body, chosen) for body in self.bodies])
+        forces = tuple([bound_force(force, chosen) for force in self.forces])
+        return changed(self, bodies=bodies, gravity=bound(self.gravity, chosen), forces=forces)
 
     def lock(self, body: str, at: float | ArrayLike | None = None) -> Mechanism:
         """The mechanism with the joint of a body standing still at a coordinate [rad or m], or several; by default 0.
@@ -261,7 +308,16 @@ def require_mechanism(model: Model, what: str) -> Mechanism:
     return mechanism
 
 
+def _shown(number: Quantity) -> str:
+    names = names_in([number])
+    return f"({', '.join(names)})" if names else f"{float(number):g}"
+
+
 def _listed(what: str, kind: type, given: Any) -> tuple[Any, ...]:
     if isinstance(given, str) or not isinstance(given, Iterable):
         raise MechanismError(f"{what} must be a sequence of {kind.__name__}, got {type(given).__name__}: {given!r:.60}")
-    return tuple(given)
+    listed = tuple(given)
+    for each in listed:
+        if not isinstance(each, kind):
+            raise MechanismError(f"{what} must be of the type {kind.__name__}, got {type(each).__name__}: {each!r:.60}")
+    return listed

@@ -108,6 +108,6 @@ def planar_links(arm: Mechanism) -> list[PlanarLink]:
     *bodies, _ = arm.bodies
     drops = [-float(np.asarray(body.joint.position)[2]) for body in arm.bodies[1:]]
     return [
-        PlanarLink(body.mass, drop, -float(np.asarray(body.center)[2]), float(np.asarray(body.inertia)[0]))
+        PlanarLink(float(body.mass), drop, -float(np.asarray(body.center)[2]), float(np.asarray(body.inertia)[0]))
         for body, drop in zip(bodies, drops, strict=True)
     ]

@@ -13,7 +13,7 @@ from cgraph.extend import Array, real_array, require_mapping
 from ...equations.initial_value import check_names
 from ...equations.state_equation import state_inputs
 from ...systems.arguments import parameter_value, per_coordinate
-from ...systems.model import Model, as_ode
+from ...systems.model import Model, as_ode, as_system
 
 
 class Starts(NamedTuple):
@@ -48,6 +48,8 @@ def starts(
         else:
             columns[name] = _column(name, value)
             del same[name]
+    if as_ode(model) is None:
+        as_system(model).require_values({**same, **columns})
     if np.ndim(tau) == 2:
         arrays["tau"] = _array("tau", tau, n)
     else:
