@@ -63,6 +63,9 @@ def body(name="b", parent="world"):
     return dyn.Body(name, dyn.Joint("revolute"), parent, 1.0, (0.0, 0.0, 0.0), (0.1, 0.1, 0.1))
 
 
+OPEN = dyn.Mechanism([dyn.Body("b", dyn.Joint("revolute"), mass="m", inertia=(1.0, 1.0, 1.0))], parameters={"m": 1.0})
+
+
 def lagrangian(q, qd, t):
     return 0.5 * qd[0] ** 2
 
@@ -126,8 +129,8 @@ CALLS = {
     "dyn.load_mjcf": call(dyn.load_mjcf, dyn.to_mjcf(ARM), ignore=True),
     "dyn.load_urdf": call(dyn.load_urdf, dyn.to_urdf(ARM), ignore=True),
     "dyn.planar_arm": call(dyn.planar_arm, [1.0], [1.0], 0.0, "rod", 9.81),
-    "dyn.serial_arm": call(dyn.serial_arm, [LINK], (0.0, 0.0, -9.81)),
-    "dyn.tree": call(dyn.tree, [-1], None, axes=(0.0, 1.0, 0.0), gravity=(0.0, 0.0, -9.81)),
+    "dyn.serial_arm": call(dyn.serial_arm, [LINK], (0.0, 0.0, -9.81), parameters=None),
+    "dyn.tree": call(dyn.tree, [-1], None, axes=(0.0, 1.0, 0.0), gravity=(0.0, 0.0, -9.81), parameters=None),
     "dyn.reference": call(
         dyn.reference, DECAY, [1.0], None, [0.0, 0.1], digits=15, method="taylor", tau=0.0, parameters=None, folder=None
     ),
@@ -152,6 +155,7 @@ CALLS = {
     "dyn.Scene": call(dyn.Scene, "s", "about", *SCENE),
     "dyn.RecursiveInverseDynamics()": call(dyn.RecursiveInverseDynamics(ARM), [0.0], [0.0], [0.0]),
     "dyn.Mechanism.attach": call(TWO.detach(LAST).attach, SUBTREE, None),
+    "dyn.Mechanism.bind": call(OPEN.bind, {"m": 2.0}),
     "dyn.Mechanism.detach": call(TWO.detach, LAST),
     "dyn.Mechanism.joint_positions": call(ARM.joint_positions, [0.0]),
     "dyn.Mechanism.lock": call(TWO.lock, FIRST, 0.0),
@@ -190,7 +194,7 @@ RECORDS = """
 """
 # Nothing to give; what empties the user's cache; the fast way into compiled code, which looks at nothing.
 LEFT_OUT = """cg.recording_lines cg.clear_cache cg.Compiled.bind cg.Compiled.values cg.Graph.check cg.Graph.counts
-    cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.bias_forces"""
+    cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.bias_forces dyn.System.require_values"""
 
 
 def public():

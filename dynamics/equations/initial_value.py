@@ -43,7 +43,7 @@ def initial_value(
     """
     inputs = state_inputs(model)
     values = _parameters(inputs, parameters)
-    if as_ode(model) is None:
+    if parameters and as_ode(model) is None:
         as_system(model).require_values(values)
     if inputs.applied:
         values = dict(zip(inputs.applied, per_coordinate("tau", tau, model.coordinates), strict=True)) | values

@@ -52,7 +52,7 @@ def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
     >>> text.count("<joint")
     2
     """
-    mechanism = require_mechanism(model, "MJCF")
+    mechanism = require_mechanism(model, "MJCF").bind()
     if not 0.0 < real_number("timestep", timestep) < math.inf:
         raise ValueError(f"timestep must be positive and finite, got {timestep!r} s")
     return mjcf_text(mechanism, timestep)
@@ -64,7 +64,6 @@ def mjcf_text(
     """The text of a mechanism with more elements: `head` before the bodies, `shapes` in the bodies of those names."""
     if mechanism.forces:
         raise MechanismError(f"MJCF has no forces, there is one on body {mechanism.forces[0].body!r}")
-    mechanism = mechanism.bind()
     children: dict[str, list[Body]] = {}
     for body in mechanism.moving:
         children.setdefault(body.parent, []).append(body)

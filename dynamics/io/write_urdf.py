@@ -43,11 +43,11 @@ def to_urdf(model: Model) -> str:
     >>> text.count('type="continuous"')
     2
     """
-    mechanism = require_mechanism(model, "URDF")
+    mechanism = require_mechanism(model, "URDF").bind()
     if mechanism.forces:
         raise MechanismError(f"URDF has no forces, there is one on body {mechanism.forces[0].body!r}")
     lines = ['<?xml version="1.0"?>', '<robot name="mechanism">', '  <link name="world"/>']
-    for body in mechanism.bind().moving:
+    for body in mechanism.moving:
         lines += [*_link_lines(body), *_joint_lines(body)]
     return "\n".join([*lines, "</robot>"]) + "\n"
 

@@ -245,7 +245,8 @@ class Mechanism(Structure):
         """
         if values is None:
             return self._bound
-        chosen = {name: parameter_value(name, value) for name, value in values.items()}
+        given = require_mapping("values", values, "name: number")
+        chosen = {name: parameter_value(name, value) for name, value in given.items()}
         if unknown := [name for name in chosen if name not in self.parameter_values]:
             has = ", ".join(self.parameter_values) or "none"
             raise MechanismError(f"the mechanism has no parameter {unknown[0]!r} (it has {has})")

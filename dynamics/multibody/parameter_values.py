@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,12 +24,29 @@ class Use(NamedTuple):
     check: Callable[[str, Any], Any]
 
 
+_KNOWN: WeakKeyDictionary[Body, tuple[Use, ...]] = WeakKeyDictionary()  # bodies are not to be altered
+
+
 def uses(bodies: Sequence[Body], gravity: Any) -> Iterator[Use]:
     """The quantities of bodies, their joints and gravity in which there are parameters."""
-    rows: list[tuple[str, Any, Callable[[str, Any], Any]]] = [("gravity", gravity, quantities)]
+    yield from _of_parameters([("gravity", gravity, quantities)])
     for body in bodies:
-        for owner, table in ((body, BODY_QUANTITIES), (body.joint, JOINT_QUANTITIES)):
-            rows += [(f"body {body.name!r}: {name}", getattr(owner, name), check) for name, check in table.items()]
+        yield from _uses_of(body)
+
+
+def _uses_of(body: Body) -> tuple[Use, ...]:
+    if body not in _KNOWN:
+        tables = (body, BODY_QUANTITIES), (body.joint, JOINT_QUANTITIES)
+        rows = [
+            (f"body {body.name!r}: {name}", getattr(owner, name), check)
+            for owner, table in tables
+            for name, check in table.items()
+        ]
+        _KNOWN[body] = tuple(_of_parameters(rows))
+    return _KNOWN[body]
+
+
+def _of_parameters(rows: Iterable[tuple[str, Any, Callable[[str, Any], Any]]]) -> Iterator[Use]:
     for what, value, check in rows:
         if names := names_in(entries(value)):
             yield Use(what, value, names, check)
@@ -62,13 +80,11 @@ def require_values(bodies: Sequence[Body], gravity: Any, values: Mapping[str, Ar
 
 def bound_body(body: Body, values: Mapping[str, float]) -> Body:
     """The body with numbers in place of these parameters; itself where it has none of them."""
+    if not any([use.names.keys() & values.keys() for use in _uses_of(body)]):
+        return body
     own = {name: bound(getattr(body, name), values) for name in BODY_QUANTITIES}
     joint = {name: bound(getattr(body.joint, name), values) for name in JOINT_QUANTITIES}
-    if all([own[name] is getattr(body, name) for name in own]):
-        own = {}
-    if any([joint[name] is not getattr(body.joint, name) for name in joint]):
-        own["joint"] = replace(body.joint, **joint)
-    return replace(body, **own) if own else body
+    return replace(body, joint=replace(body.joint, **joint), **own)
 
 
 def bound_force(force: Force, values: Mapping[str, float]) -> Force:

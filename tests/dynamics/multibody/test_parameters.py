@@ -136,7 +136,7 @@ def test_the_regressor_keeps_its_names_apart() -> None:
 
 @mark.parametrize("quantity", ["length", "center", "mass", "damping", "g"])
 def test_slopes_of_accelerations_by_any_number_are_differences(quantity: str) -> None:
-    """By complex steps no digit is lost; by differences of eighth order on floats, a few."""
+    """Differences of eighth order."""
     arm = pendulums()
     slopes = cg.jacobian(dyn.forward_dynamics(arm), [quantity])
     at, h = state(arm), 1e-3
@@ -315,10 +315,20 @@ def test_values_are_checked_wherever_they_are_bound() -> None:
         lambda: dyn.simulate(arm, q, q, 0.1, parameters=bad),
         lambda: dyn.simulate_many(arm, q, q, 0.1, parameters={"mass": [1.0, -1.0]}),
         lambda: dyn.linearize(arm, q, q, parameters=bad),
+        lambda: dyn.prune(arm, values=bad),
         lambda: replace(arm, parameters={**arm.parameters, **bad}),
     ):
         with raises(ValueError, match=message):
             bind()
+
+
+def test_chains_and_trees_take_them() -> None:
+    rod = {"joint": Joint("revolute", (0.0, 1.0, 0.0)), "mass": "m", "center": (0.0, 0.0, -0.5)}
+    chain = dyn.serial_arm([rod, rod], (0.0, 0.0, "g"), parameters={"m": 2.0, "g": -9.81})
+    assert dict(chain.parameters) == {"m": 2.0, "g": -9.81}
+    assert same(
+        dyn.bias(chain), dyn.bias(dyn.tree([-1, 0], [rod, rod], gravity=chain.gravity, parameters=chain.parameters))
+    )
 
 
 def test_orientations_are_numbers() -> None:
