@@ -94,10 +94,12 @@ class Mechanism(Structure):
         for name in self.parameters:
             if name not in used:
                 raise MechanismError(f"the mechanism has no body, joint or force that uses the parameter {name!r}")
+        for name, value in self.parameter_values.items():
+            parameter_value(name, value)
 
     def _check_parameters(self, bodies: Sequence[Body]) -> None:
         for name, value in require_mapping("parameters", self.parameters, "name: value").items():
-            parameter_value(name, value)
+            parameter_value(name, value)  # before one is put in
         require_values(bodies, self.gravity, self.parameters)
 
     def __repr__(self) -> str:
@@ -112,7 +114,10 @@ class Mechanism(Structure):
 
     @property
     def moving(self) -> tuple[Body, ...]:
-        """The bodies that move, parents first, with all that is welded to them merged into their inertia."""
+        """The bodies that move, parents first, with all that is welded to them merged into their inertia.
+
+        Where there are parameters, what is welded is kept beside: `bind` them to see sums.
+        """
         return self._merged[0]
 
     @cached_property

@@ -24,6 +24,8 @@ def entries(value: Any) -> list[Any]:
         return [value]
     if isinstance(value, tuple) and all([isinstance(each, str | Node | float) for each in value]):
         return list(value)
+    if isinstance(value, np.ndarray) and value.dtype == np.float64:
+        return value.ravel().tolist()
     try:
         flat: list[Any] = np.asarray(value, dtype=object).ravel().tolist()
     except ValueError:  # rows of unlike shapes
