@@ -128,7 +128,7 @@ CALLS = {
     "dyn.to_mjcf": call(dyn.to_mjcf, ARM, 0.001),
     "dyn.load_mjcf": call(dyn.load_mjcf, dyn.to_mjcf(ARM), ignore=True),
     "dyn.load_urdf": call(dyn.load_urdf, dyn.to_urdf(ARM), ignore=True),
-    "dyn.planar_arm": call(dyn.planar_arm, [1.0], [1.0], 0.0, "rod", 9.81),
+    "dyn.planar_arm": call(dyn.planar_arm, [1.0], [1.0], 0.0, "rod", 9.81, parameters=None),
     "dyn.serial_arm": call(dyn.serial_arm, [LINK], (0.0, 0.0, -9.81), parameters=None),
     "dyn.tree": call(dyn.tree, [-1], None, axes=(0.0, 1.0, 0.0), gravity=(0.0, 0.0, -9.81), parameters=None),
     "dyn.reference": call(

@@ -357,6 +357,19 @@ def test_chains_and_trees_take_them() -> None:
     )
 
 
+def test_a_planar_arm_takes_them() -> None:
+    numbers = dyn.planar_arm([1.5, 0.8], [1.2, 0.5], [0.1, 0.2])
+    given = {"m": 1.5, "l": 0.5, "c": 0.1, "g": 9.81}
+    arm = dyn.planar_arm(["m", 0.8], [1.2, cg.variable("l")], ["c", 0.2], gravity="g", parameters=given)
+    assert same(dyn.forward_dynamics(arm.bind()), dyn.forward_dynamics(numbers))
+    at = state(arm)
+    assert near(values(dyn.forward_dynamics(arm), at), values(dyn.forward_dynamics(numbers), at))
+    with raises(ValueError, match=r"^link 1: mass must be positive and finite, got -1\.0 kg$"):
+        dyn.planar_arm(["m"], [1.0], parameters={"m": -1.0})
+    with raises(ValueError, match="'link 1': mass has the parameter 'm', which needs a value"):
+        dyn.planar_arm(["m"], [1.0])
+
+
 def test_orientations_are_numbers() -> None:
     with raises(MechanismError, match="orientation must be"):
         Mechanism(
