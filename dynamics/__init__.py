@@ -18,7 +18,7 @@ from .io.write_mjcf import to_mjcf
 from .io.write_urdf import to_urdf
 from .multibody.build_tree import serial_arm, tree
 from .multibody.impact import Attached, FreeBody, Released, attach_with_impact, release
-from .multibody.mechanism import Body, Force, Joint, Mechanism, MechanismError
+from .multibody.mechanism import Body, Force, Joint, Mechanism, MechanismError, MechanismWarning
 from .multibody.planar_arm import planar_arm
 from .multibody.pruning import EFFECTS, OmittedTerm, PruneResult, prune
 from .multibody.recursive_inverse_dynamics import RecursiveInverseDynamics
@@ -53,6 +53,7 @@ __all__ = [
     "Joint",
     "Mechanism",
     "MechanismError",
+    "MechanismWarning",
     "OdeSystem",
     "OmittedTerm",
     "PruneResult",

@@ -14,7 +14,7 @@ from cgraph.extend import Array, real_array
 
 from ..systems.arguments import parameter_value, per_coordinate
 from ..systems.model import Model, as_ode, as_system
-from .state_equation import StateInputs, state_inputs
+from .state_equation import StateInputs, normalization, state_inputs
 
 PAST = 1e-14  # of the end: some roundings, by which a last time may lie past it
 
@@ -22,7 +22,7 @@ PAST = 1e-14  # of the end: some roundings, by which a last time may lie past it
 class InitialValue(NamedTuple):
     """Where a motion starts, and the numbers of every other input of its state equation."""
 
-    x: Array  # (m,): q and then qd, or the states of an OdeSystem
+    x: Array  # (m,): q, normalized, and then qd, or the states of an OdeSystem
     states: tuple[str, ...]  # names of x
     bound: dict[str, float]  # tau0.., parameters
 
@@ -36,8 +36,8 @@ def initial_value(
 ) -> InitialValue:
     """The start of a model's motion.
 
-    q, qd: (n,), or the states of an OdeSystem and None.  tau: constant applied force, for all coordinates or for each.
-    parameters: values in place of the model's own.
+    q, qd: (nq,) and (n,), or the states of an OdeSystem and None; of a quaternion in q only the direction counts.
+    tau: constant applied force, for all velocities or for each.  parameters: values in place of the model's own.
 
     Raises TypeError or ValueError, naming the argument, for another shape or what is not finite.
     """
@@ -46,7 +46,8 @@ def initial_value(
     if parameters and as_ode(model) is None:
         as_system(model).require_values(values)
     if inputs.applied:
-        values = dict(zip(inputs.applied, per_coordinate("tau", tau, model.coordinates), strict=True)) | values
+        applied = per_coordinate("tau", tau, as_system(model).velocities)
+        values = dict(zip(inputs.applied, applied, strict=True)) | values
     elif np.any(real_array("tau", tau)):
         raise ValueError(f"tau must be 0 for a system of first order, which no force acts on, got {tau!r:.60}")
     return InitialValue(_state(model, inputs, q, qd), inputs.states, values)
@@ -54,8 +55,30 @@ def initial_value(
 
 def split_state(model: Model, x: Sequence[float]) -> tuple[Sequence[float], Sequence[float] | None]:
     """A state (m,) as the arguments q and qd; of an OdeSystem the state and None."""
-    half = len(x) // 2
-    return (x, None) if as_ode(model) is not None else (x[:half], x[half:])
+    nq = len(model.coordinates)
+    return (x, None) if as_ode(model) is not None else (x[:nq], x[nq:])
+
+
+def normalized(model: Model, x: Array) -> Array:
+    """States (.., m) with the constraint of the coordinates met, such as quaternions of length 1.
+
+    Raises ValueError where there are no such, as of a quaternion of length 0.
+    """
+    graph = normalization(model)
+    if graph is None:
+        return x
+    columns = list(np.moveaxis(x, -1, 0))
+    with np.errstate(all="ignore"):
+        for _ in range(2):  # of a length that is far from 1, the first time is rounded
+            columns = list(graph.evaluate(dict(zip(graph.input_names, columns, strict=True))).values())
+    result = np.stack(np.broadcast_arrays(*columns), axis=-1)
+    if not (good := np.isfinite(result)).all():
+        *row, _ = np.argwhere(~good)[0].tolist()
+        bad = [k for k, fine in enumerate(good[*row]) if not fine]
+        names, values = ", ".join([repr(model.coordinates[k]) for k in bad]), x[*row, bad].tolist()
+        of = f" of trajectory {row[0]}" if row else ""
+        raise ValueError(f"{names} need a length whose square is neither 0 nor beyond float64, got {values}{of}")
+    return result
 
 
 def check_names(inputs: StateInputs, names: Iterable[str]) -> None:
@@ -102,9 +125,11 @@ def _state(model: Model, inputs: StateInputs, q: ArrayLike, qd: ArrayLike | None
             raise ValueError("qd must be None for a system of first order; q holds its whole state")
         return _row("q", q, len(inputs.states), "state")
     n = len(inputs.applied)
+    nq = len(inputs.states) - n
+    item = "coordinate" if n == nq else "velocity"
     if qd is None:
-        raise ValueError(f"qd must have shape ({n},), one for each coordinate, got None")
-    return np.concatenate([_row("q", q, n, "coordinate"), _row("qd", qd, n, "coordinate")])
+        raise ValueError(f"qd must have shape ({n},), one for each {item}, got None")
+    return normalized(model, np.concatenate([_row("q", q, nq, "coordinate"), _row("qd", qd, n, item)]))
 
 
 def _row(what: str, value: ArrayLike, n: int, item: str) -> Array:

@@ -54,7 +54,7 @@ def raise_if_singular(model: Model, info: ArrayLike) -> None:
     ...     print(error)
     the mass matrix is not positive definite: coordinate 'x' has an inertia that is not positive
     """
-    values, names = real_array("info", info), as_system(model).coordinates
+    values, names = real_array("info", info), as_system(model).velocities
     failed = np.argwhere(values != 0.0)
     if len(failed):
         at = tuple(failed[0].tolist())

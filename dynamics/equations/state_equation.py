@@ -50,6 +50,21 @@ def state_equation(model: Model) -> Graph:
     return Graph(accelerations.inputs, outputs)
 
 
+def normalization(model: Model) -> Graph | None:
+    """A state to the same one with the constraint of its coordinates met, as unit quaternions; None without any.
+
+    Inputs and outputs the states.
+    """
+    if as_ode(model) is not None:
+        return None
+    system = as_system(model)
+    quasi = system.kinematics.quasi
+    if quasi is None or quasi.normalized is None:
+        return None
+    states = [*system.kinematics.normalized(system.q), *system.qd]
+    return Graph([*system.q, *system.qd], {f"x{k}": node for k, node in enumerate(states)})
+
+
 class StateInputs(NamedTuple):
     """What the inputs of a state equation are, in the order of the graph."""
 

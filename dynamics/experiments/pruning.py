@@ -34,7 +34,8 @@ def report(
         bound = {name: value for name, value in (values or {}).items() if name in known}
         pruned = prune(scene, equations, effects=kept, lock=lock, values=bound, regroup=regroup)
         graphs.append({"equations": title, **_account(pruned)})
-    return {"name": scene.name, "about": scene.about, "effects": list(kept), "graphs": graphs}
+    described = {"name": scene.name, "about": scene.about, "left_out": list(scene.left_out)}
+    return {**described, "effects": list(kept), "graphs": graphs}
 
 
 def _inputs(graph: Graph) -> set[str]:

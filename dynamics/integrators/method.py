@@ -50,7 +50,8 @@ class Method:
     ======================  =========================================================================================
 
     and after it the next state in x, with t, count and evaluations advanced (`explicit.advance` does all but x). It
-    records t and x.
+    records t and x. Where a model's coordinates have a constraint, as quaternions have, the simulation adds to a pass
+    that x is brought back to it; a method knows nothing of that.
 
     An adaptive program makes one trial of a step in a pass. Besides x, p, t and evaluations its registers
     (`step_control.registers`) hold

@@ -32,12 +32,12 @@ class Mechanics(NamedTuple):
 def mechanics(problem: Problem) -> Mechanics:
     """The graphs of momenta of a problem.
 
-    Raises ValueError for a system of first order, which has none, SingularMassMatrixError for a coordinate without
-    inertia.
+    Raises ValueError for a system that has none, of first order or with quasi-velocities; SingularMassMatrixError for
+    a coordinate without inertia.
     """
     system = problem.system
-    if system is None:
-        raise ValueError("this method keeps momenta, which a system of first order does not have")
+    if system is None or not problem.canonical:
+        raise ValueError("this method steps momenta dL/dqd of coordinates, which the model does not have")
     build = Builder()
     p = cg.variables([f"p{i}" for i in range(system.n)])
     bars = cotangents({system.lagrangian: ONE}, [*system.q, *system.qd], build)

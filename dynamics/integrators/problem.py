@@ -12,7 +12,7 @@ from cgraph import Graph, Node
 from cgraph.extend import topological
 
 from ..equations.equations_of_motion import energy
-from ..equations.state_equation import state_equation, state_inputs
+from ..equations.state_equation import normalization, state_equation, state_inputs
 from ..systems.arguments import TIME, Parameters, call_user_function
 from ..systems.model import Model, as_ode, as_system
 from ..systems.system import System
@@ -27,6 +27,8 @@ class Problem:
     states: names, in the order of x (m,).  components: the same in words, for messages.
     parameters: names of the inputs that stay inputs.  bound: {input: number} of those that are built in.
     rate: f, inputs the states, t, parameters; outputs the rates of the states.
+    normalization: a state to the same one with the constraint of its coordinates met, as unit quaternions; None
+    without any.
     system: the Lagrangian system; None for a first-order one.
     """
 
@@ -36,12 +38,23 @@ class Problem:
     parameters: tuple[str, ...]
     bound: Mapping[str, float]
     rate: Graph
+    normalization: Graph | None
     system: System | None
 
     @property
     def size(self) -> int:
         """Numbers in a state, m."""
         return len(self.states)
+
+    @property
+    def nq(self) -> int:
+        """Numbers in a state that are coordinates, which come first; all of a first-order system."""
+        return self.size if self.system is None else self.system.nq
+
+    @property
+    def canonical(self) -> bool:
+        """Whether momenta dL/dqd belong to the coordinates: velocities are their rates."""
+        return self.system is not None and self.system.kinematics.quasi is None
 
     @property
     def timed(self) -> bool:
@@ -63,7 +76,9 @@ def derive(model: Model, bound: Mapping[str, float]) -> Problem:
         equations: tuple[Any, ...] = (ode.rates,)
     else:
         system = as_system(model)
+        moving = system.kinematics
         equations = (system.coordinates, system.partial_lagrangians, system.forces, system.damping)
+        equations += (system.velocities, *moving.q_dot, *moving.normalized(moving.q), moving.groups)
     numbers = tuple([(name, float(value).hex()) for name, value in bound.items()])  # 0.0 and -0.0 stay apart
     key = (*equations, inputs.states, inputs.applied, tuple(inputs.parameters), numbers)
     return _derived(_Request(key, model, bound))
@@ -84,9 +99,12 @@ def _derived(request: _Request) -> Problem:
     if system is None:
         components = [f"state {name!r}" for name in inputs.states]
     else:
-        components = [f"{what} {name!r}" for what in ("coordinate", "velocity of") for name in system.coordinates]
+        components = [f"coordinate {name!r}" for name in system.coordinates]
+        rated = set(system.coordinates)
+        components += [f"velocity {'of ' if name in rated else ''}{name!r}" for name in system.velocities]
     rate = _bind(state_equation(model), inputs.states, parameters, bound)
-    return Problem(model, inputs.states, tuple(components), parameters, bound, rate, system)
+    constraint = normalization(model)
+    return Problem(model, inputs.states, tuple(components), parameters, bound, rate, constraint, system)
 
 
 def _bind(graph: Graph, first: Sequence[str], parameters: Sequence[str], bound: Mapping[str, float]) -> Graph:

@@ -7,6 +7,10 @@ V_i -> P_i(V_i), so that nothing has to be explicit, separable or quadratic. Sum
 numbers of the method that float64 does not hold are two, the second what rounding took off the first: a method is only
 symplectic as exactly as w_i b_ij + w_j a_ji = w_i w_j, and what is missing adds up to a drift of the energy (Hairer,
 McLachlan and Razakarivony, BIT Numerical Mathematics 2008).
+
+Quasi-velocities have no such momenta. Methods of Gauss, and compositions of `midpoint`, step the state (q, qd) there,
+as that of a system of first order. They keep every quadratic invariant, as |q| of a quaternion, and the energy and the
+size of the momentum of a free rotor; and being symmetric, they leave the energy of reversible motions without drift.
 """
 
 from __future__ import annotations
@@ -36,18 +40,18 @@ ONCE = Composition(2, (1.0,))
 
 def composed(composition: Composition, problem: Problem) -> Program:
     """One step a pass, of steps of `verlet` where it is explicit, else of `midpoint`."""
-    explicit = problem.system is not None and mechanics(problem).separable
+    explicit = problem.canonical and mechanics(problem).separable
     return partitioned(VERLET if explicit else MIDPOINT, problem, composition)
 
 
 def partitioned(method: Partitioned, problem: Problem, composition: Composition = ONCE) -> Program:
-    """One step a pass, of a mechanical system; of one of first order where the method is one of Gauss's."""
-    make = _of_momenta if problem.system is not None else _of_first_order
+    """One step a pass: of coordinates and momenta; where there are none, of the state by a method of Gauss's."""
+    make = _of_momenta if problem.canonical else _of_states
     return make(method, problem, composition)
 
 
 def _of_momenta(method: Partitioned, problem: Problem, composition: Composition) -> Program:
-    graphs, n = mechanics(problem), problem.size // 2
+    graphs, n = mechanics(problem), problem.nq
     stages = range(len(method.w))
     lengths = {"q": n, "v": n, "momentum": n, "q_rounding": n, "momentum_rounding": n}
     lengths |= {f"{name}{i}": n for name in ("Q", "V", "P", "F", "W") for i in stages}
@@ -69,9 +73,17 @@ def _of_momenta(method: Partitioned, problem: Problem, composition: Composition)
     return _program(method, problem, lengths, [first_pass(*start, *_guess_at_rest(method, "v")), *body])
 
 
-def _of_first_order(method: Partitioned, problem: Problem, composition: Composition) -> Program:
+def _of_states(method: Partitioned, problem: Problem, composition: Composition) -> Program:
     if method.a is not method.b:
-        raise ValueError("this method advances coordinates and momenta in turn; a system of first order has none")
+        system = problem.system
+        if system is None:
+            raise ValueError("this method advances coordinates and momenta in turn; a system of first order has none")
+        pairs = zip(system.velocities, system.qd, strict=True)
+        other = next(name for name, velocity in pairs if velocity not in system.q_dot)
+        raise ValueError(
+            "this method advances coordinates and their momenta in turn, and velocity "
+            f"{other!r} is the rate of no coordinate: take 'midpoint', 'gauss4' or 'dop853'"
+        )
     m, stages = problem.size, range(len(method.w))
     lengths = {"x_rounding": m} | {f"{name}{i}": m for name in ("Q", "V", "W") for i in stages}
     turn: list[Statement] = []

@@ -11,11 +11,11 @@ import numpy as np
 
 from cgraph.extend import install
 
-from ..multibody.mechanism import require_mechanism
+from ..multibody.mechanism import Mechanism, require_mechanism
 from ..multibody.planar_arm import planar_links
 from ..multibody.spatial import Array
 from ..systems.model import Model
-from .write_mjcf import to_mjcf
+from .write_mjcf import moving_alone, to_mjcf
 
 
 def mujoco() -> Any:
@@ -33,6 +33,14 @@ def _warn(text: str) -> None:
     """MuJoCo's warning as Python's."""
     with suppress(BaseException):  # an exception that leaves a callback aborts the process
         warnings.warn(f"MuJoCo: {' '.join(text.split())}", stacklevel=2)
+
+
+def joint_order(mj: Any, mechanism: Mechanism) -> tuple[list[int], list[int]]:
+    """Where our coordinates stand in qpos, (nq,), and our velocities in qvel, (n,), by the names of the joints."""
+    joints = [(mj.joint(body.coordinate), body.joint.type) for body in mechanism.moving]
+    q = [int(joint.qposadr[0]) + k for joint, kind in joints for k in range(len(kind.coordinates))]
+    u = [int(joint.dofadr[0]) + k for joint, kind in joints for k in range(len(kind.velocities))]
+    return q, u
 
 
 def rollout(mj: Any, starts: Array, states: Array) -> Callable[[], None]:
@@ -62,7 +70,7 @@ class MujocoTwin:
     def __init__(self, of: Model, timestep: float = 1e-3) -> None:
         self.mujoco = mujoco()
         self.mechanism = require_mechanism(of, "MuJoCo").bind()
-        self.model = self.mujoco.MjModel.from_xml_string(to_mjcf(self.mechanism, timestep))
+        self.model = self.mujoco.MjModel.from_xml_string(to_mjcf(moving_alone(self.mechanism), timestep))
         self.data = self.mujoco.MjData(self.model)
 
     def _set(self, q: Array, qd: Array) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -12,20 +13,22 @@ from cgraph.extend import real_number
 
 from ..multibody import spatial
 from ..multibody.joints import AxialJoint
+from ..multibody.kinematic_tree import lock_joints, parents_first
 from ..multibody.mechanism import WORLD, Body, Mechanism, MechanismError, require_mechanism
 from ..multibody.parameters import Quantities
 from ..multibody.spatial import Array
 from ..systems.model import Model
-
-_SMALLEST = 1e-14  # kg, kg m^2: what stands for zero, since MuJoCo takes nothing up to its mjMINVAL of 1e-15
-_ROUNDING = 2.0**-50  # of the largest moment of inertia: what is left of one that is zero
+from .stand_ins import ROUNDING, with_stand_ins
 
 
 def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
     """The bodies of a model as MJCF text: masses and inertias explicit, RK4, contacts off.
 
-    Bodies that are welded on are merged into those that carry them; joints have the names of the coordinates, and of
-    parameters there are the values.
+    `load_mjcf` reads the same bodies from it, those that one carries before the next. Names, positions, centers, masses
+    and coefficients are the same to the last bit; axes, orientations and inertias to a few roundings, which quaternions
+    and principal axes cost. Joints have the names of the coordinates; one that is locked is a weld. MuJoCo takes no
+    zero for the mass and moments of a body that moves: 1e-15 stands for it there, and is zero again when it is read.
+    Of parameters the values are written.
 
     Parameters
     ----------
@@ -42,8 +45,9 @@ def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
     Raises
     ------
     MechanismError
-        For a model without bodies, and for forces on bodies: in MuJoCo they are state, `xfrc_applied`, and not the
-        model's.
+        For a model without bodies; for what MuJoCo does not take: moments that no rigid body has, a body that moves of
+        less than 1e-15 kg or kg m^2, and zeros where 1e-15 is more than 1e-9 of what moves with them; and for forces
+        on bodies: in MuJoCo they are state, `xfrc_applied`, and not the model's.
 
     Examples
     --------
@@ -58,14 +62,30 @@ def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
     return mjcf_text(mechanism, timestep)
 
 
+def all_bodies(mechanism: Mechanism) -> list[Body]:
+    """The bodies of a mechanism, checked, parents first, those welded too; a joint that is locked is a weld."""
+    return parents_first(lock_joints([mechanism.shared.body(body) for body in mechanism.bodies], mechanism.locked))
+
+
+def moving_alone(mechanism: Mechanism) -> Mechanism:
+    """The mechanism of the bodies that move, those welded to them merged in."""
+    return replace(mechanism, bodies=mechanism.moving, locked={})
+
+
 def mjcf_text(
     mechanism: Mechanism, timestep: float, head: Sequence[str] = (), shapes: Mapping[str, Sequence[str]] | None = None
 ) -> str:
     """The text of a mechanism with more elements: `head` before the bodies, `shapes` in the bodies of those names."""
     if mechanism.forces:
         raise MechanismError(f"MJCF has no forces, there is one on body {mechanism.forces[0].body!r}")
+    bodies = all_bodies(mechanism)
+    moments = {body.name: _principal(body) for body in bodies}
+    inertial = {
+        name: (mass, _diagonal(values, moments[name][1]))
+        for name, (mass, values) in with_stand_ins(bodies, moments).items()
+    }
     children: dict[str, list[Body]] = {}
-    for body in mechanism.moving:
+    for body in bodies:
         children.setdefault(body.parent, []).append(body)
     lines = [
         '<mujoco model="mechanism">',
@@ -85,27 +105,26 @@ def mjcf_text(
             lines.append("  " * indent + "</body>")
             continue
         inside = [f"  {line}" for line in (shapes or {}).get(opened.name, ())]
-        lines += ["  " * indent + line for line in [*_body_lines(opened), *inside]]
+        lines += ["  " * indent + line for line in [*_body_lines(opened, *inertial[opened.name]), *inside]]
         indent += 1
         stack += [None, *reversed(children.get(opened.name, []))]
     return "\n".join([*lines, "  </worldbody>", "</mujoco>"]) + "\n"
 
 
-def _body_lines(body: Body) -> list[str]:
+def _body_lines(body: Body, mass: float, moments: str) -> list[str]:
     joint = body.joint
-    _require_joint(body)
     x, y, _ = np.asarray(joint.orientation).T
-    spring = f'damping="{joint.damping!r}" armature="{joint.armature!r}"'
-    if isinstance(joint.type, AxialJoint):
-        spring = f'stiffness="{joint.stiffness!r}" springref="{joint.spring_reference!r}" {spring}'
-        spring = f'axis="{numbers(joint.axis)}" {spring}'
-    mass = body.mass or _SMALLEST  # one that is small stays: if MuJoCo refuses it, it says so
     place = f'pos="{numbers(joint.position)}" xyaxes="{numbers(np.concatenate([x, y]))}"'
-    return [
-        f"<body name={quoteattr(body.name)} {place}>",
-        f'  <joint name={quoteattr(body.coordinate)} type="{joint.type.mjcf}" {spring}/>',
-        f'  <inertial pos="{numbers(body.center)}" mass="{mass!r}" {_principal(np.asarray(body.inertia))}/>',
-    ]
+    lines = [f"<body name={quoteattr(body.name)} {place}>"]
+    if joint.type.moves:
+        _require_joint(body)
+        spring = f'damping="{joint.damping!r}" armature="{joint.armature!r}"'
+        if isinstance(joint.type, AxialJoint):
+            spring = f'stiffness="{joint.stiffness!r}" springref="{joint.spring_reference!r}" {spring}'
+            spring = f'axis="{numbers(joint.axis)}" {spring}'
+        lines.append(f'  <joint name={quoteattr(body.coordinate)} type="{joint.type.mjcf}" {spring}/>')
+    lines.append(f'  <inertial pos="{numbers(body.center)}" mass="{mass!r}" {moments}/>')
+    return lines
 
 
 def _require_joint(body: Body) -> None:
@@ -120,15 +139,29 @@ def _require_joint(body: Body) -> None:
             raise MechanismError(f"in MJCF a free joint has the axes and the origin of the world, and {where} has not")
 
 
-def _principal(inertia: Array) -> str:
-    """The inertia by its principal moments, more exact than what MuJoCo's own iteration finds."""
+def _principal(body: Body) -> tuple[Array, Array]:
+    """Principal moments and axes of a body, more exact than what MuJoCo's own iteration finds.
+
+    Raises MechanismError for moments that no rigid body has, by more than rounding, which MuJoCo does not take.
+    """
+    inertia = np.asarray(body.inertia)
     moments, axes = np.diag(inertia), np.eye(3)
     if np.any(inertia - np.diag(moments)):
         moments, axes = np.linalg.eigh(inertia)
         axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
-    moments = np.where(moments > _ROUNDING * moments.max(), moments, _SMALLEST)
-    largest = moments.argmax()  # of a plate it is the sum of the others, and may not be more by rounding
-    moments[largest] = min(moments[largest], np.delete(moments, largest).sum() * (1.0 - 1e-15))
+        moments = np.where(np.abs(moments) <= ROUNDING * moments.max(), 0.0, moments)
+    largest = int(moments.argmax())  # of a plate it is the sum of the others, and may not be more by rounding
+    most = float(np.delete(moments, largest).sum())
+    if moments.min() < 0.0 or moments[largest] - most > ROUNDING * moments[largest]:
+        raise MechanismError(
+            f"MuJoCo takes no body with principal moments {moments.tolist()}, as {body.name!r} has them"
+        )
+    moments = moments.copy()
+    moments[largest] = min(moments[largest], most)
+    return moments, axes
+
+
+def _diagonal(moments: Array, axes: Array) -> str:
     return f'diaginertia="{numbers(moments)}" quat="{numbers(spatial.to_quaternion(axes))}"'
 
 

@@ -8,18 +8,20 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..multibody.mechanism import Body, MechanismError, require_mechanism
+from ..multibody.mechanism import WORLD, Body, MechanismError, require_mechanism
+from ..multibody.parameters import vanishes
 from ..multibody.spatial import Array
 from ..systems.model import Model
-from .write_mjcf import numbers
-
-_FAR = 1e9  # m, N, m/s: URDF asks each slide for its limits
+from .read_urdf import FAR, GRAVITY
+from .write_mjcf import all_bodies, numbers
 
 
 def to_urdf(model: Model) -> str:
-    """The moving bodies of a model as URDF text, those welded to them merged in; the root link is "world".
+    """The bodies of a model as URDF text; the root link is "world".
 
-    URDF has no gravity: who reads it chooses. Of parameters the values are written.
+    `load_urdf` reads the same bodies in the same order from it: all numbers to the last bit but axes and orientations,
+    which angles cost a few roundings. A joint that is locked is a weld. Gravity other than 9.81 m/s^2 along -z, which
+    URDF has not, is in an element of MuJoCo's that other programs pass over. Of parameters the values are written.
 
     Parameters
     ----------
@@ -29,7 +31,7 @@ def to_urdf(model: Model) -> str:
     Returns
     -------
     str
-        The text. Joints have the names of the coordinates.
+        The text. Joints have the names of the coordinates; a slide has limits of 1e9 m, as URDF asks for some.
 
     Raises
     ------
@@ -46,16 +48,21 @@ def to_urdf(model: Model) -> str:
     mechanism = require_mechanism(model, "URDF").bind()
     if mechanism.forces:
         raise MechanismError(f"URDF has no forces, there is one on body {mechanism.forces[0].body!r}")
-    lines = ['<?xml version="1.0"?>', '<robot name="mechanism">', '  <link name="world"/>']
-    for body in mechanism.moving:
-        lines += [*_link_lines(body), *_joint_lines(body)]
+    lines = ['<?xml version="1.0"?>', '<robot name="mechanism">']
+    gravity = numbers(mechanism.gravity)
+    if gravity != numbers(GRAVITY):
+        lines.append(f'  <mujoco><option gravity="{gravity}"/></mujoco>')
+    lines.append(f'  <link name="{WORLD}"/>')
+    names = set(mechanism.coordinates)
+    for body in all_bodies(mechanism):
+        lines += [*_link_lines(body), *_joint_lines(body, _joint_name(body, names))]
     return "\n".join([*lines, "</robot>"]) + "\n"
 
 
 def _link_lines(body: Body) -> list[str]:
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = np.asarray(body.inertia).tolist()
     moments = f'ixx="{xx!r}" ixy="{xy!r}" ixz="{xz!r}" iyy="{yy!r}" iyz="{yz!r}" izz="{zz!r}"'
-    if not body.mass and not np.any(np.asarray(body.inertia)):
+    if vanishes(body.mass) and vanishes(body.inertia) and vanishes(body.center):
         return [f"  <link name={quoteattr(body.name)}/>"]
     mass = f'<origin xyz="{numbers(body.center)}"/><mass value="{body.mass!r}"/><inertia {moments}/>'
     return [
@@ -65,27 +72,44 @@ def _link_lines(body: Body) -> list[str]:
     ]
 
 
-def _joint_lines(body: Body) -> list[str]:
+def _joint_name(body: Body, names: set[str]) -> str:
+    """The name of a joint, added to those that are taken; a weld gets one that no other has."""
+    name = body.coordinate
+    while name in names and not body.joint.type.moves:
+        name += "'"
+    names.add(name)
+    return name
+
+
+def _joint_lines(body: Body, name: str) -> list[str]:
     joint = body.joint
+    place = f'    <origin xyz="{numbers(joint.position)}" rpy="{numbers(_rpy(joint.orientation))}"/>'
+    ends = f"    <parent link={quoteattr(body.parent)}/><child link={quoteattr(body.name)}/>"
+    opened = f'  <joint name={quoteattr(name)} type="{joint.type.urdf}">'
+    if not joint.type.moves:
+        return [opened, ends, place, "  </joint>"]
     for what in ("stiffness", "armature"):
         if getattr(joint, what):
             raise MechanismError(f"URDF has no {what}, body {body.name!r} has {getattr(joint, what)!r}")
-    limits = f'lower="{-_FAR!r}" upper="{_FAR!r}" ' if joint.type.limited else ""
+    limits = f'lower="{-FAR!r}" upper="{FAR!r}" ' if joint.type.limited else ""
     return [
-        f'  <joint name={quoteattr(body.coordinate)} type="{joint.type.urdf}">',
-        f"    <parent link={quoteattr(body.parent)}/><child link={quoteattr(body.name)}/>",
-        f'    <origin xyz="{numbers(joint.position)}" rpy="{numbers(_rpy(joint.orientation))}"/>',
+        opened,
+        ends,
+        place,
         f'    <axis xyz="{numbers(joint.axis)}"/><dynamics damping="{joint.damping!r}"/>',
-        f'    <limit {limits}effort="{_FAR!r}" velocity="{_FAR!r}"/>',
+        f'    <limit {limits}effort="{FAR!r}" velocity="{FAR!r}"/>',
         "  </joint>",
     ]
 
 
 def _rpy(orientation: ArrayLike) -> Array:
-    """Angles [rad] about the fixed x, then y, then z, that make the rotation; about z none where x could do it."""
+    """Angles [rad] about the fixed x, then y, then z, that make the rotation.
+
+    The angle about x is read off the rotation turned back about z, so that both fit each other where the pitch is near
+    a quarter turn and each alone is hardly determined.
+    """
     r = np.asarray(orientation)
-    cosine = math.hypot(r[0, 0], r[1, 0])
-    pitch = math.atan2(-r[2, 0], cosine)
-    if cosine < 1e-9:
-        return np.array([math.atan2(-r[1, 2], r[1, 1]), pitch, 0.0])
-    return np.array([math.atan2(r[2, 1], r[2, 2]), pitch, math.atan2(r[1, 0], r[0, 0])])
+    yaw = math.atan2(r[1, 0], r[0, 0])
+    c, s = math.cos(yaw), math.sin(yaw)
+    roll = math.atan2(s * r[0, 2] - c * r[1, 2], c * r[1, 1] - s * r[0, 1])
+    return np.array([roll, math.atan2(-r[2, 0], math.hypot(r[0, 0], r[1, 0])), yaw])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -26,6 +27,18 @@ class MechanismError(ValueError):
     """A mechanism that cannot be: which body, what was given, and what was needed."""
 
 
+class MechanismWarning(UserWarning):
+    """What a mechanism has not of the file that it was read from, or a body that cannot be, but can be calculated with.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import dynamics as dyn
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("error", dyn.MechanismWarning)  # a model that lacks something is no model
+    """
+
+
 @dataclass(frozen=True, eq=False)
 class Joint:
     """How a body hangs on its parent; the joint is at the origin of the body's frame.
@@ -44,7 +57,8 @@ class Joint:
     position : array_like, (3,)
         Origin of the body's frame in its parent's at q = 0 [m].
     orientation : array_like, (3, 3)
-        Axes of the body's frame, as columns in its parent's, at q = 0.
+        Axes of the body's frame, as columns in its parent's, at q = 0. Entries up to 1e-14 are zero: a quarter turn in
+        text, or by the cosine of pi / 2, is one.
     damping : float
         Viscous coefficient, at least 0 [N m s or N s/m].
     stiffness, spring_reference : float
@@ -209,8 +223,10 @@ def checked(body: Body) -> Body:
     where, joint = f"body {body.name!r}", body.joint
     if not isinstance(body.parent, str):
         raise MechanismError(f"{where}: parent must be the name of a body or {WORLD!r}, got {body.parent!r:.80}")
-    given = {name: check(f"{where}: {name}", getattr(body, name)) for name, check in BODY_QUANTITIES.items()}
-    return replace(body, joint=_checked_joint(where, joint), **given)
+    mass, center = _mass(f"{where}: mass", body.mass), quantities(f"{where}: center", body.center)
+    beside = 0.0 if isinstance(mass, Node) or center.dtype == object else mass * float(center @ center)
+    inertia = _inertia(f"{where}: inertia", body.inertia, beside)
+    return replace(body, mass=mass, center=center, inertia=inertia, joint=_checked_joint(where, joint))
 
 
 def _checked_joint(where: str, joint: Joint) -> Joint:
@@ -240,8 +256,12 @@ def _check_name(what: str, name: str) -> None:
         raise MechanismError(str(error)) from None
 
 
-def _inertia(what: str, given: Any) -> Array:
-    """Symmetric, and with principal moments that are not negative and obey the triangle inequality."""
+def _inertia(what: str, given: Any, beside: float = 0.0) -> Array:
+    """Symmetric, and with principal moments that are not negative; a warning where no rigid body has them.
+
+    Kinetic energy is positive all the same, so that all equations of a tree hold.
+    beside: the inertia of the mass about the joint, beside which a moment may be rounding.
+    """
     diagonal = shape_of(given) == (3,)
     inertia = quantities(what, given, (3,) if diagonal else (3, 3))
     inertia = np.where(np.eye(3, dtype=bool), inertia, 0.0) if diagonal else inertia
@@ -251,14 +271,14 @@ def _inertia(what: str, given: Any) -> Array:
     if np.abs(inertia - inertia.T).max() > _ROUNDING * scale:
         raise MechanismError(f"{what} must be symmetric")
     moments = np.linalg.eigvalsh(inertia)
-    if moments[0] < -_ROUNDING * scale:
+    rounding = _ROUNDING * scale + spatial.SNAP * beside
+    if moments[0] < -rounding:
         raise MechanismError(f"{what} must not be negative, its principal moments are {moments.tolist()}")
-    if moments[2] > moments[0] + moments[1] + _ROUNDING * scale:
-        raise MechanismError(
-            f"{what.removesuffix(': inertia')}: no body has principal moments {moments.tolist()}: "
-            "the largest exceeds the sum of the others"
-        )
-    return inertia
+    if moments[2] > moments[0] + moments[1] + rounding:
+        where = what.removesuffix(": inertia")
+        text = f"{where}: no body has principal moments {moments.tolist()}: the largest exceeds the sum of the others"
+        warnings.warn(text, MechanismWarning, stacklevel=2)
+    return 0.5 * (inertia + inertia.T)
 
 
 BODY_QUANTITIES: dict[str, Callable[[str, Any], Any]] = {

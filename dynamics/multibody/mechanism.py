@@ -1,4 +1,4 @@
-"""Mechanisms: trees of rigid bodies joined by hinges, slides and welds."""
+"""Mechanisms: trees of rigid bodies, on joints of one axis or several freedoms, or free."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cgraph.extend import Builder, building, require_flag, require_mapping
 from ..systems.arguments import parameter_value
 from ..systems.model import Model
 from ..systems.system import BodySystem, System
-from .body import WORLD, Body, Joint, MechanismError, quantities, vector
+from .body import WORLD, Body, Joint, MechanismError, MechanismWarning, quantities, vector
 from .external_force import Force, check_force, generalized_forces
 from .forward_kinematics import KinematicChain, kinematic_chain
 from .inertial_numbers import Link
@@ -31,7 +31,17 @@ from .spatial import Array
 from .subtree import Subtree
 from .tree_equations import TreeEquations
 
-__all__ = ["WORLD", "Body", "Force", "Joint", "Mechanism", "MechanismError", "as_mechanism", "require_mechanism"]
+__all__ = [
+    "WORLD",
+    "Body",
+    "Force",
+    "Joint",
+    "Mechanism",
+    "MechanismError",
+    "MechanismWarning",
+    "as_mechanism",
+    "require_mechanism",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,15 +65,16 @@ class Mechanism(Structure):
     base_parameters : bool
         Written with the fewest inertial numbers (`base_parameters.py`). Smaller graphs of the same motion; but a
         partial Lagrangian is then not the energy of its body.
-    omitted : tuple of str
+    left_out : tuple of str
         Of a mechanism that was read from a file: what the file has and the mechanism has not, a sentence each.
 
     Raises
     ------
     MechanismError
-        For an unknown parent, a cycle, a repeated name, numbers that are not finite or out of range, an inertia that
-        no body can have, a coordinate that moves no mass and has no armature, a force on an unknown body, a parameter
-        that nothing uses, one without value, and a value that makes any of this.
+        For an unknown parent, a cycle, a repeated name, numbers that are not finite or out of range, a negative
+        moment of inertia, a coordinate that moves no mass and has no armature, a force on an unknown body, a parameter
+        that nothing uses, one without value, and a value that makes any of this. Positive moments that no rigid body
+        can have, the largest above the sum of the others, are a `MechanismWarning`: the equations hold with them.
 
     Examples
     --------

@@ -25,7 +25,7 @@ class Structure:
     parameters: Mapping[str, float] = field(default_factory=dict)
     locked: Mapping[str, float | ArrayLike] = field(default_factory=dict)
     base_parameters: bool = False
-    omitted: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
     shared: SharedParts = field(default_factory=SharedParts, repr=False, kw_only=True)
 
     @property

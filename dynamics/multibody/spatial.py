@@ -50,6 +50,11 @@ def snapped(columns: Array) -> Array:
     return np.where(along & (across <= 2.0**-53), np.sign(result), result) + 0.0
 
 
+def cleaned(array: Array) -> Array:
+    """Numbers that another program computed from shapes, without those that are its rounding beside the largest."""
+    return np.where(np.abs(array) <= SNAP * np.abs(array).max(), 0.0, array) + 0.0
+
+
 def without_rounding(total: Array, terms: Array) -> Array:
     """The sums, with those that are the rounding of their terms set to zero.  terms: the sum of their absolute values.
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..io.mujoco_twin import MujocoTwin, rollout
+from ..io.mujoco_twin import MujocoTwin, joint_order, rollout
 from ..multibody.mechanism import Mechanism, as_mechanism
 from .case import BATCH, DT, PASSES, Array, Case
 from .contender import Contender, Peer, UnavailableError
@@ -30,11 +30,7 @@ class MujocoPeer(Peer):
         self.mujoco, model = self.twin.mujoco, self.twin.model
         for unused in ("CONSTRAINT", "SENSOR", "ACTUATION", "WARMSTART"):
             model.opt.disableflags |= getattr(self.mujoco.mjtDisableBit, f"mjDSBL_{unused}")
-        joints = [(model.joint(body.coordinate), body.joint.type) for body in mechanism.moving]
-        self.q_order = _order(
-            [(joint.qposadr[0], len(kind.coordinates)) for joint, kind in joints]
-        )  # of ours, in theirs
-        self.order = _order([(joint.dofadr[0], len(kind.velocities)) for joint, kind in joints])
+        self.q_order, self.order = (np.array(each) for each in joint_order(model, mechanism))
         self.q_at, self.at = np.argsort(self.q_order), np.argsort(self.order)
 
     def quantities(self, q: Array, qd: Array, qdd: Array, tau: Array) -> dict[str, Array]:
@@ -84,8 +80,3 @@ class MujocoPeer(Peer):
             return last.copy() if mode == "batch" else last[:, 0].copy()
 
         return Contender(rollout(self.twin.model, starts, states), result, BATCH if mode == "batch" else PASSES)
-
-
-def _order(slots: list[tuple[int, int]]) -> Array:
-    """The indices of slots (first, how many), one after another."""
-    return np.concatenate([np.arange(first, first + count) for first, count in slots]).astype(np.intp)

@@ -10,7 +10,7 @@ import numpy as np
 
 from cgraph.extend import install
 
-from ..io.write_mjcf import to_mjcf
+from ..io.write_mjcf import moving_alone, to_mjcf
 from .case import BATCH, Array, Case, rk4_step
 from .contender import Contender, Peer, UnavailableError
 from .mujoco import bodies
@@ -35,7 +35,7 @@ class PinocchioPeer(Peer):
             raise UnavailableError("has other coordinates of ball and free joints")
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "model.xml"
-            path.write_text(to_mjcf(mechanism), encoding="utf-8")
+            path.write_text(to_mjcf(moving_alone(mechanism)), encoding="utf-8")
             self.twin = pinocchio.buildModelFromMJCF(str(path))
         # Its reader of MJCF leaves gravity at the default.
         self.twin.gravity.linear = np.asarray(mechanism.gravity, dtype=np.float64)

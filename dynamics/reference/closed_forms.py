@@ -116,28 +116,77 @@ def free_rigid_body(times: Sequence[float], inertia: Sequence[float], omega: Seq
 
     Landau and Lifshitz, "Mechanics", section 37, from any start that is no permanent rotation and not on a separatrix.
     """
+    return _solution(times, lambda mp, t: _Rotor(mp, inertia, omega).velocity(t), "Jacobi elliptic functions")
+
+
+def free_rotor(times: Sequence[float], inertia: Sequence[float], omega: Sequence[float]) -> Reference:
+    """The same motion with the orientation. States: the body's axes, seen in those at t = 0, row by row; omega.
+
+    The body turns about the axis of its angular momentum by an elliptic integral of the third kind, and stands against
+    that axis as its angular velocity says (E. T. Whittaker, "Analytical Dynamics", section 69).
+    """
 
     def state(mp: Any, t: Any) -> list[Any]:
+        rotor = _Rotor(mp, inertia, omega)
+        first, here, angle = rotor.frame(mp.mpf(0)), rotor.frame(t), rotor.precession(t)
+        s, c = mp.sin(angle), mp.cos(angle)
+        turned = [first[0] * c + first[1] * s, first[1] * c - first[0] * s, first[2]]
+        rotation = sum([a * b.T for a, b in zip(turned, here, strict=True)], mp.zeros(3, 3))
+        return [*rotation, *rotor.velocity(t)]
+
+    return _solution(times, state, "Jacobi elliptic functions, and an integral of the third kind")
+
+
+class _Rotor:
+    """A rigid body without torque from a start: w_a = first cn(u), w_1 = middle sn(u), w_c = last dn(u)."""
+
+    def __init__(self, mp: Any, inertia: Sequence[float], omega: Sequence[float]) -> None:
         i, w = [mp.mpf(value) for value in inertia], [mp.mpf(value) for value in omega]
         energy = sum(a * b * b for a, b in zip(i, w, strict=True))  # twice
         square = sum((a * b) ** 2 for a, b in zip(i, w, strict=True))
         # With L^2 < 2 T I_2 the body turns about axis 1; the roles of axes 1 and 3 change then.
         a, c = (0, 2) if square > energy * i[1] else (2, 0)
-        first = mp.sqrt((energy * i[c] - square) / (i[a] * (i[c] - i[a])))
-        middle = mp.sqrt((energy * i[c] - square) / (i[1] * (i[c] - i[1])))
-        last = mp.sqrt((square - energy * i[a]) / (i[c] * (i[c] - i[a])))
-        rate = mp.sqrt((i[c] - i[1]) * (square - energy * i[a]) / (i[0] * i[1] * i[2]))
-        m = (i[1] - i[a]) * (energy * i[c] - square) / ((i[c] - i[1]) * (square - energy * i[a]))
         turn = mp.sign(w[c]) or 1
-        # w_a = first cn(u), w_1 = turn middle sn(u), w_c = turn last dn(u)
-        amplitude = mp.atan2(turn * w[1] / middle, w[a] / first)
-        u = mp.ellipf(amplitude, m) + rate * t
-        sn, cn, dn = (mp.ellipfun(name, u=u, m=m) for name in ("sn", "cn", "dn"))
-        result = [mp.mpf(0)] * 3
-        result[a], result[1], result[c] = first * cn, turn * middle * sn, turn * last * dn
+        self.first = mp.sqrt((energy * i[c] - square) / (i[a] * (i[c] - i[a])))
+        self.middle = turn * mp.sqrt((energy * i[c] - square) / (i[1] * (i[c] - i[1])))
+        self.last = turn * mp.sqrt((square - energy * i[a]) / (i[c] * (i[c] - i[a])))
+        self.rate = mp.sqrt((i[c] - i[1]) * (square - energy * i[a]) / (i[0] * i[1] * i[2]))
+        self.m = (i[1] - i[a]) * (energy * i[c] - square) / ((i[c] - i[1]) * (square - energy * i[a]))
+        self.start = mp.ellipf(mp.atan2(w[1] / self.middle, w[a] / self.first), self.m)
+        self.mp, self.inertia, self.energy, self.square, self.a, self.c = mp, i, energy, square, a, c
+
+    def velocity(self, t: Any) -> list[Any]:
+        """Angular velocity in the body's axes."""
+        u = self.start + self.rate * t
+        sn, cn, dn = (self.mp.ellipfun(name, u=u, m=self.m) for name in ("sn", "cn", "dn"))
+        result = [self.mp.mpf(0)] * 3
+        result[self.a], result[1], result[self.c] = self.first * cn, self.middle * sn, self.last * dn
         return result
 
-    return _solution(times, state, "Jacobi elliptic functions")
+    def frame(self, t: Any) -> list[Any]:
+        """In the body's axes: those whose z is the angular momentum, and whose x leans towards axis c."""
+        momentum = [i * w for i, w in zip(self.inertia, self.velocity(t), strict=True)]
+        z = self.mp.matrix(momentum) / self.mp.sqrt(self.square)
+        x = self.mp.matrix([int(k == self.c) - z[self.c] * z[k] for k in range(3)])
+        x /= self.mp.norm(x)
+        y = [z[1] * x[2] - z[2] * x[1], z[2] * x[0] - z[0] * x[2], z[0] * x[1] - z[1] * x[0]]
+        return [x, self.mp.matrix(y), z]
+
+    def precession(self, t: Any) -> Any:
+        """How far axis c has turned about L: the integral of L (2T - I_c w_c^2) / (L^2 - I_c^2 w_c^2) [rad]."""
+        mp, moment = self.mp, self.inertia[self.c]
+        across = self.square - (moment * self.last) ** 2  # L^2 - I_c^2 w_c^2 = across (1 - n sn^2)
+        n = -((moment * self.last) ** 2) * self.m / across
+        share = self._third(n, self.start + self.rate * t) - self._third(n, self.start)
+        return mp.sqrt(self.square) / moment * (t + (self.energy * moment - self.square) / across * share / self.rate)
+
+    def _third(self, n: Any, u: Any) -> Any:
+        """The integral of 1 / (1 - n sn^2) from 0 to u."""
+        mp, m = self.mp, self.m
+        turns = mp.nint(u / (2 * mp.ellipk(m)))
+        v = u - 2 * turns * mp.ellipk(m)
+        amplitude = mp.atan2(mp.ellipfun("sn", u=v, m=m), mp.ellipfun("cn", u=v, m=m))
+        return 2 * turns * mp.ellippi(n, m) + mp.ellippi(n, amplitude, m)
 
 
 def cyclotron(times: Sequence[float], start: Sequence[float], frequency: float) -> Reference:

@@ -50,7 +50,8 @@ def reference(
     model : System, OdeSystem, Mechanism or Scene
         What moves.
     q, qd : array_like
-        The start, (n,) each [rad or m, per second]; of an OdeSystem q is the state, (m,), and qd None.
+        The start, (nq,) and (n,) [rad or m, per second], as in `simulate`; of an OdeSystem q is the state, (m,), and qd
+        None. The length of a quaternion stays what its float64 make it, 1 to rounding.
     t_eval : array_like
         Increasing times from 0 on, (T,) [s].
     digits : int
@@ -59,7 +60,7 @@ def reference(
         "taylor", Taylor series, whose steps end where a piecewise operation switches; "radau", implicit collocation,
         for what is stiff and smooth.
     tau : float or sequence
-        Constant applied force [N m or N], for all coordinates or for each, (n,).
+        Constant applied force [N m or N], for all velocities or for each, (n,).
     parameters : mapping, optional
         {name: value} in place of the model's own.
     folder : path, optional

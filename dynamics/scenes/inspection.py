@@ -64,7 +64,7 @@ def inspection(
     frames = int(min(FRAMES, max(2.0, RATE * end))) if np.isfinite(end) else 2
     times = np.linspace(0.0, end, frames) if end > 0.0 else None
     say(f"{scene.name}: deriving the equations of {system.n} coordinates, compiling them, and a motion of {end:g} s")
-    run = simulate(system, scene.q, scene.qd, end, "dopri5", rtol=1e-6, atol=1e-8, t_eval=times)
+    run = simulate(system, scene.q, scene.qd, end, "dopri5", rtol=1e-6, t_eval=times)
     say(f"{scene.name}: deriving forward dynamics")
     rate = forward_dynamics(system)
     state = _named(q=run.q, qd=run.qd, tau=np.zeros_like(run.qd)) | system.parameters | {"t": run.t}

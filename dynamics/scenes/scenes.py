@@ -102,9 +102,9 @@ class Scene:
         return as_mechanism(self.model)
 
     @property
-    def omitted(self) -> tuple[str, ...]:
+    def left_out(self) -> tuple[str, ...]:
         """Of a model that was read from a file: what the file has and the model has not, a sentence each."""
-        return self.mechanism.omitted if self.mechanism else ()
+        return self.mechanism.left_out if self.mechanism else ()
 
     @property
     def ode(self) -> OdeSystem | None:
@@ -158,7 +158,7 @@ _SUFFIXES = (".xml", ".urdf")
 def of_file(path: str | os.PathLike[str], ignore: bool = False) -> Scene:
     """The mechanism of a file, MJCF or URDF, at rest at q = 0; named as the file is, without its suffix.
 
-    ignore: leave out what a mechanism cannot have; `omitted` says what. Raises as `load_mjcf` does.
+    ignore: leave out what a mechanism cannot have; `left_out` says what. Raises as `load_mjcf` does.
     """
     mechanism = load_model(path, ignore=ignore)
     n = mechanism.system.n

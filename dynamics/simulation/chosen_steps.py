@@ -90,7 +90,7 @@ class AdaptiveIntegration(NativeIntegration):
         if not self.program.dense:
             return StepBlock(t, x, t - h, h, np.full_like(x, math.nan), None)
         t_old, x_old, dense = rows[:, 2 + m], rows[:, 3 + m : 3 + 2 * m], rows[:, 3 + 2 * m :]
-        return StepBlock(t, x, t_old, h, x_old, dense.reshape(len(t), -1, m))
+        return StepBlock(t, x, t_old, h, x_old, dense.reshape(len(t), -1, m), self.program.normalization)
 
     def _look(self, memory: Array, rows: Array) -> None:
         """Note once what a user should know of these steps: stiffness, and tolerances below rounding."""
@@ -131,7 +131,7 @@ class AdaptiveIntegration(NativeIntegration):
         return np.array(list(rate.evaluate(values).values()), dtype=np.float64)
 
     def _fresh_sizes(self) -> StateSizes:
-        return StateSizes(self.relative, self.program.kinds, SMALLEST_ATOL)
+        return StateSizes(self.relative, self.program.kinds, self.program.groups, SMALLEST_ATOL)
 
     def _first_step(self, x: Array) -> float:
         """The first step; where atol is chosen by the sizes of the states, those that it leads to."""

@@ -26,6 +26,13 @@ class StepBlock(NamedTuple):
     h: Array  # (T,), negative in a run back in time
     x_old: Array  # (T, m)
     dense: Array | None  # (T, degree, m)
+    normalization: Graph | None = None  # of the states between the ends, see Problem
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the numbers."""
+        arrays = (self.t, self.x, self.t_old, self.h, self.x_old, self.dense)
+        return sum(array.nbytes for array in arrays if array is not None)
 
     def states_at(self, rows: Indices, s: Array) -> Array:
         """States (k, m) at the shares s (k,) of the steps `rows` (k,)."""
@@ -34,8 +41,9 @@ class StepBlock(NamedTuple):
         for coefficients in self.dense[rows].swapaxes(0, 1)[::-1]:
             total += coefficients
             total *= share
-        inside: Array = np.where((s == 1.0)[:, None], self.x[rows], self.x_old[rows] + total)
-        return inside
+        inside = normalized(self.normalization, self.x_old[rows] + total)
+        states: Array = np.where((s == 1.0)[:, None], self.x[rows], inside)
+        return states
 
     def times_at(self, rows: Indices, s: Array) -> Array:
         """Times (k,)."""
@@ -49,19 +57,40 @@ class StepBlock(NamedTuple):
         for k, coefficients in reversed(list(enumerate(self.dense[rows].swapaxes(0, 1), 1))):
             total *= share
             total += k * coefficients
-        return total
+        if self.normalization is None:
+            return total
+        between = self._replace(normalization=None).states_at(rows, s)
+        return _table(_tangent(self.normalization), np.concatenate([between, total], axis=1))
 
     def part(self, which: slice) -> StepBlock:
         """Some of the steps."""
         dense = None if self.dense is None else self.dense[which]
         t, x, t_old, h, x_old = (array[which] for array in (self.t, self.x, self.t_old, self.h, self.x_old))
-        return StepBlock(t, x, t_old, h, x_old, dense)
+        return StepBlock(t, x, t_old, h, x_old, dense, self.normalization)
 
     def ending(self, t: float, x: Array) -> StepBlock:
         """The steps, the last of which ends at an instant inside it."""
         cut = self._replace(t=self.t.copy(), x=self.x.copy())
         cut.t[-1:], cut.x[-1:] = t, x
         return cut
+
+
+def normalized(normalization: Graph | None, states: Array) -> Array:
+    """States (T, m) with the constraint of the coordinates met."""
+    return states if normalization is None else _table(normalization, states)
+
+
+@lru_cache(KEPT)
+def _tangent(graph: Graph) -> Graph:
+    """Of the outputs, from the inputs and their tangents."""
+    return cg.jvp(graph)
+
+
+def _table(graph: Graph, columns: Array) -> Array:
+    """Outputs (T, k) of a graph at rows of its inputs."""
+    with np.errstate(all="ignore"):
+        values = graph.evaluate(dict(zip(graph.input_names, columns.T, strict=True)))
+    return np.stack(np.broadcast_arrays(*values.values()), axis=1)
 
 
 @lru_cache(KEPT)

@@ -38,9 +38,10 @@ class Event:
         Whether the run ends there.
     reset : callable, optional
         The state from which the run goes on, reset(q, qd, t) or reset(q, qd, t, p) -> (q, qd) as nodes or numbers; of
-        an OdeSystem reset(x, t) or reset(x, t, p) -> x. Both states are rows of the trajectory, at the same instant; at
-        a time of `t_eval`, the one before is. Of resets at one instant the next takes what the one before left. Where
-        they follow one another in no time, as the bounces of a ball that comes to rest do, the run stops and says so.
+        an OdeSystem reset(x, t) or reset(x, t, p) -> x. Quaternions in q are brought to length 1. Both states are rows
+        of the trajectory, at the same instant; at a time of `t_eval`, the one before is. Of resets at one instant the
+        next takes what the one before left. Where they follow one another in no time, as the bounces of a ball that
+        comes to rest do, the run stops and says so.
 
     Raises
     ------

@@ -135,16 +135,16 @@ class EventLog:
             f"{MOST} looks in a step; shorter steps (max_step or dt) find all"
         )
 
-    def crossings(self, half: int) -> dict[str, Crossings]:
-        """Of each event by name, with states split after `half` numbers into q and qd."""
-        return split_crossings(self.program, self.happened, half)
+    def crossings(self, nq: int) -> dict[str, Crossings]:
+        """Of each event by name, with states split after nq numbers into q and qd."""
+        return split_crossings(self.program, self.happened, nq)
 
 
-def split_crossings(program: EventProgram, happened: Sequence[Happening], half: int) -> dict[str, Crossings]:
-    """Of each event by name, (number, t, x) as times and states, split after `half` numbers into q and qd."""
+def split_crossings(program: EventProgram, happened: Sequence[Happening], nq: int) -> dict[str, Crossings]:
+    """Of each event by name, (number, t, x) as times and states, split after nq numbers into q and qd."""
     result = {}
     for number, event in enumerate(program.events):
         matching = [(t, x) for k, t, x in happened if k == number]
         states = np.array([x for _, x in matching]).reshape(len(matching), len(program.components))
-        result[event.name] = Crossings(np.array([t for t, _ in matching]), states[:, :half], states[:, half:])
+        result[event.name] = Crossings(np.array([t for t, _ in matching]), states[:, :nq], states[:, nq:])
     return result

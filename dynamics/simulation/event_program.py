@@ -96,14 +96,16 @@ def _reset(problem: Problem, name: str, function: Callable[..., Any]) -> Graph:
     changed = call_user_function(what, function, *state_arguments(problem))
     parts = [changed] if problem.system is None else sequence(f"{what} must be (q, qd),", changed)
     halves = [sequence(f"{what} must be" + (" a pair of" if len(parts) == 2 else ""), part) for part in parts]
-    n = problem.size // (1 if problem.system is None else 2)
-    if len(halves) != problem.size // n or any(len(half) != n for half in halves):
-        needed = f"({n} coordinates, {n} velocities)" if problem.system else f"{n} states"
+    nq, n = problem.nq, problem.size - problem.nq
+    if [len(half) for half in halves] != ([nq] if problem.system is None else [nq, n]):
+        needed = f"({nq} coordinates, {n} velocities)" if problem.system else f"{nq} states"
         raise ValueError(f"{what} must be {needed}, got lengths {[len(half) for half in halves]}")
     nodes = [node_or_number(what, node) for half in halves for node in half]
     for node in topological(nodes):
         if node.op.name == "variable" and node not in inputs:
             raise ValueError(f"{what} must depend on the state, t and the parameters alone, got {node.name!r}")
+    if problem.system is not None:
+        nodes[:nq] = problem.system.kinematics.normalized(nodes[:nq])
     return problem.bind(problem.states, Graph(inputs, {f"x{k}": node for k, node in enumerate(nodes)}))
 
 

@@ -11,11 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import cgraph as cg
+from cgraph import Graph
 from cgraph.extend import Array, install
 
 from ..integrators import Problem, state_jacobian
 from ..integrators.step_control import RESOLUTION
-from .dense_output import StepBlock
+from .dense_output import StepBlock, normalized
 from .run_options import SCIPY, RunOptions
 from .stepping import BLOCK_TIME, Clock, Integration
 
@@ -35,6 +36,7 @@ class ScipySolver:
     make: Any  # SciPy's class
     rate: Any  # f(t, x) -> (m,)
     jacobian: dict[str, Any]  # {"jac": f(t, x) -> (m, m)} where the solver takes it
+    normalization: Graph | None  # of the states that it gives, see Problem
 
 
 def scipy_solver(problem: Problem, name: str, backend: str) -> ScipySolver:
@@ -48,7 +50,8 @@ def scipy_solver(problem: Problem, name: str, backend: str) -> ScipySolver:
     if name in IMPLICIT:
         slopes, m = cg.compile(state_jacobian(problem), backend), problem.size
         jacobian["jac"] = lambda t, x: slopes([*x, t]).reshape(m, m)
-    return ScipySolver(name, problem.components, getattr(integrate, name), lambda t, x: rate([*x, t]), jacobian)
+    make = getattr(integrate, name)
+    return ScipySolver(name, problem.components, make, lambda t, x: rate([*x, t]), jacobian, problem.normalization)
 
 
 class _Step(NamedTuple):
@@ -91,10 +94,10 @@ class ScipyIntegration(Integration):
             elif self._stepped(solver) and solver.t != solver.t_old:
                 rows.append(self._step(solver, rows[-1].x if rows else x))
             if rows and clock.passed(BLOCK_TIME):
-                yield _block(rows)
+                yield self._block(rows)
                 x, rows = rows[-1].x, []
         if rows:
-            yield _block(rows)
+            yield self._block(rows)
 
     def _started(self, x: Array) -> Any:
         """SciPy's solver at the start; None where it would not come back from there, and then `status` says why."""
@@ -164,15 +167,16 @@ class ScipyIntegration(Integration):
         change[-1] = x - x_old
         return _Step(t_old, t, x_old, x, np.linalg.solve(shares[:, None] ** np.arange(1, degree + 1), change))
 
+    def _block(self, steps: list[_Step]) -> StepBlock:
+        """The steps, which arrive at normalized states; the solver goes on from those that it keeps itself."""
+        t_old, t, x_old, x, dense = (np.array(column) for column in zip(*steps, strict=True))
+        graph = self.solver.normalization
+        return StepBlock(t, normalized(graph, x), t_old, t - t_old, x_old, dense, graph)
+
 
 def _inside(times: Array, t_old: float, t: float) -> bool:
     """Whether there are times between the ends of a step, in either direction."""
     return bool(((times > min(t_old, t)) & (times < max(t_old, t))).any())
-
-
-def _block(steps: list[_Step]) -> StepBlock:
-    t_old, t, x_old, x, dense = (np.array(column) for column in zip(*steps, strict=True))
-    return StepBlock(t, x, t_old, t - t_old, x_old, dense)
 
 
 def solve_ivp() -> Any:

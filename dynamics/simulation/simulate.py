@@ -71,13 +71,16 @@ def simulate(
     model : System, OdeSystem, Mechanism or Scene
         What moves.
     q, qd : array_like
-        The start, (n,) each [rad or m, per second]; of an OdeSystem q is the state, (m,), and qd None.
+        The start, (nq,) and (n,) [rad or m, per second]; of an OdeSystem q is the state, (m,), and qd None. There are
+        as many coordinates as velocities but with ball and free joints, whose quaternions (w, x, y, z) are brought to
+        length 1: only their direction counts.
     t_end : float
         Where the run ends [s], before t0 for a run back in time.
     method : str
         A name of `dyn.METHODS`. Steps chosen by error: "dop853", "dopri5", and for stiff systems "rodas", "radau";
         equal steps: "rk4", "euler" and the symplectic "verlet", "midpoint", "gauss4", ... With SciPy, "scipy:Radau",
-        "scipy:BDF", "scipy:LSODA", "scipy:DOP853", "scipy:RK45".
+        "scipy:BDF", "scipy:LSODA", "scipy:DOP853", "scipy:RK45". With ball and free joints the symplectic ones step the
+        state, which keeps what is quadratic in it, as a free rotor's energy; "verlet" and "symplectic_euler" cannot.
     t0 : float
         Where the run starts [s].
     t_span : array_like, optional
@@ -90,9 +93,9 @@ def simulate(
     rtol, atol : float, float or array_like, optional
         The error of a chosen step, relative to each component of the state, and absolute: one number for all, or (m,),
         one for each of q and then qd. By default 1e-9, and for atol rtol times the largest value that the
-        component has had so far, or a millionth of the largest coordinate or velocity, in whatever unit; 1e-10 for
-        SciPy's solvers. Of equal steps the estimated error that is no cause of a warning, relative to the largest of
-        a component over the run; 1e-3 and 0 by default.
+        component has had so far, or a millionth of the largest coordinate or velocity, in whatever unit, all entries of
+        a quaternion being as large as 1; 1e-10 for SciPy's solvers. Of equal steps the estimated error that is no cause
+        of a warning, relative to the largest of a component over the run; 1e-3 and 0 by default.
     t_eval : array_like, optional
         Times from t0 to t_end to record, in this order, (T,) [s]; by default every step. Chosen steps are not changed
         by it.
@@ -102,7 +105,7 @@ def simulate(
         Whether to keep what lies between the rows, for `Trajectory.solution(t)`: some numbers a step for every one of
         the state.
     tau : float or sequence
-        Constant applied force [N m or N], for all coordinates or for each, (n,).
+        Constant applied force [N m or N], for all velocities or for each, (n,).
     parameters : mapping, optional
         {name: value} in place of the model's own.
     first_step : float, optional
@@ -120,7 +123,7 @@ def simulate(
     Returns
     -------
     Trajectory
-        t (T,), q and qd (T, n), energy (T,), events, and `stats` on how the run went.
+        t (T,), q (T, nq), qd (T, n), energy (T,), events, and `stats` on how the run went.
 
     Raises
     ------
@@ -165,15 +168,14 @@ def simulate(
     outcome = _integrate(run, start.x, recorder, options, problem.rate, steps)
 
     # Put the result together
-    times, states = recorder.table()
-    half = len(start.x) if problem.system is None else problem.system.n
+    (times, states), nq = recorder.table(), problem.nq
     stats = _stats(run, options.method, outcome)
     for text in stats.warnings:
         warnings.warn(text, SimulationWarning, stacklevel=2)
     energies = np.full(len(times), math.nan) if energy is None else row_values(energy, times, states)[:, 0]
-    dense = None if steps is None else Solution(options.t0, start.x, steps, half)
-    rows = (times, states[:, :half], states[:, half:], energies)
-    return Trajectory(*rows, stats, log.crossings(half) if log else {}, _graphs(problem), dense)
+    dense = None if steps is None else Solution(options.t0, start.x, steps, nq)
+    rows = (times, states[:, :nq], states[:, nq:], energies)
+    return Trajectory(*rows, stats, log.crossings(nq) if log else {}, _graphs(problem), dense)
 
 
 def _compiled(problem: Problem, options: RunOptions, *, between: bool) -> Callable[[RunOptions], Integration]:
@@ -249,7 +251,7 @@ def _run(
         recorder.add(block)
         if steps is not None:
             steps.append(block)
-            kept += sum(array.nbytes for array in block if array is not None)
+            kept += block.nbytes
         if recorder.size + kept > most:
             last = f"{recorder.last:.6g} s"
             run.status = f"stopped at t = {last}: the rows fill the memory; t_eval records fewer"

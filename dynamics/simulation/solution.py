@@ -15,12 +15,12 @@ from .dense_output import StepBlock
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The state at any time of a run that began with x at t0 and made these steps; `half` numbers of it are q."""
+    """The state at any time of a run that began with x at t0 and made these steps; the first nq numbers of it are q."""
 
     t0: float
     x: Array
     steps: Sequence[StepBlock]
-    half: int
+    nq: int
 
     def __call__(self, t: ArrayLike) -> tuple[Array, Array]:
         """q and qd at a time, or at times (k,). Raises ValueError for a time that the run did not come to."""
@@ -34,7 +34,7 @@ class Solution:
             first = float(wanted[~inside][0])
             raise ValueError(f"t must be between {self.t0:g} and {end:g} s, where the run was, got {first!r} s")
         states = self._states(wanted).reshape(*times.shape, len(self.x))
-        return states[..., : self.half], states[..., self.half :]
+        return states[..., : self.nq], states[..., self.nq :]
 
     def _states(self, times: Array) -> Array:
         states = np.tile(self.x, (len(times), 1))

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from cgraph.extend import Array
+
+Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
 OTHERS = 1e-6  # of the largest component of its kind, below which one counts as no smaller: it may be rounding
 
@@ -14,23 +17,22 @@ OTHERS = 1e-6  # of the largest component of its kind, below which one counts as
 class StateSizes:
     """The absolute tolerance of a run that was given none, in the units of its states.
 
-    rtol times the largest value that the component has had so far, or a millionth of the largest of its kind,
-    coordinates or velocities. It grows with the motion.
+    rtol times the largest value that the component, or another of its group, has had so far, or a millionth of the
+    largest of its kind, coordinates or velocities. It grows with the motion.
 
-    kinds: for each component a number, the same for those of one kind, (m,).
+    kinds, groups: for each component a number, the same for those of one kind, or of one quantity, (m,).
     """
 
-    def __init__(self, rtol: float, kinds: Sequence[int], least: float) -> None:
-        kind = np.array(kinds)
-        self._alike = kind[:, None] == kind[None, :]
+    def __init__(self, rtol: float, kinds: Sequence[int], groups: Sequence[int], least: float) -> None:
+        self._alike, self._one = _same(kinds), _same(groups)
         self._rtol, self._least = rtol, least
-        self._sizes = np.zeros(len(kind))
+        self._sizes = np.zeros(len(kinds))
 
     def see(self, states: Array) -> None:
         """Note the sizes of these states, (.., m)."""
         with np.errstate(invalid="ignore"):
             largest = np.abs(np.where(np.isfinite(states), states, 0.0)).max(axis=0, initial=0.0)
-        self._sizes = np.maximum(self._sizes, largest)
+        self._sizes = np.maximum(self._sizes, _largest(largest, self._one))
 
     def tolerance(self) -> Array:
         """The tolerance, (m,), by the states noted so far."""
@@ -40,5 +42,17 @@ class StateSizes:
 
     def largest_of_kind(self, values: Array) -> Array:
         """For each component the largest size of those of its kind, (m,)."""
-        largest: Array = np.where(self._alike, np.abs(values), 0.0).max(axis=1)
-        return largest
+        return _largest(values, self._alike)
+
+
+def _same(numbers: Sequence[int]) -> Flags:
+    """Which are the same, (m, m)."""
+    number = np.array(numbers)
+    same: Flags = number[:, None] == number[None, :]
+    return same
+
+
+def _largest(values: Array, alike: Flags) -> Array:
+    """For each the largest size of those alike."""
+    largest: Array = np.where(alike, np.abs(values), 0.0).max(axis=1)
+    return largest

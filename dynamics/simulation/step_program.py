@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pickle
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from cgraph import Graph
-from cgraph.extend import Factor, Program, Runner, runner
+from cgraph.extend import Call, Factor, If, Program, Runner, runner
 
 from ..integrators import Method, Problem
 
@@ -27,7 +27,9 @@ class StepProgram:
     dense: bool  # whether its record has dense output
     finest: float  # relative tolerance
     starts: bool  # with a first step that the method chooses
-    kinds: tuple[int, ...]  # of the components: coordinates 0, velocities 1; those of an OdeSystem differ
+    kinds: tuple[int, ...]  # of the components: coordinates 0, velocities 1; those of a group or an OdeSystem differ
+    groups: tuple[int, ...]  # of the components: the same for those of one quantity, as a quaternion's
+    normalization: Graph | None  # of states, see Problem
 
     @property
     def factorizations(self) -> int:
@@ -55,19 +57,39 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
     dense: whether a method that chooses its steps records its dense output.
     Raises SingularMassMatrixError for a coordinate without inertia, ValueError for a method that the model has not.
     """
-    n = problem.size // 2
+    kinds, groups = _kinds(problem)
     return StepProgram(
         problem.components,
         problem.parameters,
-        method.program(problem, dense),
+        _normalized(method.program(problem, dense), problem, method),
         problem.rate if method.adaptive else None,
         method.order,
         method.adaptive,
         dense and method.adaptive,
         method.finest,
         method.starts,
-        tuple(range(problem.size)) if problem.system is None else (0,) * n + (1,) * n,
+        kinds,
+        groups,
+        problem.normalization,
     )
+
+
+def _kinds(problem: Problem) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Kinds and groups of the components. A group of several coordinates, such as a quaternion, is a kind too."""
+    system, every = problem.system, tuple(range(problem.size))
+    if system is None:
+        return every, every
+    groups = [system.kinematics.groups.index(group) for group in system.kinematics.groups]  # by their first
+    kinds = [2 + group if groups.count(group) > 1 else 0 for group in groups]
+    return (*kinds, *[1] * system.n), (*groups, *every[problem.nq :])
+
+
+def _normalized(steps: Program, problem: Problem, method: Method) -> Program:
+    """The steps with every state that a step arrives at normalized, so that errors do not add up along it."""
+    if problem.normalization is None:
+        return steps
+    arrived = Call(problem.normalization, ("x",), ("x",))
+    return replace(steps, body=[*steps.body, If("accepted", (arrived,)) if method.adaptive else arrived])
 
 
 @lru_cache(KEPT)

@@ -186,7 +186,8 @@ class FixedStepIntegration(NativeIntegration):
                 self.largest = max(self.largest, min(abs(stretch.h), self.options.step))
                 if not left and not failed:
                     rows[-1, 0] = stretch.end
-                yield _block(rows[:, 0], rows[:, 1 : 1 + m], t_old, x_old)
+                block = _block(rows[:, 0], rows[:, 1 : 1 + m], t_old, x_old)
+                yield block._replace(normalization=self.program.normalization)
             if failed:
                 self.status = self._failure(memory)
                 return

@@ -97,7 +97,8 @@ class Crossings(NamedTuple):
     t : ndarray
         The instants, (k,) [s].
     q, qd : ndarray
-        The states there, (k, n) [rad or m, per second]; of an OdeSystem q holds them, and qd has no columns.
+        The states there, (k, nq) and (k, n) [rad or m, per second]; of an OdeSystem q holds them, and qd has no
+        columns.
 
     Examples
     --------
@@ -122,8 +123,8 @@ class Trajectory:
     t : ndarray
         Times, (T,) [s].
     q, qd : ndarray
-        Coordinates and velocities, (T, n) [rad or m, per second]. Of an OdeSystem q holds the states, (T, m), and
-        qd has no columns.
+        Coordinates, (T, nq), and velocities, (T, n) [rad or m, per second]; quaternions have length 1. Of an OdeSystem
+        q holds the states, (T, m), and qd has no columns.
     energy : ndarray
         Kinetic and potential energy, (T,) [J]; NaN for an OdeSystem.
     stats : Stats
@@ -168,7 +169,7 @@ class Trajectory:
         Returns
         -------
         tuple of ndarray
-            q and qd, (n,) or (k, n) each; of an OdeSystem its state and an array without columns.
+            q and qd, (nq,) and (n,), or (k, nq) and (k, n); of an OdeSystem its state and an array without columns.
 
         Raises
         ------

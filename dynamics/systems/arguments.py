@@ -46,12 +46,12 @@ def names_of(what: str, kind: str, names: Sequence[str] | str) -> tuple[str, ...
 def per_coordinate(
     what: str, value: float | Sequence[float], names: Sequence[str], minimum: float = -math.inf
 ) -> tuple[float, ...]:
-    """One finite number for each of the named coordinates, from one for all or a sequence. Raises ValueError."""
+    """One finite number for each of the names, from one for all or a sequence. Raises ValueError."""
     n = len(names)
     entries = [value] * n if isinstance(value, numbers.Real) else sequence(f"{what} must be", value)
     if len(entries) != n:
         shown = ", ".join(names[:8]) + (", ..." if n > 8 else "")
-        raise ValueError(f"{what} needs one number for each of the {n} coordinates ({shown}), got {len(entries)}")
+        raise ValueError(f"{what} needs one number for each of {shown}: {n}, got {len(entries)}")
     for name, number in zip(names, entries, strict=True):
         if not math.isfinite(real_number(f"{what} of {name!r}", number)) or number < minimum:
             bound = f" and at least {minimum:g}" if math.isfinite(minimum) else ""

@@ -48,7 +48,8 @@ def certify(model: Model, states: int = 20, seed: int = 0, *, speed: float = 1.0
         Standard deviation of qd, qdd and tau, which are normal.
     twin : str, path or MjModel, optional
         What MuJoCo compares with in place of the model's own translation: a path or text of MJCF or URDF, with the
-        same joints in the same order. Its contacts, joint limits and actuators are left out.
+        joints of the same names, or in the same order. Its contacts, joint limits, friction loss and actuators are left
+        out.
 
     Returns
     -------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
 from typing import Any, NamedTuple, Protocol
@@ -13,7 +14,7 @@ import numpy as np
 from ..equations.evaluate_at import Array, evaluate_at
 from ..equations.formulations import inverse_dynamics
 from ..io.load import compiled
-from ..io.mujoco_twin import mujoco
+from ..io.mujoco_twin import joint_order, mujoco
 from ..multibody.body import Body, MechanismError
 from ..multibody.mechanism import Mechanism, as_mechanism
 from ..peers.case import Case
@@ -120,7 +121,6 @@ TERMS: dict[str, Term] = {
     "gravity": Term(_same, _still, _floating),
     "inertia about the centers of mass": Term(_alike, _all, _alike_there),
     "mass and its place": Term(_weightless, _all, _weightless_there),
-    "friction loss": Term(_same, _all, _zeroed("dof_frictionloss", "tendon_frictionloss")),
     "tendons": Term(_same, _all, _zeroed("tendon_stiffness", "tendon_damping", "tendon_armature")),
     "equality constraints": Term(_same, _all, _unbound),
     "fluid": Term(_same, _all, _thin),
@@ -180,18 +180,19 @@ class Translation:
 
 
 class Original:
-    """MuJoCo on a model of its own: of a file, say."""
+    """MuJoCo on a model of its own: of a file, say.  q_order, order: of our coordinates and velocities in its."""
 
-    def __init__(self, mj: Any) -> None:
-        self.mj = mj
+    def __init__(self, mj: Any, q_order: Sequence[int], order: Sequence[int]) -> None:
+        self.mj, self.q_order, self.order = mj, list(q_order), list(order)
 
     def inverse(self, at: Mapping[str, Array]) -> Array:
         """tau, (N, n), of q, qd, qdd, (N, n) each."""
         module, data = mujoco(), mujoco().MjData(self.mj)
         rows = []
-        for data.qpos[:], data.qvel[:], data.qacc[:] in zip(at["q"], at["qd"], at["qdd"], strict=True):
+        for q, qd, qdd in zip(at["q"], at["qd"], at["qdd"], strict=True):
+            data.qpos[self.q_order], data.qvel[self.order], data.qacc[self.order] = q, qd, qdd
             module.mj_inverse(self.mj, data)
-            rows.append(np.array(data.qfrc_inverse))
+            rows.append(data.qfrc_inverse[self.order])
         return np.array(rows)
 
     def without(self, terms: Sequence[str], sizes: Sizes) -> Original:
@@ -200,7 +201,7 @@ class Original:
         for name in terms:
             TERMS[name].theirs(mj, sizes)
         mujoco().mj_setConst(mj, mujoco().MjData(mj))
-        return Original(mj)
+        return Original(mj, self.q_order, self.order)
 
 
 def peers(model: Model, twin: Original | None = None) -> Iterator[tuple[str, Callable[[], Asked]]]:
@@ -225,8 +226,9 @@ def explanation(model: Mechanism, peer: Asked, at: Mapping[str, Array]) -> str:
     few, sizes = {name: rows[:ASKED] for name, rows in at.items()}, sizes_of(model)
     for count in range(1, TAKEN + 1):
         for terms in combinations(TERMS, count):
-            if disagreement(without(model, terms, sizes), peer.without(terms, sizes), few) <= PEERS.value:
-                return f"they agree without {' and '.join(terms)}"
+            with suppress(MechanismError):  # what is left may be a model that a peer cannot have
+                if disagreement(without(model, terms, sizes), peer.without(terms, sizes), few) <= PEERS.value:
+                    return f"they agree without {' and '.join(terms)}"
     return f"no {TAKEN} terms explain it"
 
 
@@ -266,11 +268,15 @@ def original(twin: Any, model: Model) -> Original:
     """
     module, theirs = mujoco(), copy.copy(compiled(twin))
     try:
-        system = as_system(bare(model))
+        bodies = bare(model)
     except NotComparableError as error:
         raise ValueError(f"a twin is compared with rigid bodies: MuJoCo {error}") from None
-    if (theirs.nq, theirs.nv) != (system.nq, system.n):
-        raise ValueError(f"the twin has {theirs.nv} degrees of freedom, the model {system.n}")
-    for unused in ("CONTACT", "LIMIT", "ACTUATION"):
+    nq, n = len(bodies.coordinates), len(bodies.velocities)
+    if (theirs.nq, theirs.nv) != (nq, n):
+        raise ValueError(f"the twin has {theirs.nv} degrees of freedom, the model {n}")
+    for unused in ("CONTACT", "LIMIT", "FRICTIONLOSS", "ACTUATION"):
         theirs.opt.disableflags |= getattr(module.mjtDisableBit, f"mjDSBL_{unused}")
-    return Original(theirs)
+    names = {theirs.joint(i).name for i in range(theirs.njnt)}
+    if names != {body.coordinate for body in bodies.moving}:
+        return Original(theirs, range(nq), range(n))
+    return Original(theirs, *joint_order(theirs, bodies))

@@ -56,6 +56,7 @@ URDF = """<robot name="arm"><link name="base"/><link name="a"><inertial><mass va
 <joint name="j" type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 1 0"/></joint></robot>"""
 
 
+@pytest.mark.filterwarnings("always::dynamics.MechanismWarning")
 def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
     pytest.importorskip("mujoco")
     model, arm, target = tmp_path / "model.xml", tmp_path / "arm.urdf", tmp_path / "graph.dot"
@@ -63,13 +64,14 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
     assert cli.main(["draw", str(arm), "--out", str(target)]) == 0
     assert "arm: inverse dynamics, chain rule" in target.read_text()
     assert capsys.readouterr().err == ""
-    model.write_text(MODEL)
+    model.write_text(MODEL.replace("<mujoco>", '<mujoco><option density="1"/>'))
     assert cli.main(["draw", str(model), "--out", str(target)]) == 2
-    said = "cgraph: error: a mechanism cannot have friction loss (the option ignore leaves this out)\n"
+    fluid = "a fluid (density or viscosity)"
+    said = f"cgraph: error: a mechanism cannot have {fluid} (the option ignore leaves this out)\n"
     assert capsys.readouterr().err == said
     assert cli.main(["draw", str(model), "--ignore", "--out", str(target)]) == 0
-    said = ["cgraph: model: left out friction loss", "cgraph: model: left out joint limits (j)"]
-    assert capsys.readouterr().err.splitlines() == said
+    said = f"cgraph: warning: {str(model)!r}: left out {fluid}; joint limits (j); friction loss (j: 0.1)\n"
+    assert capsys.readouterr().err == said
 
 
 @pytest.mark.parametrize(

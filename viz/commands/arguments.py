@@ -35,11 +35,8 @@ def may_ignore(command: argparse.ArgumentParser) -> None:
 
 
 def scene_of(options: argparse.Namespace) -> scenes.Scene:
-    """The scene that the arguments name; what of a file is left out goes to standard error, a line each."""
-    scene = scenes.load(options.scene, **({"ignore": True} if options.ignore else {}))
-    for what in scene.omitted:
-        say(f"{scene.name}: left out {what}")
-    return scene
+    """The scene that the arguments name; what of a file is left out is a warning, a line of standard error."""
+    return scenes.load(options.scene, **({"ignore": True} if options.ignore else {}))
 
 
 def say(line: str) -> None:

@@ -53,6 +53,7 @@ def run(options: argparse.Namespace) -> int:
             for version in content.versions
         ],
         title=f"{scene.name}: {'forward' if options.forward else 'inverse'} dynamics",
+        about=" ".join([f"Left out of the model: {what}." for what in scene.left_out]),
         motion=Motion(content.t, bones.points, bones.parents) if bones else Motion(content.t, None, ()),
         tables=[_torques(scene, content.shares)] if content.shares else [],
     )

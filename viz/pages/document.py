@@ -61,6 +61,11 @@ class Document:
         return [block for block in blocks if isinstance(block, Picture)]
 
 
+def left_out(what: Sequence[str]) -> list[Block]:
+    """What the model of a page has not of the file that it was read from; it stands at the top."""
+    return [Paragraph(f"Left out of the model: {each}.", point=True) for each in what]
+
+
 def to_html(document: Document) -> str:
     """The document as a page that needs no other file."""
     sections = [(section.anchor, section.heading, _html(section.blocks)) for section in document.sections]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .document import Block, Document, Paragraph, Section, Table
+from .document import Block, Document, Paragraph, Section, Table, left_out
 
 Content = Mapping[str, Any]  # what `dynamics.experiments.pruning.report` gives
 HEADER = ["", "why", "nodes", "edges"]
@@ -18,6 +18,7 @@ def document(content: Content) -> Document:
         for graph in content["graphs"]
     ]
     introduction: list[Block] = [
+        *left_out(content["left_out"]),
         Paragraph(f"{content['about']}. Effects that are on: {', '.join(content['effects']) or 'none'}."),
         Table("Sizes of the graphs", ["", "nodes, as given", "nodes, left", "edges, as given", "edges, left"], sizes),
         Paragraph("All counts are exact; inputs that are used and constants are nodes."),

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..plots.direct_labels import Line, Panel, bars, labeled
 from ..plots.plot import to_adaptive_svg
-from .document import Block, Document, Paragraph, Picture, Section, Table
+from .document import Block, Document, Paragraph, Picture, Section, Table, left_out
 
 Content = Mapping[str, Any]  # what `to_dict()` of the report gives, or its JSON file
 EQUAL, CHOSEN = "equal steps", "chosen steps"
@@ -30,6 +30,7 @@ def _introduction(content: Content) -> list[Block]:
     times = content["times"]
     stiff = "; stiff" if content["stiff"] else ""
     return [
+        *left_out(content["left_out"]),
         Paragraph(
             f"{_sentence(content['about'])} {content['states']} states, to t = {content['t_end']:g} s{stiff}; the "
             f"graph of the rate has {content['nodes']} nodes."
@@ -43,7 +44,6 @@ def _introduction(content: Content) -> list[Block]:
             "Times are the shortest of runs that take turns, warm, from the start to the end of the motion: nothing is "
             f"derived or compiled in them. {_sentence(content['machine'])} {_busy(content)}"
         ),
-        *[Paragraph(f"Left out of the model: {omitted}.") for omitted in content["omitted"]],
     ]
 
 

@@ -76,10 +76,7 @@ def bench(
     loads: dict[str, Load] = {name: partial(load, name, ignore) for name in scenes}
     cases = {}
     for name, scene in loads.items():  # a wrong name is told before anything is measured
-        model = scene()
-        cases[name] = Case(name, model)
-        for what in model.omitted:
-            say(f"{name}: left out {what}")
+        cases[name] = Case(name, scene())
     wanted = [name for name, kind in PEERS.items() if name == OURS or (name in peers and kind.installed)]
     asked = {task: [mode for mode in MODES if mode in modes] for task in TASKS if task in tasks}
     return _rows(cases, loads, asked, wanted, repeats, budget, say)

@@ -11,6 +11,7 @@ import multiprocessing
 import os
 import signal
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from typing import Any
 
+from ...multibody.mechanism import MechanismWarning
 from ...peers import PEERS, Case, Contender, UnavailableError
 from ...peers.case import Array
 from ...scenes import Scene
@@ -117,6 +119,7 @@ def _serve(pipe: Connection, load: Load, name: str) -> None:
     """The process's side: (task, mode) is prepared when it is new, and timed when it is not."""
     with suppress(AttributeError, OSError):
         os.setsid()  # so that a compiler ends with it
+    warnings.simplefilter("ignore", MechanismWarning)  # the first process has said what is left out
     with suppress(EOFError, BrokenPipeError):
         kind = PEERS[name]
         with suppress(Exception):  # loading a package is no part of making a contender; what is wrong shows again there

@@ -79,7 +79,7 @@ class WorkPrecision:
     curves: tuple[Curve, ...]
     cold: tuple[ColdStart, ...]
     absent: dict[str, str] = field(default_factory=dict)
-    omitted: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """All of it as plain data for JSON; None in place of what is no number."""

@@ -79,7 +79,7 @@ def work_precision(
 
 def _described(setting: Setting, problem: Problem, exact: Reference) -> dict[str, Any]:
     """What the report says of the setting and of its exact motion."""
-    fields = ("name", "about", "t_end", "conservative", "stiff", "omitted")
+    fields = ("name", "about", "t_end", "conservative", "stiff", "left_out")
     return {name: getattr(setting, name) for name in fields} | {
         "states": problem.size,
         "nodes": len(problem.rate.nodes),

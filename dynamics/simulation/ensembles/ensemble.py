@@ -66,7 +66,7 @@ class EnsembleStats:
 class Ensemble:
     """Many motions of one model, as `simulate_many` gives them.
 
-    q[k] is what trajectory k alone would have, (T, n), in one piece of memory, as in MuJoCo's rollout and a vmap. From
+    q[k] is what trajectory k alone would have, (T, nq), in one piece of memory, as in MuJoCo's rollout and a vmap. From
     where a state of a trajectory was not finite on its rows are NaN.
 
     Parameters
@@ -74,8 +74,8 @@ class Ensemble:
     t : ndarray
         Times, (T,) [s].
     q, qd : ndarray
-        Coordinates and velocities, (N, T, n) [rad or m, per second]. Of an OdeSystem q holds the states, (N, T, m), and
-        qd has no columns.
+        Coordinates, (N, T, nq), and velocities, (N, T, n) [rad or m, per second]. Of an OdeSystem q holds the states,
+        (N, T, m), and qd has no columns.
     stats : EnsembleStats
         How the runs went.
     events : mapping

@@ -59,7 +59,7 @@ class EnsembleRows:
         said, (largest, last) = tuple(self.status), self.errors
         return EnsembleStats(method, *counts, self.dt, seconds, success, said, status, largest, last, texts)
 
-    def events(self, program: EventProgram, half: int) -> dict[str, tuple[Crossings, ...]]:
-        """Of each event by name, where it happened in the trajectories; the first `half` numbers of a state are q."""
-        crossings = [split_crossings(program, happened, half) for happened in self.happened]
+    def events(self, program: EventProgram, nq: int) -> dict[str, tuple[Crossings, ...]]:
+        """Of each event by name, where it happened in the trajectories; the first nq numbers of a state are q."""
+        crossings = [split_crossings(program, happened, nq) for happened in self.happened]
         return {event.name: tuple([named[event.name] for named in crossings]) for event in program.events}

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import Array, real_array, require_mapping
 
-from ...equations.initial_value import check_names
+from ...equations.initial_value import check_names, normalized
 from ...equations.state_equation import state_inputs
 from ...systems.arguments import parameter_value, per_coordinate
 from ...systems.model import Model, as_ode, as_system
@@ -30,8 +30,8 @@ def starts(
 ) -> Starts:
     """The starts of an ensemble. Raises ValueError for shapes that do not fit, and for what is not finite."""
     inputs = state_inputs(model)
-    n = len(inputs.applied) or len(inputs.states)
-    arrays = {"q": _array("q", q, n)}
+    n = len(inputs.applied)
+    arrays = {"q": _array("q", q, len(inputs.states) - n)}
     if as_ode(model) is None:
         if qd is None:
             raise ValueError(f"qd must have shape (N, {n}) or ({n},), got None")
@@ -54,14 +54,14 @@ def starts(
         arrays["tau"] = _array("tau", tau, n)
     else:
         values = np.asarray(tau).tolist()
-        applied = per_coordinate("tau", values, model.coordinates) if inputs.applied else ()
+        applied = per_coordinate("tau", values, as_system(model).velocities) if inputs.applied else ()
         same |= zip(inputs.applied, applied, strict=True)
     counts = {what: len(array) for what, array in arrays.items() if array.ndim == 2}
     counts |= {f"parameter {name!r}": len(array) for name, array in columns.items()}
     count = _one_count(counts)
     varied = dict(zip(inputs.applied, arrays.pop("tau").T, strict=True)) if "tau" in arrays else {}
-    x = np.concatenate([np.broadcast_to(array, (count, n)) for array in arrays.values()], axis=1)
-    return Starts(x, inputs.states, same, varied | columns)
+    x = np.concatenate([np.broadcast_to(array, (count, array.shape[-1])) for array in arrays.values()], axis=1)
+    return Starts(normalized(model, x), inputs.states, same, varied | columns)
 
 
 def _array(what: str, value: ArrayLike, n: int) -> Array:

@@ -77,7 +77,8 @@ def simulate_many(
     model : System, OdeSystem, Mechanism or Scene
         What moves.
     q, qd : array_like
-        The starts, (N, n) each [rad or m, per second], or (n,) for all; of an OdeSystem q is the state, and qd None.
+        The starts, (N, nq) and (N, n) [rad or m, per second], or (nq,) and (n,) for all, as in `simulate`; of an
+        OdeSystem q is the state, and qd None.
     t_end, method, t0, t_span, dt, max_step, rtol, atol, first_step, max_steps, estimate_error, backend, progress
         As in `simulate`, without SciPy's methods.
     t_eval : array_like, optional
@@ -87,7 +88,7 @@ def simulate_many(
         Instants to look for on the way, as in `simulate`; trajectories then run one by one. One that an event ends is
         NaN from there on, and `stats.status` is 1. Rows are at the same times as without.
     tau : float or array_like
-        Constant applied force [N m or N], for all coordinates, for each, (n,), or for each trajectory too, (N, n).
+        Constant applied force [N m or N], for all velocities, for each, (n,), or for each trajectory too, (N, n).
     parameters : mapping, optional
         {name: value} in place of the model's own, a number for all or one for each trajectory, (N,).
     workers : int, callable or None
@@ -100,7 +101,7 @@ def simulate_many(
     Returns
     -------
     Ensemble
-        t (T,), q and qd (N, T, n), and `stats` with an entry for each trajectory.
+        t (T,), q (N, T, nq), qd (N, T, n), and `stats` with an entry for each trajectory.
 
     Raises
     ------
@@ -147,11 +148,11 @@ def simulate_many(
     _run(task, chunks, team, result)
 
     # Put the result together
-    half = problem.size if problem.system is None else problem.system.n
+    nq = problem.nq
     stats, rows = result.stats(method, time.perf_counter() - begin), result.rows
     if text := _warning(stats):
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    return Ensemble(options.row_times, rows[:, :, :half], rows[:, :, half:], stats, result.events(watch, half))
+    return Ensemble(options.row_times, rows[:, :, :nq], rows[:, :, nq:], stats, result.events(watch, nq))
 
 
 def _row_count(options: RunOptions) -> int:

@@ -130,6 +130,18 @@ def test_forward_dynamics_agree_with_evaluate_to_the_last_bit(links, tmp_path):
 
 
 @needs_cc
+def test_state_equations_with_quaternions_agree_with_evaluate_to_the_last_bit(tmp_path):
+    kinds = ["ball", "free", "free (body axes)"]
+    bodies = [dyn.Body("base", dyn.Joint(kind), mass=2.0, center=[0.1, 0.0, 0.2], inertia=np.eye(3)) for kind in kinds]
+    arm = dyn.Body("arm", dyn.Joint("revolute"), "base", mass=0.5, center=[0.2, 0.0, 0.0], inertia=0.1 * np.eye(3))
+    graphs = [dyn.state_equation(dyn.Mechanism([base, arm])) for base in bodies]
+    library = build(tmp_path, [cg.to_c(graph, f"rate{k}") for k, graph in enumerate(graphs)])
+    for k, graph in enumerate(graphs):
+        points = np.random.default_rng(k).normal(size=(50, len(graph.inputs)))
+        assert same(called(library, f"rate{k}", graph, points), evaluated(graph, points))
+
+
+@needs_cc
 def test_a_long_graph_is_cut_into_parts(tmp_path, monkeypatch):
     graph = dyn.forward_dynamics(dyn.planar_arm([1.0] * 10, [0.7] * 10))
     monkeypatch.setattr(body, "PART", 100)

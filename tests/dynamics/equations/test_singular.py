@@ -207,3 +207,10 @@ def test_masses_far_apart_are_no_lack_of_inertia():
 
     graph = forward_dynamics(dyn.System(lagrangian, ["x", "y"]))
     assert graph.evaluate(dict.fromkeys(graph.input_names, 0.0) | {"tau0": 1.0}) == {"qdd0": 1.0, "qdd1": -1.0}
+
+
+def test_an_inertia_that_is_not_positive_is_named_by_its_velocity() -> None:
+    """Of a free body there are more coordinates than velocities: the last of these has no fellow among them."""
+    flat = dyn.Body("flat", dyn.Joint("free"), mass=1.0, inertia=np.diag([1.0, 1.0, 2.0]))
+    with pytest.raises(dyn.SingularMassMatrixError, match=r"'flat.wz' has an inertia that is not positive"):
+        dyn.raise_if_singular(dyn.Mechanism([flat]), 6)

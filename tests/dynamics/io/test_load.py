@@ -1,11 +1,10 @@
-"""Mechanisms read from MJCF and URDF: MuJoCo's own accelerations, the frames and defaults, and what is left out."""
+"""Mechanisms read from MJCF: MuJoCo's own accelerations, the frames and defaults, and what is left out."""
 
 from __future__ import annotations
 
 import importlib.util
 import re
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +15,7 @@ from pytest import approx, importorskip, mark, param, raises, warns
 import cgraph as cg
 import dynamics as dyn
 from dynamics.multibody.mechanism import Body, Joint, Mechanism, MechanismError
-from dynamics.multibody.spatial import rotation
-from tests.dynamics.mechanisms import FAMILIES, turned_arm
+from tests.dynamics.mechanisms import FAMILIES
 from tests.dynamics.models import error
 from tests.slow import slow
 from tests.tolerances import EQUATIONS
@@ -25,10 +23,8 @@ from tests.tolerances import EQUATIONS
 mujoco = importorskip("mujoco")
 
 AGREEMENT = 1e-10  # of the largest entry: rounding of two codes, times the condition number of M
-OLD = not hasattr(mujoco.mjtDisableBit, "mjDSBL_SPRING")
-recent = mark.skipif(
-    OLD, reason="before 3.3.5 MuJoCo diagonalises URDF's inertia to 1e-7, and has other flags and no mimic"
-)
+recent = mark.skipif(not hasattr(mujoco.mjtDisableBit, "mjDSBL_SPRING"), reason="before 3.3.5 MuJoCo has other flags")
+pytestmark = mark.filterwarnings("ignore:.*left out:dynamics.MechanismWarning")
 OFF = ("CONSTRAINT", "ACTUATION")  # what acts on a mechanism from outside
 
 
@@ -132,7 +128,8 @@ def test_a_model_by_hand_agrees() -> None:
         <default><default class="arm"><joint damping="0.2" armature="0.05" stiffness="1.5"/></default></default>""",
     )
     mechanism = agrees(text)
-    assert mechanism.system.coordinates == ("upper yaw", "upper pitch", "upper", "body 4", "cart")
+    assert mechanism.system.coordinates == ("yaw", "pitch", "out", "body 4", "cart")
+    assert [body.name for body in mechanism.moving] == ["upper yaw", "upper pitch", "upper", "body 4", "cart"]
     assert np.asarray(mechanism.gravity).tolist() == [1.0, 2.0, -9.0]
 
 
@@ -168,10 +165,11 @@ def test_names_are_mujoco_s_or_new_ones() -> None:
     mechanism = dyn.load_mjcf(
         mjcf(
             f"""<body name="body 2"><joint/>{INERTIAL}</body><body><joint name="x"/><joint/>{INERTIAL}</body>
-            <body name="c"><joint/>{INERTIAL}</body>"""
+            <body name="c"><joint/>{INERTIAL}</body><body name="d"><joint name="c"/>{INERTIAL}</body>"""
         )
     )
-    assert mechanism.system.coordinates == ("body 2", "body 2' x", "body 2'", "c")
+    assert mechanism.system.coordinates == ("body 2", "x", "body 2'", "c'", "c")
+    assert [body.name for body in mechanism.moving] == ["body 2", "body 2' x", "body 2'", "c", "d"]
 
 
 # --- sources
@@ -194,7 +192,7 @@ def test_a_missing_file_is_named(load: Any, tmp_path: Path) -> None:
 
 @mark.parametrize("load", [dyn.load_mjcf, dyn.load_urdf])
 def test_what_is_no_source_is_said(load: Any) -> None:
-    with raises(MechanismError, match=r"^a model is a path, XML text or an MjModel, got int$"):
+    with raises(MechanismError, match=r"^a model is a path or XML text, and of MJCF an MjModel, too, got int$"):
         load(3)
 
 
@@ -227,7 +225,6 @@ NOT_MODELLED = [
         "equality constraints (1)",
         id="equality",
     ),
-    param(mjcf(f'<body><joint frictionloss="0.1"/>{INERTIAL}</body>'), "friction loss", id="friction"),
     param(mjcf(HINGE, '<option density="1.2"/>'), "a fluid (density or viscosity)", id="fluid"),
     param(mjcf(f'<body gravcomp="1"><joint/>{INERTIAL}</body>'), "gravity compensation", id="gravcomp"),
 ]
@@ -242,16 +239,19 @@ def test_what_is_not_modelled_is_refused_by_name(text: str, what: str) -> None:
 
 @mark.parametrize(("text", "what"), NOT_MODELLED)
 def test_what_is_not_modelled_is_left_out_on_request(text: str, what: str) -> None:
-    mechanism = dyn.load_mjcf(text, ignore=True)
-    assert mechanism.omitted == (what,)
+    with warns(dyn.MechanismWarning, match=f"^the given text: left out {re.escape(what)}$"):
+        mechanism = dyn.load_mjcf(text, ignore=True)
+    assert mechanism.left_out == (what,)
     assert len(mechanism.moving) == 1
 
 
-def test_free_and_ball_joints_move_as_mujoco_s() -> None:
+@mark.parametrize("name", ["root", ""])
+def test_free_and_ball_joints_move_as_mujoco_s(name: str) -> None:
     """At the place that the file gives the free body, and anywhere else: its coordinates are its place in the world."""
-    text = mjcf(FREE.replace(HINGE, HINGE + BALL.replace(' stiffness="2"', "")))
+    text = mjcf(FREE.replace("root", name).replace(HINGE, HINGE + BALL.replace(' stiffness="2"', "")))
     mechanism = dyn.load_mjcf(text)
-    assert mechanism.coordinates[:4] == ("f.x", "f.y", "f.z", "f.qw")
+    called = name or "f"
+    assert mechanism.coordinates[:4] == (f"{called}.x", f"{called}.y", f"{called}.z", f"{called}.qw")
     assert (mechanism.system.nq, mechanism.system.n) == (12, 10)
     assert dyn.certify(mechanism, 5, twin=text).passed
 
@@ -267,74 +267,35 @@ def test_free_and_ball_joints_move_as_mujoco_s() -> None:
 )
 def test_what_the_options_switch_off_is_not_missed(text: str, flag: str) -> None:
     loaded = dyn.load_mjcf(text.replace("<mujoco>", f'<mujoco><option><flag {flag}="disable"/></option>'))
-    assert loaded.omitted == ()
+    assert loaded.left_out == ()
 
 
-def test_what_acts_from_outside_is_listed_and_no_error() -> None:
-    loaded = dyn.load_mjcf(
-        mjcf(
-            '<geom type="plane" size="1 1 1"/>'
-            '<body><joint name="j" range="-30 30"/><geom size="0.1" pos="0.2 0 0"/></body>'
-        ).replace("</mujoco>", '<actuator><motor joint="j"/></actuator></mujoco>'),
+ACTUATORS = """<actuator><motor joint="j"/><position name="servo" joint="j" kp="50" kv="2" gear="3"/>
+<velocity joint="j" kv="4"/><general joint="j" gainprm="2" ctrllimited="true" ctrlrange="0.5 1"/></actuator>"""
+
+
+def test_what_acts_from_outside_is_left_out_with_a_warning_and_no_error() -> None:
+    """An actuator that acts with no input is told from a motor by its force."""
+    text = mjcf(
+        '<geom type="plane" size="1 1 1"/>'
+        '<body><joint name="j" range="-30 30" frictionloss="0.1"/><geom size="0.1" pos="0.2 0 0"/></body>'
+    ).replace("</mujoco>", f"{ACTUATORS}</mujoco>")
+    with warns(dyn.MechanismWarning) as said:
+        loaded = dyn.load_mjcf(text)
+    servos = "servo: -50 length -2 velocity times gear 3, number 2: -4 velocity, number 3: input at least 0.5"
+    assert loaded.left_out == (
+        "contacts",
+        "joint limits (j)",
+        "friction loss (j: 0.1)",
+        "actuators (1)",
+        f"actuators that act with no input ({servos})",
     )
-    assert loaded.omitted == ("contacts", "joint limits (j)", "actuators (1)")
+    assert [str(each.message) for each in said] == [f"the given text: left out {'; '.join(loaded.left_out)}"]
+    assert said[0].filename == __file__
+    assert dyn.scenes.Scene("a", "", loaded, (0.0,), (0.0,), 1.0).left_out == loaded.left_out
 
 
-# --- URDF
-
-LINK = """<link name="{0}"><inertial><origin xyz="0.1 0 0.2" rpy="0.1 0.2 0.3"/><mass value="1.5"/>
-<inertia ixx="0.1" ixy="0.01" ixz="0" iyy="0.2" iyz="0" izz="0.15"/></inertial>
-<visual><geometry><mesh filename="package://nowhere/{0}.stl"/></geometry></visual>
-<collision><geometry><mesh filename="package://nowhere/{0}.dae"/></geometry></collision></link>"""
-JOINT = """<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/>
-<origin xyz="0.1 0.2 0.3" rpy="0.4 0.5 0.6"/><axis xyz="{4}"/><limit lower="-1" upper="1" effort="9" velocity="9"/>
-<dynamics damping="{5}"/></joint>"""
-URDF = f"""<?xml version="1.0"?><robot name="arm"><link name="base"/>{"".join(LINK.format(f"l{i}") for i in (1, 2, 3))}
-{JOINT.format("j1", "revolute", "base", "l1", "0 0 1", 0.1)}{JOINT.format("j2", "continuous", "l1", "l2", "0 1 0", 0.2)}
-{JOINT.format("j3", "prismatic", "l2", "l3", "1 0 0", 0.3)}</robot>"""
-
-
-def turned(roll: float, pitch: float, yaw: float) -> np.ndarray:
-    """The rotation of URDF's rpy: about fixed x, then y, then z."""
-    x, y, z = np.eye(3)
-    return rotation(z, yaw) @ rotation(y, pitch) @ rotation(x, roll)
-
-
-@recent
-def test_a_urdf_arm_is_what_it_says() -> None:
-    """Its numbers put in by hand; the meshes are nowhere."""
-    loaded = dyn.load_urdf(URDF)
-    assert loaded.omitted == ("joint limits (j1, j3)",)
-    assert loaded.system.coordinates == ("l1", "l2", "l3")
-    principal = turned(0.1, 0.2, 0.3)
-    inertia = principal @ np.array([[0.1, 0.01, 0], [0.01, 0.2, 0], [0, 0, 0.15]]) @ principal.T
-    bodies = [
-        Body(
-            f"l{i}",
-            Joint(kind, axis, (0.1, 0.2, 0.3), turned(0.4, 0.5, 0.6), damping=0.1 * i),
-            f"l{i - 1}" if i > 1 else "world",
-            mass=1.5,
-            center=(0.1, 0.0, 0.2),
-            inertia=inertia,
-        )
-        for i, kind, axis in ((1, "revolute", (0, 0, 1)), (2, "revolute", (0, 1, 0)), (3, "prismatic", (1, 0, 0)))
-    ]
-    x = np.random.default_rng(3).uniform(-1.0, 1.0, 9)
-    ours, theirs = (cg.compile(dyn.inverse_dynamics(each))(x) for each in (loaded, Mechanism(bodies)))
-    assert error(ours, theirs) < EQUATIONS
-
-
-def test_a_urdf_file_is_its_text(tmp_path: Path) -> None:
-    file = tmp_path / "arm.urdf"
-    file.write_text("\ufeff\n" + URDF, encoding="utf-8")
-    assert dyn.load_urdf(file).system.coordinates == ("l1", "l2", "l3")
-
-
-def test_what_mujoco_cannot_read_of_a_urdf_file_names_the_file(tmp_path: Path) -> None:
-    file = tmp_path / "arm.urdf"
-    file.write_text('<robot name="a"><link name="b"/><joint name="j" type="fixed"><parent link="b"/></joint></robot>')
-    with raises(MechanismError, match=f"^MuJoCo cannot read '{re.escape(str(file))}': "):
-        dyn.load_urdf(file)
+# --- odd numbers and warnings
 
 
 @mark.parametrize("number", ["nan", "inf"])
@@ -363,69 +324,6 @@ def test_other_warnings_of_mujoco_are_python_s(monkeypatch: Any) -> None:
     with warns(UserWarning, match="^MuJoCo on the given text: this is odd$"):
         dyn.load_mjcf(mjcf(HINGE))
     assert mujoco.get_mju_user_warning() is before
-
-
-@mark.parametrize(
-    ("text", "message"),
-    [
-        ("<robot>", "the given text is not XML: no element found: line 1, column 7"),
-        ("<mujoco/>", "a URDF's root element is <robot>, the given text has <mujoco>"),
-    ],
-)
-def test_bad_urdf_is_one_sentence(text: str, message: str) -> None:
-    with raises(MechanismError, match=f"^{re.escape(message)}$"):
-        dyn.load_urdf(text)
-
-
-@recent
-def test_a_urdf_joint_that_mimics_is_an_equality() -> None:
-    mimicking = URDF.replace(
-        '<joint name="j2" type="continuous">', '<joint name="j2" type="continuous"><mimic joint="j1"/>'
-    )
-    with raises(MechanismError, match="equality constraints"):
-        dyn.load_urdf(mimicking)
-
-
-def without_springs(mechanism: Mechanism) -> Mechanism:
-    bodies = [replace(b, joint=replace(b.joint, stiffness=0.0, armature=0.0)) for b in mechanism.bodies]
-    return Mechanism(bodies)
-
-
-@recent
-@mark.parametrize("family", FAMILIES)
-def test_a_mechanism_comes_back_from_its_urdf(family: str) -> None:
-    mechanism = without_springs(FAMILIES[family](10))
-    back = dyn.load_urdf(dyn.to_urdf(mechanism))
-    order = [back.system.coordinates.index(name) for name in mechanism.system.coordinates]
-    x = np.random.default_rng(4).uniform(-1.0, 1.0, (3, mechanism.system.n))
-    theirs = np.empty_like(x)
-    theirs[:, order] = x
-    ours, again = (cg.compile(dyn.forward_dynamics(each), "python") for each in (mechanism, back))
-    assert error(again(theirs.ravel())[order], ours(x.ravel())) < AGREEMENT
-
-
-def test_quarter_turns_come_back_from_text_as_quarter_turns() -> None:
-    """So that they cost no nodes."""
-    arm = turned_arm(7)
-    counts = {len(dyn.inverse_dynamics(each).nodes) for each in (arm, dyn.load_mjcf(dyn.to_mjcf(arm)))}
-    assert counts == {len(dyn.inverse_dynamics(dyn.load_urdf(dyn.to_urdf(arm))).nodes)}
-
-
-@mark.parametrize("pitch", [np.pi / 2, -np.pi / 2])
-def test_a_frame_that_looks_straight_up_comes_back(pitch: float) -> None:
-    orientation = turned(0.3, pitch, 0.4)
-    joint = Joint("revolute", (0.0, 1.0, 0.0), orientation=orientation)
-    (body,) = dyn.load_urdf(
-        dyn.to_urdf(Mechanism([Body("a", joint, mass=1.0, center=(1, 0, 0), inertia=(1, 1, 1))]))
-    ).moving
-    assert np.asarray(body.joint.orientation) == approx(orientation, abs=EQUATIONS)
-
-
-@mark.parametrize("what", ["stiffness", "armature"])
-def test_what_urdf_has_not_is_said(what: str) -> None:
-    mechanism = Mechanism([Body("a", Joint("revolute", **{what: 0.5}), mass=1.0, center=(1, 0, 0))])
-    with raises(MechanismError, match=f"^URDF has no {what}, body 'a' has 0.5$"):
-        dyn.to_urdf(mechanism)
 
 
 # --- models nobody here wrote

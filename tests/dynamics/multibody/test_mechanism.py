@@ -11,7 +11,7 @@ from types import FrameType
 from typing import Any
 
 import numpy as np
-from pytest import approx, mark, param, raises
+from pytest import approx, mark, param, raises, warns
 
 import cgraph as cg
 import dynamics as dyn
@@ -284,11 +284,6 @@ BAD = [
         "body 'a': inertia must not be negative, its principal moments are [-1.0",
         id="negative",
     ),
-    param(
-        {"inertia": (1.0, 2.0, 4.0)},
-        "body 'a': no body has principal moments [1.0, 2.0, 4.0]: the largest exceeds the sum of the others",
-        id="triangle",
-    ),
     param({"name": 7}, "the name of a body must be a string, got int: 7", id="name a number"),
     param({"parent": None}, "body 'a': parent must be the name of a body or 'world', got None", id="no parent"),
     param({"joint": "revolute"}, "body 'a': joint must be of the type Joint, got str: 'revolute'", id="joint text"),
@@ -330,6 +325,12 @@ def test_what_cannot_be_is_refused_by_name(bodies: Any, message: str) -> None:
     with raises(MechanismError, match="^" + re.escape(message)) as caught:
         Mechanism([Body(**(GOOD | bodies))] if isinstance(bodies, dict) else bodies)
     assert "\n" not in str(caught.value)
+
+
+def test_moments_that_no_body_has_are_a_warning() -> None:
+    message = "body 'a': no body has principal moments [1.0, 2.0, 4.0]: the largest exceeds the sum of the others"
+    with warns(dyn.MechanismWarning, match="^" + re.escape(message) + "$"):
+        Mechanism([Body(**(GOOD | {"inertia": (1.0, 2.0, 4.0)}))])
 
 
 def test_gravity_is_a_finite_vector() -> None:

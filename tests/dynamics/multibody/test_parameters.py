@@ -298,10 +298,9 @@ BAD = [
         id="formula",
     ),
     param(
-        {"inertia": ("a", "b", 4.0)},
-        {"a": 1.0, "b": 2.0},
-        "body 'rod': no body has principal moments [1.0, 2.0, 4.0]: the largest exceeds the sum of the others, "
-        "where a = 1.0, b = 2.0",
+        {"inertia": ("a", "b", 2.0)},
+        {"a": -1.0, "b": 2.0},
+        "body 'rod': inertia must not be negative, its principal moments are [-1.0, 2.0, 2.0], where a = -1.0, b = 2.0",
         id="inertia",
     ),
     param(

@@ -331,3 +331,21 @@ def test_times_of_a_long_row_are_those_of_single_runs() -> None:
         alone = reference(KEPLER, *split_state(KEPLER, closed_forms.kepler_start(0.5)), [t], digits=20)
         assert alone.x[0] == approx(together.x[row], rel=SAME_TEXT)
     assert all(a < b for a, b in itertools.pairwise(together.t))
+
+
+def test_a_free_rotor_is_jacobis_and_any_mechanism_of_spatial_joints_has_a_reference() -> None:
+    moments, omega = (1.0, 2.0, 3.0), [0.1, 1.0, 0.2]
+    rotor = dyn.Body("rotor", dyn.Joint("ball"), mass=1.0, inertia=np.diag(moments))
+    turning = reference(dyn.Mechanism([rotor], gravity=(0, 0, 0)), [1.0, 0.0, 0.0, 0.0], omega, TIMES, digits=20)
+    exact = closed_forms.free_rigid_body(TIMES, moments, omega)
+    here = Reference(turning.t, tuple([row[4:] for row in turning.decimal]), turning.error, turning.how)
+    assert np.abs(here.deviation(exact.x) - exact.deviation(exact.x)).max() < BOTH_20
+    arm = dyn.Joint("revolute", axis=[0.0, 1.0, 0.0], position=[0.3, 0.0, 0.0])
+    bodies = [
+        dyn.Body("base", dyn.Joint("free"), mass=2.0, center=[0.1, 0.0, 0.0], inertia=np.diag(moments)),
+        dyn.Body("arm", arm, "base", mass=0.5, center=[0.2, 0.0, 0.0], inertia=0.1 * np.eye(3)),
+    ]
+    start = [0.0, 0.0, 1.0, 2.0, 0.2, 0.3, 0.1, 0.4], [0.5, 0.0, 2.0, 0.3, 0.2, 1.0, -2.0]
+    run = dyn.simulate(dyn.Mechanism(bodies), *start, 0.5, "gauss8", dt=0.01, estimate_error=False)
+    found = reference(dyn.Mechanism(bodies), *start, [0.5], digits=16)
+    assert found.relative_error([[*run.q[-1], *run.qd[-1]]]) < BOTH_14

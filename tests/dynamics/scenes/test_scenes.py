@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pytest import mark, raises
+from pytest import mark, raises, warns
 
 import dynamics as dyn
 from dynamics import scenes
@@ -50,7 +50,7 @@ def test_a_scene_is_called_by_its_name_and_starts_in_a_state_of_its_model(name: 
     scene = scenes.load(name)
     assert scene.name == name
     assert len(scene.q) == len(scene.qd) == scene.system.n
-    assert scene.omitted == ()
+    assert scene.left_out == ()
     assert np.isfinite(dyn.simulate(scene, scene.q, scene.qd, 0.01).q).all()
 
 
@@ -104,7 +104,7 @@ def test_a_model_file_is_a_scene_at_rest(file: Any, as_given: type) -> None:
 @mark.parametrize("name", ["arm.urdf", "arm.xml", "arm"])
 def test_urdf_is_known_by_its_root_element(file: Any, name: str) -> None:
     """And read without its meshes, which MuJoCo's own reader would look for."""
-    assert loaded(file(URDF, name)).system.coordinates == ("a",)
+    assert loaded(file(URDF, name)).system.coordinates == ("j",)
 
 
 def test_mjcf_may_end_in_anything(file: Any) -> None:
@@ -119,11 +119,9 @@ def test_a_file_s_name_does_not_hide_a_scene(file: Any, monkeypatch: pytest.Monk
 
 
 def test_what_acts_from_outside_is_left_out_and_said(file: Any) -> None:
-    path = file(RUBBING)
-    with raises(MechanismError, match=r"^a mechanism cannot have friction loss \(the option ignore leaves this out\)$"):
-        loaded(path)
-    scene = loaded(path, ignore=True)
-    assert [each.partition(" (")[0] for each in scene.omitted] == ["friction loss", "joint limits"]
+    with warns(dyn.MechanismWarning, match=r"model\.xml': left out joint limits \(of body 'a'\); friction loss \("):
+        scene = loaded(file(RUBBING))
+    assert [each.partition(" (")[0] for each in scene.left_out] == ["joint limits", "friction loss"]
     assert scene.system.n == 2
 
 
@@ -134,7 +132,7 @@ def test_what_acts_from_outside_is_left_out_and_said(file: Any) -> None:
         ("", "{path!r} is not XML, as MJCF and URDF are"),
         ("<mujoco><worldbody>", "MuJoCo cannot read "),
         ("not XML", "{path!r} is not XML, as MJCF and URDF are"),
-        ("<robot><link/></robot>", "MuJoCo cannot read "),
+        ("<robot><link/></robot>", "URDF, {path!r}: a link has no name"),
         ("<mujoco/>", "the mechanism has no joint that moves"),
     ],
 )

@@ -217,7 +217,7 @@ _ARGUMENTS: dict[str, tuple[dict[str, Any], str]] = {
     "t_eval beyond": ({"t_eval": [0.5, 1.5]}, "t_eval must be increasing"),
     "t_eval NaN": ({"t_eval": [math.nan]}, "t_eval must be increasing"),
     "t_eval a number": ({"t_eval": 0.5}, "t_eval must be increasing"),
-    "tau too long": ({"tau": [1.0, 2.0]}, "tau needs one number for each of the 1 coordinates .*, got 2"),
+    "tau too long": ({"tau": [1.0, 2.0]}, "tau needs one number for each of .*: 1, got 2"),
     "tau NaN": ({"tau": math.nan}, "tau must be finite, got nan for '"),
     "parameter unknown": ({"parameters": {"c": 1.0}}, r"the system has no parameter c \(it has m, k\)"),
     "parameter NaN": ({"parameters": {"k": math.nan}}, "'k'.*nan|'k'.*NaN"),

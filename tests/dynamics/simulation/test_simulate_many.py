@@ -186,7 +186,7 @@ Q = np.zeros((4, 2))
         (Q, None, {}, r"qd must have shape \(N, 2\) or \(2,\), got None"),
         (Q, Q[:3], {}, "must have the same number of trajectories, got: q has 4, qd has 3"),
         (Q, Q, {"tau": np.zeros((5, 2))}, "got: q has 4, qd has 4, tau has 5"),
-        (Q, Q, {"tau": [1.0]}, "tau needs one number for each of the 2 coordinates .*, got 1"),
+        (Q, Q, {"tau": [1.0]}, "tau needs one number for each of .*: 2, got 1"),
         (Q, Q, {"tau": np.full((4, 2), math.inf)}, "tau must be finite, got inf at index 0 of trajectory 0"),
         (Q + [0.0, math.nan], Q, {}, "q must be finite, got nan at index 1 of trajectory 0"),
         (Q[0], Q[0], {}, "how many trajectories"),

@@ -110,7 +110,7 @@ def twins() -> dict[str, tuple[str, str]]:
         r'stiffness="': ('stiffness="1', "joint springs"),
         r'mass="': ('mass="1', "mass and its place"),
         r'gravity="': ('gravity="1', "gravity"),
-        r'type="hinge"': ('type="hinge" frictionloss="0.3"', "friction loss"),
+        r'integrator="RK4"': ('density="1000"', "fluid"),
     }
 
 
@@ -150,7 +150,7 @@ def test_rods_are_told_from_capsules_by_their_inertia() -> None:
         ("/nowhere/arm.xml", "there is no file '/nowhere/arm.xml'"),
         ("garbage", "there is no file 'garbage'"),
         ("<mujoco><garbage/></mujoco>", "MuJoCo cannot read the given text"),
-        (7, "a model is a path, XML text or an MjModel, got int"),
+        (7, "a model is a path or XML text, and of MJCF an MjModel, too, got int"),
     ],
 )
 def test_a_twin_that_cannot_be_compared_is_an_error(twin, said: str) -> None:
@@ -178,11 +178,21 @@ def test_a_urdf_file_is_a_twin(tmp_path) -> None:
     assert "inverse dynamics = MuJoCo's" in [each.equation for each in found.residuals]
 
 
+def test_a_twin_may_have_its_joints_in_another_order() -> None:
+    """MuJoCo goes down each branch before the next, whatever the order of a URDF is."""
+    pytest.importorskip("mujoco")
+    joint = dyn.Joint("revolute", (0.0, 1.0, 0.2), (0.1, 0.0, -1.0))
+    link = {"joint": joint, "mass": 1.0, "center": (0.0, 0.1, -0.5), "inertia": (0.2, 0.2, 0.1)}
+    mechanism = dyn.tree([-1, 0, 0, 1, 2, 1], [link] * 6)
+    assert failed(certify(mechanism, FEW, twin=dyn.to_urdf(mechanism))) == {}
+
+
 def test_a_seed_is_not_negative() -> None:
     with pytest.raises(ValueError, match="seed must be a whole number from 0, got -1"):
         certify(dyn.scenes.load("spring_mass"), FEW, -1)
 
 
+@pytest.mark.filterwarnings("ignore:.*left out:dynamics.MechanismWarning")
 def test_the_command_finds_what_was_left_out(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("mujoco")
     model = tmp_path / "model.xml"
@@ -192,6 +202,19 @@ def test_the_command_finds_what_was_left_out(tmp_path, capsys: pytest.CaptureFix
     )
     assert cli.main(["certify", str(model), "--ignore", "--states", "3"]) == 1
     assert "they agree without joint springs" in capsys.readouterr().out
+
+
+def test_the_command_translates_what_mujoco_cannot_read(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Such as a link without mass between two joints."""
+    pytest.importorskip("mujoco")
+    hinge = dyn.Joint("revolute", (0.0, 1.0, 0.0))
+    tip = dyn.Body("tip", dyn.Joint("revolute", (1.0, 0.0, 0.0)), "bare", 1.0, (0.2, 0.0, 0.5), (0.2, 0.3, 0.4))
+    model = tmp_path / "model.urdf"
+    model.write_text(dyn.to_urdf(dyn.Mechanism([dyn.Body("bare", hinge), tip])))
+    assert cli.main(["certify", str(model), "--states", "3"]) == 0
+    printed = capsys.readouterr()
+    assert "inverse dynamics = MuJoCo's" in printed.out
+    assert printed.err.startswith("cgraph: compared is the model that was read, not the file: MuJoCo cannot read ")
 
 
 def test_pinocchio_agrees_when_it_is_there() -> None:
@@ -223,14 +246,15 @@ def test_the_command_prints_a_certificate(capsys: pytest.CaptureFixture[str]) ->
     assert all(each["value"] <= each["bound"]["value"] and each["bound"]["reason"] for each in given["residuals"])
 
 
+@pytest.mark.filterwarnings("always::dynamics.MechanismWarning")
 def test_the_command_fails_with_the_residual(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("mujoco")
     model = tmp_path / "model.xml"
     model.write_text(
-        '<mujoco><worldbody><body name="a"><joint name="j" axis="0 1 0" frictionloss="0.1"/>'
+        '<mujoco><option density="1000"/><worldbody><body name="a"><joint name="j" axis="0 1 0"/>'
         '<geom size="0.1" pos="0.2 0 0"/></body></worldbody></mujoco>'
     )
     assert cli.main(["certify", str(model), "--ignore", "--states", "3"]) == 1
     printed = capsys.readouterr()
-    assert "(they agree without friction loss)" in printed.out
+    assert "(they agree without fluid)" in printed.out
     assert printed.err.endswith("cgraph: model: 1 residual(s) exceed their bound: inverse dynamics = MuJoCo's\n")

@@ -103,6 +103,28 @@ def test_the_page_of_a_file_tells_forces_from_torques(tmp_path, capsys):
     assert "Torques that each part takes at t = 0 [N m, of slides N]" in page.read_text(encoding="utf-8")
 
 
+@pytest.mark.filterwarnings("always::dynamics.MechanismWarning")
+@pytest.mark.parametrize(
+    ("command", "page"),
+    [
+        (("inspect", "--t-end", "0.1", "--out", "out/cart.html"), "cart.html"),
+        (("report", "--pruning", "--out", "out"), "cart-pruning.html"),
+    ],
+    ids=["inspect", "pruning"],
+)
+def test_pages_say_at_the_top_what_the_model_lacks(tmp_path, monkeypatch, capsys, command, page):
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)
+    Path("out").mkdir()
+    servo = '</worldbody><actuator><position name="servo" joint="hinge" kp="50"/></actuator>'
+    Path("cart.xml").write_text(MODEL.replace("</worldbody>", servo))
+    name, *options = command
+    assert cli.main([name, "cart.xml", *options]) == 0
+    what = "actuators that act with no input (servo: -50 length)"
+    assert f"cgraph: warning: 'cart.xml': left out {what}\n" in capsys.readouterr().err
+    assert f"Left out of the model: {what}." in (tmp_path / "out" / page).read_text(encoding="utf-8")
+
+
 def test_lint_looks_in_a_box_and_at_a_point(capsys):
     text = said(capsys, "lint", "triple_pendulum", "--box", "q0=-1:1,qd0=0:2", "--at", "q0=0.5")
     assert "no slope is unbounded in the box" in text

@@ -65,7 +65,7 @@ def content(**others: Any) -> dict[str, Any]:
             {"name": "other", "seconds": None, **cold, "status": "late"},
         ],
         "absent": {"heyoka Taylor": "not installed"},
-        "omitted": ["contacts"],
+        "left_out": ["contacts"],
         "targets": [
             {"error": 1e-6, "group": "ours", "name": "dop853", "knob": 1e-6, "seconds": 4e-4, "ratio": 1.0},
             {"error": 1e-6, "group": "SciPy", "name": "scipy:LSODA", "knob": 1e-7, "seconds": 1e-2, "ratio": 25.0},

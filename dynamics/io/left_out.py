@@ -1,0 +1,36 @@
+"""What a file has and a mechanism has not: refused, or left out and said."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from cgraph.extend import require_flag
+
+from ..multibody.mechanism import Mechanism, MechanismError, MechanismWarning
+
+
+def present(what: Mapping[str, Any]) -> list[str]:
+    """The sentences of what is there."""
+    return [sentence for sentence, is_there in what.items() if is_there]
+
+
+def listed(names: Sequence[str]) -> str:
+    """All of the names, or the first few of many."""
+    return ", ".join([*names[:5], *([f"{len(names) - 5} more"] if len(names) > 5 else [])])
+
+
+def refused_or_left_out(essential: Sequence[str], outside: Sequence[str], ignore: bool) -> tuple[str, ...]:
+    """What is left out. Raises MechanismError for what belongs to the mechanism itself, unless `ignore`."""
+    if not require_flag("ignore", ignore) and essential:
+        raise MechanismError(f"a mechanism cannot have {'; '.join(essential)} (the option ignore leaves this out)")
+    return (*essential, *outside)
+
+
+def warned(mechanism: Mechanism, source: str) -> Mechanism:
+    """The mechanism, once a warning has said what is left out of its source."""
+    if mechanism.left_out:
+        text = f"{source}: left out {'; '.join(mechanism.left_out)}"
+        warnings.warn(text, MechanismWarning, stacklevel=3)  # the caller of the public function
+    return mechanism

@@ -1,0 +1,232 @@
+"""MJCF read: the mechanism of MuJoCo's own model, which its compiler makes of a file."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..multibody import spatial
+from ..multibody.joints import TYPES
+from ..multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError, MechanismWarning
+from ..multibody.spatial import Array
+from .left_out import listed, present, refused_or_left_out
+from .mujoco_twin import mujoco
+from .source import is_text, path_of, root_of, text_of
+from .stand_ins import zeros_again
+
+# Fields of MuJoCo's model that say so when they are not zero.
+_OF_A_TENDON = ("stiffness", "stiffnesspoly", "damping", "dampingpoly", "armature")
+_OF_AN_ACTUATOR = ("actuator_armature", "actuator_damping", "actuator_dampingpoly")
+_NOT_LINEAR = ("jnt_stiffnesspoly", "jnt_springyield", "dof_dampingpoly")
+
+
+class _Names(NamedTuple):
+    """All names that are taken: of bodies, MuJoCo's first and without a gap, and of joints."""
+
+    bodies: list[str]
+    joints: list[str]
+
+
+def read_mjcf(mj: Any, ignore: bool) -> Mechanism:
+    """The mechanism of MuJoCo's model. Raises MechanismError for what a mechanism cannot have."""
+    names = _Names(_body_names(mj), [mj.joint(j).name for j in range(mj.njnt)])
+    left_out = refused_or_left_out(_not_modelled(mj), _acting_from_outside(mj), ignore)
+    bodies: list[Body] = []
+    ends = [(WORLD, np.zeros(3))]  # of each MuJoCo body: the last of its chain, and its origin in that one's frame
+    with np.errstate(all="ignore"):  # of numbers that are not finite Mechanism says where they stand
+        for body in range(1, mj.nbody):
+            chain, origin = _chain(mj, body, names, *ends[mj.body_parentid[body]])
+            bodies += chain
+            ends.append((chain[-1].name, origin))
+    gravity = mj.opt.gravity * (not _disabled(mj, "GRAVITY"))
+    return Mechanism(bodies, gravity, left_out=left_out)
+
+
+def compiled_mjcf(source: Any, called: str) -> Any:
+    """MuJoCo's model of a path or text.  called: what errors call it.
+
+    MuJoCo by itself prints its warnings and adds them to a file in the current folder; a handler takes them instead.
+    """
+    models = mujoco().MjModel
+    given = text_of(source).decode() if is_text(source) else str(path_of(source))
+    said: list[str] = []
+    before = mujoco().get_mju_user_warning()
+    mujoco().set_mju_user_warning(said.append)
+    try:
+        mj = models.from_xml_string(given) if is_text(source) else models.from_xml_path(given)
+    except ValueError as error:
+        if not root_of(source):
+            raise MechanismError(f"{called} is not XML, as MJCF and URDF are") from None
+        raise MechanismError(f"MuJoCo cannot read {called}: {' '.join(str(error).split())}") from None
+    finally:
+        mujoco().set_mju_user_warning(before)
+    if any(["NaN" in each for each in said]):
+        raise MechanismError(f"{called} has a number that is NaN, and a model needs finite ones")
+    for each in said:
+        warnings.warn(f"MuJoCo on {called}: {' '.join(each.split())}", MechanismWarning, stacklevel=4)
+    return mj
+
+
+def _body_names(mj: Any) -> list[str]:
+    """Names of MuJoCo's bodies; one without gets one that no other has."""
+    names = [mj.body(i).name for i in range(mj.nbody)]
+    for i, name in enumerate(names):
+        names[i] = name or _unused(f"body {i}", names)
+    return names
+
+
+def _unused(name: str, names: Sequence[str]) -> str:
+    return name if name not in names else _unused(name + "'", names)
+
+
+def _chain(mj: Any, body: int, names: _Names, parent: str, origin: Array) -> tuple[list[Body], Array]:
+    """One of MuJoCo's bodies as a chain with one joint each, and the origin of its frame in that of the chain's last.
+
+    MuJoCo turns a body about a point (its joint's `pos`) other than its origin; here the body's origin is that point.
+    origin: of the parent's MuJoCo frame in that of `parent`.
+    """
+    name = names.bodies[body]
+    joints = range(mj.body_jntadr[body], mj.body_jntadr[body] + mj.body_jntnum[body])
+    chain: list[Body] = []
+    position, orientation = origin + mj.body_pos[body], spatial.from_quaternion(mj.body_quat[body])
+    for j in joints:
+        called = name
+        if j != joints[-1]:
+            called = _unused(f"{name} {names.joints[j] or f'joint {j}'}", names.bodies)
+            names.bodies.append(called)
+        anchor = mj.jnt_pos[j] if TYPES[_kind(mj, j)].turns else np.zeros(3)
+        label = names.joints[j] or _unused(called, names.joints)
+        link = replace(_joint(mj, j, position + orientation @ anchor, orientation), name=label * (label != called))
+        chain.append(Body(called, link, parent))
+        parent, position, orientation = called, -anchor, np.eye(3)
+    if not joints:
+        chain.append(Body(name, Joint("fixed", position=position, orientation=orientation), parent))
+        position = np.zeros(3)
+    mass, moments = mj.body_mass[body], mj.body_inertia[body]
+    if joints:
+        mass, moments = zeros_again(mass), zeros_again(moments)
+    axes = spatial.from_quaternion(mj.body_iquat[body])
+    inertia = spatial.cleaned(axes @ np.diag(moments) @ axes.T)
+    center = position + spatial.cleaned(mj.body_ipos[body])
+    last = chain[-1]
+    chain[-1] = Body(last.name, last.joint, last.parent, float(mass), center, inertia)
+    return chain, position
+
+
+def _joint(mj: Any, j: int, position: Array, orientation: Array) -> Joint:
+    """The joint, with the frame where it is at q = 0: MuJoCo's stands at q = qpos0 (`ref`)."""
+    kind, axis, dof = _kind(mj, j), np.array(mj.jnt_axis[j]), mj.jnt_dofadr[j]
+    single = len(TYPES[kind].coordinates) == 1
+    zero = float(mj.qpos0[mj.jnt_qposadr[j]]) if single else 0.0
+    if kind == "free":  # its coordinates are the body's place in the world, whatever the file says of its frame
+        position, orientation = np.zeros(3), np.eye(3)
+    if zero:
+        turn, shift = TYPES[kind].placement(axis, np.array([-zero]))
+        position, orientation = position + orientation @ shift, orientation @ turn
+    return Joint(
+        kind,
+        axis,
+        position,
+        orientation,
+        damping=float(mj.dof_damping[dof]) * (not _disabled(mj, "DAMPER")),
+        stiffness=float(mj.jnt_stiffness[j]) * single * (not _disabled(mj, "SPRING")),
+        spring_reference=float(mj.qpos_spring[mj.jnt_qposadr[j]]) if single else 0.0,
+        armature=float(mj.dof_armature[dof]),
+    )
+
+
+def _kind(mj: Any, j: int) -> str:
+    """Our kind of a joint, "" for the kinds that a mechanism has not."""
+    types = mujoco().mjtJoint
+    kinds = {int(getattr(types, f"mjJNT_{each.mjcf.upper()}")): kind for kind, each in TYPES.items() if each.mjcf}
+    return kinds.get(int(mj.jnt_type[j]), "")
+
+
+def _disabled(mj: Any, *what: str) -> bool:
+    """Whether the model's options switch off any of `what`; older MuJoCo has one switch for all passive force."""
+    bits = mujoco().mjtDisableBit.__members__
+    names = [*what, *(["PASSIVE"] if set(what) & {"DAMPER", "SPRING"} else [])]
+    return any([mj.opt.disableflags & int(bits.get(f"mjDSBL_{name}", 0)) for name in names])
+
+
+def _not_modelled(mj: Any) -> list[str]:
+    """What belongs to the mechanism of the model and a mechanism cannot have."""
+    several = [j for j in _where(mj, "jnt_stiffness") if len(TYPES[_kind(mj, j)].coordinates) > 1]
+    sprung = [] if _disabled(mj, "SPRING") else sorted(several)
+    pulling = sorted(set().union(*(_where(mj, f"tendon_{what}") for what in _OF_A_TENDON)))
+    tendons = [mj.tendon(i).name or f"number {i}" for i in pulling]
+    equalities = 0 if _disabled(mj, "CONSTRAINT", "EQUALITY") else int(np.sum(mj.eq_active0))
+    return present(
+        {
+            f"springs of free or ball joints ({listed(_joint_names(mj, sprung))})": sprung,
+            f"tendons with a spring, damper or mass ({listed(tendons)})": pulling,
+            f"equality constraints ({equalities})": equalities,
+            "springs or dampers that are not linear": _any(mj, *_NOT_LINEAR),
+            "actuators with armature or damping": _any(mj, *_OF_AN_ACTUATOR),
+            "a fluid (density or viscosity)": mj.opt.density or mj.opt.viscosity,
+            "gravity compensation": _any(mj, "body_gravcomp") and not _disabled(mj, "GRAVITY"),
+            "flexible bodies": getattr(mj, "nflex", 0),
+            "plugins": getattr(mj, "nplugin", 0),
+        }
+    )
+
+
+def _acting_from_outside(mj: Any) -> list[str]:
+    """What acts on the mechanism of the model: inputs, and forces that are not smooth."""
+    limited = not _disabled(mj, "CONSTRAINT", "LIMIT")
+    limits = sorted(_where(mj, "jnt_limited"))
+    touching = (np.any(mj.geom_contype) and np.any(mj.geom_conaffinity)) or mj.npair
+    rubbing = not _disabled(mj, "CONSTRAINT", "FRICTIONLOSS")
+    losses = [f"{_coordinate(mj, i)}: {mj.dof_frictionloss[i]:g}" for i in sorted(_where(mj, "dof_frictionloss"))]
+    actuators = {} if _disabled(mj, "ACTUATION") else {i: _at_rest(mj, i) for i in range(mj.nu)}
+    servos = [f"{mj.actuator(i).name or f'number {i}'}: {force}" for i, force in actuators.items() if force]
+    return present(
+        {
+            "contacts": touching and not _disabled(mj, "CONSTRAINT", "CONTACT"),
+            f"joint limits ({listed(_joint_names(mj, limits))})": limits and limited,
+            "tendon limits": _any(mj, "tendon_limited") and limited,
+            f"friction loss ({listed(losses)})": losses and rubbing,
+            "friction loss of tendons": _any(mj, "tendon_frictionloss") and rubbing,
+            f"actuators ({len(actuators) - len(servos)})": len(actuators) > len(servos),
+            f"actuators that act with no input ({listed(servos)})": servos,
+        }
+    )
+
+
+def _at_rest(mj: Any, i: int) -> str:
+    """The force of an actuator whose input is 0, "" for none."""
+    kind: str = mujoco().mjtBias(int(mj.actuator_biastype[i])).name.removeprefix("mjBIAS_").lower()
+    if kind not in ("none", "affine"):
+        return kind
+    numbers = zip(mj.actuator_biasprm[i, :3] * (kind == "affine"), ("", " length", " velocity"), strict=True)
+    terms = [f"{number:+g}{of}" for number, of in numbers if number]
+    lower, upper = mj.actuator_ctrlrange[i]
+    least = np.clip(0.0, lower, upper) if mj.actuator_ctrllimited[i] and not _disabled(mj, "CLAMPCTRL") else 0.0
+    terms += [f"input at least {least:g}"] if least > 0.0 else [f"input at most {least:g}"] if least < 0.0 else []
+    gear = mj.actuator_gear[i, 0]
+    return " ".join([*terms, *([f"times gear {gear:g}"] if terms and gear != 1.0 else [])])
+
+
+def _where(mj: Any, field: str) -> set[int]:
+    """Rows of a model's field that are not all zero; none for a field that this version of MuJoCo has not."""
+    values = np.asarray(getattr(mj, field, []))
+    return {int(i) for i in np.flatnonzero(values.reshape(len(values), -1).any(axis=1))} if values.size else set()
+
+
+def _any(mj: Any, *fields: str) -> bool:
+    return any([_where(mj, field) for field in fields])
+
+
+def _joint_names(mj: Any, joints: Sequence[int]) -> list[str]:
+    """Names of joints; of one that has none, the body's."""
+    bodies = _body_names(mj)
+    return [mj.joint(j).name or f"of body {bodies[mj.jnt_bodyid[j]]!r}" for j in joints]
+
+
+def _coordinate(mj: Any, dof: int) -> str:
+    """The name of the joint of a degree of freedom."""
+    return _joint_names(mj, [int(mj.dof_jntid[dof])])[0]

@@ -1,0 +1,211 @@
+"""URDF read: the mechanism of a <robot>, with the numbers of the file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from ..multibody import spatial
+from ..multibody.joints import TYPES
+from ..multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
+from ..multibody.spatial import Array
+from .left_out import listed, present, refused_or_left_out
+
+GRAVITY = (0.0, 0.0, -9.81)  # m/s^2, where the file says nothing
+FAR = 1e9  # m: a limit of a slide that `to_urdf` writes because URDF asks for one; it stands for none
+_WITH_LIMITS = {"revolute": "revolute"}  # URDF's word for a hinge with limits, beside those of the joint types
+_KNOWN = {
+    "robot": {"link", "joint", "material"},
+    "link": {"inertial", "visual", "collision"},
+    "joint": {"parent", "child", "origin", "axis", "limit", "dynamics", "mimic", "calibration"},
+}
+
+
+def read_urdf(robot: Element, called: str, ignore: bool) -> Mechanism:
+    """The mechanism of a robot, which stands on its root link. Raises MechanismError with one sentence."""
+    try:
+        links, joints = _by_name(robot, "link"), _by_name(robot, "joint")
+        root = _root(links, joints)
+        left_out = refused_or_left_out(_mimics(joints), _outside(robot, joints), ignore)
+        with np.errstate(all="ignore"):  # of numbers that are not finite Mechanism says where they stand
+            bodies = [] if root == WORLD else [Body(root, Joint("fixed"), **_inertial(links[root], root))]
+            for name, element in joints.items():
+                parent, child = _end(element, name, "parent"), _end(element, name, "child")
+                bodies.append(Body(child, _joint(element, name, child), parent, **_inertial(links[child], child)))
+        return Mechanism(bodies, _gravity(robot), left_out=left_out)
+    except MechanismError as error:
+        raise MechanismError(f"URDF, {called}: {error}") from None
+
+
+def _by_name(robot: Element, tag: str) -> dict[str, Element]:
+    """The robot's links or joints by their names."""
+    found: dict[str, Element] = {}
+    for each in robot.findall(tag):
+        name = each.get("name")
+        if not name:
+            raise MechanismError(f"a {tag} has no name")
+        if name in found:
+            raise MechanismError(f"two {tag}s have the name {name!r}")
+        found[name] = each
+    if tag == "link" and not found:
+        raise MechanismError("a robot needs a link, and there is none")
+    return found
+
+
+def _root(links: Mapping[str, Element], joints: Mapping[str, Element]) -> str:
+    """The link that is no joint's child."""
+    above: dict[str, str] = {}
+    for name, joint in joints.items():
+        parent, child = _end(joint, name, "parent"), _end(joint, name, "child")
+        for end in (parent, child):
+            if end not in links:
+                raise MechanismError(f"joint {name!r} names the link {end!r}, which is not there")
+        if child in above:
+            raise MechanismError(f"link {child!r} is the child of two joints, {above[child]!r} and {name!r}")
+        above[child] = name
+    roots = [name for name in links if name not in above]
+    if not roots:
+        raise MechanismError("a robot is one tree with a root, and every link is a joint's child")
+    if len(roots) > 1:
+        raise MechanismError(f"a robot is one tree, and {len(roots)} links are no joint's child: {listed(roots)}")
+    return roots[0]
+
+
+def _gravity(robot: Element) -> list[float]:
+    """Gravity as MuJoCo's extension of URDF has it [m/s^2], else the usual one."""
+    option = robot.find("mujoco/option")
+    return [*GRAVITY] if option is None else _numbers(option, "<mujoco>", "gravity", 3, " ".join(map(repr, GRAVITY)))
+
+
+def _end(joint: Element, name: str, which: str) -> str:
+    """The link at an end of a joint."""
+    element = _one(joint, f"joint {name!r}", which)
+    link = None if element is None else element.get("link")
+    if not link:
+        raise MechanismError(f"joint {name!r} has no {which} link")
+    return link
+
+
+def _joint(joint: Element, name: str, child: str) -> Joint:
+    """The joint, called as in the file."""
+    where, word = f"joint {name!r}", joint.get("type")
+    kinds = {each.urdf: kind for kind, each in TYPES.items() if each.urdf} | _WITH_LIMITS
+    if word not in kinds:
+        given = f"is {word}" if word else "has no type"
+        raise MechanismError(f"{where} {given}, and a mechanism has {', '.join(sorted(kinds))}")
+    fields: dict[str, Any] = dict(zip(("position", "orientation"), _origin(joint, where), strict=True))
+    if TYPES[kinds[word]].moves:
+        axis, dynamics = _one(joint, where, "axis"), _one(joint, where, "dynamics")
+        fields["axis"] = (1.0, 0.0, 0.0) if axis is None else _numbers(axis, where, "xyz", 3)
+        fields["damping"] = 0.0 if dynamics is None else _numbers(dynamics, where, "damping", 1, "0")[0]
+    return Joint(kinds[word], name="" if name == child else name, **fields)
+
+
+def _inertial(link: Element, name: str) -> dict[str, Any]:
+    """Mass, center and inertia of a link, in its frame; nothing for one without."""
+    where = f"link {name!r}"
+    inertial = _one(link, where, "inertial")
+    if inertial is None:
+        return {}
+    mass, moments = (_one(inertial, where, tag) for tag in ("mass", "inertia"))
+    if mass is None or moments is None:
+        raise MechanismError(f"{where} has an <inertial> without <{'mass' if mass is None else 'inertia'}>")
+    center, turn = _origin(inertial, where)
+    xx, xy, xz, yy, yz, zz = (
+        _numbers(moments, where, name, 1)[0] for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    )
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return {
+        "mass": _numbers(mass, where, "value", 1)[0],
+        "center": center,
+        "inertia": turn @ inertia @ turn.T,
+    }
+
+
+def _origin(element: Element, where: str) -> tuple[Array, Array]:
+    """The position [m] and the axes, as columns, in an <origin>; those of the parent where there is none."""
+    origin = _one(element, where, "origin")
+    if origin is None:
+        return np.zeros(3), np.eye(3)
+    position = np.array(_numbers(origin, where, "xyz", 3, "0 0 0"))
+    if origin.get("quat_xyzw") is not None:
+        x, y, z, w = _numbers(origin, where, "quat_xyzw", 4)
+        return position, spatial.from_quaternion((w, x, y, z))
+    return position, from_rpy(*_numbers(origin, where, "rpy", 3, "0 0 0"))
+
+
+def from_rpy(roll: float, pitch: float, yaw: float) -> Array:
+    """The rotation by angles [rad] about the fixed x, then y, then z."""
+    x, y, z = np.eye(3)
+    turns = spatial.rotation(z, yaw), spatial.rotation(y, pitch), spatial.rotation(x, roll)
+    return spatial.snapped(turns[0] @ turns[1] @ turns[2])
+
+
+def _one(element: Element, where: str, tag: str) -> Element | None:
+    """The only child of that tag, None where there is none."""
+    children = element.findall(tag)
+    if len(children) > 1:
+        raise MechanismError(f"{where} has {len(children)} elements <{tag}>, and one is needed")
+    return children[0] if children else None
+
+
+def _numbers(element: Element, where: str, attribute: str, count: int, default: str | None = None) -> list[float]:
+    """The finite numbers of an attribute."""
+    text = element.get(attribute, default)
+    if text is None:
+        raise MechanismError(f"{where}: <{element.tag}> has no {attribute}")
+    try:
+        values = [float(each) for each in text.replace("_", "?").split()]  # float() would take 1_000
+    except ValueError:
+        values = []
+    if len(values) != count or not all(map(math.isfinite, values)):
+        needed = "one finite number" if count == 1 else f"{count} finite numbers"
+        hint = ", with the macros of xacro expanded" if "${" in text else ""
+        raise MechanismError(f"{where}: {attribute} of <{element.tag}> needs {needed}{hint}, got {text!r:.60}")
+    return values
+
+
+def _mimics(joints: Mapping[str, Element]) -> list[str]:
+    """Couplings of joints."""
+    leaders = [(name, joint.find("mimic")) for name, joint in joints.items()]
+    names = [f"{name} after {leader.get('joint')}" for name, leader in leaders if leader is not None]
+    return present({f"joints that mimic others ({listed(names)})": names})
+
+
+def _outside(robot: Element, joints: Mapping[str, Element]) -> list[str]:
+    """What acts on a mechanism and does not belong to it."""
+    limited = [name for name, joint in joints.items() if _limited(joint, name)]
+    rubbing = [f"{name}: {force:g}" for name, joint in joints.items() if (force := _friction(joint, name))]
+    return present(
+        {
+            "contacts": robot.findall("link/collision"),
+            f"joint limits ({listed(limited)})": limited,
+            f"friction loss ({listed(rubbing)})": rubbing,
+            f"extensions of URDF ({listed(list(dict.fromkeys(_extensions(robot))))})": [*_extensions(robot)],
+        }
+    )
+
+
+def _limited(joint: Element, name: str) -> bool:
+    limit, where = _one(joint, f"joint {name!r}", "limit"), f"joint {name!r}"
+    if limit is None or joint.get("type") not in ("revolute", "prismatic"):
+        return False
+    return [_numbers(limit, where, side, 1, "0")[0] for side in ("lower", "upper")] != [-FAR, FAR]
+
+
+def _friction(joint: Element, name: str) -> float:
+    dynamics = _one(joint, f"joint {name!r}", "dynamics")
+    return 0.0 if dynamics is None else _numbers(dynamics, f"joint {name!r}", "friction", 1, "0")[0]
+
+
+def _extensions(robot: Element) -> Iterator[str]:
+    """Elements of the robot, its links and its joints that are not URDF's own."""
+    for parent in (robot, *robot.findall("link"), *robot.findall("joint")):
+        for each in parent:
+            alone = [[(inner.tag, *inner.keys()) for inner in each]] == [[("option", "gravity")]]
+            if each.tag not in _KNOWN[parent.tag] and not (each.tag == "mujoco" and alone):
+                yield f"<{each.tag}>"

@@ -1,0 +1,72 @@
+"""Sources of models: a path or XML text, read as bytes, and what errors call it."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+from xml.parsers import expat
+
+from ..multibody.mechanism import MechanismError
+
+_BEFORE_XML = "\ufeff \t\r\n"  # what editors leave there
+
+
+def is_text(source: Any) -> bool:
+    """Whether the source is XML text and no path."""
+    return isinstance(source, str) and source.lstrip(_BEFORE_XML).startswith("<")
+
+
+def called(source: Any) -> str:
+    """What errors call a source."""
+    return "the given text" if is_text(source) else f"{str(source)!r}"
+
+
+def path_of(source: Any) -> Path:
+    """The path of a file that is there. Raises MechanismError."""
+    if not isinstance(source, str | os.PathLike):
+        raise MechanismError(f"a model is a path or XML text, and of MJCF an MjModel, too, got {type(source).__name__}")
+    path = Path(source)
+    if path.is_dir():
+        raise MechanismError(f"{os.fspath(source)!r:.200} is a folder, and a model is a file")
+    if not path.is_file():
+        raise MechanismError(f"there is no file {os.fspath(source)!r:.200}")
+    return path
+
+
+def text_of(source: Any) -> bytes:
+    """The XML of a source, in the encoding that it declares."""
+    if is_text(source):
+        return str(source).lstrip(_BEFORE_XML).encode()
+    return path_of(source).read_bytes().removeprefix(b"\xef\xbb\xbf").lstrip()
+
+
+def root_of(source: Any) -> str:
+    """The name of the root element; "" for what is not XML."""
+    tags: list[str] = []
+    parser = expat.ParserCreate("utf-8" if is_text(source) else None)
+    parser.StartElementHandler = lambda tag, attributes: tags.append(tag)
+    text = text_of(source)
+    with suppress(expat.ExpatError, LookupError, ValueError):  # what is wrong further on shows when it is read
+        parser.Parse(text, True)
+    return tags[0] if tags else ""
+
+
+def urdf_root(source: Any) -> ElementTree.Element:
+    """The root element of a URDF. Raises MechanismError for other sources.
+
+    Prefixes of namespaces stay parts of names, so that one that is nowhere declared, left by a macro, does no harm.
+    """
+    parser, builder = expat.ParserCreate("utf-8" if is_text(source) else None), ElementTree.TreeBuilder()
+    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
+    text = text_of(source)
+    try:
+        parser.Parse(text, True)
+    except (expat.ExpatError, LookupError, ValueError) as error:
+        raise MechanismError(f"{called(source)} is not XML: {error}") from None
+    robot = builder.close()
+    if robot.tag != "robot":
+        raise MechanismError(f"a URDF's root element is <robot>, {called(source)} has <{robot.tag}>")
+    return robot

@@ -1,0 +1,173 @@
+"""Mechanisms written and read again: random trees of any size and scale are the same, or are refused in a sentence."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from pytest import mark, raises
+
+import dynamics as dyn
+from dynamics.io.mujoco_twin import MujocoTwin
+from dynamics.io.stand_ins import STAND_IN
+from dynamics.io.write_mjcf import all_bodies
+from dynamics.multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
+from tests.dynamics.mechanisms import FAMILIES, random_inertia, random_rotation
+
+EPS = 2.0**-52
+TURNED = 8 * EPS  # axes and rotations: angles or a quaternion, and their sines or squares, a few roundings each; what
+# comes back is a rotation, and so off by what the matrix that was written is off from one, too
+MOMENTS = 16 * EPS  # of the largest moment: besides, principal axes and back
+EXACT = ("damping", "stiffness", "spring_reference", "armature")
+WRITERS: dict[str, tuple[Callable[[Any], str], Callable[[Any], Mechanism]]] = {
+    "mjcf": (dyn.to_mjcf, dyn.load_mjcf),
+    "urdf": (dyn.to_urdf, dyn.load_urdf),
+}
+writers = mark.parametrize("writer", WRITERS)
+
+
+def random_tree(seed: int) -> Mechanism:
+    """Hinges, slides and welds of one scale of mass and of length; massless links, point masses, rods and plates."""
+    rng = np.random.default_rng(seed)
+    kilogram, meter = 10.0 ** rng.uniform(-12, 12), 10.0 ** rng.uniform(-9, 9)
+    bodies: list[Body] = []
+    for i in range(int(rng.integers(1, 9))):
+        kind = str(rng.choice(["revolute", "revolute", "prismatic", "fixed"]))
+        turn = random_rotation(rng) if rng.uniform() < 0.7 else np.eye(3)[rng.permutation(3)]
+        turn = turn * np.linalg.det(turn)
+        joint = Joint(kind, rng.normal(size=3), meter * rng.normal(size=3), turn, damping=rng.uniform())
+        moments = [
+            random_inertia(rng),
+            np.zeros(3),
+            rng.uniform() * np.array([1.0, 1.0, 0.0]),
+            np.array([0.1, 0.7, 0.8]),
+        ][rng.integers(4)]
+        mass = kilogram * rng.uniform(0.5, 2.0) * (rng.uniform() < 0.8)
+        inertia = kilogram * meter**2 * moments * (mass > 0)
+        parent = f"b{rng.integers(max(0, i - 3), i)}" if i and rng.uniform() < 0.9 else WORLD
+        parent = bodies[-1].name if i and not bodies[-1].mass else parent  # what has no mass carries some
+        bodies.append(Body(f"b{i}", joint, parent, mass, meter * rng.normal(size=3) * (mass > 0), inertia))
+    tip = Body("tip", Joint("revolute", rng.normal(size=3)), f"b{len(bodies) - 1}", kilogram, (meter, 0, meter))
+    return Mechanism([*bodies, replace(tip, inertia=kilogram * meter**2 * random_inertia(rng))], rng.normal(size=3))
+
+
+def difference(one: Mechanism, other: Mechanism) -> str:
+    """What is not the same in two mechanisms; "" for nothing."""
+    if np.asarray(one.gravity).tolist() != np.asarray(other.gravity).tolist():
+        return "gravity"
+    ours, theirs = ({body.name: body for body in all_bodies(each)} for each in (one, other))
+    if set(ours) != set(theirs) or set(one.coordinates) != set(other.coordinates):
+        return "names"
+    for name, a in ours.items():
+        b, size = theirs[name], float(np.abs(a.inertia).max())
+        same = (a.parent, a.mass, a.joint.kind) == (b.parent, b.mass, b.joint.kind)
+        same &= np.array_equal(a.center, b.center) and np.array_equal(a.joint.position, b.joint.position)
+        turn = np.asarray(a.joint.orientation)
+        defect = float(np.abs(turn.T @ turn - np.eye(3)).max())
+        same &= bool(np.abs(turn - b.joint.orientation).max() <= TURNED + defect)
+        same &= bool(np.abs(np.asarray(a.inertia) - b.inertia).max() <= MOMENTS * size)
+        if a.joint.type.moves:
+            same &= a.coordinate == b.coordinate and all(getattr(a.joint, n) == getattr(b.joint, n) for n in EXACT)
+            same &= bool(np.abs(np.asarray(a.joint.axis) - b.joint.axis).max() <= TURNED)
+        if not same:
+            return f"{a} and {b}"
+    return ""
+
+
+def outcomes(writer: str, seeds: range) -> dict[str, list[Any]]:
+    """Seeds of the trees that came back, that were refused and that were altered."""
+    write, load = WRITERS[writer]
+    found: dict[str, list[Any]] = {"same": [], "refused": [], "altered": []}
+    for seed in seeds:
+        mechanism = random_tree(seed)
+        try:
+            text = write(mechanism)
+        except MechanismError as error:
+            found["refused"].append((seed, str(error)))
+            continue
+        what = difference(mechanism, load(text))
+        found["altered" if what else "same"].append((seed, what))
+    return found
+
+
+@writers
+@mark.filterwarnings("ignore:MuJoCo on the given text. Inertia matrix is too close to singular")
+@mark.parametrize("count", [30, pytest.param(300, marks=mark.slow)])
+def test_random_trees_come_back_or_are_refused(writer: str, count: int, record_property: Any) -> None:
+    if writer == "mjcf":
+        pytest.importorskip("mujoco")
+    found = outcomes(writer, range(count))
+    record_property("refused", len(found["refused"]))
+    assert found["altered"] == []
+    assert not any("\n" in sentence for _, sentence in found["refused"])
+    assert len(found["same"]) > count // 4
+    assert writer == "mjcf" or not found["refused"]
+
+
+@writers
+def test_welds_frames_and_locks_come_back(writer: str) -> None:
+    """A frame without mass keeps its name; a locked joint is a weld where it stands."""
+    if writer == "mjcf":
+        pytest.importorskip("mujoco")
+    frame = Body("tool0", Joint("fixed", position=(0.1, 0.2, 0.3)), "b4")
+    mechanism = Mechanism([*[_plain(body) for body in FAMILIES["welded"](6).bodies], frame]).lock("b1", 0.3)
+    write, load = WRITERS[writer]
+    back = load(write(mechanism))
+    assert difference(mechanism, back) == ""
+    assert [body.name for body in back.bodies if not body.joint.type.moves] == ["b1", "b2", "b5", "tool0"]
+
+
+def _plain(body: Body) -> Body:
+    """Without what URDF has not."""
+    return replace(body, joint=replace(body.joint, stiffness=0.0, spring_reference=0.0, armature=0.0))
+
+
+def test_urdf_keeps_the_order_of_coordinates() -> None:
+    mechanism = replace(dyn.tree([-1, 0, 0, 1, 2, 1]), gravity=(0.0, 0.0, -9.81))
+    assert dyn.load_urdf(dyn.to_urdf(mechanism)).coordinates == mechanism.coordinates
+
+
+@mark.parametrize("pitch", [np.pi / 2 - 1e-9, np.pi / 2 - 3e-12, 1e-7 - np.pi / 2, np.pi / 2])
+def test_a_frame_near_straight_up_comes_back(pitch: float) -> None:
+    """Where roll and yaw turn about nearly the same axis, and each alone is hardly determined."""
+    turn = random_rotation(np.random.default_rng(1))
+    c, s = np.cos(pitch), np.sin(pitch)
+    turn = np.array([[np.cos(0.4), -np.sin(0.4), 0], [np.sin(0.4), np.cos(0.4), 0], [0, 0, 1]]) @ np.array(
+        [[c, 0, s], [0, 1, 0], [-s, 0, c]]
+    )
+    body = Body("a", Joint("revolute", (0.0, 1.0, 0.0), orientation=turn), inertia=(1, 1, 1))
+    mechanism = Mechanism([body])
+    assert difference(mechanism, dyn.load_urdf(dyn.to_urdf(mechanism))) == ""
+
+
+@mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"mass": 1e-20, "inertia": (1, 1, 1)}, "and body 'a' has a mass of 1e-20 kg"),
+        ({"mass": 1.0, "inertia": (1, 1, 1e-16)}, "and body 'a' has a moment of inertia of 1e-16 kg m^2"),
+        ({"mass": 1e-9, "center": (1e-6, 0, 0)}, "and body 'a' has a moment of inertia of 0, where 1e-21 kg m^2 turn"),
+        (
+            {"mass": 1.0, "inertia": (1, 2, 4)},
+            "MuJoCo takes no body with principal moments [1.0, 2.0, 4.0], as",
+        ),
+    ],
+)
+@mark.filterwarnings("ignore:body 'a'. no body has:dynamics.MechanismWarning")
+def test_what_mujoco_does_not_take_is_refused(fields: dict[str, Any], message: str) -> None:
+    spin = Body("base", Joint("revolute", (1.0, 0.0, 0.0)), mass=1.0, inertia=(1, 1, 1))
+    with raises(MechanismError, match=re.escape(message)):
+        dyn.to_mjcf(Mechanism([spin, Body("a", Joint("revolute", (0.0, 1.0, 1.0)), "base", **fields)]))
+
+
+def test_a_zero_that_no_motion_shows_is_written_at_any_scale() -> None:
+    """The moment of a planar rod about itself."""
+    pytest.importorskip("mujoco")
+    arm = dyn.planar_arm([1e-3] * 2, [1e-3] * 2)
+    twin, x = MujocoTwin(arm), np.array([0.3, -0.2])
+    assert twin.model.body_inertia[:, 2].tolist() == [0.0, STAND_IN, STAND_IN]
+    M = list(dyn.mass_matrix(arm).evaluate({"q0": 0.3, "q1": -0.2, "qd0": 0.0, "qd1": 0.0}).values())
+    assert twin.mass_matrix(x).ravel() == pytest.approx(M, rel=1e-12)

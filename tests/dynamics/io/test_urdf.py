@@ -1,0 +1,361 @@
+"""Mechanisms read from URDF: numbers of the file, frames, what is left out, and a sentence for what is wrong."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+from pytest import approx, importorskip, mark, param, raises, warns
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.io.load import compiled
+from dynamics.io.read_urdf import from_rpy
+from dynamics.multibody.mechanism import Body, Joint, Mechanism, MechanismError
+from dynamics.multibody.spatial import rotation
+from tests.dynamics.mechanisms import random_inertia
+from tests.dynamics.models import error
+from tests.tolerances import EQUATIONS, LAST_BITS
+
+Array = np.ndarray
+pytestmark = mark.filterwarnings("ignore:.*left out:dynamics.MechanismWarning")
+
+LINK = """<link name="{0}"><inertial><origin xyz="0.1 0 0.2" rpy="0.1 0.2 0.3"/><mass value="1.5"/>
+<inertia ixx="0.1" ixy="0.01" ixz="0" iyy="0.2" iyz="0" izz="0.15"/></inertial>
+<visual><geometry><mesh filename="package://nowhere/{0}.stl"/></geometry></visual></link>"""
+JOINT = """<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/>
+<origin xyz="0.1 0.2 0.3" rpy="0.4 0.5 0.6"/><axis xyz="{4}"/><limit lower="-1" upper="1" effort="9" velocity="9"/>
+<dynamics damping="{5}"/></joint>"""
+URDF = f"""<?xml version="1.0"?><robot name="arm"><link name="base"/>{"".join(LINK.format(f"l{i}") for i in (1, 2, 3))}
+{JOINT.format("j1", "revolute", "base", "l1", "0 0 1", 0.1)}{JOINT.format("j2", "continuous", "l1", "l2", "0 1 0", 0.2)}
+{JOINT.format("j3", "prismatic", "l2", "l3", "1 0 0", 0.3)}</robot>"""
+
+
+def turned(roll: float, pitch: float, yaw: float) -> Array:
+    """The rotation of URDF's rpy: about fixed x, then y, then z."""
+    x, y, z = np.eye(3)
+    return rotation(z, yaw) @ rotation(y, pitch) @ rotation(x, roll)
+
+
+def link(name: str, mass: float = 0.0, inertia: Array | None = None, origin: str = "") -> str:
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = (np.zeros((3, 3)) if inertia is None else inertia).tolist()
+    moments = f'ixx="{xx!r}" ixy="{xy!r}" ixz="{xz!r}" iyy="{yy!r}" iyz="{yz!r}" izz="{zz!r}"'
+    inside = f'<inertial>{origin}<mass value="{mass!r}"/><inertia {moments}/></inertial>'
+    return f'<link name="{name}">{inside if mass or inertia is not None else ""}</link>'
+
+
+def joint(name: str, kind: str, parent: str, child: str, inside: str = "") -> str:
+    ends = f'<parent link="{parent}"/><child link="{child}"/>'
+    return f'<joint name="{name}" type="{kind}">{ends}{inside}</joint>'
+
+
+def robot(*elements: str) -> str:
+    return f'<robot name="r">{"".join(elements)}</robot>'
+
+
+def mass_matrix(mechanism: Mechanism) -> Array:
+    """M at q = 0."""
+    n = mechanism.system.n
+    at = {f"{name}{i}": 0.0 for name in ("q", "qd") for i in range(n)}
+    return np.reshape(list(dyn.mass_matrix(mechanism).evaluate(at).values()), (n, n))
+
+
+# --- the numbers of the file
+
+
+def test_a_urdf_arm_is_what_it_says() -> None:
+    """Its numbers put in by hand; the meshes are nowhere."""
+    loaded = dyn.load_urdf(URDF)
+    assert loaded.left_out == ("joint limits (j1, j3)",)
+    assert loaded.coordinates == ("j1", "j2", "j3")
+    assert [body.name for body in loaded.bodies] == ["base", "l1", "l2", "l3"]
+    principal = turned(0.1, 0.2, 0.3)
+    inertia = principal @ np.array([[0.1, 0.01, 0], [0.01, 0.2, 0], [0, 0, 0.15]]) @ principal.T
+    bodies = [
+        Body(
+            f"l{i}",
+            Joint(kind, axis, (0.1, 0.2, 0.3), turned(0.4, 0.5, 0.6), damping=0.1 * i),
+            f"l{i - 1}" if i > 1 else "world",
+            mass=1.5,
+            center=(0.1, 0.0, 0.2),
+            inertia=inertia,
+        )
+        for i, kind, axis in ((1, "revolute", (0, 0, 1)), (2, "revolute", (0, 1, 0)), (3, "prismatic", (1, 0, 0)))
+    ]
+    x = np.random.default_rng(3).uniform(-1.0, 1.0, 9)
+    ours, theirs = (cg.compile(dyn.inverse_dynamics(each))(x) for each in (loaded, Mechanism(bodies)))
+    assert error(ours, theirs) < EQUATIONS
+
+
+def test_urdf_needs_no_mujoco(monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    assert dyn.load_urdf(URDF).coordinates == ("j1", "j2", "j3")
+
+
+def test_the_inertia_of_a_massless_welded_link_counts() -> None:
+    """A reader that fuses links and weighs their inertia by their mass says 1e-3."""
+    inertia, axis = 1e-3 * np.eye(3), '<axis xyz="0 0 1"/>'
+    text = robot(
+        link("base"),
+        link("a", 1.0, inertia),
+        link("rotor", 0.0, inertia),
+        joint("j", "continuous", "base", "a", axis),
+        joint("weld", "fixed", "a", "rotor"),
+    )
+    assert mass_matrix(dyn.load_urdf(text)) == approx(2e-3, rel=LAST_BITS)
+
+
+def test_fixed_frames_keep_their_names_and_places() -> None:
+    origin = '<origin xyz="0 0.3 0.5" rpy="0 0 1.5707963"/>'
+    frames = link("tool0"), joint("to tool0", "fixed", "l3", "tool0", origin)
+    loaded = dyn.load_urdf(URDF.replace("</robot>", "".join(frames) + "</robot>"))
+    at = {"q0": 0.3, "q1": -0.2, "q2": 0.4}
+    place = loaded.position("tool0").evaluate(at)
+    assert place == approx(loaded.position("l3", (0.0, 0.3, 0.5)).evaluate(at), rel=LAST_BITS)
+    assert loaded.position("base").evaluate(at) == {"x": 0.0, "y": 0.0, "z": 0.0}
+
+
+@mark.parametrize("angle", ["1.5708", "1.5707963", "3.14159", "-1.570796", "0.3"])
+def test_angles_are_those_of_the_file(angle: str) -> None:
+    """Nearly a quarter turn is not a quarter turn."""
+    text = robot(link("base"), link("a"), joint("j", "fixed", "base", "a", f'<origin rpy="{angle} 0 {angle}"/>'))
+    (_, body) = dyn.load_urdf(text).bodies
+    c, s = np.cos(float(angle)), np.sin(float(angle))
+    expected = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    assert np.asarray(body.joint.orientation) == approx(expected, rel=0, abs=LAST_BITS)
+    assert np.any(np.asarray(body.joint.orientation) % 1.0)
+
+
+def test_a_quarter_turn_to_the_last_digit_is_one() -> None:
+    assert from_rpy(np.pi / 2, -np.pi / 2, np.pi).tolist() == [[0, 1, 0], [0, 0, 1], [1, 0, 0]]
+
+
+def test_an_orientation_may_be_a_quaternion() -> None:
+    text = robot(link("base"), link("a"), joint("j", "fixed", "base", "a", '<origin quat_xyzw="0 0 2 2"/>'))
+    assert np.asarray(dyn.load_urdf(text).bodies[1].joint.orientation) == approx(turned(0, 0, np.pi / 2))
+
+
+def test_an_axis_that_is_not_written_is_x() -> None:
+    loaded = dyn.load_urdf(robot(link("base"), link("a", 1.0, np.eye(3)), joint("j", "continuous", "base", "a")))
+    assert np.asarray(loaded.moving[0].joint.axis).tolist() == [1.0, 0.0, 0.0]
+
+
+# --- beside other readers
+
+
+def random_urdf(rng: np.random.Generator, n: int, *, massless: bool = False) -> str:
+    """A tree of n hinges, slides and welds, with every frame turned.  massless: some links that move have no mass."""
+
+    def numbers(*size: int) -> str:
+        return " ".join(map(repr, rng.normal(size=size).tolist()))
+
+    def origin() -> str:
+        return f'<origin xyz="{numbers(3)}" rpy="{numbers(3)}"/>'
+
+    elements, light = [link("base", 2.0, np.eye(3))], set(range(0, n - 1, 3) if massless else ())
+    for i in range(n):
+        kind = "fixed" if i in (2, 5) else str(rng.choice(["continuous", "revolute", "prismatic"]))
+        parent = "base" if not i else f"l{i - 1}" if i - 1 in light else f"l{rng.integers(max(0, i - 3), i)}"
+        bare = i in light and kind != "fixed"
+        elements.append(link(f"l{i}") if bare else link(f"l{i}", rng.uniform(0.5, 2), random_inertia(rng), origin()))
+        inside = f'{origin()}<axis xyz="{numbers(3)}"/><dynamics damping="{rng.uniform()!r}"/>'
+        elements.append(joint(f"j{i}", kind, parent, f"l{i}", f"{inside}<limit effort='9' velocity='9'/>"))
+    return robot(*elements)
+
+
+@mark.parametrize("seed", range(5))
+def test_mujoco_reads_the_same(seed: int) -> None:
+    """Mass matrix, bias and damping of its own model of the file, from torques."""
+    module = importorskip("mujoco")
+    text, rng = random_urdf(np.random.default_rng(seed), 8), np.random.default_rng((seed, 1))
+    ours, mj = dyn.load_urdf(text), compiled(text)
+    order = [mj.joint(name).id for name in ours.coordinates]
+    data, inverse, worst = module.MjData(mj), cg.compile(dyn.inverse_dynamics(ours), "python"), 0.0
+    mj.opt.disableflags |= int(module.mjtDisableBit.mjDSBL_CONSTRAINT)
+    for _ in range(5):
+        x = rng.uniform(-1.0, 1.0, (3, mj.nv))
+        data.qpos[order], data.qvel[order], data.qacc[order] = x
+        module.mj_inverse(mj, data)
+        worst = max(worst, error(inverse(x.ravel()), data.qfrc_inverse[order]))
+    assert worst < EQUATIONS
+
+
+@mark.parametrize("seed", range(5))
+def test_pinocchio_reads_the_same(seed: int) -> None:
+    """Massless links that move, too."""
+    pinocchio = importorskip("pinocchio")
+    rng = np.random.default_rng((seed, 2))
+    text = random_urdf(rng, 9, massless=True)
+    ours, theirs = dyn.load_urdf(text), pinocchio.buildModelFromXML(text)
+    data, n = theirs.createData(), ours.system.n
+    order = [theirs.joints[theirs.getJointId(name)].idx_v for name in ours.coordinates]
+    damping = np.array(ours.system.damping)
+    inverse = cg.compile(dyn.inverse_dynamics(ours), "python")
+    for _ in range(5):
+        x = rng.uniform(-1.0, 1.0, (3, n))
+        given = np.zeros((3, n))
+        given[:, order] = x
+        q = np.concatenate(
+            [[np.cos(a), np.sin(a)] if theirs.joints[i + 1].nq == 2 else [a] for i, a in enumerate(given[0])]
+        )
+        tau = pinocchio.rnea(theirs, data, q, given[1], given[2])[order] + damping * x[1]
+        assert error(inverse(x.ravel()), tau) < EQUATIONS
+    frame = theirs.getFrameId(ours.bodies[-1].name)
+    pinocchio.framesForwardKinematics(theirs, data, q)
+    place = ours.position(ours.bodies[-1].name).evaluate({f"q{i}": x[0, i] for i in range(n)})
+    assert [*place.values()] == approx(data.oMf[frame].translation, abs=EQUATIONS)
+
+
+# --- what is left out
+
+
+def test_what_acts_from_outside_is_left_out_with_a_warning() -> None:
+    shape = "<collision><geometry><box size='1 1 1'/></geometry></collision>"
+    text = robot(
+        link("base"),
+        link("a", 1.0, np.eye(3)).replace("</link>", f"{shape}</link>"),
+        joint("j", "revolute", "base", "a", '<limit lower="-1" upper="2"/><dynamics friction="0.25"/>'),
+        "<transmission name='t'/><gazebo/><gazebo/>",
+    )
+    with warns(dyn.MechanismWarning) as said:
+        loaded = dyn.load_urdf(text)
+    assert loaded.left_out == (
+        "contacts",
+        "joint limits (j)",
+        "friction loss (j: 0.25)",
+        "extensions of URDF (<transmission>, <gazebo>)",
+    )
+    assert [str(each.message) for each in said] == [f"the given text: left out {'; '.join(loaded.left_out)}"]
+    assert said[0].filename == __file__
+
+
+def test_a_joint_that_mimics_is_refused_or_left_out_by_name() -> None:
+    text = URDF.replace('<joint name="j2" type="continuous">', '<joint name="j2" type="continuous"><mimic joint="j1"/>')
+    what = "joints that mimic others (j2 after j1)"
+    with raises(MechanismError, match=re.escape(f"{what} (the option ignore leaves this out)") + "$"):
+        dyn.load_urdf(text)
+    assert dyn.load_urdf(text, ignore=True).left_out[0] == what
+
+
+def test_a_floating_base_is_free() -> None:
+    text = robot(link("base"), link("a", 1.0, np.eye(3)), joint("j", "floating", "base", "a"))
+    mechanism = dyn.load_urdf(text)
+    assert mechanism.coordinates == tuple(f"j.{name}" for name in ("x", "y", "z", "qw", "qx", "qy", "qz"))
+    falling = dyn.forward_dynamics(mechanism).evaluate(
+        dict(zip([f"q{i}" for i in range(7)], mechanism.system.kinematics.neutral, strict=True))
+        | {f"{name}{i}": 0.0 for name in ("qd", "tau") for i in range(6)}
+    )
+    assert falling["qdd2"] == approx(-9.81)
+
+
+def test_moments_that_no_body_has_are_a_warning_and_count() -> None:
+    """Kinetic energy is positive with them, so that the equations of a tree hold."""
+    text = robot(link("base"), link("a", 1.0, np.diag([1.0, 2.0, 4.0])), joint("j", "continuous", "base", "a"))
+    with warns(dyn.MechanismWarning, match=r"^body 'a': no body has principal moments \[1.0, 2.0, 4.0\]"):
+        loaded = dyn.load_urdf(text)
+    assert mass_matrix(loaded) == approx(1.0)
+
+
+def test_moments_below_rounding_of_the_mass_may_be_negative() -> None:
+    """As a program writes a point mass that it has moved about; ten times as much is a mistake."""
+    for factor in (1.0, 1e6):
+        text = link("a", 0.5, factor * np.diag([-5e-20, -5e-20, 0.0]), '<origin xyz="0 0 0.03"/>')
+        text = robot(link("base"), text, joint("j", "continuous", "base", "a"))
+        if factor == 1.0:
+            assert mass_matrix(dyn.load_urdf(text)) == approx(0.5 * 0.03**2)
+        else:
+            with raises(MechanismError, match="inertia must not be negative"):
+                dyn.load_urdf(text)
+
+
+# --- what is wrong
+
+HINGE = joint("j", "continuous", "base", "a", '<axis xyz="0 0 1"/>')
+A, BASE = link("a", 1.0, np.eye(3)), link("base")
+WRONG = [
+    param("<robot>", "the given text is not XML: no element found: line 1, column 7", id="xml"),
+    param("<mujoco/>", "a URDF's root element is <robot>, the given text has <mujoco>", id="root"),
+    param("<robot/>", "a robot needs a link, and there is none", id="empty"),
+    param(robot(BASE, "<link/>"), "a link has no name", id="nameless"),
+    param(robot(BASE, A, A, HINGE), "two links have the name 'a'", id="links"),
+    param(robot(BASE, A, link("b"), HINGE, HINGE.replace("'a'", "'b'")), "two joints have the name 'j'", id="joints"),
+    param(robot(BASE, HINGE), "joint 'j' names the link 'a', which is not there", id="missing"),
+    param(robot(BASE, A, HINGE.replace('<child link="a"/>', "")), "joint 'j' has no child link", id="child"),
+    param(robot(BASE, A, HINGE.replace(' link="base"', "")), "joint 'j' has no parent link", id="parent"),
+    param(robot(BASE, A), "a robot is one tree, and 2 links are no joint's child: base, a", id="roots"),
+    param(
+        robot(BASE, A, HINGE, joint("k", "fixed", "base", "a")),
+        "link 'a' is the child of two joints, 'j' and 'k'",
+        id="twice",
+    ),
+    param(robot(A, joint("j", "fixed", "a", "a")), "every link is a joint's child", id="self"),
+    param(
+        robot(BASE, A, link("b"), joint("j", "fixed", "a", "b"), joint("k", "fixed", "b", "a")),
+        "body 'a' is its own ancestor, by way of 'b'",
+        id="circle",
+    ),
+    param(robot(BASE, A, HINGE.replace(' type="continuous"', "")), "joint 'j' has no type, and a mechanism", id="type"),
+    param(
+        robot(BASE, A, HINGE.replace("continuous", "planar")), "joint 'j' is planar, and a mechanism has", id="planar"
+    ),
+    param(robot(BASE, A, HINGE.replace(' xyz="0 0 1"', "")), "joint 'j': <axis> has no xyz", id="axis"),
+    param(robot(BASE, A, HINGE.replace("0 0 1", "0 0 0")), "body 'a': axis must not be zero", id="no axis"),
+    param(
+        robot(BASE, A, HINGE.replace("0 0 1", "0 1")),
+        "joint 'j': xyz of <axis> needs 3 finite numbers, got '0 1'",
+        id="two numbers",
+    ),
+    param(
+        robot(BASE, A, HINGE.replace("0 0 1", "0 nan 1")),
+        "joint 'j': xyz of <axis> needs 3 finite numbers, got '0 nan 1'",
+        id="nan",
+    ),
+    param(robot(BASE, A, HINGE.replace("0 0 1", "0 1_0 1")), "got '0 1_0 1'", id="underscore"),
+    param(
+        robot(BASE, A.replace('"1.0"', '"${m}"', 1), HINGE), "with the macros of xacro expanded, got '${m}'", id="xacro"
+    ),
+    param(robot(BASE, A.replace('ixy="0.0"', ""), HINGE), "link 'a': <inertia> has no ixy", id="moment"),
+    param(robot(BASE, A.replace('<mass value="1.0"/>', ""), HINGE), "'a' has an <inertial> without <mass>", id="mass"),
+    param(
+        robot(BASE, A.replace('"1.0"', '"-1.0"', 1), HINGE), "body 'a': mass must be finite and at least 0", id="heavy"
+    ),
+    param(robot(BASE, A.replace('ixx="1.0"', 'ixx="-1.0"'), HINGE), "'a': inertia must not be negative", id="negative"),
+    param(robot(BASE, A, HINGE.replace("<axis", "<origin/><origin/><axis")), "'j' has 2 elements <origin>", id="two"),
+    param(robot(BASE, link("a"), HINGE), "body 'a' has no mass, carries no mass, and its joint", id="no mass"),
+    param(
+        robot(BASE, link("world", 1.0, np.eye(3)), HINGE.replace('"a"', '"world"')),
+        "a body needs a name other than 'world'",
+        id="world",
+    ),
+]
+
+
+@mark.parametrize(("text", "message"), WRONG)
+def test_what_is_wrong_is_one_sentence(text: str, message: str, tmp_path: Path) -> None:
+    with raises(MechanismError, match=re.escape(message)) as caught:
+        dyn.load_urdf(text, ignore=True)
+    assert "\n" not in str(caught.value)
+    file = tmp_path / "robot.urdf"
+    file.write_text(text)
+    with raises(MechanismError, match=re.escape(str(file))):
+        dyn.load_urdf(file)
+
+
+# --- sources
+
+
+@mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1", "utf-16"])
+def test_a_file_is_read_in_the_encoding_that_it_declares(tmp_path: Path, encoding: str) -> None:
+    file = tmp_path / "arm.urdf"
+    name = encoding.removesuffix("-sig")
+    text = URDF.replace('version="1.0"', f'version="1.0" encoding="{name}"').replace("l3", "glied_ä")
+    file.write_bytes(text.encode(encoding))
+    assert dyn.load_urdf(file).bodies[-1].name == "glied_ä"
+    assert dyn.load_urdf(f"\ufeff\n{text}").bodies[-1].name == "glied_ä"
+
+
+def test_a_prefix_that_is_nowhere_declared_does_no_harm() -> None:
+    text = URDF.replace("</robot>", "<sensor:camera/></robot>")
+    assert dyn.load_urdf(text).left_out[-1] == "extensions of URDF (<sensor:camera>)"

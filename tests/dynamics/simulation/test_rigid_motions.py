@@ -1,0 +1,238 @@
+"""Motions of free and ball joints against what mechanics says of them: closed forms, constants, other coordinates."""
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike
+from pytest import mark
+
+import dynamics as dyn
+from dynamics.multibody.spatial import Array, from_quaternion, rotation
+from dynamics.reference import closed_forms
+
+MOMENTS = [1.0, 2.0, 3.0]  # kg m^2, of the rotor
+ROUNDING = 2e-15  # of some hundred steps, compensated
+KEPT = 1e-13  # of the largest: what a run at the finest tolerance leaves of a constant
+SAME = 1e-11  # of two runs in other coordinates, by steps of order 8
+
+
+def rotor() -> dyn.Mechanism:
+    """A body that turns about its center of mass."""
+    body = dyn.Body("rotor", dyn.Joint("ball"), mass=1.0, inertia=np.diag(MOMENTS))
+    return dyn.Mechanism([body], gravity=(0.0, 0.0, 0.0))
+
+
+def rotations(quaternions: Array) -> Array:
+    """(T, 3, 3)."""
+    return np.array([from_quaternion(q) for q in quaternions])
+
+
+def inertia(rng: np.random.Generator) -> Array:
+    """Of six point masses."""
+    places = rng.normal(size=(6, 3))
+    return 0.05 * sum([(p @ p) * np.eye(3) - np.outer(p, p) for p in places])
+
+
+def trunk(rng: np.random.Generator, joint: dyn.Joint, parent: str = "world") -> dyn.Body:
+    """The base of a tree, on any joint."""
+    return dyn.Body("base", joint, parent, mass=2.0, center=[0.1, -0.1, 0.2], inertia=inertia(rng))
+
+
+def branches(rng: np.random.Generator) -> list[dyn.Body]:
+    """What the base carries: a leg on a ball joint, with a hinged foot."""
+    leg = dyn.Joint("ball", position=[0.3, 0.1, 0.0])
+    foot = dyn.Joint("revolute", axis=[0.0, 1.0, 1.0], position=[0.4, 0.0, 0.0])
+    return [
+        dyn.Body("leg", leg, "base", mass=1.0, center=[0.2, 0.0, 0.1], inertia=inertia(rng)),
+        dyn.Body("foot", foot, "leg", mass=0.5, center=[0.1, 0.2, 0.0], inertia=inertia(rng)),
+    ]
+
+
+def tree(kind: str = "free", gravity: ArrayLike = (0.0, 0.0, 0.0)) -> dyn.Mechanism:
+    """A tree on a free base."""
+    rng = np.random.default_rng(3)
+    return dyn.Mechanism([trunk(rng, dyn.Joint(kind)), *branches(rng)], gravity=gravity)
+
+
+def start() -> tuple[Array, Array]:
+    """A state of the tree, with unit quaternions."""
+    rng = np.random.default_rng(4)
+    q, u = rng.normal(size=12), rng.normal(size=10)
+    q[3:7] /= np.linalg.norm(q[3:7])
+    q[7:11] /= np.linalg.norm(q[7:11])
+    return q, u
+
+
+def states(run: dyn.Trajectory) -> Array:
+    """q and qd of all rows, quaternions with the sign of those of the base and the leg at hand."""
+    return np.hstack([run.q, run.qd])
+
+
+@mark.parametrize("omega", [[0.1, 1.0, 0.2], [2.0, 1.0, 0.2], [-0.3, -1.0, -2.0]])
+def test_a_free_rotor_turns_as_jacobis_functions_say(omega: list[float]) -> None:
+    pytest.importorskip("mpmath")
+    times = [0.7, 10.0]
+    exact = closed_forms.free_rotor(times, MOMENTS, omega)
+    run = dyn.simulate(rotor(), [1.0, 0.0, 0.0, 0.0], omega, times[-1], "gauss8", dt=0.02, t_eval=times)
+    assert exact.relative_error(np.hstack([rotations(run.q).reshape(-1, 9), run.qd])) < 2 * ROUNDING
+
+
+def spinning_top(lean: float, precession: float, spin: float) -> tuple[dyn.Mechanism, Array, Array, Array]:
+    """Lagrange's top that leans by an angle; its state where it precesses and spins about its axis, and (A, C)."""
+    mass, length, across, along = 1.5, 0.4, 0.1, 0.2  # moments about the center of mass
+    body = dyn.Body(
+        "top", dyn.Joint("ball"), mass=mass, center=[0.0, 0.0, length], inertia=np.diag([across, across, along])
+    )
+    model = dyn.Mechanism([body], gravity=(0.0, 0.0, -9.81))
+    omega = np.array([0.0, precession * np.sin(lean), spin + precession * np.cos(lean)])
+    q = np.array([np.cos(0.5 * lean), np.sin(0.5 * lean), 0.0, 0.0])
+    return model, q, omega, np.array([across + mass * length**2, along, mass * 9.81 * length])
+
+
+def test_lagranges_top_precesses_regularly_where_it_may() -> None:
+    """A W^2 cos(lean) - C w_3 W + m g l = 0 (Goldstein, section 5.7): the axis goes round at W, the top about it."""
+    lean, fast = 0.6, 2.0
+    across, along, pull = spinning_top(lean, fast, 0.0)[3]
+    spin = (across * fast**2 * np.cos(lean) + pull) / (along * fast) - fast * np.cos(lean)
+    model, q, omega, _ = spinning_top(lean, fast, spin)
+    run = dyn.simulate(model, q, omega, 4.0, "gauss8", dt=0.02, t_eval=np.linspace(0.0, 4.0, 9))
+    x, z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    exact = [rotation(z, fast * t) @ rotation(x, lean) @ rotation(z, spin * t) for t in run.t]
+    np.testing.assert_allclose(rotations(run.q), exact, atol=SAME)
+
+
+def test_lagranges_top_keeps_its_energy_and_both_momenta_while_it_nods() -> None:
+    model, q, omega, (across, along, _) = spinning_top(0.6, 0.0, 30.0)
+    run = dyn.simulate(model, q, omega, 10.0, "gauss8", dt=0.005, t_eval=np.linspace(0.0, 10.0, 101))
+    momenta = run.qd * [across, across, along]
+    upward = np.einsum("tij,tj->ti", rotations(run.q), momenta)[:, 2]
+    assert np.ptp(rotations(run.q)[:, 2, 2]) > 0.01  # it nods
+    for kept in (run.energy, momenta[:, 2], upward):
+        assert np.ptp(kept) < KEPT * np.abs(kept).max()
+
+
+def tumbling(steps: int) -> tuple[dyn.Trajectory, Array]:
+    """A rotor that starts about its middle axis and turns over again and again, and its momentum in space, (T, 3)."""
+    times = np.linspace(0.0, 0.01 * steps, 1001)
+    options = {"t_eval": times, "estimate_error": False, "dt": 0.01}
+    run = dyn.simulate(rotor(), [1.0, 0.0, 0.0, 0.0], [1e-3, 1.0, 1e-3], times[-1], "gauss6", **options)
+    return run, np.einsum("tij,tj->ti", rotations(run.q), run.qd * MOMENTS)
+
+
+@mark.parametrize("steps", [pytest.param(10**6, marks=mark.slow), 10**4])
+def test_dzhanibekovs_rotor_keeps_energy_and_momentum_without_drift(steps: int) -> None:
+    """They are quadratic, which Gauss's methods keep exactly; the momentum's direction in space, to their order."""
+    run, momentum = tumbling(steps)
+    length = np.linalg.norm(run.qd * MOMENTS, axis=1)
+    assert run.qd[:, 1].min() < -0.99  # it has turned over
+    assert np.ptp(run.energy) < ROUNDING * run.energy[0]
+    assert np.ptp(length) < ROUNDING * length[0]
+    assert np.abs(momentum - momentum[0]).max() < KEPT * length[0]
+
+
+@mark.parametrize(("method", "options"), [("dop853", {"rtol": 1e-14}), ("gauss6", {"dt": 5e-3})])
+def test_a_free_tree_keeps_its_momentum_in_space(method: str, options: dict[str, float]) -> None:
+    model, (q, u) = tree(), start()
+    run = dyn.simulate(model, q, u, 2.0, method, t_eval=np.linspace(0.0, 2.0, 11), **options)
+    graph = dyn.momentum(model)
+    values = graph.evaluate(dict(zip(graph.input_names, states(run).T, strict=True)))
+    p = np.stack(list(values.values()), axis=1)  # of the base: linear in the world's axes, angular in the body's
+    angular = np.einsum("tij,tj->ti", rotations(run.q[:, 3:7]), p[:, 3:6]) + np.cross(run.q[:, :3], p[:, :3])
+    for kept in (p[:, :3], angular):
+        assert np.abs(kept - kept[0]).max() < KEPT * np.abs(kept[0]).max()
+
+
+def motion(model: dyn.Mechanism, q: Array, u: Array) -> dyn.Trajectory:
+    """Half a second of it."""
+    return dyn.simulate(model, q, u, 0.5, "gauss8", dt=0.02, t_eval=[0.1, 0.3, 0.5], estimate_error=False)
+
+
+def test_a_free_motion_is_the_same_from_a_frame_that_moves_and_in_one_that_is_turned() -> None:
+    """Galilei: a velocity added to the base is carried along. A turn of base and gravity turns the motion."""
+    gravity, (q, u) = np.array([0.3, -0.2, -9.81]), start()
+    plain = motion(tree(gravity=gravity), q, u)
+    velocity = np.array([3.0, -1.0, 2.0])
+    moved = motion(tree(gravity=gravity), q, u + np.concatenate([velocity, np.zeros(7)]))
+    moved.q[:, :3] -= moved.t[:, None] * velocity
+    moved.qd[:, :3] -= velocity
+    np.testing.assert_allclose(states(moved), states(plain), atol=SAME)
+    half = np.array([0.5, 0.5, -0.5, 0.5])  # a third of a turn
+    turn = from_quaternion(half)
+
+    def turned(vectors: Array) -> Array:
+        return vectors @ turn.T
+
+    def product(quaternions: Array) -> Array:
+        w, v = quaternions[..., :1], quaternions[..., 1:]
+        vector = half[0] * v + w * half[1:] + np.cross(half[1:], v)
+        return np.concatenate([half[0] * w - v @ half[1:, None], vector], axis=-1)
+
+    q_turned = np.concatenate([turned(q[:3]), product(q[3:7]), q[7:]])
+    other = motion(tree(gravity=turned(gravity)), q_turned, np.concatenate([turned(u[:3]), u[3:]]))
+    expected = [
+        turned(plain.q[:, :3]),
+        product(plain.q[:, 3:7]),
+        plain.q[:, 7:],
+        turned(plain.qd[:, :3]),
+        plain.qd[:, 3:],
+    ]
+    np.testing.assert_allclose(states(other), np.hstack(expected), atol=SAME)
+
+
+def test_a_free_base_is_three_slides_and_a_ball_and_moves_alike_in_the_bodys_axes() -> None:
+    gravity, (q, u) = (0.3, -0.2, -9.81), start()
+    rng = np.random.default_rng(3)
+    slides, parent = [], "world"
+    for name, axis in zip("xyz", np.eye(3), strict=True):
+        slides.append(dyn.Body(name, dyn.Joint("prismatic", axis=axis), parent, mass=0.0))
+        parent = name
+    sliding = dyn.Mechanism([*slides, trunk(rng, dyn.Joint("ball"), parent), *branches(rng)], gravity=gravity)
+    plain, apart = motion(tree(gravity=gravity), q, u), motion(sliding, q, u)
+    np.testing.assert_allclose(states(apart), states(plain), atol=SAME)
+    np.testing.assert_allclose(apart.qdd, plain.qdd, atol=SAME * np.abs(plain.qdd).max())
+    inward = from_quaternion(q[3:7]).T @ u[:3]
+    body = motion(tree("free (body axes)", gravity), q, np.concatenate([inward, u[3:]]))
+    outward = np.einsum("tij,tj->ti", rotations(body.q[:, 3:7]), body.qd[:, :3])
+    np.testing.assert_allclose(np.hstack([body.q, outward, body.qd[:, 3:]]), states(plain), atol=SAME)
+
+
+def test_a_ball_is_three_hinges_away_from_their_lock() -> None:
+    """Hinges about x, y and z, one on another: the same accelerations, and the same motion."""
+    gravity, angles, rates = (0.3, -0.2, -9.81), np.array([0.4, -0.5, 0.7]), np.array([0.6, -1.0, 0.8])
+    rng = np.random.default_rng(3)
+    gimbal, parent = [], "world"
+    for name, axis in zip("xy", np.eye(3), strict=False):
+        gimbal.append(dyn.Body(name, dyn.Joint("revolute", axis=axis), parent, mass=0.0))
+        parent = name
+    last = dyn.Joint("revolute", axis=[0.0, 0.0, 1.0])
+    hinges = dyn.Mechanism([*gimbal, trunk(rng, last, parent), *branches(rng)], gravity=gravity)
+    rng = np.random.default_rng(3)
+    ball = dyn.Mechanism([trunk(rng, dyn.Joint("ball")), *branches(rng)], gravity=gravity)
+    rest, rest_rates = start()[0][7:], start()[1][6:]
+
+    def turned(angle: Array) -> Array:
+        x, y, z = np.eye(3)
+        return rotation(x, float(angle[0])) @ rotation(y, float(angle[1])) @ rotation(z, float(angle[2]))
+
+    def spin(angle: Array, rate: Array) -> Array:
+        """Angular velocity in the body's axes: every hinge's axis, seen in them."""
+        x, y, z = np.eye(3)
+        inner = rotation(z, float(angle[2])).T
+        return inner @ (rotation(y, float(angle[1])).T @ x * rate[0] + y * rate[1]) + z * rate[2]
+
+    def product(a: Array, b: Array) -> Array:
+        return np.array([a[0] * b[0] - a[1:] @ b[1:], *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:]))])
+
+    quarters = [
+        np.array([np.cos(0.5 * angle), *np.sin(0.5 * angle) * axis])
+        for angle, axis in zip(angles, np.eye(3), strict=True)
+    ]
+    q_ball = product(product(quarters[0], quarters[1]), quarters[2])
+    first = motion(hinges, np.concatenate([angles, rest]), np.concatenate([rates, rest_rates]))
+    second = motion(ball, np.concatenate([q_ball, rest]), np.concatenate([spin(angles, rates), rest_rates]))
+    assert np.abs(first.q[:, 1]).max() < 1.3  # rad: the lock is a quarter turn
+    np.testing.assert_allclose(rotations(second.q[:, :4]), [turned(angle) for angle in first.q[:, :3]], atol=SAME)
+    np.testing.assert_allclose(second.q[:, 4:], first.q[:, 3:], atol=SAME)
+    spins = [spin(angle, rate) for angle, rate in zip(first.q[:, :3], first.qd[:, :3], strict=True)]
+    np.testing.assert_allclose(second.qd, np.hstack([spins, first.qd[:, 3:]]), atol=SAME)
+    scale = np.abs(first.qdd).max()
+    np.testing.assert_allclose(second.qdd[:, 3:], first.qdd[:, 3:], atol=SAME * scale)
