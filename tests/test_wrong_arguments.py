@@ -63,6 +63,9 @@ def body(name="b", parent="world"):
     return dyn.Body(name, dyn.Joint("revolute"), parent, 1.0, (0.0, 0.0, 0.0), (0.1, 0.1, 0.1))
 
 
+OPEN = dyn.Mechanism([dyn.Body("b", dyn.Joint("revolute"), mass="m", inertia=(1.0, 1.0, 1.0))], parameters={"m": 1.0})
+
+
 def closed(body_name, to, at, to_at, axis, length, coefficients, name):
     """One-body mechanisms with a loop of every kind."""
     for kind in ("distance", "hinge", "rolling"):
@@ -87,10 +90,9 @@ LINK = {"joint": dyn.Joint("revolute"), "mass": 1.0, "inertia": (0.1, 0.1, 0.1)}
 SCENE = (ARM, (0.0,), (0.0,), 1.0)
 FIRST, LAST = TWO.bodies[0].name, TWO.bodies[1].name
 RUNS = {"dt": 0.01, "max_steps": 100, "backend": "python", "estimate_error": False, "progress": False}
-MODEL_ALONE = """as_system bias coriolis damping_force energy gravity_force inertial_parameters integrable_rows
-    mass_matrix momentum center_of_mass center_of_mass_jacobian kinetic_energy potential_energy regressor state_equation state_space to_urdf
-    torque_by_joint_motion torque_by_link
-    RecursiveInverseDynamics"""
+MODEL_ALONE = """as_system bias center_of_mass center_of_mass_jacobian coriolis damping_force energy gravity_force
+    inertial_parameters integrable_rows kinetic_energy mass_matrix momentum potential_energy regressor state_equation
+    state_space to_urdf torque_by_joint_motion torque_by_link RecursiveInverseDynamics"""
 
 CALLS = {
     **{f"cg.{op.name}": call(function(op), *[X] * op.arity) for op in OPS.values()},
@@ -143,9 +145,9 @@ CALLS = {
     "dyn.to_mjcf": call(dyn.to_mjcf, ARM, 0.001),
     "dyn.load_mjcf": call(dyn.load_mjcf, dyn.to_mjcf(ARM), ignore=True),
     "dyn.load_urdf": call(dyn.load_urdf, dyn.to_urdf(ARM), ignore=True),
-    "dyn.planar_arm": call(dyn.planar_arm, [1.0], [1.0], 0.0, "rod", 9.81),
-    "dyn.serial_arm": call(dyn.serial_arm, [LINK], (0.0, 0.0, -9.81)),
-    "dyn.tree": call(dyn.tree, [-1], None, axes=(0.0, 1.0, 0.0), gravity=(0.0, 0.0, -9.81)),
+    "dyn.planar_arm": call(dyn.planar_arm, [1.0], [1.0], 0.0, "rod", 9.81, parameters=None),
+    "dyn.serial_arm": call(dyn.serial_arm, [LINK], (0.0, 0.0, -9.81), parameters=None),
+    "dyn.tree": call(dyn.tree, [-1], None, axes=(0.0, 1.0, 0.0), gravity=(0.0, 0.0, -9.81), parameters=None),
     "dyn.reference": call(
         dyn.reference, DECAY, [1.0], None, [0.0, 0.1], digits=15, method="taylor", tau=0.0, parameters=None, folder=None
     ),
@@ -174,6 +176,7 @@ CALLS = {
     "dyn.Scene": call(dyn.Scene, "s", "about", *SCENE),
     "dyn.RecursiveInverseDynamics()": call(dyn.RecursiveInverseDynamics(ARM), [0.0], [0.0], [0.0]),
     "dyn.Mechanism.attach": call(TWO.detach(LAST).attach, SUBTREE, None),
+    "dyn.Mechanism.bind": call(OPEN.bind, {"m": 2.0}),
     "dyn.Mechanism.detach": call(TWO.detach, LAST),
     "dyn.Mechanism.joint_positions": call(ARM.joint_positions, [0.0]),
     "dyn.Mechanism.lock": call(TWO.lock, FIRST, 0.0),
@@ -212,7 +215,7 @@ RECORDS = """
 """
 # Nothing to give; what empties the user's cache; the fast way into compiled code, which looks at nothing.
 LEFT_OUT = """cg.recording_lines cg.clear_cache cg.Compiled.bind cg.Compiled.values cg.Graph.check cg.Graph.counts
-    cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.bias_forces"""
+    cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.bias_forces dyn.System.require_values"""
 
 
 def public():

@@ -34,6 +34,8 @@ def evaluate_at(
     if unknown := sorted(map(str, set(parameters) - set(system.parameters))):
         has = ", ".join(system.parameters) or "none"
         raise ValueError(f"the system has no parameter {unknown[0]!r} (it has {has})")
+    if parameters:
+        system.require_values({**system.parameters, **parameters})
     values: dict[str, Any] = {TIME: real_number("t", t), **system.parameters, **parameters}
     shape: tuple[int, ...] = ()
     for name in STATE:

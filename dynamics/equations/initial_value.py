@@ -58,6 +58,8 @@ def given_start(
     """The start as it is given, whether or not it meets the constraints of the model."""
     inputs = state_inputs(model)
     values = _parameters(inputs, parameters)
+    if parameters and as_ode(model) is None:
+        as_system(model).require_values(values)
     if inputs.applied:
         applied = per_coordinate("tau", tau, as_system(model).velocities)
         values = dict(zip(inputs.applied, applied, strict=True)) | values

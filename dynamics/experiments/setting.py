@@ -83,7 +83,7 @@ class Setting(Scene):
         if not self.mechanical or state_inputs(self.model).timed:
             return False
         system = as_system(self.model)
-        return not any(system.damping) and all(force.value == 0.0 for force in system.forces)
+        return all(each == 0.0 for each in system.damping) and all(force.value == 0.0 for force in system.forces)
 
     def sizes(self, solution: Reference | None) -> tuple[float, ...]:
         """A size for each state: `size`, or the larger of the values at the start and at t_end, or 1 for zeros."""

@@ -45,7 +45,7 @@ def frames(model: Model, poses: Array, timeout: float = 60.0) -> list[np.ndarray
 
 def drawn_mjcf(model: Model) -> str:
     """MJCF with a stick from the joint of every moving body to the joints and marks on it, a camera and light."""
-    mechanism = require_mechanism(model, "MJCF")
+    mechanism = require_mechanism(model, "MJCF").bind()
     ends: dict[str, list[Array]] = {body.name: [] for body in mechanism.moving}
     for body in mechanism.bodies:
         if body.parent in ends:

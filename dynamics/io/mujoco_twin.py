@@ -69,7 +69,7 @@ class MujocoTwin:
 
     def __init__(self, of: Model, timestep: float = 1e-3) -> None:
         self.mujoco = mujoco()
-        self.mechanism = require_mechanism(of, "MuJoCo")
+        self.mechanism = require_mechanism(of, "MuJoCo").bind()
         self.model = self.mujoco.MjModel.from_xml_string(to_mjcf(moving_alone(self.mechanism), timestep))
         self.data = self.mujoco.MjData(self.model)
 

@@ -36,9 +36,9 @@ def with_stand_ins(
     for body in bodies:
         values, axes = moments[body.name]
         if not body.joint.type.moves:
-            result[body.name] = body.mass, values
+            result[body.name] = float(body.mass), values
             continue
-        if 0.0 < body.mass <= STAND_IN:
+        if 0.0 < float(body.mass) <= STAND_IN:
             _refuse(body, f"has a mass of {body.mass!r} kg")
         if small := [moment for moment in values.tolist() if 0.0 < moment <= STAND_IN]:
             _refuse(body, f"has a moment of inertia of {small[0]!r} kg m^2")
@@ -49,7 +49,7 @@ def with_stand_ins(
             _refuse(body, f"has a moment of inertia of 0, where {inertias[turned]:.3g} kg m^2 turn")
         if not body.mass and 0.0 < _NEGLIGIBLE * masses[body.name] < STAND_IN:
             _refuse(body, f"has no mass, where {masses[body.name]:.3g} kg move")
-        result[body.name] = body.mass or STAND_IN, np.where(values == 0.0, STAND_IN, values)
+        result[body.name] = float(body.mass) or STAND_IN, np.where(values == 0.0, STAND_IN, values)
     return result
 
 
@@ -65,9 +65,9 @@ def _carried(
     for body in reversed(bodies):
         name, parent = body.name, body.parent
         lever, away = (float(np.linalg.norm(np.asarray(each))) for each in (body.center, body.joint.position))
-        mass[name] += body.mass
-        first[name] += body.mass * lever
-        second[name] += float(moments[name][0].max()) + body.mass * lever**2
+        mass[name] += float(body.mass)
+        first[name] += float(body.mass) * lever
+        second[name] += float(moments[name][0].max()) + float(body.mass) * lever**2
         mass[parent] += mass[name]
         first[parent] += first[name] + away * mass[name]
         second[parent] += second[name] + 2.0 * away * first[name] + away**2 * mass[name]

@@ -8,13 +8,13 @@ from dataclasses import replace
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from cgraph.extend import real_number
 
 from ..multibody import spatial
 from ..multibody.joints import AxialJoint
 from ..multibody.mechanism import WORLD, Body, Mechanism, MechanismError, require_mechanism
+from ..multibody.parameters import Quantities
 from ..multibody.spatial import Array
 from ..systems.model import Model
 from .stand_ins import ROUNDING, with_stand_ins
@@ -27,6 +27,7 @@ def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
     and coefficients are the same to the last bit; axes, orientations and inertias to a few roundings, which quaternions
     and principal axes cost. Joints have the names of the coordinates; one that is locked is a weld. MuJoCo takes no
     zero for the mass and moments of a body that moves: 1e-15 stands for it there, and is zero again when it is read.
+    Of parameters the values are written.
 
     Parameters
     ----------
@@ -54,7 +55,7 @@ def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
     >>> text.count("<joint")
     2
     """
-    mechanism = require_mechanism(model, "MJCF")
+    mechanism = require_mechanism(model, "MJCF").bind()
     if not 0.0 < real_number("timestep", timestep) < math.inf:
         raise ValueError(f"timestep must be positive and finite, got {timestep!r} s")
     return mjcf_text(mechanism, timestep)
@@ -130,7 +131,7 @@ def _require_joint(body: Body) -> None:
     if joint.type.mjcf == "free":
         if body.parent != WORLD:
             raise MechanismError(f"in MJCF a free body hangs on the world, and body {body.name!r} on {body.parent!r}")
-        if np.any(joint.position) or np.any(np.asarray(joint.orientation) != np.eye(3)):
+        if np.any(np.asarray(joint.position)) or np.any(np.asarray(joint.orientation) != np.eye(3)):
             raise MechanismError(f"in MJCF a free joint has the axes and the origin of the world, and {where} has not")
 
 
@@ -160,6 +161,6 @@ def _diagonal(moments: Array, axes: Array) -> str:
     return f'diaginertia="{numbers(moments)}" quat="{numbers(spatial.to_quaternion(axes))}"'
 
 
-def numbers(values: ArrayLike) -> str:
+def numbers(values: Quantities) -> str:
     """Numbers as XML attributes have them, each exact."""
     return " ".join([repr(float(value)) for value in np.asarray(values)])

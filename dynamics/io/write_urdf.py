@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..multibody.mechanism import WORLD, Body, MechanismError, require_mechanism
+from ..multibody.parameters import vanishes
 from ..multibody.spatial import Array
 from ..systems.model import Model
 from .read_urdf import FAR, GRAVITY
@@ -20,7 +21,7 @@ def to_urdf(model: Model) -> str:
 
     `load_urdf` reads the same bodies in the same order from it: all numbers to the last bit but axes and orientations,
     which angles cost a few roundings. A joint that is locked is a weld. Gravity other than 9.81 m/s^2 along -z, which
-    URDF has not, is in an element of MuJoCo's that other programs pass over.
+    URDF has not, is in an element of MuJoCo's that other programs pass over. Of parameters the values are written.
 
     Parameters
     ----------
@@ -44,7 +45,7 @@ def to_urdf(model: Model) -> str:
     >>> text.count('type="continuous"')
     2
     """
-    mechanism = require_mechanism(model, "URDF")
+    mechanism = require_mechanism(model, "URDF").bind()
     if mechanism.forces:
         raise MechanismError(f"URDF has no forces, there is one on body {mechanism.forces[0].body!r}")
     if mechanism.loops:
@@ -63,7 +64,7 @@ def to_urdf(model: Model) -> str:
 def _link_lines(body: Body) -> list[str]:
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = np.asarray(body.inertia).tolist()
     moments = f'ixx="{xx!r}" ixy="{xy!r}" ixz="{xz!r}" iyy="{yy!r}" iyz="{yz!r}" izz="{zz!r}"'
-    if not (body.mass or np.any(body.inertia) or np.any(body.center)):
+    if vanishes(body.mass) and vanishes(body.inertia) and vanishes(body.center):
         return [f"  <link name={quoteattr(body.name)}/>"]
     mass = f'<origin xyz="{numbers(body.center)}"/><mass value="{body.mass!r}"/><inertia {moments}/>'
     return [

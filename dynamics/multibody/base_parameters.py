@@ -12,8 +12,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+
+from cgraph.extend import Builder, building
 
 from . import spatial
 from .inertial_numbers import Link
@@ -32,19 +35,20 @@ def base_parameter_links(
     """
     result = list(links)
     world = np.zeros(3)
-    for i in reversed(range(len(links))):
-        mass, moment, inertia = _numbers(result[i])
-        given = joints[i].unobservable(mass, moment, inertia)
-        result[i] = _with(result[i], -given[0], -given[1], -given[2])
-        seen = _seen_by_parent(links[i], *given)
-        if parents[i] >= 0:
-            result[parents[i]] = _with(result[parents[i]], *seen)
-        else:
-            world += seen[1]
+    with building(Builder()):
+        for i in reversed(range(len(links))):
+            mass, moment, inertia = _numbers(result[i])
+            given = joints[i].unobservable(mass, moment, inertia)
+            result[i] = _with(result[i], -given[0], -given[1], -given[2])
+            seen = _seen_by_parent(links[i], *given)
+            if parents[i] >= 0:
+                result[parents[i]] = _with(result[parents[i]], *seen)
+            else:
+                world = world + seen[1]
     return result, world
 
 
-def _seen_by_parent(link: Link, mass: float, moment: Array, inertia: Array) -> tuple[float, Array, Array]:
+def _seen_by_parent(link: Link, mass: Any, moment: Array, inertia: Array) -> tuple[Any, Array, Array]:
     """Mass, first moment and inertia at the link's joint, about the parent's origin and in its axes."""
     turn, place = np.array(link.turn, dtype=np.float64), _array(link.place)
     moment, inertia = spatial.product(turn, moment), spatial.product(turn, inertia, turn.T)
@@ -53,12 +57,13 @@ def _seen_by_parent(link: Link, mass: float, moment: Array, inertia: Array) -> t
     return mass, spatial.added(moment, mass * place), spatial.parallel_axis(inertia, mass, place)
 
 
-def _numbers(link: Link) -> tuple[float, Array, Array]:
-    lower = np.tril(np.array(link.inertia, dtype=np.float64))
-    return float(link.mass), _array(link.moment), lower + np.tril(lower, -1).T
+def _numbers(link: Link) -> tuple[Any, Array, Array]:
+    """Mass, first moment and inertia: floats, or nodes where there are parameters."""
+    inertia = [[link.inertia[max(i, j)][min(i, j)] for j in range(3)] for i in range(3)]
+    return link.mass, _array(link.moment), np.array(inertia)
 
 
-def _with(link: Link, mass: float, moment: Array, inertia: Array) -> Link:
+def _with(link: Link, mass: Any, moment: Array, inertia: Array) -> Link:
     """The link with these added."""
     old_mass, old_moment, old_inertia = _numbers(link)
     moment, inertia = spatial.added(old_moment, moment), spatial.added(old_inertia, inertia)
@@ -66,4 +71,4 @@ def _with(link: Link, mass: float, moment: Array, inertia: Array) -> Link:
 
 
 def _array(triple: Triple) -> Array:
-    return np.array([each.value for each in triple])
+    return np.array([spatial.plain(each) for each in triple])

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cgraph import Node
 from cgraph.extend import check_name, is_finite
 
 from . import spatial
 from .joints import COMPOSITIONS, TYPES, JointType
+from .parameters import Quantities, Quantity, entries, evaluated, names_in, symbol, vanishes
 from .spatial import Array
 
 WORLD = "world"
@@ -40,6 +42,8 @@ class MechanismWarning(UserWarning):
 @dataclass(frozen=True, eq=False)
 class Joint:
     """How a body hangs on its parent; the joint is at the origin of the body's frame.
+
+    `position` and all that is said to be a float may have parameters in place of numbers, see `Body`.
 
     Parameters
     ----------
@@ -91,9 +95,9 @@ class Joint:
 
     kind: str
     axis: ArrayLike = (0.0, 0.0, 1.0)
-    position: ArrayLike = (0.0, 0.0, 0.0)
+    position: Quantities = (0.0, 0.0, 0.0)
     orientation: ArrayLike = field(default_factory=lambda: np.eye(3))
-    damping: Any = 0.0  # a number, or of a composed joint one for each coordinate; the next three, too
+    damping: Any = 0.0  # a Quantity, or of a composed joint one for each coordinate; the next three, too
     stiffness: Any = 0.0
     spring_reference: Any = 0.0
     armature: Any = 0.0
@@ -133,6 +137,9 @@ class Joint:
 class Body:
     """A rigid body and the joint that carries it.
 
+    In place of a number of mass, center and inertia may stand a parameter: its name, or a node over `cg.variable`s.
+    Its value is in the mechanism's `parameters`, and it is an input of the graphs.
+
     Parameters
     ----------
     name : str
@@ -154,14 +161,17 @@ class Body:
     >>> rotor = dyn.Body("rotor", dyn.Joint("revolute"), inertia=(0.1, 0.1, 0.2))
     >>> dyn.mass_matrix(dyn.Mechanism([rotor])).evaluate({"q0": 0.0, "qd0": 0.0})
     {'M_0_0': 0.2}
+    >>> load = dyn.Body("load", dyn.Joint("prismatic"), mass="m")
+    >>> dyn.mass_matrix(dyn.Mechanism([load], parameters={"m": 3.0})).evaluate({"q0": 0.0, "qd0": 0.0, "m": 4.0})
+    {'M_0_0': 4.0}
     """
 
     name: str
     joint: Joint
     parent: str = WORLD
-    mass: float = 0.0
-    center: ArrayLike = (0.0, 0.0, 0.0)
-    inertia: ArrayLike = (0.0, 0.0, 0.0)
+    mass: Quantity = 0.0
+    center: Quantities = (0.0, 0.0, 0.0)
+    inertia: Quantities = (0.0, 0.0, 0.0)
 
     @property
     def coordinate(self) -> str:
@@ -197,15 +207,52 @@ def shape_of(value: Any) -> tuple[int, ...]:
         return ()
 
 
-def _number(what: str, value: Any, unit: str = "", minimum: float = 0.0) -> float:
+def quantities(what: str, value: Any, shape: tuple[int, ...] = (3,)) -> Array:
+    """As `vector`, or an array of objects: floats, and nodes where there are parameters."""
+    known = entries(value)
+    if not any([isinstance(each, str | Node) for each in known]):
+        return vector(what, value, shape)
+    if np.shape(np.asarray(value, dtype=object)) != shape:
+        raise MechanismError(f"{what} must be {shape} finite numbers, got {value!r:.80}")
+    array = np.empty(len(known), dtype=object)
+    array[:] = [_number(what, each, minimum=-math.inf) for each in known]
+    return array.reshape(shape) if names_in(known) else array.astype(np.float64).reshape(shape)
+
+
+def _number(what: str, value: Any, unit: str = "", minimum: float = 0.0) -> float | Node:
+    """The number, or the node of a parameter."""
+    if isinstance(value, Node) and not names_in([value]):
+        value = evaluated(value, {}).item()
+    if isinstance(value, str | Node):
+        _check_names(what, value)
+        return symbol(value)
     if is_finite(value) and float(value) >= minimum:
         return float(value)
     bound = " and at least 0" if minimum == 0.0 else ""
     raise MechanismError(f"{what} must be finite{bound}, got {value!r:.80}{unit}")
 
 
+def _check_names(what: str, value: str | Node) -> None:
+    for name in names_in([value]):
+        try:
+            check_name(f"a parameter of {what}", name, spaces=False)
+        except (TypeError, ValueError) as error:
+            raise MechanismError(str(error)) from None
+
+
+def _mass(what: str, value: Any) -> float | Node:
+    return _number(what, value, " kg")
+
+
+def _any_number(what: str, value: Any) -> float | Node:
+    return _number(what, value, minimum=-math.inf)
+
+
 def checked(body: Body) -> Body:
-    """The body with its numbers as arrays and floats, its axis of length 1. Raises MechanismError for what is wrong."""
+    """The body with its numbers as arrays and floats, its axis of length 1. Raises MechanismError for what is wrong.
+
+    Parameters are nodes, among the floats of arrays of objects; what their values must be is not seen here.
+    """
     if not isinstance(body, Body):
         raise MechanismError(f"bodies must be of the type Body, got {type(body).__name__}: {body!r:.60}")
     _check_name("a body", body.name)
@@ -214,14 +261,10 @@ def checked(body: Body) -> Body:
     where, joint = f"body {body.name!r}", body.joint
     if not isinstance(body.parent, str):
         raise MechanismError(f"{where}: parent must be the name of a body or {WORLD!r}, got {body.parent!r:.80}")
-    mass, center = _number(f"{where}: mass", body.mass, " kg"), vector(f"{where}: center", body.center)
-    return replace(
-        body,
-        mass=mass,
-        center=center,
-        inertia=_inertia(where, body.inertia, mass * float(center @ center)),
-        joint=_checked_joint(where, joint),
-    )
+    mass, center = _mass(f"{where}: mass", body.mass), quantities(f"{where}: center", body.center)
+    beside = 0.0 if isinstance(mass, Node) or center.dtype == object else mass * float(center @ center)
+    inertia = _inertia(f"{where}: inertia", body.inertia, beside)
+    return replace(body, mass=mass, center=center, inertia=inertia, joint=_checked_joint(where, joint))
 
 
 def unit_axis(what: str, value: Any) -> Array:
@@ -240,33 +283,24 @@ def _checked_joint(where: str, joint: Joint) -> Joint:
     axis = unit_axis(f"{where}: axis", joint.axis)
     if joint.second_axis is not None:
         raise MechanismError(f"{where}: a joint of the kind {joint.kind!r} has no second axis")
-    orientation = checked_rotation(f"{where}: orientation", joint.orientation)
-    pitch = _number(f"{where}: pitch", joint.pitch, " m/rad", minimum=-math.inf)
-    if bool(pitch) != TYPES[joint.kind].pitched:
-        needs = (
-            "a joint of the kind 'screw' needs a pitch"
-            if not pitch
-            else f"only a screw has a pitch, not {joint.kind!r}"
-        )
-        raise MechanismError(f"{where}: {needs}, got {pitch!r} m/rad")
-    stiffness = _number(f"{where}: stiffness", joint.stiffness)
-    if stiffness and len(joint.type.coordinates) > 1:
-        raise MechanismError(f"{where}: a spring needs a joint with one coordinate, got stiffness {stiffness!r}")
-    armature = _number(f"{where}: armature", joint.armature)
-    if armature and not joint.type.geared:
-        raise MechanismError(f"{where}: a joint of the kind {joint.kind!r} has no armature, got {armature!r}")
-    return Joint(
-        joint.kind,
-        axis=axis,
-        position=vector(f"{where}: position", joint.position),
-        orientation=spatial.snapped(orientation),
-        damping=_number(f"{where}: damping", joint.damping),
-        stiffness=stiffness,
-        spring_reference=_number(f"{where}: spring_reference", joint.spring_reference, minimum=-math.inf),
-        armature=armature,
-        pitch=pitch,
-        name=joint.name,
-    )
+    orientation = spatial.snapped(checked_rotation(f"{where}: orientation", joint.orientation))
+    pitch = _pitch(where, joint)
+    given = {name: check(f"{where}: {name}", getattr(joint, name)) for name, check in JOINT_QUANTITIES.items()}
+    if not vanishes(given["stiffness"]) and len(joint.type.coordinates) > 1:
+        raise MechanismError(f"{where}: a spring needs a joint with one coordinate, got stiffness {joint.stiffness!r}")
+    if not vanishes(given["armature"]) and not joint.type.geared:
+        raise MechanismError(f"{where}: a joint of the kind {joint.kind!r} has no armature, got {joint.armature!r}")
+    return Joint(joint.kind, axis=axis, orientation=orientation, pitch=pitch, name=joint.name, **given)
+
+
+def _pitch(where: str, joint: Joint) -> float:
+    if not is_finite(joint.pitch):
+        raise MechanismError(f"{where}: pitch must be finite, got {joint.pitch!r:.80} m/rad")
+    if bool(joint.pitch) == TYPES[joint.kind].pitched:
+        return float(joint.pitch)
+    kind = joint.kind
+    needs = f"only a screw has a pitch, not {kind!r}" if joint.pitch else f"a joint of the kind {kind!r} needs a pitch"
+    raise MechanismError(f"{where}: {needs}, got {joint.pitch!r} m/rad")
 
 
 def _check_name(what: str, name: str) -> None:
@@ -276,23 +310,40 @@ def _check_name(what: str, name: str) -> None:
         raise MechanismError(str(error)) from None
 
 
-def _inertia(where: str, given: ArrayLike, beside: float) -> Array:
+def _inertia(what: str, given: Any, beside: float = 0.0) -> Array:
     """Symmetric, and with principal moments that are not negative; a warning where no rigid body has them.
 
     Kinetic energy is positive all the same, so that all equations of a tree hold.
     beside: the inertia of the mass about the joint, beside which a moment may be rounding.
     """
     diagonal = shape_of(given) == (3,)
-    inertia = vector(f"{where}: inertia", given, (3,) if diagonal else (3, 3))
-    inertia = np.diag(inertia) if diagonal else inertia
+    inertia = quantities(what, given, (3,) if diagonal else (3, 3))
+    inertia = np.where(np.eye(3, dtype=bool), inertia, 0.0) if diagonal else inertia
+    if inertia.dtype == object:
+        return inertia
     scale = np.abs(inertia).max()
     if np.abs(inertia - inertia.T).max() > ROUNDING * scale:
-        raise MechanismError(f"{where}: inertia must be symmetric")
+        raise MechanismError(f"{what} must be symmetric")
     moments = np.linalg.eigvalsh(inertia)
     rounding = ROUNDING * scale + spatial.SNAP * beside
     if moments[0] < -rounding:
-        raise MechanismError(f"{where}: inertia must not be negative, its principal moments are {moments.tolist()}")
+        raise MechanismError(f"{what} must not be negative, its principal moments are {moments.tolist()}")
     if moments[2] > moments[0] + moments[1] + rounding:
+        where = what.removesuffix(": inertia")
         text = f"{where}: no body has principal moments {moments.tolist()}: the largest exceeds the sum of the others"
         warnings.warn(text, MechanismWarning, stacklevel=2)
     return 0.5 * (inertia + inertia.T)
+
+
+BODY_QUANTITIES: dict[str, Callable[[str, Any], Any]] = {
+    "mass": _mass,
+    "center": quantities,
+    "inertia": _inertia,
+}
+JOINT_QUANTITIES: dict[str, Callable[[str, Any], Any]] = {
+    "position": quantities,
+    "damping": _number,
+    "stiffness": _number,
+    "spring_reference": _any_number,
+    "armature": _number,
+}

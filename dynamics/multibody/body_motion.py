@@ -6,15 +6,15 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
+from cgraph.extend import Builder, as_node, building
 
 from . import spatial
 from .inertial_numbers import Link
 from .joints import AxialJoint, JointType, SpatialJoint
-from .spatial import STILL, ZERO, Triple
+from .spatial import STILL, ZERO, Array, Triple
 
 
 class PlaneAngle(NamedTuple):
@@ -37,23 +37,26 @@ class Motion(NamedTuple):
     velocity: Triple  # of the origin
     vertical: Triple  # upward, as long as gravity is strong; or downward, of length 1
     depth: Node  # of the origin along it
-    strength: float = 1.0  # 1 in the first case, -g [m/s^2] in the second
+    strength: float | Node = 1.0  # 1 in the first case, -g [m/s^2] in the second
     plane: PlaneAngle | None = None
 
 
-def ground(gravity: ArrayLike, *, in_plane: bool = False) -> Motion:
+def ground(gravity: Array, *, in_plane: bool = False) -> Motion:
     """The world at rest.
 
     in_plane: all bodies turn about parallel axes. Then g is kept apart from the vertical, so that heights are lengths:
     fewer nodes. In space the vertical has three components, which had better be scaled once.
     """
-    pull = np.asarray(gravity, dtype=np.float64)
-    if not pull.any():
+    along = np.flatnonzero(gravity != 0.0)
+    if not len(along):
         return Motion(STILL, STILL, STILL, ZERO)
-    if in_plane:
-        downward = spatial.unit(pull)
-        return Motion(STILL, STILL, spatial.constant(downward + 0.0), ZERO, -float(downward @ pull))
-    return Motion(STILL, STILL, spatial.constant(0.0 - pull), ZERO)
+    if in_plane and gravity.dtype != object:
+        downward = spatial.unit(gravity)
+        return Motion(STILL, STILL, spatial.constant(downward + 0.0), ZERO, -float(downward @ gravity))
+    with building(Builder()):
+        if in_plane and len(along) == 1:
+            return Motion(STILL, STILL, spatial.constant(-np.eye(3)[along[0]] + 0.0), ZERO, as_node(gravity[along[0]]))
+        return Motion(STILL, STILL, spatial.constant(0.0 - gravity), ZERO)
 
 
 def propagate_motion(parent: Motion, link: Link, joint: JointType, q: Sequence[Node], u: Sequence[Node]) -> Motion:

@@ -12,12 +12,18 @@ from numpy.typing import ArrayLike
 
 from .body import WORLD, Body, Joint, MechanismError, shape_of, vector
 from .mechanism import Mechanism
+from .parameters import Quantities
 from .spatial import Array
 
 _FIELDS = [each.name for each in fields(Body) if each.name not in ("name", "parent")]
 
 
-def serial_arm(links: Sequence[dict[str, Any]], gravity: ArrayLike = (0.0, 0.0, -9.81)) -> Mechanism:
+def serial_arm(
+    links: Sequence[dict[str, Any]],
+    gravity: Quantities = (0.0, 0.0, -9.81),
+    *,
+    parameters: Mapping[str, float] | None = None,
+) -> Mechanism:
     """A chain of bodies "link 1", "link 2", ..., each on the one before: `tree` without branches.
 
     Parameters
@@ -26,6 +32,8 @@ def serial_arm(links: Sequence[dict[str, Any]], gravity: ArrayLike = (0.0, 0.0, 
         Keyword arguments of `Body` without `name` and `parent`, for each body from the base outwards.
     gravity : array_like, (3,)
         In the world's axes [m/s^2].
+    parameters : mapping, optional
+        {name: value} of those that links and gravity have.
 
     Returns
     -------
@@ -44,7 +52,7 @@ def serial_arm(links: Sequence[dict[str, Any]], gravity: ArrayLike = (0.0, 0.0, 
     ('link 1', 'link 2')
     """
     _check_sequence("links", links)
-    return tree(range(-1, len(links) - 1), links, gravity=gravity)
+    return tree(range(-1, len(links) - 1), links, gravity=gravity, parameters=parameters)
 
 
 def tree(
@@ -52,7 +60,8 @@ def tree(
     links: Sequence[dict[str, Any]] | None = None,
     *,
     axes: ArrayLike = (0.0, 1.0, 0.0),
-    gravity: ArrayLike = (0.0, 0.0, -9.81),
+    gravity: Quantities = (0.0, 0.0, -9.81),
+    parameters: Mapping[str, float] | None = None,
 ) -> Mechanism:
     """A tree of bodies "link 1", "link 2", ...: `tree([(i - 1) // 2 for i in range(15)])` is a binary one.
 
@@ -67,6 +76,8 @@ def tree(
         Of the default's hinges, one for all or for each.
     gravity : array_like, (3,)
         In the world's axes [m/s^2].
+    parameters : mapping, optional
+        {name: value} of those that links and gravity have.
 
     Returns
     -------
@@ -102,7 +113,7 @@ def tree(
         Body(name, parent=WORLD if parent < 0 else names[parent], **link)
         for name, parent, link in zip(names, parents, given, strict=True)
     ]
-    return Mechanism(bodies, gravity)
+    return Mechanism(bodies, gravity, parameters={} if parameters is None else parameters)
 
 
 def _check_sequence(what: str, given: object) -> None:

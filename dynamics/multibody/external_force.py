@@ -69,8 +69,6 @@ class Force:
 
 def check_force(force: Force, bodies: Container[str]) -> None:
     """Raises MechanismError unless the force is three and three components at a point of one of `bodies`."""
-    if not isinstance(force, Force):
-        raise MechanismError(f"forces must be of the type Force, got {type(force).__name__}: {force!r:.60}")
     if not isinstance(force.body, str) or force.body not in bodies:
         raise MechanismError(f"there is a force on the unknown body {force.body!r:.80}")
     where = f"the force on body {force.body!r}"

@@ -13,6 +13,7 @@ from cgraph.extend import real_array
 from ..equations.equations_of_motion import forward_dynamics, momentum
 from .body import Body, MechanismError, vector
 from .mechanism import Mechanism, require_mechanism
+from .parameter_values import bound_body
 from .spatial import Array
 
 _COMPONENTS = ("x y z", "vx vy vz", "wx wy wz")
@@ -153,14 +154,15 @@ def attach_with_impact(
     q_new, qd_old = whole.map_state_from(mechanism, q, qd)
     index = {name: i for i, name in enumerate(whole.velocities)}
     p = np.zeros(len(index))
-    before = _momentum(mechanism, q, qd)
+    before = _momentum(mechanism.bind(), q, qd)
     p[[index[name] for name in mechanism.velocities]] = before
-    given = whole.shared.parts(body)[-1]
-    free, linear, angular = _motion(whole, given, q_new, qd_old)
+    given = whole.shared.parts(bound_body(body, whole.parameter_values))[-1]
+    mass = float(given.mass)
+    free, linear, angular = _motion(whole.bind(), given, q_new, qd_old)
     inertia = free.orientation @ np.asarray(given.inertia) @ free.orientation.T
-    p += given.mass * linear.T @ v + angular.T @ inertia @ w
-    qd_new = _velocities(whole, q_new, p)
-    energy = float(qd @ before + given.mass * v @ v + w @ inertia @ w - qd_new @ p) / 2.0
+    p += mass * linear.T @ v + angular.T @ inertia @ w
+    qd_new = _velocities(whole.bind(), q_new, p)
+    energy = float(qd @ before + mass * v @ v + w @ inertia @ w - qd_new @ p) / 2.0
     return Attached(whole, q_new, qd_new, energy)
 
 
@@ -203,13 +205,14 @@ def release(mechanism: Mechanism, q: ArrayLike, qd: ArrayLike, body: str) -> Rel
     rest = mechanism.detach(body)
     values = real_array("q", q), real_array("qd", qd)
     q_rest, qd_rest = rest.map_state_from(mechanism, *values)
-    free, _, _ = _motion(mechanism, mechanism.shared.parts(bodies[0])[-1], *values)
+    given = mechanism.shared.parts(bound_body(bodies[0], mechanism.parameter_values))[-1]
+    free, _, _ = _motion(mechanism.bind(), given, *values)
     return Released(rest, q_rest, qd_rest, free)
 
 
 def _motion(mechanism: Mechanism, body: Body, q: Array, qd: Array) -> tuple[FreeBody, Array, Array]:
     """How a body of the mechanism moves, and the Jacobians (3, n) of its center's velocity and of its omega."""
-    graph = mechanism.motion(body.name, body.center)
+    graph = mechanism.motion(body.name, np.asarray(body.center))
     rates = np.vstack([qd, np.eye(len(qd))])  # the state's own, then each coordinate alone
     found = graph.evaluate(_named(q=q, qd=rates.T))
     of = {name: np.broadcast_to(value, len(rates)) for name, value in found.items()}
@@ -231,7 +234,7 @@ def _velocities(mechanism: Mechanism, q: Array, p: Array) -> Array:
 
 
 def _inertia_alone(mechanism: Mechanism) -> Mechanism:
-    """The mechanism without gravity, forces and springs."""
+    """The mechanism, of numbers alone, without gravity, forces and springs."""
     bodies = [replace(body, joint=replace(body.joint, stiffness=0.0)) if body.joint.stiffness else body
               for body in mechanism.bodies]  # fmt: skip
     return replace(mechanism, bodies=bodies, gravity=(0.0, 0.0, 0.0), forces=(), parameters={})

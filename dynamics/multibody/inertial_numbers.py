@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from cgraph import Node
+from cgraph.extend import Builder, building
 
 from . import spatial
 from .body import Body
 from .joints import AxialJoint
+from .parameters import symbol
 from .spatial import Array, Matrix, Triple
 
 
@@ -40,12 +43,12 @@ class Link:
         return all([float(each) == 0.0 for each in across])
 
     @cached_property
-    def numbers(self) -> list[float]:
+    def numbers(self) -> list[float | Node]:
         """Turn, place, mass, moment, inertia (lower triangle), damping, stiffness, spring reference, armature."""
         turn = [each for row in self.turn for each in row]
         lower = [self.inertia[i][j] for i in range(3) for j in range(i + 1)]
         others = (self.damping, self.stiffness, self.spring_reference, self.armature)
-        return [float(each) for each in (*turn, *self.place, self.mass, *self.moment, *lower, *others)]
+        return [spatial.plain(each) for each in (*turn, *self.place, self.mass, *self.moment, *lower, *others)]
 
 
 def axes_of(body: Body) -> Array:
@@ -53,18 +56,33 @@ def axes_of(body: Body) -> Array:
     return spatial.to_z(np.asarray(body.joint.axis)) if isinstance(body.joint.type, AxialJoint) else np.eye(3)
 
 
-def inertia_in(axes: Array, body: Body) -> tuple[float, Array, Array]:
-    """Mass, center of mass (3,), and inertia about the joint (3, 3) of a body, in these axes of it."""
-    center = spatial.product(axes.T, np.asarray(body.center))
+@dataclass(frozen=True, eq=False)
+class MergedBody(Body):
+    """A body with others welded to it that are not merged into its inertia, since there are parameters among theirs.
+
+    welded: bodies in the same frame, of which mass, center and inertia count.
+    """
+
+    welded: tuple[Body, ...] = ()
+
+
+def inertia_in(axes: Array, body: Body) -> tuple[Any, Array, Array]:
+    """Mass, center of mass (3,), and inertia about the joint (3, 3) of a body alone, in these axes of it."""
+    mass, center = symbol(body.mass), spatial.product(axes.T, np.asarray(body.center))
     about_center = spatial.product(axes.T, np.asarray(body.inertia), axes)
-    return body.mass, center, spatial.parallel_axis(about_center, body.mass, center)
+    return mass, center, spatial.parallel_axis(about_center, mass, center)
 
 
 def link(body: Body, outer: Array) -> Link:
     """The link of a body whose parent moves in the axes `outer`."""
     axes, joint = axes_of(body), body.joint
-    turn, place = spatial.joint_placement(outer, joint.orientation, joint.position, axes)
-    mass, center, inertia = inertia_in(axes, body)
-    moment = spatial.constant(mass * center)
-    numbers = (joint.damping, joint.stiffness, joint.spring_reference, joint.armature)
+    with building(Builder()):
+        turn, place = spatial.joint_placement(outer, joint.orientation, np.asarray(joint.position), axes)
+        mass, center, inertia = inertia_in(axes, body)
+        moment = mass * center
+        for other in body.welded if isinstance(body, MergedBody) else ():
+            more, center, about_joint = inertia_in(axes, other)
+            mass, moment, inertia = mass + more, moment + more * center, spatial.added(inertia, about_joint)
+        moment = spatial.constant(moment)
+    numbers = [symbol(each) for each in (joint.damping, joint.stiffness, joint.spring_reference, joint.armature)]
     return Link(turn.tolist(), place, mass, moment, inertia.tolist(), *numbers)

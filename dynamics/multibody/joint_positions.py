@@ -87,7 +87,7 @@ def _tips(mechanism: Bodies) -> Iterator[tuple[str, ArrayLike]]:
     for body in mechanism.moving:
         if body.name not in holding:
             if body.name not in marks:
-                yield body.name, body.center
+                yield body.name, np.asarray(body.center)
             for name in marks.get(body.name, []):
                 yield name, (0.0, 0.0, 0.0)
 

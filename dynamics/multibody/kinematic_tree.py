@@ -13,7 +13,8 @@ from cgraph.extend import is_finite
 
 from . import spatial
 from .body import WORLD, Body, Joint, MechanismError, vector
-from .inertial_numbers import axes_of, inertia_in
+from .inertial_numbers import MergedBody, axes_of, inertia_in
+from .parameters import entries, names_in, vanishes
 from .spatial import Array
 
 
@@ -112,20 +113,32 @@ def merge_fixed_bodies(bodies: Sequence[Body]) -> tuple[list[Body], dict[str, Ca
             carriers[body.name] = Carrier(body.name, *_OWN)
             continue
         carriers[body.name] = Carrier(parent.name, position, orientation)
-        if parent.name != WORLD and (body.mass or np.any(body.inertia)):
+        if parent.name != WORLD and not (vanishes(body.mass) and vanishes(body.inertia)):
             center = spatial.placed(position, orientation, np.asarray(body.center))
             inertia = spatial.product(orientation, np.asarray(body.inertia), orientation.T)
-            merged[parent.name] = _joined(merged[parent.name], body.mass, center, inertia)
+            other = replace(body, center=center, inertia=inertia)
+            merged[parent.name] = _joined(merged[parent.name], other)
     return list(merged.values()), carriers
 
 
-def _joined(body: Body, mass: float, center: Array, inertia: Array) -> Body:
-    """The body with another mass fixed to it, given in its frame."""
-    both, here = body.mass + mass, np.asarray(body.center)
-    reduced = body.mass * (mass / both) if both else 0.0
-    inertia = spatial.parallel_axis(spatial.added(np.asarray(body.inertia), inertia), reduced, center - here)
-    middle = spatial.added(body.mass * here, mass * center) / both if both else here
-    return replace(body, mass=both, center=middle, inertia=inertia)
+def _joined(body: Body, other: Body) -> Body:
+    """The body with another, in its frame, fixed to it.
+
+    Where there are parameters both are kept: a sum of masses to divide by may be zero.
+    """
+    if _has_parameters(body) or _has_parameters(other):
+        welded = body.welded if isinstance(body, MergedBody) else ()
+        return MergedBody(body.name, body.joint, body.parent, body.mass, body.center, body.inertia, (*welded, other))
+    (mass, here), (more, there) = ((float(each.mass), np.asarray(each.center)) for each in (body, other))
+    both = mass + more
+    reduced = mass * (more / both) if both else 0.0
+    inertia = spatial.added(np.asarray(body.inertia), np.asarray(other.inertia))
+    middle = spatial.added(mass * here, more * there) / both if both else here
+    return replace(body, mass=both, center=middle, inertia=spatial.parallel_axis(inertia, reduced, there - here))
+
+
+def _has_parameters(body: Body) -> bool:
+    return bool(names_in([*entries(body.mass), *entries(body.center), *entries(body.inertia)]))
 
 
 def require_inertia(bodies: Sequence[Body]) -> tuple[Body, ...]:
@@ -138,7 +151,7 @@ def require_inertia(bodies: Sequence[Body]) -> tuple[Body, ...]:
         if not (body.name in carries or body.joint.armature or _resists(body)):
             lacks = "no mass" if not body.mass else "no inertia about its axis"
             raise MechanismError(f"body {body.name!r} has {lacks}, carries no mass, and its joint has no armature")
-        if body.name in carries or body.mass or np.any(body.inertia):
+        if body.name in carries or not (vanishes(body.mass) and vanishes(body.inertia)):
             carries.add(body.parent)
     return tuple(bodies)
 
@@ -146,4 +159,4 @@ def require_inertia(bodies: Sequence[Body]) -> tuple[Body, ...]:
 def _resists(body: Body) -> bool:
     """Whether the body alone has inertia along its coordinate."""
     mass, _, inertia = inertia_in(axes_of(body), body)
-    return body.joint.type.resists(mass, inertia)
+    return body.joint.type.resists(float(mass), inertia)

@@ -11,6 +11,7 @@ import numpy as np
 import cgraph as cg
 from cgraph import Node
 
+from . import spatial
 from .body import Body, checked
 from .body_motion import Motion, energy, propagate_motion
 from .composed_joints import parts_of
@@ -49,12 +50,13 @@ class SharedParts:
         """The link of a checked body."""
         known = self._links.get(body)
         if known is None or known[0] is not parent:
-            known = self._links[body] = parent, link(body, axes_of(parent) if parent else np.eye(3))
+            with cg.tag(body.name):
+                known = self._links[body] = parent, link(body, axes_of(parent) if parent else np.eye(3))
         return known[1]
 
     def ground(self, rest: Motion) -> Motion:
         """The world at rest, the same object for equal motions."""
-        return self._grounds.setdefault((rest.strength, *[each.value for each in rest.vertical]), rest)
+        return self._grounds.setdefault((rest.strength, *[spatial.plain(each) for each in rest.vertical]), rest)
 
     def moved(self, parent: Motion, body: Body, link: Link, q: Sequence[Node], u: Sequence[Node]) -> Moved:
         """The motion and energy of a body whose parent moves so. `parent` is one of these motions, or the ground's."""

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, cast
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 import cgraph as cg
@@ -17,7 +16,7 @@ from cgraph.extend import Builder, building, require_flag, require_mapping
 from ..systems.arguments import parameter_value
 from ..systems.model import Model
 from ..systems.system import BodySystem, System
-from .body import WORLD, Body, Joint, MechanismError, MechanismWarning, vector
+from .body import WORLD, Body, Joint, MechanismError, MechanismWarning, quantities, vector
 from .composed_joints import locked_parts, require_outer_parents
 from .external_force import Force, check_force, generalized_forces
 from .forward_kinematics import KinematicChain, kinematic_chain
@@ -25,10 +24,13 @@ from .inertial_numbers import Link
 from .joint_coordinates import coordinate_names, per_velocity, quasi_velocities, velocity_names
 from .joint_positions import skeleton
 from .kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia
-from .loops import Loop, check_loop, coupling_row, loop_rows, slip_rows
-from .mechanism_fields import Structure
+from .loop_equations import check_loops, position_rows, velocity_rows
+from .loops import Loop
+from .mechanism_fields import Structure, changed
+from .mechanism_summary import summary
 from .modification import attach_subtree, detach_subtree, lock_joint, map_state, subtree_of, unlock_joint
-from .relative_placement import relative_placements
+from .parameter_values import bound_body, bound_force, require_values, used_names
+from .parameters import bound, entries, names_in, symbol
 from .spatial import Array
 from .subtree import Subtree
 from .tree_equations import TreeEquations
@@ -56,12 +58,13 @@ class Mechanism(Structure):
     bodies : sequence of Body
         In any order.
     gravity : array_like, (3,)
-        In the world's axes [m/s^2].
+        In the world's axes [m/s^2]. In place of a number may stand a parameter, as in a `Body`.
     forces : sequence of Force
         On bodies from outside, beside the joint forces tau; they enter the equations as J^T f.
     parameters : mapping
-        {name: value} of the parameters that forces name; one without a value is 0. They are inputs of the graphs, and
-        `simulate` binds them.
+        {name: value} of the parameters that bodies, joints, gravity and forces have. They are inputs of the graphs, and
+        `simulate` binds them. Each needs a value with which the mechanism can be; only one that forces alone name is 0
+        without.
     locked : mapping
         {body: coordinate [rad or m]} of joints that stand still: their bodies are welded on, see `lock`.
     base_parameters : bool
@@ -76,9 +79,9 @@ class Mechanism(Structure):
     ------
     MechanismError
         For an unknown parent, a cycle, a repeated name, numbers that are not finite or out of range, a negative
-        moment of inertia, a coordinate that moves no mass and has no armature, a force on an unknown body, and a
-        parameter that no force uses. Positive moments that no rigid body can have, the largest above the sum of the
-        others, are a `MechanismWarning`: the equations hold with them.
+        moment of inertia, a coordinate that moves no mass and has no armature, a force on an unknown body, a parameter
+        that nothing uses, one without value, and a value that makes any of this. Positive moments that no rigid body
+        can have, the largest above the sum of the others, are a `MechanismWarning`: the equations hold with them.
 
     Examples
     --------
@@ -86,17 +89,18 @@ class Mechanism(Structure):
     >>> rod = dyn.Body("rod", dyn.Joint("revolute", (0.0, 1.0, 0.0)), mass=1.0, center=(0.0, 0.0, -0.5))
     >>> dyn.Mechanism([rod])
     <Mechanism of 1 bodies, 1 coordinate(s) rod; gravity 0, 0, -9.81>
+    >>> rod = dyn.Body("rod", dyn.Joint("revolute", (0.0, 1.0, 0.0)), mass="m", center=(0.0, 0.0, -0.5))
+    >>> dyn.Mechanism([rod], (0.0, 0.0, -10.0), parameters={"m": 1.0}).parameters
+    {'m': 1.0}
     """
 
     def __post_init__(self) -> None:
-        vector("gravity", self.gravity)
+        quantities("gravity", self.gravity)
         require_flag("base_parameters", self.base_parameters)
-        for what, kind in (
-            ("bodies", Body),
-            ("forces", Force),
-            ("loops", Loop),
-        ):  # kept, so that an iterator is read once
+        kinds = {"bodies": Body, "forces": Force, "loops": Loop}
+        for what, kind in kinds.items():  # kept, so that an iterator is read once
             object.__setattr__(self, what, _listed(what, kind, getattr(self, what)))
+        self._check_parameters([part for body in self.bodies for part in self.shared.parts(body)])
         seen: set[str] = set()
         for name in self.coordinates:
             if name in seen:
@@ -105,30 +109,21 @@ class Mechanism(Structure):
         carried = {body.name for body in self.bodies}
         for force in self.forces:
             check_force(force, carried)
-        bodies = {body.name: body for body in self.bodies}
-        for loop in self.loops:
-            check_loop(loop, bodies)
-        labels = [loop.label for loop in self.loops]
-        if len(set(labels)) < len(labels):
-            twice = next(label for label in labels if labels.count(label) > 1)
-            raise MechanismError(f"two loops have the name {twice!r}")
-        used = {name for force in self.forces for name in force.names}
-        for name in require_mapping("parameters", self.parameters, "name: value"):
+        check_loops(self)
+        used = used_names(self.bodies, self.gravity, self.forces)
+        for name in self.parameters:
             if name not in used:
-                raise MechanismError(f"the mechanism has no force that uses the parameter {name!r}")
+                raise MechanismError(f"the mechanism has no body, joint or force that uses the parameter {name!r}")
         for name, value in self.parameter_values.items():
             parameter_value(name, value)
 
+    def _check_parameters(self, bodies: Sequence[Body]) -> None:
+        for name, value in require_mapping("parameters", self.parameters, "name: value").items():
+            parameter_value(name, value)  # before one is put in
+        require_values(bodies, self.gravity, self.parameters)
+
     def __repr__(self) -> str:
-        names = self.coordinates
-        parts = [f"{len(self.bodies)} bodies, {len(names)} coordinate(s) {', '.join(names[:6])}".rstrip()]
-        parts[0] += ", ..." if len(names) > 6 else ""
-        parts += [f"locked {', '.join(list(self.locked)[:6])}"] if self.locked else []
-        parts += [f"forces on {', '.join([force.body for force in self.forces[:6]])}"] if self.forces else []
-        parts += [f"loops {', '.join([loop.label for loop in self.loops[:6]])}"] if self.loops else []
-        parts += [f"parameters {', '.join(self.parameter_values)}"] if self.parameter_values else []
-        parts += [f"gravity {', '.join([f'{each:g}' for each in np.asarray(self.gravity)])}"]
-        return f"<Mechanism of {'; '.join(parts)}>"
+        return f"<Mechanism of {'; '.join(summary(self, self.coordinates))}>"
 
     @cached_property
     def parts(self) -> tuple[Body, ...]:
@@ -139,7 +134,10 @@ class Mechanism(Structure):
 
     @property
     def moving(self) -> tuple[Body, ...]:
-        """The bodies that move, parents first, with all that is welded to them merged into their inertia."""
+        """The bodies that move, parents first, with all that is welded to them merged into their inertia.
+
+        Where there are parameters, what is welded is kept beside: `bind` them to see sums.
+        """
         return self._merged[0]
 
     @cached_property
@@ -168,8 +166,21 @@ class Mechanism(Structure):
 
     @cached_property
     def _merged(self) -> tuple[tuple[Body, ...], dict[str, Carrier]]:
-        moving, carriers = merge_fixed_bodies(self.parts)
-        return require_inertia(moving), carriers
+        moving, carriers = self._merge(self.parts)
+        numbers = [bound_body(part, self.parameters) for part in self.parts]
+        known = moving
+        if numbers != list(self.parts):
+            known, _ = self._merge([part for body in numbers for part in self.shared.parts(body)])
+        require_inertia(known)
+        return tuple(moving), carriers
+
+    def _merge(self, parts: Sequence[Body]) -> tuple[list[Body], dict[str, Carrier]]:
+        with building(Builder()):
+            return merge_fixed_bodies(parts)
+
+    @cached_property
+    def _bound(self) -> Mechanism:
+        return self.bind(self.parameter_values)
 
     @cached_property
     def _equations(self) -> TreeEquations:
@@ -189,31 +200,12 @@ class Mechanism(Structure):
             self.coordinates,
             self.parameter_values,
             forces=self._generalized_forces if self.forces else None,
-            damping=per_velocity(self.moving, [body.joint.damping for body in self.moving]),
+            damping=per_velocity(self.moving, [symbol(body.joint.damping) for body in self.moving]),
             quasi_velocities=quasi_velocities(self.moving),
-            constraints=self._loop_rows if self.loops else None,
-            velocity_constraints=self._slip_rows if any(loop.velocity_rows for loop in self.loops) else None,
+            constraints=lambda q, t: position_rows(self, self.moving, self._carriers, self.links, q),
+            velocity_constraints=lambda q, qd, t: velocity_rows(self, lambda body: self._chain(body, q, qd)),
+            require_values=lambda values: require_values(self.parts, self.gravity, values),
         )
-
-    def _loop_rows(self, q: list[Node], t: Node) -> dict[str, Node]:
-        bodies = {body.name: body for body in self.bodies}
-        rows: dict[str, Node] = {}
-        for loop in self.loops:
-            if loop.kind == "coupling":
-                phi = [coupling_row(loop, self.moving, bodies, self.locked, q)]
-            else:
-                carriers = [self._carriers[name] for name in (loop.body, loop.to)]
-                phi = loop_rows(loop, *relative_placements(carriers, self.moving, self.links, q))
-            rows |= dict(zip(loop.rows, phi, strict=True))
-        return rows
-
-    def _slip_rows(self, q: list[Node], qd: list[Node], t: Node) -> dict[str, Node]:
-        rows: dict[str, Node] = {}
-        for loop in self.loops:
-            if loop.velocity_rows:
-                slips = slip_rows(loop, self._chain(loop.body, q, qd), self._chain(loop.to, q, qd))
-                rows |= dict(zip(loop.velocity_rows, slips, strict=True))
-        return rows
 
     def _generalized_forces(self, q: list[Node], qd: list[Node], t: Node, p: dict[str, Node]) -> list[Node]:
         return generalized_forces([(force, self._chain(force.body, q, qd)) for force in self.forces], qd, p)
@@ -232,17 +224,17 @@ class Mechanism(Structure):
         return self._equations.parents
 
     def position(self, body: str, at: ArrayLike = (0.0, 0.0, 0.0)) -> Graph:
-        """Where a point of a body is in the world. Inputs q0.., outputs x, y, z [m].
+        """Where a point of a body is in the world. Inputs q0.. and parameters of positions; outputs x, y, z [m].
 
         at: (3,) [m], the point, in the body's frame. Raises MechanismError for an unknown body.
         """
         chain, point = self.chain(body), _point(body, at)
         with building(Builder()), cg.tag(body):
             place = chain.motion(point).position
-        return cg.simplify(Graph(self.system.q, dict(zip("xyz", place, strict=True))))
+        return cg.simplify(Graph([*self.system.q, *self._lengths], dict(zip("xyz", place, strict=True))))
 
     def motion(self, body: str, at: ArrayLike = (0.0, 0.0, 0.0)) -> Graph:
-        """How a body moves in the world: inputs q0.., qd0.., outputs in the world's axes.
+        """How a body moves in the world: inputs q0.., qd0.., parameters of positions; outputs in the world's axes.
 
         x, y, z [m] and vx, vy, vz [m/s] of a point; wx, wy, wz [rad/s], the body's angular velocity; R_0_0, R_0_1, ..
         row by row, its axes as columns.
@@ -250,7 +242,12 @@ class Mechanism(Structure):
         """
         chain, point = self.chain(body), _point(body, at)
         with building(Builder()), cg.tag(body):
-            return chain.graph(point, self.system.q, self.system.qd)
+            return chain.graph(point, self.system.q, [*self.system.qd, *self._lengths])
+
+    @property
+    def _lengths(self) -> list[Node]:
+        """The parameters of where joints are."""
+        return cg.variables(list(names_in([each for body in self.bodies for each in entries(body.joint.position)])))
 
     def chain(self, body: str) -> KinematicChain:
         """The joints between a body and the world, at q0.. and qd0... Raises MechanismError for an unknown body."""
@@ -264,7 +261,26 @@ class Mechanism(Structure):
         Joints come in the order of the coordinates, then the tips. See `joint_positions.skeleton`, which says how they
         are connected and from where a motion in space is seen.
         """
-        return skeleton(self, q).points
+        return skeleton(self._bound, q).points
+
+    def bind(self, values: Mapping[str, float] | None = None) -> Mechanism:
+        """The mechanism with numbers in place of parameters; of all at their values, or of those in `values`.
+
+        Raises MechanismError as a Mechanism does, and for a parameter that there is not.
+        """
+        if values is None:
+            return self._bound
+        given = require_mapping("values", values, "name: number")
+        chosen = {name: parameter_value(name, value) for name, value in given.items()}
+        if unknown := [name for name in chosen if name not in self.parameter_values]:
+            has = ", ".join(self.parameter_values) or "none"
+            raise MechanismError(f"the mechanism has no parameter {unknown[0]!r} (it has {has})")
+        if not chosen:
+            return self
+        require_values(self.bodies, self.gravity, {**self.parameter_values, **chosen})
+        bodies = tuple([bound_body(body, chosen) for body in self.bodies])
+        forces = tuple([bound_force(force, chosen) for force in self.forces])
+        return changed(self, bodies=bodies, gravity=bound(self.gravity, chosen), forces=forces)
 
     def lock(self, body: str, at: float | ArrayLike | None = None) -> Mechanism:
         """The mechanism with the joint of a body standing still at a coordinate [rad or m], or several; by default 0.
@@ -328,4 +344,7 @@ def _point(body: str, at: ArrayLike) -> Array:
 def _listed(what: str, kind: type, given: Any) -> tuple[Any, ...]:
     if isinstance(given, str) or not isinstance(given, Iterable):
         raise MechanismError(f"{what} must be a sequence of {kind.__name__}, got {type(given).__name__}: {given!r:.60}")
-    return tuple(given)
+    for each in (listed := tuple(given)):
+        if not isinstance(each, kind):
+            raise MechanismError(f"{what} must be of the type {kind.__name__}, got {type(each).__name__}: {each!r:.60}")
+    return listed

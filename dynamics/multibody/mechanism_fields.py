@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
 
 from numpy.typing import ArrayLike
 
@@ -11,6 +12,8 @@ from .body import Body
 from .external_force import Force
 from .link_cache import SharedParts
 from .loops import Loop
+from .parameter_values import used_names
+from .parameters import Quantities
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,7 +21,7 @@ class Structure:
     """The fields of a `Mechanism`, see there."""
 
     bodies: Sequence[Body]
-    gravity: ArrayLike = (0.0, 0.0, -9.81)
+    gravity: Quantities = (0.0, 0.0, -9.81)
     forces: Sequence[Force] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     locked: Mapping[str, float | ArrayLike] = field(default_factory=dict)
@@ -29,6 +32,17 @@ class Structure:
 
     @property
     def parameter_values(self) -> dict[str, float]:
-        """Values of the parameters: those that forces name, 0 where nothing else is said."""
+        """Values of the parameters: those that forces name are 0 where nothing else is said."""
         names = [each for force in self.forces for each in force.components if isinstance(each, str)]
         return dict.fromkeys(names, 0.0) | dict(self.parameters)
+
+
+AnyStructure = TypeVar("AnyStructure", bound=Structure)
+
+
+def changed(structure: AnyStructure, **changes: Any) -> AnyStructure:
+    """The structure with other fields; of its parameters, those that it then still has."""
+    result = {"bodies": structure.bodies, "gravity": structure.gravity, "forces": structure.forces} | changes
+    used = used_names(result["bodies"], result["gravity"], result["forces"])
+    parameters = {name: value for name, value in structure.parameters.items() if name in used}
+    return replace(structure, parameters=parameters, **changes)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,13 +11,11 @@ from numpy.typing import ArrayLike
 from cgraph.extend import real_array
 
 from .body import WORLD, Body, MechanismError
-from .external_force import Force
 from .joint_coordinates import coordinate_names, neutral, places, velocity_names
-from .mechanism_fields import Structure
+from .mechanism_fields import AnyStructure, Structure, changed
+from .parameter_values import used_names
 from .spatial import Array
 from .subtree import Subtree, as_subtree, descendants, inserted
-
-AnyStructure = TypeVar("AnyStructure", bound=Structure)
 
 
 def lock_joint(structure: AnyStructure, body: str, at: float | ArrayLike | None) -> AnyStructure:
@@ -44,12 +41,14 @@ def subtree_of(structure: Structure, body: str) -> Subtree:
     bodies = {each.name: (place, each) for place, each in enumerate(structure.bodies) if each.name in names}
     order = [body, *(name for name in bodies if name != body)]
     forces = tuple([force for force in structure.forces if force.body in names])
+    taken = tuple([bodies[name][1] for name in order])
+    used = used_names(taken, (), forces)
     return Subtree(
-        tuple([bodies[name][1] for name in order]),
+        taken,
         bodies[body][1].parent,
         tuple([bodies[name][0] for name in order]),
         forces,
-        _used(structure, forces),
+        {name: value for name, value in structure.parameters.items() if name in used},
         {name: at for name, at in structure.locked.items() if name in names},
         tuple([loop for loop in structure.loops if {loop.body, loop.to} <= {*names, WORLD}]),
     )
@@ -58,12 +57,10 @@ def subtree_of(structure: Structure, body: str) -> Subtree:
 def detach_subtree(structure: AnyStructure, body: str) -> AnyStructure:
     """The structure without a body and all that it carries. Raises MechanismError for an unknown body."""
     names = descendants(structure.bodies, body)
-    forces = tuple([force for force in structure.forces if force.body not in names])
-    return replace(
+    return changed(
         structure,
         bodies=tuple([each for each in structure.bodies if each.name not in names]),
-        forces=forces,
-        parameters=_used(structure, forces),
+        forces=tuple([force for force in structure.forces if force.body not in names]),
         locked={name: at for name, at in structure.locked.items() if name not in names},
         loops=tuple([loop for loop in structure.loops if names.isdisjoint((loop.body, loop.to))]),
     )
@@ -76,6 +73,11 @@ def attach_subtree(
     given = as_subtree(subtree)
     if to is not None:
         _check_body(to)
+    for name, value in given.parameters.items():
+        if (known := structure.parameters.get(name, value)) != value:
+            raise MechanismError(
+                f"the parameter {name!r} is {known!r} in the mechanism and {value!r} in what it takes on"
+            )
     back = to is None or to == given.parent
     bodies = given.with_parent(given.parent if to is None else to)
     return replace(
@@ -114,9 +116,3 @@ def map_state(
 def _check_body(body: object) -> None:
     if not isinstance(body, str):
         raise MechanismError(f"a body is named by a string, got {type(body).__name__}: {body!r:.60}")
-
-
-def _used(structure: Structure, forces: Iterable[Force]) -> dict[str, float]:
-    """The parameters that these forces name."""
-    used = {name for force in forces for name in force.names}
-    return {name: value for name, value in structure.parameters.items() if name in used}

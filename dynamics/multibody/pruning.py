@@ -203,7 +203,11 @@ def prune(
         raise TypeError(f"equations must be a function of a model, got {type(equations).__name__}: {equations!r:.60}")
     if unknown := [each for each in kept if each not in EFFECTS]:
         raise ValueError(f"effects are {', '.join(EFFECTS)}, got {unknown[0]!r}")
-    steps = _steps(model, kept, _mapping("lock", lock), _mapping("values", values), outputs)
+    numbers = _mapping("values", values)
+    if numbers:
+        known = as_system(model).parameters
+        as_system(model).require_values(known | {name: value for name, value in numbers.items() if name in known})
+    steps = _steps(model, kept, _mapping("lock", lock), numbers, outputs)
     graph = steps[-1].graph(equations)
     fewer = _regrouped(steps[-1]) if require_flag("regroup", regroup) else None
     if fewer is not None and len((candidate := fewer.graph(equations)).nodes) < len(graph.nodes):

@@ -39,7 +39,7 @@ class RecursiveInverseDynamics:
     Parameters
     ----------
     mechanism : Mechanism
-        Without external forces.
+        Without external forces. Of parameters it takes the values.
 
     Raises
     ------
@@ -58,11 +58,11 @@ class RecursiveInverseDynamics:
         mechanism = require_mechanism(mechanism, "RecursiveInverseDynamics")
         if mechanism.forces:
             raise ValueError("inverse dynamics body by body does not take external forces; use inverse_dynamics")
-        self.mechanism = mechanism
-        rest = ground(mechanism.gravity)
+        self.mechanism = mechanism = mechanism.bind()
+        rest = ground(np.asarray(mechanism.gravity, dtype=np.float64))
         self.n = len(mechanism.velocities)
         self._parents = mechanism.parents
-        self._links = [each.numbers for each in mechanism.links]
+        self._links = [[float(number) for number in link.numbers] for link in mechanism.links]
         self._kernels = [_kernels(body.joint.type) for body in mechanism.moving]
         self._places = places(mechanism.moving)
         self._ground = [float(each) for each in (*rest.omega, *rest.velocity, *rest.vertical, rest.depth)] + [

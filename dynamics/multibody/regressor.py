@@ -14,7 +14,7 @@ from ..equations.formulations import inverse_dynamics
 from ..systems.model import Model
 from ..systems.system import System
 from . import spatial
-from .body import WORLD
+from .body import WORLD, quantities
 from .body_motion import energy, ground, propagate_motion
 from .inertial_numbers import Link, axes_of, link
 from .joint_coordinates import parts, quasi_velocities
@@ -41,7 +41,7 @@ def regressor(model: Model) -> Graph:
     Returns
     -------
     Graph
-        Inputs q0.., qd0.., qdd0..; outputs Y_0_0, Y_0_1, .. row by row, (n, 10 n).
+        Inputs q0.., qd0.., qdd0.., parameters; outputs Y_0_0, Y_0_1, .. row by row, (n, 10 n).
 
     Raises
     ------
@@ -56,16 +56,19 @@ def regressor(model: Model) -> Graph:
     """
     mechanism = _mechanism(model)
     names = [f"{each}_{i}" for i in range(len(mechanism.moving)) for each in PARAMETERS]
+    while set(names) & mechanism.parameter_values.keys():
+        names = [f"{name}_" for name in names]
     system = System(
         lambda q, qd, t, p: _partial_lagrangians(mechanism, q, qd, [p[name] for name in names]),
         mechanism.coordinates,
-        dict.fromkeys(names, 0.0),
+        dict.fromkeys(names, 0.0) | mechanism.parameter_values,
         quasi_velocities=quasi_velocities(mechanism.moving),
     )
     slopes = cg.jacobian(inverse_dynamics(system), names).outputs.values()
     width = len(names)
     outputs = {f"Y_{k // width}_{k % width}": slope for k, slope in enumerate(slopes)}
-    return cg.simplify(Graph([*system.q, *system.qd, *system.qdd], outputs))
+    parameters = cg.variables(list(mechanism.parameter_values))
+    return cg.simplify(Graph([*system.q, *system.qd, *system.qdd, *parameters], outputs))
 
 
 def inertial_parameters(model: Model) -> Array:
@@ -80,6 +83,7 @@ def inertial_parameters(model: Model) -> Array:
     -------
     ndarray, (n, 10)
         In the bodies' axes, columns as `PARAMETERS`: m [kg], m c [kg m], and Ixx, Ixy, Iyy, Ixz, Iyz, Izz [kg m^2].
+        Of the mechanism's own parameters it takes the values.
 
     Raises
     ------
@@ -93,10 +97,10 @@ def inertial_parameters(model: Model) -> Array:
     [2.0, 0.0, 0.0, -6.0]
     """
     rows = []
-    for body in _mechanism(model).moving:
-        center = np.asarray(body.center)
-        inertia = spatial.parallel_axis(np.asarray(body.inertia), body.mass, center)
-        rows.append([body.mass, *(body.mass * center), *(inertia[i, j] for i, j in _LOWER)])
+    for body in _mechanism(model).bind().moving:
+        mass, center = float(body.mass), np.asarray(body.center)
+        inertia = spatial.parallel_axis(np.asarray(body.inertia), mass, center)
+        rows.append([mass, *(mass * center), *(inertia[i, j] for i, j in _LOWER)])
     return np.array(rows)
 
 
@@ -108,7 +112,7 @@ def _mechanism(model: Model) -> Mechanism:
 
 
 def _partial_lagrangians(mechanism: Mechanism, q: list[Node], qd: list[Node], pi: list[Node]) -> list[Node]:
-    motions, axes = {WORLD: ground(mechanism.gravity)}, {WORLD: np.eye(3)}
+    motions, axes = {WORLD: ground(quantities("gravity", mechanism.gravity))}, {WORLD: np.eye(3)}
     partials = []
     with building(Builder()):
         states = parts(mechanism.moving, q, qd)

@@ -1,4 +1,7 @@
-"""Vectors and rotations of bodies: constants as arrays, moving quantities as triples of nodes."""
+"""Vectors and rotations of bodies: constants as arrays, moving quantities as triples of nodes.
+
+An array may be one of objects: floats, and nodes where there are parameters. Rotations are floats alone.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
+from cgraph.extend import as_node
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Triple = tuple[Node, Node, Node]
@@ -54,25 +58,44 @@ def cleaned(array: Array) -> Array:
 def without_rounding(total: Array, terms: Array) -> Array:
     """The sums, with those that are the rounding of their terms set to zero.  terms: the sum of their absolute values.
 
-    Entry by entry: one that is small beside other entries has a meaning of its own.
+    Entry by entry: one that is small beside other entries has a meaning of its own. Nodes stay.
     """
+    if total.dtype == object:
+        pairs = zip(map(plain, total.flat), terms.flat, strict=True)
+        result = np.empty(total.size, dtype=object)
+        result[:] = [x if isinstance(x, Node) else 0.0 if abs(x) <= ROUNDING * size else x for x, size in pairs]
+        return result.reshape(total.shape)
     return np.where(np.abs(total) <= ROUNDING * terms, 0.0, total) + 0.0
+
+
+def plain(value: Any) -> float | Node:
+    """The number of a constant, else the node."""
+    if isinstance(value, Node):
+        return value if value.value is None else value.value
+    return float(value)
+
+
+def _sizes(array: Array) -> Array:
+    """Absolute values, 0 for nodes."""
+    if array.dtype != object:
+        return np.abs(array)
+    return np.array([0.0 if isinstance(each, Node) else abs(each) for each in array.flat]).reshape(array.shape)
 
 
 def added(a: Array, b: Array) -> Array:
     """a + b, where they cancel zero."""
-    return without_rounding(a + b, np.abs(a) + np.abs(b))
+    return without_rounding(a + b, _sizes(a) + _sizes(b))
 
 
 def product(*factors: Array) -> Array:
     """The matrix product, with entries whose terms cancel zero."""
-    return without_rounding(reduce(np.matmul, factors), reduce(np.matmul, [np.abs(each) for each in factors]))
+    return without_rounding(reduce(np.matmul, factors), reduce(np.matmul, [_sizes(each) for each in factors]))
 
 
 def placed(position: Array, orientation: Array, at: ArrayLike) -> Array:
     """A point of a frame in the axes that the frame is placed in, with components whose terms cancel zero."""
     at = np.asarray(at)
-    terms = np.abs(position) + np.abs(orientation) @ np.abs(at)
+    terms = _sizes(position) + np.abs(orientation) @ _sizes(at)
     return without_rounding(position + orientation @ at, terms)
 
 
@@ -118,7 +141,7 @@ def joint_placement(outer: Array, orientation: ArrayLike, position: ArrayLike, a
     return snapped(outer.T @ np.asarray(orientation) @ axes), constant(product(outer.T, np.asarray(position)))
 
 
-def parallel_axis(inertia: Array, mass: float, offset: Array) -> Array:
+def parallel_axis(inertia: Array, mass: float | Node, offset: Array) -> Array:
     """Inertia about a point `offset` away from the center of mass (parallel axes)."""
     x, y, z = offset
     return added(inertia, mass * np.array([[y * y + z * z, -x * y, -x * z],
@@ -157,7 +180,7 @@ def scaled(factor: float | Node, vector: Triple) -> Triple:
 
 def constant(vector: Array) -> Triple:
     """A constant vector as nodes."""
-    x, y, z = (cg.constant(float(each)) for each in vector)
+    x, y, z = (as_node(each) for each in vector.tolist())
     return x, y, z
 
 

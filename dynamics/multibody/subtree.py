@@ -27,7 +27,7 @@ class Subtree:
     forces : tuple of Force
         On these bodies.
     parameters : mapping
-        The values that the forces use.
+        The values that the bodies, their joints and the forces use.
     locked : mapping
         {body: coordinate [rad or m]} of their joints that are locked.
     loops : tuple of Loop

@@ -6,14 +6,14 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from ..equations.equations_of_motion import gravity_force
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .body import Body
 from .composed_joints import locked_parts, parts_of
 from .mechanism import Mechanism, as_mechanism
+from .mechanism_fields import changed
+from .parameters import vanishes
 
 EFFECTS = ("gravity", "damping", "springs", "armature", "forces")
 FREE_FALL = (0.0, 0.0, -9.81)  # m/s^2, put in to count what gravity would take
@@ -27,11 +27,11 @@ def has_effect(model: Model, effect: str) -> bool:
     mechanism = as_mechanism(model)
     if mechanism is not None:
         if effect in _JOINT:
-            return any(getattr(body.joint, _JOINT[effect]) for body in mechanism.moving)
-        return bool(np.any(np.asarray(mechanism.gravity))) if effect == "gravity" else bool(mechanism.forces)
+            return not all(vanishes(getattr(body.joint, _JOINT[effect])) for body in mechanism.moving)
+        return not vanishes(mechanism.gravity) if effect == "gravity" else bool(mechanism.forces)
     system = as_system(model)
     if effect == "damping":
-        return any(system.damping)
+        return not vanishes(system.damping)
     if effect == "forces":
         return any(force.value != 0.0 for force in system.forces)
     raise ValueError(f"the Lagrangian of {model!r:.60} is given as a whole: {effect} cannot be told apart in it")
@@ -42,8 +42,8 @@ def without_effect(model: Model, effect: str) -> Model:
     mechanism = as_mechanism(model)
     if mechanism is not None:
         if effect == "gravity":
-            return replace(mechanism, gravity=(0.0, 0.0, 0.0))
-        return replace(mechanism, forces=(), parameters={}) if effect == "forces" else _with(mechanism, effect, 0.0)
+            return changed(mechanism, gravity=(0.0, 0.0, 0.0))
+        return changed(mechanism, forces=()) if effect == "forces" else _with(mechanism, effect, 0.0)
     system = as_system(model)
     return System(
         lambda q, qd, t: system.partial_lagrangians,
@@ -57,32 +57,34 @@ def without_effect(model: Model, effect: str) -> Model:
 def _with(model: Mechanism, effect: str, number: float, among: Collection[str] | None = None) -> Mechanism:
     """The mechanism with that damping, stiffness or armature at the joints of those bodies, or at all that move."""
     change: dict[str, Any] = {_JOINT[effect]: number}
+    if effect == "springs" and not number:
+        change["spring_reference"] = 0.0
 
-    def changed(body: Body) -> Body:
+    def with_it(body: Body) -> Body:
         chosen = body.joint.moves if among is None else body.name in among
         return replace(body, joint=replace(body.joint, **change)) if chosen else body
 
-    return replace(model, bodies=tuple([changed(body) for body in model.bodies]))
+    return changed(model, bodies=tuple([with_it(body) for body in model.bodies]))
 
 
 def absent_parts(model: Mechanism, given: Mechanism) -> Iterator[tuple[str, str, Mechanism]]:
     """What, why, and the model with it. given: the model before anything was switched off, which is not absent."""
     model, given = _in_parts(model), _in_parts(given)
-    if not np.any(np.asarray(given.gravity)):
-        yield "gravity", "it is zero", replace(model, gravity=FREE_FALL)
-    elif np.any(np.asarray(model.gravity)):
-        forces = gravity_force(replace(model, bodies=_with(model, "springs", 0.0).bodies)).outputs.values()
+    if vanishes(given.gravity):
+        yield "gravity", "it is zero", changed(model, gravity=FREE_FALL)
+    elif not vanishes(model.gravity):
+        forces = gravity_force(_with(model, "springs", 0.0)).outputs.values()
         free = [body.name for body, force in zip(model.moving, forces, strict=True) if force.value == 0.0]
         if free:
-            yield f"gravity at {_listed(free)}", "it does no work there", replace(model, gravity=SKEW)
+            yield f"gravity at {_listed(free)}", "it does no work there", changed(model, gravity=SKEW)
     for effect, name in _JOINT.items():
-        had = {body.name for body in given.moving if getattr(body.joint, name)}
-        without = [body.name for body in model.moving if not getattr(body.joint, name) and body.name not in had]
+        had = {body.name for body in given.moving if not vanishes(getattr(body.joint, name))}
+        without = [body.name for body in model.moving if vanishes(getattr(body.joint, name)) and body.name not in had]
         if without:
             yield f"{effect} of {_listed(without)}", "it is zero", _with(model, effect, NUMBER, without)
     if massless := [body.name for body in model.bodies if not _frame(model, body) and not _has_inertia(body)]:
         yield f"mass of {_listed(massless)}", "it is zero", _replaced(model, massless, _heavy)
-    if welds := [body.name for body in model.bodies if not body.joint.moves and body.mass]:
+    if welds := [body.name for body in model.bodies if not (body.joint.moves or vanishes(body.mass))]:
         yield f"joint of {_listed(welds)}", "it is welded on", _replaced(model, welds, _hinged)
 
 
@@ -95,7 +97,7 @@ def _in_parts(model: Mechanism) -> Mechanism:
 
 
 def _has_inertia(body: Body) -> bool:
-    return bool(body.mass or np.any(np.asarray(body.inertia)))
+    return not (vanishes(body.mass) and vanishes(body.inertia))
 
 
 def _frame(model: Mechanism, body: Body) -> bool:
@@ -105,7 +107,7 @@ def _frame(model: Mechanism, body: Body) -> bool:
 
 
 def _replaced(model: Mechanism, names: Sequence[str], change: Callable[[Body], Body]) -> Mechanism:
-    return replace(model, bodies=tuple([change(body) if body.name in names else body for body in model.bodies]))
+    return changed(model, bodies=tuple([change(body) if body.name in names else body for body in model.bodies]))
 
 
 def _heavy(body: Body) -> Body:

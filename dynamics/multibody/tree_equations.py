@@ -14,7 +14,7 @@ from cgraph.extend import Builder, building
 from ..systems.system import BiasForce
 from . import newton_euler, spatial
 from .base_parameters import base_parameter_links
-from .body import WORLD, Body
+from .body import WORLD, Body, quantities
 from .body_motion import Motion, ground
 from .inertial_numbers import Link
 from .joint_coordinates import parts
@@ -30,7 +30,7 @@ class TreeEquations:
     def __init__(self, structure: Structure, bodies: Sequence[Body]) -> None:
         self.bodies, self.shared = bodies, structure.shared
         self.base_parameters = structure.base_parameters
-        self.gravity = structure.gravity
+        self.gravity = quantities("gravity", structure.gravity)
 
     @cached_property
     def parents(self) -> list[int]:
@@ -66,7 +66,7 @@ class TreeEquations:
             partials = [each.partial for each in self._moved(q, qd)]
             if self.base_parameters:
                 with cg.tag("potential"):
-                    moment = spatial.constant(self.ground.strength * self._links[1])
+                    moment = spatial.scaled(self.ground.strength, spatial.constant(self._links[1]))
                     partials[0] = partials[0] - spatial.dot(self.ground.vertical, moment)
         return partials
 

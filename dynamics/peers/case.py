@@ -13,6 +13,7 @@ from cgraph import Graph, Node
 from cgraph.extend import topological
 
 from ..integrators.tableau import RK4
+from ..multibody.mechanism import as_mechanism
 from ..systems.arguments import TIME
 from ..systems.model import Model, as_system
 from ..systems.system import System
@@ -38,8 +39,9 @@ class Case:
     """
 
     def __init__(self, name: str, model: Model) -> None:
-        self.name, self.model = name, model
-        self.system: System = as_system(model)
+        mechanism = as_mechanism(model)
+        self.name, self.model = name, mechanism.bind() if mechanism else model
+        self.system: System = as_system(self.model)
         self.nq, self.n = self.system.nq, self.system.n
         if TIME in [str(node.name) for node in self.system.extra_inputs]:
             raise ValueError(f"{name} depends on time, and the bench compares systems that do not")

@@ -81,7 +81,7 @@ def inspection(
         for name in FORMULATIONS:
             say(f"{scene.name}: deriving inverse dynamics, {name.replace('_', ' ')}")
             versions.append(_version(system, name, state))
-    places = None if scene.mechanism is None else skeleton(scene.mechanism, run.q)
+    places = None if scene.mechanism is None else skeleton(scene.mechanism.bind(), run.q)
     stopped = "" if run.stats.success else run.stats.message
     return Inspection(tuple(versions), run.t, places, _shares(scene, state), stopped)
 

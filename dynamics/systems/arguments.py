@@ -59,6 +59,15 @@ def per_coordinate(
     return tuple([float(number) for number in entries])
 
 
+def coefficients(
+    what: str, value: float | Node | Sequence[float | Node], names: Sequence[str]
+) -> tuple[float | Node, ...]:
+    """A number of at least 0, or a node, for each of the named coordinates. Raises ValueError."""
+    entries = [value] * len(names) if isinstance(value, numbers.Real | Node) else sequence(f"{what} must be", value)
+    known = per_coordinate(what, [0.0 if isinstance(each, Node) else each for each in entries], names, minimum=0.0)
+    return tuple([each if isinstance(each, Node) else number for each, number in zip(entries, known, strict=True)])
+
+
 def parameter_items(parameters: Mapping[str, float] | None) -> Iterable[tuple[str, float]]:
     """Names and values. Raises TypeError for what is no mapping."""
     return () if parameters is None else require_mapping("parameters", parameters, "name: number").items()

@@ -8,6 +8,8 @@ from copy import copy
 from functools import cached_property
 from typing import Any
 
+from numpy.typing import ArrayLike
+
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import require_sequence, shortened, topological
@@ -16,10 +18,10 @@ from .arguments import (
     TIME,
     Parameters,
     call_user_function,
+    coefficients,
     node_or_number,
     parameter_items,
     parameter_value,
-    per_coordinate,
     sequence,
 )
 from .constraints import Constraints
@@ -47,8 +49,9 @@ class System:
     forces : callable
         (q, qd, t) or (q, qd, t, p) to one generalized force for each coordinate, node or number [N m or N], beside the
         applied tau.
-    damping : float or sequence of float
-        Viscous coefficient >= 0 for all coordinates or for each [N m s or N s/m]; the force is -damping * qd.
+    damping : float or node, or a sequence of them
+        Viscous coefficient >= 0 for all coordinates or for each [N m s or N s/m]; the force is -damping * qd. A node is
+        over parameters.
     quasi_velocities : QuasiVelocities
         Where the velocities qd are no rates of the coordinates, how they move them. L is then L(q, qd, t) of these
         velocities, and forces, damping and tau belong to them, n of each; of the coordinates there are nq.
@@ -79,7 +82,7 @@ class System:
         coordinates: Sequence[str],
         parameters: Mapping[str, float] | None = None,
         forces: Callable[..., Sequence[Node | float]] | None = None,
-        damping: float | Sequence[float] = 0.0,
+        damping: float | Node | Sequence[float | Node] = 0.0,
         quasi_velocities: QuasiVelocities | None = None,
         constraints: Callable[..., Any] | None = None,
         velocity_constraints: Callable[..., Any] | None = None,
@@ -87,7 +90,7 @@ class System:
         self.kinematics = Kinematics(coordinates, quasi_velocities)
         self._require_consistent()
         self.parameters = {name: parameter_value(name, value) for name, value in parameter_items(parameters)}
-        self.damping = per_coordinate("damping", damping, self.velocities, minimum=0.0)
+        self.damping = coefficients("damping", damping, self.velocities)
         p = Parameters(self.parameters)
         energy = call_user_function("lagrangian", lagrangian, self.q, self.qd, self.t, p)
         single = isinstance(energy, (Node, numbers.Real))
@@ -106,6 +109,7 @@ class System:
         self.forces = tuple(
             [node_or_number(f"the force on {name!r}", x) for name, x in zip(self.velocities, applied, strict=True)]
         )
+        self._require_parameters(p)
         self.constraints = Constraints(self.kinematics, self.t, self.parameters, constraints, velocity_constraints)
         known = {*self.q, *self.qd, self.t, *p.values()}
         for node in topological(self._given):
@@ -114,6 +118,15 @@ class System:
                 raise ValueError(
                     f"the system uses {node.name!r}, which is no coordinate, parameter or t (it has {names})"
                 )
+
+    def _require_parameters(self, p: Mapping[str, Node]) -> None:
+        """Raises ValueError for a damping that depends on anything else."""
+        for node in topological([each for each in self.damping if isinstance(each, Node)]):
+            if node.op.name == "variable" and node not in p.values():
+                raise ValueError(f"damping uses {node.name!r}, which is no parameter (it has {', '.join(p) or 'none'})")
+
+    def require_values(self, values: Mapping[str, ArrayLike]) -> None:
+        """Raises ValueError for values of the parameters, one or N of each, that cannot be; here none."""
 
     @property
     def system(self) -> System:
@@ -292,13 +305,18 @@ class BodySystem(System):
         self,
         bias_forces: Callable[[Sequence[Node], Sequence[Node]], Sequence[BiasForce]],
         *of_system: Any,
+        require_values: Callable[[Mapping[str, ArrayLike]], None],
         **more: Any,
     ) -> None:
         super().__init__(*of_system, **more)
-        self._bias_forces = bias_forces
+        self._bias_forces, self._require_values = bias_forces, require_values
 
     def _require_consistent(self) -> None:
         """Nothing: the types of joints are known to be."""
+
+    def require_values(self, values: Mapping[str, ArrayLike]) -> None:
+        """Raises ValueError for values with which the bodies cannot be."""
+        self._require_values(values)
 
     def bias_forces(self) -> Sequence[BiasForce]:
         """The pairs (velocity, force) that the bodies state; see `System.bias_forces`."""

@@ -212,8 +212,9 @@ class _Checks:
     def _power(self) -> Residual:
         system, qd, tau, qdd = self.system, self.at["qd"], self.at["tau"], self.accelerations
         gained = self.value(self.rate(energy(system)), qdd=qdd)[..., 0]
-        forces = self.value(self.graph({f"f{i}": node for i, node in enumerate(system.forces)}))
-        power = qd * (tau + forces - np.array(system.damping) * qd)
+        rows = zip(system.forces, system.damping, system.qd, strict=True)
+        forces = self.value(self.graph({f"f{i}": f - damping * u for i, (f, damping, u) in enumerate(rows)}))
+        power = qd * (tau + forces)
         equation = "energy: dE/dt = qd . (tau + forces - damping)"
         if self.timed:
             (slope,) = cotangents({system.lagrangian: ONE}, [system.t])

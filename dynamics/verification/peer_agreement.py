@@ -42,9 +42,9 @@ class Sizes(NamedTuple):
 
 def sizes_of(mechanism: Mechanism) -> Sizes:
     """The sizes that go with a mechanism."""
-    bodies = [(body.mass, np.asarray(body.center), np.asarray(body.inertia)) for body in mechanism.moving]
+    bodies = [(float(body.mass), np.asarray(body.center), np.asarray(body.inertia)) for body in mechanism.moving]
     inertia = max(float(np.abs(moments).max() + mass * center @ center) for mass, center, moments in bodies)
-    return Sizes(TINY * max(body.mass for body in mechanism.bodies), inertia)
+    return Sizes(TINY * max(float(body.mass) for body in mechanism.bodies), inertia)
 
 
 class Term(NamedTuple):
@@ -91,7 +91,7 @@ def _floating(mj: Any, sizes: Sizes) -> None:
 
 
 def _alike(body: Body, sizes: Sizes) -> Body:
-    return replace(body, inertia=(sizes.inertia,) * 3) if body.mass > sizes.mass else body
+    return replace(body, inertia=(sizes.inertia,) * 3) if float(body.mass) > sizes.mass else body
 
 
 def _alike_there(mj: Any, sizes: Sizes) -> None:
@@ -99,7 +99,7 @@ def _alike_there(mj: Any, sizes: Sizes) -> None:
 
 
 def _weightless(body: Body, sizes: Sizes) -> Body:
-    return replace(body, mass=sizes.mass) if body.mass > sizes.mass else body
+    return replace(body, mass=sizes.mass) if float(body.mass) > sizes.mass else body
 
 
 def _weightless_there(mj: Any, sizes: Sizes) -> None:
@@ -240,13 +240,14 @@ def disagreement(model: Mechanism, peer: Asked, at: Mapping[str, Array]) -> floa
 
 
 def bare(model: Model) -> Mechanism:
-    """The mechanism of a model, without forces on its bodies, which the peers do not have.
+    """The mechanism of a model, without forces on its bodies, which the peers do not have, and parameters as numbers.
 
     Raises NotComparableError for another model.
     """
     bodies = as_mechanism(model)
     if bodies is None:
         raise NotComparableError("takes rigid bodies, not a Lagrangian")
+    bodies = bodies.bind()
     return replace(bodies, forces=(), parameters={}) if bodies.forces else bodies
 
 

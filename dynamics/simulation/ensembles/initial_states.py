@@ -53,6 +53,8 @@ def starts(
         else:
             columns[name] = _column(name, value)
             del same[name]
+    if parameters and as_ode(model) is None:
+        as_system(model).require_values({**same, **columns})
     if np.ndim(tau) == 2:
         arrays["tau"] = _array("tau", tau, n)
     else:

@@ -353,7 +353,7 @@ def test_a_force_that_cannot_be_is_refused(case: str) -> None:
     [
         ("q0", {}, "parameter 'q0' has the name of a coordinate"),
         ("m", {"m": np.nan}, "parameter 'm' must be a finite number, got nan"),
-        ("m", {"n": 1.0}, "the mechanism has no force that uses the parameter 'n'"),
+        ("m", {"n": 1.0}, "the mechanism has no body, joint or force that uses the parameter 'n'"),
         ("a b", {}, "the name of a parameter must be without white space, got 'a b'"),
     ],
 )

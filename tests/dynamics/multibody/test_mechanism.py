@@ -289,7 +289,9 @@ BAD = [
     param({"joint": "revolute"}, "body 'a': joint must be of the type Joint, got str: 'revolute'", id="joint text"),
     param([GOOD], "bodies must be of the type Body, got dict: {'name': 'a'", id="body a dict"),
     param(Body("a", hinge()), "bodies must be a sequence of Body, got Body: Body(name='a'", id="one body"),
-    param({"mass": "heavy"}, "body 'a': mass must be finite and at least 0, got 'heavy' kg", id="mass text"),
+    param(
+        {"mass": "too heavy"}, "the name of a parameter of body 'a': mass must be without white space", id="mass text"
+    ),
     param({"mass": np.inf}, "body 'a': mass must be finite and at least 0, got inf kg", id="mass infinite"),
     param({"center": "middle"}, "body 'a': center must be (3,) finite numbers, got 'middle'", id="center text"),
     param({"inertia": 0.1}, "body 'a': inertia must be (3, 3) finite numbers, got 0.1", id="inertia a number"),

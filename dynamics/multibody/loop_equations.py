@@ -1,0 +1,55 @@
+"""The rows of a mechanism's loops over its coordinates and velocities, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from cgraph import Node
+
+from .body import Body, MechanismError
+from .forward_kinematics import KinematicChain
+from .inertial_numbers import Link
+from .kinematic_tree import Carrier
+from .loops import check_loop, coupling_row, loop_rows, slip_rows
+from .mechanism_fields import Structure
+from .relative_placement import relative_placements
+
+
+def check_loops(structure: Structure) -> None:
+    """Raises MechanismError for a loop that its bodies cannot have, and for two of one name."""
+    bodies = {body.name: body for body in structure.bodies}
+    for loop in structure.loops:
+        check_loop(loop, bodies)
+    labels = [loop.label for loop in structure.loops]
+    if len(set(labels)) < len(labels):
+        twice = next(label for label in labels if labels.count(label) > 1)
+        raise MechanismError(f"two loops have the name {twice!r}")
+
+
+def position_rows(
+    structure: Structure,
+    moving: Sequence[Body],
+    carriers: Mapping[str, Carrier],
+    links: Sequence[Link],
+    q: list[Node],
+) -> dict[str, Node]:
+    """phi(q) of all loops."""
+    bodies = {body.name: body for body in structure.bodies}
+    rows: dict[str, Node] = {}
+    for loop in structure.loops:
+        if loop.kind == "coupling":
+            phi = [coupling_row(loop, moving, bodies, structure.locked, q)]
+        else:
+            ends = [carriers[name] for name in (loop.body, loop.to)]
+            phi = loop_rows(loop, *relative_placements(ends, moving, links, q))
+        rows |= dict(zip(loop.rows, phi, strict=True))
+    return rows
+
+
+def velocity_rows(structure: Structure, chain: Callable[[str], KinematicChain]) -> dict[str, Node]:
+    """Velocities that are zero in loops that roll.  chain: the joints between a body and the world."""
+    rows: dict[str, Node] = {}
+    for loop in structure.loops:
+        if loop.velocity_rows:
+            rows |= dict(zip(loop.velocity_rows, slip_rows(loop, chain(loop.body), chain(loop.to)), strict=True))
+    return rows

@@ -1,0 +1,387 @@
+"""Parameters in place of numbers of bodies, joints and gravity: the same mechanism, with more inputs."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from pytest import approx, mark, param, raises
+
+import cgraph as cg
+import dynamics as dyn
+from cgraph import Graph
+from dynamics.multibody.mechanism import Body, Joint, Mechanism, MechanismError
+from dynamics.multibody.spatial import from_quaternion
+from dynamics.scenes.inspection import inspection
+from dynamics.verification.certificate import certify
+from tests.dynamics.mechanisms import FAMILIES, random_body, random_inertia, random_rotation
+from tests.dynamics.models import Array
+from tests.dynamics.parametrized import parametrized
+
+ROUNDING = 1e-12  # of the largest of its kind, in some hundred sums
+GRAPHS: dict[str, Callable[[Any], Graph]] = {
+    "inverse dynamics": dyn.inverse_dynamics,
+    "inverse dynamics, literal": lambda model: dyn.inverse_dynamics(model, "chain_rule_literal"),
+    "forward dynamics": dyn.forward_dynamics,
+    "mass matrix": dyn.mass_matrix,
+    "bias": dyn.bias,
+    "gravity": dyn.gravity_force,
+    "momentum": dyn.momentum,
+    "energy": dyn.energy,
+    "coriolis": dyn.coriolis,
+    "regressor": dyn.regressor,
+    "state space": dyn.state_space,
+    "motion": lambda model: model.motion(model.bodies[-1].name, (0.1, 0.2, 0.3)),
+    "position": lambda model: model.position(model.bodies[-1].name),
+}
+
+
+HEAVY = ("inverse dynamics, literal", "state space", "coriolis", "regressor")
+
+
+def slow_cases() -> list[Any]:
+    return [param(base, seed, marks=mark.slow) for base in ("revolute", "ball", "free") for seed in range(4, 40)]
+
+
+def tree(seed: int, base: str = "revolute", count: int = 5) -> Mechanism:
+    """A tree of all types of joints and welds, on that one."""
+    rng = np.random.default_rng(seed)
+    bodies = [Body("b0", Joint(base), mass=1.5, center=0.2 * rng.normal(size=3), inertia=random_inertia(rng))]
+    for i in range(1, count):
+        kind = str(rng.choice(["ball", "revolute", "prismatic", "fixed", "fixed"]))
+        several = {"stiffness": 0.0, "armature": 0.1} if kind == "ball" else {}
+        body = random_body(f"b{i}", kind, f"b{rng.integers(max(0, i - 2), i)}", rng)
+        joint = replace(body.joint, orientation=random_rotation(rng), **several)
+        bodies.append(replace(body, joint=joint))
+    return Mechanism(bodies, 5.0 * rng.normal(size=3))
+
+
+def state(mechanism: Mechanism, seed: int = 0) -> dict[str, float]:
+    system, rng = mechanism.system, np.random.default_rng(seed)
+    sizes = {"q": system.nq, "qd": system.n, "qdd": system.n, "tau": system.n}
+    drawn = {f"{name}{i}": float(x) for name, size in sizes.items() for i, x in enumerate(rng.normal(size=size))}
+    return drawn | mechanism.parameter_values
+
+
+def values(graph: Graph, at: dict[str, float]) -> Array:
+    return np.array(list(graph.evaluate({name: at[name] for name in graph.input_names}).values()))
+
+
+def same(a: Graph, b: Graph) -> bool:
+    comparison = cg.compare(a, b)
+    return not (comparison.only_left or comparison.only_right or comparison.other_outputs)
+
+
+def near(a: Array, b: Array) -> bool:
+    return bool(np.abs(a - b).max() <= ROUNDING * np.abs(b).max())
+
+
+@mark.parametrize(("base", "seed"), [("revolute", 0), ("revolute", 1), ("free", 2), *slow_cases()])
+def test_every_graph_is_that_of_the_numbers(base: str, seed: int) -> None:
+    """Welded bodies among them: masses, centers and parallel axes are then nodes."""
+    numbers = tree(seed, base, 3 if seed < 4 else 5)
+    mechanism = parametrized(numbers, seed, 0.7)
+    at = state(mechanism, seed)
+    for name, graph in GRAPHS.items():
+        if name in HEAVY and base == "free" and seed < 4:
+            continue
+        mine = graph(mechanism)
+        assert near(values(mine, at), values(graph(numbers), at)), name
+        if name not in ("motion", "position"):
+            assert set(mechanism.parameters) <= set(mine.input_names)
+
+
+@mark.parametrize("family", ["mixed", "welded"])
+def test_base_parameters_are_nodes_too(family: str) -> None:
+    numbers = replace(FAMILIES[family](4), base_parameters=True)
+    mechanism = parametrized(numbers, 1)
+    at = state(mechanism)
+    for graph in (dyn.inverse_dynamics, dyn.forward_dynamics, dyn.energy):
+        assert near(values(graph(mechanism), at), values(graph(numbers), at))
+
+
+def test_numbers_alone_keep_their_graphs() -> None:
+    """Values of parameters bound to a mechanism give the very graph of the numbers; so do nodes of constants."""
+    arm = dyn.planar_arm([1.0, 0.8, 0.5], [1.0, 0.5, 0.3], damping=0.1)
+    mass, length = cg.variable("m"), cg.variable("l")
+    bodies = [replace(arm.bodies[0], mass=mass), *arm.bodies[1:]]
+    bodies[1] = replace(bodies[1], joint=replace(bodies[1].joint, position=(0.0, 0.0, -length)))
+    whole = replace(arm, bodies=bodies, parameters={"m": 1.0, "l": 1.0})
+    constants = replace(arm, gravity=[0.0, 0.0, 0.0 - cg.constant(9.81)])
+    for back in (whole.bind(), whole.bind({"m": 1.0}).bind({"l": 1.0}), constants):
+        assert same(dyn.inverse_dynamics(back), dyn.inverse_dynamics(arm))
+        assert back.parameters == {}
+
+
+def test_slopes_of_torque_by_mass_and_inertia_are_columns_of_the_regressor() -> None:
+    rng = np.random.default_rng(3)
+    body = random_body("b", "revolute", "a", rng, mass="m", center=(0.0, 0.0, 0.0), inertia=("x", "y", "z"))
+    values_ = {"m": 1.3, "x": 0.2, "y": 0.3, "z": 0.25}
+    mechanism = Mechanism([random_body("a", "revolute", "world", rng), body], parameters=values_)
+    at = state(mechanism)
+    slopes = values(cg.jacobian(dyn.inverse_dynamics(mechanism), list(values_)), at).reshape(2, 4)
+    columns = values(dyn.regressor(mechanism), at).reshape(2, 2, 10)[:, 1, [0, 4, 6, 9]]
+    assert slopes == approx(columns, rel=1e-12)
+
+
+def test_the_regressor_keeps_its_names_apart() -> None:
+    """A parameter may be called as the regressor calls its own."""
+    rod = Body("rod", Joint("revolute", (0.0, 1.0, 0.0), ("m_0", 0, 0)), mass=1.0, center=("mx_0", 0.0, 0.0))
+    mechanism = Mechanism([rod], parameters={"m_0": 0.3, "mx_0": 0.4})
+    at = state(mechanism)
+    assert near(values(dyn.regressor(mechanism), at), values(dyn.regressor(mechanism.bind()), at))
+
+
+@mark.parametrize("quantity", ["length", "center", "mass", "damping", "g"])
+def test_slopes_of_accelerations_by_any_number_are_differences(quantity: str) -> None:
+    """Differences of eighth order."""
+    arm = pendulums()
+    slopes = cg.jacobian(dyn.forward_dynamics(arm), [quantity])
+    at, h = state(arm), 1e-3
+    weights = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}
+    graph = dyn.forward_dynamics(arm)
+    difference = sum(
+        w * sign * values(graph, at | {quantity: at[quantity] + sign * k * h}) / h
+        for k, w in weights.items()
+        for sign in (1, -1)
+    )
+    assert values(slopes, at) == approx(difference, rel=1e-9)
+
+
+LENGTH = {cg.variable("length")}
+
+
+def pendulums(**more: float) -> Mechanism:
+    """Two links and a load welded to the second, of one parameter each."""
+    length, center = cg.variable("length"), cg.variable("center")
+    hinge = Joint("revolute", (0.0, -1.0, 0.0), damping="damping")
+    lower = replace(hinge, position=(0.0, 0.0, -length), stiffness="k", spring_reference="rest", armature="rotor")
+    bodies = [
+        Body("upper", hinge, mass="mass", center=(0.0, 0.0, -center), inertia=(0.1, "inertia", 0.01)),
+        Body("lower", lower, "upper", mass=0.5, center=(0.1, 0.0, -0.5 * length), inertia=(0.1, 0.1, 0.01)),
+        Body("load", Joint("fixed", position=(0.0, 0.0, -length)), "lower", mass="load"),
+    ]
+    chosen = {"mass": 1.0, "center": 0.4, "length": 0.8, "damping": 0.1, "inertia": 0.1, "load": 0.0, "g": 9.81}
+    chosen |= {"k": 0.3, "rest": 0.2, "rotor": 0.01}
+    return Mechanism(bodies, (0.0, 0.0, -cg.variable("g")), parameters=chosen | more)
+
+
+def test_a_load_of_no_mass_on_a_frame_of_none_is_none() -> None:
+    """No quotient of masses is in the graph."""
+    frame = Body("frame", Joint("fixed"), "rod")
+    rod = Body("rod", Joint("revolute", (0.0, 1.0, 0.0), armature=1.0))
+    loads = [Body(name, Joint("fixed", position=(1.0, 0.0, 0.0)), "frame", mass=name) for name in ("a", "b")]
+    mechanism = Mechanism([rod, frame, *loads], parameters={"a": 0.0, "b": 0.0})
+    assert values(dyn.forward_dynamics(mechanism), state(mechanism) | {"tau0": 2.0}).tolist() == [2.0]
+
+
+def test_a_force_at_a_place_of_parameters_does_its_work() -> None:
+    """Q = J^T f of a body welded on where a parameter says."""
+    wind = dyn.Force("load", ("wind", 0.0, 1.0))
+    arm = replace(pendulums(), forces=[wind], parameters=pendulums().parameters | {"wind": 2.0})
+    at = state(arm)
+    for graph in (dyn.inverse_dynamics, dyn.forward_dynamics):
+        assert near(values(graph(arm), at), values(graph(arm.bind()), at))
+        assert near(values(graph(arm.bind({"length": 0.8})), at), values(graph(arm), at))
+
+
+START = ([0.3, -0.2], [0.0, 0.5], 0.3)
+PLAIN: dict[str, Any] = {"method": "rk4", "dt": 0.05, "backend": "python"}
+
+
+def test_simulate_binds_them() -> None:
+    heavy = pendulums(load=0.7, length=1.1)
+    chosen = dyn.simulate(pendulums(), *START, **PLAIN, parameters={"load": 0.7, "length": 1.1}).q[-1]
+    for model in (heavy, heavy.bind()):
+        assert chosen == approx(dyn.simulate(model, *START, **PLAIN).q[-1], rel=ROUNDING)
+
+
+def test_simulate_many_varies_them() -> None:
+    arm, loads = pendulums(), [0.0, 0.3, 0.9]
+    many = dyn.simulate_many(arm, *START, **PLAIN, parameters={"load": loads}, t_eval=[0.3])
+    for k, load in enumerate(loads):
+        alone = dyn.simulate(pendulums(load=load), *START, **PLAIN)
+        assert many.q[k, -1] == approx(alone.q[-1], rel=ROUNDING)
+
+
+def test_the_certificate_holds() -> None:
+    certificate = certify(pendulums(), states=3)
+    assert certificate.passed, str(certificate)
+
+
+def test_pruning_takes_their_parameters_away() -> None:
+    result = dyn.prune(pendulums(), effects=["armature", "forces"], values={"load": 0.0})
+    kept = {"mass", "center", "length", "inertia", "load", "rotor"}
+    assert set(result.model.parameters) == kept
+    assert {term.what for term in result.omitted} == {"gravity", "damping", "springs", "input load"}
+    regrouped = dyn.prune(pendulums(), regroup=True)
+    at = state(pendulums())
+    assert near(values(regrouped.graph, at), values(dyn.inverse_dynamics(pendulums()), at))
+
+
+def test_they_go_with_their_bodies() -> None:
+    arm = pendulums()
+    assert set(arm.detach("lower").parameters) == {"mass", "center", "damping", "inertia", "g"}
+    assert set(arm.subtree("load").parameters) == {"length", "load"}
+    again = arm.detach("load").attach(arm.subtree("load"))
+    assert dict(again.parameters) == dict(arm.parameters)
+    assert same(dyn.inverse_dynamics(again), dyn.inverse_dynamics(arm))
+    locked = arm.lock("lower", 0.4)
+    assert dict(locked.parameters) == dict(arm.parameters)
+    at = state(locked)
+    assert near(
+        values(dyn.inverse_dynamics(locked), at), values(dyn.inverse_dynamics(arm.bind().lock("lower", 0.4)), at)
+    )
+    with raises(
+        MechanismError, match=r"^the parameter 'length' is 0\.8 in the mechanism and 2\.0 in what it takes on$"
+    ):
+        arm.attach(
+            dyn.Subtree((Body("c", Joint("fixed", position=("length", 0, 0))),), "load", parameters={"length": 2.0})
+        )
+
+
+def test_what_takes_numbers_takes_the_values() -> None:
+    arm = pendulums(load=0.3)
+    q, qd, qdd = np.random.default_rng(0).normal(size=(3, 2))
+    at = {f"{name}{i}": float(x) for name, row in (("q", q), ("qd", qd), ("qdd", qdd)) for i, x in enumerate(row)}
+    tau = values(dyn.inverse_dynamics(arm), at | dict(arm.parameters))
+    assert dyn.RecursiveInverseDynamics(arm)(q, qd, qdd) == approx(tau)
+    assert dyn.to_mjcf(arm) == dyn.to_mjcf(arm.bind())
+    assert dyn.inertial_parameters(arm) == approx(dyn.inertial_parameters(arm.bind()))
+    assert arm.joint_positions(q) == approx(arm.bind().joint_positions(q))
+    caught, numbers = (
+        dyn.attach_with_impact(model.detach("load"), q, qd, load, velocity=(1.0, 0.0, 0.0))
+        for model, load in ((arm, replace(arm.bodies[2], mass=0.3)), (arm.bind(), arm.bind().bodies[2]))
+    )
+    assert caught.qd == approx(numbers.qd)
+    assert caught.energy == approx(numbers.energy)
+    assert dyn.release(arm, q, qd, "load").body.velocity == approx(dyn.release(arm.bind(), q, qd, "load").body.velocity)
+
+
+def test_a_page_shows_them() -> None:
+    arm = pendulums()
+    found, numbers = (
+        inspection(dyn.scenes.Scene("arm", "", model, (0.1, 0.2), (0.0, 0.0), 0.1)) for model in (arm, arm.bind())
+    )
+    assert found.skeleton is not None
+    assert numbers.skeleton is not None
+    assert found.skeleton.points == approx(numbers.skeleton.points)
+    assert found.shares["lower"] == approx(numbers.shares["lower"])
+    assert "load" in found.versions[0].at
+
+
+def test_they_are_read_by_their_names() -> None:
+    graph = dyn.forward_dynamics(pendulums())
+    assert "length" in str(cg.why(graph, "qdd1", "length"))
+    assert "FUNCTION_IN_length" in cg.to_c(graph).header
+    assert any("lower" in node.tags for node in graph.nodes if node.op.name == "mul" and set(node.args) & LENGTH)
+    assert "load" in repr(pendulums())
+
+
+ROD: dict[str, Any] = {"joint": Joint("revolute"), "inertia": (1.0, 1.0, 1.0)}
+BAD = [
+    param({"mass": "m"}, {}, "body 'rod': mass has the parameter 'm', which needs a value in `parameters`", id="none"),
+    param({"mass": cg.variable("q0")}, {}, "body 'rod': mass has the parameter 'q0', which needs a value", id="state"),
+    param(
+        {"mass": "m"},
+        {"m": -1.0},
+        "body 'rod': mass must be finite and at least 0, got -1.0 kg, where m = -1.0",
+        id="mass",
+    ),
+    param(
+        {"mass": 1.0 - cg.variable("m")},
+        {"m": 3.0},
+        "body 'rod': mass must be finite and at least 0, got -2.0 kg, where m = 3.0",
+        id="formula",
+    ),
+    param(
+        {"inertia": ("a", "b", 2.0)},
+        {"a": -1.0, "b": 2.0},
+        "body 'rod': inertia must not be negative, its principal moments are [-1.0, 2.0, 2.0], where a = -1.0, b = 2.0",
+        id="inertia",
+    ),
+    param(
+        {"center": (0.0, 1.0 / cg.variable("a"), 0.0)},
+        {"a": 0.0},
+        "body 'rod': center must be (3,) finite numbers, got [0.0, inf, 0.0], where a = 0.0",
+        id="infinite",
+    ),
+    param(
+        {"joint": Joint("revolute", damping="c")},
+        {"c": -1.0},
+        "body 'rod': damping must be finite and at least 0, got -1.0, where c = -1.0",
+        id="damping",
+    ),
+    param(
+        {"joint": Joint("ball", stiffness="k")}, {"k": 1.0}, "body 'rod': a spring needs a joint with one", id="ball"
+    ),
+    param({"center": ("a", 0.0)}, {"a": 1.0}, "body 'rod': center must be (3,) finite numbers, got", id="shape"),
+    param({"mass": "a b"}, {}, "the name of a parameter of body 'rod': mass must be without white space", id="name"),
+    param({"mass": "m"}, {"m": 1.0, "n": 1.0}, "the mechanism has no body, joint or force that uses", id="unused"),
+    param({"mass": "m", "inertia": (0, 0, 0)}, {"m": 0.0}, "body 'rod' has no mass, carries no mass", id="massless"),
+]
+
+
+@mark.parametrize(("fields", "parameters", "message"), BAD)
+def test_a_parameter_that_cannot_be_is_refused(fields: Any, parameters: dict[str, float], message: str) -> None:
+    with raises(ValueError, match=f"^{re.escape(message)}"):
+        Mechanism([Body("rod", **(ROD | fields))], parameters=parameters)
+
+
+def test_values_are_checked_wherever_they_are_bound() -> None:
+    arm = pendulums()
+    message = r"^body 'upper': mass must be finite and at least 0, got -1\.0 kg, where mass = -1\.0$"
+    q, bad = np.zeros(2), {"mass": -1.0}
+    for bind in (
+        lambda: arm.bind(bad),
+        lambda: dyn.simulate(arm, q, q, 0.1, parameters=bad),
+        lambda: dyn.simulate_many(arm, q, q, 0.1, parameters={"mass": [1.0, -1.0]}),
+        lambda: dyn.linearize(arm, q, q, parameters=bad),
+        lambda: dyn.prune(arm, values=bad),
+        lambda: replace(arm, parameters={**arm.parameters, **bad}),
+    ):
+        with raises(ValueError, match=message):
+            bind()
+
+
+def test_chains_and_trees_take_them() -> None:
+    rod = {"joint": Joint("revolute", (0.0, 1.0, 0.0)), "mass": "m", "center": (0.0, 0.0, -0.5)}
+    chain = dyn.serial_arm([rod, rod], (0.0, 0.0, "g"), parameters={"m": 2.0, "g": -9.81})
+    assert dict(chain.parameters) == {"m": 2.0, "g": -9.81}
+    assert same(
+        dyn.bias(chain), dyn.bias(dyn.tree([-1, 0], [rod, rod], gravity=chain.gravity, parameters=chain.parameters))
+    )
+
+
+def test_a_planar_arm_takes_them() -> None:
+    numbers = dyn.planar_arm([1.5, 0.8], [1.2, 0.5], [0.1, 0.2])
+    given = {"m": 1.5, "l": 0.5, "c": 0.1, "g": 9.81}
+    arm = dyn.planar_arm(["m", 0.8], [1.2, cg.variable("l")], ["c", 0.2], gravity="g", parameters=given)
+    assert same(dyn.forward_dynamics(arm.bind()), dyn.forward_dynamics(numbers))
+    at = state(arm)
+    assert near(values(dyn.forward_dynamics(arm), at), values(dyn.forward_dynamics(numbers), at))
+    with raises(ValueError, match=r"^link 1: mass must be positive and finite, got -1\.0 kg$"):
+        dyn.planar_arm(["m"], [1.0], parameters={"m": -1.0})
+    with raises(ValueError, match="'link 1': mass has the parameter 'm', which needs a value"):
+        dyn.planar_arm(["m"], [1.0])
+
+
+def test_orientations_are_numbers() -> None:
+    with raises(MechanismError, match="orientation must be"):
+        Mechanism(
+            [Body("a", Joint("revolute", orientation=from_quaternion([1, 0, 0, 0]).astype(object) * cg.variable("a")))]
+        )
+
+
+def test_damping_of_a_system_may_be_a_node() -> None:
+    def make(damping: Any, **more: Any) -> dyn.System:
+        return dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - q[0] ** 2, ["x"], damping=damping, **more)
+
+    known, named = make(0.3), make(cg.variable("c"), parameters={"c": 0.3})
+    runs = [dyn.simulate(model, [1.0], [0.0], 1.0, **PLAIN).q for model in (named, known)]
+    assert runs[0] == approx(runs[1])
+    with raises(ValueError, match="damping uses 'q0', which is no parameter"):
+        make(cg.variable("q0"))
