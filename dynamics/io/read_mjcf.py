@@ -166,6 +166,7 @@ def _not_modelled(mj: Any) -> list[str]:
             f"tendons with a spring, damper or mass ({listed(tendons)})": pulling,
             f"equality constraints ({equalities})": equalities,
             "springs or dampers that are not linear": _any(mj, *_NOT_LINEAR),
+            f"joints with several dampings or armatures ({listed(_joint_names(mj, _uneven(mj)))})": _uneven(mj),
             "actuators with armature or damping": _any(mj, *_OF_AN_ACTUATOR),
             "a fluid (density or viscosity)": mj.opt.density or mj.opt.viscosity,
             "gravity compensation": _any(mj, "body_gravcomp") and not _disabled(mj, "GRAVITY"),
@@ -215,6 +216,13 @@ def _where(mj: Any, field: str) -> set[int]:
     """Rows of a model's field that are not all zero; none for a field that this version of MuJoCo has not."""
     values = np.asarray(getattr(mj, field, []))
     return {int(i) for i in np.flatnonzero(values.reshape(len(values), -1).any(axis=1))} if values.size else set()
+
+
+def _uneven(mj: Any) -> list[int]:
+    """Joints of which one degree of freedom has another damping or armature than the first."""
+    first = mj.jnt_dofadr[mj.dof_jntid]
+    dofs = (mj.dof_damping != mj.dof_damping[first]) | (mj.dof_armature != mj.dof_armature[first])
+    return sorted({int(j) for j in mj.dof_jntid[dofs]})
 
 
 def _any(mj: Any, *fields: str) -> bool:

@@ -45,8 +45,9 @@ def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
     ------
     MechanismError
         For a model without bodies; for what MuJoCo does not take: moments that no rigid body has, a body that moves of
-        less than 1e-15 kg or kg m^2, and zeros where 1e-15 is more than 1e-9 of what moves with them; and for forces
-        on bodies: in MuJoCo they are state, `xfrc_applied`, and not the model's.
+        less than 1e-15 kg or kg m^2, zeros where 1e-15 is more than 1e-9 of what moves with them, and free joints other
+        than on the world, in its axes and at its origin; and for forces on bodies: in MuJoCo they are state,
+        `xfrc_applied`, and not the model's.
 
     Examples
     --------

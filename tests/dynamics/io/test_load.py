@@ -245,6 +245,16 @@ def test_what_is_not_modelled_is_left_out_on_request(text: str, what: str) -> No
     assert len(mechanism.moving) == 1
 
 
+def test_a_joint_has_one_damping_and_one_armature() -> None:
+    """A program can give each degree of freedom of MuJoCo's model another."""
+    model = compiled(mjcf(FREE))
+    model.dof_damping[4] = 0.1
+    what = "joints with several dampings or armatures (root)"
+    with raises(MechanismError, match=re.escape(what)):
+        dyn.load_mjcf(model)
+    assert dyn.load_mjcf(model, ignore=True).left_out == (what,)
+
+
 @mark.parametrize("name", ["root", ""])
 def test_free_and_ball_joints_move_as_mujoco_s(name: str) -> None:
     """At the place that the file gives the free body, and anywhere else: its coordinates are its place in the world."""
