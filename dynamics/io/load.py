@@ -30,7 +30,7 @@ def load_mjcf(source: Any, *, ignore: bool = False) -> Mechanism:
     source : str, path or MjModel
         A path, the XML text (it starts with "<"), or MuJoCo's own model.
     ignore : bool
-        Leave out what a mechanism cannot have: springs of ball joints, tendons, equality constraints, fluid, ...
+        Leave out what a mechanism cannot have: springs of free joints, tendons, equality constraints, fluid, ...
         Contacts, joint limits, friction loss and actuators, which act on a mechanism and do not belong to it, are
         always left out; of an actuator that acts with no input, such as a servo, the force is said.
 

@@ -120,8 +120,9 @@ def _body_lines(body: Body, mass: float, moments: str) -> list[str]:
         _require_joint(body)
         spring = f'damping="{joint.damping!r}" armature="{joint.armature!r}"'
         if isinstance(joint.type, AxialJoint):
-            spring = f'stiffness="{joint.stiffness!r}" springref="{joint.spring_reference!r}" {spring}'
-            spring = f'axis="{numbers(joint.axis)}" {spring}'
+            spring = f'springref="{joint.spring_reference!r}" axis="{numbers(joint.axis)}" {spring}'
+        if joint.type.sprung:
+            spring = f'stiffness="{joint.stiffness!r}" {spring}'
         lines.append(f'  <joint name={quoteattr(body.coordinate)} type="{joint.type.mjcf}" {spring}/>')
     lines.append(f'  <inertial pos="{numbers(body.center)}" mass="{mass!r}" {moments}/>')
     return lines

@@ -57,8 +57,9 @@ class Joint:
     damping : float
         Viscous coefficient, at least 0 [N m s or N s/m].
     stiffness, spring_reference : float
-        Spring constant, at least 0 [N m/rad or N/m], and the coordinate where it pulls nowhere [rad or m]. Only of
-        joints with one coordinate.
+        Spring constant, at least 0 [N m/rad or N/m], and the coordinate where it pulls nowhere [rad or m]. A ball's
+        spring turns the body back to the joint by the shortest way, k times the angle, and has no reference; free
+        joints have no springs.
     armature : float
         Inertia of the coordinate itself, such as a rotor's, at least 0 [kg m^2 or kg].
     name : str
@@ -197,8 +198,8 @@ def _checked_joint(where: str, joint: Joint) -> Joint:
     if np.abs(orientation.T @ orientation - np.eye(3)).max() > _ROUNDING or np.linalg.det(orientation) < 0:
         raise MechanismError(f"{where}: orientation must be a rotation matrix")
     stiffness = _number(f"{where}: stiffness", joint.stiffness)
-    if stiffness and len(joint.type.coordinates) > 1:
-        raise MechanismError(f"{where}: a spring needs a joint with one coordinate, got stiffness {stiffness!r}")
+    if stiffness and not joint.type.sprung:
+        raise MechanismError(f"{where}: a joint of the kind {joint.kind!r} has no spring, got stiffness {stiffness!r}")
     armature = _number(f"{where}: armature", joint.armature)
     if armature and not joint.type.geared:
         raise MechanismError(f"{where}: a joint of the kind {joint.kind!r} has no armature, got {armature!r}")

@@ -32,7 +32,8 @@ class PinocchioPeer(Peer):
         self.stiffness = np.array(per_velocity(moving, [body.joint.stiffness for body in moving]))
         self.spring_reference = np.array(per_velocity(moving, [body.joint.spring_reference for body in moving]))
         self.damping = np.array(case.system.damping)
-        # Where the coordinate of a velocity is; of joints with several, which have no springs, the first.
+        self.balls = [place for body, place in zip(moving, places(moving), strict=True) if body.joint.kind == "ball"]
+        # Where the coordinate of a velocity is; of joints with several, the first.
         self.coordinate = np.array(per_velocity(moving, [place.q.start for place in places(moving)]))
 
     def _passive(self, q: Array, u: Array) -> Array:
@@ -40,7 +41,10 @@ class PinocchioPeer(Peer):
         damping, stiffness, rest = (
             each.reshape(-1, *[1] * (u.ndim - 1)) for each in (self.damping, self.stiffness, self.spring_reference)
         )
-        force: Array = damping * u + stiffness * (q[self.coordinate] - rest)
+        stretch = q[self.coordinate] - rest
+        for place in self.balls:
+            stretch[place.u] = _rotation_vector(q[place.q])
+        force: Array = damping * u + stiffness * stretch
         return force
 
     def _arguments(self, x: Array, task: str) -> tuple[Array, Array, Array]:
@@ -123,3 +127,11 @@ class PinocchioPeer(Peer):
         x = self.case.point("rk4")
         x = np.concatenate([x[at], x[n + at]])
         return Contender(lambda: rk4_step(rate, x), lambda y: y[back])
+
+
+def _rotation_vector(e: Array) -> Array:
+    """Axis times angle [rad], at most pi, of quaternions (w, x, y, z), (4,) or (4, k)."""
+    length = np.linalg.norm(e[1:], axis=0)
+    angle = 2.0 * np.arctan2(length, np.abs(e[0]))
+    result: Array = e[1:] * (np.copysign(angle, e[0]) / np.where(length, length, 1.0))
+    return result

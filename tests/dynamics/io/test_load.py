@@ -226,7 +226,11 @@ BALL = f'<body name="b"><joint name="ball" type="ball" stiffness="2"/>{INERTIAL}
 FREE = f'<body name="f" pos="0 0 2"><freejoint name="root"/>{INERTIAL}{HINGE}</body>'
 TENDON = '<tendon><fixed name="string" stiffness="3"><joint joint="j" coef="1"/></fixed></tendon>'
 NOT_MODELLED = [
-    param(mjcf(BALL), "springs of free or ball joints (ball)", id="ball"),
+    param(
+        mjcf(BALL.replace('type="ball"', 'type="free"')),
+        "springs of free joints, or of turned ball joints (ball)",
+        id="spring",
+    ),
     param(
         mjcf(HINGE).replace("</mujoco>", TENDON + "</mujoco>"),
         "tendons with a spring, damper or mass (string)",
@@ -270,7 +274,7 @@ def test_a_joint_has_one_damping_and_one_armature() -> None:
 @mark.parametrize("name", ["root", ""])
 def test_free_and_ball_joints_move_as_mujoco_s(name: str) -> None:
     """At the place that the file gives the free body, and anywhere else: its coordinates are its place in the world."""
-    text = mjcf(FREE.replace("root", name).replace(HINGE, HINGE + BALL.replace(' stiffness="2"', "")))
+    text = mjcf(FREE.replace("root", name).replace(HINGE, HINGE + BALL))
     mechanism = dyn.load_mjcf(text)
     called = name or "f"
     assert mechanism.coordinates[:4] == (f"{called}.x", f"{called}.y", f"{called}.z", f"{called}.qw")

@@ -52,7 +52,7 @@ def random_tree(seed: int, geared: bool) -> Mechanism:
             parent, place, turn = WORLD if not i or bodies[-1].mass else parent, np.zeros(3), np.eye(3)
         joint = Joint(kind, rng.normal(size=3), place, turn, damping=rng.uniform())
         if geared and kind != "fixed":
-            armature, stiffness, reference = rng.uniform(size=3) * (joint.type.geared, not whole, not whole)
+            armature, stiffness, reference = rng.uniform(size=3) * (joint.type.geared, joint.type.sprung, not whole)
             joint = replace(joint, armature=armature, stiffness=stiffness, spring_reference=reference)
         moments = [
             random_inertia(rng),

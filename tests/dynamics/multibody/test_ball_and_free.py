@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from pytest import importorskip, mark, param, raises
+from pytest import approx, importorskip, mark, param, raises
 
 import dynamics as dyn
 from cgraph import Graph
 from dynamics.multibody.joint_coordinates import per_velocity
-from dynamics.multibody.joints import AxialJoint
 from dynamics.multibody.spatial import from_quaternion
 from dynamics.peers import PEERS
 from dynamics.peers.case import Case
@@ -41,9 +41,9 @@ def random_tree(seed: int, base: str = "free", most: int = 5) -> dyn.Mechanism:
             damping=float(rng.uniform(0.0, 0.3)),
             armature=0.0 if "axes" in kind else float(rng.uniform(0.0, 0.1)),
         )
-        if isinstance(joint.type, AxialJoint):
+        if joint.type.sprung:
             stiffness, reference = rng.uniform(0.0, 0.5, 2).tolist()
-            joint = replace(joint, stiffness=stiffness, spring_reference=reference)
+            joint = replace(joint, stiffness=stiffness, spring_reference=reference * (kind != "ball"))
         inertia = 0.1 * sum([(p @ p) * np.eye(3) - np.outer(p, p) for p in points])
         parent = f"b{rng.integers(max(0, i - 2), i)}" if i else "world"
         bodies.append(dyn.Body(f"b{i}", joint, parent, float(rng.uniform(0.5, 2.0)), 0.3 * rng.normal(size=3), inertia))
@@ -119,7 +119,12 @@ def test_pinocchio_s_derivatives_are_ours(count: int, record_property: Callable[
     pinocchio = importorskip("pinocchio")
     worst = 0.0
     for seed in range(count):
-        mechanism = random_tree(seed, ["free (body axes)", "ball", "revolute"][seed % 3], most=3)
+        tree = random_tree(seed, ["free (body axes)", "ball", "revolute"][seed % 3], most=3)
+        joints = [
+            replace(body.joint, stiffness=body.joint.stiffness * (body.joint.kind != "ball")) for body in tree.bodies
+        ]
+        bodies = [replace(body, joint=joint) for body, joint in zip(tree.bodies, joints, strict=True)]
+        mechanism = replace(tree, bodies=bodies)  # the slope of a ball's spring is no diagonal
         n, nq, theirs = mechanism.system.n, mechanism.system.nq, PinocchioModel(mechanism)
         x = np.array(list(state(mechanism.system, seed, tau=1).values()))
         q, u, tau = x[:nq], x[nq : nq + n], x[nq + n :]
@@ -166,6 +171,25 @@ def test_bodies_state_the_bias_that_the_lagrangian_has(base: str) -> None:
     undamped = values(dyn.inverse_dynamics(derived, "chain_rule_literal"), at)
     damping = np.array(system.damping) * [at[f"qd{i}"] for i in range(system.n)]
     assert near(values(dyn.inverse_dynamics(mechanism), at), undamped + damping)
+
+
+@mark.parametrize("angle", [0.0, 1e-300, 1e-150, 1e-8, 0.3, 2.0, 3.0, math.pi - 1e-9, math.pi + 1e-9, 6.0])
+def test_a_ball_s_spring_pulls_back_by_the_shortest_way(angle: float) -> None:
+    """k times the rotation vector, with slopes where nothing is stretched, too; at any length of the quaternion."""
+    k, axis = 3.0, np.array([2.0, -1.0, 2.0]) / 3.0
+    ball = dyn.Mechanism([dyn.Body("b", dyn.Joint("ball", stiffness=k), inertia=(1.0, 2.0, 3.0))], gravity=(0, 0, 0))
+    e = 7.0 * np.array([math.cos(angle / 2), *(math.sin(angle / 2) * axis)])
+    shortest = angle if angle <= math.pi else angle - 2.0 * math.pi
+    at = {f"q{i}": float(x) for i, x in enumerate(e)} | dict.fromkeys(("qd0", "qd1", "qd2"), 0.0)
+    pull = values(dyn.bias(ball), at)
+    assert pull == approx(k * shortest * axis, rel=2e-15, abs=0.0)
+    energy = dyn.energy(ball).evaluate(at)
+    assert sum(energy.values()) == approx(0.5 * k * shortest**2, rel=4e-15, abs=0.0)
+    A, _ = dyn.linearize(ball, e, np.zeros(3))
+    c = shortest / 2.0 / math.tan(shortest / 2.0) if shortest else 1.0
+    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    slopes = c * np.eye(3) + (1.0 - c) * np.outer(axis, axis) + 0.5 * shortest * cross  # of the rotation vector
+    assert A[3:, :3] == approx(-k * slopes / np.array([[1.0], [2.0], [3.0]]), rel=0, abs=1e-14)
 
 
 def test_the_length_of_a_quaternion_has_no_part_in_anything() -> None:
@@ -228,8 +252,8 @@ def test_three_hinges_are_a_ball_away_from_their_lock() -> None:
 
 
 def test_what_joints_of_several_freedoms_cannot_have_is_said() -> None:
-    with raises(dyn.MechanismError, match="a spring needs a joint with one coordinate"):
-        _ = dyn.Mechanism([dyn.Body("b", dyn.Joint("ball", stiffness=1.0), inertia=(1.0, 1.0, 1.0))]).coordinates
+    with raises(dyn.MechanismError, match=r"a joint of the kind 'free' has no spring, got stiffness 1.0"):
+        _ = dyn.Mechanism([dyn.Body("b", dyn.Joint("free", stiffness=1.0), inertia=(1.0, 1.0, 1.0))]).coordinates
     turning = dyn.Mechanism([dyn.Body("b", dyn.Joint("ball"), mass=1.0, inertia=(1.0, 1.0, 1.0)),
                              dyn.Body("c", dyn.Joint("revolute"), "b", inertia=(1.0, 1.0, 1.0))])  # fmt: skip
     assert turning.coordinates == ("b.qw", "b.qx", "b.qy", "b.qz", "c")
