@@ -90,7 +90,7 @@ def errors(mechanism: dyn.Mechanism, seed: int) -> dict[str, float]:
     bias = np.abs(weight) + np.abs(ours["bias"] - weight)
     tau = M @ np.abs(rows["qdd"]) + bias + braking
     qdd = np.abs(np.linalg.inv(ours["M"])) @ (np.abs(rows["tau"]) + bias + braking)
-    scales = {"tau": tau, "qdd": qdd, "M": M, "bias": bias, "recursive": tau}
+    scales = {"tau": tau, "qdd": qdd, "M": M, "bias": tau, "recursive": tau}
     result = {}
     for peer in INSTALLED:
         if peer == "mujoco" and any("axes" in body.joint.kind for body in mechanism.bodies):
