@@ -58,8 +58,7 @@ class PinocchioModel:
             frame = module.SE3(np.array(body.joint.orientation), np.array(body.joint.position))
             joint = self.model.addJoint(ids[body.parent], _joint(module, body), frame, body.coordinate)
             ids[body.name] = joint
-            inertia = module.Inertia(body.mass, np.array(body.center), np.array(body.inertia))
-            self.model.appendBodyToJoint(joint, inertia, module.SE3.Identity())
+            self.model.appendBodyToJoint(joint, _inertia(module, body), module.SE3.Identity())
             at, u = self.model.joints[joint].idx_q, self.model.joints[joint].idx_v
             end, last = u + len(body.joint.type.velocities), at + len(body.joint.type.coordinates)
             self.model.armature[u:end] = body.joint.armature
@@ -140,6 +139,14 @@ def _joint(module: Any, body: Body) -> Any:
         if np.array_equal(axis, unit):
             return getattr(module, _ALIGNED[kind] + name)()
     return getattr(module, _JOINTS[kind])(axis)
+
+
+def _inertia(module: Any, body: Body) -> Any:
+    """Pinocchio's inertia. Raises UnavailableError for one that it does not take, as with a moment of -1e-20."""
+    try:
+        return module.Inertia(body.mass, np.array(body.center), np.array(body.inertia))
+    except (RuntimeError, ValueError) as error:
+        raise UnavailableError(f"does not take body {body.name!r}: {error}") from None
 
 
 def _axes(turn: Array) -> Array:
