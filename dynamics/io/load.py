@@ -5,11 +5,16 @@ from __future__ import annotations
 from typing import Any
 from xml.etree import ElementTree
 
-from ..multibody.mechanism import Mechanism
+import numpy as np
+
+from cgraph.extend import require_flag
+
+from ..multibody.joint_coordinates import neutral
+from ..multibody.mechanism import Mechanism, MechanismError
 from .left_out import warned
 from .mujoco_twin import mujoco
 from .read_mjcf import compiled_mjcf, read_mjcf
-from .read_urdf import read_urdf
+from .read_urdf import add_floating_base, origin_of, read_urdf
 from .source import called, root_of, urdf_root
 
 
@@ -25,7 +30,7 @@ def load_mjcf(source: Any, *, ignore: bool = False) -> Mechanism:
     source : str, path or MjModel
         A path, the XML text (it starts with "<"), or MuJoCo's own model.
     ignore : bool
-        Leave out what a mechanism cannot have: springs of ball joints, tendons, equality constraints, fluid, ...
+        Leave out what a mechanism cannot have: springs of free joints, tendons, equality constraints, fluid, ...
         Contacts, joint limits, friction loss and actuators, which act on a mechanism and do not belong to it, are
         always left out; of an actuator that acts with no input, such as a servo, the force is said.
 
@@ -53,8 +58,8 @@ def load_mjcf(source: Any, *, ignore: bool = False) -> Mechanism:
     return warned(read_mjcf(mj, ignore), "the model" if given else name)
 
 
-def load_urdf(source: Any, *, ignore: bool = False) -> Mechanism:
-    """The mechanism of a URDF file, with the numbers of the file; it stands on its root link.
+def load_urdf(source: Any, *, ignore: bool = False, floating: bool = False) -> Mechanism:
+    """The mechanism of a URDF file, with the numbers of the file; its root link stands still, or floats.
 
     Every link is a body of its name, those without mass and those on fixed joints too, so that `position("tool0")` is
     where that frame is. Coordinates have the names of the joints, in the order of the file, those that carry
@@ -68,6 +73,9 @@ def load_urdf(source: Any, *, ignore: bool = False) -> Mechanism:
     ignore : bool
         Leave out what a mechanism cannot have, the coupling of joints that mimic others. Contacts, joint limits,
         friction loss and extensions of URDF, such as transmissions, are always left out.
+    floating : bool
+        Whether the root link moves freely, by a joint that is called as the link is. Joints that are floating in the
+        file are free in any case.
 
     Returns
     -------
@@ -77,8 +85,8 @@ def load_urdf(source: Any, *, ignore: bool = False) -> Mechanism:
     Raises
     ------
     MechanismError
-        For a file that is missing or wrong, for joints of other types, for joints that mimic others,
-        unless `ignore`, and as `Mechanism`.
+        For a file that is missing or wrong, for joints of other types, for joints that mimic others, unless `ignore`,
+        for `floating` where the root link is the world, and as `Mechanism`.
 
     Examples
     --------
@@ -87,25 +95,48 @@ def load_urdf(source: Any, *, ignore: bool = False) -> Mechanism:
     >>> dyn.load_urdf(dyn.to_urdf(dyn.Mechanism([rotor]))).coordinates
     ('rotor',)
     """
-    return warned(read_urdf(urdf_root(source), called(source), ignore), called(source))
+    return warned(read_urdf(urdf_root(source), called(source), ignore, floating), called(source))
 
 
-def load_model(source: Any, *, ignore: bool = False) -> Mechanism:
-    """As `load_urdf` for XML whose root element is <robot>, else as `load_mjcf`."""
-    load = load_urdf if root_of(source) == "robot" else load_mjcf
-    return load(source, ignore=ignore)
+def load_at_start(source: Any, *, ignore: bool = False, floating: bool = False) -> tuple[Mechanism, tuple[float, ...]]:
+    """The mechanism of MJCF or URDF, by the root element, and the coordinates (nq,) at which the file has it.
+
+    Of MJCF these are the references of joints and the places of free bodies; of URDF they are neutral. Raises as
+    `load_mjcf` and `load_urdf` do, and for `floating` of MJCF, which says itself what is free.
+    """
+    if root_of(source) == "robot":
+        mechanism = load_urdf(source, ignore=ignore, floating=floating)
+        return mechanism, tuple(neutral(mechanism.moving))
+    if require_flag("floating", floating):
+        raise MechanismError(
+            f"floating goes with URDF, and MJCF, as is {called(source)}, says itself which bodies float"
+        )
+    mj = compiled_mjcf(source, called(source))
+    return warned(read_mjcf(mj, ignore), called(source)), tuple(mj.qpos0.tolist())
 
 
-def compiled(source: Any) -> Any:
-    """MuJoCo's own model, an MjModel, of what `load_model` takes. Raises MechanismError and ImportError."""
+def compiled(source: Any, *, floating: bool = False) -> Any:
+    """MuJoCo's own model, an MjModel, of a model, MJCF or URDF, read as `load_at_start` does.
+
+    Raises MechanismError for what MuJoCo cannot read, and for joints with other coordinates there; and ImportError.
+    """
     if isinstance(source, mujoco().MjModel):
         return source
-    text = _for_mujoco(urdf_root(source)) if root_of(source) == "robot" else source
+    text = _for_mujoco(urdf_root(source), floating) if root_of(source) == "robot" else source
     return compiled_mjcf(text, called(source))
 
 
-def _for_mujoco(robot: ElementTree.Element) -> str:
+def _for_mujoco(robot: ElementTree.Element, floating: bool) -> str:
     """The text of a URDF for MuJoCo: without shapes, and to be read without fusing links, which drops inertia."""
+    if floating:
+        add_floating_base(robot)
+    for joint in robot.findall("joint[@type='floating']"):
+        where = f"joint {joint.get('name')!r}"
+        position, orientation = origin_of(joint, where)
+        if np.any(position) or np.any(orientation != np.eye(3)):
+            raise MechanismError(
+                f"in MuJoCo a free joint has the axes and the origin of the world, and {where} has not"
+            )
     for link in robot.iter("link"):
         for shape in [each for each in link if each.tag in ("visual", "collision")]:
             link.remove(shape)

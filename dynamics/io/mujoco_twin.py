@@ -101,10 +101,11 @@ class MujocoTwin:
         return columns
 
     def bias(self, q: Array, qd: Array) -> Array:
-        """Coriolis, centrifugal and gravity force, (n,)."""
+        """Coriolis, centrifugal and gravity force and that of springs, (n,)."""
         self._set(q, qd)
         self.mujoco.mj_forward(self.model, self.data)
-        return np.array(self.data.qfrc_bias)
+        springs = self.data.qfrc_passive + self.model.dof_damping * qd
+        return np.array(self.data.qfrc_bias - springs)
 
     def trajectory(self, q: Array, qd: Array, steps: int) -> tuple[Array, Array]:
         """q and qd, (steps + 1, n) each, from the start on, by MuJoCo's RK4."""

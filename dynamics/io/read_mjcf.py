@@ -133,7 +133,7 @@ def _joint(mj: Any, j: int, position: Array, orientation: Array) -> Joint:
         position,
         orientation,
         damping=float(mj.dof_damping[dof]) * (not _disabled(mj, "DAMPER")),
-        stiffness=float(mj.jnt_stiffness[j]) * single * (not _disabled(mj, "SPRING")),
+        stiffness=float(mj.jnt_stiffness[j]) * (not _elsewhere(mj, j)) * (not _disabled(mj, "SPRING")),
         spring_reference=float(mj.qpos_spring[mj.jnt_qposadr[j]]) if single else 0.0,
         armature=float(mj.dof_armature[dof]),
     )
@@ -155,17 +155,17 @@ def _disabled(mj: Any, *what: str) -> bool:
 
 def _not_modelled(mj: Any) -> list[str]:
     """What belongs to the mechanism of the model and a mechanism cannot have."""
-    several = [j for j in _where(mj, "jnt_stiffness") if len(TYPES[_kind(mj, j)].coordinates) > 1]
-    sprung = [] if _disabled(mj, "SPRING") else sorted(several)
+    sprung = [] if _disabled(mj, "SPRING") else sorted(j for j in _where(mj, "jnt_stiffness") if _elsewhere(mj, j))
     pulling = sorted(set().union(*(_where(mj, f"tendon_{what}") for what in _OF_A_TENDON)))
     tendons = [mj.tendon(i).name or f"number {i}" for i in pulling]
     equalities = 0 if _disabled(mj, "CONSTRAINT", "EQUALITY") else int(np.sum(mj.eq_active0))
     return present(
         {
-            f"springs of free or ball joints ({listed(_joint_names(mj, sprung))})": sprung,
+            f"springs of free joints, or of turned ball joints ({listed(_joint_names(mj, sprung))})": sprung,
             f"tendons with a spring, damper or mass ({listed(tendons)})": pulling,
             f"equality constraints ({equalities})": equalities,
             "springs or dampers that are not linear": _any(mj, *_NOT_LINEAR),
+            f"joints with several dampings or armatures ({listed(_joint_names(mj, _uneven(mj)))})": _uneven(mj),
             "actuators with armature or damping": _any(mj, *_OF_AN_ACTUATOR),
             "a fluid (density or viscosity)": mj.opt.density or mj.opt.viscosity,
             "gravity compensation": _any(mj, "body_gravcomp") and not _disabled(mj, "GRAVITY"),
@@ -215,6 +215,20 @@ def _where(mj: Any, field: str) -> set[int]:
     """Rows of a model's field that are not all zero; none for a field that this version of MuJoCo has not."""
     values = np.asarray(getattr(mj, field, []))
     return {int(i) for i in np.flatnonzero(values.reshape(len(values), -1).any(axis=1))} if values.size else set()
+
+
+def _elsewhere(mj: Any, j: int) -> bool:
+    """Whether a joint's spring is one that ours cannot have, or pulls where ours does not."""
+    kind, at = TYPES[_kind(mj, j)], mj.jnt_qposadr[j]
+    count = len(kind.coordinates)
+    return not kind.sprung or (count > 1 and mj.qpos_spring[at : at + count].tolist() != [*kind.neutral])
+
+
+def _uneven(mj: Any) -> list[int]:
+    """Joints of which one degree of freedom has another damping or armature than the first."""
+    first = mj.jnt_dofadr[mj.dof_jntid]
+    dofs = (mj.dof_damping != mj.dof_damping[first]) | (mj.dof_armature != mj.dof_armature[first])
+    return sorted({int(j) for j in mj.dof_jntid[dofs]})
 
 
 def _any(mj: Any, *fields: str) -> bool:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from typing import Any
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
+from cgraph.extend import require_flag
+
 from ..multibody import spatial
-from ..multibody.joints import TYPES
+from ..multibody.joints import TYPES, SpatialJoint
 from ..multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
 from ..multibody.spatial import Array
 from .left_out import listed, present, refused_or_left_out
@@ -25,9 +27,11 @@ _KNOWN = {
 }
 
 
-def read_urdf(robot: Element, called: str, ignore: bool) -> Mechanism:
-    """The mechanism of a robot, which stands on its root link. Raises MechanismError with one sentence."""
+def read_urdf(robot: Element, called: str, ignore: bool, floating: bool = False) -> Mechanism:
+    """The mechanism of a robot, whose root link stands still or floats. Raises MechanismError with one sentence."""
     try:
+        if require_flag("floating", floating):
+            add_floating_base(robot)
         links, joints = _by_name(robot, "link"), _by_name(robot, "joint")
         root = _root(links, joints)
         left_out = refused_or_left_out(_mimics(joints), _outside(robot, joints), ignore)
@@ -39,6 +43,20 @@ def read_urdf(robot: Element, called: str, ignore: bool) -> Mechanism:
         return Mechanism(bodies, _gravity(robot), left_out=left_out)
     except MechanismError as error:
         raise MechanismError(f"URDF, {called}: {error}") from None
+
+
+def add_floating_base(robot: Element) -> None:
+    """Hang the root link of a robot on the world by a floating joint, called as the link or as no joint is."""
+    joints = _by_name(robot, "joint")
+    root = name = _root(_by_name(robot, "link"), joints)
+    if root == WORLD:
+        raise MechanismError(f"the root link is {WORLD!r}, which does not float")
+    while name in joints:
+        name += "'"
+    SubElement(robot, "link", name=WORLD)
+    joint = SubElement(robot, "joint", name=name, type="floating")
+    SubElement(joint, "parent", link=WORLD)
+    SubElement(joint, "child", link=root)
 
 
 def _by_name(robot: Element, tag: str) -> dict[str, Element]:
@@ -97,10 +115,11 @@ def _joint(joint: Element, name: str, child: str) -> Joint:
     if word not in kinds:
         given = f"is {word}" if word else "has no type"
         raise MechanismError(f"{where} {given}, and a mechanism has {', '.join(sorted(kinds))}")
-    fields: dict[str, Any] = dict(zip(("position", "orientation"), _origin(joint, where), strict=True))
+    fields: dict[str, Any] = dict(zip(("position", "orientation"), origin_of(joint, where), strict=True))
     if kinds[word] != "fixed":
         axis, dynamics = _one(joint, where, "axis"), _one(joint, where, "dynamics")
-        fields["axis"] = (1.0, 0.0, 0.0) if axis is None else _numbers(axis, where, "xyz", 3)
+        if not isinstance(TYPES.get(kinds[word]), SpatialJoint):
+            fields["axis"] = (1.0, 0.0, 0.0) if axis is None else _numbers(axis, where, "xyz", 3)
         fields["damping"] = 0.0 if dynamics is None else _numbers(dynamics, where, "damping", 1, "0")[0]
     return Joint(kinds[word], name="" if name == child else name, **fields)
 
@@ -114,7 +133,7 @@ def _inertial(link: Element, name: str) -> dict[str, Any]:
     mass, moments = (_one(inertial, where, tag) for tag in ("mass", "inertia"))
     if mass is None or moments is None:
         raise MechanismError(f"{where} has an <inertial> without <{'mass' if mass is None else 'inertia'}>")
-    center, turn = _origin(inertial, where)
+    center, turn = origin_of(inertial, where)
     xx, xy, xz, yy, yz, zz = (
         _numbers(moments, where, name, 1)[0] for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     )
@@ -126,7 +145,7 @@ def _inertial(link: Element, name: str) -> dict[str, Any]:
     }
 
 
-def _origin(element: Element, where: str) -> tuple[Array, Array]:
+def origin_of(element: Element, where: str) -> tuple[Array, Array]:
     """The position [m] and the axes, as columns, in an <origin>; those of the parent where there is none."""
     origin = _one(element, where, "origin")
     if origin is None:

@@ -45,8 +45,9 @@ def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
     ------
     MechanismError
         For a model without bodies; for what MuJoCo does not take: moments that no rigid body has, a body that moves of
-        less than 1e-15 kg or kg m^2, and zeros where 1e-15 is more than 1e-9 of what moves with them; and for forces
-        on bodies: in MuJoCo they are state, `xfrc_applied`, and not the model's.
+        less than 1e-15 kg or kg m^2, zeros where 1e-15 is more than 1e-9 of what moves with them, and free joints other
+        than on the world, in its axes and at its origin; and for forces on bodies: in MuJoCo they are state,
+        `xfrc_applied`, and not the model's.
 
     Examples
     --------
@@ -116,8 +117,9 @@ def _body_lines(body: Body, mass: float, moments: str) -> list[str]:
         _require_joint(body)
         spring = f'damping="{joint.damping!r}" armature="{joint.armature!r}"'
         if isinstance(joint.type, AxialJoint):
-            spring = f'stiffness="{joint.stiffness!r}" springref="{joint.spring_reference!r}" {spring}'
-            spring = f'axis="{numbers(joint.axis)}" {spring}'
+            spring = f'springref="{joint.spring_reference!r}" axis="{numbers(joint.axis)}" {spring}'
+        if joint.type.sprung:
+            spring = f'stiffness="{joint.stiffness!r}" {spring}'
         lines.append(f'  <joint name={quoteattr(body.coordinate)} type="{joint.type.mjcf}" {spring}/>')
     lines.append(f'  <inertial pos="{numbers(body.center)}" mass="{mass!r}" {moments}/>')
     return lines

@@ -8,6 +8,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..multibody.joints import AxialJoint
 from ..multibody.mechanism import WORLD, Body, MechanismError, require_mechanism
 from ..multibody.parameters import vanishes
 from ..multibody.spatial import Array
@@ -36,7 +37,7 @@ def to_urdf(model: Model) -> str:
     Raises
     ------
     MechanismError
-        For a model without bodies, and for what URDF has not: a spring, an armature, a force.
+        For a model without bodies, and for what URDF has not: a spring, an armature, a force, a ball joint.
 
     Examples
     --------
@@ -90,17 +91,22 @@ def _joint_lines(body: Body, name: str) -> list[str]:
     place = f'    <origin xyz="{numbers(joint.position)}" rpy="{numbers(_rpy(joint.orientation))}"/>'
     ends = f"    <parent link={quoteattr(body.parent)}/><child link={quoteattr(body.name)}/>"
     opened = f'  <joint name={quoteattr(name)} type="{joint.type.urdf}">'
+    if not joint.type.urdf:
+        raise MechanismError(f"URDF has no joint of the kind {joint.kind!r}, as is the joint of body {body.name!r}")
     if not joint.type.moves:
         return [opened, ends, place, "  </joint>"]
     for what in ("stiffness", "armature"):
         if getattr(joint, what):
             raise MechanismError(f"URDF has no {what}, body {body.name!r} has {getattr(joint, what)!r}")
+    dynamics = f'<dynamics damping="{joint.damping!r}"/>'
+    if not isinstance(joint.type, AxialJoint):
+        return [opened, ends, place, f"    {dynamics}", "  </joint>"]
     limits = f'lower="{-FAR!r}" upper="{FAR!r}" ' if joint.type.limited else ""
     return [
         opened,
         ends,
         place,
-        f'    <axis xyz="{numbers(joint.axis)}"/><dynamics damping="{joint.damping!r}"/>',
+        f'    <axis xyz="{numbers(joint.axis)}"/>{dynamics}',
         f'    <limit {limits}effort="{FAR!r}" velocity="{FAR!r}"/>',
         "  </joint>",
     ]

@@ -70,8 +70,9 @@ class Joint:
         Viscous coefficient, at least 0 [N m s or N s/m]. This and the next three, of a joint that is several, are one
         number for all its coordinates, or a sequence of one for each.
     stiffness, spring_reference : float
-        Spring constant, at least 0 [N m/rad or N/m], and the coordinate where it pulls nowhere [rad or m]. Only of
-        joints with one coordinate, or made of such.
+        Spring constant, at least 0 [N m/rad or N/m], and the coordinate where it pulls nowhere [rad or m]. A ball's
+        spring turns the body back to the joint by the shortest way, k times the angle, and has no reference; free
+        joints have no springs.
     armature : float
         Inertia of the coordinate itself, such as a rotor's, at least 0 [kg m^2 or kg].
     pitch : float
@@ -286,10 +287,10 @@ def _checked_joint(where: str, joint: Joint) -> Joint:
     orientation = spatial.snapped(checked_rotation(f"{where}: orientation", joint.orientation))
     pitch = _pitch(where, joint)
     given = {name: check(f"{where}: {name}", getattr(joint, name)) for name, check in JOINT_QUANTITIES.items()}
-    if not vanishes(given["stiffness"]) and len(joint.type.coordinates) > 1:
-        raise MechanismError(f"{where}: a spring needs a joint with one coordinate, got stiffness {joint.stiffness!r}")
-    if not vanishes(given["armature"]) and not joint.type.geared:
-        raise MechanismError(f"{where}: a joint of the kind {joint.kind!r} has no armature, got {joint.armature!r}")
+    for name, has in {"stiffness": joint.type.sprung, "armature": joint.type.geared}.items():
+        if not (has or vanishes(given[name])):
+            value = getattr(joint, name)
+            raise MechanismError(f"{where}: a joint of the kind {joint.kind!r} has no {name}, got {value!r}")
     return Joint(joint.kind, axis=axis, orientation=orientation, pitch=pitch, name=joint.name, **given)
 
 

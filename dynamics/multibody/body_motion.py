@@ -153,7 +153,7 @@ def _in_plane_axes(motion: Motion, vector: Triple) -> Triple:
     return spatial.rotate_about_z(motion.plane.cos, -motion.plane.sin, vector) if motion.plane else vector
 
 
-def energy(motion: Motion, link: Link, q: Sequence[Node], u: Sequence[Node]) -> Node:
+def energy(motion: Motion, link: Link, joint: JointType, q: Sequence[Node], u: Sequence[Node]) -> Node:
     """L_i = K_i - P_i with the first moment m c and the inertia J about the joint, without the center's velocity.
 
     K = m v.v / 2 + m c . (v x w) + w . J w / 2,  P = m g h + g u . m c + spring.
@@ -175,15 +175,17 @@ def energy(motion: Motion, link: Link, q: Sequence[Node], u: Sequence[Node]) -> 
     with cg.tag("potential"):
         weight = spatial.scaled(motion.strength, link.moment)
         potential = link.mass * motion.strength * motion.depth + spatial.dot(own.vertical, weight)
-        for stretch in _stretches(link, q):
+        for stretch in _stretches(link, joint, q):
             potential = potential + 0.5 * link.stiffness * (stretch * stretch)
     return kinetic - potential
 
 
-def spring_forces(link: Link, q: Sequence[Node], u: Sequence[Node]) -> list[tuple[Node, Node]]:
-    """The velocity that the joint's spring works on, and its force; of a joint with one coordinate."""
-    return [(velocity, link.stiffness * stretch) for velocity, stretch in zip(u, _stretches(link, q), strict=False)]
+def spring_forces(link: Link, joint: JointType, q: Sequence[Node], u: Sequence[Node]) -> list[tuple[Node, Node]]:
+    """The velocities that the joint's spring works on, and its forces."""
+    return [(velocity, link.stiffness * x) for velocity, x in zip(u, _stretches(link, joint, q), strict=False)]
 
 
-def _stretches(link: Link, q: Sequence[Node]) -> list[Node]:
-    return [q[0] - link.spring_reference] if len(q) == 1 else []  # other joints have no springs, see `checked`
+def _stretches(link: Link, joint: JointType, q: Sequence[Node]) -> Sequence[Node]:
+    """One for each velocity, or none where there is no spring."""
+    absent = not isinstance(link.stiffness, Node) and not link.stiffness
+    return [] if absent else joint.stretches(q, link.spring_reference)

@@ -64,5 +64,5 @@ class SharedParts:
         if key not in self._moved:
             with cg.tag(body.name):
                 motion = propagate_motion(parent, link, body.joint.type, q, u)
-                self._moved[key] = Moved(parent, motion, energy(motion, link, q, u))
+                self._moved[key] = Moved(parent, motion, energy(motion, link, body.joint.type, q, u))
         return self._moved[key]

@@ -125,7 +125,7 @@ def _about_axis(
 
 
 def bias_wrench(
-    acceleration: Acceleration, motion: Motion, link: Link, q: Sequence[Node], u: Sequence[Node]
+    acceleration: Acceleration, motion: Motion, link: Link, joint: JointType, q: Sequence[Node], u: Sequence[Node]
 ) -> list[BiasForce]:
     """Bias wrench, each component paired with the velocity it works on; and the spring's force, with its velocity.
 
@@ -145,7 +145,7 @@ def bias_wrench(
             a = spatial.rotate_about_z(motion.plane.cos, motion.plane.sin, a)
         torque = [a + b for a, b in zip(torque, spatial.cross(link.moment, a), strict=True)]
     with cg.tag(POTENTIAL):
-        springs = spring_forces(link, q, u)
+        springs = spring_forces(link, joint, q, u)
     return [*zip((*motion.velocity, *motion.omega), (*force, *torque), strict=True), *springs]
 
 

@@ -110,7 +110,7 @@ def _kernels(joint: JointType) -> _Kernels:
     with building(build):
         motion = propagate_motion(_motion(parent), link, joint, q, qd)
         after = [*motion.omega, *motion.velocity, *motion.vertical, motion.depth]
-        lagrangian = energy(motion, link, q, qd)
+        lagrangian = energy(motion, link, joint, q, qd)
         q_dot = joint.rate(q, qd)
     along = dict(zip([*parent, *q, *qd], [*rates, *q_dot, *qdd], strict=True))
     dots = tangents(along, after, build)

@@ -122,7 +122,7 @@ def _partial_lagrangians(mechanism: Mechanism, q: list[Node], qd: list[Node], pi
             with cg.tag(body.name):
                 motions[body.name] = propagate_motion(motions[body.parent], known, body.joint.type, *states[i])
                 unknown = _symbolic(known, axes[body.name], pi[10 * i : 10 * i + 10])
-                partials.append(energy(motions[body.name], unknown, *states[i]))
+                partials.append(energy(motions[body.name], unknown, body.joint.type, *states[i]))
     return partials
 
 

@@ -81,7 +81,7 @@ class TreeEquations:
                     acceleration = accelerations[body.name] = newton_euler.propagate_acceleration(
                         accelerations[body.parent], moved.parent, moved.motion, link, body.joint.type, x, u
                     )
-                    forces += newton_euler.bias_wrench(acceleration, moved.motion, link, x, u)
+                    forces += newton_euler.bias_wrench(acceleration, moved.motion, link, body.joint.type, x, u)
         return forces
 
     def _moved(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Moved]:

@@ -175,7 +175,7 @@ def _moments(mechanism: Mechanism) -> Moments:
             with cg.tag(body.name):
                 motion = propagate_motion(motions[body.parent], link, body.joint.type, q, u)
                 motions[body.name] = motion
-                total = total + energy(motion, link, q, u)
+                total = total + energy(motion, link, body.joint.type, q, u)
                 mass = mass + link.mass
     bars = cotangents({total: ONE}, ground, build)
     still = folded(substitute(bars, dict.fromkeys(ground, ZERO)), build)

@@ -2,76 +2,84 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from cgraph.extend import install
-
-from ..io.write_mjcf import moving_alone, to_mjcf
+from ..multibody.joint_coordinates import per_velocity, places
 from .case import BATCH, Array, Case, rk4_step
 from .contender import Contender, Peer, UnavailableError
 from .mujoco import bodies
+from .pinocchio_model import PinocchioModel, pinocchio
 
 
 class PinocchioPeer(Peer):
-    """Pinocchio on the model's MJCF.
+    """Pinocchio on the bodies of the model.
 
     Damping and springs, which its algorithms leave out, are taken off the torque or added to it outside what is timed,
-    except within a step of RK4.
+    except within a step of RK4, and so are states translated from our coordinates to its own.
     """
 
     def __init__(self, case: Case) -> None:
         super().__init__(case)
-        try:
-            import pinocchio
-        except ImportError as error:
-            raise ImportError(f"Pinocchio is not installed: {install('bench')}") from error
-        self.pinocchio = pinocchio
+        self.pinocchio = pinocchio()
         mechanism = bodies(case)
-        if case.nq != case.n:
-            raise UnavailableError("has other coordinates of ball and free joints")
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "model.xml"
-            path.write_text(to_mjcf(moving_alone(mechanism)), encoding="utf-8")
-            self.twin = pinocchio.buildModelFromMJCF(str(path))
-        # Its reader of MJCF leaves gravity at the default.
-        self.twin.gravity.linear = np.asarray(mechanism.gravity, dtype=np.float64)
+        self.of = PinocchioModel(mechanism)
+        self.twin = self.of.model
         self.data = self.twin.createData()
-        self.order = np.array([self.twin.joints[self.twin.getJointId(name)].idx_v for name in mechanism.coordinates])
-        self.at = np.argsort(self.order)
-        joints = [body.joint for body in mechanism.moving]
-        self.stiffness = np.array([joint.stiffness for joint in joints])
-        self.spring_reference = np.array([joint.spring_reference for joint in joints])
+        moving = mechanism.moving
+        self.stiffness = np.array(per_velocity(moving, [body.joint.stiffness for body in moving]))
+        self.spring_reference = np.array(per_velocity(moving, [body.joint.spring_reference for body in moving]))
         self.damping = np.array(case.system.damping)
+        self.balls = [place for body, place in zip(moving, places(moving), strict=True) if body.joint.kind == "ball"]
+        # Where the coordinate of a velocity is; of joints with several, the first.
+        self.coordinate = np.array(per_velocity(moving, [place.q.start for place in places(moving)]))
 
-    def _passive(self, x: Array) -> Array:
-        """The torque of dampers and springs against the motion, in our order; x: (2n or 3n,) or with columns."""
-        n = self.case.n
+    def _passive(self, q: Array, u: Array) -> Array:
+        """The torque of dampers and springs against the motion, in our order; (n,), or with columns."""
         damping, stiffness, rest = (
-            each.reshape(-1, *[1] * (x.ndim - 1)) for each in (self.damping, self.stiffness, self.spring_reference)
+            each.reshape(-1, *[1] * (u.ndim - 1)) for each in (self.damping, self.stiffness, self.spring_reference)
         )
-        force: Array = damping * x[n : 2 * n] + stiffness * (x[:n] - rest)
+        stretch = q[self.coordinate] - rest
+        for place in self.balls:
+            stretch[place.u] = _rotation_vector(q[place.q])
+        force: Array = damping * u + stiffness * stretch
         return force
 
     def _arguments(self, x: Array, task: str) -> tuple[Array, Array, Array]:
-        """q, v and the third argument in Pinocchio's order."""
-        n = self.case.n
-        last = x[2 * n :] - self._passive(x) if task == "forward" else x[2 * n :]
-        return x[self.at], x[n + self.at], last[self.at]
+        """q, v and the third argument as Pinocchio has them."""
+        q, u, last = np.split(x, [self.case.nq, self.case.nq + self.case.n])
+        theirs = self.of.q(q)
+        v = self.of.v(theirs, u)
+        if task == "inverse":
+            return theirs, v, self.of.a(theirs, v, last)
+        return theirs, v, self.of.v(theirs, last - self._passive(q, u)) - self.of.rotor(v)
+
+    def _result(self, x: Array, q: Array, v: Array, y: Array, task: str) -> Array:
+        """Torques of the motion or accelerations as we have them.  q, v: Pinocchio's."""
+        if task == "forward":
+            return self.of.our_a(q, v, y)
+        nq = self.case.nq
+        return self.of.our_v(q, y + self.of.rotor(v)) + self._passive(x[:nq], x[nq : nq + self.case.n])
+
+    def _asked(self, x: Array, task: str) -> Array:
+        """The answer at one state."""
+        algorithm = self.pinocchio.aba if task == "forward" else self.pinocchio.rnea
+        q, v, last = self._arguments(x, task)
+        return self._result(x, q, v, algorithm(self.twin, self.data, q, v, last), task)
 
     def quantities(self, q: Array, qd: Array, qdd: Array, tau: Array) -> dict[str, Array]:
         """tau of a motion, qdd under torques tau, M(q) and the bias at one state, in our order."""
-        pinocchio, twin, data, order = self.pinocchio, self.twin, self.data, self.order
-        x = np.concatenate([q, qd, tau])
-        upper = np.triu(pinocchio.crba(twin, data, q[self.at]))
+        theirs = self.of.q(q)
+        upper = np.triu(self.pinocchio.crba(self.twin, self.data, theirs))
+        rows = self.of.our_v(theirs, upper + np.triu(upper, 1).T)
+        still = self._asked(np.concatenate([q, qd, np.zeros_like(qd)]), "inverse")
         return {
-            "tau": pinocchio.rnea(twin, data, *[each[self.at] for each in (q, qd, qdd)])[order] + self._passive(x),
-            "qdd": pinocchio.aba(twin, data, *self._arguments(x, "forward"))[order],
-            "M": (upper + np.triu(upper, 1).T)[np.ix_(order, order)],
-            "bias": pinocchio.nonLinearEffects(twin, data, q[self.at], qd[self.at])[order],
+            "tau": self._asked(np.concatenate([q, qd, qdd]), "inverse"),
+            "qdd": self._asked(np.concatenate([q, qd, tau]), "forward"),
+            "M": self.of.our_v(theirs, rows.T),
+            "bias": still - self.damping * qd,
         }
 
     def prepare(self, task: str, mode: str) -> Contender:
@@ -79,15 +87,18 @@ class PinocchioPeer(Peer):
         if task == "rk4":
             return self._step()
         x = self.case.point(task) if mode == "call" else self.case.points(task)
-        added = 0.0 if task == "forward" else self._passive(x)
         arguments = self._arguments(x, task)
+
+        def result(y: Any) -> Array:
+            return self._result(x, *arguments[:2], y, task)
+
         if mode == "call":
             algorithm = self.pinocchio.aba if task == "forward" else self.pinocchio.rnea
             twin, data = self.twin, self.data
-            return Contender(lambda: algorithm(twin, data, *arguments), lambda y: y[self.order] + added)
-        return self._many("abaInParallel" if task == "forward" else "rneaInParallel", arguments, added)
+            return Contender(lambda: algorithm(twin, data, *arguments), result)
+        return self._many("abaInParallel" if task == "forward" else "rneaInParallel", arguments, result)
 
-    def _many(self, name: str, arguments: tuple[Array, ...], added: Any) -> Contender:
+    def _many(self, name: str, arguments: tuple[Array, ...], result: Callable[[Any], Array]) -> Contender:
         """Its loop over the columns of a batch, on one thread. Builds without OpenMP lack it."""
         algorithm = getattr(self.pinocchio, name, None)
         if algorithm is None:
@@ -96,15 +107,16 @@ class PinocchioPeer(Peer):
         columns = [np.asfortranarray(each) for each in arguments]
         y = np.zeros((self.case.n, BATCH), order="F")
         return Contender(
-            lambda: algorithm(1, pool, *columns, y),
-            lambda result: (y if result is None else result)[self.order] + added,
-            BATCH,
+            lambda: algorithm(1, pool, *columns, y), lambda found: result(y if found is None else found), BATCH
         )
 
     def _step(self) -> Contender:
         """RK4 in Python over aba."""
+        if self.case.nq != self.case.n:
+            raise UnavailableError("has no rates of quaternions")
         n, twin, data, aba = self.case.n, self.twin, self.data, self.pinocchio.aba
-        damping, stiffness, rest = self.damping[self.at], self.stiffness[self.at], self.spring_reference[self.at]
+        at, back = np.argsort(self.of.order), np.concatenate([self.of.order, n + self.of.order])
+        damping, stiffness, rest = self.damping[at], self.stiffness[at], self.spring_reference[at]
         bare = not stiffness.any()
 
         def rate(x: Array) -> Array:
@@ -113,6 +125,13 @@ class PinocchioPeer(Peer):
             return np.concatenate([v, aba(twin, data, q, v, torque)])
 
         x = self.case.point("rk4")
-        x = np.concatenate([x[self.at], x[n + self.at]])
-        back = np.concatenate([self.order, n + self.order])
+        x = np.concatenate([x[at], x[n + at]])
         return Contender(lambda: rk4_step(rate, x), lambda y: y[back])
+
+
+def _rotation_vector(e: Array) -> Array:
+    """Axis times angle [rad], at most pi, of quaternions (w, x, y, z), (4,) or (4, k)."""
+    length = np.linalg.norm(e[1:], axis=0)
+    angle = 2.0 * np.arctan2(length, np.abs(e[0]))
+    result: Array = e[1:] * (np.copysign(angle, e[0]) / np.where(length, length, 1.0))
+    return result

@@ -18,7 +18,7 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.extend import real_array, real_number
 
-from ..io.load import load_model
+from ..io.load import load_at_start
 from ..multibody.mechanism import Mechanism, as_mechanism
 from ..multibody.planar_arm import planar_arm
 from ..systems.model import Model, as_ode, as_system
@@ -155,15 +155,15 @@ _SCENES: dict[str, Callable[..., Scene]] = {each.__name__: each for each in (spr
 _SUFFIXES = (".xml", ".urdf")
 
 
-def of_file(path: str | os.PathLike[str], ignore: bool = False) -> Scene:
-    """The mechanism of a file, MJCF or URDF, at rest at q = 0; named as the file is, without its suffix.
+def of_file(path: str | os.PathLike[str], ignore: bool = False, floating: bool = False) -> Scene:
+    """The mechanism of a file, MJCF or URDF, at rest where the file has it; named as the file is, without its suffix.
 
-    ignore: leave out what a mechanism cannot have; `left_out` says what. Raises as `load_mjcf` does.
+    ignore: leave out what a mechanism cannot have; `left_out` says what.  floating: of URDF, whether the root link
+    moves freely. Raises as `load_mjcf` and `load_urdf` do, and for `floating` of MJCF.
     """
-    mechanism = load_model(path, ignore=ignore)
-    n = mechanism.system.n
+    mechanism, q = load_at_start(path, ignore=ignore, floating=floating)
     about = f"{len(mechanism.moving)} moving bodies of {os.fspath(path)}"
-    return Scene(Path(path).stem, about, mechanism, mechanism.system.kinematics.neutral, (0.0,) * n, 3.0)
+    return Scene(Path(path).stem, about, mechanism, q, (0.0,) * mechanism.system.n, 3.0)
 
 
 def _is_path(name: object) -> bool:

@@ -261,7 +261,7 @@ def _translated(make: Callable[[Case], Peer], model: Model) -> Translation:
 
 
 def original(twin: Any, model: Model) -> Original:
-    """MuJoCo on what `load_model` takes, with the coordinates of the model.
+    """MuJoCo on a model, MJCF or URDF, with the coordinates of the model.
 
     Raises ValueError for a twin that cannot be read or has another number of coordinates, and for a model that is not
     of rigid bodies.

@@ -64,6 +64,12 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
     assert cli.main(["draw", str(arm), "--out", str(target)]) == 0
     assert "arm: inverse dynamics, chain rule" in target.read_text()
     assert capsys.readouterr().err == ""
+    inertial = URDF[URDF.index("<inertial>") : URDF.index("</inertial>")] + "</inertial>"
+    arm.write_text(URDF.replace('<link name="base"/>', f'<link name="base">{inertial}</link>'))
+    assert cli.main(["draw", str(arm), "--floating", "--out", str(target)]) == 0
+    assert "qd5" in target.read_text()
+    assert cli.main(["certify", str(arm), "--floating", "--states", "1"]) == 0
+    assert "MuJoCo's" in capsys.readouterr().out
     model.write_text(MODEL.replace("<mujoco>", '<mujoco><option density="1"/>'))
     assert cli.main(["draw", str(model), "--out", str(target)]) == 2
     fluid = "a fluid (density or viscosity)"
@@ -83,6 +89,7 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
         (["draw", "a_file", "--out", "x.dot"], "'a_file' is not XML, as MJCF and URDF are"),
         (["draw", ".", "--out", "x.dot"], "'.' is a folder, and a model is a file"),
         (["draw", "chain", "--ignore", "--out", "x.dot"], "scene 'chain' has no option 'ignore'"),
+        (["draw", "chain", "--floating", "--out", "x.dot"], "scene 'chain' has no option 'floating'"),
         (["draw", "spring_mass", "--out", "x.jpg"], "must end in .svg, .png, .dot or .txt"),
         (["draw", "spring_mass", "--out", "missing/x.dot"], "does not exist"),
         (["draw", "spring_mass", "--out", "x.dot", "--collapse", "link 9"], "link 9"),

@@ -21,22 +21,29 @@ from ..graph_drawing.render import check_can_draw, render_svg, tags_to_collapse
 from .signals import settled
 
 Commands = argparse._SubParsersAction  # what `add_subparsers` returns has no public name
+READING = ("ignore", "floating")  # options of `scenes.of_file`
 
 
 def takes_a_scene(command: argparse.ArgumentParser) -> None:
     """The arguments that `scene_of` reads."""
     command.add_argument("scene", metavar="SCENE", help=f"{', '.join(scenes.names())}, or a model file, MJCF or URDF")
-    may_ignore(command)
+    reads_files(command)
 
 
-def may_ignore(command: argparse.ArgumentParser) -> None:
-    """The argument by which what cannot be modeled is left out."""
+def reads_files(command: argparse.ArgumentParser) -> None:
+    """The arguments that say how a model file is read, `READING`."""
     command.add_argument("--ignore", action="store_true", help="leave out what of a model file cannot be modeled")
+    command.add_argument("--floating", action="store_true", help="let the root link of a URDF file move freely")
+
+
+def reading(options: argparse.Namespace) -> dict[str, bool]:
+    """Those of the arguments that say how a model file is read that are there."""
+    return {name: True for name in READING if getattr(options, name)}
 
 
 def scene_of(options: argparse.Namespace) -> scenes.Scene:
     """The scene that the arguments name; what of a file is left out is a warning, a line of standard error."""
-    return scenes.load(options.scene, **({"ignore": True} if options.ignore else {}))
+    return scenes.load(options.scene, **reading(options))
 
 
 def say(line: str) -> None:

@@ -11,10 +11,10 @@ from dynamics.experiments.speed.bench import MODES, PEERS, QUICK, SCENES, TASKS,
 from dynamics.experiments.speed.bench_figures import FIGURES
 from dynamics.experiments.speed.bench_table import tables
 
-from .arguments import Commands, may_ignore, positive, say, whole
+from .arguments import READING, Commands, positive, reading, reads_files, say, whole
 
 SPEED = "speed"
-OF_SPEED = ("ignore", "tasks", "modes", "peers", "quick", "budget", "json")  # options of speed alone
+OF_SPEED = (*READING, "tasks", "modes", "peers", "quick", "budget", "json")  # options of speed alone
 NUMBERS = {"links": "links of the models", "repeats": "turns", "count": "trajectories, or states"}
 
 
@@ -42,7 +42,7 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
         help=f"a figure of those below, {SPEED} if none; its scenes: {', '.join(SCENES)} (default: all of these), a "
         "name that `cgraph scenes` lists, or a model file",
     )
-    may_ignore(parser)
+    reads_files(parser)
     for what, known in (("tasks", TASKS), ("modes", MODES), ("peers", PEERS)):
         parser.add_argument(f"--{what}", metavar="A,B", help=f"only these of {', '.join(known)}")
     parser.add_argument("--quick", action="store_true", help=f"fewer turns and, unless named, {', '.join(QUICK)} alone")
@@ -91,7 +91,7 @@ def _speed(scenes: list[str], options: argparse.Namespace) -> None:
         *chosen,
         repeats=options.repeats or (5 if options.quick else 15),
         budget=(20.0 if options.quick else 60.0) if options.budget is None else options.budget,
-        ignore=options.ignore,
+        reading=reading(options),
         say=say,
     )
     try:

@@ -28,7 +28,7 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> int:
     """Print the residuals; 1 where one exceeds its bound."""
     scene = scene_of(options)
-    certificate = certify(scene, options.states, options.seed, twin=_twin(options.scene))
+    certificate = certify(scene, options.states, options.seed, twin=_twin(options.scene, options.floating))
     answer(unless_json(options, {"scene": scene.name} | certificate.to_dict(), certificate))
     if certificate.passed:
         return 0
@@ -37,12 +37,12 @@ def run(options: argparse.Namespace) -> int:
     return 1
 
 
-def _twin(scene: str) -> Any:
+def _twin(scene: str, floating: bool) -> Any:
     """MuJoCo's own model of a file; None for a scene by name, and where MuJoCo cannot read the file."""
     if scene in scenes.names():
         return None
     try:
-        return compiled(scene)
+        return compiled(scene, floating=floating)
     except (MechanismError, ImportError) as error:
         say(f"compared is the model that was read, not the file: {error}")
         return None

@@ -10,7 +10,7 @@ from dynamics.experiments import pruning
 
 from ..pages import pruning as page
 from ..pages.document_files import document_files
-from .arguments import answer, unless_json
+from .arguments import answer, reading, unless_json
 
 
 def run(options: argparse.Namespace) -> None:
@@ -24,7 +24,7 @@ def run(options: argparse.Namespace) -> None:
         raise ValueError(f"--lock takes each body once, got {', '.join(body for body, _ in locked)}")
     found, lines, files = [], [], dict[Path, str | bytes]()
     for name in options.scenes:
-        scene = scenes.load(name, **({"ignore": True} if options.ignore else {}))
+        scene = scenes.load(name, **reading(options))
         effects = [each for each in EFFECTS if each not in without]
         content = pruning.report(scene, effects=effects, lock=_bodies(scene, lock))
         found.append(content)

@@ -22,11 +22,11 @@ from ..pages import work_precision as page
 from ..pages.document_files import check_folder, document_files
 from ..plots.plot import check_can_plot
 from . import pruning_report, stability_report
-from .arguments import Commands, answer, may_ignore, number, positive, say, unless_json
+from .arguments import READING, Commands, answer, number, positive, reading, reads_files, say, unless_json
 
 CURVES, STABILITY, PRUNING, COMPARE = "a report of run times", "--stability", "--pruning", "--compare"
 GO_WITH = {  # options that not every kind of report has
-    "ignore": (CURVES, PRUNING),
+    **dict.fromkeys(READING, (CURVES, PRUNING)),
     "t_end": (CURVES,),
     "start": (CURVES,),
     "methods": (CURVES,),
@@ -53,7 +53,7 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
     parser.add_argument(
         "--stability", action="store_true", help="the table of stiff and extreme cases; status 1 for an unexplained row"
     )
-    may_ignore(parser)
+    reads_files(parser)
     parser.add_argument("--out", type=Path, help=f"folder to fill (default: {FOLDER}; with --json, none)")
     parser.add_argument("--t-end", type=positive, metavar="S", help="how long, instead of the scene's own time")
     parser.add_argument("--start", type=_state, metavar="A,B", help="q and then qd, instead of the scene's own start")
@@ -156,10 +156,10 @@ def _comparisons(options: argparse.Namespace) -> None:
 
 def _curves(options: argparse.Namespace) -> None:
     """A page of run time beside error for each scene."""
-    named = {named_settings.load(name, ignore=options.ignore).name for name in options.scenes}
+    named = {named_settings.load(name, reading=reading(options)).name for name in options.scenes}
     if len(named) < len(options.scenes):
         raise ValueError(f"each scene needs a name of its own for its files, got {', '.join(options.scenes)}")
-    chosen = {"t_end": options.t_end, "start": options.start, "ignore": options.ignore}
+    chosen = {"t_end": options.t_end, "start": options.start, "reading": reading(options)}
     peers = tuple(PEERS) if options.peers is None else tuple(filter(None, options.peers.split(",")))
     if options.out is not None:
         check_can_plot()

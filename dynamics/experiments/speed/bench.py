@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -58,14 +58,14 @@ def bench(
     *,
     repeats: int = 15,
     budget: float = 60.0,
-    ignore: bool = False,
+    reading: Mapping[str, bool] | None = None,
     say: Callable[[str], None] = lambda line: None,
 ) -> Iterator[Row]:
     """Rows, scene by scene, as they are measured. Ours is among the peers in any case.
 
     scenes: names among `SCENES`, of `dynamics.scenes`, or paths of model files.  repeats: turns of each peer.
-    budget: seconds that a peer may take to make one task in one mode.  ignore: leave out what a file's mechanism cannot
-    have.  say: takes lines of progress.
+    budget: seconds that a peer may take to make one task in one mode.  reading: options of `scenes.of_file`.
+    say: takes lines of progress.
     Raises ValueError for an unknown name or a budget that is not positive, RuntimeError when ours is not ready in time.
     """
     for what, names, known in (("task", tasks, TASKS), ("mode", modes, MODES), ("peer", peers, PEERS)):
@@ -73,7 +73,7 @@ def bench(
             raise ValueError(f"there is no {what} {unknown[0]!r}; the {what}s are {', '.join(known)}")
     if not budget > 0.0:
         raise ValueError(f"the budget must be positive, got {budget!r} s")
-    loads: dict[str, Load] = {name: partial(load, name, ignore) for name in scenes}
+    loads: dict[str, Load] = {name: partial(load, name, **(reading or {})) for name in scenes}
     cases = {}
     for name, scene in loads.items():  # a wrong name is told before anything is measured
         cases[name] = Case(name, scene())

@@ -68,10 +68,10 @@ SCENES: dict[str, Callable[[], Scene]] = {
 QUICK = ("planar 3", "planar 7", "arm 7")
 
 
-def load(name: str, ignore: bool = False) -> Scene:
+def load(name: str, **reading: bool) -> Scene:
     """The scene of that name, of `SCENES` or else of `dynamics.scenes` or a file.
 
-    ignore: leave out what a mechanism cannot have. Raises ValueError for a name that is neither, and as
+    reading: options of `dynamics.scenes.of_file`. Raises ValueError for a name that is neither, and as
     `dynamics.scenes.load` does.
     """
     if name in SCENES:
@@ -81,4 +81,4 @@ def load(name: str, ignore: bool = False) -> Scene:
             f"there is no scene {name!r}; the bench has {', '.join(SCENES)}, the scenes {', '.join(scenes.names())}, "
             "and files are those that end in .xml or .urdf"
         )
-    return scenes.load(name, **({"ignore": True} if ignore and name not in scenes.names() else {}))
+    return scenes.load(name, **({} if name in scenes.names() else reading))

@@ -59,9 +59,12 @@ def pinocchio(arm: Mechanism, x: Array) -> Solver:
     models.append(pin.RigidConstraintModel(pin.ContactType.CONTACT_3D, model, last, tip, 0, place, pin.LOCAL))
     datas.append(models[0].createData())
     pin.initConstraintDynamics(model, data, models, datas)
-    q, qd, tau = (np.array(x[k * n : (k + 1) * n][peer.at]) for k in range(3))
+    q = peer.of.q(x[:n])
+    qd, tau = (peer.of.v(q, x[k * n : (k + 1) * n]) for k in (1, 2))
     settings, solve = pin.ProximalSettings(1e-12, 1e-10, 10), pin.constraintDynamics
-    return Solver(lambda: solve(model, data, q, qd, tau, models, datas, settings), lambda: data.ddq[peer.order])
+    return Solver(
+        lambda: solve(model, data, q, qd, tau, models, datas, settings), lambda: peer.of.our_a(q, qd, data.ddq)
+    )
 
 
 def connected(arm: Mechanism, x: Array) -> Solver:

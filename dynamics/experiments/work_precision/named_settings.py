@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from ... import scenes
 from ...equations.state_equation import state_inputs
@@ -29,19 +28,22 @@ def names() -> list[str]:
 
 
 def load(
-    name: str, *, t_end: float | None = None, start: Sequence[float] | None = None, ignore: bool = False
+    name: str,
+    *,
+    t_end: float | None = None,
+    start: Sequence[float] | None = None,
+    reading: Mapping[str, bool] | None = None,
 ) -> Setting:
     """The setting of that name: of `SETTINGS`, a scene, a case, or an MJCF or URDF file.
 
-    t_end [s], start: in place of its own.  ignore: leave out what of a file a mechanism cannot have.
+    t_end [s], start: in place of its own.  reading: options of `dynamics.scenes.of_file`.
     Raises ValueError for a name that is none of these, a horizon that is not positive, or a start of another length.
     """
     fixed = SETTINGS.get(name) or (partial(cases.load, name) if name in cases.names() else None)
     if fixed is not None:
         setting = fixed()
     elif name in scenes.names() or Path(name).suffix:
-        options: dict[str, Any] = {"ignore": True} if ignore and name not in scenes.names() else {}
-        setting = Setting(**vars(scenes.load(name, **options)))
+        setting = Setting(**vars(scenes.load(name, **({} if name in scenes.names() else reading or {}))))
     else:
         raise ValueError(
             f"there is no scene {name!r}; there are {', '.join([*scenes.names(), *SETTINGS])}, the cases "

@@ -23,6 +23,7 @@ class Ball(SpatialJoint):
     units = ("", "", "", "")
     neutral = quaternion.NEUTRAL
     groups = (0, 0, 0, 0)
+    sprung = True
 
     def rotation(self, q: Sequence[Node]) -> NodeMatrix:
         """That of the quaternion."""
@@ -40,6 +41,10 @@ class Ball(SpatialJoint):
     def structure(self, u: Sequence[Node], p: Sequence[Node]) -> Sequence[Node]:
         """omega x p."""
         return quaternion.structure(u, p)
+
+    def stretches(self, q: Sequence[Node], reference: float | Node) -> Sequence[Node]:
+        """The rotation vector, from where the body stands at the joint."""
+        return quaternion.rotation_vector(q)
 
     def normalized(self, q: Sequence[Node]) -> Sequence[Node]:
         """Of length 1."""

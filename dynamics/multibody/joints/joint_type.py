@@ -21,6 +21,7 @@ class JointType(ABC):
     moves: whether it has a coordinate; of "fixed" no function below is asked but `placement`.
     turns: whether it turns the body.  limited: whether URDF demands limits of it.  geared: whether its velocities can
     have an inertia of their own, an armature.  pitched: whether it needs a `Joint.pitch`, see `with_pitch`.
+    sprung: whether it can have a spring.
     coordinates, velocities: what they are called after the joint's name; "" of a single one, which has the joint's.
     units: of the coordinates.  neutral: the coordinates where the body stands at the joint.
     groups: for each coordinate a number, the same for those that are one quantity.
@@ -33,6 +34,7 @@ class JointType(ABC):
     limited = False
     geared = True
     pitched = False
+    sprung = False
     coordinates: tuple[str, ...] = ("",)
     velocities: tuple[str, ...] = ("",)
     units: tuple[str, ...] = ("rad",)
@@ -50,6 +52,13 @@ class JointType(ABC):
     def structure(self, u: Sequence[Node], p: Sequence[Node]) -> Sequence[Node]:
         """ad(u; p) of the momenta p = dL/du, see `QuasiVelocities`; 0 where velocities are rates of coordinates."""
         return [ZERO] * len(u)
+
+    def stretches(self, q: Sequence[Node], reference: float | Node) -> Sequence[Node]:
+        """How far the joint's spring of stiffness k is stretched along the velocities; none where it has no spring.
+
+        The energy is k/2 times the sum of their squares, whose slopes along the velocities they are.
+        """
+        return []
 
     def normalized(self, q: Sequence[Node]) -> Sequence[Node]:
         """The same configuration, with a quaternion of length 1."""
@@ -76,6 +85,12 @@ class AxialJoint(JointType):
 
     Nodes are over the child's axes, in which the joint's axis is z, and stand for their z component.
     """
+
+    sprung = True
+
+    def stretches(self, q: Sequence[Node], reference: float | Node) -> Sequence[Node]:
+        """From the coordinate where it pulls nowhere."""
+        return [q[0] - reference]
 
     def angle(self, x: Node) -> Node:
         """How far the coordinate turns the body [rad]; of its rate, the angular velocity. Linear in it."""

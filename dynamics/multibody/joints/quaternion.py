@@ -12,6 +12,7 @@ from .joint_type import NodeMatrix
 
 NAMES = ("qw", "qx", "qy", "qz")
 NEUTRAL = (1.0, 0.0, 0.0, 0.0)
+_HALVINGS, _TERMS = 3, 9  # tan(pi / 32)^2 to the power 9, over 19: below 1e-19
 
 
 def rotation(e: Sequence[Node]) -> NodeMatrix:
@@ -33,6 +34,28 @@ def rate(e: Sequence[Node], omega: Sequence[Node]) -> list[Node]:
     w, x, y, z = e
     a, b, c = [0.5 * each for each in omega]
     return [-(x * a + y * b + z * c), w * a + y * c - z * b, w * b + z * a - x * c, w * c + x * b - y * a]
+
+
+def rotation_vector(e: Sequence[Node]) -> list[Node]:
+    """The rotation as an axis times an angle of at most pi [rad]; smooth but at half turns, where it changes sign.
+
+    With t = tan(angle / 4) = |v| / (|e| + |w|) the angle is 4 atan t, and tan of a half of an angle is t / (1 + sqrt(1
+    + t^2)): after three halvings the angle is at most pi / 32, and atan(t) / t the first terms of its series in t^2, so
+    that nothing is divided by |v|.
+    """
+    w, *v = e
+    squares = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
+    sign = cg.where(cg.less(w, 0.0), -1.0, 1.0)
+    over = w + sign * cg.sqrt(w * w + squares)
+    tangent = squares / (over * over)
+    for _ in range(_HALVINGS):
+        half = 1.0 + cg.sqrt(1.0 + tangent)
+        over, tangent = over * half, tangent / (half * half)
+    series = cg.constant(0.0)
+    for k in reversed(range(_TERMS)):
+        series = (-1.0) ** k / (2 * k + 1) + tangent * series
+    factor = 4.0 * 2.0**_HALVINGS * series / over
+    return [factor * each for each in v]
 
 
 def structure(omega: Sequence[Node], momentum: Sequence[Node]) -> Triple:

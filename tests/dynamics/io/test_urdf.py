@@ -239,8 +239,37 @@ def test_a_joint_that_mimics_is_refused_or_left_out_by_name() -> None:
     assert dyn.load_urdf(text, ignore=True).left_out[0] == what
 
 
-def test_a_floating_base_is_free() -> None:
-    text = robot(link("base"), link("a", 1.0, np.eye(3)), joint("j", "floating", "base", "a"))
+@mark.parametrize(("taken", "called"), [("j", "base"), ("base", "base'")])
+def test_the_root_link_floats_on_request(taken: str, called: str) -> None:
+    """Its joint has its name, or one that no other has; MuJoCo and Pinocchio find the same equations."""
+    text = URDF.replace('<link name="base"/>', LINK.format("base")).replace(
+        '"j1"', f'"{taken}1"'.replace("base1", "base")
+    )
+    mechanism = dyn.load_urdf(text, floating=True)
+    assert mechanism.coordinates[:4] == tuple(f"{called}.{name}" for name in ("x", "y", "z", "qw"))
+    assert mechanism.velocities[6:] == dyn.load_urdf(text).coordinates
+    importorskip("mujoco")
+    certificate = dyn.certify(mechanism, 3, twin=compiled(text, floating=True))
+    assert certificate.passed, str(certificate)
+
+
+def test_what_cannot_float_is_said() -> None:
+    with raises(MechanismError, match=r"the root link is 'world', which does not float$"):
+        dyn.load_urdf(URDF.replace('"base"', '"world"'), floating=True)
+    with raises(TypeError, match="floating must be True or False"):
+        dyn.load_urdf(URDF, floating="base")  # type: ignore[arg-type]
+    hung = robot(
+        link("world"), link("a", 1.0, np.eye(3)), joint("j", "floating", "world", "a", "<origin xyz='0 0 1'/>")
+    )
+    assert np.asarray(dyn.load_urdf(hung).bodies[0].joint.position).tolist() == [0.0, 0.0, 1.0]
+    importorskip("mujoco")
+    with raises(MechanismError, match="in MuJoCo a free joint has the axes and the origin of the world"):
+        compiled(hung)
+
+
+def test_a_floating_joint_is_free() -> None:
+    axis = '<axis xyz="0 0 0"/>'  # of no meaning
+    text = robot(link("base"), link("a", 1.0, np.eye(3)), joint("j", "floating", "base", "a", axis))
     mechanism = dyn.load_urdf(text)
     assert mechanism.coordinates == tuple(f"j.{name}" for name in ("x", "y", "z", "qw", "qx", "qy", "qz"))
     falling = dyn.forward_dynamics(mechanism).evaluate(

@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from pytest import importorskip, mark, param, raises
+from pytest import approx, importorskip, mark, param, raises
 
 import dynamics as dyn
 from cgraph import Graph
+from dynamics.multibody.joint_coordinates import per_velocity
 from dynamics.multibody.spatial import from_quaternion
+from dynamics.peers import PEERS
 from dynamics.peers.case import Case
+from dynamics.peers.pinocchio_model import PinocchioModel
 from dynamics.systems.system import System
 from dynamics.verification.certificate import certify
 from tests.dynamics.models import Array
 
 ROUNDING = 1e-12  # of the largest of its kind, in some hundred sums
+PEER = 1e-14  # of the sums of sizes that an answer comes from
+INSTALLED = [name for name in ("mujoco", "pinocchio") if PEERS[name].installed]
 
 
 def random_tree(seed: int, base: str = "free", most: int = 5) -> dyn.Mechanism:
-    """A tree of ball joints, hinges and slides on a base of that kind, with damping and armature."""
+    """A tree of ball joints, hinges, slides and welds on a base of that kind, with springs, damping and armature."""
     rng = np.random.default_rng(seed)
     bodies = []
     for i in range(int(rng.integers(1, most + 1))):
-        kind = str(rng.choice(["ball", "revolute", "prismatic"])) if i else base
+        kind = str(rng.choice(["ball", "revolute", "prismatic", "fixed"], p=(0.3, 0.3, 0.3, 0.1))) if i else base
         points = rng.normal(size=(6, 3))
         free = kind.startswith("free")
         joint = dyn.Joint(
@@ -34,6 +41,9 @@ def random_tree(seed: int, base: str = "free", most: int = 5) -> dyn.Mechanism:
             damping=float(rng.uniform(0.0, 0.3)),
             armature=0.0 if "axes" in kind else float(rng.uniform(0.0, 0.1)),
         )
+        if joint.type.sprung:
+            stiffness, reference = rng.uniform(0.0, 0.5, 2).tolist()
+            joint = replace(joint, stiffness=stiffness, spring_reference=reference * (kind != "ball"))
         inertia = 0.1 * sum([(p @ p) * np.eye(3) - np.outer(p, p) for p in points])
         parent = f"b{rng.integers(max(0, i - 2), i)}" if i else "world"
         bodies.append(dyn.Body(f"b{i}", joint, parent, float(rng.uniform(0.5, 2.0)), 0.3 * rng.normal(size=3), inertia))
@@ -61,23 +71,90 @@ def test_its_certificate_holds(base: str, seed: int) -> None:
     assert certificate.passed, str(certificate)
 
 
-@mark.parametrize("seed", [*range(2), *[param(seed, marks=mark.slow) for seed in range(2, 200)]])
-def test_mujoco_finds_the_same(seed: int) -> None:
-    importorskip("mujoco")
-    from dynamics.peers.mujoco import MujocoPeer
+def errors(mechanism: dyn.Mechanism, seed: int) -> dict[str, float]:
+    """How far the peers are from our graphs at a random state, over the sums of sizes that the answers come from."""
+    n, at = mechanism.system.n, state(mechanism.system, seed, qdd=1, tau=1)
+    rows = {
+        name: np.array([x for key, x in at.items() if key.rstrip("0123456789") == name])
+        for name in ("q", "qd", "qdd", "tau")
+    }
+    ours = {
+        "tau": values(dyn.inverse_dynamics(mechanism), at),
+        "qdd": values(dyn.forward_dynamics(mechanism), at),
+        "M": values(dyn.mass_matrix(mechanism), at).reshape(n, n),
+        "bias": values(dyn.bias(mechanism), at),
+        "recursive": dyn.RecursiveInverseDynamics(mechanism)(rows["q"], rows["qd"], rows["qdd"]),
+    }
+    weight, M = values(dyn.gravity_force(mechanism), at), np.abs(ours["M"])
+    braking = np.abs(np.array(mechanism.system.damping) * rows["qd"])
+    bias = np.abs(weight) + np.abs(ours["bias"] - weight)
+    tau = M @ np.abs(rows["qdd"]) + bias + braking
+    qdd = np.abs(np.linalg.inv(ours["M"])) @ (np.abs(rows["tau"]) + bias + braking)
+    scales = {"tau": tau, "qdd": qdd, "M": M, "bias": tau, "recursive": tau}
+    result = {}
+    for peer in INSTALLED:
+        if peer == "mujoco" and any("axes" in body.joint.kind for body in mechanism.bodies):
+            continue  # which it has not
+        theirs = PEERS[peer].make(Case("tree", mechanism)).quantities(**rows)  # type: ignore[attr-defined]
+        theirs["recursive"] = theirs["tau"]
+        for name, scale in scales.items():
+            result[f"{peer} {name}"] = float(np.abs(ours[name] - theirs[name]).max() / scale.max())
+    return result
 
-    mechanism = random_tree(100 + seed)
-    system = mechanism.system
-    at = state(system, seed, qdd=1, tau=1)
-    rows = {name: np.array([x for key, x in at.items() if key.rstrip("0123456789") == name]) for name in
-            ("q", "qd", "qdd", "tau")}  # fmt: skip
-    theirs = MujocoPeer(Case("tree", mechanism)).quantities(**rows)
-    assert near(values(dyn.inverse_dynamics(mechanism), at), theirs["tau"])
-    assert near(values(dyn.forward_dynamics(mechanism), at), theirs["qdd"])
-    assert near(values(dyn.mass_matrix(mechanism), at).reshape(system.n, -1), theirs["M"])
-    assert near(values(dyn.bias(mechanism), at), theirs["bias"])
-    recursive = dyn.RecursiveInverseDynamics(mechanism)
-    assert near(recursive(rows["q"], rows["qd"], rows["qdd"]), theirs["tau"])
+
+@mark.skipif(not INSTALLED, reason="neither MuJoCo nor Pinocchio is installed")
+@mark.parametrize("count", [4, param(1000, marks=mark.slow)])
+def test_peers_find_the_same(count: int, record_property: Callable[[str, object], None]) -> None:
+    bases, worst = ["free", "ball", "revolute", "free (body axes)"], dict[str, float]()
+    for seed in range(100, 100 + count):
+        for name, error in errors(random_tree(seed, bases[seed % len(bases)], most=7), seed).items():
+            worst[name] = max(error, worst.get(name, 0.0))
+    record_property("worst", worst)
+    assert max(worst.values()) <= PEER, worst
+
+
+@mark.parametrize("count", [3, param(60, marks=mark.slow)])
+def test_pinocchio_s_derivatives_are_ours(count: int, record_property: Callable[[str, object], None]) -> None:
+    """Of accelerations by small displacements, which both have in the body's axes, by velocities and by torques."""
+    pinocchio = importorskip("pinocchio")
+    worst = 0.0
+    for seed in range(count):
+        tree = random_tree(seed, ["free (body axes)", "ball", "revolute"][seed % 3], most=3)
+        joints = [
+            replace(body.joint, stiffness=body.joint.stiffness * (body.joint.kind != "ball")) for body in tree.bodies
+        ]
+        bodies = [replace(body, joint=joint) for body, joint in zip(tree.bodies, joints, strict=True)]
+        mechanism = replace(tree, bodies=bodies)  # the slope of a ball's spring is no diagonal
+        n, nq, theirs = mechanism.system.n, mechanism.system.nq, PinocchioModel(mechanism)
+        x = np.array(list(state(mechanism.system, seed, tau=1).values()))
+        q, u, tau = x[:nq], x[nq : nq + n], x[nq + n :]
+        A, B = dyn.linearize(mechanism, q, u, tau)
+        joints = [body.joint for body in mechanism.moving]
+        springs = np.array(per_velocity(mechanism.moving, [joint.stiffness for joint in joints]))
+        damping = np.array(mechanism.system.damping)
+        applied = tau - damping * u - (values(dyn.bias(mechanism), at_rest(q, n)) - springless(mechanism, q))
+        at, data = theirs.q(q), theirs.model.createData()
+        by_q, by_v, inverse = pinocchio.computeABADerivatives(
+            theirs.model, data, at, theirs.v(at, u), theirs.v(at, applied)
+        )
+        rows = np.ix_(theirs.order, theirs.order)
+        inverse = (np.triu(inverse) + np.triu(inverse, 1).T)[rows]
+        expected = np.hstack([by_q[rows] - inverse * springs, by_v[rows] - inverse * damping, inverse])
+        ours = np.hstack([A[n:], B[n:]])
+        worst = max(worst, float(np.abs(ours - expected).max() / np.abs(expected).max()))
+    record_property("worst", worst)
+    assert worst <= ROUNDING
+
+
+def at_rest(q: Array, n: int) -> dict[str, float]:
+    return {f"q{i}": float(x) for i, x in enumerate(q)} | {f"qd{i}": 0.0 for i in range(n)}
+
+
+def springless(mechanism: dyn.Mechanism, q: Array) -> Array:
+    """The bias at rest of the mechanism without its springs."""
+    bodies = [replace(body, joint=replace(body.joint, stiffness=0.0)) for body in mechanism.bodies]
+    bare = replace(mechanism, bodies=bodies)
+    return values(dyn.bias(bare), at_rest(q, bare.system.n))
 
 
 @mark.parametrize("base", ["free", "ball", "free (body axes)"])
@@ -94,6 +171,25 @@ def test_bodies_state_the_bias_that_the_lagrangian_has(base: str) -> None:
     undamped = values(dyn.inverse_dynamics(derived, "chain_rule_literal"), at)
     damping = np.array(system.damping) * [at[f"qd{i}"] for i in range(system.n)]
     assert near(values(dyn.inverse_dynamics(mechanism), at), undamped + damping)
+
+
+@mark.parametrize("angle", [0.0, 1e-300, 1e-150, 1e-8, 0.3, 2.0, 3.0, math.pi - 1e-9, math.pi + 1e-9, 6.0])
+def test_a_ball_s_spring_pulls_back_by_the_shortest_way(angle: float) -> None:
+    """k times the rotation vector, with slopes where nothing is stretched, too; at any length of the quaternion."""
+    k, axis = 3.0, np.array([2.0, -1.0, 2.0]) / 3.0
+    ball = dyn.Mechanism([dyn.Body("b", dyn.Joint("ball", stiffness=k), inertia=(1.0, 2.0, 3.0))], gravity=(0, 0, 0))
+    e = 7.0 * np.array([math.cos(angle / 2), *(math.sin(angle / 2) * axis)])
+    shortest = angle if angle <= math.pi else angle - 2.0 * math.pi
+    at = {f"q{i}": float(x) for i, x in enumerate(e)} | dict.fromkeys(("qd0", "qd1", "qd2"), 0.0)
+    pull = values(dyn.bias(ball), at)
+    assert pull == approx(k * shortest * axis, rel=2e-15, abs=0.0)
+    energy = dyn.energy(ball).evaluate(at)
+    assert sum(energy.values()) == approx(0.5 * k * shortest**2, rel=4e-15, abs=0.0)
+    A, _ = dyn.linearize(ball, e, np.zeros(3))
+    c = shortest / 2.0 / math.tan(shortest / 2.0) if shortest else 1.0
+    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    slopes = c * np.eye(3) + (1.0 - c) * np.outer(axis, axis) + 0.5 * shortest * cross  # of the rotation vector
+    assert A[3:, :3] == approx(-k * slopes / np.array([[1.0], [2.0], [3.0]]), rel=0, abs=1e-14)
 
 
 def test_the_length_of_a_quaternion_has_no_part_in_anything() -> None:
@@ -156,8 +252,8 @@ def test_three_hinges_are_a_ball_away_from_their_lock() -> None:
 
 
 def test_what_joints_of_several_freedoms_cannot_have_is_said() -> None:
-    with raises(dyn.MechanismError, match="a spring needs a joint with one coordinate"):
-        _ = dyn.Mechanism([dyn.Body("b", dyn.Joint("ball", stiffness=1.0), inertia=(1.0, 1.0, 1.0))]).coordinates
+    with raises(dyn.MechanismError, match=r"a joint of the kind 'free' has no spring, got stiffness 1.0"):
+        _ = dyn.Mechanism([dyn.Body("b", dyn.Joint("free", stiffness=1.0), inertia=(1.0, 1.0, 1.0))]).coordinates
     turning = dyn.Mechanism([dyn.Body("b", dyn.Joint("ball"), mass=1.0, inertia=(1.0, 1.0, 1.0)),
                              dyn.Body("c", dyn.Joint("revolute"), "b", inertia=(1.0, 1.0, 1.0))])  # fmt: skip
     assert turning.coordinates == ("b.qw", "b.qx", "b.qy", "b.qz", "c")

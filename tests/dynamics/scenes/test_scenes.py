@@ -65,8 +65,8 @@ def test_options_go_to_the_scene_s_function() -> None:
         ("chain", {"links": 4}, "scene 'chain' has no option 'links'; its options are n"),
         ("chain", {"name": "x"}, "scene 'chain' has no option 'name'; its options are n"),
         ("spring_mass", {"k": 2.0}, "scene 'spring_mass' has no option 'k'; it has none"),
-        ("robot.xml", {"n": 4}, "scene 'robot.xml' has no option 'n'; its options are ignore"),
-        ("robot.xml", {"path": "x"}, "scene 'robot.xml' has no option 'path'; its options are ignore"),
+        ("robot.xml", {"n": 4}, "scene 'robot.xml' has no option 'n'; its options are ignore, floating"),
+        ("robot.xml", {"path": "x"}, "scene 'robot.xml' has no option 'path'; its options are ignore, floating"),
     ],
 )
 def test_an_unknown_option_is_named_with_those_that_there_are(name: str, options: Any, message: str) -> None:
@@ -99,6 +99,31 @@ def test_a_model_file_is_a_scene_at_rest(file: Any, as_given: type) -> None:
     assert scene.system.coordinates == ("a", "b")
     assert scene.q == scene.qd == (0.0, 0.0)
     assert np.isfinite(dyn.simulate(scene, scene.q, scene.qd, 0.01).q).all()
+
+
+def test_a_model_of_a_file_starts_where_the_file_has_it(file: Any) -> None:
+    """A free body at its place, a hinge at its reference, a ball unturned."""
+    free = f"""<body pos="1 2 3" quat="0 0 2 0"><freejoint name="f"/>{INERTIAL}</body>
+    <body><joint name="h" axis="0 1 0" ref="90"/>{INERTIAL}</body>
+    <body><joint name="b" type="ball"/>{INERTIAL}</body>"""
+    scene = loaded(file(f"<mujoco><worldbody>{free}</worldbody></mujoco>"))
+    assert scene.q == (1.0, 2.0, 3.0, 0.0, 0.0, 1.0, 0.0, np.pi / 2, 1.0, 0.0, 0.0, 0.0)
+    assert scene.qd == (0.0,) * 10
+    assert [*scene.mechanism.position("body 1").evaluate({f"q{i}": x for i, x in enumerate(scene.q)}).values()] == [
+        1,
+        2,
+        3,
+    ]
+
+
+def test_the_root_of_a_urdf_may_float(file: Any) -> None:
+    heavy = URDF.replace('<link name="base"/>', '<link name="base"><inertial><mass value="2"/><inertia ixx="1" ixy="0"'
+                         ' ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>')  # fmt: skip
+    scene = scenes.load(file(heavy, "arm.urdf"), floating=True)
+    assert scene.q == (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
+    assert scene.velocities == (*[f"base.{name}" for name in ("vx", "vy", "vz", "wx", "wy", "wz")], "j")
+    with raises(MechanismError, match=r"says itself which bodies float$"):
+        loaded(file(MJCF), floating=True)
 
 
 @mark.parametrize("name", ["arm.urdf", "arm.xml", "arm"])

@@ -225,6 +225,15 @@ def test_pinocchio_agrees_when_it_is_there() -> None:
         assert "inverse dynamics = Pinocchio's" in [each.equation for each in found.residuals]
 
 
+def test_a_body_that_pinocchio_does_not_take_is_named() -> None:
+    """Moments below rounding, as programs write those of a point mass that they have moved about."""
+    pytest.importorskip("pinocchio", reason="the bench extra has it")
+    hinge = dyn.Joint("revolute", (0.0, 1.0, 0.0))
+    certificate = certify(dyn.Mechanism([dyn.Body("a", hinge, "world", 0.5, (0, 0, 0.03), (-5e-20, -5e-20, 0.0))]), FEW)
+    assert failed(certificate) == {}
+    assert "Pinocchio: does not take body 'a'" in str(certificate)
+
+
 def test_forces_on_bodies_are_not_asked_of_peers() -> None:
     mechanism = FAMILIES["serial"](3)
     pushed = replace(mechanism, forces=[dyn.Force("b2", (1.0, 2.0, "f"))], parameters={"f": 3.0})
