@@ -28,8 +28,10 @@ from .reference import Reference, reference
 from .scenes.scenes import Scene
 from .simulation.ensembles import Ensemble, EnsembleStats, simulate_many
 from .simulation.event import Event
+from .simulation.sampled_controller import SampledController
 from .simulation.simulate import simulate
 from .simulation.trajectory import Crossings, SimulationWarning, Stats, Trajectory
+from .systems.controller import with_controller
 from .systems.model import as_system
 from .systems.ode_system import OdeSystem
 from .systems.quasi_velocities import QuasiVelocities
@@ -61,6 +63,7 @@ __all__ = [
     "RecursiveInverseDynamics",
     "Reference",
     "Released",
+    "SampledController",
     "Scene",
     "SimulationWarning",
     "SingularMassMatrixError",
@@ -105,4 +108,5 @@ __all__ = [
     "torque_by_joint_motion",
     "torque_by_link",
     "tree",
+    "with_controller",
 ]

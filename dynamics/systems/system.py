@@ -86,24 +86,11 @@ class System:
         if not partials:
             raise ValueError("the lagrangian gave no partial Lagrangians")
         self.partial_lagrangians = tuple([node_or_number("the lagrangian", partial) for partial in partials])
-        applied: Sequence[Node | float] = [0.0] * self.n
+        self.forces = tuple([cg.constant(0.0)] * self.n)
         if forces is not None:
             with cg.tag("force"):
-                value = call_user_function("forces", forces, self.q, self.qd, self.t, p)
-                applied = sequence("forces must give", value)
-            if len(applied) != self.n:
-                names = ", ".join(self.velocities)
-                raise ValueError(f"forces must give {self.n} values, one for each of {names}; got {len(applied)}")
-        self.forces = tuple(
-            [node_or_number(f"the force on {name!r}", x) for name, x in zip(self.velocities, applied, strict=True)]
-        )
-        known = {*self.q, *self.qd, self.t, *p.values()}
-        for node in topological((*self.partial_lagrangians, *self.forces)):
-            if node.op.name == "variable" and node not in known:
-                names = ", ".join((*self.coordinates, *self.parameters))
-                raise ValueError(
-                    f"the system uses {node.name!r}, which is no coordinate, parameter or t (it has {names})"
-                )
+                self.forces = tuple(generalized_forces("forces", forces, self, p))
+        require_known("the system", (*self.partial_lagrangians, *self.forces), self, p)
 
     @property
     def system(self) -> System:
@@ -275,6 +262,26 @@ class BodySystem(System):
     def bias_forces(self) -> Sequence[BiasForce]:
         """The pairs (velocity, force) that the bodies state; see `System.bias_forces`."""
         return self._bias_forces(self.q, self.qd)
+
+
+def generalized_forces(what: str, function: Callable[..., Any], system: System, p: Parameters) -> list[Node]:
+    """What a function of (q, qd, t) or (q, qd, t, p) gives: a node for each velocity. Raises what is wrong with it."""
+    value = call_user_function(what, function, system.q, system.qd, system.t, p)
+    applied = sequence(f"{what} must give", value)
+    if len(applied) != system.n:
+        names = ", ".join(system.velocities)
+        raise ValueError(f"{what} must give {system.n} values, one for each of {names}; got {len(applied)}")
+    pairs = zip(system.velocities, applied, strict=True)
+    return [node_or_number(f"the force on {name!r}", force) for name, force in pairs]
+
+
+def require_known(what: str, nodes: Sequence[Node], system: System, p: Parameters) -> None:
+    """Raises ValueError for a variable that is neither of the state, nor t, nor a parameter."""
+    known = {*system.q, *system.qd, system.t, *p.values()}
+    for node in topological(nodes):
+        if node.op.name == "variable" and node not in known:
+            names = ", ".join((*system.coordinates, *p))
+            raise ValueError(f"{what} uses {node.name!r}, which is no coordinate, parameter or t (it has {names})")
 
 
 def _sum(nodes: Sequence[Node]) -> Node:
