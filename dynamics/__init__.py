@@ -18,6 +18,7 @@ from .io.write_mjcf import to_mjcf
 from .io.write_urdf import to_urdf
 from .multibody.build_tree import serial_arm, tree
 from .multibody.impact import Attached, FreeBody, Released, attach_with_impact, release
+from .multibody.joint_force import Actuator, JointForce, JointFriction, JointLimit
 from .multibody.mechanism import Body, Force, Joint, Mechanism, MechanismError, MechanismWarning
 from .multibody.planar_arm import planar_arm
 from .multibody.pruning import EFFECTS, OmittedTerm, PruneResult, prune
@@ -43,6 +44,7 @@ __all__ = [
     "EFFECTS",
     "FORMULATIONS",
     "METHODS",
+    "Actuator",
     "Attached",
     "Body",
     "Certificate",
@@ -53,6 +55,9 @@ __all__ = [
     "Force",
     "FreeBody",
     "Joint",
+    "JointForce",
+    "JointFriction",
+    "JointLimit",
     "Mechanism",
     "MechanismError",
     "MechanismWarning",

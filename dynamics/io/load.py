@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 from xml.etree import ElementTree
 
@@ -10,10 +11,18 @@ from .left_out import warned
 from .mujoco_twin import mujoco
 from .read_mjcf import compiled_mjcf, read_mjcf
 from .read_urdf import read_urdf
+from .smooth_forces import smooth
 from .source import called, root_of, urdf_root
 
 
-def load_mjcf(source: Any, *, ignore: bool = False) -> Mechanism:
+def load_mjcf(
+    source: Any,
+    *,
+    ignore: bool = False,
+    limits: Sequence[float] | None = None,
+    friction: float | None = None,
+    actuators: bool = False,
+) -> Mechanism:
     """The mechanism of a MuJoCo model: its trees of joints and welds, springs, damping and armature.
 
     Coordinates are MuJoCo's qpos, in its order and from the same zero, and velocities its qvel; both have the names of
@@ -27,7 +36,15 @@ def load_mjcf(source: Any, *, ignore: bool = False) -> Mechanism:
     ignore : bool
         Leave out what a mechanism cannot have: springs of ball joints, tendons, equality constraints, fluid, ...
         Contacts, joint limits, friction loss and actuators, which act on a mechanism and do not belong to it, are
-        always left out; of an actuator that acts with no input, such as a servo, the force is said.
+        left out unless asked for; of an actuator that acts with no input, such as a servo, the force is said.
+        Contact always is.
+    limits : pair of floats, optional
+        (stiffness, damping) of springs that stand for the limits of hinges and slides, see `JointLimit`.
+    friction : float, optional
+        A velocity [rad/s or m/s]; friction loss then acts as loss tanh(qd / friction), see `JointFriction`.
+    actuators : bool
+        Take motors, position and velocity servos and the like on hinges and slides, see `Actuator`. Their inputs are
+        parameters, "ctrl_" and the actuator's name (or number), 0 where nothing else is said.
 
     Returns
     -------
@@ -50,10 +67,12 @@ def load_mjcf(source: Any, *, ignore: bool = False) -> Mechanism:
     """
     given, name = isinstance(source, mujoco().MjModel), called(source)
     mj = source if given else compiled_mjcf(source, name)
-    return warned(read_mjcf(mj, ignore), "the model" if given else name)
+    return warned(read_mjcf(mj, ignore, smooth(limits, friction, actuators)), "the model" if given else name)
 
 
-def load_urdf(source: Any, *, ignore: bool = False) -> Mechanism:
+def load_urdf(
+    source: Any, *, ignore: bool = False, limits: Sequence[float] | None = None, friction: float | None = None
+) -> Mechanism:
     """The mechanism of a URDF file, with the numbers of the file; it stands on its root link.
 
     Every link is a body of its name, those without mass and those on fixed joints too, so that `position("tool0")` is
@@ -67,7 +86,12 @@ def load_urdf(source: Any, *, ignore: bool = False) -> Mechanism:
         A path or the XML text (it starts with "<").
     ignore : bool
         Leave out what a mechanism cannot have, the coupling of joints that mimic others. Contacts, joint limits,
-        friction loss and extensions of URDF, such as transmissions, are always left out.
+        friction loss and extensions of URDF, such as transmissions, are left out, the second and third unless asked
+        for.
+    limits : pair of floats, optional
+        (stiffness, damping) of springs that stand for the limits of hinges and slides, see `JointLimit`.
+    friction : float, optional
+        A velocity [rad/s or m/s]; friction loss then acts as loss tanh(qd / friction), see `JointFriction`.
 
     Returns
     -------
@@ -87,7 +111,8 @@ def load_urdf(source: Any, *, ignore: bool = False) -> Mechanism:
     >>> dyn.load_urdf(dyn.to_urdf(dyn.Mechanism([rotor]))).coordinates
     ('rotor',)
     """
-    return warned(read_urdf(urdf_root(source), called(source), ignore), called(source))
+    taken = smooth(limits, friction, False)
+    return warned(read_urdf(urdf_root(source), called(source), ignore, taken), called(source))
 
 
 def load_model(source: Any, *, ignore: bool = False) -> Mechanism:

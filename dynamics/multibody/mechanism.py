@@ -22,6 +22,7 @@ from .external_force import Force, check_force, generalized_forces
 from .forward_kinematics import KinematicChain, kinematic_chain
 from .inertial_numbers import Link
 from .joint_coordinates import coordinate_names, per_velocity, quasi_velocities, velocity_names
+from .joint_force import JointForce, add_joint_forces, check_joint_force
 from .joint_positions import skeleton
 from .kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia
 from .mechanism_fields import Structure
@@ -53,8 +54,9 @@ class Mechanism(Structure):
         In any order.
     gravity : array_like, (3,)
         In the world's axes [m/s^2].
-    forces : sequence of Force
-        On bodies from outside, beside the joint forces tau; they enter the equations as J^T f.
+    forces : sequence of Force and JointForce
+        On bodies from outside, beside the joint forces tau; they enter the equations as J^T f. And along joints:
+        `JointLimit`, `JointFriction`, `Actuator`.
     parameters : mapping
         {name: value} of the parameters that forces name; one without a value is 0. They are inputs of the graphs, and
         `simulate` binds them.
@@ -94,7 +96,10 @@ class Mechanism(Structure):
             seen.add(name)
         carried = set(self._carriers) - {WORLD}
         for force in self.forces:
-            check_force(force, carried)
+            if isinstance(force, JointForce):
+                check_joint_force(force, self.bodies)
+            else:
+                check_force(force, carried)
         used = {name for force in self.forces for name in force.names}
         for name in require_mapping("parameters", self.parameters, "name: value"):
             if name not in used:
@@ -170,7 +175,10 @@ class Mechanism(Structure):
         )
 
     def _generalized_forces(self, q: list[Node], qd: list[Node], t: Node, p: dict[str, Node]) -> list[Node]:
-        return generalized_forces([(force, self._chain(force.body, q, qd)) for force in self.forces], qd, p)
+        on_joints = [force for force in self.forces if isinstance(force, JointForce)]
+        on_bodies = [force for force in self.forces if isinstance(force, Force)]
+        total = generalized_forces([(force, self._chain(force.body, q, qd)) for force in on_bodies], qd, p)
+        return add_joint_forces(total, on_joints, self.moving, (q, qd), p)
 
     def _chain(self, body: str, q: Sequence[Node], qd: Sequence[Node]) -> KinematicChain:
         return kinematic_chain(self._carriers[body], self.moving, self.links, q, qd)

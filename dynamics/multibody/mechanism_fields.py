@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from .body import Body
 from .external_force import Force
+from .joint_force import JointForce
 from .link_cache import SharedParts
 
 
@@ -18,7 +19,7 @@ class Structure:
 
     bodies: Sequence[Body]
     gravity: ArrayLike = (0.0, 0.0, -9.81)
-    forces: Sequence[Force] = ()
+    forces: Sequence[Force | JointForce] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     locked: Mapping[str, float | ArrayLike] = field(default_factory=dict)
     base_parameters: bool = False

@@ -14,6 +14,7 @@ from cgraph.extend import real_array
 from .body import Body, MechanismError
 from .external_force import Force
 from .joint_coordinates import coordinate_names, neutral, places, velocity_names
+from .joint_force import JointForce
 from .mechanism_fields import Structure
 from .spatial import Array
 from .subtree import Subtree, as_subtree, descendants, inserted
@@ -113,7 +114,7 @@ def _check_body(body: object) -> None:
         raise MechanismError(f"a body is named by a string, got {type(body).__name__}: {body!r:.60}")
 
 
-def _used(structure: Structure, forces: Iterable[Force]) -> dict[str, float]:
+def _used(structure: Structure, forces: Iterable[Force | JointForce]) -> dict[str, float]:
     """The parameters that these forces name."""
     used = {name for force in forces for name in force.names}
     return {name: value for name, value in structure.parameters.items() if name in used}
