@@ -23,8 +23,26 @@ Range = tuple[float, float]
 class JointForce(ABC):
     """A force along the freedoms of a joint, smooth or with kinks, one of the `forces` of a mechanism.
 
-    On a joint that is locked it has no effect.
-    body: the name of the body on the joint.
+    On a joint that is locked it has no effect. `JointLimit`, `JointFriction` and `Actuator` are such forces; one of your
+    own says its force in `along` and what it refuses in `check`.
+
+    Parameters
+    ----------
+    body : str
+        The name of the body on the joint.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> class Cubic(dyn.JointForce):
+    ...     def check(self, body):
+    ...         pass
+    ...     def along(self, q, qd, parameters):
+    ...         return [-8.0 * q[0] ** 3]
+    >>> cart = dyn.Body("cart", dyn.Joint("prismatic", (1.0, 0.0, 0.0)), mass=2.0)
+    >>> sprung = dyn.Mechanism([cart], forces=[Cubic("cart")])
+    >>> dyn.forward_dynamics(sprung).evaluate({"q0": 0.5, "qd0": 0.0, "tau0": 0.0})
+    {'qdd0': -0.5}
     """
 
     body: str
