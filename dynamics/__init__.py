@@ -29,7 +29,7 @@ from .reference import Reference, reference
 from .scenes.scenes import Scene
 from .simulation.ensembles import Ensemble, EnsembleStats, simulate_many
 from .simulation.event import Event
-from .simulation.sampled_controller import SampledController
+from .simulation.sampled_controller import HeldForces, SampledController
 from .simulation.simulate import simulate
 from .simulation.trajectory import Crossings, SimulationWarning, Stats, Trajectory
 from .systems.controller import with_controller
@@ -54,6 +54,7 @@ __all__ = [
     "Event",
     "Force",
     "FreeBody",
+    "HeldForces",
     "Joint",
     "JointForce",
     "JointFriction",

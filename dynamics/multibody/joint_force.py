@@ -23,8 +23,8 @@ Range = tuple[float, float]
 class JointForce(ABC):
     """A force along the freedoms of a joint, smooth or with kinks, one of the `forces` of a mechanism.
 
-    On a joint that is locked it has no effect. `JointLimit`, `JointFriction` and `Actuator` are such forces; one of your
-    own says its force in `along` and what it refuses in `check`.
+    On a joint that is locked it has no effect. `JointLimit`, `JointFriction` and `Actuator` are such forces; one of
+    your own says its force in `along` and what it refuses in `check`.
 
     Parameters
     ----------

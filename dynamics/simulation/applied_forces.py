@@ -13,7 +13,7 @@ from ..integrators import Problem, quantity_inputs
 from ..systems.controller import with_closed_form
 from ..systems.model import Model, as_ode, as_system
 from .run_options import RunOptions
-from .sampled_controller import HeldForces, SampledController
+from .sampled_controller import Hold, SampledController
 
 Constant: TypeAlias = float | Sequence[float]
 Tau: TypeAlias = Constant | Callable[..., Sequence[Node | float]] | SampledController
@@ -37,7 +37,7 @@ class Applied:
         varied = () if self.controller is None else state_inputs(self.model).applied
         return {name: value for name, value in numbers.items() if name not in varied}
 
-    def held(self, options: RunOptions) -> HeldForces | None:
+    def hold(self, options: RunOptions) -> Hold | None:
         """The forces that a sampled controller is to hold. Raises ValueError for a run that it cannot control."""
         if self.controller is None:
             return None
@@ -46,7 +46,7 @@ class Applied:
         if options.direction < 0.0:
             raise ValueError("a SampledController holds what it has seen, so that t_end has to be later than t0")
         system = as_system(self.model)
-        return HeldForces(self.controller, system.velocities, system.nq, options.t0)
+        return Hold(self.controller, system.velocities, system.nq, options.t0)
 
     def graph(self, problem: Problem) -> Graph:
         """tau as a graph over the states, t and parameters of a problem of the model."""

@@ -14,7 +14,7 @@ from ..integrators.step_control import COLLAPSE, DONE, SMALLEST_ATOL, TOO_SMALL
 from .dense_output import StepBlock
 from .first_step import LEAP, first_step
 from .run_options import RunOptions
-from .sampled_controller import HeldForces
+from .sampled_controller import Hold
 from .state_sizes import StateSizes
 from .step_program import CompiledSteps
 from .stepping import FIRST_PASSES, NativeIntegration
@@ -33,7 +33,7 @@ class AdaptiveIntegration(NativeIntegration):
         options: RunOptions,
         parameters: Sequence[float] = (),
         stopped: Callable[[], bool] = lambda: False,
-        control: HeldForces | None = None,
+        control: Hold | None = None,
     ) -> None:
         super().__init__(compiled, options, parameters, stopped, control)
         self.relative = max(options.relative, self.program.finest)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from .chosen_steps import AdaptiveIntegration
 from .run_options import RunOptions
-from .sampled_controller import HeldForces
+from .sampled_controller import Hold
 from .step_program import CompiledSteps
 from .stepping import FixedStepIntegration, NativeIntegration
 
@@ -16,7 +16,7 @@ def integration(
     options: RunOptions,
     parameters: Sequence[float] = (),
     stopped: Callable[[], bool] = lambda: False,
-    control: HeldForces | None = None,
+    control: Hold | None = None,
     *,
     every_step: bool = False,
 ) -> NativeIntegration:

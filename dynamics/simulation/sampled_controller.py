@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -54,7 +55,35 @@ class SampledController:
             raise ValueError(f"the period of a controller must be positive and finite, got {self.period!r} s")
 
 
-class HeldForces:
+class HeldForces(NamedTuple):
+    """What a SampledController has given in a run, a row for each period.
+
+    Parameters
+    ----------
+    t : ndarray
+        The starts of the periods, (k,) [s].
+    tau : ndarray
+        The forces held from there on, (k, n) [N m or N].
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> hold = dyn.SampledController(lambda q, qd, t: -q, period=0.25)
+    >>> dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.5], [0.0], t_end=1.0, tau=hold).held.t
+    array([0.  , 0.25, 0.5 , 0.75])
+    """
+
+    t: Array
+    tau: Array
+
+    def at(self, t: Array) -> Array:
+        """The forces at times (T,), (T, n); at the end of a period those of the next, NaN before the first."""
+        none = np.full((1, self.tau.shape[1]), np.nan)
+        rows: Array = np.concatenate([none, self.tau])[np.searchsorted(self.t, t + _rounding(t), side="right")]
+        return rows
+
+
+class Hold:
     """The forces of a controller along a run that starts at t0: those so far, and the times of the next.
 
     velocities: their names.  nq: of the numbers of a state, the coordinates.  times, forces: one for each period.
@@ -64,18 +93,18 @@ class HeldForces:
         self.controller, self.velocities, self.nq, self.t0 = controller, velocities, nq, t0
         self.times: list[float] = []
         self.forces: list[list[float]] = []
-        self._replayed = False
+        self._replayed: HeldForces | None = None
 
-    def replay(self) -> HeldForces:
+    def replay(self) -> Hold:
         """The same forces at the same times, for another run."""
-        other = HeldForces(self.controller, self.velocities, self.nq, self.t0)
-        other.times, other.forces, other._replayed = self.times, self.forces, True
+        other = Hold(self.controller, self.velocities, self.nq, self.t0)
+        other._replayed = self.held
         return other
 
     def at(self, t: float, x: Array) -> list[float]:
         """The forces from t on, (n,); x: the state, (m,)."""
-        if self._replayed:
-            return list(self.values(np.array([t]))[0].tolist())
+        if self._replayed is not None:
+            return list(self._replayed.at(np.array([t]))[0].tolist())
         if t >= self._start(len(self.times)) - _rounding(t):
             self.forces.append(self._called(t, x))
             self.times.append(t)
@@ -97,10 +126,10 @@ class HeldForces:
             result += self.ends(result[-1], instant)
         return result
 
-    def values(self, t: Array) -> Array:
-        """The forces at times (T,), (T, n); at the end of a period those of the next."""
-        at = np.searchsorted(self.times, t + _rounding(t), side="right") - 1
-        return np.array(self.forces)[at]
+    @property
+    def held(self) -> HeldForces:
+        """The forces so far."""
+        return HeldForces(np.array(self.times), np.array(self.forces).reshape(-1, len(self.velocities)))
 
     def _start(self, number: int) -> float:
         """The start of a period [s]."""

@@ -29,7 +29,7 @@ from .progress_bar import Progress
 from .recorder import Recorder
 from .row_values import row_values
 from .run_options import METHOD, TABLES, RunOptions, time_span
-from .sampled_controller import HeldForces
+from .sampled_controller import HeldForces, Hold
 from .scipy_solvers import ScipyIntegration, scipy_solver
 from .solution import Solution
 from .step_program import compile_steps, step_program
@@ -162,10 +162,10 @@ def simulate(
     # Derive the equations, xdot = f(x, t), the energy and the events as graphs
     problem = derive(model, applied.bound(start.bound))
     energy, log = total_energy(problem), EventLog(event_program(problem, watched)) if watched else None
-    held = applied.held(options)
+    hold = applied.hold(options)
 
     # Write the steps of the method over these graphs, and compile them
-    leg = _compiled(problem, options, held, between=bool(watched) or dense_output)
+    leg = _compiled(problem, options, hold, between=bool(watched) or dense_output)
 
     # Integrate, noting rows and events
     run = WatchedIntegration(leg, options, log) if log else leg(options)
@@ -175,7 +175,7 @@ def simulate(
     outcome = _integrate(run, start.x, recorder, options, problem.rate, steps)
 
     # Put the result together
-    (times, states), nq = recorder.table(), problem.nq
+    (times, states), nq, held = recorder.table(), problem.nq, None if hold is None else hold.held
     stats = _stats(run, options.method, outcome)
     for text in stats.warnings:
         warnings.warn(text, SimulationWarning, stacklevel=2)
@@ -186,7 +186,7 @@ def simulate(
 
 
 def _compiled(
-    problem: Problem, options: RunOptions, held: HeldForces | None, *, between: bool
+    problem: Problem, options: RunOptions, hold: Hold | None, *, between: bool
 ) -> Callable[[RunOptions], Integration]:
     """What makes a run, compiled, of options. between: with all steps, and the dense output of chosen ones."""
     name = options.scipy_solver
@@ -196,7 +196,7 @@ def _compiled(
     method = METHODS[options.method]
     program = step_program(problem, method, dense=method.adaptive and (between or options.times is not None))
     compiled = compile_steps(program, options.backend)
-    return lambda options: integration(compiled, options, control=held, every_step=between)
+    return lambda options: integration(compiled, options, control=hold, every_step=between)
 
 
 class _Outcome(NamedTuple):
@@ -273,7 +273,7 @@ def _run(
 def _energies(energy: Graph | None, times: Array, states: Array, held: HeldForces | None) -> Array:
     if energy is None:
         return np.full(len(times), math.nan)
-    return row_values(energy, times, states, None if held is None else held.values(times))[:, 0]
+    return row_values(energy, times, states, None if held is None else held.at(times))[:, 0]
 
 
 def _stats(run: Integration, method: str, outcome: _Outcome) -> Stats:

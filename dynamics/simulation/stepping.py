@@ -13,7 +13,7 @@ from cgraph.extend import Array
 from .dense_output import StepBlock
 from .equal_steps import EqualSteps, equal_steps
 from .run_options import RunOptions
-from .sampled_controller import HeldForces
+from .sampled_controller import Hold
 from .step_program import CompiledSteps
 
 BLOCK_TIME = 0.1  # s of run time after which a run comes back to Python: for Ctrl-C, progress and events
@@ -99,7 +99,7 @@ class NativeIntegration(Integration):
         options: RunOptions,
         parameters: Sequence[float] = (),
         stopped: Callable[[], bool] = lambda: False,
-        control: HeldForces | None = None,
+        control: Hold | None = None,
     ) -> None:
         super().__init__(compiled.program.components)
         self.program, self.runner, self.options = compiled.program, compiled.runner, options
@@ -150,7 +150,7 @@ class FixedStepIntegration(NativeIntegration):
         options: RunOptions,
         parameters: Sequence[float] = (),
         stopped: Callable[[], bool] = lambda: False,
-        control: HeldForces | None = None,
+        control: Hold | None = None,
         *,
         every_step: bool,
         stretches: Sequence[EqualSteps] | None = None,

@@ -140,7 +140,7 @@ class Trajectory:
     dense : Solution, optional
         The steps with their dense output, which `solution` reads; of a run with `dense_output=True`.
     held : HeldForces, optional
-        What a SampledController has given, `held.times` and `held.forces`, a row for each period.
+        What a SampledController has given, `held.t` and `held.tau`, a row for each period.
 
     Examples
     --------
@@ -213,7 +213,7 @@ class Trajectory:
         if name not in self.graphs:
             return np.empty_like(self.qd)
         states = np.concatenate([self.q, self.qd], axis=1)
-        return row_values(self.graphs[name], self.t, states, None if self.held is None else self.held.values(self.t))
+        return row_values(self.graphs[name], self.t, states, None if self.held is None else self.held.at(self.t))
 
     @property
     def success(self) -> bool:

@@ -1,6 +1,7 @@
 """Controllers: in closed form, as forces of the system; and sampled, held over periods."""
 
 import math
+import pickle
 from typing import Any
 
 import numpy as np
@@ -125,12 +126,12 @@ def test_held_forces_give_the_exact_discretization_of_a_linear_system(method: st
     options = {"tau": dyn.SampledController(regulator, period), "dense_output": True}
     run = dyn.simulate(SPRINGS, **START, t_end=1.0, method=method, **options, **step(method, 2e-3, rtol=1e-10))
     assert run.held is not None
-    assert regulator.calls == run.held.times == approx([k * period for k in range(10)])
+    assert regulator.calls == run.held.t.tolist() == approx([k * period for k in range(10)])
     error = ERRORS.get(METHODS[method].order, RUN_ERROR)
     a, b = discretized(period)
     a_half, b_half = discretized(0.5 * period)
     x = np.array([*START["q"], *START["qd"]])
-    for t in run.held.times:
+    for t in run.held.t:
         row, u = int(np.searchsorted(run.t, t)), -GAIN @ x
         assert run.t[row] == t
         assert np.concatenate([run.q[row], run.qd[row]]) == approx(x, abs=error)
@@ -140,6 +141,7 @@ def test_held_forces_give_the_exact_discretization_of_a_linear_system(method: st
     assert run.t[-1] == 1.0
     assert np.concatenate([run.q[-1], run.qd[-1]]) == approx(x, abs=error)
     assert (run.forces == run.tau).all()
+    assert (pickle.loads(pickle.dumps(run)).tau == run.tau).all()
 
 
 @mark.parametrize("method", [*ADAPTIVE, "rk4"])
@@ -153,8 +155,8 @@ def test_steps_end_where_periods_do_and_all_move(method: str, period: float) -> 
     chosen = dyn.simulate(SPRINGS, **START, t_end=1.0, method=method, tau=controller, t_eval=times, **limit)
     assert every.held is not None
     assert chosen.held is not None
-    assert len(chosen.held.times) == len(every.held.times) == math.ceil(1.0 / period - 1e-9)
-    assert set(every.held.times) <= set(every.t.tolist())
+    assert len(chosen.held.t) == len(every.held.t) == math.ceil(1.0 / period - 1e-9)
+    assert set(every.held.t.tolist()) <= set(every.t.tolist())
     assert np.diff(every.t).min() > 1e-9  # of periods of 70 ms, none is cut to a rounding
     assert chosen.success
     assert chosen.t.tolist() == times
@@ -204,7 +206,7 @@ def test_a_reset_leaves_held_forces_and_periods_as_they_are(method: str) -> None
     for t in instants:
         rows = np.flatnonzero(run.t == t)
         assert len(rows) == 2
-        assert (run.tau[rows] == run.held.forces[int(t / 0.1)]).all()
+        assert (run.tau[rows] == run.held.tau[int(t / 0.1)]).all()
 
 
 def test_the_error_of_equal_steps_is_estimated_without_a_call_more() -> None:
@@ -231,15 +233,18 @@ def test_what_a_controller_raises_says_when() -> None:
 
 
 def test_ctrl_c_in_a_controller_keeps_what_was_run() -> None:
-    def control(q: Array, qd: Array, t: float) -> Array:
-        if t > 0.45:
-            raise KeyboardInterrupt
-        return -q
+    for last in (0.5, 0.0):
 
-    run = dyn.simulate(SPRINGS, **START, t_end=1.0, tau=dyn.SampledController(control, 0.1))
-    assert run.message == "interrupted after t = 0.5 s"
-    assert run.t[-1] == 0.5
-    assert run.tau.shape == run.q.shape
+        def control(q: Array, qd: Array, t: float, last: float = last) -> Array:
+            if t > last - 0.05:
+                raise KeyboardInterrupt
+            return -q
+
+        run = dyn.simulate(SPRINGS, **START, t_end=1.0, tau=dyn.SampledController(control, 0.1))
+        assert run.message == f"interrupted after t = {last:g} s"
+        assert run.t[-1] == last
+        assert (run.tau[:-1] == run.forces[:-1]).all()
+        assert np.isnan(run.tau).any() == (last == 0.0)
 
 
 @mark.parametrize(
