@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cgraph.extend import real_number, require_flag
+from cgraph.extend import real_array, real_number, require_flag
 
 from ..multibody.body import Body, MechanismError
 from ..multibody.joint_force import Actuator, JointForce, JointFriction, JointLimit, Range
@@ -39,9 +39,12 @@ NONE = Smooth()
 
 def smooth(limits: Sequence[float] | None, friction: float | None, actuators: bool) -> Smooth:
     """The same, checked. Raises MechanismError and TypeError."""
-    springs = None if limits is None else tuple([real_number("limits", each) for each in limits])
-    if springs is not None and not (len(springs) == 2 and springs[0] > 0.0 and springs[1] >= 0.0):
-        raise MechanismError(f"limits must be (stiffness > 0, damping >= 0) of springs, got {limits!r:.60}")
+    springs = None
+    if limits is not None:
+        pair = real_array("limits", limits)
+        if pair.shape != (2,) or not (np.isfinite(pair).all() and pair[0] > 0.0 and pair[1] >= 0.0):
+            raise MechanismError(f"limits must be (stiffness > 0, damping >= 0) of springs, got {limits!r:.60}")
+        springs = (float(pair[0]), float(pair[1]))
     if friction is not None and not 0.0 < real_number("friction", friction) < math.inf:
         raise MechanismError(f"friction must be a velocity > 0, at which most of it acts, got {friction!r}")
     return Smooth(springs, friction, require_flag("actuators", actuators))

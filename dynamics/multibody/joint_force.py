@@ -8,9 +8,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, building, real_number
+from cgraph.extend import Builder, building, check_name, real_array, real_number
 
 from .body import Body, MechanismError
 from .external_force import FORCE
@@ -216,16 +218,17 @@ class Actuator(JointForce):
     def check(self, body: Body) -> None:
         """Raises MechanismError for a joint of several coordinates, and for numbers that are not finite."""
         self._require_axis(body)
+        where = f"Actuator on body {self.body!r}"
+        check_name(f"the input of the {where}", self.input, spaces=False)
         self._require("gear", self.gear)
         for what, numbers in (("gain", self.gain), ("bias", self.bias)):
-            if len(numbers) != 3:
-                raise MechanismError(f"Actuator on body {self.body!r}: {what} needs three numbers, got {numbers!r:.60}")
-            for number in numbers:
-                self._require(what, number)
+            if (row := real_array(f"{where}: {what}", numbers)).shape != (3,) or not np.isfinite(row).all():
+                raise MechanismError(f"{where}: {what} needs three finite numbers, got {numbers!r:.60}")
         for what, pair in (("input", self.input_range), ("force", self.force_range), ("joint", self.joint_range)):
-            if pair is not None and not (len(pair) == 2 and pair[0] <= pair[1]):
-                where = f"Actuator on body {self.body!r}: {what}_range"
-                raise MechanismError(f"{where} must be (lower, upper), got {pair!r}")
+            if pair is not None:
+                row = real_array(f"{where}: {what}_range", pair)
+                if row.shape != (2,) or not row[0] <= row[1]:
+                    raise MechanismError(f"{where}: {what}_range must be (lower, upper), got {pair!r:.60}")
 
     def along(self, q: Sequence[Node], qd: Sequence[Node], parameters: Mapping[str, Node]) -> list[Node]:
         """The force on the joint."""

@@ -49,7 +49,7 @@ class SampledController:
     period: float
 
     def __post_init__(self) -> None:
-        if not callable(self.function):
+        if not callable(self.function) or isinstance(self.function, type):
             raise TypeError(f"a controller must be a function of (q, qd, t), got {self.function!r:.60}")
         if not 0.0 < real_number("period", self.period) < math.inf:
             raise ValueError(f"the period of a controller must be positive and finite, got {self.period!r} s")
@@ -76,10 +76,11 @@ class HeldForces(NamedTuple):
     t: Array
     tau: Array
 
-    def at(self, t: Array) -> Array:
+    def at(self, t: ArrayLike) -> Array:
         """The forces at times (T,), (T, n); at the end of a period those of the next, NaN before the first."""
+        times = real_array("t", t)
         none = np.full((1, self.tau.shape[1]), np.nan)
-        rows: Array = np.concatenate([none, self.tau])[np.searchsorted(self.t, t + _rounding(t), side="right")]
+        rows: Array = np.concatenate([none, self.tau])[np.searchsorted(self.t, times + _rounding(times), side="right")]
         return rows
 
 

@@ -147,7 +147,7 @@ def test_joint_forces_go_with_their_bodies() -> None:
         (dyn.JointLimit("cart", 1.0, -1.0, 1e3), "lower must be below upper"),
         (dyn.JointLimit("cart", -1.0, 1.0, -1.0), "stiffness must be finite and at least 0"),
         (dyn.JointFriction("cart", 1.0, 0.0), "velocity must be positive"),
-        (dyn.Actuator("cart", "u", gain=(1.0,)), "gain needs three numbers"),
+        (dyn.Actuator("cart", "u", gain=(1.0,)), "gain needs three finite numbers"),
         (dyn.Actuator("cart", "u", force_range=(1.0, -1.0)), "force_range must be"),
         (dyn.Actuator("nobody", "u"), "unknown body 'nobody'"),
     ],
