@@ -3,9 +3,14 @@
 from cgraph import __version__ as __version__
 
 from . import scenes
+from .equations.arrays_at import arrays_at
+from .equations.consistent_state import consistent_state
+from .equations.constraint_rank import ConstraintWarning
 from .equations.coriolis import coriolis, damping_force
+from .equations.energies import kinetic_energy, potential_energy
 from .equations.equations_of_motion import bias, energy, forward_dynamics, gravity_force, mass_matrix, momentum
 from .equations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious_nodes
+from .equations.integrability import integrable_rows
 from .equations.linearization import linearize, state_space
 from .equations.singular_mass_matrix import SingularMassMatrixError, raise_if_singular
 from .equations.state_equation import state_equation
@@ -17,14 +22,23 @@ from .io.load import load_mjcf, load_urdf
 from .io.write_mjcf import to_mjcf
 from .io.write_urdf import to_urdf
 from .multibody.build_tree import serial_arm, tree
+from .multibody.frames import (
+    frame_acceleration,
+    frame_bias_acceleration,
+    frame_jacobian,
+    frame_jacobian_rate,
+    frame_placement,
+    frame_velocity,
+)
 from .multibody.impact import Attached, FreeBody, Released, attach_with_impact, release
 from .multibody.joint_force import Actuator, JointForce, JointFriction, JointLimit
-from .multibody.mechanism import Body, Force, Joint, Mechanism, MechanismError, MechanismWarning
+from .multibody.mechanism import Body, Force, Joint, Loop, Mechanism, MechanismError, MechanismWarning
 from .multibody.planar_arm import planar_arm
 from .multibody.pruning import EFFECTS, OmittedTerm, PruneResult, prune
 from .multibody.recursive_inverse_dynamics import RecursiveInverseDynamics
 from .multibody.regressor import inertial_parameters, regressor
 from .multibody.subtree import Subtree
+from .multibody.whole_body import center_of_mass, center_of_mass_jacobian, spatial_momentum
 from .reference import Reference, reference
 from .scenes.scenes import Scene
 from .simulation.ensembles import Ensemble, EnsembleStats, simulate_many
@@ -32,6 +46,7 @@ from .simulation.event import Event
 from .simulation.sampled_controller import HeldForces, SampledController
 from .simulation.simulate import simulate
 from .simulation.trajectory import Crossings, SimulationWarning, Stats, Trajectory
+from .systems.constraints import ConstraintError
 from .systems.controller import with_controller
 from .systems.model import as_system
 from .systems.ode_system import OdeSystem
@@ -48,6 +63,8 @@ __all__ = [
     "Attached",
     "Body",
     "Certificate",
+    "ConstraintError",
+    "ConstraintWarning",
     "Crossings",
     "Ensemble",
     "EnsembleStats",
@@ -59,6 +76,7 @@ __all__ = [
     "JointForce",
     "JointFriction",
     "JointLimit",
+    "Loop",
     "Mechanism",
     "MechanismError",
     "MechanismWarning",
@@ -78,18 +96,30 @@ __all__ = [
     "System",
     "TorqueTable",
     "Trajectory",
+    "arrays_at",
     "as_system",
     "attach_with_impact",
     "bias",
     "cases",
+    "center_of_mass",
+    "center_of_mass_jacobian",
     "certify",
+    "consistent_state",
     "coriolis",
     "damping_force",
     "energy",
     "forward_dynamics",
+    "frame_acceleration",
+    "frame_bias_acceleration",
+    "frame_jacobian",
+    "frame_jacobian_rate",
+    "frame_placement",
+    "frame_velocity",
     "gravity_force",
     "inertial_parameters",
+    "integrable_rows",
     "inverse_dynamics",
+    "kinetic_energy",
     "linearize",
     "load_mjcf",
     "load_urdf",
@@ -97,6 +127,7 @@ __all__ = [
     "momentum",
     "momentum_rate",
     "planar_arm",
+    "potential_energy",
     "prune",
     "raise_if_singular",
     "reference",
@@ -106,6 +137,7 @@ __all__ = [
     "serial_arm",
     "simulate",
     "simulate_many",
+    "spatial_momentum",
     "spurious_nodes",
     "state_equation",
     "state_space",

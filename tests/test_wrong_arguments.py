@@ -63,6 +63,15 @@ def body(name="b", parent="world"):
     return dyn.Body(name, dyn.Joint("revolute"), parent, 1.0, (0.0, 0.0, 0.0), (0.1, 0.1, 0.1))
 
 
+def closed(body_name, to, at, to_at, axis, length, coefficients, name):
+    """One-body mechanisms with a loop of every kind."""
+    for kind in ("distance", "hinge", "rolling"):
+        loop = dyn.Loop(kind, body_name, to, at, to_at, axis, axis, length=length, name=name)
+        dyn.Mechanism([body(), body("c", "b")], loops=[loop])
+    coupling = dyn.Loop("coupling", body_name, "c", coefficients=coefficients, name=name)
+    return dyn.Mechanism([body(), body("c", "b")], loops=[coupling])
+
+
 def lagrangian(q, qd, t):
     return 0.5 * qd[0] ** 2
 
@@ -85,8 +94,11 @@ LINK = {"joint": dyn.Joint("revolute"), "mass": 1.0, "inertia": (0.1, 0.1, 0.1)}
 SCENE = (ARM, (0.0,), (0.0,), 1.0)
 FIRST, LAST = TWO.bodies[0].name, TWO.bodies[1].name
 RUNS = {"dt": 0.01, "max_steps": 100, "backend": "python", "estimate_error": False, "progress": False}
-MODEL_ALONE = """as_system bias coriolis damping_force energy gravity_force inertial_parameters mass_matrix momentum
-    regressor state_equation state_space to_urdf torque_by_joint_motion torque_by_link RecursiveInverseDynamics"""
+MODEL_ALONE = """as_system bias coriolis damping_force energy gravity_force inertial_parameters integrable_rows
+    mass_matrix momentum center_of_mass center_of_mass_jacobian kinetic_energy potential_energy regressor state_equation
+    state_space to_urdf
+    torque_by_joint_motion torque_by_link
+    RecursiveInverseDynamics"""
 
 CALLS = {
     **{f"cg.{op.name}": call(function(op), *[X] * op.arity) for op in OPS.values()},
@@ -119,6 +131,13 @@ CALLS = {
     "cg.Comparison.classes": call(cg.compare(GRAPH, SQUARES).classes, "left"),
     "cg.CSource.write": call(cg.to_c(GRAPH).write, os.devnull),
     **{f"dyn.{name}": call(getattr(dyn, name), ARM) for name in MODEL_ALONE.split()},
+    "dyn.consistent_state": call(dyn.consistent_state, ARM, [0.0], [0.0], 0.0, parameters=None),
+    "dyn.frame_placement": call(dyn.frame_placement, ARM, FIRST, (0.0, 0.0, 0.0)),
+    **{f"dyn.frame_{name}": call(getattr(dyn, f"frame_{name}"), ARM, FIRST, (0.0, 0.0, 0.0), "world")
+       for name in ("acceleration", "bias_acceleration", "jacobian", "jacobian_rate", "velocity")},
+    "dyn.arrays_at": call(dyn.arrays_at, ARM, dyn.mass_matrix(ARM), [0.0], None, None, None, t=0.0, parameters=None),
+    "dyn.spatial_momentum": call(dyn.spatial_momentum, ARM, "origin"),
+    "dyn.Mechanism.chain": call(ARM.chain, FIRST),
     "dyn.forward_dynamics": call(dyn.forward_dynamics, ARM, "auto", check=False),
     "dyn.inverse_dynamics": call(dyn.inverse_dynamics, ARM, "chain_rule", simplify=True),
     "dyn.momentum_rate": call(dyn.momentum_rate, ARM, "chain_rule", simplify=True, keep_momentum=False),
@@ -162,10 +181,14 @@ CALLS = {
     "dyn.SampledController": call(dyn.SampledController, lambda q, qd, t: q, 0.1),
     "dyn.HeldForces.at": call(dyn.HeldForces(np.zeros(1), np.zeros((1, 1))).at, [0.1]),
     "dyn.with_controller": call(dyn.with_controller, ARM, lambda q, qd, t, p: [p["k"]], {"k": 1.0}),
+    "dyn.Loop": call(lambda kind: dyn.Loop(kind, "b"), "point"),
+    "dyn.Mechanism with a loop": call(closed, "b", "world", (0, 0, 0), (0, 0, 0), (0, 0, 1), 1.0, [0.0, 1.0], "loop"),
     "dyn.Event": call(dyn.Event, "e", lambda q, qd, t: q[0], 0, False, None),
     "dyn.Mechanism": call(dyn.Mechanism, [body()], (0.0, 0.0, -9.81), (), {}, {}, False),
     "dyn.OdeSystem": call(dyn.OdeSystem, lambda x, t: [-x[0]], ["x"], {}),
-    "dyn.System": call(dyn.System, lagrangian, ["a"], {}, None, 0.0, None),
+    "dyn.System": call(
+        dyn.System, lagrangian, ["a"], {}, None, 0.0, None, constraints=None, velocity_constraints=None
+    ),
     "dyn.Scene": call(dyn.Scene, "s", "about", *SCENE),
     "dyn.RecursiveInverseDynamics()": call(dyn.RecursiveInverseDynamics(ARM), [0.0], [0.0], [0.0]),
     "dyn.Mechanism.attach": call(TWO.detach(LAST).attach, SUBTREE, None),
@@ -340,7 +363,7 @@ CASES = {
     "info of no coordinate": (lambda: dyn.raise_if_singular(ARM, 7.0), "from 1 to 1 for a coordinate, got 7"),
     "rows without room": (lambda: LOOP.batch([[1.0]], 10**12), "do not fit in memory"),
     "half a link": (lambda: dyn.scenes.load("chain", n=2.5), "at least one link, got 2.5"),
-    "kind of a joint": (lambda: dyn.Joint("screw"), "must be one of ball, fixed, free, free (body axes), "),
+    "kind of a joint": (lambda: dyn.Joint("cogwheel"), "must be one of ball, fixed, free, free (body axes), "),
     "start too long": (lambda: dyn.scenes.Scene("s", "", ARM, (0.0, 0.0), (0.0,), 1.0), "q needs 1 finite numbers"),
     "start of text": (lambda: dyn.scenes.Scene("s", "", ARM, ("a",), (0.0,), 1.0), "q"),
     "time backwards": (lambda: dyn.scenes.Scene("s", "", ARM, (0.0,), (0.0,), -1.0), "t_end must be positive"),

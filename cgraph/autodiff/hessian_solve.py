@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from ..core.graph import Graph, require_graph
 from ..core.label import ADJOINT, TANGENT
@@ -12,6 +12,7 @@ from ..core.traversal import topological
 from ..simplify.builder import Builder
 from ..util.require import require_flag, require_sequence
 from .elimination_order import Step, elimination_steps
+from .reverse import cotangents
 from .schur_elimination import EdgePushing
 
 
@@ -78,6 +79,7 @@ def solve_nodes(
     build: Builder | None = None,
     *,
     at: Mapping[Node, Node] | None = None,
+    multipliers: Collection[Node] = (),
     check: bool = False,
 ) -> list[Node]:
     """Nodes x with (d2f/dw2) x = rhs: `cg.hessian_solve` on nodes.
@@ -101,8 +103,13 @@ def solve_nodes(
     at : mapping of Node to Node, optional
         {z: b_z}, right-hand sides at nodes that depend on w. They stand for (dz/dw)^T b_z more at w, but reach w by the
         elimination itself: fewer nodes, and no large sums at w that the elimination has to undo.
+    multipliers : collection of Node
+        Those s of w that f is linear in, f = g(u) + s . h(u), as of constraints h. They have no pivots of their own,
+        and each is eliminated after the last of the variables that its df/ds depends on.
     check : bool
-        Append the node that tells whether the Hessian is positive definite, see `cg.hessian_solve`.
+        Append the node that tells whether the Hessian is positive definite, see `cg.hessian_solve`; with multipliers,
+        whether it is so in u, and whether each of them leaves with a negative pivot: 0, or 1 + the index in w of the
+        first that does not.
 
     Returns
     -------
@@ -128,7 +135,7 @@ def solve_nodes(
     order = _dependent([output, *(at or ())], wrt)
     with building(build) as set_label:
         equations = EdgePushing(build, output, dict(zip(wrt, rhs, strict=True)), at or {}, order)
-        plan = elimination_steps(equations.arguments(), equations.rotations)
+        plan = elimination_steps(equations.arguments(_rows(output, multipliers, wrt)), equations.rotations)
         for step in plan:
             set_label(_node_of(step).label.derived(ADJOINT))
             equations.reduce(step)
@@ -139,8 +146,17 @@ def solve_nodes(
         x = [equations.dots[node] for node in wrt]
         if check:
             set_label(output.label.derived(ADJOINT))
-            x.append(equations.info())
+            x.append(equations.info(multipliers))
     return x
+
+
+def _rows(output: Node, multipliers: Collection[Node], wrt: Sequence[Node]) -> dict[Node, list[Node]]:
+    """{s: the variables that df/ds depends on}."""
+    if not multipliers:
+        return {}
+    slopes = cotangents({output: as_node(1.0)}, list(multipliers))
+    rows = {s: set(topological([slope])) for s, slope in zip(multipliers, slopes, strict=True)}
+    return {s: [w for w in wrt if w in reached] for s, reached in rows.items()}
 
 
 def _node_of(step: Step) -> Node:

@@ -55,8 +55,11 @@ class EdgePushing(SymmetricElimination):
         self.dots: dict[Node, Node] = {}  # tangents
         self.partials: dict[Node, dict[Node, Node]] = {}  # of each operation, by argument that depends on w
 
-    def arguments(self) -> dict[Node, list[Node]]:
-        """The nodes that each step's equation passes to; nodes that leave with another are no key."""
+    def arguments(self, rows: Mapping[Node, Sequence[Node]]) -> dict[Node, list[Node]]:
+        """The nodes that each step's equation passes to; nodes that leave with another are no key.
+
+        rows: {multiplier: variables that its row holds}; the equation of each of these passes to it.
+        """
         firsts = {r.second: r.first for r in self.rotations.values()}
         absorbed = {node for r in self.rotations.values() for node in r.products}
         absorbed |= {terms.variable for terms in self.sums.values()} | firsts.keys()
@@ -69,6 +72,10 @@ class EdgePushing(SymmetricElimination):
                 elif node in self.rotations:
                     args = self.rotations[node].x, self.rotations[node].y
                 result[node] = list(dict.fromkeys([firsts.get(arg, arg) for arg in args if arg in self.depends]))
+        leaves_at = {terms.variable: node for node, terms in self.sums.items()}
+        for multiplier, variables in rows.items():
+            for variable in variables:
+                result[leaves_at.get(variable, variable)].append(leaves_at.get(multiplier, multiplier))
         return result
 
     def reduce(self, step: Step) -> None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
 from ..core.node import Node, as_node
-from ..core.ops import less, where
+from ..core.ops import equal, less, where
 from ..errors import GraphError
 from .symmetric_matrix import ZERO, SymmetricMatrix
 
@@ -115,17 +115,24 @@ class SymmetricElimination:
             total = total - gain * known[other]
         return total
 
-    def info(self) -> Node:
-        """0 where all pivots are positive, else 1 + the place of the first that is not (NaN is not), as a node.
+    def info(self, negative: Collection[Node] = ()) -> Node:
+        """0 where all pivots have their sign, else 1 + the place of the first that has not (NaN has not), as a node.
 
-        Once one has failed, those after it mean nothing. Two operations for each pivot. Raises SingularError for a
-        constant that is not positive, and for a pair: one of its eigenvalues is negative.
+        negative: unknowns whose pivots are to be negative; those of others are to be positive. Once one has failed,
+        those after it mean nothing. Two operations for each pivot. Raises SingularError for a constant of the other
+        sign, and for a pair, unless it is one of each kind: one of its eigenvalues is negative.
         """
-        if self._pairs:
-            raise SingularError(self.place[self._pairs[0][0]], regular=True)
+        pairs = {i: pair for pair in self._pairs for i in pair}
         info = as_node(0.0)
         for i, row in reversed(self.pivot_rows.items()):
-            if row.pivot.value is not None and row.pivot.value <= 0.0:
+            if i in pairs:
+                if sum(each in negative for each in pairs[i]) != 1:
+                    raise SingularError(self.place[i], regular=True)
+                info = where(equal(row.pivot, 0.0), 1.0 + self.place[i], info)
+                continue
+            sign = -1.0 if i in negative else 1.0
+            if row.pivot.value is not None and sign * row.pivot.value <= 0.0:
                 raise SingularError(self.place[i], row.pivot.value)
-            info = where(less(0.0, row.pivot), info, 1.0 + self.place[i])
+            right = less(row.pivot, 0.0) if i in negative else less(0.0, row.pivot)
+            info = where(right, info, 1.0 + self.place[i])
         return info

@@ -23,6 +23,7 @@ class BiasTerms(NamedTuple):
     forces: list[Node]  # applied ones, the same
     inertial: dict[Node, Node]  # d/dt dL/dz, by z
     gradient: list[Node]  # dL/dq at fixed z
+    rates: list[Node]  # rows of velocities that constraints hold at 0
 
     def bias(self, system: System, build: Builder) -> list[Node]:
         """The bias at the coordinates: one reverse sweep carries all inertial terms from their velocities to qd."""
@@ -38,21 +39,23 @@ def bias_terms(system: System) -> BiasTerms:
         return bias_terms_of_lagrangian(system)
     pairs = [node for pair in stated for node in pair]
     build = Builder()
-    lagrangian, *nodes = folded([system.lagrangian, *system.forces, *pairs], build)
-    forces, pairs = nodes[: system.n], nodes[system.n :]
+    rates, n = system.constraints.rates, system.n
+    lagrangian, *nodes = folded([system.lagrangian, *system.forces, *pairs, *rates], build)
+    forces, pairs, rows = nodes[:n], nodes[n : n + len(pairs)], nodes[n + len(pairs) :]
     inertial: dict[Node, Node] = {}
     with building(build):
         for velocity, force in zip(pairs[::2], pairs[1::2], strict=True):
             if velocity.value is None:  # a constant velocity does no virtual work
                 inertial[velocity] = inertial.get(velocity, ZERO) + force
-    return BiasTerms(lagrangian, forces, inertial, [ZERO] * system.n)
+    return BiasTerms(lagrangian, forces, inertial, [ZERO] * system.n, rows)
 
 
 def bias_terms_of_lagrangian(system: System) -> BiasTerms:
     """Lagrange's equation of L(q, z(q, qd), t), term by term."""
     # Two builders: a term of L must not get the tags of an equal term that derives from it, and hand them on.
     written, build = Builder(), Builder()
-    lagrangian, *forces = folded([system.lagrangian, *system.forces], written)
+    lagrangian, *nodes = folded([system.lagrangian, *system.forces, *system.constraints.rates], written)
+    forces, rates = nodes[: system.n], nodes[system.n :]
     if system.kinematics.quasi is None:
         velocities = velocity_nodes(lagrangian, system.q, system.qd, system.t, written)
     else:  # the identities behind velocity nodes hold of rates of functions of q, which quasi-velocities are not
@@ -68,4 +71,4 @@ def bias_terms_of_lagrangian(system: System) -> BiasTerms:
     )
     dots = tangents(x_dot, momenta, build)
     inertial = {velocity: dots[p] for velocity, p in zip(velocities, momenta, strict=True) if p in dots}
-    return BiasTerms(lagrangian, forces, inertial, gradient)
+    return BiasTerms(lagrangian, forces, inertial, gradient, rates)

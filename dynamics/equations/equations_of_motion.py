@@ -4,21 +4,13 @@ from __future__ import annotations
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import (
-    Builder,
-    SingularError,
-    building,
-    cotangents,
-    hessian_nodes,
-    ldl_solve,
-    require_choice,
-    require_flag,
-    solve_nodes,
-)
+from cgraph.extend import Builder, SingularError, building, cotangents, hessian_nodes, require_choice, require_flag
 
+from ..systems.constraints import ConstraintError
 from ..systems.model import Model, as_system
 from ..systems.system import BodySystem, System
 from .bias_terms import BiasTerms, bias_terms, bias_terms_of_lagrangian
+from .constraints import constraint_rows, multiplier_outputs, solved_by_elimination, solved_dense, unknown_names
 from .formulations import ONE, ZERO
 from .inertia_rank import without_inertia
 from .shorter_form import shorter_form
@@ -226,15 +218,21 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
     check : bool
         One more output, `info`: 0 where M is positive definite, else 1 + the index of the coordinate whose inertia
         is zero or negative after elimination; the accelerations mean nothing there. `raise_if_singular` raises on it.
-        Three nodes a coordinate. Without, the result where M is singular is infinite, NaN or meaningless.
+        Three nodes a coordinate. Beyond the coordinates it counts the independent constraints: that one says nothing
+        new at this state. Not by "dense" where there are constraints. Without `check`, the result where M is singular
+        is infinite, NaN or meaningless.
 
     Returns
     -------
     Graph
-        Inputs q0.., qd0.., tau0.., t if needed, parameters; outputs qdd0.., (n,) [rad/s^2 or m/s^2].
+        Inputs q0.., qd0.., tau0.., t if needed, parameters; outputs qdd0.., (n,) [rad/s^2 or m/s^2]. With constraints
+        then lambda0.., (m,): M qdd = tau + forces - damping * qd - bias + J^T lambda, for the rows J of all
+        constraints. Those that follow from others are left out, with a warning that names them; theirs are 0.
 
     Raises
     ------
+    ConstraintError
+        No state was seen that meets the constraints, or they hold a direction without inertia.
     SingularMassMatrixError
         M is singular at every state, or with `check` not positive definite at any; the message names the coordinates.
         An indefinite M that is regular is solved with.
@@ -249,9 +247,20 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
     >>> block = dyn.System(lambda q, qd, t: 0.5 * 4.0 * qd[0] ** 2, ["x"], damping=0.5)
     >>> dyn.forward_dynamics(block).evaluate({"q0": 0.0, "qd0": 2.0, "tau0": 9.0})
     {'qdd0': 2.0}
+
+    A mass of 1 kg at the end of a rod of 1 m, in x and y: the rod pulls with its weight, and holds it on its circle.
+
+    >>> def energy(q, qd, t):
+    ...     return 0.5 * (qd[0] ** 2 + qd[1] ** 2) - 9.81 * q[1]
+    >>> rod = dyn.System(energy, "x y", constraints=lambda q, t: {"rod": 0.5 * (q[0] ** 2 + q[1] ** 2 - 1.0)})
+    >>> at = {"q0": 0.0, "q1": -1.0, "qd0": 2.0, "qd1": 0.0, "tau0": 0.0, "tau1": 0.0}
+    >>> dyn.forward_dynamics(rod).evaluate(at)
+    {'qdd0': 0.0, 'qdd1': 4.0, 'lambda0': -13.81}
     """
     require_choice("method", method, SOLUTIONS)
     require_flag("check", check)
+    if check and method == "dense" and len(as_system(model).constraints):
+        raise ValueError('check needs method="recursive" or "auto" where there are constraints, got "dense"')
     return shorter_form(as_system(model), lambda system: accelerations(system, method, check))
 
 
@@ -271,12 +280,24 @@ def _require_inertia(system: System, accelerations: Graph) -> None:
         )
 
 
+def _require_inertia_without_constraints(system: System) -> None:
+    """A coordinate whose inertia is the constant zero may leave with a constraint; one that is rounding must not."""
+    free = system.without_constraints
+    try:
+        graph = _solved(free, bias_terms(free), "recursive", check=False)
+    except SingularError:
+        return
+    _require_inertia(free, graph)
+
+
 def accelerations(system: System, method: str = "auto", check: bool = False) -> Graph:
     """Forward dynamics from the Lagrangian as it is written, by one of `SOLUTIONS`.
 
     Raises SingularMassMatrixError, see `forward_dynamics`.
     """
-    methods = [method] if method != "auto" else ["recursive", "dense"] if system.n <= DENSE_UP_TO else ["recursive"]
+    held = bool(len(system.constraints))
+    short = system.n <= DENSE_UP_TO and not (held and check)
+    methods = [method] if method != "auto" else ["recursive", "dense"] if short else ["recursive"]
     terms = bias_terms(system)
     graphs: list[Graph] = []
     for each in methods:  # the dense matrix may lose in its entries what elimination keeps
@@ -284,17 +305,26 @@ def accelerations(system: System, method: str = "auto", check: bool = False) -> 
             graphs.append(_solved(system, terms, each, check))
         except SingularError as error:
             failure = error
+    if not graphs and failure.index >= system.n:
+        raise ConstraintError(
+            f"the constraints are singular: {unknown_names(system)[failure.index]} does nothing, or holds a direction "
+            "without inertia"
+        ) from None
     if not graphs:
         raise SingularMassMatrixError(_without_inertia(system, failure)) from None
     chosen = graphs[-1] if len(graphs[-1].nodes) < WORTH * len(graphs[0].nodes) else graphs[0]
     if not isinstance(system, BodySystem):  # bodies have masses; of another Lagrangian nobody knows
-        _require_inertia(system, chosen)
+        if held:
+            _require_inertia_without_constraints(system)
+        else:
+            _require_inertia(system, chosen)
     return chosen
 
 
 def _solved(system: System, terms: BiasTerms, method: str, check: bool) -> Graph:
-    """M qdd = tau + forces - D qd - bias, solved by one method."""
+    """M qdd - J^T lambda = tau + forces - D qd - bias, J qdd = -(dJ/dt) qd, solved by one method."""
     build = Builder()
+    rows = constraint_rows(system, terms)
     with building(build):
         # What stands at the coordinates already. Elimination takes the inertial terms where they are, at their
         # velocity nodes, and carries them to the coordinates on its way; a dense solve needs the whole bias here.
@@ -306,10 +336,13 @@ def _solved(system: System, terms: BiasTerms, method: str, check: bool) -> Graph
             for tau, force, brake, applied in zip(system.tau, at_rest, braking, terms.forces, strict=True)
         ]
         inertial = {velocity: -force for velocity, force in terms.inertial.items()}
+        rhs += [-change for change in system.constraints.rate_changes(rows.rates, build)]
     if method == "recursive":
-        solved = solve_nodes(terms.lagrangian, system.qd, rhs, build, at=inertial, check=check)
+        solved = solved_by_elimination(system, terms, rows, rhs, inertial, build, check)
     else:
-        solved = ldl_solve(hessian_nodes(terms.lagrangian, system.qd, build), rhs, build, check=check)
-    names = [f"qdd{i}" for i in range(system.n)] + ["info"] * check
-    outputs = dict(zip(names, solved, strict=True))
+        solved = solved_dense(system, terms, rows, rhs, build, check)
+    end = system.n + len(rows.kept)
+    outputs = {f"qdd{i}": node for i, node in enumerate(solved[: system.n])}
+    outputs |= multiplier_outputs(system, rows, solved[system.n : end], build)
+    outputs |= dict(zip(("info",), solved[end:], strict=False))
     return cg.simplify(system.graph(outputs, system.q, system.qd, system.tau))

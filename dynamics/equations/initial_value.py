@@ -14,6 +14,7 @@ from cgraph.extend import Array, real_array
 
 from ..systems.arguments import parameter_value, per_coordinate
 from ..systems.model import Model, as_ode, as_system
+from .projection import projected_start
 from .state_equation import StateInputs, normalization, state_inputs
 
 PAST = 1e-14  # of the end: some roundings, by which a last time may lie past it
@@ -33,14 +34,28 @@ def initial_value(
     qd: ArrayLike | None,
     tau: float | Sequence[float] = 0.0,
     parameters: Mapping[str, float] | None = None,
+    t: float = 0.0,
 ) -> InitialValue:
     """The start of a model's motion.
 
     q, qd: (nq,) and (n,), or the states of an OdeSystem and None; of a quaternion in q only the direction counts.
     tau: constant applied force, for all velocities or for each.  parameters: values in place of the model's own.
+    t: when [s]. A start that does not meet the constraints of a system is moved onto them, with a ConstraintWarning.
 
     Raises TypeError or ValueError, naming the argument, for another shape or what is not finite.
     """
+    start = given_start(model, q, qd, tau, parameters)
+    return start._replace(x=on_constraints(model, start.x, t, start.bound))
+
+
+def given_start(
+    model: Model,
+    q: ArrayLike,
+    qd: ArrayLike | None,
+    tau: float | Sequence[float] = 0.0,
+    parameters: Mapping[str, float] | None = None,
+) -> InitialValue:
+    """The start as it is given, whether or not it meets the constraints of the model."""
     inputs = state_inputs(model)
     values = _parameters(inputs, parameters)
     if inputs.applied:
@@ -77,6 +92,14 @@ def normalized(model: Model, x: Array) -> Array:
         of = f" of trajectory {row[0]}" if row else ""
         raise ValueError(f"{names} need a length whose square is neither 0 nor beyond float64, got {values}{of}")
     return result
+
+
+def on_constraints(model: Model, x: Array, t: float, values: Mapping[str, float]) -> Array:
+    """A state (m,) that meets the constraints of a model, near to x. Warns where it is another."""
+    if as_ode(model) is not None:
+        return x
+    system = as_system(model)
+    return projected_start(system, x, t, {name: values[name] for name in system.parameters})
 
 
 def check_names(inputs: StateInputs, names: Iterable[str]) -> None:

@@ -58,6 +58,7 @@ def state_space(model: Model) -> Graph:
 
 
 def _state_space(system: System) -> Graph:
+    system.constraints.require_none("state_space")
     n, build = system.n, Builder()
     qdd = accelerations(system)
     (lagrangian,) = folded([system.lagrangian], Builder())

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from cgraph.extend import real_array
 
 from ..systems.model import Model, as_system
+from .constraints import unknown_names
 
 
 class SingularMassMatrixError(ValueError):
@@ -54,7 +55,7 @@ def raise_if_singular(model: Model, info: ArrayLike) -> None:
     ...     print(error)
     the mass matrix is not positive definite: coordinate 'x' has an inertia that is not positive
     """
-    values, names = real_array("info", info), as_system(model).velocities
+    values, names = real_array("info", info), unknown_names(as_system(model))
     failed = np.argwhere(values != 0.0)
     if len(failed):
         at = tuple(failed[0].tolist())
@@ -62,6 +63,8 @@ def raise_if_singular(model: Model, info: ArrayLike) -> None:
             raise ValueError(f"info must be 0, or from 1 to {len(names)} for a coordinate, got {values[at]:g}")
         name = names[int(values[at]) - 1]
         where = f" at state {', '.join(map(str, at))}" if at else ""
+        if name.startswith("constraint"):
+            raise SingularMassMatrixError(f"the constraints are singular{where}: {name} follows from others")
         raise SingularMassMatrixError(
-            f"the mass matrix is not positive definite{where}: coordinate {name!r} has an inertia that is not positive"
+            f"the mass matrix is not positive definite{where}: {name} has an inertia that is not positive"
         )

@@ -38,6 +38,7 @@ def mechanics(problem: Problem) -> Mechanics:
     system = problem.system
     if system is None or not problem.canonical:
         raise ValueError("this method steps momenta dL/dqd of coordinates, which the model does not have")
+    system.constraints.require_none("a method that steps momenta")
     build = Builder()
     p = cg.variables([f"p{i}" for i in range(system.n)])
     bars = cotangents({system.lagrangian: ONE}, [*system.q, *system.qd], build)

@@ -12,6 +12,7 @@ from cgraph import Graph, Node
 from cgraph.extend import topological
 
 from ..equations.equations_of_motion import energy
+from ..equations.projection import projection
 from ..equations.state_equation import normalization, state_equation, state_inputs
 from ..systems.arguments import TIME, Parameters, call_user_function
 from ..systems.model import Model, as_ode, as_system
@@ -29,6 +30,8 @@ class Problem:
     rate: f, inputs the states, t, parameters; outputs the rates of the states.
     normalization: a state to the same one with the constraint of its coordinates met, as unit quaternions; None
     without any.
+    projection: a state to one nearer to the constraints, and normalized; inputs the states, t, parameters. None without
+    constraints.
     system: the Lagrangian system; None for a first-order one.
     """
 
@@ -39,6 +42,7 @@ class Problem:
     bound: Mapping[str, float]
     rate: Graph
     normalization: Graph | None
+    projection: Graph | None
     system: System | None
 
     @property
@@ -79,6 +83,7 @@ def derive(model: Model, bound: Mapping[str, float]) -> Problem:
         moving = system.kinematics
         equations = (system.coordinates, system.partial_lagrangians, system.forces, system.damping)
         equations += (system.velocities, *moving.q_dot, *moving.normalized(moving.q), moving.groups)
+        equations += (system.constraints.positions, system.constraints.velocities)
     numbers = tuple([(name, float(value).hex()) for name, value in bound.items()])  # 0.0 and -0.0 stay apart
     key = (*equations, inputs.states, inputs.applied, tuple(inputs.parameters), numbers)
     return _derived(_Request(key, model, bound))
@@ -103,8 +108,10 @@ def _derived(request: _Request) -> Problem:
         rated = set(system.coordinates)
         components += [f"velocity {'of ' if name in rated else ''}{name!r}" for name in system.velocities]
     rate = _bind(state_equation(model), inputs.states, parameters, bound)
-    constraint = normalization(model)
-    return Problem(model, inputs.states, tuple(components), parameters, bound, rate, constraint, system)
+    step = None if system is None else projection(system)
+    projected = None if step is None else _bind(step, inputs.states, parameters, bound)
+    whole = normalization(model)
+    return Problem(model, inputs.states, tuple(components), parameters, bound, rate, whole, projected, system)
 
 
 def _bind(graph: Graph, first: Sequence[str], parameters: Sequence[str], bound: Mapping[str, float]) -> Graph:

@@ -101,7 +101,7 @@ def load_urdf(
     Raises
     ------
     MechanismError
-        For a file that is missing or wrong, for joints of other types (floating, planar), for joints that mimic others,
+        For a file that is missing or wrong, for joints of other types, for joints that mimic others,
         unless `ignore`, and as `Mechanism`.
 
     Examples

@@ -19,7 +19,7 @@ from .smooth_forces import NONE, Smooth
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s^2, where the file says nothing
 FAR = 1e9  # m: a limit of a slide that `to_urdf` writes because URDF asks for one; it stands for none
-_WITH_LIMITS = {"revolute": "revolute"}  # URDF's word for a hinge with limits, beside those of the joint types
+_OTHERS = {"revolute": "revolute", "planar": "planar"}  # beside the words of joint types: a hinge with limits, three
 _KNOWN = {
     "robot": {"link", "joint", "material"},
     "link": {"inertial", "visual", "collision"},
@@ -95,12 +95,12 @@ def _end(joint: Element, name: str, which: str) -> str:
 def _joint(joint: Element, name: str, child: str) -> Joint:
     """The joint, called as in the file."""
     where, word = f"joint {name!r}", joint.get("type")
-    kinds = {each.urdf: kind for kind, each in TYPES.items() if each.urdf} | _WITH_LIMITS
+    kinds = {each.urdf: kind for kind, each in TYPES.items() if each.urdf} | _OTHERS
     if word not in kinds:
         given = f"is {word}" if word else "has no type"
         raise MechanismError(f"{where} {given}, and a mechanism has {', '.join(sorted(kinds))}")
     fields: dict[str, Any] = dict(zip(("position", "orientation"), _origin(joint, where), strict=True))
-    if TYPES[kinds[word]].moves:
+    if kinds[word] != "fixed":
         axis, dynamics = _one(joint, where, "axis"), _one(joint, where, "dynamics")
         fields["axis"] = (1.0, 0.0, 0.0) if axis is None else _numbers(axis, where, "xyz", 3)
         fields["damping"] = 0.0 if dynamics is None else _numbers(dynamics, where, "damping", 1, "0")[0]

@@ -14,7 +14,6 @@ from cgraph.extend import real_number
 
 from ..multibody import spatial
 from ..multibody.joints import AxialJoint
-from ..multibody.kinematic_tree import lock_joints, parents_first
 from ..multibody.mechanism import WORLD, Body, Mechanism, MechanismError, require_mechanism
 from ..multibody.spatial import Array
 from ..systems.model import Model
@@ -61,11 +60,6 @@ def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
     return mjcf_text(mechanism, timestep)
 
 
-def all_bodies(mechanism: Mechanism) -> list[Body]:
-    """The bodies of a mechanism, checked, parents first, those welded too; a joint that is locked is a weld."""
-    return parents_first(lock_joints([mechanism.shared.body(body) for body in mechanism.bodies], mechanism.locked))
-
-
 def moving_alone(mechanism: Mechanism) -> Mechanism:
     """The mechanism of the bodies that move, those welded to them merged in."""
     return replace(mechanism, bodies=mechanism.moving, locked={})
@@ -77,7 +71,9 @@ def mjcf_text(
     """The text of a mechanism with more elements: `head` before the bodies, `shapes` in the bodies of those names."""
     if mechanism.forces:
         raise MechanismError(f"MJCF has no forces, there is one on body {mechanism.forces[0].body!r}")
-    bodies = all_bodies(mechanism)
+    if mechanism.loops:
+        raise MechanismError(f"loops are not written to MJCF; there is {mechanism.loops[0].label!r}")
+    bodies = mechanism.parts
     moments = {body.name: _principal(body) for body in bodies}
     inertial = {
         name: (mass, _diagonal(values, moments[name][1]))

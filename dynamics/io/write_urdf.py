@@ -12,7 +12,7 @@ from ..multibody.mechanism import WORLD, Body, MechanismError, require_mechanism
 from ..multibody.spatial import Array
 from ..systems.model import Model
 from .read_urdf import FAR, GRAVITY
-from .write_mjcf import all_bodies, numbers
+from .write_mjcf import numbers
 
 
 def to_urdf(model: Model) -> str:
@@ -47,13 +47,15 @@ def to_urdf(model: Model) -> str:
     mechanism = require_mechanism(model, "URDF")
     if mechanism.forces:
         raise MechanismError(f"URDF has no forces, there is one on body {mechanism.forces[0].body!r}")
+    if mechanism.loops:
+        raise MechanismError(f"loops are not written to URDF; there is {mechanism.loops[0].label!r}")
     lines = ['<?xml version="1.0"?>', '<robot name="mechanism">']
     gravity = numbers(mechanism.gravity)
     if gravity != numbers(GRAVITY):
         lines.append(f'  <mujoco><option gravity="{gravity}"/></mujoco>')
     lines.append(f'  <link name="{WORLD}"/>')
     names = set(mechanism.coordinates)
-    for body in all_bodies(mechanism):
+    for body in mechanism.parts:
         lines += [*_link_lines(body), *_joint_lines(body, _joint_name(body, names))]
     return "\n".join([*lines, "</robot>"]) + "\n"
 
@@ -82,6 +84,8 @@ def _joint_name(body: Body, names: set[str]) -> str:
 
 def _joint_lines(body: Body, name: str) -> list[str]:
     joint = body.joint
+    if not joint.type.urdf:
+        raise MechanismError(f"URDF has no joint of the kind {joint.kind!r}, as is the joint of body {body.name!r}")
     place = f'    <origin xyz="{numbers(joint.position)}" rpy="{numbers(_rpy(joint.orientation))}"/>'
     ends = f"    <parent link={quoteattr(body.parent)}/><child link={quoteattr(body.name)}/>"
     opened = f'  <joint name={quoteattr(name)} type="{joint.type.urdf}">'

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -13,11 +14,11 @@ from numpy.typing import ArrayLike
 from cgraph.extend import check_name, is_finite
 
 from . import spatial
-from .joints import TYPES, JointType
+from .joints import COMPOSITIONS, TYPES, JointType
 from .spatial import Array
 
 WORLD = "world"
-_ROUNDING = 1e-9  # of the largest entry: what is left of an inertia or a rotation that came through text
+ROUNDING = 1e-9  # of the largest entry: what is left of an inertia or a rotation that came through text
 
 
 class MechanismError(ValueError):
@@ -43,24 +44,34 @@ class Joint:
     Parameters
     ----------
     kind : str
-        "revolute" (turns about `axis`), "prismatic" (slides along it), "fixed" (welded), "ball" (turns about a point:
+        "revolute" (turns about `axis`), "prismatic" (slides along it), "screw" (turns about it and slides
+        by `pitch`), "fixed" (welded), "ball" (turns about a point:
         a unit quaternion (w, x, y, z), and the angular velocity in the body's axes), "free" (moves as it likes: the
         place of its origin and a quaternion; the rates of that place, and the angular velocity in the body's axes), or
-        "free (body axes)" (the linear velocity in the body's axes, too).
+        "free (body axes)" (the linear velocity in the body's axes, too). Several joints one after another, with
+        massless bodies between, are "cylindrical" (shift along `axis`, angle about it), "universal" (angle1 about
+        `axis`, which stays with the parent, then angle2 about `second_axis`, which stays with the body) and "planar" (x
+        along `second_axis`, y along axis x second_axis, both with the parent, then angle about `axis`).
     axis : array_like, (3,)
-        In the body's axes; need not have length 1. Of "ball" and "free" it has no meaning.
+        In the body's axes at q = 0; need not have length 1. Of "ball" and "free" it has no meaning.
+    second_axis : array_like, (3,), optional
+        Of "universal" and "planar", at a right angle to `axis`. By default the axis of x, y or z that is least along
+        `axis`, the first of them, turned to a right angle: of z it is x.
     position : array_like, (3,)
         Origin of the body's frame in its parent's at q = 0 [m].
     orientation : array_like, (3, 3)
         Axes of the body's frame, as columns in its parent's, at q = 0. Entries up to 1e-14 are zero: a quarter turn in
         text, or by the cosine of pi / 2, is one.
     damping : float
-        Viscous coefficient, at least 0 [N m s or N s/m].
+        Viscous coefficient, at least 0 [N m s or N s/m]. This and the next three, of a joint that is several, are one
+        number for all its coordinates, or a sequence of one for each.
     stiffness, spring_reference : float
         Spring constant, at least 0 [N m/rad or N/m], and the coordinate where it pulls nowhere [rad or m]. Only of
-        joints with one coordinate.
+        joints with one coordinate, or made of such.
     armature : float
         Inertia of the coordinate itself, such as a rotor's, at least 0 [kg m^2 or kg].
+    pitch : float
+        Of "screw", how far a radian moves the body along the axis, positive for a right-handed thread [m/rad].
     name : str
         What the coordinate is called; by default as the body. Of several coordinates it goes before what they are,
         as in "base.x".
@@ -82,20 +93,40 @@ class Joint:
     axis: ArrayLike = (0.0, 0.0, 1.0)
     position: ArrayLike = (0.0, 0.0, 0.0)
     orientation: ArrayLike = field(default_factory=lambda: np.eye(3))
-    damping: float = 0.0
-    stiffness: float = 0.0
-    spring_reference: float = 0.0
-    armature: float = 0.0
+    damping: Any = 0.0  # a number, or of a composed joint one for each coordinate; the next three, too
+    stiffness: Any = 0.0
+    spring_reference: Any = 0.0
+    armature: Any = 0.0
+    pitch: float = 0.0
+    second_axis: ArrayLike | None = None
     name: str = ""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.kind, str) or self.kind not in TYPES:
-            raise MechanismError(f"a joint must be one of {', '.join(TYPES)}, got {self.kind!r:.60}")
+        kinds = [*TYPES, *COMPOSITIONS]
+        if not isinstance(self.kind, str) or self.kind not in kinds:
+            raise MechanismError(f"a joint must be one of {', '.join(kinds)}, got {self.kind!r:.60}")
+        for name in ("damping", "stiffness", "spring_reference", "armature"):
+            value = getattr(self, name)
+            if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str):
+                object.__setattr__(self, name, tuple(value))
 
     @property
     def type(self) -> JointType:
-        """What the library knows of joints of this kind."""
-        return TYPES[self.kind]
+        """What the library knows of joints of this kind and pitch. Raises MechanismError for one that is several."""
+        if self.kind in COMPOSITIONS:
+            raise MechanismError(f"a joint of the kind {self.kind!r} is several, and each of these has a type")
+        return TYPES[self.kind].with_pitch(self.pitch)
+
+    @property
+    def moves(self) -> bool:
+        """Whether it has a coordinate."""
+        return self.kind in COMPOSITIONS or self.type.moves
+
+    @property
+    def neutral(self) -> tuple[float, ...]:
+        """The coordinates where the body stands at the joint."""
+        parts = COMPOSITIONS.get(self.kind)
+        return (0.0,) * len(parts) if parts else self.type.neutral
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,6 +181,14 @@ def vector(what: str, value: Any, shape: tuple[int, ...] = (3,)) -> Array:
     return array
 
 
+def checked_rotation(what: str, value: Any) -> Array:
+    """The value as a rotation, (3, 3). Raises MechanismError, naming `what`, unless it is one."""
+    matrix = vector(what, value, (3, 3))
+    if np.abs(matrix.T @ matrix - np.eye(3)).max() > ROUNDING or np.linalg.det(matrix) < 0:
+        raise MechanismError(f"{what} must be a rotation matrix")
+    return matrix
+
+
 def shape_of(value: Any) -> tuple[int, ...]:
     """The shape of an array or of nested sequences; () for rows of unlike length."""
     try:
@@ -185,17 +224,31 @@ def checked(body: Body) -> Body:
     )
 
 
+def unit_axis(what: str, value: Any) -> Array:
+    """The value at length 1. Raises MechanismError, naming `what`, unless it is three finite numbers and not zero."""
+    axis = vector(what, value)
+    if not axis.any():
+        raise MechanismError(f"{what} must not be zero")
+    return spatial.snapped(spatial.unit(axis))
+
+
 def _checked_joint(where: str, joint: Joint) -> Joint:
     if not isinstance(joint, Joint):
         raise MechanismError(f"{where}: joint must be of the type Joint, got {type(joint).__name__}: {joint!r:.60}")
     if joint.name != "":
         _check_name(f"the joint of {where}", joint.name)
-    axis = vector(f"{where}: axis", joint.axis)
-    if not axis.any():
-        raise MechanismError(f"{where}: axis must not be zero")
-    orientation = vector(f"{where}: orientation", joint.orientation, (3, 3))
-    if np.abs(orientation.T @ orientation - np.eye(3)).max() > _ROUNDING or np.linalg.det(orientation) < 0:
-        raise MechanismError(f"{where}: orientation must be a rotation matrix")
+    axis = unit_axis(f"{where}: axis", joint.axis)
+    if joint.second_axis is not None:
+        raise MechanismError(f"{where}: a joint of the kind {joint.kind!r} has no second axis")
+    orientation = checked_rotation(f"{where}: orientation", joint.orientation)
+    pitch = _number(f"{where}: pitch", joint.pitch, " m/rad", minimum=-math.inf)
+    if bool(pitch) != TYPES[joint.kind].pitched:
+        needs = (
+            "a joint of the kind 'screw' needs a pitch"
+            if not pitch
+            else f"only a screw has a pitch, not {joint.kind!r}"
+        )
+        raise MechanismError(f"{where}: {needs}, got {pitch!r} m/rad")
     stiffness = _number(f"{where}: stiffness", joint.stiffness)
     if stiffness and len(joint.type.coordinates) > 1:
         raise MechanismError(f"{where}: a spring needs a joint with one coordinate, got stiffness {stiffness!r}")
@@ -204,13 +257,14 @@ def _checked_joint(where: str, joint: Joint) -> Joint:
         raise MechanismError(f"{where}: a joint of the kind {joint.kind!r} has no armature, got {armature!r}")
     return Joint(
         joint.kind,
-        axis=spatial.snapped(spatial.unit(axis)),
+        axis=axis,
         position=vector(f"{where}: position", joint.position),
         orientation=spatial.snapped(orientation),
         damping=_number(f"{where}: damping", joint.damping),
         stiffness=stiffness,
         spring_reference=_number(f"{where}: spring_reference", joint.spring_reference, minimum=-math.inf),
         armature=armature,
+        pitch=pitch,
         name=joint.name,
     )
 
@@ -232,10 +286,10 @@ def _inertia(where: str, given: ArrayLike, beside: float) -> Array:
     inertia = vector(f"{where}: inertia", given, (3,) if diagonal else (3, 3))
     inertia = np.diag(inertia) if diagonal else inertia
     scale = np.abs(inertia).max()
-    if np.abs(inertia - inertia.T).max() > _ROUNDING * scale:
+    if np.abs(inertia - inertia.T).max() > ROUNDING * scale:
         raise MechanismError(f"{where}: inertia must be symmetric")
     moments = np.linalg.eigvalsh(inertia)
-    rounding = _ROUNDING * scale + spatial.SNAP * beside
+    rounding = ROUNDING * scale + spatial.SNAP * beside
     if moments[0] < -rounding:
         raise MechanismError(f"{where}: inertia must not be negative, its principal moments are {moments.tolist()}")
     if moments[2] > moments[0] + moments[1] + rounding:

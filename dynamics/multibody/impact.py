@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from cgraph.extend import real_array
 
 from ..equations.equations_of_motion import forward_dynamics, momentum
-from .body import Body, MechanismError, checked, vector
+from .body import Body, MechanismError, vector
 from .mechanism import Mechanism, require_mechanism
 from .spatial import Array
 
@@ -112,7 +112,8 @@ def attach_with_impact(
     """A free body is caught, and hangs from then on as its joint says.
 
     The impact is inelastic and instantaneous: positions stay, and velocities jump so that
-    M qd+ = M_old qd- + J^T m v + J_w^T I w, in the coordinates of the mechanism with the body.
+    M qd+ = M_old qd- + J^T m v + J_w^T I w, in the coordinates of the mechanism with the body; with loops, by their
+    impulses too, to velocities that keep them closed.
 
     Parameters
     ----------
@@ -154,7 +155,7 @@ def attach_with_impact(
     p = np.zeros(len(index))
     before = _momentum(mechanism, q, qd)
     p[[index[name] for name in mechanism.velocities]] = before
-    given = checked(body)
+    given = whole.shared.parts(body)[-1]
     free, linear, angular = _motion(whole, given, q_new, qd_old)
     inertia = free.orientation @ np.asarray(given.inertia) @ free.orientation.T
     p += given.mass * linear.T @ v + angular.T @ inertia @ w
@@ -202,7 +203,7 @@ def release(mechanism: Mechanism, q: ArrayLike, qd: ArrayLike, body: str) -> Rel
     rest = mechanism.detach(body)
     values = real_array("q", q), real_array("qd", qd)
     q_rest, qd_rest = rest.map_state_from(mechanism, *values)
-    free, _, _ = _motion(mechanism, checked(bodies[0]), *values)
+    free, _, _ = _motion(mechanism, mechanism.shared.parts(bodies[0])[-1], *values)
     return Released(rest, q_rest, qd_rest, free)
 
 
@@ -224,9 +225,9 @@ def _momentum(mechanism: Mechanism, q: Array, qd: Array) -> Array:
 
 
 def _velocities(mechanism: Mechanism, q: Array, p: Array) -> Array:
-    """M^-1 p, (n,): the accelerations at rest under p alone."""
+    """M^-1 p, (n,): the accelerations at rest under p alone; with loops those that they let through."""
     found = forward_dynamics(_inertia_alone(mechanism)).evaluate(_named(q=q, qd=np.zeros_like(p), tau=p))
-    return np.array(list(found.values()))
+    return np.array([found[f"qdd{i}"] for i in range(len(p))])
 
 
 def _inertia_alone(mechanism: Mechanism) -> Mechanism:

@@ -67,11 +67,11 @@ def _above(mechanism: Bodies) -> dict[str, str]:
     """For each body the nearest one inwards that moves; the world's name where there is none."""
     parents = {body.name: body.parent for body in mechanism.bodies}
     moving = {body.name for body in mechanism.moving}
-    result = {}
+    result = {body.name: body.parent for body in mechanism.moving}
     for name, parent in parents.items():
         while parent in parents and parent not in moving:
             parent = parents[parent]
-        result[name] = parent
+        result.setdefault(name, parent)
     return result
 
 

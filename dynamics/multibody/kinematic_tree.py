@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import is_finite, require_mapping
+from cgraph.extend import is_finite
 
 from . import spatial
 from .body import WORLD, Body, Joint, MechanismError, vector
@@ -56,12 +56,10 @@ def parents_first(bodies: Sequence[Body]) -> list[Body]:
 def lock_joints(bodies: Sequence[Body], at: Mapping[str, float | ArrayLike]) -> list[Body]:
     """The bodies, with the joints named in `at` welded where they stand at that coordinate [rad or m], or at several.
 
-    Raises MechanismError for a body that is not there or has no joint to lock, and a coordinate that is not finite.
+    Raises MechanismError for a body that has no joint to lock, and a coordinate that is not finite.
     """
     by_name = {body.name: body for body in bodies}
-    for name, value in require_mapping("locked", at, "body: coordinate").items():
-        if name not in by_name:
-            raise MechanismError(f"there is no body {name!r:.80} to lock in the mechanism")
+    for name, value in at.items():
         if not by_name[name].joint.type.moves:
             raise MechanismError(f"body {name!r} is welded on and has no joint to lock")
         locked_at(by_name[name], value)

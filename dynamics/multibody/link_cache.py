@@ -13,6 +13,7 @@ from cgraph import Node
 
 from .body import Body, checked
 from .body_motion import Motion, energy, propagate_motion
+from .composed_joints import parts_of
 from .inertial_numbers import Link, axes_of, link
 
 
@@ -28,7 +29,7 @@ class SharedParts:
     """Bodies checked, their links, motions and energies. Bodies are not to be altered."""
 
     def __init__(self) -> None:
-        self._bodies: WeakKeyDictionary[Body, Body] = WeakKeyDictionary()
+        self._bodies: WeakKeyDictionary[Body, tuple[Body, ...]] = WeakKeyDictionary()
         self._links: WeakKeyDictionary[Body, tuple[Body | None, Link]] = WeakKeyDictionary()  # with the parent
         self._grounds: dict[tuple[Any, ...], Motion] = {}
         self._moved: dict[tuple[Any, ...], Moved] = {}
@@ -36,11 +37,11 @@ class SharedParts:
     def __reduce__(self) -> tuple[type[SharedParts], tuple[()]]:
         return SharedParts, ()  # a copy in another process computes its own
 
-    def body(self, body: Body) -> Body:
-        """The body, checked."""
+    def parts(self, body: Body) -> tuple[Body, ...]:
+        """The bodies that a body is, one but for a composed joint, checked; the last is itself."""
         known = self._bodies.get(body) if isinstance(body, Body) else None
         if known is None:
-            known = checked(body)
+            known = tuple([checked(part) for part in parts_of(body)])
             self._bodies[body] = known
         return known
 
@@ -57,7 +58,7 @@ class SharedParts:
 
     def moved(self, parent: Motion, body: Body, link: Link, q: Sequence[Node], u: Sequence[Node]) -> Moved:
         """The motion and energy of a body whose parent moves so. `parent` is one of these motions, or the ground's."""
-        key = (id(parent), body.name, body.joint.kind, *[node.name for node in (*q, *u)], *link.numbers)
+        key = (id(parent), body.name, body.joint.type, *[node.name for node in (*q, *u)], *link.numbers)
         if key not in self._moved:
             with cg.tag(body.name):
                 motion = propagate_motion(parent, link, body.joint.type, q, u)

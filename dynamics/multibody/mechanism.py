@@ -18,6 +18,7 @@ from ..systems.arguments import parameter_value
 from ..systems.model import Model
 from ..systems.system import BodySystem, System
 from .body import WORLD, Body, Joint, MechanismError, MechanismWarning, vector
+from .composed_joints import locked_parts, require_outer_parents
 from .external_force import Force, check_force, generalized_forces
 from .forward_kinematics import KinematicChain, kinematic_chain
 from .inertial_numbers import Link
@@ -25,8 +26,10 @@ from .joint_coordinates import coordinate_names, per_velocity, quasi_velocities,
 from .joint_force import JointForce, add_joint_forces, check_joint_force
 from .joint_positions import skeleton
 from .kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia
+from .loops import Loop, check_loop, coupling_row, loop_rows, slip_rows
 from .mechanism_fields import Structure
 from .modification import attach_subtree, detach_subtree, lock_joint, map_state, subtree_of, unlock_joint
+from .relative_placement import relative_placements
 from .spatial import Array
 from .subtree import Subtree
 from .tree_equations import TreeEquations
@@ -36,6 +39,7 @@ __all__ = [
     "Body",
     "Force",
     "Joint",
+    "Loop",
     "Mechanism",
     "MechanismError",
     "MechanismWarning",
@@ -67,6 +71,8 @@ class Mechanism(Structure):
         partial Lagrangian is then not the energy of its body.
     left_out : tuple of str
         Of a mechanism that was read from a file: what the file has and the mechanism has not, a sentence each.
+    loops : sequence of Loop
+        What holds bodies of the tree together, beside their joints, and closes it to loops.
 
     Raises
     ------
@@ -87,19 +93,30 @@ class Mechanism(Structure):
     def __post_init__(self) -> None:
         vector("gravity", self.gravity)
         require_flag("base_parameters", self.base_parameters)
-        for what, kind in (("bodies", Body), ("forces", Force)):  # kept, so that an iterator is read once
+        for what, kind in (
+            ("bodies", Body),
+            ("forces", Force),
+            ("loops", Loop),
+        ):  # kept, so that an iterator is read once
             object.__setattr__(self, what, _listed(what, kind, getattr(self, what)))
         seen: set[str] = set()
         for name in self.coordinates:
             if name in seen:
                 raise MechanismError(f"two joints that move have the name {name!r}")
             seen.add(name)
-        carried = set(self._carriers) - {WORLD}
+        carried = {body.name for body in self.bodies}
         for force in self.forces:
             if isinstance(force, JointForce):
                 check_joint_force(force, self.bodies)
             else:
                 check_force(force, carried)
+        bodies = {body.name: body for body in self.bodies}
+        for loop in self.loops:
+            check_loop(loop, bodies)
+        labels = [loop.label for loop in self.loops]
+        if len(set(labels)) < len(labels):
+            twice = next(label for label in labels if labels.count(label) > 1)
+            raise MechanismError(f"two loops have the name {twice!r}")
         used = {name for force in self.forces for name in force.names}
         for name in require_mapping("parameters", self.parameters, "name: value"):
             if name not in used:
@@ -113,9 +130,17 @@ class Mechanism(Structure):
         parts[0] += ", ..." if len(names) > 6 else ""
         parts += [f"locked {', '.join(list(self.locked)[:6])}"] if self.locked else []
         parts += [f"forces on {', '.join([force.body for force in self.forces[:6]])}"] if self.forces else []
+        parts += [f"loops {', '.join([loop.label for loop in self.loops[:6]])}"] if self.loops else []
         parts += [f"parameters {', '.join(self.parameter_values)}"] if self.parameter_values else []
         parts += [f"gravity {', '.join([f'{each:g}' for each in np.asarray(self.gravity)])}"]
         return f"<Mechanism of {'; '.join(parts)}>"
+
+    @cached_property
+    def parts(self) -> tuple[Body, ...]:
+        """All bodies as the equations have them, parents first: a locked joint a weld, those of several parts apart."""
+        parts = [part for body in self.bodies for part in self.shared.parts(body)]
+        require_outer_parents(self.bodies)
+        return tuple(parents_first(lock_joints(parts, locked_parts(self.bodies, self.locked))))
 
     @property
     def moving(self) -> tuple[Body, ...]:
@@ -148,8 +173,7 @@ class Mechanism(Structure):
 
     @cached_property
     def _merged(self) -> tuple[tuple[Body, ...], dict[str, Carrier]]:
-        bodies = [self.shared.body(body) for body in self.bodies]
-        moving, carriers = merge_fixed_bodies(parents_first(lock_joints(bodies, self.locked)))
+        moving, carriers = merge_fixed_bodies(self.parts)
         return require_inertia(moving), carriers
 
     @cached_property
@@ -172,7 +196,29 @@ class Mechanism(Structure):
             forces=self._generalized_forces if self.forces else None,
             damping=per_velocity(self.moving, [body.joint.damping for body in self.moving]),
             quasi_velocities=quasi_velocities(self.moving),
+            constraints=self._loop_rows if self.loops else None,
+            velocity_constraints=self._slip_rows if any(loop.velocity_rows for loop in self.loops) else None,
         )
+
+    def _loop_rows(self, q: list[Node], t: Node) -> dict[str, Node]:
+        bodies = {body.name: body for body in self.bodies}
+        rows: dict[str, Node] = {}
+        for loop in self.loops:
+            if loop.kind == "coupling":
+                phi = [coupling_row(loop, self.moving, bodies, self.locked, q)]
+            else:
+                carriers = [self._carriers[name] for name in (loop.body, loop.to)]
+                phi = loop_rows(loop, *relative_placements(carriers, self.moving, self.links, q))
+            rows |= dict(zip(loop.rows, phi, strict=True))
+        return rows
+
+    def _slip_rows(self, q: list[Node], qd: list[Node], t: Node) -> dict[str, Node]:
+        rows: dict[str, Node] = {}
+        for loop in self.loops:
+            if loop.velocity_rows:
+                slips = slip_rows(loop, self._chain(loop.body, q, qd), self._chain(loop.to, q, qd))
+                rows |= dict(zip(loop.velocity_rows, slips, strict=True))
+        return rows
 
     def _generalized_forces(self, q: list[Node], qd: list[Node], t: Node, p: dict[str, Node]) -> list[Node]:
         on_joints = [force for force in self.forces if isinstance(force, JointForce)]
@@ -198,9 +244,9 @@ class Mechanism(Structure):
 
         at: (3,) [m], the point, in the body's frame. Raises MechanismError for an unknown body.
         """
-        point = self._checked_point(body, at)
+        chain, point = self.chain(body), _point(body, at)
         with building(Builder()), cg.tag(body):
-            place = self._chain(body, self.system.q, self.system.qd).motion(point).position
+            place = chain.motion(point).position
         return cg.simplify(Graph(self.system.q, dict(zip("xyz", place, strict=True))))
 
     def motion(self, body: str, at: ArrayLike = (0.0, 0.0, 0.0)) -> Graph:
@@ -210,15 +256,15 @@ class Mechanism(Structure):
         row by row, its axes as columns.
         at: (3,) [m], the point, in the body's frame. Raises MechanismError for an unknown body.
         """
-        point = self._checked_point(body, at)
-        q, qd = self.system.q, self.system.qd
+        chain, point = self.chain(body), _point(body, at)
         with building(Builder()), cg.tag(body):
-            return self._chain(body, q, qd).graph(point, q, qd)
+            return chain.graph(point, self.system.q, self.system.qd)
 
-    def _checked_point(self, body: str, at: ArrayLike) -> Array:
+    def chain(self, body: str) -> KinematicChain:
+        """The joints between a body and the world, at q0.. and qd0... Raises MechanismError for an unknown body."""
         if not isinstance(body, str) or body not in self._carriers:
             raise MechanismError(f"there is no body {body!r:.80} in the mechanism")
-        return vector(f"position on body {body!r}: at", at)
+        return self._chain(body, self.system.q, self.system.qd)
 
     def joint_positions(self, q: ArrayLike) -> Array:
         """Places of joints and tips [m] in a drawing, (T, k, 2), x to the right and y up, for q, (T, n) [rad or m].
@@ -246,7 +292,10 @@ class Mechanism(Structure):
         return subtree_of(self, body)
 
     def detach(self, body: str) -> Mechanism:
-        """The mechanism without a body and all that it carries. Raises MechanismError for an unknown body."""
+        """The mechanism without a body and all that it carries, and without the loops that held these.
+
+        Raises MechanismError for an unknown body.
+        """
         return detach_subtree(self, body)
 
     def attach(self, subtree: Subtree | Body | Iterable[Body], to: str | None = None) -> Mechanism:
@@ -264,7 +313,7 @@ class Mechanism(Structure):
         states of another shape.
         """
         other = require_mechanism(other, "map_state_from")
-        return map_state(self.moving, other.moving, dict(other.locked), q, qd)
+        return map_state(self.moving, other.moving, locked_parts(other.bodies, other.locked), q, qd)
 
 
 def as_mechanism(model: Model) -> Mechanism | None:
@@ -278,6 +327,10 @@ def require_mechanism(model: Model, what: str) -> Mechanism:
     if mechanism is None:
         raise MechanismError(f"{what} takes rigid bodies, a Mechanism or a scene of one, got {model!r:.80}")
     return mechanism
+
+
+def _point(body: str, at: ArrayLike) -> Array:
+    return vector(f"position on body {body!r}: at", at)
 
 
 def _listed(what: str, kind: type, given: Any) -> tuple[Any, ...]:

@@ -11,6 +11,7 @@ from .body import Body
 from .external_force import Force
 from .joint_force import JointForce
 from .link_cache import SharedParts
+from .loops import Loop
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +25,7 @@ class Structure:
     locked: Mapping[str, float | ArrayLike] = field(default_factory=dict)
     base_parameters: bool = False
     left_out: tuple[str, ...] = ()
+    loops: Sequence[Loop] = ()
     shared: SharedParts = field(default_factory=SharedParts, repr=False, kw_only=True)
 
     @property

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import real_array
 
-from .body import Body, MechanismError
+from .body import WORLD, Body, MechanismError
 from .external_force import Force
 from .joint_coordinates import coordinate_names, neutral, places, velocity_names
 from .joint_force import JointForce
@@ -26,8 +26,8 @@ def lock_joint(structure: AnyStructure, body: str, at: float | ArrayLike | None)
     """The structure with the joint of a body standing still at a coordinate [rad or m], or several."""
     _check_body(body)
     if at is None:
-        kinds = [each.joint.type for each in structure.bodies if each.name == body]
-        at = 0.0 if not kinds or len(kinds[0].neutral) == 1 else kinds[0].neutral
+        known = [each.joint.neutral for each in structure.bodies if each.name == body]
+        at = known[0] if known and len(known[0]) != 1 else 0.0
     return replace(structure, locked={**structure.locked, body: at})
 
 
@@ -52,6 +52,7 @@ def subtree_of(structure: Structure, body: str) -> Subtree:
         forces,
         _used(structure, forces),
         {name: at for name, at in structure.locked.items() if name in names},
+        tuple([loop for loop in structure.loops if {loop.body, loop.to} <= {*names, WORLD}]),
     )
 
 
@@ -65,6 +66,7 @@ def detach_subtree(structure: AnyStructure, body: str) -> AnyStructure:
         forces=forces,
         parameters=_used(structure, forces),
         locked={name: at for name, at in structure.locked.items() if name not in names},
+        loops=tuple([loop for loop in structure.loops if names.isdisjoint((loop.body, loop.to))]),
     )
 
 
@@ -83,6 +85,7 @@ def attach_subtree(
         forces=(*structure.forces, *given.forces),
         parameters={**structure.parameters, **given.parameters},
         locked={**structure.locked, **given.locked},
+        loops=(*structure.loops, *given.loops),
     )
 
 

@@ -22,7 +22,7 @@ from cgraph.extend import Builder, building, cotangents, real_array, tangents
 from .body_motion import Motion, energy, ground, propagate_motion
 from .inertial_numbers import Link
 from .joint_coordinates import places
-from .joints import TYPES
+from .joints import JointType
 from .mechanism import Mechanism, require_mechanism
 from .spatial import Array
 
@@ -63,7 +63,7 @@ class RecursiveInverseDynamics:
         self.n = len(mechanism.velocities)
         self._parents = mechanism.parents
         self._links = [each.numbers for each in mechanism.links]
-        self._kernels = [_kernels(body.joint.kind) for body in mechanism.moving]
+        self._kernels = [_kernels(body.joint.type) for body in mechanism.moving]
         self._places = places(mechanism.moving)
         self._ground = [float(each) for each in (*rest.omega, *rest.velocity, *rest.vertical, rest.depth)] + [
             0.0
@@ -100,10 +100,9 @@ class _Kernels(NamedTuple):
 
 
 @cache
-def _kernels(kind: str) -> _Kernels:
-    """What a link with that kind of joint needs, whatever its numbers are."""
+def _kernels(joint: JointType) -> _Kernels:
+    """What a link with that type of joint needs, whatever its numbers are."""
     parent, rates, bars, bar_rates = (_variables(name, MOTION) for name in ("s", "s_dot", "bar", "bar_dot"))
-    joint = TYPES[kind]
     q = _variables("q", len(joint.coordinates))
     qd, qdd = (_variables(name, len(joint.velocities)) for name in ("qd", "qdd"))
     link, numbers = _link_of_nodes()

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from .body import WORLD, Body, MechanismError
 from .external_force import Force
 from .joint_force import JointForce
+from .loops import Loop
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +31,8 @@ class Subtree:
         The values that the forces use.
     locked : mapping
         {body: coordinate [rad or m]} of their joints that are locked.
+    loops : tuple of Loop
+        Among these bodies, and with the world.
 
     Examples
     --------
@@ -45,6 +48,7 @@ class Subtree:
     forces: tuple[Force | JointForce, ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     locked: Mapping[str, float | ArrayLike] = field(default_factory=dict)
+    loops: tuple[Loop, ...] = ()
 
     def with_parent(self, parent: str) -> tuple[Body, ...]:
         """The bodies, with the first on that parent."""

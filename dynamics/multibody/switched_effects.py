@@ -12,6 +12,7 @@ from ..equations.equations_of_motion import gravity_force
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .body import Body
+from .composed_joints import locked_parts, parts_of
 from .mechanism import Mechanism, as_mechanism
 
 EFFECTS = ("gravity", "damping", "springs", "armature", "forces")
@@ -58,7 +59,7 @@ def _with(model: Mechanism, effect: str, number: float, among: Collection[str] |
     change: dict[str, Any] = {_JOINT[effect]: number}
 
     def changed(body: Body) -> Body:
-        chosen = body.joint.type.moves if among is None else body.name in among
+        chosen = body.joint.moves if among is None else body.name in among
         return replace(body, joint=replace(body.joint, **change)) if chosen else body
 
     return replace(model, bodies=tuple([changed(body) for body in model.bodies]))
@@ -66,6 +67,7 @@ def _with(model: Mechanism, effect: str, number: float, among: Collection[str] |
 
 def absent_parts(model: Mechanism, given: Mechanism) -> Iterator[tuple[str, str, Mechanism]]:
     """What, why, and the model with it. given: the model before anything was switched off, which is not absent."""
+    model, given = _in_parts(model), _in_parts(given)
     if not np.any(np.asarray(given.gravity)):
         yield "gravity", "it is zero", replace(model, gravity=FREE_FALL)
     elif np.any(np.asarray(model.gravity)):
@@ -80,8 +82,16 @@ def absent_parts(model: Mechanism, given: Mechanism) -> Iterator[tuple[str, str,
             yield f"{effect} of {_listed(without)}", "it is zero", _with(model, effect, NUMBER, without)
     if massless := [body.name for body in model.bodies if not _frame(model, body) and not _has_inertia(body)]:
         yield f"mass of {_listed(massless)}", "it is zero", _replaced(model, massless, _heavy)
-    if welds := [body.name for body in model.bodies if not body.joint.type.moves and body.mass]:
+    if welds := [body.name for body in model.bodies if not body.joint.moves and body.mass]:
         yield f"joint of {_listed(welds)}", "it is welded on", _replaced(model, welds, _hinged)
+
+
+def _in_parts(model: Mechanism) -> Mechanism:
+    """The mechanism with bodies on composed joints as the bodies that they are, whose names `moving` has."""
+    bodies = [part for body in model.bodies for part in parts_of(body)]
+    if len(bodies) == len(model.bodies):
+        return model
+    return replace(model, bodies=bodies, locked=locked_parts(model.bodies, model.locked))
 
 
 def _has_inertia(body: Body) -> bool:
@@ -91,7 +101,7 @@ def _has_inertia(body: Body) -> bool:
 def _frame(model: Mechanism, body: Body) -> bool:
     """Whether a body only marks a place: welded on, without mass, carrying nothing."""
     carries = any(body.name == other.parent for other in model.bodies)
-    return not (carries or body.joint.type.moves or _has_inertia(body))
+    return not (carries or body.joint.moves or _has_inertia(body))
 
 
 def _replaced(model: Mechanism, names: Sequence[str], change: Callable[[Body], Body]) -> Mechanism:

@@ -26,7 +26,7 @@ class StepBlock(NamedTuple):
     h: Array  # (T,), negative in a run back in time
     x_old: Array  # (T, m)
     dense: Array | None  # (T, degree, m)
-    normalization: Graph | None = None  # of the states between the ends, see Problem
+    normalization: Graph | None = None  # of the states between the ends, over states, or states and t; see Problem
 
     @property
     def nbytes(self) -> int:
@@ -41,7 +41,7 @@ class StepBlock(NamedTuple):
         for coefficients in self.dense[rows].swapaxes(0, 1)[::-1]:
             total += coefficients
             total *= share
-        inside = normalized(self.normalization, self.x_old[rows] + total)
+        inside = normalized(self.normalization, self.x_old[rows] + total, self.times_at(rows, s))
         states: Array = np.where((s == 1.0)[:, None], self.x[rows], inside)
         return states
 
@@ -60,7 +60,8 @@ class StepBlock(NamedTuple):
         if self.normalization is None:
             return total
         between = self._replace(normalization=None).states_at(rows, s)
-        return _table(_tangent(self.normalization), np.concatenate([between, total], axis=1))
+        columns = _with_times(self.normalization, between, self.times_at(rows, s))
+        return _table(_tangent(self.normalization, self.x.shape[1]), np.concatenate([columns, total], axis=1))
 
     def part(self, which: slice) -> StepBlock:
         """Some of the steps."""
@@ -75,15 +76,21 @@ class StepBlock(NamedTuple):
         return cut
 
 
-def normalized(normalization: Graph | None, states: Array) -> Array:
-    """States (T, m) with the constraint of the coordinates met."""
-    return states if normalization is None else _table(normalization, states)
+def normalized(normalization: Graph | None, states: Array, times: Array) -> Array:
+    """States (T, m) at the times (T,) with the constraints of the coordinates met."""
+    return states if normalization is None else _table(normalization, _with_times(normalization, states, times))
+
+
+def _with_times(normalization: Graph, states: Array, times: Array) -> Array:
+    """The inputs of a normalization: states, and t where it takes it."""
+    timed = len(normalization.inputs) > states.shape[1]
+    return np.concatenate([states, times[:, None]], axis=1) if timed else states
 
 
 @lru_cache(KEPT)
-def _tangent(graph: Graph) -> Graph:
-    """Of the outputs, from the inputs and their tangents."""
-    return cg.jvp(graph)
+def _tangent(graph: Graph, m: int) -> Graph:
+    """Of the outputs, from the inputs and the tangents of the first m."""
+    return cg.jvp(graph, list(graph.input_names[:m]))
 
 
 def _table(graph: Graph, columns: Array) -> Array:

@@ -18,6 +18,7 @@ from ..integrators import Problem, state_jacobian
 from ..integrators.step_control import RESOLUTION
 from .dense_output import StepBlock, normalized
 from .run_options import SCIPY, RunOptions
+from .step_program import between
 from .stepping import BLOCK_TIME, Clock, Integration
 
 IMPLICIT = ("Radau", "BDF", "LSODA")
@@ -51,7 +52,7 @@ def scipy_solver(problem: Problem, name: str, backend: str) -> ScipySolver:
         slopes, m = cg.compile(state_jacobian(problem), backend), problem.size
         jacobian["jac"] = lambda t, x: slopes([*x, t]).reshape(m, m)
     make = getattr(integrate, name)
-    return ScipySolver(name, problem.components, make, lambda t, x: rate([*x, t]), jacobian, problem.normalization)
+    return ScipySolver(name, problem.components, make, lambda t, x: rate([*x, t]), jacobian, between(problem))
 
 
 class _Step(NamedTuple):
@@ -171,7 +172,7 @@ class ScipyIntegration(Integration):
         """The steps, which arrive at normalized states; the solver goes on from those that it keeps itself."""
         t_old, t, x_old, x, dense = (np.array(column) for column in zip(*steps, strict=True))
         graph = self.solver.normalization
-        return StepBlock(t, normalized(graph, x), t_old, t - t_old, x_old, dense, graph)
+        return StepBlock(t, normalized(graph, x, t), t_old, t - t_old, x_old, dense, graph)
 
 
 def _inside(times: Array, t_old: float, t: float) -> bool:

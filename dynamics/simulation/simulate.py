@@ -155,7 +155,7 @@ def simulate(
     if not isinstance(dense_output, bool):
         raise TypeError(f"dense_output must be True or False, got {dense_output!r:.40}")
     model, applied = with_applied(model, tau, parameters)
-    start = initial_value(model, q, qd, applied.constant, parameters)
+    start = initial_value(model, q, qd, applied.constant, parameters, t0)
     options.check(start.states)
     options.check_room(len(start.x))
 

@@ -29,7 +29,7 @@ class StepProgram:
     starts: bool  # with a first step that the method chooses
     kinds: tuple[int, ...]  # of the components: coordinates 0, velocities 1; those of a group or an OdeSystem differ
     groups: tuple[int, ...]  # of the components: the same for those of one quantity, as a quaternion's
-    normalization: Graph | None  # of states, see Problem
+    normalization: Graph | None  # of states, see Problem; with constraints their projection, over states and t
 
     @property
     def factorizations(self) -> int:
@@ -70,7 +70,7 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
         method.starts,
         kinds,
         groups,
-        problem.normalization,
+        between(problem),
     )
 
 
@@ -85,11 +85,24 @@ def _kinds(problem: Problem) -> tuple[tuple[int, ...], tuple[int, ...]]:
 
 
 def _normalized(steps: Program, problem: Problem, method: Method) -> Program:
-    """The steps with every state that a step arrives at normalized, so that errors do not add up along it."""
-    if problem.normalization is None:
+    """The steps with every state that a step arrives at normalized, so that errors do not add up along it.
+
+    Where there are constraints it is projected onto them, which normalizes it.
+    """
+    if problem.projection is not None:
+        arrived = Call(problem.projection, ("x", "t", "p"), ("x",))
+    elif problem.normalization is not None:
+        arrived = Call(problem.normalization, ("x",), ("x",))
+    else:
         return steps
-    arrived = Call(problem.normalization, ("x",), ("x",))
     return replace(steps, body=[*steps.body, If("accepted", (arrived,)) if method.adaptive else arrived])
+
+
+def between(problem: Problem) -> Graph | None:
+    """What is done to states between the ends of steps: the projection where it needs no more than states and t."""
+    if problem.projection is None or problem.parameters:
+        return problem.normalization
+    return problem.projection
 
 
 @lru_cache(KEPT)

@@ -14,7 +14,7 @@ from cgraph import Node
 from cgraph.extend import check_name, is_finite, real_number, require_mapping
 
 TIME = "t"
-_RESERVED = re.compile(r"(q|qd|qdd|tau)\d+(_old)?|t|dt")
+_RESERVED = re.compile(r"(q|qd|qdd|tau|lambda)\d+(_old)?|t|dt")
 
 
 class Parameters(dict[str, Node]):
@@ -74,12 +74,13 @@ def parameter_value(name: str, value: float) -> float:
     return float(value)
 
 
-def call_user_function(what: str, function: Callable[..., Any], *arguments: Any) -> Any:
+def call_user_function(what: str, function: Callable[..., Any], *arguments: Any, state: str = "x") -> Any:
     """function(*arguments), or without the last of them, the parameters, where it does not take them.
 
+    state: what the first of three is called.
     Raises TypeError, naming `what`, for what is no such function.
     """
-    names = "(q, qd, t) or (q, qd, t, p)" if len(arguments) == 4 else "(x, t) or (x, t, p)"
+    names = "(q, qd, t) or (q, qd, t, p)" if len(arguments) == 4 else f"({state}, t) or ({state}, t, p)"
     if not callable(function):
         raise TypeError(f"{what} must be a function of {names}, got {function!r:.60}")
     signature = inspect.signature(function)

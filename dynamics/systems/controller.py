@@ -119,7 +119,7 @@ def _with_forces(system: System, forces: Sequence[Node], parameters: Mapping[str
     pairs = zip(system.forces, forces, strict=True)
     changes["forces"] = tuple([more if own.value == 0.0 else own + more for own, more in pairs])
     other = copy(system)
-    for name in ("extra_inputs", "shortened"):
+    for name in ("extra_inputs", "shortened", "without_constraints"):
         other.__dict__.pop(name, None)
     other.__dict__ |= changes
     return other

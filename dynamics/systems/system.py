@@ -22,6 +22,7 @@ from .arguments import (
     per_coordinate,
     sequence,
 )
+from .constraints import Constraints
 from .kinematics import Kinematics
 from .quasi_velocities import QuasiVelocities
 
@@ -51,6 +52,12 @@ class System:
     quasi_velocities : QuasiVelocities
         Where the velocities qd are no rates of the coordinates, how they move them. L is then L(q, qd, t) of these
         velocities, and forces, damping and tau belong to them, n of each; of the coordinates there are nq.
+    constraints : callable
+        (q, t) or (q, t, p) to m nodes that are 0, phi(q, t) = 0: a sequence, or {name: node}. They hold the motion by
+        forces J^T lambda, and `forward_dynamics` gives both. Energies, mass matrix, bias and inverse dynamics are those
+        of the system without them.
+    velocity_constraints : callable
+        (q, qd, t) or (q, qd, t, p) to rows that are 0 and linear in qd, such as those of rolling (nonholonomic).
 
     Raises
     ------
@@ -74,6 +81,8 @@ class System:
         forces: Callable[..., Sequence[Node | float]] | None = None,
         damping: float | Sequence[float] = 0.0,
         quasi_velocities: QuasiVelocities | None = None,
+        constraints: Callable[..., Any] | None = None,
+        velocity_constraints: Callable[..., Any] | None = None,
     ) -> None:
         self.kinematics = Kinematics(coordinates, quasi_velocities)
         self._require_consistent()
@@ -90,7 +99,8 @@ class System:
         if forces is not None:
             with cg.tag("force"):
                 self.forces = tuple(generalized_forces("forces", forces, self, p))
-        require_known("the system", (*self.partial_lagrangians, *self.forces), self, p)
+        self.constraints = Constraints(self.kinematics, self.t, self.parameters, constraints, velocity_constraints)
+        require_known("the system", self._given, self, p)
 
     @property
     def system(self) -> System:
@@ -162,14 +172,25 @@ class System:
         """What a person reads in place of q0, qd0, qdd0 and tau0: "q.<coordinate>" and so on, by input."""
         shown = {f"q{i}": f"q.{name}" for i, name in enumerate(self.coordinates)}
         kinds = ("qd", "qdd", "tau")
-        return shown | {f"{kind}{i}": f"{kind}.{name}" for kind in kinds for i, name in enumerate(self.velocities)}
+        shown |= {f"{kind}{i}": f"{kind}.{name}" for kind in kinds for i, name in enumerate(self.velocities)}
+        return shown | {f"lambda{k}": f"lambda.{name}" for k, name in enumerate(self.constraints.names)}
 
     @cached_property
     def extra_inputs(self) -> list[Node]:
         """Inputs that every graph of the system has after its state: t if anything depends on it, and parameters."""
-        reached = set(topological((*self.partial_lagrangians, *self.forces)))
+        reached = set(topological(self._given))
         time = [self.t] if self.t in reached else []
         return [*time, *cg.variables(list(self.parameters))]
+
+    @property
+    def _given(self) -> tuple[Node, ...]:
+        """All nodes that the caller gave."""
+        return (
+            *self.partial_lagrangians,
+            *self.forces,
+            *self.constraints.positions,
+            *self.constraints.velocities,
+        )
 
     @cached_property
     def lagrangian(self) -> Node:
@@ -222,6 +243,13 @@ class System:
             other.__dict__.pop(name, None)
         other.__dict__ |= {"extra_inputs": self.extra_inputs, "shortened": None}
         other.partial_lagrangians, other.forces = (kinetic[0], -potential[0]), tuple(forces)
+        return other
+
+    @cached_property
+    def without_constraints(self) -> System:
+        """The system without what holds it."""
+        other = copy(self)
+        other.constraints = Constraints(self.kinematics, self.t, self.parameters, None, None)
         return other
 
     def bias_forces(self) -> Sequence[BiasForce] | None:

@@ -80,6 +80,7 @@ def certify(model: Model, states: int = 20, seed: int = 0, *, speed: float = 1.0
     theirs = None if twin is None else agreement.original(twin, model)
     rng = np.random.default_rng(seed)
     system = as_system(model)
+    system.constraints.require_none("certify")
     at = {"q": _configurations(system, states, rng)} | {
         name: speed * rng.normal(size=(states, system.n)) for name in ("qd", "qdd", "tau")
     }

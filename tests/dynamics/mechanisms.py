@@ -15,6 +15,9 @@ from dynamics.multibody.spatial import rotation
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
+PITCH = 0.3  # m/rad, of screws
+
+
 def random_inertia(rng: np.random.Generator) -> Array:
     """(3, 3) [kg m^2], of a body that can be: J = tr(S) - S of a positive definite second moment of mass S."""
     mixed = rng.normal(size=(3, 3))
@@ -34,13 +37,14 @@ def random_joint(kind: str, rng: np.random.Generator, **others: Any) -> Joint:
         "stiffness": rng.uniform(),
         "spring_reference": rng.normal(),
         "armature": rng.uniform(),
+        "pitch": PITCH if kind == "screw" else 0.0,
     }
     return Joint(kind, rng.normal(size=3), 0.3 * rng.normal(size=3), random_rotation(rng), **(numbers | others))
 
 
 def random_body(name: str, kind: str, parent: str, rng: np.random.Generator, **others: Any) -> Body:
     given = {"mass": rng.uniform(0.5, 2.0), "center": 0.2 * rng.normal(size=3), "inertia": random_inertia(rng)}
-    return Body(name, random_joint(kind, rng), parent, **(given | others))
+    return Body(name, others.pop("joint", None) or random_joint(kind, rng), parent, **(given | others))
 
 
 def random_mechanism(n: int, kinds: Sequence[str], reach: int, seed: int = 0) -> Mechanism:

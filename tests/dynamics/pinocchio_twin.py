@@ -64,6 +64,7 @@ class PinocchioTwin:
             kinds = {
                 "revolute": pinocchio.JointModelRevoluteUnaligned,
                 "prismatic": pinocchio.JointModelPrismaticUnaligned,
+                "screw": lambda axis: pinocchio.JointModelHelicalUnaligned(axis, body.joint.pitch),
             }
             joint = self.model.addJoint(parent, kinds[body.joint.kind](axis), at, body.name)
             self.joints[body.name], at = joint, pinocchio.SE3.Identity()

@@ -47,6 +47,7 @@ def in_units(mechanism: dyn.Mechanism, units: Units) -> dyn.Mechanism:
             damping=joint.damping * (units.energy * t / u / u),
             stiffness=joint.stiffness * (units.energy / u / u),
             spring_reference=joint.spring_reference * u,
+            pitch=length * joint.pitch,
             armature=joint.armature * (m * length * length / u / u),
         )
         center, inertia = length * np.asarray(body.center), m * length * length * np.asarray(body.inertia)

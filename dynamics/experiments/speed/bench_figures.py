@@ -9,6 +9,7 @@ from ..trust.tightest import tightest
 from ..trust.trust import trust
 from .agreement import agreement
 from .build_time import build_time
+from .closed_chains import closed_chains
 from .ensembles import ensembles
 from .long_chains import long_chains
 from .node_counts import node_counts
@@ -33,5 +34,6 @@ FIGURES = {
         "random Lagrangians with exact answers: runs right, said to be wrong, silent", trust, ("count",)
     ),
     "tightest": BenchFigure("the same as exactly as float64 has them, beside heyoka", tightest, ("count",)),
+    "closed-chains": BenchFigure("chains pinned at the tip beside Pinocchio and MuJoCo", closed_chains, ("repeats",)),
     "long-chains": BenchFigure("cost of a thousand links, and accuracy of long chains", long_chains, ("links",)),
 }

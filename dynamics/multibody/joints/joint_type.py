@@ -20,7 +20,7 @@ class JointType(ABC):
     kind: the word for it in `Joint.kind`.  mjcf, urdf: the words for it in those files; "" where they have none.
     moves: whether it has a coordinate; of "fixed" no function below is asked but `placement`.
     turns: whether it turns the body.  limited: whether URDF demands limits of it.  geared: whether its velocities can
-    have an inertia of their own, an armature.
+    have an inertia of their own, an armature.  pitched: whether it needs a `Joint.pitch`, see `with_pitch`.
     coordinates, velocities: what they are called after the joint's name; "" of a single one, which has the joint's.
     units: of the coordinates.  neutral: the coordinates where the body stands at the joint.
     groups: for each coordinate a number, the same for those that are one quantity.
@@ -32,11 +32,16 @@ class JointType(ABC):
     turns = True
     limited = False
     geared = True
+    pitched = False
     coordinates: tuple[str, ...] = ("",)
     velocities: tuple[str, ...] = ("",)
     units: tuple[str, ...] = ("rad",)
     neutral: tuple[float, ...] = (0.0,)
     groups: tuple[int, ...] = (0,)
+
+    def with_pitch(self, pitch: float) -> JointType:
+        """The type of a joint with that pitch [m/rad], where joints of the kind differ by it."""
+        return self
 
     def rate(self, q: Sequence[Node], u: Sequence[Node]) -> Sequence[Node]:
         """Rates of the coordinates, G(q) u."""

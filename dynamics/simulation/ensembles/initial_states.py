@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import Array, real_array, require_mapping
 
-from ...equations.initial_value import check_names, normalized
+from ...equations.initial_value import check_names, normalized, on_constraints
 from ...equations.state_equation import state_inputs
 from ...systems.arguments import parameter_value, per_coordinate
 from ...systems.model import Model, as_ode, as_system
@@ -26,7 +26,12 @@ class Starts(NamedTuple):
 
 
 def starts(
-    model: Model, q: ArrayLike, qd: ArrayLike | None, tau: ArrayLike, parameters: Mapping[str, ArrayLike] | None
+    model: Model,
+    q: ArrayLike,
+    qd: ArrayLike | None,
+    tau: ArrayLike,
+    parameters: Mapping[str, ArrayLike] | None,
+    t: float = 0.0,
 ) -> Starts:
     """The starts of an ensemble. Raises ValueError for shapes that do not fit, and for what is not finite."""
     inputs = state_inputs(model)
@@ -59,7 +64,11 @@ def starts(
     count = _one_count(counts)
     varied = dict(zip(inputs.applied, arrays.pop("tau").T, strict=True)) if "tau" in arrays else {}
     x = np.concatenate([np.broadcast_to(array, (count, array.shape[-1])) for array in arrays.values()], axis=1)
-    return Starts(normalized(model, x), inputs.states, same, varied | columns)
+    x = normalized(model, x)
+    if as_ode(model) is None and len(as_system(model).constraints):
+        others = [same | {name: float(column[i]) for name, column in columns.items()} for i in range(count)]
+        x = np.array([on_constraints(model, row, t, values) for row, values in zip(x, others, strict=True)])
+    return Starts(x, inputs.states, same, varied | columns)
 
 
 def _array(what: str, value: ArrayLike, n: int) -> Array:

@@ -135,7 +135,7 @@ def simulate_many(
     watched, team = as_events(events), checked(workers)
     _check_chunk(chunk)
     model, tau = _closed(model, tau, parameters)
-    start = starts(model, q, qd, tau, parameters)
+    start = starts(model, q, qd, tau, parameters, t0)
     options.check(start.states)
     count = _row_count(options)
     _check_room(start.x, count)

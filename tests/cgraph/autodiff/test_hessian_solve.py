@@ -328,3 +328,71 @@ def test_elimination_is_exact_over_fractions() -> None:
     x, pivots = ldl_elimination(lower, rhs)
     assert x == expected
     assert pivots[0] * pivots[1] * pivots[2] == 70  # the determinant
+
+
+def saddle(n, m, seed=0, scale=1.0):
+    """A chain of squares and products in u, and multipliers s of rows that each hold a stretch of it; its matrix."""
+    rng = np.random.default_rng(seed)
+    u, s = cg.variables([f"u{i}" for i in range(n)]), cg.variables([f"s{k}" for k in range(m)])
+    total, at = 0.0, 0.0
+    for node in u:
+        at = at + node * float(rng.uniform(0.5, 1.5))
+        total = total + float(rng.uniform(0.5, 1.5)) * at * at * scale
+    for k, node in enumerate(s):
+        row = 0.0
+        for other in u[k * n // m : (k + 1) * n // m]:
+            row = row + float(rng.normal()) * other
+        total = total + node * row
+    hessian = cg.hessian(cg.Graph([*u, *s], {"f": total})).evaluate({node.name: 0.0 for node in (*u, *s)})
+    return total, u, s, np.array(list(hessian.values())).reshape(n + m, n + m)
+
+
+@pytest.mark.parametrize(("n", "m"), [(2, 1), (6, 2), (12, 4)])
+def test_multipliers_are_solved_for_with_the_variables(n, m):
+    total, u, s, matrix = saddle(n, m)
+    rhs = np.random.default_rng(1).normal(size=n + m)
+    solved = solve_nodes(total, [*u, *s], [cg.constant(x) for x in rhs], multipliers=s, check=True)
+    assert solved[-1].value == 0.0
+    assert np.array([node.value for node in solved[:-1]]) == pytest.approx(np.linalg.solve(matrix, rhs), rel=1e-9)
+
+
+def test_the_sign_of_a_pivot_is_told_by_its_place():
+    """Indefinite in u, or a row that says nothing new: the constant pivot of the one that has the wrong sign."""
+    u, v, s, r = cg.variables("u v s r")
+    one = cg.constant(1.0)
+    with pytest.raises(SingularError) as raised:
+        solve_nodes(u * u - v * v + s * u, [u, v, s], [one] * 3, multipliers=[s], check=True)
+    assert raised.value.index == 1
+    with pytest.raises(SingularError) as raised:
+        solve_nodes(u * u + v * v + s * u + r * (2.0 * u), [u, v, s, r], [one] * 4, multipliers=[s, r])
+    assert raised.value.index in (2, 3)
+    x = cg.variable("x")
+    *_, info = solve_nodes(u * u + x * v * v + s * (u + v), [u, v, s], [one] * 3, multipliers=[s], check=True)
+    graph = cg.Graph([x], {"info": info})
+    assert [graph.evaluate({"x": value})["info"] for value in (2.0, -2.0)] == [0.0, 2.0]
+
+
+def test_a_multiplier_leaves_where_its_row_ends():
+    """Nodes grow with the length of a chain of many rows, not with its square."""
+    counts = []
+    for n in (12, 24, 36, 48):
+        total, u, s, _ = saddle_with_parameters(n)
+        counts.append(len(cg.Graph(cg.variables([f"k{i}" for i in range(n)]), numbered(total, u, s)).nodes))
+    growth = np.diff(counts)
+    assert growth.max() - growth.min() <= 0.02 * growth.max()
+
+
+def saddle_with_parameters(n):
+    u, s = cg.variables([f"u{i}" for i in range(n)]), cg.variables([f"s{i}" for i in range(n // 4)])
+    k, total, at = cg.variables([f"k{i}" for i in range(n)]), 0.0, 0.0
+    for stiffness, node in zip(k, u, strict=True):
+        at = stiffness * at + node
+        total = total + stiffness * at * at
+    for i, node in enumerate(s):
+        total = total + node * sum((k[j] * u[j] for j in range(4 * i + 1, 4 * i + 4)), u[4 * i])
+    return total, u, s, k
+
+
+def numbered(total, u, s):
+    one = cg.constant(1.0)
+    return {f"{i}": x for i, x in enumerate(solve_nodes(total, [*u, *s], [one] * len([*u, *s]), multipliers=s))}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
-from dynamics.experiments.speed import ensembles, long_chains, reconfiguration
+from dynamics.experiments.speed import closed_chains, ensembles, long_chains, reconfiguration
 from dynamics.experiments.speed.agreement import QUANTITIES, differences, random_arm
 from dynamics.experiments.speed.bench_figures import FIGURES
 from dynamics.experiments.speed.bench_scenes import turned_arm
@@ -68,6 +68,14 @@ def test_the_cost_of_a_chain_is_told_by_stage(capsys: pytest.CaptureFixture[str]
     lines = capsys.readouterr().out.splitlines()
     assert [line.split("  ")[0] for line in lines[2:5]] == ["Lagrangian", "forward dynamics", "evaluate"]
     assert lines[-1].startswith(f"{len(dyn.forward_dynamics(turned_arm(3)).nodes)} nodes")
+
+
+def test_closed_chains_are_timed_and_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(closed_chains, "SIZES", (3,))
+    (text,) = closed_chains.closed_chains(1)
+    row = text.splitlines()[-1].split()
+    assert row[:2] == ["3", "259"]
+    assert float(row[2]) > 0.0
 
 
 def test_every_change_of_structure_is_timed_and_its_torques_agree() -> None:

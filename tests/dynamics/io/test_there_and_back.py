@@ -14,7 +14,6 @@ from pytest import mark, raises
 import dynamics as dyn
 from dynamics.io.mujoco_twin import MujocoTwin
 from dynamics.io.stand_ins import STAND_IN
-from dynamics.io.write_mjcf import all_bodies
 from dynamics.multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
 from tests.dynamics.mechanisms import FAMILIES, random_inertia, random_rotation
 
@@ -59,7 +58,7 @@ def difference(one: Mechanism, other: Mechanism) -> str:
     """What is not the same in two mechanisms; "" for nothing."""
     if np.asarray(one.gravity).tolist() != np.asarray(other.gravity).tolist():
         return "gravity"
-    ours, theirs = ({body.name: body for body in all_bodies(each)} for each in (one, other))
+    ours, theirs = ({body.name: body for body in each.parts} for each in (one, other))
     if set(ours) != set(theirs) or set(one.coordinates) != set(other.coordinates):
         return "names"
     for name, a in ours.items():

@@ -1,46 +1,17 @@
-"""A type of joint is one object: what else the library does with it follows, as of a screw that is added here."""
+"""A type of joint is one object: what else the library does with it follows, as of a screw."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
-from pytest import MonkeyPatch, approx, fixture, mark
+from pytest import approx, mark, raises
 
 import dynamics as dyn
-from cgraph import Node
-from dynamics.multibody.joints import TYPES
-from dynamics.multibody.joints.revolute import Revolute
-from dynamics.multibody.spatial import Array
-from tests.dynamics.mechanisms import random_mechanism
+from tests.dynamics.mechanisms import PITCH, random_mechanism
 from tests.dynamics.models import error, run, states
 from tests.tolerances import LAST_BITS
 
-PITCH = 0.3  # m a radian
 ROUNDING = 1e-11  # of the largest torque
-
-
-class Screw(Revolute):
-    """A hinge that moves along its axis as it turns."""
-
-    kind = "screw"
-    mjcf = ""
-
-    def shift(self, x: Node) -> Node:
-        return PITCH * x
-
-    def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
-        turn, _ = super().placement(axis, at)
-        return turn, PITCH * at[0] * axis
-
-    def resists(self, mass: float, inertia: Array) -> bool:
-        return mass > 0.0 or super().resists(mass, inertia)
-
-    def unobservable(self, mass: float, moment: Array, inertia: Array) -> tuple[float, Array, Array]:
-        return 0.0, 0.0 * moment, 0.0 * inertia
-
-
-@fixture(autouse=True)
-def screw(monkeypatch: MonkeyPatch) -> None:
-    monkeypatch.setitem(TYPES, "screw", Screw())
 
 
 def screwed(kinds: tuple[str, ...]) -> dyn.Mechanism:
@@ -71,7 +42,9 @@ def test_torques_body_by_body_and_regrouped_are_the_same(kinds: tuple[str, ...])
 
 
 def test_it_winds_along_its_axis() -> None:
-    nut = dyn.Mechanism([dyn.Body("nut", dyn.Joint("screw", (0.0, 0.0, 1.0)), mass=2.0, inertia=(1.0, 1.0, 0.5))])
+    nut = dyn.Mechanism(
+        [dyn.Body("nut", dyn.Joint("screw", (0.0, 0.0, 1.0), pitch=PITCH), mass=2.0, inertia=(1.0, 1.0, 0.5))]
+    )
     place = nut.motion("nut", (1.0, 0.0, 0.0)).evaluate({"q0": math.pi / 2, "qd0": 2.0})
     assert [place[name] for name in ("x", "y", "z")] == approx([0.0, 1.0, PITCH * math.pi / 2])
     assert [place[name] for name in ("vx", "vy", "vz", "wz")] == approx([-2.0, 0.0, 2.0 * PITCH, 2.0], abs=LAST_BITS)
@@ -89,3 +62,31 @@ def test_locked_it_is_the_weld_that_it_stands_at() -> None:
         for graph, values in zip(graphs, (q, q[1:]), strict=True)
     )
     assert [free[name] for name in "xyz"] == approx([still[name] for name in "xyz"])
+
+
+def test_screws_of_other_pitches_are_told_apart() -> None:
+    """Also where mechanisms that derive from one another share the motions of their bodies."""
+    first = screwed(("screw",))
+    steeper = replace(first.bodies[2], joint=replace(first.bodies[2].joint, pitch=2.0 * PITCH))
+    bodies = [*first.bodies[:2], steeper, *first.bodies[3:]]
+    derived, fresh = replace(first, bodies=bodies), dyn.Mechanism(bodies, first.gravity)
+    run(dyn.bias(first), states(first, 3))
+    given = states(fresh, 3)
+    torques = run(dyn.inverse_dynamics(fresh), given)
+    assert np.array_equal(run(dyn.inverse_dynamics(derived), given), torques)
+    recursive = dyn.RecursiveInverseDynamics(derived)
+    assert error(np.array([recursive(*(given[name][0] for name in ("q", "qd", "qdd")))]), torques[:1]) < ROUNDING
+
+
+def test_only_a_screw_has_a_pitch_and_none_is_without() -> None:
+    for joint, said in (
+        (dyn.Joint("screw"), "body 'b': a joint of the kind 'screw' needs a pitch, got 0.0 m/rad"),
+        (dyn.Joint("revolute", pitch=0.1), "body 'b': only a screw has a pitch, not 'revolute', got 0.1 m/rad"),
+        (dyn.Joint("screw", pitch=math.nan), "body 'b': pitch must be finite, got nan m/rad"),
+    ):
+        with raises(dyn.MechanismError, match=said):
+            dyn.Mechanism([dyn.Body("b", joint, mass=1.0)])
+    for write, kind in ((dyn.to_mjcf, "screw"), (dyn.to_urdf, "screw"), (dyn.to_urdf, "ball")):
+        joint = dyn.Joint(kind, pitch=PITCH if kind == "screw" else 0.0)
+        with raises(dyn.MechanismError, match=f"no joint of the kind '{kind}'"):
+            write(dyn.Mechanism([dyn.Body("b", joint, mass=1.0, inertia=(1.0, 1.0, 1.0))]))

@@ -25,11 +25,13 @@ STATES = 5
 
 
 def random_tree(seed: int, most: int) -> dyn.Mechanism:
-    """Hinges, slides and welds in a tree, in space or by quarter turns, with springs, armature, links without mass."""
+    """Hinges, slides, screws and welds, in space or by quarter turns, with springs, armature, links without mass."""
     rng = np.random.default_rng(seed)
     bodies: list[dyn.Body] = []
     for i in range(int(rng.integers(2, most + 1))):
-        kind = str(rng.choice(["revolute", "revolute", "prismatic", "fixed"] if i else ["revolute", "prismatic"]))
+        kind = str(
+            rng.choice(["revolute", "revolute", "prismatic", "screw", "fixed"] if i else ["revolute", "prismatic"])
+        )
         parent = bodies[int(rng.integers(max(0, i - 2), i))].name if i else "world"
         others: dict[str, Any] = {} if rng.random() < 0.3 else {"armature": 0.0, "stiffness": 0.0}
         if seed % 2:  # axes along or across, and places beside
@@ -53,6 +55,10 @@ QUANTITIES: dict[str, tuple[Callable[[Any], cg.Graph], Factor]] = {
     "inverse dynamics": (dyn.inverse_dynamics, lambda s, u: s.energy / u),
     "forward dynamics": (dyn.forward_dynamics, lambda s, u: u / s.time / s.time),
     "energy": (dyn.energy, lambda s, u: s.energy),
+    "momentum in space": (
+        dyn.spatial_momentum,
+        lambda s, u: s.energy * s.time / s.length * s.length ** (np.arange(6) // 3),
+    ),
 }
 
 

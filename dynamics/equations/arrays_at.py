@@ -1,0 +1,106 @@
+"""Arrays at a state: the numbers of a model's graph, matrices and vectors in their shapes."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cgraph import Graph
+
+from ..systems.arguments import TIME
+from ..systems.model import Model, as_system
+from .evaluate_at import Array, evaluate_at
+
+_ENTRY = re.compile(r"(.*?[^\d_])((?:_\d+)+|\d+)")  # M_0_1, h_2, tau0
+
+
+def arrays_at(
+    model: Model,
+    graph: Graph,
+    q: ArrayLike | None = None,
+    qd: ArrayLike | None = None,
+    qdd: ArrayLike | None = None,
+    tau: ArrayLike | None = None,
+    *,
+    t: float = 0.0,
+    parameters: Mapping[str, float] | None = None,
+) -> dict[str, Array]:
+    """The outputs of a graph at a state, or at many, as arrays by name: M_0_0, M_0_1, .. are the matrix "M".
+
+    For a loop over many states, compile the graph.
+
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene with n velocities, and nq coordinates.
+    graph : Graph
+        Of the model, such as `mass_matrix(model)`: inputs among q0.., qd0.., qdd0.., tau0.., t and the parameters.
+    q : array_like, (nq,) or (N, nq)
+        Coordinates [rad or m]; by default 0, quaternions neutral.
+    qd, qdd, tau : array_like, (n,) or (N, n)
+        Velocities, accelerations, and applied forces [N m or N]; by default 0.
+    t : float
+        Time [s], for a model that depends on it.
+    parameters : mapping of str to float
+        Values in place of the model's.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Outputs whose names differ in their indices alone are one array, the others are alone, of the shape (). In
+        front of these shapes stands N where there are N states.
+
+    Raises
+    ------
+    ValueError
+        For arrays of another shape, a number that is not finite, an unknown parameter, and a graph of another model.
+    TypeError
+        For what is no graph, or no model with a Lagrangian.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm(masses=[1.0, 1.0], lengths=[1.0, 1.0])
+    >>> dyn.arrays_at(arm, dyn.mass_matrix(arm), q=[0.0, 0.0])["M"].round(12).tolist()
+    [[2.666666666667, 0.833333333333], [0.833333333333, 0.333333333333]]
+    """
+    if not isinstance(graph, Graph):
+        raise TypeError(f"graph must be a Graph, such as mass_matrix(model), got {type(graph).__name__}: {graph!r:.60}")
+    system, state = as_system(model), {"q": q, "qd": qd, "qdd": qdd, "tau": tau}
+    known = {*system.display_names, TIME, *system.parameters}
+    if unknown := [name for name in graph.input_names if name not in known]:
+        raise ValueError(f"the graph has the input {unknown[0]!r}, which is no state or parameter of the model")
+    flat = evaluate_at(system, graph, state, t, parameters)
+    arrays: dict[str, Array] = {}
+    start = 0
+    for name, shape in _shapes(graph.outputs):
+        end = start + math.prod(shape)
+        arrays[name] = flat[..., start:end].reshape((*flat.shape[:-1], *shape))
+        start = end
+    return arrays
+
+
+def _shapes(outputs: Iterable[str]) -> Iterator[tuple[str, tuple[int, ...]]]:
+    """Name and shape of the arrays that names of outputs spell, one after another."""
+    for stem, run in groupby(outputs, key=lambda name: _split(name)[0]):
+        names = list(run)
+        indices = [_split(name)[1] for name in names]
+        if len({len(index) for index in indices}) == 1:
+            shape = tuple([1 + max(axis) for axis in zip(*indices, strict=True)])
+            if list(np.ndindex(*shape)) == indices:
+                yield stem, shape
+                continue
+        yield from [(name, ()) for name in names]  # an array with entries left out
+
+
+def _split(name: str) -> tuple[str, tuple[int, ...]]:
+    """The name of the array and the place in it, as in M_0_1, h_2 and tau0; of other names no place."""
+    match = _ENTRY.fullmatch(name)
+    if match is None:
+        return name, ()
+    return match[1], tuple([int(index) for index in match[2].strip("_").split("_")])

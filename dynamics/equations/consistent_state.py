@@ -1,0 +1,61 @@
+"""Consistent states: those that meet the constraints of a model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from numpy.typing import ArrayLike
+
+from cgraph.extend import Array, real_number
+
+from ..systems.model import Model, as_system
+from .initial_value import given_start
+from .projection import projected
+
+
+def consistent_state(
+    model: Model, q: ArrayLike, qd: ArrayLike, t: float = 0.0, parameters: Mapping[str, float] | None = None
+) -> tuple[Array, Array]:
+    """The state that meets the constraints of a model and is near to (q, qd), in the metric of its mass matrix.
+
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene.
+    q, qd : array_like, (nq,) and (n,)
+        Where to start.
+    t : float
+        Time [s], for constraints that depend on it.
+    parameters : mapping, optional
+        {name: value} in place of the model's own.
+
+    Returns
+    -------
+    tuple of ndarray
+        q, (nq,), and qd, (n,); as they are of a state that meets the constraints to rounding.
+
+    Raises
+    ------
+    ConstraintError
+        Where Newton's method does not arrive; the message names the constraint that is left open.
+    ValueError
+        For states of another shape.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> def energy(q, qd, t):
+    ...     return 0.5 * (qd[0] ** 2 + qd[1] ** 2)
+    >>> rod = dyn.System(energy, "x y", constraints=lambda q, t: {"rod": q[0] ** 2 + q[1] ** 2 - 1.0})
+    >>> q, qd = dyn.consistent_state(rod, [3.0, 4.0], [1.0, 0.0])
+    >>> q.round(12).tolist(), qd.round(12).tolist()
+    ([0.6, 0.8], [0.64, -0.48])
+    """
+    system = as_system(model)
+    time = real_number("t", t)
+    if not math.isfinite(time):
+        raise ValueError(f"t must be finite, got {t!r} s")
+    start = given_start(model, q, qd, 0.0, parameters)
+    state = projected(system, start.x, time, {name: start.bound[name] for name in system.parameters})
+    return state[: system.nq], state[system.nq :]

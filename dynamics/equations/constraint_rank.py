@@ -1,0 +1,219 @@
+"""The rank of constraints: which rows say something new, looked for at states that meet them, free of units."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Graph
+from cgraph.extend import Array, Builder, building, certain_digits, cotangents
+
+from ..systems.constraints import ConstraintError, Constraints
+from ..systems.kinematics import ZERO
+
+STATES = 3  # states that meet the constraints, at which rows are compared
+SPREADS = (0.3, 1.0, 0.1, 3.0, 0.01, 0.001, 10.0, 0.0001) * 2  # of random starts about the neutral coordinates
+ITERATIONS, HALVINGS = 50, 12  # of Newton's method for such a state
+DEPENDENT = 1e-9  # a row of length 1 is one of the others if this much of it is left without them
+SMALL = 1e-6  # of the first gap: what Newton's method closes to rounding in a step or two
+OPEN = 0.5  # certain digits of a row that is not 0
+KEPT = 16  # constraints whose rank stays known
+
+
+Indices = np.ndarray[Any, np.dtype[np.intp]]
+
+
+class ConstraintWarning(UserWarning):
+    """Constraints that say nothing new, and a start that had to be moved to meet them.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import dynamics as dyn
+    >>> def energy(q, qd, t):
+    ...     return 0.5 * (qd[0] ** 2 + qd[1] ** 2)
+    >>> twice = dyn.System(energy, "x y", constraints=lambda q, t: {"row": q[0] - q[1], "again": 2.0 * (q[0] - q[1])})
+    >>> with warnings.catch_warnings(record=True) as noted:
+    ...     warnings.simplefilter("always")
+    ...     accelerations = dyn.forward_dynamics(twice)
+    >>> print(noted[0].message)
+    constraint 'again' follows from the others and is left out
+    """
+
+
+@lru_cache(KEPT)
+def independent_rows(constraints: Constraints) -> tuple[int, ...]:
+    """Indices of the rows that do not follow from those before them, at all states seen.
+
+    The states are random ones that meet the constraints, since rows may depend on one another only there. Warns of
+    rows that are left out, unless they hold nothing, as the third of a point in a plane.
+
+    Raises ConstraintError where no state is seen that meets all.
+    """
+    numbers = RowNumbers(constraints)
+    kept: list[int] = []
+    acting = np.zeros(len(constraints), dtype=bool)
+    for point in numbers.states():
+        matrix = numbers.certain_matrix(point)
+        kept = max(kept, _independent(matrix), key=len)
+        acting |= matrix.any(axis=1)
+        if len(kept) == len(constraints):
+            break
+    dropped = [name for k, name in enumerate(constraints.names) if k not in kept and acting[k]]
+    if dropped:
+        names = " and ".join(map(repr, dropped))
+        one = len(dropped) == 1
+        verbs = "follows from the others and is" if one else "follow from the others and are"
+        text = f"constraint{'' if one else 's'} {names} {verbs} left out"
+        warnings.warn(text, ConstraintWarning, stacklevel=2)
+    return tuple(kept)
+
+
+class RowNumbers:
+    """The rows of constraints as numbers: phi and the matrix J of all rows, less what is rounding."""
+
+    def __init__(self, constraints: Constraints) -> None:
+        self.constraints, kinematics = constraints, constraints.kinematics
+        self.n, self.nq = len(kinematics.u), len(kinematics.q)
+        weights = cg.variables([f"lambda{k}" for k in range(len(constraints))])
+        build = Builder()
+        with building(build):
+            total = ZERO
+            for weight, rate in zip(weights, constraints.rates, strict=True):
+                total = total + weight * rate
+        bars = cotangents({total: cg.constant(1.0)}, kinematics.u, build)
+        displaced = dict(zip(kinematics.u, cg.variables([f"d{i}" for i in range(self.n)]), strict=True))
+        moved = [
+            q + dot for q, dot in zip(kinematics.q, kinematics.rate([displaced[u] for u in kinematics.u]), strict=True)
+        ]
+        self.inputs = [*kinematics.q, constraints.t, *cg.variables(list(constraints.parameters))]
+        numbered = [(f"phi{k}", phi) for k, phi in enumerate(constraints.positions)]
+        self.phi = Graph(self.inputs, dict(numbered)) if numbered else None
+        self.columns = Graph([*self.inputs, *weights], {f"J{i}": bar for i, bar in enumerate(bars)})
+        normalized = kinematics.normalized(moved)
+        self.moved = Graph([*kinematics.q, *displaced.values()], {f"{i}": node for i, node in enumerate(normalized)})
+
+    def states(self) -> Iterator[dict[str, float]]:
+        """Some random states that meet the constraints: values of q0.., t and parameters."""
+        rng, found = np.random.default_rng(0), 0
+        nearest: tuple[float, int] | None = None
+        neutral = np.array(self.constraints.kinematics.neutral)
+        for spread in SPREADS:
+            start = neutral + spread * rng.uniform(-1.0, 1.0, self.nq)
+            closing = self.closed(start, float(rng.uniform(0.3, 1.2)))
+            if closing.worst is None:
+                yield closing.point
+                found += 1
+                if found == STATES:
+                    return
+            elif nearest is None or closing.size < nearest[0]:
+                nearest = closing.size, closing.worst
+        if found:
+            return
+        row = 0 if nearest is None else nearest[1]
+        raise ConstraintError(
+            f"the constraints cannot be met: no state was seen where {self.constraints.names[row]!r} is 0"
+        )
+
+    def closed(self, q: Array, t: float, parameters: Mapping[str, float] | None = None) -> Closing:
+        """A state that meets phi = 0, by Newton's method with halved steps from q.
+
+        parameters: in place of the constraints' own.
+        """
+        shown = {"t": t} | dict(self.constraints.parameters if parameters is None else parameters)
+        with np.errstate(all="ignore"):
+            point = self._point(q, shown)
+            size, looked = np.inf, 0.0  # at the rounding of phi, which takes longer than a step, once a gap is so small
+            for k in range(ITERATIONS):
+                phi = self._phi(point)
+                if (not k or size <= looked) and not len(self._open_rows(point)):
+                    return Closing(point, 0.0, None)
+                matrix = self.matrix(point)[: len(phi)]
+                if not (np.isfinite(phi).all() and np.isfinite(matrix).all()):
+                    return Closing(point, np.inf, int(np.argmin(np.isfinite(phi))))
+                scale = np.abs(matrix).max(axis=1)
+                scale = np.where(scale > 0.0, scale, 1.0)
+                step = -np.linalg.lstsq(matrix / scale[:, None], phi / scale, rcond=1e-10)[0]
+                size = float(np.abs(phi / scale).max())
+                looked = looked or SMALL * size
+                for halved in range(HALVINGS):
+                    trial = self._point(self._moved(point, step * 0.5**halved), shown)
+                    if np.abs(self._phi(trial) / scale).max() < size:
+                        point = trial
+                        break
+                else:
+                    break
+            phi, open_rows = self._phi(point), self._open_rows(point)
+        if not len(open_rows):
+            return Closing(point, 0.0, None)
+        return Closing(point, size, int(open_rows[np.abs(phi[open_rows]).argmax()]))
+
+    def matrix(self, point: Mapping[str, float]) -> Array:
+        """J, (m, n)."""
+        m = len(self.constraints)
+        weights = dict(zip([f"lambda{k}" for k in range(m)], np.eye(m), strict=True))
+        columns = self.columns.evaluate({**point, **weights})
+        return np.stack([np.broadcast_to(column, m) for column in columns.values()], axis=1)
+
+    def certain_matrix(self, point: Mapping[str, float]) -> Array:
+        """J with 0 for entries that are rounding alone."""
+        m = len(self.constraints)
+        matrix = self.matrix(point)
+        for k in range(m):
+            digits = certain_digits(self.columns, {**point, **{f"lambda{j}": float(j == k) for j in range(m)}})
+            matrix[k] = np.where(np.array(list(digits.values())) >= 1.0, matrix[k], 0.0)
+        return matrix
+
+    def _phi(self, point: Mapping[str, float]) -> Array:
+        return np.zeros(0) if self.phi is None else np.array(list(self.phi.evaluate(dict(point)).values()))
+
+    def _open_rows(self, point: Mapping[str, float]) -> Indices:
+        """The rows of phi that are not 0 to their rounding."""
+        digits = {} if self.phi is None else certain_digits(self.phi, point)
+        values = zip(self._phi(point), digits.values(), strict=True)
+        wrong = [value != 0.0 and not (left < OPEN and np.isfinite(value)) for value, left in values]
+        return np.flatnonzero(wrong)
+
+    def _point(self, q: Array, shown: Mapping[str, float]) -> dict[str, float]:
+        return {f"q{i}": float(x) for i, x in enumerate(q)} | dict(shown)
+
+    def _moved(self, point: Mapping[str, float], step: Any) -> Array:
+        at = {name: point[name] for name in self.moved.input_names if name in point}
+        at |= {f"d{i}": float(x) for i, x in enumerate(step)}
+        return np.array(list(self.moved.evaluate(at).values()), dtype=np.float64)
+
+
+class Closing(NamedTuple):
+    """Where Newton's method arrived."""
+
+    point: dict[str, float]
+    size: float  # of what is left, in the unit of displacements
+    worst: int | None  # the row that is furthest from 0; None where all are 0
+
+
+def _independent(matrix: Array) -> list[int]:
+    """Rows that are not sums of earlier ones: Gram and Schmidt, on rows and columns scaled to be alike."""
+    scaled = matrix.copy()
+    for _ in range(4):
+        for axis in (0, 1):
+            size = np.abs(scaled).max(axis=axis, keepdims=True)
+            scaled = scaled / np.sqrt(np.where(size > 0.0, size, 1.0))
+    kept: list[int] = []
+    basis: list[Array] = []
+    for k, row in enumerate(scaled):
+        length = float(np.linalg.norm(row))
+        if not length:
+            continue
+        rest = row / length
+        for _ in range(2):
+            for unit in basis:
+                rest = rest - (unit @ rest) * unit
+        if np.linalg.norm(rest) > DEPENDENT:
+            kept.append(k)
+            basis.append(rest / np.linalg.norm(rest))
+    return kept

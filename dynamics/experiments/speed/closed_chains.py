@@ -1,0 +1,122 @@
+"""Closed chains: forward dynamics of chains pinned at their tips, beside Pinocchio's and MuJoCo's, a call at a time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+from typing import NamedTuple
+
+import numpy as np
+
+import cgraph as cg
+from cgraph.extend import Array
+
+from ...equations.consistent_state import consistent_state
+from ...equations.equations_of_motion import forward_dynamics
+from ...io.mujoco_twin import mujoco
+from ...io.write_mjcf import to_mjcf
+from ...multibody.loops import Loop
+from ...multibody.mechanism import Mechanism
+from ...multibody.planar_arm import planar_arm
+from ...peers.case import Case
+from ...peers.pinocchio import PinocchioPeer
+from ..text_table import table
+
+SIZES, LENGTH = (3, 10, 40), 0.8  # links, m each
+PIN = (1.0, 0.0, 0.0)  # m, where the tip is held
+REPEATS, SECONDS = 50, 0.002  # turns, and how long the calls of one take: short, so that some are not disturbed
+AGREE = 1e-6  # relative: Pinocchio's iteration, which stops before rounding
+
+
+class Solver(NamedTuple):
+    """A call that is timed, and the accelerations (n,) that it left."""
+
+    call: Callable[[], object]
+    result: Callable[[], Array]
+
+
+def pinned(links: int) -> tuple[Mechanism, Mechanism]:
+    """A chain of rods, and the same with its tip held."""
+    arm = planar_arm([1.0] * links, [LENGTH] * links)
+    return arm, Mechanism(arm.bodies, arm.gravity, loops=[Loop("point", "tip", to_at=PIN)])
+
+
+def ours(held: Mechanism, x: Array) -> Solver:
+    """The compiled graph, bound to its arrays: accelerations and the force of the pin."""
+    compiled, n = cg.compile(forward_dynamics(held)), len(x) // 3
+    out = np.empty(compiled.n_out)
+    return Solver(compiled.bind(np.array(x), out), lambda: out[:n])
+
+
+def pinocchio(arm: Mechanism, x: Array) -> Solver:
+    """constraintDynamics, proximal, with a point of the last body held; without its stabilisation."""
+    peer = PinocchioPeer(Case("pinned", arm))
+    pin, model, data, n = peer.pinocchio, peer.twin, peer.data, len(x) // 3
+    models, datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
+    tip, place = pin.SE3(np.eye(3), np.array([0.0, 0.0, -LENGTH])), pin.SE3(np.eye(3), np.array(PIN))
+    last = model.njoints - 1
+    models.append(pin.RigidConstraintModel(pin.ContactType.CONTACT_3D, model, last, tip, 0, place, pin.LOCAL))
+    datas.append(models[0].createData())
+    pin.initConstraintDynamics(model, data, models, datas)
+    q, qd, tau = (np.array(x[k * n : (k + 1) * n][peer.at]) for k in range(3))
+    settings, solve = pin.ProximalSettings(1e-12, 1e-10, 10), pin.constraintDynamics
+    return Solver(lambda: solve(model, data, q, qd, tau, models, datas, settings), lambda: data.ddq[peer.order])
+
+
+def connected(arm: Mechanism, x: Array) -> Solver:
+    """mj_forward with an equality constraint, which is soft: other accelerations, the same work."""
+    module, n = mujoco(), len(x) // 3
+    hold = f'<equality><connect body1="{arm.moving[-1].name}" anchor="0 0 {-LENGTH}"/></equality>'
+    model = module.MjModel.from_xml_string(to_mjcf(arm).replace("</worldbody>", f"</worldbody>{hold}"))
+    data = module.MjData(model)
+    data.qpos[:], data.qvel[:], data.qfrc_applied[:] = x[:n], x[n : 2 * n], x[2 * n :]
+    return Solver(lambda: module.mj_forward(model, data), lambda: data.qacc)
+
+
+def closed_chains(repeats: int = REPEATS) -> Iterator[str]:
+    """The table: nodes, microseconds a call, and ratios to ours, shortest of turns in one process."""
+    rows = []
+    for links in SIZES:
+        arm, held = pinned(links)
+        rng = np.random.default_rng(links)
+        q, qd = consistent_state(held, 0.6 * rng.normal(size=links), rng.normal(size=links))
+        x = np.concatenate([q, qd, rng.normal(size=links)])
+        calls = {"ours": ours(held, x)}
+        calls |= {"Pinocchio": pinocchio(arm, x)} if find_spec("pinocchio") else {}
+        calls |= {"MuJoCo": connected(arm, x)} if find_spec("mujoco") else {}
+        if "Pinocchio" in calls:
+            _check(links, calls["ours"], calls["Pinocchio"])
+        turns = [{name: _microseconds(each.call) for name, each in calls.items()} for _ in range(repeats)]
+        spent = {name: min(turn[name] for turn in turns) for name in calls}
+        ratios = [
+            cell
+            for name in ("Pinocchio", "MuJoCo")
+            for cell in ((f"{spent[name]:.2f}", f"{spent[name] / spent['ours']:.1f}") if name in spent else ("-", "-"))
+        ]
+        nodes = len(forward_dynamics(held).nodes)
+        rows.append([str(links), str(nodes), f"{spent['ours']:.2f}", *ratios])
+    header = ["links", "nodes", "ours", "constraintDynamics", "ratio", "connect", "ratio"]
+    yield "\n".join(["chains pinned at the tip; microseconds a call", *table(header, rows)])
+
+
+def _check(links: int, one: Solver, other: Solver) -> None:
+    """Raise ArithmeticError where accelerations differ by more than Pinocchio's iteration leaves."""
+    one.call()
+    other.call()
+    ours, theirs = one.result(), other.result()
+    off = float(np.abs(ours - theirs).max() / np.abs(ours).max())
+    if not off <= AGREE:
+        raise ArithmeticError(f"{links} links: accelerations differ from Pinocchio's by {off:.1e} of the largest")
+
+
+def _microseconds(call: Callable[[], object]) -> float:
+    """Of one call, over so many as take long enough to be timed."""
+    call()
+    begin = time.perf_counter()
+    call()
+    count = max(10, int(SECONDS / max(time.perf_counter() - begin, 1e-7)))
+    begin = time.perf_counter()
+    for _ in range(count):
+        call()
+    return 1e6 * (time.perf_counter() - begin) / count

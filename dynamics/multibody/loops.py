@@ -1,0 +1,226 @@
+"""Loops: frames of two bodies held together, and coordinates held to one another, as rows phi(q) = 0."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import cgraph as cg
+from cgraph import Node
+from cgraph.extend import Builder, building, check_name, is_finite
+
+from . import spatial
+from .body import WORLD, Body, MechanismError, checked_rotation, vector
+from .forward_kinematics import KinematicChain
+from .joint_coordinates import places
+from .kinematic_tree import locked_at
+from .relative_placement import RelativePlacement
+from .spatial import ZERO, Array
+
+ROWS = {
+    "point": ("x", "y", "z"),
+    "hinge": ("x", "y", "z", "about x", "about y"),
+    "weld": ("x", "y", "z", "about x", "about y", "about z"),
+    "distance": ("",),
+    "coupling": ("",),
+    "rolling": ("height",),
+}
+SLIPS = ("slip x", "slip y")  # rows of velocities of a rolling wheel
+ROUNDING = 1e-9  # of the lengths of a loop: what is left of rows that numbers from text close
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """What holds a body of a tree to another, or the coordinate of its joint to another's.
+
+    Parameters
+    ----------
+    kind : str
+        "point": a point of the body is on a point of the other. "hinge": and an axis along an axis. "weld": and all
+        axes. "distance": the points are `length` apart, as by a rod with ball joints. "coupling": the coordinate of the
+        body's joint is a polynomial of that of the other's, as in gears (URDF `mimic`, MJCF `equality/joint`).
+        "rolling": a wheel with a thin rim, about `axis` through `at`, of radius `length`, rolls without slip on the
+        plane of the other through `to_at` with the normal `to_axis` (nonholonomic).
+    body, to : str
+        Names of the bodies; `to` may be "world", except in a coupling without a second joint.
+    at, to_at : array_like, (3,)
+        The points, each in its body's frame [m].
+    axis, to_axis : array_like, (3,)
+        Of a "hinge" and a "rolling", each in its body's axes; need not have length 1.
+    orientation : array_like, (3, 3)
+        Of a "weld": the body's axes as columns in those of the other.
+    length : float
+        Of a "distance" and a "rolling", positive [m].
+    coefficients : sequence of float
+        Of a "coupling": c0, c1, .. of q = c0 + c1 q_to + c2 q_to^2 + ... [rad or m].
+    name : str
+        What its rows are called, by default "<body> to <to>".
+
+    Raises
+    ------
+    MechanismError
+        For an unknown kind; for other fields when a mechanism is made of it.
+
+    Notes
+    -----
+    Rows are in the axes of the body that carries both, or the world's. Their multipliers are the force on `body`
+    [N] at the point, and, of a hinge and a weld, the torque on it [N m] about axes of the other: x and y across its
+    axis, or its own. Of a distance it is the force that pushes them apart, of a coupling the force on the coordinate,
+    of a rolling wheel the force of the plane across it and along two axes in it.
+
+    Examples
+    --------
+    Two wheels geared one to two: a torque of 3 N m on the first turns both, and the gear pushes the second.
+
+    >>> import dynamics as dyn
+    >>> first, second = (dyn.Body(name, dyn.Joint("revolute"), inertia=(0.5, 0.5, 1.0)) for name in ("first", "second"))
+    >>> gear = dyn.Loop("coupling", "second", "first", coefficients=[0.0, -2.0], name="gear")
+    >>> wheels = dyn.Mechanism([first, second], loops=[gear])
+    >>> at = {"q0": 0.0, "q1": 0.0, "qd0": 0.0, "qd1": 0.0, "tau0": 3.0, "tau1": 0.0}
+    >>> {name: round(x, 9) for name, x in dyn.forward_dynamics(wheels).evaluate(at).items()}
+    {'qdd0': 0.6, 'qdd1': -1.2, 'lambda0': -1.2}
+    """
+
+    kind: str
+    body: str
+    to: str = WORLD
+    at: ArrayLike = (0.0, 0.0, 0.0)
+    to_at: ArrayLike = (0.0, 0.0, 0.0)
+    axis: ArrayLike = (0.0, 0.0, 1.0)
+    to_axis: ArrayLike = (0.0, 0.0, 1.0)
+    orientation: ArrayLike = field(default_factory=lambda: np.eye(3))
+    length: float = 0.0
+    coefficients: Sequence[float] = (0.0, 1.0)
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.kind, str) or self.kind not in ROWS:
+            raise MechanismError(f"a loop must be one of {', '.join(ROWS)}, got {self.kind!r:.60}")
+
+    @property
+    def label(self) -> str:
+        """What its rows are called."""
+        return self.name or f"{self.body} to {self.to}"
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """Names of its rows."""
+        return tuple([f"{self.label} {row}".rstrip() for row in ROWS[self.kind]])
+
+    @property
+    def velocity_rows(self) -> tuple[str, ...]:
+        """Names of its rows of velocities alone."""
+        return tuple([f"{self.label} {row}" for row in SLIPS]) if self.kind == "rolling" else ()
+
+
+def check_loop(loop: Loop, bodies: Mapping[str, Body]) -> None:
+    """Raises MechanismError unless the loop's bodies are there and its numbers are what its kind needs."""
+    if not isinstance(loop, Loop):
+        raise MechanismError(f"loops must be of the type Loop, got {type(loop).__name__}: {loop!r:.60}")
+    for name in (loop.body, loop.to):
+        if not isinstance(name, str) or (name not in bodies and (name != WORLD or name is loop.body)):
+            raise MechanismError(f"there is a loop on the unknown body {name!r:.80}")
+    try:
+        check_name("a loop", loop.label)
+    except (TypeError, ValueError) as error:
+        raise MechanismError(str(error)) from None
+    where = f"loop {loop.label!r}"
+    for what in ("at", "to_at"):
+        vector(f"{where}: {what}", getattr(loop, what))
+    if loop.kind in ("hinge", "rolling"):
+        for what in ("axis", "to_axis"):
+            if not np.any(vector(f"{where}: {what}", getattr(loop, what))):
+                raise MechanismError(f"{where}: {what} must not be zero")
+    if loop.kind == "weld":
+        checked_rotation(f"{where}: orientation", loop.orientation)
+    if loop.kind in ("distance", "rolling") and not (is_finite(loop.length) and loop.length > 0.0):
+        raise MechanismError(f"{where}: length must be positive and finite, got {loop.length!r:.60} m")
+    if loop.kind == "coupling":
+        _check_coupling(loop, where, bodies)
+
+
+def _check_coupling(loop: Loop, where: str, bodies: Mapping[str, Body]) -> None:
+    given = loop.coefficients
+    listed = isinstance(given, Sequence | np.ndarray) and not isinstance(given, str)
+    if not (listed and len(given) and all([is_finite(each) for each in given])):
+        raise MechanismError(f"{where}: coefficients must be finite numbers, at least one, got {given!r:.60}")
+    for name in (loop.body, loop.to):
+        constant = name == WORLD and len(given) == 1
+        if not constant and (name == WORLD or len(bodies[name].joint.type.coordinates) != 1):
+            raise MechanismError(f"{where}: a coupling needs joints with one coordinate, which {name!r} has not")
+
+
+def loop_rows(loop: Loop, body: RelativePlacement, to: RelativePlacement) -> list[Node]:
+    """phi of a loop that holds frames, of which these are the placements."""
+    with building(Builder()), cg.tag(loop.label):
+        gap = spatial.plus(body.point(loop.at), spatial.scaled(-1.0, to.point(loop.to_at)))
+        if loop.kind == "distance":
+            length = float(loop.length)
+            return [(0.5 / length) * (spatial.dot(gap, gap) - length * length)]
+        if loop.kind == "rolling":
+            axis, target = _axes(loop)
+            normal = to.direction(target[:, 2])
+            tilt = spatial.dot(body.direction(axis[:, 2]), normal)
+            return [spatial.dot(gap, normal) - float(loop.length) * cg.sqrt(1.0 - tilt * tilt)]
+        rows = list(gap)
+        if loop.kind == "hinge":
+            axis, target = _axes(loop)
+            along = body.direction(axis[:, 2])
+            rows += [-spatial.dot(to.direction(target[:, 1]), along), spatial.dot(to.direction(target[:, 0]), along)]
+        if loop.kind == "weld":
+            x, y, z = (body.direction(column) for column in np.asarray(loop.orientation, dtype=np.float64))
+            x_to, y_to, z_to = (to.direction(column) for column in np.eye(3))
+            rows += [spatial.dot(y, z_to), spatial.dot(z, x_to), spatial.dot(x, y_to)]
+    return _without_rounding(rows, [*body.lengths(loop.at), *to.lengths(loop.to_at)])
+
+
+def slip_rows(loop: Loop, body: KinematicChain, to: KinematicChain) -> list[Node]:
+    """The velocity of a rolling wheel's lowest point against the plane, along two axes of it; in the world's axes."""
+    with building(Builder()), cg.tag(loop.label):
+        axis, target = _axes(loop)
+        x, y, normal = (to.direction(spatial.constant(column)) for column in target.T)
+        along = body.direction(spatial.constant(axis[:, 2]))
+        tilt = spatial.dot(along, normal)
+        down = spatial.plus(spatial.scaled(tilt, along), spatial.scaled(-1.0, normal))
+        arm = spatial.scaled(float(loop.length) / cg.sqrt(1.0 - tilt * tilt), down)
+        wheel, ground = body.motion(loop.at), to.motion(loop.to_at)
+        slip = spatial.plus(wheel.velocity, spatial.cross(wheel.omega, arm))
+        reach = spatial.plus(spatial.plus(wheel.position, arm), spatial.scaled(-1.0, ground.position))
+        moving = spatial.plus(ground.velocity, spatial.cross(ground.omega, reach))
+        slip = spatial.plus(slip, spatial.scaled(-1.0, moving))
+        return [spatial.dot(x, slip), spatial.dot(y, slip)]
+
+
+def coupling_row(loop: Loop, bodies: Sequence[Body], all_bodies: Mapping[str, Body], locked: Mapping[str, ArrayLike],
+                 q: Sequence[Node]) -> Node:  # fmt: skip
+    """q - (c0 + c1 q_to + ..) of a coupling; a locked joint is a number."""
+    index: dict[str, int] = {body.name: place.q.start for body, place in zip(bodies, places(bodies), strict=True)}
+
+    def coordinate(name: str) -> Node:
+        if name in index:
+            return q[index[name]]
+        return cg.constant(float(locked_at(all_bodies[name], locked[name])[0]))
+
+    with building(Builder()), cg.tag(loop.label):
+        value = ZERO
+        for coefficient in reversed(loop.coefficients[1:]):
+            value = (value + float(coefficient)) * coordinate(loop.to)
+        return coordinate(loop.body) - (value + float(loop.coefficients[0]))
+
+
+def _axes(loop: Loop) -> list[Array]:
+    """Axes whose third column is that of the loop, (3, 3), of each of its bodies."""
+    given = [np.asarray(axis, dtype=np.float64) for axis in (loop.axis, loop.to_axis)]
+    return [spatial.to_z(spatial.snapped(spatial.unit(axis))) for axis in given]
+
+
+def _without_rounding(rows: Sequence[Node], lengths: Sequence[float]) -> list[Node]:
+    """The rows, with 0 for constants that are rounding of the loop's lengths, or, of angles, of 1."""
+    scale = [max(lengths, default=0.0)] * 3 + [1.0] * 3
+    return [
+        ZERO if row.value is not None and abs(row.value) <= ROUNDING * size else row
+        for row, size in zip(rows, scale, strict=False)
+    ]

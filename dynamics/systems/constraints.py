@@ -1,0 +1,106 @@
+"""Constraints of a system: rows phi(q, t) = 0, and rows A(q, t) u + a(q, t) = 0 of its velocities."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import Any
+
+from cgraph import Node
+from cgraph.extend import Builder, check_name, cotangents, tangents, topological
+
+from .arguments import Parameters, call_user_function, node_or_number, sequence
+from .kinematics import ONE, ZERO, Kinematics
+
+Function = Callable[..., Any]
+
+
+class ConstraintError(ValueError):
+    """Constraints that cannot be met, or of which some follow from others; the message names them.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> def energy(q, qd, t):
+    ...     return 0.5 * qd[0] ** 2
+    >>> try:
+    ...     dyn.forward_dynamics(dyn.System(energy, "x", constraints=lambda q, t: {"wall": q[0] * q[0] + 1.0}))
+    ... except dyn.ConstraintError as error:
+    ...     print(error)
+    the constraints cannot be met: no state was seen where 'wall' is 0
+    """
+
+
+class Constraints:
+    """The rows that hold a system, as nodes.
+
+    names: of all rows, m: those of positions, then those of velocities alone.
+    positions: phi.  velocities: A u + a, linear in the velocities.  parameters: values by name.
+    """
+
+    def __init__(
+        self,
+        kinematics: Kinematics,
+        t: Node,
+        parameters: Mapping[str, float],
+        positions: Function | None,
+        velocities: Function | None,
+    ) -> None:
+        self.kinematics, self.t, self.parameters = kinematics, t, parameters
+        p = Parameters(parameters)
+        q, u = kinematics.q, kinematics.u
+        given: dict[str, tuple[Node, ...]] = {}
+        self.names: list[str] = []
+        for what, function, arguments in (
+            ("constraints", positions, (q, t, p)),
+            ("velocity_constraints", velocities, (q, u, t, p)),
+        ):
+            rows = {} if function is None else _rows(what, call_user_function(what, function, *arguments, state="q"))
+            given[what] = tuple(rows.values())
+            self.names += rows
+        twice = [name for i, name in enumerate(self.names) if name in self.names[:i]]
+        if twice:
+            raise ValueError(f"two constraints have the name {twice[0]!r}")
+        self.positions, self.velocities = given.values()
+        self._check()
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @cached_property
+    def rates(self) -> tuple[Node, ...]:
+        """All rows as rows of velocities, z(q, u, t) = 0: d phi/dt = J u + d phi/dt at rest, then A u + a."""
+        k = self.kinematics
+        dots = tangents(dict(zip(k.q, k.q_dot, strict=True)) | {self.t: ONE}, self.positions, Builder())
+        return (*[dots.get(phi, ZERO) for phi in self.positions], *self.velocities)
+
+    def rate_changes(self, rates: list[Node], build: Builder) -> list[Node]:
+        """dz/dt at udot = 0 of the rows z, as they are folded elsewhere."""
+        k = self.kinematics
+        dots = tangents(dict(zip(k.q, k.q_dot, strict=True)) | {self.t: ONE}, rates, build)
+        return [dots.get(z, ZERO) for z in rates]
+
+    def require_none(self, what: str) -> None:
+        """Raises ValueError, saying that `what` does not know constraints, where there are any."""
+        if self.names:
+            raise ValueError(f"{what} does not know constraints yet; {self.names[0]!r} holds this system")
+
+    def _check(self) -> None:
+        u = set(self.kinematics.u)
+        if u & set(topological(self.positions)):
+            raise ValueError("constraints must depend on coordinates, t and parameters alone; see velocity_constraints")
+        for name, row in zip(self.names[len(self.positions) :], self.velocities, strict=True):
+            if u & set(topological(cotangents({row: ONE}, self.kinematics.u))):
+                raise ValueError(f"velocity constraint {name!r} must be linear in the velocities")
+
+
+def _rows(what: str, given: Any) -> dict[str, Node]:
+    """{name: node}, names from a mapping, or numbered."""
+    if isinstance(given, Node):
+        given = [given]
+    if not isinstance(given, Mapping):
+        kind = what.rstrip("s").replace("_", " ")
+        given = {f"{kind} {i}": row for i, row in enumerate(sequence(f"{what} must give", given))}
+    for name in given:
+        check_name("a constraint", name)
+    return {name: node_or_number(f"constraint {name!r}", row) for name, row in given.items()}

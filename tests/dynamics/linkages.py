@@ -1,0 +1,111 @@
+"""Linkages for tests: four-bars, a slider-crank and Andrews' squeezer."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import cgraph as cg
+import dynamics as dyn
+
+ACROSS = (0.0, 1.0, 0.0)
+
+
+def bar(name: str, parent: str, length: float, place: Any, mass: float = 1.0, kind: str = "revolute") -> dyn.Body:
+    """A uniform rod along x, on a hinge about y."""
+    inertia = mass * length**2 / 12.0
+    joint = dyn.Joint(kind, ACROSS, place)
+    return dyn.Body(name, joint, parent, mass, (0.5 * length, 0.0, 0.0), (0.0, inertia, inertia))
+
+
+def scaled_four_bar(length: float, mass: float) -> dyn.Mechanism:
+    """The four-bar with all lengths and masses so many times larger."""
+    sizes = {"crank": 0.3 * length, "coupler": 0.8 * length, "rocker": 0.6 * length}
+    places = {"crank": 0.0, "coupler": sizes["crank"], "rocker": 0.9 * length}
+    bars = [
+        bar(name, "crank" if name == "coupler" else "world", size, (places[name], 0, 0), mass)
+        for name, size in sizes.items()
+    ]
+    loop = dyn.Loop("point", "coupler", "rocker", at=(sizes["coupler"], 0, 0), to_at=(sizes["rocker"], 0, 0))
+    return dyn.Mechanism(bars, (0.0, 0.0, -9.81 * length), loops=[loop])
+
+
+def peaucellier() -> dyn.Mechanism:
+    """Peaucellier's linkage: long bars of 0.5 m from the world, a rhombus of 0.2 m, and a crank of 0.3 m at 0.3 m."""
+    places = {"long 1": "world", "side 1": "long 1", "long 2": "world", "side 2": "long 2"}
+    bars = [bar(name, on, 0.5 if on == "world" else 0.2, (0.5 * (on != "world"), 0, 0)) for name, on in places.items()]
+    bars += [bar("crank", "world", 0.3, (0.3, 0, 0)), bar("side 3", "crank", 0.2, (0.3, 0, 0))]
+    bars.append(bar("side 4", "crank", 0.2, (0.3, 0, 0)))
+    ends = [("side 1", "side 2", 0.2), ("side 3", "long 1", 0.5), ("side 4", "long 2", 0.5)]
+    loops = [dyn.Loop("point", name, to, at=(0.2, 0, 0), to_at=(end, 0, 0)) for name, to, end in ends]
+    return dyn.Mechanism(bars, loops=loops)
+
+
+def stewart_platform() -> dyn.Mechanism:
+    """A free platform of 2 kg on six legs: a universal joint on the ground, a slide, and a ball in the platform."""
+    plate = dyn.Body("plate", dyn.Joint("free", position=(0.0, 0.0, 0.8)), "world", 2.0, (0, 0, 0), (0.1, 0.1, 0.2))
+    bodies, loops = [plate], []
+    for k in range(6):
+        foot, hand = (
+            np.array([r * np.cos(a), r * np.sin(a), 0.0]) for r, a in ((0.6, k * 1.05), (0.4, k * 1.05 + 0.3))
+        )
+        bodies += [
+            dyn.Body(f"yoke {k}", dyn.Joint("revolute", (1.0, 0.0, 0.0), foot), "world", 0.1, inertia=(1e-3,) * 3),
+            dyn.Body(f"barrel {k}", dyn.Joint("revolute", ACROSS), f"yoke {k}", 0.5, (0, 0, 0.2), (1e-2, 1e-2, 1e-3)),
+            dyn.Body(
+                f"rod {k}", dyn.Joint("prismatic", (0, 0, 1.0)), f"barrel {k}", 0.3, (0, 0, 0.5), (1e-2, 1e-2, 1e-3)
+            ),
+        ]
+        loops.append(dyn.Loop("point", f"rod {k}", "plate", at=(0.0, 0.0, 0.7), to_at=hand, name=f"leg {k}"))
+    return dyn.Mechanism(bodies, loops=loops)
+
+
+def four_bar(kind: str = "point", *, cut: int = 3) -> dyn.Mechanism:
+    """Bars of 0.3, 0.8 and 0.6 m on hinges 0.9 m apart, closed between the second and the third, or at the ground."""
+    loop = dyn.Loop(kind, "coupler", "rocker", at=(0.8, 0, 0), to_at=(0.6, 0, 0), axis=ACROSS, to_axis=ACROSS)
+    bars = [bar("crank", "world", 0.3, (0, 0, 0)), bar("coupler", "crank", 0.8, (0.3, 0, 0))]
+    if cut == 3:
+        bars.append(bar("rocker", "world", 0.6, (0.9, 0, 0)))
+    else:  # the rocker hangs on the coupler, by its other end
+        inertia = 0.6**2 / 12.0
+        joint = dyn.Joint("revolute", ACROSS, (0.8, 0, 0))
+        bars.append(dyn.Body("rocker", joint, "coupler", 1.0, (-0.3, 0, 0), (0.0, inertia, inertia)))
+        loop = dyn.Loop(kind, "rocker", at=(-0.6, 0, 0), to_at=(0.9, 0, 0), axis=ACROSS, to_axis=ACROSS)
+    return dyn.Mechanism(bars, loops=[loop])
+
+
+def squeezer() -> dyn.Mechanism:
+    """Andrews' squeezing mechanism: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section VI.9.
+
+    Coordinates in this order: beta, theta, gamma, delta, phi, epsilon, omega.
+    """
+    about_z = (0.0, 0.0, 1.0)
+
+    def link(name: str, parent: str, place: Any, mass: float, center: Any, inertia: float) -> dyn.Body:
+        joint = dyn.Joint("revolute", about_z, (*place, 0.0))
+        return dyn.Body(name, joint, parent, mass, (*center, 0.0), (inertia, inertia, inertia))
+
+    a, b, c = (-0.06934, -0.00227), (-0.03635, 0.03273), (0.014, 0.072)
+    links = [
+        link("K1", "world", (0.0, 0.0), 0.04325, (0.00092, 0.0), 2.194e-6),
+        link("K2", "K1", (0.007, 0.0), 0.00365, (-0.0115, 0.0), 4.410e-7),
+        link("K3", "world", b, 0.02373, (0.01043, -0.01874), 5.255e-6),
+        link("K5", "world", a, 0.07050, (0.02308, 0.00916), 1.169e-5),
+        link("K4", "K5", (0.04, 0.0), 0.00706, (0.0, 0.01421 - 0.02), 5.667e-7),
+        link("K7", "world", a, 0.05498, (0.00449, -0.01228), 1.912e-5),
+        link("K6", "K7", (0.0, -0.04), 0.00706, (0.02 - 0.01421, 0.0), 5.667e-7),
+    ]
+    (gamma,) = cg.variables("q2")
+    sine, cosine = cg.sin(gamma), cg.cos(gamma)
+    x = 0.02 * cosine + 0.018 * sine + b[0] - c[0]
+    y = 0.02 * sine - 0.018 * cosine + b[1] - c[1]
+    length = cg.sqrt(x * x + y * y)
+    pull = -4530.0 * (length - 0.07785) / length
+    spring = dyn.Force("K3", (pull * x, pull * y, 0.0), (0.02, -0.018, 0.0))
+    meeting = dyn.Loop("point", "K2", "K3", at=(-0.028, 0, 0), to_at=(0.0, -0.035, 0), name="with K3")
+    others = [
+        dyn.Loop("point", "K2", "K4", at=(-0.028, 0, 0), to_at=(0.0, -0.02, 0), name="with K4"),
+        dyn.Loop("point", "K2", "K6", at=(-0.028, 0, 0), to_at=(0.02, 0.0, 0), name="with K6"),
+    ]
+    return dyn.Mechanism(links, (0.0, 0.0, 0.0), [spring], loops=[meeting, *others])

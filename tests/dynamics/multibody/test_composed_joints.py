@@ -1,0 +1,188 @@
+"""Cylindrical, universal and planar joints: the slides and hinges that they are made of, written by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from pytest import importorskip, mark, raises
+
+import dynamics as dyn
+from dynamics.multibody.spatial import rotation, unit
+from tests.dynamics.mechanisms import random_body, random_mechanism
+from tests.dynamics.models import Array, error, run, states
+from tests.tolerances import LONG_SUM, TORQUES
+
+KINDS = {"cylindrical": ("shift", "angle"), "universal": ("angle1", "angle2"), "planar": ("x", "y", "angle")}
+SIZES = {"damping": (0.1, 0.2, 0.3), "stiffness": (3.0, 0.0, 5.0), "spring_reference": (0.1, -0.2, 0.3),
+         "armature": (0.0, 0.02, 0.03)}  # fmt: skip
+ACROSS = (2.0, -1.0, 0.0)  # at a right angle to AXIS
+AXIS = (1.0, 2.0, 2.0)
+
+
+def on_joint(kind: str, *, name: str = "") -> dyn.Mechanism:
+    """A hinge, a body with numbers of any kind on the composed joint, and one on it."""
+    rng = np.random.default_rng(2)
+    count = len(KINDS[kind])
+    first, middle, last = (random_body(f"b{i}", "revolute", f"b{i - 1}" if i else "world", rng) for i in range(3))
+    numbers = {field: values[:count] for field, values in SIZES.items()}
+    second = {} if kind == "cylindrical" else {"second_axis": ACROSS}
+    joint = dyn.Joint(kind, AXIS, middle.joint.position, middle.joint.orientation, name=name, **numbers, **second)
+    return dyn.Mechanism([first, replace(middle, joint=joint), last])
+
+
+def by_hand(kind: str) -> dyn.Mechanism:
+    mechanism = on_joint(kind)
+    first, middle, last = mechanism.bodies
+    third = np.cross(unit(np.array(AXIS)), unit(np.array(ACROSS)))
+    chain: list[tuple[str, Any]] = {
+        "cylindrical": [("prismatic", AXIS), ("revolute", AXIS)],
+        "universal": [("revolute", AXIS), ("revolute", ACROSS)],
+        "planar": [("prismatic", ACROSS), ("prismatic", third), ("revolute", AXIS)],
+    }[kind]
+    names = [f"b1.{name}" for name in KINDS[kind]]
+    joints = [dyn.Joint(each, axis, name=name, **{field: values[i] for field, values in SIZES.items()})
+              for i, ((each, axis), name) in enumerate(zip(chain, names, strict=True))]  # fmt: skip
+    joints[0] = replace(joints[0], position=middle.joint.position, orientation=middle.joint.orientation)
+    bodies = [dyn.Body(name, joint, parent) for name, joint, parent in
+              zip(names[:-1], joints, ["b0", *names], strict=False)]  # fmt: skip
+    return dyn.Mechanism([first, *bodies, replace(middle, joint=joints[-1], parent=names[-2]), last])
+
+
+@mark.parametrize("kind", KINDS)
+def test_a_composed_joint_is_its_parts_node_by_node(kind: str) -> None:
+    composed, chain = on_joint(kind), by_hand(kind)
+    assert composed.coordinates == chain.coordinates == ("b0", *[f"b1.{name}" for name in KINDS[kind]], "b2")
+    assert len(composed.bodies) == 3
+    for graph in (dyn.inverse_dynamics, dyn.forward_dynamics, dyn.energy, dyn.spatial_momentum):
+        assert graph(composed).listing() == graph(chain).listing()
+    recursive = [dyn.RecursiveInverseDynamics(each)(*np.random.default_rng(0).normal(size=(3, composed.system.n)))
+                 for each in (composed, chain)]  # fmt: skip
+    assert np.array_equal(*recursive)
+    assert str(dyn.prune(composed)) == str(dyn.prune(chain))
+    assert on_joint(kind, name="j").coordinates[1] == f"j.{KINDS[kind][0]}"
+
+
+def placed(mechanism: dyn.Mechanism, body: str, q: Any) -> tuple[Array, Array]:
+    of = dyn.arrays_at(mechanism, dyn.frame_placement(mechanism, body), q)
+    return of["R"], of["p"]
+
+
+@mark.parametrize("kind", KINDS)
+def test_coordinates_are_what_they_are_called(kind: str) -> None:
+    given = {} if kind == "cylindrical" else {"second_axis": ACROSS}
+    body = dyn.Body("b", dyn.Joint(kind, AXIS, **given), mass=1.0, inertia=(1.0, 1.0, 1.0))
+    q = [0.4, -0.7, 1.1][: len(KINDS[kind])]
+    turn, place = placed(dyn.Mechanism([body]), "b", q)
+    z, x = np.array(AXIS) / 3.0, np.array(ACROSS) / math.sqrt(5.0)
+    turns, places = {
+        "cylindrical": (rotation(z, -0.7), 0.4 * z),
+        "universal": (rotation(z, 0.4) @ rotation(x, -0.7), np.zeros(3)),
+        "planar": (rotation(z, 1.1), 0.4 * x - 0.7 * np.cross(z, x)),
+    }[kind]
+    assert np.abs(turn - turns).max() < LONG_SUM
+    assert np.abs(place - places).max() < LONG_SUM
+
+
+def test_a_plane_across_z_has_the_axes_x_and_y() -> None:
+    puck = dyn.Mechanism([dyn.Body("puck", dyn.Joint("planar", damping=0.5), mass=1.0, inertia=(1.0, 1.0, 1.0))])
+    assert placed(puck, "puck", [0.3, 0.4, 0.0])[1].tolist() == [0.3, 0.4, 0.0]
+    assert puck.system.damping == (0.5, 0.5, 0.5)
+
+
+@mark.parametrize("kinds", [("cylindrical", "screw"), ("universal",), ("planar", "revolute")])
+def test_their_newton_euler_bias_is_lagrange_s(kinds: tuple[str, ...]) -> None:
+    mechanism = random_mechanism(4, kinds, 2)
+    system, given = mechanism.system, states(mechanism, 5)
+    derived = dyn.System(lambda q, qd, t: list(system.partial_lagrangians), system.coordinates)
+    assert error(run(dyn.bias(mechanism), given), run(dyn.bias(derived), given)) < TORQUES
+
+
+@mark.parametrize("kind", KINDS)
+def test_locked_it_is_the_weld_that_it_stands_at(kind: str) -> None:
+    mechanism, count = on_joint(kind), len(KINDS[kind])
+    at = [0.3, -0.5, 0.8][:count]
+    locked = mechanism.lock("b1", at)
+    assert locked.coordinates == ("b0", "b2")
+    for ours, theirs in zip(placed(locked, "b2", [0.2, 0.9]), placed(mechanism, "b2", [0.2, *at, 0.9]), strict=True):
+        assert np.abs(ours - theirs).max() < LONG_SUM
+    q, qd = mechanism.map_state_from(locked, [0.2, 0.9], [1.0, 2.0])
+    assert q.tolist() == [0.2, *at, 0.9]
+    assert qd.tolist() == [1.0, *[0.0] * count, 2.0]
+    assert mechanism.lock("b1").unlock("b1").coordinates == mechanism.coordinates
+    with raises(dyn.MechanismError, match=rf"joint of body 'b1': .* must be \({count},\) finite numbers"):
+        _ = mechanism.lock("b1", 0.3).coordinates
+    with raises(dyn.MechanismError, match=r"there is no body 'b1\.shift' to lock"):
+        _ = on_joint("cylindrical").lock("b1.shift", 0.1).coordinates
+
+
+@mark.parametrize("kind", KINDS)
+def test_it_comes_off_and_goes_on_with_its_body(kind: str) -> None:
+    mechanism = on_joint(kind)
+    taken = mechanism.subtree("b1")
+    assert [body.name for body in taken.bodies] == ["b1", "b2"]
+    again = mechanism.detach("b1").attach(taken)
+    assert dyn.bias(again).listing() == dyn.bias(mechanism).listing()
+    assert mechanism.joint_positions(np.zeros(mechanism.system.n)).shape[1] == mechanism.system.n + 1
+    kept = mechanism.detach("b2")
+    q, qd = np.random.default_rng(1).normal(size=(2, kept.system.n))
+    let_go = dyn.release(kept, q, qd, "b1")
+    moving = dyn.arrays_at(kept, dyn.frame_velocity(kept, "b1", kept.bodies[1].center), q, qd)["V"]
+    assert np.abs(let_go.body.velocity - moving[:3]).max() < LONG_SUM
+    pushed = dyn.Mechanism(mechanism.bodies, forces=[dyn.Force("b1", (1.0, 0.0, 0.0))])
+    force = dyn.arrays_at(pushed, dyn.bias(pushed))["bias"]
+    assert force.shape == (pushed.system.n,)
+
+
+@mark.parametrize("kind", KINDS)
+def test_files_have_the_parts(kind: str) -> None:
+    importorskip("mujoco")
+    mechanism = on_joint(kind)
+    again = dyn.load_mjcf(dyn.to_mjcf(mechanism))
+    assert again.coordinates == mechanism.coordinates
+    given = states(mechanism, 3)
+    assert error(run(dyn.bias(again), given), run(dyn.bias(mechanism), given)) < TORQUES
+
+
+def test_a_planar_joint_of_urdf() -> None:
+    inertia = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+    text = (
+        f'<robot name="r"><link name="world"/><link name="puck">{inertia}</link><joint name="j" type="planar">'
+        '<parent link="world"/><child link="puck"/><axis xyz="0 0 1"/><dynamics damping="0.2"/></joint></robot>'
+    )
+    puck = dyn.load_urdf(text)
+    assert puck.coordinates == ("j.x", "j.y", "j.angle")
+    assert puck.system.damping == (0.2, 0.2, 0.2)
+    assert dyn.load_urdf(dyn.to_urdf(puck)).coordinates == puck.coordinates
+
+
+@mark.parametrize(
+    ("joint", "said"),
+    [
+        (dyn.Joint("universal", second_axis=(0.1, 0.0, 1.0)), "body 'b': second_axis must be at a right angle to axis"),
+        (dyn.Joint("planar", axis=(0.0, 0.0, 0.0)), "body 'b': axis must not be zero"),
+        (dyn.Joint("planar", second_axis="x"), "body 'b': second_axis must be"),
+        (dyn.Joint("cylindrical", second_axis=(1.0, 0.0, 0.0)), "'cylindrical' has no second axis"),
+        (dyn.Joint("revolute", second_axis=(1.0, 0.0, 0.0)), "'revolute' has no second axis"),
+        (dyn.Joint("planar", damping=(0.1, 0.2)), "body 'b': damping must be one number, or 3 for x, y, angle, got"),
+        (dyn.Joint("revolute", damping=(0.1,)), "body 'b': damping must be finite and at least 0, got"),
+        (dyn.Joint("universal", stiffness=(1.0, -2.0)), "body 'b': stiffness must be finite and at least 0, got -2.0"),
+        (dyn.Joint("cylindrical", pitch=1.0), "only a screw has a pitch"),
+    ],
+)
+def test_what_is_wrong_is_said(joint: dyn.Joint, said: str) -> None:
+    with raises(dyn.MechanismError, match=said):
+        dyn.Mechanism([dyn.Body("b", joint, mass=1.0, inertia=(1.0, 1.0, 1.0))])
+
+
+def test_names_inside_are_taken() -> None:
+    body = dyn.Body("b", dyn.Joint("cylindrical"), mass=1.0, inertia=(1.0, 1.0, 1.0))
+    weld = dyn.Joint("fixed")
+    with raises(dyn.MechanismError, match=r"two bodies have the name 'b\.shift'"):
+        dyn.Mechanism([body, dyn.Body("b.shift", weld)])
+    with raises(dyn.MechanismError, match=r"body 'c' has the unknown parent 'b\.shift'"):
+        dyn.Mechanism([body, dyn.Body("c", weld, "b.shift")])
+    with raises(dyn.MechanismError, match=r"a force on the unknown body 'b\.shift'"):
+        dyn.Mechanism([body], forces=[dyn.Force("b.shift", (1.0, 0.0, 0.0))])

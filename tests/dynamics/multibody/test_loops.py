@@ -1,0 +1,390 @@
+"""Loops: accelerations and loop forces against the equations that define them, in NumPy, from graphs of other parts."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cgraph as cg
+import dynamics as dyn
+
+from ..linkages import ACROSS, bar, four_bar, peaucellier, scaled_four_bar, squeezer, stewart_platform
+from ..mechanisms import random_body, random_joint, random_rotation
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+TIGHT = 1e-12  # of the largest entry: what a dense solve of the same equations leaves
+
+
+def state_of(model: Any, seed: int = 0) -> dict[str, float]:
+    rng, system = np.random.default_rng(seed), dyn.as_system(model)
+    names = [str(node.name) for node in (*system.q, *system.qd, *system.tau)]
+    return {name: float(rng.normal()) for name in names}
+
+
+def values(graph: cg.Graph, at: dict[str, Any]) -> Array:
+    return np.array(list(graph.evaluate({name: at[name] for name in graph.input_names}).values()))
+
+
+def dense_kkt(model: Any, at: dict[str, float], rate: cg.Graph) -> tuple[Array, Array]:
+    """(udot, lambda) of M udot - J^T lambda = tau - damping u - bias, J udot = -Jdot u, by least squares.
+
+    rate: the rows of velocities z(q, u) = J u, inputs q0.., qd0...
+    """
+    system = dyn.as_system(model)
+    n, m = system.n, len(rate.outputs)
+    mass = values(dyn.mass_matrix(model), at).reshape(n, n)
+    u = np.array([at[f"qd{i}"] for i in range(n)])
+    force = np.array([at[f"tau{i}"] for i in range(n)]) - np.array(system.damping) * u - values(dyn.bias(model), at)
+    basis = [at | {f"qd{i}": float(i == k) for i in range(n)} for k in range(n)]
+    rows = np.array([values(rate, each) for each in basis]).T
+    along = at | {f"q{i}_dot": x for i, x in enumerate(values(q_dot(system), at))}
+    change = values(cg.jvp(rate, [f"q{i}" for i in range(system.nq)]), along)
+    matrix = np.block([[mass, -rows.T], [rows, np.zeros((m, m))]])
+    solved = np.linalg.lstsq(matrix, np.concatenate([force, -change]), rcond=1e-13)[0]
+    return solved[:n], rows.T @ solved[n:]
+
+
+def q_dot(system: dyn.System) -> cg.Graph:
+    return cg.Graph([*system.q, *system.qd], {f"{i}": node for i, node in enumerate(system.q_dot)})
+
+
+def velocity_rows(model: dyn.Mechanism, loop: dyn.Loop) -> cg.Graph:
+    """What a loop holds at zero, from how its two bodies move in the world: the relative velocity, and rotation."""
+    q, qd = model.system.q, model.system.qd
+    state = [*q, *qd]
+    ends = []
+    for body, at in ((loop.body, loop.at), (loop.to, loop.to_at)):
+        ends.append(model.motion(body, at)(*state))
+    (a, b), rows = ends, {}
+    for axis in "xyz":
+        rows[f"v{axis}"] = a[f"v{axis}"] - b[f"v{axis}"]
+        rows[f"w{axis}"] = a[f"w{axis}"] - b[f"w{axis}"]
+    if loop.kind == "point":
+        rows = {name: row for name, row in rows.items() if name[0] == "v"}
+    if loop.kind == "distance":
+        gap = [a[x] - b[x] for x in "xyz"]
+        rows = {"d": sum(g * rows[f"v{x}"] for g, x in zip(gap, "xyz", strict=True))}
+    if loop.kind == "hinge":
+        turned = np.asarray(loop.to_axis, dtype=float)
+        axis = [sum(b[f"R_{i}_{j}"] * float(turned[j]) for j in range(3)) for i in range(3)]
+        w = [rows.pop(f"w{x}") for x in "xyz"]
+        rows |= {f"w{i}": w[(i + 1) % 3] * axis[(i + 2) % 3] - w[(i + 2) % 3] * axis[(i + 1) % 3] for i in range(3)}
+    return cg.Graph(state, rows)
+
+
+def closed_tree(kind: str, seed: int = 0) -> tuple[dyn.Mechanism, dyn.Loop, dict[str, float]]:
+    """Two chains, of 3 and 4 joints, on one of 2, held together by a loop; and a state where it is closed."""
+    rng, parents = np.random.default_rng(seed), ["world", "b0", "b1", "b2", "b3", "b1", "b5", "b6", "b7"]
+    kinds = ["revolute", "free", "prismatic"] + ["revolute", "ball", "prismatic"] * 2
+    joints = [random_joint(kind, rng, stiffness=0.0) for kind in kinds]
+    bodies = [random_body(f"b{i}", "", parent, rng, joint=joints[i]) for i, parent in enumerate(parents)]
+    tree = dyn.Mechanism(bodies, 5.0 * rng.normal(size=3))
+    at = state_of(tree, seed)
+    motions = [values(tree.motion(name), at) for name in ("b8", "b4")]
+    (place, turn), (place_to, turn_to) = ((each[:3], each[9:].reshape(3, 3)) for each in motions)
+    offset = 0.2 * rng.normal(size=3)
+    apart = place + turn @ offset - place_to
+    axis = rng.normal(size=3)
+    loop = dyn.Loop(
+        kind,
+        "b8",
+        "b4",
+        at=offset,
+        to_at=turn_to.T @ apart if kind != "distance" else (0.0, 0.0, 0.0),
+        axis=axis,
+        to_axis=turn_to.T @ turn @ axis,
+        orientation=turn_to.T @ turn,
+        length=float(np.linalg.norm(apart)),
+    )
+    return dyn.Mechanism(tree.bodies, tree.gravity, loops=[loop]), loop, held_still(tree, velocity_rows(tree, loop), at)
+
+
+def held_still(model: dyn.Mechanism, rate: cg.Graph, at: dict[str, float]) -> dict[str, float]:
+    """The state with velocities that the rows of velocities allow."""
+    n = model.system.n
+    u = np.array([at[f"qd{i}"] for i in range(n)])
+    rows = np.array([values(rate, at | {f"qd{i}": float(i == k) for i in range(n)}) for k in range(n)]).T
+    return at | {f"qd{i}": x for i, x in enumerate((u - np.linalg.lstsq(rows, rows @ u)[0]).tolist())}
+
+
+@pytest.mark.parametrize("kind", ["point", "hinge", "weld", "distance"])
+def test_accelerations_and_loop_forces_solve_the_defining_equations(kind: str) -> None:
+    model, loop, at = closed_tree(kind)
+    tree = dyn.Mechanism(model.bodies, model.gravity)
+    expected, forces = dense_kkt(tree, at, velocity_rows(tree, loop))
+    for method in ("recursive", "dense") if kind == "point" else ("recursive",):
+        graph = dyn.forward_dynamics(model, method)
+        found = graph.evaluate(at)
+        udot = np.array([found[f"qdd{i}"] for i in range(model.system.n)])
+        assert np.abs(udot - expected).max() <= TIGHT * np.abs(expected).max()
+        weighted = sum(found[f"lambda{k}"] * values_of_row(model, k, at) for k in range(len(model.system.constraints)))
+        assert np.abs(weighted - forces).max() <= TIGHT * np.abs(forces).max()
+
+
+def values_of_row(model: dyn.Mechanism, k: int, at: dict[str, float]) -> Array:
+    """J of one constraint."""
+    system = model.system
+    rate = cg.Graph([*system.q, *system.qd], {"z": system.constraints.rates[k]})
+    return values(cg.gradient(rate, [f"qd{i}" for i in range(system.n)]), at)
+
+
+def node_count(n: int) -> int:
+    arm = dyn.planar_arm([1.0] * n, [0.8] * n)
+    pinned = dyn.Mechanism(arm.bodies, arm.gravity, loops=[dyn.Loop("point", "tip", to_at=(1.0, 0.0, 0.0))])
+    return len(dyn.forward_dynamics(pinned, "recursive").nodes)
+
+
+def test_a_pinned_chain_grows_linearly() -> None:
+    counts = [node_count(n) for n in (3, 4, 10, 16)]
+    assert counts == [259, 399, 1233, 2067]
+    assert [counts[0] <= 270, counts[2] <= 1290] == [True, True]
+
+
+def ladder(rungs: int) -> dyn.Mechanism:
+    """Four-bars on one another: every coupler carries the next."""
+    bodies, loops, base = [], [], "world"
+    for k in range(rungs):
+        left, right, top = f"left {k}", f"right {k}", f"top {k}"
+        bodies += [
+            bar(left, base, 0.3, (0, 0, 0.1)),
+            bar(top, left, 0.7, (0.3, 0, 0)),
+            bar(right, base, 0.4, (0.9, 0, 0)),
+        ]
+        loops.append(dyn.Loop("point", top, right, at=(0.7, 0, 0), to_at=(0.4, 0, 0)))
+        base = top
+    return dyn.Mechanism(bodies, loops=loops)
+
+
+def test_each_of_many_loops_is_eliminated_where_it_closes() -> None:
+    counts = [len(dyn.forward_dynamics(ladder(k), "recursive").nodes) for k in (2, 3, 4, 5)]
+    growth = np.diff(counts)
+    assert growth.max() - growth.min() <= 0.02 * growth.max()
+
+
+def test_andrews_squeezer_has_the_published_accelerations_forces_and_motion() -> None:
+    model = squeezer()
+    q = [-0.0617138900142764496, 0.0, 0.455279819163070380, 0.487364979543842550, 0.222668390165885885]
+    q += [1.23054744454982119, -0.222668390165885885]
+    at = {f"{kind}{i}": 0.0 for kind in ("qd", "tau") for i in range(7)} | {f"q{i}": x for i, x in enumerate(q)}
+    found = dyn.forward_dynamics(model).evaluate(at | {"tau0": 0.033})
+    assert found["qdd0"] == pytest.approx(14222.4439199541138705911625887, rel=1e-13)
+    assert found["qdd1"] == pytest.approx(-10666.8329399655854029433719415, rel=1e-13)
+    assert max(abs(found[f"qdd{i}"]) for i in range(2, 7)) < 1e-13 * found["qdd0"]
+    assert found["lambda0"] == pytest.approx(-98.5668703962410896057654982170, rel=1e-13)
+    assert found["lambda1"] == pytest.approx(6.12268834425566265503114393122, rel=1e-12)
+    run = dyn.simulate(model, q, [0.0] * 7, 0.03, rtol=1e-11, tau=[0.033] + [0.0] * 6)
+    final = [15.81077119629904, -15.75637105984298, 0.04082224013073101, 0.5244099658805304, -0.5347301163226948]
+    assert run.q[-1] == pytest.approx([*final, 1.048080741042263, 0.5347301163226948], rel=1e-9)
+
+
+def residuals(model: dyn.Mechanism, run: dyn.Trajectory) -> tuple[float, float]:
+    """The largest phi and the largest rate of a motion."""
+    system = model.system
+    rows = {"phi": system.constraints.positions, "rate": system.constraints.rates}
+    state = {f"q{i}": column for i, column in enumerate(run.q.T)} | {f"qd{i}": x for i, x in enumerate(run.qd.T)}
+    largest = []
+    for nodes in rows.values():
+        graph = cg.Graph([*system.q, *system.qd], {f"{k}": node for k, node in enumerate(nodes)})
+        largest.append(max(float(np.abs(value).max()) for value in graph.evaluate(state).values()))
+    return largest[0], largest[1]
+
+
+@pytest.mark.parametrize(("method", "options"), [("dop853", {"rtol": 1e-9}), ("rk4", {})])
+def test_a_motion_of_50_s_stays_on_its_constraints(method: str, options: dict[str, float]) -> None:
+    model = four_bar()
+    q, qd = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    times = np.linspace(0.0, 50.0, 301)  # between steps, too
+    run = dyn.simulate(model, q, qd, 50.0, method, t_eval=times, **options)  # type: ignore[arg-type]
+    position, velocity = residuals(model, run)
+    assert position < 1e-12
+    assert velocity < 1e-13
+
+
+def test_a_loop_cut_elsewhere_moves_alike() -> None:
+    one, other = four_bar(), four_bar(cut=4)
+    q, qd = dyn.consistent_state(one, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    relative = [*q[:2], q[2] - q[0] - q[1]], [*qd[:2], qd[2] - qd[0] - qd[1]]
+    first = dyn.simulate(one, q, qd, 2.0, rtol=1e-11, t_eval=[2.0])
+    second = dyn.simulate(other, *dyn.consistent_state(other, *relative), 2.0, rtol=1e-11, t_eval=[2.0])
+    assert second.q[0, :2] == pytest.approx(first.q[0, :2], abs=1e-8)
+    assert second.q[0].sum() == pytest.approx(first.q[0, 2], abs=1e-8)
+
+
+def test_a_slider_crank_moves_as_its_closed_form_says() -> None:
+    """Of a rod without mass but at the slider: a crank of inertia I and a slider m at x(a), one freedom."""
+    r, rod, inertia, m = 0.2, 0.7, 0.05, 1.3
+    crank = dyn.Body("crank", dyn.Joint("revolute", ACROSS), inertia=(0.0, inertia, inertia))
+    slider = dyn.Body("slider", dyn.Joint("prismatic", (1.0, 0.0, 0.0)), mass=m)
+    hold = dyn.Loop("distance", "crank", "slider", at=(r, 0.0, 0.0), length=rod)
+    model = dyn.Mechanism([crank, slider], loops=[hold])
+    (a,) = cg.variables("q0")
+    place = r * cg.cos(a) + cg.sqrt(rod**2 - (r * cg.sin(a)) ** 2)
+    known = dyn.System(lambda q, qd, t: 0.5 * inertia * qd[0] ** 2 + 0.5 * m * (slope(place, q[0]) * qd[0]) ** 2, ["a"])
+    x, slopes = (cg.Graph([a], {"x": node}).evaluate({"q0": 0.7})["x"] for node in (place, slope(place, a)))
+    state = {"q0": 0.7, "q1": x, "qd0": 3.0, "qd1": 3.0 * slopes, "tau0": 0.4, "tau1": 0.0}
+    expected = dyn.forward_dynamics(known).evaluate({"q0": 0.7, "qd0": 3.0, "tau0": 0.4})["qdd0"]
+    assert dyn.forward_dynamics(model).evaluate(state)["qdd0"] == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_coordinate_follows_another_as_a_polynomial() -> None:
+    """q_b = 0.2 + 0.5 q_a + 0.3 q_a^2, against the Lagrangian with q_b written so; and with q_a locked."""
+    wheels = [
+        dyn.Body(name, dyn.Joint("revolute"), inertia=(1.0, 1.0, size)) for name, size in (("a", 1.0), ("b", 1.5))
+    ]
+    follow = dyn.Loop("coupling", "b", "a", coefficients=[0.2, 0.5, 0.3])
+    model = dyn.Mechanism(wheels, loops=[follow])
+    known = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 + 0.75 * ((0.5 + 0.6 * q[0]) * qd[0]) ** 2, ["a"])
+    a, rate, ratio = 0.7, 1.1, 0.5 + 0.6 * 0.7
+    state = {"q0": a, "q1": 0.2 + 0.5 * a + 0.3 * a * a, "qd0": rate, "qd1": ratio * rate, "tau0": 0.4, "tau1": 0.0}
+    expected = dyn.forward_dynamics(known).evaluate({"q0": a, "qd0": rate, "tau0": 0.4})["qdd0"]
+    assert dyn.forward_dynamics(model).evaluate(state)["qdd0"] == pytest.approx(expected, rel=1e-14)
+    stopped = model.lock("a", a)
+    with pytest.warns(dyn.ConstraintWarning, match="coordinate 'b' by 0.697"):
+        run = dyn.simulate(stopped, [0.0], [0.0], 0.1)
+    assert run.q[-1, 0] == pytest.approx(state["q1"], rel=1e-14)
+
+
+def slope(node: cg.Node, a: cg.Node) -> cg.Node:
+    return next(iter(cg.gradient(cg.Graph([a], {"y": node})).outputs.values()))
+
+
+def test_a_hinge_in_a_plane_holds_what_a_point_does() -> None:
+    """Three of its rows say nothing about a planar linkage, and cost nothing."""
+    graphs = [dyn.forward_dynamics(four_bar(kind)) for kind in ("point", "hinge")]
+    at = {f"{kind}{i}": 0.3 * i + 0.2 for kind in ("q", "qd", "tau") for i in range(3)}
+    values_ = [graph.evaluate(at) for graph in graphs]
+    assert {name: values_[1][name] for name in values_[0]} == values_[0]
+    assert [values_[1][f"lambda{k}"] for k in (1, 3, 4)] == [0.0, 0.0, 0.0]
+    assert len(graphs[0].nodes) == len(graphs[1].nodes)
+
+
+@pytest.mark.parametrize("kind", ["point", "hinge"])
+def test_a_planar_loop_in_any_plane_moves_alike(kind: str) -> None:
+    """Of rows across the plane only rounding is left, or sums of others: they are told by their digits."""
+    flat, turn = four_bar(kind), random_rotation(np.random.default_rng(1))
+    bars = [
+        replace(each, joint=replace(each.joint, position=turn @ each.joint.position, orientation=turn))
+        if each.parent == "world"
+        else each
+        for each in flat.bodies
+    ]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", dyn.ConstraintWarning)
+        tilted = dyn.Mechanism(bars, turn @ np.array(flat.gravity), loops=flat.loops)
+        graph = dyn.forward_dynamics(tilted)
+    q, qd = dyn.consistent_state(flat, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    at = {f"q{i}": x for i, x in enumerate(q)} | {f"qd{i}": x for i, x in enumerate(qd)}
+    at |= {f"tau{i}": 0.3 * i for i in range(3)}
+    expected, found = (each.evaluate(at) for each in (dyn.forward_dynamics(flat), graph))
+    for i in range(3):
+        assert found[f"qdd{i}"] == pytest.approx(expected[f"qdd{i}"], rel=1e-11)
+
+
+def test_a_redundant_loop_is_named_and_left_out() -> None:
+    bars = four_bar()
+    again = dyn.Loop("point", "rocker", "coupler", at=(0.6, 0, 0), to_at=(0.8, 0, 0), name="again")
+    twice = dyn.Mechanism(bars.bodies, bars.gravity, loops=[*bars.loops, again])
+    with pytest.warns(dyn.ConstraintWarning, match="constraints 'again x' and 'again z' follow from the others"):
+        graph = dyn.forward_dynamics(twice)
+    at = {f"{kind}{i}": 0.3 * i + 0.2 for kind in ("q", "qd", "tau") for i in range(3)}
+    once = dyn.forward_dynamics(bars).evaluate(at)
+    assert {name: value for name, value in graph.evaluate(at).items() if name in once} == once
+
+
+def test_a_loop_that_cannot_close_is_named() -> None:
+    long = dyn.Mechanism(
+        [bar("crank", "world", 0.1, (0, 0, 0)), bar("rod", "crank", 0.2, (0.1, 0, 0))],
+        loops=[dyn.Loop("point", "rod", at=(0.2, 0, 0), to_at=(0.9, 0, 0), name="far")],
+    )
+    with pytest.raises(dyn.ConstraintError, match="no state was seen where 'far x' is 0"):
+        dyn.forward_dynamics(long)
+    with pytest.raises(dyn.ConstraintError, match="cannot be moved onto the constraints: 'coupler to rocker"):
+        dyn.simulate(four_bar(), [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 1.0)
+
+
+def test_a_start_off_the_constraints_is_moved_and_said_to_be() -> None:
+    model = four_bar()
+    q, qd = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    with pytest.warns(dyn.ConstraintWarning, match="was moved onto them: coordinate 'coupler' by 0.00"):
+        run = dyn.simulate(model, q + 1e-3, qd, 0.01)
+    assert residuals(model, run)[0] < 1e-15
+
+
+def test_a_loop_among_locked_joints_is_a_weld() -> None:
+    model = four_bar()
+    q, _ = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    free = bar("load", "coupler", 0.2, (0.4, 0, 0))
+    loaded = dyn.Mechanism([*model.bodies, free], model.gravity, loops=model.loops)
+    stiff = loaded
+    for name, at in zip(("crank", "coupler", "rocker"), q.tolist(), strict=True):
+        stiff = stiff.lock(name, at)
+    welded = dyn.Mechanism(stiff.bodies, stiff.gravity, locked=stiff.locked)
+    at = {"q0": 0.3, "qd0": 0.5, "tau0": 0.7}
+    assert dyn.forward_dynamics(stiff).evaluate(at)["qdd0"] == dyn.forward_dynamics(welded).evaluate(at)["qdd0"]
+
+
+def test_a_body_caught_by_a_closed_chain_leaves_it_closed() -> None:
+    """Impulses of the loop are J^T s: M qd+ - p does no work on a motion that the loop lets through."""
+    model = four_bar()
+    q, qd = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    load = dyn.Body("load", dyn.Joint("fixed", position=(0.4, 0.0, 0.1)), "coupler", 0.7, inertia=(0.01, 0.02, 0.01))
+    caught = dyn.attach_with_impact(model, q, qd, load, velocity=(1.0, 0.0, -2.0))
+    assert len(caught.mechanism.loops) == 1
+    at = {f"q{i}": x for i, x in enumerate(q)} | {f"qd{i}": x for i, x in enumerate(caught.qd)}
+    rows = np.array([values_of_row(caught.mechanism, k, at) for k in (0, 2)])
+    assert np.abs(rows @ caught.qd).max() < 1e-14 * np.abs(caught.qd).max()
+    assert caught.energy > 0.0
+    whole = dyn.Mechanism(caught.mechanism.bodies, (0.0, 0.0, 0.0))
+    free, spin = (
+        np.linalg.svd(rows)[2][2],
+        dyn.attach_with_impact(dyn.Mechanism(model.bodies, (0.0, 0.0, 0.0)), q, qd, load, velocity=(1.0, 0.0, -2.0)),
+    )
+    mass = values(dyn.mass_matrix(whole), at).reshape(3, 3)
+    assert free @ mass @ caught.qd == pytest.approx(free @ mass @ spin.qd, rel=1e-12)  # of the tree: M qd = p
+
+
+@pytest.mark.parametrize("length", [1e-9, 1e9])
+@pytest.mark.parametrize("mass", [1e-12, 1e12])
+def test_a_loop_has_no_units(length: float, mass: float) -> None:
+    graphs = [
+        dyn.forward_dynamics(model, "recursive") for model in (scaled_four_bar(1, 1), scaled_four_bar(length, mass))
+    ]
+    at = {f"{kind}{i}": 0.3 * i + 0.2 for kind in ("q", "qd") for i in range(3)} | {f"tau{i}": 0.0 for i in range(3)}
+    one, other = (graph.evaluate(at) for graph in graphs)
+    for name, value in one.items():
+        unit = mass * length if name.startswith("lambda") else 1.0
+        assert other[name] == pytest.approx(value * unit, rel=1e-13)
+
+
+def test_peaucelliers_linkage_draws_a_straight_line() -> None:
+    """One freedom of seven bars, and no row too many."""
+    model = peaucellier()
+    q, qd = dyn.consistent_state(model, [-0.35, 0.7, 0.35, -0.7, 0.1, -0.6, 0.4], [0.3] * 7)
+    run = dyn.simulate(model, q, qd, 0.2, rtol=1e-10)
+    tip = model.position("side 1", (0.2, 0.0, 0.0))
+    state = {f"q{i}": column for i, column in enumerate(run.q.T)}
+    x = np.asarray(tip.evaluate(state)["x"])
+    z = np.asarray(tip.evaluate(state)["z"])
+    assert np.ptp(z) > 1e-3
+    assert np.ptp(x) < 1e-13
+
+
+def test_a_stewart_platform_obeys_the_defining_equations() -> None:
+    model = stewart_platform()
+    tree = dyn.Mechanism(model.bodies, model.gravity)
+    start = np.zeros(model.system.nq)
+    start[[0, 1, 2, 3]] = 0.02, 0.01, 0.0, 1.0
+    q, u = dyn.consistent_state(model, start, np.random.default_rng(0).normal(size=model.system.n))
+    at = {f"q{i}": x for i, x in enumerate(q.tolist())} | {f"qd{i}": x for i, x in enumerate(u.tolist())}
+    at |= {f"tau{i}": 0.1 * i for i in range(model.system.n)}
+    rates = [velocity_rows(tree, loop).outputs for loop in model.loops]
+    rows = {f"{k} {name}": node for k, rate in enumerate(rates) for name, node in rate.items()}
+    expected, _ = dense_kkt(tree, at, cg.Graph([*tree.system.q, *tree.system.qd], rows))
+    found = dyn.forward_dynamics(model).evaluate(at)
+    assert np.array([found[f"qdd{i}"] for i in range(model.system.n)]) == pytest.approx(
+        expected, abs=TIGHT * np.abs(expected).max()
+    )
