@@ -31,6 +31,7 @@ from .multibody.frames import (
     frame_velocity,
 )
 from .multibody.impact import Attached, FreeBody, Released, attach_with_impact, release
+from .multibody.joint_force import Actuator, JointForce, JointFriction, JointLimit
 from .multibody.mechanism import Body, Force, Joint, Loop, Mechanism, MechanismError, MechanismWarning
 from .multibody.planar_arm import planar_arm
 from .multibody.pruning import EFFECTS, OmittedTerm, PruneResult, prune
@@ -42,9 +43,11 @@ from .reference import Reference, reference
 from .scenes.scenes import Scene
 from .simulation.ensembles import Ensemble, EnsembleStats, simulate_many
 from .simulation.event import Event
+from .simulation.sampled_controller import HeldForces, SampledController
 from .simulation.simulate import simulate
 from .simulation.trajectory import Crossings, SimulationWarning, Stats, Trajectory
 from .systems.constraints import ConstraintError
+from .systems.controller import with_controller
 from .systems.model import as_system
 from .systems.ode_system import OdeSystem
 from .systems.quasi_velocities import QuasiVelocities
@@ -56,6 +59,7 @@ __all__ = [
     "EFFECTS",
     "FORMULATIONS",
     "METHODS",
+    "Actuator",
     "Attached",
     "Body",
     "Certificate",
@@ -67,7 +71,11 @@ __all__ = [
     "Event",
     "Force",
     "FreeBody",
+    "HeldForces",
     "Joint",
+    "JointForce",
+    "JointFriction",
+    "JointLimit",
     "Loop",
     "Mechanism",
     "MechanismError",
@@ -79,6 +87,7 @@ __all__ = [
     "RecursiveInverseDynamics",
     "Reference",
     "Released",
+    "SampledController",
     "Scene",
     "SimulationWarning",
     "SingularMassMatrixError",
@@ -137,4 +146,5 @@ __all__ = [
     "torque_by_joint_motion",
     "torque_by_link",
     "tree",
+    "with_controller",
 ]

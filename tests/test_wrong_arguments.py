@@ -86,6 +86,13 @@ DECAY = dyn.OdeSystem(lambda x, t: [-x[0]], ["x"])
 RUN = dyn.simulate(ARM, [0.1], [0.0], 0.02, "rk4", dt=0.01, backend="python", dense_output=True)
 TABLE, SYSTEM, SUBTREE = dyn.torque_by_link(ARM), dyn.System(lagrangian, ["a"]), TWO.subtree(TWO.bodies[1].name)
 EXACT = dyn.Reference((0.0, 1.0), (("0.0", "1.0"), ("0.0", "1.0")), 1e-30, "by hand")
+
+
+def on_joint(kind):
+    """Makes a mechanism with a force of that kind on its joint."""
+    return lambda *numbers: dyn.Mechanism([body("b")], forces=[kind(*numbers)])
+
+
 LINK = {"joint": dyn.Joint("revolute"), "mass": 1.0, "inertia": (0.1, 0.1, 0.1)}
 SCENE = (ARM, (0.0,), (0.0,), 1.0)
 FIRST, LAST = TWO.bodies[0].name, TWO.bodies[1].name
@@ -143,8 +150,10 @@ CALLS = {
     ),
     "dyn.certify": call(dyn.certify, SYSTEM, 1, 0, speed=1.0),
     "dyn.to_mjcf": call(dyn.to_mjcf, ARM, 0.001),
-    "dyn.load_mjcf": call(dyn.load_mjcf, dyn.to_mjcf(ARM), ignore=True),
-    "dyn.load_urdf": call(dyn.load_urdf, dyn.to_urdf(ARM), ignore=True),
+    "dyn.load_mjcf": call(
+        dyn.load_mjcf, dyn.to_mjcf(ARM), ignore=True, limits=(1e3, 0.1), friction=0.1, actuators=True
+    ),
+    "dyn.load_urdf": call(dyn.load_urdf, dyn.to_urdf(ARM), ignore=True, limits=(1e3, 0.1), friction=0.1),
     "dyn.planar_arm": call(dyn.planar_arm, [1.0], [1.0], 0.0, "rod", 9.81, parameters=None),
     "dyn.serial_arm": call(dyn.serial_arm, [LINK], (0.0, 0.0, -9.81), parameters=None),
     "dyn.tree": call(dyn.tree, [-1], None, axes=(0.0, 1.0, 0.0), gravity=(0.0, 0.0, -9.81), parameters=None),
@@ -165,6 +174,14 @@ CALLS = {
     ),
     "dyn.release": call(dyn.release, TWO, [0.0, 0.0], [0.0, 0.0], TWO.bodies[-1].name),
     "dyn.Joint": call(dyn.Joint, "revolute"),
+    "dyn.JointLimit": call(on_joint(dyn.JointLimit), "b", -1.0, 1.0, 1e3, 0.1),
+    "dyn.JointFriction": call(on_joint(dyn.JointFriction), "b", 1.0, 0.1),
+    "dyn.Actuator": call(
+        on_joint(dyn.Actuator), "b", "u", 1.0, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (-1.0, 1.0), (-1.0, 1.0), (-1.0, 1.0)
+    ),
+    "dyn.SampledController": call(dyn.SampledController, lambda q, qd, t: q, 0.1),
+    "dyn.HeldForces.at": call(dyn.HeldForces(np.zeros(1), np.zeros((1, 1))).at, [0.1]),
+    "dyn.with_controller": call(dyn.with_controller, ARM, lambda q, qd, t, p: [p["k"]], {"k": 1.0}),
     "dyn.Loop": call(lambda kind: dyn.Loop(kind, "b"), "point"),
     "dyn.Mechanism with a loop": call(closed, "b", "world", (0, 0, 0), (0, 0, 0), (0, 0, 1), 1.0, [0.0, 1.0], "loop"),
     "dyn.Event": call(dyn.Event, "e", lambda q, qd, t: q[0], 0, False, None),
@@ -210,12 +227,16 @@ CALLS = {
 RECORDS = """
     cg.CSource cg.Comparison cg.Compiled cg.Counts cg.Edge cg.Lint cg.Loop cg.Node cg.Why cg.WhyNot
     dyn.Attached dyn.Body dyn.Certificate dyn.Crossings dyn.Ensemble dyn.EnsembleStats dyn.Force dyn.FreeBody
+    dyn.HeldForces dyn.JointForce
     dyn.OmittedTerm dyn.PruneResult dyn.QuasiVelocities dyn.Reference dyn.Released dyn.Stats dyn.Subtree dyn.TorqueTable
     dyn.Trajectory
 """
-# Nothing to give; what empties the user's cache; the fast way into compiled code, which looks at nothing.
+# Nothing to give; what a mechanism calls; what empties the user's cache; the fast way into compiled code, which looks
+# at nothing.
 LEFT_OUT = """cg.recording_lines cg.clear_cache cg.Compiled.bind cg.Compiled.values cg.Graph.check cg.Graph.counts
-    cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.bias_forces dyn.System.require_values"""
+    cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.bias_forces dyn.System.require_values
+    dyn.JointForce.along dyn.JointForce.check dyn.JointLimit.along dyn.JointLimit.check dyn.JointFriction.along
+    dyn.JointFriction.check dyn.Actuator.along dyn.Actuator.check"""
 
 
 def public():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 from xml.etree import ElementTree
 
@@ -15,10 +16,18 @@ from .left_out import warned
 from .mujoco_twin import mujoco
 from .read_mjcf import compiled_mjcf, read_mjcf
 from .read_urdf import add_floating_base, origin_of, read_urdf
+from .smooth_forces import smooth
 from .source import called, root_of, urdf_root
 
 
-def load_mjcf(source: Any, *, ignore: bool = False) -> Mechanism:
+def load_mjcf(
+    source: Any,
+    *,
+    ignore: bool = False,
+    limits: Sequence[float] | None = None,
+    friction: float | None = None,
+    actuators: bool = False,
+) -> Mechanism:
     """The mechanism of a MuJoCo model: its trees of joints and welds, springs, damping and armature.
 
     Coordinates are MuJoCo's qpos, in its order and from the same zero, and velocities its qvel; both have the names of
@@ -32,7 +41,15 @@ def load_mjcf(source: Any, *, ignore: bool = False) -> Mechanism:
     ignore : bool
         Leave out what a mechanism cannot have: springs of free joints, tendons, equality constraints, fluid, ...
         Contacts, joint limits, friction loss and actuators, which act on a mechanism and do not belong to it, are
-        always left out; of an actuator that acts with no input, such as a servo, the force is said.
+        left out unless asked for; of an actuator that acts with no input, such as a servo, the force is said.
+        Contact always is.
+    limits : pair of floats, optional
+        (stiffness, damping) of springs that stand for the limits of hinges and slides, see `JointLimit`.
+    friction : float, optional
+        A velocity [rad/s or m/s]; friction loss then acts as loss tanh(qd / friction), see `JointFriction`.
+    actuators : bool
+        Take motors, position and velocity servos and the like on hinges and slides, see `Actuator`. Their inputs are
+        parameters, "ctrl_" and the actuator's name (or number), 0 where nothing else is said.
 
     Returns
     -------
@@ -55,10 +72,17 @@ def load_mjcf(source: Any, *, ignore: bool = False) -> Mechanism:
     """
     given, name = isinstance(source, mujoco().MjModel), called(source)
     mj = source if given else compiled_mjcf(source, name)
-    return warned(read_mjcf(mj, ignore), "the model" if given else name)
+    return warned(read_mjcf(mj, ignore, smooth(limits, friction, actuators)), "the model" if given else name)
 
 
-def load_urdf(source: Any, *, ignore: bool = False, floating: bool = False) -> Mechanism:
+def load_urdf(
+    source: Any,
+    *,
+    ignore: bool = False,
+    floating: bool = False,
+    limits: Sequence[float] | None = None,
+    friction: float | None = None,
+) -> Mechanism:
     """The mechanism of a URDF file, with the numbers of the file; its root link stands still, or floats.
 
     Every link is a body of its name, those without mass and those on fixed joints too, so that `position("tool0")` is
@@ -72,10 +96,15 @@ def load_urdf(source: Any, *, ignore: bool = False, floating: bool = False) -> M
         A path or the XML text (it starts with "<").
     ignore : bool
         Leave out what a mechanism cannot have, the coupling of joints that mimic others. Contacts, joint limits,
-        friction loss and extensions of URDF, such as transmissions, are always left out.
+        friction loss and extensions of URDF, such as transmissions, are left out, the second and third unless asked
+        for.
     floating : bool
         Whether the root link moves freely, by a joint that is called as the link is. Joints that are floating in the
         file are free in any case.
+    limits : pair of floats, optional
+        (stiffness, damping) of springs that stand for the limits of hinges and slides, see `JointLimit`.
+    friction : float, optional
+        A velocity [rad/s or m/s]; friction loss then acts as loss tanh(qd / friction), see `JointFriction`.
 
     Returns
     -------
@@ -95,7 +124,8 @@ def load_urdf(source: Any, *, ignore: bool = False, floating: bool = False) -> M
     >>> dyn.load_urdf(dyn.to_urdf(dyn.Mechanism([rotor]))).coordinates
     ('rotor',)
     """
-    return warned(read_urdf(urdf_root(source), called(source), ignore, floating), called(source))
+    taken = smooth(limits, friction, False)
+    return warned(read_urdf(urdf_root(source), called(source), ignore, floating, taken), called(source))
 
 
 def load_at_start(source: Any, *, ignore: bool = False, floating: bool = False) -> tuple[Mechanism, tuple[float, ...]]:

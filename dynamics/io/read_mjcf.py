@@ -15,6 +15,7 @@ from ..multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError,
 from ..multibody.spatial import Array
 from .left_out import listed, present, refused_or_left_out
 from .mujoco_twin import mujoco
+from .smooth_forces import NONE, Smooth, actuators, disabled, mjcf_forces, modelled, single
 from .source import is_text, path_of, root_of, text_of
 from .stand_ins import zeros_again
 
@@ -31,10 +32,10 @@ class _Names(NamedTuple):
     joints: list[str]
 
 
-def read_mjcf(mj: Any, ignore: bool) -> Mechanism:
+def read_mjcf(mj: Any, ignore: bool, smooth: Smooth = NONE) -> Mechanism:
     """The mechanism of MuJoCo's model. Raises MechanismError for what a mechanism cannot have."""
     names = _Names(_body_names(mj), [mj.joint(j).name for j in range(mj.njnt)])
-    left_out = refused_or_left_out(_not_modelled(mj), _acting_from_outside(mj), ignore)
+    left_out = refused_or_left_out(_not_modelled(mj), _acting_from_outside(mj, smooth), ignore)
     bodies: list[Body] = []
     ends = [(WORLD, np.zeros(3))]  # of each MuJoCo body: the last of its chain, and its origin in that one's frame
     with np.errstate(all="ignore"):  # of numbers that are not finite Mechanism says where they stand
@@ -42,8 +43,9 @@ def read_mjcf(mj: Any, ignore: bool) -> Mechanism:
             chain, origin = _chain(mj, body, names, *ends[mj.body_parentid[body]])
             bodies += chain
             ends.append((chain[-1].name, origin))
-    gravity = mj.opt.gravity * (not _disabled(mj, "GRAVITY"))
-    return Mechanism(bodies, gravity, left_out=left_out)
+    gravity = mj.opt.gravity * (not disabled(mj, "GRAVITY"))
+    forces = mjcf_forces(mj, [body for body in bodies if body.joint.type.moves], smooth)
+    return Mechanism(bodies, gravity, forces, left_out=left_out)
 
 
 def compiled_mjcf(source: Any, called: str) -> Any:
@@ -132,8 +134,8 @@ def _joint(mj: Any, j: int, position: Array, orientation: Array) -> Joint:
         axis,
         position,
         orientation,
-        damping=float(mj.dof_damping[dof]) * (not _disabled(mj, "DAMPER")),
-        stiffness=float(mj.jnt_stiffness[j]) * (not _elsewhere(mj, j)) * (not _disabled(mj, "SPRING")),
+        damping=float(mj.dof_damping[dof]) * (not disabled(mj, "DAMPER")),
+        stiffness=float(mj.jnt_stiffness[j]) * (not _elsewhere(mj, j)) * (not disabled(mj, "SPRING")),
         spring_reference=float(mj.qpos_spring[mj.jnt_qposadr[j]]) if single else 0.0,
         armature=float(mj.dof_armature[dof]),
     )
@@ -146,19 +148,12 @@ def _kind(mj: Any, j: int) -> str:
     return kinds.get(int(mj.jnt_type[j]), "")
 
 
-def _disabled(mj: Any, *what: str) -> bool:
-    """Whether the model's options switch off any of `what`; older MuJoCo has one switch for all passive force."""
-    bits = mujoco().mjtDisableBit.__members__
-    names = [*what, *(["PASSIVE"] if set(what) & {"DAMPER", "SPRING"} else [])]
-    return any([mj.opt.disableflags & int(bits.get(f"mjDSBL_{name}", 0)) for name in names])
-
-
 def _not_modelled(mj: Any) -> list[str]:
     """What belongs to the mechanism of the model and a mechanism cannot have."""
-    sprung = [] if _disabled(mj, "SPRING") else sorted(j for j in _where(mj, "jnt_stiffness") if _elsewhere(mj, j))
+    sprung = [] if disabled(mj, "SPRING") else sorted(j for j in _where(mj, "jnt_stiffness") if _elsewhere(mj, j))
     pulling = sorted(set().union(*(_where(mj, f"tendon_{what}") for what in _OF_A_TENDON)))
     tendons = [mj.tendon(i).name or f"number {i}" for i in pulling]
-    equalities = 0 if _disabled(mj, "CONSTRAINT", "EQUALITY") else int(np.sum(mj.eq_active0))
+    equalities = 0 if disabled(mj, "CONSTRAINT", "EQUALITY") else int(np.sum(mj.eq_active0))
     return present(
         {
             f"springs of free joints, or of turned ball joints ({listed(_joint_names(mj, sprung))})": sprung,
@@ -168,30 +163,31 @@ def _not_modelled(mj: Any) -> list[str]:
             f"joints with several dampings or armatures ({listed(_joint_names(mj, _uneven(mj)))})": _uneven(mj),
             "actuators with armature or damping": _any(mj, *_OF_AN_ACTUATOR),
             "a fluid (density or viscosity)": mj.opt.density or mj.opt.viscosity,
-            "gravity compensation": _any(mj, "body_gravcomp") and not _disabled(mj, "GRAVITY"),
+            "gravity compensation": _any(mj, "body_gravcomp") and not disabled(mj, "GRAVITY"),
             "flexible bodies": getattr(mj, "nflex", 0),
             "plugins": getattr(mj, "nplugin", 0),
         }
     )
 
 
-def _acting_from_outside(mj: Any) -> list[str]:
-    """What acts on the mechanism of the model: inputs, and forces that are not smooth."""
-    limited = not _disabled(mj, "CONSTRAINT", "LIMIT")
-    limits = sorted(_where(mj, "jnt_limited"))
+def _acting_from_outside(mj: Any, smooth: Smooth) -> list[str]:
+    """What acts on the mechanism of the model, inputs and forces that are not smooth, and is not taken."""
+    limited = not disabled(mj, "CONSTRAINT", "LIMIT")
+    limits = [j for j in sorted(_where(mj, "jnt_limited")) if smooth.limits is None or not single(mj, j)]
     touching = (np.any(mj.geom_contype) and np.any(mj.geom_conaffinity)) or mj.npair
-    rubbing = not _disabled(mj, "CONSTRAINT", "FRICTIONLOSS")
+    rubbing = not disabled(mj, "CONSTRAINT", "FRICTIONLOSS")
     losses = [f"{_coordinate(mj, i)}: {mj.dof_frictionloss[i]:g}" for i in sorted(_where(mj, "dof_frictionloss"))]
-    actuators = {} if _disabled(mj, "ACTUATION") else {i: _at_rest(mj, i) for i in range(mj.nu)}
-    servos = [f"{mj.actuator(i).name or f'number {i}'}: {force}" for i, force in actuators.items() if force]
+    left = [i for i in range(actuators(mj)) if not (smooth.actuators and modelled(mj, i))]
+    acting = {} if disabled(mj, "ACTUATION") else {i: _at_rest(mj, i) for i in left}
+    servos = [f"{mj.actuator(i).name or f'number {i}'}: {force}" for i, force in acting.items() if force]
     return present(
         {
-            "contacts": touching and not _disabled(mj, "CONSTRAINT", "CONTACT"),
+            "contacts": touching and not disabled(mj, "CONSTRAINT", "CONTACT"),
             f"joint limits ({listed(_joint_names(mj, limits))})": limits and limited,
             "tendon limits": _any(mj, "tendon_limited") and limited,
-            f"friction loss ({listed(losses)})": losses and rubbing,
+            f"friction loss ({listed(losses)})": losses and rubbing and smooth.friction is None,
             "friction loss of tendons": _any(mj, "tendon_frictionloss") and rubbing,
-            f"actuators ({len(actuators) - len(servos)})": len(actuators) > len(servos),
+            f"actuators ({len(acting) - len(servos)})": len(acting) > len(servos),
             f"actuators that act with no input ({listed(servos)})": servos,
         }
     )
@@ -205,7 +201,7 @@ def _at_rest(mj: Any, i: int) -> str:
     numbers = zip(mj.actuator_biasprm[i, :3] * (kind == "affine"), ("", " length", " velocity"), strict=True)
     terms = [f"{number:+g}{of}" for number, of in numbers if number]
     lower, upper = mj.actuator_ctrlrange[i]
-    least = np.clip(0.0, lower, upper) if mj.actuator_ctrllimited[i] and not _disabled(mj, "CLAMPCTRL") else 0.0
+    least = np.clip(0.0, lower, upper) if mj.actuator_ctrllimited[i] and not disabled(mj, "CLAMPCTRL") else 0.0
     terms += [f"input at least {least:g}"] if least > 0.0 else [f"input at most {least:g}"] if least < 0.0 else []
     gear = mj.actuator_gear[i, 0]
     return " ".join([*terms, *([f"times gear {gear:g}"] if terms and gear != 1.0 else [])])

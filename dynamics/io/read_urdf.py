@@ -12,10 +12,12 @@ import numpy as np
 from cgraph.extend import require_flag
 
 from ..multibody import spatial
+from ..multibody.joint_force import JointForce, JointFriction
 from ..multibody.joints import TYPES, SpatialJoint
 from ..multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
 from ..multibody.spatial import Array
 from .left_out import listed, present, refused_or_left_out
+from .smooth_forces import NONE, Smooth
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s^2, where the file says nothing
 FAR = 1e9  # m: a limit of a slide that `to_urdf` writes because URDF asks for one; it stands for none
@@ -27,20 +29,20 @@ _KNOWN = {
 }
 
 
-def read_urdf(robot: Element, called: str, ignore: bool, floating: bool = False) -> Mechanism:
+def read_urdf(robot: Element, called: str, ignore: bool, floating: bool = False, smooth: Smooth = NONE) -> Mechanism:
     """The mechanism of a robot, whose root link stands still or floats. Raises MechanismError with one sentence."""
     try:
         if require_flag("floating", floating):
             add_floating_base(robot)
         links, joints = _by_name(robot, "link"), _by_name(robot, "joint")
         root = _root(links, joints)
-        left_out = refused_or_left_out(_mimics(joints), _outside(robot, joints), ignore)
+        left_out = refused_or_left_out(_mimics(joints), _outside(robot, joints, smooth), ignore)
         with np.errstate(all="ignore"):  # of numbers that are not finite Mechanism says where they stand
             bodies = [] if root == WORLD else [Body(root, Joint("fixed"), **_inertial(links[root], root))]
             for name, element in joints.items():
                 parent, child = _end(element, name, "parent"), _end(element, name, "child")
                 bodies.append(Body(child, _joint(element, name, child), parent, **_inertial(links[child], child)))
-        return Mechanism(bodies, _gravity(robot), left_out=left_out)
+        return Mechanism(bodies, _gravity(robot), _forces(joints, smooth), left_out=left_out)
     except MechanismError as error:
         raise MechanismError(f"URDF, {called}: {error}") from None
 
@@ -195,18 +197,31 @@ def _mimics(joints: Mapping[str, Element]) -> list[str]:
     return present({f"joints that mimic others ({listed(names)})": names})
 
 
-def _outside(robot: Element, joints: Mapping[str, Element]) -> list[str]:
-    """What acts on a mechanism and does not belong to it."""
+def _outside(robot: Element, joints: Mapping[str, Element], smooth: Smooth) -> list[str]:
+    """What acts on a mechanism and does not belong to it, and is not taken."""
     limited = [name for name, joint in joints.items() if _limited(joint, name)]
     rubbing = [f"{name}: {force:g}" for name, joint in joints.items() if (force := _friction(joint, name))]
     return present(
         {
             "contacts": robot.findall("link/collision"),
-            f"joint limits ({listed(limited)})": limited,
-            f"friction loss ({listed(rubbing)})": rubbing,
+            f"joint limits ({listed(limited)})": limited and smooth.limits is None,
+            f"friction loss ({listed(rubbing)})": rubbing and smooth.friction is None,
             f"extensions of URDF ({listed(list(dict.fromkeys(_extensions(robot))))})": [*_extensions(robot)],
         }
     )
+
+
+def _forces(joints: Mapping[str, Element], smooth: Smooth) -> list[JointForce]:
+    """The forces of joints that are taken."""
+    forces: list[JointForce] = []
+    for name, joint in joints.items():
+        body, limit, where = _end(joint, name, "child"), _one(joint, f"joint {name!r}", "limit"), f"joint {name!r}"
+        if smooth.limits is not None and limit is not None and _limited(joint, name):
+            lower, upper = (_numbers(limit, where, side, 1, "0")[0] for side in ("lower", "upper"))
+            forces.append(smooth.limit(body, lower, upper))
+        if smooth.friction is not None and (loss := _friction(joint, name)):
+            forces.append(JointFriction(body, loss, smooth.friction))
+    return forces
 
 
 def _limited(joint: Element, name: str) -> bool:

@@ -287,21 +287,22 @@ def _checked_joint(where: str, joint: Joint) -> Joint:
     orientation = spatial.snapped(checked_rotation(f"{where}: orientation", joint.orientation))
     pitch = _pitch(where, joint)
     given = {name: check(f"{where}: {name}", getattr(joint, name)) for name, check in JOINT_QUANTITIES.items()}
-    for name, has in {"stiffness": joint.type.sprung, "armature": joint.type.geared}.items():
-        if not (has or vanishes(given[name])):
-            value = getattr(joint, name)
-            raise MechanismError(f"{where}: a joint of the kind {joint.kind!r} has no {name}, got {value!r}")
+    no = f"{where}: a joint of the kind {joint.kind!r} has no"
+    if not (joint.type.sprung or vanishes(given["stiffness"])):
+        raise MechanismError(f"{no} spring, got stiffness {joint.stiffness!r}")
+    if not (joint.type.geared or vanishes(given["armature"])):
+        raise MechanismError(f"{no} armature, got {joint.armature!r}")
     return Joint(joint.kind, axis=axis, orientation=orientation, pitch=pitch, name=joint.name, **given)
 
 
 def _pitch(where: str, joint: Joint) -> float:
-    if not is_finite(joint.pitch):
-        raise MechanismError(f"{where}: pitch must be finite, got {joint.pitch!r:.80} m/rad")
-    if bool(joint.pitch) == TYPES[joint.kind].pitched:
-        return float(joint.pitch)
-    kind = joint.kind
-    needs = f"only a screw has a pitch, not {kind!r}" if joint.pitch else f"a joint of the kind {kind!r} needs a pitch"
-    raise MechanismError(f"{where}: {needs}, got {joint.pitch!r} m/rad")
+    kind, pitch = joint.kind, joint.pitch
+    if not is_finite(pitch):
+        raise MechanismError(f"{where}: pitch must be finite, got {pitch!r:.80} m/rad")
+    if bool(pitch) != TYPES[kind].pitched:
+        needs = f"only a screw has a pitch, not {kind!r}" if pitch else f"a joint of the kind {kind!r} needs a pitch"
+        raise MechanismError(f"{where}: {needs}, got {pitch!r} m/rad")
+    return float(pitch)
 
 
 def _check_name(what: str, name: str) -> None:

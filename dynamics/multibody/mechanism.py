@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, cast
+from typing import cast
 
 from numpy.typing import ArrayLike
 
@@ -18,15 +18,16 @@ from ..systems.model import Model
 from ..systems.system import BodySystem, System
 from .body import WORLD, Body, Joint, MechanismError, MechanismWarning, quantities, vector
 from .composed_joints import locked_parts, require_outer_parents
-from .external_force import Force, check_force, generalized_forces
+from .external_force import Force, generalized_forces
 from .forward_kinematics import KinematicChain, kinematic_chain
 from .inertial_numbers import Link
 from .joint_coordinates import coordinate_names, per_velocity, quasi_velocities, velocity_names
+from .joint_force import JointForce, add_joint_forces, check_any_force
 from .joint_positions import skeleton
 from .kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia
 from .loop_equations import check_loops, position_rows, velocity_rows
 from .loops import Loop
-from .mechanism_fields import Structure, changed
+from .mechanism_fields import Structure, changed, listed
 from .mechanism_summary import summary
 from .modification import attach_subtree, detach_subtree, lock_joint, map_state, subtree_of, unlock_joint
 from .parameter_values import bound_body, bound_force, require_values, used_names
@@ -59,8 +60,9 @@ class Mechanism(Structure):
         In any order.
     gravity : array_like, (3,)
         In the world's axes [m/s^2]. In place of a number may stand a parameter, as in a `Body`.
-    forces : sequence of Force
-        On bodies from outside, beside the joint forces tau; they enter the equations as J^T f.
+    forces : sequence of Force and JointForce
+        On bodies from outside, beside the joint forces tau; they enter the equations as J^T f. And along joints:
+        `JointLimit`, `JointFriction`, `Actuator`.
     parameters : mapping
         {name: value} of the parameters that bodies, joints, gravity and forces have. They are inputs of the graphs, and
         `simulate` binds them. Each needs a value with which the mechanism can be; only one that forces alone name is 0
@@ -97,9 +99,9 @@ class Mechanism(Structure):
     def __post_init__(self) -> None:
         quantities("gravity", self.gravity)
         require_flag("base_parameters", self.base_parameters)
-        kinds = {"bodies": Body, "forces": Force, "loops": Loop}
-        for what, kind in kinds.items():  # kept, so that an iterator is read once
-            object.__setattr__(self, what, _listed(what, kind, getattr(self, what)))
+        kinds = {"bodies": (Body,), "forces": (Force, JointForce), "loops": (Loop,)}
+        for what, allowed in kinds.items():  # kept, so that an iterator is read once
+            object.__setattr__(self, what, listed(what, allowed, getattr(self, what)))
         self._check_parameters([part for body in self.bodies for part in self.shared.parts(body)])
         seen: set[str] = set()
         for name in self.coordinates:
@@ -108,7 +110,7 @@ class Mechanism(Structure):
             seen.add(name)
         carried = {body.name for body in self.bodies}
         for force in self.forces:
-            check_force(force, carried)
+            check_any_force(force, carried, self.bodies)
         check_loops(self)
         used = used_names(self.bodies, self.gravity, self.forces)
         for name in self.parameters:
@@ -208,7 +210,9 @@ class Mechanism(Structure):
         )
 
     def _generalized_forces(self, q: list[Node], qd: list[Node], t: Node, p: dict[str, Node]) -> list[Node]:
-        return generalized_forces([(force, self._chain(force.body, q, qd)) for force in self.forces], qd, p)
+        on_bodies = [force for force in self.forces if isinstance(force, Force)]
+        total = generalized_forces([(force, self._chain(force.body, q, qd)) for force in on_bodies], qd, p)
+        return add_joint_forces(total, self.forces, self.moving, (q, qd), p)
 
     def _chain(self, body: str, q: Sequence[Node], qd: Sequence[Node]) -> KinematicChain:
         return kinematic_chain(self._carriers[body], self.moving, self.links, q, qd)
@@ -280,7 +284,7 @@ class Mechanism(Structure):
         require_values(self.bodies, self.gravity, {**self.parameter_values, **chosen})
         bodies = tuple([bound_body(body, chosen) for body in self.bodies])
         forces = tuple([bound_force(force, chosen) for force in self.forces])
-        return changed(self, bodies=bodies, gravity=bound(self.gravity, chosen), forces=forces)
+        return changed(self, chosen, bodies=bodies, gravity=bound(self.gravity, chosen), forces=forces)
 
     def lock(self, body: str, at: float | ArrayLike | None = None) -> Mechanism:
         """The mechanism with the joint of a body standing still at a coordinate [rad or m], or several; by default 0.
@@ -339,12 +343,3 @@ def require_mechanism(model: Model, what: str) -> Mechanism:
 
 def _point(body: str, at: ArrayLike) -> Array:
     return vector(f"position on body {body!r}: at", at)
-
-
-def _listed(what: str, kind: type, given: Any) -> tuple[Any, ...]:
-    if isinstance(given, str) or not isinstance(given, Iterable):
-        raise MechanismError(f"{what} must be a sequence of {kind.__name__}, got {type(given).__name__}: {given!r:.60}")
-    for each in (listed := tuple(given)):
-        if not isinstance(each, kind):
-            raise MechanismError(f"{what} must be of the type {kind.__name__}, got {type(each).__name__}: {each!r:.60}")
-    return listed

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 from numpy.typing import ArrayLike
 
-from .body import Body
+from .body import Body, MechanismError
 from .external_force import Force
+from .joint_force import JointForce
 from .link_cache import SharedParts
 from .loops import Loop
 from .parameter_values import used_names
@@ -22,7 +24,7 @@ class Structure:
 
     bodies: Sequence[Body]
     gravity: Quantities = (0.0, 0.0, -9.81)
-    forces: Sequence[Force] = ()
+    forces: Sequence[Force | JointForce] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     locked: Mapping[str, float | ArrayLike] = field(default_factory=dict)
     base_parameters: bool = False
@@ -40,9 +42,23 @@ class Structure:
 AnyStructure = TypeVar("AnyStructure", bound=Structure)
 
 
-def changed(structure: AnyStructure, **changes: Any) -> AnyStructure:
-    """The structure with other fields; of its parameters, those that it then still has."""
+def changed(
+    structure: AnyStructure, values: Mapping[str, float] = MappingProxyType({}), **changes: Any
+) -> AnyStructure:
+    """The structure with other fields; of its parameters, those that it then still has, some with other values."""
     result = {"bodies": structure.bodies, "gravity": structure.gravity, "forces": structure.forces} | changes
     used = used_names(result["bodies"], result["gravity"], result["forces"])
-    parameters = {name: value for name, value in structure.parameters.items() if name in used}
+    parameters = {name: value for name, value in {**structure.parameters, **values}.items() if name in used}
     return replace(structure, parameters=parameters, **changes)
+
+
+def listed(what: str, kinds: tuple[type, ...], given: Any) -> tuple[Any, ...]:
+    """The entries of a field. Raises MechanismError for what is no sequence, and for entries of another type."""
+    names = " or ".join([kind.__name__ for kind in kinds])
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise MechanismError(f"{what} must be a sequence of {names}, got {type(given).__name__}: {given!r:.60}")
+    entries = tuple(given)
+    for each in entries:
+        if not isinstance(each, kinds):
+            raise MechanismError(f"{what} must be of the type {names}, got {type(each).__name__}: {each!r:.60}")
+    return entries

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from .body import BODY_QUANTITIES, JOINT_QUANTITIES, Body, MechanismError, quantities
 from .external_force import Force
+from .joint_force import JointForce
 from .parameters import bound, entries, evaluated, names_in
 
 
@@ -52,7 +53,7 @@ def _of_parameters(rows: Iterable[tuple[str, Any, Callable[[str, Any], Any]]]) -
             yield Use(what, value, names, check)
 
 
-def used_names(bodies: Sequence[Body], gravity: Any, forces: Iterable[Force]) -> dict[str, None]:
+def used_names(bodies: Sequence[Body], gravity: Any, forces: Iterable[Force | JointForce]) -> dict[str, None]:
     """The names that occur in forces, and then those in bodies and gravity."""
     result = dict.fromkeys([name for force in forces for name in force.names])
     return result | {name: None for use in uses(bodies, gravity) for name in use.names}
@@ -87,9 +88,9 @@ def bound_body(body: Body, values: Mapping[str, float]) -> Body:
     return replace(body, joint=replace(body.joint, **joint), **own)
 
 
-def bound_force(force: Force, values: Mapping[str, float]) -> Force:
-    """The force likewise."""
-    if not force.names & values.keys():
+def bound_force(force: Force | JointForce, values: Mapping[str, float]) -> Force | JointForce:
+    """The force likewise; one along a joint keeps its input, which then has that value."""
+    if isinstance(force, JointForce) or not force.names & values.keys():
         return force
     value, torque = ([bound(each, values) for each in three] for three in (force.value, force.torque))
     return replace(force, value=value, torque=torque)

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from .body import WORLD, Body, MechanismError
 from .external_force import Force
+from .joint_force import JointForce
 from .loops import Loop
 
 
@@ -24,8 +25,8 @@ class Subtree:
         What the first hung on.
     places : tuple of int
         Where the bodies stood among the mechanism's, which orders coordinates.
-    forces : tuple of Force
-        On these bodies.
+    forces : tuple of Force and JointForce
+        On these bodies and their joints.
     parameters : mapping
         The values that the bodies, their joints and the forces use.
     locked : mapping
@@ -44,7 +45,7 @@ class Subtree:
     bodies: tuple[Body, ...]
     parent: str = WORLD
     places: tuple[int, ...] = ()
-    forces: tuple[Force, ...] = ()
+    forces: tuple[Force | JointForce, ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     locked: Mapping[str, float | ArrayLike] = field(default_factory=dict)
     loops: tuple[Loop, ...] = ()

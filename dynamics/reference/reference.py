@@ -8,10 +8,12 @@ from pathlib import Path
 
 from numpy.typing import ArrayLike
 
+from cgraph import Node
 from cgraph.extend import require_choice, require_path
 
 from ..equations.initial_value import initial_value, times_to_record
 from ..equations.state_equation import state_equation, state_inputs
+from ..systems.controller import with_closed_form
 from ..systems.model import Model
 from .collocation import collocation
 from .disk_store import Store, key
@@ -35,7 +37,7 @@ def reference(
     *,
     digits: int = 30,
     method: str = "taylor",
-    tau: float | Sequence[float] = 0.0,
+    tau: float | Sequence[float] | Callable[..., Sequence[Node | float]] = 0.0,
     parameters: Mapping[str, float] | None = None,
     folder: str | Path | None = None,
 ) -> Reference:
@@ -59,10 +61,11 @@ def reference(
     method : str
         "taylor", Taylor series, whose steps end where a piecewise operation switches; "radau", implicit collocation,
         for what is stiff and smooth.
-    tau : float or sequence
-        Constant applied force [N m or N], for all velocities or for each, (n,).
+    tau : float, sequence or callable
+        Constant applied force [N m or N], for all velocities or for each, (n,); or a controller in closed form, see
+        `with_controller`.
     parameters : mapping, optional
-        {name: value} in place of the model's own.
+        {name: value} in place of the model's own, and of those of a controller.
     folder : path, optional
         Where solutions are kept and read again; one that cannot be read is computed anew.
 
@@ -94,7 +97,8 @@ def reference(
         folder = require_path("folder", folder)
     if isinstance(digits, bool) or not (isinstance(digits, int) and 1 <= digits <= MOST // 2):
         raise ValueError(f"digits must be a whole number from 1 to {MOST // 2}, got {digits!r}")
-    start, inputs = initial_value(model, q, qd, tau, parameters), state_inputs(model)
+    model, constant, _ = with_closed_form(model, tau, parameters)
+    start, inputs = initial_value(model, q, qd, constant, parameters), state_inputs(model)
     x, times = start.x.tolist(), times_to_record(t_eval).tolist()
     values = {name: start.bound[name] for name in (*inputs.parameters, *inputs.applied)}
     graph, solver = state_equation(model), REFERENCE_METHODS[method]

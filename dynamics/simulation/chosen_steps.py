@@ -14,6 +14,7 @@ from ..integrators.step_control import COLLAPSE, DONE, SMALLEST_ATOL, TOO_SMALL
 from .dense_output import StepBlock
 from .first_step import LEAP, first_step
 from .run_options import RunOptions
+from .sampled_controller import Hold
 from .state_sizes import StateSizes
 from .step_program import CompiledSteps
 from .stepping import FIRST_PASSES, NativeIntegration
@@ -32,8 +33,9 @@ class AdaptiveIntegration(NativeIntegration):
         options: RunOptions,
         parameters: Sequence[float] = (),
         stopped: Callable[[], bool] = lambda: False,
+        control: Hold | None = None,
     ) -> None:
-        super().__init__(compiled, options, parameters, stopped)
+        super().__init__(compiled, options, parameters, stopped, control)
         self.relative = max(options.relative, self.program.finest)
         self.absolute = np.broadcast_to(np.maximum(options.absolute, SMALLEST_ATOL), self.program.size)
         self.sizes = self._fresh_sizes() if options.atol is None else None
@@ -41,12 +43,13 @@ class AdaptiveIntegration(NativeIntegration):
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
-        options, wanted = self.options, self._first_step(x)
+        options, end = self.options, self._hold(self.options.t0, x)
+        wanted = self._first_step(x)
         start: Mapping[str, float | Array | list[float]] = {
             "x": x,
             "p": self.parameters,
             "t": options.t0,
-            "end": options.t_end,
+            "end": end,
             "rtol": self.relative,
             "atol": self.absolute,
             "next": wanted,
@@ -80,8 +83,26 @@ class AdaptiveIntegration(NativeIntegration):
                     self.runner.write(memory, "atol", self.absolute)
             if status == TOO_SMALL:
                 self.status = self._too_small(memory)
-            if status in (TOO_SMALL, DONE):
+            if status == TOO_SMALL or (status == DONE and not self._next_period(memory)):
                 return
+
+    def _hold(self, t: float, x: Array) -> float:
+        """Where the steps from t on end; of a controller, take its forces for this period."""
+        if self.control is None:
+            return self.options.t_end
+        self.parameters = self.control.at(t, x)
+        return next(self.control.ends(t, self.options.t_end))
+
+    def _next_period(self, memory: Array) -> bool:
+        """Whether the run is not over yet; the memory is then at the start of the next period of a controller."""
+        t = self._number(memory, "t")
+        if t == self.options.t_end:
+            return False
+        end, wanted = self._hold(t, self.runner.read(memory, "x")), self._number(memory, "next")
+        wanted = wanted if math.isfinite(wanted) else self.options.length  # Taylor's method chooses it by itself
+        for name, value in (("end", end), ("p", self.parameters), ("next", wanted), ("fresh", 1.0), ("status", 0.0)):
+            self.runner.write(memory, name, value)
+        return True
 
     def _block(self, rows: Array) -> StepBlock:
         m = self.program.size

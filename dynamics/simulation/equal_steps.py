@@ -7,6 +7,8 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+SAME = 8.0  # units of the last bit of the time, by which instants that are meant to be the same may differ
+
 
 class EqualSteps(NamedTuple):
     """`steps` steps of h [s] from `begin` on, negative in a run back in time; the last one ends at `end` exactly."""

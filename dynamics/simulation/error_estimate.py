@@ -15,14 +15,13 @@ import numpy as np
 from cgraph.extend import Array
 
 from .dense_output import Indices
-from .equal_steps import EqualSteps
+from .equal_steps import SAME, EqualSteps
 from .run_options import RunOptions
 from .step_program import CompiledSteps
 from .stepping import FixedStepIntegration
 
 ENOUGH = 1.5  # times the longest of the steps that make up one of the second run
 APART = 1.5  # the ratio of errors from which a difference of two runs tells them
-SAME = 8.0  # units of the last bit of the time, by which instants of two runs may differ
 ROUNDING = 1e-10  # of the largest component: where another is that small, rounding is no error of it
 LAWLESS = 0.1  # of the size of a component: a difference above it follows no power of the step
 
@@ -34,15 +33,19 @@ class SecondRun(NamedTuple):
     ratio: float
 
 
-def second_run(stretches: Sequence[EqualSteps], order: int) -> SecondRun:
-    """Steps of about twice the length; where there are too few for that, of half."""
-    first = sum(part.steps * abs(part.h) ** (order + 1) for part in stretches)
-    longer = _merged(_doubled(stretches))
-    ratio = sum(part.steps * abs(part.h) ** (order + 1) for part in longer) / first
-    if ratio >= APART:
-        return SecondRun(longer, ratio)
-    shorter = [part._replace(h=0.5 * part.h, steps=2 * part.steps) for part in stretches]
-    return SecondRun(shorter, 0.5**order)
+def second_run(stretches: Sequence[EqualSteps], order: int, *, shorter: bool = False) -> SecondRun:
+    """Steps of about twice the length; where there are too few for that, of half.
+
+    shorter: of half, for every stretch has to end where it does.
+    """
+    if not shorter:
+        first = sum(part.steps * abs(part.h) ** (order + 1) for part in stretches)
+        longer = _merged(_doubled(stretches))
+        ratio = sum(part.steps * abs(part.h) ** (order + 1) for part in longer) / first
+        if ratio >= APART:
+            return SecondRun(longer, ratio)
+    halves = [part._replace(h=0.5 * part.h, steps=2 * part.steps) for part in stretches]
+    return SecondRun(halves, 0.5**order)
 
 
 def _doubled(stretches: Sequence[EqualSteps]) -> Iterable[EqualSteps]:
@@ -191,9 +194,10 @@ def estimate(
     report: is told the time [s] that the second run has come to.  stopped: see NativeIntegration.
     """
     options, program = run.options, run.program
-    second, ratio = second_run(run.stretches, program.order)
+    control = None if run.control is None else run.control.replay()
+    second, ratio = second_run(run.stretches, program.order, shorter=control is not None)
     compiled = CompiledSteps(program, run.runner)
-    other = FixedStepIntegration(compiled, options, run.parameters, stopped, every_step=True, stretches=second)
+    other = FixedStepIntegration(compiled, options, run.parameters, stopped, control, every_step=True, stretches=second)
     differences = Differences(states[None])
     for block in other.blocks(x):
         beyond = options.direction * (block.t - times[-1]) > 0.0

@@ -27,12 +27,14 @@ class EventLog:
     """The events of a run, (number, t, x) each in `happened`.
 
     ended: the event that has ended the run, in words.  status: why a reset has stopped it.
+    parameters: of the rate, those of the block that is to come.
     restart: (t, x) to go on from after a reset, else None.
     warnings: a sentence for each event of which some may have been missed.
     """
 
-    def __init__(self, program: EventProgram, parameters: Sequence[float] = ()) -> None:
-        self.program, self.parameters = program, list(parameters)
+    def __init__(self, program: EventProgram) -> None:
+        self.program = program
+        self.parameters: Sequence[float] = ()
         self.ended = self.status = ""
         self.restart: tuple[float, Array] | None = None
         self.warnings: list[str] = []

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 from .chosen_steps import AdaptiveIntegration
 from .run_options import RunOptions
+from .sampled_controller import Hold
 from .step_program import CompiledSteps
 from .stepping import FixedStepIntegration, NativeIntegration
 
@@ -15,11 +16,12 @@ def integration(
     options: RunOptions,
     parameters: Sequence[float] = (),
     stopped: Callable[[], bool] = lambda: False,
+    control: Hold | None = None,
     *,
     every_step: bool = False,
 ) -> NativeIntegration:
     """A run, before its first step.  every_step: of equal steps, keep those between times of t_eval too."""
     if compiled.program.adaptive:
-        return AdaptiveIntegration(compiled, options, parameters, stopped)
+        return AdaptiveIntegration(compiled, options, parameters, stopped, control)
     every_step = every_step or options.times is None
-    return FixedStepIntegration(compiled, options, parameters, stopped, every_step=every_step)
+    return FixedStepIntegration(compiled, options, parameters, stopped, control, every_step=every_step)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from cgraph.extend import Array
 from ..equations.initial_value import initial_value
 from ..integrators import METHODS, Problem, derive, force, total_energy
 from ..systems.model import Model
+from .applied_forces import Applied, Tau, with_applied
 from .dense_output import StepBlock, with_hermite
 from .error_estimate import ErrorEstimate, estimate
 from .event import Event, as_events
@@ -28,6 +29,7 @@ from .progress_bar import Progress
 from .recorder import Recorder
 from .row_values import row_values
 from .run_options import METHOD, TABLES, RunOptions, time_span
+from .sampled_controller import HeldForces, Hold
 from .scipy_solvers import ScipyIntegration, scipy_solver
 from .solution import Solution
 from .step_program import compile_steps, step_program
@@ -52,7 +54,7 @@ def simulate(
     t_eval: ArrayLike | None = None,
     events: Event | Iterable[Event] = (),
     dense_output: bool = False,
-    tau: float | Sequence[float] = 0.0,
+    tau: Tau = 0.0,
     parameters: Mapping[str, float] | None = None,
     first_step: float | None = None,
     max_steps: float = math.inf,
@@ -104,10 +106,13 @@ def simulate(
     dense_output : bool
         Whether to keep what lies between the rows, for `Trajectory.solution(t)`: some numbers a step for every one of
         the state.
-    tau : float or sequence
-        Constant applied force [N m or N], for all velocities or for each, (n,).
+    tau : float, sequence, callable or SampledController
+        Applied force [N m or N]: constant, for all velocities or for each, (n,); or a controller. One in closed form is
+        a function (q, qd, t) or (q, qd, t, p) to a node or number for each velocity, which is compiled into the steps,
+        see `with_controller`. A `SampledController` calls a Python function of numbers once in a period; equal steps
+        then have their error estimated by steps of half the length, with the same forces.
     parameters : mapping, optional
-        {name: value} in place of the model's own.
+        {name: value} in place of the model's own, and of those that a controller in closed form has besides.
     first_step : float, optional
         In place of the first step that the method chooses [s].
     max_steps : float
@@ -149,16 +154,18 @@ def simulate(
     watched = as_events(events)
     if not isinstance(dense_output, bool):
         raise TypeError(f"dense_output must be True or False, got {dense_output!r:.40}")
-    start = initial_value(model, q, qd, tau, parameters, t0)
+    model, applied = with_applied(model, tau, parameters)
+    start = initial_value(model, q, qd, applied.constant, parameters, t0)
     options.check(start.states)
     options.check_room(len(start.x))
 
     # Derive the equations, xdot = f(x, t), the energy and the events as graphs
-    problem = derive(model, start.bound)
+    problem = derive(model, applied.bound(start.bound))
     energy, log = total_energy(problem), EventLog(event_program(problem, watched)) if watched else None
+    hold = applied.hold(options)
 
     # Write the steps of the method over these graphs, and compile them
-    leg = _compiled(problem, options, between=bool(watched) or dense_output)
+    leg = _compiled(problem, options, hold, between=bool(watched) or dense_output)
 
     # Integrate, noting rows and events
     run = WatchedIntegration(leg, options, log) if log else leg(options)
@@ -168,17 +175,19 @@ def simulate(
     outcome = _integrate(run, start.x, recorder, options, problem.rate, steps)
 
     # Put the result together
-    (times, states), nq = recorder.table(), problem.nq
+    (times, states), nq, held = recorder.table(), problem.nq, None if hold is None else hold.held
     stats = _stats(run, options.method, outcome)
     for text in stats.warnings:
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    energies = np.full(len(times), math.nan) if energy is None else row_values(energy, times, states)[:, 0]
+    energies = _energies(energy, times, states, held)
     dense = None if steps is None else Solution(options.t0, start.x, steps, nq)
     rows = (times, states[:, :nq], states[:, nq:], energies)
-    return Trajectory(*rows, stats, log.crossings(nq) if log else {}, _graphs(problem), dense)
+    return Trajectory(*rows, stats, log.crossings(nq) if log else {}, _graphs(problem, applied), dense, held)
 
 
-def _compiled(problem: Problem, options: RunOptions, *, between: bool) -> Callable[[RunOptions], Integration]:
+def _compiled(
+    problem: Problem, options: RunOptions, hold: Hold | None, *, between: bool
+) -> Callable[[RunOptions], Integration]:
     """What makes a run, compiled, of options. between: with all steps, and the dense output of chosen ones."""
     name = options.scipy_solver
     if name is not None:
@@ -187,7 +196,7 @@ def _compiled(problem: Problem, options: RunOptions, *, between: bool) -> Callab
     method = METHODS[options.method]
     program = step_program(problem, method, dense=method.adaptive and (between or options.times is not None))
     compiled = compile_steps(program, options.backend)
-    return lambda options: integration(compiled, options, every_step=between)
+    return lambda options: integration(compiled, options, control=hold, every_step=between)
 
 
 class _Outcome(NamedTuple):
@@ -247,7 +256,7 @@ def _run(
     most, kept = room() / TABLES, 0
     for block in run.blocks(x):
         if steps is not None and block.dense is None:
-            block = with_hermite(block, rate)
+            block = with_hermite(block, rate, run.parameters)
         recorder.add(block)
         if steps is not None:
             steps.append(block)
@@ -259,6 +268,12 @@ def _run(
         report(float(block.t[-1]))
     if run.event:
         recorder.add_last()
+
+
+def _energies(energy: Graph | None, times: Array, states: Array, held: HeldForces | None) -> Array:
+    if energy is None:
+        return np.full(len(times), math.nan)
+    return row_values(energy, times, states, None if held is None else held.at(times))[:, 0]
 
 
 def _stats(run: Integration, method: str, outcome: _Outcome) -> Stats:
@@ -284,7 +299,7 @@ def _stats(run: Integration, method: str, outcome: _Outcome) -> Stats:
     )
 
 
-def _graphs(problem: Problem) -> dict[str, Graph]:
+def _graphs(problem: Problem, applied: Applied) -> dict[str, Graph]:
     """What a trajectory computes accelerations and forces by."""
-    applied = force(problem)
-    return {"rate": problem.rate} | ({} if applied is None else {"force": applied})
+    forces = force(problem)
+    return {"rate": problem.rate} | ({} if forces is None else {"force": forces, "tau": applied.graph(problem)})

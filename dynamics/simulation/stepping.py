@@ -13,6 +13,7 @@ from cgraph.extend import Array
 from .dense_output import StepBlock
 from .equal_steps import EqualSteps, equal_steps
 from .run_options import RunOptions
+from .sampled_controller import Hold
 from .step_program import CompiledSteps
 
 BLOCK_TIME = 0.1  # s of run time after which a run comes back to Python: for Ctrl-C, progress and events
@@ -43,6 +44,7 @@ class Integration(ABC):
 
     status: empty while all is well, else why it stopped before the end.  largest: step [s].
     warnings: what speaks against the result, a sentence each.  event: the one that has ended it, in words.
+    parameters: values of the rate's inputs that are not built in, as of the block that has come last.
     """
 
     def __init__(self, components: Sequence[str]) -> None:
@@ -52,6 +54,7 @@ class Integration(ABC):
         self.status = ""
         self.warnings: list[str] = []
         self.event = ""
+        self.parameters: list[float] = []
 
     @property
     def plain(self) -> Integration | None:
@@ -87,6 +90,7 @@ class NativeIntegration(Integration):
 
     parameters: values of the program's inputs that are not built in.
     stopped: asked before every block; a run that is stopped raises StoppedError.
+    control: the forces that are held over periods, which then are the parameters.
     """
 
     def __init__(
@@ -95,10 +99,11 @@ class NativeIntegration(Integration):
         options: RunOptions,
         parameters: Sequence[float] = (),
         stopped: Callable[[], bool] = lambda: False,
+        control: Hold | None = None,
     ) -> None:
         super().__init__(compiled.program.components)
         self.program, self.runner, self.options = compiled.program, compiled.runner, options
-        self.parameters, self._stopped = list(parameters), stopped
+        self.parameters, self._stopped, self.control = list(parameters), stopped, control
         self._passes = FIRST_PASSES
         self._accepted = True
 
@@ -145,23 +150,32 @@ class FixedStepIntegration(NativeIntegration):
         options: RunOptions,
         parameters: Sequence[float] = (),
         stopped: Callable[[], bool] = lambda: False,
+        control: Hold | None = None,
         *,
         every_step: bool,
         stretches: Sequence[EqualSteps] | None = None,
     ) -> None:
-        super().__init__(compiled, options, parameters, stopped)
+        super().__init__(compiled, options, parameters, stopped, control)
         self.every_step = every_step
-        self.stretches = equal_steps(options.instants, options.step) if stretches is None else stretches
+        if stretches is None:
+            instants = options.instants if control is None else control.instants(options.instants)
+            stretches = equal_steps(instants, options.step)
+        self.stretches = stretches
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
-        start: dict[str, float | Array | list[float]] = {"x": x, "p": self.parameters}
+        start: dict[str, float | Array | list[float]] = {"x": x}
+        if self.control is None:
+            start["p"] = self.parameters
         if "fresh" in self.runner.program.registers:
             start["fresh"] = 1.0
         memory = self.runner.memory(start)
         for stretch in self.stretches:
             for name, value in (("start", stretch.begin), ("t", stretch.begin), ("count", 0.0), ("h", stretch.h)):
                 self.runner.write(memory, name, value)
+            if self.control is not None:
+                self.parameters = self.control.at(stretch.begin, self.runner.read(memory, "x"))
+                self.runner.write(memory, "p", self.parameters)
             yield from self._equal_steps(memory, stretch)
             if self.status:
                 return

@@ -14,6 +14,7 @@ from cgraph import Graph
 from cgraph.extend import Array
 
 from .row_values import row_values
+from .sampled_controller import HeldForces
 from .solution import Solution
 
 
@@ -134,9 +135,12 @@ class Trajectory:
         {name of an event: Crossings}.
     graphs : mapping
         {"rate": xdot, "force": tau + forces - damping qd}: graphs over the states and t, with the numbers of the run
-        built in, by which `qdd` and `forces` are computed. "force" is missing of an OdeSystem.
+        built in, by which `qdd` and `forces` are computed, and "tau". Both forces are missing of an OdeSystem. With a
+        SampledController, tau0, .. are inputs too.
     dense : Solution, optional
         The steps with their dense output, which `solution` reads; of a run with `dense_output=True`.
+    held : HeldForces, optional
+        What a SampledController has given, `held.t` and `held.tau`, a row for each period.
 
     Examples
     --------
@@ -154,6 +158,7 @@ class Trajectory:
     events: Mapping[str, Crossings] = field(default_factory=dict)
     graphs: Mapping[str, Graph] = field(default_factory=dict)
     dense: Solution | None = None
+    held: HeldForces | None = None
 
     def solution(self, t: ArrayLike) -> tuple[Array, Array]:
         """The motion at any time of the run, by the dense output of its steps.
@@ -191,19 +196,24 @@ class Trajectory:
     @cached_property
     def qdd(self) -> Array:
         """Accelerations at the rows, (T, n); of an OdeSystem without columns."""
-        rates = row_values(self.graphs["rate"], self.t, self._states)
+        rates = self._rows("rate")
         return rates[:, rates.shape[1] - self.qd.shape[1] :]
 
     @cached_property
     def forces(self) -> Array:
         """Generalized forces besides those of the Lagrangian at the rows, tau + forces - damping qd, (T, n)."""
-        if "force" not in self.graphs:
-            return np.empty_like(self.qd)
-        return row_values(self.graphs["force"], self.t, self._states)
+        return self._rows("force")
 
-    @property
-    def _states(self) -> Array:
-        return np.concatenate([self.q, self.qd], axis=1)
+    @cached_property
+    def tau(self) -> Array:
+        """Applied forces at the rows, (T, n); of a SampledController those held from there on."""
+        return self._rows("tau")
+
+    def _rows(self, name: str) -> Array:
+        if name not in self.graphs:
+            return np.empty_like(self.qd)
+        states = np.concatenate([self.q, self.qd], axis=1)
+        return row_values(self.graphs[name], self.t, states, None if self.held is None else self.held.at(self.t))
 
     @property
     def success(self) -> bool:

@@ -62,6 +62,7 @@ class WatchedIntegration(Integration):
         self._legs.append(run)
         rejected, evaluations = self.rejected, self.evaluations
         for block in run.blocks(x):
+            log.parameters = run.parameters
             kept = log(block)
             self.steps += len(kept.t)
             self._count(run, rejected, evaluations)

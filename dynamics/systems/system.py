@@ -98,26 +98,13 @@ class System:
         if not partials:
             raise ValueError("the lagrangian gave no partial Lagrangians")
         self.partial_lagrangians = tuple([node_or_number("the lagrangian", partial) for partial in partials])
-        applied: Sequence[Node | float] = [0.0] * self.n
+        self.forces = tuple([cg.constant(0.0)] * self.n)
         if forces is not None:
             with cg.tag("force"):
-                value = call_user_function("forces", forces, self.q, self.qd, self.t, p)
-                applied = sequence("forces must give", value)
-            if len(applied) != self.n:
-                names = ", ".join(self.velocities)
-                raise ValueError(f"forces must give {self.n} values, one for each of {names}; got {len(applied)}")
-        self.forces = tuple(
-            [node_or_number(f"the force on {name!r}", x) for name, x in zip(self.velocities, applied, strict=True)]
-        )
+                self.forces = tuple(generalized_forces("forces", forces, self, p))
         self._require_parameters(p)
         self.constraints = Constraints(self.kinematics, self.t, self.parameters, constraints, velocity_constraints)
-        known = {*self.q, *self.qd, self.t, *p.values()}
-        for node in topological(self._given):
-            if node.op.name == "variable" and node not in known:
-                names = ", ".join((*self.coordinates, *self.parameters))
-                raise ValueError(
-                    f"the system uses {node.name!r}, which is no coordinate, parameter or t (it has {names})"
-                )
+        require_known("the system", self._given, self, p)
 
     def _require_parameters(self, p: Mapping[str, Node]) -> None:
         """Raises ValueError for a damping that depends on anything else."""
@@ -321,6 +308,26 @@ class BodySystem(System):
     def bias_forces(self) -> Sequence[BiasForce]:
         """The pairs (velocity, force) that the bodies state; see `System.bias_forces`."""
         return self._bias_forces(self.q, self.qd)
+
+
+def generalized_forces(what: str, function: Callable[..., Any], system: System, p: Parameters) -> list[Node]:
+    """What a function of (q, qd, t) or (q, qd, t, p) gives: a node for each velocity. Raises what is wrong with it."""
+    value = call_user_function(what, function, system.q, system.qd, system.t, p)
+    applied = sequence(f"{what} must give", value)
+    if len(applied) != system.n:
+        names = ", ".join(system.velocities)
+        raise ValueError(f"{what} must give {system.n} values, one for each of {names}; got {len(applied)}")
+    pairs = zip(system.velocities, applied, strict=True)
+    return [node_or_number(f"the force on {name!r}", force) for name, force in pairs]
+
+
+def require_known(what: str, nodes: Sequence[Node], system: System, p: Parameters) -> None:
+    """Raises ValueError for a variable that is neither of the state, nor t, nor a parameter."""
+    known = {*system.q, *system.qd, system.t, *p.values()}
+    for node in topological(nodes):
+        if node.op.name == "variable" and node not in known:
+            names = ", ".join((*system.coordinates, *p))
+            raise ValueError(f"{what} uses {node.name!r}, which is no coordinate, parameter or t (it has {names})")
 
 
 def _sum(nodes: Sequence[Node]) -> Node:

@@ -6,16 +6,19 @@ import math
 import pickle
 import time
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cgraph import Node
 from cgraph.extend import Array, require_whole
 
 from ...integrators import METHODS, derive
+from ...systems.controller import with_closed_form
 from ...systems.model import Model
 from ..equal_steps import step_count
 from ..event import Event, as_events
@@ -23,6 +26,7 @@ from ..event_program import event_program
 from ..free_memory import room
 from ..progress_bar import Progress
 from ..run_options import METHOD, RunOptions, time_span
+from ..sampled_controller import SampledController
 from ..step_program import StepProgram, pickled_steps, step_program
 from ..trajectory import SimulationWarning
 from .branch_free import branch_free
@@ -55,7 +59,7 @@ def simulate_many(
     atol: ArrayLike | None = None,
     t_eval: ArrayLike | None = None,
     events: Event | Iterable[Event] = (),
-    tau: ArrayLike = 0.0,
+    tau: ArrayLike | Callable[..., Sequence[Node | float]] = 0.0,
     parameters: Mapping[str, ArrayLike] | None = None,
     workers: Workers = 1,
     chunk: int | None = None,
@@ -87,10 +91,13 @@ def simulate_many(
     events : Event or iterable of Event
         Instants to look for on the way, as in `simulate`; trajectories then run one by one. One that an event ends is
         NaN from there on, and `stats.status` is 1. Rows are at the same times as without.
-    tau : float or array_like
-        Constant applied force [N m or N], for all velocities, for each, (n,), or for each trajectory too, (N, n).
+    tau : float, array_like or callable
+        Constant applied force [N m or N], for all velocities, for each, (n,), or for each trajectory too, (N, n); or a
+        controller in closed form, see `with_controller`. A `SampledController`, which may remember what it has seen, is
+        refused: it controls one run of `simulate`.
     parameters : mapping, optional
-        {name: value} in place of the model's own, a number for all or one for each trajectory, (N,).
+        {name: value} in place of the model's own, and of those of a controller, a number for all or one for each
+        trajectory, (N,).
     workers : int, callable or None
         How many threads share the work, None for one on each core; or any map, `workers(function, iterable)`, such as
         that of a pool of processes. The numbers are the same to the last bit.
@@ -127,6 +134,7 @@ def simulate_many(
     options = RunOptions(t_end, method, *arguments, t0, estimate_error)
     watched, team = as_events(events), checked(workers)
     _check_chunk(chunk)
+    model, tau = _closed(model, tau, parameters)
     start = starts(model, q, qd, tau, parameters, t0)
     options.check(start.states)
     count = _row_count(options)
@@ -153,6 +161,16 @@ def simulate_many(
     if text := _warning(stats):
         warnings.warn(text, SimulationWarning, stacklevel=2)
     return Ensemble(options.row_times, rows[:, :, :nq], rows[:, :, nq:], stats, result.events(watch, nq))
+
+
+def _closed(model: Model, tau: Any, parameters: object) -> tuple[Model, ArrayLike]:
+    """The model with a controller in closed form, and the constant force on it."""
+    if isinstance(tau, SampledController):
+        raise TypeError(
+            "a SampledController may remember what it has seen, and so controls one run: call simulate for each start, "
+            "or write the controller in closed form"
+        )
+    return with_closed_form(model, tau, parameters)[:2]
 
 
 def _row_count(options: RunOptions) -> int:

@@ -120,7 +120,7 @@ class Task:
 
         if not self.events:
             return leg(self.options)
-        log = EventLog(_event_program(self.events), parameters)
+        log = EventLog(_event_program(self.events))
         log.happened = happened
         return WatchedIntegration(leg, self.options, log)
 

@@ -316,7 +316,10 @@ BAD = [
         id="damping",
     ),
     param(
-        {"joint": Joint("ball", stiffness="k")}, {"k": 1.0}, "body 'rod': a spring needs a joint with one", id="ball"
+        {"joint": Joint("free", stiffness="k")},
+        {"k": 1.0},
+        "body 'rod': a joint of the kind 'free' has no spring",
+        id="free",
     ),
     param({"center": ("a", 0.0)}, {"a": 1.0}, "body 'rod': center must be (3,) finite numbers, got", id="shape"),
     param({"mass": "a b"}, {}, "the name of a parameter of body 'rod': mass must be without white space", id="name"),

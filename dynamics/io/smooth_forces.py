@@ -1,0 +1,166 @@
+"""Smooth forces of a robot file, taken on request: limits as springs, friction loss without its jump, actuators."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cgraph.extend import real_array, real_number, require_flag
+
+from ..multibody.body import Body, MechanismError
+from ..multibody.joint_force import Actuator, JointForce, JointFriction, JointLimit, Range
+from .mujoco_twin import mujoco
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """Which of the forces that a file asks for are taken.
+
+    limits: stiffness and damping of springs in place of joint limits, see `JointLimit`; None leaves limits out.
+    friction: the velocity of `JointFriction`; None leaves friction loss out.  actuators: whether they are taken.
+    """
+
+    limits: tuple[float, float] | None = None
+    friction: float | None = None
+    actuators: bool = False
+
+    def limit(self, body: str, lower: float, upper: float) -> JointLimit:
+        """The limit of a joint."""
+        assert self.limits is not None
+        return JointLimit(body, lower, upper, *self.limits)
+
+
+NONE = Smooth()
+
+
+def smooth(limits: Sequence[float] | None, friction: float | None, actuators: bool) -> Smooth:
+    """The same, checked. Raises MechanismError and TypeError."""
+    springs = None
+    if limits is not None:
+        pair = real_array("limits", limits)
+        if pair.shape != (2,) or not (np.isfinite(pair).all() and pair[0] > 0.0 and pair[1] >= 0.0):
+            raise MechanismError(f"limits must be (stiffness > 0, damping >= 0) of springs, got {limits!r:.60}")
+        springs = (float(pair[0]), float(pair[1]))
+    if friction is not None and not 0.0 < real_number("friction", friction) < math.inf:
+        raise MechanismError(f"friction must be a velocity > 0, at which most of it acts, got {friction!r}")
+    return Smooth(springs, friction, require_flag("actuators", actuators))
+
+
+def disabled(mj: Any, *what: str) -> bool:
+    """Whether the model's options switch off any of `what`; older MuJoCo has one switch for all passive force."""
+    bits = mujoco().mjtDisableBit.__members__
+    names = [*what, *(["PASSIVE"] if set(what) & {"DAMPER", "SPRING"} else [])]
+    return any([mj.opt.disableflags & int(bits.get(f"mjDSBL_{name}", 0)) for name in names])
+
+
+def single(mj: Any, j: int) -> bool:
+    """Whether a joint of MuJoCo's model is a hinge or slide."""
+    types = mujoco().mjtJoint
+    return int(mj.jnt_type[j]) in (int(types.mjJNT_HINGE), int(types.mjJNT_SLIDE))
+
+
+def modelled(mj: Any, i: int) -> bool:
+    """Whether an actuator of MuJoCo's model is an `Actuator`: on a hinge or slide, affine, without memory.
+
+    Of several on a joint whose whole force has a range, none is.
+    """
+    j = int(mj.actuator_trnid[i, 0])
+    if not (_on_joint(mj, i) and single(mj, j)):
+        return False
+    sharing = sum(_on_joint(mj, k) and mj.actuator_trnid[k, 0] == j for k in range(actuators(mj)))
+    return (
+        _called("Dyn", mj.actuator_dyntype[i]) == "none"
+        and _called("Gain", mj.actuator_gaintype[i]) in ("fixed", "affine")
+        and _called("Bias", mj.actuator_biastype[i]) in ("none", "affine")
+        and not (mj.jnt_actfrclimited[j] and sharing > 1)
+        and not (_delayed(mj, i) or mj.jnt_actgravcomp[j])
+        and int(np.asarray(getattr(mj, "actuator_ctrlnum", np.ones(i + 1)))[i]) == 1
+    )
+
+
+def actuators(mj: Any) -> int:
+    """The number of actuators, which may have several inputs each in newer versions of MuJoCo."""
+    return len(mj.actuator_trntype)
+
+
+def _called(kind: str, value: Any) -> str:
+    """MuJoCo's word for a type of a transmission, gain, ..."""
+    word: str = getattr(mujoco(), f"mjt{kind}")(int(value)).name
+    return word.removeprefix(f"mj{kind.upper()}_").lower()
+
+
+def _on_joint(mj: Any, i: int) -> bool:
+    return _called("Trn", mj.actuator_trntype[i]) in ("joint", "jointinparent")
+
+
+def _first(mj: Any, i: int, field: str) -> int:
+    """Where an actuator's only input or output stands among all."""
+    return int(np.asarray(getattr(mj, field, np.arange(i + 1)))[i])
+
+
+def _delayed(mj: Any, i: int) -> bool:
+    """Whether an actuator acts later than its input, as in newer versions of MuJoCo."""
+    delays = np.asarray(getattr(mj, "actuator_delay", []))
+    return bool(delays.size and delays[i] > 0.0)
+
+
+def mjcf_forces(mj: Any, moving: Sequence[Body], taken: Smooth) -> list[JointForce]:
+    """The forces of MuJoCo's model that are taken.  moving: the bodies on its joints, in their order."""
+    forces: list[JointForce] = []
+    for j, body in enumerate(moving):
+        if taken.limits is not None and mj.jnt_limited[j] and single(mj, j) and not disabled(mj, "CONSTRAINT", "LIMIT"):
+            lower, upper = mj.jnt_range[j].tolist()
+            margin = float(mj.jnt_margin[j])
+            forces.append(taken.limit(body.name, lower + margin, upper - margin))
+        loss = float(mj.dof_frictionloss[mj.jnt_dofadr[j]])
+        if taken.friction is not None and loss and not disabled(mj, "CONSTRAINT", "FRICTIONLOSS"):
+            forces.append(JointFriction(body.name, loss, taken.friction))
+    if taken.actuators and not disabled(mj, "ACTUATION"):
+        names = _input_names(mj)
+        acting = [i for i in range(actuators(mj)) if modelled(mj, i) and not _switched_off(mj, i)]
+        forces += [_actuator(mj, i, names[i], moving) for i in acting]
+    return forces
+
+
+def _switched_off(mj: Any, i: int) -> bool:
+    """Whether the model's options switch the group of an actuator off."""
+    group = int(mj.actuator_group[i])
+    return 0 <= group < 31 and bool(int(mj.opt.disableactuator) >> group & 1)
+
+
+def _input_names(mj: Any) -> list[str]:
+    """Names of the parameters that control the actuators, all different."""
+    names: list[str] = []
+    for i in range(actuators(mj)):
+        name = "ctrl_" + (mj.actuator(i).name or str(i)).replace(" ", "_")
+        while name in names:
+            name += "_"
+        names.append(name)
+    return names
+
+
+def _actuator(mj: Any, i: int, name: str, moving: Sequence[Body]) -> Actuator:
+    j, ctrl = int(mj.actuator_trnid[i, 0]), _first(mj, i, "actuator_ctrladr")
+    gain, bias = mj.actuator_gainprm[i, :3].tolist(), mj.actuator_biasprm[i, :3].tolist()
+    if _called("Gain", mj.actuator_gaintype[i]) == "fixed":
+        gain[1:] = 0.0, 0.0
+    if _called("Bias", mj.actuator_biastype[i]) == "none":
+        bias = [0.0, 0.0, 0.0]
+    return Actuator(
+        moving[j].name,
+        name,
+        float(mj.actuator_gear[_first(mj, i, "actuator_outadr"), 0]),
+        gain,
+        bias,
+        None if disabled(mj, "CLAMPCTRL") else _range(mj.actuator_ctrllimited[ctrl], mj.actuator_ctrlrange[ctrl]),
+        _range(mj.actuator_forcelimited[i], mj.actuator_forcerange[i]),
+        _range(mj.jnt_actfrclimited[j], mj.jnt_actfrcrange[j]),
+    )
+
+
+def _range(limited: Any, ends: Any) -> Range | None:
+    return (float(ends[0]), float(ends[1])) if limited else None

@@ -1,0 +1,68 @@
+"""Applied: the force tau of a run, constant, by a controller in closed form, or held by one over periods."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+from cgraph import Graph, Node
+
+from ..equations.state_equation import state_inputs
+from ..integrators import Problem, quantity_inputs
+from ..systems.controller import with_closed_form
+from ..systems.model import Model, as_ode, as_system
+from .run_options import RunOptions
+from .sampled_controller import Hold, SampledController
+
+Constant: TypeAlias = float | Sequence[float]
+Tau: TypeAlias = Constant | Callable[..., Sequence[Node | float]] | SampledController
+
+
+@dataclass(frozen=True)
+class Applied:
+    """The applied force of a run of a model, which has the forces of a controller in closed form.
+
+    constant: force besides.  nodes: tau, of the state, t, tau0, .. and parameters; None of a first-order system.
+    controller: a sampled one.
+    """
+
+    model: Model
+    constant: Any
+    nodes: Sequence[Node] | None
+    controller: SampledController | None = None
+
+    def bound(self, numbers: Mapping[str, float]) -> dict[str, float]:
+        """The inputs of the state equation that are built into a run; of a sampled controller without tau0, .."""
+        varied = () if self.controller is None else state_inputs(self.model).applied
+        return {name: value for name, value in numbers.items() if name not in varied}
+
+    def hold(self, options: RunOptions) -> Hold | None:
+        """The forces that a sampled controller is to hold. Raises ValueError for a run that it cannot control."""
+        if self.controller is None:
+            return None
+        if options.scipy_solver is not None:
+            raise ValueError(f"method {options.method!r} does not end its steps with periods: take one of dyn.METHODS")
+        if options.direction < 0.0:
+            raise ValueError("a SampledController holds what it has seen, so that t_end has to be later than t0")
+        system = as_system(self.model)
+        return Hold(self.controller, system.velocities, system.nq, options.t0)
+
+    def graph(self, problem: Problem) -> Graph:
+        """tau as a graph over the states, t and parameters of a problem of the model."""
+        assert self.nodes is not None
+        outputs = {f"tau{k}": node for k, node in enumerate(self.nodes)}
+        return problem.bind(problem.states, Graph(quantity_inputs(problem), outputs))
+
+
+def with_applied(model: Model, tau: Tau, parameters: Mapping[str, Any] | None) -> tuple[Model, Applied]:
+    """The model that moves, with a controller in closed form, and what is applied to it.
+
+    parameters: of the run; those that the model does not have are the controller's.
+    """
+    if isinstance(tau, SampledController):
+        if as_ode(model) is not None:
+            raise TypeError("a controller gives forces, and none act on a system of first order")
+        return model, Applied(model, 0.0, as_system(model).tau, tau)
+    moving, constant, forces = with_closed_form(model, tau, parameters)
+    return moving, Applied(moving, constant, forces)

@@ -1,0 +1,125 @@
+"""Controllers in closed form: a system with the forces of a function of its state, as nodes, added to its forces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from copy import copy
+from typing import Any, NamedTuple
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph.extend import topological
+
+from .arguments import Parameters, parameter_items, parameter_value
+from .model import Model, as_ode, as_system
+from .system import System, generalized_forces, require_known
+
+KEPT = 16  # systems that stay for another run
+
+_kept: dict[tuple[object, ...], Controlled] = {}
+
+
+class Controlled(NamedTuple):
+    """A system with a controller, and the controller's forces alone, n nodes."""
+
+    system: System
+    forces: tuple[Node, ...]
+
+
+def with_controller(
+    model: Model, controller: Callable[..., Sequence[Node | float]], parameters: Mapping[str, float] | None = None
+) -> System:
+    """The system with a controller in closed form: its forces act beside those of the model.
+
+    It is a system like any other: its state equation, Jacobian and C code contain the controller. `simulate(tau=...)`
+    takes the function itself.
+
+    Parameters
+    ----------
+    model : System, Mechanism or Scene
+        What is controlled.
+    controller : callable
+        (q, qd, t) or (q, qd, t, p) to one generalized force for each velocity, node or number [N m or N]. It is called
+        once, with q (nq) and qd (n) as lists of nodes, t a node, p {parameter name: node}.
+    parameters : mapping of str to float, optional
+        Parameters of the controller, such as gains, beside the model's own; each is an input of the graphs.
+
+    Returns
+    -------
+    System
+        With the model's coordinates, Lagrangian, damping and parameters.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For what is no such function, for another number of forces, and for parameters that the controller does not use.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm([1.0], [1.0])
+    >>> held = dyn.with_controller(arm, lambda q, qd, t, p: [p["kp"] * (0.5 - q[0]) - 3.0 * qd[0]], {"kp": 20.0})
+    >>> held
+    <System of 1 coordinate(s) joint 1, parameters kp>
+    >>> A, B = dyn.linearize(held, [0.2], [0.0])  # of the closed loop
+    >>> A.round(3).tolist()
+    [[0.0, 1.0], [-74.422, -9.0]]
+    """
+    return controlled(model, controller, parameters).system
+
+
+def controlled(
+    model: Model, controller: Callable[..., Sequence[Node | float]], parameters: Mapping[str, float] | None = None
+) -> Controlled:
+    """See `with_controller`. For a controller with the same graph as one of the last few, the same nodes."""
+    if as_ode(model) is not None:
+        raise TypeError("a controller gives forces, and none act on a system of first order: write it into the rate")
+    system = as_system(model)
+    gains = {name: parameter_value(name, value) for name, value in parameter_items(parameters)}
+    if shared := [name for name in gains if name in system.parameters]:
+        raise ValueError(f"{shared[0]!r} is a parameter of the model; choose another name for that of the controller")
+    names = (*system.parameters, *gains)
+    p = Parameters(names)
+    with cg.tag("controller"):
+        forces = generalized_forces("the controller", controller, system, p)
+    require_known("the controller", forces, system, p)
+    used = {node.name for node in topological(forces)}
+    if unused := [name for name in gains if name not in used]:
+        has = ", ".join(system.parameters) or "none"
+        raise ValueError(f"neither the system nor the controller has a parameter {unused[0]!r} (the system has {has})")
+    graph = Graph([*system.q, *system.qd, system.t, *p.values()], _numbered(forces))
+    key = (system, cg.structure_hash(graph), *gains.items())
+    if key not in _kept:
+        _kept[key] = Controlled(_with_forces(system, forces, gains), tuple(forces))
+        while len(_kept) > KEPT:
+            del _kept[next(iter(_kept))]
+    return _kept[key]
+
+
+def with_closed_form(model: Model, tau: Any, parameters: object) -> tuple[Model, Any, Sequence[Node] | None]:
+    """What moves, the constant force on it, and the whole applied force as nodes; of a first-order model None.
+
+    tau: a controller in closed form, or the constant force.  parameters: of the run, {name: value}; those that the
+    model does not have are the controller's.
+    """
+    if not callable(tau):
+        return model, tau, None if as_ode(model) is not None else as_system(model).tau
+    given = parameters if isinstance(parameters, Mapping) else {}
+    closed = controlled(model, tau, {name: 0.0 for name in given if name not in model.parameters})
+    return closed.system, 0.0, closed.forces
+
+
+def _numbered(forces: Sequence[Node]) -> dict[str, Node]:
+    return {f"force{k}": node for k, node in enumerate(forces)}
+
+
+def _with_forces(system: System, forces: Sequence[Node], parameters: Mapping[str, float]) -> System:
+    """The system with these forces besides its own, and these parameters."""
+    changes: dict[str, Any] = {"parameters": system.parameters | dict(parameters)}
+    pairs = zip(system.forces, forces, strict=True)
+    changes["forces"] = tuple([more if own.value == 0.0 else own + more for own, more in pairs])
+    other = copy(system)
+    for name in ("extra_inputs", "shortened", "without_constraints"):
+        other.__dict__.pop(name, None)
+    other.__dict__ |= changes
+    return other

@@ -1,0 +1,163 @@
+"""Smooth forces of robot files: limits as springs, friction without its jump, actuators."""
+
+import math
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+from pytest import approx, mark, raises
+
+import dynamics as dyn
+
+MUJOCO_ERROR = 1e-12  # relative to the largest acceleration
+RUN_ERROR = 1e-6  # of runs at rtol 1e-9 through kinks
+
+MODEL = """<mujoco><option>{flags}</option><worldbody><body name="a">
+<joint name="ja" type="hinge" axis="0 1 0" range="-60 60" limited="true" frictionloss="0.1"
+ actuatorfrcrange="-200 200" actuatorfrclimited="true"/><geom type="capsule" size=".05 .2" mass="1"/>
+<body name="b" pos="0 0 .5"><joint name="jb" type="slide" axis="1 0 0.3" ref="0.1" frictionloss=".2"/>
+<joint name="jc" type="hinge" axis="1 0 0"/><geom type="capsule" size=".04 .3" mass="0.4" pos=".1 0 0.1"/>
+</body></body></worldbody><actuator>
+<position name="x y" joint="ja" kp="50" kv="2" gear="3" ctrlrange="-.5 .5" ctrllimited="true"/>
+<velocity name="x_y" joint="jb" kv="4" gear="-2" forcerange="-1 1" forcelimited="true"/>
+<motor joint="jb" gear="5" group="1"/>
+<general name="affine" joint="jc" gaintype="affine" gainprm="2 3 4" biastype="affine" biasprm="1 -2 -3"/>
+<damper name="damper" joint="jc" kv="0.7" ctrlrange="0 2"/>
+<motor name="unused" joint="jc" group="2"/>
+{more}</actuator></mujoco>"""
+INPUTS = ["ctrl_x_y", "ctrl_x_y_", "ctrl_2", "ctrl_affine", "ctrl_damper"]
+SMOOTH: dict[str, Any] = {"limits": (1e3, 0.1), "friction": 0.01, "actuators": True}
+ROBOT = """<robot name="r"><link name="base"/><link name="arm"><inertial><mass value="1"/><origin xyz="0 0 -.5"/>
+<inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="hinge" type="revolute">
+<parent link="base"/><child link="arm"/><axis xyz="0 1 0"/><limit lower="-0.5" upper="1" effort="9" velocity="9"/>
+<dynamics damping="0.2" friction="0.3"/></joint></robot>"""
+
+
+def compiled(flags: str = "", more: str = "") -> Any:
+    """MuJoCo's model of it, where there is MuJoCo."""
+    mj = pytest.importorskip("mujoco").MjModel.from_xml_string(MODEL.format(flags=flags, more=more))
+    mj.opt.disableactuator = 1 << 2
+    return mj
+
+
+def silently(mj: Any, **options: Any) -> dyn.Mechanism:
+    """The mechanism, whatever is left out."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", dyn.MechanismWarning)
+        return dyn.load_mjcf(mj, **options)
+
+
+def test_actuators_are_those_of_mujoco() -> None:
+    """Gear, gain and bias, all three ranges, groups that are off: accelerations of random states and inputs."""
+    mj = compiled('<flag contact="disable" limit="disable" frictionloss="disable"/>')
+    mujoco = pytest.importorskip("mujoco")
+    model = dyn.load_mjcf(mj, **SMOOTH)  # nothing to warn of
+    forward, rng = dyn.forward_dynamics(model), np.random.default_rng(1)
+    assert model.left_out == ()
+    assert forward.input_names[-5:] == tuple(INPUTS)
+    clipped = 0
+    for _ in range(50):
+        data = mujoco.MjData(mj)
+        for field in (data.qpos, data.qvel, data.ctrl, data.qfrc_applied):
+            field[:] = rng.normal(size=len(field))
+        mujoco.mj_forward(mj, data)
+        clipped += abs(data.qfrc_actuator[0]) == 200.0
+        given = [*data.qpos, *data.qvel, *data.qfrc_applied, *data.ctrl[:5]]
+        ours = np.array(list(forward.evaluate(dict(zip(forward.input_names, given, strict=True))).values()))
+        assert ours == approx(data.qacc, abs=MUJOCO_ERROR * np.abs(data.qacc).max())
+    assert 10 < clipped < 50
+
+
+def test_what_is_taken_is_not_left_out_and_the_rest_is() -> None:
+    mj = compiled(more='<intvelocity name="memory" joint="jc" kp="3" actrange="-1 1"/>')
+    none = silently(mj)
+    assert not none.forces
+    assert [text.split(" (")[0] for text in none.left_out] == [
+        "contacts",
+        "joint limits",
+        "friction loss",
+        "actuators",
+        "actuators that act with no input",
+    ]
+    with pytest.warns(dyn.MechanismWarning, match="left out contacts; actuators that act with no input .memory"):
+        model = dyn.load_mjcf(mj, **SMOOTH)
+    kinds = [type(force).__name__ for force in model.forces]
+    assert {kind: kinds.count(kind) for kind in kinds} == {"JointLimit": 1, "JointFriction": 2, "Actuator": 5}
+    limit = next(force for force in model.forces if isinstance(force, dyn.JointLimit))
+    assert (limit.body, limit.upper, limit.stiffness, limit.damping) == ("a", approx(math.pi / 3.0), 1e3, 0.1)
+    off = silently(compiled('<flag constraint="disable" actuation="disable"/>'), **SMOOTH)
+    assert (off.forces, off.left_out) == ((), ())
+
+
+def test_limits_and_friction_of_a_urdf() -> None:
+    with pytest.warns(dyn.MechanismWarning, match="joint limits .hinge.; friction loss"):
+        dyn.load_urdf(ROBOT)
+    model = dyn.load_urdf(ROBOT, limits=(200.0, 0.5), friction=0.02)
+    assert model.left_out == ()
+    state = {"q0": 1.25, "qd0": 0.4, "tau0": 0.0}
+    plain = dyn.Mechanism(model.bodies)
+    difference = [dyn.forward_dynamics(each).evaluate(state)["qdd0"] for each in (model, plain)]
+    force = -200.0 * 0.25 * (1.0 + 0.5 * 0.4) - 0.3 * math.tanh(0.4 / 0.02)
+    inertia = 0.1 + 0.5**2
+    assert difference[0] - difference[1] == approx(force / inertia)
+
+
+def cart(*forces: dyn.JointForce) -> dyn.Mechanism:
+    return dyn.Mechanism([dyn.Body("cart", dyn.Joint("prismatic", (1.0, 0.0, 0.0)), mass=2.0)], forces=forces)
+
+
+@mark.parametrize("side", [1.0, -1.0])
+@mark.parametrize("unit", [1.0, 1e-9])
+def test_a_limit_gives_back_what_it_took_but_for_its_damping(side: float, unit: float) -> None:
+    """In meters and nanometers: a spring returns the speed v, one with damping v (1 - 2/3 d v) to first order."""
+    for d in (0.0, 0.05):
+        limit = dyn.JointLimit("cart", -unit, unit, stiffness=2e4, damping=d / unit)
+        run = dyn.simulate(cart(limit), [0.5 * side * unit], [side * unit], t_end=1.0)
+        returned = -run.qd[-1, 0] / (side * unit)
+        assert returned == approx(1.0 - 2.0 / 3.0 * d, abs=d * d + RUN_ERROR)
+        assert (side * run.forces[:, 0] <= 0.0).all()
+
+
+def test_friction_brings_a_body_to_rest_in_the_time_of_dry_friction() -> None:
+    """v0 m / loss, but for the last creep."""
+    run = dyn.simulate(cart(dyn.JointFriction("cart", 4.0, 1e-4)), [0.0], [1.0], 0.6, "radau", t_eval=[0.4, 0.6])
+    assert run.qd[:, 0] == approx([1.0 - 4.0 / 2.0 * 0.4, 0.0], abs=1e-3)
+    assert (run.forces * run.qd <= 0.0).all()
+
+
+def test_joint_forces_go_with_their_bodies() -> None:
+    arm = dyn.planar_arm([1.0, 0.5], [1.0, 0.8])
+    servo = dyn.Actuator("link 2", "target", gain=(9.0, 0.0, 0.0), bias=(0.0, -9.0, 0.0))
+    model = dyn.Mechanism(arm.bodies, arm.gravity, [servo, dyn.JointLimit("link 1", -1.0, 1.0, 1e3)], {"target": 0.3})
+    assert dict(model.system.parameters) == {"target": 0.3}
+    taken = model.subtree("link 2")
+    assert taken.forces == (servo,)
+    assert model.detach("link 2").attach(taken).system.parameters == {"target": 0.3}
+    assert [force.body for force in model.detach("link 2").forces] == ["link 1"]
+    still = model.lock("link 2", 0.2)
+    bare = dyn.Mechanism(still.bodies, still.gravity, locked=still.locked)
+    state = {"q0": 0.4, "qd0": 0.1, "tau0": 0.0}
+    assert dyn.forward_dynamics(still).evaluate({**state, "target": 5.0}) == dyn.forward_dynamics(bare).evaluate(state)
+
+
+@mark.parametrize(
+    ("force", "message"),
+    [
+        (dyn.JointLimit("cart", 1.0, -1.0, 1e3), "lower must be below upper"),
+        (dyn.JointLimit("cart", -1.0, 1.0, -1.0), "stiffness must be finite and at least 0"),
+        (dyn.JointFriction("cart", 1.0, 0.0), "velocity must be positive"),
+        (dyn.Actuator("cart", "u", gain=(1.0,)), "gain needs three finite numbers"),
+        (dyn.Actuator("cart", "u", force_range=(1.0, -1.0)), "force_range must be"),
+        (dyn.Actuator("nobody", "u"), "unknown body 'nobody'"),
+    ],
+)
+def test_a_joint_force_out_of_range_is_refused(force: dyn.JointForce, message: str) -> None:
+    with raises(dyn.MechanismError, match=message):
+        cart(force)
+
+
+@mark.parametrize("options", [{"limits": (0.0, 1.0)}, {"limits": (1.0,)}, {"friction": 0.0}, {"friction": math.nan}])
+def test_options_out_of_range_are_refused(options: dict[str, Any]) -> None:
+    with raises(dyn.MechanismError, match=next(iter(options))):
+        dyn.load_urdf(ROBOT, **options)
