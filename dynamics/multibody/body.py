@@ -331,9 +331,8 @@ def _inertia(what: str, given: Any, beside: float = 0.0) -> Array:
     if moments[0] < -rounding:
         raise MechanismError(f"{what} must not be negative, its principal moments are {moments.tolist()}")
     if moments[2] > moments[0] + moments[1] + rounding:
-        where = what.removesuffix(": inertia")
-        text = f"{where}: no body has principal moments {moments.tolist()}: the largest exceeds the sum of the others"
-        warnings.warn(text, MechanismWarning, stacklevel=2)
+        text = f"no body has principal moments {moments.tolist()}: the largest exceeds the sum of the others"
+        warnings.warn(f"{what.removesuffix(': inertia')}: {text}", MechanismWarning, stacklevel=2)
     return 0.5 * (inertia + inertia.T)
 
 
