@@ -309,8 +309,8 @@ BAD: dict[str, tuple[Any, str]] = {
     "unknown body": ([Force("hand", (1, 0, 0))], "there is a force on the unknown body 'hand'"),
     "the world": ([Force("world", (1, 0, 0))], "there is a force on the unknown body 'world'"),
     "no name": ([Force(3, (1, 0, 0))], "there is a force on the unknown body 3"),
-    "no force": ([(1, 0, 0)], "forces must be of the type Force, got tuple: (1, 0, 0)"),
-    "one force": (Force("rotor"), "forces must be a sequence of Force, got Force: "),
+    "no force": ([(1, 0, 0)], "forces must be of the type Force or JointForce, got tuple: (1, 0, 0)"),
+    "one force": (Force("rotor"), "forces must be a sequence of Force or JointForce, got Force: "),
     "frame": (
         [Force("rotor", (1, 0, 0), frame="local")],
         "the force on body 'rotor': frame must be one of world, body, got 'local'",
