@@ -103,7 +103,7 @@ def errors(mechanism: dyn.Mechanism, seed: int) -> dict[str, float]:
 
 
 @mark.skipif(not INSTALLED, reason="neither MuJoCo nor Pinocchio is installed")
-@mark.parametrize("count", [4, param(1000, marks=mark.slow)])
+@mark.parametrize("count", [4, param(1000, marks=[mark.slow, mark.timeout(3600)])])
 def test_peers_find_the_same(count: int, record_property: Callable[[str, object], None]) -> None:
     bases, worst = ["free", "ball", "revolute", "free (body axes)"], dict[str, float]()
     for seed in range(100, 100 + count):
@@ -113,7 +113,7 @@ def test_peers_find_the_same(count: int, record_property: Callable[[str, object]
     assert max(worst.values()) <= PEER, worst
 
 
-@mark.parametrize("count", [3, param(60, marks=mark.slow)])
+@mark.parametrize("count", [3, param(60, marks=[mark.slow, mark.timeout(600)])])
 def test_pinocchio_s_derivatives_are_ours(count: int, record_property: Callable[[str, object], None]) -> None:
     """Of accelerations by small displacements, which both have in the body's axes, by velocities and by torques."""
     pinocchio = importorskip("pinocchio")
