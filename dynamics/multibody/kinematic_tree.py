@@ -81,9 +81,10 @@ def locked_at(body: Body, value: Any) -> Array:
             raise MechanismError(f"{where}: it can be locked at a finite number, got {value!r:.80}")
         return np.array([float(value)])
     at = vector(f"{where}: the coordinates where it is locked", value, (count,))
-    turns = np.array([name.startswith("q") for name in body.joint.type.coordinates])
-    if turns.any() and not np.any(at[turns]):
-        raise MechanismError(f"{where}: a quaternion must not be zero, got {value!r:.80}")
+    groups = np.array(body.joint.type.groups)
+    for group in {*groups.tolist()}:  # the entries of a quaternion are one
+        if (groups == group).sum() > 1 and not np.any(at[groups == group]):
+            raise MechanismError(f"{where}: a quaternion must not be zero, got {value!r:.80}")
     return at
 
 

@@ -281,7 +281,7 @@ class Mechanism(Structure):
             raise MechanismError(f"the mechanism has no parameter {unknown[0]!r} (it has {has})")
         if not chosen:
             return self
-        require_values(self.bodies, self.gravity, {**self.parameter_values, **chosen})
+        require_values(self.parts, self.gravity, {**self.parameter_values, **chosen})
         bodies = tuple([bound_body(body, chosen) for body in self.bodies])
         forces = tuple([bound_force(force, chosen) for force in self.forces])
         return changed(self, chosen, bodies=bodies, gravity=bound(self.gravity, chosen), forces=forces)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 from typing import Any, TypeVar
 
@@ -31,6 +31,10 @@ class Structure:
     left_out: tuple[str, ...] = ()
     loops: Sequence[Loop] = ()
     shared: SharedParts = field(default_factory=SharedParts, repr=False, kw_only=True)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields alone: what was derived from them is derived again where it is needed."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @property
     def parameter_values(self) -> dict[str, float]:
