@@ -15,7 +15,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, Builder, building, tangents
+from cgraph.extend import Array, Builder, building, tangents, topological
 
 from ..systems.kinematics import ZERO
 from ..systems.model import Model, as_system
@@ -46,6 +46,8 @@ def integrable_rows(model: Model) -> dict[str, bool]:
     ------
     ConstraintError
         Where no state is seen that meets the constraints.
+    ValueError
+        For a constraint that depends on time, whose drift the brackets do not see.
 
     Examples
     --------
@@ -67,6 +69,9 @@ def integrable_rows(model: Model) -> dict[str, bool]:
     system = as_system(model)
     if not len(system.constraints):
         return {}
+    for name, rate in zip(system.constraints.names, system.constraints.rates, strict=True):
+        if system.t in topological([rate]):
+            raise ValueError(f"integrable_rows takes constraints that do not depend on time, and {name!r} does")
     numbers, curvature = RowNumbers(system.constraints), _Curvature(system)
     kept = list(range(len(system.constraints)))
     rng = np.random.default_rng(1)

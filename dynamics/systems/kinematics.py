@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
@@ -17,7 +16,7 @@ from .arguments import names_of, node_or_number, sequence
 from .quasi_velocities import Function, QuasiVelocities
 
 ONE, ZERO = cg.constant(1.0), cg.constant(0.0)
-STATES, TOLERANCE = 3, 1e-9  # random states at which brackets are compared, and their rounding
+TOLERANCE = 1e-9  # of the terms of a bracket: their rounding
 
 
 class Kinematics:
@@ -108,28 +107,37 @@ class Kinematics:
         first = tangents(dict(zip(self.q, along, strict=True)), across, build)  # D(G v)[G u]
         second = tangents(dict(zip(self.q, across, strict=True)), along, build)
         with building(build):
-            bracket = [second.get(b, ZERO) - first.get(a, ZERO) for a, b in zip(across, along, strict=True)]
+            bent = [second.get(node, ZERO) for node in along]  # D(G u)[G v]
             c = [sum([entry * x for entry, x in zip(row, v, strict=True)], ZERO) for row in self.brackets(build)]
             spanned = self.rate(c)
-        outputs = [*bracket, *spanned, *[node for row in slopes for node in row]]
+        straight = [first.get(node, ZERO) for node in across]
+        outputs = [*bent, *straight, *spanned, *[node for row in slopes for node in row]]
         graph = Graph([*self.q, *u, *v], {f"{k}": node for k, node in enumerate(outputs)})
         self._compare(graph, n)
 
     def _compare(self, graph: Graph, n: int) -> None:
-        rng, nq = np.random.default_rng(0), len(self.q)
-        for _ in range(STATES):
-            point = dict(zip(graph.input_names, rng.uniform(0.3, 1.2, nq + 2 * n).tolist(), strict=True))
-            values = np.array(list(graph.evaluate(point).values()), dtype=np.float64)
-            if not np.isfinite(values).all():
+        """At random states about neutral coordinates and others, row by row, as rows may have any unit."""
+        rng, nq, compared = np.random.default_rng(0), len(self.q), False
+        neutral = np.array(self.neutral)
+        for start in (neutral, neutral, np.zeros(nq), np.zeros(nq)):
+            numbers = [*(start + rng.uniform(0.3, 1.2, nq)), *rng.uniform(0.3, 1.2, 2 * n)]
+            values = graph.evaluate(dict(zip(graph.input_names, map(float, numbers), strict=True))).values()
+            rows = np.array(list(values), dtype=np.float64)
+            if not np.isfinite(rows).all():
                 continue  # outside of where the coordinates are defined
-            bracket, spanned, matrix = values[:nq], values[nq : 2 * nq], values[2 * nq :].reshape(nq, n)
-            if np.linalg.matrix_rank(matrix) < n:
+            terms, matrix = rows[: 3 * nq].reshape(3, nq), rows[3 * nq :].reshape(nq, n)
+            sizes = np.linalg.norm(matrix, axis=0)
+            if np.linalg.matrix_rank(matrix / np.where(sizes > 0.0, sizes, 1.0)) < n:
                 raise ValueError("rate must tell the velocities apart: two of them move the coordinates alike")
-            if np.abs(bracket - spanned).max() > TOLERANCE * np.abs(values).max():
+            bent, straight, spanned = terms
+            if (np.abs(bent - straight - spanned) > TOLERANCE * np.abs(terms).sum(axis=0)).any():
                 raise ValueError(
                     "structure does not belong to rate: ad_k(u, p) must be p . c(u, e_k) with "
                     "G c(u, v) = D(G u)[G v] - D(G v)[G u]"
                 )
+            compared = True
+        if not compared:
+            raise ValueError("rate is not finite about the neutral coordinates: give others, where it can be compared")
 
     def _called(self, what: str, function: Function, count: int, *arguments: Sequence[Node]) -> list[Node]:
         if not callable(function):
@@ -148,4 +156,4 @@ class Kinematics:
         values = sequence(f"{what} must be", default if given is None else given)
         if len(values) != len(self.coordinates) or not all(map(is_finite, values)):
             raise ValueError(f"{what} must be {len(self.coordinates)} finite numbers, got {values!r:.60}")
-        return tuple([float(value) for value in values if math.isfinite(value)])
+        return tuple([float(value) for value in values])

@@ -32,7 +32,7 @@ class QuasiVelocities:
         (u, p) to ad(u; p): n nodes or numbers, linear in u and in p. Left out, it is 0: u are then rates of
         coordinates, if not of these.
     neutral : sequence of float, optional
-        The coordinates where nothing else is said, (nq,); by default 0.
+        The coordinates where nothing else is said, (nq,); by default 0. About them `rate` has to be finite.
     normalized : callable, optional
         q to the same configuration with its constraint met, as q / |q| of a quaternion: nq nodes. L has to be the same
         of both, and is best written so that |q| has no part in it.

@@ -47,6 +47,14 @@ def test_a_sleigh_ends_up_running_straight() -> None:
     assert run.energy == pytest.approx(run.energy[0], rel=1e-7)
 
 
+def test_integrability_is_not_judged_of_rows_that_depend_on_time() -> None:
+    moving = dyn.System(
+        lambda q, u, t: 0.5 * (u[0] ** 2 + u[1] ** 2), "x y", velocity_constraints=lambda q, u, t: {"belt": u[0] - t}
+    )
+    with pytest.raises(ValueError, match="'belt' does"):
+        dyn.integrable_rows(moving)
+
+
 def test_integrable_rows_of_velocities_are_told_from_others() -> None:
     """Rates of functions, also times a factor, or only together; a rolling coin is neither."""
 
