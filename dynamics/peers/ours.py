@@ -12,6 +12,7 @@ from cgraph import Graph
 
 from ..equations.equations_of_motion import forward_dynamics
 from ..equations.formulations import inverse_dynamics
+from ..equations.state_equation import state_equation
 from .case import NUDGE, PASSES, Array, Case, rk4_step
 from .contender import Contender, Peer
 
@@ -19,16 +20,19 @@ from .contender import Contender, Peer
 def task_graph(case: Case, task: str) -> Graph:
     """Our graph of a task."""
     if task == "rk4":
-        return step_graph(case.bound(forward_dynamics(case.model)))
+        return step_graph(rate_graph(case))
     return case.bound((inverse_dynamics if task == "inverse" else forward_dynamics)(case.model))
 
 
-def step_graph(forward: Graph) -> Graph:
-    """(q0.., qd0..) -> (q0_next.., qd0_next..), one RK4 step without applied torque."""
-    n = len(forward.outputs)
-    rate = cg.specialize(forward, {f"tau{i}": 0.0 for i in range(n)})
-    state = cg.variables([f"q{i}" for i in range(n)] + [f"qd{i}" for i in range(n)])
-    after = rk4_step(lambda x: np.array([*x[n:], *rate(*x).values()]), np.array(state))
+def rate_graph(case: Case) -> Graph:
+    """(q0.., qd0..) -> their rates without applied torque."""
+    return cg.specialize(case.bound(state_equation(case.model)), {f"tau{i}": 0.0 for i in range(case.n)})
+
+
+def step_graph(rate: Graph) -> Graph:
+    """(q0.., qd0..) -> (q0_next.., qd0_next..), one RK4 step."""
+    state = cg.variables(rate.input_names)
+    after = rk4_step(lambda x: np.array([*rate(*x).values()]), np.array(state))
     return cg.simplify(Graph(state, {f"{node.name}_next": x for node, x in zip(state, after, strict=True)}))
 
 
@@ -37,7 +41,7 @@ def carried(case: Case, task: str, graph: Graph) -> tuple[Graph, dict[str, str]]
     if task == "rk4":
         return graph, dict(zip(graph.input_names, graph.outputs, strict=True))
     results = list(graph.outputs.values())
-    nudged = [x + NUDGE * results[i % case.n] for i, x in enumerate(graph.inputs)]
+    nudged = [x + NUDGE * results[i] for x, i in zip(graph.inputs, case.nudges(task), strict=True)]
     names = [f"{node.name}_next" for node in graph.inputs]
     moved = Graph(graph.inputs, dict(zip(names, nudged, strict=True)))
     return moved, dict(zip(moved.input_names, names, strict=True))
