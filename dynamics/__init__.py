@@ -11,6 +11,8 @@ from .equations.energies import kinetic_energy, potential_energy
 from .equations.equations_of_motion import bias, energy, forward_dynamics, gravity_force, mass_matrix, momentum
 from .equations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious_nodes
 from .equations.integrability import integrable_rows
+from .equations.inverse_dynamics_derivatives import inverse_dynamics_derivatives
+from .equations.inverse_mass_matrix import inverse_mass_matrix
 from .equations.linearization import linearize, state_space
 from .equations.singular_mass_matrix import SingularMassMatrixError, raise_if_singular
 from .equations.state_equation import state_equation
@@ -119,6 +121,8 @@ __all__ = [
     "inertial_parameters",
     "integrable_rows",
     "inverse_dynamics",
+    "inverse_dynamics_derivatives",
+    "inverse_mass_matrix",
     "kinetic_energy",
     "linearize",
     "load_mjcf",

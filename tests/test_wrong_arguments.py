@@ -98,8 +98,9 @@ SCENE = (ARM, (0.0,), (0.0,), 1.0)
 FIRST, LAST = TWO.bodies[0].name, TWO.bodies[1].name
 RUNS = {"dt": 0.01, "max_steps": 100, "backend": "python", "estimate_error": False, "progress": False}
 MODEL_ALONE = """as_system bias center_of_mass center_of_mass_jacobian coriolis damping_force energy gravity_force
-    inertial_parameters integrable_rows kinetic_energy mass_matrix momentum potential_energy regressor state_equation
-    state_space to_urdf torque_by_joint_motion torque_by_link RecursiveInverseDynamics"""
+    inertial_parameters integrable_rows inverse_dynamics_derivatives inverse_mass_matrix kinetic_energy mass_matrix
+    momentum potential_energy regressor state_equation state_space to_urdf torque_by_joint_motion torque_by_link
+    RecursiveInverseDynamics"""
 
 CALLS = {
     **{f"cg.{op.name}": call(function(op), *[X] * op.arity) for op in OPS.values()},
@@ -235,6 +236,7 @@ RECORDS = """
 # at nothing.
 LEFT_OUT = """cg.recording_lines cg.clear_cache cg.Compiled.bind cg.Compiled.values cg.Graph.check cg.Graph.counts
     cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.bias_forces dyn.System.require_values
+    dyn.System.torque_derivatives
     dyn.JointForce.along dyn.JointForce.check dyn.JointLimit.along dyn.JointLimit.check dyn.JointFriction.along
     dyn.JointFriction.check dyn.Actuator.along dyn.Actuator.check"""
 

@@ -198,6 +198,7 @@ class Mechanism(Structure):
             raise MechanismError("the mechanism has no joint that moves")
         return BodySystem(
             self._equations.bias_forces,
+            self._equations.torque_derivatives,
             lambda q, qd, t: self._equations.partial_lagrangians(q, qd),
             self.coordinates,
             self.parameter_values,

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import require_sequence, shortened, topological
+from cgraph.extend import Builder, require_sequence, shortened, topological
 
 from .arguments import (
     TIME,
@@ -27,6 +27,7 @@ from .arguments import (
 from .constraints import Constraints
 from .kinematics import Kinematics
 from .quasi_velocities import QuasiVelocities
+from .torque_derivatives import MotionState, TorqueDerivatives
 
 BiasForce = tuple[Node, Node]  # a velocity, and the force that works on it
 
@@ -272,6 +273,10 @@ class System:
         """
         return None
 
+    def torque_derivatives(self, qdd: Sequence[Node], build: Builder) -> TorqueDerivatives | None:
+        """Torques of a motion and their derivatives, without damping and applied forces; None as for `bias_forces`."""
+        return None
+
     def _require_consistent(self) -> None:
         self.kinematics.require_consistent()
 
@@ -286,17 +291,19 @@ class System:
 
 
 class BodySystem(System):
-    """The system of bodies that give their bias themselves, by bias_forces(q, qd)."""
+    """The system of bodies that give their bias themselves, by bias_forces(q, qd), and derivatives, likewise."""
 
     def __init__(
         self,
         bias_forces: Callable[[Sequence[Node], Sequence[Node]], Sequence[BiasForce]],
+        torque_derivatives: Callable[[MotionState, Builder], TorqueDerivatives],
         *of_system: Any,
         require_values: Callable[[Mapping[str, ArrayLike]], None],
         **more: Any,
     ) -> None:
         super().__init__(*of_system, **more)
         self._bias_forces, self._require_values = bias_forces, require_values
+        self._torque_derivatives = torque_derivatives
 
     def _require_consistent(self) -> None:
         """Nothing: the types of joints are known to be."""
@@ -308,6 +315,10 @@ class BodySystem(System):
     def bias_forces(self) -> Sequence[BiasForce]:
         """The pairs (velocity, force) that the bodies state; see `System.bias_forces`."""
         return self._bias_forces(self.q, self.qd)
+
+    def torque_derivatives(self, qdd: Sequence[Node], build: Builder) -> TorqueDerivatives:
+        """In closed form; see `System.torque_derivatives`."""
+        return self._torque_derivatives((self.q, self.qd, qdd), build)
 
 
 def generalized_forces(what: str, function: Callable[..., Any], system: System, p: Parameters) -> list[Node]:

@@ -26,6 +26,7 @@ class Free(SpatialJoint):
     units = ("m", "m", "m", "", "", "", "")
     neutral = (0.0, 0.0, 0.0, *quaternion.NEUTRAL)
     groups = (0, 1, 2, 3, 3, 3, 3)
+    sliding = 3
 
     def rotation(self, q: Sequence[Node]) -> NodeMatrix:
         """That of the quaternion."""

@@ -102,7 +102,13 @@ class AxialJoint(JointType):
 
 
 class SpatialJoint(JointType):
-    """A joint of several freedoms. Its motion is in the body's axes where nothing else is said."""
+    """A joint of several freedoms. Its motion is in the body's axes where nothing else is said.
+
+    sliding: how many of the velocities, the first ones, move the body along the joint's axes, one after another. The
+    others are along axes that turn with the body.
+    """
+
+    sliding = 0
 
     @abstractmethod
     def rotation(self, q: Sequence[Node]) -> NodeMatrix:
