@@ -24,7 +24,8 @@ label may have. `certain_digits` says what rounding leaves of the outputs.
 **At the edges**: `real_array`, `real_number`, `is_finite`, `check_name`, `require_graph`, `require_flag`,
 `require_whole`, `require_choice`, `require_sequence`, `require_mapping` and `require_path` check what a caller passed,
 `thread_count` reads `threads=`, `atomic_write` writes a file whole or not at all, `write_files` several, and
-`check_writable` looks beforehand; `install` ends an error about a missing package. `Array` is the type of an array of
+`check_writable` looks beforehand; `install` ends an error about a missing package, `scipy_integrate` gives SciPy's
+module or raises it. `Array` is the type of an array of
 float64.
 
     >>> import cgraph as cg
@@ -52,6 +53,7 @@ from .core.node import as_node
 from .core.operation import MathML, Op
 from .core.ops import OPS
 from .core.register import register
+from .core.scipy_modules import scipy_integrate
 from .core.scope import building
 from .core.traversal import topological
 from .errors import install
@@ -124,6 +126,7 @@ __all__ = [
     "require_whole",
     "rewritten",
     "runner",
+    "scipy_integrate",
     "shortened",
     "solve_nodes",
     "tangents",

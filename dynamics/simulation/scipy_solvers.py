@@ -12,7 +12,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Array, install
+from cgraph.extend import Array, scipy_integrate
 
 from ..integrators import Problem, state_jacobian
 from ..integrators.step_control import RESOLUTION
@@ -42,10 +42,7 @@ class ScipySolver:
 
 def scipy_solver(problem: Problem, name: str, backend: str) -> ScipySolver:
     """The solver, with the problem's rate and Jacobian compiled. Raises ImportError without SciPy."""
-    try:
-        from scipy import integrate
-    except ImportError:
-        raise ImportError(f"method {SCIPY + name!r} needs SciPy: {install('scipy')}") from None
+    integrate = scipy_integrate(f"method {SCIPY + name!r}")
     rate = cg.compile(problem.rate, backend)
     jacobian: dict[str, Any] = {}
     if name in IMPLICIT:
@@ -182,6 +179,4 @@ def _inside(times: Array, t_old: float, t: float) -> bool:
 
 def solve_ivp() -> Any:
     """SciPy's `solve_ivp` itself, to compare with. Raises ImportError without SciPy."""
-    from scipy.integrate import solve_ivp as function
-
-    return function
+    return scipy_integrate("solve_ivp").solve_ivp

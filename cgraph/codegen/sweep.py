@@ -1,0 +1,63 @@
+"""Sweep: a derivative of a compiled graph, ready to run along many directions at one point."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..autodiff.direction_split import DirectionSplit
+from ..autodiff.sparsity import Indices
+from ..core.evaluate import Array
+
+NO_ENTRIES = np.zeros(0, dtype=np.int64)
+
+
+class Sweep(ABC):
+    """A derivative along groups of directions.
+
+    Directions lie side by side: those of a group are the last axis of an array (groups, entries, lanes), and so are
+    their results.  lanes: how many a group has.
+    """
+
+    def __init__(self, split: DirectionSplit, lanes: int) -> None:
+        self.split, self.lanes = split, lanes
+        self.directions, self.results = split.directions, len(split.linear.outputs)  # numbers in one
+
+    @abstractmethod
+    def bind(
+        self, x: Array, s: Array, y: Array, take: Indices = NO_ENTRIES, put: Indices = NO_ENTRIES, values: Any = None
+    ) -> Callable[[], None]:
+        """A function of nothing: y of the point x along s, then values[put] = y[take], y and values as rows of numbers.
+
+        It keeps the arrays alive. One thread at a time may call it.
+        """
+
+    def along(self, x: Array, directions: Array) -> Array:
+        """The results, (k, results), along directions, (k, entries), at a point."""
+        k, lanes = len(directions), self.lanes
+        result = np.empty((k, self.results))
+        block = lanes * max(1, WORK // (len(self.split.linear.nodes) * lanes))
+        for start in range(0, k, block):  # between blocks, Ctrl-C is heard
+            some = directions[start : start + block]
+            groups = -(-len(some) // lanes)
+            s, y = aligned((groups, self.directions, lanes)), aligned((groups, self.results, lanes))
+            filled = np.zeros((groups * lanes, self.directions))
+            filled[: len(some)] = some
+            s[...] = filled.reshape(groups, lanes, -1).transpose(0, 2, 1)
+            self.bind(x, s, y)()
+            result[start : start + block] = y.transpose(0, 2, 1).reshape(-1, self.results)[: len(some)]
+        return result
+
+
+WORK = 2**23  # nodes times directions in a block: some milliseconds
+
+
+def aligned(shape: tuple[int, ...]) -> Array:
+    """An array that begins where a line of the cache does: a vector then lies in one."""
+    size = int(np.prod(shape))
+    memory = np.empty(size + 7)
+    start = -(memory.ctypes.data // 8) % 8
+    return memory[start : start + size].reshape(shape)
