@@ -182,7 +182,8 @@ def simulate(
     energies = _energies(energy, times, states, held)
     dense = None if steps is None else Solution(options.t0, start.x, steps, nq)
     rows = (times, states[:, :nq], states[:, nq:], energies)
-    return Trajectory(*rows, stats, log.crossings(nq) if log else {}, _graphs(problem, applied), dense, held)
+    crossings, names = log.crossings(nq) if log else {}, (model.coordinates, model.velocities)
+    return Trajectory(*rows, stats, crossings, _graphs(problem, applied), dense, held, *names)
 
 
 def _compiled(
