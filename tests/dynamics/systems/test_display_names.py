@@ -35,7 +35,9 @@ def test_every_input_and_output_of_the_equations_of_a_model_is_called_by_its_coo
         assert unnamed <= {"dt", "t", "info"}
     for kind, names in (("q", HOPPER.coordinates), ("qd", HOPPER.velocities), ("tau", HOPPER.velocities)):
         assert [CALLED[f"{kind}{i}"] for i in range(len(names))] == [f"{kind}.{name}" for name in names]
-    assert CALLED["q3"] == "q.base.qw" and CALLED["qd3"] == "qd.base.wx" and CALLED["q10"] == "q.hip.qz"
+    assert CALLED["q3"] == "q.base.qw"
+    assert CALLED["qd3"] == "qd.base.wx"
+    assert CALLED["q10"] == "q.hip.qz"
 
 
 def test_questions_are_answered_alike_by_either_name_and_shown_by_the_coordinate_s():
@@ -79,7 +81,7 @@ def test_columns_of_a_trajectory_have_names():
         table = getattr(run, kind)
         for i, name in enumerate(names):
             assert run[f"{kind}.{name}"].tolist() == run[f"{kind}{i}"].tolist() == table[:, i].tolist()
-    with pytest.raises(ValueError, match="did you mean 'q.ankle'"):
+    with pytest.raises(ValueError, match=r"did you mean 'q\.ankle'"):
         run["q.ankel"]
     with pytest.raises(TypeError, match="a column of a trajectory has a name"):
         run[0]
@@ -90,9 +92,11 @@ def test_columns_of_a_trajectory_have_names():
 def test_headers_drawings_and_pages_show_them():
     graph = dyn.forward_dynamics(HOPPER)
     header = cg.to_c(graph, "hopper", names=CALLED).header
-    assert "HOPPER_IN_q3 = 3, /* q.base.qw */" in header and "HOPPER_OUT_qdd9 = 9, /* qdd.ankle */" in header
+    assert "HOPPER_IN_q3 = 3, /* q.base.qw */" in header
+    assert "HOPPER_OUT_qdd9 = 9, /* qdd.ankle */" in header
     drawing = viz.to_dot(graph, names=theme.called(CALLED), collapse=["base", "leg"]).source
-    assert "q.hip.qw" in drawing and "q\u0307.base.wx" in drawing
+    assert "q.hip.qw" in drawing
+    assert "q\u0307.base.wx" in drawing
 
 
 URDF = """<robot name="crawler"><link name="trunk"><inertial><mass value="4"/><inertia ixx="0.1" iyy="0.2" izz="0.2"
@@ -106,7 +110,8 @@ def test_the_command_line_takes_and_shows_them(tmp_path, capsys):
     scene = [str(tmp_path / "crawler.urdf"), "--floating"]
     assert cli.main(["why", *scene, "tau.hip", "q.trunk.qy", "--k", "1", "--at", "q.hip=0.5"]) == 0
     out = capsys.readouterr().out
-    assert "tau.hip depends on q.trunk.qy along" in out and "q.hip=0.5" in out
+    assert "tau.hip depends on q.trunk.qy along" in out
+    assert "q.hip=0.5" in out
     assert cli.main(["why", *scene, "tau.hipp", "q.hip"]) == 2
     assert "did you mean tau.hip" in capsys.readouterr().err
     assert cli.main(["lint", *scene, "--json"]) == 0
