@@ -45,7 +45,8 @@ def run(options: argparse.Namespace) -> int:
     scene = scene_of(options)
     left, right = (inverse_dynamics(scene, name) for name in options.formulations)
     state = [name for graph in (left, right) for names in state_names(graph, scene) for name in names]
-    comparison = cg.compare(left, right, atoms=dict.fromkeys(state), classify=formulation_classes)
+    called = display_names(scene)
+    comparison = cg.compare(left, right, atoms=dict.fromkeys(state), classify=formulation_classes, names=called)
     named = dict(zip(("left", "right"), options.formulations, strict=True))
     both = len(comparison.common)
     sizes = {"left_nodes": len(left.nodes), "right_nodes": len(right.nodes), "in_both": both}
@@ -62,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
         unless_json(options, data, "\n".join([*lines, str(comparison)])),
         together.graph,
         marked=dict(zip(*groups, strict=True)),
-        names=theme.called(display_names(scene)),
+        names=theme.called(called),
         caption=f"{scene.name}: {' and '.join(options.formulations)} in one".replace("_", " "),
     )
     return 1 if any(only) else 0

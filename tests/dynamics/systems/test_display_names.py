@@ -117,3 +117,18 @@ def test_the_command_line_takes_and_shows_them(tmp_path, capsys):
     assert cli.main(["lint", *scene, "--json"]) == 0
     proof = json.loads(capsys.readouterr().out)["proofs"][0]
     assert "q.hip" in proof  # the last of the coordinates, which are more than the velocities
+
+
+def test_what_is_pruned_of_joints_of_several_coordinates_is_counted(tmp_path, capsys):
+    """Effects that a joint cannot have, such as a free base's armature, are none that it lacks."""
+    (tmp_path / "crawler.urdf").write_text(URDF)
+    report = ["report", str(tmp_path / "crawler.urdf"), "--floating", "--pruning", "--json"]
+    assert cli.main(report) == 0
+    found = json.loads(capsys.readouterr().out)[0]["graphs"]
+    absent = {row["what"] for row in found[0]["absent"]}
+    assert {"springs of thigh", "armature of thigh"} <= absent
+    assert cli.main([*report, "--lock", "hip=0.5"]) == 0
+    assert cli.main([*report, "--lock", "hipp=0.5"]) == 2
+    assert "did you mean 'hip'" in capsys.readouterr().err
+    assert cli.main([*report, "--lock", "trunk=0.5"]) == 2
+    assert "(7,)" in capsys.readouterr().err
