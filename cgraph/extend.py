@@ -64,6 +64,7 @@ from .simplify.builder import Builder, folded
 from .simplify.identities import rewritten, shortened
 from .simplify.polynomial import Polynomial, expand, format_polynomial
 from .util.atomic_write import atomic_write, check_writable, write_files
+from .util.nearest import nearest, or_nearest
 from .util.real_arrays import is_finite, real_array, real_number
 from .util.require import (
     require_choice,
@@ -114,6 +115,8 @@ __all__ = [
     "is_finite",
     "ldl_elimination",
     "ldl_solve",
+    "nearest",
+    "or_nearest",
     "real_array",
     "real_number",
     "register",

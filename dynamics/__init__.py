@@ -50,6 +50,7 @@ from .simulation.simulate import simulate
 from .simulation.trajectory import Crossings, SimulationWarning, Stats, Trajectory
 from .systems.constraints import ConstraintError
 from .systems.controller import with_controller
+from .systems.display_names import display_names
 from .systems.model import as_system
 from .systems.ode_system import OdeSystem
 from .systems.quasi_velocities import QuasiVelocities
@@ -109,6 +110,7 @@ __all__ = [
     "consistent_state",
     "coriolis",
     "damping_force",
+    "display_names",
     "energy",
     "forward_dynamics",
     "frame_acceleration",

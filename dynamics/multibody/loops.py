@@ -13,9 +13,10 @@ from cgraph import Node
 from cgraph.extend import Builder, building, check_name, is_finite
 
 from . import spatial
-from .body import WORLD, Body, MechanismError, checked_rotation, vector
+from .body import WORLD, Body, Joint, MechanismError, checked_rotation, vector
 from .forward_kinematics import KinematicChain
 from .joint_coordinates import places
+from .joints import COMPOSITIONS
 from .kinematic_tree import locked_at
 from .relative_placement import RelativePlacement
 from .spatial import ZERO, Array
@@ -149,8 +150,12 @@ def _check_coupling(loop: Loop, where: str, bodies: Mapping[str, Body]) -> None:
         raise MechanismError(f"{where}: coefficients must be finite numbers, at least one, got {given!r:.60}")
     for name in (loop.body, loop.to):
         constant = name == WORLD and len(given) == 1
-        if not constant and (name == WORLD or len(bodies[name].joint.type.coordinates) != 1):
+        if not constant and (name == WORLD or not _has_one_coordinate(bodies[name].joint)):
             raise MechanismError(f"{where}: a coupling needs joints with one coordinate, which {name!r} has not")
+
+
+def _has_one_coordinate(joint: Joint) -> bool:
+    return joint.kind not in COMPOSITIONS and len(joint.type.coordinates) == 1
 
 
 def loop_rows(loop: Loop, body: RelativePlacement, to: RelativePlacement) -> list[Node]:

@@ -17,7 +17,7 @@ from ..systems.arguments import parameter_value
 from ..systems.model import Model
 from ..systems.system import BodySystem, System
 from .body import WORLD, Body, Joint, MechanismError, MechanismWarning, quantities, vector
-from .composed_joints import locked_parts, require_outer_parents
+from .composed_joints import locked_parts, outer_names, require_parents
 from .external_force import Force, generalized_forces
 from .forward_kinematics import KinematicChain, kinematic_chain
 from .inertial_numbers import Link
@@ -122,7 +122,8 @@ class Mechanism(Structure):
     def _check_parameters(self, bodies: Sequence[Body]) -> None:
         for name, value in require_mapping("parameters", self.parameters, "name: value").items():
             parameter_value(name, value)  # before one is put in
-        require_values(bodies, self.gravity, self.parameters)
+        with outer_names(self.bodies):
+            require_values(bodies, self.gravity, self.parameters)
 
     def __repr__(self) -> str:
         return f"<Mechanism of {'; '.join(summary(self, self.coordinates))}>"
@@ -131,7 +132,7 @@ class Mechanism(Structure):
     def parts(self) -> tuple[Body, ...]:
         """All bodies as the equations have them, parents first: a locked joint a weld, those of several parts apart."""
         parts = [part for body in self.bodies for part in self.shared.parts(body)]
-        require_outer_parents(self.bodies)
+        require_parents(self.bodies)
         return tuple(parents_first(lock_joints(parts, locked_parts(self.bodies, self.locked))))
 
     @property
@@ -207,8 +208,12 @@ class Mechanism(Structure):
             quasi_velocities=quasi_velocities(self.moving),
             constraints=lambda q, t: position_rows(self, self.moving, self._carriers, self.links, q),
             velocity_constraints=lambda q, qd, t: velocity_rows(self, lambda body: self._chain(body, q, qd)),
-            require_values=lambda values: require_values(self.parts, self.gravity, values),
+            require_values=self._require_values,
         )
+
+    def _require_values(self, values: Mapping[str, ArrayLike]) -> None:
+        with outer_names(self.bodies):
+            require_values(self.parts, self.gravity, values)
 
     def _generalized_forces(self, q: list[Node], qd: list[Node], t: Node, p: dict[str, Node]) -> list[Node]:
         on_bodies = [force for force in self.forces if isinstance(force, Force)]
@@ -282,7 +287,7 @@ class Mechanism(Structure):
             raise MechanismError(f"the mechanism has no parameter {unknown[0]!r} (it has {has})")
         if not chosen:
             return self
-        require_values(self.parts, self.gravity, {**self.parameter_values, **chosen})
+        self._require_values({**self.parameter_values, **chosen})
         bodies = tuple([bound_body(body, chosen) for body in self.bodies])
         forces = tuple([bound_force(force, chosen) for force in self.forces])
         return changed(self, chosen, bodies=bodies, gravity=bound(self.gravity, chosen), forces=forces)

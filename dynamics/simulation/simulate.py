@@ -179,10 +179,10 @@ def simulate(
     stats = _stats(run, options.method, outcome)
     for text in stats.warnings:
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    energies = _energies(energy, times, states, held)
     dense = None if steps is None else Solution(options.t0, start.x, steps, nq)
-    rows = (times, states[:, :nq], states[:, nq:], energies)
-    return Trajectory(*rows, stats, log.crossings(nq) if log else {}, _graphs(problem, applied), dense, held)
+    rows = (times, states[:, :nq], states[:, nq:], _energies(energy, times, states, held))
+    kept = (log.crossings(nq) if log else {}, _graphs(problem, applied), dense, held)
+    return Trajectory(*rows, stats, *kept, model.coordinates, model.velocities)
 
 
 def _compiled(

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
-from cgraph.extend import Array
+from cgraph.extend import Array, or_nearest
 
 from .row_values import row_values
 from .sampled_controller import HeldForces
@@ -141,6 +141,8 @@ class Trajectory:
         The steps with their dense output, which `solution` reads; of a run with `dense_output=True`.
     held : HeldForces, optional
         What a SampledController has given, `held.t` and `held.tau`, a row for each period.
+    coordinates, velocities : tuple of str
+        Names of the columns of q and of those of qd, qdd, tau and forces: `run["q.elbow"]` is such a column.
 
     Examples
     --------
@@ -148,6 +150,8 @@ class Trajectory:
     >>> run = dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.1], [0.0], 1.0, t_eval=[0.5, 1.0])
     >>> run.q.shape, run.stats.success
     ((2, 1), True)
+    >>> run["q.joint 1"].round(3)
+    array([-0.034, -0.077])
     """
 
     t: Array
@@ -159,6 +163,31 @@ class Trajectory:
     graphs: Mapping[str, Graph] = field(default_factory=dict)
     dense: Solution | None = None
     held: HeldForces | None = None
+    coordinates: tuple[str, ...] = ()
+    velocities: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> Array:
+        """A column by its name, (T,): "q.elbow", "qd.elbow", "qdd.elbow", "tau.elbow", "forces.elbow", or a state.
+
+        Velocities with names of their own have these, as in "qd.base.wx"; the graphs' names, as "q3", do too.
+
+        Raises
+        ------
+        TypeError
+            For what is no text.
+        ValueError
+            For a name that no column has.
+        """
+        if not isinstance(name, str):
+            raise TypeError(f"a column of a trajectory has a name, got {type(name).__name__}: {name!r:.60}")
+        known = {"q": self.coordinates} | dict.fromkeys(("qd", "qdd", "tau", "forces"), self.velocities)
+        places = {f"{kind}.{each}": (kind, i) for kind, names in known.items() for i, each in enumerate(names)}
+        by_number = {f"{kind}{i}": (kind, i) for kind, names in known.items() for i in range(len(names))}
+        states = {} if self.velocities else {each: ("q", i) for i, each in enumerate(self.coordinates)}
+        if (place := (by_number | places | states).get(name)) is None:
+            raise ValueError(f"the trajectory has no column {name!r:.80}; {or_nearest(name, [*states, *places])}")
+        table: Array = getattr(self, place[0])
+        return table[:, place[1]]
 
     def solution(self, t: ArrayLike) -> tuple[Array, Array]:
         """The motion at any time of the run, by the dense output of its steps.

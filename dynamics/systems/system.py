@@ -182,14 +182,6 @@ class System:
         return cg.variable(TIME)
 
     @cached_property
-    def display_names(self) -> dict[str, str]:
-        """What a person reads in place of q0, qd0, qdd0 and tau0: "q.<coordinate>" and so on, by input."""
-        shown = {f"q{i}": f"q.{name}" for i, name in enumerate(self.coordinates)}
-        kinds = ("qd", "qdd", "tau")
-        shown |= {f"{kind}{i}": f"{kind}.{name}" for kind in kinds for i, name in enumerate(self.velocities)}
-        return shown | {f"lambda{k}": f"lambda.{name}" for k, name in enumerate(self.constraints.names)}
-
-    @cached_property
     def extra_inputs(self) -> list[Node]:
         """Inputs that every graph of the system has after its state: t if anything depends on it, and parameters."""
         reached = set(topological(self._given))
