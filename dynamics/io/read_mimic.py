@@ -32,7 +32,7 @@ def read_mimics(joints: Mapping[str, Element]) -> Mimics:
     fixed = [name for name in leaders if kinds[name] == "fixed"]
     follow = [name for name in leaders if name not in fixed]
     astray = [name for name in follow if leaders[name] not in joints]
-    circle = [name for name in follow if _follows_itself(name, leaders)]
+    circle = [name for name in follow if follows_itself(name, leaders)]
     others = [name for name in follow if name not in (*astray, *circle)]
     several = [name for name in others if not {kinds[name], kinds[leaders[name]]} <= {*_SINGLE}]
     refused = {
@@ -47,7 +47,8 @@ def read_mimics(joints: Mapping[str, Element]) -> Mimics:
     )
 
 
-def _follows_itself(name: str, leaders: Mapping[str, str]) -> bool:
+def follows_itself(name: str, leaders: Mapping[str, str]) -> bool:
+    """Whether a joint mimics itself, by way of others."""
     at, seen = leaders[name], {name}
     while at in leaders and at not in seen:
         seen.add(at)

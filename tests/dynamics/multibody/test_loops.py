@@ -11,6 +11,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics.multibody.spatial import rotation
 
 from ..linkages import ACROSS, bar, four_bar, peaucellier, scaled_four_bar, squeezer, stewart_platform
 from ..mechanisms import random_body, random_joint, random_rotation
@@ -388,3 +389,16 @@ def test_a_stewart_platform_obeys_the_defining_equations() -> None:
     assert np.array([found[f"qdd{i}"] for i in range(model.system.n)]) == pytest.approx(
         expected, abs=TIGHT * np.abs(expected).max()
     )
+
+
+@pytest.mark.parametrize("angle", [2.0 * np.pi / 3.0, 3.0])
+def test_a_weld_turns_a_body_to_its_place_from_nearly_half_a_turn_away(angle: float) -> None:
+    """And not to another where axes are at right angles; by a third of a turn about (1, 1, 1) they all are."""
+    axis = np.full(3, 3.0**-0.5)
+    orientation = rotation(axis, angle)
+    body = dyn.Body("b", dyn.Joint("free"), "world", 1.0, inertia=(1.0, 1.0, 1.0))
+    model = dyn.Mechanism([body], loops=[dyn.Loop("weld", "b", orientation=orientation)])
+    q, u = dyn.consistent_state(model, [0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0], np.ones(6))
+    quaternion = [np.cos(angle / 2.0), *(np.sin(angle / 2.0) * axis)]
+    assert q == pytest.approx([0.0, 0.0, 0.0, *quaternion], abs=1e-15)
+    assert np.abs(u).max() < 1e-15
