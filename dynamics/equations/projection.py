@@ -20,7 +20,7 @@ from cgraph.extend import Array, Builder, building, certain_digits, folded, solv
 
 from ..systems.constraints import ConstraintError
 from ..systems.system import System
-from .constraint_rank import ConstraintWarning, RowNumbers, independent_rows
+from .constraint_rank import ConstraintWarning, RowNumbers, independent_rows, step_names
 from .constraints import Rows
 from .formulations import ZERO
 from .substitute import substitute
@@ -121,10 +121,7 @@ def projected_start(system: System, x: Array, t: float, parameters: Mapping[str,
 def _all_rows(system: System) -> Graph:
     """phi and the rates of all constraints at x + step; inputs x, t if needed, parameters, and the steps."""
     state = [*system.q, *system.qd]
-    free = "step"
-    while any([str(node.name).startswith(free) for node in system.extra_inputs]):
-        free += "'"
-    steps = cg.variables([f"{free}{k}" for k in range(len(state))])
+    steps = cg.variables(step_names(len(state), system.parameters))
     positions, rates = system.constraints.positions, system.constraints.rates
     names = [*[f"phi{k}" for k in range(len(positions))], *[f"rate{k}" for k in range(len(rates))]]
     with building(Builder()):
