@@ -16,7 +16,7 @@ from ..multibody.spatial import Array
 from .left_out import listed, present, refused_or_left_out
 from .mujoco_twin import mujoco
 from .read_equality import left_of_equalities, other_equalities, read_loops
-from .smooth_forces import NONE, Smooth, actuators, disabled, mjcf_forces, modelled, single
+from .smooth_forces import NONE, Smooth, actuators, disabled, first_output, inputs, mjcf_forces, modelled, single
 from .source import is_text, path_of, root_of, text_of
 from .stand_ins import zeros_again
 
@@ -202,10 +202,10 @@ def _at_rest(mj: Any, i: int) -> str:
         return kind
     numbers = zip(mj.actuator_biasprm[i, :3] * (kind == "affine"), ("", " length", " velocity"), strict=True)
     terms = [f"{number:+g}{of}" for number, of in numbers if number]
-    lower, upper = mj.actuator_ctrlrange[i]
-    least = np.clip(0.0, lower, upper) if mj.actuator_ctrllimited[i] and not disabled(mj, "CLAMPCTRL") else 0.0
-    terms += [f"input at least {least:g}"] if least > 0.0 else [f"input at most {least:g}"] if least < 0.0 else []
-    gear = mj.actuator_gear[i, 0]
+    limited = [] if disabled(mj, "CLAMPCTRL") else [k for k in inputs(mj, i) if mj.actuator_ctrllimited[k]]
+    nearest = [float(np.clip(0.0, *mj.actuator_ctrlrange[k])) for k in limited]
+    terms += [f"input at {'least' if least > 0.0 else 'most'} {least:g}" for least in nearest if least]
+    gear = mj.actuator_gear[first_output(mj, i), 0]
     return " ".join([*terms, *([f"times gear {gear:g}"] if terms and gear != 1.0 else [])])
 
 
