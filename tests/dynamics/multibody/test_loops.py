@@ -11,6 +11,8 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics.equations.constraint_rank import independent_rows
+from dynamics.multibody.spatial import rotation
 
 from ..linkages import ACROSS, bar, four_bar, peaucellier, scaled_four_bar, squeezer, stewart_platform
 from ..mechanisms import random_body, random_joint, random_rotation
@@ -388,3 +390,31 @@ def test_a_stewart_platform_obeys_the_defining_equations() -> None:
     assert np.array([found[f"qdd{i}"] for i in range(model.system.n)]) == pytest.approx(
         expected, abs=TIGHT * np.abs(expected).max()
     )
+
+
+@pytest.mark.parametrize("angle", [2.0 * np.pi / 3.0, 3.0])
+def test_a_weld_turns_a_body_to_its_place_from_nearly_half_a_turn_away(angle: float) -> None:
+    """And not to another where axes are at right angles; by a third of a turn about (1, 1, 1) they all are."""
+    axis = np.full(3, 3.0**-0.5)
+    orientation = rotation(axis, angle)
+    body = dyn.Body("b", dyn.Joint("free"), "world", 1.0, inertia=(1.0, 1.0, 1.0))
+    model = dyn.Mechanism([body], loops=[dyn.Loop("weld", "b", orientation=orientation)])
+    q, u = dyn.consistent_state(model, [0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0], np.ones(6))
+    quaternion = [np.cos(angle / 2.0), *(np.sin(angle / 2.0) * axis)]
+    assert q == pytest.approx([0.0, 0.0, 0.0, *quaternion], abs=1e-15)
+    assert np.abs(u).max() < 1e-15
+
+
+@pytest.mark.parametrize("meter", [1e-9, 1e5, 1e9])
+def test_a_loop_closes_at_any_length(meter: float) -> None:
+    """Newton's method on slides and turns, whose units differ."""
+    rng = np.random.default_rng(0)
+    names, (axes, places, centers) = ("a", "b"), rng.normal(size=(3, 2, 3))
+    arm = [
+        dyn.Body(name, dyn.Joint("revolute", axis, meter * place), parent, 1.0, meter * center)
+        for name, parent, axis, place, center in zip(names, ("world", "a"), axes, places, centers, strict=True)
+    ]
+    held = dyn.Body("held", dyn.Joint("free"), mass=1.0, inertia=(meter**2,) * 3)
+    at, to_at = meter * rng.normal(size=(2, 3))
+    loops = [dyn.Loop("point", "held", "b", at, to_at), dyn.Loop("coupling", "a", coefficients=[0.4])]
+    assert independent_rows(dyn.Mechanism([*arm, held], loops=loops).system.constraints) == (0, 1, 2, 3)
