@@ -11,6 +11,8 @@ from tempfile import TemporaryDirectory
 import pytest
 from hypothesis import HealthCheck, settings
 
+from cgraph.codegen import llvm_engine
+
 if sys.dont_write_bytecode:  # else every process that a test starts would compile the library anew
     _bytecode = TemporaryDirectory(prefix="cgraph-bytecode-")
     atexit.register(_bytecode.cleanup)
@@ -29,6 +31,13 @@ def pytest_collection_finish() -> None:
     """Modules and tests stay to the end: the garbage collector need not walk through them again and again."""
     gc.collect()
     gc.freeze()
+
+
+@pytest.fixture(autouse=True)
+def quick_machine_code(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """LLVM's code generator does not optimise, for a quarter of the time and the same bits; it does for its tests."""
+    if not {"codegen", "program"} & set(request.path.parts):
+        monkeypatch.setattr(llvm_engine, "LEVEL", 0)
 
 
 @pytest.fixture
