@@ -122,8 +122,7 @@ class Mechanism(Structure):
     def _check_parameters(self, bodies: Sequence[Body]) -> None:
         for name, value in require_mapping("parameters", self.parameters, "name: value").items():
             parameter_value(name, value)  # before one is put in
-        with outer_names(self.bodies):
-            require_values(bodies, self.gravity, self.parameters)
+        self._require_values(self.parameters, bodies)
 
     def __repr__(self) -> str:
         return f"<Mechanism of {'; '.join(summary(self, self.coordinates))}>"
@@ -211,9 +210,9 @@ class Mechanism(Structure):
             require_values=self._require_values,
         )
 
-    def _require_values(self, values: Mapping[str, ArrayLike]) -> None:
+    def _require_values(self, values: Mapping[str, ArrayLike], bodies: Sequence[Body] | None = None) -> None:
         with outer_names(self.bodies):
-            require_values(self.parts, self.gravity, values)
+            require_values(self.parts if bodies is None else bodies, self.gravity, values)
 
     def _generalized_forces(self, q: list[Node], qd: list[Node], t: Node, p: dict[str, Node]) -> list[Node]:
         on_bodies = [force for force in self.forces if isinstance(force, Force)]
