@@ -99,9 +99,11 @@ class RowNumbers:
         self.columns = Graph([*self.inputs, *weights], {f"J{i}": bar for i, bar in enumerate(bars)})
         normalized = kinematics.normalized(moved)
         self.moved = Graph([*kinematics.q, *displaced.values()], {f"{i}": node for i, node in enumerate(normalized)})
-        there = substitute([phi for _, phi in numbered], dict(zip(kinematics.q, normalized, strict=True)))
-        landed = {name: phi for (name, _), phi in zip(numbered, there, strict=True)}
-        self.landed = Graph([*self.inputs, *displaced.values()], landed) if landed else None
+        self.landed: Graph | None = None
+        if numbered:
+            there = substitute(list(constraints.positions), dict(zip(kinematics.q, normalized, strict=True)))
+            outputs = {name: phi for (name, _), phi in zip(numbered, there, strict=True)}
+            self.landed = Graph([*self.inputs, *displaced.values()], outputs)
 
     def states(self) -> Iterator[dict[str, float]]:
         """Some random states that meet the constraints: values of q0.., t and parameters."""
