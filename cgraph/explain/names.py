@@ -91,7 +91,7 @@ class Names:
                 near = self._near(name, self.graph.input_names)
                 raise GraphError(f"{what}: the graph has no input {name!s:.80}{near} (it has {listed})")
             if meant in result:
-                raise GraphError(f"{what} gives the input {name} twice: it is {meant}, too")
+                raise GraphError(f"{what} gives the input {self.shown(meant)} twice, once as {meant}")
             result[meant] = value
         return result
 

@@ -100,7 +100,10 @@ def page(
             raise TypeError(f"{what} of a page must be text, got {type(text).__name__}: {text!r:.60}")
     if at is not None:
         require_mapping("at", at, "input: value")
-    texts = [require_mapping(what, given or {}, "name: text") for what, given in (("names", names), ("units", units))]
+    texts = [
+        {} if given is None else require_mapping(what, given, "name: text")
+        for what, given in (("names", names), ("units", units))
+    ]
     nodes, tables = frozenset(require_sequence("marked", marked, "nodes")), require_sequence("tables", tables, "Table")
     if not all([isinstance(table, Table) for table in tables]):
         raise TypeError(f"tables must be a sequence of Table, got {tables!r:.60}")
