@@ -72,6 +72,7 @@ from .util.require import (
     require_mapping,
     require_path,
     require_sequence,
+    require_texts,
     require_whole,
 )
 from .util.threads import thread_count
@@ -126,6 +127,7 @@ __all__ = [
     "require_mapping",
     "require_path",
     "require_sequence",
+    "require_texts",
     "require_whole",
     "rewritten",
     "runner",

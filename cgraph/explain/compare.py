@@ -11,7 +11,7 @@ from ..core.graph import Graph, require_graph
 from ..core.node import VARIABLE, Node, variable
 from ..core.structure_hash import node_hashes
 from ..errors import GraphError
-from ..util.require import require_choice, require_mapping, require_sequence
+from ..util.require import require_choice, require_sequence, require_texts
 from .names import Names, joined, many
 
 Classify = Callable[[Graph], Callable[[Node], str]]
@@ -217,7 +217,7 @@ def compare(
         tuple([name for name in shared if name not in same]),
         stand_ins,
         classify or _by_label,
-        {} if names is None else require_mapping("names", names, "name: text"),
+        require_texts("names", names),
     )
 
 

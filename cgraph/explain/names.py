@@ -11,7 +11,7 @@ from ..core.operation import SUM
 from ..core.source_lines import lines_text
 from ..errors import GraphError
 from ..util.nearest import nearest
-from ..util.require import require_mapping
+from ..util.require import require_texts
 
 Name = str | Node
 Value = TypeVar("Value")
@@ -64,7 +64,7 @@ class Names:
                 self.by_name.setdefault(node.name, []).append(node)
         self._called: dict[str, str] = {}
         self._meant: dict[str, str] = {}
-        for name, text in ({} if called is None else require_mapping("names", called, "name: text")).items():
+        for name, text in require_texts("names", called).items():
             if self._has(name) and not self._has(text) and text not in self._meant:
                 self._called[name], self._meant[text] = text, name
 
@@ -91,7 +91,7 @@ class Names:
                 near = self._near(name, self.graph.input_names)
                 raise GraphError(f"{what}: the graph has no input {name!s:.80}{near} (it has {listed})")
             if meant in result:
-                raise GraphError(f"{what} gives the input {name} twice: it is {meant}, too")
+                raise GraphError(f"{what} gives the input {self.shown(meant)} twice, once as {meant}")
             result[meant] = value
         return result
 

@@ -12,7 +12,7 @@ from string import Template
 from typing import Any
 
 from cgraph import Graph, Node
-from cgraph.extend import require_graph, require_mapping, require_sequence
+from cgraph.extend import require_graph, require_mapping, require_sequence, require_texts
 
 from .. import theme
 from ..pages import html
@@ -100,7 +100,7 @@ def page(
             raise TypeError(f"{what} of a page must be text, got {type(text).__name__}: {text!r:.60}")
     if at is not None:
         require_mapping("at", at, "input: value")
-    texts = [require_mapping(what, given or {}, "name: text") for what, given in (("names", names), ("units", units))]
+    texts = require_texts("names", names), require_texts("units", units)
     nodes, tables = frozenset(require_sequence("marked", marked, "nodes")), require_sequence("tables", tables, "Table")
     if not all([isinstance(table, Table) for table in tables]):
         raise TypeError(f"tables must be a sequence of Table, got {tables!r:.60}")

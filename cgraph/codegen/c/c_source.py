@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from ...core.graph import Graph, require_graph
 from ...util.atomic_write import atomic_write
-from ...util.require import require_flag, require_mapping, require_path
+from ...util.require import require_flag, require_path, require_texts
 from .c_identifiers import check_function_name, distinct
 from .c_statements import comment, functions
 
@@ -140,7 +140,7 @@ def to_c(graph: Graph, name: str = "function", *, fma: bool = False, names: Mapp
     require_graph("to_c", graph)
     check_function_name(name)
     inputs, outputs, input_names = graph.inputs, graph.outputs, graph.input_names
-    called = {} if names is None else require_mapping("names", names, "name: text")
+    called = require_texts("names", names)
     places = [f"{name.upper()}_IN_{word}" for word in distinct(input_names)]
     results = [f"{name.upper()}_OUT_{word}" for word in distinct(list(outputs))]
     header = _HEADER.format(

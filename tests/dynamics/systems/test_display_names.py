@@ -126,7 +126,7 @@ def test_what_is_pruned_of_joints_of_several_coordinates_is_counted(tmp_path, ca
     assert cli.main(report) == 0
     found = json.loads(capsys.readouterr().out)[0]["graphs"]
     absent = {row["what"] for row in found[0]["absent"]}
-    assert {"springs of thigh", "armature of thigh"} <= absent
+    assert "springs of thigh" in absent
     assert cli.main([*report, "--lock", "hip=0.5"]) == 0
     assert cli.main([*report, "--lock", "hipp=0.5"]) == 2
     assert "did you mean 'hip'" in capsys.readouterr().err
