@@ -9,7 +9,7 @@ is kept stable.
 copies nodes through a builder, `topological` gives all nodes that some nodes reach, arguments first.
 
 **Differentiate**: `cotangents` pulls from outputs, `tangents` pushes from inputs, `hessian_nodes` gives the lower
-triangle of second derivatives, all as nodes.
+triangle of second derivatives, all as nodes. `compressed_jacobian` gives the parts of a loop over colors of columns.
 
 **Solve**: `solve_nodes` is `cg.hessian_solve` on nodes, `ldl_solve` the dense factorization; both raise
 `SingularError`. `ldl_elimination` does the same over any numbers.
@@ -39,6 +39,7 @@ float64.
     (True, True)
 """
 
+from .autodiff.compressed_jacobian import CompressedJacobian, compressed_jacobian
 from .autodiff.forward import tangents
 from .autodiff.hessian_solve import solve_nodes
 from .autodiff.jacobian import hessian_nodes
@@ -86,6 +87,7 @@ __all__ = [
     "Array",
     "Builder",
     "Call",
+    "CompressedJacobian",
     "Factor",
     "If",
     "Map",
@@ -107,6 +109,7 @@ __all__ = [
     "certain_digits",
     "check_name",
     "check_writable",
+    "compressed_jacobian",
     "cotangents",
     "expand",
     "folded",

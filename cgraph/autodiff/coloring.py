@@ -71,6 +71,12 @@ def jacobian_coloring(entries: Pattern, lanes: int) -> Coloring:
     return best
 
 
+def column_coloring(entries: Pattern) -> Coloring:
+    """Colors of the columns alone."""
+    m, n = entries.shape
+    return Coloring(_greedy(entries.by_row(), n), [NONE] * m, np.zeros(len(entries.rows), dtype=bool))
+
+
 def _cost(directions: tuple[int, int], lanes: int) -> tuple[int, int]:
     """Sweeps over vectors of directions, with what stands before them; and directions."""
     return sum([1 - count // -lanes for count in directions if count]), sum(directions)

@@ -17,7 +17,8 @@ from cgraph.extend import Call, Factor, If, Map, Program, Solve, Statement, Sum,
 
 from .elementwise import SAME, identity, weighted
 from .explicit import stage_time
-from .problem import Problem, state_jacobian
+from .jacobian_statements import jacobian_statements
+from .problem import Problem
 from .step_control import (
     accept_step,
     control,
@@ -72,12 +73,10 @@ def radau(problem: Problem, dense: bool) -> Program:
     z, w, f = (tuple([f"{name}{k}" for k in range(3)]) for name in ("Z", "W", "F"))
     powers = tuple([f"dense{k + 1}" for k in range(3)])
 
-    def evaluated(graph: Graph, target: str) -> Call:
-        return Call(graph, ("x", "t", "p"), (target,))
-
+    slopes, on_the_way = jacobian_statements(problem)
     body: list[Statement] = [
         first_pass(identity(m), *[Call(Graph([], {f"{k}": 0.0 for k in range(m)}), (), (name,)) for name in powers]),
-        If("accepted", (evaluated(state_jacobian(problem), "jacobian"), evaluated(problem.rate, "rate"), count(1))),
+        If("accepted", (*slopes, Call(problem.rate, ("x", "t", "p"), ("rate",)), count(1))),
         trial(),
         *_matrices(m),
         *[stage_time(f"time{k}", _C[k]) for k in range(3)],
@@ -92,7 +91,7 @@ def radau(problem: Problem, dense: bool) -> Program:
     lengths = {"unit": m * m, "jacobian": m * m, "real": m * m, "complex": 4 * m * m, "pivots": m, "pivots2": 2 * m}
     lengths |= dict.fromkeys((*z, *w, *f, *powers, "rate", "at", "right0", "error_vector"), m) | {"right12": 2 * m}
     single = "lost lost2 going turns change change_old newton sum converged h_old again time0 time1 time2"
-    lengths |= dict.fromkeys(single.split(), 1)
+    lengths |= on_the_way | dict.fromkeys(single.split(), 1)
     return Program({**registers(problem), **lengths}, body, recorded(dense, 3), record_if="accepted", stop="status")
 
 

@@ -15,7 +15,8 @@ from cgraph.extend import Call, Factor, If, Map, Program, Solve, Statement
 
 from .elementwise import SAME, function, identity, weighted
 from .explicit import stage_time
-from .problem import Problem, state_jacobian, time_derivative
+from .jacobian_statements import jacobian_statements
+from .problem import Problem, time_derivative
 from .step_control import accept_step, control, first_pass, lost, measured, recorded, registers, trial
 from .tableau import Row
 
@@ -88,7 +89,7 @@ def rosenbrock(method: Rosenbrock, problem: Problem, dense: bool) -> Program:
     m, stages = problem.size, len(method.c)
     slopes = tuple([f"U{k}" for k in range(stages)])
     timed = problem.timed
-    now: list[Statement] = [Call(state_jacobian(problem), ("x", "t", "p"), ("jacobian",))]
+    now, on_the_way = jacobian_statements(problem)
     if timed:
         now.append(Call(time_derivative(problem), ("x", "t", "p"), ("time_slope",)))
     body: list[Statement] = [first_pass(identity(m)), If("accepted", tuple(now)), trial()]
@@ -103,7 +104,7 @@ def rosenbrock(method: Rosenbrock, problem: Problem, dense: bool) -> Program:
     ]
     degree = len(method.dense) + 1
     lengths = dict.fromkeys(("unit", "jacobian", "matrix"), m * m) | dict.fromkeys(("pivots", "at", "rate", *slopes), m)
-    lengths |= {"time_slope": m if timed else 0, "at_t": 1, "sum": 1, "lost": 1}
+    lengths |= on_the_way | {"time_slope": m if timed else 0, "at_t": 1, "sum": 1, "lost": 1}
     if dense:
         lengths |= {
             f"{name}{k + 1}": m for name, count in (("h_", degree - 1), ("dense", degree)) for k in range(count)

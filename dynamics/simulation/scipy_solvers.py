@@ -14,7 +14,7 @@ import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Array, scipy_integrate
 
-from ..integrators import Problem, state_jacobian
+from ..integrators import Problem
 from ..integrators.step_control import RESOLUTION
 from .dense_output import StepBlock, normalized
 from .run_options import SCIPY, RunOptions
@@ -46,8 +46,7 @@ def scipy_solver(problem: Problem, name: str, backend: str) -> ScipySolver:
     rate = cg.compile(problem.rate, backend)
     jacobian: dict[str, Any] = {}
     if name in IMPLICIT:
-        slopes, m = cg.compile(state_jacobian(problem), backend), problem.size
-        jacobian["jac"] = lambda t, x: slopes([*x, t]).reshape(m, m)
+        jacobian["jac"] = lambda t, x: rate.jacobian([*x, t])[:, : problem.size]
     make = getattr(integrate, name)
     return ScipySolver(name, problem.components, make, lambda t, x: rate([*x, t]), jacobian, between(problem))
 
