@@ -14,7 +14,7 @@ import numpy as np
 
 from cgraph.extend import install
 
-from .case import BATCH, NUDGE, PASSES, Array, Case, rk4_step
+from .case import BATCH, DERIVATIVES, NUDGE, PASSES, Array, Case, rk4_step
 from .contender import Contender, Peer, UnavailableError
 from .ours import rate_graph, task_graph
 from .translate import lagrangian, quasi_velocities, translated
@@ -41,6 +41,8 @@ class CasadiPeer(Peer):
         ca, n = self.casadi, self.case.n
         if task == "rk4":
             return self._step(self.function("rate"))
+        if task in DERIVATIVES:
+            return self._slopes(task)
         q, qd, last = ca.SX.sym("q", self.case.nq), ca.SX.sym("qd", n), ca.SX.sym("last", n)
         energy, forces = lagrangian(self.case, ca.vertsplit(q), ca.vertsplit(qd), ca, NAMES, ca.SX)
         p, slope = ca.gradient(energy, qd), ca.gradient(energy, q)
@@ -57,6 +59,18 @@ class CasadiPeer(Peer):
             x, y = ca.vertcat(q, qd), ca.vertcat(q_dot, ca.substitute(y, last, ca.SX.zeros(n)))
             return ca.Function(task, [x], [ca.cse(y)])
         return ca.Function(task, [ca.vertcat(q, qd, last)], [ca.cse(y)])
+
+    def _slopes(self, task: str) -> Any:
+        """The derivatives of a task, by CasADi's Jacobian; those by q along the velocities."""
+        ca, nq, n = self.casadi, self.case.nq, self.case.n
+        function = self.function(DERIVATIVES[task])
+        x = ca.SX.sym("x", self.case.width(task))
+        q, qd = ca.vertsplit(x[:nq]), ca.SX.sym("u", n)
+        rates = quasi_velocities(self.case, q, ca.vertsplit(qd), q[:n], ca, NAMES, ca.SX)[0]
+        along = ca.jacobian(ca.vertcat(*rates), qd)
+        rows = ca.jacobian(function(x), x)
+        rows = ca.horzcat(ca.mtimes(rows[:, :nq], along), rows[:, nq:])
+        return ca.Function("slopes", [x], [ca.cse(ca.densify(ca.vec(rows.T)))])
 
     def _ours(self, task: str) -> Any:
         """Our graph of the task, node for node."""

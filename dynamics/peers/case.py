@@ -21,12 +21,16 @@ from ..systems.system import System
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-# Each task takes one vector, the blocks end to end, and gives the last block's kind.
+# Each task takes one vector, the blocks end to end. Derivatives are n rows of 3 n columns; those by q are by
+# displacements where velocities are no rates of coordinates.
 TASKS = {
     "inverse": "inverse dynamics, (q, qd, qdd) -> tau",
     "forward": "forward dynamics, (q, qd, tau) -> qdd",
     "rk4": "one RK4 step, (q, qd) -> (q, qd) after dt, tau = 0",
+    "inverse-derivatives": "derivatives of inverse dynamics, (q, qd, qdd) -> dtau/dq, dtau/dqd, M",
+    "derivatives": "derivatives of forward dynamics, (q, qd, tau) -> dqdd/dq, dqdd/dqd, M^-1",
 }
+DERIVATIVES = {"inverse-derivatives": "inverse", "derivatives": "forward"}  # and what they are of
 BATCH = 4096  # states
 PASSES = 1000  # of a native loop
 DT = 1e-5  # s, the step of RK4: short, so that a thousand of them do not magnify rounding

@@ -9,7 +9,7 @@ import numpy as np
 
 from cgraph.extend import install, ldl_elimination
 
-from .case import BATCH, NUDGE, PASSES, Array, Case, rk4_step
+from .case import BATCH, DERIVATIVES, NUDGE, PASSES, Array, Case, rk4_step
 from .contender import Contender, Peer
 from .translate import lagrangian, quasi_velocities
 
@@ -74,9 +74,24 @@ class JaxPeer(Peer):
     def _step(self, x: Any) -> Any:
         return rk4_step(self.rate, x)
 
+    def _function(self, task: str) -> Callable[[Any], Any]:
+        if task in DERIVATIVES:
+            return self._slopes(self._function(DERIVATIVES[task]))
+        return {"inverse": self._inverse, "forward": self._forward, "rk4": self._step}[task]
+
+    def _slopes(self, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        """Its derivatives, row by row; those by q along the velocities."""
+
+        def slopes(x: Any) -> Any:
+            q, qd, _ = self._split(x)
+            rows, along = self.jax.jacfwd(function)(x), self.jax.jacfwd(lambda u: self._rate(q, u))(qd)
+            return self.np.hstack([rows[:, : self.case.nq] @ along, rows[:, self.case.nq :]]).ravel()
+
+        return slopes
+
     def prepare(self, task: str, mode: str) -> Contender:
         """JAX's jitted function of the task."""
-        function: Callable[[Any], Any] = {"inverse": self._inverse, "forward": self._forward, "rk4": self._step}[task]
+        function = self._function(task)
         x = self.np.asarray(self.case.point(task))
         if mode == "call":
             return _contender(self.jax.jit(function), x, 1)

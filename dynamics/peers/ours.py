@@ -12,7 +12,10 @@ from cgraph import Graph
 
 from ..equations.equations_of_motion import forward_dynamics
 from ..equations.formulations import inverse_dynamics
+from ..equations.inverse_dynamics_derivatives import inverse_dynamics_derivatives
+from ..equations.linearization import state_space
 from ..equations.state_equation import state_equation
+from ..systems.model import Model
 from .case import NUDGE, PASSES, Array, Case, rk4_step
 from .contender import Contender, Peer
 
@@ -21,7 +24,25 @@ def task_graph(case: Case, task: str) -> Graph:
     """Our graph of a task."""
     if task == "rk4":
         return step_graph(rate_graph(case))
-    return case.bound((inverse_dynamics if task == "inverse" else forward_dynamics)(case.model))
+    if task == "derivatives":
+        return slope_graph(case)
+    make = {"inverse": inverse_dynamics, "forward": forward_dynamics, "inverse-derivatives": _inverse_derivatives}
+    return case.bound(make[task](case.model))
+
+
+def slope_graph(case: Case) -> Graph:
+    """(q0.., qd0.., tau0..) -> dqdd/d(q, qd, tau), row by row."""
+    matrices, n = case.bound(state_space(case.model)), case.n
+    names = [f"A_{i}_{j}" if j < 2 * n else f"B_{i}_{j - 2 * n}" for i in range(n, 2 * n) for j in range(3 * n)]
+    return cg.simplify(Graph(matrices.inputs, {name: matrices.outputs[name] for name in names}))
+
+
+def _inverse_derivatives(model: Model) -> Graph:
+    """(q0.., qd0.., qdd0..) -> dtau/d(q, qd, qdd), row by row."""
+    graph = inverse_dynamics_derivatives(model)
+    n = sum(name.startswith("tau") for name in graph.outputs)
+    names = [f"{block}_{i}_{j}" for i in range(n) for block in ("dtau_dq", "dtau_dqd", "M") for j in range(n)]
+    return cg.simplify(Graph(graph.inputs, {name: graph.outputs[name] for name in names}))
 
 
 def rate_graph(case: Case) -> Graph:
