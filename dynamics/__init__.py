@@ -12,6 +12,7 @@ from .equations.equations_of_motion import bias, energy, forward_dynamics, gravi
 from .equations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious_nodes
 from .equations.integrability import integrable_rows
 from .equations.linearization import linearize, state_space
+from .equations.reduced_linearization import ReducedLinearization, reduced_linearization
 from .equations.singular_mass_matrix import SingularMassMatrixError, raise_if_singular
 from .equations.state_equation import state_equation
 from .equations.torque_decomposition import torque_by_joint_motion, torque_by_link
@@ -85,6 +86,7 @@ __all__ = [
     "PruneResult",
     "QuasiVelocities",
     "RecursiveInverseDynamics",
+    "ReducedLinearization",
     "Reference",
     "Released",
     "SampledController",
@@ -130,6 +132,7 @@ __all__ = [
     "potential_energy",
     "prune",
     "raise_if_singular",
+    "reduced_linearization",
     "reference",
     "regressor",
     "release",

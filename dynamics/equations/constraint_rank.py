@@ -196,13 +196,18 @@ class Closing(NamedTuple):
     worst: int | None  # the row that is furthest from 0; None where all are 0
 
 
-def _independent(matrix: Array) -> list[int]:
-    """Rows that are not sums of earlier ones: Gram and Schmidt, on rows and columns scaled to be alike."""
-    scaled = matrix.copy()
+def equilibrated(matrix: Array) -> Array:
+    """The matrix with rows and columns scaled to be alike, whatever their units."""
     for _ in range(4):
         for axis in (0, 1):
-            size = np.abs(scaled).max(axis=axis, keepdims=True)
-            scaled = scaled / np.sqrt(np.where(size > 0.0, size, 1.0))
+            size = np.abs(matrix).max(axis=axis, keepdims=True, initial=0.0)
+            matrix = matrix / np.sqrt(np.where(size > 0.0, size, 1.0))
+    return matrix
+
+
+def _independent(matrix: Array) -> list[int]:
+    """Rows that are not sums of earlier ones: Gram and Schmidt, on rows and columns scaled to be alike."""
+    scaled = equilibrated(matrix)
     kept: list[int] = []
     basis: list[Array] = []
     for k, row in enumerate(scaled):

@@ -40,13 +40,13 @@ class Rows(NamedTuple):
         return lagrangian
 
 
-def constraint_rows(system: System, terms: BiasTerms) -> Rows:
-    """The rows that a system is solved with; none of a system without constraints.
+def constraint_rows(system: System, rates: Sequence[Node]) -> Rows:
+    """The rows that a system is solved with, of all as they are folded; none of a system without constraints.
 
     Raises ConstraintError for constraints that cannot be met together.
     """
     kept = independent_rows(system.constraints) if len(system.constraints) else ()
-    return Rows(kept, [terms.rates[k] for k in kept], cg.variables([f"lambda{k}" for k in kept]))
+    return Rows(kept, [rates[k] for k in kept], cg.variables([f"lambda{k}" for k in kept]))
 
 
 def unknown_names(system: System) -> list[str]:

@@ -324,7 +324,7 @@ def accelerations(system: System, method: str = "auto", check: bool = False) -> 
 def _solved(system: System, terms: BiasTerms, method: str, check: bool) -> Graph:
     """M qdd - J^T lambda = tau + forces - D qd - bias, J qdd = -(dJ/dt) qd, solved by one method."""
     build = Builder()
-    rows = constraint_rows(system, terms)
+    rows = constraint_rows(system, terms.rates)
     with building(build):
         # What stands at the coordinates already. Elimination takes the inertial terms where they are, at their
         # velocity nodes, and carries them to the coordinates on its way; a dense solve needs the whole bias here.

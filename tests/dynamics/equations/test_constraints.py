@@ -182,7 +182,6 @@ def test_what_constraints_cannot_be_is_said() -> None:
 def test_what_does_not_know_constraints_refuses() -> None:
     system = sleigh()
     for use in (
-        lambda: dyn.state_space(system),
         lambda: dyn.certify(system),
         lambda: dyn.simulate(system, [0.0] * 3, [0.0] * 3, 1.0, "verlet"),
     ):
