@@ -163,7 +163,8 @@ class Mechanism(Structure):
         return None
 
     @property
-    def _carriers(self) -> dict[str, Carrier]:
+    def carriers(self) -> dict[str, Carrier]:
+        """For every body where it is in the frame of the moving body that carries it."""
         return self._merged[1]
 
     @cached_property
@@ -204,7 +205,7 @@ class Mechanism(Structure):
             forces=self._generalized_forces if self.forces else None,
             damping=per_velocity(self.moving, [symbol(body.joint.damping) for body in self.moving]),
             quasi_velocities=quasi_velocities(self.moving),
-            constraints=lambda q, t: position_rows(self, self.moving, self._carriers, self.links, q),
+            constraints=lambda q, t: position_rows(self, self.moving, self.carriers, self.links, q),
             velocity_constraints=lambda q, qd, t: velocity_rows(self, lambda body: self._chain(body, q, qd)),
             require_values=lambda values: require_values(self.parts, self.gravity, values),
         )
@@ -215,7 +216,7 @@ class Mechanism(Structure):
         return add_joint_forces(total, self.forces, self.moving, (q, qd), p)
 
     def _chain(self, body: str, q: Sequence[Node], qd: Sequence[Node]) -> KinematicChain:
-        return kinematic_chain(self._carriers[body], self.moving, self.links, q, qd)
+        return kinematic_chain(self.carriers[body], self.moving, self.links, q, qd)
 
     @property
     def links(self) -> list[Link]:
@@ -255,7 +256,7 @@ class Mechanism(Structure):
 
     def chain(self, body: str) -> KinematicChain:
         """The joints between a body and the world, at q0.. and qd0... Raises MechanismError for an unknown body."""
-        if not isinstance(body, str) or body not in self._carriers:
+        if not isinstance(body, str) or body not in self.carriers:
             raise MechanismError(f"there is no body {body!r:.80} in the mechanism")
         return self._chain(body, self.system.q, self.system.qd)
 
