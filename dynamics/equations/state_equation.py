@@ -40,14 +40,20 @@ def state_equation(model: Model) -> Graph:
     >>> dyn.state_equation(block).evaluate({"q0": 0.0, "qd0": 2.0, "tau0": 8.0})
     {'q0_dot': 2.0, 'qd0_dot': 2.0}
     """
+    return with_multipliers(model)[0]
+
+
+def with_multipliers(model: Model) -> tuple[Graph, Graph | None]:
+    """The state equation, and over the same inputs the multipliers lambda0.. of its constraints; None without any."""
     ode = as_ode(model)
     if ode is not None:
-        return ode.graph
+        return ode.graph, None
     system = as_system(model)
-    accelerations = forward_dynamics(system)
+    solved = forward_dynamics(system)
     outputs = {f"q{i}_dot": rate for i, rate in enumerate(system.q_dot)}
-    outputs |= {f"qd{i}_dot": accelerations.outputs[f"qdd{i}"] for i in range(system.n)}
-    return Graph(accelerations.inputs, outputs)
+    outputs |= {f"qd{i}_dot": solved.outputs[f"qdd{i}"] for i in range(system.n)}
+    held = {name: node for name, node in solved.outputs.items() if name.startswith("lambda")}
+    return Graph(solved.inputs, outputs), Graph(solved.inputs, held) if held else None
 
 
 def normalization(model: Model) -> Graph | None:

@@ -182,7 +182,9 @@ def simulate(
     energies = _energies(energy, times, states, held)
     dense = None if steps is None else Solution(options.t0, start.x, steps, nq)
     rows = (times, states[:, :nq], states[:, nq:], energies)
-    return Trajectory(*rows, stats, log.crossings(nq) if log else {}, _graphs(problem, applied), dense, held)
+    happened = log.crossings(nq) if log else {}
+    names = () if problem.system is None else tuple(problem.system.constraints.names)
+    return Trajectory(*rows, stats, happened, _graphs(problem, applied), dense, held, names)
 
 
 def _compiled(
@@ -302,4 +304,5 @@ def _stats(run: Integration, method: str, outcome: _Outcome) -> Stats:
 def _graphs(problem: Problem, applied: Applied) -> dict[str, Graph]:
     """What a trajectory computes accelerations and forces by."""
     forces = force(problem)
-    return {"rate": problem.rate} | ({} if forces is None else {"force": forces, "tau": applied.graph(problem)})
+    graphs = {"rate": problem.rate} | ({} if forces is None else {"force": forces, "tau": applied.graph(problem)})
+    return graphs | ({} if problem.multipliers is None else {"multipliers": problem.multipliers})

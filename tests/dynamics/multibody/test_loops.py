@@ -202,6 +202,22 @@ def test_a_motion_of_50_s_stays_on_its_constraints(method: str, options: dict[st
     position, velocity = residuals(model, run)
     assert position < 1e-12
     assert velocity < 1e-13
+    assert np.ptp(run.energy) < (1e-7 if method == "dop853" else 1e-6) * np.abs(run.energy).max()  # forces do no work
+
+
+def test_a_trajectory_has_the_forces_of_its_loops_by_name() -> None:
+    """Those of forward dynamics at the rows, under a held force and with parameters, too; and of a mass on a rod."""
+    model = four_bar()
+    q, qd = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    servo = dyn.SampledController(lambda q, qd, t: [0.3 - 0.1 * qd[0], 0.0, 0.0], 0.05)
+    run = dyn.simulate(model, q, qd, 0.2, tau=servo)
+    state = {f"q{i}": x for i, x in enumerate(run.q.T)} | {f"qd{i}": x for i, x in enumerate(run.qd.T)}
+    expected = dyn.forward_dynamics(model).evaluate(state | {f"tau{i}": x for i, x in enumerate(run.tau.T)})
+    assert list(run.multipliers) == [f"coupler to rocker {axis}" for axis in "xyz"]
+    for k, column in enumerate(run.multipliers.values()):
+        assert column == pytest.approx(np.broadcast_to(expected[f"lambda{k}"], len(run.t)), abs=1e-12)
+    assert np.ptp(run.multipliers["coupler to rocker x"]) > 1.0
+    assert dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.1], [0.0], 0.1).multipliers == {}
 
 
 def test_a_loop_cut_elsewhere_moves_alike() -> None:
