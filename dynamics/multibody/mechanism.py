@@ -21,7 +21,7 @@ from .composed_joints import locked_parts, require_outer_parents
 from .external_force import Force, generalized_forces
 from .forward_kinematics import KinematicChain, kinematic_chain
 from .inertial_numbers import Link
-from .joint_coordinates import coordinate_names, per_velocity, quasi_velocities, velocity_names
+from .joint_coordinates import coordinate_names, lengths, per_velocity, quasi_velocities, velocity_names
 from .joint_force import JointForce, add_joint_forces, check_any_force
 from .joint_positions import skeleton
 from .kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia
@@ -207,6 +207,7 @@ class Mechanism(Structure):
             quasi_velocities=quasi_velocities(self.moving),
             constraints=lambda q, t: position_rows(self, self.moving, self.carriers, self.links, q),
             velocity_constraints=lambda q, qd, t: velocity_rows(self, lambda body: self._chain(body, q, qd)),
+            lengths=lengths(self._bound.moving),
             require_values=lambda values: require_values(self.parts, self.gravity, values),
         )
 

@@ -151,6 +151,14 @@ class System:
         return len(self.coordinates)
 
     @property
+    def lengths(self) -> tuple[float, ...]:
+        """What 1 of each coordinate, then velocity, stands for beside 1 of others, (nq + n,); here 1 as nobody knows.
+
+        Where tolerances are chosen by sizes, one is compared with another so. 0 of what cannot be compared.
+        """
+        return (1.0,) * (self.nq + self.n)
+
+    @property
     def q(self) -> list[Node]:
         """Coordinates, variables q0, q1, ..."""
         return self.kinematics.q
@@ -293,10 +301,16 @@ class BodySystem(System):
         bias_forces: Callable[[Sequence[Node], Sequence[Node]], Sequence[BiasForce]],
         *of_system: Any,
         require_values: Callable[[Mapping[str, ArrayLike]], None],
+        lengths: tuple[float, ...],
         **more: Any,
     ) -> None:
         super().__init__(*of_system, **more)
-        self._bias_forces, self._require_values = bias_forces, require_values
+        self._bias_forces, self._require_values, self._lengths = bias_forces, require_values, lengths
+
+    @property
+    def lengths(self) -> tuple[float, ...]:
+        """1 of lengths, and of angles what they move the bodies by [m]."""
+        return self._lengths
 
     def _require_consistent(self) -> None:
         """Nothing: the types of joints are known to be."""

@@ -21,6 +21,7 @@ class Ball(SpatialJoint):
     coordinates = quaternion.NAMES
     velocities = ("wx", "wy", "wz")
     units = ("", "", "", "")
+    velocity_units = ("rad",) * 3
     neutral = quaternion.NEUTRAL
     groups = (0, 0, 0, 0)
     sprung = True

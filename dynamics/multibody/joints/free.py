@@ -24,6 +24,7 @@ class Free(SpatialJoint):
     coordinates = ("x", "y", "z", *quaternion.NAMES)
     velocities = ("vx", "vy", "vz", "wx", "wy", "wz")
     units = ("m", "m", "m", "", "", "", "")
+    velocity_units = ("m", "m", "m", "rad", "rad", "rad")
     neutral = (0.0, 0.0, 0.0, *quaternion.NEUTRAL)
     groups = (0, 1, 2, 3, 3, 3, 3)
 

@@ -23,7 +23,8 @@ class JointType(ABC):
     have an inertia of their own, an armature.  pitched: whether it needs a `Joint.pitch`, see `with_pitch`.
     sprung: whether it can have a spring.
     coordinates, velocities: what they are called after the joint's name; "" of a single one, which has the joint's.
-    units: of the coordinates.  neutral: the coordinates where the body stands at the joint.
+    units: of the coordinates, "rad", "m" or "".  velocity_units: of the velocities, "rad" or "m" a second.
+    neutral: the coordinates where the body stands at the joint.
     groups: for each coordinate a number, the same for those that are one quantity.
     """
 
@@ -38,6 +39,7 @@ class JointType(ABC):
     coordinates: tuple[str, ...] = ("",)
     velocities: tuple[str, ...] = ("",)
     units: tuple[str, ...] = ("rad",)
+    velocity_units: tuple[str, ...] = ("rad",)
     neutral: tuple[float, ...] = (0.0,)
     groups: tuple[int, ...] = (0,)
 

@@ -17,7 +17,7 @@ class Prismatic(AxialJoint):
     mjcf = "slide"
     urdf = "prismatic"
     turns = False
-    units = ("m",)
+    units = velocity_units = ("m",)
     limited = True
 
     def shift(self, x: Node) -> Node:
