@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, building, cotangents, hessian_nodes, ldl_solve, solve_nodes
+from cgraph.extend import Builder, building, cotangents, hessian_nodes, ldl_solve, solve_nodes, topological
 
 from ..systems.system import System
 from .bias_terms import BiasTerms
@@ -47,6 +47,12 @@ def constraint_rows(system: System, rates: Sequence[Node]) -> Rows:
     """
     kept = independent_rows(system.constraints) if len(system.constraints) else ()
     return Rows(kept, [rates[k] for k in kept], cg.variables([f"lambda{k}" for k in kept]))
+
+
+def held_still(system: System) -> bool:
+    """Whether constraints that do not depend on time leave no motion: as many independent ones as velocities."""
+    rates = system.constraints.rates
+    return len(rates) >= system.n == len(independent_rows(system.constraints)) and system.t not in topological(rates)
 
 
 def unknown_names(system: System) -> list[str]:

@@ -8,7 +8,9 @@ from cgraph import Graph
 
 from ..systems.arguments import TIME
 from ..systems.model import Model, as_ode, as_system
+from .constraints import held_still
 from .equations_of_motion import forward_dynamics
+from .formulations import ZERO
 
 
 def state_equation(model: Model) -> Graph:
@@ -23,7 +25,8 @@ def state_equation(model: Model) -> Graph:
     -------
     Graph
         Of a mechanical model: inputs q0.., qd0.., tau0.., t if needed, parameters; outputs q0_dot.., qd0_dot.. with
-        q_dot = qd, or G(q) qd of `QuasiVelocities`, and qd_dot from `forward_dynamics`. Of an OdeSystem: inputs its
+        q_dot = qd, or G(q) qd of `QuasiVelocities`, and qd_dot from `forward_dynamics`, 0 where constraints that do not
+        depend on time leave no motion. Of an OdeSystem: inputs its
         states, t if needed, parameters; outputs `<state>_dot`.
 
     Raises
@@ -51,7 +54,8 @@ def with_multipliers(model: Model) -> tuple[Graph, Graph | None]:
     system = as_system(model)
     solved = forward_dynamics(system)
     outputs = {f"q{i}_dot": rate for i, rate in enumerate(system.q_dot)}
-    outputs |= {f"qd{i}_dot": solved.outputs[f"qdd{i}"] for i in range(system.n)}
+    still = held_still(system)  # the rounding of accelerations that are 0 is all that steps could be chosen by
+    outputs |= {f"qd{i}_dot": ZERO if still else solved.outputs[f"qdd{i}"] for i in range(system.n)}
     held = {name: node for name, node in solved.outputs.items() if name.startswith("lambda")}
     return Graph(solved.inputs, outputs), Graph(solved.inputs, held) if held else None
 

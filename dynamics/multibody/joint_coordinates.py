@@ -12,6 +12,8 @@ from cgraph import Node
 
 from ..systems.quasi_velocities import QuasiVelocities
 from .body import WORLD, Body
+from .parameters import Quantities
+from .spatial import Array
 
 Value = TypeVar("Value")
 
@@ -66,12 +68,16 @@ def lengths(bodies: Sequence[Body]) -> tuple[float, ...]:
     1 of slides. An angle is as large as the way of a point that it moves by the largest length of the bodies, of
     numbers: where their joints are on one another, where their mass is, and over which it is spread.
     """
-    known = [float(np.linalg.norm(body.joint.position)) for body in bodies if body.parent != WORLD]
-    known += [float(np.linalg.norm(body.center)) for body in bodies]
-    known += [math.sqrt(float(np.max(np.abs(body.inertia))) / float(body.mass)) for body in bodies if body.mass]
+    known = [float(np.linalg.norm(_numbers(body.joint.position))) for body in bodies if body.parent != WORLD]
+    known += [float(np.linalg.norm(_numbers(body.center))) for body in bodies]
+    known += [math.sqrt(float(np.abs(_numbers(body.inertia)).max()) / float(body.mass)) for body in bodies if body.mass]
     of = {"m": 1.0, "rad": max(known, default=0.0), "": 1.0}
     types = [body.joint.type for body in bodies]
     return tuple([of[unit] for part in ("units", "velocity_units") for kind in types for unit in getattr(kind, part)])
+
+
+def _numbers(values: Quantities) -> Array:
+    return np.asarray(values, dtype=np.float64)
 
 
 def neutral(bodies: Sequence[Body]) -> list[float]:

@@ -316,7 +316,8 @@ class Mechanism(Structure):
         """The mechanism with a subtree, a body, or several of which the first carries the others, hung on a body.
 
         to: a body's name or "world"; by default what the first names as its parent. A subtree that goes back where it
-        was taken off gives the same mechanism again. Raises MechanismError as a Mechanism does.
+        was taken off gives the same mechanism again, with its loops after the others. Raises MechanismError as a
+        Mechanism does, also for a loop of the subtree with a body that is not there.
         """
         return attach_subtree(self, subtree, to)
 
