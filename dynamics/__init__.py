@@ -5,6 +5,7 @@ from cgraph import __version__ as __version__
 from . import scenes
 from .equations.arrays_at import arrays_at
 from .equations.consistent_state import consistent_state
+from .equations.constraint_lint import ConstraintLint, lint_constraints
 from .equations.constraint_rank import ConstraintWarning
 from .equations.coriolis import coriolis, damping_force
 from .equations.energies import kinetic_energy, potential_energy
@@ -65,6 +66,7 @@ __all__ = [
     "Body",
     "Certificate",
     "ConstraintError",
+    "ConstraintLint",
     "ConstraintWarning",
     "Crossings",
     "Ensemble",
@@ -123,6 +125,7 @@ __all__ = [
     "inverse_dynamics",
     "kinetic_energy",
     "linearize",
+    "lint_constraints",
     "load_mjcf",
     "load_urdf",
     "mass_matrix",

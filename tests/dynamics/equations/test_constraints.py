@@ -10,6 +10,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from viz import cli
 
 
 def plane(q: Any, qd: Any, t: Any) -> Any:
@@ -53,6 +54,38 @@ def test_integrability_is_not_judged_of_rows_that_depend_on_time() -> None:
     )
     with pytest.raises(ValueError, match="'belt' does"):
         dyn.integrable_rows(moving)
+
+
+def test_the_lint_tells_vakonomic_from_nonholonomic() -> None:
+    found = dyn.lint_constraints(sleigh())
+    assert found.ok
+    assert "'blade' is not integrable (nonholonomic)" in str(found)
+
+    def action(q: Any, qd: Any, t: Any) -> Any:
+        along, across = qd[0] - 0.5 * cg.cos(q[2]) * qd[3], qd[1] - 0.5 * cg.sin(q[2]) * qd[3]
+        return plane(q, qd, t) + 0.1 * qd[3] ** 2 + q[4] * along + 0.2 * q[5] * across - 0.5 * q[6] ** 2
+
+    mixed = dyn.lint_constraints(dyn.System(action, "x y heading roll mu nu other"))  # a coin
+    assert mixed.vakonomic == {"mu": True, "nu": True}
+    assert not mixed.ok
+    assert "coordinate 'mu' is a multiplier in L of a row that is not integrable" in str(mixed)
+    alone = dyn.System(lambda q, qd, t: plane(q, qd, t) + q[3] * (qd[0] - 0.5 * qd[2]), "x y angle nu")
+    assert dyn.lint_constraints(alone).vakonomic == {"nu": False}
+
+    def rows(q: Any, qd: Any, t: Any) -> Any:
+        return {"belt": qd[0] - t, "rail": qd[1] - q[2] * qd[2]}
+
+    timed = dyn.lint_constraints(dyn.System(plane, "x y a", velocity_constraints=rows))
+    assert timed.integrable == {"belt": None, "rail": True}
+    assert "'belt' depends on time, and is not judged" in str(timed)
+    assert str(dyn.lint_constraints(dyn.planar_arm([1.0], [1.0]))) == ""
+
+
+def test_the_command_line_says_so(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    scene = dyn.Scene("sleigh", "a blade", sleigh(), (0.0,) * 3, (0.0,) * 3, 1.0)
+    monkeypatch.setattr("viz.commands.lint.scene_of", lambda options: scene)
+    assert cli.main(["lint", "sleigh"]) == 0
+    assert "velocity constraint 'blade' is not integrable" in capsys.readouterr().out
 
 
 def test_integrable_rows_of_velocities_are_told_from_others() -> None:
