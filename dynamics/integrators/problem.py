@@ -59,8 +59,9 @@ class Problem:
 
     @property
     def canonical(self) -> bool:
-        """Whether momenta dL/dqd belong to the coordinates: velocities are their rates."""
-        return self.system is not None and self.system.kinematics.quasi is None
+        """Whether momenta dL/dqd belong to the coordinates: velocities are their rates, and nothing holds them."""
+        system = self.system
+        return system is not None and system.kinematics.quasi is None and not len(system.constraints)
 
     @property
     def timed(self) -> bool:

@@ -75,7 +75,8 @@ class Mechanism(Structure):
     left_out : tuple of str
         Of a mechanism that was read from a file: what the file has and the mechanism has not, a sentence each.
     loops : sequence of Loop
-        What holds bodies of the tree together, beside their joints, and closes it to loops.
+        What holds bodies of the tree together, beside their joints, and closes it to loops. Motions, accelerations
+        and linearizations are with them; mass matrix, bias, inverse dynamics, tables and the like are the tree's.
 
     Raises
     ------

@@ -81,8 +81,9 @@ def simulate(
     method : str
         A name of `dyn.METHODS`. Steps chosen by error: "dop853", "dopri5", and for stiff systems "rodas", "radau";
         equal steps: "rk4", "euler" and the symplectic "verlet", "midpoint", "gauss4", ... With SciPy, "scipy:Radau",
-        "scipy:BDF", "scipy:LSODA", "scipy:DOP853", "scipy:RK45". With ball and free joints the symplectic ones step the
-        state, which keeps what is quadratic in it, as a free rotor's energy; "verlet" and "symplectic_euler" cannot.
+        "scipy:BDF", "scipy:LSODA", "scipy:DOP853", "scipy:RK45". With ball and free joints and constraints the
+        symplectic ones step the state, which keeps what is quadratic in it, as a free rotor's energy; "verlet" and
+        "symplectic_euler" cannot.
     t0 : float
         Where the run starts [s].
     t_span : array_like, optional

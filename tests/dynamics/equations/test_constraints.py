@@ -217,8 +217,13 @@ def test_what_constraints_cannot_be_is_said() -> None:
         dyn.System(plane, "x y a", **twice)
 
 
-def test_what_does_not_know_constraints_refuses() -> None:
-    system = sleigh()
-    for use in (lambda: dyn.simulate(system, [0.0] * 3, [0.0] * 3, 1.0, "verlet"),):
-        with pytest.raises(ValueError, match="does not know constraints yet; 'blade' holds this system"):
-            use()
+def test_symplectic_methods_step_the_state_of_what_is_held_or_say_that_they_cannot() -> None:
+    rod = dyn.System(plane, "x y a", constraints=lambda q, t: {"rod": q[0] ** 2 + q[1] ** 2 - 1.0})
+    start = dyn.consistent_state(rod, [1.0, 0.0, 0.0], [0.0, 1.0, 1.0])
+    run = dyn.simulate(rod, *start, 20.0, "gauss4", dt=0.02)
+    assert np.abs(np.hypot(run.q[:, 0], run.q[:, 1]) - 1.0).max() < 1e-15
+    early, late = run.energy[:500], run.energy[500:]
+    assert np.ptp(late) < 1.2 * np.ptp(early) < 1e-4  # no drift
+    for method in ("verlet", "symplectic_euler"):
+        with pytest.raises(ValueError, match="constraint 'blade' holds both: take 'midpoint', 'gauss4' or 'dop853'"):
+            dyn.simulate(sleigh(), [0.0] * 3, [0.0] * 3, 0.1, method)
