@@ -82,7 +82,8 @@ def bias(model: Model) -> Graph:
     """
 
     def derive(system: System) -> Graph:
-        outputs = {f"bias{i}": node for i, node in enumerate(bias_terms(system).bias(system, Builder()))}
+        free = system.without_constraints  # whose tags shared nodes would have
+        outputs = {f"bias{i}": node for i, node in enumerate(bias_terms(free).bias(free, Builder()))}
         return cg.simplify(system.graph(outputs, system.q, system.qd))
 
     return shorter_form(as_system(model), derive)
@@ -117,7 +118,7 @@ def gravity_force(model: Model) -> Graph:
     """
 
     def derive(system: System) -> Graph:
-        derived = bias_terms_of_lagrangian(system).bias(system, Builder())
+        derived = bias_terms_of_lagrangian(system.without_constraints).bias(system, Builder())
         at_rest = substitute(derived, dict.fromkeys(system.qd, ZERO))
         return cg.simplify(system.graph({f"gravity{i}": node for i, node in enumerate(at_rest)}, system.q, system.qd))
 

@@ -178,13 +178,17 @@ def test_info_names_the_constraint_that_says_nothing_new_at_a_state() -> None:
         dyn.raise_if_singular(held, info)
 
 
-def test_a_coordinate_without_inertia_may_be_held_by_a_constraint() -> None:
-    """A rope over two pulleys: the hook y between masses has none, and 2 y = x - z."""
+def pulleys() -> dyn.System:
+    """A rope over two pulleys: the hook y between masses has no inertia, and 2 y = x - z."""
 
     def energy(q: Any, qd: Any, t: Any) -> Any:
         return 0.5 * (2.0 * qd[0] ** 2 + 3.0 * qd[2] ** 2) - 9.81 * (2.0 * q[0] + 3.0 * q[2])
 
-    rope = dyn.System(energy, "x hook z", constraints=lambda q, t: {"rope": 2.0 * q[1] - q[0] + q[2]})
+    return dyn.System(energy, "x hook z", constraints=lambda q, t: {"rope": 2.0 * q[1] - q[0] + q[2]})
+
+
+def test_a_coordinate_without_inertia_may_be_held_by_a_constraint() -> None:
+    rope = pulleys()
     at = {f"{kind}{i}": 0.0 for kind in ("q", "qd", "tau") for i in range(3)}
     found = dyn.forward_dynamics(rope).evaluate(at | {"tau1": 4.0})
     assert [found[name] for name in ("qdd0", "qdd2", "lambda0")] == pytest.approx([-8.81, -9.81 - 2.0 / 3.0, -2.0])

@@ -143,6 +143,19 @@ def test_a_sleigh_that_runs_straight_turns_back_at_the_known_rate() -> None:
     assert np.poly(reduced.A) == pytest.approx(np.poly(expected), abs=1e-13)
 
 
+def test_a_free_body_that_is_pinned_at_a_point_is_a_ball_joint() -> None:
+    """Turning, too: displacements of a quaternion are along its angular velocity."""
+    numbers: dict[str, Any] = {"mass": 1.3, "inertia": (0.1, 0.2, 0.15)}
+    body = dyn.Body("body", dyn.Joint("free"), center=(0.1, 0.0, -0.2), **numbers)
+    pinned = dyn.Mechanism([body], loops=[dyn.Loop("point", "body", at=(0, 0, 0.5), to_at=(0, 0, 0.5))])
+    joint = dyn.Joint("ball", position=(0.0, 0.0, 0.5))
+    ball = dyn.Mechanism([dyn.Body("body", joint, center=(0.1, 0.0, -0.7), **numbers)])
+    q, qd = dyn.consistent_state(pinned, pinned.system.kinematics.neutral, [0.0, 0.0, 0.0, 0.3, 0.2, 0.1])
+    reduced = dyn.reduced_linearization(pinned, q, qd)
+    assert reduced.states == tuple([f"{kind}.body.w{axis}" for kind in ("q", "qd") for axis in "xyz"])
+    assert pytest.approx(dyn.linearize(ball, [1.0, 0.0, 0.0, 0.0], qd[3:])[0], abs=1e-12) == reduced.A
+
+
 def test_without_constraints_it_is_linearize() -> None:
     arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.5])
     a, b = dyn.linearize(arm, [0.3, 0.2], [1.0, -0.4], [0.1, 0.2])

@@ -20,7 +20,7 @@ from dynamics.systems.constraints import Constraints
 from dynamics.verification import certificate
 from dynamics.verification.certificate import certify
 from dynamics.verification.residual import ROUNDING, Certificate, Residual
-from tests.dynamics.equations.test_constraints import moving_wall, sleigh
+from tests.dynamics.equations.test_constraints import moving_wall, pulleys, sleigh
 from tests.dynamics.linkages import four_bar, peaucellier
 from tests.dynamics.mechanisms import FAMILIES
 from tests.dynamics.models import MODELS
@@ -48,7 +48,14 @@ def test_every_kind_of_model_passes(make) -> None:
     assert str(found).count("ok  ") == len(found.residuals)
 
 
-HELD = {"four-bar": four_bar, "hinges": lambda: four_bar("hinge"), "blade": sleigh, "disk": disk, "wall": moving_wall}
+HELD = {
+    "four-bar": four_bar,
+    "hinges": lambda: four_bar("hinge"),
+    "blade": sleigh,
+    "disk": disk,
+    "wall": moving_wall,
+    "rope": pulleys,
+}
 
 
 @pytest.mark.parametrize("name", HELD)
