@@ -10,7 +10,7 @@ from ..systems.constraints import ConstraintError
 from ..systems.model import Model, as_system
 from ..systems.system import BodySystem, System
 from .bias_terms import BiasTerms, bias_terms, bias_terms_of_lagrangian
-from .constraints import constraint_rows, multiplier_outputs, solved_by_elimination, solved_dense, unknown_names
+from .constraints import DenseSolver, constraint_rows, multiplier_outputs, solved_by_elimination, unknown_names
 from .formulations import ONE, ZERO
 from .inertia_rank import without_inertia
 from .shorter_form import shorter_form
@@ -341,7 +341,7 @@ def _solved(system: System, terms: BiasTerms, method: str, check: bool) -> Graph
     if method == "recursive":
         solved = solved_by_elimination(system, terms, rows, rhs, inertial, build, check)
     else:
-        solved = solved_dense(system, terms, rows, rhs, build, check)
+        solved = DenseSolver(system, terms.lagrangian, rows, build).solve(rhs, check)
     end = system.n + len(rows.kept)
     outputs = {f"qdd{i}": node for i, node in enumerate(solved[: system.n])}
     outputs |= multiplier_outputs(system, rows, solved[system.n : end], build)

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 
 from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, building, cotangents, folded, hessian_nodes, ldl_solve, solve_nodes, tangents
+from cgraph.extend import Builder, SingularError, building, cotangents, folded, solve_nodes, tangents
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
-from .constraints import Rows, constraint_rows
+from .constraints import DenseSolver, Rows, constraint_rows
 from .equations_of_motion import DENSE_UP_TO, accelerations
 from .evaluate_at import Array, evaluate_at
 from .formulations import ONE, ZERO, torques
@@ -72,19 +73,25 @@ def _state_space(system: System) -> Graph:
     with building(build):
         sides = [[-row[j] for row in partials] for j in range(2 * n)]
     sides += [[ONE if i == j else ZERO for i in range(len(partials))] for j in range(n)]
-    s = rows.multipliers
-    if n <= DENSE_UP_TO and not s:
-        lower = hessian_nodes(lagrangian, system.qd, build)
-        columns = [ldl_solve(lower, side, build) for side in sides]
-    else:
-        function, unknowns = rows.function(lagrangian, build), [*system.qd, *s]
-        columns = [solve_nodes(function, unknowns, side, build, multipliers=s) for side in sides]
+    columns = _solved(system, lagrangian, rows, sides, build)
     brackets = system.kinematics.brackets(build)  # xi_dot = dqd + C(qd) xi
     lines = [[*row, *[ONE if i == j else ZERO for j in range(n)], *[ZERO] * n] for i, row in enumerate(brackets)]
     lines += [[column[i] for column in columns] for i in range(n)]
     outputs = {f"A_{i}_{j}": entry for i, line in enumerate(lines) for j, entry in enumerate(line[: 2 * n])}
     outputs |= {f"B_{i}_{j}": entry for i, line in enumerate(lines) for j, entry in enumerate(line[2 * n :])}
     return cg.simplify(Graph(solved.inputs, outputs))
+
+
+def _solved(
+    system: System, lagrangian: Node, rows: Rows, sides: Sequence[Sequence[Node]], build: Builder
+) -> list[list[Node]]:
+    """(dqdd, -dlambda) for right-hand sides: densely up to 6 coordinates, where that goes without exchanging rows."""
+    if system.n <= DENSE_UP_TO:
+        with suppress(SingularError):
+            dense = DenseSolver(system, lagrangian, rows, build)
+            return [dense.solve(side) for side in sides]
+    function, s = rows.function(lagrangian, build), rows.multipliers
+    return [solve_nodes(function, [*system.qd, *s], side, build, multipliers=s) for side in sides]
 
 
 def _slopes(system: System, rows: Rows, solved: Graph, build: Builder) -> list[list[Node]]:

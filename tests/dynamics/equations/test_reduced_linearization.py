@@ -104,7 +104,7 @@ def ring(seed: int) -> tuple[dyn.Mechanism, dyn.Mechanism]:
     return replace(still, loops=[pin]), dyn.Mechanism(apart, still.gravity, loops=[pin, hinge])
 
 
-@pytest.mark.parametrize("seed", [0, *slow(*range(1, 20))])
+@pytest.mark.parametrize("seed", slow(*range(20)))
 def test_a_joint_cut_to_a_loop_leaves_the_modes(seed: int) -> None:
     found = []
     for model in ring(seed):
