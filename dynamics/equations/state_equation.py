@@ -47,7 +47,7 @@ def state_equation(model: Model) -> Graph:
 
 
 def with_multipliers(model: Model) -> tuple[Graph, Graph | None]:
-    """The state equation, and over the same inputs the multipliers lambda0.. of its constraints; None without any."""
+    """The state equation, and over the same inputs the multipliers of its constraints by name; None without any."""
     ode = as_ode(model)
     if ode is not None:
         return ode.graph, None
@@ -56,7 +56,7 @@ def with_multipliers(model: Model) -> tuple[Graph, Graph | None]:
     outputs = {f"q{i}_dot": rate for i, rate in enumerate(system.q_dot)}
     still = held_still(system)  # the rounding of accelerations that are 0 is all that steps could be chosen by
     outputs |= {f"qd{i}_dot": ZERO if still else solved.outputs[f"qdd{i}"] for i in range(system.n)}
-    held = {name: node for name, node in solved.outputs.items() if name.startswith("lambda")}
+    held = {name: solved.outputs[f"lambda{k}"] for k, name in enumerate(system.constraints.names)}
     return Graph(solved.inputs, outputs), Graph(solved.inputs, held) if held else None
 
 

@@ -32,7 +32,7 @@ class Problem:
     without any.
     projection: a state to one nearer to the constraints, and normalized; inputs the states, t, parameters. None without
     constraints.
-    multipliers: of the constraints, lambda0..; inputs the states, t, parameters. None without constraints.
+    multipliers: of the constraints, by name; inputs the states, t, parameters. None without constraints.
     system: the Lagrangian system; None for a first-order one.
     """
 

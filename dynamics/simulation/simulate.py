@@ -184,9 +184,7 @@ def simulate(
     energies = _energies(energy, times, states, held)
     dense = None if steps is None else Solution(options.t0, start.x, steps, nq)
     rows = (times, states[:, :nq], states[:, nq:], energies)
-    happened = log.crossings(nq) if log else {}
-    names = () if problem.system is None else tuple(problem.system.constraints.names)
-    return Trajectory(*rows, stats, happened, _graphs(problem, applied), dense, held, names)
+    return Trajectory(*rows, stats, log.crossings(nq) if log else {}, _graphs(problem, applied), dense, held)
 
 
 def _compiled(

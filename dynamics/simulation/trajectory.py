@@ -141,8 +141,6 @@ class Trajectory:
         The steps with their dense output, which `solution` reads; of a run with `dense_output=True`.
     held : HeldForces, optional
         What a SampledController has given, `held.t` and `held.tau`, a row for each period.
-    constraints : tuple of str
-        Names of the constraints, m, of which `multipliers` are.
 
     Examples
     --------
@@ -161,7 +159,6 @@ class Trajectory:
     graphs: Mapping[str, Graph] = field(default_factory=dict)
     dense: Solution | None = None
     held: HeldForces | None = None
-    constraints: tuple[str, ...] = ()
 
     def solution(self, t: ArrayLike) -> tuple[Array, Array]:
         """The motion at any time of the run, by the dense output of its steps.
@@ -226,8 +223,9 @@ class Trajectory:
         >>> run.multipliers["rod"].tolist()
         [-9.81, -9.81]
         """
-        columns = self._rows("multipliers").T
-        return dict(zip(self.constraints, columns, strict=False))
+        if "multipliers" not in self.graphs:
+            return {}
+        return dict(zip(self.graphs["multipliers"].outputs, self._rows("multipliers").T, strict=True))
 
     @cached_property
     def tau(self) -> Array:

@@ -152,10 +152,7 @@ class System:
 
     @property
     def lengths(self) -> tuple[float, ...]:
-        """What 1 of each coordinate, then velocity, stands for beside 1 of others, (nq + n,); here 1 as nobody knows.
-
-        Where tolerances are chosen by sizes, one is compared with another so. 0 of what cannot be compared.
-        """
+        """What 1 of coordinates, then velocities, counts beside 1 of others, where sizes are compared; else 0."""
         return (1.0,) * (self.nq + self.n)
 
     @property
