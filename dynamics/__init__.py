@@ -5,6 +5,7 @@ from cgraph import __version__ as __version__
 from . import scenes
 from .equations.arrays_at import arrays_at
 from .equations.consistent_state import consistent_state
+from .equations.constraint_lint import ConstraintLint, lint_constraints
 from .equations.constraint_rank import ConstraintWarning
 from .equations.coriolis import coriolis, damping_force
 from .equations.energies import kinetic_energy, potential_energy
@@ -14,6 +15,7 @@ from .equations.integrability import integrable_rows
 from .equations.inverse_dynamics_derivatives import inverse_dynamics_derivatives
 from .equations.inverse_mass_matrix import inverse_mass_matrix
 from .equations.linearization import linearize, state_space
+from .equations.reduced_linearization import ReducedLinearization, reduced_linearization
 from .equations.singular_mass_matrix import SingularMassMatrixError, raise_if_singular
 from .equations.state_equation import state_equation
 from .equations.torque_decomposition import torque_by_joint_motion, torque_by_link
@@ -67,6 +69,7 @@ __all__ = [
     "Body",
     "Certificate",
     "ConstraintError",
+    "ConstraintLint",
     "ConstraintWarning",
     "Crossings",
     "Ensemble",
@@ -88,6 +91,7 @@ __all__ = [
     "PruneResult",
     "QuasiVelocities",
     "RecursiveInverseDynamics",
+    "ReducedLinearization",
     "Reference",
     "Released",
     "SampledController",
@@ -127,6 +131,7 @@ __all__ = [
     "inverse_mass_matrix",
     "kinetic_energy",
     "linearize",
+    "lint_constraints",
     "load_mjcf",
     "load_urdf",
     "mass_matrix",
@@ -136,6 +141,7 @@ __all__ = [
     "potential_energy",
     "prune",
     "raise_if_singular",
+    "reduced_linearization",
     "reference",
     "regressor",
     "release",

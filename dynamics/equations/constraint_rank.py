@@ -219,15 +219,20 @@ def balance(matrix: Array) -> tuple[Array, Array]:
     rows, columns = (np.ones(count) for count in matrix.shape)
     for _ in range(4):
         for axis, factors in ((0, columns), (1, rows)):
-            size = np.abs(rows[:, None] * matrix * columns).max(axis=axis)
+            size = np.abs(rows[:, None] * matrix * columns).max(axis=axis, initial=0.0)
             factors /= np.sqrt(np.where(size > 0.0, size, 1.0))
     return rows, columns
 
 
+def equilibrated(matrix: Array) -> Array:
+    """The matrix with rows and columns scaled to be alike, whatever their units."""
+    rows, columns = balance(matrix)
+    return rows[:, None] * matrix * columns
+
+
 def _independent(matrix: Array) -> list[int]:
     """Rows that are not sums of earlier ones: Gram and Schmidt, on rows and columns scaled to be alike."""
-    rows, columns = balance(matrix)
-    scaled = rows[:, None] * matrix * columns
+    scaled = equilibrated(matrix)
     kept: list[int] = []
     basis: list[Array] = []
     for k, row in enumerate(scaled):

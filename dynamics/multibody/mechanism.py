@@ -21,7 +21,7 @@ from .composed_joints import locked_parts, outer_names, require_parents
 from .external_force import Force, generalized_forces
 from .forward_kinematics import KinematicChain, kinematic_chain
 from .inertial_numbers import Link
-from .joint_coordinates import coordinate_names, per_velocity, quasi_velocities, velocity_names
+from .joint_coordinates import coordinate_names, lengths, per_velocity, quasi_velocities, velocity_names
 from .joint_force import JointForce, add_joint_forces, check_any_force
 from .joint_positions import skeleton
 from .kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia
@@ -75,7 +75,8 @@ class Mechanism(Structure):
     left_out : tuple of str
         Of a mechanism that was read from a file: what the file has and the mechanism has not, a sentence each.
     loops : sequence of Loop
-        What holds bodies of the tree together, beside their joints, and closes it to loops.
+        What holds bodies of the tree together, beside their joints, and closes it to loops. Motions, accelerations
+        and linearizations are with them; mass matrix, bias, inverse dynamics, tables and the like are the tree's.
 
     Raises
     ------
@@ -163,7 +164,8 @@ class Mechanism(Structure):
         return None
 
     @property
-    def _carriers(self) -> dict[str, Carrier]:
+    def carriers(self) -> dict[str, Carrier]:
+        """For every body where it is in the frame of the moving body that carries it."""
         return self._merged[1]
 
     @cached_property
@@ -205,8 +207,9 @@ class Mechanism(Structure):
             forces=self._generalized_forces if self.forces else None,
             damping=per_velocity(self.moving, [symbol(body.joint.damping) for body in self.moving]),
             quasi_velocities=quasi_velocities(self.moving),
-            constraints=lambda q, t: position_rows(self, self.moving, self._carriers, self.links, q),
+            constraints=lambda q, t: position_rows(self, self.moving, self.carriers, self.links, q),
             velocity_constraints=lambda q, qd, t: velocity_rows(self, lambda body: self._chain(body, q, qd)),
+            lengths=lengths(self._bound.moving),
             require_values=self._require_values,
         )
 
@@ -220,7 +223,7 @@ class Mechanism(Structure):
         return add_joint_forces(total, self.forces, self.moving, (q, qd), p)
 
     def _chain(self, body: str, q: Sequence[Node], qd: Sequence[Node]) -> KinematicChain:
-        return kinematic_chain(self._carriers[body], self.moving, self.links, q, qd)
+        return kinematic_chain(self.carriers[body], self.moving, self.links, q, qd)
 
     @property
     def links(self) -> list[Link]:
@@ -260,7 +263,7 @@ class Mechanism(Structure):
 
     def chain(self, body: str) -> KinematicChain:
         """The joints between a body and the world, at q0.. and qd0... Raises MechanismError for an unknown body."""
-        if not isinstance(body, str) or body not in self._carriers:
+        if not isinstance(body, str) or body not in self.carriers:
             raise MechanismError(f"there is no body {body!r:.80} in the mechanism")
         return self._chain(body, self.system.q, self.system.qd)
 
@@ -319,7 +322,8 @@ class Mechanism(Structure):
         """The mechanism with a subtree, a body, or several of which the first carries the others, hung on a body.
 
         to: a body's name or "world"; by default what the first names as its parent. A subtree that goes back where it
-        was taken off gives the same mechanism again. Raises MechanismError as a Mechanism does.
+        was taken off gives the same mechanism again, with its loops after the others. Raises MechanismError as a
+        Mechanism does, also for a loop of the subtree with a body that is not there.
         """
         return attach_subtree(self, subtree, to)
 

@@ -47,7 +47,7 @@ class PinocchioPeer(Peer):
         force: Array = damping * u + stiffness * stretch
         return force
 
-    def _arguments(self, x: Array, task: str) -> tuple[Array, Array, Array]:
+    def arguments(self, x: Array, task: str) -> tuple[Array, Array, Array]:
         """q, v and the third argument as Pinocchio has them."""
         q, u, last = np.split(x, [self.case.nq, self.case.nq + self.case.n])
         theirs = self.of.q(q)
@@ -66,7 +66,7 @@ class PinocchioPeer(Peer):
     def _asked(self, x: Array, task: str) -> Array:
         """The answer at one state."""
         algorithm = self.pinocchio.aba if task == "forward" else self.pinocchio.rnea
-        q, v, last = self._arguments(x, task)
+        q, v, last = self.arguments(x, task)
         return self._result(x, q, v, algorithm(self.twin, self.data, q, v, last), task)
 
     def quantities(self, q: Array, qd: Array, qdd: Array, tau: Array) -> dict[str, Array]:
@@ -89,7 +89,7 @@ class PinocchioPeer(Peer):
         if task in DERIVATIVES:
             return self._slopes(task)
         x = self.case.point(task) if mode == "call" else self.case.points(task)
-        arguments = self._arguments(x, task)
+        arguments = self.arguments(x, task)
 
         def result(y: Any) -> Array:
             return self._result(x, *arguments[:2], y, task)

@@ -135,8 +135,8 @@ class Trajectory:
         {name of an event: Crossings}.
     graphs : mapping
         {"rate": xdot, "force": tau + forces - damping qd}: graphs over the states and t, with the numbers of the run
-        built in, by which `qdd` and `forces` are computed, and "tau". Both forces are missing of an OdeSystem. With a
-        SampledController, tau0, .. are inputs too.
+        built in, by which `qdd` and `forces` are computed, "tau", and, with constraints, "multipliers". Both forces are
+        missing of an OdeSystem. With a SampledController, tau0, .. are inputs too.
     dense : Solution, optional
         The steps with their dense output, which `solution` reads; of a run with `dense_output=True`.
     held : HeldForces, optional
@@ -232,6 +232,29 @@ class Trajectory:
     def forces(self) -> Array:
         """Generalized forces besides those of the Lagrangian at the rows, tau + forces - damping qd, (T, n)."""
         return self._rows("force")
+
+    @cached_property
+    def multipliers(self) -> dict[str, Array]:
+        """What holds the constraints at the rows, {name: (T,)}: M qdd = tau + forces - damping qd - bias + J^T lambda.
+
+        The force [N] or torque [N m] of a `Loop`, whose rows are named after it; of other rows J qd + a = 0 the power
+        [W] over the unit of J qd. 0 of rows that follow from others. Without constraints there are none.
+
+        Examples
+        --------
+        A mass of 1 kg hangs on a rod, in x and y, and pulls at it with its weight.
+
+        >>> import dynamics as dyn
+        >>> def energy(q, qd, t):
+        ...     return 0.5 * (qd[0] ** 2 + qd[1] ** 2) - 9.81 * q[1]
+        >>> rod = dyn.System(energy, "x y", constraints=lambda q, t: {"rod": 0.5 * (q[0] ** 2 + q[1] ** 2 - 1.0)})
+        >>> run = dyn.simulate(rod, [0.0, -1.0], [0.0, 0.0], t_end=1.0, t_eval=[0.0, 1.0])
+        >>> run.multipliers["rod"].tolist()
+        [-9.81, -9.81]
+        """
+        if "multipliers" not in self.graphs:
+            return {}
+        return dict(zip(self.graphs["multipliers"].outputs, self._rows("multipliers").T, strict=True))
 
     @cached_property
     def tau(self) -> Array:

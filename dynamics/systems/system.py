@@ -152,6 +152,11 @@ class System:
         return len(self.coordinates)
 
     @property
+    def lengths(self) -> tuple[float, ...]:
+        """What 1 of coordinates, then velocities, counts beside 1 of others, where sizes are compared; else 0."""
+        return (1.0,) * (self.nq + self.n)
+
+    @property
     def q(self) -> list[Node]:
         """Coordinates, variables q0, q1, ..."""
         return self.kinematics.q
@@ -291,11 +296,17 @@ class BodySystem(System):
         torque_derivatives: Callable[[MotionState, Builder], TorqueDerivatives],
         *of_system: Any,
         require_values: Callable[[Mapping[str, ArrayLike]], None],
+        lengths: tuple[float, ...],
         **more: Any,
     ) -> None:
         super().__init__(*of_system, **more)
-        self._bias_forces, self._require_values = bias_forces, require_values
+        self._bias_forces, self._require_values, self._lengths = bias_forces, require_values, lengths
         self._torque_derivatives = torque_derivatives
+
+    @property
+    def lengths(self) -> tuple[float, ...]:
+        """1 of lengths, and of angles what they move the bodies by [m]."""
+        return self._lengths
 
     def _require_consistent(self) -> None:
         """Nothing: the types of joints are known to be."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 import cgraph as cg
-from dynamics import display_names, inverse_dynamics
+from dynamics import display_names, inverse_dynamics, lint_constraints
 
 from .. import theme
 from .arguments import (
@@ -58,7 +58,11 @@ def run(options: argparse.Namespace) -> int:
         names=display_names(scene),
     )
     proof = report if q and qd else f"Holds: the equations have no {'coordinates' if qd else 'velocities'}.\n{report}"
+    held = lint_constraints(scene)
+    if str(held):
+        proof = f"{proof}\n{held}"
     data = {"scene": scene.name, "formulation": options.formulation} | report.to_dict()
+    data |= {"constraints": held.to_dict(), "ok": report.ok and held.ok}
     answer_and_draw(
         options,
         unless_json(options, data, proof),
@@ -69,4 +73,4 @@ def run(options: argparse.Namespace) -> int:
         names=theme.called(display_names(scene)),
         caption=f"{scene.name}: inverse dynamics, {options.formulation.replace('_', ' ')}",
     )
-    return 0 if report.ok else 1
+    return 0 if report.ok and held.ok else 1

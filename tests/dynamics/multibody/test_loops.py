@@ -204,6 +204,22 @@ def test_a_motion_of_50_s_stays_on_its_constraints(method: str, options: dict[st
     position, velocity = residuals(model, run)
     assert position < 1e-12
     assert velocity < 1e-13
+    assert np.ptp(run.energy) < (1e-7 if method == "dop853" else 1e-6) * np.abs(run.energy).max()  # forces do no work
+
+
+def test_a_trajectory_has_the_forces_of_its_loops_by_name() -> None:
+    """Those of forward dynamics at the rows, under a held force and with parameters, too; and of a mass on a rod."""
+    model = four_bar()
+    q, qd = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    servo = dyn.SampledController(lambda q, qd, t: [0.3 - 0.1 * qd[0], 0.0, 0.0], 0.05)
+    run = dyn.simulate(model, q, qd, 0.2, tau=servo)
+    state = {f"q{i}": x for i, x in enumerate(run.q.T)} | {f"qd{i}": x for i, x in enumerate(run.qd.T)}
+    expected = dyn.forward_dynamics(model).evaluate(state | {f"tau{i}": x for i, x in enumerate(run.tau.T)})
+    assert list(run.multipliers) == [f"coupler to rocker {axis}" for axis in "xyz"]
+    for k, column in enumerate(run.multipliers.values()):
+        assert column == pytest.approx(np.broadcast_to(expected[f"lambda{k}"], len(run.t)), abs=1e-12)
+    assert np.ptp(run.multipliers["coupler to rocker x"]) > 1.0
+    assert dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.1], [0.0], 0.1).multipliers == {}
 
 
 def test_a_loop_cut_elsewhere_moves_alike() -> None:
@@ -327,6 +343,33 @@ def test_a_loop_among_locked_joints_is_a_weld() -> None:
     welded = dyn.Mechanism(stiff.bodies, stiff.gravity, locked=stiff.locked)
     at = {"q0": 0.3, "qd0": 0.5, "tau0": 0.7}
     assert dyn.forward_dynamics(stiff).evaluate(at)["qdd0"] == dyn.forward_dynamics(welded).evaluate(at)["qdd0"]
+
+
+def test_a_body_taken_off_takes_its_loops_along_and_brings_them_back() -> None:
+    model = four_bar()
+    taken, rest = model.subtree("rocker"), model.detach("rocker")
+    assert rest.loops == ()
+    back = rest.attach(taken)
+    assert [loop.label for loop in back.loops] == ["coupler to rocker"]
+    at = {f"{kind}{i}": 0.3 * i + 0.2 for kind in ("q", "qd", "tau") for i in range(3)}
+    assert dyn.forward_dynamics(back).evaluate(at) == dyn.forward_dynamics(model).evaluate(at)
+    with pytest.raises(dyn.MechanismError, match="there is a loop on the unknown body 'coupler'"):
+        model.detach("rocker").detach("coupler").attach(taken)
+    q, qd = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    let = dyn.release(model, q, qd, "rocker")
+    assert let.mechanism.loops == ()
+    assert (let.q.tolist(), let.qd.tolist()) == (q[:2].tolist(), qd[:2].tolist())
+
+
+@pytest.mark.parametrize("method", ["dop853", "rk4", "radau"])
+def test_a_linkage_that_is_locked_stands(method: str) -> None:
+    """Accelerations are rounding alone there, by which no steps can be chosen."""
+    model = four_bar()
+    q, _ = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    run = dyn.simulate(model.lock("crank", q[0]), q[1:], [0.0, 0.0], 1.0, method, max_steps=2000)
+    assert run.success
+    assert np.abs(run.q - q[1:]).max() < 1e-15
+    assert np.ptp(run.multipliers["coupler to rocker z"]) < 1e-12
 
 
 def test_a_body_caught_by_a_closed_chain_leaves_it_closed() -> None:
