@@ -115,7 +115,7 @@ class PinocchioPeer(Peer):
     def _slopes(self, task: str) -> Contender:
         """The derivatives of rnea or aba; those of dampers and springs are added outside what is timed."""
         forward, n, x = task == "derivatives", self.case.n, self.case.point(task)
-        q, v, last = self._arguments(x, DERIVATIVES[task])
+        q, v, last = self.arguments(x, DERIVATIVES[task])
         algorithm = getattr(self.pinocchio, f"compute{'ABA' if forward else 'RNEA'}Derivatives")
         model, data, stretched = self.twin, self.data, self.stiffness != 0.0
         if any([stretched[place.u].any() for place in self.balls]):
