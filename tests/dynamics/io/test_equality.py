@@ -17,7 +17,7 @@ pytestmark = mark.filterwarnings("ignore:.*left out:dynamics.MechanismWarning")
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 CLOSED = 1e-13  # m, rad: MuJoCo's rows where ours are zero
-AGREEMENT = 1e-11  # of the largest acceleration: rounding of two codes, and of differences, times a condition number
+AGREEMENT = 1e-12  # of the largest acceleration: rounding of two codes, and of differences, times a condition number
 STENCIL = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])  # of a central difference of order 8
 STEP = 0.02
 

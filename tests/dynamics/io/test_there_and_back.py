@@ -173,7 +173,7 @@ def test_random_trees_come_back_or_are_refused(writer: str, count: int, record_p
 @writers
 @mark.filterwarnings("ignore:MuJoCo on the given text. Inertia matrix is too close to singular")
 @mark.filterwarnings("ignore:the given text. left out softness:dynamics.MechanismWarning")
-@mark.parametrize("count", [8, pytest.param(200, marks=mark.slow)])
+@mark.parametrize("count", [4, pytest.param(200, marks=mark.slow)])
 def test_random_loops_come_back_or_are_refused(writer: str, count: int, record_property: Any) -> None:
     if writer == "mjcf":
         pytest.importorskip("mujoco")
@@ -181,7 +181,7 @@ def test_random_loops_come_back_or_are_refused(writer: str, count: int, record_p
     record_property("refused", len(found["refused"]))
     assert found["altered"] == []
     assert not any("\n" in sentence for _, sentence in found["refused"])
-    assert len(found["same"]) >= count // 8
+    assert len(found["same"]) >= max(1, count // 8)
 
 
 @mark.parametrize(
