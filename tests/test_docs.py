@@ -19,7 +19,6 @@ PAGES = {
 RUN = [name for name, page in PAGES.items() if "```python\n" in page]
 FENCE = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 MARK = "-- end of example --"
-QUICK = "import cgraph.codegen.llvm_engine as _; _.LEVEL = 0"  # as in all tests
 SECONDS = 120  # for one page; each takes a few
 
 
@@ -36,7 +35,7 @@ def examples(page: str) -> list[tuple[int, str, str]]:
 
 def program(page: str) -> str:
     """The examples of a page as one program, each on the line that it has there, with a mark printed after each."""
-    lines = [QUICK]
+    lines: list[str] = []
     for line, code, _ in examples(page):
         lines += [""] * (line - len(lines)) + code.splitlines() + [f"print({MARK!r})"]
     return "\n".join(lines) + "\n"
