@@ -192,18 +192,6 @@ def test_the_dense_solve_finds_what_numpy_finds():
     assert np.array(ldl_elimination(a, b)[0]) == pytest.approx(np.linalg.solve(a, b), rel=DENSE)
 
 
-def test_a_worker_answers_and_is_timed():
-    worker = Worker(partial(load, "planar 3"), "ours")
-    try:
-        answer = worker.prepare("forward", "call", budget=PATIENT)
-        assert isinstance(answer, Prepared)
-        assert answer.values.shape == (3,)
-        assert worker.turn("forward", "call") > 0.0
-    finally:
-        worker.end()
-    assert not worker.alive
-
-
 def test_a_worker_that_is_late_is_ended_and_not_asked_for_what_contains_the_same():
     late: dict[str, str] = {}
     pool, skipped = WorkerPool(partial(load, "planar 3"), ["ours"], 1e-3, late), {}
@@ -215,9 +203,12 @@ def test_a_worker_that_is_late_is_ended_and_not_asked_for_what_contains_the_same
 
 
 @pytest.mark.parametrize("gone", [False, True])  # the pipe breaks at the answer, or already at the question
-def test_a_worker_that_dies_is_told(gone):
+def test_a_worker_answers_and_is_timed_and_if_it_dies_it_is_told(gone):
     worker = Worker(partial(load, "planar 3"), "ours")
-    assert isinstance(worker.prepare("forward", "call", budget=PATIENT), Prepared)
+    answer = worker.prepare("forward", "call", budget=PATIENT)
+    assert isinstance(answer, Prepared)
+    assert answer.values.shape == (3,)
+    assert worker.turn("forward", "call") > 0.0
     worker._process.kill()
     if gone:
         worker._process.join()
@@ -232,8 +223,10 @@ def test_what_a_peer_s_own_code_raises_is_a_reason():
     pytest.importorskip("mujoco")
     try:
         assert worker.prepare("forward", "call", 60.0) == Refused("takes rigid bodies, not a Lagrangian")
+        assert worker.alive
     finally:
         worker.end()
+    assert not worker.alive
 
 
 @pytest.mark.parametrize(
