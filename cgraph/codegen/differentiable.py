@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -12,9 +13,9 @@ from numpy.typing import ArrayLike
 
 from ..autodiff.coloring import jacobian_coloring
 from ..autodiff.direction_split import DirectionSplit, direction_split
-from ..autodiff.forward import jvp
+from ..autodiff.forward import forward_products
 from ..autodiff.jacobian_entries import entry_graph, written_sizes
-from ..autodiff.reverse import vjp
+from ..autodiff.reverse import reverse_products
 from ..autodiff.sparsity import Pattern, csr, pattern, symmetric
 from ..core.evaluate import Array
 from ..core.graph import Graph
@@ -26,6 +27,7 @@ from ..util.require import require_flag
 from .colored_matrix import ColoredMatrix, WrittenPart, colored_hessian, colored_jacobian
 from .sweep import Sweep
 
+CHECK = 256  # operations that take as long as to look whether slopes are infinite
 Made = TypeVar("Made")
 LANES = 8  # directions that count as one where colorings are compared, whatever the processor's vectors
 
@@ -43,8 +45,8 @@ class Differentiable(ABC):
         self._making = threading.RLock()
 
     @abstractmethod
-    def _sweep(self, split: DirectionSplit) -> Sweep:
-        """The sweep of a derivative."""
+    def _sweep(self, split: DirectionSplit, guarded: DirectionSplit | None) -> Sweep:
+        """The sweep of a derivative, see `Sweep`."""
 
     @abstractmethod
     def _like(self, graph: Graph) -> Any:
@@ -155,20 +157,24 @@ class Differentiable(ABC):
                 nothing = np.zeros(0, dtype=np.int64)
                 return ColoredMatrix(Pattern(nothing, nothing, (0, 0)), [], self.n_out)
             graph = self._numbered()
-            reverse = vjp(graph)
-            entries = symmetric(pattern(reverse, graph.inputs))
-            sweep = self._sweep(direction_split(jvp(reverse, graph.inputs), self.n_in))
+            entries = symmetric(pattern(reverse_products(graph, graph.inputs, zero_wins=False), graph.inputs))
+            sweep = self._guarded_sweep(partial(_second_products, graph), self.n_in)
             return colored_hessian(entries, sweep, self.n_in + self.n_out)
 
         return self._once("hessian", make)
 
     def _derivative(self, kind: str) -> Sweep:
         """The forward or the reverse sweep."""
-        make = {
-            "forward": lambda: self._sweep(direction_split(jvp(self._numbered()), self.n_in)),
-            "reverse": lambda: self._sweep(direction_split(vjp(self._numbered()), self.n_out)),
-        }
-        return self._once(kind, make[kind])
+        graph = self._numbered()
+        products, count = (forward_products, self.n_in) if kind == "forward" else (reverse_products, self.n_out)
+        derive = partial(products, graph, graph.inputs)
+        return self._once(kind, lambda: self._guarded_sweep(derive, count))
+
+    def _guarded_sweep(self, derive: Callable[..., Graph], directions: int) -> Sweep:
+        """The sweep in which zeros win over infinite slopes; where that takes long, only where there are such."""
+        plain, guarded = [direction_split(derive(zero_wins=wins), directions) for wins in (False, True)]
+        saved = len(guarded.linear.nodes) - len(plain.linear.nodes)
+        return self._sweep(plain, guarded) if saved > CHECK else self._sweep(guarded, None)
 
     def _numbered(self) -> Graph:
         """The graph with numbers for names: the longest name, or one with spaces, has no room for a suffix."""
@@ -187,6 +193,12 @@ class Differentiable(ABC):
                     self._made[name] = make()
         made: Made = self._made[name]
         return made
+
+
+def _second_products(graph: Graph, *, zero_wins: bool) -> Graph:
+    """x, y_bar, x_dot -> the Hessian of y_bar . y times x_dot."""
+    reverse = reverse_products(graph, graph.inputs, zero_wins=zero_wins)
+    return forward_products(reverse, graph.inputs, zero_wins=zero_wins)
 
 
 def require_memory(name: str, array: Any, *shapes: tuple[int, ...]) -> None:

@@ -20,13 +20,26 @@ class Sweep(ABC):
 
     Directions lie side by side: those of a group are the last axis of an array (groups, entries, lanes), and so are
     their results.  lanes: how many a group has.
+
+    Where an entry of a direction is zero, an infinite slope counts for nothing. To look at the entries makes the
+    directions' part longer, of second derivatives by a half. With `guarded`, the split that does, the other one need
+    not: `guarded` runs only where a value that the directions' part reads is infinite or NaN, and elsewhere it would
+    give the same.
     """
 
-    def __init__(self, split: DirectionSplit, lanes: int) -> None:
-        self.split, self.lanes = split, lanes
+    def __init__(self, split: DirectionSplit, lanes: int, guarded: DirectionSplit | None) -> None:
+        self.split, self.lanes, self._guarded = split, lanes, guarded
+        self._guard: Sweep | None = None
         self.directions, self.results = split.directions, len(split.linear.outputs)  # numbers in one
 
     @abstractmethod
+    def _bound(self, x: Array, s: Array, y: Array, take: Indices, put: Indices, values: Array) -> Callable[[], Any]:
+        """As `bind`; the function tells whether a value that the directions' part read is infinite or NaN."""
+
+    @abstractmethod
+    def _like(self, split: DirectionSplit) -> Sweep:
+        """Another split made ready to run in the same way, without a guard."""
+
     def bind(
         self, x: Array, s: Array, y: Array, take: Indices = NO_ENTRIES, put: Indices = NO_ENTRIES, values: Any = None
     ) -> Callable[[], None]:
@@ -34,6 +47,23 @@ class Sweep(ABC):
 
         It keeps the arrays alive. One thread at a time may call it.
         """
+        arrays = (x, s, y, take, put, y if values is None else values)
+        run = self._bound(*arrays)
+        if self._guarded is None:
+            return run
+
+        def checked() -> None:
+            if run():
+                self._careful()._bound(*arrays)()
+
+        return checked
+
+    def _careful(self) -> Sweep:
+        """The guarded sweep, made at its first use."""
+        if self._guard is None:
+            assert self._guarded is not None
+            self._guard = self._like(self._guarded)
+        return self._guard
 
     def along(self, x: Array, directions: Array) -> Array:
         """The results, (k, results), along directions, (k, entries), at a point."""
