@@ -30,6 +30,7 @@ class Sweep(ABC):
     def __init__(self, split: DirectionSplit, lanes: int, guarded: DirectionSplit | None) -> None:
         self.split, self.lanes, self._guarded = split, lanes, guarded
         self._guard: Sweep | None = None
+        self._free: dict[int, list[tuple[Array, Array, Array, Callable[[], None]]]] = {}  # pop and append are atomic
         self.directions, self.results = split.directions, len(split.linear.outputs)  # numbers in one
 
     @abstractmethod
@@ -67,21 +68,41 @@ class Sweep(ABC):
 
     def along(self, x: Array, directions: Array) -> Array:
         """The results, (k, results), along directions, (k, entries), at a point."""
-        k, lanes = len(directions), self.lanes
-        result = np.empty((k, self.results))
-        block = lanes * max(1, WORK // (len(self.split.linear.nodes) * lanes))
-        for start in range(0, k, block):  # between blocks, Ctrl-C is heard
-            some = directions[start : start + block]
-            groups = -(-len(some) // lanes)
-            s, y = aligned((groups, self.directions, lanes)), aligned((groups, self.results, lanes))
-            filled = np.zeros((groups * lanes, self.directions))
-            filled[: len(some)] = some
-            s[...] = filled.reshape(groups, lanes, -1).transpose(0, 2, 1)
-            self.bind(x, s, y)()
-            result[start : start + block] = y.transpose(0, 2, 1).reshape(-1, self.results)[: len(some)]
+        result = np.empty((len(directions), self.results))
+        block = self.lanes * max(1, WORK // (len(self.split.linear.nodes) * self.lanes))
+        for start in range(0, len(directions), block):  # between blocks, Ctrl-C is heard
+            self._block(x, directions[start : start + block], result[start : start + block])
         return result
 
+    def _block(self, x: Array, directions: Array, result: Array) -> None:
+        k, lanes = len(directions), self.lanes
+        groups, full = -(-k // lanes), k // lanes
+        free = self._free.setdefault(groups, [])
+        try:
+            buffers = free.pop()
+        except IndexError:
+            buffers = self._buffers(groups)
+        point, s, y, run = buffers
+        point[:] = x
+        s[:full] = directions[: full * lanes].reshape(full, lanes, self.directions).transpose(0, 2, 1)
+        if full < groups:  # the last group is filled up with zeros
+            s[full, :, : k % lanes] = directions[full * lanes :].T
+            s[full, :, k % lanes :] = 0.0
+        run()
+        result[: full * lanes] = y[:full].transpose(0, 2, 1).reshape(full * lanes, self.results)
+        if full < groups:
+            result[full * lanes :] = y[full, :, : k % lanes].T
+        if groups <= REUSED:
+            free.append(buffers)
 
+    def _buffers(self, groups: int) -> tuple[Array, Array, Array, Callable[[], None]]:
+        """What one call at a time has for itself: point, directions, results, and the function from these to those."""
+        x = np.empty(len(self.split.primal.inputs))
+        s, y = aligned((groups, self.directions, self.lanes)), aligned((groups, self.results, self.lanes))
+        return x, s, y, self.bind(x, s, y)
+
+
+REUSED = 16  # groups, at most, whose buffers stay for another call
 WORK = 2**23  # nodes times directions in a block: some milliseconds
 
 
