@@ -9,12 +9,12 @@ from .llvm_ir import Arithmetic, body, point_arithmetic, preamble
 FIELDS = ("x", "p", "s", "y", "groups", "take", "put", "values", "entries")
 
 
-def sweep_ir(split: DirectionSplit, lanes: int, flags: str = "") -> str:
-    """A module with `void sweep(int64_t *fields)`, the derivative y of a point x along directions s.
+def sweep_ir(split: DirectionSplit, lanes: int, flags: str = "", *, check: bool) -> str:
+    """A module with `int sweep(int64_t *fields)`, the derivative y of a point x along directions s.
 
     Directions come in groups of `lanes`: entry k of the group g is the vector s[g][k], and likewise for y. p is room
-    for the values between the two parts. Then values[put[e]] = y[take[e]] for e = 0 .. entries - 1, y read as one row
-    of numbers.
+    for the values between the two parts, zeros behind them up to a whole vector; with `check` the result is 1 if one of
+    them is infinite or NaN. Then values[put[e]] = y[take[e]] for e = 0 .. entries - 1, y read as one row of numbers.
     """
     point, vector = point_arithmetic(flags), Arithmetic(flags, lanes)
     primal = body(split.primal, point, _address, "primal", ["ptr %x", "ptr %y"])
@@ -44,6 +44,7 @@ def sweep_ir(split: DirectionSplit, lanes: int, flags: str = "") -> str:
         "  ret void",
         "}",
         *_sweep(split.directions * lanes, len(split.linear.outputs) * lanes),
+        *_end(whole(known, lanes) if check else 0, vector),
     ]
     return "\n".join([*lines, ""])
 
@@ -52,15 +53,20 @@ def _address(base: str, name: str, row: int) -> list[str]:
     return [f"  {name} = getelementptr double, ptr %{base}, i64 {row}"]
 
 
+def whole(count: int, lanes: int) -> int:
+    """At least so many numbers, in whole vectors."""
+    return -(-count // lanes) * lanes
+
+
 def _sweep(seeds: int, results: int) -> list[str]:
-    """The function that calls the others. seeds, results: numbers in a group."""
+    """The function that calls the others, without its end. seeds, results: numbers in a group."""
     fields = []
     for k, name in enumerate(FIELDS):
         kind = "i64" if name in ("groups", "entries") else "ptr"
         fields.append(f"  %{name}.field = getelementptr i64, ptr %fields, i64 {k}")
         fields.append(f"  %{name} = load {kind}, ptr %{name}.field, align 8")
     return [
-        "define void @sweep(ptr noalias %fields) nounwind {",
+        "define i32 @sweep(ptr noalias %fields) nounwind {",
         "start:",
         *fields,
         "  call void @primal(ptr %x, ptr %p)",
@@ -80,7 +86,7 @@ def _sweep(seeds: int, results: int) -> list[str]:
         "entry:",
         "  %e = phi i64 [ 0, %group ], [ %e.next, %entry.body ]",
         "  %e.more = icmp slt i64 %e, %entries",
-        "  br i1 %e.more, label %entry.body, label %end",
+        "  br i1 %e.more, label %entry.body, label %done",
         "entry.body:",
         "  %take.at = getelementptr i64, ptr %take, i64 %e",
         "  %put.at = getelementptr i64, ptr %put, i64 %e",
@@ -92,7 +98,31 @@ def _sweep(seeds: int, results: int) -> list[str]:
         "  store double %value, ptr %to.at, align 8",
         "  %e.next = add i64 %e, 1",
         "  br label %entry",
+    ]
+
+
+def _end(known: int, vector: Arithmetic) -> list[str]:
+    """What the function gives: whether one of so many numbers in p is infinite or NaN."""
+    t, lanes = vector.type, vector.lanes
+    if not known:
+        return ["done:", "  ret i32 0", "}"]
+    return [
+        "done:",  # the last, when p has long been written
+        "  br label %check",
+        "check:",  # v - v is 0, or NaN where v is infinite or NaN
+        "  %k = phi i64 [ 0, %done ], [ %k.next, %check ]",
+        f"  %lost = phi {t} [ zeroinitializer, %done ], [ %lost.next, %check ]",
+        "  %v.at = getelementptr double, ptr %p, i64 %k",
+        f"  %v = load {t}, ptr %v.at, align 8",
+        f"  %v.lost = fsub {t} %v, %v",
+        f"  %lost.next = fadd {t} %lost, %v.lost",
+        f"  %k.next = add i64 %k, {lanes}",
+        f"  %k.more = icmp slt i64 %k.next, {known}",
+        "  br i1 %k.more, label %check, label %end",
         "end:",
-        "  ret void",
+        f"  %nan = fcmp uno {t} %lost.next, zeroinitializer",
+        f"  %any = call i1 @llvm.vector.reduce.or.v{lanes}i1(<{lanes} x i1> %nan)",
+        "  %result = zext i1 %any to i32",
+        "  ret i32 %result",
         "}",
     ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -12,9 +13,9 @@ from numpy.typing import ArrayLike
 
 from ..autodiff.coloring import jacobian_coloring
 from ..autodiff.direction_split import DirectionSplit, direction_split
-from ..autodiff.forward import jvp
+from ..autodiff.forward import forward_products
 from ..autodiff.jacobian_entries import entry_graph, written_sizes
-from ..autodiff.reverse import vjp
+from ..autodiff.reverse import reverse_products
 from ..autodiff.sparsity import Pattern, csr, pattern, symmetric
 from ..core.evaluate import Array
 from ..core.graph import Graph
@@ -26,6 +27,7 @@ from ..util.require import require_flag
 from .colored_matrix import ColoredMatrix, WrittenPart, colored_hessian, colored_jacobian
 from .sweep import Sweep
 
+CHECK = 256  # operations that take as long as to look whether slopes are infinite
 Made = TypeVar("Made")
 LANES = 8  # directions that count as one where colorings are compared, whatever the processor's vectors
 
@@ -43,8 +45,8 @@ class Differentiable(ABC):
         self._making = threading.RLock()
 
     @abstractmethod
-    def _sweep(self, split: DirectionSplit) -> Sweep:
-        """The sweep of a derivative."""
+    def _sweep(self, split: DirectionSplit, guarded: DirectionSplit | None) -> Sweep:
+        """The sweep of a derivative, see `Sweep`."""
 
     @abstractmethod
     def _like(self, graph: Graph) -> Any:
@@ -61,7 +63,7 @@ class Differentiable(ABC):
         entry of x_dot that is zero counts for nothing, also where y has no slope in it.
         Raises GraphError for another shape.
         """
-        return self._along("forward", x, "X_dot", X_dot, self.n_in)
+        return self._along(self._forward, x, "X_dot", X_dot, (self.n_in, self.n_out))
 
     def vjp(self, x: ArrayLike, Y_bar: ArrayLike) -> Array:
         """Products x_bar = J^T y_bar of the transposed Jacobian at x with cotangents, side by side: reverse mode.
@@ -69,7 +71,7 @@ class Differentiable(ABC):
         Y_bar: (k, n_out), a cotangent a row; the result is (k, n_in). Of one cotangent, (n_out,), it is (n_in,).
         Raises GraphError for another shape.
         """
-        return self._along("reverse", x, "Y_bar", Y_bar, self.n_out)
+        return self._along(self._reverse, x, "Y_bar", Y_bar, (self.n_out, self.n_in))
 
     def jacobian(self, x: ArrayLike, *, sparse: bool = False) -> Any:
         """The Jacobian dy_i/dx_j at x, (n_out, n_in).
@@ -115,15 +117,15 @@ class Differentiable(ABC):
         values[...] = 0.0
         return matrix.bind(x, values)
 
-    def _along(self, kind: str, x: ArrayLike, name: str, directions: ArrayLike, entries: int) -> Array:
+    def _along(
+        self, sweep: Callable[[], Sweep], x: ArrayLike, name: str, directions: ArrayLike, shape: tuple[int, int]
+    ) -> Array:
+        """shape: the numbers of entries of a direction and of a result."""
         point, rows = self._point(x), real_array(name, directions)
-        if rows.ndim not in (1, 2) or rows.shape[-1] != entries:
-            raise GraphError(f"{name} must have shape (k, {entries}) or ({entries},), got {rows.shape}")
-        matrix = np.atleast_2d(rows)
-        if self.n_in:
-            result = self._derivative(kind).along(np.require(point, requirements=["C", "A"]), matrix)
-        else:
-            result = np.zeros((len(matrix), self.n_out if kind == "forward" else 0))
+        if rows.ndim not in (1, 2) or rows.shape[-1] != shape[0]:
+            raise GraphError(f"{name} must have shape (k, {shape[0]}) or ({shape[0]},), got {rows.shape}")
+        matrix = rows if rows.ndim == 2 else rows[None]
+        result = sweep().along(point, matrix) if self.n_in else np.zeros((len(matrix), shape[1]))
         return result if rows.ndim == 2 else result[0]
 
     def _matrix(self, matrix: ColoredMatrix, point: Array, sparse: bool) -> Any:
@@ -133,51 +135,59 @@ class Differentiable(ABC):
         return csr(module, matrix.entries, matrix.values(point, dense=False))
 
     def _jacobian(self) -> ColoredMatrix:
-        def make() -> ColoredMatrix:
-            graph = self._numbered()
-            entries = pattern(graph, graph.inputs)
-            if not len(entries.rows):
-                return ColoredMatrix(entries, [], self.n_in)
-            coloring = jacobian_coloring(entries, LANES)
-            once, columns, rows = written_sizes(graph, graph.inputs)
-            if min(columns, rows) <= once * coloring.vectors(LANES) * self.vector_cost:
-                written = entry_graph(graph, graph.inputs, entries, rows < columns)
-                return ColoredMatrix(entries, [WrittenPart(self._like(written))], self.n_in)
-            return colored_jacobian(
-                entries, coloring, lambda: self._derivative("forward"), lambda: self._derivative("reverse")
-            )
+        return self._once("jacobian", self._make_jacobian)
 
-        return self._once("jacobian", make)
+    def _make_jacobian(self) -> ColoredMatrix:
+        graph = self._numbered()
+        entries = pattern(graph, graph.inputs)
+        if not len(entries.rows):
+            return ColoredMatrix(entries, [], self.n_in)
+        coloring = jacobian_coloring(entries, LANES)
+        once, columns, rows = written_sizes(graph, graph.inputs)
+        if min(columns, rows) <= once * coloring.vectors(LANES) * self.vector_cost:
+            written = entry_graph(graph, graph.inputs, entries, rows < columns)
+            return ColoredMatrix(entries, [WrittenPart(self._like(written))], self.n_in)
+        return colored_jacobian(entries, coloring, self._forward, self._reverse)
 
     def _hessian(self) -> ColoredMatrix:
-        def make() -> ColoredMatrix:
-            if not self.n_in:  # and no cotangents, which would be the outputs of the reverse sweep
-                nothing = np.zeros(0, dtype=np.int64)
-                return ColoredMatrix(Pattern(nothing, nothing, (0, 0)), [], self.n_out)
-            graph = self._numbered()
-            reverse = vjp(graph)
-            entries = symmetric(pattern(reverse, graph.inputs))
-            sweep = self._sweep(direction_split(jvp(reverse, graph.inputs), self.n_in))
-            return colored_hessian(entries, sweep, self.n_in + self.n_out)
+        return self._once("hessian", self._make_hessian)
 
-        return self._once("hessian", make)
+    def _make_hessian(self) -> ColoredMatrix:
+        if not self.n_in:  # and no cotangents, which would be the outputs of the reverse sweep
+            nothing = np.zeros(0, dtype=np.int64)
+            return ColoredMatrix(Pattern(nothing, nothing, (0, 0)), [], self.n_out)
+        graph = self._numbered()
+        entries = symmetric(pattern(reverse_products(graph, graph.inputs, zero_wins=False), graph.inputs))
+        sweep = self._guarded_sweep(partial(_second_products, graph), self.n_in)
+        return colored_hessian(entries, sweep, self.n_in + self.n_out)
 
-    def _derivative(self, kind: str) -> Sweep:
-        """The forward or the reverse sweep."""
-        make = {
-            "forward": lambda: self._sweep(direction_split(jvp(self._numbered()), self.n_in)),
-            "reverse": lambda: self._sweep(direction_split(vjp(self._numbered()), self.n_out)),
-        }
-        return self._once(kind, make[kind])
+    def _forward(self) -> Sweep:
+        return self._once("forward", self._make_forward)
+
+    def _make_forward(self) -> Sweep:
+        graph = self._numbered()
+        return self._guarded_sweep(partial(forward_products, graph, graph.inputs), self.n_in)
+
+    def _reverse(self) -> Sweep:
+        return self._once("reverse", self._make_reverse)
+
+    def _make_reverse(self) -> Sweep:
+        graph = self._numbered()
+        return self._guarded_sweep(partial(reverse_products, graph, graph.inputs), self.n_out)
+
+    def _guarded_sweep(self, derive: Callable[..., Graph], directions: int) -> Sweep:
+        """The sweep in which zeros win over infinite slopes; where that takes long, only where there are such."""
+        plain, guarded = [direction_split(derive(zero_wins=wins), directions) for wins in (False, True)]
+        saved = len(guarded.linear.nodes) - len(plain.linear.nodes)
+        return self._sweep(plain, guarded) if saved > CHECK else self._sweep(guarded, None)
 
     def _numbered(self) -> Graph:
         """The graph with numbers for names: the longest name, or one with spaces, has no room for a suffix."""
+        return self._once("graph", self._make_numbered)
 
-        def make() -> Graph:
-            inputs = [variable(f"x{k}") for k in range(self.n_in)]
-            return Graph(inputs, {f"y{k}": node for k, node in enumerate(self.graph(*inputs).values())})
-
-        return self._once("graph", make)
+    def _make_numbered(self) -> Graph:
+        inputs = [variable(f"x{k}") for k in range(self.n_in)]
+        return Graph(inputs, {f"y{k}": node for k, node in enumerate(self.graph(*inputs).values())})
 
     def _once(self, name: str, make: Callable[[], Made]) -> Made:
         """What `make` gives, made once, by whichever thread asks first."""
@@ -187,6 +197,12 @@ class Differentiable(ABC):
                     self._made[name] = make()
         made: Made = self._made[name]
         return made
+
+
+def _second_products(graph: Graph, *, zero_wins: bool) -> Graph:
+    """x, y_bar, x_dot -> the Hessian of y_bar . y times x_dot."""
+    reverse = reverse_products(graph, graph.inputs, zero_wins=zero_wins)
+    return forward_products(reverse, graph.inputs, zero_wins=zero_wins)
 
 
 def require_memory(name: str, array: Any, *shapes: tuple[int, ...]) -> None:

@@ -97,8 +97,8 @@ class Native(Compiled):
         lanes = self._host.lanes
         return max(WORK // len(self.graph.nodes) // lanes, 1) * lanes, partial(_sweep, self._batch_entry, lanes)
 
-    def _sweep(self, split: DirectionSplit) -> NativeSweep:
-        return NativeSweep(split, self._host, self._flags, self._cache)
+    def _sweep(self, split: DirectionSplit, guarded: DirectionSplit | None) -> NativeSweep:
+        return NativeSweep(split, self._host, self._flags, self._cache, guarded)
 
     def _compiled(self, text: str, name: str, prototype: Any) -> Any:
         return self._host.compile(text, libm_functions(self.graph), self._cache).function(name, prototype)

@@ -7,19 +7,15 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, ClassVar
 
-import numpy as np
-
 from ..autodiff.direction_split import DirectionSplit
 from ..autodiff.sparsity import Indices
 from ..core.evaluate import Array
-from .derivative_ir import FIELDS, sweep_ir
+from .derivative_ir import FIELDS, sweep_ir, whole
 from .disk_cache import Cache
 from .llvm_engine import Host
 from .llvm_ir import libm_functions
-from .sweep import NO_ENTRIES, Sweep
+from .sweep import Sweep, aligned
 
-_SHORT = ctypes.PYFUNCTYPE(None, ctypes.c_void_p)  # too short a call to give the interpreter away for
-_LONG = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
 LONG = 2**16  # instructions
 
 
@@ -33,18 +29,30 @@ class _Fields(ctypes.Structure):
 class NativeSweep(Sweep):
     """Machine code through LLVM. flags: of the arithmetic.  cache: where machine code is kept."""
 
-    def __init__(self, split: DirectionSplit, host: Host, flags: str, cache: Cache | None) -> None:
-        super().__init__(split, host.lanes)
-        self.source = sweep_ir(split, host.lanes, flags)
+    def __init__(
+        self,
+        split: DirectionSplit,
+        host: Host,
+        flags: str,
+        cache: Cache | None,
+        guarded: DirectionSplit | None = None,
+    ) -> None:
+        super().__init__(split, host.lanes, guarded)
+        self._how = (host, flags, cache)
+        self.source = sweep_ir(split, host.lanes, flags, check=guarded is not None)
         code = host.compile(self.source, libm_functions(split.primal), cache)
-        self._short, self._long = code.function("sweep", _SHORT), code.function("sweep", _LONG)
+        result = None if guarded is None else ctypes.c_int
+        # A call that is short is not worth giving the interpreter away for.
+        self._short = code.function("sweep", ctypes.PYFUNCTYPE(result, ctypes.c_void_p))
+        self._long = code.function("sweep", ctypes.CFUNCTYPE(result, ctypes.c_void_p))
 
-    def bind(
-        self, x: Array, s: Array, y: Array, take: Indices = NO_ENTRIES, put: Indices = NO_ENTRIES, values: Any = None
-    ) -> Callable[[], None]:
-        """As `Sweep.bind` says."""
-        groups, p = len(s), np.empty(len(self.split.primal.outputs))
-        arrays = {"x": x, "p": p, "s": s, "y": y, "take": take, "put": put, "values": y if values is None else values}
+    def _like(self, split: DirectionSplit) -> NativeSweep:
+        return NativeSweep(split, *self._how)
+
+    def _bound(self, x: Array, s: Array, y: Array, take: Indices, put: Indices, values: Array) -> Callable[[], Any]:
+        groups, p = len(s), aligned((whole(len(self.split.primal.outputs), self.lanes),))
+        p[:] = 0.0
+        arrays = {"x": x, "p": p, "s": s, "y": y, "take": take, "put": put, "values": values}
         counts = {"groups": groups, "entries": len(take)}
         numbers = [arrays[name].ctypes.data if name in arrays else counts[name] for name in FIELDS]
         fields = _Fields(*numbers)

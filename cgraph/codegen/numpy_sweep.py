@@ -10,7 +10,8 @@ import numpy as np
 from ..autodiff.direction_split import DirectionSplit
 from ..autodiff.sparsity import Indices
 from ..core.evaluate import Array
-from .sweep import NO_ENTRIES, Sweep
+from ..core.graph import Graph
+from .sweep import Sweep
 
 LANES = 8
 
@@ -24,23 +25,29 @@ class _Function(Protocol):
 
 
 class NumpySweep(Sweep):
-    """primal, linear: the two parts of the split, compiled."""
+    """compiled: what compiles a graph in a dialect, "python" or "numpy"."""
 
-    def __init__(self, split: DirectionSplit, primal: _Function, linear: _Function) -> None:
-        super().__init__(split, LANES)
-        self._primal, self._linear = primal, linear
+    def __init__(
+        self,
+        split: DirectionSplit,
+        compiled: Callable[[Graph, str], _Function],
+        guarded: DirectionSplit | None = None,
+    ) -> None:
+        super().__init__(split, LANES, guarded)
+        self._compiled = compiled
+        self._primal, self._linear = compiled(split.primal, "python"), compiled(split.linear, "numpy")
 
-    def bind(
-        self, x: Array, s: Array, y: Array, take: Indices = NO_ENTRIES, put: Indices = NO_ENTRIES, values: Any = None
-    ) -> Callable[[], None]:
-        """As `Sweep.bind` says."""
+    def _like(self, split: DirectionSplit) -> NumpySweep:
+        return NumpySweep(split, self._compiled)
 
-        def run() -> None:
+    def _bound(self, x: Array, s: Array, y: Array, take: Indices, put: Indices, values: Array) -> Callable[[], Any]:
+        def run() -> bool | None:
             directions = s.transpose(1, 0, 2).reshape(self.directions, -1)
             known = np.array(self._primal.values(x.tolist()))
             points = np.concatenate([np.repeat(known[:, None], directions.shape[1], axis=1), directions])
             y[...] = self._linear.batch(points).reshape(self.results, -1, self.lanes).transpose(1, 0, 2)
             if len(take):
                 values.reshape(-1)[put] = y.reshape(-1)[take]
+            return None if self._guarded is None else not np.isfinite(known).all()
 
         return run

@@ -58,9 +58,8 @@ class Generated(Compiled):
             named = dict(zip(self.graph.input_names, x, strict=True))
             return tuple([float(value) for value in self.graph.evaluate(named).values()])
 
-    def _sweep(self, split: DirectionSplit) -> NumpySweep:
-        primal, linear = Generated(split.primal, "python", self.options), Generated(split.linear, "numpy", self.options)
-        return NumpySweep(split, primal, linear)
+    def _sweep(self, split: DirectionSplit, guarded: DirectionSplit | None) -> NumpySweep:
+        return NumpySweep(split, partial(Generated, options=self.options), guarded)
 
     def _columns(self) -> tuple[int, Callable[[Array, Array], None]]:
         if self.backend == "python":

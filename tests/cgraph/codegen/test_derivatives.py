@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
-from cgraph.codegen import parts, sweep
+from cgraph.codegen import differentiable, parts, sweep
 from cgraph.errors import GraphError
 from tests import high_precision
 from tests.strategies import cases, examples
@@ -195,6 +195,20 @@ def test_a_sparse_hessian_is_compressed(backend):
     found = function.hessian(point, [2.0], sparse=True)
     np.testing.assert_allclose(found.toarray(), 2.0 * expected, rtol=SHORT_SUM, atol=SHORT_SUM)
     assert found.nnz == np.count_nonzero(expected)
+
+
+@pytest.mark.parametrize("check", [-1, math.inf])
+def test_zeros_in_a_direction_win_over_infinite_slopes(backend, check, monkeypatch):
+    """Whether every entry of a direction is looked at, or only where a slope is infinite."""
+    monkeypatch.setattr(differentiable, "CHECK", check)
+    function = compiled(cg.Graph([x, y], {"f": cg.sqrt(x) + y * y * x, "g": x * y}), backend, LANES)
+    inf = math.inf
+    for _ in range(2):
+        assert function.jacobian([1.0, 2.0]).tolist() == [[4.5, 4.0], [2.0, 1.0]]
+        assert function.jacobian([0.0, 2.0]).tolist() == [[inf, 0.0], [2.0, 0.0]]
+        assert function.jvp([0.0, 2.0], [[0.0, 1.0], [1.0, 0.0]]).tolist() == [[0.0, 0.0], [inf, 2.0]]
+        assert function.vjp([0.0, 2.0], [[0.0, 1.0], [1.0, 0.0]]).tolist() == [[2.0, 0.0], [inf, 0.0]]
+        assert function.hessian([0.0, 2.0], [1.0, 0.0]).tolist() == [[-inf, 4.0], [4.0, 0.0]]
 
 
 def test_names_are_no_matter():
