@@ -170,17 +170,13 @@ class Mechanism(Structure):
 
     @cached_property
     def _merged(self) -> tuple[tuple[Body, ...], dict[str, Carrier]]:
-        moving, carriers = self._merge(self.parts)
+        moving, carriers = merge_fixed_bodies(self.parts)
         numbers = [bound_body(part, self.parameters) for part in self.parts]
         known = moving
         if numbers != list(self.parts):
-            known, _ = self._merge([part for body in numbers for part in self.shared.parts(body)])
+            known, _ = merge_fixed_bodies([part for body in numbers for part in self.shared.parts(body)])
         require_inertia(known)
         return tuple(moving), carriers
-
-    def _merge(self, parts: Sequence[Body]) -> tuple[list[Body], dict[str, Carrier]]:
-        with building(Builder()):
-            return merge_fixed_bodies(parts)
 
     @cached_property
     def _bound(self) -> Mechanism:
