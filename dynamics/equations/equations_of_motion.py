@@ -6,9 +6,10 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Builder, SingularError, building, cotangents, hessian_nodes, require_choice, require_flag
 
+from ..systems.body_system import BodySystem
 from ..systems.constraints import ConstraintError
 from ..systems.model import Model, as_system
-from ..systems.system import BodySystem, System
+from ..systems.system import System
 from .bias_terms import BiasTerms, bias_terms, bias_terms_of_lagrangian
 from .constraints import DenseSolver, constraint_rows, multiplier_outputs, solved_by_elimination, unknown_names
 from .formulations import ONE, ZERO

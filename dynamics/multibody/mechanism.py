@@ -14,8 +14,9 @@ from cgraph import Graph, Node
 from cgraph.extend import Builder, building, require_flag, require_mapping
 
 from ..systems.arguments import parameter_value
+from ..systems.body_system import BodySystem
 from ..systems.model import Model
-from ..systems.system import BodySystem, System
+from ..systems.system import System
 from .body import WORLD, Body, Joint, MechanismError, MechanismWarning, quantities, vector
 from .composed_joints import locked_parts, outer_names, require_parents
 from .external_force import Force, generalized_forces
@@ -172,10 +173,8 @@ class Mechanism(Structure):
     def _merged(self) -> tuple[tuple[Body, ...], dict[str, Carrier]]:
         moving, carriers = merge_fixed_bodies(self.parts)
         numbers = [bound_body(part, self.parameters) for part in self.parts]
-        known = moving
-        if numbers != list(self.parts):
-            known, _ = merge_fixed_bodies([part for body in numbers for part in self.shared.parts(body)])
-        require_inertia(known)
+        shown = [part for body in numbers for part in self.shared.parts(body)]
+        require_inertia(moving if numbers == list(self.parts) else merge_fixed_bodies(shown)[0])
         return tuple(moving), carriers
 
     @cached_property
