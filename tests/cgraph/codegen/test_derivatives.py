@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
-from cgraph.codegen import differentiable, parts, sweep
+from cgraph.codegen import colored_matrix, differentiable, parts, sweep
 from cgraph.errors import GraphError
 from tests import high_precision
 from tests.strategies import cases, examples
@@ -259,6 +259,14 @@ def test_a_bound_jacobian_needs_memory_that_it_can_use(backend):
     both = np.empty(36)
     with pytest.raises(GraphError, match="share"):
         function.bind_jacobian(both[:4], both[1:33].reshape(8, 4))
+
+
+def test_large_matrices_are_filled_in(backend, monkeypatch):
+    expected = compiled(example(), backend).jacobian(POINT)
+    monkeypatch.setattr(colored_matrix, "LARGE", 1)
+    function = compiled(example(), backend)
+    assert np.array_equal(function.jacobian(POINT), expected)
+    assert np.array_equal(function.jacobian(POINT, sparse=True).toarray(), expected)
 
 
 def test_a_result_is_the_callers_own(backend):
