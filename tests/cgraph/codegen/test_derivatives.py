@@ -311,6 +311,18 @@ def test_a_function_that_has_derivatives_pickles(backend):
     assert np.array_equal(pickle.loads(pickle.dumps(function)).jacobian(POINT), expected)
 
 
+def test_machine_code_of_derivatives_is_kept_on_disk(tmp_path):
+    pytest.importorskip("llvmlite")
+    graph = cg.Graph([x, y], {"f": x * y * y, "g": x / y})
+    found = []
+    for _ in range(2):
+        function = compiled(graph, "llvm", LANES, cache=tmp_path)
+        products = function.jvp([1.0, 2.0], np.eye(2)).tolist(), function.hessian([1.0, 2.0], [1.0, 0.0]).tolist()
+        found.append((products, sorted(tmp_path.iterdir())))
+    assert found[0] == found[1]
+    assert len(found[0][1]) == 3  # with the function itself
+
+
 @pytest.mark.parametrize("given_x", [POINT.tolist(), POINT.astype(np.float32), np.repeat(POINT, 2)[::2]])
 def test_the_kind_of_array_is_no_matter(backend, given_x):
     function = compiled(example(), backend)
