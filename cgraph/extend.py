@@ -65,6 +65,7 @@ from .simplify.builder import Builder, folded
 from .simplify.identities import rewritten, shortened
 from .simplify.polynomial import Polynomial, expand, format_polynomial
 from .util.atomic_write import atomic_write, check_writable, write_files
+from .util.nearest import nearest, or_nearest
 from .util.real_arrays import is_finite, real_array, real_number
 from .util.require import (
     require_choice,
@@ -72,6 +73,7 @@ from .util.require import (
     require_mapping,
     require_path,
     require_sequence,
+    require_texts,
     require_whole,
 )
 from .util.threads import thread_count
@@ -117,6 +119,8 @@ __all__ = [
     "is_finite",
     "ldl_elimination",
     "ldl_solve",
+    "nearest",
+    "or_nearest",
     "real_array",
     "real_number",
     "register",
@@ -126,6 +130,7 @@ __all__ = [
     "require_mapping",
     "require_path",
     "require_sequence",
+    "require_texts",
     "require_whole",
     "rewritten",
     "runner",
