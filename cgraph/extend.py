@@ -23,9 +23,9 @@ label may have. `certain_digits` says what rounding leaves of the outputs.
 
 **At the edges**: `real_array`, `real_number`, `is_finite`, `check_name`, `require_graph`, `require_flag`,
 `require_whole`, `require_choice`, `require_sequence`, `require_mapping` and `require_path` check what a caller passed,
-`thread_count` reads `threads=`, `atomic_write` writes a file whole or not at all, `write_files` several, and
-`check_writable` looks beforehand; `install` ends an error about a missing package. `Array` is the type of an array of
-float64.
+`thread_count` reads `threads=`, `share` gives work to threads, `atomic_write` writes a file whole or not at all,
+`write_files` several, and `check_writable` looks beforehand; `install` ends an error about a missing package. `Array`
+is the type of an array of float64.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, building, cotangents
@@ -71,7 +71,7 @@ from .util.require import (
     require_sequence,
     require_whole,
 )
-from .util.threads import thread_count
+from .util.threads import share, thread_count
 
 __all__ = [
     "ADJOINT",
@@ -124,6 +124,7 @@ __all__ = [
     "require_whole",
     "rewritten",
     "runner",
+    "share",
     "shortened",
     "solve_nodes",
     "tangents",

@@ -14,6 +14,7 @@ from .equations.integrability import integrable_rows
 from .equations.inverse_dynamics_derivatives import inverse_dynamics_derivatives
 from .equations.inverse_mass_matrix import inverse_mass_matrix
 from .equations.linearization import linearize, state_space
+from .equations.linearize_many import linearize_many
 from .equations.singular_mass_matrix import SingularMassMatrixError, raise_if_singular
 from .equations.state_equation import state_equation
 from .equations.torque_decomposition import torque_by_joint_motion, torque_by_link
@@ -125,6 +126,7 @@ __all__ = [
     "inverse_mass_matrix",
     "kinetic_energy",
     "linearize",
+    "linearize_many",
     "load_mjcf",
     "load_urdf",
     "mass_matrix",

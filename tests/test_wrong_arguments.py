@@ -144,6 +144,7 @@ CALLS = {
     "dyn.inverse_dynamics": call(dyn.inverse_dynamics, ARM, "chain_rule", simplify=True),
     "dyn.momentum_rate": call(dyn.momentum_rate, ARM, "chain_rule", simplify=True, keep_momentum=False),
     "dyn.linearize": call(dyn.linearize, SYSTEM, [0.0], [0.0], None, t=0.0, parameters=None),
+    "dyn.linearize_many": call(dyn.linearize_many, SYSTEM, [[0.0]], [[0.0]], None, t=0.0, parameters=None, threads=1),
     "dyn.raise_if_singular": call(dyn.raise_if_singular, ARM, 0.0),
     "dyn.spurious_nodes": call(dyn.spurious_nodes, GRAPH),
     "dyn.prune": call(

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Builder, building, folded
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
-from .equations_of_motion import accelerations
 from .evaluate_at import Array, evaluate_at
-from .formulations import ONE, ZERO
-from .inverse_dynamics_derivatives import torque_derivatives
-from .mass_matrix_solve import inverse, mass_solve
+from .linearization_parts import assembled, linearization_parts
 from .shorter_form import shorter_form
 
 
@@ -62,21 +58,7 @@ def state_space(model: Model) -> Graph:
 
 def _state_space(system: System) -> Graph:
     system.constraints.require_none("state_space")
-    n, build = system.n, Builder()
-    qdd = accelerations(system)
-    slopes = torque_derivatives(system, folded(list(qdd.outputs.values()), build), build)
-    # M dqdd = dtau - (d tau / dx) dx, one column for each of the 2n numbers of x; those of tau are M^-1.
-    with building(build):
-        sides = [[-row[j] for row in rows] for rows in (slopes.by_q, slopes.by_qd) for j in range(n)]
-    solve = mass_solve(system, build, sides)
-    columns = solve.solutions(sides, build)
-    by_tau = inverse(solve, build)
-    brackets = system.kinematics.brackets(build)  # xi_dot = dqd + C(qd) xi
-    rows = [[*row, *[ONE if i == j else ZERO for j in range(n)], *[ZERO] * n] for i, row in enumerate(brackets)]
-    rows += [[*[column[i] for column in columns], *by_tau[i]] for i in range(n)]
-    outputs = {f"A_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[: 2 * n])}
-    outputs |= {f"B_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[2 * n :])}
-    return cg.simplify(Graph(qdd.inputs, outputs))
+    return linearization_parts(system).written_out()
 
 
 def linearize(
@@ -92,7 +74,7 @@ def linearize(
 
     Of quasi-velocities dx is of displacements, see `state_space`.
 
-    For many states, compile `state_space`.
+    For many states there is `linearize_many`.
 
     Parameters
     ----------
@@ -126,8 +108,15 @@ def linearize(
     ([[0.0, 1.0], [-9.0, -0.5]], [[0.0], [1.0]])
     """
     system = as_system(model)
-    n = system.n
-    flat = evaluate_at(system, state_space(system), {"q": q, "qd": qd, "tau": tau}, t, parameters)
+    system.constraints.require_none("linearize")
+    graphs = linearization_parts(system).in_columns()
+    flat = evaluate_at(system, graphs.shared, {"q": q, "qd": qd, "tau": tau}, t, parameters)
     if flat.ndim != 1:
-        raise ValueError(f"linearize takes one state, q, qd and tau of the shape ({n},), got several rows")
-    return flat[: 4 * n * n].reshape(2 * n, 2 * n), flat[4 * n * n :].reshape(2 * n, n)
+        raise ValueError(
+            f"linearize takes one state, q, qd and tau of the shape ({system.n},), got several rows; see linearize_many"
+        )
+    factors, rest = np.split(flat, [graphs.factors])
+    sides, brackets = np.split(rest, [3 * system.n**2])
+    rows = [*factors, *sides.reshape(system.n, -1)]
+    solved = graphs.column.evaluate(dict(zip(graphs.column.input_names, rows, strict=True))).values()
+    return assembled(brackets, np.concatenate([np.broadcast_to(x, 3 * system.n) for x in solved]), system.n)
