@@ -115,8 +115,7 @@ def linearize(
         raise ValueError(
             f"linearize takes one state, q, qd and tau of the shape ({system.n},), got several rows; see linearize_many"
         )
-    factors, rest = np.split(flat, [graphs.factors])
-    sides, brackets = np.split(rest, [3 * system.n**2])
-    rows = [*factors, *sides.reshape(system.n, -1)]
+    factors, sides, brackets = np.split(flat, [graphs.factors, len(flat) - system.n**2])
+    rows = [*factors, *sides.reshape(-1, 3 * system.n)]
     solved = graphs.column.evaluate(dict(zip(graphs.column.input_names, rows, strict=True))).values()
     return assembled(brackets, np.concatenate([np.broadcast_to(x, 3 * system.n) for x in solved]), system.n)

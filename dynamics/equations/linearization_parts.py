@@ -63,7 +63,7 @@ class LinearizationParts(NamedTuple):
         n = len(self.brackets)
         factors, column = self.solve.split()
         outputs = {f"p{k}": node for k, node in enumerate(factors)}
-        for i in range(n):
+        for i in range(len(self.solve.b)):
             row = [*[side[i] for side in self.sides], *_unit(i, n)]
             outputs |= {f"b_{i}_{j}": entry for j, entry in enumerate(row)}
         outputs |= {f"C_{i}_{j}": entry for i, row in enumerate(self.brackets) for j, entry in enumerate(row)}

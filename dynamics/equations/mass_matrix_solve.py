@@ -44,7 +44,7 @@ class MassSolve(NamedTuple):
     def size(self, sides: Rows) -> int:
         """How many nodes these right-hand sides, their solutions and the columns of M^-1 take, about."""
         shared = topological([*self.x, *[node for side in sides for node in side]])
-        return len(shared) + (len(sides) + len(self.b)) * len(self.column)
+        return len(shared) + (len(sides) + len(self.x)) * len(self.column)
 
     def split(self) -> tuple[list[Node], Graph]:
         """What a column reads of the factorization, and the graph of one: inputs p0.., of those, b0..; outputs x0..."""
@@ -79,8 +79,8 @@ def mass_solve(system: System, build: Builder, sides: Rows = ()) -> MassSolve:
 
 def inverse(solve: MassSolve, build: Builder) -> list[list[Node]]:
     """Rows of M^-1: of the symmetric entries those with fewer operations, where the column is of a later coordinate."""
-    n = len(solve.b)
-    columns = solve.solutions([[ONE if i == j else ZERO for i in range(n)] for j in range(n)], build)
+    n = len(solve.x)
+    columns = solve.solutions([[ONE if i == j else ZERO for i in range(len(solve.b))] for j in range(n)], build)
     return [[columns[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
 
 
