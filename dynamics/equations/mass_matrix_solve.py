@@ -7,12 +7,11 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, building, folded, hessian_nodes, ldl_solve, solve_nodes, topological
+from cgraph.extend import Builder, building, cotangents, folded, hessian_nodes, ldl_solve, solve_nodes, topological
 
 from ..systems.system import System
 from .formulations import ONE, ZERO
 
-DENSE_COORDINATES = 40  # beyond, no dense factorization is tried
 DENSE_PATH = 12  # coordinates from the world to a tip; a dense factorization loses digits with about their fourth power
 WORTH = 0.85  # of the nodes by elimination, at most, for the dense one: elimination keeps more digits
 
@@ -68,12 +67,10 @@ def mass_solve(system: System, build: Builder, sides: Rows = ()) -> MassSolve:
     b = cg.variables([f"b{i}#" for i in range(system.n)])
     (lagrangian,) = folded([system.lagrangian], build)
     solved = linear(b, solve_nodes(lagrangian, system.qd, b, build))
-    if system.n <= DENSE_COORDINATES:
-        lower = hessian_nodes(lagrangian, system.qd, build)
-        if max([sum([node.value != 0.0 for node in row[: i + 1]]) for i, row in enumerate(lower)]) <= DENSE_PATH:
-            dense = linear(b, ldl_solve(lower, b, build))
-            if dense.size(sides) < WORTH * solved.size(sides):
-                return dense
+    if _longest_path(lagrangian, system.qd) <= DENSE_PATH:
+        dense = linear(b, ldl_solve(hessian_nodes(lagrangian, system.qd, build), b, build))
+        if dense.size(sides) < WORTH * solved.size(sides):
+            return dense
     return solved
 
 
@@ -82,6 +79,13 @@ def inverse(solve: MassSolve, build: Builder) -> list[list[Node]]:
     n = len(solve.x)
     columns = solve.solutions([[ONE if i == j else ZERO for i in range(len(solve.b))] for j in range(n)], build)
     return [[columns[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
+
+
+def _longest_path(lagrangian: Node, velocities: Sequence[Node]) -> int:
+    """The most velocities that come before one and move with it, itself among them: entries in a lower row of M."""
+    momenta = cotangents({lagrangian: ONE}, velocities)
+    moving = [set(topological([p])) for p in momenta]
+    return max([sum([u in moving[i] for u in velocities[: i + 1]]) for i in range(len(velocities))])
 
 
 def linear(b: list[Node], x: list[Node]) -> MassSolve:
