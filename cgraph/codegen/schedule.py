@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -17,8 +18,18 @@ class Joined(NamedTuple):
     arguments: tuple[Node, ...]
 
 
-def schedule(graph: Graph, calls: Mapping[Node, Joined]) -> list[Node | Joined]:
-    """Every node once, arguments first, and before the results of a joined call the call.
+class Merged(NamedTuple):
+    """What machine code does in one step though the graph has several nodes for it.
+
+    calls: {node: the call that gives it}.  products: {sum or difference: its argument that it multiplies itself}.
+    """
+
+    calls: Mapping[Node, Joined]
+    products: Mapping[Node, Node]
+
+
+def schedule(graph: Graph, merged: Merged) -> list[Node | Joined]:
+    """Every operation once, arguments first, and before the results of a joined call the call.
 
     Calls of library functions come as early as they can, since a call empties the registers and at first there is
     little in them. Else the order is depth first from the outputs, and of a node's arguments the one that needs the
@@ -26,13 +37,14 @@ def schedule(graph: Graph, calls: Mapping[Node, Joined]) -> list[Node | Joined]:
     fewest registers, where nothing is shared).
     """
     registers = _registers(graph)
-    early = [calls.get(node, node) for node in graph.nodes if node.args and node.op.calls_library]
+    early = [merged.calls.get(node, node) for node in graph.nodes if node.args and node.op.calls_library]
     order: list[Node | Joined] = []
     done: set[Node | Joined] = set()
-    stack: list[Node | Joined] = [*reversed(graph.outputs.values()), *reversed(early)]
+    results = [node for node in graph.outputs.values() if node.args]
+    stack: list[Node | Joined] = [*reversed(results), *reversed(early)]
     while stack:
         step = stack[-1]
-        missing = [each for each in reversed(needed(step, calls)) if each not in done]
+        missing = [each for each in reversed(needed(step, merged)) if each not in done and not _leaf(each)]
         if missing and step not in done:
             stack += sorted(missing, key=registers.__getitem__) if len(missing) > 1 else missing
             continue
@@ -43,11 +55,35 @@ def schedule(graph: Graph, calls: Mapping[Node, Joined]) -> list[Node | Joined]:
     return order
 
 
-def needed(step: Node | Joined, calls: Mapping[Node, Joined]) -> tuple[Node | Joined, ...]:
-    """What a step reads: arguments, or the joined call that gives the node."""
+def _leaf(step: Node | Joined) -> bool:
+    return isinstance(step, Node) and not step.args
+
+
+def needed(step: Node | Joined, merged: Merged) -> tuple[Node | Joined, ...]:
+    """What a step reads: arguments, or the joined call that gives the node; of a product that it takes in, the factors.
+
+    In their place, as in a * b + c and in c - a * b.
+    """
     if isinstance(step, Joined):
         return step.arguments
-    return (calls[step],) if step in calls else step.args
+    if step in merged.calls:
+        return (merged.calls[step],)
+    if (product := merged.products.get(step)) is not None:
+        first, second = step.args
+        return (*product.args, second) if first is product else (first, *product.args)
+    return step.args
+
+
+def products_of(graph: Graph) -> dict[Node, Node]:
+    """{sum or difference: its argument, a product that nothing else needs}, the first where both are; rounded once."""
+    users = Counter([arg for node in graph.nodes for arg in node.args] + list(graph.outputs.values()))
+    return {
+        node: product
+        for node in graph.nodes
+        if node.op.name in ("add", "sub")
+        for product in [next((arg for arg in node.args if arg.op.name == "mul" and users[arg] == 1), None)]
+        if product is not None
+    }
 
 
 def _registers(graph: Graph) -> dict[Node | Joined, int]:

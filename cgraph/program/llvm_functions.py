@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
-from ..codegen.llvm_ir import Address, Arithmetic, Body, body, libm_functions
+from ..codegen.arithmetic import Arithmetic
+from ..codegen.llvm_ir import Address, Body, body, libm_functions
 from ..core.graph import Graph
 from .lu_solve import factor_text, solve_text
 
@@ -60,7 +61,7 @@ class Functions:
 
     def _map_in_vectors(self, graph: Graph, inputs: Lengths, count: int) -> Callable[[], list[str]]:
         """As `map`, a vector of elements at a time; results beyond the last element go to the register's padding."""
-        arithmetic = Arithmetic(self.arithmetic.flags, self.width)
+        arithmetic = self.arithmetic._replace(lanes=self.width, together=1)
         t, scalars = arithmetic.type, [k for k, length in enumerate(inputs) if length != count]
 
         def address(base: str, name: str, row: int) -> list[str]:
@@ -120,7 +121,7 @@ class Functions:
     def _body(self, graph: Graph, arithmetic: Arithmetic, address: Address, scope: Sequence[str]) -> Body:
         """The body of the function that is being defined, those that it calls defined before."""
         written = body(graph, arithmetic, address, next(reversed(self._names.values())), scope)
-        self.definitions += written.functions
+        self.definitions += written.definitions
         return written
 
     def _define(
