@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import threading
 from collections.abc import Callable
-from functools import partial
 from struct import Struct
 from typing import Any
 
@@ -16,6 +15,7 @@ from ..core.evaluate import Array
 from ..core.graph import Graph
 from . import llvm_engine as llvm
 from .batch_ir import Batch, batch_ir
+from .bound_call import bound_call
 from .compiled import Compiled
 from .disk_cache import open_cache
 from .llvm_ir import libm_functions, scalar_ir
@@ -91,7 +91,7 @@ class Native(Compiled):
             return x.data, y, y.data, self._bound(x, y)
 
     def _bound(self, x: Array, y: Array) -> Callable[[], None]:
-        return partial(self._entry, x.ctypes.data_as(ctypes.c_void_p), y.ctypes.data_as(ctypes.c_void_p))
+        return bound_call(self._entry, x, y)
 
     def _columns(self) -> tuple[int, Callable[[Array, Array], None]]:
         lanes = self._host.lanes
