@@ -10,7 +10,7 @@ from ..core.node import CONSTANT, OPS, Node
 from .arithmetic import REGISTERS, Arithmetic, words_of
 from .constants import Constants
 from .parts import Parts, Step
-from .schedule import Joined, Merged, joined_calls, needed, products_of, schedule
+from .schedule import Joined, Merged, joined_calls, products_of, schedule
 from .vector_math import helpers
 
 TOGETHER = 4  # arguments in a joined call at one point: a vector of them is one register or two on every processor
@@ -137,14 +137,14 @@ def instructions(graph: Graph, arithmetic: Arithmetic, address: Address, name: s
             yield from [*address("y", f"%y{row}", row), f"  store {t} {r}, ptr %y{row}, align 8"]
 
     merged = Merged(_joined_calls(graph, arithmetic), products_of(graph) if arithmetic.fuses else {})
-    steps = list(_results_behind_calls(schedule(graph, merged), merged.calls))
-    parts = Parts(steps, merged, t, 8 * arithmetic.lanes, arithmetic.registers, leaf)
+    steps = _results_behind_calls(schedule(graph, merged), merged.calls)
+    parts = Parts(steps, merged.calls, t, 8 * arithmetic.lanes, arithmetic.registers, leaf)
     written: list[list[str]] = [[]]
-    for number, step in enumerate(steps):
+    for number, (step, reads) in enumerate(steps.items()):
         if number in parts.starts:
             written[-1] += parts.forget()
             written.append([])
-        args, lines = parts.read(number, needed(step, merged))
+        args, lines = parts.read(reads)
         if isinstance(step, Joined) or (step not in merged.calls and step.op.calls_library):
             lines += parts.forget()
         r, more = _step(step, f"%v{number}", args, merged, arithmetic)
@@ -182,16 +182,20 @@ def _product_and_sum(node: Node, product: Node, r: str, args: list[str], arithme
     return [*lines, f"  {r} = call {t} @llvm.fmuladd.{arithmetic.suffix}({t} {a}, {t} {b}, {t} {c})"]
 
 
-def _results_behind_calls(steps: Sequence[Node | Joined], calls: Mapping[Node, Joined]) -> Iterator[Node | Joined]:
+def _results_behind_calls(
+    steps: Mapping[Step, tuple[Step, ...]], calls: Mapping[Node, Joined]
+) -> dict[Step, tuple[Step, ...]]:
     """The steps, the nodes that a joined call gives right behind it."""
     results: dict[Joined, list[Node]] = {}
     for node, call in calls.items():
         results.setdefault(call, []).append(node)
-    for step in steps:
+    order: dict[Step, tuple[Step, ...]] = {}
+    for step, reads in steps.items():
         if step not in calls:
-            yield step
+            order[step] = reads
         if isinstance(step, Joined):
-            yield from results[step]
+            order |= dict.fromkeys(results[step], (step,))
+    return order
 
 
 def _vector(arithmetic: Arithmetic) -> Arithmetic:

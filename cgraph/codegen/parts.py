@@ -7,12 +7,11 @@ the processor has registers: others wait in memory, those that are needed last (
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from heapq import heappop, heappush
 
 from ..core.node import Node
-from .schedule import Joined, Merged, needed
+from .schedule import Joined
 
 STEPS = 400  # in a function
 Step = Node | Joined
@@ -21,9 +20,9 @@ Step = Node | Joined
 class Parts:
     """The names of values while the steps are written in order.
 
-    steps: what is computed.  merged: what is one step of several nodes.  kind, size: of a value, in LLVM's language and
-    in bytes.  registers: how many values have names at once.  leaf: (a constant or an input, name) -> its name and the
-    lines that make it so.
+    steps: what is computed, and what that reads.  calls: {node: the joined call that gives it}.  kind, size: of a
+    value, in LLVM's language and in bytes.  registers: how many values have names at once.  leaf: (a constant or an
+    input, name) -> its name and the lines that make it so.
 
     starts: the numbers of the steps with which a part begins, without the first.  places: how many values the memory
     %w has to hold; one that nothing needs any more leaves its place to others.
@@ -31,20 +30,20 @@ class Parts:
 
     def __init__(
         self,
-        steps: Sequence[Step],
-        merged: Merged,
+        steps: Mapping[Step, tuple[Step, ...]],
+        calls: Mapping[Node, Joined],
         kind: str,
         size: int,
         registers: int,
         leaf: Callable[[Node, str], tuple[str, list[str]]],
     ) -> None:
         self.kind, self.size, self.places = kind, size, 0
-        self._merged, self._leaf, self._registers = merged, leaf, registers
-        self.starts = _starts(steps, merged)
-        self._uses: dict[Step, deque[int]] = {}  # numbers of the steps that will need a value
-        for number, step in enumerate(steps):
-            for arg in dict.fromkeys(needed(step, merged)):
-                self._uses.setdefault(arg, deque()).append(number)
+        self._leaf, self._registers = leaf, registers
+        self.starts = _starts(steps, calls)
+        self._uses: dict[Step, list[int]] = {}  # numbers of the steps that will need a value, the next one last
+        for number, reads in zip(range(len(steps) - 1, -1, -1), reversed(list(steps.values())), strict=True):
+            for arg in reads:
+                self._uses.setdefault(arg, []).append(number)
         self._names: dict[Step, str] = {}
         self._latest: list[tuple[int, int, Step]] = []  # heap by the next use, latest first; some outdated
         self._slots: dict[Step, int] = {}
@@ -57,19 +56,19 @@ class Parts:
         self._names, self._latest = {}, []
         return lines
 
-    def read(self, number: int, steps: Sequence[Step]) -> tuple[list[str], list[str]]:
-        """The names of values for step `number`, and the lines that bring them from memory."""
+    def read(self, steps: Sequence[Step]) -> tuple[list[str], list[str]]:
+        """The names of values for the next step, and the lines that bring them from memory."""
         lines: list[str] = []
         names = []
         for step in steps:
-            if step not in self._names:
-                self._names[step], more = self._fetch(step)
+            name = self._names.get(step)
+            if name is None:
+                name, more = self._fetch(step)
+                self._names[step] = name
                 lines += more
-            names.append(self._names[step])
-        for step in dict.fromkeys(steps):
-            uses = self._uses.get(step)
-            if uses and uses[0] == number:
-                uses.popleft()
+            names.append(name)
+            self._uses[step].pop()
+        for step in steps:
             self._used(step)
         return names, lines
 
@@ -80,7 +79,7 @@ class Parts:
         lines: list[str] = []
         while len(self._names) > self._registers:
             next_use, _, latest = heappop(self._latest)
-            if latest in self._names and self._uses[latest][0] == -next_use:
+            if latest in self._names and self._uses[latest][-1] == -next_use:
                 lines += self._keep(latest)
                 del self._names[latest]
         return lines
@@ -89,9 +88,9 @@ class Parts:
         """Its next use is another one; after the last one it goes."""
         if uses := self._uses.get(step):
             self._count += 1
-            heappush(self._latest, (-uses[0], self._count, step))
+            heappush(self._latest, (-uses[-1], self._count, step))
             return
-        del self._names[step]
+        self._names.pop(step, None)
         if step in self._slots:
             self._free.append(self._slots.pop(step))
 
@@ -121,12 +120,12 @@ class Parts:
         return [f"  {name}.at = getelementptr {self.kind}, ptr %w, i64 {self._slots[step]}"]
 
 
-def _starts(steps: Iterable[Step], merged: Merged) -> set[int]:
+def _starts(steps: Iterable[Step], calls: Mapping[Node, Joined]) -> set[int]:
     """Where parts begin, without the first."""
     starts: set[int] = set()
     begin = 0
     for number, step in enumerate(steps):
-        if number - begin >= STEPS and step not in merged.calls:  # the results of a joined call stay in its part
+        if number - begin >= STEPS and step not in calls:  # the results of a joined call stay in its part
             starts.add(number)
             begin = number
     return starts

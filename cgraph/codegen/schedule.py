@@ -28,8 +28,8 @@ class Merged(NamedTuple):
     products: Mapping[Node, Node]
 
 
-def schedule(graph: Graph, merged: Merged) -> list[Node | Joined]:
-    """Every operation once, arguments first, and before the results of a joined call the call.
+def schedule(graph: Graph, merged: Merged) -> dict[Node | Joined, tuple[Node | Joined, ...]]:
+    """Every operation once and what it reads, arguments first, and before the results of a joined call the call.
 
     Calls of library functions come as early as they can, since a call empties the registers and at first there is
     little in them. Else the order is depth first from the outputs, and of a node's arguments the one that needs the
@@ -38,20 +38,24 @@ def schedule(graph: Graph, merged: Merged) -> list[Node | Joined]:
     """
     registers = _registers(graph)
     early = [merged.calls.get(node, node) for node in graph.nodes if node.args and node.op.calls_library]
-    order: list[Node | Joined] = []
-    done: set[Node | Joined] = set()
+    order: dict[Node | Joined, tuple[Node | Joined, ...]] = {}
+    waiting: dict[Node | Joined, tuple[Node | Joined, ...]] = {}
     results = [node for node in graph.outputs.values() if node.args]
     stack: list[Node | Joined] = [*reversed(results), *reversed(early)]
     while stack:
         step = stack[-1]
-        missing = [each for each in reversed(needed(step, merged)) if each not in done and not _leaf(each)]
-        if missing and step not in done:
-            stack += sorted(missing, key=registers.__getitem__) if len(missing) > 1 else missing
+        if step in order:
+            stack.pop()
             continue
-        stack.pop()
-        if step not in done:
-            done.add(step)
-            order.append(step)
+        if step in waiting:  # all that it reads is there
+            stack.pop()
+            order[step] = waiting.pop(step)
+            continue
+        reads = waiting[step] = needed(step, merged)
+        missing = [each for each in reversed(reads) if each not in order and not _leaf(each)]
+        if len(missing) > 1:
+            missing.sort(key=registers.__getitem__)
+        stack += missing
     return order
 
 
@@ -90,9 +94,16 @@ def _registers(graph: Graph) -> dict[Node | Joined, int]:
     """Registers to compute a node with, were it a tree; a constant needs none."""
     registers: dict[Node | Joined, int] = {}
     for node in graph.nodes:
-        below = sorted([registers[arg] for arg in dict.fromkeys(node.args)], reverse=True)
-        alone = 1 if node.value is None else 0
-        registers[node] = max([alone, *[count + kept for kept, count in enumerate(below)]])
+        below = [registers[arg] for arg in node.args]
+        if len(below) == 2:
+            first, second = below
+            same = first == second and node.args[0] is not node.args[1]
+            registers[node] = max(1, first + 1 if same else max(below))
+        elif below:
+            below = sorted([registers[arg] for arg in dict.fromkeys(node.args)], reverse=True)
+            registers[node] = max([1, *[count + kept for kept, count in enumerate(below)]])
+        else:
+            registers[node] = 1 if node.value is None else 0
     return registers
 
 
