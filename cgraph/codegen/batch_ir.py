@@ -1,7 +1,8 @@
-"""LLVM's text for a batch: the graph on one vector of columns after another, in memory that stays in the cache.
+"""LLVM's text for a batch: the graph on one vector of columns after another.
 
 Rows of a large batch lie far apart, each in a page of memory of its own, often by a power of two, where few of them fit
-in a cache at once. So the inputs of some vectors, a tile, are brought together at a time, and results go out together.
+in a cache at once. So where there are many rows, the inputs of some vectors, a tile, are brought together at a time,
+and results go out together.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from .llvm_ir import instructions, preamble
 
 MEMORY = 2**18  # bytes for inputs and outputs of a tile: a part of a core's second cache
 VECTORS = 16  # in a tile, at most
+FEW = 48  # inputs and outputs that a cache holds wherever they lie
 
 
 class Batch(NamedTuple):
@@ -32,15 +34,22 @@ def batch_ir(graph: Graph, lanes: int, flags: str = "", registers: int = REGISTE
     arithmetic = Arithmetic(flags, lanes, registers)
     n_in, n_out = len(graph.inputs), len(graph.outputs)
 
+    tiled = n_in + n_out > FEW
+
     def address(base: str, name: str, row: int) -> list[str]:
-        return [f"  {name} = getelementptr {arithmetic.type}, ptr %{base}, i64 {row}"]
+        if tiled:
+            return [f"  {name} = getelementptr {arithmetic.type}, ptr %{base}, i64 {row}"]
+        return [
+            f"  {name}.row = mul i64 %d{base}, {row}",
+            f"  {name} = getelementptr double, ptr %{base}, i64 {name}.row",
+        ]
 
     code = instructions(graph, arithmetic, address, "batch")
     lines = [*preamble([graph], arithmetic), *code.definitions]
     for number, part in enumerate(code.parts):
         lines += [_PART.format(number=number, bytes=8 * lanes), *code.start, *part, "  ret void", "}"]
-    vectors = max(1, min(VECTORS, MEMORY // (8 * lanes * max(1, n_in + n_out))))
-    text = _BATCH.format(
+    vectors = max(1, min(VECTORS, MEMORY // (8 * lanes * max(1, n_in + n_out)))) if tiled else 0
+    text = (_TILED if tiled else _DIRECT).format(
         t=arithmetic.type,
         lanes=lanes,
         columns=vectors * lanes,
@@ -56,13 +65,30 @@ def batch_ir(graph: Graph, lanes: int, flags: str = "", registers: int = REGISTE
 
 
 _PART = """\
-define internal void @part{number}(ptr noalias %x, ptr noalias %y, ptr noalias %w)
+define internal void @part{number}(ptr noalias %x, ptr noalias %y, i64 %dx, i64 %dy, ptr noalias %w)
     nounwind noinline alignstack({bytes}) {{
 start:"""
-_CALL = "  call void @part{number}(ptr %point, ptr %result, ptr %w)"
+_CALL = "  call void @part{number}(ptr %x.at, ptr %y.at, i64 %dx, i64 %dy, ptr %w)"
+
+_DIRECT = """\
+define void @batch(ptr noalias %x, ptr noalias %y, i64 %n, i64 %dx, i64 %dy, ptr noalias %w) nounwind {{
+start:
+  br label %vector
+vector:
+  %i = phi i64 [ 0, %start ], [ %next, %vector ]
+  %x.at = getelementptr double, ptr %x, i64 %i
+  %y.at = getelementptr double, ptr %y, i64 %i
+{parts}
+  %next = add i64 %i, {lanes}
+  %more = icmp slt i64 %next, %n
+  br i1 %more, label %vector, label %end
+end:
+  ret void
+}}
+"""
 
 # copy: to[row * to.row + k * to.vector] = from[row * from.row + k * from.vector], a vector each, for k < count
-_BATCH = """\
+_TILED = """\
 define void @batch(ptr noalias %x, ptr noalias %y, i64 %n, i64 %dx, i64 %dy, ptr noalias %w) nounwind {{
 start:
   %points = getelementptr {t}, ptr %w, i64 {places}
@@ -75,22 +101,22 @@ tile:
   %whole = icmp sge i64 %left, {columns}
   %here = select i1 %whole, i64 {columns}, i64 %left
   %count = udiv i64 %here, {lanes}
-  %x.at = getelementptr double, ptr %x, i64 %i
-  %y.at = getelementptr double, ptr %y, i64 %i
-  call void @copy(ptr %x.at, ptr %points, i64 {n_in}, i64 %count, i64 %dx, i64 {lanes}, i64 {lanes}, i64 {x_vector})
+  %x.tile = getelementptr double, ptr %x, i64 %i
+  %y.tile = getelementptr double, ptr %y, i64 %i
+  call void @copy(ptr %x.tile, ptr %points, i64 {n_in}, i64 %count, i64 %dx, i64 {lanes}, i64 {lanes}, i64 {x_vector})
   br label %vector
 vector:
   %k = phi i64 [ 0, %tile ], [ %k.next, %vector ]
   %x.row = mul i64 %k, {n_in}
   %y.row = mul i64 %k, {n_out}
-  %point = getelementptr {t}, ptr %points, i64 %x.row
-  %result = getelementptr {t}, ptr %results, i64 %y.row
+  %x.at = getelementptr {t}, ptr %points, i64 %x.row
+  %y.at = getelementptr {t}, ptr %results, i64 %y.row
 {parts}
   %k.next = add i64 %k, 1
   %k.more = icmp slt i64 %k.next, %count
   br i1 %k.more, label %vector, label %end.tile
 end.tile:
-  call void @copy(ptr %results, ptr %y.at, i64 {n_out}, i64 %count, i64 {lanes}, i64 {y_vector}, i64 %dy, i64 {lanes})
+  call void @copy(ptr %results, ptr %y.tile, i64 {n_out}, i64 %count, i64 {lanes}, i64 {y_vector}, i64 %dy, i64 {lanes})
   %more = icmp slt i64 %next, %n
   br i1 %more, label %tile, label %end
 end:

@@ -162,11 +162,13 @@ def test_the_bits_do_not_depend_on_how_code_is_divided_and_optimized(monkeypatch
     whole, function = results()
     assert "@part1" not in function.batch_source()
     assert "@point.part1" not in function.source
-    settings = {"steps": (parts, "STEPS", 7), "level": (llvm_engine, "QUICK", 3), "tile": (batch_ir, "VECTORS", 2)}
-    settings["small tile"] = batch_ir, "MEMORY", 1
+    settings = {"steps": (parts, "STEPS", 7), "level": (llvm_engine, "QUICK", 3), "tiles": (batch_ir, "FEW", -1)}
+    settings["tiles of two"] = batch_ir, "VECTORS", 2
     for name, (module, setting, value) in settings.items():
         with monkeypatch.context() as patch:
             patch.setattr(module, setting, value)
+            if name == "tiles of two":
+                patch.setattr(batch_ir, "FEW", -1)
             other, function = results()
             assert all(map(same, other, whole)), name
             assert name != "steps" or ("@part1" in function.batch_source() and "@point.part1" in function.source)
