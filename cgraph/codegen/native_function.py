@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from ..core.evaluate import Array
 from ..core.graph import Graph
+from ..util.garbage import without_collection
 from . import llvm_engine as llvm
 from .batch_ir import Batch, batch_ir
 from .bound_call import bound_call
@@ -44,7 +45,8 @@ class Native(Compiled):
         self._flags = flags_of(options["fast"], options["fma"])
         self._cache = open_cache(options["cache"])
         self._host = llvm.host()
-        self.source = scalar_ir(graph, self._flags, self._host.registers)
+        with without_collection():
+            self.source = scalar_ir(graph, self._flags, self._host.registers)
         self._entry = self._compiled(self.source, "point", _POINT)
         self._free: list[_Buffers] = []  # pop and append are atomic: no lock, and a call inside a call is safe
         self._pack, self._unpack = Struct(f"{self.n_in}d").pack_into, Struct(f"{self.n_out}d").unpack_from
@@ -80,7 +82,8 @@ class Native(Compiled):
         return self._batch_text().source
 
     def _batch_text(self) -> Batch:
-        return batch_ir(self.graph, self._host.lanes, self._flags, self._host.registers)
+        with without_collection():
+            return batch_ir(self.graph, self._host.lanes, self._flags, self._host.registers)
 
     def _take(self) -> _Buffers:
         """Where one call at a time puts its point and finds its result."""
