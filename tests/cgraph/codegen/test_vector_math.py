@@ -272,7 +272,7 @@ def test_a_call_waits_for_the_calls_that_its_arguments_need():
     assert cg.compile(graph, "llvm")([0.3, 1.2, 0.7]) == pytest.approx(list(expected.values()), rel=SHORT_SUM)
 
 
-def test_the_argument_that_needs_more_registers_is_computed_first():
+def test_the_deeper_argument_is_computed_first():
     a, b, c, d, e = cg.variables("a b c d e")
     wide, narrow = (a * b) / (c * d), -e
     for y in (narrow + wide, wide + narrow):
