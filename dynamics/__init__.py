@@ -43,6 +43,9 @@ from .reference import Reference, reference
 from .scenes.scenes import Scene
 from .simulation.ensembles import Ensemble, EnsembleStats, simulate_many
 from .simulation.event import Event
+from .simulation.gradients.gradient import MotionGradient, gradient
+from .simulation.gradients.motion import MotionError
+from .simulation.gradients.sensitivities import Sensitivities, sensitivities
 from .simulation.sampled_controller import HeldForces, SampledController
 from .simulation.simulate import simulate
 from .simulation.trajectory import Crossings, SimulationWarning, Stats, Trajectory
@@ -80,6 +83,8 @@ __all__ = [
     "Mechanism",
     "MechanismError",
     "MechanismWarning",
+    "MotionError",
+    "MotionGradient",
     "OdeSystem",
     "OmittedTerm",
     "PruneResult",
@@ -89,6 +94,7 @@ __all__ = [
     "Released",
     "SampledController",
     "Scene",
+    "Sensitivities",
     "SimulationWarning",
     "SingularMassMatrixError",
     "Stats",
@@ -115,6 +121,7 @@ __all__ = [
     "frame_jacobian_rate",
     "frame_placement",
     "frame_velocity",
+    "gradient",
     "gravity_force",
     "inertial_parameters",
     "integrable_rows",
@@ -134,6 +141,7 @@ __all__ = [
     "regressor",
     "release",
     "scenes",
+    "sensitivities",
     "serial_arm",
     "simulate",
     "simulate_many",

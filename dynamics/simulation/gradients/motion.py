@@ -1,0 +1,162 @@
+"""Motion: what gradients and sensitivities are of, the problem, its start, its steps and what to differentiate by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cgraph import Node
+from cgraph.extend import Array, real_array, require_sequence
+
+from ...equations.initial_value import initial_value
+from ...equations.state_equation import state_inputs
+from ...integrators import METHODS, Method, Problem, derive
+from ...systems.model import Model, as_ode, as_system
+from ..applied_forces import with_applied
+from ..equal_steps import step_count
+from ..run_options import RunOptions, time_span
+from ..sampled_controller import SampledController
+from ..simulate import simulate
+from ..trajectory import Trajectory
+
+START, VELOCITY, TORQUE = "q", "qd", "tau"
+
+
+class MotionError(ValueError):
+    """A motion that has no derivatives: it does not reach its end, or its equations were not solved.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> runaway = dyn.OdeSystem(lambda x, t: [x[0] * x[0]], ["x"])
+    >>> dyn.gradient(runaway, lambda x, t: x[0], [1.0], None, t_end=2.0)
+    Traceback (most recent call last):
+    dynamics.simulation.gradients.motion.MotionError: the motion does not stay finite: shorter steps may help
+    """
+
+
+@dataclass(frozen=True, eq=False)
+class MotionOf:
+    """A motion, whose steps are chosen.
+
+    x: (m,), where it starts.
+    t, h: (steps + 1,), where the steps begin and the last one ends, and (steps,), their lengths.
+    tau: (steps, n) of forces that change with the steps, else (n,) those that stay.
+    values: of the parameters that stay inputs.  wrt: names.  applied: the whole applied force as nodes.
+    """
+
+    problem: Problem
+    method: Method
+    x: Array
+    t: Array
+    h: Array
+    tau: Array
+    values: Array
+    wrt: tuple[str, ...]
+    applied: Sequence[Node] | None
+
+    @property
+    def each_step(self) -> bool:
+        """Whether the applied force changes with the steps."""
+        return self.tau.ndim == 2
+
+    @property
+    def forces(self) -> int:
+        """How many applied forces are inputs."""
+        return int(self.tau.shape[-1])
+
+
+def motion_of(
+    model: Model,
+    q: ArrayLike,
+    qd: ArrayLike | None,
+    span: tuple[float | None, float, ArrayLike | None],
+    method: str,
+    tau: Any,
+    parameters: Mapping[str, float] | None,
+    wrt: str | Iterable[str] | None,
+    options: Mapping[str, Any],
+) -> MotionOf:
+    """The motion of checked arguments.  span: t_end, t0, t_span.  options: those of `simulate` besides.
+
+    Raises TypeError or ValueError naming the argument, and MotionError for a motion that does not reach its end.
+    """
+    if isinstance(tau, SampledController):
+        raise TypeError(
+            "tau must be numbers or a controller in closed form: a SampledController calls Python, which has no "
+            "derivative"
+        )
+    t0, t_end = time_span(span[0], span[1], span[2])
+    rows = None if callable(tau) else _rows(model, tau)
+    run = RunOptions(t_end, method, t0=t0, **options)
+    if run.scipy_solver is not None or METHODS[method].step is None:
+        names = ", ".join([name for name, each in METHODS.items() if each.step is not None])
+        raise ValueError(f"motions by method {method!r} have no derivatives here; those by {names} have")
+    moving, applied = with_applied(model, 0.0 if rows is not None else tau, parameters)
+    start = initial_value(moving, q, qd, applied.constant, parameters, t0)
+    run.check(start.states)
+    chosen = _wrt(moving, wrt, closed=callable(tau))
+    inputs = state_inputs(moving).applied if rows is not None or TORQUE in chosen else ()
+    free = {*inputs, *chosen}
+    problem = derive(moving, {name: value for name, value in start.bound.items() if name not in free})
+    if run.adaptive:
+        if rows is not None:
+            raise ValueError(f"tau of shape {rows.shape} is one row a step, which needs equal steps: method {method!r}")
+        t, h = _accepted(simulate(model, q, qd, t_end, method, t0=t0, tau=tau, parameters=parameters, **options))
+    else:
+        t, h = _equal(run, None if rows is None else len(rows))
+    constant = np.array([start.bound[name] for name in inputs])
+    values = np.array([start.bound[name] for name in problem.parameters if name not in inputs])
+    forces = constant if rows is None else rows
+    return MotionOf(problem, METHODS[method], start.x, t, h, forces, values, chosen, applied.nodes)
+
+
+def _rows(model: Model, tau: Any) -> Array | None:
+    """tau where it is one row a step, (steps, n)."""
+    if np.ndim(tau) != 2:
+        return None
+    rows = real_array("tau", tau)
+    n = 0 if as_ode(model) is not None else as_system(model).n
+    if not n or rows.shape[1] != n or not len(rows):
+        raise ValueError(f"tau must have shape (n,) or (steps, n) with n = {n} velocities, got {rows.shape}")
+    if not np.isfinite(rows).all():
+        raise ValueError("tau must be finite")
+    return rows
+
+
+def _wrt(model: Model, wrt: str | Iterable[str] | None, *, closed: bool) -> tuple[str, ...]:
+    """What to differentiate by. By default the start, and the applied force where it is numbers."""
+    ode, inputs = as_ode(model) is not None, state_inputs(model)
+    usual = [START] if ode else [START, VELOCITY] if closed else [START, VELOCITY, TORQUE]
+    if wrt is None:
+        return tuple(usual)
+    names = [wrt] if isinstance(wrt, str) else require_sequence("wrt", wrt, "names")
+    known = [*usual, *inputs.parameters]
+    for name in names:
+        if not isinstance(name, str) or name not in known:
+            raise ValueError(f"wrt must be among {', '.join(known)}, got {name!r:.60}")
+    if clash := [name for name in names if name in usual and name in inputs.parameters]:
+        raise ValueError(f"wrt {clash[0]!r} is the start or the applied force, and a parameter: rename the parameter")
+    if not names:
+        raise ValueError(f"wrt needs at least one of {', '.join(known)}")
+    return tuple(dict.fromkeys(names))
+
+
+def _equal(run: RunOptions, rows: int | None) -> tuple[Array, Array]:
+    """Times (steps + 1,) and lengths of equal steps; of so many where rows say it."""
+    count = step_count(run.length, run.step) if rows is None or run.dt is not None else rows
+    if rows is not None and rows != count:
+        raise ValueError(f"tau has {rows} rows, and there are {count} steps of dt = {run.step:g} s: leave out dt")
+    h = (run.t_end - run.t0) / count
+    return np.append(run.t0 + np.arange(count) * h, run.t_end), np.full(count, h)
+
+
+def _accepted(run: Trajectory) -> tuple[Array, Array]:
+    """Times (steps + 1,) and lengths of the accepted steps of a run."""
+    if not run.stats.success:
+        raise MotionError(f"the motion did not reach t_end, {run.stats.message}")
+    return run.t, np.diff(run.t)
