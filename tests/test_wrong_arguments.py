@@ -167,7 +167,7 @@ CALLS = {
     "dyn.gradient": call(
         dyn.gradient, ARM, lambda q, qd, t: q[0], [0.1], [0.0], 0.02, "rk4", running=lambda q, qd, tau, t: q[0],
         wrt=["q"], t0=0.0, t_span=None, dt=0.01, max_step=None, rtol=None, atol=None, first_step=None, tau=[0.0],
-        parameters=None, backend="python"
+        parameters=None, events=(), backend="python"
     ),
     "dyn.sensitivities": call(
         dyn.sensitivities, ARM, [0.1], [0.0], 0.02, "rk4", wrt=["q"], t0=0.0, t_span=None, dt=0.01, max_step=None,

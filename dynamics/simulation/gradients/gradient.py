@@ -16,10 +16,11 @@ from cgraph.extend import Array, Builder
 from ...integrators import Problem, quantity, quantity_inputs
 from ...systems.model import Model
 from ..applied_forces import Constant
+from ..event import Event, as_events
+from ..event_program import event_program
+from .legs import Bars, Legs, point, pulled_at
 from .motion import START, TORQUE, VELOCITY, MotionOf, motion_of
 from .motion_programs import Request, motion_programs, request_key
-from .motion_run import MotionRun
-from .motion_steps import LOSS
 
 Loss = Callable[..., Node]
 
@@ -83,6 +84,7 @@ def gradient(
     first_step: float | None = None,
     tau: Constant | ArrayLike | Callable[..., Sequence[Node | float]] = 0.0,
     parameters: Mapping[str, float] | None = None,
+    events: Event | Iterable[Event] = (),
     backend: str = "auto",
 ) -> MotionGradient:
     """A loss of a motion and its gradient, by reverse mode through every step, in a few times the motion itself.
@@ -114,6 +116,9 @@ def gradient(
         are; or a controller in closed form, as for `simulate`, whose parameters may be in `wrt`.
     parameters : mapping, optional
         {name: value} in place of the model's own, and of those that a controller has besides.
+    events : Event or iterable of Event
+        Those of `simulate`: where one ends the motion or resets its state depends on all before, and so do the steps
+        after it. Not with a row of forces a step.
 
     Returns
     -------
@@ -141,7 +146,8 @@ def gradient(
     (-0.403412, [-0.880376], (100, 1))
     """
     options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
-    motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options)
+    watched = as_events(events)
+    motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, watched)
     problem = motion.problem
     if loss is None and running is None:
         raise ValueError("a loss is needed: of the end of the motion, `loss`, of how it goes, `running`, or both")
@@ -149,56 +155,55 @@ def gradient(
     total = None if running is None else _graph(problem, quantity(problem, "running", running, motion.applied))
     by = [TORQUE] if TORQUE in motion.wrt else []
     by += ["p"] if len(motion.values) else []
-    key = request_key(total)
+    by += ["t", "h"] if watched else []
     request = Request(
-        problem, motion.method, motion.forces, motion.each_step, tuple(by), forwards=False, backend=backend, key=key,
+        problem,
+        motion.method,
+        motion.forces,
+        motion.each_step,
+        tuple(by),
+        forwards=False,
+        backend=backend,
+        key=request_key(total),
         running=total,
-    )  # fmt: skip
-    run = MotionRun(motion, motion_programs(request))
-    value, seeds, direct = _final(final, motion, run.x)
-    bars, rows = run.pulled({"x": seeds, LOSS: 1.0})
-    gradients = _gradients(motion, bars, rows, direct)
-    end = run.x
-    return MotionGradient(value + run.loss, gradients, motion.t, end[: problem.nq], end[problem.nq :], run.checkpoints)
+    )
+    program = event_program(problem, watched)
+    legs = Legs(motion, motion_programs(request), {event.name: event for event in program.events})
+    value, end = _final(final, motion, legs)
+    start, inputs, rows = legs.pulled(end)
+    gradients = _gradients(motion, start, inputs, rows, end)
+    nq, checkpoints = problem.nq, max([run.checkpoints for run in legs.runs])
+    return MotionGradient(value + legs.loss, gradients, legs.t, legs.x[:nq], legs.x[nq:], checkpoints)
 
 
 def _graph(problem: Problem, node: Node) -> Graph:
     return problem.bind(problem.states, Graph(quantity_inputs(problem), {"loss": node}))
 
 
-def _final(graph: Graph | None, motion: MotionOf, x: Array) -> tuple[float, Array, dict[str, float]]:
-    """The final loss, its slope in x, (m,), and in the parameters that stay inputs."""
-    problem = motion.problem
+def _final(graph: Graph | None, motion: MotionOf, legs: Legs) -> tuple[float, Bars]:
+    """The final loss, and its slopes."""
+    t = float(legs.t[-1])
     if graph is None:
-        return 0.0, np.zeros(problem.size), {}
-    tau = motion.tau[-1] if motion.each_step else motion.tau
-    point = dict(
-        zip(graph.input_names, [*x.tolist(), float(motion.t[-1]), *tau.tolist(), *motion.values.tolist()], strict=True)
-    )
-    slopes = cg.gradient(graph).evaluate(point)
-    by = dict(zip(graph.input_names, np.array(list(slopes.values()), dtype=np.float64), strict=True))
-    seeds = np.array([by[name] for name in problem.states])
-    return float(graph.evaluate(point)["loss"]), seeds, {name: by[name] for name in problem.parameters}
+        return 0.0, Bars(np.zeros(len(legs.x)), 0.0, np.zeros(len(motion.problem.parameters)))
+    value = float(graph.evaluate(point(graph, motion, legs.x, t))["loss"])
+    return value, pulled_at(graph, motion, legs.x, t, [1.0])
 
 
-def _gradients(motion: MotionOf, bars: Mapping[str, Array], rows: Array, direct: Mapping[str, float]) -> dict[str, Any]:
-    """By the names of `wrt`: cotangents of the start and of the inputs, and what the final loss has of them itself."""
+def _gradients(motion: MotionOf, start: Array, inputs: Array, rows: Array, end: Bars) -> dict[str, Any]:
+    """By the names of `wrt`, from the cotangents of the start, of the inputs, and of the forces of each step."""
     problem = motion.problem
-    nq, applied = problem.nq, problem.parameters[: motion.forces]
-    names = problem.parameters[motion.forces :]
+    nq, forces, names = problem.nq, motion.forces, list(problem.parameters)
     result: dict[str, Any] = {}
     for name in motion.wrt:
         if name == START:
-            result[name] = _displaced(problem, motion.x, bars["x"])
+            result[name] = _displaced(problem, motion.x, start)
         elif name == VELOCITY:
-            result[name] = bars["x"][nq:]
-        elif name == TORQUE:
-            last = np.array([direct.get(force, 0.0) for force in applied])
-            if motion.each_step:
-                rows[-1] += last
-            result[name] = rows if motion.each_step else bars[TORQUE] + last
+            result[name] = start[nq:]
+        elif name == TORQUE and motion.each_step:
+            rows[-1] += end.inputs[:forces]  # what the final loss has of the force itself
+            result[name] = rows
         else:
-            result[name] = float(bars["p"][names.index(name)] + direct.get(name, 0.0))
+            result[name] = inputs[:forces] if name == TORQUE else float(inputs[names.index(name)])
     return result
 
 

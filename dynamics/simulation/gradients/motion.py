@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,12 +18,26 @@ from ...integrators import METHODS, Method, Problem, derive
 from ...systems.model import Model, as_ode, as_system
 from ..applied_forces import with_applied
 from ..equal_steps import step_count
+from ..event import Event
 from ..run_options import RunOptions, time_span
 from ..sampled_controller import SampledController
 from ..simulate import simulate
 from ..trajectory import Trajectory
 
 START, VELOCITY, TORQUE = "q", "qd", "tau"
+
+
+class Leg(NamedTuple):
+    """A part of a motion.
+
+    t: (steps + 1,), where its steps begin and the last one ends.  event: with which it ends, by name, or empty.
+    equal: into how many equal steps the time from its begin to `end` is divided; 0 of chosen steps.
+    """
+
+    t: Array
+    event: str = ""
+    equal: int = 0
+    end: float = 0.0
 
 
 class MotionError(ValueError):
@@ -44,7 +58,7 @@ class MotionOf:
     """A motion, whose steps are chosen.
 
     x: (m,), where it starts.
-    t, h: (steps + 1,), where the steps begin and the last one ends, and (steps,), their lengths.
+    legs: its parts.  t, h: (steps + 1,), where the steps begin and the last one ends, and (steps,), their lengths.
     tau: (steps, n) of forces that change with the steps, else (n,) those that stay.
     values: of the parameters that stay inputs.  wrt: names.  applied: the whole applied force as nodes.
     """
@@ -52,6 +66,7 @@ class MotionOf:
     problem: Problem
     method: Method
     x: Array
+    legs: tuple[Leg, ...]
     t: Array
     h: Array
     tau: Array
@@ -80,6 +95,7 @@ def motion_of(
     parameters: Mapping[str, float] | None,
     wrt: str | Iterable[str] | None,
     options: Mapping[str, Any],
+    events: Sequence[Event] = (),
 ) -> MotionOf:
     """The motion of checked arguments.  span: t_end, t0, t_span.  options: those of `simulate` besides.
 
@@ -103,16 +119,20 @@ def motion_of(
     inputs = state_inputs(moving).applied if rows is not None or TORQUE in chosen else ()
     free = {*inputs, *chosen}
     problem = derive(moving, {name: value for name, value in start.bound.items() if name not in free})
-    if run.adaptive:
+    if run.adaptive or events:
         if rows is not None:
-            raise ValueError(f"tau of shape {rows.shape} is one row a step, which needs equal steps: method {method!r}")
-        t, h = _accepted(simulate(model, q, qd, t_end, method, t0=t0, tau=tau, parameters=parameters, **options))
+            needed = "equal steps without events" if events else f"equal steps: method {method!r} chooses its steps"
+            raise ValueError(f"tau of shape {rows.shape} is one row a step, which needs {needed}")
+        given = {"t0": t0, "tau": tau, "parameters": parameters, "events": events, **options}
+        given |= {} if run.adaptive else {"estimate_error": False}
+        legs = _legs(simulate(model, q, qd, t_end, method, **given), run, events)
     else:
-        t, h = _equal(run, None if rows is None else len(rows))
+        legs = (_equal(run, None if rows is None else len(rows)),)
     constant = np.array([start.bound[name] for name in inputs])
     values = np.array([start.bound[name] for name in problem.parameters if name not in inputs])
     forces = constant if rows is None else rows
-    return MotionOf(problem, METHODS[method], start.x, t, h, forces, values, chosen, applied.nodes)
+    nothing = np.empty(0)  # of steps, before the legs are run
+    return MotionOf(problem, METHODS[method], start.x, legs, nothing, nothing, forces, values, chosen, applied.nodes)
 
 
 def _rows(model: Model, tau: Any) -> Array | None:
@@ -146,17 +166,35 @@ def _wrt(model: Model, wrt: str | Iterable[str] | None, *, closed: bool) -> tupl
     return tuple(dict.fromkeys(names))
 
 
-def _equal(run: RunOptions, rows: int | None) -> tuple[Array, Array]:
-    """Times (steps + 1,) and lengths of equal steps; of so many where rows say it."""
+def _equal(run: RunOptions, rows: int | None) -> Leg:
+    """Equal steps; so many where rows say it."""
     count = step_count(run.length, run.step) if rows is None or run.dt is not None else rows
     if rows is not None and rows != count:
         raise ValueError(f"tau has {rows} rows, and there are {count} steps of dt = {run.step:g} s: leave out dt")
     h = (run.t_end - run.t0) / count
-    return np.append(run.t0 + np.arange(count) * h, run.t_end), np.full(count, h)
+    return Leg(np.append(run.t0 + np.arange(count) * h, run.t_end), equal=count, end=run.t_end)
 
 
-def _accepted(run: Trajectory) -> tuple[Array, Array]:
-    """Times (steps + 1,) and lengths of the accepted steps of a run."""
-    if not run.stats.success:
-        raise MotionError(f"the motion did not reach t_end, {run.stats.message}")
-    return run.t, np.diff(run.t)
+def _legs(motion: Trajectory, run: RunOptions, events: Sequence[Event]) -> tuple[Leg, ...]:
+    """The accepted steps of a motion, between the events that reset its state or end it."""
+    if not motion.stats.success:
+        raise MotionError(f"the motion did not reach t_end, {motion.stats.message}")
+    starts = np.flatnonzero(np.diff(motion.t) == 0.0) + 1  # rows after a reset
+    parts = np.split(motion.t, starts)
+    legs = []
+    for number, t in enumerate(parts):
+        ends = number < len(parts) - 1
+        stopped = motion.stats.status == 1 and not ends
+        at = [
+            each.name
+            for each in events
+            if (each.reset if ends else each.terminal) and t[-1] in motion.events[each.name].t
+        ]
+        if (ends or stopped) and len(at) != 1:
+            raise ValueError(
+                f"events {', '.join(at)} happen at one instant, t = {t[-1]:.6g} s, which has no derivative"
+            )
+        count = 0 if run.adaptive else step_count(run.t_end - t[0], run.step)
+        if len(t) > 1:
+            legs.append(Leg(t, at[0] if ends or stopped else "", count, run.t_end))
+    return tuple(legs)

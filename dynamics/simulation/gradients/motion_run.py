@@ -23,15 +23,19 @@ class MotionRun:
 
     checkpoints: steps between two of them; 0 where all that is needed of every step is kept.
     x: (m,), the end.  loss: the running loss.
+    arrives: whether the last step is still to be fitted, by `tried`, and then made, by `finish`.
     Raises MotionError for a motion that does not stay finite, or whose equations are not solved.
     """
 
-    def __init__(self, motion: MotionOf, programs: MotionPrograms) -> None:
+    def __init__(self, motion: MotionOf, programs: MotionPrograms, *, arrives: bool = False) -> None:
         self.motion, self.start, self.step, self.failed = motion, programs.start, programs.step, programs.failed
         count, width = len(motion.h), self.step.forward.program.width
         self.checkpoints = 0 if 8 * width * count <= MOST_RECORDED else math.ceil(math.sqrt(count))
         self._blocks: list[tuple[int, int, Array]] = []  # first and last step, and the rows, or the memory before
-        self._run(self._begin())
+        self._memory = self._begin()
+        self._run(0, count - arrives)
+        if not arrives:
+            self._end()
 
     def _begin(self) -> Array:
         """The memory before the first step."""
@@ -52,15 +56,29 @@ class MotionRun:
         columns = [motion.t[:-1][part, None], motion.h[part, None]]
         return np.hstack([*columns, motion.tau[part]] if motion.each_step else columns)
 
-    def _run(self, memory: Array) -> None:
-        forward, handed = self.step.forward, self.step.passes.handed
-        count, size = len(self.motion.h), self.checkpoints or PIECE
-        for first in range(0, count, size):
-            last = min(first + size, count)
+    def tried(self) -> Array:
+        """Where the last step arrives, (m,)."""
+        count, memory = len(self.motion.h), self._memory.copy()
+        self.step.forward.run(memory, 1, 1, self._feed(count - 1, count))
+        return self.step.forward.read(memory, self.step.passes.handed["x"])
+
+    def finish(self) -> None:
+        """Make the last step."""
+        count = len(self.motion.h)
+        self._run(count - 1, count)
+        self._end()
+
+    def _run(self, begin: int, end: int) -> None:
+        forward, memory, size = self.step.forward, self._memory, self.checkpoints or PIECE
+        for first in range(begin, end, size):
+            last = min(first + size, end)
             before = memory.copy() if self.checkpoints else None
             every = last - first if self.checkpoints else 1
             rows = forward.run(memory, last - first, every, self._feed(first, last)).rows
             self._blocks.append((first, last, rows if before is None else before))
+
+    def _end(self) -> None:
+        forward, handed, memory = self.step.forward, self.step.passes.handed, self._memory
         self.x = forward.read(memory, handed["x"]).copy()
         self.loss = float(forward.read(memory, handed[LOSS])[0]) if LOSS in handed else 0.0
         if self.failed and forward.read(memory, handed[self.failed])[0]:
@@ -93,6 +111,13 @@ class MotionRun:
         memory = self._linear_memory(self.start, self._start_constants, bars)
         self.start.back.run(memory, 1, 1, self._start_tape)
         return self._vectors(self.start, memory), rows
+
+    def last_slope(self, seed: Array) -> float:
+        """The cotangent of h of the last step, from that of x after it."""
+        memory = self._linear_memory(self.step, self._constants, {"x": seed})
+        _, _, tape = next(self.recorded(backwards=True))
+        row = self.step.back.run(memory, 1, 1, tape[-1:, : self.step.back.program.feed_width]).rows[0]
+        return float(row[self.step.passes.varied.index("h")])
 
     def pushed(self, directions: Mapping[str, Array]) -> tuple[Array, Array]:
         """States (steps + 1, m), and their tangents (steps + 1, m, k) along k directions of the start and inputs."""

@@ -14,9 +14,9 @@ from cgraph.extend import Array
 
 from ...systems.model import Model
 from ..applied_forces import Constant
+from .legs import Legs
 from .motion import START, TORQUE, VELOCITY, MotionOf, motion_of
 from .motion_programs import Request, motion_programs
-from .motion_run import MotionRun
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,10 +118,11 @@ def sensitivities(
     by += ["p"] if len(motion.values) else []
     request = Request(motion.problem, motion.method, motion.forces, False, tuple(by), forwards=True, backend=backend)
     directions, columns = _directions(motion)
-    states, tangents = MotionRun(motion, motion_programs(request)).pushed(directions)
+    run = Legs(motion, motion_programs(request), {}).runs[0]
+    states, tangents = run.pushed(directions)
     derivatives = {name: tangents[:, :, place] for name, place in columns.items()}
     nq = motion.problem.nq
-    return Sensitivities(motion.t, states[:, :nq], states[:, nq:], derivatives)
+    return Sensitivities(run.motion.t, states[:, :nq], states[:, nq:], derivatives)
 
 
 def _directions(motion: MotionOf) -> tuple[dict[str, Array], dict[str, int | slice]]:

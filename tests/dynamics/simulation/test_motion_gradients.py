@@ -239,6 +239,50 @@ def test_quaternions_and_loops_by_displacements_and_through_projections(make: An
     assert (ends[0] - ends[1]) / 2e-6 == approx(float(result["q"].sum()), rel=1e-6)
 
 
+def falling() -> System:
+    """A ball over a table that moves up and down."""
+
+    def lagrangian(q: Any, qd: Any, t: Any, p: Any) -> Any:
+        return 0.5 * p["m"] * qd[0] ** 2 - p["m"] * 9.81 * q[0]
+
+    return System(lagrangian, ["height"], {"m": 1.0, "e": 0.8}, damping=0.3)
+
+
+def table(q: Any, qd: Any, t: Any) -> Any:
+    return q[0] - 0.02 * cg.sin(3.0 * t)
+
+
+BOUNCE = dyn.Event("bounce", table, direction=-1, reset=lambda q, qd, t, p: (q, [-p["e"] * qd[0] + 0.1 * t]))
+TOP = dyn.Event("top", lambda q, qd, t: qd[0] - 0.2, direction=-1, terminal=True)
+
+
+@mark.parametrize(
+    ("method", "events"), [("rk4", [BOUNCE]), ("dopri5", [BOUNCE, TOP]), *slow(("gauss4", [BOUNCE, TOP]))]
+)
+def test_events_that_reset_the_state_or_end_the_motion(method: str, events: Any) -> None:
+    given = {"t_end": 1.0, "method": method, "events": events, "wrt": ["q", "tau", "m", "e"], "backend": "python"}
+    given |= {"rtol": 1e-7} if METHODS[method].adaptive else {"dt": 0.05}
+
+    def at(q: float = 1.0, tau: float = 0.2, **numbers: float) -> dyn.MotionGradient:
+        final = lambda q, qd, t: q[0] * qd[0] + t * q[0]  # noqa: E731
+        return dyn.gradient(falling(), final, [q], [0.1], tau=[tau], parameters=numbers, **given)
+
+    result = at()
+    assert result.t[-1] == (1.0 if len(events) == 1 else approx(0.785, abs=1e-3))
+    for name, value in {"q": 1.0, "e": 0.8}.items():
+        difference = (at(**{name: value + 1e-6}).value - at(**{name: value - 1e-6}).value) / 2e-6
+        assert float(np.squeeze(result[name])) == approx(difference, rel=DIFFERENCES)
+
+
+def test_a_stopping_time_is_differentiated() -> None:
+    """A fall from rest takes sqrt(2 q / g)."""
+    ground = dyn.Event("ground", lambda q, qd, t: q[0], terminal=True)
+    free = System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 9.81 * q[0], ["height"])
+    result = dyn.gradient(free, lambda q, qd, t: t, [2.0], [0.0], 1.0, dt=0.1, events=ground, backend="python")
+    assert result.value == approx(math.sqrt(4.0 / 9.81), rel=SHORT_SUM)
+    assert result["q"] == approx([1.0 / math.sqrt(4.0 * 9.81)], rel=SHORT_SUM)
+
+
 def test_checkpoints_give_the_same_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     given = {"t_end": 1.0, "dt": 0.01, "wrt": WRT, "backend": "python"}
     whole = dyn.gradient(bead(), loss, [0.5], [0.2], **given)
@@ -286,6 +330,11 @@ def test_what_is_not_there_is_said_in_a_sentence() -> None:
         end(tau=np.zeros((3, 1)))
     with raises(ValueError, match="needs equal steps: method 'dop853'"):
         end(tau=np.zeros((3, 1)), method="dop853", dt=None)
+    one, two = (dyn.Event(name, lambda q, qd, t: q[0] - 0.5001, reset=lambda q, qd, t: (q, qd)) for name in ("a", "b"))
+    with raises(ValueError, match="events a, b happen at one instant"):
+        end(events=[one, two])
+    with raises(ValueError, match="needs equal steps without events"):
+        end(events=one, tau=np.zeros((2, 1)))
     with raises(dyn.MotionError, match="does not stay finite"):
         end(tau=[1e300])
 
