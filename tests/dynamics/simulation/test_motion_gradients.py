@@ -11,7 +11,7 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS
+from dynamics.integrators import METHODS, Tableau, runge_kutta
 from dynamics.simulation.gradients import motion_run
 from dynamics.systems.system import System
 from tests.slow import slow
@@ -281,6 +281,14 @@ def test_a_stopping_time_is_differentiated() -> None:
     result = dyn.gradient(free, lambda q, qd, t: t, [2.0], [0.0], 1.0, dt=0.1, events=ground, backend="python")
     assert result.value == approx(math.sqrt(4.0 / 9.81), rel=SHORT_SUM)
     assert result["q"] == approx([1.0 / math.sqrt(4.0 * 9.81)], rel=SHORT_SUM)
+
+
+def test_a_new_tableau_has_gradients(monkeypatch: pytest.MonkeyPatch) -> None:
+    heun = Tableau(2, c=(0.0, 1.0), a=((), (1.0,)), b=(0.5, 0.5))
+    monkeypatch.setitem(METHODS, "heun", runge_kutta(heun))
+    decay = dyn.OdeSystem(lambda x, t: [-2.0 * x[0]], ["x"])
+    result = dyn.gradient(decay, lambda x, t: x[0], [3.0], None, 1.0, "heun", dt=0.25, backend="python")
+    assert result["q"] == approx([(1.0 - 0.5 + 0.125) ** 4], rel=SHORT_SUM)
 
 
 def test_checkpoints_give_the_same_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
