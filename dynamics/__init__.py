@@ -44,6 +44,7 @@ from .scenes.scenes import Scene
 from .simulation.ensembles import Ensemble, EnsembleStats, simulate_many
 from .simulation.event import Event
 from .simulation.gradients.gradient import MotionGradient, gradient
+from .simulation.gradients.gradient_many import MotionGradients, gradient_many
 from .simulation.gradients.motion import MotionError
 from .simulation.gradients.sensitivities import Sensitivities, sensitivities
 from .simulation.sampled_controller import HeldForces, SampledController
@@ -85,6 +86,7 @@ __all__ = [
     "MechanismWarning",
     "MotionError",
     "MotionGradient",
+    "MotionGradients",
     "OdeSystem",
     "OmittedTerm",
     "PruneResult",
@@ -122,6 +124,7 @@ __all__ = [
     "frame_placement",
     "frame_velocity",
     "gradient",
+    "gradient_many",
     "gravity_force",
     "inertial_parameters",
     "integrable_rows",

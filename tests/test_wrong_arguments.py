@@ -169,6 +169,11 @@ CALLS = {
         wrt=["q"], t0=0.0, t_span=None, dt=0.01, max_step=None, rtol=None, atol=None, first_step=None, tau=[0.0],
         parameters=None, events=(), backend="python"
     ),
+    "dyn.gradient_many": call(
+        dyn.gradient_many, ARM, lambda q, qd, t: q[0], [[0.1]], [[0.0]], 0.02, "rk4",
+        running=lambda q, qd, tau, t: q[0], wrt=["q"], t0=0.0, t_span=None, dt=0.01, tau=[[0.0]], parameters={},
+        backend="python"
+    ),
     "dyn.sensitivities": call(
         dyn.sensitivities, ARM, [0.1], [0.0], 0.02, "rk4", wrt=["q"], t0=0.0, t_span=None, dt=0.01, max_step=None,
         rtol=None, atol=None, first_step=None, tau=[0.0], parameters=None, backend="python"
@@ -236,8 +241,9 @@ CALLS = {
 RECORDS = """
     cg.CSource cg.Comparison cg.Compiled cg.Counts cg.Edge cg.Lint cg.Loop cg.Node cg.Why cg.WhyNot
     dyn.Attached dyn.Body dyn.Certificate dyn.Crossings dyn.Ensemble dyn.EnsembleStats dyn.Force dyn.FreeBody
-    dyn.HeldForces dyn.JointForce dyn.MotionGradient dyn.OmittedTerm dyn.PruneResult dyn.QuasiVelocities
-    dyn.Reference dyn.Released dyn.Sensitivities dyn.Stats dyn.Subtree dyn.TorqueTable dyn.Trajectory
+    dyn.HeldForces dyn.JointForce dyn.MotionGradient dyn.MotionGradients dyn.OmittedTerm dyn.PruneResult
+    dyn.QuasiVelocities dyn.Reference dyn.Released dyn.Sensitivities dyn.Stats dyn.Subtree dyn.TorqueTable
+    dyn.Trajectory
 """
 # Nothing to give; what a mechanism calls; what empties the user's cache; the fast way into compiled code, which looks
 # at nothing.

@@ -89,7 +89,7 @@ class PythonRunner(Runner):
             state.update(_split(np.broadcast_to(feed[done - 1], shape), program.feed, state))
             for statement in program.body:
                 self._statement_many(statement, state)
-            if done % every == 0:
+            if done % every == 0 and program.record:
                 np.concatenate([state[name] for name in program.record], out=rows[done // every - 1])
         for name, place in self._slices.items():
             memories[place] = state[name]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from cgraph.extend import Statement
+from cgraph.extend import Factor, Solve, Statement, While
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,3 +26,8 @@ class Step:
     body: Sequence[Statement]
     fixed: tuple[str, ...] = ()
     failed: str = ""
+
+    @property
+    def branches(self) -> bool:
+        """Whether what is done depends on numbers, so that steps from several states cannot go side by side."""
+        return any(isinstance(each, While | Factor | Solve) for each in (*self.start, *self.body))

@@ -18,7 +18,7 @@ from ...systems.model import Model
 from ..applied_forces import Constant
 from ..event import Event, as_events
 from ..event_program import event_program
-from .legs import Bars, Legs, point, pulled_at
+from .legs import Bars, Legs, pulled_at, values_at
 from .motion import START, TORQUE, VELOCITY, MotionOf, motion_of
 from .motion_programs import Request, motion_programs, request_key
 
@@ -148,6 +148,15 @@ def gradient(
     options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
     watched = as_events(events)
     motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, watched)
+    value, gradients, legs = differentiated(motion, loss, running, backend, watched)
+    nq, checkpoints = motion.problem.nq, max([run.checkpoints for run in legs.runs])
+    return MotionGradient(float(value), gradients, legs.t, legs.x[:nq], legs.x[nq:], checkpoints)
+
+
+def differentiated(
+    motion: MotionOf, loss: Loss | None, running: Loss | None, backend: str, watched: Sequence[Event] = ()
+) -> tuple[Any, dict[str, Any], Legs]:
+    """The loss of a motion, its gradient by names, and the motion; of N motions side by side an axis more, the last."""
     problem = motion.problem
     if loss is None and running is None:
         raise ValueError("a loss is needed: of the end of the motion, `loss`, of how it goes, `running`, or both")
@@ -171,21 +180,19 @@ def gradient(
     legs = Legs(motion, motion_programs(request), {event.name: event for event in program.events})
     value, end = _final(final, motion, legs)
     start, inputs, rows = legs.pulled(end)
-    gradients = _gradients(motion, start, inputs, rows, end)
-    nq, checkpoints = problem.nq, max([run.checkpoints for run in legs.runs])
-    return MotionGradient(value + legs.loss, gradients, legs.t, legs.x[:nq], legs.x[nq:], checkpoints)
+    return value + legs.loss, _gradients(motion, start, inputs, rows, end), legs
 
 
 def _graph(problem: Problem, node: Node) -> Graph:
     return problem.bind(problem.states, Graph(quantity_inputs(problem), {"loss": node}))
 
 
-def _final(graph: Graph | None, motion: MotionOf, legs: Legs) -> tuple[float, Bars]:
+def _final(graph: Graph | None, motion: MotionOf, legs: Legs) -> tuple[Any, Bars]:
     """The final loss, and its slopes."""
-    t = float(legs.t[-1])
+    t, more = float(legs.t[-1]), legs.x.shape[1:]
     if graph is None:
-        return 0.0, Bars(np.zeros(len(legs.x)), 0.0, np.zeros(len(motion.problem.parameters)))
-    value = float(graph.evaluate(point(graph, motion, legs.x, t))["loss"])
+        return 0.0, Bars(np.zeros_like(legs.x), 0.0, np.zeros((len(motion.problem.parameters), *more)))
+    (value,) = values_at(graph, motion, legs.x, t)
     return value, pulled_at(graph, motion, legs.x, t, [1.0])
 
 
@@ -203,7 +210,9 @@ def _gradients(motion: MotionOf, start: Array, inputs: Array, rows: Array, end: 
             rows[-1] += end.inputs[:forces]  # what the final loss has of the force itself
             result[name] = rows
         else:
-            result[name] = inputs[:forces] if name == TORQUE else float(inputs[names.index(name)])
+            result[name] = inputs[:forces] if name == TORQUE else inputs[names.index(name)]
+            if not motion.many and name != TORQUE:
+                result[name] = float(result[name])
     return result
 
 
@@ -215,5 +224,5 @@ def _displaced(problem: Problem, x: Array, bar: Array) -> Array:
     bars = cg.variables([f"bar{k}" for k in range(nq)])
     pulled = system.kinematics.pulled_back(bars, Builder())
     graph = Graph([*system.q, *bars], {f"{k}": node for k, node in enumerate(pulled)})
-    values = graph.evaluate(dict(zip(graph.input_names, [*x[:nq].tolist(), *bar[:nq].tolist()], strict=True)))
-    return np.array(list(values.values()), dtype=np.float64)
+    values = graph.evaluate(dict(zip(graph.input_names, [*x[:nq], *bar[:nq]], strict=True)))
+    return np.array([np.broadcast_to(value, x.shape[1:]) for value in values.values()], dtype=np.float64)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,7 +30,7 @@ class Bars(NamedTuple):
     """Cotangents of a state at an instant, of the instant, and of the forces and parameters that stay inputs."""
 
     x: Array
-    t: float
+    t: Any  # float, or (N,) of N motions side by side
     inputs: Array  # forces, then parameters
 
 
@@ -57,9 +57,9 @@ class Legs:
             self.runs.append(run)
             x, begin = run.x, float(t[-1])
             if leg.event and (reset := self.events[leg.event].reset) is not None:
-                x = np.array(list(reset.evaluate(point(reset, motion, x, begin)).values()), dtype=np.float64)
+                x = values_at(reset, motion, x, begin)
         self.x, self.t = x, np.concatenate([run.motion.t[:-1] for run in self.runs] + [[begin]])
-        self.loss = sum([run.loss for run in self.runs])
+        self.loss = np.sum([run.loss for run in self.runs], axis=0)
 
     def _arrive(self, run: MotionRun, event: WatchedEvent) -> None:
         """The last step of a leg, as long as it takes to where the event happens."""
@@ -67,8 +67,7 @@ class Legs:
         for _ in range(MOST_TURNS):
             x, t = run.tried(), motion.t[-1:]
             g, values = event.value(t, x[None], _inputs(motion)), _inputs(motion)
-            rate = motion.problem.rate
-            x_dot = np.array(list(rate.evaluate(point(rate, motion, x, float(t[0]))).values()), dtype=np.float64)
+            x_dot = values_at(motion.problem.rate, motion, x, float(t[0]))
             step = float(g[0] / event.slope(t, x[None], values, x_dot[None], np.ones(1))[0])
             if not abs(step) < last:
                 break
@@ -94,7 +93,7 @@ class Legs:
             if leg.event:
                 end, later = self._through(run, self.events[leg.event], end, inputs)
             bars, rows = run.pulled({"x": end.x, LOSS: 1.0})
-            inputs += np.concatenate([bars.get(name, np.zeros(n)) for name, n in self._lengths()])
+            inputs += np.concatenate([bars.get(name, np.zeros((n, *inputs.shape[1:]))) for name, n in self._lengths()])
             if k == 0:
                 return bars["x"], inputs, rows
             t, h = (rows[:, names.index(name)].copy() for name in ("t", "h"))
@@ -151,17 +150,31 @@ def pulled_at(graph: Graph, motion: MotionOf, x: Array, t: float, seeds: Sequenc
     """J^T seeds of a graph over the states, t and parameters, at a state and an instant."""
     pulled = cg.vjp(graph)
     bars = dict(zip(pulled.input_names[len(graph.inputs) :], seeds, strict=True))
-    values = np.array(list(pulled.evaluate(point(graph, motion, x, t) | bars).values()), dtype=np.float64)
-    m = motion.problem.size
-    return Bars(values[:m], float(values[m]), values[m + 1 :])
+    values, m = _arrays(pulled.evaluate(point(graph, motion, x, t) | bars), motion), motion.problem.size
+    return Bars(values[:m], values[m] if motion.many else float(values[m]), values[m + 1 :])
 
 
-def _inputs(motion: MotionOf) -> list[float]:
+def values_at(graph: Graph, motion: MotionOf, x: Array, t: float) -> Array:
+    """The outputs of a graph over the states, t and parameters, at a state and an instant."""
+    return _arrays(graph.evaluate(point(graph, motion, x, t)), motion)
+
+
+def _arrays(values: Mapping[str, Any], motion: MotionOf) -> Array:
+    """(k,), or (k, N) of N motions side by side."""
+    shape = (motion.many,) if motion.many else ()
+    rows = [np.broadcast_to(np.asarray(value, dtype=np.float64), shape) for value in values.values()]
+    return np.array(rows).reshape(len(rows), *shape)
+
+
+def _inputs(motion: MotionOf) -> list[Any]:
     """Forces and parameters that stay inputs, at the end."""
-    tau = motion.tau[-1] if motion.each_step else motion.tau
-    return [*tau.tolist(), *motion.values.tolist()]
+    return [*motion.force_at_end, *motion.values] if motion.many else _numbers(motion.force_at_end, motion.values)
 
 
-def point(graph: Graph, motion: MotionOf, x: Array, t: float) -> dict[str, float]:
+def _numbers(*arrays: Array) -> list[float]:
+    return [number for array in arrays for number in array.tolist()]
+
+
+def point(graph: Graph, motion: MotionOf, x: Array, t: float) -> dict[str, Any]:
     """The inputs of a graph over the states, t and parameters, at a state and an instant."""
-    return dict(zip(graph.input_names, [*x.tolist(), t, *_inputs(motion)], strict=True))
+    return dict(zip(graph.input_names, [*(x if motion.many else x.tolist()), t, *_inputs(motion)], strict=True))

@@ -59,8 +59,9 @@ class MotionOf:
 
     x: (m,), where it starts.
     legs: its parts.  t, h: (steps + 1,), where the steps begin and the last one ends, and (steps,), their lengths.
-    tau: (steps, n) of forces that change with the steps, else (n,) those that stay.
+    tau: the applied forces that are inputs, (forces,), or where they change with the steps, (steps, forces).
     values: of the parameters that stay inputs.  wrt: names.  applied: the whole applied force as nodes.
+    Of N motions side by side x, tau and values have an axis of N besides, the last.
     """
 
     problem: Problem
@@ -70,19 +71,26 @@ class MotionOf:
     t: Array
     h: Array
     tau: Array
+    forces: int
+    each_step: bool
     values: Array
     wrt: tuple[str, ...]
     applied: Sequence[Node] | None
 
     @property
-    def each_step(self) -> bool:
-        """Whether the applied force changes with the steps."""
-        return self.tau.ndim == 2
+    def many(self) -> int:
+        """How many motions go side by side; 0 of one alone."""
+        return self.x.shape[1] if self.x.ndim == 2 else 0
 
     @property
-    def forces(self) -> int:
-        """How many applied forces are inputs."""
-        return int(self.tau.shape[-1])
+    def force_at_start(self) -> Array:
+        """The applied forces that are inputs, in the first step."""
+        return self.tau[0] if self.each_step else self.tau
+
+    @property
+    def force_at_end(self) -> Array:
+        """The same in the last step."""
+        return self.tau[-1] if self.each_step else self.tau
 
 
 def motion_of(
@@ -108,14 +116,11 @@ def motion_of(
         )
     t0, t_end = time_span(span[0], span[1], span[2])
     rows = None if callable(tau) else _rows(model, tau)
-    run = RunOptions(t_end, method, t0=t0, **options)
-    if run.scipy_solver is not None or METHODS[method].step is None:
-        names = ", ".join([name for name, each in METHODS.items() if each.step is not None])
-        raise ValueError(f"motions by method {method!r} have no derivatives here; those by {names} have")
+    run = options_of(t_end, method, t0, options)
     moving, applied = with_applied(model, 0.0 if rows is not None else tau, parameters)
     start = initial_value(moving, q, qd, applied.constant, parameters, t0)
     run.check(start.states)
-    chosen = _wrt(moving, wrt, closed=callable(tau))
+    chosen = names_of(moving, wrt, closed=callable(tau))
     inputs = state_inputs(moving).applied if rows is not None or TORQUE in chosen else ()
     free = {*inputs, *chosen}
     problem = derive(moving, {name: value for name, value in start.bound.items() if name not in free})
@@ -127,12 +132,33 @@ def motion_of(
         given |= {} if run.adaptive else {"estimate_error": False}
         legs = _legs(simulate(model, q, qd, t_end, method, **given), run, events)
     else:
-        legs = (_equal(run, None if rows is None else len(rows)),)
+        legs = (equal_leg(run, None if rows is None else len(rows)),)
     constant = np.array([start.bound[name] for name in inputs])
     values = np.array([start.bound[name] for name in problem.parameters if name not in inputs])
     forces = constant if rows is None else rows
-    nothing = np.empty(0)  # of steps, before the legs are run
-    return MotionOf(problem, METHODS[method], start.x, legs, nothing, nothing, forces, values, chosen, applied.nodes)
+    return MotionOf(
+        problem,
+        METHODS[method],
+        start.x,
+        legs,
+        np.empty(0),  # of steps, before the legs are run
+        np.empty(0),
+        forces,
+        len(inputs),
+        rows is not None,
+        values,
+        chosen,
+        applied.nodes,
+    )
+
+
+def options_of(t_end: float, method: str, t0: float, options: Mapping[str, Any]) -> RunOptions:
+    """The options of a run, by a method whose motions have derivatives. Raises ValueError for another."""
+    run = RunOptions(t_end, method, t0=t0, **options)
+    if run.scipy_solver is not None or METHODS[method].step is None:
+        names = ", ".join([name for name, each in METHODS.items() if each.step is not None])
+        raise ValueError(f"motions by method {method!r} have no derivatives here; those by {names} have")
+    return run
 
 
 def _rows(model: Model, tau: Any) -> Array | None:
@@ -148,7 +174,7 @@ def _rows(model: Model, tau: Any) -> Array | None:
     return rows
 
 
-def _wrt(model: Model, wrt: str | Iterable[str] | None, *, closed: bool) -> tuple[str, ...]:
+def names_of(model: Model, wrt: str | Iterable[str] | None, *, closed: bool) -> tuple[str, ...]:
     """What to differentiate by. By default the start, and the applied force where it is numbers."""
     ode, inputs = as_ode(model) is not None, state_inputs(model)
     usual = [START] if ode else [START, VELOCITY] if closed else [START, VELOCITY, TORQUE]
@@ -166,7 +192,7 @@ def _wrt(model: Model, wrt: str | Iterable[str] | None, *, closed: bool) -> tupl
     return tuple(dict.fromkeys(names))
 
 
-def _equal(run: RunOptions, rows: int | None) -> Leg:
+def equal_leg(run: RunOptions, rows: int | None) -> Leg:
     """Equal steps; so many where rows say it."""
     count = step_count(run.length, run.step) if rows is None or run.dt is not None else rows
     if rows is not None and rows != count:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from cgraph.extend import Array, Factor, Runner, Solve, While
+from cgraph.extend import Array, Factor, Record, Runner, Solve, While
 
 from .iteration import UNSOLVED
 from .motion import MotionError, MotionOf
@@ -30,7 +30,8 @@ class MotionRun:
     def __init__(self, motion: MotionOf, programs: MotionPrograms, *, arrives: bool = False) -> None:
         self.motion, self.start, self.step, self.failed = motion, programs.start, programs.step, programs.failed
         count, width = len(motion.h), self.step.forward.program.width
-        self.checkpoints = 0 if 8 * width * count <= MOST_RECORDED else math.ceil(math.sqrt(count))
+        fits = 8 * width * count * max(1, motion.many) <= MOST_RECORDED
+        self.checkpoints = 0 if fits else math.ceil(math.sqrt(count))
         self._blocks: list[tuple[int, int, Array]] = []  # first and last step, and the rows, or the memory before
         self._memory = self._begin()
         self._run(0, count - arrives)
@@ -40,21 +41,25 @@ class MotionRun:
     def _begin(self) -> Array:
         """The memory before the first step."""
         motion, passes, forward = self.motion, self.start.passes, self.start.forward
-        given = {"t": motion.t[:1], "tau": motion.tau[0] if motion.each_step else motion.tau, "p": motion.values}
-        memory = forward.memory(_known(forward, {**given, passes.handed["x"]: motion.x}))
-        rows = forward.run(memory, 1).rows
+        given = {"t": motion.t[:1], "tau": motion.force_at_start, "p": motion.values}
+        memory = _memory(forward, {**given, passes.handed["x"]: motion.x}, motion.many)
+        rows = _run(forward, memory, 1, 1, np.empty((1, 0))).rows
         self._start_tape = rows[:, : self.start.linear.program.feed_width]
         self.begin = forward.read(memory, passes.handed["x"]).copy()
         self._start_constants = {name: forward.read(memory, name).copy() for name in passes.constants}
         handed = self.step.passes.handed
         values = {handed.get(name, name): forward.read(memory, after).copy() for name, after in passes.handed.items()}
-        return self.step.forward.memory(_known(self.step.forward, {**given, **values}))
+        return _memory(self.step.forward, {**given, **values}, motion.many)
 
     def _feed(self, first: int, last: int) -> Array:
         """What the steps first .. last - 1 are fed."""
         motion, part = self.motion, slice(first, last)
-        columns = [motion.t[:-1][part, None], motion.h[part, None]]
-        return np.hstack([*columns, motion.tau[part]] if motion.each_step else columns)
+        columns = np.stack([motion.t[:-1][part], motion.h[part]], axis=1)
+        if not motion.each_step:
+            return columns
+        tau = motion.tau[part]
+        wide = np.broadcast_to(columns[..., None], (*columns.shape, motion.many)) if motion.many else columns
+        return np.concatenate([wide, tau], axis=1)
 
     def tried(self) -> Array:
         """Where the last step arrives, (m,)."""
@@ -74,16 +79,16 @@ class MotionRun:
             last = min(first + size, end)
             before = memory.copy() if self.checkpoints else None
             every = last - first if self.checkpoints else 1
-            rows = forward.run(memory, last - first, every, self._feed(first, last)).rows
+            rows = _run(forward, memory, last - first, every, self._feed(first, last)).rows
             self._blocks.append((first, last, rows if before is None else before))
 
     def _end(self) -> None:
         forward, handed, memory = self.step.forward, self.step.passes.handed, self._memory
         self.x = forward.read(memory, handed["x"]).copy()
-        self.loss = float(forward.read(memory, handed[LOSS])[0]) if LOSS in handed else 0.0
+        self.loss = forward.read(memory, handed[LOSS])[0].copy() if LOSS in handed else np.zeros(self.x.shape[1:])
         if self.failed and forward.read(memory, handed[self.failed])[0]:
             raise MotionError("the equations of a step were not solved: the step is too long")
-        if not (np.isfinite(self.x).all() and math.isfinite(self.loss)):
+        if not (np.isfinite(self.x).all() and np.isfinite(self.loss).all()) and not self.motion.many:
             raise MotionError("the motion does not stay finite: shorter steps may help")
         self._constants = {name: forward.read(memory, name).copy() for name in self.step.passes.constants}
 
@@ -94,7 +99,7 @@ class MotionRun:
         """
         for first, last, kept in reversed(self._blocks) if backwards else self._blocks:
             if self.checkpoints:
-                yield first, last, self.step.forward.run(kept.copy(), last - first, 1, self._feed(first, last)).rows
+                yield first, last, _run(self.step.forward, kept.copy(), last - first, 1, self._feed(first, last)).rows
             else:
                 yield first, last, kept
 
@@ -102,14 +107,14 @@ class MotionRun:
         """Cotangents of the start and of the inputs, from those after the last step; and rows, those of each step."""
         memory = self._linear_memory(self.step, self._constants, seeds)
         back = self.step.back
-        rows = np.empty((len(self.motion.h), back.program.width))
+        rows = np.empty((len(self.motion.h), back.program.width, *self.x.shape[1:]))
         width = back.program.feed_width
         for first, last, tape in self.recorded(backwards=True):
-            pulled = back.run(memory, last - first, 1, tape[::-1, :width]).rows
+            pulled = _run(back, memory, last - first, 1, tape[::-1, :width]).rows
             rows[first:last] = pulled[::-1] if back.program.record else 0.0
         bars = self._vectors(self.step, memory)
         memory = self._linear_memory(self.start, self._start_constants, bars)
-        self.start.back.run(memory, 1, 1, self._start_tape)
+        _run(self.start.back, memory, 1, 1, self._start_tape)
         return self._vectors(self.start, memory), rows
 
     def last_slope(self, seed: Array) -> float:
@@ -141,10 +146,7 @@ class MotionRun:
         names = along.linear.vectors
         placed = {names[name]: np.asarray(vector) for name, vector in vectors.items() if name in names}
         many = [vector.shape[1] for vector in placed.values() if vector.ndim == 2]
-        known = _known(along.back, constants)
-        if many:  # a column for each of them
-            known = {name: np.repeat(value[:, None], many[0], axis=1) for name, value in known.items()}
-        return along.back.memory({**known, **placed}, *many[:1])
+        return _memory(along.back, {**constants, **placed}, max(many, default=0))
 
     def _vectors(self, along: Along, memory: Array) -> dict[str, Array]:
         if np.any(along.back.read(memory, UNSOLVED)):
@@ -154,8 +156,8 @@ class MotionRun:
 
 def _run_all(ready: Runner, memories: Array, feed: Array) -> Array:
     """The rows (passes, width, k) of k memories that are fed the same: side by side, unless the passes branch."""
-    if not any(isinstance(each, While | Factor | Solve) for each in ready.program.statements()):
-        return ready.run_many(memories, len(feed), 1, feed[:, :, None]).rows
+    if branch_free(ready):
+        return _run(ready, memories, len(feed), 1, feed).rows
     rows = np.empty((len(feed), ready.program.width, memories.shape[1]))
     for k in range(memories.shape[1]):
         memory = memories[:, k].copy()
@@ -164,6 +166,25 @@ def _run_all(ready: Runner, memories: Array, feed: Array) -> Array:
     return rows
 
 
-def _known(ready: Runner, values: Mapping[str, Array]) -> dict[str, Array]:
-    """Those of the values that a program has registers for."""
-    return {name: value for name, value in values.items() if name in ready.program.registers}
+def _memory(ready: Runner, values: Mapping[str, Array], many: int) -> Array:
+    """A memory, or many, with those of the values that the program has registers for; a vector is that of all."""
+    known = {name: value for name, value in values.items() if name in ready.program.registers}
+    if not many:
+        return ready.memory(known)
+    wide = {
+        name: value if value.ndim != 1 else np.repeat(value[:, None], many, axis=1) for name, value in known.items()
+    }
+    return ready.memory(wide, many)
+
+
+def _run(ready: Runner, memory: Array, passes: int, every: int, feed: Array) -> Record:
+    """Passes of one memory, or of many side by side."""
+    if memory.ndim == 1:
+        return ready.run(memory, passes, every, feed)
+    with np.errstate(all="ignore"):
+        return ready.run_many(memory, passes, every, feed if feed.ndim == 3 else feed[:, :, None])
+
+
+def branch_free(ready: Runner) -> bool:
+    """Whether many memories can run side by side."""
+    return not any(isinstance(each, While | Factor | Solve) for each in ready.program.statements())

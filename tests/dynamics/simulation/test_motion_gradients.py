@@ -11,11 +11,15 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS, Tableau, runge_kutta
+from dynamics.integrators import METHODS, Tableau, derive, runge_kutta
 from dynamics.simulation.gradients import motion_run
+from dynamics.simulation.gradients.rate_pullback import rate_pullback
 from dynamics.systems.system import System
+from tests.dynamics.mechanisms import random_mechanism
+from tests.dynamics.models import driven_pendulum, magnetic, random_arm, relativistic
+from tests.dynamics.parametrized import parametrized
 from tests.slow import slow
-from tests.tolerances import EQUATIONS, LONG_SUM, SHORT_SUM
+from tests.tolerances import EQUATIONS, LONG_SUM, SHORT_SUM, SOLVED
 
 DUAL = 1e-12  # of the size of the terms: a gradient beside forward sensitivities
 DIFFERENCES = 2e-8  # central differences over 1e-5 of float64
@@ -283,6 +287,36 @@ def test_a_stopping_time_is_differentiated() -> None:
     assert result["q"] == approx([1.0 / math.sqrt(4.0 * 9.81)], rel=SHORT_SUM)
 
 
+@mark.parametrize(("method", "backend"), [("rk4", "python"), ("rk4", "llvm"), *slow(("gauss4", "python"))])
+def test_many_gradients_are_those_one_by_one(method: str, backend: str) -> None:
+    rng = np.random.default_rng(3)
+    q, qd, tau, k = (rng.normal(size=shape) for shape in ((9, 1), (9, 1), (9, 4, 1), 9))
+    given = {"t_end": 0.2, "method": method, "wrt": WRT, "backend": backend}
+    running = lambda q, qd, tau, t: q[0] * tau[0]  # noqa: E731
+    many = dyn.gradient_many(bead(), loss, q, qd, tau=tau, parameters={"k": 2.0 + k}, running=running, **given)
+    for row in (0, 4, 8):
+        one = dyn.gradient(
+            bead(), loss, q[row], qd[row], tau=tau[row], parameters={"k": 2.0 + k[row]}, running=running, **given
+        )
+        assert many.value[row] == approx(one.value, rel=SHORT_SUM)
+        assert (many.q[row], many.qd[row]) == (approx(one.q, rel=SHORT_SUM), approx(one.qd, rel=SHORT_SUM))
+        for name in WRT:
+            assert many[name][row] == approx(one[name], rel=LONG_SUM, abs=LONG_SUM)
+
+
+def test_many_gradients_with_what_is_the_same_for_all() -> None:
+    held = {"tau": lambda q, qd, t, p: [p["gain"] * (1.0 - q[0])], "parameters": {"gain": [3.0, 4.0]}}
+    given = {"t_end": 0.2, "dt": 0.05, "backend": "python"}
+    two = dyn.gradient_many(bead(), loss, [0.5], [0.2], wrt=["q", "gain", "m"], **given, **held)
+    held["parameters"] = {"gain": 4.0}
+    one = dyn.gradient(bead(), loss, [0.5], [0.2], wrt=["q", "gain", "m"], **given, **held)
+    assert [two[name][1] for name in ("q", "gain", "m")] == [approx(one[name]) for name in ("q", "gain", "m")]
+    same = dyn.gradient_many(bead(), loss, [[0.5], [0.5]], [0.2], tau=[0.3], **given)
+    assert same["tau"].shape == (2, 1)
+    with raises(ValueError, match="gradient_many needs equal steps"):
+        dyn.gradient_many(bead(), loss, [[0.5]], [0.2], 0.2, "dop853")
+
+
 def test_a_new_tableau_has_gradients(monkeypatch: pytest.MonkeyPatch) -> None:
     heun = Tableau(2, c=(0.0, 1.0), a=((), (1.0,)), b=(0.5, 0.5))
     monkeypatch.setitem(METHODS, "heun", runge_kutta(heun))
@@ -362,3 +396,32 @@ def test_the_adjoint_of_a_million_steps_takes_at_most_200_mb() -> None:
     assert result["tau"].shape == (10**6, 3)
     assert np.isfinite(result["tau"]).all()
     assert peak < 200e6
+
+
+PULLED = {
+    "tree": lambda: parametrized(random_mechanism(4, ("revolute", "prismatic"), 2, seed=5), 1, 0.3),
+    "free": free_body,
+    "arm": lambda: random_arm(3),
+    "magnetic": magnetic,
+    "relativistic": relativistic,
+    "driven": driven_pendulum,
+}
+
+
+@mark.parametrize("name", PULLED)
+def test_the_rate_is_pulled_back_by_inverse_dynamics_as_by_its_graph(name: str) -> None:
+    """At states and cotangents of any kind: J^T y_bar of one way and the other."""
+    problem = derive(PULLED[name](), {})
+    by = [node for node in problem.rate.inputs if node.name != "t"]
+    made, plain = rate_pullback(problem), cg.vjp(problem.rate, by)
+    assert made is not None
+    graph, rng = made(by), np.random.default_rng(2)
+    for _ in range(3):
+        numbers = {node.name: rng.uniform(0.2, 0.8) for node in problem.rate.inputs}
+        numbers |= problem.system.parameters
+        values, bars = list(problem.rate.evaluate(numbers).values()), rng.normal(size=problem.size).tolist()
+        direct = plain.evaluate(numbers | dict(zip(plain.input_names[-problem.size :], bars, strict=True)))
+        inputs = zip(graph.input_names, [*numbers.values(), *values, *bars], strict=True)
+        pulled = graph.evaluate(dict(inputs))
+        expected = np.array(list(direct.values()))
+        assert np.array(list(pulled.values())) == approx(expected, rel=SOLVED, abs=SOLVED * np.abs(expected).max())
