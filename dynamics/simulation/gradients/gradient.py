@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from ..event import Event, as_events
 from ..event_program import event_program
 from .legs import Bars, Legs, pulled_at, values_at
 from .motion import START, TORQUE, VELOCITY, MotionOf, motion_of
-from .motion_programs import Request, motion_programs, request_key
+from .motion_programs import KEPT, Request, motion_programs, request_key
 
 Loss = Callable[..., Node]
 
@@ -183,8 +184,24 @@ def differentiated(
     return value + legs.loss, _gradients(motion, start, inputs, rows, end), legs
 
 
+@dataclass(frozen=True)
+class _Quantity:
+    """A quantity of a problem, known by its structure, so that what is derived from it is derived once."""
+
+    problem: Problem
+    key: str
+    graph: Graph = field(compare=False)
+
+
 def _graph(problem: Problem, node: Node) -> Graph:
-    return problem.bind(problem.states, Graph(quantity_inputs(problem), {"loss": node}))
+    """The loss over the states, t and parameters."""
+    graph = Graph(quantity_inputs(problem), {"loss": node})
+    return _bound(_Quantity(problem, str(cg.structure_hash(graph)), graph))
+
+
+@lru_cache(KEPT)
+def _bound(quantity: _Quantity) -> Graph:
+    return quantity.problem.bind(quantity.problem.states, quantity.graph)
 
 
 def _final(graph: Graph | None, motion: MotionOf, legs: Legs) -> tuple[Any, Bars]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from cgraph.extend import Array
 
 from ..event_program import WatchedEvent
 from .motion import Leg, MotionError, MotionOf
-from .motion_programs import MotionPrograms
+from .motion_programs import KEPT, MotionPrograms
 from .motion_run import MotionRun
 from .motion_steps import LOSS
 
@@ -83,7 +84,7 @@ class Legs:
     def pulled(self, end: Bars) -> tuple[Array, Array, Array]:
         """Cotangents of the start of the motion, of its inputs, and rows of each step, from those of its end."""
         inputs = end.inputs.copy()
-        names = self.programs.step.passes.varied
+        names, forces, values = self.programs.step.passes.varied, self.motion.forces, len(self.motion.values)
         last = self.motion.legs[-1].event
         if last and self.events[last].reset is not None:
             end = self._before(len(self.runs), end, inputs)
@@ -93,7 +94,8 @@ class Legs:
             if leg.event:
                 end, later = self._through(run, self.events[leg.event], end, inputs)
             bars, rows = run.pulled({"x": end.x, LOSS: 1.0})
-            inputs += np.concatenate([bars.get(name, np.zeros((n, *inputs.shape[1:]))) for name, n in self._lengths()])
+            more = [bars.get(name, np.zeros((n, *inputs.shape[1:]))) for name, n in (("tau", forces), ("p", values))]
+            inputs += np.concatenate(more)
             if k == 0:
                 return bars["x"], inputs, rows
             t, h = (rows[:, names.index(name)].copy() for name in ("t", "h"))
@@ -104,9 +106,6 @@ class Legs:
             begin = float(t @ by_t + h @ by_h) + float(bars["t"][0])
             end = self._before(k, Bars(bars["x"], begin, np.zeros(0)), inputs)
         raise AssertionError("a motion has at least one leg")
-
-    def _lengths(self) -> list[tuple[str, int]]:
-        return [("tau", 0 if self.motion.each_step else self.motion.forces), ("p", len(self.motion.values))]
 
     def _before(self, k: int, after: Bars, inputs: Array) -> Bars:
         """Through the reset with which leg k begins; adds to the cotangents of the inputs."""
@@ -146,9 +145,14 @@ def _slopes(leg: Leg) -> tuple[Array, Array]:
     return np.where(first, 1.0, 0.0), np.where(first, -1.0, 0.0)
 
 
+@lru_cache(KEPT)
+def _pullback(graph: Graph) -> Graph:
+    return cg.vjp(graph)
+
+
 def pulled_at(graph: Graph, motion: MotionOf, x: Array, t: float, seeds: Sequence[float]) -> Bars:
     """J^T seeds of a graph over the states, t and parameters, at a state and an instant."""
-    pulled = cg.vjp(graph)
+    pulled = _pullback(graph)
     bars = dict(zip(pulled.input_names[len(graph.inputs) :], seeds, strict=True))
     values, m = _arrays(pulled.evaluate(point(graph, motion, x, t) | bars), motion), motion.problem.size
     return Bars(values[:m], values[m] if motion.many else float(values[m]), values[m + 1 :])

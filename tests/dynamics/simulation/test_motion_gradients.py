@@ -107,6 +107,8 @@ def pendulum_step(x: Any, tau: Any, m: Any, h: float) -> Any:
 
 @mark.parametrize("backend", ["python", "llvm"])
 def test_torques_a_step_a_running_loss_and_a_parameter_beside_complex_steps(backend: str) -> None:
+    if backend == "llvm":
+        pytest.importorskip("llvmlite")
     rod = dyn.planar_arm(["m"], [1.0], damping=0.1, parameters={"m": 1.2})
     tau, h = np.random.default_rng(0).normal(size=(20, 1)), 0.5 / 20
 
@@ -117,14 +119,14 @@ def test_torques_a_step_a_running_loss_and_a_parameter_beside_complex_steps(back
             x = pendulum_step(x, u, m, h)
         return sums + x[0] * x[1]
 
-    result = dyn.gradient(
-        rod, lambda q, qd, t: q[0] * qd[0], [0.5], [0.2], 0.5, tau=tau, wrt=["q", "tau", "m"], backend=backend,
-        running=lambda q, qd, tau, t, p: p["m"] * tau[0] ** 2 + q[0] * tau[0],
-    )  # fmt: skip
+    given = {"tau": tau, "backend": backend, "running": lambda q, qd, tau, t, p: p["m"] * tau[0] ** 2 + q[0] * tau[0]}
+    final = lambda q, qd, t: q[0] * qd[0]  # noqa: E731
+    result = dyn.gradient(rod, final, [0.5], [0.2], 0.5, wrt=["q", "tau", "m"], **given)
     tiny, forces = 1e-40, tau[:, 0].astype(complex)
     assert result.value == approx(total(0.5, forces, 1.2).real, rel=SHORT_SUM)
     assert result["q"] == approx([total(0.5 + 1j * tiny, forces, 1.2).imag / tiny], rel=LONG_SUM)
     assert result["m"] == approx(total(0.5, forces, 1.2 + 1j * tiny).imag / tiny, rel=LONG_SUM)
+    assert dyn.gradient(rod, final, [0.5], [0.2], 0.5, wrt="m", **given)["m"] == approx(result["m"], rel=SHORT_SUM)
     unit = 1j * tiny * np.eye(20)
     rows = [total(0.5, forces + unit[k], 1.2).imag / tiny for k in range(20)]
     assert result["tau"][:, 0] == approx(np.array(rows), rel=EQUATIONS, abs=LONG_SUM)
@@ -134,7 +136,6 @@ def test_a_gradient_through_implicit_steps_beside_differences_of_30_digits() -> 
     """Of Radau IIA's equations, at the steps that were accepted."""
     mpmath = pytest.importorskip("mpmath")
     result = dyn.gradient(bead(), loss, [0.5], [0.2], 0.6, "radau", wrt=["q", "k"], rtol=1e-3, backend="python")
-    root = mpmath.sqrt(mpmath.mpf(6))
     with mpmath.workdps(40):
         root = mpmath.sqrt(mpmath.mpf(6))
         a = [
@@ -289,6 +290,8 @@ def test_a_stopping_time_is_differentiated() -> None:
 
 @mark.parametrize(("method", "backend"), [("rk4", "python"), ("rk4", "llvm"), *slow(("gauss4", "python"))])
 def test_many_gradients_are_those_one_by_one(method: str, backend: str) -> None:
+    if backend == "llvm":
+        pytest.importorskip("llvmlite")
     rng = np.random.default_rng(3)
     q, qd, tau, k = (rng.normal(size=shape) for shape in ((9, 1), (9, 1), (9, 4, 1), 9))
     given = {"t_end": 0.2, "method": method, "wrt": WRT, "backend": backend}
