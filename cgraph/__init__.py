@@ -6,6 +6,7 @@ from .autodiff.forward import jvp
 from .autodiff.hessian_solve import hessian_solve
 from .autodiff.jacobian import hessian, jacobian
 from .autodiff.reverse import gradient, vjp
+from .autodiff.sparsity import sparsity
 from .codegen import Compiled, clear_cache, compile
 from .codegen.c import CSource, to_c
 from .core.counts import Counts
@@ -122,6 +123,7 @@ __all__ = [
     "simplify",
     "sin",
     "sinh",
+    "sparsity",
     "specialize",
     "sqrt",
     "structure_hash",

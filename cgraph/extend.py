@@ -9,7 +9,7 @@ is kept stable.
 copies nodes through a builder, `topological` gives all nodes that some nodes reach, arguments first.
 
 **Differentiate**: `cotangents` pulls from outputs, `tangents` pushes from inputs, `hessian_nodes` gives the lower
-triangle of second derivatives, all as nodes.
+triangle of second derivatives, all as nodes. `compressed_jacobian` gives the parts of a loop over colors of columns.
 
 **Solve**: `solve_nodes` is `cg.hessian_solve` on nodes, `ldl_solve` the dense factorization; both raise
 `SingularError`. `ldl_elimination` does the same over any numbers.
@@ -24,7 +24,8 @@ label may have. `certain_digits` says what rounding leaves of the outputs.
 **At the edges**: `real_array`, `real_number`, `is_finite`, `check_name`, `require_graph`, `require_flag`,
 `require_whole`, `require_choice`, `require_sequence`, `require_mapping` and `require_path` check what a caller passed,
 `thread_count` reads `threads=`, `atomic_write` writes a file whole or not at all, `write_files` several, and
-`check_writable` looks beforehand; `install` ends an error about a missing package. `Array` is the type of an array of
+`check_writable` looks beforehand; `install` ends an error about a missing package, `scipy_integrate` gives SciPy's
+module or raises it. `Array` is the type of an array of
 float64.
 
     >>> import cgraph as cg
@@ -38,6 +39,7 @@ float64.
     (True, True)
 """
 
+from .autodiff.compressed_jacobian import CompressedJacobian, compressed_jacobian
 from .autodiff.forward import tangents
 from .autodiff.hessian_solve import solve_nodes
 from .autodiff.jacobian import hessian_nodes
@@ -52,6 +54,7 @@ from .core.node import as_node
 from .core.operation import MathML, Op
 from .core.ops import OPS
 from .core.register import register
+from .core.scipy_modules import scipy_integrate
 from .core.scope import building
 from .core.traversal import topological
 from .errors import install
@@ -62,6 +65,7 @@ from .simplify.builder import Builder, folded
 from .simplify.identities import rewritten, shortened
 from .simplify.polynomial import Polynomial, expand, format_polynomial
 from .util.atomic_write import atomic_write, check_writable, write_files
+from .util.nearest import nearest, or_nearest
 from .util.real_arrays import is_finite, real_array, real_number
 from .util.require import (
     require_choice,
@@ -69,6 +73,7 @@ from .util.require import (
     require_mapping,
     require_path,
     require_sequence,
+    require_texts,
     require_whole,
 )
 from .util.threads import thread_count
@@ -82,6 +87,7 @@ __all__ = [
     "Array",
     "Builder",
     "Call",
+    "CompressedJacobian",
     "Factor",
     "If",
     "Map",
@@ -103,6 +109,7 @@ __all__ = [
     "certain_digits",
     "check_name",
     "check_writable",
+    "compressed_jacobian",
     "cotangents",
     "expand",
     "folded",
@@ -112,6 +119,8 @@ __all__ = [
     "is_finite",
     "ldl_elimination",
     "ldl_solve",
+    "nearest",
+    "or_nearest",
     "real_array",
     "real_number",
     "register",
@@ -121,9 +130,11 @@ __all__ = [
     "require_mapping",
     "require_path",
     "require_sequence",
+    "require_texts",
     "require_whole",
     "rewritten",
     "runner",
+    "scipy_integrate",
     "shortened",
     "solve_nodes",
     "tangents",

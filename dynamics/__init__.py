@@ -5,13 +5,17 @@ from cgraph import __version__ as __version__
 from . import scenes
 from .equations.arrays_at import arrays_at
 from .equations.consistent_state import consistent_state
+from .equations.constraint_lint import ConstraintLint, lint_constraints
 from .equations.constraint_rank import ConstraintWarning
 from .equations.coriolis import coriolis, damping_force
 from .equations.energies import kinetic_energy, potential_energy
 from .equations.equations_of_motion import bias, energy, forward_dynamics, gravity_force, mass_matrix, momentum
 from .equations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious_nodes
 from .equations.integrability import integrable_rows
+from .equations.inverse_dynamics_derivatives import inverse_dynamics_derivatives
+from .equations.inverse_mass_matrix import inverse_mass_matrix
 from .equations.linearization import linearize, state_space
+from .equations.reduced_linearization import ReducedLinearization, reduced_linearization
 from .equations.singular_mass_matrix import SingularMassMatrixError, raise_if_singular
 from .equations.state_equation import state_equation
 from .equations.torque_decomposition import torque_by_joint_motion, torque_by_link
@@ -52,6 +56,7 @@ from .simulation.simulate import simulate
 from .simulation.trajectory import Crossings, SimulationWarning, Stats, Trajectory
 from .systems.constraints import ConstraintError
 from .systems.controller import with_controller
+from .systems.display_names import display_names
 from .systems.model import as_system
 from .systems.ode_system import OdeSystem
 from .systems.quasi_velocities import QuasiVelocities
@@ -68,6 +73,7 @@ __all__ = [
     "Body",
     "Certificate",
     "ConstraintError",
+    "ConstraintLint",
     "ConstraintWarning",
     "Crossings",
     "Ensemble",
@@ -92,6 +98,7 @@ __all__ = [
     "PruneResult",
     "QuasiVelocities",
     "RecursiveInverseDynamics",
+    "ReducedLinearization",
     "Reference",
     "Released",
     "SampledController",
@@ -115,6 +122,7 @@ __all__ = [
     "consistent_state",
     "coriolis",
     "damping_force",
+    "display_names",
     "energy",
     "forward_dynamics",
     "frame_acceleration",
@@ -129,8 +137,11 @@ __all__ = [
     "inertial_parameters",
     "integrable_rows",
     "inverse_dynamics",
+    "inverse_dynamics_derivatives",
+    "inverse_mass_matrix",
     "kinetic_energy",
     "linearize",
+    "lint_constraints",
     "load_mjcf",
     "load_urdf",
     "mass_matrix",
@@ -140,6 +151,7 @@ __all__ = [
     "potential_energy",
     "prune",
     "raise_if_singular",
+    "reduced_linearization",
     "reference",
     "regressor",
     "release",

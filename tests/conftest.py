@@ -11,6 +11,8 @@ from tempfile import TemporaryDirectory
 import pytest
 from hypothesis import HealthCheck, settings
 
+from cgraph.codegen import llvm_engine
+
 if sys.dont_write_bytecode:  # else every process that a test starts would compile the library anew
     _bytecode = TemporaryDirectory(prefix="cgraph-bytecode-")
     atexit.register(_bytecode.cleanup)
@@ -26,9 +28,22 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "reproducible"))
 
 
 def pytest_collection_finish() -> None:
-    """Modules and tests stay to the end: the garbage collector need not walk through them again and again."""
+    """Modules and tests stay to the end: the garbage collector need not walk through them, nor come as often."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(50_000, 20, 20)
+
+
+@pytest.fixture(autouse=True)
+def quick_machine_code(request: pytest.FixtureRequest) -> Iterator[None]:
+    """LLVM's code generator does not optimize, in a quarter of the time, but where its code is what a test is about.
+
+    Products and sums are then not fused, so that last bits are those of a processor without such an instruction.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        if not ({"codegen", "program"} & set(request.path.parts) or "optimized" in request.keywords):
+            patch.setattr(llvm_engine, "LEVEL", 0)
+        yield
 
 
 @pytest.fixture

@@ -97,29 +97,32 @@ LINK = {"joint": dyn.Joint("revolute"), "mass": 1.0, "inertia": (0.1, 0.1, 0.1)}
 SCENE = (ARM, (0.0,), (0.0,), 1.0)
 FIRST, LAST = TWO.bodies[0].name, TWO.bodies[1].name
 RUNS = {"dt": 0.01, "max_steps": 100, "backend": "python", "estimate_error": False, "progress": False}
-MODEL_ALONE = """as_system bias center_of_mass center_of_mass_jacobian coriolis damping_force energy gravity_force
-    inertial_parameters integrable_rows kinetic_energy mass_matrix momentum potential_energy regressor state_equation
-    state_space to_urdf torque_by_joint_motion torque_by_link RecursiveInverseDynamics"""
+MODEL_ALONE = """as_system bias center_of_mass center_of_mass_jacobian coriolis damping_force display_names energy
+    gravity_force inertial_parameters integrable_rows inverse_dynamics_derivatives inverse_mass_matrix kinetic_energy
+    mass_matrix momentum potential_energy regressor state_equation state_space to_urdf torque_by_joint_motion
+    torque_by_link RecursiveInverseDynamics"""
 
 CALLS = {
     **{f"cg.{op.name}": call(function(op), *[X] * op.arity) for op in OPS.values()},
     **{f"cg.{name}": call(getattr(cg, name), GRAPH) for name in ("simplify", "structure_hash")},
     **{f"cg.{name}": call(getattr(cg, name), GRAPH, wrt=None) for name in ("gradient", "hessian", "jacobian")},
-    **{f"cg.{name}": call(getattr(cg, name), GRAPH, wrt=None) for name in ("jvp", "vjp")},
-    "cg.compare": call(cg.compare, GRAPH, SQUARES, atoms=(), classify=None),
+    **{f"cg.{name}": call(getattr(cg, name), GRAPH, wrt=None) for name in ("jvp", "sparsity", "vjp")},
+    "cg.compare": call(cg.compare, GRAPH, SQUARES, atoms=(), classify=None, names=None),
     "cg.compile": call(cg.compile, GRAPH, "python", fast=False, fma=True),
     "cg.constant": call(cg.constant, 1.0),
     "cg.double_double": call(cg.double_double, GRAPH, low=False),
     "cg.hessian_solve": call(cg.hessian_solve, SQUARES, ["x", "y"], [1.0, 2.0], check=False),
-    "cg.lint": call(cg.lint, GRAPH, independent=(), depends=None, box=None, at=None, digits=4.0, function="f"),
+    "cg.lint": call(
+        cg.lint, GRAPH, independent=(), depends=None, box=None, at=None, digits=4.0, function="f", names=None
+    ),
     "cg.loop": call(cg.loop, HALVE, {"x": "next"}, "python", fast=False, fma=True),
     "cg.specialize": call(cg.specialize, GRAPH, {"x": 1.0}, outputs=None),
     "cg.tag": call(tagged, "a"),
-    "cg.to_c": call(cg.to_c, GRAPH, "f", fma=False),
+    "cg.to_c": call(cg.to_c, GRAPH, "f", fma=False, names=None),
     "cg.variable": call(cg.variable, "x"),
     "cg.variables": call(cg.variables, "x y"),
-    "cg.why": call(cg.why, GRAPH, "r", "x", at=None, k=10),
-    "cg.why_not": call(cg.why_not, cg.Graph([X, Y], {"r": X}), "r", "y"),
+    "cg.why": call(cg.why, GRAPH, "r", "x", at=None, k=10, names=None),
+    "cg.why_not": call(cg.why_not, cg.Graph([X, Y], {"r": X}), "r", "y", names=None),
     "cg.with_name": call(cg.with_name, X * Y, "n"),
     "cg.Graph": call(cg.Graph, [X, Y], {"r": X * Y}),
     "cg.Graph()": call(GRAPH, 1.0, 2.0),
@@ -127,6 +130,11 @@ CALLS = {
     "cg.Graph.select_inputs": call(GRAPH.select_inputs, None),
     "cg.Compiled()": call(cg.compile(GRAPH, "python"), [1.0, 2.0]),
     "cg.Compiled.batch": call(cg.compile(GRAPH, "python").batch, [[1.0], [2.0]], 1),
+    "cg.Compiled.jvp": call(cg.compile(GRAPH, "python").jvp, [1.0, 2.0], [[1.0, 0.0]]),
+    "cg.Compiled.vjp": call(cg.compile(GRAPH, "python").vjp, [1.0, 2.0], [[1.0]]),
+    "cg.Compiled.jacobian": call(cg.compile(GRAPH, "python").jacobian, [1.0, 2.0], sparse=False),
+    "cg.Compiled.hessian": call(cg.compile(GRAPH, "python").hessian, [1.0, 2.0], [1.0], sparse=False),
+    "cg.Compiled.bind_jacobian": call(cg.compile(GRAPH, "python").bind_jacobian, np.ones(2), np.ones((1, 2))),
     "cg.Loop()": call(LOOP, [1.0], 2, 1),
     "cg.Loop.batch": call(LOOP.batch, [[1.0]], 2, 1),
     "cg.Comparison.classes": call(cg.compare(GRAPH, SQUARES).classes, "left"),
@@ -228,7 +236,9 @@ CALLS = {
     "dyn.scenes.triple_pendulum": call(dyn.scenes.triple_pendulum, "rod"),
     "dyn.cases.load": call(dyn.cases.load, "exponential decay"),
     "viz.graph_svg": call(viz.graph_svg, GRAPH),
-    "viz.page": call(viz.page, GRAPH, title="t", about="", at=None, marked=frozenset(), motion=None, tables=()),
+    "viz.page": call(
+        viz.page, GRAPH, title="t", about="", at=None, marked=(), motion=None, tables=(), names=None, units=None
+    ),
     "viz.render_svg": call(viz.render_svg, "digraph {}", engine="dot", timeout=5.0),
     "viz.render_png": call(viz.render_png, "<svg xmlns='http://www.w3.org/2000/svg' width='1' height='1'/>", scale=2.0),
     "viz.to_dot": call(
@@ -249,6 +259,7 @@ RECORDS = """
 # at nothing.
 LEFT_OUT = """cg.recording_lines cg.clear_cache cg.Compiled.bind cg.Compiled.values cg.Graph.check cg.Graph.counts
     cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.bias_forces dyn.System.require_values
+    dyn.System.torque_derivatives
     dyn.JointForce.along dyn.JointForce.check dyn.JointLimit.along dyn.JointLimit.check dyn.JointFriction.along
     dyn.JointFriction.check dyn.Actuator.along dyn.Actuator.check"""
 
@@ -339,6 +350,7 @@ GRAPH_FIRST = [
     (cg.lint, ()),
     (cg.loop, ({},)),
     (cg.simplify, ()),
+    (cg.sparsity, ()),
     (cg.specialize, ({},)),
     (cg.structure_hash, ()),
     (cg.to_c, ()),

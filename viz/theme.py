@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -112,6 +112,11 @@ _WORD = re.compile(r"(?<![A-Za-z0-9])([A-Za-z]+)([0-9]*)(?![A-Za-z0-9])")
 def pretty(name: str) -> str:
     """A name in mathematical letters: q0 is q₀, qdd1 is q̈₁, tau2 is τ₂, and dL/dqd0 is dL/dq̇₀."""
     return _WORD.sub(_pretty_word, name)
+
+
+def called(names: Mapping[str, str]) -> dict[str, str]:
+    """Names of coordinates, such as `dynamics.display_names`, as they are drawn: q̇.knee for qd.knee."""
+    return {name: ".".join([pretty(kind), *rest]) for name, text in names.items() for kind, *rest in [text.split(".")]}
 
 
 def _pretty_word(match: re.Match[str]) -> str:

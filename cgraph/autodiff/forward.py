@@ -100,10 +100,14 @@ def jvp(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> G
     {'f_dot': 3.0}
     """
     require_graph("jvp", graph)
-    chosen = graph.select_inputs(wrt)
+    return forward_products(graph, graph.select_inputs(wrt), zero_wins=True)
+
+
+def forward_products(graph: Graph, chosen: Sequence[Node], *, zero_wins: bool) -> Graph:
+    """`jvp` by these inputs; zero_wins: as for `tangents`."""
     suffix = free_suffix("_dot", graph.input_names, [str(node.name) for node in chosen])
     seeds = {node: variable(f"{node.name}{suffix}") for node in chosen}
-    dots = tangents(seeds, graph.outputs.values(), zero_wins=len(seeds) > 1)
+    dots = tangents(seeds, graph.outputs.values(), zero_wins=zero_wins and len(seeds) > 1)
     zero = as_node(0.0)
     outputs = {f"{name}{suffix}": dots.get(node, zero) for name, node in graph.outputs.items()}
     return Graph((*graph.inputs, *seeds.values()), outputs)

@@ -124,13 +124,17 @@ def vjp(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> G
     {'x_bar': 3.0, 'y_bar': 2.0}
     """
     require_graph("vjp", graph)
-    chosen = graph.select_inputs(wrt)
+    return reverse_products(graph, graph.select_inputs(wrt), zero_wins=True)
+
+
+def reverse_products(graph: Graph, chosen: Sequence[Node], *, zero_wins: bool) -> Graph:
+    """`vjp` by these inputs; zero_wins: as for `cotangents`."""
     suffix = free_suffix("_bar", graph.input_names, list(graph.outputs))
     bars = {name: variable(f"{name}{suffix}") for name in graph.outputs}
     seeds: dict[Node, Node] = {}
     for name, node in graph.outputs.items():  # two names may share a node
         seeds[node] = seeds[node] + bars[name] if node in seeds else bars[name]
-    results = cotangents(seeds, chosen, zero_wins=len(seeds) > 1)
+    results = cotangents(seeds, chosen, zero_wins=zero_wins and len(seeds) > 1)
     outputs = {f"{node.name}{suffix}": bar for node, bar in zip(chosen, results, strict=True)}
     return Graph((*graph.inputs, *bars.values()), outputs)
 

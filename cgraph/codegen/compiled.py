@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable
 from typing import Any
 
@@ -14,9 +14,10 @@ from ..core.graph import Graph
 from ..errors import GraphError
 from ..util.real_arrays import real_array
 from ..util.threads import share, thread_count
+from .differentiable import Differentiable, require_memory
 
 
-class Compiled(ABC):
+class Compiled(Differentiable):
     """A graph compiled by `cg.compile`. Inputs and outputs are in the order of the graph's.
 
     Attributes
@@ -39,11 +40,14 @@ class Compiled(ABC):
     >>> f = cg.compile(cg.Graph([x], {"y": x + 1.0}), "python")
     >>> f.n_in, f.n_out, f([2.0]).tolist()
     (1, 1, [3.0])
+    >>> f.jacobian([2.0]).tolist(), f.jvp([2.0], [[5.0], [7.0]]).tolist()
+    ([[1.0]], [[5.0], [7.0]])
     """
 
     source: str
 
     def __init__(self, graph: Graph, backend: str, options: dict[str, Any]) -> None:
+        super().__init__()
         self.graph = graph
         self.backend, self.options = backend, options
         self.n_in, self.n_out = len(graph.inputs), len(graph.outputs)
@@ -86,12 +90,8 @@ class Compiled(ABC):
         Raises GraphError unless both are contiguous arrays of float64 in these shapes, y can be written and they
         share no memory.
         """
-        for name, array, size in (("x", x, self.n_in), ("y", y, self.n_out)):
-            if not isinstance(array, np.ndarray) or array.dtype != np.float64 or array.shape != (size,):
-                given = f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
-                raise GraphError(f"{name} must be an array of float64 in shape ({size},), got {given}")
-            if not array.flags.c_contiguous or not array.flags.aligned:
-                raise GraphError(f"{name} must be contiguous and aligned, got strides {array.strides}")
+        require_memory("x", x, (self.n_in,))
+        require_memory("y", y, (self.n_out,))
         if not y.flags.writeable:
             raise GraphError("y must be an array that can be written, got one that is read-only")
         if np.may_share_memory(x, y):
@@ -105,6 +105,9 @@ class Compiled(ABC):
     @abstractmethod
     def _bound(self, x: Array, y: Array) -> Callable[[], None]:
         """`bind`, after its checks."""
+
+    def _like(self, graph: Graph) -> Compiled:
+        return type(self)(graph, self.backend, self.options)
 
     def _point(self, x: ArrayLike) -> Array:
         point = real_array("x", x)

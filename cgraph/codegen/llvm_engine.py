@@ -50,7 +50,7 @@ class Host:
         self.lanes = 8 if features.get("avx512f") else 4 if features.get("avx2") else 2
         self._name, self._features = binding.get_host_cpu_name(), features.flatten()
         self._target = binding.Target.from_default_triple()
-        llvm = (f"llvmlite {version}", f"LLVM {binding.llvm_version_info}", f"level {LEVEL}")
+        llvm = (f"llvmlite {version}", f"LLVM {binding.llvm_version_info}")
         self._identity = "\n".join((*llvm, self._target.triple, self._name, self._features))
 
     def compile(self, text: str, functions: Iterable[str], cache: Cache | None = None) -> Code:
@@ -59,7 +59,8 @@ class Host:
             self._find(functions)
             if cache is None:
                 return self._loaded(self._translated(text))
-            return self._loaded(cache.fetch(f"{self._identity}\n{text}", lambda: self._translated(text)))
+            recipe = f"{self._identity}\nlevel {LEVEL}\n{text}"
+            return self._loaded(cache.fetch(recipe, lambda: self._translated(text)))
 
     def _translated(self, text: str) -> bytes:
         """An object file of the text. LLVM's own cache wants the text parsed even when it has the object."""

@@ -154,10 +154,13 @@ class Body(NamedTuple):
     functions: list[str]
 
 
-def body(graph: Graph, arithmetic: Arithmetic, address: Address, name: str, scope: Sequence[str]) -> Body:
+def body(
+    graph: Graph, arithmetic: Arithmetic, address: Address, name: str, scope: Sequence[str], *, uniform: int = 0
+) -> Body:
     """Every node in the order of `schedule`; an output is stored as soon as it is known.
 
     name: of the function.  scope: what the addresses are made from, each with its type.
+    uniform: so many inputs, the first, are single numbers in memory, the same for all lanes.
     """
     words, t = arithmetic.words(), arithmetic.type
     stored: dict[Node, list[int]] = {}
@@ -187,7 +190,7 @@ def body(graph: Graph, arithmetic: Arithmetic, address: Address, name: str, scop
             r = arithmetic.number(step.value)
         elif step.op is VARIABLE:
             lines += address("x", f"%x{number}", rows[step])
-            lines.append(f"  {r} = load {t}, ptr %x{number}, align 8")
+            lines += _loaded(r, f"%x{number}", arithmetic, uniform=rows[step] < uniform)
         elif step in calls:
             r, more = _result(step, calls[step], r, args[0], arithmetic)
             lines += more
@@ -201,6 +204,18 @@ def body(graph: Graph, arithmetic: Arithmetic, address: Address, name: str, scop
             lines += address("y", f"%y{row}", row)
             lines.append(f"  store {t} {r}, ptr %y{row}, align 8")
     return _in_functions(written, name, scope, f"[{parts.places} x {t}]")
+
+
+def _loaded(r: str, place: str, arithmetic: Arithmetic, *, uniform: bool) -> list[str]:
+    """An input from memory: a value, or a number for all lanes."""
+    t = arithmetic.type
+    if not uniform or arithmetic.lanes == 1:
+        return [f"  {r} = load {t}, ptr {place}, align 8"]
+    return [
+        f"  {r}.one = load double, ptr {place}, align 8",
+        f"  {r}.first = insertelement {t} poison, double {r}.one, i32 0",
+        f"  {r} = shufflevector {t} {r}.first, {t} poison, <{arithmetic.lanes} x i32> zeroinitializer",
+    ]
 
 
 def _in_functions(written: Sequence[list[str]], name: str, scope: Sequence[str], memory: str) -> Body:

@@ -12,12 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..autodiff.direction_split import DirectionSplit
 from ..core.evaluate import Array
 from ..core.graph import Graph
 from . import llvm_engine as llvm
 from .compiled import Compiled
 from .disk_cache import open_cache
 from .llvm_ir import batch_ir, libm_functions, scalar_ir
+from .native_sweep import NativeSweep
 
 _POINT = ctypes.PYFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)  # too short a call to give the interpreter away for
 _BATCH = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
@@ -94,6 +96,9 @@ class Native(Compiled):
                 self._batch_entry = self._compiled(self.batch_source(), "batch", _BATCH)
         lanes = self._host.lanes
         return max(WORK // len(self.graph.nodes) // lanes, 1) * lanes, partial(_sweep, self._batch_entry, lanes)
+
+    def _sweep(self, split: DirectionSplit, guarded: DirectionSplit | None) -> NativeSweep:
+        return NativeSweep(split, self._host, self._flags, self._cache, guarded)
 
     def _compiled(self, text: str, name: str, prototype: Any) -> Any:
         return self._host.compile(text, libm_functions(self.graph), self._cache).function(name, prototype)

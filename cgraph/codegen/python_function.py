@@ -12,12 +12,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..autodiff.direction_split import DirectionSplit
 from ..core.evaluate import Array
 from ..core.graph import Graph
 from ..core.op_values import by_element
 from ..core.operation import LIBRARY, Op
 from ..core.ops import OPS
 from .compiled import Compiled
+from .numpy_sweep import NumpySweep
 from .python_source import source
 
 BLOCK = 4096  # states a NumPy sweep takes at once: its temporaries stay in the cache
@@ -31,6 +33,8 @@ class Generated(Compiled):
 
     options: fma; without it NumPy has its functions from the C library, too, one element after another.
     """
+
+    vector_cost = 20  # NumPy's call, against one of Python's operators
 
     def __init__(self, graph: Graph, backend: str, options: dict[str, Any]) -> None:
         super().__init__(graph, backend, options)
@@ -53,6 +57,9 @@ class Generated(Compiled):
         except (ValueError, OverflowError, ZeroDivisionError):  # out of a function's domain: IEEE values node by node
             named = dict(zip(self.graph.input_names, x, strict=True))
             return tuple([float(value) for value in self.graph.evaluate(named).values()])
+
+    def _sweep(self, split: DirectionSplit, guarded: DirectionSplit | None) -> NumpySweep:
+        return NumpySweep(split, partial(Generated, options=self.options), guarded)
 
     def _columns(self) -> tuple[int, Callable[[Array, Array], None]]:
         if self.backend == "python":

@@ -30,8 +30,6 @@ def _leaf(name: str) -> Op:
 VARIABLE = _leaf("variable")
 CONSTANT = _leaf("constant")
 
-_set = object.__setattr__
-
 
 class Node:
     """An immutable node of a computational graph: a constant, a named variable or an operation.
@@ -81,11 +79,11 @@ class Node:
         value: float | None = None,
         name: str | None = None,
     ) -> None:
-        _set(self, "op", op)
-        _set(self, "args", args)
-        _set(self, "label", label)
-        _set(self, "value", value)
-        _set(self, "name", name)
+        _set_op(self, op)
+        _set_args(self, args)
+        _set_label(self, label)
+        _set_value(self, value)
+        _set_name(self, name)
 
     def __setattr__(self, key: str, value: object) -> NoReturn:
         raise AttributeError(f"a Node is immutable: cannot set {key!r}")
@@ -209,10 +207,10 @@ class Node:
         raise AttributeError(f"a Node has no attribute {name!r}")
 
 
+# Past Node.__setattr__, in half the time of object.__setattr__.
+_set_args, _set_label, _set_name, _set_op, _set_value = [vars(Node)[field].__set__ for field in Node.__slots__[1:]]
 Scalar = Node | float
 _TURNED = {np.greater: np.less, np.greater_equal: np.less_equal}  # a > b is b < a
-
-
 _constants: Interned[tuple[float, float], Node] = Interned()
 _variables: Interned[str, Node] = Interned()
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 from ..core.graph import Graph, require_graph
 from ..core.node import VARIABLE, Node, variable
 from ..core.structure_hash import node_hashes
 from ..errors import GraphError
-from ..util.require import require_choice, require_sequence
+from ..util.require import require_choice, require_sequence, require_texts
 from .names import Names, joined, many
 
 Classify = Callable[[Graph], Callable[[Node], str]]
@@ -45,6 +45,8 @@ class Comparison:
         The nodes that count as a variable of that name.
     classify : callable
         Graph -> (node -> name of its class).
+    names : mapping of str to str
+        {name in the graphs: what a person calls it}.
 
     Examples
     --------
@@ -66,6 +68,7 @@ class Comparison:
     other_outputs: tuple[str, ...]
     atoms: dict[Node, str]
     classify: Classify
+    names: Mapping[str, str] = field(default_factory=dict)
 
     def classes(self, side: Side) -> dict[str, int]:
         """{class: number of nodes that only that side has}, the largest first."""
@@ -80,9 +83,9 @@ class Comparison:
         only = f"{len(self.only_left)} only left, {len(self.only_right)} only right"
         lines = [f"{sizes}: {len(self.common)} in both, {only}."]
         if self.same_outputs:
-            lines.append(f"Computed alike: {joined(self.same_outputs)}.")
+            lines.append(f"Computed alike: {joined(self._shown(self.same_outputs))}.")
         if self.other_outputs:
-            lines.append(f"Computed otherwise: {joined(self.other_outputs)}.")
+            lines.append(f"Computed otherwise: {joined(self._shown(self.other_outputs))}.")
         sides: tuple[Side, Side] = ("left", "right")
         for side in sides:
             if rows := list(self.classes(side).items()):
@@ -92,13 +95,16 @@ class Comparison:
                     lines.append(f"  {sum([number for _, number in rest]):>5}  in {len(rest)} more classes")
         return "\n".join(lines)
 
+    def _shown(self, outputs: Sequence[str]) -> list[str]:
+        return [self.names.get(name, name) for name in outputs]
+
     def to_dict(self) -> dict[str, Any]:
         """The same for JSON; nodes are numbered as in `graph.nodes` of their graph."""
         left, right = ({node: i for i, node in enumerate(graph.nodes)} for graph in (self.left, self.right))
         return {
             "common": [[left[a], right[b]] for a, b in self.common],
-            "only_left": _described(self.left, self.only_left, self.classify),
-            "only_right": _described(self.right, self.only_right, self.classify),
+            "only_left": _described(self.left, self.only_left, self.classify, self.names),
+            "only_right": _described(self.right, self.only_right, self.classify, self.names),
             "left_classes": self.classes("left"),
             "right_classes": self.classes("right"),
             "same_outputs": list(self.same_outputs),
@@ -138,7 +144,12 @@ class Comparison:
 
 
 def compare(
-    left: Graph, right: Graph, *, atoms: str | Iterable[str] = (), classify: Classify | None = None
+    left: Graph,
+    right: Graph,
+    *,
+    atoms: str | Iterable[str] = (),
+    classify: Classify | None = None,
+    names: Mapping[str, str] | None = None,
 ) -> Comparison:
     """Compare two graphs by structure.
 
@@ -156,6 +167,8 @@ def compare(
     classify : callable, optional
         Called with a graph, it returns a function from nodes to names of classes, by which the summary counts; by
         default, a node's roles and tags.
+    names : mapping of str to str, optional
+        {name in the graphs: what a person calls it}, shown in the summary.
 
     Returns
     -------
@@ -204,6 +217,7 @@ def compare(
         tuple([name for name in shared if name not in same]),
         stand_ins,
         classify or _by_label,
+        require_texts("names", names),
     )
 
 
@@ -225,7 +239,9 @@ def _by_label(graph: Graph) -> Callable[[Node], str]:
     return lambda node: "; ".join([", ".join(sorted(part)) for part in (node.roles, node.tags) if part]) or node.op.name
 
 
-def _described(graph: Graph, nodes: Iterable[Node], classify: Classify) -> list[dict[str, Any]]:
-    names, name_of = Names(graph), classify(graph)
+def _described(
+    graph: Graph, nodes: Iterable[Node], classify: Classify, called: Mapping[str, str]
+) -> list[dict[str, Any]]:
+    names, name_of = Names(graph, called), classify(graph)
     number = {node: i for i, node in enumerate(graph.nodes)}
     return [{"node": number[node], "text": names.line(node), "class": name_of(node)} for node in nodes]

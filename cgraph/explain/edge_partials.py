@@ -10,32 +10,34 @@ from ..core.node import Node
 from ..errors import GraphError
 from ..util.real_arrays import is_finite
 from ..util.require import require_mapping
+from .names import Names
 
 Point = Mapping[str, float]
 
 
-def checked(graph: Graph, at: Point) -> dict[str, float]:
-    """The point as floats. Raises GraphError for a missing or unknown name, ValueError for what is not finite."""
+def checked(names: Names, at: Point) -> dict[str, float]:
+    """The point as floats, by the graph's names.
+
+    Raises GraphError for a missing or unknown name, ValueError for what is not finite.
+    """
     for name, value in require_mapping("at", at, "input: value").items():
         if isinstance(value, bool) or not is_finite(value):
             raise ValueError(f"at: input {name!r} must be a finite number, got {value!r:.60}")
-    if missing := [name for name in graph.input_names if name not in at]:
+    given = names.inputs_of("at", at)
+    if missing := [names.shown(name) for name in names.graph.input_names if name not in given]:
         raise GraphError(f"at: no value for input {', '.join(missing)}")
-    if unknown := [name for name in at if name not in graph.input_names]:
-        raise GraphError(
-            f"at: the graph has no input {', '.join(map(str, unknown))} (it has {', '.join(graph.input_names)})"
-        )
-    return {name: float(value) for name, value in at.items()}
+    return {name: float(value) for name, value in given.items()}
 
 
-def node_values(graph: Graph, nodes: Sequence[Node], at: Point) -> list[float]:
+def node_values(names: Names, nodes: Sequence[Node], at: Point) -> list[float]:
     """The values of nodes of the graph at a point."""
     if not nodes:
         return []
-    values = Graph(graph.inputs, {str(i): node for i, node in enumerate(nodes)}).evaluate(checked(graph, at))
+    inputs = names.graph.inputs
+    values = Graph(inputs, {str(i): node for i, node in enumerate(nodes)}).evaluate(checked(names, at))
     return [float(values[str(i)]) for i in range(len(nodes))]
 
 
-def edge_slopes(graph: Graph, edges: Sequence[Edge], at: Point) -> list[float]:
+def edge_slopes(names: Names, edges: Sequence[Edge], at: Point) -> list[float]:
     """d target / d source of each edge alone, at a point; NaN or infinite where there is no derivative."""
-    return node_values(graph, [edge.partial for edge in edges], at)
+    return node_values(names, [edge.partial for edge in edges], at)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TypeVar
 
 from ..core.graph import Graph
 from ..core.node import CONSTANT, Node
 from ..core.operation import SUM
 from ..core.source_lines import lines_text
 from ..errors import GraphError
+from ..util.nearest import nearest
+from ..util.require import require_texts
 
 Name = str | Node
+Value = TypeVar("Value")
 LENGTH = 32  # characters up to which a node is written out; a longer one refers to its parts by their %numbers
 DEPTH = 4  # most operations within one another in such a text
 
@@ -24,6 +28,9 @@ class Names:
     ----------
     graph : Graph
         Whose nodes.
+    called : mapping of str to str, optional
+        {name in the graph: what a person calls it}, such as `dynamics.display_names(model)`. These are shown, and taken
+        beside the graph's; where the graph has the same name, or two have one, the graph's stands.
 
     Attributes
     ----------
@@ -44,7 +51,7 @@ class Names:
     'sin(x * h)'
     """
 
-    def __init__(self, graph: Graph) -> None:
+    def __init__(self, graph: Graph, called: Mapping[str, str] | None = None) -> None:
         self.graph = graph
         self.number: dict[Node, int] = {}
         self.by_name: dict[str, list[Node]] = {}
@@ -55,6 +62,38 @@ class Names:
         for node in self.known:
             if node.name is not None:
                 self.by_name.setdefault(node.name, []).append(node)
+        self._called: dict[str, str] = {}
+        self._meant: dict[str, str] = {}
+        for name, text in require_texts("names", called).items():
+            if self._has(name) and not self._has(text) and text not in self._meant:
+                self._called[name], self._meant[text] = text, name
+
+    def _has(self, name: str) -> bool:
+        return name in self.by_name or name in self.graph.outputs
+
+    # Between a graph's name and what a person calls it.
+
+    def shown(self, name: str) -> str:
+        """What a person calls a node, input or output of that name."""
+        return self._called.get(name, name)
+
+    def meant(self, name: str) -> str:
+        """The graph's name of what a person calls so."""
+        return self._meant.get(name, name)
+
+    def inputs_of(self, what: str, values: Mapping[str, Value]) -> dict[str, Value]:
+        """Values by the graph's names of inputs. Raises GraphError, naming `what`, for what is no input, or twice."""
+        result: dict[str, Value] = {}
+        for name, value in values.items():
+            meant = self.meant(name) if isinstance(name, str) else name
+            if meant not in self.graph.input_names:
+                listed = _listed([self.shown(each) for each in self.graph.input_names]) or "none"
+                near = self._near(name, self.graph.input_names)
+                raise GraphError(f"{what}: the graph has no input {name!s:.80}{near} (it has {listed})")
+            if meant in result:
+                raise GraphError(f"{what} gives the input {self.shown(meant)} twice, once as {meant}")
+            result[meant] = value
+        return result
 
     # From a name to nodes.
 
@@ -66,14 +105,16 @@ class Names:
             return [who]
         if not isinstance(who, str):
             raise TypeError(f"a node is given by its name or itself, got {type(who).__name__}: {who!r:.60}")
-        nodes = self.by_name.get(who, []) + ([self.graph.outputs[who]] if who in self.graph.outputs else [])
+        name = self.meant(who)
+        nodes = self.by_name.get(name, []) + ([self.graph.outputs[name]] if name in self.graph.outputs else [])
         if not nodes:
-            raise GraphError(f"nothing in the graph is called {who!r} ({self._known()})")
+            near = self._near(who, [*self.by_name, *self.graph.outputs])
+            raise GraphError(f"nothing in the graph is called {who!r:.80}{near} ({self._known()})")
         return list(dict.fromkeys(nodes))
 
     def group(self, who: Name | Sequence[Name]) -> list[Node]:
         """The nodes of a group: a name or several in one string, a node, or a sequence of these."""
-        if isinstance(who, str) and who not in self.by_name and who not in self.graph.outputs:
+        if isinstance(who, str) and not self._has(self.meant(who)):
             who = who.replace(",", " ").split()
         if not isinstance(who, (str, Node, Iterable)):
             raise TypeError(f"a group is a name or several, or nodes; got {type(who).__name__}: {who!r:.60}")
@@ -86,17 +127,23 @@ class Names:
         """The one node of a name. Raises GraphError if there is none, or more than one."""
         nodes = self.all(who)
         if len(nodes) > 1:
-            raise GraphError(f"{len(nodes)} nodes are called {who!r}; give the node itself")
+            raise GraphError(f"{len(nodes)} nodes are called {who!r:.80}; give the node itself")
         return nodes[0]
 
     def output(self, who: Name) -> Node:
         """The output of a name, else the one node of that name."""
-        return self.graph.outputs[who] if isinstance(who, str) and who in self.graph.outputs else self.one(who)
+        name = self.meant(who) if isinstance(who, str) else who
+        return self.graph.outputs[name] if isinstance(name, str) and name in self.graph.outputs else self.one(who)
+
+    def _near(self, who: str, known: Iterable[str]) -> str:
+        """Which of the known names may be meant; a part of a sentence, empty where none is near."""
+        near = nearest(who, [each for name in known for each in dict.fromkeys((self.shown(name), name))])
+        return f": did you mean {' or '.join(near)}?" if near else ""
 
     def _known(self) -> str:
         named = [name for name, nodes in self.by_name.items() if any(node.args for node in nodes)]
         parts = (("inputs", self.graph.input_names), ("named nodes", named), ("outputs", tuple(self.graph.outputs)))
-        return "; ".join(f"{what} {_listed(names)}" for what, names in parts if names)
+        return "; ".join(f"{what} {_listed([self.shown(name) for name in names])}" for what, names in parts if names)
 
     # From a node to text.
 
@@ -104,7 +151,9 @@ class Names:
         """A name, a number, or the %number of the listing; a question mark for an operation of no such line."""
         if node.op is CONSTANT:
             return f"{node.value:.6g}"
-        return node.name or (f"%{self.number[node]}" if node in self.number else "?")
+        if node.name:
+            return self.shown(node.name)
+        return f"%{self.number[node]}" if node in self.number else "?"
 
     def text(self, node: Node, length: int = LENGTH) -> str:
         """A name, or the formula, such as `qd0 * dt`, as deep as `length` characters allow."""
@@ -122,7 +171,7 @@ class Names:
         tags += f"  {lines_text([node])}" if node.lines else ""
         if not node.args:
             return self.short(node) + tags
-        name = f"  ({node.name})" if node.name else ""
+        name = f"  ({self.shown(node.name)})" if node.name else ""
         return f"%{self.number[node]} = {self.formula(node)}{name}{tags}"
 
     def formula(self, node: Node) -> str:

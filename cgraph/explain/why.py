@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -142,7 +142,15 @@ class Why:
         }
 
 
-def why(graph: Graph, output: Name, input: Name, at: Point | None = None, k: int = 10) -> Why:  # noqa: A002 (its name)
+def why(
+    graph: Graph,
+    output: Name,
+    input: Name,  # noqa: A002 (its name)
+    at: Point | None = None,
+    k: int = 10,
+    *,
+    names: Mapping[str, str] | None = None,
+) -> Why:
     """Why `output` depends on `input`: the number of paths, and the k heaviest at the point `at`.
 
     The value of a path is the product of the partials along it; over all paths these add up to the derivative. All
@@ -158,6 +166,9 @@ def why(graph: Graph, output: Name, input: Name, at: Point | None = None, k: int
         {input: number} for all inputs. Without it, the k shortest paths are listed.
     k : int
         How many paths to list.
+    names : mapping of str to str, optional
+        {name in the graph: what a person calls it}, such as `dynamics.display_names(model)`: shown, and taken beside
+        the graph's, as in `why(graph, "tau.knee", "q.hip", names=..)`.
 
     Returns
     -------
@@ -182,11 +193,11 @@ def why(graph: Graph, output: Name, input: Name, at: Point | None = None, k: int
     The 1 heaviest add up to 1 and carry 100.0% of the weight of all.
     """
     require_graph("why", graph)
-    names = Names(graph)
+    known = Names(graph, names)
     if not isinstance(k, int) or isinstance(k, bool) or k < 0:
         raise ValueError(f"k must be a whole number of paths, at least 0, got {k!r}")
-    source, sink = names.one(input), names.output(output)
-    to, origin = _name_of(names, output), _name_of(names, input)
+    source, sink = known.one(input), known.output(output)
+    to, origin = _name_of(known, output), _name_of(known, input)
     nodes = between(graph.nodes, [source], [sink])
     inside = set(nodes)
     edges = [Edge(arg, node, slot) for node in nodes for slot, arg in enumerate(node.args) if arg in inside]
@@ -195,13 +206,13 @@ def why(graph: Graph, output: Name, input: Name, at: Point | None = None, k: int
     count = path_count(nodes, edges, source, sink) if nodes else 0
     if at is None:
         shortest = best_paths(nodes, edges, source, sink, k, lambda edge: 1.0) if count else []
-        return Why(graph, to, origin, count, tuple([_path(names, to, path, None) for path in shortest]))
-    slopes = dict(zip(edges, edge_slopes(graph, edges, at), strict=True))
-    edges = _contributing(names, nodes, edges, slopes, sink)
+        return Why(graph, to, origin, count, tuple([_path(known, to, path, None) for path in shortest]))
+    slopes = dict(zip(edges, edge_slopes(known, edges, at), strict=True))
+    edges = _contributing(known, nodes, edges, slopes, sink)
     derivative, weight = _path_sums(nodes, edges, slopes, source, sink)
     # The largest |product| of partials has the least sum of -log |partial|.
     heaviest = best_paths(nodes, edges, source, sink, k, lambda edge: -math.log(abs(slopes[edge]))) if count else []
-    paths = [_path(names, to, path, math.prod([slopes[edge] for edge in path])) for path in heaviest]
+    paths = [_path(known, to, path, math.prod([slopes[edge] for edge in path])) for path in heaviest]
     return Why(graph, to, origin, count, tuple(paths), derivative, weight)
 
 
@@ -245,7 +256,7 @@ def _path_sums(
 
 
 def _name_of(names: Names, who: Name) -> str:
-    return who if isinstance(who, str) else names.text(who)
+    return names.shown(names.meant(who)) if isinstance(who, str) else names.text(who)
 
 
 def _path(names: Names, output: str, edges: tuple[Edge, ...], value: float | None) -> Path:
@@ -256,19 +267,19 @@ def _path(names: Names, output: str, edges: tuple[Edge, ...], value: float | Non
     text = " -> ".join([start, *[names.text(node) for node in inner], *end])
     tags = sorted({tag for node in inner for tag in node.tags})
     if len(text) > LENGTH:
-        text = " -> ".join([start, *_route(inner), *end])
+        text = " -> ".join([start, *_route(names, inner), *end])
     elif tags:
         text += f"  [{', '.join(tags)}]"
     lines = lines_text(inner)
     return Path(edges, value, f"{text}  {lines}" if lines else text)
 
 
-def _route(nodes: Sequence[Node]) -> list[str]:
+def _route(names: Names, nodes: Sequence[Node]) -> list[str]:
     """A long path by names, tags and operations: neighbors with the same tags count as one step."""
     steps: list[tuple[str, list[str]]] = []
     for node in nodes:
         if node.name:
-            steps.append((node.name, []))
+            steps.append((names.text(node), []))
         else:
             tags = f"[{', '.join(sorted(node.tags))}]"
             if not steps or steps[-1][0] != tags:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from ..core.graph import Graph, require_graph
@@ -32,6 +33,8 @@ class WhyNot:
         Names of the outputs that depend on the input.
     inputs : tuple of str
         Names of the inputs that the output depends on.
+    names : mapping of str to str
+        {name in the graph: what a person calls it}.
 
     Examples
     --------
@@ -49,9 +52,10 @@ class WhyNot:
     meetings: tuple[Node, ...]
     outputs: tuple[str, ...]
     inputs: tuple[str, ...]
+    names: Mapping[str, str] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        names = Names(self.graph)
+        names = Names(self.graph, self.names)
         number = len(self.reached) - 1
         lines = [f"{self.output} does not depend on {self.input}."]
         if number:
@@ -82,7 +86,13 @@ class WhyNot:
         }
 
 
-def why_not(graph: Graph, output: Name, input: Name) -> WhyNot:  # noqa: A002 (its name)
+def why_not(
+    graph: Graph,
+    output: Name,
+    input: Name,  # noqa: A002 (its name)
+    *,
+    names: Mapping[str, str] | None = None,
+) -> WhyNot:
     """Why `output` does not depend on `input`: how far the input reaches, and what the output is made from.
 
     Parameters
@@ -91,6 +101,8 @@ def why_not(graph: Graph, output: Name, input: Name) -> WhyNot:  # noqa: A002 (i
         Where they are.
     output, input : str or Node
         Names of an output and an input, or of nodes named by `cg.with_name`, or nodes.
+    names : mapping of str to str, optional
+        {name in the graph: what a person calls it}, as `why` takes them.
 
     Returns
     -------
@@ -113,10 +125,10 @@ def why_not(graph: Graph, output: Name, input: Name) -> WhyNot:  # noqa: A002 (i
     The two meet where f does not look: %2 = x * y.
     """
     require_graph("why_not", graph)
-    names = Names(graph)
-    source, sink = names.one(input), names.output(output)
+    known = Names(graph, names)
+    source, sink = known.one(input), known.output(output)
     reached, made_from = descendants(graph.nodes, [source]), ancestors([sink])
-    to, origin = (who if isinstance(who, str) else names.text(who) for who in (output, input))
+    to, origin = (known.shown(known.meant(who)) if isinstance(who, str) else known.text(who) for who in (output, input))
     if sink in reached:
         raise GraphError(f"{to} depends on {origin}; cg.why lists the paths")
     return WhyNot(
@@ -126,8 +138,9 @@ def why_not(graph: Graph, output: Name, input: Name) -> WhyNot:  # noqa: A002 (i
         reached=frozenset(reached),
         made_from=frozenset(made_from),
         meetings=_first_meetings(graph, reached, made_from),
-        outputs=tuple([name for name, node in graph.outputs.items() if node in reached]),
-        inputs=tuple([str(node.name) for node in graph.inputs if node in made_from]),
+        outputs=tuple([known.shown(name) for name, node in graph.outputs.items() if node in reached]),
+        inputs=tuple([known.text(node) for node in graph.inputs if node in made_from]),
+        names=names or {},
     )
 
 

@@ -42,11 +42,15 @@ class Functions:
         scope = [*_pointers("in", inputs), *_pointers("out", outputs)]
         return self._define((id(graph), inputs, outputs), "call", lines, len(inputs), len(outputs))
 
-    def map(self, graph: Graph, inputs: Lengths, count: int) -> str:
-        """y[i] = graph(x[i]) for i = 0 .. count - 1; an input of another length holds one number for all i."""
-        t = self.arithmetic.type
+    def map(self, graph: Graph, inputs: Lengths, count: int, shared: Lengths = ()) -> str:
+        """y[i] = graph(shared, x[i]) for i = 0 .. count - 1; an input of another length holds one number for all i."""
+        t, known = self.arithmetic.type, _numbers(shared)
+        inputs = (*shared, *inputs)
 
         def address(base: str, name: str, row: int) -> list[str]:
+            if base == "x" and row < len(known):
+                return [f"  {name} = getelementptr {t}, ptr %in{known[row][0]}, i64 {known[row][1]}"]
+            row += len(shared) - len(known) if base == "x" else 0
             moves = base == "y" or inputs[row] == count
             return [f"  {name} = getelementptr {t}, ptr %{_ARGUMENT[base]}{row}, i64 {'%i' if moves else 0}"]
 
@@ -55,15 +59,22 @@ class Functions:
 
         scope = [*_pointers("in", inputs), *_pointers("out", graph.outputs), "i64 %i"]
         in_vectors = self.arithmetic.lanes == 1 and self.width > 1 and count > 1 and not libm_functions(graph)
-        chosen = self._map_in_vectors(graph, inputs, count) if in_vectors else lines
-        return self._define(("map", id(graph), inputs, count), "map", chosen, len(inputs), len(graph.outputs))
+        chosen = self._map_in_vectors(graph, inputs, count, shared) if in_vectors else lines
+        key = ("map", id(graph), inputs, count, len(shared))
+        return self._define(key, "map", chosen, len(inputs), len(graph.outputs))
 
-    def _map_in_vectors(self, graph: Graph, inputs: Lengths, count: int) -> Callable[[], list[str]]:
-        """As `map`, a vector of elements at a time; results beyond the last element go to the register's padding."""
-        arithmetic = Arithmetic(self.arithmetic.flags, self.width)
-        t, scalars = arithmetic.type, [k for k, length in enumerate(inputs) if length != count]
+    def _map_in_vectors(self, graph: Graph, inputs: Lengths, count: int, shared: Lengths) -> Callable[[], list[str]]:
+        """As `map`, a vector of elements at a time; results beyond the last element go to the register's padding.
+
+        inputs: the shared ones first.
+        """
+        arithmetic, known, first = Arithmetic(self.arithmetic.flags, self.width), _numbers(shared), len(shared)
+        t, scalars = arithmetic.type, [k for k, length in enumerate(inputs) if k >= first and length != count]
 
         def address(base: str, name: str, row: int) -> list[str]:
+            if base == "x" and row < len(known):
+                return [f"  {name} = getelementptr double, ptr %in{known[row][0]}, i64 {known[row][1]}"]
+            row += first - len(known) if base == "x" else 0
             if base == "x" and row in scalars:
                 return [f"  {name} = getelementptr {t}, ptr %same{row}, i64 0"]
             return [f"  {name} = getelementptr {t}, ptr %{_ARGUMENT[base]}{row}, i64 %i"]
@@ -78,7 +89,8 @@ class Functions:
                     f"  %all{k} = shufflevector {t} %first{k}, {t} poison, <{self.width} x i32> zeroinitializer",
                     f"  store {t} %all{k}, ptr %same{k}, align 64",
                 ]
-            return [*spread, *_loop(self._body(graph, arithmetic, address, scope), [], -(-count // self.width))]
+            written = self._body(graph, arithmetic, address, scope, len(known))
+            return [*spread, *_loop(written, [], -(-count // self.width))]
 
         scope = [*_pointers("in", inputs), *_pointers("out", graph.outputs), "i64 %i"]
         scope += [f"ptr %same{k}" for k in scalars]
@@ -117,9 +129,11 @@ class Functions:
         """The solution of A x = b in place of b, see `lu_solve.solve_text`."""
         return self._define_text("lu.solve", solve_text)
 
-    def _body(self, graph: Graph, arithmetic: Arithmetic, address: Address, scope: Sequence[str]) -> Body:
+    def _body(
+        self, graph: Graph, arithmetic: Arithmetic, address: Address, scope: Sequence[str], uniform: int = 0
+    ) -> Body:
         """The body of the function that is being defined, those that it calls defined before."""
-        written = body(graph, arithmetic, address, next(reversed(self._names.values())), scope)
+        written = body(graph, arithmetic, address, next(reversed(self._names.values())), scope, uniform=uniform)
         self.definitions += written.functions
         return written
 
@@ -141,6 +155,11 @@ class Functions:
             self._names[name,] = name
             self.definitions += text(self.arithmetic.flags)
         return name
+
+
+def _numbers(registers: Lengths) -> list[tuple[int, int]]:
+    """Of the numbers of registers end to end, which register and where in it."""
+    return [(register, k) for register, length in enumerate(registers) for k in range(length)]
 
 
 def _pointers(name: str, registers: Iterable[object]) -> list[str]:

@@ -174,8 +174,9 @@ class _RunFunction:
 
     def _map(self, statement: Map) -> None:
         if count := self.program.elements(statement):
-            name = self.functions.map(statement.graph, self._lengths(statement.inputs), count)
-            self._calls(name, statement.inputs, statement.outputs)
+            shared = self._lengths(statement.shared)
+            name = self.functions.map(statement.graph, self._lengths(statement.inputs), count, shared)
+            self._calls(name, (*statement.shared, *statement.inputs), statement.outputs)
 
     def _sum(self, statement: Sum) -> None:
         count = self.program.elements(statement)

@@ -45,6 +45,8 @@ class Map:
     inputs, outputs : tuple of str
         A register for each input and each output of the graph, of one common length; an input of length 1 has the same
         value for every element.
+    shared : tuple of str
+        Registers which, end to end, are the graph's first inputs, before those of `inputs`: the same for every element.
 
     Examples
     --------
@@ -57,6 +59,7 @@ class Map:
     graph: Graph
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
+    shared: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -287,7 +290,10 @@ class Program:
     def _check_elements(self, statement: Map | Sum) -> None:
         where = f"{type(statement).__name__} of {statement.graph!r}"
         outputs = statement.outputs if isinstance(statement, Map) else (statement.output,)
-        counts = ((statement.inputs, len(statement.graph.inputs)), (outputs, len(statement.graph.outputs)))
+        known = sum([self._length(where, name) for name in statement.shared]) if isinstance(statement, Map) else 0
+        if known > len(statement.graph.inputs):
+            raise GraphError(f"{where} has {len(statement.graph.inputs)} inputs, the shared registers hold {known}")
+        counts = ((statement.inputs, len(statement.graph.inputs) - known), (outputs, len(statement.graph.outputs)))
         for names, needed in counts:
             if len(names) != needed:
                 raise GraphError(f"{where} needs {needed} registers, got {len(names)}: {', '.join(names)}")

@@ -77,7 +77,8 @@ class PythonRunner(Runner):
 
     def _elements(self, statement: Map | Sum, state: dict[str, list[float]]) -> list[tuple[float, ...]]:
         count, function = self.program.elements(statement), self._functions[id(statement.graph)]
-        inputs = [state[name] if len(state[name]) == count else state[name] * count for name in statement.inputs]
+        inputs = [[value] * count for value in _joined(state, _shared(statement))]
+        inputs += [state[name] if len(state[name]) == count else state[name] * count for name in statement.inputs]
         return [function.values(list(values)) for values in zip(*inputs, strict=True)]
 
     def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record:
@@ -104,8 +105,10 @@ class PythonRunner(Runner):
         # All elements of all N states are points of one batch: (inputs, elements * N) -> (outputs, elements, N).
         count = self.program.elements(statement)
         shape = (count, next(iter(state.values())).shape[1])
-        inputs = np.array([np.broadcast_to(state[name], shape) for name in statement.inputs])
-        results = self._batch(statement.graph, inputs.reshape(len(statement.inputs), -1)).reshape(-1, *shape)
+        rows = [row for name in _shared(statement) for row in state[name]]
+        rows += [state[name] for name in statement.inputs]
+        inputs = np.array([np.broadcast_to(row, shape) for row in rows])
+        results = self._batch(statement.graph, inputs.reshape(len(rows), -1)).reshape(-1, *shape)
         if isinstance(statement, Map):
             state.update(zip(statement.outputs, results, strict=True))
         else:
@@ -115,6 +118,10 @@ class PythonRunner(Runner):
         if id(graph) not in self._arrays:
             self._arrays[id(graph)] = compile(graph, "numpy", fma=self._fma)
         return self._arrays[id(graph)].batch(points)
+
+
+def _shared(statement: Map | Sum) -> tuple[str, ...]:
+    return statement.shared if isinstance(statement, Map) else ()
 
 
 def _joined(state: Mapping[str, list[float]], names: Sequence[str]) -> list[float]:

@@ -44,9 +44,9 @@ class Builder:
         if op.commutative and args[1].op is CONSTANT and args[0].op is not CONSTANT:
             args = args[::-1]
         key: tuple[str | int, ...] = (op.name, *map(id, args))  # no objects, which the garbage collector would follow
+        if op.commutative and key[1] > key[2]:  # type: ignore[operator]
+            key = (op.name, key[2], key[1])
         node = self._made.get(key)
-        if node is None and op.commutative:
-            node = self._made.get((op.name, key[2], key[1]))
         if node is None:
             if not label.has_tags:
                 for arg in args:

@@ -181,6 +181,40 @@ def require_mapping(what: str, value: Any, of: str) -> Mapping[Any, Any]:
     return value
 
 
+def require_texts(what: str, value: Any) -> Mapping[str, str]:
+    """The value, if it is a mapping of names to texts; an empty one for None.
+
+    Parameters
+    ----------
+    what : str
+        What the value is, as the error begins.
+    value : mapping of str to str, or None
+        Such as what a person calls the inputs of a graph.
+
+    Returns
+    -------
+    mapping of str to str
+
+    Raises
+    ------
+    TypeError
+        For anything else.
+
+    Examples
+    --------
+    >>> from cgraph.extend import require_texts
+    >>> require_texts("names", {"q0": 1})
+    Traceback (most recent call last):
+    TypeError: names must be a mapping {name: text}, got int for 'q0': 1
+    """
+    texts: Mapping[str, str] = {} if value is None else require_mapping(what, value, "name: text")
+    for name, text in texts.items():
+        if not isinstance(text, str):
+            given = f"{type(text).__name__} for {name!r:.60}: {text!r:.60}"
+            raise TypeError(f"{what} must be a mapping {{name: text}}, got {given}")
+    return texts
+
+
 def require_path(what: str, value: Any) -> Path:
     """The value as a path, a leading ~ read as the home.
 

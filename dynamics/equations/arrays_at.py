@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 
 from cgraph import Graph
 
-from ..systems.arguments import TIME
 from ..systems.model import Model, as_system
 from .evaluate_at import Array, evaluate_at
 
@@ -72,8 +71,8 @@ def arrays_at(
     if not isinstance(graph, Graph):
         raise TypeError(f"graph must be a Graph, such as mass_matrix(model), got {type(graph).__name__}: {graph!r:.60}")
     system, state = as_system(model), {"q": q, "qd": qd, "qdd": qdd, "tau": tau}
-    known = {*system.display_names, TIME, *system.parameters}
-    if unknown := [name for name in graph.input_names if name not in known]:
+    known = {*system.q, *system.qd, *system.qdd, *system.tau, system.t, *system.extra_inputs}
+    if unknown := [node.name for node in graph.inputs if node not in known]:
         raise ValueError(f"the graph has the input {unknown[0]!r}, which is no state or parameter of the model")
     flat = evaluate_at(system, graph, state, t, parameters)
     arrays: dict[str, Array] = {}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -15,6 +15,7 @@ from cgraph.extend import Array, Builder, building, certain_digits, cotangents
 
 from ..systems.constraints import ConstraintError, Constraints
 from ..systems.kinematics import ZERO
+from .substitute import substitute
 
 STATES = 3  # states that meet the constraints, at which rows are compared
 SPREADS = (0.3, 1.0, 0.1, 3.0, 0.01, 0.001, 10.0, 0.0001) * 2  # of random starts about the neutral coordinates
@@ -87,7 +88,8 @@ class RowNumbers:
             for weight, rate in zip(weights, constraints.rates, strict=True):
                 total = total + weight * rate
         bars = cotangents({total: cg.constant(1.0)}, kinematics.u, build)
-        displaced = dict(zip(kinematics.u, cg.variables([f"d{i}" for i in range(self.n)]), strict=True))
+        self.steps = step_names(self.n, constraints.parameters)
+        displaced = dict(zip(kinematics.u, cg.variables(self.steps), strict=True))
         moved = [
             q + dot for q, dot in zip(kinematics.q, kinematics.rate([displaced[u] for u in kinematics.u]), strict=True)
         ]
@@ -97,6 +99,11 @@ class RowNumbers:
         self.columns = Graph([*self.inputs, *weights], {f"J{i}": bar for i, bar in enumerate(bars)})
         normalized = kinematics.normalized(moved)
         self.moved = Graph([*kinematics.q, *displaced.values()], {f"{i}": node for i, node in enumerate(normalized)})
+        self.landed: Graph | None = None
+        if numbered:
+            there = substitute(list(constraints.positions), dict(zip(kinematics.q, normalized, strict=True)))
+            outputs = {name: phi for (name, _), phi in zip(numbered, there, strict=True)}
+            self.landed = Graph([*self.inputs, *displaced.values()], outputs)
 
     def states(self) -> Iterator[dict[str, float]]:
         """Some random states that meet the constraints: values of q0.., t and parameters."""
@@ -127,28 +134,29 @@ class RowNumbers:
         """
         shown = {"t": t} | dict(self.constraints.parameters if parameters is None else parameters)
         with np.errstate(all="ignore"):
-            point = self._point(q, shown)
+            point = before = self._point(q, shown)
+            step = np.zeros(self.n)  # from the point before
             size, looked = np.inf, 0.0  # at the rounding of phi, which takes longer than a step, once a gap is so small
             for k in range(ITERATIONS):
                 phi = self._phi(point)
-                if (not k or size <= looked) and not len(self._open_rows(point)):
+                if (not k or size <= looked) and not len(self._open_rows(before, step)):
                     return Closing(point, 0.0, None)
                 matrix = self.matrix(point)[: len(phi)]
                 if not (np.isfinite(phi).all() and np.isfinite(matrix).all()):
                     return Closing(point, np.inf, int(np.argmin(np.isfinite(phi))))
-                scale = np.abs(matrix).max(axis=1)
-                scale = np.where(scale > 0.0, scale, 1.0)
-                step = -np.linalg.lstsq(matrix / scale[:, None], phi / scale, rcond=1e-10)[0]
-                size = float(np.abs(phi / scale).max())
+                rows, columns = balance(matrix)
+                whole = -columns * np.linalg.lstsq(rows[:, None] * matrix * columns, rows * phi, rcond=1e-10)[0]
+                size = float(np.abs(rows * phi).max())
                 looked = looked or SMALL * size
                 for halved in range(HALVINGS):
-                    trial = self._point(self._moved(point, step * 0.5**halved), shown)
-                    if np.abs(self._phi(trial) / scale).max() < size:
-                        point = trial
+                    shorter = whole * 0.5**halved
+                    trial = self._point(self._moved(point, shorter), shown)
+                    if np.abs(rows * self._phi(trial)).max() < size:
+                        before, point, step = point, trial, shorter
                         break
                 else:
                     break
-            phi, open_rows = self._phi(point), self._open_rows(point)
+            phi, open_rows = self._phi(point), self._open_rows(before, step)
         if not len(open_rows):
             return Closing(point, 0.0, None)
         return Closing(point, size, int(open_rows[np.abs(phi[open_rows]).argmax()]))
@@ -172,11 +180,13 @@ class RowNumbers:
     def _phi(self, point: Mapping[str, float]) -> Array:
         return np.zeros(0) if self.phi is None else np.array(list(self.phi.evaluate(dict(point)).values()))
 
-    def _open_rows(self, point: Mapping[str, float]) -> Indices:
-        """The rows of phi that are not 0 to their rounding."""
-        digits = {} if self.phi is None else certain_digits(self.phi, point)
-        values = zip(self._phi(point), digits.values(), strict=True)
-        wrong = [value != 0.0 and not (left < OPEN and np.isfinite(value)) for value, left in values]
+    def _open_rows(self, before: Mapping[str, float], step: Array) -> Indices:
+        """The rows of phi that are not 0 to their rounding, that of the step included, after a step."""
+        if self.landed is None:
+            return np.zeros(0, dtype=np.intp)
+        point = {**before, **dict(zip(self.steps, step.tolist(), strict=True))}
+        values, digits = self.landed.evaluate(point), certain_digits(self.landed, point)
+        wrong = [x != 0.0 and not (digits[name] < OPEN and np.isfinite(x)) for name, x in values.items()]
         return np.flatnonzero(wrong)
 
     def _point(self, q: Array, shown: Mapping[str, float]) -> dict[str, float]:
@@ -184,7 +194,7 @@ class RowNumbers:
 
     def _moved(self, point: Mapping[str, float], step: Any) -> Array:
         at = {name: point[name] for name in self.moved.input_names if name in point}
-        at |= {f"d{i}": float(x) for i, x in enumerate(step)}
+        at |= dict(zip(self.steps, step.tolist(), strict=True))
         return np.array(list(self.moved.evaluate(at).values()), dtype=np.float64)
 
 
@@ -196,13 +206,33 @@ class Closing(NamedTuple):
     worst: int | None  # the row that is furthest from 0; None where all are 0
 
 
+def step_names(count: int, taken: Iterable[str]) -> list[str]:
+    """Names of steps, none of which is that of a parameter."""
+    stem = "d"
+    while any([name.startswith(stem) for name in taken]):
+        stem += "'"
+    return [f"{stem}{i}" for i in range(count)]
+
+
+def balance(matrix: Array) -> tuple[Array, Array]:
+    """Factors of rows and columns that make them alike, and free of units (Ruiz)."""
+    rows, columns = (np.ones(count) for count in matrix.shape)
+    for _ in range(4):
+        for axis, factors in ((0, columns), (1, rows)):
+            size = np.abs(rows[:, None] * matrix * columns).max(axis=axis, initial=0.0)
+            factors /= np.sqrt(np.where(size > 0.0, size, 1.0))
+    return rows, columns
+
+
+def equilibrated(matrix: Array) -> Array:
+    """The matrix with rows and columns scaled to be alike, whatever their units."""
+    rows, columns = balance(matrix)
+    return rows[:, None] * matrix * columns
+
+
 def _independent(matrix: Array) -> list[int]:
     """Rows that are not sums of earlier ones: Gram and Schmidt, on rows and columns scaled to be alike."""
-    scaled = matrix.copy()
-    for _ in range(4):
-        for axis in (0, 1):
-            size = np.abs(scaled).max(axis=axis, keepdims=True)
-            scaled = scaled / np.sqrt(np.where(size > 0.0, size, 1.0))
+    scaled = equilibrated(matrix)
     kept: list[int] = []
     basis: list[Array] = []
     for k, row in enumerate(scaled):

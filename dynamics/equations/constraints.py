@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, building, cotangents, hessian_nodes, ldl_solve, solve_nodes
+from cgraph.extend import Builder, building, cotangents, hessian_nodes, ldl_solve, solve_nodes, topological
 
 from ..systems.system import System
 from .bias_terms import BiasTerms
@@ -40,13 +40,19 @@ class Rows(NamedTuple):
         return lagrangian
 
 
-def constraint_rows(system: System, terms: BiasTerms) -> Rows:
-    """The rows that a system is solved with; none of a system without constraints.
+def constraint_rows(system: System, rates: Sequence[Node]) -> Rows:
+    """The rows that a system is solved with, of all as they are folded; none of a system without constraints.
 
     Raises ConstraintError for constraints that cannot be met together.
     """
     kept = independent_rows(system.constraints) if len(system.constraints) else ()
-    return Rows(kept, [terms.rates[k] for k in kept], cg.variables([f"lambda{k}" for k in kept]))
+    return Rows(kept, [rates[k] for k in kept], cg.variables([f"lambda{k}" for k in kept]))
+
+
+def held_still(system: System) -> bool:
+    """Whether constraints that do not depend on time leave no motion: as many independent ones as velocities."""
+    rates = system.constraints.rates
+    return len(rates) >= system.n == len(independent_rows(system.constraints)) and system.t not in topological(rates)
 
 
 def unknown_names(system: System) -> list[str]:
@@ -65,19 +71,20 @@ def solved_by_elimination(
     return solve_nodes(function, [*system.qd, *s], rhs, build, at=at, multipliers=s, check=check)
 
 
-def solved_dense(
-    system: System, terms: BiasTerms, rows: Rows, rhs: Sequence[Node], build: Builder, check: bool
-) -> list[Node]:
-    """The same by LDL^T of the whole matrix, the rows of the multipliers eliminated last."""
-    m = len(rows.kept)
-    lower = hessian_nodes(terms.lagrangian, system.qd, build)
-    if not m:
-        return ldl_solve(lower, rhs, build, check=check)
-    slopes = [cotangents({z: ONE}, system.qd, build) for z in rows.rates]
-    matrix = [[ZERO] * (k + 1) for k in range(m)]
-    matrix += [[*[slope[i] for slope in slopes], *row[: i + 1]] for i, row in enumerate(lower)]
-    solved = ldl_solve(matrix, [*rhs[system.n :], *rhs[: system.n]], build)
-    return [*solved[m:], *solved[:m]]
+class DenseSolver:
+    """The same by LDL^T of the whole matrix, the rows of the multipliers eliminated last, for any right-hand sides."""
+
+    def __init__(self, system: System, lagrangian: Node, rows: Rows, build: Builder) -> None:
+        slopes = [cotangents({z: ONE}, system.qd, build) for z in rows.rates]
+        lower = hessian_nodes(lagrangian, system.qd, build)
+        self._matrix = [[ZERO] * (k + 1) for k in range(len(slopes))]
+        self._matrix += [[*[slope[i] for slope in slopes], *row[: i + 1]] for i, row in enumerate(lower)]
+        self._n, self._m, self._build = system.n, len(slopes), build
+
+    def solve(self, rhs: Sequence[Node], check: bool = False) -> list[Node]:
+        """(udot, s), and without rows and with `check` the info."""
+        solved = ldl_solve(self._matrix, [*rhs[self._n :], *rhs[: self._n]], self._build, check=check and not self._m)
+        return [*solved[self._m :], *solved[: self._m]]
 
 
 def multiplier_outputs(system: System, rows: Rows, solved: Sequence[Node], build: Builder) -> dict[str, Node]:

@@ -6,8 +6,9 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Builder, building, cotangents
 
+from ..systems.body_system import BodySystem
 from ..systems.model import Model, as_system
-from ..systems.system import BodySystem, System
+from ..systems.system import System
 from .formulations import ONE, ZERO
 from .shorter_form import shorter_form
 from .substitute import substitute

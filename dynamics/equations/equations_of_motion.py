@@ -6,11 +6,12 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Builder, SingularError, building, cotangents, hessian_nodes, require_choice, require_flag
 
+from ..systems.body_system import BodySystem
 from ..systems.constraints import ConstraintError
 from ..systems.model import Model, as_system
-from ..systems.system import BodySystem, System
+from ..systems.system import System
 from .bias_terms import BiasTerms, bias_terms, bias_terms_of_lagrangian
-from .constraints import constraint_rows, multiplier_outputs, solved_by_elimination, solved_dense, unknown_names
+from .constraints import DenseSolver, constraint_rows, multiplier_outputs, solved_by_elimination, unknown_names
 from .formulations import ONE, ZERO
 from .inertia_rank import without_inertia
 from .shorter_form import shorter_form
@@ -82,7 +83,8 @@ def bias(model: Model) -> Graph:
     """
 
     def derive(system: System) -> Graph:
-        outputs = {f"bias{i}": node for i, node in enumerate(bias_terms(system).bias(system, Builder()))}
+        free = system.without_constraints  # whose tags shared nodes would have
+        outputs = {f"bias{i}": node for i, node in enumerate(bias_terms(free).bias(free, Builder()))}
         return cg.simplify(system.graph(outputs, system.q, system.qd))
 
     return shorter_form(as_system(model), derive)
@@ -117,7 +119,7 @@ def gravity_force(model: Model) -> Graph:
     """
 
     def derive(system: System) -> Graph:
-        derived = bias_terms_of_lagrangian(system).bias(system, Builder())
+        derived = bias_terms_of_lagrangian(system.without_constraints).bias(system, Builder())
         at_rest = substitute(derived, dict.fromkeys(system.qd, ZERO))
         return cg.simplify(system.graph({f"gravity{i}": node for i, node in enumerate(at_rest)}, system.q, system.qd))
 
@@ -324,7 +326,7 @@ def accelerations(system: System, method: str = "auto", check: bool = False) -> 
 def _solved(system: System, terms: BiasTerms, method: str, check: bool) -> Graph:
     """M qdd - J^T lambda = tau + forces - D qd - bias, J qdd = -(dJ/dt) qd, solved by one method."""
     build = Builder()
-    rows = constraint_rows(system, terms)
+    rows = constraint_rows(system, terms.rates)
     with building(build):
         # What stands at the coordinates already. Elimination takes the inertial terms where they are, at their
         # velocity nodes, and carries them to the coordinates on its way; a dense solve needs the whole bias here.
@@ -340,7 +342,7 @@ def _solved(system: System, terms: BiasTerms, method: str, check: bool) -> Graph
     if method == "recursive":
         solved = solved_by_elimination(system, terms, rows, rhs, inertial, build, check)
     else:
-        solved = solved_dense(system, terms, rows, rhs, build, check)
+        solved = DenseSolver(system, terms.lagrangian, rows, build).solve(rhs, check)
     end = system.n + len(rows.kept)
     outputs = {f"qdd{i}": node for i, node in enumerate(solved[: system.n])}
     outputs |= multiplier_outputs(system, rows, solved[system.n : end], build)

@@ -20,7 +20,7 @@ from cgraph.extend import Array, Builder, building, certain_digits, folded, solv
 
 from ..systems.constraints import ConstraintError
 from ..systems.system import System
-from .constraint_rank import ConstraintWarning, RowNumbers, independent_rows
+from .constraint_rank import ConstraintWarning, RowNumbers, independent_rows, step_names
 from .constraints import Rows
 from .formulations import ZERO
 from .substitute import substitute
@@ -79,7 +79,7 @@ def _correction(
 def projected(system: System, x: Array, t: float, parameters: Mapping[str, float]) -> Array:
     """The state x, (m,), if it meets the constraints to rounding, else one near to it that does."""
     graph = projection(system)
-    if graph is None or not (left := _open_rows(system, x, t, parameters)):
+    if graph is None or not (left := _open_rows(system, x, x, t, parameters)):
         return x
     others = {"t": t, **parameters}
     fixed = {name: others[name] for name in graph.input_names if name in others}
@@ -88,10 +88,11 @@ def projected(system: System, x: Array, t: float, parameters: Mapping[str, float
         if k == ITERATIONS:  # Newton's method may need shorter steps on its way from afar
             point = RowNumbers(system.constraints).closed(start[: system.nq], t, parameters).point
             x = np.array([*[point[f"q{i}"] for i in range(system.nq)], *start[system.nq :]])
+        before = x
         with np.errstate(all="ignore"):
             values = graph.evaluate(dict(zip(names, x.tolist(), strict=True)) | fixed)
         x = np.array(list(values.values()), dtype=np.float64)
-        if np.isfinite(x).all() and not (left := _open_rows(system, x, t, parameters)):
+        if np.isfinite(x).all() and not (left := _open_rows(system, x, before, t, parameters)):
             return x
     raise ConstraintError(
         f"the start cannot be moved onto the constraints: {system.constraints.names[left[0]]!r} stays open from "
@@ -118,18 +119,27 @@ def projected_start(system: System, x: Array, t: float, parameters: Mapping[str,
 
 @lru_cache(KEPT)
 def _all_rows(system: System) -> Graph:
-    """phi and the rates of all constraints; inputs the states, t if needed, parameters."""
-    outputs = {f"phi{k}": phi for k, phi in enumerate(system.constraints.positions)}
-    outputs |= {f"rate{k}": rate for k, rate in enumerate(system.constraints.rates)}
-    return Graph([*system.q, *system.qd, *system.extra_inputs], outputs)
+    """phi and the rates of all constraints at x + step; inputs x, t if needed, parameters, and the steps."""
+    state = [*system.q, *system.qd]
+    steps = cg.variables(step_names(len(state), system.parameters))
+    positions, rates = system.constraints.positions, system.constraints.rates
+    names = [*[f"phi{k}" for k in range(len(positions))], *[f"rate{k}" for k in range(len(rates))]]
+    with building(Builder()):
+        moved = {x: x + step for x, step in zip(state, steps, strict=True)}
+    rows = substitute([*positions, *rates], moved)
+    return Graph([*state, *system.extra_inputs, *steps], dict(zip(names, rows, strict=True)))
 
 
-def _open_rows(system: System, x: Array, t: float, parameters: Mapping[str, float]) -> list[int]:
-    """Constraints that are not 0 at a state, or whose rate is not, beyond rounding."""
+def _open_rows(system: System, x: Array, before: Array, t: float, parameters: Mapping[str, float]) -> list[int]:
+    """Constraints that are not 0 at a state, or whose rate is not, beyond rounding.
+
+    That of the step from `before`, too: what is to be 0 is so once it is small beside what it was.
+    """
     graph = _all_rows(system)
     others = {"t": t, **parameters}
-    point = dict(zip(graph.input_names, x.tolist(), strict=False))
-    point |= {name: others[name] for name in graph.input_names if name in others}
+    names, n = graph.input_names, len(x)
+    point = {name: others[name] for name in names if name in others}
+    point |= dict(zip([*names[:n], *names[-n:]], [*before.tolist(), *(x - before).tolist()], strict=True))
     values, digits = graph.evaluate(point), certain_digits(graph, point)
     left = [
         name for name, value in values.items() if value != 0.0 and not (digits[name] < SPARE and np.isfinite(value))

@@ -8,7 +8,8 @@ import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import shortened
 
-from ..systems.system import BodySystem, System
+from ..systems.body_system import BodySystem
+from ..systems.system import System
 
 LONGEST = 200  # nodes of a graph whose outputs are written anew
 

@@ -8,7 +8,9 @@ from cgraph import Graph
 
 from ..systems.arguments import TIME
 from ..systems.model import Model, as_ode, as_system
+from .constraints import held_still
 from .equations_of_motion import forward_dynamics
+from .formulations import ZERO
 
 
 def state_equation(model: Model) -> Graph:
@@ -23,7 +25,8 @@ def state_equation(model: Model) -> Graph:
     -------
     Graph
         Of a mechanical model: inputs q0.., qd0.., tau0.., t if needed, parameters; outputs q0_dot.., qd0_dot.. with
-        q_dot = qd, or G(q) qd of `QuasiVelocities`, and qd_dot from `forward_dynamics`. Of an OdeSystem: inputs its
+        q_dot = qd, or G(q) qd of `QuasiVelocities`, and qd_dot from `forward_dynamics`, 0 where constraints that do not
+        depend on time leave no motion. Of an OdeSystem: inputs its
         states, t if needed, parameters; outputs `<state>_dot`.
 
     Raises
@@ -40,14 +43,21 @@ def state_equation(model: Model) -> Graph:
     >>> dyn.state_equation(block).evaluate({"q0": 0.0, "qd0": 2.0, "tau0": 8.0})
     {'q0_dot': 2.0, 'qd0_dot': 2.0}
     """
+    return with_multipliers(model)[0]
+
+
+def with_multipliers(model: Model) -> tuple[Graph, Graph | None]:
+    """The state equation, and over the same inputs the multipliers of its constraints by name; None without any."""
     ode = as_ode(model)
     if ode is not None:
-        return ode.graph
+        return ode.graph, None
     system = as_system(model)
-    accelerations = forward_dynamics(system)
+    solved = forward_dynamics(system)
     outputs = {f"q{i}_dot": rate for i, rate in enumerate(system.q_dot)}
-    outputs |= {f"qd{i}_dot": accelerations.outputs[f"qdd{i}"] for i in range(system.n)}
-    return Graph(accelerations.inputs, outputs)
+    still = held_still(system)  # the rounding of accelerations that are 0 is all that steps could be chosen by
+    outputs |= {f"qd{i}_dot": ZERO if still else solved.outputs[f"qdd{i}"] for i in range(system.n)}
+    held = {name: solved.outputs[f"lambda{k}"] for k, name in enumerate(system.constraints.names)}
+    return Graph(solved.inputs, outputs), Graph(solved.inputs, held) if held else None
 
 
 def normalization(model: Model) -> Graph | None:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from cgraph import Graph, Node
 from cgraph.extend import Names, require_whole, topological
 
+from ..systems.display_names import display_names
 from ..systems.system import System
 from .evaluate_at import Array, evaluate_at
 
@@ -156,19 +157,19 @@ class TorqueTable:
         ]
 
     def _expressions(self) -> list[list[str]]:
-        names = Names(self.graph)
-        cells = [self._expression(names, node) for node in self.graph.outputs.values()]
+        names, called = Names(self.graph), display_names(self.system)
+        cells = [self._expression(names, called, node) for node in self.graph.outputs.values()]
         width = len(self.columns)
         return [cells[i * width : (i + 1) * width] for i in range(len(self.rows))]
 
-    def _expression(self, names: Names, node: Node) -> str:
+    def _expression(self, names: Names, called: Mapping[str, str], node: Node) -> str:
         """A cell written out, coordinates by name, or the number of its operations where that would be too long."""
         if node.value == 0.0:
             return STRUCTURAL_ZERO
         text = names.text(node, LONGEST_EXPRESSION)
         if "%" in text:  # it refers to a line of the listing
             return f"{len([part for part in topological([node]) if part.args])} operations"
-        return re.sub(r"\b(q|qd|qdd)\d+\b", lambda match: self.system.display_names[match[0]], text)
+        return re.sub(r"\b(q|qd|qdd)\d+\b", lambda match: called[match[0]], text)
 
 
 def _aligned(rows: Sequence[Sequence[str]], gap: str) -> str:

@@ -32,13 +32,12 @@ class Mechanics(NamedTuple):
 def mechanics(problem: Problem) -> Mechanics:
     """The graphs of momenta of a problem.
 
-    Raises ValueError for a system that has none, of first order or with quasi-velocities; SingularMassMatrixError for
-    a coordinate without inertia.
+    Raises ValueError for a system that has none, of first order, with quasi-velocities or with constraints;
+    SingularMassMatrixError for a coordinate without inertia.
     """
     system = problem.system
     if system is None or not problem.canonical:
         raise ValueError("this method steps momenta dL/dqd of coordinates, which the model does not have")
-    system.constraints.require_none("a method that steps momenta")
     build = Builder()
     p = cg.variables([f"p{i}" for i in range(system.n)])
     bars = cotangents({system.lagrangian: ONE}, [*system.q, *system.qd], build)

@@ -13,7 +13,7 @@ from cgraph.extend import topological
 
 from ..equations.equations_of_motion import energy
 from ..equations.projection import projection
-from ..equations.state_equation import normalization, state_equation, state_inputs
+from ..equations.state_equation import normalization, state_inputs, with_multipliers
 from ..systems.arguments import TIME, Parameters, call_user_function
 from ..systems.model import Model, as_ode, as_system
 from ..systems.system import System
@@ -32,6 +32,7 @@ class Problem:
     without any.
     projection: a state to one nearer to the constraints, and normalized; inputs the states, t, parameters. None without
     constraints.
+    multipliers: of the constraints, by name; inputs the states, t, parameters. None without constraints.
     system: the Lagrangian system; None for a first-order one.
     """
 
@@ -43,6 +44,7 @@ class Problem:
     rate: Graph
     normalization: Graph | None
     projection: Graph | None
+    multipliers: Graph | None
     system: System | None
 
     @property
@@ -57,8 +59,9 @@ class Problem:
 
     @property
     def canonical(self) -> bool:
-        """Whether momenta dL/dqd belong to the coordinates: velocities are their rates."""
-        return self.system is not None and self.system.kinematics.quasi is None
+        """Whether momenta dL/dqd belong to the coordinates: velocities are their rates, and nothing holds them."""
+        system = self.system
+        return system is not None and system.kinematics.quasi is None and not len(system.constraints)
 
     @property
     def timed(self) -> bool:
@@ -82,8 +85,8 @@ def derive(model: Model, bound: Mapping[str, float]) -> Problem:
         system = as_system(model)
         moving = system.kinematics
         equations = (system.coordinates, system.partial_lagrangians, system.forces, system.damping)
-        equations += (system.velocities, *moving.q_dot, *moving.normalized(moving.q), moving.groups)
-        equations += (system.constraints.positions, system.constraints.velocities)
+        equations += (system.lengths, system.velocities, *moving.q_dot, *moving.normalized(moving.q), moving.groups)
+        equations += (tuple(system.constraints.names), system.constraints.positions, system.constraints.velocities)
     numbers = tuple([(name, float(value).hex()) for name, value in bound.items()])  # 0.0 and -0.0 stay apart
     key = (*equations, inputs.states, inputs.applied, tuple(inputs.parameters), numbers)
     return _derived(_Request(key, model, bound))
@@ -107,11 +110,14 @@ def _derived(request: _Request) -> Problem:
         components = [f"coordinate {name!r}" for name in system.coordinates]
         rated = set(system.coordinates)
         components += [f"velocity {'of ' if name in rated else ''}{name!r}" for name in system.velocities]
-    rate = _bind(state_equation(model), inputs.states, parameters, bound)
+    equation, held = with_multipliers(model)
+    rate = _bind(equation, inputs.states, parameters, bound)
+    multipliers = None if held is None else _bind(held, inputs.states, parameters, bound)
     step = None if system is None else projection(system)
     projected = None if step is None else _bind(step, inputs.states, parameters, bound)
     whole = normalization(model)
-    return Problem(model, inputs.states, tuple(components), parameters, bound, rate, whole, projected, system)
+    graphs = (rate, whole, projected, multipliers)
+    return Problem(model, inputs.states, tuple(components), parameters, bound, *graphs, system)
 
 
 def _bind(graph: Graph, first: Sequence[str], parameters: Sequence[str], bound: Mapping[str, float]) -> Graph:

@@ -18,7 +18,8 @@ from cgraph.extend import Call, Factor, If, Map, Program, Solve, Statement, Sum,
 
 from .elementwise import SAME, identity, weighted
 from .explicit import stage_time
-from .problem import Problem, state_jacobian
+from .jacobian_statements import jacobian_statements
+from .problem import Problem
 from .step import Step
 from .step_control import (
     accept_step,
@@ -77,12 +78,10 @@ def radau(problem: Problem, dense: bool) -> Program:
     z, w, f = (tuple([f"{name}{k}" for k in range(3)]) for name in ("Z", "W", "F"))
     powers = tuple([f"dense{k + 1}" for k in range(3)])
 
-    def evaluated(graph: Graph, target: str) -> Call:
-        return Call(graph, ("x", "t", "p"), (target,))
-
+    slopes, on_the_way = jacobian_statements(problem)
     body: list[Statement] = [
         first_pass(identity(m), *[Call(Graph([], {f"{k}": 0.0 for k in range(m)}), (), (name,)) for name in powers]),
-        If("accepted", (evaluated(state_jacobian(problem), "jacobian"), evaluated(problem.rate, "rate"), count(1))),
+        If("accepted", (*slopes, Call(problem.rate, ("x", "t", "p"), ("rate",)), count(1))),
         trial(),
         *_matrices(m),
         *[stage_time(f"time{k}", _C[k]) for k in range(3)],
@@ -94,7 +93,7 @@ def radau(problem: Problem, dense: bool) -> Program:
         control(4, 0),
         accept_step(*_dense(z, powers), Call(SAME, ("h",), ("h_old",))),
     ]
-    lengths = _lengths(m) | dict.fromkeys((*powers, "error_vector"), m)
+    lengths = _lengths(m) | on_the_way | dict.fromkeys((*powers, "error_vector"), m)
     lengths |= dict.fromkeys("newton sum converged h_old again".split(), 1)
     return Program({**registers(problem), **lengths}, body, recorded(dense, 3), record_if="accepted", stop="status")
 
@@ -112,8 +111,9 @@ def radau_step(problem: Problem) -> Step:
     z, w, f = (tuple([f"{name}{k}" for k in range(3)]) for name in ("Z", "W", "F"))
     zeros = Graph([], {f"{k}": 0.0 for k in range(m)})
     begin = Graph([], {"going": 1.0, "turns": 0.0, "change_old": math.inf, "stalled": 0.0})
+    slopes, on_the_way = jacobian_statements(problem)
     body: list[Statement] = [
-        Call(state_jacobian(problem), ("x", "t", "p"), ("jacobian",)),
+        *slopes,
         Call(problem.rate, ("x", "t", "p"), ("rate",)),
         *_matrices(m),
         *[stage_time(f"time{k}", _C[k]) for k in range(3)],
@@ -123,9 +123,14 @@ def radau_step(problem: Problem) -> Step:
         While("going", (*_turn(problem, z, w, f), *_to_rounding())),
         Map(SAME, ("x_new",), ("x",)),
     ]
-    lengths = _lengths(m) | dict.fromkeys(("x_new", "size", "scale"), m) | {"stalled": 1, "failed": 1, "evaluations": 1}
+    lengths = (
+        _lengths(m)
+        | on_the_way
+        | dict.fromkeys(("x_new", "size", "scale"), m)
+        | {"stalled": 1, "failed": 1, "evaluations": 1}
+    )
     controls = "lost lost2 going turns change change_old stalled failed"
-    fixed = ("jacobian", "real", "complex", "size", "scale", *controls.split())
+    fixed = ("jacobian", "real", "complex", "size", "scale", *on_the_way, *controls.split())
     return Step(lengths, [identity(m), Call(zeros, (), ("size",))], body, fixed, "failed")
 
 

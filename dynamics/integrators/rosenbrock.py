@@ -15,6 +15,7 @@ from cgraph.extend import Call, Factor, If, Map, Program, Solve, Statement
 
 from .elementwise import SAME, function, identity, weighted
 from .explicit import stage_time
+from .jacobian_statements import jacobian_statements
 from .problem import Problem, state_jacobian, time_derivative
 from .step import Step
 from .step_control import accept_step, control, first_pass, lost, measured, recorded, registers, trial
@@ -88,7 +89,9 @@ def rosenbrock(method: Rosenbrock, problem: Problem, dense: bool) -> Program:
     """A trial of one step."""
     m, stages = problem.size, len(method.c)
     slopes = tuple([f"U{k}" for k in range(stages)])
-    body: list[Statement] = [first_pass(identity(m)), If("accepted", tuple(_slopes(problem))), trial()]
+    now, on_the_way = jacobian_statements(problem)
+    now += _time_slope(problem)
+    body: list[Statement] = [first_pass(identity(m)), If("accepted", tuple(now)), trial()]
     body += [_matrix(method.gamma), Factor("matrix", "pivots"), lost("matrix", "lost")]
     body += _stages(method, problem)
     body += [
@@ -98,7 +101,7 @@ def rosenbrock(method: Rosenbrock, problem: Problem, dense: bool) -> Program:
         accept_step(*(_dense(method, slopes) if dense else ())),
     ]
     degree = len(method.dense) + 1
-    lengths = {**_lengths(method, problem), "sum": 1, "lost": 1}
+    lengths = {**_lengths(method, problem), **on_the_way, "sum": 1, "lost": 1}
     if dense:
         lengths |= {
             f"{name}{k + 1}": m for name, count in (("h_", degree - 1), ("dense", degree)) for k in range(count)
@@ -108,18 +111,16 @@ def rosenbrock(method: Rosenbrock, problem: Problem, dense: bool) -> Program:
 
 
 def rosenbrock_step(method: Rosenbrock, problem: Problem) -> Step:
-    """One step."""
-    body = [*_slopes(problem), _matrix(method.gamma), Factor("matrix", "pivots"), *_stages(method, problem)]
+    """One step, with the Jacobian written out, since it has derivatives."""
+    slope = Call(state_jacobian(problem), ("x", "t", "p"), ("jacobian",))
+    body = [slope, *_time_slope(problem), _matrix(method.gamma), Factor("matrix", "pivots"), *_stages(method, problem)]
     body.append(Map(SAME, ("x_new",), ("x",)))
     return Step({**_lengths(method, problem), "x_new": problem.size}, [identity(problem.size)], body)
 
 
-def _slopes(problem: Problem) -> list[Statement]:
-    """df/dx, and df/dt where there is one."""
-    body: list[Statement] = [Call(state_jacobian(problem), ("x", "t", "p"), ("jacobian",))]
-    if problem.timed:
-        body.append(Call(time_derivative(problem), ("x", "t", "p"), ("time_slope",)))
-    return body
+def _time_slope(problem: Problem) -> list[Statement]:
+    """df/dt, where there is one."""
+    return [Call(time_derivative(problem), ("x", "t", "p"), ("time_slope",))] if problem.timed else []
 
 
 def _stages(method: Rosenbrock, problem: Problem) -> list[Statement]:

@@ -8,9 +8,10 @@ numbers of the method that float64 does not hold are two, the second what roundi
 symplectic as exactly as w_i b_ij + w_j a_ji = w_i w_j, and what is missing adds up to a drift of the energy (Hairer,
 McLachlan and Razakarivony, BIT Numerical Mathematics 2008).
 
-Quasi-velocities have no such momenta. Methods of Gauss, and compositions of `midpoint`, step the state (q, qd) there,
-as that of a system of first order. They keep every quadratic invariant, as |q| of a quaternion, and the energy and the
-size of the momentum of a free rotor; and being symmetric, they leave the energy of reversible motions without drift.
+Quasi-velocities have no such momenta, and constraints hold them. Methods of Gauss, and compositions of `midpoint`, step
+the state (q, qd) there, as that of a system of first order. They keep every quadratic invariant, as |q| of a
+quaternion, and the energy and the size of the momentum of a free rotor; and being symmetric, they leave the energy of
+reversible motions without drift.
 """
 
 from __future__ import annotations
@@ -89,6 +90,11 @@ def _of_states(method: Partitioned, problem: Problem, composition: Composition) 
         system = problem.system
         if system is None:
             raise ValueError("this method advances coordinates and momenta in turn; a system of first order has none")
+        if len(system.constraints):
+            raise ValueError(
+                "this method advances coordinates and their momenta in turn, and constraint "
+                f"{system.constraints.names[0]!r} holds both: take 'midpoint', 'gauss4' or 'dop853'"
+            )
         pairs = zip(system.velocities, system.qd, strict=True)
         other = next(name for name, velocity in pairs if velocity not in system.q_dot)
         raise ValueError(

@@ -1,4 +1,4 @@
-"""What a file has and a mechanism has not: refused, or left out and said."""
+"""What a file has and a mechanism has not: refused, or left out and said; and what of its loops says nothing new."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from typing import Any
 
 from cgraph.extend import require_flag
 
+from ..equations.constraint_rank import independent_rows
 from ..multibody.mechanism import Mechanism, MechanismError, MechanismWarning
+from ..systems.constraints import ConstraintError
 
 
 def present(what: Mapping[str, Any]) -> list[str]:
@@ -29,8 +31,16 @@ def refused_or_left_out(essential: Sequence[str], outside: Sequence[str], ignore
 
 
 def warned(mechanism: Mechanism, source: str) -> Mechanism:
-    """The mechanism, once a warning has said what is left out of its source."""
+    """The mechanism, once warnings have said what is left out of its source, and which loops follow from others.
+
+    Raises MechanismError for loops that cannot be closed together.
+    """
     if mechanism.left_out:
         text = f"{source}: left out {'; '.join(mechanism.left_out)}"
         warnings.warn(text, MechanismWarning, stacklevel=3)  # the caller of the public function
+    if mechanism.loops and mechanism.moving:
+        try:
+            independent_rows(mechanism.system.constraints)
+        except ConstraintError as error:
+            raise MechanismError(f"{source}: {error}") from None
     return mechanism

@@ -28,18 +28,19 @@ def load_mjcf(
     friction: float | None = None,
     actuators: bool = False,
 ) -> Mechanism:
-    """The mechanism of a MuJoCo model: its trees of joints and welds, springs, damping and armature.
+    """The mechanism of a MuJoCo model: its trees of joints and welds, springs, damping and armature, and its loops.
 
     Coordinates are MuJoCo's qpos, in its order and from the same zero, and velocities its qvel; both have the names of
     its joints, as "root.x" and "root.vx" of a free one. A body with several joints becomes a chain; its last joint
-    carries the body's name, the others the body's and their own.
+    carries the body's name, the others the body's and their own. Equality constraints of joints, points and welds are
+    loops of their names, see `Loop`: exact, where MuJoCo's are soft, which `left_out` says.
 
     Parameters
     ----------
     source : str, path or MjModel
         A path, the XML text (it starts with "<"), or MuJoCo's own model.
     ignore : bool
-        Leave out what a mechanism cannot have: springs of free joints, tendons, equality constraints, fluid, ...
+        Leave out what a mechanism cannot have: springs of free joints, tendons, fluid, ...
         Contacts, joint limits, friction loss and actuators, which act on a mechanism and do not belong to it, are
         left out unless asked for; of an actuator that acts with no input, such as a servo, the force is said.
         Contact always is.
@@ -59,7 +60,8 @@ def load_mjcf(
     Raises
     ------
     MechanismError
-        For a file that is missing or wrong, for what a mechanism cannot have, unless `ignore`, and as `Mechanism`.
+        For a file that is missing or wrong, for what a mechanism cannot have, unless `ignore`, for loops that cannot be
+        closed together, and as `Mechanism`. Rows of loops that follow from others are a `ConstraintWarning`.
     ImportError
         Without MuJoCo.
 
@@ -87,17 +89,17 @@ def load_urdf(
 
     Every link is a body of its name, those without mass and those on fixed joints too, so that `position("tool0")` is
     where that frame is. Coordinates have the names of the joints, in the order of the file, those that carry
-    others first. Shapes are not read, so their meshes need not be there. A link whose moments no rigid body
-    can have is taken as it is, with a warning.
+    others first. A joint that mimics another is coupled to it by a loop, see `Loop`. Shapes are not read, so their
+    meshes need not be there. A link whose moments no rigid body can have is taken as it is, with a warning.
 
     Parameters
     ----------
     source : str or path
         A path or the XML text (it starts with "<").
     ignore : bool
-        Leave out what a mechanism cannot have, the coupling of joints that mimic others. Contacts, joint limits,
-        friction loss and extensions of URDF, such as transmissions, are left out, the second and third unless asked
-        for.
+        Leave out what a mechanism cannot have: joints that mimic one that is not there, or themselves by way of others,
+        or that have not one coordinate. Contacts, joint limits, friction loss and extensions of URDF, such as
+        transmissions, are left out, the second and third unless asked for.
     floating : bool
         Whether the root link moves freely, by a joint that is called as the link is. Joints that are floating in the
         file are free in any case.
@@ -114,8 +116,8 @@ def load_urdf(
     Raises
     ------
     MechanismError
-        For a file that is missing or wrong, for joints of other types, for joints that mimic others, unless `ignore`,
-        for `floating` where the root link is the world, and as `Mechanism`.
+        For a file that is missing or wrong, for joints of other types, for what a mechanism cannot have, unless
+        `ignore`, for `floating` where the root link is the world, and as `Mechanism`.
 
     Examples
     --------

@@ -6,6 +6,7 @@ import io
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,8 @@ from ..multibody.mechanism import require_mechanism
 from ..multibody.spatial import Array
 from ..systems.model import Model
 from .mujoco_twin import mujoco
-from .write_mjcf import mjcf_text, numbers
+from .write_mjcf import mjcf_text
+from .xml_numbers import numbers
 
 CAMERA = "side"  # looks along y
 _COLORS = ("0.46 0.24 0.62 1", "0.16 0.38 0.78 1", "0.80 0.20 0.16 1")  # the paper's purple, blue and red
@@ -71,7 +73,7 @@ def drawn_mjcf(model: Model) -> str:
         f'  <camera name="{CAMERA}" pos="0 {-1.75 * reach!r} {-0.45 * reach!r}" xyaxes="1 0 0 0 0 1"/>',
         "</worldbody>",
     ]
-    return mjcf_text(mechanism, 1e-3, head, shapes)
+    return mjcf_text(replace(mechanism, loops=()), 1e-3, head, shapes)
 
 
 def _write_frames() -> None:

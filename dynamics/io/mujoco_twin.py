@@ -11,7 +11,7 @@ import numpy as np
 
 from cgraph.extend import install
 
-from ..multibody.mechanism import Mechanism, require_mechanism
+from ..multibody.mechanism import Mechanism, MechanismError, require_mechanism
 from ..multibody.planar_arm import planar_links
 from ..multibody.spatial import Array
 from ..systems.model import Model
@@ -64,7 +64,9 @@ def rollout(mj: Any, starts: Array, states: Array) -> Callable[[], None]:
 class MujocoTwin:
     """MuJoCo's model of a mechanism, asked for the quantities that the graphs give.
 
-    Damping is in the accelerations and not in `bias`, as in `dynamics`. Raises ImportError without MuJoCo.
+    Damping is in the accelerations and not in `bias`, as in `dynamics`. Of a mechanism with loops it has the tree,
+    whose torques, mass matrix and bias are the mechanism's; its accelerations and motions are not, as MuJoCo's equality
+    constraints are soft, and are refused. Raises ImportError without MuJoCo.
     """
 
     def __init__(self, of: Model, timestep: float = 1e-3) -> None:
@@ -73,12 +75,18 @@ class MujocoTwin:
         self.model = self.mujoco.MjModel.from_xml_string(to_mjcf(moving_alone(self.mechanism), timestep))
         self.data = self.mujoco.MjData(self.model)
 
+    def require_tree(self, what: str) -> None:
+        """Raises MechanismError for a mechanism with loops, whose `what` MuJoCo does not compute."""
+        if self.mechanism.loops:
+            raise MechanismError(f"MuJoCo has soft loops, and so no {what} of loop {self.mechanism.loops[0].label!r}")
+
     def _set(self, q: Array, qd: Array) -> None:
         self.data.qpos[:], self.data.qvel[:] = q, qd
         self.data.qfrc_applied[:] = 0.0
 
     def accelerations(self, q: Array, qd: Array, tau: Array) -> Array:
-        """qdd, (n,), by `mj_forward` under applied torque tau, (n,)."""
+        """qdd, (n,), by `mj_forward` under applied torque tau, (n,). Raises MechanismError for loops."""
+        self.require_tree("accelerations")
         self._set(q, qd)
         self.data.qfrc_applied[:] = tau
         self.mujoco.mj_forward(self.model, self.data)
@@ -108,7 +116,8 @@ class MujocoTwin:
         return np.array(self.data.qfrc_bias - springs)
 
     def trajectory(self, q: Array, qd: Array, steps: int) -> tuple[Array, Array]:
-        """q and qd, (steps + 1, n) each, from the start on, by MuJoCo's RK4."""
+        """q and qd, (steps + 1, n) each, from the start on, by MuJoCo's RK4. Raises MechanismError for loops."""
+        self.require_tree("motions")
         self.mujoco.mj_resetData(self.model, self.data)
         self._set(q, qd)
         nq = self.model.nq

@@ -15,7 +15,8 @@ from ..multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError,
 from ..multibody.spatial import Array
 from .left_out import listed, present, refused_or_left_out
 from .mujoco_twin import mujoco
-from .smooth_forces import NONE, Smooth, actuators, disabled, mjcf_forces, modelled, single
+from .read_equality import left_of_equalities, other_equalities, read_loops
+from .smooth_forces import NONE, Smooth, actuators, disabled, first_output, inputs, mjcf_forces, modelled, single
 from .source import is_text, path_of, root_of, text_of
 from .stand_ins import zeros_again
 
@@ -44,8 +45,9 @@ def read_mjcf(mj: Any, ignore: bool, smooth: Smooth = NONE) -> Mechanism:
             bodies += chain
             ends.append((chain[-1].name, origin))
     gravity = mj.opt.gravity * (not disabled(mj, "GRAVITY"))
-    forces = mjcf_forces(mj, [body for body in bodies if body.joint.type.moves], smooth)
-    return Mechanism(bodies, gravity, forces, left_out=left_out)
+    moving = [body for body in bodies if body.joint.type.moves]
+    forces, loops = mjcf_forces(mj, moving, smooth), read_loops(mj, moving, ends)
+    return Mechanism(bodies, gravity, forces, left_out=left_out, loops=loops)
 
 
 def compiled_mjcf(source: Any, called: str) -> Any:
@@ -153,12 +155,10 @@ def _not_modelled(mj: Any) -> list[str]:
     sprung = [] if disabled(mj, "SPRING") else sorted(j for j in _where(mj, "jnt_stiffness") if _elsewhere(mj, j))
     pulling = sorted(set().union(*(_where(mj, f"tendon_{what}") for what in _OF_A_TENDON)))
     tendons = [mj.tendon(i).name or f"number {i}" for i in pulling]
-    equalities = 0 if disabled(mj, "CONSTRAINT", "EQUALITY") else int(np.sum(mj.eq_active0))
-    return present(
+    others = present(
         {
             f"springs of free joints, or of turned ball joints ({listed(_joint_names(mj, sprung))})": sprung,
             f"tendons with a spring, damper or mass ({listed(tendons)})": pulling,
-            f"equality constraints ({equalities})": equalities,
             "springs or dampers that are not linear": _any(mj, *_NOT_LINEAR),
             f"joints with several dampings or armatures ({listed(_joint_names(mj, _uneven(mj)))})": _uneven(mj),
             "actuators with armature or damping": _any(mj, *_OF_AN_ACTUATOR),
@@ -168,6 +168,7 @@ def _not_modelled(mj: Any) -> list[str]:
             "plugins": getattr(mj, "nplugin", 0),
         }
     )
+    return [*others, *other_equalities(mj)]
 
 
 def _acting_from_outside(mj: Any, smooth: Smooth) -> list[str]:
@@ -180,7 +181,7 @@ def _acting_from_outside(mj: Any, smooth: Smooth) -> list[str]:
     left = [i for i in range(actuators(mj)) if not (smooth.actuators and modelled(mj, i))]
     acting = {} if disabled(mj, "ACTUATION") else {i: _at_rest(mj, i) for i in left}
     servos = [f"{mj.actuator(i).name or f'number {i}'}: {force}" for i, force in acting.items() if force]
-    return present(
+    others = present(
         {
             "contacts": touching and not disabled(mj, "CONSTRAINT", "CONTACT"),
             f"joint limits ({listed(_joint_names(mj, limits))})": limits and limited,
@@ -191,6 +192,7 @@ def _acting_from_outside(mj: Any, smooth: Smooth) -> list[str]:
             f"actuators that act with no input ({listed(servos)})": servos,
         }
     )
+    return [*others, *left_of_equalities(mj)]
 
 
 def _at_rest(mj: Any, i: int) -> str:
@@ -200,10 +202,10 @@ def _at_rest(mj: Any, i: int) -> str:
         return kind
     numbers = zip(mj.actuator_biasprm[i, :3] * (kind == "affine"), ("", " length", " velocity"), strict=True)
     terms = [f"{number:+g}{of}" for number, of in numbers if number]
-    lower, upper = mj.actuator_ctrlrange[i]
-    least = np.clip(0.0, lower, upper) if mj.actuator_ctrllimited[i] and not disabled(mj, "CLAMPCTRL") else 0.0
-    terms += [f"input at least {least:g}"] if least > 0.0 else [f"input at most {least:g}"] if least < 0.0 else []
-    gear = mj.actuator_gear[i, 0]
+    limited = [] if disabled(mj, "CLAMPCTRL") else [k for k in inputs(mj, i) if mj.actuator_ctrllimited[k]]
+    nearest = [float(np.clip(0.0, *mj.actuator_ctrlrange[k])) for k in limited]
+    terms += [f"input at {'least' if least > 0.0 else 'most'} {least:g}" for least in nearest if least]
+    gear = mj.actuator_gear[first_output(mj, i), 0]
     return " ".join([*terms, *([f"times gear {gear:g}"] if terms and gear != 1.0 else [])])
 
 

@@ -14,9 +14,11 @@ from cgraph.extend import require_flag
 from ..multibody import spatial
 from ..multibody.joint_force import JointForce, JointFriction
 from ..multibody.joints import TYPES, SpatialJoint
+from ..multibody.loops import Loop
 from ..multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
 from ..multibody.spatial import Array
 from .left_out import listed, present, refused_or_left_out
+from .read_mimic import read_mimics
 from .smooth_forces import NONE, Smooth
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s^2, where the file says nothing
@@ -36,13 +38,21 @@ def read_urdf(robot: Element, called: str, ignore: bool, floating: bool = False,
             add_floating_base(robot)
         links, joints = _by_name(robot, "link"), _by_name(robot, "joint")
         root = _root(links, joints)
-        left_out = refused_or_left_out(_mimics(joints), _outside(robot, joints, smooth), ignore)
+        mimics = read_mimics(joints)
+        outside = [*_outside(robot, joints, smooth), *mimics.of_no_effect]
+        left_out = refused_or_left_out(mimics.refused, outside, ignore)
         with np.errstate(all="ignore"):  # of numbers that are not finite Mechanism says where they stand
             bodies = [] if root == WORLD else [Body(root, Joint("fixed"), **_inertial(links[root], root))]
             for name, element in joints.items():
                 parent, child = _end(element, name, "parent"), _end(element, name, "child")
                 bodies.append(Body(child, _joint(element, name, child), parent, **_inertial(links[child], child)))
-        return Mechanism(bodies, _gravity(robot), _forces(joints, smooth), left_out=left_out)
+        return Mechanism(
+            bodies,
+            _gravity(robot),
+            _forces(joints, smooth),
+            left_out=left_out,
+            loops=_couplings(joints, mimics.leaders),
+        )
     except MechanismError as error:
         raise MechanismError(f"URDF, {called}: {error}") from None
 
@@ -190,11 +200,16 @@ def _numbers(element: Element, where: str, attribute: str, count: int, default: 
     return values
 
 
-def _mimics(joints: Mapping[str, Element]) -> list[str]:
-    """Couplings of joints."""
-    leaders = [(name, joint.find("mimic")) for name, joint in joints.items()]
-    names = [f"{name} after {leader.get('joint')}" for name, leader in leaders if leader is not None]
-    return present({f"joints that mimic others ({listed(names)})": names})
+def _couplings(joints: Mapping[str, Element], leaders: Mapping[str, str]) -> list[Loop]:
+    """The loops q = multiplier q_leader + offset."""
+    loops = []
+    for name, leader in leaders.items():
+        mimic, where = joints[name].find("mimic"), f"joint {name!r}"
+        assert mimic is not None
+        line = [_numbers(mimic, where, "offset", 1, "0")[0], _numbers(mimic, where, "multiplier", 1, "1")[0]]
+        body, to = (_end(joints[each], each, "child") for each in (name, leader))
+        loops.append(Loop("coupling", body, to, coefficients=line))
+    return loops
 
 
 def _outside(robot: Element, joints: Mapping[str, Element], smooth: Smooth) -> list[str]:

@@ -78,7 +78,7 @@ def modelled(mj: Any, i: int) -> bool:
         and _called("Bias", mj.actuator_biastype[i]) in ("none", "affine")
         and not (mj.jnt_actfrclimited[j] and sharing > 1)
         and not (_delayed(mj, i) or mj.jnt_actgravcomp[j])
-        and int(np.asarray(getattr(mj, "actuator_ctrlnum", np.ones(i + 1)))[i]) == 1
+        and len(inputs(mj, i)) == 1
     )
 
 
@@ -97,9 +97,15 @@ def _on_joint(mj: Any, i: int) -> bool:
     return _called("Trn", mj.actuator_trntype[i]) in ("joint", "jointinparent")
 
 
-def _first(mj: Any, i: int, field: str) -> int:
-    """Where an actuator's only input or output stands among all."""
-    return int(np.asarray(getattr(mj, field, np.arange(i + 1)))[i])
+def inputs(mj: Any, i: int) -> range:
+    """Where the inputs of an actuator stand among all; newer versions of MuJoCo have several of one."""
+    first = int(getattr(mj, "actuator_ctrladr", range(i + 1))[i])
+    return range(first, first + int(getattr(mj, "actuator_ctrlnum", [1] * (i + 1))[i]))
+
+
+def first_output(mj: Any, i: int) -> int:
+    """Where the first output of an actuator stands among all."""
+    return int(getattr(mj, "actuator_outadr", range(i + 1))[i])
 
 
 def _delayed(mj: Any, i: int) -> bool:
@@ -144,7 +150,7 @@ def _input_names(mj: Any) -> list[str]:
 
 
 def _actuator(mj: Any, i: int, name: str, moving: Sequence[Body]) -> Actuator:
-    j, ctrl = int(mj.actuator_trnid[i, 0]), _first(mj, i, "actuator_ctrladr")
+    j, ctrl = int(mj.actuator_trnid[i, 0]), inputs(mj, i)[0]
     gain, bias = mj.actuator_gainprm[i, :3].tolist(), mj.actuator_biasprm[i, :3].tolist()
     if _called("Gain", mj.actuator_gaintype[i]) == "fixed":
         gain[1:] = 0.0, 0.0
@@ -153,7 +159,7 @@ def _actuator(mj: Any, i: int, name: str, moving: Sequence[Body]) -> Actuator:
     return Actuator(
         moving[j].name,
         name,
-        float(mj.actuator_gear[_first(mj, i, "actuator_outadr"), 0]),
+        float(mj.actuator_gear[first_output(mj, i), 0]),
         gain,
         bias,
         None if disabled(mj, "CLAMPCTRL") else _range(mj.actuator_ctrllimited[ctrl], mj.actuator_ctrlrange[ctrl]),

@@ -14,10 +14,11 @@ from cgraph.extend import real_number
 from ..multibody import spatial
 from ..multibody.joints import AxialJoint
 from ..multibody.mechanism import WORLD, Body, Mechanism, MechanismError, require_mechanism
-from ..multibody.parameters import Quantities
 from ..multibody.spatial import Array
 from ..systems.model import Model
 from .stand_ins import ROUNDING, with_stand_ins
+from .write_loops import equality_lines, site_lines
+from .xml_numbers import numbers
 
 
 def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
@@ -27,7 +28,8 @@ def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
     and coefficients are the same to the last bit; axes, orientations and inertias to a few roundings, which quaternions
     and principal axes cost. Joints have the names of the coordinates; one that is locked is a weld. MuJoCo takes no
     zero for the mass and moments of a body that moves: 1e-15 stands for it there, and is zero again when it is read.
-    Of parameters the values are written.
+    Of parameters the values are written. Of loops, points and welds are equality constraints of sites, and couplings
+    those of joints: MuJoCo has them soft.
 
     Parameters
     ----------
@@ -46,8 +48,8 @@ def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
     MechanismError
         For a model without bodies; for what MuJoCo does not take: moments that no rigid body has, a body that moves of
         less than 1e-15 kg or kg m^2, zeros where 1e-15 is more than 1e-9 of what moves with them, and free joints other
-        than on the world, in its axes and at its origin; and for forces on bodies: in MuJoCo they are state,
-        `xfrc_applied`, and not the model's.
+        than on the world, in its axes and at its origin; for loops of other kinds, couplings of more than degree 4 and
+        those of locked joints; and for forces on bodies: in MuJoCo they are state, `xfrc_applied`, and not the model's.
 
     Examples
     --------
@@ -63,8 +65,8 @@ def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
 
 
 def moving_alone(mechanism: Mechanism) -> Mechanism:
-    """The mechanism of the bodies that move, those welded to them merged in."""
-    return replace(mechanism, bodies=mechanism.moving, locked={})
+    """The tree of the bodies that move, those welded to them merged in, without loops."""
+    return replace(mechanism, bodies=mechanism.moving, locked={}, loops=())
 
 
 def mjcf_text(
@@ -73,8 +75,6 @@ def mjcf_text(
     """The text of a mechanism with more elements: `head` before the bodies, `shapes` in the bodies of those names."""
     if mechanism.forces:
         raise MechanismError(f"MJCF has no forces, there is one on body {mechanism.forces[0].body!r}")
-    if mechanism.loops:
-        raise MechanismError(f"loops are not written to MJCF; there is {mechanism.loops[0].label!r}")
     bodies = mechanism.parts
     moments = {body.name: _principal(body) for body in bodies}
     inertial = {
@@ -93,6 +93,8 @@ def mjcf_text(
         *[f"  {line}" for line in head],
         "  <worldbody>",
     ]
+    more = [site_lines(mechanism.loops), shapes or {}]
+    lines += [f"    {line}" for line in more[0].get(WORLD, ())]
     indent = 2
     stack: list[Body | None] = [*reversed(children.get(WORLD, []))]  # None closes a body
     while stack:
@@ -101,11 +103,11 @@ def mjcf_text(
             indent -= 1
             lines.append("  " * indent + "</body>")
             continue
-        inside = [f"  {line}" for line in (shapes or {}).get(opened.name, ())]
+        inside = [f"  {line}" for each in more for line in each.get(opened.name, ())]
         lines += ["  " * indent + line for line in [*_body_lines(opened, *inertial[opened.name]), *inside]]
         indent += 1
         stack += [None, *reversed(children.get(opened.name, []))]
-    return "\n".join([*lines, "  </worldbody>", "</mujoco>"]) + "\n"
+    return "\n".join([*lines, "  </worldbody>", *equality_lines(mechanism), "</mujoco>"]) + "\n"
 
 
 def _body_lines(body: Body, mass: float, moments: str) -> list[str]:
@@ -161,8 +163,3 @@ def _principal(body: Body) -> tuple[Array, Array]:
 
 def _diagonal(moments: Array, axes: Array) -> str:
     return f'diaginertia="{numbers(moments)}" quat="{numbers(spatial.to_quaternion(axes))}"'
-
-
-def numbers(values: Quantities) -> str:
-    """Numbers as XML attributes have them, each exact."""
-    return " ".join([repr(float(value)) for value in np.asarray(values)])

@@ -14,7 +14,8 @@ from ..multibody.parameters import vanishes
 from ..multibody.spatial import Array
 from ..systems.model import Model
 from .read_urdf import FAR, GRAVITY
-from .write_mjcf import numbers
+from .write_loops import mimic_lines
+from .xml_numbers import numbers
 
 
 def to_urdf(model: Model) -> str:
@@ -22,7 +23,8 @@ def to_urdf(model: Model) -> str:
 
     `load_urdf` reads the same bodies in the same order from it: all numbers to the last bit but axes and orientations,
     which angles cost a few roundings. A joint that is locked is a weld. Gravity other than 9.81 m/s^2 along -z, which
-    URDF has not, is in an element of MuJoCo's that other programs pass over. Of parameters the values are written.
+    URDF has not, is in an element of MuJoCo's that other programs pass over. Of parameters the values are written. A
+    loop that couples two joints by a line is a <mimic>, which has no name.
 
     Parameters
     ----------
@@ -37,7 +39,8 @@ def to_urdf(model: Model) -> str:
     Raises
     ------
     MechanismError
-        For a model without bodies, and for what URDF has not: a spring, an armature, a force, a ball joint.
+        For a model without bodies, and for what URDF has not: a spring, an armature, a force, a ball joint, and
+        any other loop, such as a second one on the same joint.
 
     Examples
     --------
@@ -49,8 +52,7 @@ def to_urdf(model: Model) -> str:
     mechanism = require_mechanism(model, "URDF").bind()
     if mechanism.forces:
         raise MechanismError(f"URDF has no forces, there is one on body {mechanism.forces[0].body!r}")
-    if mechanism.loops:
-        raise MechanismError(f"loops are not written to URDF; there is {mechanism.loops[0].label!r}")
+    mimics = mimic_lines(mechanism)
     lines = ['<?xml version="1.0"?>', '<robot name="mechanism">']
     gravity = numbers(mechanism.gravity)
     if gravity != numbers(GRAVITY):
@@ -58,7 +60,7 @@ def to_urdf(model: Model) -> str:
     lines.append(f'  <link name="{WORLD}"/>')
     names = set(mechanism.coordinates)
     for body in mechanism.parts:
-        lines += [*_link_lines(body), *_joint_lines(body, _joint_name(body, names))]
+        lines += [*_link_lines(body), *_joint_lines(body, _joint_name(body, names), mimics.get(body.name, ""))]
     return "\n".join([*lines, "</robot>"]) + "\n"
 
 
@@ -84,15 +86,13 @@ def _joint_name(body: Body, names: set[str]) -> str:
     return name
 
 
-def _joint_lines(body: Body, name: str) -> list[str]:
+def _joint_lines(body: Body, name: str, mimic: str) -> list[str]:
     joint = body.joint
     if not joint.type.urdf:
         raise MechanismError(f"URDF has no joint of the kind {joint.kind!r}, as is the joint of body {body.name!r}")
     place = f'    <origin xyz="{numbers(joint.position)}" rpy="{numbers(_rpy(joint.orientation))}"/>'
     ends = f"    <parent link={quoteattr(body.parent)}/><child link={quoteattr(body.name)}/>"
     opened = f'  <joint name={quoteattr(name)} type="{joint.type.urdf}">'
-    if not joint.type.urdf:
-        raise MechanismError(f"URDF has no joint of the kind {joint.kind!r}, as is the joint of body {body.name!r}")
     if not joint.type.moves:
         return [opened, ends, place, "  </joint>"]
     for what in ("stiffness", "armature"):
@@ -106,7 +106,7 @@ def _joint_lines(body: Body, name: str) -> list[str]:
         opened,
         ends,
         place,
-        f'    <axis xyz="{numbers(joint.axis)}"/>{dynamics}',
+        f'    <axis xyz="{numbers(joint.axis)}"/>{dynamics}{mimic}',
         f'    <limit {limits}effort="{FAR!r}" velocity="{FAR!r}"/>',
         "  </joint>",
     ]

@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import require_mapping
+from cgraph.extend import check_name, is_finite, require_mapping
 
 from . import spatial
-from .body import ROUNDING, Body, Joint, MechanismError, unit_axis, vector
+from .body import (
+    JOINT_QUANTITIES,
+    ROUNDING,
+    WORLD,
+    Body,
+    Joint,
+    MechanismError,
+    checked_rotation,
+    quantities,
+    unit_axis,
+    vector,
+)
 from .joints import COMPOSITIONS
 from .joints.composition import AXIS
 from .spatial import Array
@@ -25,8 +37,9 @@ def parts_of(body: Body) -> list[Body]:
     if not isinstance(body, Body) or not isinstance(body.joint, Joint) or body.joint.kind not in COMPOSITIONS:
         return [body]
     where, joint, chain = f"body {body.name!r}", body.joint, COMPOSITIONS[body.joint.kind]
+    _check_placement(where, joint)
     axes = _axes(where, joint)
-    numbers = {name: _per_part(f"{where}: {name}", joint, getattr(joint, name)) for name in _NUMBERS}
+    numbers = {name: _per_part(where, body, name) for name in _NUMBERS}
     placed: dict[str, Any] = {"position": joint.position, "orientation": joint.orientation}
     bodies: list[Body] = []
     for i, part in enumerate(chain):
@@ -40,12 +53,26 @@ def parts_of(body: Body) -> list[Body]:
     return bodies
 
 
-def require_outer_parents(bodies: Sequence[Body]) -> None:
-    """Raises MechanismError for a body that hangs inside of a composed joint: with this it would come and go."""
-    inside = {_inner(body, i) for body in bodies for i in range(len(COMPOSITIONS.get(body.joint.kind, ())) - 1)}
+def require_parents(bodies: Sequence[Body]) -> None:
+    """Raises MechanismError for a parent that is no body, such as what is inside of a composed joint."""
+    known = {WORLD, *[body.name for body in bodies]}
     for body in bodies:
-        if body.parent in inside:
+        if body.parent not in known:
             raise MechanismError(f"body {body.name!r} has the unknown parent {body.parent!r}")
+
+
+@contextmanager
+def outer_names(bodies: Sequence[Body]) -> Iterator[None]:
+    """Within, a MechanismError on a part of a composed joint names the body, and the coordinate of the part."""
+    try:
+        yield
+    except MechanismError as error:
+        text = str(error)
+        for body in bodies:
+            for i, part in enumerate(COMPOSITIONS.get(body.joint.kind, ())[:-1]):
+                owner = f"body {body.name!r}, coordinate {f'{body.coordinate}.{part.name}'!r}"
+                text = text.replace(f"body {_inner(body, i)!r}", owner)
+        raise MechanismError(text) from None
 
 
 def locked_parts(bodies: Sequence[Body], locked: Mapping[str, float | ArrayLike]) -> dict[str, float | ArrayLike]:
@@ -89,11 +116,26 @@ def _axes(where: str, joint: Joint) -> tuple[ArrayLike, ArrayLike, Array]:
     return joint.axis, joint.second_axis, spatial.snapped(np.cross(axis, second))
 
 
-def _per_part(what: str, joint: Joint, value: Any) -> Sequence[Any]:
+def _check_placement(where: str, joint: Joint) -> None:
+    """Raises MechanismError for what the parts have not apart: a place, a name, and a pitch, which none has."""
+    quantities(f"{where}: position", joint.position)
+    checked_rotation(f"{where}: orientation", joint.orientation)
+    try:
+        check_name(f"the joint of {where}", joint.name or "default")
+    except (TypeError, ValueError) as error:
+        raise MechanismError(str(error)) from None
+    if not is_finite(joint.pitch) or joint.pitch:
+        raise MechanismError(f"{where}: only a screw has a pitch, not {joint.kind!r}, got {joint.pitch!r:.80} m/rad")
+
+
+def _per_part(where: str, body: Body, quantity: str) -> Sequence[Any]:
     """A number for each part, from one for all, or as many."""
-    names = [part.name for part in COMPOSITIONS[joint.kind]]
+    what, value = f"{where}: {quantity}", getattr(body.joint, quantity)
+    names = [part.name for part in COMPOSITIONS[body.joint.kind]]
     if not isinstance(value, tuple):
-        return [value] * len(names)
+        value = (value,) * len(names)
     if len(value) != len(names):
         raise MechanismError(f"{what} must be one number, or {len(names)} for {', '.join(names)}, got {value!r:.80}")
+    for name, number in zip(names, value, strict=True):
+        JOINT_QUANTITIES[quantity](f"{what} of the coordinate {f'{body.coordinate}.{name}'!r}", number)
     return value

@@ -167,7 +167,7 @@ def attach_with_impact(
 
 
 def release(mechanism: Mechanism, q: ArrayLike, qd: ArrayLike, body: str) -> Released:
-    """A body is let go: all velocities stay, and it leaves as the one that held it moved there.
+    """A body is let go, by its loops too: all velocities stay, and it leaves as the one that held it moved there.
 
     Parameters
     ----------

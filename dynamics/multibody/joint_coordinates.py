@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple, TypeVar
+
+import numpy as np
 
 from cgraph import Node
 
 from ..systems.quasi_velocities import QuasiVelocities
-from .body import Body
+from .body import WORLD, Body
+from .parameters import Quantities
+from .spatial import Array
 
 Value = TypeVar("Value")
 
@@ -55,6 +60,25 @@ def _called(body: Body, name: str) -> str:
 def per_velocity(bodies: Sequence[Body], values: Sequence[Value]) -> list[Value]:
     """A value of each joint for each of its velocities."""
     return [value for body, value in zip(bodies, values, strict=True) for _ in body.joint.type.velocities]
+
+
+def lengths(bodies: Sequence[Body]) -> tuple[float, ...]:
+    """What length [m] 1 of a coordinate stands for, of all, then of all velocities in a second; 0 where none is known.
+
+    1 of slides. An angle is as large as the way of a point that it moves by the largest length of the bodies, of
+    numbers: where their joints are on one another, where their mass is, and over which it is spread.
+    """
+    known = [float(np.linalg.norm(_numbers(body.joint.position))) for body in bodies if body.parent != WORLD]
+    known += [float(np.linalg.norm(_numbers(body.center))) for body in bodies]
+    known += [math.sqrt(float(np.abs(_numbers(body.inertia)).max()) / float(body.mass)) for body in bodies if body.mass]
+    of = {"rad": max(known, default=0.0)}
+    types = [body.joint.type for body in bodies]
+    units = [unit for part in ("units", "velocity_units") for kind in types for unit in getattr(kind, part)]
+    return tuple([of.get(unit.removesuffix("/s"), 1.0) for unit in units])
+
+
+def _numbers(values: Quantities) -> Array:
+    return np.asarray(values, dtype=np.float64)
 
 
 def neutral(bodies: Sequence[Body]) -> list[float]:

@@ -17,6 +17,7 @@ from cgraph.extend import Builder, building, check_name, real_array, real_number
 from .body import Body, MechanismError
 from .external_force import FORCE, Force, check_force
 from .joint_coordinates import places
+from .joints import COMPOSITIONS
 
 Range = tuple[float, float]
 
@@ -259,6 +260,9 @@ def _check_joint_force(force: JointForce, bodies: Sequence[Body]) -> None:
     if not isinstance(force.body, str) or force.body not in named:
         raise MechanismError(f"there is a force on the joint of the unknown body {force.body!r:.80}")
     body = named[force.body]
+    if body.joint.kind in COMPOSITIONS:
+        acts = f"{type(force).__name__} acts on joints of one coordinate"
+        raise MechanismError(f"{acts}, and that of body {body.name!r} is {body.joint.kind}")
     if not body.joint.type.moves:
         raise MechanismError(f"there is a force on the joint of body {body.name!r}, which does not move")
     force.check(body)

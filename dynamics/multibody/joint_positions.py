@@ -13,6 +13,7 @@ from cgraph.extend import real_array
 
 from .body import Body
 from .joint_coordinates import coordinate_names
+from .loops import Loop
 from .spatial import Array
 
 _FLAT = 1e-9  # of the largest extent: a direction in which nothing moves or lies
@@ -29,6 +30,10 @@ class Bodies(Protocol):
     def moving(self) -> Sequence[Body]:
         """Those that move, parents first."""
 
+    @property
+    def loops(self) -> Sequence[Loop]:
+        """What closes the tree."""
+
     def position(self, body: str, at: ArrayLike = ...) -> Graph:
         """Where a point of a body is: outputs x, y, z."""
 
@@ -43,7 +48,8 @@ class Skeleton(NamedTuple):
 def skeleton(mechanism: Bodies, q: ArrayLike) -> Skeleton:
     """Places of joints and tips for q, (T, n).
 
-    A tip is a body without mass that is welded to the last moving one, or else the center of mass of that one.
+    A tip is a body without mass that is welded to the last moving one, or a point where a loop holds it, or else the
+    center of mass of that one.
     A mechanism that moves in a plane of two axes is seen at a right angle to it, any other from above and one side.
     """
     q, n = np.atleast_2d(real_array("q", q)), len(coordinate_names(mechanism.moving))
@@ -84,9 +90,15 @@ def _tips(mechanism: Bodies) -> Iterator[tuple[str, ArrayLike]]:
     for body in mechanism.bodies:
         if body.name not in moving | carrying and not body.mass and not np.any(np.asarray(body.inertia)):
             marks.setdefault(above[body.name], []).append(body.name)
+    pins: dict[str, list[tuple[str, ArrayLike]]] = {}
+    for loop in mechanism.loops:
+        ends = ((loop.body, loop.at), (loop.to, loop.to_at)) if loop.kind != "coupling" else ()
+        for name, at in ends:
+            pins.setdefault(name if name in moving else above.get(name, name), []).append((name, at))
     for body in mechanism.moving:
+        yield from pins.get(body.name, [])
         if body.name not in holding:
-            if body.name not in marks:
+            if body.name not in marks and body.name not in pins:
                 yield body.name, np.asarray(body.center)
             for name in marks.get(body.name, []):
                 yield name, (0.0, 0.0, 0.0)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import is_finite
+from cgraph.extend import Builder, building, is_finite
 
 from . import spatial
 from .body import WORLD, Body, Joint, MechanismError, vector
@@ -98,28 +98,29 @@ def _weld_at(joint: Joint, at: Array) -> Joint:
 
 def merge_fixed_bodies(bodies: Sequence[Body]) -> tuple[list[Body], dict[str, Carrier]]:
     """The bodies that move and what carries each body of all: a welded body's mass and children are its carrier's."""
-    carriers = {WORLD: Carrier(WORLD, *_OWN)}
-    merged: dict[str, Body] = {}
-    for body in bodies:
-        parent = carriers[body.parent]
-        if parent.name == body.parent and body.joint.type.moves:
-            merged[body.name] = body
-            carriers[body.name] = Carrier(body.name, *_OWN)
-            continue
-        position = spatial.placed(parent.position, parent.orientation, np.asarray(body.joint.position))
-        orientation = spatial.snapped(parent.orientation @ np.asarray(body.joint.orientation))
-        if body.joint.type.moves:
-            joint = replace(body.joint, position=position, orientation=orientation)
-            merged[body.name] = replace(body, parent=parent.name, joint=joint)
-            carriers[body.name] = Carrier(body.name, *_OWN)
-            continue
-        carriers[body.name] = Carrier(parent.name, position, orientation)
-        if parent.name != WORLD and not (vanishes(body.mass) and vanishes(body.inertia)):
-            center = spatial.placed(position, orientation, np.asarray(body.center))
-            inertia = spatial.product(orientation, np.asarray(body.inertia), orientation.T)
-            other = replace(body, center=center, inertia=inertia)
-            merged[parent.name] = _joined(merged[parent.name], other)
-    return list(merged.values()), carriers
+    with building(Builder()):
+        carriers = {WORLD: Carrier(WORLD, *_OWN)}
+        merged: dict[str, Body] = {}
+        for body in bodies:
+            parent = carriers[body.parent]
+            if parent.name == body.parent and body.joint.type.moves:
+                merged[body.name] = body
+                carriers[body.name] = Carrier(body.name, *_OWN)
+                continue
+            position = spatial.placed(parent.position, parent.orientation, np.asarray(body.joint.position))
+            orientation = spatial.snapped(parent.orientation @ np.asarray(body.joint.orientation))
+            if body.joint.type.moves:
+                joint = replace(body.joint, position=position, orientation=orientation)
+                merged[body.name] = replace(body, parent=parent.name, joint=joint)
+                carriers[body.name] = Carrier(body.name, *_OWN)
+                continue
+            carriers[body.name] = Carrier(parent.name, position, orientation)
+            if parent.name != WORLD and not (vanishes(body.mass) and vanishes(body.inertia)):
+                center = spatial.placed(position, orientation, np.asarray(body.center))
+                inertia = spatial.product(orientation, np.asarray(body.inertia), orientation.T)
+                other = replace(body, center=center, inertia=inertia)
+                merged[parent.name] = _joined(merged[parent.name], other)
+        return list(merged.values()), carriers
 
 
 def _joined(body: Body, other: Body) -> Body:

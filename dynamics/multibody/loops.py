@@ -13,12 +13,13 @@ from cgraph import Node
 from cgraph.extend import Builder, building, check_name, is_finite
 
 from . import spatial
-from .body import WORLD, Body, MechanismError, checked_rotation, vector
+from .body import WORLD, Body, Joint, MechanismError, checked_rotation, vector
 from .forward_kinematics import KinematicChain
 from .joint_coordinates import places
+from .joints import COMPOSITIONS
 from .kinematic_tree import locked_at
 from .relative_placement import RelativePlacement
-from .spatial import ZERO, Array
+from .spatial import ZERO, Array, Triple
 
 ROWS = {
     "point": ("x", "y", "z"),
@@ -149,8 +150,12 @@ def _check_coupling(loop: Loop, where: str, bodies: Mapping[str, Body]) -> None:
         raise MechanismError(f"{where}: coefficients must be finite numbers, at least one, got {given!r:.60}")
     for name in (loop.body, loop.to):
         constant = name == WORLD and len(given) == 1
-        if not constant and (name == WORLD or len(bodies[name].joint.type.coordinates) != 1):
+        if not constant and (name == WORLD or not _has_one_coordinate(bodies[name].joint)):
             raise MechanismError(f"{where}: a coupling needs joints with one coordinate, which {name!r} has not")
+
+
+def _has_one_coordinate(joint: Joint) -> bool:
+    return joint.kind not in COMPOSITIONS and len(joint.type.coordinates) == 1
 
 
 def loop_rows(loop: Loop, body: RelativePlacement, to: RelativePlacement) -> list[Node]:
@@ -173,8 +178,19 @@ def loop_rows(loop: Loop, body: RelativePlacement, to: RelativePlacement) -> lis
         if loop.kind == "weld":
             x, y, z = (body.direction(column) for column in np.asarray(loop.orientation, dtype=np.float64))
             x_to, y_to, z_to = (to.direction(column) for column in np.eye(3))
-            rows += [spatial.dot(y, z_to), spatial.dot(z, x_to), spatial.dot(x, y_to)]
+            rows += _rotation_rows((x, y, z), (x_to, y_to, z_to))
     return _without_rounding(rows, [*body.lengths(loop.at), *to.lengths(loop.to_at)])
+
+
+def _rotation_rows(axes: Sequence[Triple], to: Sequence[Triple]) -> list[Node]:
+    """2 tan(angle / 2) about the axis of the rotation between two frames, zero where they are the same and only there.
+
+    Its rate is then the angular velocity, and Newton's method takes angle - sin(angle): it turns by less than half a
+    turn and back.
+    """
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = ([spatial.dot(axis, each) for each in to] for axis in axes)
+    scale = 2.0 / (1.0 + xx + yy + zz)
+    return [scale * (yz - zy), scale * (zx - xz), scale * (xy - yx)]
 
 
 def slip_rows(loop: Loop, body: KinematicChain, to: KinematicChain) -> list[Node]:

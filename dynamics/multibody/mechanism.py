@@ -14,14 +14,15 @@ from cgraph import Graph, Node
 from cgraph.extend import Builder, building, require_flag, require_mapping
 
 from ..systems.arguments import parameter_value
+from ..systems.body_system import BodySystem
 from ..systems.model import Model
-from ..systems.system import BodySystem, System
+from ..systems.system import System
 from .body import WORLD, Body, Joint, MechanismError, MechanismWarning, quantities, vector
-from .composed_joints import locked_parts, require_outer_parents
+from .composed_joints import locked_parts, outer_names, require_parents
 from .external_force import Force, generalized_forces
 from .forward_kinematics import KinematicChain, kinematic_chain
 from .inertial_numbers import Link
-from .joint_coordinates import coordinate_names, per_velocity, quasi_velocities, velocity_names
+from .joint_coordinates import coordinate_names, lengths, per_velocity, quasi_velocities, velocity_names
 from .joint_force import JointForce, add_joint_forces, check_any_force
 from .joint_positions import skeleton
 from .kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia
@@ -75,7 +76,8 @@ class Mechanism(Structure):
     left_out : tuple of str
         Of a mechanism that was read from a file: what the file has and the mechanism has not, a sentence each.
     loops : sequence of Loop
-        What holds bodies of the tree together, beside their joints, and closes it to loops.
+        What holds bodies of the tree together, beside their joints, and closes it to loops. Motions, accelerations
+        and linearizations are with them; mass matrix, bias, inverse dynamics, tables and the like are the tree's.
 
     Raises
     ------
@@ -122,7 +124,7 @@ class Mechanism(Structure):
     def _check_parameters(self, bodies: Sequence[Body]) -> None:
         for name, value in require_mapping("parameters", self.parameters, "name: value").items():
             parameter_value(name, value)  # before one is put in
-        require_values(bodies, self.gravity, self.parameters)
+        self._require_values(self.parameters, bodies)
 
     def __repr__(self) -> str:
         return f"<Mechanism of {'; '.join(summary(self, self.coordinates))}>"
@@ -131,7 +133,7 @@ class Mechanism(Structure):
     def parts(self) -> tuple[Body, ...]:
         """All bodies as the equations have them, parents first: a locked joint a weld, those of several parts apart."""
         parts = [part for body in self.bodies for part in self.shared.parts(body)]
-        require_outer_parents(self.bodies)
+        require_parents(self.bodies)
         return tuple(parents_first(lock_joints(parts, locked_parts(self.bodies, self.locked))))
 
     @property
@@ -163,22 +165,17 @@ class Mechanism(Structure):
         return None
 
     @property
-    def _carriers(self) -> dict[str, Carrier]:
+    def carriers(self) -> dict[str, Carrier]:
+        """For every body where it is in the frame of the moving body that carries it."""
         return self._merged[1]
 
     @cached_property
     def _merged(self) -> tuple[tuple[Body, ...], dict[str, Carrier]]:
-        moving, carriers = self._merge(self.parts)
+        moving, carriers = merge_fixed_bodies(self.parts)
         numbers = [bound_body(part, self.parameters) for part in self.parts]
-        known = moving
-        if numbers != list(self.parts):
-            known, _ = self._merge([part for body in numbers for part in self.shared.parts(body)])
-        require_inertia(known)
+        shown = [part for body in numbers for part in self.shared.parts(body)]
+        require_inertia(moving if numbers == list(self.parts) else merge_fixed_bodies(shown)[0])
         return tuple(moving), carriers
-
-    def _merge(self, parts: Sequence[Body]) -> tuple[list[Body], dict[str, Carrier]]:
-        with building(Builder()):
-            return merge_fixed_bodies(parts)
 
     @cached_property
     def _bound(self) -> Mechanism:
@@ -198,16 +195,22 @@ class Mechanism(Structure):
             raise MechanismError("the mechanism has no joint that moves")
         return BodySystem(
             self._equations.bias_forces,
+            self._equations.torque_derivatives,
             lambda q, qd, t: self._equations.partial_lagrangians(q, qd),
             self.coordinates,
             self.parameter_values,
             forces=self._generalized_forces if self.forces else None,
             damping=per_velocity(self.moving, [symbol(body.joint.damping) for body in self.moving]),
             quasi_velocities=quasi_velocities(self.moving),
-            constraints=lambda q, t: position_rows(self, self.moving, self._carriers, self.links, q),
+            constraints=lambda q, t: position_rows(self, self.moving, self.carriers, self.links, q),
             velocity_constraints=lambda q, qd, t: velocity_rows(self, lambda body: self._chain(body, q, qd)),
-            require_values=lambda values: require_values(self.parts, self.gravity, values),
+            lengths=lengths(self._bound.moving),
+            require_values=self._require_values,
         )
+
+    def _require_values(self, values: Mapping[str, ArrayLike], bodies: Sequence[Body] | None = None) -> None:
+        with outer_names(self.bodies):
+            require_values(self.parts if bodies is None else bodies, self.gravity, values)
 
     def _generalized_forces(self, q: list[Node], qd: list[Node], t: Node, p: dict[str, Node]) -> list[Node]:
         on_bodies = [force for force in self.forces if isinstance(force, Force)]
@@ -215,7 +218,7 @@ class Mechanism(Structure):
         return add_joint_forces(total, self.forces, self.moving, (q, qd), p)
 
     def _chain(self, body: str, q: Sequence[Node], qd: Sequence[Node]) -> KinematicChain:
-        return kinematic_chain(self._carriers[body], self.moving, self.links, q, qd)
+        return kinematic_chain(self.carriers[body], self.moving, self.links, q, qd)
 
     @property
     def links(self) -> list[Link]:
@@ -255,7 +258,7 @@ class Mechanism(Structure):
 
     def chain(self, body: str) -> KinematicChain:
         """The joints between a body and the world, at q0.. and qd0... Raises MechanismError for an unknown body."""
-        if not isinstance(body, str) or body not in self._carriers:
+        if not isinstance(body, str) or body not in self.carriers:
             raise MechanismError(f"there is no body {body!r:.80} in the mechanism")
         return self._chain(body, self.system.q, self.system.qd)
 
@@ -281,7 +284,7 @@ class Mechanism(Structure):
             raise MechanismError(f"the mechanism has no parameter {unknown[0]!r} (it has {has})")
         if not chosen:
             return self
-        require_values(self.parts, self.gravity, {**self.parameter_values, **chosen})
+        self._require_values({**self.parameter_values, **chosen})
         bodies = tuple([bound_body(body, chosen) for body in self.bodies])
         forces = tuple([bound_force(force, chosen) for force in self.forces])
         return changed(self, chosen, bodies=bodies, gravity=bound(self.gravity, chosen), forces=forces)
@@ -314,7 +317,8 @@ class Mechanism(Structure):
         """The mechanism with a subtree, a body, or several of which the first carries the others, hung on a body.
 
         to: a body's name or "world"; by default what the first names as its parent. A subtree that goes back where it
-        was taken off gives the same mechanism again. Raises MechanismError as a Mechanism does.
+        was taken off gives the same mechanism again, with its loops after the others. Raises MechanismError as a
+        Mechanism does, also for a loop of the subtree with a body that is not there.
         """
         return attach_subtree(self, subtree, to)
 

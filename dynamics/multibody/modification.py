@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import real_array
 
-from .body import WORLD, Body, MechanismError
+from .body import Body, MechanismError
 from .joint_coordinates import coordinate_names, neutral, places, velocity_names
 from .mechanism_fields import AnyStructure, Structure, changed
 from .parameter_values import used_names
@@ -50,7 +50,7 @@ def subtree_of(structure: Structure, body: str) -> Subtree:
         forces,
         {name: value for name, value in structure.parameters.items() if name in used},
         {name: at for name, at in structure.locked.items() if name in names},
-        tuple([loop for loop in structure.loops if {loop.body, loop.to} <= {*names, WORLD}]),
+        tuple([loop for loop in structure.loops if not names.isdisjoint((loop.body, loop.to))]),
     )
 
 

@@ -32,7 +32,7 @@ class Subtree:
     locked : mapping
         {body: coordinate [rad or m]} of their joints that are locked.
     loops : tuple of Loop
-        Among these bodies, and with the world.
+        Of these bodies, among one another and with others, which `attach` needs to be there.
 
     Examples
     --------

@@ -11,6 +11,7 @@ from ..systems.model import Model, as_system
 from ..systems.system import System
 from .body import Body
 from .composed_joints import locked_parts, parts_of
+from .joint_coordinates import places
 from .mechanism import Mechanism, as_mechanism
 from .mechanism_fields import changed
 from .parameters import vanishes
@@ -73,13 +74,16 @@ def absent_parts(model: Mechanism, given: Mechanism) -> Iterator[tuple[str, str,
     if vanishes(given.gravity):
         yield "gravity", "it is zero", changed(model, gravity=FREE_FALL)
     elif not vanishes(model.gravity):
-        forces = gravity_force(_with(model, "springs", 0.0)).outputs.values()
-        free = [body.name for body, force in zip(model.moving, forces, strict=True) if force.value == 0.0]
+        forces = list(gravity_force(_with(model, "springs", 0.0)).outputs.values())
+        along = [forces[place.u] for place in places(model.moving)]
+        still = [all([force.value == 0.0 for force in each]) for each in along]
+        free = [body.name for body, none in zip(model.moving, still, strict=True) if none]
         if free:
             yield f"gravity at {_listed(free)}", "it does no work there", changed(model, gravity=SKEW)
     for effect, name in _JOINT.items():
         had = {body.name for body in given.moving if not vanishes(getattr(body.joint, name))}
-        without = [body.name for body in model.moving if vanishes(getattr(body.joint, name)) and body.name not in had]
+        able = [body for body in model.moving if _can_have(body, name)]
+        without = [body.name for body in able if vanishes(getattr(body.joint, name)) and body.name not in had]
         if without:
             yield f"{effect} of {_listed(without)}", "it is zero", _with(model, effect, NUMBER, without)
     if massless := [body.name for body in model.bodies if not _frame(model, body) and not _has_inertia(body)]:
@@ -94,6 +98,11 @@ def _in_parts(model: Mechanism) -> Mechanism:
     if len(bodies) == len(model.bodies):
         return model
     return replace(model, bodies=bodies, locked=locked_parts(model.bodies, model.locked))
+
+
+def _can_have(body: Body, name: str) -> bool:
+    kind = body.joint.type
+    return {"stiffness": kind.sprung, "armature": kind.geared}.get(name, True)
 
 
 def _has_inertia(body: Body) -> bool:

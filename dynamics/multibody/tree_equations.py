@@ -12,11 +12,13 @@ from cgraph import Node
 from cgraph.extend import Builder, building
 
 from ..systems.system import BiasForce
+from ..systems.torque_derivatives import MotionState, TorqueDerivatives
 from . import newton_euler, spatial
 from .base_parameters import base_parameter_links
 from .body import WORLD, Body, quantities
 from .body_motion import Motion, ground
 from .inertial_numbers import Link
+from .inverse_dynamics_columns import torque_derivatives
 from .joint_coordinates import parts
 from .joints import AxialJoint
 from .link_cache import Moved
@@ -83,6 +85,12 @@ class TreeEquations:
                     )
                     forces += newton_euler.bias_wrench(acceleration, moved.motion, link, body.joint.type, x, u)
         return forces
+
+    def torque_derivatives(self, state: MotionState, build: Builder) -> TorqueDerivatives:
+        """Of all bodies, with their springs."""
+        with building(build):
+            up = newton_euler.base_acceleration(self.ground).linear
+            return torque_derivatives(self.bodies, self.links, self.parents, up, state, build)
 
     def _moved(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Moved]:
         motions = {WORLD: self.ground}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 
 from .casadi import CasadiPeer
-from .case import TASKS, Case
+from .case import DERIVATIVES, TASKS, Case
 from .contender import MODES, Contender, Peer, UnavailableError
 from .heyoka import HeyokaPeer
 from .jax import JaxPeer
@@ -19,7 +19,8 @@ from .torch import TorchPeer
 
 CALLS = {(task, mode) for task in ("inverse", "forward") for mode in ("call", "batch")}
 RK4 = {("rk4", mode) for mode in MODES}
-ALL = {(task, mode) for task in TASKS for mode in MODES}
+SLOPES = {(task, mode) for task in DERIVATIVES for mode in ("call", "batch")}
+ALL = {(task, mode) for task in TASKS if task not in DERIVATIVES for mode in MODES} | SLOPES
 
 
 @dataclass(frozen=True)
@@ -64,9 +65,9 @@ PEERS = {
     ),
     "casadi": Kind("CasADi's own graph in its virtual machine", "casadi", ALL, CasadiPeer),
     "pinocchio": Kind(
-        "Pinocchio's rnea and aba, C++; the step of RK4 is written in Python",
+        "Pinocchio's rnea and aba and their derivatives, C++; the step of RK4 is written in Python",
         "pinocchio",
-        CALLS | {("rk4", "call")},
+        CALLS | {("rk4", "call")} | {(task, "call") for task in DERIVATIVES},
         PinocchioPeer,
     ),
     "mujoco": Kind(

@@ -14,10 +14,10 @@ import numpy as np
 
 from cgraph.extend import install
 
-from .case import BATCH, NUDGE, PASSES, Array, Case, rk4_step
+from .case import BATCH, DERIVATIVES, NUDGE, PASSES, Array, Case, rk4_step
 from .contender import Contender, Peer, UnavailableError
-from .ours import task_graph
-from .translate import lagrangian, translated
+from .ours import rate_graph, task_graph
+from .translate import lagrangian, quasi_velocities, translated
 
 FLAGS = ("-O3", "-march=native", "-shared", "-fPIC")
 # Of our operations, where CasADi has another name.
@@ -40,34 +40,53 @@ class CasadiPeer(Peer):
         """The task from the Lagrangian, x -> y."""
         ca, n = self.casadi, self.case.n
         if task == "rk4":
-            return self._step(self.function("forward"))
-        q, qd, last = (ca.SX.sym(name, n) for name in ("q", "qd", "last"))
+            return self._step(self.function("rate"))
+        if task in DERIVATIVES:
+            return self._slopes(task)
+        q, qd, last = ca.SX.sym("q", self.case.nq), ca.SX.sym("qd", n), ca.SX.sym("last", n)
         energy, forces = lagrangian(self.case, ca.vertsplit(q), ca.vertsplit(qd), ca, NAMES, ca.SX)
         p, slope = ca.gradient(energy, qd), ca.gradient(energy, q)
-        known = ca.vertcat(*forces) - ca.DM(list(self.case.system.damping)) * qd + slope
+        q_dot, taken = quasi_velocities(self.case, ca.vertsplit(q), ca.vertsplit(qd), ca.vertsplit(p), ca, NAMES, ca.SX)
+        q_dot, slope = ca.vertcat(*q_dot), ca.jtimes(ca.vertcat(*q_dot), qd, slope, True)
+        known = ca.vertcat(*forces) - ca.DM(list(self.case.system.damping)) * qd + slope - ca.vertcat(*taken)
         if task == "inverse":
-            rate = ca.jtimes(p, ca.vertcat(q, qd), ca.vertcat(qd, last))
+            rate = ca.jtimes(p, ca.vertcat(q, qd), ca.vertcat(q_dot, last))
             y = rate - known
         else:
             diagonal, factor, order = ca.ldl(ca.jacobian(p, qd), False)
-            y = ca.ldl_solve(last + known - ca.jtimes(p, q, qd), diagonal, factor, order)
+            y = ca.ldl_solve(last + known - ca.jtimes(p, q, q_dot), diagonal, factor, order)
+        if task == "rate":
+            x, y = ca.vertcat(q, qd), ca.vertcat(q_dot, ca.substitute(y, last, ca.SX.zeros(n)))
+            return ca.Function(task, [x], [ca.cse(y)])
         return ca.Function(task, [ca.vertcat(q, qd, last)], [ca.cse(y)])
+
+    def _slopes(self, task: str) -> Any:
+        """The derivatives of a task, by CasADi's Jacobian; those by q along the velocities."""
+        ca, nq, n = self.casadi, self.case.nq, self.case.n
+        function = self.function(DERIVATIVES[task])
+        x = ca.SX.sym("x", self.case.width(task))
+        q, qd = ca.vertsplit(x[:nq]), ca.SX.sym("u", n)
+        rates = quasi_velocities(self.case, q, ca.vertsplit(qd), q[:n], ca, NAMES, ca.SX)[0]
+        along = ca.jacobian(ca.vertcat(*rates), qd)
+        rows = ca.jacobian(function(x), x)
+        rows = ca.horzcat(ca.mtimes(rows[:, :nq], along), rows[:, nq:])
+        return ca.Function("slopes", [x], [ca.cse(ca.densify(ca.vec(rows.T)))])
 
     def _ours(self, task: str) -> Any:
         """Our graph of the task, node for node."""
         ca = self.casadi
         if task == "rk4":
-            return self._step(self.function("forward"))
-        graph = task_graph(self.case, task)
+            return self._step(self.function("rate"))
+        graph = rate_graph(self.case) if task == "rate" else task_graph(self.case, task)
         x = ca.SX.sym("x", len(graph.inputs))
         values = translated(graph.nodes, dict(zip(graph.inputs, ca.vertsplit(x), strict=True)), ca, NAMES, ca.SX)
         return ca.Function(task, [x], [ca.vertcat(*[values[node] for node in graph.outputs.values()])])
 
-    def _step(self, forward: Any) -> Any:
-        """One RK4 step that calls the forward dynamics four times."""
-        ca, n = self.casadi, self.case.n
-        state = ca.MX.sym("x", 2 * n)
-        after = rk4_step(lambda x: ca.vertcat(x[n:], forward(ca.vertcat(x, ca.MX.zeros(n)))), state)
+    def _step(self, rate: Any) -> Any:
+        """One RK4 step that calls the rate of the state four times."""
+        ca = self.casadi
+        state = ca.MX.sym("x", self.case.width("rk4"))
+        after = rk4_step(rate, state)
         step = ca.Function("rk4", [state], [after])
         return step if self.native else step.expand()  # the virtual machine is faster on scalars; gcc inlines by itself
 
@@ -76,8 +95,8 @@ class CasadiPeer(Peer):
         function = self.function(task)
         if task == "rk4":
             return function
-        x = self.casadi.MX.sym("x", 3 * self.case.n)
-        moved = x + NUDGE * self.casadi.repmat(function(x), 3, 1)
+        x = self.casadi.MX.sym("x", self.case.width(task))
+        moved = x + NUDGE * function(x)[self.case.nudges(task).tolist()]
         return self.casadi.Function("moved", [x], [moved])
 
     def prepare(self, task: str, mode: str) -> Contender:

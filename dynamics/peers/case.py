@@ -12,6 +12,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import topological
 
+from ..equations.state_equation import normalization
 from ..integrators.tableau import RK4
 from ..multibody.mechanism import as_mechanism
 from ..systems.arguments import TIME
@@ -20,12 +21,16 @@ from ..systems.system import System
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-# Each task takes one vector, the blocks end to end, and gives the last block's kind.
+# Each task takes one vector, the blocks end to end. Derivatives are n rows of 3 n columns; those by q are by
+# displacements where velocities are no rates of coordinates.
 TASKS = {
     "inverse": "inverse dynamics, (q, qd, qdd) -> tau",
     "forward": "forward dynamics, (q, qd, tau) -> qdd",
     "rk4": "one RK4 step, (q, qd) -> (q, qd) after dt, tau = 0",
+    "inverse-derivatives": "derivatives of inverse dynamics, (q, qd, qdd) -> dtau/dq, dtau/dqd, M",
+    "derivatives": "derivatives of forward dynamics, (q, qd, tau) -> dqdd/dq, dqdd/dqd, M^-1",
 }
+DERIVATIVES = {"inverse-derivatives": "inverse", "derivatives": "forward"}  # and what they are of
 BATCH = 4096  # states
 PASSES = 1000  # of a native loop
 DT = 1e-5  # s, the step of RK4: short, so that a thousand of them do not magnify rounding
@@ -57,15 +62,26 @@ class Case:
 
     def point(self, task: str) -> Array:
         """The input of one call."""
-        return np.random.default_rng(0).normal(size=self.width(task))
+        return self._normalized(np.random.default_rng(0).normal(size=(self.width(task), 1)))[:, 0]
 
     def points(self, task: str) -> Array:
         """The inputs of a batch, (n_in, BATCH)."""
-        return np.random.default_rng(1).normal(size=(self.width(task), BATCH))
+        return self._normalized(np.random.default_rng(1).normal(size=(self.width(task), BATCH)))
+
+    def _normalized(self, x: Array) -> Array:
+        """The same with quaternions of length 1."""
+        graph = normalization(self.model)
+        if graph is not None:
+            x[: self.nq + self.n] = cg.compile(graph, backend="numpy").batch(x[: self.nq + self.n])
+        return x
 
     def width(self, task: str) -> int:
         """How many numbers go into a task."""
         return self.nq + (1 if task == "rk4" else 2) * self.n
+
+    def nudges(self, task: str) -> np.ndarray[Any, np.dtype[np.intp]]:
+        """Which result moves each input from one pass of a loop to the next."""
+        return np.arange(self.width(task)) % self.n
 
 
 def rk4_step(rate: Callable[[Any], Any], x: Any, dt: float = DT) -> Any:

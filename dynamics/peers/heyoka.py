@@ -10,7 +10,7 @@ from cgraph.extend import install, ldl_elimination
 
 from .case import BATCH, Case
 from .contender import Contender, Peer
-from .translate import lagrangian
+from .translate import lagrangian, require_rates
 
 COMPACT = 15  # coordinates; beyond, code written out takes longer to compile than its `compact_mode`
 
@@ -20,6 +20,7 @@ class HeyokaPeer(Peer):
 
     def __init__(self, case: Case) -> None:
         super().__init__(case)
+        require_rates(case)
         self.heyoka = heyoka()
         leave_cache(self.heyoka)
         self.functions: dict[str, Any] = {}

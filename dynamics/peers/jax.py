@@ -9,9 +9,9 @@ import numpy as np
 
 from cgraph.extend import install, ldl_elimination
 
-from .case import BATCH, NUDGE, PASSES, Array, Case, rk4_step
+from .case import BATCH, DERIVATIVES, NUDGE, PASSES, Array, Case, rk4_step
 from .contender import Contender, Peer
-from .translate import lagrangian
+from .translate import lagrangian, quasi_velocities
 
 SHORT = 10  # coordinates; beyond, a solve written out takes longer to compile than it gains on LAPACK's Cholesky
 NAMES = {f"a{name}": f"arc{name}" for name in ("sin", "cos", "tan")} | {"atan2": "arctan2"}
@@ -38,17 +38,28 @@ class JaxPeer(Peer):
         """dL/dq, applied forces and damping."""
         forces = self.np.stack([self.np.asarray(f) for f in lagrangian(self.case, q, qd, self.np, NAMES)[1]])
         damping = self.np.array(self.case.system.damping) * qd
-        return self.jax.grad(self._energy, 0)(q, qd) + forces - damping
+        slope, momenta = self.jax.grad(self._energy, 0)(q, qd), self.jax.grad(self._energy, 1)(q, qd)
+        taken = quasi_velocities(self.case, q, qd, momenta, self.np, NAMES)[1]
+        (pulled,) = self.jax.vjp(lambda u: self._rate(q, u), qd)[1](slope)
+        return pulled + forces - damping - self.np.stack([self.np.asarray(f) for f in taken])
+
+    def _rate(self, q: Any, qd: Any) -> Any:
+        """The rates of the coordinates."""
+        rates = quasi_velocities(self.case, q, qd, qd, self.np, NAMES)[0]
+        return self.np.stack([self.np.asarray(rate) for rate in rates])
+
+    def _split(self, x: Any) -> Any:
+        return self.np.split(x, [self.case.nq, self.case.nq + self.case.n])
 
     def _inverse(self, x: Any) -> Any:
-        q, qd, qdd = self.np.split(x, 3)
-        _, rate = self.jax.jvp(self.jax.grad(self._energy, 1), (q, qd), (qd, qdd))
+        q, qd, qdd = self._split(x)
+        _, rate = self.jax.jvp(self.jax.grad(self._energy, 1), (q, qd), (self._rate(q, qd), qdd))
         return rate - self._known(q, qd)
 
     def _forward(self, x: Any) -> Any:
-        q, qd, tau = self.np.split(x, 3)
+        q, qd, tau = self._split(x)
         momentum = self.jax.grad(self._energy, 1)
-        _, moved = self.jax.jvp(lambda q: momentum(q, qd), (q,), (qd,))
+        _, moved = self.jax.jvp(lambda q: momentum(q, qd), (q,), (self._rate(q, qd),))
         mass, rhs = self.jax.jacfwd(momentum, 1)(q, qd), tau + self._known(q, qd) - moved
         if self.case.n <= SHORT:
             return self.np.stack(ldl_elimination(mass, rhs)[0])
@@ -56,15 +67,31 @@ class JaxPeer(Peer):
 
     def rate(self, x: Any) -> Any:
         """xdot of a state (q, qd) without applied torque."""
-        n, join = self.case.n, self.np.concatenate
-        return join([x[n:], self._forward(join([x, self.np.zeros(n)]))])
+        join = self.np.concatenate
+        q, qd, _ = self._split(x)
+        return join([self._rate(q, qd), self._forward(join([x, self.np.zeros(self.case.n)]))])
 
     def _step(self, x: Any) -> Any:
         return rk4_step(self.rate, x)
 
+    def _function(self, task: str) -> Callable[[Any], Any]:
+        if task in DERIVATIVES:
+            return self._slopes(self._function(DERIVATIVES[task]))
+        return {"inverse": self._inverse, "forward": self._forward, "rk4": self._step}[task]
+
+    def _slopes(self, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        """Its derivatives, row by row; those by q along the velocities."""
+
+        def slopes(x: Any) -> Any:
+            q, qd, _ = self._split(x)
+            rows, along = self.jax.jacfwd(function)(x), self.jax.jacfwd(lambda u: self._rate(q, u))(qd)
+            return self.np.hstack([rows[:, : self.case.nq] @ along, rows[:, self.case.nq :]]).ravel()
+
+        return slopes
+
     def prepare(self, task: str, mode: str) -> Contender:
         """JAX's jitted function of the task."""
-        function: Callable[[Any], Any] = {"inverse": self._inverse, "forward": self._forward, "rk4": self._step}[task]
+        function = self._function(task)
         x = self.np.asarray(self.case.point(task))
         if mode == "call":
             return _contender(self.jax.jit(function), x, 1)
@@ -72,8 +99,10 @@ class JaxPeer(Peer):
             points = self.np.asarray(np.ascontiguousarray(self.case.points(task).T))
             return _contender(self.jax.jit(self.jax.vmap(function)), points, BATCH)
 
+        nudges = self.case.nudges(task)
+
         def one_pass(carry: Any, _: None) -> tuple[Any, None]:
-            return (function(carry) if task == "rk4" else carry + NUDGE * self.np.tile(function(carry), 3)), None
+            return (function(carry) if task == "rk4" else carry + NUDGE * function(carry)[nudges]), None
 
         return _contender(self.jax.jit(lambda x: self.jax.lax.scan(one_pass, x, None, PASSES)[0]), x, PASSES)
 

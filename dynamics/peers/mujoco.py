@@ -45,6 +45,8 @@ class MujocoPeer(Peer):
 
     def prepare(self, task: str, mode: str) -> Contender:
         """MuJoCo's call for the task, at one state, in a loop or over states."""
+        if task != "inverse" and self.twin.mechanism.loops:
+            raise UnavailableError("has soft loops, which move otherwise")
         if mode != "call":
             return self._rollout(mode)
         m, model, data = self.mujoco, self.twin.model, self.twin.data

@@ -12,6 +12,10 @@ from cgraph import Graph
 
 from ..equations.equations_of_motion import forward_dynamics
 from ..equations.formulations import inverse_dynamics
+from ..equations.inverse_dynamics_derivatives import inverse_dynamics_derivatives
+from ..equations.linearization import state_space
+from ..equations.state_equation import state_equation
+from ..systems.model import Model
 from .case import NUDGE, PASSES, Array, Case, rk4_step
 from .contender import Contender, Peer
 
@@ -19,16 +23,37 @@ from .contender import Contender, Peer
 def task_graph(case: Case, task: str) -> Graph:
     """Our graph of a task."""
     if task == "rk4":
-        return step_graph(case.bound(forward_dynamics(case.model)))
-    return case.bound((inverse_dynamics if task == "inverse" else forward_dynamics)(case.model))
+        return step_graph(rate_graph(case))
+    if task == "derivatives":
+        return slope_graph(case)
+    make = {"inverse": inverse_dynamics, "forward": forward_dynamics, "inverse-derivatives": _inverse_derivatives}
+    return case.bound(make[task](case.model))
 
 
-def step_graph(forward: Graph) -> Graph:
-    """(q0.., qd0..) -> (q0_next.., qd0_next..), one RK4 step without applied torque."""
-    n = len(forward.outputs)
-    rate = cg.specialize(forward, {f"tau{i}": 0.0 for i in range(n)})
-    state = cg.variables([f"q{i}" for i in range(n)] + [f"qd{i}" for i in range(n)])
-    after = rk4_step(lambda x: np.array([*x[n:], *rate(*x).values()]), np.array(state))
+def slope_graph(case: Case) -> Graph:
+    """(q0.., qd0.., tau0..) -> dqdd/d(q, qd, tau), row by row."""
+    matrices, n = case.bound(state_space(case.model)), case.n
+    names = [f"A_{i}_{j}" if j < 2 * n else f"B_{i}_{j - 2 * n}" for i in range(n, 2 * n) for j in range(3 * n)]
+    return cg.simplify(Graph(matrices.inputs, {name: matrices.outputs[name] for name in names}))
+
+
+def _inverse_derivatives(model: Model) -> Graph:
+    """(q0.., qd0.., qdd0..) -> dtau/d(q, qd, qdd), row by row."""
+    graph = inverse_dynamics_derivatives(model)
+    n = sum(name.startswith("tau") for name in graph.outputs)
+    names = [f"{block}_{i}_{j}" for i in range(n) for block in ("dtau_dq", "dtau_dqd", "M") for j in range(n)]
+    return cg.simplify(Graph(graph.inputs, {name: graph.outputs[name] for name in names}))
+
+
+def rate_graph(case: Case) -> Graph:
+    """(q0.., qd0..) -> their rates without applied torque."""
+    return cg.specialize(case.bound(state_equation(case.model)), {f"tau{i}": 0.0 for i in range(case.n)})
+
+
+def step_graph(rate: Graph) -> Graph:
+    """(q0.., qd0..) -> (q0_next.., qd0_next..), one RK4 step."""
+    state = cg.variables(rate.input_names)
+    after = rk4_step(lambda x: np.array([*rate(*x).values()]), np.array(state))
     return cg.simplify(Graph(state, {f"{node.name}_next": x for node, x in zip(state, after, strict=True)}))
 
 
@@ -37,7 +62,7 @@ def carried(case: Case, task: str, graph: Graph) -> tuple[Graph, dict[str, str]]
     if task == "rk4":
         return graph, dict(zip(graph.input_names, graph.outputs, strict=True))
     results = list(graph.outputs.values())
-    nudged = [x + NUDGE * results[i % case.n] for i, x in enumerate(graph.inputs)]
+    nudged = [x + NUDGE * results[i] for x, i in zip(graph.inputs, case.nudges(task), strict=True)]
     names = [f"{node.name}_next" for node in graph.inputs]
     moved = Graph(graph.inputs, dict(zip(names, nudged, strict=True)))
     return moved, dict(zip(moved.input_names, names, strict=True))

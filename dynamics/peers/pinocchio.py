@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..multibody.joint_coordinates import per_velocity, places
-from .case import BATCH, Array, Case, rk4_step
+from .case import BATCH, DERIVATIVES, Array, Case, rk4_step
 from .contender import Contender, Peer, UnavailableError
 from .mujoco import bodies
 from .pinocchio_model import PinocchioModel, pinocchio
@@ -47,7 +47,7 @@ class PinocchioPeer(Peer):
         force: Array = damping * u + stiffness * stretch
         return force
 
-    def _arguments(self, x: Array, task: str) -> tuple[Array, Array, Array]:
+    def arguments(self, x: Array, task: str) -> tuple[Array, Array, Array]:
         """q, v and the third argument as Pinocchio has them."""
         q, u, last = np.split(x, [self.case.nq, self.case.nq + self.case.n])
         theirs = self.of.q(q)
@@ -66,7 +66,7 @@ class PinocchioPeer(Peer):
     def _asked(self, x: Array, task: str) -> Array:
         """The answer at one state."""
         algorithm = self.pinocchio.aba if task == "forward" else self.pinocchio.rnea
-        q, v, last = self._arguments(x, task)
+        q, v, last = self.arguments(x, task)
         return self._result(x, q, v, algorithm(self.twin, self.data, q, v, last), task)
 
     def quantities(self, q: Array, qd: Array, qdd: Array, tau: Array) -> dict[str, Array]:
@@ -86,8 +86,10 @@ class PinocchioPeer(Peer):
         """Pinocchio's rnea or aba, at one state or over states."""
         if task == "rk4":
             return self._step()
+        if task in DERIVATIVES:
+            return self._slopes(task)
         x = self.case.point(task) if mode == "call" else self.case.points(task)
-        arguments = self._arguments(x, task)
+        arguments = self.arguments(x, task)
 
         def result(y: Any) -> Array:
             return self._result(x, *arguments[:2], y, task)
@@ -110,6 +112,28 @@ class PinocchioPeer(Peer):
             lambda: algorithm(1, pool, *columns, y), lambda found: result(y if found is None else found), BATCH
         )
 
+    def _slopes(self, task: str) -> Contender:
+        """The derivatives of rnea or aba; those of dampers and springs are added outside what is timed."""
+        forward, n, x = task == "derivatives", self.case.n, self.case.point(task)
+        q, v, last = self.arguments(x, DERIVATIVES[task])
+        algorithm = getattr(self.pinocchio, f"compute{'ABA' if forward else 'RNEA'}Derivatives")
+        model, data, stretched = self.twin, self.data, self.stiffness != 0.0
+        if any([stretched[place.u].any() for place in self.balls]):
+            raise UnavailableError("has no slopes of the springs of ball joints")
+
+        def result(_: Any) -> Array:
+            if forward:
+                found = data.ddq_dq, data.ddq_dv, _symmetric(data.Minv)
+            else:
+                found = data.dtau_dq, data.dtau_dv, _symmetric(data.M)
+            rows = self.of.our_slopes(q, v, last, data.ddq if forward else data.tau, found, forward=forward)
+            by_q, by_u, by_last = (rows[:, k * n : (k + 1) * n] for k in range(3))
+            passive = -by_last if forward else np.eye(n)
+            rows = np.hstack([by_q + passive * self.stiffness, by_u + passive * self.damping, by_last])
+            return rows.ravel()
+
+        return Contender(lambda: algorithm(model, data, q, v, last), result)
+
     def _step(self) -> Contender:
         """RK4 in Python over aba."""
         if self.case.nq != self.case.n:
@@ -127,6 +151,12 @@ class PinocchioPeer(Peer):
         x = self.case.point("rk4")
         x = np.concatenate([x[at], x[n + at]])
         return Contender(lambda: rk4_step(rate, x), lambda y: y[back])
+
+
+def _symmetric(upper: Array) -> Array:
+    """The matrix whose upper triangle is there."""
+    rows = np.triu(upper)
+    return rows + np.triu(rows, 1).T
 
 
 def _rotation_vector(e: Array) -> Array:

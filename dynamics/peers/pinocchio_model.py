@@ -118,6 +118,39 @@ class PinocchioModel:
         """Our accelerations of Pinocchio's."""
         return self.our_v(q, a + self.curved(v))
 
+    def our_slopes(
+        self, q: Array, v: Array, last: Array, y: Array, slopes: tuple[Array, Array, Array], *, forward: bool
+    ) -> Array:
+        """Our derivatives by q, qd and the last argument, (n, 3 n), of Pinocchio's result y at q, v, last and its own.
+
+        Of free bodies, with E = diag(R^T, 1) and dtheta the turn: last = E ours - into(v), ours = E^T (y + out(v)),
+        dv = E du + [v]x dtheta, dlast = E dours + [E ours]x dtheta - dinto dv; displacements E xi.
+        forward: y is an acceleration and `last` a force, else the other way around.
+        """
+        n = len(v)
+        into, out = (self.rotor, self.curved) if forward else (self.curved, self.rotor)
+        axes, turned_v, turned_last, turned_y, slope_in, slope_out = np.eye(n), *(np.zeros((n, n)) for _ in range(5))
+        raw, whole = last + into(v), y + out(v)
+        for linear, angular, rows, armature in self._turned:
+            axes[linear, linear] = _axes(q[rows]).T
+            for matrix, vector in ((turned_v, v[linear]), (turned_last, raw[linear]), (turned_y, -whole[linear])):
+                matrix[linear, angular] = _cross(vector)
+            for matrix, scale in zip(
+                (slope_in, slope_out), (armature, 1.0) if forward else (1.0, armature), strict=True
+            ):
+                matrix[linear, linear] = scale * _cross(v[angular])
+                matrix[linear, angular] = -scale * _cross(v[linear])
+        by_q, by_v, by_last = slopes
+        by_v = by_v - by_last @ slope_in + slope_out
+        by_q = by_q @ axes + by_v @ turned_v + by_last @ turned_last + turned_y
+        ours = [(axes.T @ matrix)[np.ix_(self.order, self.order)] for matrix in (by_q, by_v @ axes, by_last @ axes)]
+        return np.hstack(ours)
+
+
+def _cross(vector: Array) -> Array:
+    """[v]x."""
+    return np.cross(np.eye(3), vector)
+
 
 def _depth_first(bodies: Sequence[Body]) -> Iterator[Body]:
     """The bodies in the order that Pinocchio needs: what a body carries follows it without a gap."""

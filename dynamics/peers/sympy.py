@@ -8,7 +8,7 @@ import numpy as np
 
 from .case import BATCH, Array, Case
 from .contender import Contender, Peer
-from .translate import lagrangian
+from .translate import lagrangian, require_rates
 
 NAMES = {"abs": "Abs", "minimum": "Min", "maximum": "Max"}
 
@@ -18,6 +18,7 @@ class SympyPeer(Peer):
 
     def __init__(self, case: Case) -> None:
         super().__init__(case)
+        require_rates(case)
         import sympy
 
         self.sympy = sympy

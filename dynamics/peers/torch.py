@@ -13,6 +13,7 @@ from cgraph.extend import topological
 from ..systems.system import System
 from .case import Case
 from .contender import Contender, Peer, UnavailableError
+from .translate import require_rates
 
 
 class TorchPeer(Peer):
@@ -20,6 +21,7 @@ class TorchPeer(Peer):
 
     def __init__(self, case: Case) -> None:
         super().__init__(case)
+        require_rates(case)
         self.evaluate = eager_evaluations(case.system, ["chain_rule"])["chain_rule"]
 
     def prepare(self, task: str, mode: str) -> Contender:

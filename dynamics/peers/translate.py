@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import cgraph as cg
 from cgraph import Node
+from cgraph.extend import Builder, topological
 
 from .case import Case
 from .contender import UnavailableError
@@ -53,3 +55,27 @@ def lagrangian(
     env |= {node: number(system.parameters[str(node.name)]) for node in system.extra_inputs}
     values = translated(case.order, env, functions, names, number)
     return values[system.lagrangian], [values[force] for force in system.forces]
+
+
+def quasi_velocities(
+    case: Case,
+    q: Sequence[Any],
+    qd: Sequence[Any],
+    momenta: Sequence[Any],
+    functions: Any,
+    names: Mapping[str, str] | None = None,
+    number: Callable[[float], Any] = float,
+) -> tuple[list[Any], list[Any]]:
+    """The rates of the coordinates, G(q) qd, and what brackets of velocities take of the force, ad(qd; p)."""
+    kinematics = case.system.kinematics
+    p = cg.variables([f"p{i}" for i in range(case.n)])
+    taken = kinematics.structure(p, Builder())
+    env = dict(zip([*case.system.q, *case.system.qd, *p], [*q, *qd, *momenta], strict=True))
+    values = translated(topological([*kinematics.q_dot, *taken]), env, functions, names, number)
+    return [values[rate] for rate in kinematics.q_dot], [values[term] for term in taken]
+
+
+def require_rates(case: Case) -> None:
+    """Raises UnavailableError for a model with quasi-velocities: for peers whose derivation knows none."""
+    if case.system.kinematics.quasi is not None:
+        raise UnavailableError("is measured on velocities that are rates of coordinates")

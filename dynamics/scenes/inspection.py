@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ from cgraph import Graph, Node
 
 from ..equations.equations_of_motion import forward_dynamics
 from ..equations.formulations import inverse_dynamics, spurious_nodes
+from ..multibody.display_units import display_units
 from ..multibody.joint_positions import Skeleton, skeleton
 from ..simulation.simulate import simulate
 from ..simulation.trajectory import Trajectory
@@ -40,6 +41,7 @@ class Inspection:
 
     shares: {part: torques (n,) [N m or N] at t = 0}, what each partial Lagrangian takes, and the rest; {} for one part.
     stopped: why the motion ends before its time, empty where it does not.
+    units: {name in the graphs: unit}, where they are known.
     """
 
     versions: tuple[Equations, ...]
@@ -47,6 +49,7 @@ class Inspection:
     skeleton: Skeleton | None
     shares: Mapping[str, Array]
     stopped: str = ""
+    units: Mapping[str, str] = field(default_factory=dict)
 
 
 def inspection(
@@ -70,6 +73,7 @@ def inspection(
     state = _named(q=run.q, qd=run.qd, tau=np.zeros_like(run.qd)) | system.parameters | {"t": run.t}
     if forward:
         about = "Accelerations from torques: solved joint by joint from the tip to the base, then back out to the tip."
+        about += " With them come the forces that hold the constraints." if system.constraints else ""
         versions = [Equations("forward dynamics", rate, about, frozenset(), _needed(rate, state))]
     else:
         found = rate.evaluate(_needed(rate, state))
@@ -83,7 +87,8 @@ def inspection(
             versions.append(_version(system, name, state))
     places = None if scene.mechanism is None else skeleton(scene.mechanism.bind(), run.q)
     stopped = "" if run.stats.success else run.stats.message
-    return Inspection(tuple(versions), run.t, places, _shares(scene, state), stopped)
+    units = {} if scene.mechanism is None else display_units(scene.mechanism.moving)
+    return Inspection(tuple(versions), run.t, places, _shares(scene, state), stopped, units | {"t": "s", "dt": "s"})
 
 
 def _version(system: System, name: str, state: Mapping[str, Any]) -> Equations:
@@ -98,8 +103,11 @@ def _version(system: System, name: str, state: Mapping[str, Any]) -> Equations:
         )
     else:
         about = f"No spurious branch: {len(graph.nodes)} nodes, and the torques that the motion takes."
-    moving = " Nothing drives the joints here, so the torques should be 0." if not wrong else ""
-    return Equations(name, graph, about + moving, wrong, _needed(graph, state))
+    if not wrong and system.constraints:
+        about += " Nothing drives the joints here: these torques are those of the constraints alone."
+    elif not wrong:
+        about += " Nothing drives the joints here, so the torques should be 0."
+    return Equations(name, graph, about, wrong, _needed(graph, state))
 
 
 def _coordinate_rates(system: System, run: Trajectory) -> Array:

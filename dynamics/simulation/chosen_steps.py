@@ -152,7 +152,7 @@ class AdaptiveIntegration(NativeIntegration):
         return np.array(list(rate.evaluate(values).values()), dtype=np.float64)
 
     def _fresh_sizes(self) -> StateSizes:
-        return StateSizes(self.relative, self.program.kinds, self.program.groups, SMALLEST_ATOL)
+        return StateSizes(self.relative, self.program.kinds, self.program.groups, SMALLEST_ATOL, self.program.lengths)
 
     def _first_step(self, x: Array) -> float:
         """The first step; where atol is chosen by the sizes of the states, those that it leads to."""

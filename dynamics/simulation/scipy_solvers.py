@@ -12,9 +12,9 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Array, install
+from cgraph.extend import Array, scipy_integrate
 
-from ..integrators import Problem, state_jacobian
+from ..integrators import Problem
 from ..integrators.step_control import RESOLUTION
 from .dense_output import StepBlock, normalized
 from .run_options import SCIPY, RunOptions
@@ -42,15 +42,11 @@ class ScipySolver:
 
 def scipy_solver(problem: Problem, name: str, backend: str) -> ScipySolver:
     """The solver, with the problem's rate and Jacobian compiled. Raises ImportError without SciPy."""
-    try:
-        from scipy import integrate
-    except ImportError:
-        raise ImportError(f"method {SCIPY + name!r} needs SciPy: {install('scipy')}") from None
+    integrate = scipy_integrate(f"method {SCIPY + name!r}")
     rate = cg.compile(problem.rate, backend)
     jacobian: dict[str, Any] = {}
     if name in IMPLICIT:
-        slopes, m = cg.compile(state_jacobian(problem), backend), problem.size
-        jacobian["jac"] = lambda t, x: slopes([*x, t]).reshape(m, m)
+        jacobian["jac"] = lambda t, x: rate.jacobian([*x, t])[:, : problem.size]
     make = getattr(integrate, name)
     return ScipySolver(name, problem.components, make, lambda t, x: rate([*x, t]), jacobian, between(problem))
 
@@ -182,6 +178,4 @@ def _inside(times: Array, t_old: float, t: float) -> bool:
 
 def solve_ivp() -> Any:
     """SciPy's `solve_ivp` itself, to compare with. Raises ImportError without SciPy."""
-    from scipy.integrate import solve_ivp as function
-
-    return function
+    return scipy_integrate("solve_ivp").solve_ivp

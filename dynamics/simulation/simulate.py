@@ -81,8 +81,9 @@ def simulate(
     method : str
         A name of `dyn.METHODS`. Steps chosen by error: "dop853", "dopri5", and for stiff systems "rodas", "radau";
         equal steps: "rk4", "euler" and the symplectic "verlet", "midpoint", "gauss4", ... With SciPy, "scipy:Radau",
-        "scipy:BDF", "scipy:LSODA", "scipy:DOP853", "scipy:RK45". With ball and free joints the symplectic ones step the
-        state, which keeps what is quadratic in it, as a free rotor's energy; "verlet" and "symplectic_euler" cannot.
+        "scipy:BDF", "scipy:LSODA", "scipy:DOP853", "scipy:RK45". With ball and free joints and constraints the
+        symplectic ones step the state, which keeps what is quadratic in it, as a free rotor's energy; "verlet" and
+        "symplectic_euler" cannot.
     t0 : float
         Where the run starts [s].
     t_span : array_like, optional
@@ -95,9 +96,10 @@ def simulate(
     rtol, atol : float, float or array_like, optional
         The error of a chosen step, relative to each component of the state, and absolute: one number for all, or (m,),
         one for each of q and then qd. By default 1e-9, and for atol rtol times the largest value that the
-        component has had so far, or a millionth of the largest coordinate or velocity, in whatever unit, all entries of
-        a quaternion being as large as 1; 1e-10 for SciPy's solvers. Of equal steps the estimated error that is no cause
-        of a warning, relative to the largest of a component over the run; 1e-3 and 0 by default.
+        component has had so far, or a millionth of the largest coordinate or velocity, in whatever unit: of a mechanism
+        an angle counts as the way that it moves its bodies by. All entries of a quaternion are as large as 1; 1e-10 for
+        SciPy's solvers. Of equal steps the estimated error that is no cause of a warning, relative to the largest of a
+        component over the run; 1e-3 and 0 by default.
     t_eval : array_like, optional
         Times from t0 to t_end to record, in this order, (T,) [s]; by default every step. Chosen steps are not changed
         by it.
@@ -179,10 +181,10 @@ def simulate(
     stats = _stats(run, options.method, outcome)
     for text in stats.warnings:
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    energies = _energies(energy, times, states, held)
     dense = None if steps is None else Solution(options.t0, start.x, steps, nq)
-    rows = (times, states[:, :nq], states[:, nq:], energies)
-    return Trajectory(*rows, stats, log.crossings(nq) if log else {}, _graphs(problem, applied), dense, held)
+    rows = (times, states[:, :nq], states[:, nq:], _energies(energy, times, states, held))
+    kept = (log.crossings(nq) if log else {}, _graphs(problem, applied), dense, held)
+    return Trajectory(*rows, stats, *kept, model.coordinates, model.velocities)
 
 
 def _compiled(
@@ -302,4 +304,5 @@ def _stats(run: Integration, method: str, outcome: _Outcome) -> Stats:
 def _graphs(problem: Problem, applied: Applied) -> dict[str, Graph]:
     """What a trajectory computes accelerations and forces by."""
     forces = force(problem)
-    return {"rate": problem.rate} | ({} if forces is None else {"force": forces, "tau": applied.graph(problem)})
+    graphs = {"rate": problem.rate} | ({} if forces is None else {"force": forces, "tau": applied.graph(problem)})
+    return graphs | ({} if problem.multipliers is None else {"multipliers": problem.multipliers})

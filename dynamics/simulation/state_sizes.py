@@ -18,12 +18,16 @@ class StateSizes:
     """The absolute tolerance of a run that was given none, in the units of its states.
 
     rtol times the largest value that the component, or another of its group, has had so far, or a millionth of the
-    largest of its kind, coordinates or velocities. It grows with the motion.
+    largest of its kind, coordinates or velocities, angles and lengths compared by `lengths`. It grows with the motion.
 
     kinds, groups: for each component a number, the same for those of one kind, or of one quantity, (m,).
+    lengths: what 1 of a component stands for beside 1 of others of its kind, (m,).
     """
 
-    def __init__(self, rtol: float, kinds: Sequence[int], groups: Sequence[int], least: float) -> None:
+    def __init__(
+        self, rtol: float, kinds: Sequence[int], groups: Sequence[int], least: float, lengths: Sequence[float]
+    ) -> None:
+        self._lengths = np.array(lengths)
         self._alike, self._one = _same(kinds), _same(groups)
         self._rtol, self._least = rtol, least
         self._sizes = np.zeros(len(kinds))
@@ -41,8 +45,9 @@ class StateSizes:
         return result
 
     def largest_of_kind(self, values: Array) -> Array:
-        """For each component the largest size of those of its kind, (m,)."""
-        return _largest(values, self._alike)
+        """For each component the largest size of those of its kind, as one of its own, (m,)."""
+        result: Array = _largest(self._lengths * values, self._alike) / self._lengths
+        return result
 
 
 def _same(numbers: Sequence[int]) -> Flags:

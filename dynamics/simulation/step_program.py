@@ -27,7 +27,8 @@ class StepProgram:
     dense: bool  # whether its record has dense output
     finest: float  # relative tolerance
     starts: bool  # with a first step that the method chooses
-    kinds: tuple[int, ...]  # of the components: coordinates 0, velocities 1; those of a group or an OdeSystem differ
+    kinds: tuple[int, ...]  # of the components: the same for those that can be compared, see `System.lengths`
+    lengths: tuple[float, ...]  # of the components: what 1 stands for beside 1 of others of its kind
     groups: tuple[int, ...]  # of the components: the same for those of one quantity, as a quaternion's
     normalization: Graph | None  # of states, see Problem; with constraints their projection, over states and t
 
@@ -69,19 +70,27 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
         method.finest,
         method.starts,
         kinds,
+        tuple([size or 1.0 for size in problem.system.lengths]) if problem.system else (1.0,) * problem.size,
         groups,
         between(problem),
     )
 
 
 def _kinds(problem: Problem) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Kinds and groups of the components. A group of several coordinates, such as a quaternion, is a kind too."""
+    """Kinds and groups of the components.
+
+    Coordinates are a kind, and velocities; those of no known length are others, and so is a group of several
+    coordinates, such as a quaternion.
+    """
     system, every = problem.system, tuple(range(problem.size))
     if system is None:
         return every, every
     groups = [system.kinematics.groups.index(group) for group in system.kinematics.groups]  # by their first
-    kinds = [2 + group if groups.count(group) > 1 else 0 for group in groups]
-    return (*kinds, *[1] * system.n), (*groups, *every[problem.nq :])
+    alone = [group if groups.count(group) > 1 else None for group in groups] + [None] * system.n
+    kinds = [
+        (k < problem.nq, not size, group) for k, (size, group) in enumerate(zip(system.lengths, alone, strict=True))
+    ]
+    return tuple([kinds.index(kind) for kind in kinds]), (*groups, *every[problem.nq :])
 
 
 def _normalized(steps: Program, problem: Problem, method: Method) -> Program:

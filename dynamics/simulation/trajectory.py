@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
-from cgraph.extend import Array
+from cgraph.extend import Array, or_nearest
 
 from .row_values import row_values
 from .sampled_controller import HeldForces
@@ -135,12 +135,14 @@ class Trajectory:
         {name of an event: Crossings}.
     graphs : mapping
         {"rate": xdot, "force": tau + forces - damping qd}: graphs over the states and t, with the numbers of the run
-        built in, by which `qdd` and `forces` are computed, and "tau". Both forces are missing of an OdeSystem. With a
-        SampledController, tau0, .. are inputs too.
+        built in, by which `qdd` and `forces` are computed, "tau", and, with constraints, "multipliers". Both forces are
+        missing of an OdeSystem. With a SampledController, tau0, .. are inputs too.
     dense : Solution, optional
         The steps with their dense output, which `solution` reads; of a run with `dense_output=True`.
     held : HeldForces, optional
         What a SampledController has given, `held.t` and `held.tau`, a row for each period.
+    coordinates, velocities : tuple of str
+        Names of the columns of q and of those of qd, qdd, tau and forces: `run["q.elbow"]` is such a column.
 
     Examples
     --------
@@ -148,6 +150,8 @@ class Trajectory:
     >>> run = dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.1], [0.0], 1.0, t_eval=[0.5, 1.0])
     >>> run.q.shape, run.stats.success
     ((2, 1), True)
+    >>> run["q.joint 1"].round(3)
+    array([-0.034, -0.077])
     """
 
     t: Array
@@ -159,6 +163,31 @@ class Trajectory:
     graphs: Mapping[str, Graph] = field(default_factory=dict)
     dense: Solution | None = None
     held: HeldForces | None = None
+    coordinates: tuple[str, ...] = ()
+    velocities: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> Array:
+        """A column by its name, (T,): "q.elbow", "qd.elbow", "qdd.elbow", "tau.elbow", "forces.elbow", or a state.
+
+        Velocities with names of their own have these, as in "qd.base.wx"; the graphs' names, as "q3", do too.
+
+        Raises
+        ------
+        TypeError
+            For what is no text.
+        ValueError
+            For a name that no column has.
+        """
+        if not isinstance(name, str):
+            raise TypeError(f"a column of a trajectory has a name, got {type(name).__name__}: {name!r:.60}")
+        known = {"q": self.coordinates} | dict.fromkeys(("qd", "qdd", "tau", "forces"), self.velocities)
+        places = {f"{kind}.{each}": (kind, i) for kind, names in known.items() for i, each in enumerate(names)}
+        by_number = {f"{kind}{i}": (kind, i) for kind, names in known.items() for i in range(len(names))}
+        states = {} if self.velocities else {each: ("q", i) for i, each in enumerate(self.coordinates)}
+        if (place := (by_number | places | states).get(name)) is None:
+            raise ValueError(f"the trajectory has no column {name!r:.80}; {or_nearest(name, [*states, *places])}")
+        table: Array = getattr(self, place[0])
+        return table[:, place[1]]
 
     def solution(self, t: ArrayLike) -> tuple[Array, Array]:
         """The motion at any time of the run, by the dense output of its steps.
@@ -203,6 +232,29 @@ class Trajectory:
     def forces(self) -> Array:
         """Generalized forces besides those of the Lagrangian at the rows, tau + forces - damping qd, (T, n)."""
         return self._rows("force")
+
+    @cached_property
+    def multipliers(self) -> dict[str, Array]:
+        """What holds the constraints at the rows, {name: (T,)}: M qdd = tau + forces - damping qd - bias + J^T lambda.
+
+        The force [N] or torque [N m] of a `Loop`, whose rows are named after it; of other rows J qd + a = 0 the power
+        [W] over the unit of J qd. 0 of rows that follow from others. Without constraints there are none.
+
+        Examples
+        --------
+        A mass of 1 kg hangs on a rod, in x and y, and pulls at it with its weight.
+
+        >>> import dynamics as dyn
+        >>> def energy(q, qd, t):
+        ...     return 0.5 * (qd[0] ** 2 + qd[1] ** 2) - 9.81 * q[1]
+        >>> rod = dyn.System(energy, "x y", constraints=lambda q, t: {"rod": 0.5 * (q[0] ** 2 + q[1] ** 2 - 1.0)})
+        >>> run = dyn.simulate(rod, [0.0, -1.0], [0.0, 0.0], t_end=1.0, t_eval=[0.0, 1.0])
+        >>> run.multipliers["rod"].tolist()
+        [-9.81, -9.81]
+        """
+        if "multipliers" not in self.graphs:
+            return {}
+        return dict(zip(self.graphs["multipliers"].outputs, self._rows("multipliers").T, strict=True))
 
     @cached_property
     def tau(self) -> Array:

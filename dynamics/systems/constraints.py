@@ -80,11 +80,6 @@ class Constraints:
         dots = tangents(dict(zip(k.q, k.q_dot, strict=True)) | {self.t: ONE}, rates, build)
         return [dots.get(z, ZERO) for z in rates]
 
-    def require_none(self, what: str) -> None:
-        """Raises ValueError, saying that `what` does not know constraints, where there are any."""
-        if self.names:
-            raise ValueError(f"{what} does not know constraints yet; {self.names[0]!r} holds this system")
-
     def _check(self) -> None:
         u = set(self.kinematics.u)
         if u & set(topological(self.positions)):

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import require_sequence, shortened, topological
+from cgraph.extend import Builder, require_sequence, shortened, topological
 
 from .arguments import (
     TIME,
@@ -27,6 +27,7 @@ from .arguments import (
 from .constraints import Constraints
 from .kinematics import Kinematics
 from .quasi_velocities import QuasiVelocities
+from .torque_derivatives import TorqueDerivatives
 
 BiasForce = tuple[Node, Node]  # a velocity, and the force that works on it
 
@@ -151,6 +152,11 @@ class System:
         return len(self.coordinates)
 
     @property
+    def lengths(self) -> tuple[float, ...]:
+        """What 1 of coordinates, then velocities, counts beside 1 of others, where sizes are compared; else 0."""
+        return (1.0,) * (self.nq + self.n)
+
+    @property
     def q(self) -> list[Node]:
         """Coordinates, variables q0, q1, ..."""
         return self.kinematics.q
@@ -179,14 +185,6 @@ class System:
     def t(self) -> Node:
         """Time."""
         return cg.variable(TIME)
-
-    @cached_property
-    def display_names(self) -> dict[str, str]:
-        """What a person reads in place of q0, qd0, qdd0 and tau0: "q.<coordinate>" and so on, by input."""
-        shown = {f"q{i}": f"q.{name}" for i, name in enumerate(self.coordinates)}
-        kinds = ("qd", "qdd", "tau")
-        shown |= {f"{kind}{i}": f"{kind}.{name}" for kind in kinds for i, name in enumerate(self.velocities)}
-        return shown | {f"lambda{k}": f"lambda.{name}" for k, name in enumerate(self.constraints.names)}
 
     @cached_property
     def extra_inputs(self) -> list[Node]:
@@ -272,6 +270,10 @@ class System:
         """
         return None
 
+    def torque_derivatives(self, qdd: Sequence[Node], build: Builder) -> TorqueDerivatives | None:
+        """Torques of a motion and their derivatives, without damping and applied forces; None as for `bias_forces`."""
+        return None
+
     def _require_consistent(self) -> None:
         self.kinematics.require_consistent()
 
@@ -283,31 +285,6 @@ class System:
     def __repr__(self) -> str:
         parameters = f", parameters {', '.join(self.parameters)}" if self.parameters else ""
         return f"<System of {self.nq} coordinate(s) {', '.join(self.coordinates[:6])}{parameters}>"
-
-
-class BodySystem(System):
-    """The system of bodies that give their bias themselves, by bias_forces(q, qd)."""
-
-    def __init__(
-        self,
-        bias_forces: Callable[[Sequence[Node], Sequence[Node]], Sequence[BiasForce]],
-        *of_system: Any,
-        require_values: Callable[[Mapping[str, ArrayLike]], None],
-        **more: Any,
-    ) -> None:
-        super().__init__(*of_system, **more)
-        self._bias_forces, self._require_values = bias_forces, require_values
-
-    def _require_consistent(self) -> None:
-        """Nothing: the types of joints are known to be."""
-
-    def require_values(self, values: Mapping[str, ArrayLike]) -> None:
-        """Raises ValueError for values with which the bodies cannot be."""
-        self._require_values(values)
-
-    def bias_forces(self) -> Sequence[BiasForce]:
-        """The pairs (velocity, force) that the bodies state; see `System.bias_forces`."""
-        return self._bias_forces(self.q, self.qd)
 
 
 def generalized_forces(what: str, function: Callable[..., Any], system: System, p: Parameters) -> list[Node]:

@@ -24,7 +24,8 @@ from ..equations.torque_table import TorqueTable
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from . import peer_agreement as agreement
-from .residual import DIFFERENCES, POSITIVE, ROUNDING, Certificate, Residual
+from .held_states import Held, random_states
+from .residual import DIFFERENCES, POSITIVE, ROUNDING, Certificate, Residual, worst
 
 STEP = 1e-3  # of differences, in units of the coordinates
 
@@ -34,6 +35,9 @@ MOST_STATES = 1_000_000  # of a certificate, some of whose matrices are kept for
 
 def certify(model: Model, states: int = 20, seed: int = 0, *, speed: float = 1.0, twin: Any = None) -> Certificate:
     """Check the model's graphs against each other, against differences of L, and against MuJoCo and Pinocchio.
+
+    With constraints the states meet them; the equations are those of the whole, J^T lambda in them, and of the rows.
+    Inverse dynamics and tables are those of the system without.
 
     A peer that disagrees is asked again with one term taken out on both sides, then two; what restores the agreement is
     in the residual's note.
@@ -45,7 +49,7 @@ def certify(model: Model, states: int = 20, seed: int = 0, *, speed: float = 1.0
     states, seed : int
         How many random states, with q uniform in -pi .. pi, and the seed of their generator.
     speed : float
-        Standard deviation of qd, qdd and tau, which are normal.
+        Standard deviation of qd, qdd and tau, which are normal; with constraints, before qd is moved onto them.
     twin : str, path or MjModel, optional
         What MuJoCo compares with in place of the model's own translation: a path or text of MJCF or URDF, with the
         joints of the same names, or in the same order. Its contacts, joint limits, friction loss and actuators are left
@@ -60,6 +64,8 @@ def certify(model: Model, states: int = 20, seed: int = 0, *, speed: float = 1.0
     ValueError
         For fewer than one state, a seed below 0, and a twin that cannot be read, has another number of coordinates, or
         stands beside a model that is not of rigid bodies.
+    ConstraintError
+        Where random states cannot be moved onto the constraints.
     SingularMassMatrixError
         For a coordinate or a motion without inertia. A mass matrix that is regular, but indefinite, is a residual that
         fails, and its note says so.
@@ -79,17 +85,17 @@ def certify(model: Model, states: int = 20, seed: int = 0, *, speed: float = 1.0
         raise ValueError(f"speed must be finite, got {speed!r}")
     theirs = None if twin is None else agreement.original(twin, model)
     rng = np.random.default_rng(seed)
-    system = as_system(model)
-    system.constraints.require_none("certify")
-    at = {"q": _configurations(system, states, rng)} | {
-        name: speed * rng.normal(size=(states, system.n)) for name in ("qd", "qdd", "tau")
-    }
-    residuals, left_out = _among_graphs(_Checks(system, at, rng))
+    system, t = as_system(model), float(rng.uniform())
+    at = random_states(system, states, t, speed, rng)
+    residuals, left_out = _among_graphs(_Checks(system, at, t, rng))
     for name, peer in agreement.peers(model, theirs):
         try:
             residuals.append(agreement.residual(name, peer(), model, at))
         except agreement.NotComparableError as error:
             left_out.append(f"{name}: {error}")
+    if len(system.constraints):
+        held, said = agreement.with_loops(model, at)
+        residuals, left_out = [*residuals, *held], [*left_out, *said]
     return Certificate(states, seed, tuple(residuals), tuple(left_out))
 
 
@@ -106,10 +112,10 @@ def _among_graphs(checks: _Checks) -> tuple[list[Residual], list[str]]:
 class _Checks:
     """The equations at some states."""
 
-    def __init__(self, system: System, at: dict[str, Array], rng: np.random.Generator) -> None:
-        self.system, self.at, self.rng = system, at, rng
+    def __init__(self, system: System, at: dict[str, Array], t: float, rng: np.random.Generator) -> None:
+        self.system, self.at, self.t, self.rng = system, at, t, rng
         self.timed = system.t in system.extra_inputs
-        self.t = float(rng.uniform())
+        self.held = Held(system, self.value)
 
     def value(self, graph: Graph, **other: ArrayLike | None) -> Array:
         """Outputs, (N, n_out), at the states, some of them replaced."""
@@ -147,7 +153,17 @@ class _Checks:
 
     @cached_property
     def accelerations(self) -> Array:
+        return self._solved[:, : self.system.n]
+
+    @cached_property
+    def _solved(self) -> Array:
+        """qdd, and the multipliers of constraints."""
         return self.value(forward_dynamics(self.system))
+
+    @cached_property
+    def held_by(self) -> Array:
+        """Forces of the constraints, one by one, (N, n, m)."""
+        return self.held.matrix * self._solved[:, None, self.system.n :]
 
     def always(self) -> Iterator[Residual]:
         """What holds for every Lagrangian."""
@@ -157,7 +173,11 @@ class _Checks:
         yield self._energy()
         yield self._sum("links: partial torques add up to tau", torque_by_link(self.system))
         yield self._adjoint()
-        for name, graph in (("L", self.graph({"L": self.system.lagrangian})), ("tau", self.inverse)):
+        graphs = {"L": self.graph({"L": self.system.lagrangian}), "tau": self.inverse}
+        if self.held.any:
+            yield self.held.closed(self.accelerations)
+            graphs["the constraints and their rates"] = self.graph(self.held.rows)
+        for name, graph in graphs.items():
             yield self._differences(f"AD: slope of {name} along a line = differences", graph)
 
     def of_coriolis(self) -> Iterator[Residual]:
@@ -168,7 +188,7 @@ class _Checks:
         force = (matrix @ qd[..., None])[..., 0]
         yield Residual(
             "coriolis: C qd + gravity = bias",
-            _worst(force + self.gravity - self.bias, terms[..., 0] + np.abs(self.gravity)),
+            worst(force + self.gravity - self.bias, terms[..., 0] + np.abs(self.gravity)),
             ROUNDING,
         )
         if not self.timed:
@@ -176,7 +196,7 @@ class _Checks:
             skew = rate - 2.0 * matrix
             yield Residual(
                 "coriolis: dM/dt - 2 C is skew",
-                _worst(skew + np.swapaxes(skew, 1, 2), np.abs(rate) + np.abs(matrix)),
+                worst(skew + np.swapaxes(skew, 1, 2), np.abs(rate) + np.abs(matrix)),
                 ROUNDING,
             )
         yield self._sum("motion: torques by motion add up to tau", torque_by_joint_motion(self.system))
@@ -188,54 +208,58 @@ class _Checks:
         terms = np.abs(columns) + np.abs(still)[..., None]
         yield Residual(
             "M: symmetric, as columns of inverse dynamics",
-            _worst(columns - np.swapaxes(columns, 1, 2), terms),
+            worst(columns - np.swapaxes(columns, 1, 2), terms),
             ROUNDING,
         )
-        yield Residual("M: d2L/dqd2 = columns of inverse dynamics", _worst(columns - self.inertia, terms), ROUNDING)
-        sizes = np.linalg.eigvalsh(balanced(self.inertia))
+        yield Residual("M: d2L/dqd2 = columns of inverse dynamics", worst(columns - self.inertia, terms), ROUNDING)
+        sizes = np.linalg.eigvalsh(balanced(self.held.admitted(self.inertia)))
         smallest, rounding = float(sizes.min()), n * np.finfo(float).eps
         kind = "regular, but indefinite, " if smallest < 0.0 < sizes.max() else "negative, " if smallest < 0.0 else ""
         if np.abs(sizes).min() <= rounding:
             kind = "singular, "
         note = f"{kind}smallest eigenvalue {smallest:.1e}, scaled"
-        yield Residual("M: positive definite", max(0.0, rounding - smallest), POSITIVE, note)
+        equation = "M: positive definite" + " on motions that the constraints admit" * self.held.any
+        yield Residual(equation, max(0.0, rounding - smallest), POSITIVE, note)
 
     def _forward(self) -> Residual:
         tau, qdd = self.at["tau"], self.accelerations
         terms = (np.abs(self.inertia) @ np.abs(qdd)[..., None])[..., 0] + np.abs(self.bias) + np.abs(tau)
-        return Residual(
-            "inverse dynamics of forward dynamics = tau",
-            _worst(self.value(self.inverse, qdd=qdd) - tau, terms),
-            ROUNDING,
-        )
+        equation = "inverse dynamics of forward dynamics = tau" + " + J^T lambda" * self.held.any
+        held, terms = self.held_by.sum(axis=-1), terms + np.abs(self.held_by).sum(axis=-1)
+        return Residual(equation, worst(self.value(self.inverse, qdd=qdd) - tau - held, terms), ROUNDING)
 
     def _power(self) -> Residual:
         system, qd, tau, qdd = self.system, self.at["qd"], self.at["tau"], self.accelerations
         gained = self.value(self.rate(energy(system)), qdd=qdd)[..., 0]
         rows = zip(system.forces, system.damping, system.qd, strict=True)
         forces = self.value(self.graph({f"f{i}": f - damping * u for i, (f, damping, u) in enumerate(rows)}))
-        power = qd * (tau + forces)
-        equation = "energy: dE/dt = qd . (tau + forces - damping)"
+        held = self.held_by.sum(axis=-1)
+        power = np.concatenate([qd * (tau + forces), qd * held], axis=-1)
+        equation = "energy: dE/dt = qd . (tau + forces - damping" + " + J^T lambda" * self.held.any + ")"
         if self.timed:
             (slope,) = cotangents({system.lagrangian: ONE}, [system.t])
             power = np.concatenate([power, -self.value(self.graph({"dL/dt": slope}))], axis=-1)
             equation += " - dL/dt"
-        terms = np.abs(qd) * ((np.abs(self.inertia) @ np.abs(qdd)[..., None])[..., 0] + np.abs(self.bias))
+        terms = np.abs(qd) * (
+            np.abs(self.held_by).sum(axis=-1)
+            + (np.abs(self.inertia) @ np.abs(qdd)[..., None])[..., 0]
+            + np.abs(self.bias)
+        )
         total = np.abs(power).sum(axis=-1) + terms.sum(axis=-1)
-        return Residual(equation, _worst((gained - power.sum(axis=-1))[:, None], total[:, None]), ROUNDING)
+        return Residual(equation, worst((gained - power.sum(axis=-1))[:, None], total[:, None]), ROUNDING)
 
     def _energy(self) -> Residual:
         qd = self.at["qd"]
         slopes = self.value(cg.gradient(energy(self.system), self.system.qd))
         momenta = self.inertia @ qd[..., None]
         terms = np.abs(self.inertia) @ np.abs(qd)[..., None]
-        return Residual("energy: dE/dqd = M qd", _worst(slopes - momenta[..., 0], terms[..., 0]), ROUNDING)
+        return Residual("energy: dE/dqd = M qd", worst(slopes - momenta[..., 0], terms[..., 0]), ROUNDING)
 
     def _sum(self, equation: str, table: TorqueTable) -> Residual:
         cells = self.value(table.graph).reshape(-1, len(table.rows), len(table.columns))
         axis = 1 + table.sum_axis
         tau = self.value(self.inverse)
-        return Residual(equation, _worst(cells.sum(axis=axis) - tau, np.abs(cells).sum(axis=axis)), ROUNDING)
+        return Residual(equation, worst(cells.sum(axis=axis) - tau, np.abs(cells).sum(axis=axis)), ROUNDING)
 
     def _adjoint(self) -> Residual:
         """u . (J v) by forward mode and (J^T u) . v by reverse mode, J = d tau / d(q, qd, qdd)."""
@@ -252,7 +276,7 @@ class _Checks:
         pulled = self.value(self.graph({str(i): bar for i, bar in enumerate(bars)}))
         terms = np.abs(pushed * u).sum(axis=-1) + np.abs(pulled * v).sum(axis=-1)
         return Residual(
-            "AD: u . (J v) = (J^T u) . v for tau", _worst((pushed @ u - pulled @ v)[:, None], terms[:, None]), ROUNDING
+            "AD: u . (J v) = (J^T u) . v for tau", worst((pushed @ u - pulled @ v)[:, None], terms[:, None]), ROUNDING
         )
 
     def _differences(self, equation: str, graph: Graph) -> Residual:
@@ -274,20 +298,4 @@ class _Checks:
         )
         unexplained = np.maximum(np.abs(slope - narrow) - np.abs(wide - narrow), 0.0)
         scale = np.abs(slope) + np.max([np.abs(each) for each in around.values()], axis=0)
-        return Residual(equation, _worst(unexplained, scale), DIFFERENCES)
-
-
-def _configurations(system: System, count: int, rng: np.random.Generator) -> Array:
-    """Random coordinates, (count, nq), uniform in -pi .. pi; quaternions of length 1."""
-    q = rng.uniform(-np.pi, np.pi, (count, system.nq))
-    if system.kinematics.quasi is None:
-        return q
-    normalized = Graph(system.q, {str(i): node for i, node in enumerate(system.kinematics.normalized(system.q))})
-    values = normalized.evaluate({f"q{i}": column for i, column in enumerate(q.T)}).values()
-    return np.stack([np.broadcast_to(value, count) for value in values], axis=1)
-
-
-def _worst(difference: Array, terms: Array) -> float:
-    """The largest difference relative to the largest term of its state; over all states. NaN stays."""
-    flat = [np.abs(each).reshape(len(each), -1).max(axis=1) for each in (difference, terms)]
-    return float(np.max(np.divide(flat[0], flat[1], out=np.array(flat[0]), where=flat[1] > 0.0)))
+        return Residual(equation, worst(unexplained, scale), DIFFERENCES)

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from ..equations.equations_of_motion import forward_dynamics
 from ..equations.evaluate_at import Array, evaluate_at
 from ..equations.formulations import inverse_dynamics
 from ..io.load import compiled
@@ -21,8 +22,9 @@ from ..peers.case import Case
 from ..peers.contender import Peer, UnavailableError
 from ..peers.mujoco import MujocoPeer
 from ..peers.pinocchio import PinocchioPeer
+from ..peers.pinocchio_loops import constrained_accelerations
 from ..systems.model import Model, as_system
-from .residual import PEERS, Residual
+from .residual import PEERS, PROXIMAL, Residual
 
 ASKED = 4  # states at which a disagreement is explained
 TAKEN = 2  # terms at most that are taken out together
@@ -239,7 +241,34 @@ def disagreement(model: Mechanism, peer: Asked, at: Mapping[str, Array]) -> floa
     return float(np.max(np.abs(ours - peer.inverse(at)).max(axis=1) / size))
 
 
+def with_loops(model: Model, at: Mapping[str, Array]) -> tuple[list[Residual], list[str]]:
+    """How far accelerations with constraints are from those of peers, and what is not compared, a sentence each.
+
+    at: states that meet the constraints.
+    """
+    said = ["MuJoCo: its equality constraints are soft, so that it is compared without the loops"]
+    try:
+        bodies = _without_forces(model)
+        theirs = constrained_accelerations(bodies, at["q"], at["qd"], at["tau"])
+    except NotComparableError as error:
+        return [], [f"MuJoCo and Pinocchio with constraints: {error}"]
+    except ImportError:
+        return [], [*said, "Pinocchio's constraintDynamics: is not installed"]
+    except UnavailableError as error:
+        return [], [*said, f"Pinocchio's constraintDynamics: {error}"]
+    ours = evaluate_at(as_system(bodies), forward_dynamics(bodies), at)[:, : theirs.shape[1]]
+    size = np.maximum(np.abs(ours).max(axis=1), np.finfo(float).tiny)
+    value = float(np.max(np.abs(ours - theirs).max(axis=1) / size))
+    return [Residual("forward dynamics with loops = Pinocchio's constraintDynamics", value, PROXIMAL)], said
+
+
 def bare(model: Model) -> Mechanism:
+    """The tree of `_without_forces`, as its loops are no part of inverse dynamics."""
+    bodies = _without_forces(model)
+    return replace(bodies, loops=()) if bodies.loops else bodies
+
+
+def _without_forces(model: Model) -> Mechanism:
     """The mechanism of a model, without forces on its bodies, which the peers do not have, and parameters as numbers.
 
     Raises NotComparableError for another model.
@@ -271,10 +300,11 @@ def original(twin: Any, model: Model) -> Original:
         bodies = bare(model)
     except NotComparableError as error:
         raise ValueError(f"a twin is compared with rigid bodies: MuJoCo {error}") from None
+    loops = getattr(as_mechanism(model), "loops", ())
     nq, n = len(bodies.coordinates), len(bodies.velocities)
     if (theirs.nq, theirs.nv) != (nq, n):
         raise ValueError(f"the twin has {theirs.nv} degrees of freedom, the model {n}")
-    for unused in ("CONTACT", "LIMIT", "FRICTIONLOSS", "ACTUATION"):
+    for unused in ("CONTACT", "LIMIT", "FRICTIONLOSS", "ACTUATION", *["EQUALITY"] * bool(loops)):
         theirs.opt.disableflags |= getattr(module.mjtDisableBit, f"mjDSBL_{unused}")
     names = {theirs.joint(i).name for i in range(theirs.njnt)}
     if names != {body.coordinate for body in bodies.moving}:

@@ -5,6 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+
+from cgraph.extend import Array
+
 
 @dataclass(frozen=True)
 class Bound:
@@ -19,6 +23,7 @@ ROUNDING = Bound("rounding", 1e-13, "the same terms summed in another order, som
 POSITIVE = Bound("positive", 0.0, "the smallest eigenvalue of M, scaled to rows of about 1, exceeds its rounding")
 DIFFERENCES = Bound("differences", 1e-7, "what halving the step of fourth-order differences does not account for")
 PEERS = Bound("peers", 1e-10, "the rounding of two programs, and inertias that pass through principal axes")
+PROXIMAL = Bound("proximal", 1e-7, "a solver that iterates on regularized constraints until 1e-14 of them is left")
 
 
 @dataclass(frozen=True)
@@ -87,3 +92,9 @@ class Certificate:
             | asdict(self)
             | {"residuals": [asdict(each) | {"passed": each.passed} for each in self.residuals]}
         )
+
+
+def worst(difference: Array, terms: Array) -> float:
+    """The largest difference relative to the largest term of its state; over all states. NaN stays."""
+    flat = [np.abs(each).reshape(len(each), -1).max(axis=1) for each in (difference, terms)]
+    return float(np.max(np.divide(flat[0], flat[1], out=np.array(flat[0]), where=flat[1] > 0.0)))

@@ -11,7 +11,7 @@ PACKAGES = ("cgraph", "dynamics", "viz")
 TABLE = {
     "cgraph": (
         "util, errors <- core <- simplify <- autodiff <- explain",
-        "core <- codegen <- program",
+        "autodiff <- codegen <- program",
     ),
     "dynamics": (
         "systems <- equations <- multibody <- io",

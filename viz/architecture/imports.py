@@ -60,14 +60,15 @@ class Module:
 
 def imports_of(tree: ast.AST, package: str = "") -> Iterator[Import]:
     """The imports of a syntax tree at any depth.  package: where its file lies, for relative imports."""
+    nodes = list(ast.walk(tree))
     for_types = {
         id(inner)
-        for node in ast.walk(tree)
+        for node in nodes
         if isinstance(node, ast.If) and _is_type_checking(node.test)
         for line in node.body
         for inner in ast.walk(line)
     }
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield Import(alias.name, None, alias.asname or alias.name.partition(".")[0], id(node) in for_types)

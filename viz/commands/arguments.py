@@ -163,10 +163,10 @@ def collapsed(graph: Graph) -> list[str]:
     return tags
 
 
-def state_names(graph: Graph, n: int) -> tuple[list[str], list[str]]:
+def state_names(graph: Graph, scene: scenes.Scene) -> tuple[list[str], list[str]]:
     """Names of the coordinates and of the velocities that the graph has, as inputs or as inner nodes."""
     known = {node.name for node in (*graph.inputs, *graph.nodes)}
-    q, qd = ([f"{letter}{i}" for i in range(n) if f"{letter}{i}" in known] for letter in ("q", "qd"))
+    q, qd = ([str(node.name) for node in nodes if node.name in known] for nodes in (scene.system.q, scene.system.qd))
     return q, qd
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 
 import cgraph as cg
-from dynamics import FORMULATIONS, inverse_dynamics
+from dynamics import FORMULATIONS, display_names, inverse_dynamics
 from dynamics.equations.node_classes import formulation_classes
 
+from .. import theme
 from .arguments import (
     Commands,
     answer_and_draw,
@@ -43,8 +44,9 @@ def run(options: argparse.Namespace) -> int:
     check_picture(options)
     scene = scene_of(options)
     left, right = (inverse_dynamics(scene, name) for name in options.formulations)
-    state = [name for graph in (left, right) for names in state_names(graph, scene.system.n) for name in names]
-    comparison = cg.compare(left, right, atoms=dict.fromkeys(state), classify=formulation_classes)
+    state = [name for graph in (left, right) for names in state_names(graph, scene) for name in names]
+    called = display_names(scene)
+    comparison = cg.compare(left, right, atoms=dict.fromkeys(state), classify=formulation_classes, names=called)
     named = dict(zip(("left", "right"), options.formulations, strict=True))
     both = len(comparison.common)
     sizes = {"left_nodes": len(left.nodes), "right_nodes": len(right.nodes), "in_both": both}
@@ -61,6 +63,7 @@ def run(options: argparse.Namespace) -> int:
         unless_json(options, data, "\n".join([*lines, str(comparison)])),
         together.graph,
         marked=dict(zip(*groups, strict=True)),
+        names=theme.called(called),
         caption=f"{scene.name}: {' and '.join(options.formulations)} in one".replace("_", " "),
     )
     return 1 if any(only) else 0

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from cgraph import Graph
 from cgraph.extend import check_writable
-from dynamics import inverse_dynamics, spurious_nodes
+from dynamics import display_names, inverse_dynamics, spurious_nodes
 
+from .. import theme
 from ..graph_drawing.dot import to_dot
 from ..graph_drawing.render import check_can_draw, render_png, render_svg
 from .arguments import Commands, answer, collapsed, scene_of, takes_a_formulation, takes_a_scene
@@ -46,17 +47,20 @@ def run(options: argparse.Namespace) -> None:
     scene = scene_of(options)
     graph = inverse_dynamics(scene, options.formulation)
     caption = f"{scene.name}: inverse dynamics, {options.formulation.replace('_', ' ')}"
-    content = graph.listing() if kind == ".txt" else _drawn(graph, kind, options.collapse, caption)
+    names = theme.called(display_names(scene))
+    content = graph.listing() if kind == ".txt" else _drawn(graph, kind, options.collapse, caption, names)
     counts = graph.counts()
     answer(f"{options.out}: {counts.nodes} nodes, {counts.edges} edges", {options.out: content})
 
 
-def _drawn(graph: Graph, kind: str, collapse: Sequence[str] | None, caption: str) -> str | bytes:
+def _drawn(
+    graph: Graph, kind: str, collapse: Sequence[str] | None, caption: str, names: Mapping[str, str]
+) -> str | bytes:
     if collapse is None:
         tags = collapsed(graph) if kind in PICTURES else []
     else:
         tags = [tag for each in collapse for tag in tags_of(each, graph)]
-    drawing = to_dot(graph, marked=spurious_nodes(graph), collapse=tags, caption=caption)
+    drawing = to_dot(graph, marked=spurious_nodes(graph), names=names, collapse=tags, caption=caption)
     if kind == ".dot":
         return str(drawing.source)
     svg = render_svg(drawing)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cgraph.extend import check_writable
-from dynamics import scenes
+from dynamics import display_names, scenes
 from dynamics.scenes.inspection import FRAMES, inspection
 
 from .. import theme
@@ -53,9 +53,11 @@ def run(options: argparse.Namespace) -> int:
             for version in content.versions
         ],
         title=f"{scene.name}: {'forward' if options.forward else 'inverse'} dynamics",
-        about=" ".join([f"Left out of the model: {what}." for what in scene.left_out]),
+        about=f"Left out of the model: {'; '.join(scene.left_out)}." if scene.left_out else "",
         motion=Motion(content.t, bones.points, bones.parents) if bones else Motion(content.t, None, ()),
-        tables=[_torques(scene, content.shares)] if content.shares else [],
+        tables=[_torques(scene, content.shares, content.units)] if content.shares else [],
+        names=display_names(scene),
+        units=content.units,
     )
     sizes = {
         version.name: {
@@ -74,14 +76,16 @@ def run(options: argparse.Namespace) -> int:
     return 1 if cut else 0
 
 
-def _torques(scene: scenes.Scene, shares: Mapping[str, NDArray[np.float64]]) -> Table:
-    """A row for each part; what is rounding beside the largest number is written as such."""
+def _torques(scene: scenes.Scene, shares: Mapping[str, NDArray[np.float64]], units: Mapping[str, str]) -> Table:
+    """A row for each velocity, a column for each part; what is rounding beside the largest number is said to be."""
     largest = max(float(np.abs(torques).max()) for torques in shares.values())
 
     def text(value: float) -> str:
         return "≈0" if 0.0 < abs(value) <= ROUNDING * largest else f"{value:.4g}".replace("-", "−")
 
-    slides = any("m" in body.joint.type.units for body in scene.mechanism.moving) if scene.mechanism else False
-    caption = f"Torques that each part takes at t = 0 [N m{', of slides N' if slides else ''}]"
-    rows = [[part, *map(text, torques)] for part, torques in shares.items()]
-    return Table(caption, ["part", *(theme.pretty(f"tau{i}") for i in range(scene.system.n))], rows)
+    names = theme.called(display_names(scene))
+    rows = [
+        [f"{names[f'tau{i}']} [{units.get(f'tau{i}', 'N m')}]", *[text(torques[i]) for torques in shares.values()]]
+        for i in range(scene.system.n)
+    ]
+    return Table("Torques and forces that each part takes at t = 0", ["", *shares], rows)

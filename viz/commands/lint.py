@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 
 import cgraph as cg
-from dynamics import inverse_dynamics
+from dynamics import display_names, inverse_dynamics, lint_constraints
 
+from .. import theme
 from .arguments import (
     Commands,
     answer_and_draw,
@@ -47,16 +48,21 @@ def run(options: argparse.Namespace) -> int:
     check_picture(options)
     scene = scene_of(options)
     graph = inverse_dynamics(scene, options.formulation)
-    q, qd = state_names(graph, scene.system.n)
+    q, qd = state_names(graph, scene)
     report = cg.lint(
         graph,
         independent=[(q, qd)] if q and qd else [],
         box=options.box,
         at=None if options.at is None else filled(graph, scene, options.at),
         function="L",
+        names=display_names(scene),
     )
     proof = report if q and qd else f"Holds: the equations have no {'coordinates' if qd else 'velocities'}.\n{report}"
+    held = lint_constraints(scene)
+    if str(held):
+        proof = f"{proof}\n{held}"
     data = {"scene": scene.name, "formulation": options.formulation} | report.to_dict()
+    data |= {"constraints": held.to_dict(), "ok": report.ok and held.ok}
     answer_and_draw(
         options,
         unless_json(options, data, proof),
@@ -64,6 +70,7 @@ def run(options: argparse.Namespace) -> int:
         marked=report.nodes,
         marked_label="to blame",
         marked_edges=report.edges,
+        names=theme.called(display_names(scene)),
         caption=f"{scene.name}: inverse dynamics, {options.formulation.replace('_', ' ')}",
     )
-    return 0 if report.ok else 1
+    return 0 if report.ok and held.ok else 1

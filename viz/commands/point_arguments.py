@@ -1,12 +1,15 @@
-"""Points and boxes of a graph's inputs, from the command line: `q0=0.1,qd0=2` and `q0=-1:1`."""
+"""Points and boxes of a graph's inputs, from the command line: `q.knee=0.1,qd0=2` and `q0=-1:1`."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 
 import numpy as np
 
 from cgraph import Graph
+from cgraph.extend import Names
+from dynamics import display_names
 from dynamics.scenes.scenes import Scene
 
 from .arguments import number
@@ -40,21 +43,21 @@ def box(text: str) -> dict[str, tuple[float, float]]:
 
 
 def filled(graph: Graph, scene: Scene, given: dict[str, float]) -> dict[str, float]:
-    """The given numbers with the rest that the graph's inputs need; names that the graph has not are kept."""
+    """The given numbers with the rest that the graph's inputs need, by the graph's names. Raises for unknown names."""
     chosen = np.random.default_rng(SEED)
     parameters = scene.system.parameters
     values = {}
     for name in graph.input_names:
         drawn = round(chosen.uniform(-1.0, 1.0), DIGITS)
         values[name] = parameters[name] if name in parameters else {"dt": DT, "t": 0.0}.get(name, drawn)
-    return values | given
+    return values | Names(graph, display_names(scene)).inputs_of("--at", given)
 
 
-def point_text(at: dict[str, float]) -> str:
-    """`q0=0.1 qd0=2`, and of many inputs the first."""
+def point_text(at: Mapping[str, float]) -> str:
+    """`q.knee=0.1, qd.knee=2`, and of many inputs the first."""
     shown = [f"{name}={value:g}" for name, value in list(at.items())[:SHOWN]]
     rest = [f"and {len(at) - SHOWN} more"] if len(at) > SHOWN else []
-    return " ".join([*shown, *rest])
+    return ", ".join([*shown, *rest])
 
 
 def _pairs(text: str) -> list[tuple[str, str]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from cgraph.extend import or_nearest
 from dynamics import EFFECTS, scenes
 from dynamics.experiments import pruning
 
@@ -40,9 +41,10 @@ def run(options: argparse.Namespace) -> None:
 
 def _bodies(scene: scenes.Scene, lock: dict[str, float]) -> dict[str, float]:
     """What is to be locked by its body's name, where it may be given by its coordinate's."""
-    bodies = [body.name for body in scene.mechanism.moving] if scene.mechanism else []
-    of = dict(zip(scene.coordinates, bodies, strict=False)) | {name: name for name in bodies}
+    moving = scene.mechanism.moving if scene.mechanism else ()
+    bodies = [body.name for body in moving]
+    of = {body.coordinate: body.name for body in moving} | {name: name for name in bodies}
     if unknown := [name for name in lock if name not in of]:
-        known = f"its bodies are {', '.join(bodies)}" if bodies else "it has no bodies"
-        raise ValueError(f"{scene.name} has no joint {unknown[0]!r} to lock: {known}")
+        known = or_nearest(unknown[0], list(of)) if of else "it has no bodies"
+        raise ValueError(f"{scene.name} has no joint {unknown[0]!r:.80} to lock; {known}")
     return {of[name]: at for name, at in lock.items()}

@@ -7,8 +7,9 @@ import argparse
 import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Names, cotangents
-from dynamics import forward_dynamics, inverse_dynamics
+from dynamics import display_names, forward_dynamics, inverse_dynamics, scenes
 
+from .. import theme
 from .arguments import (
     Commands,
     answer_and_draw,
@@ -27,8 +28,8 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
     """The command's arguments."""
     parser = commands.add_parser("why", help="the paths by which an output depends on an input, and what they weigh")
     takes_a_scene(parser)
-    parser.add_argument("output", metavar="OUTPUT", help="such as tau0")
-    parser.add_argument("input", metavar="INPUT", help="such as q2")
+    parser.add_argument("output", metavar="OUTPUT", help="such as tau0, or tau.knee of a joint by its name")
+    parser.add_argument("input", metavar="INPUT", help="such as q2, or q.hip")
     which = parser.add_mutually_exclusive_group()
     takes_a_formulation(which)
     which.add_argument("--forward", action="store_true", help="of forward dynamics, with outputs such as qdd0")
@@ -43,30 +44,33 @@ def run(options: argparse.Namespace) -> None:
     check_picture(options)
     scene = scene_of(options)
     graph = forward_dynamics(scene) if options.forward else inverse_dynamics(scene, options.formulation)
+    names = Names(graph, display_names(scene))
     at = filled(graph, scene, options.at)
-    found = cg.why(graph, options.output, options.input, at=at, k=options.k)
+    found = cg.why(graph, options.output, options.input, at=at, k=options.k, names=display_names(scene))
     if not found.count:
-        _not_connected(options, graph)
+        _not_connected(options, scene, graph)
         return
     assert found.derivative is not None
     all_listed = len(found.paths) == found.count
     total = sum([path.value or 0.0 for path in found.paths]) if all_listed else found.derivative
-    derivative = _by_reverse_sweep(graph, options.output, options.input, at)
+    derivative = _by_reverse_sweep(names, options.output, options.input, at)
+    shown = {names.shown(name): value for name, value in at.items()}
     gap = abs(total - derivative)
     balance = {"sum_over_all_paths": total, "derivative_by_reverse_sweep": derivative, "difference": gap}
     what = "sum of path products" if all_listed else f"sum over all {found.count} path products"
-    text = f"At {point_text(at)}:\n{found}\n|{what} - derivative by a reverse sweep| = {gap:.2g}"
+    text = f"At {point_text(shown)}:\n{found}\n|{what} - derivative by a reverse sweep| = {gap:.2g}"
     answer_and_draw(
         options,
         unless_json(options, {"depends": True, "at": at} | found.to_dict() | balance, text),
         graph,
         marked_edges=found.edges,
+        names=theme.called(display_names(scene)),
         caption=f"{found.output} depends on {found.input}: {len(found.paths)} of {found.count} paths",
     )
 
 
-def _not_connected(options: argparse.Namespace, graph: Graph) -> None:
-    stops = cg.why_not(graph, options.output, options.input)
+def _not_connected(options: argparse.Namespace, scene: scenes.Scene, graph: Graph) -> None:
+    stops = cg.why_not(graph, options.output, options.input, names=display_names(scene))
     here = set(graph.nodes)  # an input that nothing uses is none of the graph's nodes
     answer_and_draw(
         options,
@@ -76,12 +80,12 @@ def _not_connected(options: argparse.Namespace, graph: Graph) -> None:
             f"made from {stops.input}": stops.reached & here,
             f"{stops.output} is made from it": stops.made_from & here,
         },
+        names=theme.called(display_names(scene)),
         caption=f"{stops.output} does not depend on {stops.input}",
     )
 
 
-def _by_reverse_sweep(graph: Graph, output: str, source: str, at: dict[str, float]) -> float:
+def _by_reverse_sweep(names: Names, output: str, source: str, at: dict[str, float]) -> float:
     """d output / d source by the library's reverse mode, which knows no paths."""
-    names = Names(graph)
     (bar,) = cotangents({names.output(output): cg.constant(1.0)}, [names.one(source)])
-    return float(Graph(graph.inputs, {"bar": bar}).evaluate(at)["bar"])
+    return float(Graph(names.graph.inputs, {"bar": bar}).evaluate(at)["bar"])

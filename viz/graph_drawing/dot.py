@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 from cgraph import Edge, Graph, Node
-from cgraph.extend import require_choice, require_flag, require_graph, require_mapping, require_sequence
+from cgraph.extend import require_choice, require_flag, require_graph, require_sequence, require_texts
 
 from .. import theme
 from ..theme import Paint
@@ -97,7 +97,7 @@ def to_dot(
             raise TypeError(f"{what} must be text, got {type(text).__name__}: {text!r:.60}")
     plan = plan_of(
         graph,
-        {} if names is None else require_mapping("names", names, "name: text"),
+        require_texts("names", names),
         _marks(marked, marked_label),
         _edges(marked_edges),
         _cluster_rule(clusters),

@@ -2,6 +2,7 @@
 
 const READABLE = 100; // nodes that are drawn one by one at first; of a larger graph all clusters are folded
 const DRAWABLE = 2500; // more than these are never drawn one by one at once
+const RESULTS = 60; // outputs in the table beside the picture
 const PATHS = 5, DEPTH = 4, FPS = 30;
 
 /** An element around texts and other elements: texts stay texts, whatever is in them. */
@@ -18,12 +19,16 @@ const table = (names, rows) => tag("table", {},
 
 function start() {
   const data = JSON.parse(document.getElementById("data").textContent);
+  data.called = new Map(data.called);
+  data.units = new Map(data.units);
   const versions = data.versions.map(prepare);
   const $ = (id) => document.getElementById(id);
   const svg = $("picture");
   const largest = Math.max(...versions.map((version) => version.ops.length));
   const all = () => new Set(data.clusters.map((_, c) => c));
   const atFirst = () => (largest <= READABLE ? new Set() : all());
+  const { width, height } = svg.getBoundingClientRect();
+  if (width && height) data.aspect = Math.min(2, Math.max(0.5, width / height));
   arrange(data, atFirst()); // settles how columns are broken into bands, for every state of folding
   const state = {
     version: 0, frame: 0, rows: data.versions.map((version) => [...version.rows[0]]), folded: atFirst(),
@@ -32,7 +37,12 @@ function start() {
   let drawn, values, slopes, show = null;
   const version = () => versions[state.version];
   const outputs = () => version().outputs;
-  const nameOf = (node) => version().names[node]?.[1] ?? outputs().find(([, , out]) => out === node)?.[1] ?? `v${node}`;
+  const shownName = (name, letters) => data.called.get(name) ?? letters ?? name;
+  const unitOf = (name) => (data.units.has(name) ? [" ", tag("span", { class: "unit" }, `[${data.units.get(name)}]`)] : []);
+  const nameOf = (node) => {
+    const [name, letters] = version().names[node] ?? outputs().find(([, , out]) => out === node) ?? [`v${node}`];
+    return shownName(name, letters);
+  };
   const told = (node) => `${nameOf(node)}${version().args[node].length ? ` (${caption(data, version(), node)})` : ""}`;
 
   // Values
@@ -189,7 +199,7 @@ function start() {
       const bar = bars ?? adjoints(version(), partials(), fromNode());
       const words = [`n${node}, ${version().ops[node]}, ${wrong ? `spurious, ${role}` : role}`,
         ...(tags.length ? [tag("br"), `tags: ${tags.join(", ")}`] : []), tag("br"),
-        `value ${brief(values[node])}, ∂${outputs().find(([, , out]) => out === fromNode())[1]} by it ${brief(bar[node])}`];
+        `value ${brief(values[node])}, ∂${nameOf(fromNode())} by it ${brief(bar[node])}`];
       $("node").replaceChildren(tag("div", { class: "scroll" }, equation(version(), node, DEPTH)), tag("p", {}, ...words));
     }
     why();
@@ -224,19 +234,21 @@ function start() {
     return words.length <= 8 ? words : [...words.slice(0, 4), "…", ...words.slice(-3)];
   }
   function results() {
-    const names = [...new Set(versions.flatMap((each) => each.outputs.map(([name]) => name)))].slice(0, 12);
+    const names = [...new Set(versions.flatMap((each) => each.outputs.map(([name]) => name)))];
+    const more = names.splice(RESULTS).length;
     const found = versions.map((each, i) => {
       const own = i === state.version ? values : evaluate(each, state.rows[i]);
       return new Map(each.outputs.map(([name, , node]) => [name, own[node]]));
     });
-    const pretty = new Map(versions.flatMap((each) => each.outputs.map(([name, shown]) => [name, shown])));
+    const pretty = new Map(versions.flatMap((each) => each.outputs.map(([name, letters]) => [name, shownName(name, letters)])));
     const right = versions.findLastIndex((each) => !each.marked.size && versions.some((other) => other.marked.size));
-    const rows = names.map((name) => tag("tr", {}, rowHead(pretty.get(name)), ...found.map((each, i) => {
+    const rows = names.map((name) => tag("tr", {}, tag("th", { scope: "row" }, pretty.get(name), ...unitOf(name)), ...found.map((each, i) => {
       const value = each.get(name), truth = right < 0 ? value : found[right].get(name);
       const off = value !== undefined && truth !== undefined && Math.abs(value - truth) > 0.01 * Math.max(0.1, Math.abs(truth));
       return tag("td", { class: off ? "off" : "" }, value === undefined ? "" : (value && Math.abs(value) < 5e-4 ? "≈0" : brief(value)));
     })));
-    $("results").replaceChildren(table(versions.map((each) => each.name), rows),
+    $("results").replaceChildren(tag("div", { class: "scroll" }, table(versions.map((each) => each.name), rows)),
+      ...(more ? [quiet(`${more} more outputs are in the picture.`)] : []),
       ...(right < 0 ? [] : [quiet(`In vermillion: differs from ${versions[right].name}.`)]));
   }
   function counts() {
@@ -250,8 +262,8 @@ function start() {
   }
   function inputs() {
     const rows = version().inputs.map(([name], i) => {
-      const field = tag("input", { type: "number", step: "any", "aria-label": name });
-      field.value = +state.rows[state.version][i].toPrecision(6);
+      const field = tag("input", { type: "number", step: "any", "aria-label": shownName(name) });
+      field.value = +state.rows[state.version][i].toPrecision(5);
       field.onchange = () => {
         if (!Number.isFinite(field.valueAsNumber)) return;
         play(false);
@@ -259,9 +271,9 @@ function start() {
         compute();
         refresh();
       };
-      return tag("tr", {}, tag("td", {}, name), tag("td", {}, field));
+      return tag("tr", {}, tag("td", {}, shownName(name), ...unitOf(name)), tag("td", {}, field));
     });
-    $("inputs").replaceChildren(tag("table", {}, tag("tbody", {}, ...rows)));
+    $("inputs").replaceChildren(tag("div", { class: "scroll" }, tag("table", {}, tag("tbody", {}, ...rows))));
   }
   function legend() {
     const kinds = [["input", "input"], ["primal", "as written"], ["adjoint", "adjoint: reverse"], ["tangent", "tangent: forward"], ["several", "several roles"], ["wrong", "spurious"]];
@@ -294,11 +306,11 @@ function start() {
       button.setAttribute("aria-checked", k === i);
       button.tabIndex = k === i ? 0 : -1;
     });
-    $("about").textContent = [data.introduction, version().about].filter(Boolean).join(" ");
+    $("about").textContent = version().about;
     $("about").hidden = !$("about").textContent;
     $("about").classList.toggle("flawed", version().marked.size > 0);
     $("sweep").max = 2 * version().ops.length;
-    $("from").replaceChildren(...outputs().map(([name, shown]) => tag("option", { value: name }, shown)));
+    $("from").replaceChildren(...outputs().map(([name, letters]) => tag("option", { value: name }, shownName(name, letters))));
     if (outputs().some(([name]) => name === state.output)) $("from").value = state.output;
     redraw(!state.view);
     legend();
@@ -330,13 +342,14 @@ function start() {
     version().ops.forEach((op, node) => {
       if (version().constants.has(node)) return;
       const [tags, role] = version().labels[version().label[node]];
-      const words = [...(version().names[node] ?? []), ...tags];
+      const names = version().names[node] ?? [];
+      const words = [...names, ...names.map((name) => shownName(name)), ...tags];
       const hit = words.some((word) => word.toLowerCase().includes(wanted)) || [`n${node}`, op, role].includes(wanted)
         || (wanted === "spurious" && version().marked.has(node));
       if (hit) hits.push(node);
     });
     outputs().forEach(([name, shown, node]) => {
-      if ([name, shown].some((each) => each.toLowerCase().includes(wanted))) {
+      if ([name, shown, shownName(name)].some((each) => each.toLowerCase().includes(wanted))) {
         drawn.items.get(`o${name}`).group.classList.add("found");
         hits.push(node);
       }
@@ -509,11 +522,16 @@ function start() {
   });
   addEventListener("resize", fitView);
 
+  $("introduction").textContent = data.introduction;
+  $("introduction").hidden = !data.introduction;
   $("tables").hidden = !$("tables").querySelector("table");
   if (data.motion) {
     $("moving").hidden = false;
-    if (data.motion.points) show = armView($("arm"), data.motion);
-    else { $("arm").remove(); show = () => {}; }
+    if (data.motion.points) {
+      const view = armView($("arm"), data.motion);
+      show = view.show;
+      $("frame").textContent = view.words;
+    } else { $("arm").remove(); show = () => {}; }
     const frame = Math.floor(data.motion.t.length / 4); // where it is on its way: at rest many products are 0
     $("time").max = data.motion.t.length - 1;
     choose(0);

@@ -1,21 +1,32 @@
 // The moving points, as sticks.
 
-/** A view of the motion; returns a function that draws a frame. */
+const FOLLOW = 5; // how much larger than the mechanism its way is where the frame goes with it
+
+/** A view of the motion; returns a function that draws a frame, and the words for what the frame shows. */
 function armView(svg, motion) {
-  const xs = motion.points.flat().map(([x]) => x), ys = motion.points.flat().map(([, y]) => y);
-  const [left, right, low, high] = [Math.min(0, ...xs), Math.max(0, ...xs), Math.min(0, ...ys), Math.max(0, ...ys)];
-  const size = Math.max(right - left, high - low, 1e-6), pad = 0.08 * size;
-  const cx = (left + right) / 2, cy = (low + high) / 2, half = size / 2 + pad;
-  svg.setAttribute("viewBox", `${cx - half} ${-cy - half} ${2 * half} ${2 * half}`);
+  const range = (values) => [values.reduce((a, b) => Math.min(a, b), Infinity), values.reduce((a, b) => Math.max(a, b), -Infinity)];
+  const center = (points) => [0, 1].map((k) => { const [a, b] = range(points.map((each) => each[k])); return (a + b) / 2; });
+  const middles = motion.points.map(center);
+  const reach = motion.points.reduce((most, points, i) => points.reduce((far, [x, y]) => (
+    Math.max(far, Math.abs(x - middles[i][0]), Math.abs(y - middles[i][1]))), most), 0);
+  const [left, right] = range([0, ...motion.points.flat().map(([x]) => x)]);
+  const [low, high] = range([0, ...motion.points.flat().map(([, y]) => y)]);
+  const way = Math.max(right - left, high - low), size = way || 1;
+  const follows = way > FOLLOW * 2 * reach;
+  const half = follows ? Math.max(1.5 * reach, size / 100) : 0.58 * size;
   svg.replaceChildren();
-  const r = size / 55;
+  const r = half / 32, step = nice(0.8 * half);
+  const grid = element("path", { class: "grid", "stroke-width": r / 4 }, svg);
   element("path", { class: "ground", d: `M${-4 * r} 0H${4 * r}`, "stroke-width": r / 2 }, svg);
   const trace = element("path", { class: "trace", "stroke-width": r / 3 }, svg);
   const sticks = motion.parents.map(() => element("path", { class: "stick", "stroke-width": 1.3 * r }, svg));
   const joints = motion.parents.map(() => element("circle", { class: "joint", r, "stroke-width": r / 3 }, svg));
   const last = motion.parents.length - 1;
-  return (frame) => {
+  const show = (frame) => {
     const points = motion.points[frame];
+    const [cx, cy] = follows ? middles[frame] : [(left + right) / 2, (low + high) / 2];
+    svg.setAttribute("viewBox", `${cx - half} ${-cy - half} ${2 * half} ${2 * half}`);
+    if (follows) grid.setAttribute("d", lines(cx, cy, 2 * half, step));
     points.forEach(([x, y], i) => {
       const [px, py] = motion.parents[i] < 0 ? [x, y] : points[motion.parents[i]];
       sticks[i].setAttribute("d", `M${px} ${-py}L${x} ${-y}`);
@@ -25,4 +36,17 @@ function armView(svg, motion) {
     const past = motion.points.slice(Math.max(0, frame - 40), frame + 1).map((each) => `${each[last][0]} ${-each[last][1]}`);
     trace.setAttribute("d", `M${past.join("L")}`);
   };
+  return { show, words: follows ? `The frame goes with it; the lines stand still, ${+step.toPrecision(1)} m apart.` : "" };
+}
+
+/** The largest of 1, 2 and 5 times a power of ten up to a length. */
+function nice(length) {
+  const power = 10 ** Math.floor(Math.log10(length));
+  return [5, 2, 1].find((each) => each * power <= length) * power;
+}
+
+/** Lines of the world around a place, a step apart; twice as wide as high, for a wide picture. */
+function lines(cx, cy, half, step) {
+  const at = (middle) => Array.from({ length: 2 * Math.ceil(half / step) + 1 }, (_, i) => (Math.round(middle / step) + i - Math.ceil(half / step)) * step);
+  return [...at(cx).map((x) => `M${x} ${-cy - half}V${-cy + half}`), ...at(cy).map((y) => `M${cx - half} ${-y}H${cx + half}`)].join("");
 }

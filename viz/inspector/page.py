@@ -12,7 +12,7 @@ from string import Template
 from typing import Any
 
 from cgraph import Graph, Node
-from cgraph.extend import require_graph, require_mapping, require_sequence
+from cgraph.extend import require_graph, require_mapping, require_sequence, require_texts
 
 from .. import theme
 from ..pages import html
@@ -49,6 +49,8 @@ def page(
     marked: Collection[Node] = frozenset(),
     motion: Motion | None = None,
     tables: Sequence[Table] = (),
+    names: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
 ) -> Page:
     """The page on which a graph is looked at: it folds by tags, and shows values, paths, sweeps and equations.
 
@@ -68,6 +70,11 @@ def page(
         Instants to play [s], and points that move beside the graph [m].
     tables : sequence of Table
         Texts in rows, shown below the graph.
+    names : mapping of str to str, optional
+        {name of an input, output or node: what a person calls it}, such as `dynamics.display_names(model)`. Tables and
+        panels show it, and boxes of small graphs; those of larger ones have letters, as q₀.
+    units : mapping of str to str, optional
+        {name of an input or output: its unit}, shown beside the name.
 
     Returns
     -------
@@ -93,29 +100,17 @@ def page(
             raise TypeError(f"{what} of a page must be text, got {type(text).__name__}: {text!r:.60}")
     if at is not None:
         require_mapping("at", at, "input: value")
+    texts = require_texts("names", names), require_texts("units", units)
     nodes, tables = frozenset(require_sequence("marked", marked, "nodes")), require_sequence("tables", tables, "Table")
     if not all([isinstance(table, Table) for table in tables]):
         raise TypeError(f"tables must be a sequence of Table, got {tables!r:.60}")
-    if isinstance(graph, Graph):
-        versions: Sequence[Version] = [Version("graph", graph, about, nodes, at or {})]
-    else:
-        if (
-            isinstance(graph, str)
-            or not isinstance(graph, Sequence)
-            or not all(isinstance(each, Version) for each in graph)
-        ):
-            require_graph("page", graph)
-        versions = list(graph)
-        if at is not None or nodes:
-            raise ValueError("with versions, give each its own at and marked")
-    names = [version.name for version in versions]
-    if not names or len(set(names)) < len(names):
-        raise ValueError(f"a page needs versions with names of their own, got {names}")
+    versions = _versions(graph, about, at, nodes)
     if motion is not None:
         if not isinstance(motion, Motion):
             raise TypeError(f"motion must be a Motion, got {type(motion).__name__}: {motion!r:.60}")
         motion.check()
-    data = {"title": title, "introduction": "" if isinstance(graph, Graph) else about, **record(versions, motion)}
+    introduction = "" if isinstance(graph, Graph) else about
+    data = {"title": title, "introduction": introduction} | record(versions, motion, *texts)
     script = f'"use strict";\n{scripts()}\nstart();'
     style = f"{_colors()}{_asset('page.css')}"
     policy = _POLICY.format(script=_digest(script), style=_digest(style))
@@ -132,6 +127,26 @@ def page(
         f"<script>{script}</script>\n"
         "</body>\n</html>\n"
     )
+
+
+def _versions(
+    graph: Graph | Sequence[Version], about: str, at: Mapping[str, Any] | None, marked: frozenset[Node]
+) -> list[Version]:
+    """The versions to switch among, checked; a graph alone is one."""
+    if isinstance(graph, Graph):
+        return [Version("graph", graph, about, marked, at or {})]
+    if (
+        isinstance(graph, str)
+        or not isinstance(graph, Sequence)
+        or not all(isinstance(each, Version) for each in graph)
+    ):
+        require_graph("page", graph)
+    if at is not None or marked:
+        raise ValueError("with versions, give each its own at and marked")
+    names = [version.name for version in graph]
+    if not names or len(set(names)) < len(names):
+        raise ValueError(f"a page needs versions with names of their own, got {names}")
+    return list(graph)
 
 
 def scripts() -> str:

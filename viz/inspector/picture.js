@@ -29,7 +29,7 @@ function arrange(data, folded) {
   const boxes = [], titles = [];
   const stages = data.stages.map((_, i) => i);
   const widths = data.columns.map((_, i) => Math.max(90, ...stages.map((stage) => cell(i, stage).w)));
-  const bands = data.bands ??= bandsFor(widths, stages.map((stage) => Math.max(...widths.map((_, i) => cell(i, stage).h))));
+  const bands = data.bands ??= bandsFor(widths, stages.map((stage) => Math.max(...widths.map((_, i) => cell(i, stage).h))), data.aspect);
   const perBand = Math.ceil(data.columns.length / bands);
   const inputs = new Map(), outputs = new Map(); // place: width; name: width
   for (const version of data.versions) {
@@ -74,7 +74,7 @@ function arrange(data, folded) {
 }
 
 /** Into how many bands columns of these widths are broken: one, unless the picture is much larger with more. */
-function bandsFor(widths, heights) {
+function bandsFor(widths, heights, aspect = CELL.aspect) {
   const high = heights.reduce((sum, each) => sum + (each ? each + CELL.gap : 0), CELL.title);
   const scale = (bands) => {
     const per = Math.ceil(widths.length / bands);
@@ -82,7 +82,7 @@ function bandsFor(widths, heights) {
     for (let i = 0; i < widths.length; i += per) {
       most = Math.max(most, widths.slice(i, i + per).reduce((sum, each) => sum + each + CELL.gap, 0));
     }
-    return Math.min(CELL.aspect / (most + 150), 1 / (bands * high + 2 * LEAF.row));
+    return Math.min(aspect / (most + 150), 1 / (bands * high + 2 * LEAF.row));
   };
   let best = 1;
   for (let bands = 2; bands <= widths.length; bands++) if (scale(bands) > 1.7 * scale(1) && scale(bands) > 1.05 * scale(best)) best = bands;
@@ -124,6 +124,9 @@ function line(leaves, total, y) {
   return { at, end: y };
 }
 
+/** What a person calls an input, output or node of that name. */
+const called = (data, name) => data.called.get(name) ?? name;
+
 /** What the operation of a node shows: its symbol, with the constants among its arguments. */
 function caption(data, version, node) {
   const name = version.names[node];
@@ -159,7 +162,8 @@ function draw(svg, data, version, folded) {
     if (each.column === undefined) continue;
     element("rect", { class: "column", x: each.x - 9, y: each.y, width: each.w + 18, height: each.h, rx: 8 }, frames);
     const words = element("text", { class: "column-title", x: each.x + each.w / 2, y: each.y + 16 }, frames);
-    words.textContent = data.columns[each.column] || "no tag";
+    words.textContent = fitted(data.columns[each.column] || "no tag", (each.w + 18) / 8.6);
+    element("title", {}, words).textContent = data.columns[each.column];
   }
   for (const each of layout.titles) {
     if (each.stage === undefined) continue;
@@ -190,7 +194,7 @@ function draw(svg, data, version, folded) {
     }
     const first = cluster.marked ? "spurious" : cluster.title || cluster.column || "no tag";
     const second = cluster.marked && cluster.title ? `${cluster.title} (${many})` : count;
-    const item = shape(shapes, id, { ...at }, `box ${role}`, `▸ ${first.length > 13 ? `${first.slice(0, 12)}…` : first}`, true);
+    const item = shape(shapes, id, { ...at }, `box ${role}`, `▸ ${fitted(first, 13)}`, true);
     item.group.setAttribute("data-cluster", c);
     item.group.setAttribute("aria-expanded", "false");
     item.group.setAttribute("aria-label", [cluster.column, cluster.stage, words, count, "folded"].filter(Boolean).join(", "));
@@ -206,14 +210,17 @@ function draw(svg, data, version, folded) {
     const leaf = !version.args[node].length;
     const item = shape(shapes, `n${node}`, at, `${leaf ? "leaf" : "node"} ${role}`, caption(data, version, node), leaf);
     item.group.setAttribute("data-node", node);
-    item.group.setAttribute("aria-label", `n${node}, ${version.names[node]?.[0] ?? op}${role === "wrong" ? ", spurious" : ""}`);
+    const name = version.names[node] && called(data, version.names[node][0]);
+    item.group.setAttribute("aria-label", `n${node}, ${name ?? op}${role === "wrong" ? ", spurious" : ""}`);
+    if (name) element("title", {}, item.group).textContent = name;
     items.set(`n${node}`, { ...item, nodes: [node] });
     shownBy[node] = `n${node}`;
   });
   for (const [name, pretty, node] of version.outputs) {
     const item = shape(shapes, `o${name}`, layout.outputs.get(name), "output", pretty, true);
     item.group.setAttribute("data-node", node);
-    item.group.setAttribute("aria-label", `output ${name}`);
+    item.group.setAttribute("aria-label", `output ${called(data, name)}`);
+    element("title", {}, item.group).textContent = called(data, name);
     items.set(`o${name}`, { ...item, nodes: [node], output: true });
   }
   const arrows = drawLines(lines, version, items, shownBy);
@@ -223,6 +230,13 @@ function draw(svg, data, version, folded) {
 function commonRole(version, nodes) {
   const roles = new Set(nodes.map((node) => version.labels[version.label[node]][1]));
   return roles.size === 1 ? [...roles][0] : "several";
+}
+
+/** A text of at most so many letters: of a longer one, its ends. */
+function fitted(text, most) {
+  const letters = [...text], room = Math.max(4, Math.floor(most) - 1);
+  if (letters.length <= room + 1) return text;
+  return `${letters.slice(0, Math.ceil(room / 2)).join("")}…${letters.slice(letters.length - Math.floor(room / 2)).join("")}`;
 }
 
 /** One shape with its text, and a line for its value. */

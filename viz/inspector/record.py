@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import cgraph as cg
@@ -20,6 +20,7 @@ OTHER = "other"  # of a body, what carries no energy's tag
 MANY = 60  # clusters; above, they are not split by energy
 STAGES = {PRIMAL: "as written", ADJOINT: "reverse sweep", TANGENT: "forward sweep"}
 TWICE = "both sweeps"
+FEW = 24  # inputs and outputs whose boxes have room for what a person calls them
 _TALL = 34  # pixels that a node's label takes at least
 
 
@@ -32,8 +33,15 @@ class Group(NamedTuple):
     marked: bool
 
 
-def record(versions: Sequence[Version], motion: Motion | None) -> dict[str, Any]:
+def record(
+    versions: Sequence[Version],
+    motion: Motion | None,
+    names: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+) -> dict[str, Any]:
     """All that the page's script reads, as JSON can hold it.
+
+    names, units: {name in a graph: what a person calls it, and its unit}.
 
     A place is a position of the picture: nodes that compute the same in two versions share it.
     """
@@ -48,14 +56,22 @@ def record(versions: Sequence[Version], motion: Motion | None) -> dict[str, Any]
         fine = [[each and each._replace(title="") for each in groups] for groups in fine]
     places, at = _places(versions, fine)
     clusters = sorted({group for _, group, _ in places if group}, key=_cluster_order)
-    drawn = _drawn(places, clusters, versions, at)
+    letters = _letters(versions, names or {})
+    drawn = _drawn(places, clusters, versions, at, letters)
+    known = {each.name for version in versions for each in (*version.graph.inputs, *version.graph.nodes) if each.name}
+    known |= {name for version in versions for name in version.graph.outputs}
     return {
         "ops": {op.name: [op.symbol, op.commutative] for op in OPS.values()},
         "slopes": {op.name: slopes(op) for op in OPS.values()},
         **drawn,
         "stages": [stage for stage in (*STAGES.values(), TWICE) if any(group.stage == stage for group in clusters)],
         "columns": _columns(clusters, bodies),
-        "versions": [{**_version(version, at[i]), "rows": rows[i].tolist()} for i, version in enumerate(versions)],
+        "called": [[name, text] for name, text in theme.called(names or {}).items() if name in known],
+        "units": [[name, text] for name, text in (units or {}).items() if name in known],
+        "versions": [
+            {**_version(version, own, letters), "rows": table.tolist()}
+            for version, own, table in zip(versions, at, rows, strict=True)
+        ],
         "motion": None
         if motion is None
         else {
@@ -151,7 +167,11 @@ def _places(versions: Sequence[Version], groups: Sequence[Sequence[Group | None]
 
 
 def _drawn(
-    places: Sequence[_Place], clusters: Sequence[Group], versions: Sequence[Version], at: Sequence[Sequence[int]]
+    places: Sequence[_Place],
+    clusters: Sequence[Group],
+    versions: Sequence[Version],
+    at: Sequence[Sequence[int]],
+    letters: Callable[[str], str],
 ) -> dict[str, Any]:
     """Clusters with their sizes, and where each place is in its cluster."""
     number = {group: i for i, group in enumerate(clusters)}
@@ -170,7 +190,7 @@ def _drawn(
     drawn = []
     for c, (group, inside) in enumerate(zip(clusters, members, strict=True)):
         local = {p: i for i, p in enumerate(inside)}
-        widths = [_width(places[p][0]) for p in inside]
+        widths = [_width(places[p][0], letters) for p in inside]
         edges = sorted((local[s], local[t]) for s, t in lines[c] if local[s] < local[t])
         layout = layered(widths, edges)
         for p, x, y, width in zip(inside, layout.x, layout.y, widths, strict=True):
@@ -187,13 +207,20 @@ def _drawn(
         )
     for p, (node, group, _) in enumerate(places):
         if group is None and node.value is None:
-            spot[p] = [-1, 0, 0, round(_width(node))]
+            spot[p] = [-1, 0, 0, round(_width(node, letters))]
     return {"clusters": drawn, "places": spot}
 
 
-def _width(node: Node) -> float:
+def _letters(versions: Sequence[Version], names: Mapping[str, str]) -> Callable[[str], str]:
+    """What the picture shows of a name: what a person calls it, or letters where there are many."""
+    leaves = {name for version in versions for name in (*version.graph.input_names, *version.graph.outputs)}
+    shown = theme.called(names) if len(leaves) <= FEW else {}
+    return lambda name: shown.get(name) or theme.pretty(name)
+
+
+def _width(node: Node, letters: Callable[[str], str]) -> float:
     """Pixels that the node's label and value need."""
-    name = len(theme.pretty(node.name).replace("\u0307", "").replace("\u0308", "")) if node.name else 0
+    name = len(letters(node.name).replace("\u0307", "").replace("\u0308", "")) if node.name else 0
     constants = sum([len(f"{arg.value:.4g}") + 1 for arg in node.args if arg.value is not None])
     return max(_TALL + 12, 7.5 * (name + constants + len(node.op.symbol)) + 14)
 
@@ -208,7 +235,7 @@ def _columns(clusters: Sequence[Group], bodies: Sequence[str]) -> list[str]:
     return [*sorted(used - set(bodies), key=theme.natural_order), *[body for body in bodies if body in used]]
 
 
-def _version(version: Version, place: Sequence[int]) -> dict[str, Any]:
+def _version(version: Version, place: Sequence[int], letters: Callable[[str], str]) -> dict[str, Any]:
     graph = version.graph
     number = {node: i for i, node in enumerate(graph.nodes)}
     labels: dict[tuple[tuple[str, ...], str], int] = {}
@@ -219,7 +246,7 @@ def _version(version: Version, place: Sequence[int]) -> dict[str, Any]:
         kind = (tuple(sorted(node.tags, key=theme.natural_order)), theme.role_of(node))
         label.append(labels.setdefault(kind, len(labels)))
     marked = sorted([number[node] for node in set(version.marked)])
-    names = {i: [node.name, theme.pretty(node.name)] for node, i in number.items() if node.name}
+    names = {i: [node.name, letters(node.name)] for node, i in number.items() if node.name}
     return {
         "name": version.name,
         "about": version.about,
@@ -231,7 +258,7 @@ def _version(version: Version, place: Sequence[int]) -> dict[str, Any]:
         "names": names,
         "marked": marked,
         "inputs": [[name, number.get(node, -1)] for name, node in zip(graph.input_names, graph.inputs, strict=True)],
-        "outputs": [[name, theme.pretty(name), number[node]] for name, node in graph.outputs.items()],
+        "outputs": [[name, letters(name), number[node]] for name, node in graph.outputs.items()],
         "counts": [len(graph.nodes), len(graph.edges)],
     }
 

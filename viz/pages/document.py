@@ -63,7 +63,7 @@ class Document:
 
 def left_out(what: Sequence[str]) -> list[Block]:
     """What the model of a page has not of the file that it was read from; it stands at the top."""
-    return [Paragraph(f"Left out of the model: {each}.", point=True) for each in what]
+    return [Paragraph(f"Left out of the model: {'; '.join(what)}.", point=True)] if what else []
 
 
 def to_html(document: Document) -> str:

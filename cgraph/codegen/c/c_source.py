@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from ...core.graph import Graph, require_graph
 from ...util.atomic_write import atomic_write
-from ...util.require import require_flag, require_path
+from ...util.require import require_flag, require_path, require_texts
 from .c_identifiers import check_function_name, distinct
 from .c_statements import comment, functions
 
@@ -98,7 +98,7 @@ class CSource(NamedTuple):
         return atomic_write(place / f"{self.name}.c", self.source), header
 
 
-def to_c(graph: Graph, name: str = "function", *, fma: bool = False) -> CSource:
+def to_c(graph: Graph, name: str = "function", *, fma: bool = False, names: Mapping[str, str] | None = None) -> CSource:
     """C99 source and header of `void name(const double *x, double *y)`; `.write(folder)` makes the two files.
 
     It needs the C library alone: no heap, no globals, no recursion. The header names the places of inputs in x and
@@ -114,6 +114,9 @@ def to_c(graph: Graph, name: str = "function", *, fma: bool = False) -> CSource:
         Of the function, and of both files.
     fma : bool
         Let the compiler round a product and the sum that it goes into once.
+    names : mapping of str to str, optional
+        {name of an input or output: what a person calls it}, such as `dynamics.display_names(model)`: the header says
+        it beside the place.
 
     Returns
     -------
@@ -137,6 +140,7 @@ def to_c(graph: Graph, name: str = "function", *, fma: bool = False) -> CSource:
     require_graph("to_c", graph)
     check_function_name(name)
     inputs, outputs, input_names = graph.inputs, graph.outputs, graph.input_names
+    called = require_texts("names", names)
     places = [f"{name.upper()}_IN_{word}" for word in distinct(input_names)]
     results = [f"{name.upper()}_OUT_{word}" for word in distinct(list(outputs))]
     header = _HEADER.format(
@@ -144,8 +148,8 @@ def to_c(graph: Graph, name: str = "function", *, fma: bool = False) -> CSource:
         NAME=name.upper(),
         n_in=len(inputs),
         n_out=len(outputs),
-        inputs=_enumerators(places, input_names, f"{name.upper()}_N_IN"),
-        outputs=_enumerators(results, list(outputs), f"{name.upper()}_N_OUT"),
+        inputs=_enumerators(places, input_names, called, f"{name.upper()}_N_IN"),
+        outputs=_enumerators(results, list(outputs), called, f"{name.upper()}_N_OUT"),
     )
     contract = _CONTRACT.format(**_ROUNDING[require_flag("fma", fma)])
     text = functions(
@@ -155,9 +159,10 @@ def to_c(graph: Graph, name: str = "function", *, fma: bool = False) -> CSource:
     return CSource(name, source, header)
 
 
-def _enumerators(places: Sequence[str], names: Sequence[str], count: str) -> str:
+def _enumerators(places: Sequence[str], names: Sequence[str], called: Mapping[str, str], count: str) -> str:
+    shown = [called.get(name, name) for name in names]
     lines = [
-        f"    {place} = {row}," + ("" if place.endswith(f"_{name}") else f" /* {comment(name)} */")
-        for row, (place, name) in enumerate(zip(places, names, strict=True))
+        f"    {place} = {row}," + ("" if place.endswith(f"_{text}") else f" /* {comment(text)} */")
+        for row, (place, text) in enumerate(zip(places, shown, strict=True))
     ]
     return "\n".join([*lines, f"    {count} = {len(places)}"])

@@ -37,9 +37,9 @@ def rounded(names: Names, at: Point) -> Rounded:
     An error passes on through the local partials, in absolute value, and each operation adds its own.
     """
     graph = names.graph
-    values = dict(zip(graph.nodes, node_values(graph, graph.nodes, at), strict=True))
+    values = dict(zip(graph.nodes, node_values(names, graph.nodes, at), strict=True))
     edges = [Edge(arg, node, slot) for node in graph.nodes for slot, arg in enumerate(node.args)]
-    slopes = iter(edge_slopes(graph, edges, at))
+    slopes = iter(edge_slopes(names, edges, at))
     errors: dict[Node, float] = {}
     for node in graph.nodes:
         inherited = [_times(next(slopes), errors[arg]) for arg in node.args]

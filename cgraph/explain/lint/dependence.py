@@ -14,7 +14,9 @@ def unused_inputs(names: Names) -> list[Finding]:
     used = set(names.graph.nodes)
     unused = [node for node in names.graph.inputs if node not in used]
     return [
-        Finding("unused input", f"Nothing uses the input {node.name}.", (node,), data={"input": str(node.name)})
+        Finding(
+            "unused input", f"Nothing uses the input {names.text(node)}.", (node,), data={"input": names.text(node)}
+        )
         for node in unused
     ]
 
@@ -25,10 +27,10 @@ def missing_dependences(names: Names, depends: Mapping[Name, Name | Sequence[Nam
     for output, declared in depends.items():
         sink = names.output(output)
         reached = ancestors([sink])
-        inputs = [str(node.name) for node in names.graph.inputs if node in reached]
+        inputs = [names.text(node) for node in names.graph.inputs if node in reached]
         for node in names.group(declared):
             if node not in reached:
-                output_name = output if isinstance(output, str) else names.text(sink)
+                output_name = names.shown(names.meant(output)) if isinstance(output, str) else names.text(sink)
                 name = names.text(node)
                 text = f"{output_name} does not depend on {name}; it is made from {joined(inputs, 12) or 'numbers'}."
                 data = {"output": output_name, "input": name, "made_from_inputs": inputs}

@@ -54,7 +54,7 @@ def _proof(names: Names, dependent: list[Node], on: list[Node]) -> str:
     if not any([node.args for node in dependent]):
         return f"{claim}: {to} {'are inputs' if len(dependent) > 1 else 'is an input'}."
     reached = ancestors(dependent)
-    sources = [str(node.name) for node in names.graph.inputs if node in reached]
+    sources = [names.text(node) for node in names.graph.inputs if node in reached]
     return f"{claim}, made from {joined(sources, 12) or 'numbers'} alone."
 
 
@@ -124,7 +124,7 @@ def _report(
             lines.append(f"    on the path {_path_text(names, path)}")
     if through:
         affected = descendants(names.graph.nodes, through)
-        outputs = [name for name, node in names.graph.outputs.items() if node in affected]
+        outputs = [names.shown(name) for name, node in names.graph.outputs.items() if node in affected]
         alone = f"{many(len(wrong), 'node')} of {len(names.graph.nodes)} {_verb(wrong, 'serve')} nothing else."
         lines.append(f"{joined(outputs)} {_verb(outputs, 'contain')} what was gained; {alone}")
     elif through is not None:

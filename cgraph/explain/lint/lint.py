@@ -91,6 +91,7 @@ def lint(
     at: Point | None = None,
     digits: float = 4.0,
     function: str = "f",
+    names: Mapping[str, str] | None = None,
 ) -> Lint:
     """Check what is declared of a graph; a declaration ends in a proof or in the nodes and edges to blame.
 
@@ -114,6 +115,8 @@ def lint(
         The loss that counts, in decimal digits.
     function : str
         What the texts call the function that is differentiated, such as "L".
+    names : mapping of str to str, optional
+        {name in the graph: what a person calls it}, shown, and taken beside the graph's.
 
     Returns
     -------
@@ -141,29 +144,29 @@ def lint(
         raise ValueError(f"digits must be a positive number, got {digits!r:.60}")
     if not isinstance(function, str):
         raise TypeError(f"function must be the name of one, got {type(function).__name__}: {function!r:.60}")
-    names = Names(graph)
+    known = Names(graph, names)
     findings: list[Finding] = []
     proofs: list[str] = []
     for first, second in _pairs(independent):
-        violations, held = check_independence(names, first, second, function)
+        violations, held = check_independence(known, first, second, function)
         findings += violations
         proofs += held
     if depends is not None and require_mapping("depends", depends, "output: names"):
-        missing = missing_dependences(names, depends)
+        missing = missing_dependences(known, depends)
         findings += missing
         if not missing:
             proofs.append("every output depends on what was declared for it.")
     if box is not None:
-        singular = singular_nodes(names, box)
+        singular = singular_nodes(known, box)
         findings += singular
         if not singular:
-            proofs.append(f"no slope is unbounded in the box, of {many(len(names.number), 'operation')}.")
+            proofs.append(f"no slope is unbounded in the box, of {many(len(known.number), 'operation')}.")
     if at is not None:
-        losses = cancellations(names, at, digits)
+        losses = cancellations(known, at, digits)
         findings += losses
         if not losses:
-            proofs.append(_accuracy(names, at, digits))
-    return Lint(graph, tuple(findings), tuple(unused_inputs(names)), tuple(proofs))
+            proofs.append(_accuracy(known, at, digits))
+    return Lint(graph, tuple(findings), tuple(unused_inputs(known)), tuple(proofs))
 
 
 def _pairs(independent: Pair | Sequence[Pair]) -> list[Pair]:

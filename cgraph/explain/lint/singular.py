@@ -10,7 +10,6 @@ from ...core.graph import Graph
 from ...core.node import CONSTANT, VARIABLE, Node, Op
 from ...core.op_intervals import LINE
 from ...core.operation import Interval
-from ...errors import GraphError
 from ...util.real_arrays import real_number
 from ...util.require import require_mapping
 from ..names import Names
@@ -25,11 +24,7 @@ def intervals(graph: Graph, box: Box) -> dict[Node, Interval]:
     box: {input: (low, high) or a number}. The bounds hold, but may be wide: an interval forgets which values belong
     together. Raises GraphError for an unknown input, ValueError for what is no interval.
     """
-    if unknown := [name for name in require_mapping("box", box, "input: interval") if name not in graph.input_names]:
-        raise GraphError(
-            f"box: the graph has no input {', '.join(map(str, unknown))} (it has {', '.join(graph.input_names)})"
-        )
-    given = {name: _interval(name, value) for name, value in box.items()}
+    given = _given(Names(graph), box)
     found: dict[Node, Interval] = {}
     for node in graph.nodes:
         if node.op is VARIABLE:
@@ -61,7 +56,7 @@ def singular_at(op: Op, arguments: list[Interval]) -> str | None:
 
 def singular_nodes(names: Names, box: Box) -> list[Finding]:
     """The operations that could meet a singular point of theirs for inputs in the box."""
-    bounds = intervals(names.graph, box)
+    bounds = intervals(names.graph, _given(names, box))
     findings = []
     for node in names.graph.nodes:
         reason = singular_at(node.op, [bounds[arg] for arg in node.args]) if node.args else None
@@ -78,6 +73,12 @@ def singular_nodes(names: Names, box: Box) -> list[Finding]:
             text = f"{names.line(node)}: {reason}" + (f"; {within}." if within else ".")
             findings.append(Finding("singular", text, (node,), data=data))
     return findings
+
+
+def _given(names: Names, box: Box) -> dict[str, Interval]:
+    """The box by the graph's names. Raises as `intervals` does."""
+    known = names.inputs_of("box", require_mapping("box", box, "input: interval"))
+    return {name: _interval(names.shown(name), value) for name, value in known.items()}
 
 
 def _interval(name: str, value: object) -> Interval:

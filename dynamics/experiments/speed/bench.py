@@ -78,7 +78,10 @@ def bench(
     for name, scene in loads.items():  # a wrong name is told before anything is measured
         cases[name] = Case(name, scene())
     wanted = [name for name, kind in PEERS.items() if name == OURS or (name in peers and kind.installed)]
-    asked = {task: [mode for mode in MODES if mode in modes] for task in TASKS if task in tasks}
+    ours = PEERS[OURS].offers
+    asked = {
+        task: [mode for mode in MODES if mode in modes and (task, mode) in ours] for task in TASKS if task in tasks
+    }
     return _rows(cases, loads, asked, wanted, repeats, budget, say)
 
 

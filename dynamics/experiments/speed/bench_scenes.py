@@ -1,9 +1,10 @@
-"""The bench's own scenes: planar chains, 3D arms and a tree, of sizes that show how cost grows."""
+"""The bench's own scenes: planar chains, 3D arms and trees, of sizes that show how cost grows."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -34,6 +35,13 @@ def binary_tree(n: int) -> Mechanism:
     return Mechanism([_body(i, WORLD if i == 0 else f"link{(i - 1) // 2 + 1}", rng) for i in range(n)])
 
 
+def free_tree(n: int) -> Mechanism:
+    """A free base with limbs of up to seven revolute joints, n degrees of freedom, the bodies of `turned_arm`."""
+    rng = np.random.default_rng(n)
+    base = replace(_body(0, WORLD, rng), joint=Joint("free"))
+    return Mechanism([base, *(_body(i, f"link{i if (i - 1) % 7 else 1}", rng) for i in range(1, n - 5))])
+
+
 def _body(i: int, parent: str, rng: np.random.Generator) -> Body:
     mixed = rng.normal(size=(3, 3))
     second = 0.05 * mixed @ mixed.T + 0.01 * np.eye(3)  # of mass; any such matrix is a body's
@@ -49,7 +57,9 @@ def _body(i: int, parent: str, rng: np.random.Generator) -> Body:
 
 
 def _at_rest(name: str, n: int, build: Callable[[int], Mechanism]) -> Scene:
-    return Scene(name, f"a mechanism of the bench with {n} joints", build(n), (0.0,) * n, (0.0,) * n, 3.0)
+    model = build(n)
+    q = tuple(model.system.kinematics.neutral)
+    return Scene(name, f"a mechanism of the bench with {n} degrees of freedom", model, q, (0.0,) * n, 3.0)
 
 
 _MODELS: dict[str, Callable[[int], Mechanism]] = {
@@ -61,6 +71,7 @@ _MODELS: dict[str, Callable[[int], Mechanism]] = {
     "arm 7": turned_arm,
     "arm 30": turned_arm,
     "tree 15": binary_tree,
+    "free 35": free_tree,
 }
 SCENES: dict[str, Callable[[], Scene]] = {
     name: partial(_at_rest, name, int(name.split()[1]), build) for name, build in _MODELS.items()

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from ... import scenes
 from ...equations.state_equation import state_inputs
+from ...systems.display_names import display_names
 from ..setting import Setting
 from ..stability import cases
 from ..stability.cases.orbits import kepler
@@ -56,7 +57,9 @@ def load(
     if start is not None:
         states = state_inputs(setting.model).states
         if len(start) != len(states):
-            raise ValueError(f"the start needs {len(states)} numbers ({', '.join(states[:12])}), got {len(start)}")
+            called = display_names(setting.model)
+            shown = ", ".join([called.get(name, name) for name in states[:12]]) + (", .." if len(states) > 12 else "")
+            raise ValueError(f"the start needs {len(states)} numbers ({shown}), got {len(start)}")
         if fixed is not None:
             raise ValueError(f"{name!r} has a start of its own; scenes and files take others")
         n = len(setting.q)

@@ -20,7 +20,8 @@ class Ball(SpatialJoint):
     kind = mjcf = "ball"
     coordinates = quaternion.NAMES
     velocities = ("wx", "wy", "wz")
-    units = ("", "", "", "")
+    units = quaternion.UNITS
+    velocity_units = ("rad/s", "rad/s", "rad/s")
     neutral = quaternion.NEUTRAL
     groups = (0, 0, 0, 0)
     sprung = True

@@ -15,7 +15,7 @@ class Fixed(AxialJoint):
     urdf = "fixed"
     moves = False
     turns = False
-    coordinates = velocities = units = ()
+    coordinates = velocities = units = velocity_units = ()
     neutral = groups = ()
 
     def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:

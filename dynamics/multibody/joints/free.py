@@ -23,9 +23,11 @@ class Free(SpatialJoint):
     urdf = "floating"
     coordinates = ("x", "y", "z", *quaternion.NAMES)
     velocities = ("vx", "vy", "vz", "wx", "wy", "wz")
-    units = ("m", "m", "m", "", "", "", "")
+    units = ("m", "m", "m", *quaternion.UNITS)
+    velocity_units = ("m/s", "m/s", "m/s", "rad/s", "rad/s", "rad/s")
     neutral = (0.0, 0.0, 0.0, *quaternion.NEUTRAL)
     groups = (0, 1, 2, 3, 3, 3, 3)
+    sliding = 3
 
     def rotation(self, q: Sequence[Node]) -> NodeMatrix:
         """That of the quaternion."""

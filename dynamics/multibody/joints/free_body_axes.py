@@ -17,6 +17,7 @@ class FreeBodyAxes(Free):
 
     kind = "free (body axes)"
     mjcf = urdf = ""
+    sliding = 0
     geared = False  # of a velocity in axes that turn, it would be a mass
 
     def linear_velocity(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:

@@ -23,7 +23,8 @@ class JointType(ABC):
     have an inertia of their own, an armature.  pitched: whether it needs a `Joint.pitch`, see `with_pitch`.
     sprung: whether it can have a spring.
     coordinates, velocities: what they are called after the joint's name; "" of a single one, which has the joint's.
-    units: of the coordinates.  neutral: the coordinates where the body stands at the joint.
+    units, velocity_units: of the coordinates, "1" of those without, and of the velocities.
+    neutral: the coordinates where the body stands at the joint.
     groups: for each coordinate a number, the same for those that are one quantity.
     """
 
@@ -38,6 +39,7 @@ class JointType(ABC):
     coordinates: tuple[str, ...] = ("",)
     velocities: tuple[str, ...] = ("",)
     units: tuple[str, ...] = ("rad",)
+    velocity_units: tuple[str, ...] = ("rad/s",)
     neutral: tuple[float, ...] = (0.0,)
     groups: tuple[int, ...] = (0,)
 
@@ -102,7 +104,13 @@ class AxialJoint(JointType):
 
 
 class SpatialJoint(JointType):
-    """A joint of several freedoms. Its motion is in the body's axes where nothing else is said."""
+    """A joint of several freedoms. Its motion is in the body's axes where nothing else is said.
+
+    sliding: how many of the velocities, the first ones, move the body along the joint's axes, one after another. The
+    others are along axes that turn with the body.
+    """
+
+    sliding = 0
 
     @abstractmethod
     def rotation(self, q: Sequence[Node]) -> NodeMatrix:

@@ -18,6 +18,7 @@ class Prismatic(AxialJoint):
     urdf = "prismatic"
     turns = False
     units = ("m",)
+    velocity_units = ("m/s",)
     limited = True
 
     def shift(self, x: Node) -> Node:

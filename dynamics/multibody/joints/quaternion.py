@@ -11,6 +11,7 @@ from ..spatial import Triple, cross
 from .joint_type import NodeMatrix
 
 NAMES = ("qw", "qx", "qy", "qz")
+UNITS = ("1", "1", "1", "1")
 NEUTRAL = (1.0, 0.0, 0.0, 0.0)
 _HALVINGS, _TERMS = 3, 9  # tan(pi / 32)^2 to the power 9, over 19: below 1e-19
 

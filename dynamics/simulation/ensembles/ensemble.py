@@ -67,7 +67,8 @@ class Ensemble:
     """Many motions of one model, as `simulate_many` gives them.
 
     q[k] is what trajectory k alone would have, (T, nq), in one piece of memory, as in MuJoCo's rollout and a vmap. From
-    where a state of a trajectory was not finite on its rows are NaN.
+    where a state of a trajectory was not finite on its rows are NaN. It keeps states alone: accelerations, and the
+    multipliers of constraints, are outputs of `forward_dynamics` at q[k], qd[k], see `arrays_at`.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from cgraph.extend import Call, Factor, Map, Solve, Statement, Sum, While
 from ...integrators.elementwise import SAME
 from .iteration import ADDED, until_settled
 from .products import Products
-from .single_assignment import Assignment, fresh
+from .single_assignment import Assignment, fresh, require_no_shared
 
 
 class Adjoint:
@@ -93,6 +93,8 @@ class Adjoint:
     def _map(self, statement: Map) -> None:
         seeded = self._seeded(statement.outputs)
         seeds = [self.bars[statement.outputs[k]] for k in seeded]
+        if seeded:
+            require_no_shared(statement)
         self._elements(statement, self.lengths[statement.outputs[0]], seeded, seeds)
 
     def _sum(self, statement: Sum) -> None:

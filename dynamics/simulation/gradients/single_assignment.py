@@ -58,9 +58,12 @@ class Assigned:
 
     def _assigned(self, statement: Statement) -> Assignment:
         match statement:
-            case Call() | Map():
+            case Call():
                 inputs = self._read(statement.inputs)
-                return Assignment(type(statement)(statement.graph, inputs, self._written(statement.outputs)))
+                return Assignment(Call(statement.graph, inputs, self._written(statement.outputs)))
+            case Map():
+                inputs, shared = self._read(statement.inputs), self._read(statement.shared)
+                return Assignment(Map(statement.graph, inputs, self._written(statement.outputs), shared))
             case Sum():
                 inputs = self._read(statement.inputs)
                 return Assignment(Sum(statement.graph, inputs, self._write(statement.output)))
@@ -94,8 +97,11 @@ class Assigned:
     def _in_place(self, statement: Statement) -> Statement:
         """With the registers of now, which it also writes."""
         match statement:
-            case Call() | Map():
-                return type(statement)(statement.graph, self._read(statement.inputs), self._read(statement.outputs))
+            case Call():
+                return Call(statement.graph, self._read(statement.inputs), self._read(statement.outputs))
+            case Map():
+                inputs, outputs = self._read(statement.inputs), self._read(statement.outputs)
+                return Map(statement.graph, inputs, outputs, self._read(statement.shared))
             case Sum():
                 return Sum(statement.graph, self._read(statement.inputs), self.now(statement.output))
             case Solve():
@@ -111,11 +117,19 @@ def fresh(lengths: dict[str, int], name: str, length: int) -> str:
     return f"{stem}@{number}"
 
 
+def require_no_shared(statement: Map) -> None:
+    """Raises TypeError for a Map with shared registers, of which there are no derivatives."""
+    if statement.shared:
+        raise TypeError(f"a Map with shared registers, {', '.join(statement.shared)}, has no derivatives here")
+
+
 def reads_and_writes(statement: Statement) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """The registers that a statement reads, and those that it writes."""
     match statement:
-        case Call() | Map():
+        case Call():
             return statement.inputs, statement.outputs
+        case Map():
+            return (*statement.shared, *statement.inputs), statement.outputs
         case Sum():
             return statement.inputs, (statement.output,)
         case Factor():

@@ -11,7 +11,7 @@ from cgraph.extend import Call, Factor, Map, Solve, Statement, Sum, While
 from ...integrators.elementwise import SAME
 from .iteration import until_settled
 from .products import Products
-from .single_assignment import Assignment, fresh, reads_and_writes
+from .single_assignment import Assignment, fresh, reads_and_writes, require_no_shared
 
 
 class Tangent:
@@ -74,7 +74,9 @@ class Tangent:
         return product.graph, (*inputs, *[self.dots[inputs[k]] for k in moving]), product.kept
 
     def _map(self, statement: Map) -> None:
-        if self._moving(statement.inputs) and not self.active.isdisjoint(statement.outputs):
+        inputs = (*statement.shared, *statement.inputs)
+        if self._moving(inputs) and not self.active.isdisjoint(statement.outputs):
+            require_no_shared(statement)
             graph, inputs, kept = self._elements(statement.inputs, statement.graph)
             if kept:
                 self.statements.append(Map(graph, inputs, tuple([self._dot(statement.outputs[k]) for k in kept])))

@@ -23,7 +23,7 @@ def test_random_graphs_use_every_operation_and_share_nodes():
     """Test the tests: the properties below are tried on all that the table offers."""
     seen: list[cg.Graph] = []
 
-    @settings(max_examples=300)
+    @settings(max_examples=150)
     @given(cases())
     def draw(case: Case) -> None:
         seen.append(case.graph)

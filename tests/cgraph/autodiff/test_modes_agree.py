@@ -6,12 +6,14 @@ on all paths that count are finite, the derivative is the sum of their products,
 
 import math
 from typing import NamedTuple
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 from hypothesis import assume, given, strategies as st
 
 import cgraph as cg
+from cgraph.codegen import differentiable
 from cgraph.core.node import OPS, apply
 from cgraph.extend import cotangents
 from tests.tolerances import LONG_SUM
@@ -87,6 +89,11 @@ def every_jacobian(graph: cg.Graph, point: dict[str, float]) -> dict[str, np.nda
         return values(derived, dict(zip(derived.input_names[n:], unit.tolist(), strict=True)))
 
     tall = cg.Graph(graph.inputs, {**graph.outputs, **{f"more{k}": cg.exp(v) for k, v in enumerate(graph.inputs)}})
+    compiled, in_lanes = cg.compile(graph, "python"), cg.compile(graph, "python")
+    compiled.vector_cost, in_lanes.vector_cost = math.inf, 0
+    x = list(point.values())
+    with patch.object(differentiable, "CHECK", -1):  # guarded only where a slope is infinite
+        in_lanes.jacobian(x)
     one_by_one = [cg.Graph(graph.inputs, {name: node}) for name, node in graph.outputs.items()]
     return {
         "jvp": np.array([seeded(cg.jvp(graph), unit) for unit in columns]).T,
@@ -94,6 +101,10 @@ def every_jacobian(graph: cg.Graph, point: dict[str, float]) -> dict[str, np.nda
         "vjp": np.array([seeded(cg.vjp(graph), unit) for unit in rows]),
         "jacobian": np.reshape(values(cg.jacobian(graph)), (m, n)),
         "jacobian, forward": np.reshape(values(cg.jacobian(tall)), (-1, n))[:m],
+        "jvp, compiled": compiled.jvp(x, columns).T,
+        "vjp, compiled": compiled.vjp(x, rows),
+        "jacobian, compiled": compiled.jacobian(x),
+        "jacobian, in lanes": in_lanes.jacobian(x),
         "gradient": np.array([values(cg.gradient(each)) for each in one_by_one]),
     }
 
@@ -102,8 +113,10 @@ def assert_one_jacobian(graph: cg.Graph, point: dict[str, float]) -> None:
     total, size, tame = sums_over_paths(graph, point)
     every = cg.Graph(graph.inputs, {str(k): node for k, node in enumerate(graph.nodes)}).evaluate(point)
     finite = all(map(math.isfinite, every.values()))
+    m, n = len(graph.outputs), len(graph.inputs)
+    seeds = {"jvp": n, "vjp": m, "jvp, compiled": n, "vjp, compiled": m, "jacobian, in lanes": max(m, n)}
     for name, found in every_jacobian(graph, point).items():
-        if not finite and {"jvp": len(graph.inputs), "vjp": len(graph.outputs)}.get(name, 1) > 1:
+        if not finite and seeds.get(name, 1) > 1:
             continue  # a zero in the seed wins over a slope that is infinite, not over a value
         assert near(found, total, size, tame), f"{name}: {found}, not {total} where {tame}\n{graph.listing()}"
 

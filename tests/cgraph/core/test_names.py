@@ -34,7 +34,7 @@ def weighted(names, outputs):
 
 
 @given(st.lists(NAMES, min_size=1, max_size=8, unique=True), st.lists(NAMES, min_size=1, max_size=3, unique=True))
-@settings(max_examples=20)
+@settings(max_examples=10)
 def test_generated_code_goes_by_position_whatever_the_names(names, outputs):
     graph = weighted(names, outputs)
     point = [3.0**i for i in range(len(names))]

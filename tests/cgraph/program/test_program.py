@@ -80,6 +80,22 @@ def test_registers_that_are_read_and_written(backend: str) -> None:
     assert run.run(run.memory({"x": [1, 2, 3], "y": [4, 5, 6]}), 1).rows.tolist() == [[4, 5, 6, 1, 2, 3]]
 
 
+@pytest.mark.parametrize("count", [1, 3, 8, 19])
+def test_registers_that_every_element_shares(backend: str, count: int) -> None:
+    a, b, c, x, h = cg.variables("a b c x h")
+    graph = cg.Graph([a, b, c, x, h], {"u": (a + b * x) * h, "v": c - x})
+    registers = {"ab": 2, "c": 1, "x": count, "h": 1, "u": count, "v": count}
+    program = Program(registers, [Map(graph, ("x", "h"), ("u", "v"), shared=("ab", "c"))], record=["u", "v"])
+    run, elements = runner(program, backend, fma=False), np.arange(count) + 0.5
+    start = {"ab": [2.0, 3.0], "c": 7.0, "x": elements, "h": 0.25}
+    expected = [*((2.0 + 3.0 * elements) * 0.25), *(7.0 - elements)]
+    assert run.run(run.memory(start), 1).rows[0].tolist() == expected
+    memories = run.memory({"ab": [[2.0, 2.0], [3.0, 0.0]], "c": 7.0, "x": np.tile(elements, (2, 1)).T, "h": 0.25}, 2)
+    both = run.run_many(memories, 1).rows[0]
+    assert both[:, 0].tolist() == expected
+    assert both[:count, 1].tolist() == [0.5] * count
+
+
 def test_sum_adds_from_the_first_to_the_last(backend: str) -> None:
     a, s = cg.variables("a s")
     program = Program({"a": 4, "s": 1, "o": 1}, [Sum(cg.Graph([a, s], {"o": a * s}), ("a", "s"), "o")], record=["o"])
@@ -199,6 +215,8 @@ ONE = cg.Graph([cg.variable("a")], {"o": -cg.variable("a")})
         ({"a": 1, "b": 2}, [Call(ONE, ("a",), ("b",))], "needs 1 outputs, the registers b hold 2"),
         ({"a": 2, "b": 3}, [Map(ONE, ("a",), ("b",))], "register 'a' needs length 3 or 1, got 2"),
         ({"a": 2, "b": 3}, [Map(ONE, ("a", "b"), ("b",))], "needs 1 registers, got 2: a, b"),
+        ({"a": 2, "b": 3}, [Map(ONE, (), ("b",), shared=("a",))], "has 1 inputs, the shared registers hold 2"),
+        ({"b": 3}, [Map(ONE, (), ("b",), shared=("a",))], "names register 'a', not among b"),
         ({"a": 2, "b": 3}, [Sum(ONE, ("a",), "b")], "needs register 'b' to have length 1, got 3"),
         ({"a": 2}, [While("a", ())], "While needs register 'a' to have length 1, got 2"),
         ({"a": 2}, [If("a", ())], "If needs register 'a' to have length 1, got 2"),

@@ -10,6 +10,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from viz import cli
 
 
 def plane(q: Any, qd: Any, t: Any) -> Any:
@@ -55,6 +56,38 @@ def test_integrability_is_not_judged_of_rows_that_depend_on_time() -> None:
         dyn.integrable_rows(moving)
 
 
+def test_the_lint_tells_vakonomic_from_nonholonomic() -> None:
+    found = dyn.lint_constraints(sleigh())
+    assert found.ok
+    assert "'blade' is not integrable (nonholonomic)" in str(found)
+
+    def action(q: Any, qd: Any, t: Any) -> Any:
+        along, across = qd[0] - 0.5 * cg.cos(q[2]) * qd[3], qd[1] - 0.5 * cg.sin(q[2]) * qd[3]
+        return plane(q, qd, t) + 0.1 * qd[3] ** 2 + q[4] * along + 0.2 * q[5] * across - 0.5 * q[6] ** 2
+
+    mixed = dyn.lint_constraints(dyn.System(action, "x y heading roll mu nu other"))  # a coin
+    assert mixed.vakonomic == {"mu": True, "nu": True}
+    assert not mixed.ok
+    assert "coordinate 'mu' is a multiplier in L of a row that is not integrable" in str(mixed)
+    alone = dyn.System(lambda q, qd, t: plane(q, qd, t) + q[3] * (qd[0] - 0.5 * qd[2]), "x y angle nu")
+    assert dyn.lint_constraints(alone).vakonomic == {"nu": False}
+
+    def rows(q: Any, qd: Any, t: Any) -> Any:
+        return {"belt": qd[0] - t, "rail": qd[1] - q[2] * qd[2]}
+
+    timed = dyn.lint_constraints(dyn.System(plane, "x y a", velocity_constraints=rows))
+    assert timed.integrable == {"belt": None, "rail": True}
+    assert "'belt' depends on time, and is not judged" in str(timed)
+    assert str(dyn.lint_constraints(dyn.planar_arm([1.0], [1.0]))) == ""
+
+
+def test_the_command_line_says_so(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    scene = dyn.Scene("sleigh", "a blade", sleigh(), (0.0,) * 3, (0.0,) * 3, 1.0)
+    monkeypatch.setattr("viz.commands.lint.scene_of", lambda options: scene)
+    assert cli.main(["lint", "sleigh"]) == 0
+    assert "velocity constraint 'blade' is not integrable" in capsys.readouterr().out
+
+
 def test_integrable_rows_of_velocities_are_told_from_others() -> None:
     """Rates of functions, also times a factor, or only together; a rolling coin is neither."""
 
@@ -91,9 +124,14 @@ def test_brackets_of_quasi_velocities_count() -> None:
     assert dyn.integrable_rows(held(2)) == {"z": True, "y": True}
 
 
+def moving_wall() -> dyn.System:
+    """x = sin(w t)."""
+    return dyn.System(plane, "x y a", {"w": 3.0}, constraints=lambda q, t, p: {"wall": q[0] - cg.sin(p["w"] * t)})
+
+
 def test_a_moving_wall_drives() -> None:
-    """x = sin(w t): acceleration, force, and a start on the wall's velocity."""
-    driven = dyn.System(plane, "x y a", {"w": 3.0}, constraints=lambda q, t, p: {"wall": q[0] - cg.sin(p["w"] * t)})
+    """Acceleration, force, and a start on the wall's velocity."""
+    driven = moving_wall()
     at = {f"{kind}{i}": 0.0 for kind in ("q", "qd", "tau") for i in range(3)} | {"t": 0.3, "w": 3.0}
     found = dyn.forward_dynamics(driven).evaluate(at)
     assert found["qdd0"] == pytest.approx(-9.0 * math.sin(0.9), rel=1e-14)
@@ -140,13 +178,17 @@ def test_info_names_the_constraint_that_says_nothing_new_at_a_state() -> None:
         dyn.raise_if_singular(held, info)
 
 
-def test_a_coordinate_without_inertia_may_be_held_by_a_constraint() -> None:
-    """A rope over two pulleys: the hook y between masses has none, and 2 y = x - z."""
+def pulleys() -> dyn.System:
+    """A rope over two pulleys: the hook y between masses has no inertia, and 2 y = x - z."""
 
     def energy(q: Any, qd: Any, t: Any) -> Any:
         return 0.5 * (2.0 * qd[0] ** 2 + 3.0 * qd[2] ** 2) - 9.81 * (2.0 * q[0] + 3.0 * q[2])
 
-    rope = dyn.System(energy, "x hook z", constraints=lambda q, t: {"rope": 2.0 * q[1] - q[0] + q[2]})
+    return dyn.System(energy, "x hook z", constraints=lambda q, t: {"rope": 2.0 * q[1] - q[0] + q[2]})
+
+
+def test_a_coordinate_without_inertia_may_be_held_by_a_constraint() -> None:
+    rope = pulleys()
     at = {f"{kind}{i}": 0.0 for kind in ("q", "qd", "tau") for i in range(3)}
     found = dyn.forward_dynamics(rope).evaluate(at | {"tau1": 4.0})
     assert [found[name] for name in ("qdd0", "qdd2", "lambda0")] == pytest.approx([-8.81, -9.81 - 2.0 / 3.0, -2.0])
@@ -179,12 +221,13 @@ def test_what_constraints_cannot_be_is_said() -> None:
         dyn.System(plane, "x y a", **twice)
 
 
-def test_what_does_not_know_constraints_refuses() -> None:
-    system = sleigh()
-    for use in (
-        lambda: dyn.state_space(system),
-        lambda: dyn.certify(system),
-        lambda: dyn.simulate(system, [0.0] * 3, [0.0] * 3, 1.0, "verlet"),
-    ):
-        with pytest.raises(ValueError, match="does not know constraints yet; 'blade' holds this system"):
-            use()
+def test_symplectic_methods_step_the_state_of_what_is_held_or_say_that_they_cannot() -> None:
+    rod = dyn.System(plane, "x y a", constraints=lambda q, t: {"rod": q[0] ** 2 + q[1] ** 2 - 1.0})
+    start = dyn.consistent_state(rod, [1.0, 0.0, 0.0], [0.0, 1.0, 1.0])
+    run = dyn.simulate(rod, *start, 20.0, "gauss4", dt=0.02)
+    assert np.abs(np.hypot(run.q[:, 0], run.q[:, 1]) - 1.0).max() < 1e-15
+    early, late = run.energy[:500], run.energy[500:]
+    assert np.ptp(late) < 1.2 * np.ptp(early) < 1e-4  # no drift
+    for method in ("verlet", "symplectic_euler"):
+        with pytest.raises(ValueError, match="constraint 'blade' holds both: take 'midpoint', 'gauss4' or 'dop853'"):
+            dyn.simulate(sleigh(), [0.0] * 3, [0.0] * 3, 0.1, method)

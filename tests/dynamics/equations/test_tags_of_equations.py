@@ -13,6 +13,7 @@ MODELS = {name: lambda name=name: dyn.scenes.load(name) for name in dyn.scenes.n
 MODELS |= {"turned": lambda: turned_arm(3), "mixed": lambda: FAMILIES["mixed"](3)}
 GRAPHS = {name: lambda model, name=name: dyn.inverse_dynamics(model, name) for name in dyn.FORMULATIONS}
 GRAPHS |= {name: lambda model, name=name: dyn.forward_dynamics(model, name) for name in SOLUTIONS}
+GRAPHS |= {"derivatives": dyn.inverse_dynamics_derivatives}
 
 
 def untagged(graph: cg.Graph) -> list[cg.Node]:
@@ -38,6 +39,13 @@ def test_every_gravity_force_is_made_of_products_that_come_of_the_potential() ->
     for name, node in graph.outputs.items():
         nodes = cg.Graph(graph.inputs, {name: node}).nodes
         assert [each for each in nodes if each.op.name == "mul" and "potential" in each.tags]
+
+
+def test_derivatives_say_whose_they_are() -> None:
+    graph = dyn.inverse_dynamics_derivatives(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7]))
+    for name, bodies in (("M_1_1", {"link 3"}), ("dtau_dqd_1_1", {"link 3"}), ("dtau_dq_2_0", {"link 3"})):
+        tags = set().union(*[node.tags for node in cg.Graph(graph.inputs, {name: graph.outputs[name]}).nodes])
+        assert bodies | {"kinetic"} <= tags
 
 
 def test_without_gravity_nothing_comes_of_the_potential() -> None:

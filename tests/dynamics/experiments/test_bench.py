@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from copy import deepcopy
 from functools import partial
 
 import numpy as np
@@ -13,7 +14,7 @@ from cgraph.extend import ldl_elimination
 from dynamics.experiments.machine import machine
 from dynamics.experiments.speed import bench as module
 from dynamics.experiments.speed.bench import MODES, PEERS, TASKS, Cell, Row, WorkerPool, bench
-from dynamics.experiments.speed.bench_scenes import SCENES, load
+from dynamics.experiments.speed.bench_scenes import SCENES, free_tree, load
 from dynamics.experiments.speed.bench_table import tables
 from dynamics.experiments.speed.worker import Prepared, Refused, Worker
 from dynamics.experiments.text_table import digits
@@ -129,6 +130,34 @@ def test_a_peer_knows_springs_armature_slides_and_the_order_of_joints(name, task
     assert difference(found, Reference(case).value(task, x), x if task == "rk4" else 0.0) < ROUNDING
 
 
+@pytest.fixture(scope="module")
+def floating():
+    """A free base with a limb of two links, and the results of our code without LLVM at the states of a batch."""
+    case = Case("free", free_tree(8))
+    return case, {task: prepared("ours-numpy", case, task, "batch")[1] for task in TASKS}
+
+
+@pytest.mark.parametrize(
+    ("name", "task", "mode"),
+    [each.values for each in OFFERED if each.values[2] != "loop" and each.values[0] != "jax"]
+    + [pytest.param("jax", task, "batch", marks=pytest.mark.slow) for task in ("inverse", "forward")],
+)
+def test_a_peer_moves_a_free_base_as_we_do(name, task, mode, floating):
+    case, ours = floating
+    if name in ("heyoka", "sympy", "torch") or (name, task) == ("pinocchio", "rk4"):
+        with pytest.raises(UnavailableError, match="rates of"):
+            prepared(name, case, task, mode)
+        return
+    x = case.points(task)
+    if mode == "batch":
+        found, expected = prepared(name, case, task, mode)[1], ours[task]
+    else:
+        case = deepcopy(case)
+        case.point = lambda task: case.points(task)[:, 0].copy()
+        found, expected, x = prepared(name, case, task, mode)[1], ours[task][:, 0], x[:, 0]
+    assert difference(found, expected, x if task == "rk4" else 0.0) < ROUNDING
+
+
 @pytest.mark.parametrize("name", [name for name in PEERS if name != "torch"])
 def test_a_peer_takes_parameters_and_applied_forces(name):
     system = dyn.System(
@@ -163,18 +192,6 @@ def test_the_dense_solve_finds_what_numpy_finds():
     assert np.array(ldl_elimination(a, b)[0]) == pytest.approx(np.linalg.solve(a, b), rel=DENSE)
 
 
-def test_a_worker_answers_and_is_timed():
-    worker = Worker(partial(load, "planar 3"), "ours")
-    try:
-        answer = worker.prepare("forward", "call", budget=PATIENT)
-        assert isinstance(answer, Prepared)
-        assert answer.values.shape == (3,)
-        assert worker.turn("forward", "call") > 0.0
-    finally:
-        worker.end()
-    assert not worker.alive
-
-
 def test_a_worker_that_is_late_is_ended_and_not_asked_for_what_contains_the_same():
     late: dict[str, str] = {}
     pool, skipped = WorkerPool(partial(load, "planar 3"), ["ours"], 1e-3, late), {}
@@ -186,9 +203,12 @@ def test_a_worker_that_is_late_is_ended_and_not_asked_for_what_contains_the_same
 
 
 @pytest.mark.parametrize("gone", [False, True])  # the pipe breaks at the answer, or already at the question
-def test_a_worker_that_dies_is_told(gone):
+def test_a_worker_answers_and_is_timed_and_if_it_dies_it_is_told(gone):
     worker = Worker(partial(load, "planar 3"), "ours")
-    assert isinstance(worker.prepare("forward", "call", budget=PATIENT), Prepared)
+    answer = worker.prepare("forward", "call", budget=PATIENT)
+    assert isinstance(answer, Prepared)
+    assert answer.values.shape == (3,)
+    assert worker.turn("forward", "call") > 0.0
     worker._process.kill()
     if gone:
         worker._process.join()
@@ -203,8 +223,10 @@ def test_what_a_peer_s_own_code_raises_is_a_reason():
     pytest.importorskip("mujoco")
     try:
         assert worker.prepare("forward", "call", 60.0) == Refused("takes rigid bodies, not a Lagrangian")
+        assert worker.alive
     finally:
         worker.end()
+    assert not worker.alive
 
 
 @pytest.mark.parametrize(

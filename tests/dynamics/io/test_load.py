@@ -225,6 +225,7 @@ def test_bad_mjcf_is_one_sentence(text: str, tmp_path: Path) -> None:
 BALL = f'<body name="b"><joint name="ball" type="ball" stiffness="2"/>{INERTIAL}</body>'
 FREE = f'<body name="f" pos="0 0 2"><freejoint name="root"/>{INERTIAL}{HINGE}</body>'
 TENDON = '<tendon><fixed name="string" stiffness="3"><joint joint="j" coef="1"/></fixed></tendon>'
+HELD_TENDON = TENDON.replace(' stiffness="3"', "") + '<equality><tendon tendon1="string"/></equality>'
 NOT_MODELLED = [
     param(
         mjcf(BALL.replace('type="ball"', 'type="free"')),
@@ -237,8 +238,8 @@ NOT_MODELLED = [
         id="tendon",
     ),
     param(
-        mjcf(HINGE, '<equality><joint joint1="j" polycoef="0.1 0 0 0 0"/></equality>'),
-        "equality constraints (1)",
+        mjcf(HINGE).replace("</mujoco>", f"{HELD_TENDON}</mujoco>"),
+        "equality constraints of the type tendon (number 0)",
         id="equality",
     ),
     param(mjcf(HINGE, '<option density="1.2"/>'), "a fluid (density or viscosity)", id="fluid"),

@@ -90,6 +90,29 @@ def test_what_is_taken_is_not_left_out_and_the_rest_is() -> None:
     assert (off.forces, off.left_out) == ((), ())
 
 
+SEVERAL = """<orientation name="many" joint="ball" kp="5"/><pid name="pid" joint="one" kp="3" velrange="0.2 1"/>
+<motor name="least" joint="one" gear="7" ctrlrange="0.5 1" ctrllimited="true"/><motor joint="one" gear="2"/>"""
+
+
+def test_actuators_after_one_of_several_inputs_keep_their_numbers() -> None:
+    """Ranges of inputs and gears are arrays of inputs and outputs, of which an actuator may have several."""
+    mujoco = pytest.importorskip("mujoco")
+    if not hasattr(mujoco.mjtGain, "mjGAIN_SO3"):
+        pytest.skip("before 3.12 MuJoCo has one input for each actuator")
+    inertial = '<inertial pos="0 0 0.1" mass="1" diaginertia="0.1 0.2 0.3"/>'
+    bodies = f'<body><joint name="ball" type="ball"/>{inertial}<body><joint name="one"/>{inertial}</body></body>'
+    text = f"<mujoco><worldbody>{bodies}</worldbody><actuator>{SEVERAL}</actuator></mujoco>"
+    said = "many: so3, pid: -3 length input at least 0.2"
+    with pytest.warns(dyn.MechanismWarning, match="left out"):
+        none = dyn.load_mjcf(text)
+    least = "least: input at least 0.5 times gear 7"
+    assert none.left_out == ("actuators (1)", f"actuators that act with no input ({said}, {least})")
+    model = silently(text, actuators=True)
+    assert model.left_out == (f"actuators that act with no input ({said})",)
+    motors = [force for force in model.forces if isinstance(force, dyn.Actuator)]
+    assert [(motor.gear, motor.input_range) for motor in motors] == [(7.0, (0.5, 1.0)), (2.0, None)]
+
+
 def test_limits_and_friction_of_a_urdf() -> None:
     with pytest.warns(dyn.MechanismWarning, match="joint limits .hinge.; friction loss"):
         dyn.load_urdf(ROBOT)

@@ -15,6 +15,7 @@ import dynamics as dyn
 from dynamics.io.mujoco_twin import MujocoTwin
 from dynamics.io.stand_ins import STAND_IN
 from dynamics.multibody.joints import AxialJoint
+from dynamics.multibody.loops import Loop
 from dynamics.multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
 from tests.dynamics.mechanisms import FAMILIES, random_inertia, random_rotation
 
@@ -66,6 +67,52 @@ def random_tree(seed: int, geared: bool) -> Mechanism:
     return Mechanism([*bodies, replace(tip, inertia=kilogram * meter**2 * random_inertia(rng))], rng.normal(size=3))
 
 
+def random_loops(tree: Mechanism, seed: int, whole: bool) -> Mechanism:
+    """The tree with joints that follow earlier ones, and with free bodies that are held to some of its bodies.
+
+    whole: most have polynomials and bodies that are held; else few, and for URDF they are too many.
+    """
+    rng = np.random.default_rng((seed, 1))
+    whole = whole or rng.uniform() < 0.1
+    meter = float(np.abs(tree.parts[-1].center).max())
+    bodies, loops = [*tree.bodies], []
+    single = [body.name for body in tree.moving if len(body.joint.type.coordinates) == 1]
+    for k, follower in enumerate(single[1:], 1):
+        if rng.uniform() < 0.5:
+            leader = single[rng.integers(k)]
+            line = rng.normal(size=rng.choice([2, 5 if whole else 2])).tolist()
+            loops.append(Loop("coupling", follower, leader, coefficients=line, name=str(rng.choice(["", f"<{k}>"]))))
+    if len(single) > 1 and not loops:
+        loops.append(Loop("coupling", single[0], coefficients=[rng.normal()]))
+    for k in range(int(rng.integers(3)) * whole):
+        kind, held = str(rng.choice(["point", "weld", "hinge"], p=(0.45, 0.45, 0.1))), f"held {k}"
+        bodies.append(replace(tree.parts[-1], name=held, joint=Joint("free"), parent=WORLD))
+        at, to_at = meter * rng.normal(size=(2, 3))
+        to = str(rng.choice([body.name for body in tree.bodies] + [WORLD]))
+        ends = (held, to) if to == WORLD or rng.uniform() < 0.5 else (to, held)
+        loops.append(Loop(kind, *ends, at, to_at, orientation=random_rotation(rng), name=f"loop {k}"))
+    return Mechanism(bodies, tree.gravity, loops=loops)
+
+
+def other_loops(one: Mechanism, other: Mechanism) -> str:
+    """The first loop that is not the same in two mechanisms; "" for none. A <mimic> has no name."""
+    if len(one.loops) != len(other.loops):
+        return "the number of loops"
+    theirs = {(loop.body, loop.to, loop.kind): loop for loop in other.loops}
+    for a in one.loops:
+        b = theirs[a.body, a.to, a.kind]
+        turns = [np.asarray(loop.orientation) * (loop.kind == "weld") for loop in (a, b)]
+        same = (
+            np.array_equal(a.at, b.at)
+            and np.array_equal(a.to_at, b.to_at)
+            and np.abs(turns[0] - turns[1]).max() <= TURNED
+        )
+        same &= a.kind != "coupling" or [*a.coefficients] == [*b.coefficients]
+        if not same:
+            return f"{a} and {b}"
+    return ""
+
+
 def difference(one: Mechanism, other: Mechanism) -> str:
     """What is not the same in two mechanisms; "" for nothing."""
     if np.asarray(one.gravity).tolist() != np.asarray(other.gravity).tolist():
@@ -90,18 +137,20 @@ def difference(one: Mechanism, other: Mechanism) -> str:
     return ""
 
 
-def outcomes(writer: str, seeds: range) -> dict[str, list[Any]]:
-    """Seeds of the trees that came back, that were refused and that were altered."""
+def outcomes(writer: str, seeds: range, *, closed: bool = False) -> dict[str, list[Any]]:
+    """Seeds of the trees that came back, that were refused and that were altered.  closed: with loops."""
     write, load = WRITERS[writer]
     found: dict[str, list[Any]] = {"same": [], "refused": [], "altered": []}
     for seed in seeds:
         mechanism = random_tree(seed, geared=writer == "mjcf" and seed % 2 > 0)
+        mechanism = random_loops(mechanism, seed, writer == "mjcf") if closed else mechanism
         try:
             text = write(mechanism)
         except MechanismError as error:
             found["refused"].append((seed, str(error)))
             continue
-        what = difference(mechanism, load(text))
+        back = load(text)
+        what = difference(mechanism, back) or other_loops(mechanism, back)
         found["altered" if what else "same"].append((seed, what))
     return found
 
@@ -119,6 +168,43 @@ def test_random_trees_come_back_or_are_refused(writer: str, count: int, record_p
     assert len(found["same"]) > count // 4
     of_urdf = [sentence.startswith("URDF has no joint of the kind") for _, sentence in found["refused"]]
     assert writer == "mjcf" or all(of_urdf)
+
+
+@writers
+@mark.filterwarnings("ignore:MuJoCo on the given text. Inertia matrix is too close to singular")
+@mark.filterwarnings("ignore:the given text. left out softness:dynamics.MechanismWarning")
+@mark.parametrize("count", [4, pytest.param(200, marks=mark.slow)])
+def test_random_loops_come_back_or_are_refused(writer: str, count: int, record_property: Any) -> None:
+    if writer == "mjcf":
+        pytest.importorskip("mujoco")
+    found = outcomes(writer, range(count), closed=True)
+    record_property("refused", len(found["refused"]))
+    assert found["altered"] == []
+    assert not any("\n" in sentence for _, sentence in found["refused"])
+    assert len(found["same"]) >= max(1, count // 8)
+
+
+@mark.parametrize(
+    ("writer", "loops", "message"),
+    [
+        (
+            "mjcf",
+            [Loop("distance", "b", "a", length=1.0, name="rod")],
+            "MJCF has no loop of the kind 'distance', as is 'rod'",
+        ),
+        ("mjcf", [Loop("coupling", "b", "a", coefficients=[0, 1, 0, 0, 0, 2], name="cam")], "loop 'cam' is of more"),
+        ("mjcf", [Loop("coupling", "b", "c", name="gear")], "loop 'gear' couples that of 'c'"),
+        ("urdf", [Loop("point", "b", name="pin")], "URDF has no loop of the kind 'point', as is 'pin'"),
+        ("urdf", [Loop("coupling", "b", coefficients=[1.0], name="stop")], "holds one joint alone, as is 'stop'"),
+        ("urdf", [Loop("coupling", "b", "a", coefficients=[0, 0, 1])], "loop 'b to a' is of more"),
+        ("urdf", [Loop("coupling", "b", "a"), Loop("coupling", "b", "d")], "loop 'b to d' is the second of body 'b'"),
+        ("urdf", [Loop("coupling", "b", "a"), Loop("coupling", "a", "b")], "and with loop 'a to b' one does"),
+    ],
+)
+def test_a_loop_that_a_format_has_not_is_refused_by_name(writer: str, loops: list[Loop], message: str) -> None:
+    bodies = [Body(name, Joint("revolute"), inertia=(1.0, 1.0, 1.0)) for name in "abcd"]
+    with raises(MechanismError, match=re.escape(message)):
+        WRITERS[writer][0](Mechanism(bodies, loops=loops).lock("c", 0.3))
 
 
 @writers

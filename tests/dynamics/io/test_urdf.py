@@ -231,14 +231,6 @@ def test_what_acts_from_outside_is_left_out_with_a_warning() -> None:
     assert said[0].filename == __file__
 
 
-def test_a_joint_that_mimics_is_refused_or_left_out_by_name() -> None:
-    text = URDF.replace('<joint name="j2" type="continuous">', '<joint name="j2" type="continuous"><mimic joint="j1"/>')
-    what = "joints that mimic others (j2 after j1)"
-    with raises(MechanismError, match=re.escape(f"{what} (the option ignore leaves this out)") + "$"):
-        dyn.load_urdf(text)
-    assert dyn.load_urdf(text, ignore=True).left_out[0] == what
-
-
 @mark.parametrize(("taken", "called"), [("j", "base"), ("base", "base'")])
 def test_the_root_link_floats_on_request(taken: str, called: str) -> None:
     """Its joint has its name, or one that no other has; MuJoCo and Pinocchio find the same equations."""
@@ -299,6 +291,83 @@ def test_moments_below_rounding_of_the_mass_may_be_negative() -> None:
                 dyn.load_urdf(text)
 
 
+# --- joints that mimic others
+
+AXIS = '<axis xyz="0 1 0"/><origin xyz="0.1 0 0.2"/>'
+
+
+def fingers(**mimics: str) -> str:
+    """A knuckle and what follows it: an inner and an outer link, another finger on a slide, and a cap that is fixed."""
+    kinds = {"knuckle": "revolute", "inner": "continuous", "outer": "revolute", "slide": "prismatic", "cap": "fixed"}
+    parents = {"knuckle": "palm", "inner": "knuckle", "outer": "inner", "slide": "palm", "cap": "palm"}
+    links = [link(name, 0.3, 1e-3 * np.eye(3), '<origin xyz="0 0.02 0.05"/>') for name in ("palm", *kinds)]
+    joints = [
+        joint(f"{name} joint", kind, parents[name], name, AXIS + mimics.get(name, "")) for name, kind in kinds.items()
+    ]
+    return robot(*links, *joints)
+
+
+def mimic(leader: str, numbers: str = "") -> str:
+    return f'<mimic joint="{leader} joint" {numbers}/>'
+
+
+def test_joints_that_mimic_others_are_coupled() -> None:
+    """A chain of three and one on a slide, against the chain rule in the torque of a tree: one freedom is left."""
+    lines = {"inner": (-2.0, 0.1), "outer": (0.5, 0.0), "slide": (0.03, -0.01)}
+    leaders = {"inner": "knuckle", "outer": "inner", "slide": "knuckle"}
+    given = {name: f'multiplier="{a}" offset="{b}"' for name, (a, b) in lines.items()} | {"outer": 'multiplier="0.5"'}
+    loaded = dyn.load_urdf(fingers(**{name: mimic(leaders[name], given[name]) for name in lines}))
+    assert [loop.label for loop in loaded.loops] == ["inner to knuckle", "outer to inner", "slide to knuckle"]
+    order = [each.removesuffix(" joint") for each in loaded.coordinates]
+    ratio, start = {"knuckle": 1.0}, {"knuckle": 0.4}
+    for name, (a, b) in lines.items():
+        ratio[name], start[name] = a * ratio[leaders[name]], a * start[leaders[name]] + b
+    along, q = (np.array([each[name] for name in order]) for each in (ratio, start))
+    u, tau = 1.3 * along, np.array([0.3, -0.2, 0.1, 2.0])
+    at = {f"{kind}{i}": x for kind, row in (("q", q), ("qd", u), ("tau", tau)) for i, x in enumerate(row.tolist())}
+    tree = Mechanism(loaded.bodies)
+    mass, force = (
+        np.array(list(graph(tree).evaluate({name: at[name] for name in graph(tree).input_names}).values()))
+        for graph in (dyn.mass_matrix, dyn.bias)
+    )
+    expected = along @ (tau - force) / (along @ mass.reshape(4, 4) @ along)
+    found = dyn.forward_dynamics(loaded).evaluate(at)
+    assert [found[f"qdd{i}"] for i in range(4)] == approx((along * expected).tolist(), rel=1e-12)
+
+
+CANNOT = [
+    param(
+        {"inner": mimic("thumb")}, "joints that mimic one that is not there (inner joint after thumb joint)", id="none"
+    ),
+    param(
+        {"inner": mimic("outer"), "outer": mimic("inner"), "slide": mimic("inner")},
+        "joints that mimic one another in a circle (inner joint after outer joint, outer joint after inner joint)",
+        id="circle",
+    ),
+    param({"slide": mimic("slide")}, "one another in a circle (slide joint after slide joint)", id="itself"),
+    param(
+        {"inner": mimic("cap")},
+        "joints that mimic others where one of both has not one coordinate (inner joint after cap joint)",
+        id="fixed",
+    ),
+]
+
+
+@mark.parametrize(("mimics", "what"), CANNOT)
+def test_a_coupling_that_cannot_be_is_refused_or_left_out_by_name(mimics: dict[str, str], what: str) -> None:
+    with raises(MechanismError, match=re.escape(f"{what} (the option ignore leaves this out)") + "$"):
+        dyn.load_urdf(fingers(**mimics))
+    loaded = dyn.load_urdf(fingers(**mimics), ignore=True)
+    assert loaded.left_out[0].endswith(what)
+    assert len(loaded.loops) == len(mimics) - 1 - what.count(",")
+
+
+def test_a_fixed_joint_that_mimics_another_stays_fixed_and_is_said() -> None:
+    loaded = dyn.load_urdf(fingers(cap=mimic("knuckle"), inner=mimic("knuckle")))
+    assert loaded.left_out[-1] == "fixed joints that mimic others (cap joint after knuckle joint)"
+    assert [loop.body for loop in loaded.loops] == ["inner"]
+
+
 # --- what is wrong
 
 HINGE = joint("j", "continuous", "base", "a", '<axis xyz="0 0 1"/>')
@@ -324,6 +393,11 @@ WRONG = [
         robot(BASE, A, link("b"), joint("j", "fixed", "a", "b"), joint("k", "fixed", "b", "a")),
         "body 'a' is its own ancestor, by way of 'b'",
         id="circle",
+    ),
+    param(
+        fingers(inner=mimic("knuckle", 'multiplier="two"')),
+        "joint 'inner joint': multiplier of <mimic> needs one finite number, got 'two'",
+        id="multiplier",
     ),
     param(robot(BASE, A, HINGE.replace(' type="continuous"', "")), "joint 'j' has no type, and a mechanism", id="type"),
     param(robot(BASE, A, HINGE.replace("continuous", "screw")), "joint 'j' is screw, and a mechanism has", id="screw"),

@@ -170,7 +170,10 @@ def test_a_planar_joint_of_urdf() -> None:
         (dyn.Joint("revolute", second_axis=(1.0, 0.0, 0.0)), "'revolute' has no second axis"),
         (dyn.Joint("planar", damping=(0.1, 0.2)), "body 'b': damping must be one number, or 3 for x, y, angle, got"),
         (dyn.Joint("revolute", damping=(0.1,)), "body 'b': damping must be finite and at least 0, got"),
-        (dyn.Joint("universal", stiffness=(1.0, -2.0)), "body 'b': stiffness must be finite and at least 0, got -2.0"),
+        (
+            dyn.Joint("universal", stiffness=(1.0, -2.0)),
+            "body 'b': stiffness of the coordinate 'b.angle2' must be finite and at least 0, got -2.0",
+        ),
         (dyn.Joint("cylindrical", pitch=1.0), "only a screw has a pitch"),
     ],
 )
@@ -203,3 +206,45 @@ def test_a_mechanism_that_was_used_pickles() -> None:
     arm = dyn.Mechanism([dyn.Body("b", dyn.Joint("planar"), mass=1.0, inertia=(1.0, 1.0, 1.0))])
     graph = dyn.forward_dynamics(arm)
     assert cg.structure_hash(dyn.forward_dynamics(pickle.loads(pickle.dumps(arm)))) == cg.structure_hash(graph)
+
+
+WRONG = {
+    "position": (0.0, 1.0),
+    "orientation": np.ones((3, 3)),
+    "axis": (0.0, 0.0, 0.0),
+    "pitch": 1.0,
+    "name": "a\n",
+    "damping": -1.0,
+    "stiffness": math.nan,
+    "spring_reference": math.inf,
+    "armature": "no name",
+}
+
+
+def wrong(what: str, kind: str) -> object:
+    inertia = {"mass": 1.0, "center": (0.1, 0.2, 0.3), "inertia": (0.1, 0.2, 0.2)}
+    body = dyn.Body("b", dyn.Joint(kind, name="j", damping="c"), **inertia)
+    if what in WRONG:
+        return dyn.Mechanism([replace(body, joint=replace(body.joint, **{what: WRONG[what]}))], parameters={"c": 0.1})
+    if what == "parent":
+        return dyn.mass_matrix(dyn.Mechanism([replace(body, parent="nobody")], parameters={"c": 0.1}))
+    if what == "value":
+        return dyn.Mechanism([body], parameters={"c": -1.0})
+    if what == "bound":
+        return dyn.Mechanism([body], parameters={"c": 1.0}).bind({"c": -1.0})
+    if what == "force":
+        return dyn.Mechanism([body], parameters={"c": 1.0}, forces=[dyn.JointFriction("b", 1.0, 1.0)])
+    other = dyn.Body("other", dyn.Joint("revolute"), **inertia)
+    return dyn.Mechanism([body, other], parameters={"c": 1.0}, loops=[dyn.Loop("coupling", "b", "other")])
+
+
+@mark.parametrize("kind", KINDS)
+@mark.parametrize("what", [*WRONG, "parent", "value", "bound", "force", "coupling"])
+def test_what_is_wrong_with_a_joint_of_parts_is_said_of_the_body_and_its_coordinate(kind: str, what: str) -> None:
+    with raises(dyn.MechanismError) as caught:
+        wrong(what, kind)
+    said = str(caught.value)
+    assert "'b'" in said or "'b to other'" in said
+    assert "'b." not in said
+    of_one = what in (*SIZES, "value", "bound")
+    assert f"'j.{KINDS[kind][0]}'" in said or not of_one

@@ -16,6 +16,7 @@ from dynamics import Body, Force, Joint, Mechanism, MechanismError
 from dynamics.multibody.spatial import from_quaternion
 from tests.dynamics.mechanisms import FAMILIES, turned_arm
 from tests.dynamics.models import Array, at, error, inputs, run, states
+from tests.slow import slow
 from tests.tolerances import EQUATIONS, SHORT_SUM, SOLVED
 
 ROUNDING = 1e-12  # of the largest entry: two orders of summing the same few terms
@@ -62,7 +63,7 @@ def work(graphs: list[cg.Graph], q: Array, value: Array, torque: Array, step: fl
 
 
 @mark.parametrize("frame", ["world", "body"])
-@mark.parametrize("family", FAMILIES)
+@mark.parametrize("family", ["mixed", "welded", *slow("serial", "branched")])
 def test_a_force_does_the_virtual_work_of_its_point(family: str, frame: str) -> None:
     mechanism = FAMILIES[family](7)
     q = states(mechanism, 1)["q"][0]
@@ -74,7 +75,7 @@ def test_a_force_does_the_virtual_work_of_its_point(family: str, frame: str) -> 
         assert np.abs(ours - expected).max() < DIFFERENCES * np.abs(expected).max()
 
 
-@mark.parametrize("family", FAMILIES)
+@mark.parametrize("family", ["mixed", "welded", *slow("serial", "branched")])
 def test_a_force_at_every_centre_of_mass_is_gravity(family: str) -> None:
     """m a at the centre of each body, welded ones too, is what a further gravity a does; in every function."""
     mechanism, extra = FAMILIES[family](4), np.array([1.0, -2.0, 3.0])
@@ -159,8 +160,9 @@ def test_mujoco_s_applied_force_agrees(body: str, frame: str) -> None:
     compiled = [cg.compile(graph, "python") for graph in graphs]
     place = cg.compile(mechanism.position(body, HAND), "python")
     index = model.body(body).id
+    given_states = states(mechanism, 100)
     for row in range(100):
-        state = at(states(mechanism, 100), row)
+        state = at(given_states, row)
         rng = np.random.default_rng(row)
         value, torque = rng.normal(size=(2, 3))
         given = [[*state["q"], *state["qd"], *state["tau"], *(_ordered(graph, value, torque))] for graph in graphs]

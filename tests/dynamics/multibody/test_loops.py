@@ -11,6 +11,8 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics.equations.constraint_rank import independent_rows
+from dynamics.multibody.spatial import rotation
 
 from ..linkages import ACROSS, bar, four_bar, peaucellier, scaled_four_bar, squeezer, stewart_platform
 from ..mechanisms import random_body, random_joint, random_rotation
@@ -202,6 +204,22 @@ def test_a_motion_of_50_s_stays_on_its_constraints(method: str, options: dict[st
     position, velocity = residuals(model, run)
     assert position < 1e-12
     assert velocity < 1e-13
+    assert np.ptp(run.energy) < (1e-7 if method == "dop853" else 1e-6) * np.abs(run.energy).max()  # forces do no work
+
+
+def test_a_trajectory_has_the_forces_of_its_loops_by_name() -> None:
+    """Those of forward dynamics at the rows, under a held force and with parameters, too; and of a mass on a rod."""
+    model = four_bar()
+    q, qd = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    servo = dyn.SampledController(lambda q, qd, t: [0.3 - 0.1 * qd[0], 0.0, 0.0], 0.05)
+    run = dyn.simulate(model, q, qd, 0.2, tau=servo)
+    state = {f"q{i}": x for i, x in enumerate(run.q.T)} | {f"qd{i}": x for i, x in enumerate(run.qd.T)}
+    expected = dyn.forward_dynamics(model).evaluate(state | {f"tau{i}": x for i, x in enumerate(run.tau.T)})
+    assert list(run.multipliers) == [f"coupler to rocker {axis}" for axis in "xyz"]
+    for k, column in enumerate(run.multipliers.values()):
+        assert column == pytest.approx(np.broadcast_to(expected[f"lambda{k}"], len(run.t)), abs=1e-12)
+    assert np.ptp(run.multipliers["coupler to rocker x"]) > 1.0
+    assert dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.1], [0.0], 0.1).multipliers == {}
 
 
 def test_a_loop_cut_elsewhere_moves_alike() -> None:
@@ -327,6 +345,33 @@ def test_a_loop_among_locked_joints_is_a_weld() -> None:
     assert dyn.forward_dynamics(stiff).evaluate(at)["qdd0"] == dyn.forward_dynamics(welded).evaluate(at)["qdd0"]
 
 
+def test_a_body_taken_off_takes_its_loops_along_and_brings_them_back() -> None:
+    model = four_bar()
+    taken, rest = model.subtree("rocker"), model.detach("rocker")
+    assert rest.loops == ()
+    back = rest.attach(taken)
+    assert [loop.label for loop in back.loops] == ["coupler to rocker"]
+    at = {f"{kind}{i}": 0.3 * i + 0.2 for kind in ("q", "qd", "tau") for i in range(3)}
+    assert dyn.forward_dynamics(back).evaluate(at) == dyn.forward_dynamics(model).evaluate(at)
+    with pytest.raises(dyn.MechanismError, match="there is a loop on the unknown body 'coupler'"):
+        model.detach("rocker").detach("coupler").attach(taken)
+    q, qd = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    let = dyn.release(model, q, qd, "rocker")
+    assert let.mechanism.loops == ()
+    assert (let.q.tolist(), let.qd.tolist()) == (q[:2].tolist(), qd[:2].tolist())
+
+
+@pytest.mark.parametrize("method", ["dop853", "rk4", "radau"])
+def test_a_linkage_that_is_locked_stands(method: str) -> None:
+    """Accelerations are rounding alone there, by which no steps can be chosen."""
+    model = four_bar()
+    q, _ = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    run = dyn.simulate(model.lock("crank", q[0]), q[1:], [0.0, 0.0], 1.0, method, max_steps=2000)
+    assert run.success
+    assert np.abs(run.q - q[1:]).max() < 1e-15
+    assert np.ptp(run.multipliers["coupler to rocker z"]) < 1e-12
+
+
 def test_a_body_caught_by_a_closed_chain_leaves_it_closed() -> None:
     """Impulses of the loop are J^T s: M qd+ - p does no work on a motion that the loop lets through."""
     model = four_bar()
@@ -388,3 +433,31 @@ def test_a_stewart_platform_obeys_the_defining_equations() -> None:
     assert np.array([found[f"qdd{i}"] for i in range(model.system.n)]) == pytest.approx(
         expected, abs=TIGHT * np.abs(expected).max()
     )
+
+
+@pytest.mark.parametrize("angle", [2.0 * np.pi / 3.0, 3.0])
+def test_a_weld_turns_a_body_to_its_place_from_nearly_half_a_turn_away(angle: float) -> None:
+    """And not to another where axes are at right angles; by a third of a turn about (1, 1, 1) they all are."""
+    axis = np.full(3, 3.0**-0.5)
+    orientation = rotation(axis, angle)
+    body = dyn.Body("b", dyn.Joint("free"), "world", 1.0, inertia=(1.0, 1.0, 1.0))
+    model = dyn.Mechanism([body], loops=[dyn.Loop("weld", "b", orientation=orientation)])
+    q, u = dyn.consistent_state(model, [0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0], np.ones(6))
+    quaternion = [np.cos(angle / 2.0), *(np.sin(angle / 2.0) * axis)]
+    assert q == pytest.approx([0.0, 0.0, 0.0, *quaternion], abs=1e-15)
+    assert np.abs(u).max() < 1e-15
+
+
+@pytest.mark.parametrize("meter", [1e-9, 1e5, 1e9])
+def test_a_loop_closes_at_any_length(meter: float) -> None:
+    """Newton's method on slides and turns, whose units differ."""
+    rng = np.random.default_rng(0)
+    names, (axes, places, centers) = ("a", "b"), rng.normal(size=(3, 2, 3))
+    arm = [
+        dyn.Body(name, dyn.Joint("revolute", axis, meter * place), parent, 1.0, meter * center)
+        for name, parent, axis, place, center in zip(names, ("world", "a"), axes, places, centers, strict=True)
+    ]
+    held = dyn.Body("held", dyn.Joint("free"), mass=1.0, inertia=(meter**2,) * 3)
+    at, to_at = meter * rng.normal(size=(2, 3))
+    loops = [dyn.Loop("point", "held", "b", at, to_at), dyn.Loop("coupling", "a", coefficients=[0.4])]
+    assert independent_rows(dyn.Mechanism([*arm, held], loops=loops).system.constraints) == (0, 1, 2, 3)

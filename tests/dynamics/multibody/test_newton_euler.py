@@ -13,6 +13,7 @@ from cgraph import Graph
 from dynamics.multibody.mechanism import WORLD, Body, Joint, Mechanism
 from tests.dynamics.mechanisms import FAMILIES, random_body, random_mechanism, turned_arm, turned_tree
 from tests.dynamics.models import Array
+from tests.slow import slow
 
 AGREEMENT = 1e-12  # of the largest force or acceleration: two ways of rounding
 
@@ -68,8 +69,15 @@ def test_the_bias_is_that_of_lagrange_s_equation(name: str) -> None:
         assert values(found, seed) == approx(expected, abs=AGREEMENT * np.abs(expected).max())
 
 
-@mark.parametrize("method", ["recursive", "dense"])
-@mark.parametrize("name", MODELS)
+@mark.parametrize(
+    ("name", "method"),
+    [(name, "recursive") for name in MODELS]
+    + [
+        ("mixed", "dense"),
+        ("welded", "dense"),
+        *slow(*[(name, "dense") for name in MODELS if name not in ("mixed", "welded")]),
+    ],
+)
 def test_accelerations_are_those_of_lagrange_s_equation(name: str, method: str) -> None:
     mechanism = MODELS[name]()
     found, derived = (dyn.forward_dynamics(each, method) for each in (mechanism, by_lagrange(mechanism)))

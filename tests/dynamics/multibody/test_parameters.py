@@ -79,7 +79,9 @@ def near(a: Array, b: Array) -> bool:
     return bool(np.abs(a - b).max() <= ROUNDING * np.abs(b).max())
 
 
-@mark.parametrize(("base", "seed"), [("revolute", 0), ("revolute", 1), ("free", 2), *slow_cases()])
+@mark.parametrize(
+    ("base", "seed"), [("revolute", 0), ("free", 2), param("revolute", 1, marks=mark.slow), *slow_cases()]
+)
 def test_every_graph_is_that_of_the_numbers(base: str, seed: int) -> None:
     """Welded bodies among them: masses, centers and parallel axes are then nodes."""
     numbers = tree(seed, base, 3 if seed < 4 else 5)

@@ -104,7 +104,7 @@ def test_torques_in_planes_are_those_body_by_body(seed: int) -> None:
         assert run(q, qd, qdd) == approx(expected, abs=AGREEMENT * max(1.0, np.abs(expected).max()))
 
 
-@mark.parametrize("family", FAMILIES)
+@mark.parametrize("family", ["mixed", "welded", *slow("serial", "branched")])
 @mark.parametrize("equations", BOTH)
 def test_regrouped_inertia_moves_alike_in_no_more_nodes(family: str, equations: Equations) -> None:
     mechanism = FAMILIES[family](5)
@@ -116,7 +116,7 @@ def test_regrouped_inertia_moves_alike_in_no_more_nodes(family: str, equations: 
     assert sum(each.nodes for each in kept.remains) == nodes(kept.graph) - nodes(pruned.graph)
 
 
-@mark.parametrize("n", [10, 40])
+@mark.parametrize("n", [10, *slow(40)])
 def test_by_default_pruning_costs_no_digit(n: int) -> None:
     """Nothing is switched off, so the graph is that of the model; regrouped, it has lost some."""
     importorskip("flint")

@@ -16,6 +16,11 @@ DOWN = (0.0, 0.0, 9.81)  # z is down
 ACROSS = (0.0, 1.0, 0.0)
 ROLL, STEER, REAR, FRONT = 4, 7, 6, 8  # coordinates of the bicycle
 RADII = 0.3, 0.35
+PUBLISHED_MODES = {  # table 2, by the speed [m/s]
+    0.0: [-5.53094371765393, -3.13164324790656, 3.13164324790656, 5.53094371765393],
+    5.0: [-14.07838969279822, -0.77534188219585 - 4.46486771378823j, -0.77534188219585 + 4.46486771378823j]
+    + [-0.32286642900409],
+}
 
 
 def inertia(xx: float, yy: float, zz: float, xz: float = 0.0) -> list[list[float]]:
@@ -94,12 +99,7 @@ def test_the_benchmark_bicycle_has_the_published_matrices_and_eigenvalues() -> N
     }
     for name, (expected, found) in published.items():
         assert found == pytest.approx(np.array(expected), abs=1e-11), name
-    modes = {
-        0.0: [-5.53094371765393, -3.13164324790656, 3.13164324790656, 5.53094371765393],
-        5.0: [-14.07838969279822, -0.77534188219585 - 4.46486771378823j, -0.77534188219585 + 4.46486771378823j]
-        + [-0.32286642900409],
-    }
-    for speed, expected in modes.items():
+    for speed, expected in PUBLISHED_MODES.items():
         eigenvalues = np.linalg.eigvals(slopes(rate, states, straight(speed)))
         for mode in expected:
             assert np.abs(eigenvalues - mode).min() < 1e-10 * abs(mode)

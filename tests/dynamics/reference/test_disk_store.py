@@ -64,5 +64,5 @@ def test_a_damaged_entry_is_computed_anew(tmp_path: Path) -> None:
 
 def test_a_run_that_fails_leaves_nothing_in_the_folder(tmp_path: Path) -> None:
     with raises(ReferenceFailedError):
-        reference(OdeSystem(lambda x, t: [x[0] * x[0]], "x"), [1.0], None, [2.0], digits=10, folder=tmp_path)
+        reference(OdeSystem(lambda x, t: [cg.log(x[0])], "x"), [-1.0], None, [2.0], digits=10, folder=tmp_path)
     assert list(tmp_path.iterdir()) == []

@@ -18,6 +18,7 @@ from dynamics.equations.state_equation import state_equation, state_inputs
 from dynamics.experiments.stability import cases
 from dynamics.reference import REFERENCE_METHODS, Reference, ReferenceFailedError, closed_forms, reference
 from dynamics.systems.ode_system import OdeSystem
+from tests.slow import slow
 
 pytest.importorskip("flint", reason="reference solutions need python-flint")
 
@@ -133,7 +134,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("references")
 
 
-@mark.parametrize("name", PUBLISHED)
+@mark.parametrize("name", ["Robertson, to 1e11", *slow("Van der Pol, mu = 1000")])
 def test_stiff_references_are_the_published_values_to_their_digits(name: str, folder: Path) -> None:
     """And near to SciPy's Radau of order 5, whose error falls with its tolerance as far as float64 goes."""
     case = cases.load(name)

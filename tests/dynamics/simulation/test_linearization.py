@@ -89,6 +89,25 @@ def test_a_cotangent_times_a_tangent_is_the_same_before_and_after() -> None:
         assert float(np.sum(slope * change)) == approx(difference, rel=CONDITIONED, abs=CONDITIONED)
 
 
+def test_numbers_that_a_map_shares_have_no_derivatives() -> None:
+    x, a = cg.variables("x a")
+    step = [Map(cg.Graph([a, x], {"y": a * x}), ("x",), ("x",), shared=("a",))]
+    passes = Linearization(
+        step,
+        {"x": 2, "a": 1},
+        fed=(),
+        inputs=("a",),
+        varied=(),
+        fixed=(),
+        carried=("x",),
+        renamed={},
+        products=Products({}),
+    )
+    for derived in (lambda: passes.adjoint(["x"]), lambda: passes.tangent(["a"])):
+        with pytest.raises(TypeError, match="a Map with shared registers, a, has no derivatives here"):
+            derived()
+
+
 def test_a_statement_that_a_step_cannot_have_is_refused() -> None:
     x = cg.variable("x")
     step = [If("x", (Map(cg.Graph([x], {"x": 2.0 * x}), ("x",), ("x",)),))]

@@ -67,6 +67,7 @@ def states(run: dyn.Trajectory) -> Array:
     return np.hstack([run.q, run.qd])
 
 
+@mark.optimized  # the bound is that of fused products
 @mark.parametrize("omega", [[0.1, 1.0, 0.2], [2.0, 1.0, 0.2], [-0.3, -1.0, -2.0]])
 def test_a_free_rotor_turns_as_jacobis_functions_say(omega: list[float]) -> None:
     pytest.importorskip("mpmath")

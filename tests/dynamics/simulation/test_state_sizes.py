@@ -7,6 +7,8 @@ from pytest import mark
 import cgraph as cg
 import dynamics as dyn
 from dynamics.integrators import METHODS
+from tests.dynamics.mechanisms import random_body, random_joint
+from tests.dynamics.units import Units, in_units
 from tests.slow import slow
 
 ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
@@ -69,6 +71,36 @@ def test_a_component_of_rounding_alone_does_not_hold_the_steps(method: str) -> N
     run = dyn.simulate(pendulum, [0.5, 0.0], [0.0, 0.0], 3.0, method, max_steps=5000)
     assert run.success
     assert np.abs(run.q[:, 1]).max() < 1e-9
+
+
+@mark.parametrize("length", [2.0**40, 2.0**-40])
+def test_lengths_and_angles_of_a_mechanism_take_the_same_steps_in_any_unit(length: float) -> None:
+    """Of free bodies, slides and hinges, some of which stand still but for rounding; every bit of the motion."""
+
+    def ends(unit: float, method: str) -> tuple[list[float], int]:
+        rng = np.random.default_rng(3)
+        base = random_joint("free", rng, stiffness=0.0, damping=0.0, armature=0.0)
+        joints = [base, random_joint("revolute", rng), random_joint("prismatic", rng)]
+        places = zip(["world", "b0", "b1"], joints, strict=True)
+        bodies = [random_body(f"b{i}", "", on, rng, joint=joint) for i, (on, joint) in enumerate(places)]
+        model = in_units(dyn.Mechanism(bodies, (0.0, 0.0, -9.81)), Units(length=unit))
+        q, qd = rng.uniform(-1e-4, 1e-4, 9), rng.uniform(-1e-3, 1e-3, 8)
+        q[3] = 1.0
+        sizes = np.array([unit] * 3 + [1.0] * 5 + [unit]), np.array([unit] * 3 + [1.0] * 4 + [unit])
+        run = dyn.simulate(model, q * sizes[0], qd * sizes[1], 0.3, method)
+        return [*(run.q[-1] / sizes[0]), *(run.qd[-1] / sizes[1])], run.stats.steps + run.stats.rejected
+
+    assert ends(length, "dop853") == ends(1.0, "dop853")
+
+
+def test_an_angle_that_is_rounding_alone_does_not_hold_the_steps_of_a_slide() -> None:
+    """A hinge across the fall, of a body whose center is in line but for rounding."""
+    slide = dyn.Body("slide", dyn.Joint("prismatic", (0.0, 0.0, 1.0), stiffness=50.0), mass=1.0)
+    hinge = dyn.Joint("revolute", (0.0, 1.0, 0.0), stiffness=1.0)
+    rod = dyn.Body("rod", hinge, "slide", 1.0, (1e-17, 0.0, -0.5), (0.1, 0.1, 0.01))
+    run = dyn.simulate(dyn.Mechanism([slide, rod]), [0.3, 0.0], [0.0, 0.0], 3.0, max_steps=2000)
+    assert run.success
+    assert 0.0 < np.abs(run.q[:, 1]).max() < 1e-14
 
 
 def test_a_tolerance_that_is_given_stays() -> None:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from pytest import mark, raises
 
+from cgraph.codegen import llvm_engine
 from dynamics.simulation.ensembles import task
 from dynamics.simulation.ensembles.simulate_many import simulate_many
 from tests.dynamics.ensembles import arms, same
@@ -50,11 +51,16 @@ def test_parts_may_come_in_any_order() -> None:
     assert same(alone, simulate_many(*arguments, **options, workers=lambda f, each: [f(x) for x in reversed(each)]))
 
 
+def optimize(level: int) -> None:
+    llvm_engine.LEVEL = level
+
+
 @mark.parametrize("method", ["rk4", "dopri5"])
 def test_processes_change_nothing_and_make_the_code_once(method: str) -> None:
     arguments, options = case(method)
     alone = simulate_many(*arguments, **options)
-    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(1, spawn, optimize, [llvm_engine.LEVEL]) as pool:
         assert same(alone, simulate_many(*arguments, **options, workers=pool.map, chunk=8))
         assert pool.submit(programs_made).result() == 1
 

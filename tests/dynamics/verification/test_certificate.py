@@ -12,13 +12,19 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from cgraph.core.node import OPS
+from dynamics.equations import equations_of_motion
+from dynamics.equations.constraints import multiplier_outputs
 from dynamics.io.mujoco_render import drawn_mjcf
 from dynamics.io.write_mjcf import to_mjcf
+from dynamics.systems.constraints import Constraints
 from dynamics.verification import certificate
 from dynamics.verification.certificate import certify
 from dynamics.verification.residual import ROUNDING, Certificate, Residual
+from tests.dynamics.equations.test_constraints import moving_wall, pulleys, sleigh
+from tests.dynamics.linkages import four_bar, peaucellier
 from tests.dynamics.mechanisms import FAMILIES
 from tests.dynamics.models import MODELS
+from tests.dynamics.multibody.test_rolling import disk
 from tests.dynamics.units import Units, in_units
 from viz import cli
 
@@ -40,6 +46,50 @@ def test_every_kind_of_model_passes(make) -> None:
     assert failed(found) == {}
     assert len(found.residuals) >= 10
     assert str(found).count("ok  ") == len(found.residuals)
+
+
+HELD = {
+    "four-bar": four_bar,
+    "hinges": lambda: four_bar("hinge"),
+    "blade": sleigh,
+    "disk": disk,
+    "wall": moving_wall,
+    "rope": pulleys,
+}
+
+
+@pytest.mark.parametrize("name", HELD)
+def test_every_kind_of_constraint_passes_and_a_wrong_one_is_found(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    model = HELD[name]()
+    found = certify(model, 2)
+    assert failed(found) == {}
+    rows = [each for each in found.residuals if "constraints" in each.equation or "lambda" in each.equation]
+    assert len(rows) == 5
+    changes = Constraints.rate_changes
+    monkeypatch.setattr(Constraints, "rate_changes", lambda *a: [1.001 * node + 0.001 for node in changes(*a)])
+    assert set(failed(certify(model, 2))) >= {"constraints: J qdd + (dz/dt at qdd = 0) = 0, all rows"}
+    monkeypatch.undo()
+    monkeypatch.setattr(equations_of_motion, "multiplier_outputs", lambda *a: doubled(multiplier_outputs(*a)))
+    assert set(failed(certify(model, 2))) >= {"inverse dynamics of forward dynamics = tau + J^T lambda"}
+
+
+def doubled(nodes: dict[str, cg.Node]) -> dict[str, cg.Node]:
+    return {name: 2.0 * node for name, node in nodes.items()}
+
+
+def test_loops_are_those_of_pinocchio() -> None:
+    pytest.importorskip("pinocchio", reason="the bench extra has it")
+    for model in (four_bar(), peaucellier()):
+        found = certify(model, 3)
+        assert failed(found) == {}
+        assert [each.value < 1e-11 for each in found.residuals if "constraintDynamics" in each.equation] == [True]
+
+
+def test_what_was_not_compared_of_loops_is_said() -> None:
+    said = [each for each in certify(four_bar("hinge"), 1).left_out if "loop" in each or "constraintDynamics" in each]
+    assert len(said) == 2
+    assert "MuJoCo: its equality constraints are soft" in said[0]
+    assert re.search("no loop of the kind 'hinge'|not installed", said[1])
 
 
 def test_the_same_seed_gives_the_same_certificate() -> None:

@@ -21,7 +21,7 @@ import viz
 from cgraph.core.ops import OPS
 from dynamics.scenes.inspection import FORMULATIONS, inspection
 from tests.tolerances import SUMS
-from viz import cli
+from viz import cli, theme
 from viz.inspector import Motion, Table, Version
 from viz.inspector.page import scripts
 from viz.inspector.record import record, slopes
@@ -67,8 +67,10 @@ def test_it_has_all_formulations_with_their_counts_and_spurious_nodes(pendulum):
         assert each["counts"] == [graph.counts().nodes, graph.counts().edges]
         assert len(each["marked"]) == len(dyn.spurious_nodes(graph))
         assert len(each["rows"]) == len(data["motion"]["t"])
-    table = pendulum.partition("Torques that each part takes at t = 0 [N m]")[2].partition("</table>")[0]
-    assert "<td>link 2</td><td>−0.9391</td>" in table
+    table = pendulum.partition("Torques and forces that each part takes at t = 0")[2].partition("</table>")[0]
+    assert "<th></th><th>link 1</th><th>link 2</th>" in table
+    assert re.search(r"<td>τ.joint 1 \[N m\]</td><td>[^<]*</td><td>[^<]*</td>", table)
+    assert "<td>−0.9391</td>" in table
     assert "<td>≈0</td>" in table  # what is left of the difference that damping is
     assert "e-1" not in table
 
@@ -322,6 +324,64 @@ def test_huge_numbers_of_paths_are_exact():
     assert int(found["paths"][0]) == 2**200
 
 
+STICKS = """
+globalThis.document = { createElementNS: (_, name) => ({
+  at: {}, setAttribute(key, value) { this.at[key] = value; }, appendChild() {} }) };
+const boxes = given.map((motion) => {
+  const svg = { at: {}, setAttribute(key, value) { this.at[key] = value; }, appendChild() {}, replaceChildren() {} };
+  const { show, words } = armView(svg, motion);
+  return [words, motion.points.map((_, frame) => { show(frame); return svg.at.viewBox.split(" ").map(Number); })];
+});
+console.log(JSON.stringify(boxes));
+"""
+
+
+def test_every_frame_of_a_motion_has_the_whole_mechanism_in_it_and_large_enough_to_see():
+    """Whatever the size, falling, flying or held: the points are inside, and take a tenth of the frame."""
+    t = np.linspace(0.0, 3.0, 20)[:, None, None]
+    body = np.array([[[0.0, 0.0], [0.3, -0.2], [-0.3, -0.2]]])
+    falling = body + np.concatenate([0.0 * t, -4.905 * t**2], axis=-1)
+    turning = np.concatenate([np.zeros((20, 1, 2)), np.concatenate([np.sin(t), -np.cos(t)], axis=-1)], axis=1)
+    motions = [1e-3 * falling, falling, 1e3 * falling + 7e3, turning, 1e-9 * turning, np.zeros((3, 2, 2))]
+    given = [{"points": each.tolist(), "parents": [-1, *[0] * (each.shape[1] - 1)]} for each in motions]
+    for points, (words, boxes) in zip(motions, run_script(STICKS, given), strict=True):
+        for frame, (x, y, width, height) in zip(points, boxes, strict=True):
+            assert (frame[:, 0] >= x).all()
+            assert (frame[:, 0] <= x + width).all()
+            assert (-frame[:, 1] >= y).all()
+            assert (-frame[:, 1] <= y + height).all()
+            assert np.ptp(frame, axis=0).max() >= 0.1 * width or np.ptp(frame) == 0.0
+        assert bool(words) == bool(np.ptp(points[:, 0], axis=0).max() > 2.0 * np.ptp(points[0]))
+
+
+def test_a_page_of_coordinates_with_names_shows_these_and_their_units():
+    hinge, ball = dyn.Joint("revolute", (0, 1, 0), name="hip_" * 20), dyn.Joint("ball", (0, 0, 0.1), name="knee")
+    model = dyn.Mechanism([dyn.Body("thigh", hinge, mass=1.0, center=(0.0, 0.0, -0.2)),
+                           dyn.Body("shank", ball, "thigh", 1.0, (0.0, 0.0, -0.2), (0.1, 0.2, 0.2))])  # fmt: skip
+    found = inspection(dyn.scenes.Scene("leg", "", model, (0.1, 1.0, 0.0, 0.0, 0.0), (0.0,) * 4, 0.1))
+    data = record([Version(*found.versions[2][:4])], None, dyn.display_names(model), found.units)
+    called, units = dict(data["called"]), dict(data["units"])
+    (version,) = data["versions"]
+    names = [name for name, *_ in version["inputs"] + version["outputs"]]
+    assert set(names) <= set(called)
+    assert set(names) <= set(units)
+    assert (called["q1"], units["q1"]) == ("q.knee.qw", "1")
+    assert (called["qd1"], units["qd1"]) == ("q\u0307.knee.wx", "rad/s")
+    assert (called["tau0"], units["tau0"]) == ("\u03c4." + "hip_" * 20, "N m")
+
+
+def test_a_page_of_loops_shows_where_they_close_and_does_not_promise_torques_of_zero():
+    rod = {"mass": 1.0, "center": (0.5, 0.0, 0.0), "inertia": (0.0, 0.1, 0.1)}
+    first = dyn.Body("a", dyn.Joint("revolute", (0, 1, 0)), **rod)
+    bars = [first, dyn.Body("b", dyn.Joint("revolute", (0, 1, 0), (1.0, 0, 0)), "a", **rod)]
+    pin = dyn.Loop("point", "b", "world", at=(1.0, 0, 0), to_at=(1.0, 0, 0))
+    q, qd = dyn.consistent_state(model := dyn.Mechanism(bars, loops=[pin]), [0.5, 1.0], [1.0, 0.0])
+    found = inspection(dyn.scenes.Scene("truss", "", model, tuple(q), tuple(qd), 0.1))
+    assert "should be 0" not in found.versions[-1].about
+    assert "constraints" in found.versions[-1].about
+    assert np.ptp(found.skeleton.points[:, -1], axis=0) == pytest.approx([0.0, 0.0], abs=1e-6)
+
+
 # The page in a browser, where Playwright and a Chromium are installed.
 
 
@@ -404,7 +464,7 @@ def test_clusters_fold_and_unfold(opened):
 
 def test_two_clicks_ask_why(opened):
     opened.keyboard.press("3")
-    opened.locator('[aria-label$=", q0"]').click()
+    opened.locator('[aria-label$=", q.joint 1"]').click()
     opened.locator("#otau0").click()
     graph = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"))
     at = dict.fromkeys(graph.input_names, 0.5)
@@ -449,10 +509,14 @@ def test_the_reverse_sweep_goes_from_the_chosen_output_to_its_derivatives(opened
     for output, adjoint in (("tau2", "1"), ("tau0", "0")):  # tau0 does not depend on tau2
         opened.select_option("#from", output)
         opened.eval_on_selector("#sweep", move, len(graph.nodes) + 1)
-        assert opened.inner_text("#step") == f"reverse, 1 of 249: τ₂ (+) has adjoint {adjoint}"
+        assert opened.inner_text("#step") == f"reverse, 1 of 249: τ.joint 3 (+) has adjoint {adjoint}"
     opened.eval_on_selector("#sweep", move, 2 * len(graph.nodes))
-    shown = opened.inner_text("#step").partition("reverse, 249 of 249: q̈₀ has adjoint ")[2]
-    at = dict(opened.eval_on_selector_all("#inputs input", "(all) => all.map((e) => [e.ariaLabel, Number(e.value)])"))
+    shown = opened.inner_text("#step").partition("reverse, 249 of 249: q̈.joint 1 has adjoint ")[2]
+    given = dict(
+        opened.eval_on_selector_all("#inputs input", "(all) => all.map((e) => [e.ariaLabel, Number(e.value)])")
+    )
+    called = theme.called(dyn.display_names(dyn.scenes.load("triple_pendulum")))
+    at = {name: given[called.get(name, name)] for name in graph.input_names}
     up, down = [graph.evaluate(at | {"qdd0": at["qdd0"] + sign * 1e-3})["tau0"] for sign in (1, -1)]
     assert float(shown.replace("−", "-")) == pytest.approx((up - down) / 2e-3, rel=5e-3)  # three digits are shown
 

@@ -1,0 +1,110 @@
+"""A Jacobian in three graphs: what the point decides, a product with one color's columns, and where entries belong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from ..core.graph import Graph, require_graph
+from ..core.node import Node, as_node, variable
+from ..core.ops import equal
+from ..simplify.simplify import simplify
+from .coloring import NONE, Coloring, column_coloring
+from .direction_split import direction_split
+from .forward import jvp
+from .jacobian_entries import written_sizes
+from .sparsity import pattern
+
+LANES = 8  # colors that cost one sweep
+
+
+class CompressedJacobian(NamedTuple):
+    """The Jacobian of a graph x (n) -> y (m), to be run as a loop over colors.
+
+    Attributes
+    ----------
+    colors : int
+        Columns that share no row have one color.
+    primal : Graph
+        x -> p, the values that the products need, once for all colors.
+    product : Graph
+        p and the number of a color -> the sum of its columns, (m,).
+    entries : Graph
+        The sums, (m, colors) row by row -> the Jacobian, row by row.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import compressed_jacobian
+    >>> x = cg.variables([f"x{k}" for k in range(9)])
+    >>> graph = cg.Graph(x, {f"y{k}": cg.sin(cg.sin(cg.sin(x[k] * x[k - 1]))) for k in range(9)})
+    >>> compressed_jacobian(graph) is None  # shorter with a node for every entry
+    True
+    >>> energy = sum(x)
+    >>> for _ in range(9):
+    ...     energy = cg.sin(energy)
+    >>> compressed_jacobian(cg.Graph(x, {f"y{k}": energy * x[k] for k in range(9)})).colors
+    9
+    """
+
+    colors: int
+    primal: Graph
+    product: Graph
+    entries: Graph
+
+
+def compressed_jacobian(
+    graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None
+) -> CompressedJacobian | None:
+    """The Jacobian as a product repeated for colors of columns, where that is smaller than a node for every entry.
+
+    Parameters
+    ----------
+    graph : Graph
+        x -> y.
+    wrt : str, Node or sequence of these, optional
+        The n inputs to differentiate by; by default all.
+
+    Returns
+    -------
+    CompressedJacobian or None
+        None where `cg.jacobian` is smaller, counted in operations, of which eight colors share one.
+
+    Raises
+    ------
+    GraphError
+        If the graph has no such input.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import compressed_jacobian
+    >>> x = cg.variable("x")
+    >>> compressed_jacobian(cg.Graph([x], {"y": cg.sin(x)})) is None
+    True
+    """
+    require_graph("compressed_jacobian", graph)
+    chosen = graph.select_inputs(wrt)
+    entries = pattern(graph, chosen)
+    coloring = column_coloring(entries)
+    once, columns, rows = written_sizes(graph, chosen)
+    if min(columns, rows) <= once * coloring.vectors(LANES):
+        return None
+    (colors, _), n = coloring.counts, len(chosen)
+    split = direction_split(simplify(jvp(graph, chosen)), n)
+    color = variable("color")
+    known = split.linear.inputs[: len(split.primal.outputs)]
+    seeds = [equal(color, float(each)) for each in coloring.columns]
+    product = Graph([*known, color], split.linear(*known, *seeds))
+    return CompressedJacobian(colors, split.primal, product, _placed(entries.by_row(), coloring, n))
+
+
+def _placed(rows: Sequence[Sequence[int]], coloring: Coloring, n: int) -> Graph:
+    colors = coloring.counts[0]
+    sums = [[variable(f"sum{i}_{c}") for c in range(colors)] for i in range(len(rows))]
+    zero = as_node(0.0)
+    outputs: dict[str, Node] = {}
+    for i, row in enumerate(rows):
+        place = {j: sums[i][coloring.columns[j]] for j in row if coloring.columns[j] != NONE}
+        outputs |= {f"{i}_{j}": place.get(j, zero) for j in range(n)}
+    return Graph([each for row in sums for each in row], outputs)

@@ -1,0 +1,157 @@
+"""Sparsity: which entries of a graph's Jacobian can be other than zero, known from the graph alone."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..core.graph import Graph, require_graph
+from ..core.node import Node, Op, as_node, variable
+from ..core.scipy_modules import scipy_sparse
+from ..core.scope import building
+from ..simplify.builder import Builder
+
+Indices = np.ndarray[Any, np.dtype[np.int64]]
+
+
+class Pattern(NamedTuple):
+    """Entries of a matrix, row by row and in each row from left to right.
+
+    rows, columns: of the entries.  shape: of the matrix.
+    """
+
+    rows: Indices
+    columns: Indices
+    shape: tuple[int, int]
+
+    def by_row(self) -> list[list[int]]:
+        """The columns of the entries in each row."""
+        return _grouped(self.columns, self.rows, self.shape[0])
+
+    def by_column(self) -> list[list[int]]:
+        """The rows of the entries in each column."""
+        order = np.lexsort((self.rows, self.columns))
+        return _grouped(self.rows[order], self.columns[order], self.shape[1])
+
+
+def _grouped(values: Indices, keys: Indices, count: int) -> list[list[int]]:
+    """The values of each key 0 .. count - 1; keys ascend."""
+    ends = np.searchsorted(keys, np.arange(count + 1)).tolist()
+    flat = values.tolist()
+    return [flat[begin:end] for begin, end in itertools.pairwise(ends)]
+
+
+def sparsity(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Any:
+    """Where the Jacobian of a graph can be other than zero, whatever the values of the inputs.
+
+    An entry that is left out is zero everywhere: no path leads from the input to the output, or each one passes an
+    operation with the slope 0, such as `floor`. An entry that is there may be zero too, at some points or, where terms
+    cancel, at all.
+
+    Parameters
+    ----------
+    graph : Graph
+        x (n) -> y (m).
+    wrt : str, Node or sequence of these, optional
+        The inputs x to differentiate by; by default all.
+
+    Returns
+    -------
+    scipy.sparse.csr_array of bool, shape (m, n)
+        True at the entries that can be other than zero; the indices of a row ascend.
+
+    Raises
+    ------
+    GraphError
+        If the graph has no such input.
+    ImportError
+        Without SciPy (extra `scipy`).
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x, y, z = cg.variables("x y z")
+    >>> cg.sparsity(cg.Graph([x, y, z], {"f": x * y, "g": cg.sin(z), "h": cg.floor(x)})).toarray().astype(int)
+    array([[1, 1, 0],
+           [0, 0, 1],
+           [0, 0, 0]])
+    """
+    require_graph("sparsity", graph)
+    sparse = scipy_sparse("sparsity")
+    return csr(sparse, pattern(graph, graph.select_inputs(wrt)), None)
+
+
+def csr(sparse: Any, entries: Pattern, values: Any) -> Any:
+    """The entries as SciPy's sparse matrix; without values, True."""
+    starts = np.searchsorted(entries.rows, np.arange(entries.shape[0] + 1))
+    data = np.ones(len(entries.rows), dtype=bool) if values is None else values
+    return sparse.csr_array((data, entries.columns.copy(), starts), shape=entries.shape)
+
+
+def pattern(graph: Graph, wrt: Sequence[Node]) -> Pattern:
+    """The entries of the Jacobian by `wrt` that are not structurally zero."""
+    outputs = set(graph.outputs.values())
+    kept = {node: bits for node, bits in dependence(graph, wrt) if node in outputs}
+    rows = [_places(kept[node]) for node in graph.outputs.values()]
+    places = np.repeat(np.arange(len(rows)), [len(row) for row in rows])
+    return Pattern(places, np.concatenate(rows), (len(rows), len(wrt)))
+
+
+def dependence(graph: Graph, wrt: Sequence[Node]) -> Iterator[tuple[Node, int]]:
+    """Every node, arguments first, and the inputs that it depends on, as the bits of an integer."""
+    place = {node: j for j, node in enumerate(wrt)}
+    uses = Counter([arg for node in graph.nodes for arg in node.args])
+    bits: dict[Node, int] = {}
+    for node in graph.nodes:
+        depends = 1 << place[node] if node in place else 0
+        for arg in slopes(node):
+            depends |= bits[arg]
+        yield node, depends
+        bits[node] = depends
+        for arg in node.args:  # a set is kept until its last use
+            uses[arg] -= 1
+            if not uses[arg]:
+                del bits[arg]
+
+
+def symmetric(entries: Pattern) -> Pattern:
+    """The entries and their mirror images."""
+    i, j = np.concatenate([entries.rows, entries.columns]), np.concatenate([entries.columns, entries.rows])
+    n = entries.shape[1]
+    rows, columns = np.divmod(np.unique(i * n + j), max(n, 1))
+    return Pattern(rows, columns, entries.shape)
+
+
+def _places(bits: int) -> Indices:
+    """The places of the bits that are set, from the lowest."""
+    if not bits:
+        return np.zeros(0, dtype=np.int64)
+    lowest = (bits & -bits).bit_length() - 1
+    bits >>= lowest
+    octets = np.frombuffer(bits.to_bytes(-(-bits.bit_length() // 8), "little"), dtype=np.uint8)
+    return lowest + np.flatnonzero(np.unpackbits(octets, bitorder="little"))
+
+
+def slopes(node: Node) -> Collection[Node]:
+    """The arguments in which a node's partial derivative is not the constant zero."""
+    if not node.args:
+        return ()
+    if all([arg.value is None for arg in node.args]):
+        return [node.args[slot] for slot in _sloping_slots(node.op)]
+    with building(Builder()):
+        partials = [as_node(each) for each in node.op.partials(node, *node.args)]
+    return [arg for arg, partial in zip(node.args, partials, strict=True) if partial.value != 0.0]
+
+
+@cache
+def _sloping_slots(op: Op) -> list[int]:
+    """The slots in which an operation on variables has a slope."""
+    arguments = [variable(f"argument{slot}#") for slot in range(op.arity)]
+    with building(Builder()):
+        partials = [as_node(each) for each in op.partials(variable("output#"), *arguments)]
+    return [slot for slot, partial in enumerate(partials) if partial.value != 0.0]

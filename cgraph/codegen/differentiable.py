@@ -1,0 +1,215 @@
+"""Differentiable: the derivatives of a compiled graph, in vector lanes of directions and compressed by colors."""
+
+from __future__ import annotations
+
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from functools import partial
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..autodiff.coloring import jacobian_coloring
+from ..autodiff.direction_split import DirectionSplit, direction_split
+from ..autodiff.forward import forward_products
+from ..autodiff.jacobian_entries import entry_graph, written_sizes
+from ..autodiff.reverse import reverse_products
+from ..autodiff.sparsity import Pattern, csr, pattern, symmetric
+from ..core.evaluate import Array
+from ..core.graph import Graph
+from ..core.node import variable
+from ..core.scipy_modules import scipy_sparse
+from ..errors import GraphError
+from ..util.real_arrays import real_array
+from ..util.require import require_flag
+from .colored_matrix import ColoredMatrix, WrittenPart, colored_hessian, colored_jacobian
+from .sweep import Sweep
+
+CHECK = 256  # operations that take as long as to look whether slopes are infinite
+Made = TypeVar("Made")
+LANES = 8  # directions that count as one where colorings are compared, whatever the processor's vectors
+
+
+class Differentiable(ABC):
+    """A compiled graph y = f(x) that has derivatives at run time. All that they need is made at the first use."""
+
+    graph: Graph
+    n_in: int
+    n_out: int
+    vector_cost = 1  # of an operation on a vector of directions, in operations on numbers
+
+    def __init__(self) -> None:
+        self._made: dict[str, Any] = {}  # sweeps and matrices
+        self._making = threading.RLock()
+
+    @abstractmethod
+    def _sweep(self, split: DirectionSplit, guarded: DirectionSplit | None) -> Sweep:
+        """The sweep of a derivative, see `Sweep`."""
+
+    @abstractmethod
+    def _like(self, graph: Graph) -> Any:
+        """Another graph compiled in the same way."""
+
+    @abstractmethod
+    def _point(self, x: ArrayLike) -> Array:
+        """The point, checked."""
+
+    def jvp(self, x: ArrayLike, X_dot: ArrayLike) -> Array:
+        """Products y_dot = J x_dot of the Jacobian at x with directions, side by side in vectors: forward mode.
+
+        X_dot: (k, n_in), a direction a row; the result is (k, n_out). Of one direction, (n_in,), it is (n_out,). An
+        entry of x_dot that is zero counts for nothing, also where y has no slope in it.
+        Raises GraphError for another shape.
+        """
+        return self._along(self._forward, x, "X_dot", X_dot, (self.n_in, self.n_out))
+
+    def vjp(self, x: ArrayLike, Y_bar: ArrayLike) -> Array:
+        """Products x_bar = J^T y_bar of the transposed Jacobian at x with cotangents, side by side: reverse mode.
+
+        Y_bar: (k, n_out), a cotangent a row; the result is (k, n_in). Of one cotangent, (n_out,), it is (n_in,).
+        Raises GraphError for another shape.
+        """
+        return self._along(self._reverse, x, "Y_bar", Y_bar, (self.n_out, self.n_in))
+
+    def jacobian(self, x: ArrayLike, *, sparse: bool = False) -> Any:
+        """The Jacobian dy_i/dx_j at x, (n_out, n_in).
+
+        Columns that share no row are one direction of a forward sweep, rows that share no column one of a reverse
+        sweep, whichever costs less, or both: `cg.sparsity` tells the entries, greedy coloring the directions.
+        sparse: give a scipy.sparse.csr_array with the entries of `cg.sparsity`.
+        Raises GraphError for another shape, ImportError with `sparse` without SciPy.
+        """
+        return self._matrix(self._jacobian(), self._point(x), sparse)
+
+    def hessian(self, x: ArrayLike, y_bar: ArrayLike | None = None, *, sparse: bool = False) -> Any:
+        """The Hessian of y_bar . y at x, (n_in, n_in): forward sweeps over the reverse one, never a tensor.
+
+        Columns are compressed by a star coloring, which reads an entry or its mirror image.
+        y_bar: (n_out,), the weights of the outputs; not needed for one output.
+        sparse: give a scipy.sparse.csr_array.
+        Raises GraphError for another shape, ImportError with `sparse` without SciPy.
+        """
+        if y_bar is None and self.n_out != 1:
+            raise GraphError(f"hessian needs y_bar, the weights of the {self.n_out} outputs")
+        weights = real_array("y_bar", [1.0] if y_bar is None else y_bar)
+        if weights.shape != (self.n_out,):
+            raise GraphError(f"y_bar must have shape ({self.n_out},), one weight for each output, got {weights.shape}")
+        return self._matrix(self._hessian(), np.concatenate([self._point(x), weights]), sparse)
+
+    def bind_jacobian(self, x: Array, values: Array) -> Callable[[], None]:
+        """A function of nothing that reads x, (n_in,), and writes the Jacobian: the fastest way to it.
+
+        values: (n_out, n_in), or one number for each entry of `cg.sparsity`, row by row. What is zero whatever x is set
+        to zero here, and not touched by the function. As for `bind`, the arrays are checked here and kept alive, and
+        one thread at a time may call it.
+        Raises GraphError for arrays that are not contiguous float64 of these shapes, or share memory.
+        """
+        matrix = self._jacobian()
+        count = len(matrix.entries.rows)
+        require_memory("x", x, (self.n_in,))
+        require_memory("values", values, (self.n_out, self.n_in), (count,))
+        if not values.flags.writeable:
+            raise GraphError("values must be an array that can be written, got one that is read-only")
+        if np.may_share_memory(x, values):
+            raise GraphError("x and values must not share memory")
+        values[...] = 0.0
+        return matrix.bind(x, values)
+
+    def _along(
+        self, sweep: Callable[[], Sweep], x: ArrayLike, name: str, directions: ArrayLike, shape: tuple[int, int]
+    ) -> Array:
+        """shape: the numbers of entries of a direction and of a result."""
+        point, rows = self._point(x), real_array(name, directions)
+        if rows.ndim not in (1, 2) or rows.shape[-1] != shape[0]:
+            raise GraphError(f"{name} must have shape (k, {shape[0]}) or ({shape[0]},), got {rows.shape}")
+        matrix = rows if rows.ndim == 2 else rows[None]
+        result = sweep().along(point, matrix) if self.n_in else np.zeros((len(matrix), shape[1]))
+        return result if rows.ndim == 2 else result[0]
+
+    def _matrix(self, matrix: ColoredMatrix, point: Array, sparse: bool) -> Any:
+        if not require_flag("sparse", sparse):
+            return matrix.values(point, dense=True)
+        module = scipy_sparse("a sparse derivative")
+        return csr(module, matrix.entries, matrix.values(point, dense=False))
+
+    def _jacobian(self) -> ColoredMatrix:
+        return self._once("jacobian", self._make_jacobian)
+
+    def _make_jacobian(self) -> ColoredMatrix:
+        graph = self._numbered()
+        entries = pattern(graph, graph.inputs)
+        if not len(entries.rows):
+            return ColoredMatrix(entries, [], self.n_in)
+        coloring = jacobian_coloring(entries, LANES)
+        once, columns, rows = written_sizes(graph, graph.inputs)
+        if min(columns, rows) <= once * coloring.vectors(LANES) * self.vector_cost:
+            written = entry_graph(graph, graph.inputs, entries, rows < columns)
+            return ColoredMatrix(entries, [WrittenPart(self._like(written))], self.n_in)
+        return colored_jacobian(entries, coloring, self._forward, self._reverse)
+
+    def _hessian(self) -> ColoredMatrix:
+        return self._once("hessian", self._make_hessian)
+
+    def _make_hessian(self) -> ColoredMatrix:
+        if not self.n_in:  # and no cotangents, which would be the outputs of the reverse sweep
+            nothing = np.zeros(0, dtype=np.int64)
+            return ColoredMatrix(Pattern(nothing, nothing, (0, 0)), [], self.n_out)
+        graph = self._numbered()
+        entries = symmetric(pattern(reverse_products(graph, graph.inputs, zero_wins=False), graph.inputs))
+        sweep = self._guarded_sweep(partial(_second_products, graph), self.n_in)
+        return colored_hessian(entries, sweep, self.n_in + self.n_out)
+
+    def _forward(self) -> Sweep:
+        return self._once("forward", self._make_forward)
+
+    def _make_forward(self) -> Sweep:
+        graph = self._numbered()
+        return self._guarded_sweep(partial(forward_products, graph, graph.inputs), self.n_in)
+
+    def _reverse(self) -> Sweep:
+        return self._once("reverse", self._make_reverse)
+
+    def _make_reverse(self) -> Sweep:
+        graph = self._numbered()
+        return self._guarded_sweep(partial(reverse_products, graph, graph.inputs), self.n_out)
+
+    def _guarded_sweep(self, derive: Callable[..., Graph], directions: int) -> Sweep:
+        """The sweep in which zeros win over infinite slopes; where that takes long, only where there are such."""
+        plain, guarded = [direction_split(derive(zero_wins=wins), directions) for wins in (False, True)]
+        saved = len(guarded.linear.nodes) - len(plain.linear.nodes)
+        return self._sweep(plain, guarded) if saved > CHECK else self._sweep(guarded, None)
+
+    def _numbered(self) -> Graph:
+        """The graph with numbers for names: the longest name, or one with spaces, has no room for a suffix."""
+        return self._once("graph", self._make_numbered)
+
+    def _make_numbered(self) -> Graph:
+        inputs = [variable(f"x{k}") for k in range(self.n_in)]
+        return Graph(inputs, {f"y{k}": node for k, node in enumerate(self.graph(*inputs).values())})
+
+    def _once(self, name: str, make: Callable[[], Made]) -> Made:
+        """What `make` gives, made once, by whichever thread asks first."""
+        if name not in self._made:
+            with self._making:
+                if name not in self._made:
+                    self._made[name] = make()
+        made: Made = self._made[name]
+        return made
+
+
+def _second_products(graph: Graph, *, zero_wins: bool) -> Graph:
+    """x, y_bar, x_dot -> the Hessian of y_bar . y times x_dot."""
+    reverse = reverse_products(graph, graph.inputs, zero_wins=zero_wins)
+    return forward_products(reverse, graph.inputs, zero_wins=zero_wins)
+
+
+def require_memory(name: str, array: Any, *shapes: tuple[int, ...]) -> None:
+    """Raise GraphError unless machine code can use the array as it lies."""
+    wanted = " or ".join(map(str, shapes))
+    if not isinstance(array, np.ndarray) or array.dtype != np.float64 or array.shape not in shapes:
+        given = f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
+        raise GraphError(f"{name} must be an array of float64 in shape {wanted}, got {given}")
+    if not array.flags.c_contiguous or not array.flags.aligned:
+        raise GraphError(f"{name} must be contiguous and aligned, got strides {array.strides}")

@@ -1,0 +1,47 @@
+"""SciPy's modules, asked for where they are used: the one place that imports them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..errors import install
+
+
+def scipy_sparse(what: str) -> Any:
+    """The module `scipy.sparse`. Raises ImportError, saying that `what` needs SciPy, where there is none."""
+    try:
+        from scipy import sparse
+    except ImportError:
+        raise ImportError(f"{what} needs SciPy: {install('scipy')}") from None
+    return sparse
+
+
+def scipy_integrate(what: str) -> Any:
+    """The module `scipy.integrate`.
+
+    Parameters
+    ----------
+    what : str
+        What needs it, for the error's sentence.
+
+    Returns
+    -------
+    module
+        SciPy's.
+
+    Raises
+    ------
+    ImportError
+        Where SciPy is not installed.
+
+    Examples
+    --------
+    >>> from cgraph.extend import scipy_integrate
+    >>> scipy_integrate("method 'scipy:BDF'").__name__
+    'scipy.integrate'
+    """
+    try:
+        from scipy import integrate
+    except ImportError:
+        raise ImportError(f"{what} needs SciPy: {install('scipy')}") from None
+    return integrate

@@ -1,0 +1,69 @@
+"""Nearest names: what somebody may have meant by a name that is not there."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+from itertools import islice
+
+_MOST, _LENGTH = 5000, 80  # names compared, and characters of each: an error should come at once
+_ALIKE = 0.7  # share of the letters that two names have in common
+_LISTED = 12  # names that are listed where none is near
+
+
+def nearest(name: str, known: Iterable[str], most: int = 3) -> list[str]:
+    """The known names that are spelled most like a name, whatever their case; the best first.
+
+    Parameters
+    ----------
+    name : str
+        A name that is not there.
+    known : iterable of str
+        Those that are.
+    most : int
+        How many to give at most.
+
+    Returns
+    -------
+    list of str
+        Empty where none is alike.
+
+    Examples
+    --------
+    >>> from cgraph.extend import nearest
+    >>> nearest("q.ankel", ["q.hip", "q.knee", "q.ankle"])
+    ['q.ankle']
+    """
+    folded: dict[str, str] = {}
+    for each in islice(known, _MOST):
+        folded.setdefault(each[:_LENGTH].casefold(), each)
+    return [folded[each] for each in difflib.get_close_matches(name[:_LENGTH].casefold(), folded, most, _ALIKE)]
+
+
+def or_nearest(name: str, known: Sequence[str]) -> str:
+    """What an error says after "there is no ...": the nearest of the known names, or some of them.
+
+    Parameters
+    ----------
+    name : str
+        A name that is not there.
+    known : sequence of str
+        Those that are.
+
+    Returns
+    -------
+    str
+        A part of a sentence, without the stop.
+
+    Examples
+    --------
+    >>> from cgraph.extend import or_nearest
+    >>> or_nearest("kne", ["hip", "knee", "ankle"])
+    "did you mean 'knee'?"
+    >>> or_nearest("x", ["hip", "knee", "ankle"])
+    'it has hip, knee, ankle'
+    """
+    if near := nearest(name, known):
+        return f"did you mean {' or '.join(map(repr, near))}?"
+    listed = known if len(known) <= _LISTED else [*known[: _LISTED - 2], "...", known[-1]]
+    return f"it has {', '.join(listed) or 'none'}"

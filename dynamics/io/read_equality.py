@@ -1,0 +1,133 @@
+"""Equality constraints of MuJoCo's model as loops: exact, where MuJoCo's give way as springs do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+from ..multibody import spatial
+from ..multibody.body import WORLD, Body, MechanismError
+from ..multibody.loops import Loop
+from ..multibody.spatial import Array
+from .left_out import listed, present
+from .mujoco_twin import mujoco
+from .smooth_forces import disabled
+
+_MODELLED = ("joint", "connect", "weld")
+
+
+class End(NamedTuple):
+    """Where a frame of MuJoCo's is in that of one of our bodies."""
+
+    body: str
+    position: Array  # (3,) [m]
+    orientation: Array  # (3, 3)
+
+
+def read_loops(mj: Any, moving: Sequence[Body], ends: Sequence[tuple[str, Array]]) -> list[Loop]:
+    """The loops of MuJoCo's model.
+
+    moving: the bodies on its joints, in their order.  ends: for each of its bodies ours, and the origin of its frame in
+    that of ours. Raises MechanismError for what holds a body to itself.
+    """
+    loops: list[Loop] = []
+    taken = {mj.equality(i).name for i in range(mj.neq)} - {""}
+    for i in _modelled(mj):
+        loop = _loop(mj, i, moving, ends)
+        while not mj.equality(i).name and loop.label in taken:
+            loop = replace(loop, name=loop.label + "'")
+        taken.add(loop.label)
+        loops.append(loop)
+    return loops
+
+
+def other_equalities(mj: Any) -> list[str]:
+    """Those that no loop is, and that act."""
+    others: dict[str, list[int]] = {}
+    for i in _active(mj):
+        if _kind(mj, i) not in _MODELLED:
+            others.setdefault(_kind(mj, i), []).append(i)
+    return [f"equality constraints of the type {kind} ({_names(mj, which)})" for kind, which in others.items()]
+
+
+def left_of_equalities(mj: Any) -> list[str]:
+    """What is left out of those that are loops, and those that do not act."""
+    inactive = [i for i in range(mj.neq) if not (mj.eq_active0[i] or disabled(mj, "CONSTRAINT", "EQUALITY"))]
+    return present(
+        {
+            f"softness of equality constraints ({_names(mj, _modelled(mj))})": _modelled(mj),
+            f"inactive equality constraints ({_names(mj, inactive)})": inactive,
+        }
+    )
+
+
+def _names(mj: Any, which: Sequence[int]) -> str:
+    return listed([mj.equality(i).name or f"number {i}" for i in which])
+
+
+def _active(mj: Any) -> list[int]:
+    return [] if disabled(mj, "CONSTRAINT", "EQUALITY") else [i for i in range(mj.neq) if mj.eq_active0[i]]
+
+
+def _modelled(mj: Any) -> list[int]:
+    """Those that act and are loops."""
+    return [i for i in _active(mj) if _kind(mj, i) in _MODELLED]
+
+
+def _kind(mj: Any, i: int) -> str:
+    kind: str = mujoco().mjtEq(int(mj.eq_type[i])).name
+    return kind.removeprefix("mjEQ_").lower()
+
+
+def _loop(mj: Any, i: int, moving: Sequence[Body], ends: Sequence[tuple[str, Array]]) -> Loop:
+    kind, name = _kind(mj, i), mj.equality(i).name
+    if kind == "joint":
+        return _coupling(mj, i, name, moving)
+    body, to = _sites(mj, i, ends) or _frames(mj, i, ends)
+    if body.body == to.body:
+        raise MechanismError(f"equality constraint {name or f'number {i}'} holds the body {body.body!r} to itself")
+    if body.body == WORLD:
+        body, to = to, body
+    at, to_at = body.position.tolist(), to.position.tolist()
+    if kind == "connect" or not mj.eq_data[i, 10]:  # of a weld its torquescale
+        return Loop("point", body.body, to.body, at, to_at, name=name)
+    orientation = spatial.snapped(to.orientation @ body.orientation.T)
+    return Loop("weld", body.body, to.body, at, to_at, orientation=orientation, name=name)
+
+
+def _coupling(mj: Any, i: int, name: str, moving: Sequence[Body]) -> Loop:
+    """q - q0 = c0 + c1 (q_to - q0_to) + .., as a polynomial of q_to; c0 alone without another joint."""
+    one, other = int(mj.eq_obj1id[i]), int(mj.eq_obj2id[i])
+    starts = mj.qpos0[mj.jnt_qposadr]
+    if other < 0:
+        held = float(mj.eq_data[i, 0] + starts[one])
+        return Loop("coupling", moving[one].name, coefficients=[held], name=name)
+    shifted = Polynomial(mj.eq_data[i, :5])(Polynomial([-starts[other], 1.0])) + float(starts[one])
+    coefficients = [float(x) for x in np.trim_zeros(shifted.coef, "b")]
+    return Loop("coupling", moving[one].name, moving[other].name, coefficients=coefficients or [0.0], name=name)
+
+
+def _sites(mj: Any, i: int, ends: Sequence[tuple[str, Array]]) -> tuple[End, End] | None:
+    """The sites that are held together; None where the constraint is of bodies."""
+    kinds = getattr(mj, "eq_objtype", None)
+    if kinds is None or int(kinds[i]) != int(mujoco().mjtObj.mjOBJ_SITE):
+        return None
+    sites = []
+    for site in (int(mj.eq_obj1id[i]), int(mj.eq_obj2id[i])):
+        body, origin = ends[mj.site_bodyid[site]]
+        sites.append(End(body, origin + mj.site_pos[site], spatial.from_quaternion(mj.site_quat[site])))
+    return sites[0], sites[1]
+
+
+def _frames(mj: Any, i: int, ends: Sequence[tuple[str, Array]]) -> tuple[End, End]:
+    """The frames of two bodies that are held together: points, and of a weld the second's axes in the first."""
+    (body, origin), (to, to_origin) = (ends[int(each[i])] for each in (mj.eq_obj1id, mj.eq_obj2id))
+    data, turn = np.array(mj.eq_data[i]), np.eye(3)
+    point, computed = data[0:3], spatial.cleaned(data[3:6])
+    if _kind(mj, i) == "connect":
+        return End(body, origin + point, turn), End(to, to_origin + computed, turn)
+    return End(body, origin + computed, spatial.from_quaternion(data[6:10])), End(to, to_origin + point, turn)

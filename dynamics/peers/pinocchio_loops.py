@@ -1,0 +1,52 @@
+"""Pinocchio's constraintDynamics on the loops of a mechanism."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..multibody.body import WORLD
+from ..multibody.loops import Loop
+from ..multibody.mechanism import Mechanism
+from .case import Array, Case
+from .contender import UnavailableError
+from .pinocchio import PinocchioPeer
+
+_KINDS = {"point": "CONTACT_3D", "weld": "CONTACT_6D"}
+_PROXIMAL = 1e-14, 1e-8, 200  # what is left of the constraints, its regularization, and iterations
+
+
+def constrained_accelerations(mechanism: Mechanism, q: Array, qd: Array, tau: Array) -> Array:
+    """qdd, (N, n), at states that meet the loops, without Baumgarte's stabilization.
+
+    Raises ImportError without Pinocchio, and UnavailableError for what it has not.
+    """
+    for loop in mechanism.loops:
+        if loop.kind not in _KINDS:
+            raise UnavailableError(f"has no loop of the kind {loop.kind!r}")
+    peer = PinocchioPeer(Case("held", mechanism))
+    pin, twin, data = peer.pinocchio, peer.twin, peer.data
+    models, datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
+    for loop in mechanism.loops:
+        ends = [*_frame(peer, mechanism, loop.body, loop.at), *_frame(peer, mechanism, loop.to, loop.to_at, loop)]
+        models.append(pin.RigidConstraintModel(getattr(pin.ContactType, _KINDS[loop.kind]), twin, *ends, pin.LOCAL))
+        datas.append(models[-1].createData())
+    pin.initConstraintDynamics(twin, data, models, datas)
+    rows = []
+    for x in np.concatenate([q, qd, tau], axis=1):
+        theirs, v, force = peer.arguments(x, "forward")
+        settings = pin.ProximalSettings(*_PROXIMAL)
+        solved = pin.constraintDynamics(twin, data, theirs, v, force, models, datas, settings)
+        rows.append(peer.of.our_a(theirs, v, np.array(solved)))
+    return np.array(rows)
+
+
+def _frame(peer: PinocchioPeer, mechanism: Mechanism, body: str, at: Any, loop: Loop | None = None) -> tuple[int, Any]:
+    """Pinocchio's joint of a body, and the frame of a loop there.  loop: whose orientation the frame has."""
+    carrier = mechanism.carriers[body]
+    names = {each.name: each.coordinate for each in mechanism.moving}
+    joint = 0 if carrier.name == WORLD else peer.twin.getJointId(names[carrier.name])
+    turn = np.eye(3) if loop is None else np.asarray(loop.orientation, dtype=np.float64)
+    place = carrier.position + carrier.orientation @ np.asarray(at, dtype=np.float64)
+    return joint, peer.pinocchio.SE3(carrier.orientation @ turn, place)

@@ -1,0 +1,106 @@
+"""Held states: random ones that meet a system's constraints, and the equations that constraints add there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Graph
+from cgraph.extend import Builder, cotangents, tangents
+
+from ..equations.consistent_state import consistent_state
+from ..equations.evaluate_at import Array
+from ..equations.formulations import ONE, ZERO
+from ..systems.constraints import ConstraintError
+from ..systems.system import System
+from .residual import ROUNDING, Residual, worst
+
+TRIALS = 20  # for a state that constraints let be
+DEPENDENT = 1e-9  # of the largest singular value of J, its columns scaled to kinetic energy: rows that say nothing
+
+
+def random_states(system: System, count: int, t: float, speed: float, rng: np.random.Generator) -> dict[str, Array]:
+    """q uniform in -pi .. pi, quaternions of length 1; qd, qdd and tau normal, of this deviation: (count, ..) each.
+
+    Raises ConstraintError where there are constraints, and a state cannot be moved onto them.
+    """
+    at = {"q": _configurations(system, count, rng)} | {
+        name: speed * rng.normal(size=(count, system.n)) for name in ("qd", "qdd", "tau")
+    }
+    if len(system.constraints):
+        for k in range(count):
+            at["q"][k], at["qd"][k] = _moved(system, at["q"][k], at["qd"][k], t, rng)
+    return at
+
+
+def _moved(system: System, q: Array, qd: Array, t: float, rng: np.random.Generator) -> tuple[Array, Array]:
+    """The state on the constraints; another one where this cannot be moved there."""
+    for k in range(TRIALS):
+        try:
+            return consistent_state(system, q, qd, t)
+        except ConstraintError:
+            if k == TRIALS - 1:
+                raise
+            (q,) = _configurations(system, 1, rng)
+    raise AssertionError
+
+
+def _configurations(system: System, count: int, rng: np.random.Generator) -> Array:
+    """Random coordinates, (count, nq), uniform in -pi .. pi; quaternions of length 1."""
+    q = rng.uniform(-np.pi, np.pi, (count, system.nq))
+    if system.kinematics.quasi is None:
+        return q
+    normalized = Graph(system.q, {str(i): node for i, node in enumerate(system.kinematics.normalized(system.q))})
+    values = normalized.evaluate({f"q{i}": column for i, column in enumerate(q.T)}).values()
+    return np.stack([np.broadcast_to(value, count) for value in values], axis=1)
+
+
+class Held:
+    """The rows of a system's constraints at some states.  value: numbers of a graph there, (N, n_out)."""
+
+    def __init__(self, system: System, value: Callable[[Graph], Array]) -> None:
+        self.system, self.value = system, value
+        self.any = bool(len(system.constraints))
+
+    @property
+    def rows(self) -> dict[str, cg.Node]:
+        """phi and the rates of all rows."""
+        constraints = self.system.constraints
+        rows = {f"phi{k}": phi for k, phi in enumerate(constraints.positions)}
+        return rows | {f"rate{k}": rate for k, rate in enumerate(constraints.rates)}
+
+    @cached_property
+    def matrix(self) -> Array:
+        """J^T, (N, n, m)."""
+        system, build = self.system, Builder()
+        columns = [cotangents({rate: ONE}, system.qd, build) for rate in system.constraints.rates]
+        outputs = {f"{i}_{k}": bar for k, column in enumerate(columns) for i, bar in enumerate(column)}
+        if not outputs:
+            return np.zeros((1, system.n, 0))
+        values = self.value(system.graph(outputs, system.q, system.qd))
+        return np.swapaxes(values.reshape(len(values), -1, system.n), 1, 2)
+
+    def admitted(self, inertia: Array) -> Array:
+        """M of the motions that the rows admit, (N, k, k); M itself, (N, n, n), without rows."""
+        if not self.any:
+            return inertia
+        size = np.sqrt(np.abs(np.diagonal(inertia, axis1=1, axis2=2)))
+        size = np.where(size > 0.0, size, 1.0)[:, :, None]
+        _, values, vectors = np.linalg.svd(np.swapaxes(self.matrix / size, 1, 2))
+        rank = int((values > DEPENDENT * values.max(axis=1, keepdims=True)).sum(axis=1).max())
+        kernel = np.swapaxes(vectors, 1, 2)[:, :, rank:] / size
+        return np.asarray(np.swapaxes(kernel, 1, 2) @ inertia @ kernel)
+
+    def closed(self, accelerations: Array) -> Residual:
+        """The rows stay 0: their second rates, of all rows, also of those that were left out as saying nothing new."""
+        system, (build, rates) = self.system, (Builder(), self.system.constraints.rates)
+        x_dot = dict(zip(system.q, system.q_dot, strict=True)) | {system.t: ONE}
+        dots = tangents(x_dot, rates, build)
+        graph = system.graph({str(k): dots.get(z, ZERO) for k, z in enumerate(rates)}, system.q, system.qd)
+        change, pushed = self.value(graph), np.swapaxes(self.matrix, 1, 2) * accelerations[:, None, :]
+        terms = np.abs(change) + np.abs(pushed).sum(axis=-1)
+        equation = "constraints: J qdd + (dz/dt at qdd = 0) = 0, all rows"
+        return Residual(equation, worst(change + pushed.sum(axis=-1), terms), ROUNDING)

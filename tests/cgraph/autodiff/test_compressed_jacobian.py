@@ -1,0 +1,49 @@
+"""A Jacobian as a product repeated for colors is the Jacobian, and is taken where it is smaller."""
+
+import numpy as np
+from hypothesis import given
+
+import cgraph as cg
+from cgraph.autodiff import compressed_jacobian as module
+from cgraph.extend import compressed_jacobian
+from tests.strategies import cases
+from tests.tolerances import LONG_SUM
+
+
+def values(graph, numbers):
+    return list(graph.evaluate(dict(zip(graph.input_names, numbers, strict=True))).values())
+
+
+def assembled(parts, point):
+    """The Jacobian, row by row, as a program would run it."""
+    known = values(parts.primal, point)
+    sums = np.array([values(parts.product, [*known, float(color)]) for color in range(parts.colors)])
+    return np.array(values(parts.entries, sums.T.ravel().tolist()))
+
+
+@given(cases())
+def test_the_parts_make_the_jacobian(case):
+    every, module.written_sizes = module.written_sizes, lambda graph, wrt: (0, 1, 1)  # so that it is compressed
+    try:
+        parts = compressed_jacobian(case.graph)
+    finally:
+        module.written_sizes = every
+    point = list(case.values.values())
+    expected = np.array(values(cg.jacobian(case.graph), point))
+    if parts.colors:
+        size = np.abs(expected).max()
+        np.testing.assert_allclose(assembled(parts, point), expected, rtol=LONG_SUM, atol=LONG_SUM * size)
+
+
+def test_it_is_taken_where_it_is_smaller():
+    x = cg.variables([f"x{k}" for k in range(12)])
+    shared = cg.sin(sum(x[1:], x[0]))
+    dense = cg.Graph(x, {f"y{k}": cg.exp(shared * cg.cos(shared)) * each for k, each in enumerate(x)})
+    band = cg.Graph(x, {f"y{k}": cg.sin(x[k]) * x[k - 1] for k in range(12)})
+    assert compressed_jacobian(band) is None
+    parts = compressed_jacobian(dense, [each.name for each in x[:9]])
+    assert parts.colors == 9
+    assert len(parts.primal.nodes) + len(parts.product.nodes) < len(cg.jacobian(dense, x[:9]).nodes)
+    point = np.linspace(0.1, 0.4, 12)
+    expected = values(cg.jacobian(dense, x[:9]), point)
+    np.testing.assert_allclose(assembled(parts, point), expected, rtol=LONG_SUM)

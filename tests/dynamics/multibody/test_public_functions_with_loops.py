@@ -1,0 +1,114 @@
+"""Every public function of a model, of one with a loop: of the whole, or of its tree, as its documentation says."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.equations.evaluate_at import Array
+
+from ..linkages import bar, four_bar
+
+MODEL = four_bar()
+TREE = replace(MODEL, loops=())
+Q, QD = dyn.consistent_state(MODEL, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+STILL = np.zeros(3)
+TAU = {"tau": [0.4, 0.1, -0.2]}
+
+
+def at_rest(graph: cg.Graph, model: Any = MODEL) -> Array:
+    """Accelerations there, of the outputs of a graph."""
+    arrays = dyn.arrays_at(model, graph, Q, STILL, **TAU)
+    return np.array([value for name, value in arrays.items() if name in ("qdd", "qd_dot")]).ravel()
+
+
+def rates(graph: cg.Graph) -> Array:
+    values = dyn.arrays_at(MODEL, graph, Q, STILL, **TAU)
+    return np.array([values[f"qd{i}_dot"] for i in range(3)])
+
+
+def caught() -> tuple[Array, Array]:
+    load = bar("load", "coupler", 0.2, (0.4, 0.0, 0.0), kind="fixed")
+    after = dyn.attach_with_impact(MODEL, Q, QD, load, velocity=(1.0, 0.0, 0.5))
+    return after.q, after.qd
+
+
+def ended(run: Any) -> tuple[Array, Array]:
+    return run.q[..., -1, :].ravel(), run.qd[..., -1, :].ravel()
+
+
+# A configuration, and what the loop has to let through there: velocities, accelerations from rest, or columns of them.
+HELD: dict[str, Callable[[], tuple[Array, Array]]] = {
+    "forward_dynamics": lambda: (Q, at_rest(dyn.forward_dynamics(MODEL))),
+    "state_equation": lambda: (Q, rates(dyn.state_equation(MODEL))),
+    "as_system": lambda: (Q, at_rest(dyn.forward_dynamics(dyn.as_system(MODEL)))),
+    "prune": lambda: (Q, at_rest(dyn.prune(MODEL, dyn.forward_dynamics, effects=["gravity"]).graph)),
+    "with_controller": lambda: (
+        Q,
+        at_rest(dyn.forward_dynamics(dyn.with_controller(MODEL, lambda q, qd, t: [1.0 - q[0], 0.0, 0.0]))),
+    ),
+    "state_space": lambda: (Q, dyn.arrays_at(MODEL, dyn.state_space(MODEL), Q, QD, **TAU)["B"][3:]),
+    "linearize": lambda: (Q, dyn.linearize(MODEL, Q, QD)[1][3:]),
+    "reduced_linearization": lambda: (Q, dyn.reduced_linearization(MODEL, Q, QD).displacements[:3]),
+    "consistent_state": lambda: dyn.consistent_state(MODEL, Q + 1e-3, QD + 0.1),
+    "attach_with_impact": caught,
+    "simulate": lambda: ended(dyn.simulate(MODEL, Q, QD, 0.1)),
+    "simulate_many": lambda: ended(dyn.simulate_many(MODEL, [Q], [QD], 0.1, t_eval=[0.1])),
+    "reference": lambda: tuple(np.split(dyn.reference(MODEL, Q, QD, [0.01], digits=15).x[-1], 2)),
+}
+ELSEWHERE = {
+    *("certify", "integrable_rows", "lint_constraints", "raise_if_singular", "release"),  # tests of what they say
+    *("to_mjcf", "to_urdf"),  # tests of files
+    "arrays_at",  # numbers of any graph
+}
+
+
+def of_models() -> list[str]:
+    """Public functions whose first argument is a model."""
+    functions = {name: getattr(dyn, name) for name in dyn.__all__ if inspect.isfunction(getattr(dyn, name))}
+    first = {name: [*inspect.signature(function).parameters, ""][0] for name, function in functions.items()}
+    return [name for name, argument in first.items() if argument in ("model", "mechanism")]
+
+
+def held_rows(q: Array) -> Array:
+    """J of the loop's rows in x and z, from how the bodies move."""
+    system = MODEL.system
+    graph = cg.Graph([*system.q, *system.qd], {f"{k}": system.constraints.rates[k] for k in (0, 2)})
+    state = {f"q{i}": x for i, x in enumerate(q)} | {f"qd{i}": row for i, row in enumerate(np.eye(3))}
+    return np.array(list(graph.evaluate(state).values()))
+
+
+@pytest.mark.parametrize("name", HELD)
+def test_what_is_of_the_whole_keeps_the_loop_closed(name: str) -> None:
+    q, motion = HELD[name]()
+    assert motion.shape[0] == 3
+    assert np.abs(motion).max() > 1e-3
+    assert np.abs(held_rows(q) @ motion).max() < 1e-13 * np.abs(motion).max()
+
+
+@pytest.mark.parametrize("name", [name for name in of_models() if name not in HELD and name not in ELSEWHERE])
+def test_what_is_of_the_tree_is_the_same_without_the_loop(name: str) -> None:
+    of = ("rocker",) if name.startswith("frame_") else ()
+    found, expected = (read(getattr(dyn, name)(model, *of)) for model in (MODEL, TREE))
+    assert found == expected
+
+
+def read(result: Any) -> Any:
+    """A graph, a table or an array as something to compare."""
+    if isinstance(result, np.ndarray):
+        return result.tolist()
+    return getattr(result, "graph", result).listing()  # tags too
+
+
+def test_the_path_from_a_loop_force_to_a_joint_is_told() -> None:
+    told = str(cg.why(dyn.forward_dynamics(MODEL), "lambda0", "qd0"))
+    assert "lambda0" in told
+    assert "qd0" in told
+    assert MODEL.system.display_names["lambda0"] == "lambda.coupler to rocker x"
