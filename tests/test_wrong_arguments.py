@@ -99,7 +99,7 @@ FIRST, LAST = TWO.bodies[0].name, TWO.bodies[1].name
 RUNS = {"dt": 0.01, "max_steps": 100, "backend": "python", "estimate_error": False, "progress": False}
 MODEL_ALONE = """as_system bias center_of_mass center_of_mass_jacobian coriolis damping_force display_names energy
     gravity_force inertial_parameters integrable_rows inverse_dynamics_derivatives inverse_mass_matrix kinetic_energy
-    mass_matrix momentum potential_energy regressor state_equation state_space to_urdf torque_by_joint_motion
+    lint_constraints mass_matrix momentum potential_energy regressor state_equation state_space to_urdf torque_by_joint_motion
     torque_by_link RecursiveInverseDynamics"""
 
 CALLS = {
@@ -150,6 +150,7 @@ CALLS = {
     "dyn.forward_dynamics": call(dyn.forward_dynamics, ARM, "auto", check=False),
     "dyn.inverse_dynamics": call(dyn.inverse_dynamics, ARM, "chain_rule", simplify=True),
     "dyn.momentum_rate": call(dyn.momentum_rate, ARM, "chain_rule", simplify=True, keep_momentum=False),
+    "dyn.reduced_linearization": call(dyn.reduced_linearization, SYSTEM, [0.0], [0.0], None, t=0.0, parameters=None),
     "dyn.linearize": call(dyn.linearize, SYSTEM, [0.0], [0.0], None, t=0.0, parameters=None),
     "dyn.raise_if_singular": call(dyn.raise_if_singular, ARM, 0.0),
     "dyn.spurious_nodes": call(dyn.spurious_nodes, GRAPH),
@@ -251,9 +252,9 @@ CALLS = {
 RECORDS = """
     cg.CSource cg.Comparison cg.Compiled cg.Counts cg.Edge cg.Lint cg.Loop cg.Node cg.Why cg.WhyNot
     dyn.Attached dyn.Body dyn.Certificate dyn.Crossings dyn.Ensemble dyn.EnsembleStats dyn.Force dyn.FreeBody
-    dyn.HeldForces dyn.JointForce dyn.MotionGradient dyn.MotionGradients dyn.OmittedTerm dyn.PruneResult
-    dyn.QuasiVelocities dyn.Reference dyn.Released dyn.Sensitivities dyn.Stats dyn.Subtree dyn.TorqueTable
-    dyn.Trajectory
+    dyn.ConstraintLint dyn.HeldForces dyn.JointForce dyn.MotionGradient dyn.MotionGradients dyn.OmittedTerm
+    dyn.PruneResult dyn.QuasiVelocities dyn.ReducedLinearization dyn.Reference dyn.Released dyn.Sensitivities dyn.Stats
+    dyn.Subtree dyn.TorqueTable dyn.Trajectory
 """
 # Nothing to give; what a mechanism calls; what empties the user's cache; the fast way into compiled code, which looks
 # at nothing.

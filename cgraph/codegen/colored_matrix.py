@@ -12,6 +12,8 @@ from ..autodiff.sparsity import Indices, Pattern
 from ..core.evaluate import Array
 from .sweep import Sweep, aligned
 
+LARGE = 2**16  # numbers in a matrix, of which no copy is kept for another call
+
 
 class Part(Protocol):
     """What gives some of the entries."""
@@ -78,6 +80,11 @@ class ColoredMatrix:
 
     def values(self, x: Array, dense: bool) -> Array:
         """The entries, or with `dense` the whole matrix."""
+        m, n = self.entries.shape
+        if dense and m * n > LARGE:
+            matrix = np.zeros((m, n))
+            matrix[self.entries.rows, self.entries.columns] = self.values(x, dense=False)
+            return matrix
         free = self._free[dense]
         try:
             buffers = free.pop()

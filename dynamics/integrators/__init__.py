@@ -5,6 +5,7 @@ from functools import cache, partial
 from .composition import COMPOSITIONS, Composition
 from .dop853 import DOP853
 from .explicit import explicit, explicit_step
+from .jacobian_statements import jacobian_statements
 from .method import Method
 from .momentum_graphs import Mechanics, mechanics
 from .partitioned_tableau import PARTITIONED, Partitioned, gauss
@@ -104,6 +105,7 @@ __all__ = [
     "Tableau",
     "derive",
     "force",
+    "jacobian_statements",
     "mechanics",
     "quantity",
     "quantity_inputs",

@@ -26,9 +26,9 @@ class Method:
     order : int
         p, where the error of a run falls as h^p.
     program : callable
-        program(problem, dense), the steps as a program. It reads `problem.rate`, and what `state_jacobian`,
-        `time_derivative` and `mechanics` derive. What the program has to keep to depends on `adaptive`; m is the size
-        of a state.
+        program(problem, dense), the steps as a program. It reads `problem.rate`, and what `time_derivative` and
+        `mechanics` derive; `jacobian_statements` are those for the Jacobian of the rate. What the program has to keep
+        to depends on `adaptive`; m is the size of a state.
     adaptive : bool
         Whether the method chooses its steps by an estimate of their error.
     degree : int

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
-from cgraph.codegen import differentiable, parts, sweep
+from cgraph.codegen import colored_matrix, differentiable, parts, sweep
 from cgraph.errors import GraphError
 from tests import high_precision
 from tests.strategies import cases, examples
@@ -261,6 +261,14 @@ def test_a_bound_jacobian_needs_memory_that_it_can_use(backend):
         function.bind_jacobian(both[:4], both[1:33].reshape(8, 4))
 
 
+def test_large_matrices_are_filled_in(backend, monkeypatch):
+    expected = compiled(example(), backend).jacobian(POINT)
+    monkeypatch.setattr(colored_matrix, "LARGE", 1)
+    function = compiled(example(), backend)
+    assert np.array_equal(function.jacobian(POINT), expected)
+    assert np.array_equal(function.jacobian(POINT, sparse=True).toarray(), expected)
+
+
 def test_a_result_is_the_callers_own(backend):
     function = compiled(example(), backend)
     first = function.jacobian(POINT)
@@ -301,6 +309,18 @@ def test_a_function_that_has_derivatives_pickles(backend):
     function = compiled(example(), backend)
     expected = function.jacobian(POINT)
     assert np.array_equal(pickle.loads(pickle.dumps(function)).jacobian(POINT), expected)
+
+
+def test_machine_code_of_derivatives_is_kept_on_disk(tmp_path):
+    pytest.importorskip("llvmlite")
+    graph = cg.Graph([x, y], {"f": x * y * y, "g": x / y})
+    found = []
+    for _ in range(2):
+        function = compiled(graph, "llvm", LANES, cache=tmp_path)
+        products = function.jvp([1.0, 2.0], np.eye(2)).tolist(), function.hessian([1.0, 2.0], [1.0, 0.0]).tolist()
+        found.append((products, sorted(tmp_path.iterdir())))
+    assert found[0] == found[1]
+    assert len(found[0][1]) == 3  # with the function itself
 
 
 @pytest.mark.parametrize("given_x", [POINT.tolist(), POINT.astype(np.float32), np.repeat(POINT, 2)[::2]])
