@@ -77,20 +77,21 @@ def test_a_gradient_is_the_end_s_slope_along_forward_sensitivities_and_that_of_d
         assert float(np.squeeze(result[name])) == approx(difference, rel=DIFFERENCES, abs=DIFFERENCES)
 
 
-@mark.parametrize("method", ["rk4", "verlet", "gauss4"])
+@mark.parametrize("method", [*USUAL, *slow(*OTHERS)])
 def test_adjoint_times_tangent_is_constant_along_the_motion(method: str) -> None:
     """lam . dx at any step, with lam from the motion that begins there."""
-    given = {"method": method, "backend": "python"}
-    forward = dyn.sensitivities(bead(), [0.5], [0.2], 1.0, dt=0.05, wrt=["q", "qd"], **given)
+    given = {"method": method, "backend": "python", **options(method)}
+    forward = dyn.sensitivities(bead(), [0.5], [0.2], 1.0, wrt=["q", "qd"], **given)
+    if "dt" in given:
+        given["dt"] *= 1.0 + 1e-9  # the time that is left is a whole number of steps, to rounding
     products = []
-    for row in (0, 5, 13, 19):
-        begin = dyn.gradient(
-            bead(), loss, forward.q[row], forward.qd[row], t_span=(forward.t[row], 1.0), dt=0.0500001, **given
-        )
-        assert len(begin.t) == 21 - row
+    for row in (0, 4, 9):
+        span = (forward.t[row], 1.0)
+        begin = dyn.gradient(bead(), loss, forward.q[row], forward.qd[row], t_span=span, wrt=["q", "qd"], **given)
+        assert len(begin.t) == len(forward.t) - row
         bar = np.concatenate([begin["q"], begin["qd"]])
         products.append(bar @ np.concatenate([forward["q"][row], forward["qd"][row]], axis=1))
-    assert np.array(products) == approx(np.tile(products[0], (4, 1)), rel=LONG_SUM)
+    assert np.array(products) == approx(np.tile(products[0], (3, 1)), rel=LONG_SUM)
 
 
 def pendulum_step(x: Any, tau: Any, m: Any, h: float) -> Any:
