@@ -48,6 +48,10 @@ from .reference import Reference, reference
 from .scenes.scenes import Scene
 from .simulation.ensembles import Ensemble, EnsembleStats, simulate_many
 from .simulation.event import Event
+from .simulation.gradients.gradient import MotionGradient, gradient
+from .simulation.gradients.gradient_many import MotionGradients, gradient_many
+from .simulation.gradients.motion import MotionError
+from .simulation.gradients.sensitivities import Sensitivities, sensitivities
 from .simulation.sampled_controller import HeldForces, SampledController
 from .simulation.simulate import simulate
 from .simulation.trajectory import Crossings, SimulationWarning, Stats, Trajectory
@@ -87,6 +91,9 @@ __all__ = [
     "Mechanism",
     "MechanismError",
     "MechanismWarning",
+    "MotionError",
+    "MotionGradient",
+    "MotionGradients",
     "OdeSystem",
     "OmittedTerm",
     "PruneResult",
@@ -97,6 +104,7 @@ __all__ = [
     "Released",
     "SampledController",
     "Scene",
+    "Sensitivities",
     "SimulationWarning",
     "SingularMassMatrixError",
     "Stats",
@@ -124,6 +132,8 @@ __all__ = [
     "frame_jacobian_rate",
     "frame_placement",
     "frame_velocity",
+    "gradient",
+    "gradient_many",
     "gravity_force",
     "inertial_parameters",
     "integrable_rows",
@@ -148,6 +158,7 @@ __all__ = [
     "regressor",
     "release",
     "scenes",
+    "sensitivities",
     "serial_arm",
     "simulate",
     "simulate_many",

@@ -174,6 +174,20 @@ CALLS = {
         dyn.simulate, ARM, [0.1], [0.0], 0.02, "rk4", t0=0.0, t_span=None, max_step=None, rtol=None, atol=None,
         t_eval=None, events=(), dense_output=False, tau=0.0, parameters=None, first_step=None, **RUNS
     ),
+    "dyn.gradient": call(
+        dyn.gradient, ARM, lambda q, qd, t: q[0], [0.1], [0.0], 0.02, "rk4", running=lambda q, qd, tau, t: q[0],
+        wrt=["q"], t0=0.0, t_span=None, dt=0.01, max_step=None, rtol=None, atol=None, first_step=None, tau=[0.0],
+        parameters=None, events=(), backend="python"
+    ),
+    "dyn.gradient_many": call(
+        dyn.gradient_many, ARM, lambda q, qd, t: q[0], [[0.1]], [[0.0]], 0.02, "rk4",
+        running=lambda q, qd, tau, t: q[0], wrt=["q"], t0=0.0, t_span=None, dt=0.01, tau=[[0.0]], parameters={},
+        backend="python"
+    ),
+    "dyn.sensitivities": call(
+        dyn.sensitivities, ARM, [0.1], [0.0], 0.02, "rk4", wrt=["q"], t0=0.0, t_span=None, dt=0.01, max_step=None,
+        rtol=None, atol=None, first_step=None, tau=[0.0], parameters=None, backend="python"
+    ),
     "dyn.simulate_many": call(
         dyn.simulate_many, ARM, [[0.1]], [[0.0]], 0.02, "rk4", t0=0.0, t_span=None, t_eval=None, tau=0.0,
         parameters=None, workers=1, chunk=None, **RUNS
@@ -239,9 +253,9 @@ CALLS = {
 RECORDS = """
     cg.CSource cg.Comparison cg.Compiled cg.Counts cg.Edge cg.Lint cg.Loop cg.Node cg.Why cg.WhyNot
     dyn.Attached dyn.Body dyn.Certificate dyn.Crossings dyn.Ensemble dyn.EnsembleStats dyn.Force dyn.FreeBody
-    dyn.ConstraintLint dyn.HeldForces dyn.JointForce dyn.ReducedLinearization
-    dyn.OmittedTerm dyn.PruneResult dyn.QuasiVelocities dyn.Reference dyn.Released dyn.Stats dyn.Subtree dyn.TorqueTable
-    dyn.Trajectory
+    dyn.ConstraintLint dyn.HeldForces dyn.JointForce dyn.MotionGradient dyn.MotionGradients dyn.OmittedTerm
+    dyn.PruneResult dyn.QuasiVelocities dyn.ReducedLinearization dyn.Reference dyn.Released dyn.Sensitivities dyn.Stats
+    dyn.Subtree dyn.TorqueTable dyn.Trajectory
 """
 # Nothing to give; what a mechanism calls; what empties the user's cache; the fast way into compiled code, which looks
 # at nothing.

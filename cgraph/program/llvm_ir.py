@@ -33,10 +33,13 @@ def offsets(program: Program, width: int) -> dict[str, int]:
 
 
 def program_ir(program: Program, flags: str = "", lanes: int = 1, width: int = 1, registers: int = REGISTERS) -> str:
-    """A module with `int64_t run(double *memory, double *records, int64_t passes, int64_t every, int64_t *done)`.
+    """A module with the function `run`.
+
+    int64_t run(double *memory, double *records, int64_t passes, int64_t every, int64_t *done, double *feed)
 
     The registers lie in `memory` as `offsets` says, each number a vector of `lanes`. A row is written to `records`
-    after every `every`th pass; the result is how many; the number of passes that were run goes to `done`.
+    after every `every`th pass; the result is how many; the number of passes that were run goes to `done`. A row of
+    `feed` is read before every pass.
     width: of the vectors in which `Map` goes through its elements.
     """
     arithmetic = point_arithmetic(flags, registers) if lanes == 1 else Arithmetic(flags, lanes, registers)
@@ -45,10 +48,15 @@ def program_ir(program: Program, flags: str = "", lanes: int = 1, width: int = 1
     return "\n".join([*preamble(program.graphs(), arithmetic), *functions.definitions, *run, ""])
 
 
+_ARGUMENTS = "ptr noalias %memory, ptr noalias %records, i64 %passes, i64 %every, ptr %done, ptr noalias %feed"
+
+
 class _RunFunction:
     """The function `run`: the passes, and in each of them the statements, the record and the stop.
 
-    for (done = 0; done < passes;) { statements; done++; if (--until == 0) { until = every; record } if (stop) break }
+    for (done = 0; done < passes;) {
+        read; statements; done++; if (--until == 0) { until = every; record } if (stop) break
+    }
     """
 
     def __init__(self, program: Program, functions: Functions) -> None:
@@ -64,7 +72,7 @@ class _RunFunction:
         places = offsets(self.program, self.functions.width)
         self._run(self.program.body)
         return [
-            "define i64 @run(ptr noalias %memory, ptr noalias %records, i64 %passes, i64 %every, ptr %done) nounwind {",
+            f"define i64 @run({_ARGUMENTS}) nounwind {{",
             "start:",
             *(
                 f"  {pointer} = getelementptr {self.type}, ptr %memory, i64 {places[name]}"
@@ -82,6 +90,7 @@ class _RunFunction:
             "  %more = icmp slt i64 %before, %passes",
             "  br i1 %more, label %pass, label %end",
             "pass:",
+            *self._read(),
             *self._lines,
             "  %after = add i64 %before, 1",
             "  store i64 %after, ptr %done",
@@ -96,6 +105,22 @@ class _RunFunction:
             "  ret i64 %rows",
             "}",
         ]
+
+    def _read(self) -> list[str]:
+        """Registers = row `done` of the feed."""
+        if not self.program.feed:
+            return []
+        lines = [
+            f"  %fed = mul i64 %before, {self.program.feed_width}",
+            f"  %fed0 = getelementptr {self.type}, ptr %feed, i64 %fed",
+        ]
+        for k, name in enumerate(self.program.feed):
+            length = self.program.registers[name]
+            lines += [
+                _copy(self._pointers[name], f"%fed{k}", length * self.size),
+                f"  %fed{k + 1} = getelementptr {self.type}, ptr %fed{k}, i64 {length}",
+            ]
+        return lines
 
     def _record(self) -> list[str]:
         """if (--until == 0) { until = every; if (record_if > 0) write a row }."""

@@ -14,9 +14,8 @@ from .llvm_ir import program_functions, program_ir
 from .program import Program
 from .runner import Record, Runner
 
-_RUN = ctypes.CFUNCTYPE(
-    ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p
-)
+_POINTER, _COUNT = ctypes.c_void_p, ctypes.c_int64
+_RUN = ctypes.CFUNCTYPE(_COUNT, _POINTER, _POINTER, _COUNT, _COUNT, _POINTER, _POINTER)
 
 
 class NativeRunner(Runner):
@@ -36,13 +35,14 @@ class NativeRunner(Runner):
         nodes = sum([len(graph.nodes) for graph in self._fused.graphs()])
         return self._host.compile(text, program_functions(self._fused), nodes)
 
-    def _run(self, memory: Array, passes: int, every: int) -> Record:
+    def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record:
         rows = np.empty((passes // every, self.program.width))
-        done = ctypes.c_int64()
-        count = self._entry(memory.ctypes.data, rows.ctypes.data, passes, every, ctypes.addressof(done))
+        done, fed = ctypes.c_int64(), np.ascontiguousarray(feed)
+        where = ctypes.addressof(done), fed.ctypes.data
+        count = self._entry(memory.ctypes.data, rows.ctypes.data, passes, every, *where)
         return Record(rows[:count], done.value)
 
-    def _run_many(self, memories: Array, passes: int, every: int) -> Record:
+    def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record:
         lanes = self._host.lanes
         if self._many is None:
             code = self._compiled(program_ir(self._fused, self._flags, lanes, self.width, self._host.registers))
@@ -50,12 +50,17 @@ class NativeRunner(Runner):
         entry, total = self._many[1], memories.shape[1]
         rows = np.empty((passes // every, self.program.width, total))
         block, part = np.empty((self.size, lanes)), np.empty((*rows.shape[:2], lanes))
+        fed = np.empty((*feed.shape[:2], lanes))
+        if feed.shape[2] == 1:
+            fed[...] = feed
         done = ctypes.c_int64()
         # A vector of memories at a time; the last one is filled up with copies of its first memory.
         for start in range(0, total, lanes):
             here = slice(start, min(start + lanes, total))
             width = here.stop - start
             block[:, :width], block[:, width:] = memories[:, here], memories[:, start : start + 1]
-            entry(block.ctypes.data, part.ctypes.data, passes, every, ctypes.addressof(done))
+            if feed.shape[2] > 1:
+                fed[:, :, :width], fed[:, :, width:] = feed[:, :, here], feed[:, :, start : start + 1]
+            entry(block.ctypes.data, part.ctypes.data, passes, every, ctypes.addressof(done), fed.ctypes.data)
             memories[:, here], rows[:, :, here] = block[:, :width], part[:, :, :width]
         return Record(rows, passes)

@@ -201,6 +201,8 @@ class Program:
         A register of length 1; a pass at whose end it is not positive records nothing.
     stop : str, optional
         A register of length 1; the passes end after one at whose end it is not 0.
+    feed : sequence of str
+        Registers which, end to end, take a row of numbers before each pass, from those handed to the run.
 
     Raises
     ------
@@ -223,6 +225,7 @@ class Program:
     record: Sequence[str]
     record_if: str | None = None
     stop: str | None = None
+    feed: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         for name, length in self.registers.items():
@@ -230,6 +233,9 @@ class Program:
                 raise GraphError(f"register {name!r} needs a length, an integer not negative, got {length!r:.60}")
         for name in self.record:
             self._length("the record", name)
+        for name in self.feed:
+            self._length("the feed", name)
+        _check_once("the feed", self.feed)
         for what, control in (("record_if", self.record_if), ("stop", self.stop)):
             if control is not None:
                 self._need(what, control, 1)
@@ -250,6 +256,11 @@ class Program:
     def width(self) -> int:
         """Numbers in a row of the record."""
         return sum(self.registers[name] for name in self.record)
+
+    @property
+    def feed_width(self) -> int:
+        """Numbers in a row of the feed."""
+        return sum(self.registers[name] for name in self.feed)
 
     def graphs(self) -> list[Graph]:
         """The graphs that statements run, each once."""

@@ -29,12 +29,13 @@ class PythonRunner(Runner):
         self._functions = {id(graph): compile(graph, "python") for graph in program.graphs()}
         self._arrays: dict[int, Compiled] = {}
 
-    def _run(self, memory: Array, passes: int, every: int) -> Record:
+    def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record:
         program = self.program
         state = {name: memory[place].tolist() for name, place in self._slices.items()}
         rows: list[list[float]] = []
         done = 0
         for done in range(1, passes + 1):
+            state.update(_split(feed[done - 1].tolist(), program.feed, state))
             self._statements(program.body, state)
             if done % every == 0 and (program.record_if is None or state[program.record_if][0] > 0.0):
                 rows.append([value for name in program.record for value in state[name]])
@@ -80,14 +81,16 @@ class PythonRunner(Runner):
         inputs += [state[name] if len(state[name]) == count else state[name] * count for name in statement.inputs]
         return [function.values(list(values)) for values in zip(*inputs, strict=True)]
 
-    def _run_many(self, memories: Array, passes: int, every: int) -> Record:
+    def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record:
         program = self.program
         state = {name: memories[place].copy() for name, place in self._slices.items()}
         rows = np.empty((passes // every, program.width, memories.shape[1]))
+        shape = (program.feed_width, memories.shape[1])
         for done in range(1, passes + 1):
+            state.update(_split(np.broadcast_to(feed[done - 1], shape), program.feed, state))
             for statement in program.body:
                 self._statement_many(statement, state)
-            if done % every == 0:
+            if done % every == 0 and program.record:
                 np.concatenate([state[name] for name in program.record], out=rows[done // every - 1])
         for name, place in self._slices.items():
             memories[place] = state[name]

@@ -117,7 +117,7 @@ class Runner(ABC):
             raise GraphError(f"register {name!r} needs shape {register.shape}, got {numbers.shape}")
         register[...] = numbers
 
-    def run(self, memory: Array, passes: int, every: int = 1) -> Record:
+    def run(self, memory: Array, passes: int, every: int = 1, feed: ArrayLike | None = None) -> Record:
         """Run passes, fewer if the program stops, and record a row after each `every`th.
 
         Parameters
@@ -126,6 +126,8 @@ class Runner(ABC):
             Changed in place: the next run continues from it.
         passes, every : int
             At least 0 and at least 1.
+        feed : array_like, shape (passes, feed_width), optional
+            Of a program with a feed, what its registers are before each pass.
 
         Returns
         -------
@@ -135,13 +137,14 @@ class Runner(ABC):
         Raises
         ------
         GraphError
-            If the memory has another shape or type, or `passes` or `every` is out of range.
+            If the memory or the feed has another shape or type, or `passes` or `every` is out of range.
         """
         self._check(memory, (self.size,), passes, every)
+        fed = self._fed(feed, (passes, self.program.feed_width))
         with _fitting(passes // every, self.program.width):
-            return self._run(memory, passes, every)
+            return self._run(memory, passes, every, fed)
 
-    def run_many(self, memories: Array, passes: int, every: int = 1) -> Record:
+    def run_many(self, memories: Array, passes: int, every: int = 1, feed: ArrayLike | None = None) -> Record:
         """As `run`, for N memories at once, in vectors; the program has to be branch-free.
 
         Parameters
@@ -150,6 +153,8 @@ class Runner(ABC):
             Changed in place.
         passes, every : int
             At least 0 and at least 1.
+        feed : array_like, shape (passes, feed_width, N) or (passes, feed_width, 1), optional
+            As for `run`, for each memory or one for all.
 
         Returns
         -------
@@ -169,8 +174,19 @@ class Runner(ABC):
         kinds |= {name for name in ("record_if", "stop") if getattr(program, name) is not None}
         if kinds:
             raise GraphError(f"runs side by side need a branch-free program: no {', '.join(sorted(kinds))}")
-        with _fitting(passes // every, self.program.width * memories.shape[1]):
-            return self._run_many(memories, passes, every)
+        count = memories.shape[1]
+        fed = self._fed(feed, (passes, self.program.feed_width, count))
+        with _fitting(passes // every, self.program.width * count):
+            return self._run_many(memories, passes, every, fed)
+
+    def _fed(self, feed: ArrayLike | None, shape: tuple[int, ...]) -> Array:
+        """The rows of a feed, of that shape; the last dimension may be one for all."""
+        if feed is None and not self.program.feed:
+            return np.empty(shape)
+        rows = np.asarray(feed, dtype=np.float64)
+        if rows.shape not in (shape, (*shape[:2], 1)[: len(shape)]):
+            raise GraphError(f"the program needs a feed of shape {shape}, got {rows.shape}")
+        return rows
 
     def _check(self, memory: Array, shape: tuple[int, ...], passes: int, every: int) -> None:
         if memory.dtype != np.float64 or memory.shape != shape or not memory.flags.c_contiguous:
@@ -179,7 +195,7 @@ class Runner(ABC):
         require_whole("every", every, 1)
 
     @abstractmethod
-    def _run(self, memory: Array, passes: int, every: int) -> Record: ...
+    def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record: ...
 
     @abstractmethod
-    def _run_many(self, memories: Array, passes: int, every: int) -> Record: ...
+    def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record: ...

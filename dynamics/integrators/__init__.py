@@ -4,7 +4,7 @@ from functools import cache, partial
 
 from .composition import COMPOSITIONS, Composition
 from .dop853 import DOP853
-from .explicit import explicit
+from .explicit import explicit, explicit_step
 from .jacobian_statements import jacobian_statements
 from .method import Method
 from .momentum_graphs import Mechanics, mechanics
@@ -20,10 +20,11 @@ from .problem import (
     time_derivative,
     total_energy,
 )
-from .radau import ORDER as RADAU_ORDER, radau
-from .rosenbrock import RODAS5P, rosenbrock
+from .radau import ORDER as RADAU_ORDER, radau, radau_step
+from .rosenbrock import RODAS5P, rosenbrock, rosenbrock_step
+from .step import Step
 from .step_control import embedded
-from .symplectic import composed, partitioned
+from .symplectic import composed, composed_step, partitioned, partitioned_step
 from .tableau import TABLEAUS, Tableau
 from .taylor import ORDER as TAYLOR_ORDER, taylor
 
@@ -32,17 +33,21 @@ MOST_STAGES = 12  # of Gauss's methods: order 24, beyond which float64 gains not
 
 def runge_kutta(tableau: Tableau) -> Method:
     """An explicit Runge-Kutta method: equal steps, or steps by error where the tableau has weights of an estimate."""
+    step = partial(explicit_step, tableau)
     if tableau.error:
-        return Method(tableau.order, partial(embedded, tableau), adaptive=True, degree=len(tableau.interpolant[0]))
-    return Method(tableau.order, lambda problem, _: explicit(tableau, problem), adaptive=False)
+        degree = len(tableau.interpolant[0])
+        return Method(tableau.order, partial(embedded, tableau), adaptive=True, degree=degree, step=step)
+    return Method(tableau.order, lambda problem, _: explicit(tableau, problem), adaptive=False, step=step)
 
 
 def _symplectic(method: Partitioned) -> Method:
-    return Method(method.order, lambda problem, _: partitioned(method, problem), adaptive=False)
+    step = partial(partitioned_step, method)
+    return Method(method.order, lambda problem, _: partitioned(method, problem), adaptive=False, step=step)
 
 
 def _composition(composition: Composition) -> Method:
-    return Method(composition.order, lambda problem, _: composed(composition, problem), adaptive=False)
+    step = partial(composed_step, composition)
+    return Method(composition.order, lambda problem, _: composed(composition, problem), adaptive=False, step=step)
 
 
 class Methods(dict[str, Method]):
@@ -70,8 +75,14 @@ METHODS: dict[str, Method] = Methods(
     {
         **{name: runge_kutta(tableau) for name, tableau in TABLEAUS.items()},
         "dop853": runge_kutta(DOP853),
-        "rodas": Method(RODAS5P.order, partial(rosenbrock, RODAS5P), adaptive=True, degree=len(RODAS5P.dense) + 1),
-        "radau": Method(RADAU_ORDER, radau, adaptive=True, degree=3),
+        "rodas": Method(
+            RODAS5P.order,
+            partial(rosenbrock, RODAS5P),
+            adaptive=True,
+            degree=len(RODAS5P.dense) + 1,
+            step=partial(rosenbrock_step, RODAS5P),
+        ),
+        "radau": Method(RADAU_ORDER, radau, adaptive=True, degree=3, step=radau_step),
         "taylor": Method(
             TAYLOR_ORDER,
             partial(taylor, TAYLOR_ORDER),
@@ -90,6 +101,7 @@ __all__ = [
     "Mechanics",
     "Method",
     "Problem",
+    "Step",
     "Tableau",
     "derive",
     "force",

@@ -14,6 +14,7 @@ from cgraph.extend import Call, Map, Program, Statement, Sum
 
 from .elementwise import ahead
 from .problem import Problem
+from .step import Step
 from .tableau import Tableau
 
 
@@ -56,12 +57,17 @@ def stage_state(target: str, weights: Sequence[float]) -> Map:
     return Map(ahead([weights[k] for k in used]), ("x", "h", *slopes), (target,))
 
 
-def explicit(tableau: Tableau, problem: Problem) -> Program:
-    """One explicit step a pass."""
+def explicit_step(tableau: Tableau, problem: Problem) -> Step:
+    """One explicit step, embedded or not."""
     body: list[Statement] = []
     for k in range(len(tableau.b)):
         body += stage(problem, tableau, k)
-    body += [stage_state("x", tableau.b), *advance(len(tableau.b))]
     slopes = {f"slope{k}": problem.size for k in range(len(tableau.b))}
-    lengths = {"at": problem.size, "at_t": 1, **slopes}
-    return Program({**registers(problem), **lengths}, body, record=["t", "x"], stop="nonfinite")
+    return Step({"at": problem.size, "at_t": 1, **slopes}, [], [*body, stage_state("x", tableau.b)])
+
+
+def explicit(tableau: Tableau, problem: Problem) -> Program:
+    """One explicit step a pass."""
+    step = explicit_step(tableau, problem)
+    body = [*step.body, *advance(len(tableau.b))]
+    return Program({**registers(problem), **step.lengths}, body, record=["t", "x"], stop="nonfinite")

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from cgraph.extend import Program
 
 from .problem import Problem
+from .step import Step
 
 ROUNDING = 16.0 * 2.0**-52  # of the sums of a step
 
@@ -36,6 +37,8 @@ class Method:
         The relative tolerance below which a step's own rounding is larger.
     starts : bool
         Whether the first step needs no search, since a step is at most what the derivatives at its start allow.
+    step : callable, optional
+        step(problem), one step of a size that is handed in, see `Step`: what derivatives of motions are taken of.
 
     A program of equal steps makes one step in a pass. Before each pass its registers (`explicit.registers`) hold
 
@@ -78,6 +81,7 @@ class Method:
     degree: int = 0
     finest: float = ROUNDING
     starts: bool = False
+    step: Callable[[Problem], Step] | None = None
 
     def __repr__(self) -> str:
         return f"<Method of order {self.order}, {'steps by error' if self.adaptive else 'equal steps'}>"

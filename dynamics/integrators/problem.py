@@ -154,12 +154,18 @@ def time_derivative(problem: Problem) -> Graph:
     return cg.simplify(cg.jacobian(problem.rate, [TIME]))
 
 
-def quantity(problem: Problem, what: str, function: Callable[..., Any]) -> Node:
+def quantity(problem: Problem, what: str, function: Callable[..., Any], tau: Sequence[Node] | None = None) -> Node:
     """A quantity of the state, function(q, qd, t[, p]) or (x, t[, p]), as a node over inputs that are not bound yet.
 
+    tau: of a quantity of the applied force besides, function(q, qd, tau, t[, p]).
     Raises TypeError for what is no such function, ValueError for a result that is no node of the state.
     """
-    node = call_user_function(what, function, *state_arguments(problem))
+    arguments = state_arguments(problem)
+    if tau is None:
+        node = call_user_function(what, function, *arguments)
+    else:
+        q, qd, *rest = arguments
+        node = call_user_function(what, function, q, qd, list(tau), *rest, state="q, qd, tau")
     known = set(quantity_inputs(problem))
     if not isinstance(node, Node) or any(
         other.op.name == "variable" and other not in known for other in topological([node])

@@ -8,6 +8,7 @@ one, (c/h - J), here as a real one of twice the size.
 from __future__ import annotations
 
 import math
+from functools import reduce
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from .elementwise import SAME, identity, weighted
 from .explicit import stage_time
 from .jacobian_statements import jacobian_statements
 from .problem import Problem
+from .step import Step
 from .step_control import (
     accept_step,
     control,
@@ -47,6 +49,9 @@ _COMPLEX = complex(3.0 + 0.5 * (3.0 ** (1 / 3) - 3.0 ** (2 / 3)), 0.5 * (3.0 ** 
 _ERROR = ((-13 - 7 * _R6) / 3, (-13 + 7 * _R6) / 3, -1 / 3)  # weights of Z / h in the estimate
 HALVES = (0.9 / 0.5) ** 4  # the error at which a step of estimate h^4 is halved
 TURNS = 8  # of Newton's iteration, at most
+MOST_TURNS = 60  # where it goes on to rounding
+SMALL = 1e-6  # of the largest coordinate or velocity, below which a component is measured by it
+CHANGES = ("right0", "F1", "F2")  # of W in a turn
 ORDER = 5
 
 
@@ -83,16 +88,87 @@ def radau(problem: Problem, dense: bool) -> Program:
         *_guess(z, powers),
         *_combined(_T_INVERSE, z, w),
         _begin(),
-        While("going", tuple(_turn(problem, z, w, f))),
+        While("going", (*_turn(problem, z, w, f), *_compared(m))),
         *_estimate(problem, z),
         control(4, 0),
         accept_step(*_dense(z, powers), Call(SAME, ("h",), ("h_old",))),
     ]
-    lengths = {"unit": m * m, "jacobian": m * m, "real": m * m, "complex": 4 * m * m, "pivots": m, "pivots2": 2 * m}
-    lengths |= dict.fromkeys((*z, *w, *f, *powers, "rate", "at", "right0", "error_vector"), m) | {"right12": 2 * m}
-    single = "lost lost2 going turns change change_old newton sum converged h_old again time0 time1 time2"
-    lengths |= on_the_way | dict.fromkeys(single.split(), 1)
+    lengths = _lengths(m) | on_the_way | dict.fromkeys((*powers, "error_vector"), m)
+    lengths |= dict.fromkeys("newton sum converged h_old again".split(), 1)
     return Program({**registers(problem), **lengths}, body, recorded(dense, 3), record_if="accepted", stop="status")
+
+
+def _lengths(m: int) -> dict[str, int]:
+    lengths = {"unit": m * m, "jacobian": m * m, "real": m * m, "complex": 4 * m * m, "pivots": m, "pivots2": 2 * m}
+    lengths |= dict.fromkeys([f"{name}{k}" for name in "ZWF" for k in range(3)], m)
+    lengths |= dict.fromkeys(("rate", "at", "right0"), m) | {"right12": 2 * m}
+    return lengths | dict.fromkeys("lost lost2 going turns change change_old time0 time1 time2".split(), 1)
+
+
+def radau_step(problem: Problem) -> Step:
+    """One step, whose stages are iterated until they no longer come nearer."""
+    m = problem.size
+    z, w, f = (tuple([f"{name}{k}" for k in range(3)]) for name in ("Z", "W", "F"))
+    zeros = Graph([], {f"{k}": 0.0 for k in range(m)})
+    begin = Graph([], {"going": 1.0, "turns": 0.0, "change_old": math.inf, "stalled": 0.0})
+    slopes, on_the_way = jacobian_statements(problem)
+    body: list[Statement] = [
+        *slopes,
+        Call(problem.rate, ("x", "t", "p"), ("rate",)),
+        *_matrices(m),
+        *[stage_time(f"time{k}", _C[k]) for k in range(3)],
+        *[Call(zeros, (), (name,)) for name in (*z, *w)],
+        _sizes(problem),
+        Call(begin, (), tuple(begin.outputs)),
+        While("going", (*_turn(problem, z, w, f), *_to_rounding())),
+        Map(SAME, ("x_new",), ("x",)),
+    ]
+    lengths = (
+        _lengths(m)
+        | on_the_way
+        | dict.fromkeys(("x_new", "size", "scale"), m)
+        | {"stalled": 1, "failed": 1, "evaluations": 1}
+    )
+    controls = "lost lost2 going turns change change_old stalled failed"
+    fixed = ("jacobian", "real", "complex", "size", "scale", *on_the_way, *controls.split())
+    return Step(lengths, [identity(m), Call(zeros, (), ("size",))], body, fixed, "failed")
+
+
+def _sizes(problem: Problem) -> Call:
+    """How large each component has been so far, and what a change is measured by: no less than 1e-6 of its kind."""
+    m, nq = problem.size, problem.nq
+    names = ["size", "x", "rate"]
+    size, x, rate = ([cg.variable(f"{name}{k}") for k in range(m)] for name in names)
+    h = cg.variable("h")
+    largest = [cg.maximum(cg.maximum(a, abs(b)), abs(h * c)) for a, b, c in zip(size, x, rate, strict=True)]
+    kinds = [range(nq), range(nq, m)] if problem.system is not None else [range(k, k + 1) for k in range(m)]
+    scales: list[Node] = []
+    for kind in kinds:
+        most = reduce(cg.maximum, [largest[k] for k in kind], cg.constant(0.0))
+        scales += [cg.maximum(largest[k], SMALL * most) for k in kind]
+    outputs = {f"{k}": node for k, node in enumerate([*largest, *scales])}
+    return Call(Graph([*size, *x, *rate, h], outputs), (*names, "h"), ("size", "scale"))
+
+
+def _to_rounding() -> list[Statement]:
+    """Go on while changes get smaller by half; three that do not are rounding."""
+    size, *changes = cg.variables(["size", "d0", "d1", "d2"])
+    parts = [cg.where(size, change / size, 0.0) for change in changes]
+    graph = Graph([size, *changes], {"y": parts[0] * parts[0] + parts[1] * parts[1] + parts[2] * parts[2]})
+    change, old, turns, stalled, failed = inputs = cg.variables("change change_old turns stalled failed")
+    stalls = stalled + cg.where(4.0 * change < old, 0.0, 1.0)
+    lost = 1.0 - (change < math.inf)
+    most = turns + 1.0 >= MOST_TURNS
+    going = (1.0 - lost) * (1.0 - most) * (stalls < 3.0) * (change > 0.0)
+    outputs = {
+        "going": going,
+        "change_old": change,
+        "turns": turns + 1.0,
+        "stalled": stalls,
+        "failed": failed + cg.maximum(lost, most * (stalls < 3.0)),
+    }
+    names = ("change", "change_old", "turns", "stalled", "failed")
+    return [Sum(graph, ("scale", *CHANGES), "change"), Call(Graph(inputs, outputs), names, tuple(outputs))]
 
 
 def _matrices(m: int) -> list[Statement]:
@@ -172,17 +248,20 @@ def _turn(problem: Problem, z: tuple[str, ...], w: tuple[str, ...], f: tuple[str
     joined = Call(Graph(lanes, {f"{k}": node for k, node in enumerate(lanes)}), ("F1", "F2"), ("right12",))
     parted = Call(joined.graph, ("right12",), ("F1", "F2"))
     body += [rights, Solve("real", "pivots", "right0"), joined, Solve("complex", "pivots2", "right12"), parted]
-    steps = ("right0", "F1", "F2")
     before, after = cg.variables("before after")
     add = Graph([before, after], {"w": before + after})
-    body += [Map(add, (name, step), (name,)) for name, step in zip(w, steps, strict=True)]
-    body += [*_combined(_T, w, z), _sum_of("x", z[2:], (1.0,), "x_new")]
+    body += [Map(add, (name, step), (name,)) for name, step in zip(w, CHANGES, strict=True)]
+    return [*body, *_combined(_T, w, z), _sum_of("x", z[2:], (1.0,), "x_new")]
+
+
+def _compared(m: int) -> list[Statement]:
+    """The change of a turn beside the tolerance of the step, and what follows from it."""
     names = ("x", "x_new", "rtol", "atol")
     x, x_new, rtol, atol, *changes = cg.variables([*names, "d0", "d1", "d2"])
     size = scale(x, x_new, rtol, atol)
     squares = [(change / size) * (change / size) for change in changes]
     graph = Graph([x, x_new, rtol, atol, *changes], {"y": squares[0] + squares[1] + squares[2]})
-    return [*body, Sum(graph, (*names, *steps), "change"), _judged(3 * m)]
+    return [Sum(graph, (*names, *CHANGES), "change"), _judged(3 * m)]
 
 
 def _judged(numbers: int) -> Call:

@@ -16,7 +16,8 @@ from cgraph.extend import Call, Factor, If, Map, Program, Solve, Statement
 from .elementwise import SAME, function, identity, weighted
 from .explicit import stage_time
 from .jacobian_statements import jacobian_statements
-from .problem import Problem, time_derivative
+from .problem import Problem, state_jacobian, time_derivative
+from .step import Step
 from .step_control import accept_step, control, first_pass, lost, measured, recorded, registers, trial
 from .tableau import Row
 
@@ -88,14 +89,11 @@ def rosenbrock(method: Rosenbrock, problem: Problem, dense: bool) -> Program:
     """A trial of one step."""
     m, stages = problem.size, len(method.c)
     slopes = tuple([f"U{k}" for k in range(stages)])
-    timed = problem.timed
     now, on_the_way = jacobian_statements(problem)
-    if timed:
-        now.append(Call(time_derivative(problem), ("x", "t", "p"), ("time_slope",)))
+    now += _time_slope(problem)
     body: list[Statement] = [first_pass(identity(m)), If("accepted", tuple(now)), trial()]
     body += [_matrix(method.gamma), Factor("matrix", "pivots"), lost("matrix", "lost")]
-    for k in range(stages):
-        body += _stage(method, problem, k)
+    body += _stages(method, problem)
     body += [
         *measured(slopes[-1], m),
         Call(function("error lost", error=cg.variable("error") + cg.variable("lost")), ("error", "lost"), ("error",)),
@@ -103,14 +101,36 @@ def rosenbrock(method: Rosenbrock, problem: Problem, dense: bool) -> Program:
         accept_step(*(_dense(method, slopes) if dense else ())),
     ]
     degree = len(method.dense) + 1
-    lengths = dict.fromkeys(("unit", "jacobian", "matrix"), m * m) | dict.fromkeys(("pivots", "at", "rate", *slopes), m)
-    lengths |= on_the_way | {"time_slope": m if timed else 0, "at_t": 1, "sum": 1, "lost": 1}
+    lengths = {**_lengths(method, problem), **on_the_way, "sum": 1, "lost": 1}
     if dense:
         lengths |= {
             f"{name}{k + 1}": m for name, count in (("h_", degree - 1), ("dense", degree)) for k in range(count)
         }
     record = recorded(dense, degree)
     return Program({**registers(problem), **lengths}, body, record, record_if="accepted", stop="status")
+
+
+def rosenbrock_step(method: Rosenbrock, problem: Problem) -> Step:
+    """One step, with the Jacobian written out, since it has derivatives."""
+    slope = Call(state_jacobian(problem), ("x", "t", "p"), ("jacobian",))
+    body = [slope, *_time_slope(problem), _matrix(method.gamma), Factor("matrix", "pivots"), *_stages(method, problem)]
+    body.append(Map(SAME, ("x_new",), ("x",)))
+    return Step({**_lengths(method, problem), "x_new": problem.size}, [identity(problem.size)], body)
+
+
+def _time_slope(problem: Problem) -> list[Statement]:
+    """df/dt, where there is one."""
+    return [Call(time_derivative(problem), ("x", "t", "p"), ("time_slope",))] if problem.timed else []
+
+
+def _stages(method: Rosenbrock, problem: Problem) -> list[Statement]:
+    return [statement for k in range(len(method.c)) for statement in _stage(method, problem, k)]
+
+
+def _lengths(method: Rosenbrock, problem: Problem) -> dict[str, int]:
+    m, stages = problem.size, [f"U{k}" for k in range(len(method.c))]
+    lengths = dict.fromkeys(("unit", "jacobian", "matrix"), m * m) | dict.fromkeys(("pivots", "at", "rate", *stages), m)
+    return lengths | {"time_slope": m if problem.timed else 0, "at_t": 1}
 
 
 def _matrix(gamma: float) -> Map:

@@ -30,6 +30,7 @@ from .explicit import advance, registers, stage_time
 from .momentum_graphs import Mechanics, mechanics
 from .partitioned_tableau import MIDPOINT, SYMPLECTIC_EULER, VERLET, Partitioned, Row, over
 from .problem import Problem
+from .step import Step
 from .step_control import count, first_pass
 
 TURNS = 60.0  # of the iteration for the stages, at most
@@ -41,17 +42,27 @@ ONCE = Composition(2, (1.0,))
 
 def composed(composition: Composition, problem: Problem) -> Program:
     """One step a pass, of steps of `verlet` where it is explicit, else of `midpoint`."""
-    explicit = problem.canonical and mechanics(problem).separable
-    return partitioned(VERLET if explicit else MIDPOINT, problem, composition)
+    return _program(composed_step(composition, problem), problem)
 
 
-def partitioned(method: Partitioned, problem: Problem, composition: Composition = ONCE) -> Program:
+def partitioned(method: Partitioned, problem: Problem) -> Program:
     """One step a pass: of coordinates and momenta; where there are none, of the state by a method of Gauss's."""
+    return _program(partitioned_step(method, problem), problem)
+
+
+def composed_step(composition: Composition, problem: Problem) -> Step:
+    """One step, of steps of `verlet` where it is explicit, else of `midpoint`."""
+    explicit = problem.canonical and mechanics(problem).separable
+    return partitioned_step(VERLET if explicit else MIDPOINT, problem, composition)
+
+
+def partitioned_step(method: Partitioned, problem: Problem, composition: Composition = ONCE) -> Step:
+    """One step of coordinates and momenta; where there are none, of the state by a method of Gauss's."""
     make = _of_momenta if problem.canonical else _of_states
     return make(method, problem, composition)
 
 
-def _of_momenta(method: Partitioned, problem: Problem, composition: Composition) -> Program:
+def _of_momenta(method: Partitioned, problem: Problem, composition: Composition) -> Step:
     graphs, n = mechanics(problem), problem.nq
     stages = range(len(method.w))
     lengths = {"q": n, "v": n, "momentum": n, "q_rounding": n, "momentum_rounding": n}
@@ -70,11 +81,11 @@ def _of_momenta(method: Partitioned, problem: Problem, composition: Composition)
         body = _iterated(method, turn)
         body += [_added("q", "q_rounding", "V", method.w), _added("momentum", "momentum_rounding", "F", method.w)]
         body += [stage_time("later", 1.0), *_settled(graphs)]
-    body = [*_in_turn(composition, body), _copied(problem.size, ("q", "v"), ("x",)), *advance(0)]
-    return _program(method, problem, lengths, [first_pass(*start, *_guess_at_rest(method, "v")), *body])
+    body = [*_in_turn(composition, body), _copied(problem.size, ("q", "v"), ("x",))]
+    return _step(method, lengths, [*start, *_guess_at_rest(method, "v")], body)
 
 
-def _of_states(method: Partitioned, problem: Problem, composition: Composition) -> Program:
+def _of_states(method: Partitioned, problem: Problem, composition: Composition) -> Step:
     if method.a is not method.b:
         system = problem.system
         if system is None:
@@ -97,20 +108,27 @@ def _of_states(method: Partitioned, problem: Problem, composition: Composition) 
         turn.append(_stage(method.a[i], "x", "V", f"Q{i}"))
         turn.append(Call(problem.rate, (f"Q{i}", f"time{i}", "p"), (f"W{i}",)))
     body = [*_iterated(method, turn), _added("x", "x_rounding", "V", method.w)]
-    body = [*_in_turn(composition, body), *advance(0)]
     rate = Call(problem.rate, ("x", "t", "p"), ("W0",))
-    return _program(method, problem, lengths, [first_pass(rate, *_guess_at_rest(method, "W0")), *body])
+    return _step(method, lengths, [rate, *_guess_at_rest(method, "W0")], _in_turn(composition, body))
 
 
-def _program(method: Partitioned, problem: Problem, lengths: dict[str, int], body: list[Statement]) -> Program:
-    names = "fresh singular failed failures whole begin going turns change speed change_old later"
+def _step(method: Partitioned, lengths: dict[str, int], start: list[Statement], body: list[Statement]) -> Step:
+    names = "singular failed failures whole begin going turns change speed change_old later"
     single = dict.fromkeys(names.split(), 1)
     single |= {f"{name}{i}": 1 for name in ("time", "change", "speed") for i in range(len(method.w))}
+    fixed = [name for name in lengths if name.endswith("rounding")]
+    fixed += [name for name in single if not name.startswith(("time", "whole", "begin", "later"))]
+    return Step({**lengths, **single}, start, body, tuple(fixed), "failures")
+
+
+def _program(step: Step, problem: Problem) -> Program:
     nonfinite, failures, singular = inputs = cg.variables("nonfinite failures singular")
     bad = nonfinite + failures  # of what goes on, an inertia that is negative says nothing
     either = Graph(inputs, {"nonfinite": bad, "failures": 0.0, "singular": cg.where(bad, singular, 0.0)})
-    body = [*body, Call(either, ("nonfinite", "failures", "singular"), ("nonfinite", "failures", "singular"))]
-    return Program({**registers(problem), **lengths, **single}, body, record=["t", "x"], stop="nonfinite")
+    judged = Call(either, ("nonfinite", "failures", "singular"), ("nonfinite", "failures", "singular"))
+    body = [first_pass(*step.start), *step.body, *advance(0), judged]
+    lengths = {**registers(problem), "fresh": 1, **step.lengths}
+    return Program(lengths, body, record=["t", "x"], stop="nonfinite")
 
 
 def _in_turn(composition: Composition, body: list[Statement]) -> list[Statement]:

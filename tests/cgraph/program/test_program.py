@@ -268,3 +268,24 @@ def test_code_in_a_cycle_of_garbage_is_let_go_in_order() -> None:
         held.append(held)
         del held
         gc.collect()
+
+
+def test_a_feed_is_read_before_every_pass(backend: str) -> None:
+    x, u = cg.variables("x u")
+    added = Call(cg.Graph([x, u, cg.variable("w")], {"x": x + u}), ("x", "u"), ("x",))
+    sums = Program({"x": 1, "u": 2, "v": 2}, [added], record=["x", "v"], feed=["u", "v"])
+    ready = runner(sums, backend)
+    feed = np.arange(12.0).reshape(3, 4)
+    assert ready.run(ready.memory({"x": 1.0}), 3, 1, feed).rows.tolist() == [[1, 2, 3], [5, 6, 7], [13, 10, 11]]
+    assert ready.run(ready.memory({"x": 1.0}), 2, 2, feed[:2]).rows.tolist() == [[5, 6, 7]]
+    many = np.stack([feed, 2.0 * feed], axis=2)
+    memories = ready.memory({"x": np.array([[1.0, 0.0]])}, 2)
+    assert ready.run_many(memories.copy(), 3, 1, many).rows[:, 0].tolist() == [[1, 0], [5, 8], [13, 24]]
+    assert ready.run_many(memories.copy(), 3, 1, feed[:, :, None]).rows[:, 0].tolist() == [[1, 0], [5, 4], [13, 12]]
+    for wrong in (None, feed[:2], feed[:, :3]):
+        with pytest.raises(cg.GraphError, match=r"needs a feed of shape \(3, 4\)"):
+            ready.run(ready.memory({}), 3, 1, wrong)
+    with pytest.raises(cg.GraphError, match="the feed writes register 'u' twice"):
+        Program({"u": 1}, [], record=[], feed=["u", "u"])
+    with pytest.raises(cg.GraphError, match="the feed names register 'w'"):
+        Program({"u": 1}, [], record=[], feed=["w"])

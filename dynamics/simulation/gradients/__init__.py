@@ -1,0 +1,1 @@
+"""Gradients and sensitivities of motions: derivatives of a method's steps, statement by statement."""

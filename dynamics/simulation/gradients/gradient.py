@@ -1,0 +1,245 @@
+"""Gradients of motions: a loss of where a motion ends and of how it goes, differentiated by the discrete adjoint."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph.extend import Array, Builder
+
+from ...integrators import Problem, quantity, quantity_inputs
+from ...systems.model import Model
+from ..applied_forces import Constant
+from ..event import Event, as_events
+from ..event_program import event_program
+from .legs import Bars, Legs, pulled_at, values_at
+from .motion import START, TORQUE, VELOCITY, MotionOf, motion_of
+from .motion_programs import KEPT, Request, motion_programs, request_key
+
+Loss = Callable[..., Node]
+
+
+@dataclass(frozen=True, eq=False)
+class MotionGradient:
+    """The value of a loss of a motion, and its gradient.
+
+    Attributes
+    ----------
+    value : float
+        The loss.
+    gradients : dict of str to ndarray or float
+        By the names of `wrt`: "q" and "qd" (n,), of an OdeSystem "q" (m,); "tau" (n,), or (steps, n) where tau has a
+        row a step; of a parameter a number. Where velocities are no rates of coordinates, as of quaternions, "q" is by
+        small displacements xi, dq = G(q) xi, (n,).
+    t : ndarray, (steps + 1,)
+        Where the steps begin, and the last one ends [s].
+    q, qd : ndarray, (nq,) and (n,)
+        Where the motion ends; of an OdeSystem q is its state and qd is empty.
+    checkpoints : int
+        Steps between two states that were kept, from which the steps between were made again; 0 where all were kept.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm([1.0], [1.0])
+    >>> result = dyn.gradient(arm, lambda q, qd, t: q[0], [0.5], [0.0], t_end=0.1, dt=0.05)
+    >>> list(result.gradients), result.t.round(3).tolist(), result.checkpoints
+    (['q', 'qd', 'tau'], [0.0, 0.05, 0.1], 0)
+    """
+
+    value: float
+    gradients: dict[str, Any]
+    t: Array
+    q: Array
+    qd: Array
+    checkpoints: int
+
+    def __getitem__(self, name: str) -> Any:
+        """The gradient by one of `wrt`. Raises KeyError for another name."""
+        return self.gradients[name]
+
+
+def gradient(
+    model: Model,
+    loss: Loss | None,
+    q: ArrayLike,
+    qd: ArrayLike | None,
+    t_end: float | None = None,
+    method: str = "rk4",
+    *,
+    running: Loss | None = None,
+    wrt: str | Iterable[str] | None = None,
+    t0: float = 0.0,
+    t_span: ArrayLike | None = None,
+    dt: float | None = None,
+    max_step: float | None = None,
+    rtol: float | None = None,
+    atol: ArrayLike | None = None,
+    first_step: float | None = None,
+    tau: Constant | ArrayLike | Callable[..., Sequence[Node | float]] = 0.0,
+    parameters: Mapping[str, float] | None = None,
+    events: Event | Iterable[Event] = (),
+    backend: str = "auto",
+) -> MotionGradient:
+    """A loss of a motion and its gradient, by reverse mode through every step, in a few times the motion itself.
+
+    The discrete adjoint: the exact derivative of the numbers that the method computes, to rounding. Steps that are
+    chosen by error are those of `simulate`, and count as constants. Every step is run once and pulled back once, as
+    machine code; where what that needs of all of them would take more than 64 MB, one state in every sqrt(steps) is
+    kept, and the steps between are made again.
+
+    Parameters
+    ----------
+    model : System, OdeSystem, Mechanism or Scene
+        What moves.
+    loss : callable, optional
+        (q, qd, t) or (q, qd, t, p) of the state and time where the motion ends, to a node; of an OdeSystem (x, t) or
+        (x, t, p). None for a running loss alone.
+    q, qd, t_end, t0, t_span, dt, max_step, rtol, atol, first_step, backend
+        As for `simulate`.
+    method : str
+        A name of `dyn.METHODS`, of equal or chosen steps, but "taylor". Equations that are iterated are solved to
+        rounding, of implicit methods and of their derivatives.
+    running : callable, optional
+        (q, qd, tau, t) or (q, qd, tau, t, p) to a node, summed over the steps, at the state, force and time where each
+        begins; of an OdeSystem (x, t) or (x, t, p). An integral is dt times that.
+    wrt : str or sequence of str, optional
+        What to differentiate by: "q", "qd", "tau" and names of parameters. By default the start and the applied force.
+    tau : float, array_like or callable
+        Applied force [N m or N]: constant, (n,); of equal steps one row a step, (steps, n), which says how many there
+        are; or a controller in closed form, as for `simulate`, whose parameters may be in `wrt`.
+    parameters : mapping, optional
+        {name: value} in place of the model's own, and of those that a controller has besides.
+    events : Event or iterable of Event
+        Those of `simulate`: where one ends the motion or resets its state depends on all before, and so do the steps
+        after it. Not with a row of forces a step.
+
+    Returns
+    -------
+    MotionGradient
+        `value`, and the gradient by each name of `wrt`, as `result["q"]`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For arguments of another type, shape or range, and methods without derivatives.
+    MotionError
+        For a motion that does not stay finite or does not reach its end.
+    SingularMassMatrixError
+        For a coordinate without inertia.
+
+    Examples
+    --------
+    How far a pendulum's angle after a second depends on where it starts, and on torques that change with the steps:
+
+    >>> import numpy as np
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm([1.0], [1.0])
+    >>> result = dyn.gradient(arm, lambda q, qd, t: q[0], [0.5], [0.0], t_end=1.0, tau=np.zeros((100, 1)))
+    >>> round(result.value, 6), result["q"].round(6).tolist(), result["tau"].shape
+    (-0.403412, [-0.880376], (100, 1))
+    """
+    options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
+    watched = as_events(events)
+    motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, watched)
+    value, gradients, legs = differentiated(motion, loss, running, backend, watched)
+    nq, checkpoints = motion.problem.nq, max([run.checkpoints for run in legs.runs])
+    return MotionGradient(float(value), gradients, legs.t, legs.x[:nq], legs.x[nq:], checkpoints)
+
+
+def differentiated(
+    motion: MotionOf, loss: Loss | None, running: Loss | None, backend: str, watched: Sequence[Event] = ()
+) -> tuple[Any, dict[str, Any], Legs]:
+    """The loss of a motion, its gradient by names, and the motion; of N motions side by side an axis more, the last."""
+    problem = motion.problem
+    if loss is None and running is None:
+        raise ValueError("a loss is needed: of the end of the motion, `loss`, of how it goes, `running`, or both")
+    final = None if loss is None else _graph(problem, quantity(problem, "loss", loss))
+    total = None if running is None else _graph(problem, quantity(problem, "running", running, motion.applied))
+    by = [TORQUE] if TORQUE in motion.wrt else []
+    by += ["p"] if len(motion.values) else []
+    by += ["t", "h"] if watched else []
+    request = Request(
+        problem,
+        motion.method,
+        motion.forces,
+        motion.each_step,
+        tuple(by),
+        forwards=False,
+        backend=backend,
+        key=request_key(total),
+        running=total,
+    )
+    program = event_program(problem, watched)
+    legs = Legs(motion, motion_programs(request), {event.name: event for event in program.events})
+    value, end = _final(final, motion, legs)
+    start, inputs, rows = legs.pulled(end)
+    return value + legs.loss, _gradients(motion, start, inputs, rows, end), legs
+
+
+@dataclass(frozen=True)
+class _Quantity:
+    """A quantity of a problem, known by its structure, so that what is derived from it is derived once."""
+
+    problem: Problem
+    key: str
+    graph: Graph = field(compare=False)
+
+
+def _graph(problem: Problem, node: Node) -> Graph:
+    """The loss over the states, t and parameters."""
+    graph = Graph(quantity_inputs(problem), {"loss": node})
+    return _bound(_Quantity(problem, str(cg.structure_hash(graph)), graph))
+
+
+@lru_cache(KEPT)
+def _bound(quantity: _Quantity) -> Graph:
+    return quantity.problem.bind(quantity.problem.states, quantity.graph)
+
+
+def _final(graph: Graph | None, motion: MotionOf, legs: Legs) -> tuple[Any, Bars]:
+    """The final loss, and its slopes."""
+    t, more = float(legs.t[-1]), legs.x.shape[1:]
+    if graph is None:
+        return 0.0, Bars(np.zeros_like(legs.x), 0.0, np.zeros((len(motion.problem.parameters), *more)))
+    (value,) = values_at(graph, motion, legs.x, t)
+    return value, pulled_at(graph, motion, legs.x, t, [1.0])
+
+
+def _gradients(motion: MotionOf, start: Array, inputs: Array, rows: Array, end: Bars) -> dict[str, Any]:
+    """By the names of `wrt`, from the cotangents of the start, of the inputs, and of the forces of each step."""
+    problem = motion.problem
+    nq, forces, names = problem.nq, motion.forces, list(problem.parameters)
+    result: dict[str, Any] = {}
+    for name in motion.wrt:
+        if name == START:
+            result[name] = _displaced(problem, motion.x, start)
+        elif name == VELOCITY:
+            result[name] = start[nq:]
+        elif name == TORQUE and motion.each_step:
+            rows[-1] += end.inputs[:forces]  # what the final loss has of the force itself
+            result[name] = rows
+        else:
+            result[name] = inputs[:forces] if name == TORQUE else inputs[names.index(name)]
+            if not motion.many and name != TORQUE:
+                result[name] = float(result[name])
+    return result
+
+
+def _displaced(problem: Problem, x: Array, bar: Array) -> Array:
+    """The cotangent of the coordinates; of quasi-velocities by displacements, G^T q_bar."""
+    system, nq = problem.system, problem.nq
+    if system is None or system.kinematics.quasi is None:
+        return bar[:nq]
+    bars = cg.variables([f"bar{k}" for k in range(nq)])
+    pulled = system.kinematics.pulled_back(bars, Builder())
+    graph = Graph([*system.q, *bars], {f"{k}": node for k, node in enumerate(pulled)})
+    values = graph.evaluate(dict(zip(graph.input_names, [*x[:nq], *bar[:nq]], strict=True)))
+    return np.array([np.broadcast_to(value, x.shape[1:]) for value in values.values()], dtype=np.float64)

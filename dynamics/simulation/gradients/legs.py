@@ -1,0 +1,184 @@
+"""Legs: the parts of a motion between events that reset its state or end it, run one after another and pulled back.
+
+An event happens where g(x, t) = 0, so that the length h of the step that arrives there depends on where it began:
+dh = -(dg/dx dx) / (dg/dx dx/dh + dg/dt). The leg after it begins from the reset state at that instant, and of equal
+steps all depend on it. These jumps are those of the numbers that are computed: h is solved for to rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Graph
+from cgraph.extend import Array
+
+from ..event_program import WatchedEvent
+from .motion import Leg, MotionError, MotionOf
+from .motion_programs import KEPT, MotionPrograms
+from .motion_run import MotionRun
+from .motion_steps import LOSS
+
+MOST_TURNS = 20  # of Newton's method for the length of a step that arrives at an event
+
+
+class Bars(NamedTuple):
+    """Cotangents of a state at an instant, of the instant, and of the forces and parameters that stay inputs."""
+
+    x: Array
+    t: Any  # float, or (N,) of N motions side by side
+    inputs: Array  # forces, then parameters
+
+
+@dataclass
+class Legs:
+    """The legs of a motion, run from its start to its end.
+
+    events: by name.  x, t: the end of the motion.  loss: the running loss of all legs.
+    """
+
+    motion: MotionOf
+    programs: MotionPrograms
+    events: Mapping[str, WatchedEvent]
+
+    def __post_init__(self) -> None:
+        motion = self.motion
+        self.runs: list[MotionRun] = []
+        x, begin = motion.x, float(motion.legs[0].t[0])
+        for leg in motion.legs:
+            t, h = _steps(leg, begin)
+            run = MotionRun(replace(motion, x=x, t=t, h=h), self.programs, arrives=bool(leg.event))
+            if leg.event:
+                self._arrive(run, self.events[leg.event])
+            self.runs.append(run)
+            x, begin = run.x, float(t[-1])
+            if leg.event and (reset := self.events[leg.event].reset) is not None:
+                x = values_at(reset, motion, x, begin)
+        self.x, self.t = x, np.concatenate([run.motion.t[:-1] for run in self.runs] + [[begin]])
+        self.loss = np.sum([run.loss for run in self.runs], axis=0)
+
+    def _arrive(self, run: MotionRun, event: WatchedEvent) -> None:
+        """The last step of a leg, as long as it takes to where the event happens."""
+        motion, last = run.motion, np.inf
+        for _ in range(MOST_TURNS):
+            x, t = run.tried(), motion.t[-1:]
+            g, values = event.value(t, x[None], _inputs(motion)), _inputs(motion)
+            x_dot = values_at(motion.problem.rate, motion, x, float(t[0]))
+            step = float(g[0] / event.slope(t, x[None], values, x_dot[None], np.ones(1))[0])
+            if not abs(step) < last:
+                break
+            last = abs(step)
+            motion.h[-1] -= step
+            motion.t[-1] = motion.t[-2] + motion.h[-1]
+        if not np.isfinite(motion.h[-1]):
+            raise MotionError(
+                f"event {event.name!r} at t = {motion.t[-2]:.6g} s does not pass through zero with a slope"
+            )
+        run.finish()
+
+    def pulled(self, end: Bars) -> tuple[Array, Array, Array]:
+        """Cotangents of the start of the motion, of its inputs, and rows of each step, from those of its end."""
+        inputs = end.inputs.copy()
+        names, forces, values = self.programs.step.passes.varied, self.motion.forces, len(self.motion.values)
+        last = self.motion.legs[-1].event
+        if last and self.events[last].reset is not None:
+            end = self._before(len(self.runs), end, inputs)
+        for k in reversed(range(len(self.runs))):
+            run, leg = self.runs[k], self.motion.legs[k]
+            later = 0.0
+            if leg.event:
+                end, later = self._through(run, self.events[leg.event], end, inputs)
+            bars, rows = run.pulled({"x": end.x, LOSS: 1.0})
+            more = [bars.get(name, np.zeros((n, *inputs.shape[1:]))) for name, n in (("tau", forces), ("p", values))]
+            inputs += np.concatenate(more)
+            if k == 0:
+                return bars["x"], inputs, rows
+            t, h = (rows[:, names.index(name)].copy() for name in ("t", "h"))
+            t[-1] += later
+            if leg.event:
+                h[-1] = 0.0  # which the event determines
+            by_t, by_h = _slopes(leg)
+            begin = float(t @ by_t + h @ by_h) + float(bars["t"][0])
+            end = self._before(k, Bars(bars["x"], begin, np.zeros(0)), inputs)
+        raise AssertionError("a motion has at least one leg")
+
+    def _before(self, k: int, after: Bars, inputs: Array) -> Bars:
+        """Through the reset with which leg k begins; adds to the cotangents of the inputs."""
+        run, event = self.runs[k - 1], self.events[self.motion.legs[k - 1].event]
+        assert event.reset is not None
+        bars = pulled_at(event.reset, run.motion, run.x, float(run.motion.t[-1]), after.x.tolist())
+        inputs += bars.inputs
+        return Bars(bars.x, bars.t + after.t, inputs)
+
+    def _through(self, run: MotionRun, event: WatchedEvent, end: Bars, inputs: Array) -> tuple[Bars, float]:
+        """Cotangents where a leg arrives at an event, with h as the event determines it; and that of t there."""
+        g = pulled_at(event.values, run.motion, run.x, float(run.motion.t[-1]), [1.0])
+        slope = run.last_slope(g.x) + g.t
+        share = -(run.last_slope(end.x) + end.t) / slope
+        inputs += share * g.inputs
+        return Bars(end.x + share * g.x, 0.0, inputs), end.t + share * g.t
+
+
+def _steps(leg: Leg, begin: float) -> tuple[Array, Array]:
+    """Times and lengths of the steps of a leg that begins at this instant."""
+    t = leg.t.copy()
+    t[0] = begin
+    if leg.equal:
+        t[:-1] = begin + np.arange(len(t) - 1) * ((leg.end - begin) / leg.equal)
+    h = np.diff(t)
+    if leg.equal:
+        h[: len(h) - bool(leg.event)] = (leg.end - begin) / leg.equal
+    return t, h
+
+
+def _slopes(leg: Leg) -> tuple[Array, Array]:
+    """How the times of the steps of a leg and their lengths depend on where it begins."""
+    count = len(leg.t) - 1
+    if leg.equal:
+        return 1.0 - np.arange(count) / leg.equal, np.full(count, -1.0 / leg.equal)
+    first = np.arange(count) == 0
+    return np.where(first, 1.0, 0.0), np.where(first, -1.0, 0.0)
+
+
+@lru_cache(KEPT)
+def _pullback(graph: Graph) -> Graph:
+    return cg.vjp(graph)
+
+
+def pulled_at(graph: Graph, motion: MotionOf, x: Array, t: float, seeds: Sequence[float]) -> Bars:
+    """J^T seeds of a graph over the states, t and parameters, at a state and an instant."""
+    pulled = _pullback(graph)
+    bars = dict(zip(pulled.input_names[len(graph.inputs) :], seeds, strict=True))
+    values, m = _arrays(pulled.evaluate(point(graph, motion, x, t) | bars), motion), motion.problem.size
+    return Bars(values[:m], values[m] if motion.many else float(values[m]), values[m + 1 :])
+
+
+def values_at(graph: Graph, motion: MotionOf, x: Array, t: float) -> Array:
+    """The outputs of a graph over the states, t and parameters, at a state and an instant."""
+    return _arrays(graph.evaluate(point(graph, motion, x, t)), motion)
+
+
+def _arrays(values: Mapping[str, Any], motion: MotionOf) -> Array:
+    """(k,), or (k, N) of N motions side by side."""
+    shape = (motion.many,) if motion.many else ()
+    rows = [np.broadcast_to(np.asarray(value, dtype=np.float64), shape) for value in values.values()]
+    return np.array(rows).reshape(len(rows), *shape)
+
+
+def _inputs(motion: MotionOf) -> list[Any]:
+    """Forces and parameters that stay inputs, at the end."""
+    return [*motion.force_at_end, *motion.values] if motion.many else _numbers(motion.force_at_end, motion.values)
+
+
+def _numbers(*arrays: Array) -> list[float]:
+    return [number for array in arrays for number in array.tolist()]
+
+
+def point(graph: Graph, motion: MotionOf, x: Array, t: float) -> dict[str, Any]:
+    """The inputs of a graph over the states, t and parameters, at a state and an instant."""
+    return dict(zip(graph.input_names, [*(x if motion.many else x.tolist()), t, *_inputs(motion)], strict=True))

@@ -1,0 +1,226 @@
+"""Motion: what gradients and sensitivities are of, the problem, its start, its steps and what to differentiate by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cgraph import Node
+from cgraph.extend import Array, real_array, require_sequence
+
+from ...equations.initial_value import initial_value
+from ...equations.state_equation import state_inputs
+from ...integrators import METHODS, Method, Problem, derive
+from ...systems.model import Model, as_ode, as_system
+from ..applied_forces import with_applied
+from ..equal_steps import step_count
+from ..event import Event
+from ..run_options import RunOptions, time_span
+from ..sampled_controller import SampledController
+from ..simulate import simulate
+from ..trajectory import Trajectory
+
+START, VELOCITY, TORQUE = "q", "qd", "tau"
+
+
+class Leg(NamedTuple):
+    """A part of a motion.
+
+    t: (steps + 1,), where its steps begin and the last one ends.  event: with which it ends, by name, or empty.
+    equal: into how many equal steps the time from its begin to `end` is divided; 0 of chosen steps.
+    """
+
+    t: Array
+    event: str = ""
+    equal: int = 0
+    end: float = 0.0
+
+
+class MotionError(ValueError):
+    """A motion that has no derivatives: it does not reach its end, or its equations were not solved.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> runaway = dyn.OdeSystem(lambda x, t: [x[0] * x[0]], ["x"])
+    >>> dyn.gradient(runaway, lambda x, t: x[0], [1.0], None, t_end=2.0)
+    Traceback (most recent call last):
+    dynamics.simulation.gradients.motion.MotionError: the motion does not stay finite: shorter steps may help
+    """
+
+
+@dataclass(frozen=True, eq=False)
+class MotionOf:
+    """A motion, whose steps are chosen.
+
+    x: (m,), where it starts.
+    legs: its parts.  t, h: (steps + 1,), where the steps begin and the last one ends, and (steps,), their lengths.
+    tau: the applied forces that are inputs, (forces,), or where they change with the steps, (steps, forces).
+    values: of the parameters that stay inputs.  wrt: names.  applied: the whole applied force as nodes.
+    Of N motions side by side x, tau and values have an axis of N besides, the last.
+    """
+
+    problem: Problem
+    method: Method
+    x: Array
+    legs: tuple[Leg, ...]
+    t: Array
+    h: Array
+    tau: Array
+    forces: int
+    each_step: bool
+    values: Array
+    wrt: tuple[str, ...]
+    applied: Sequence[Node] | None
+
+    @property
+    def many(self) -> int:
+        """How many motions go side by side; 0 of one alone."""
+        return self.x.shape[1] if self.x.ndim == 2 else 0
+
+    @property
+    def force_at_start(self) -> Array:
+        """The applied forces that are inputs, in the first step."""
+        return self.tau[0] if self.each_step else self.tau
+
+    @property
+    def force_at_end(self) -> Array:
+        """The same in the last step."""
+        return self.tau[-1] if self.each_step else self.tau
+
+
+def motion_of(
+    model: Model,
+    q: ArrayLike,
+    qd: ArrayLike | None,
+    span: tuple[float | None, float, ArrayLike | None],
+    method: str,
+    tau: Any,
+    parameters: Mapping[str, float] | None,
+    wrt: str | Iterable[str] | None,
+    options: Mapping[str, Any],
+    events: Sequence[Event] = (),
+) -> MotionOf:
+    """The motion of checked arguments.  span: t_end, t0, t_span.  options: those of `simulate` besides.
+
+    Raises TypeError or ValueError naming the argument, and MotionError for a motion that does not reach its end.
+    """
+    if isinstance(tau, SampledController):
+        raise TypeError(
+            "tau must be numbers or a controller in closed form: a SampledController calls Python, which has no "
+            "derivative"
+        )
+    t0, t_end = time_span(span[0], span[1], span[2])
+    rows = None if callable(tau) else _rows(model, tau)
+    run = options_of(t_end, method, t0, options)
+    moving, applied = with_applied(model, 0.0 if rows is not None else tau, parameters)
+    start = initial_value(moving, q, qd, applied.constant, parameters, t0)
+    run.check(start.states)
+    chosen = names_of(moving, wrt, closed=callable(tau))
+    inputs = state_inputs(moving).applied if rows is not None or TORQUE in chosen else ()
+    free = {*inputs, *chosen}
+    problem = derive(moving, {name: value for name, value in start.bound.items() if name not in free})
+    if run.adaptive or events:
+        if rows is not None:
+            needed = "equal steps without events" if events else f"equal steps: method {method!r} chooses its steps"
+            raise ValueError(f"tau of shape {rows.shape} is one row a step, which needs {needed}")
+        given = {"t0": t0, "tau": tau, "parameters": parameters, "events": events, **options}
+        given |= {} if run.adaptive else {"estimate_error": False}
+        legs = _legs(simulate(model, q, qd, t_end, method, **given), run, events)
+    else:
+        legs = (equal_leg(run, None if rows is None else len(rows)),)
+    constant = np.array([start.bound[name] for name in inputs])
+    values = np.array([start.bound[name] for name in problem.parameters if name not in inputs])
+    forces = constant if rows is None else rows
+    return MotionOf(
+        problem,
+        METHODS[method],
+        start.x,
+        legs,
+        np.empty(0),  # of steps, before the legs are run
+        np.empty(0),
+        forces,
+        len(inputs),
+        rows is not None,
+        values,
+        chosen,
+        applied.nodes,
+    )
+
+
+def options_of(t_end: float, method: str, t0: float, options: Mapping[str, Any]) -> RunOptions:
+    """The options of a run, by a method whose motions have derivatives. Raises ValueError for another."""
+    run = RunOptions(t_end, method, t0=t0, **options)
+    if run.scipy_solver is not None or METHODS[method].step is None:
+        names = ", ".join([name for name, each in METHODS.items() if each.step is not None])
+        raise ValueError(f"motions by method {method!r} have no derivatives here; those by {names} have")
+    return run
+
+
+def _rows(model: Model, tau: Any) -> Array | None:
+    """tau where it is one row a step, (steps, n)."""
+    if np.ndim(tau) != 2:
+        return None
+    rows = real_array("tau", tau)
+    n = 0 if as_ode(model) is not None else as_system(model).n
+    if not n or rows.shape[1] != n or not len(rows):
+        raise ValueError(f"tau must have shape (n,) or (steps, n) with n = {n} velocities, got {rows.shape}")
+    if not np.isfinite(rows).all():
+        raise ValueError("tau must be finite")
+    return rows
+
+
+def names_of(model: Model, wrt: str | Iterable[str] | None, *, closed: bool) -> tuple[str, ...]:
+    """What to differentiate by. By default the start, and the applied force where it is numbers."""
+    ode, inputs = as_ode(model) is not None, state_inputs(model)
+    usual = [START] if ode else [START, VELOCITY] if closed else [START, VELOCITY, TORQUE]
+    if wrt is None:
+        return tuple(usual)
+    names = [wrt] if isinstance(wrt, str) else require_sequence("wrt", wrt, "names")
+    known = [*usual, *inputs.parameters]
+    for name in names:
+        if not isinstance(name, str) or name not in known:
+            raise ValueError(f"wrt must be among {', '.join(known)}, got {name!r:.60}")
+    if clash := [name for name in names if name in usual and name in inputs.parameters]:
+        raise ValueError(f"wrt {clash[0]!r} is the start or the applied force, and a parameter: rename the parameter")
+    if not names:
+        raise ValueError(f"wrt needs at least one of {', '.join(known)}")
+    return tuple(dict.fromkeys(names))
+
+
+def equal_leg(run: RunOptions, rows: int | None) -> Leg:
+    """Equal steps; so many where rows say it."""
+    count = step_count(run.length, run.step) if rows is None or run.dt is not None else rows
+    if rows is not None and rows != count:
+        raise ValueError(f"tau has {rows} rows, and there are {count} steps of dt = {run.step:g} s: leave out dt")
+    h = (run.t_end - run.t0) / count
+    return Leg(np.append(run.t0 + np.arange(count) * h, run.t_end), equal=count, end=run.t_end)
+
+
+def _legs(motion: Trajectory, run: RunOptions, events: Sequence[Event]) -> tuple[Leg, ...]:
+    """The accepted steps of a motion, between the events that reset its state or end it."""
+    if not motion.stats.success:
+        raise MotionError(f"the motion did not reach t_end, {motion.stats.message}")
+    starts = np.flatnonzero(np.diff(motion.t) == 0.0) + 1  # rows after a reset
+    parts = np.split(motion.t, starts)
+    legs = []
+    for number, t in enumerate(parts):
+        ends = number < len(parts) - 1
+        stopped = motion.stats.status == 1 and not ends
+        at = [
+            each.name
+            for each in events
+            if (each.reset if ends else each.terminal) and t[-1] in motion.events[each.name].t
+        ]
+        if (ends or stopped) and len(at) != 1:
+            raise ValueError(
+                f"events {', '.join(at)} happen at one instant, t = {t[-1]:.6g} s, which has no derivative"
+            )
+        count = 0 if run.adaptive else step_count(run.t_end - t[0], run.step)
+        if len(t) > 1:
+            legs.append(Leg(t, at[0] if ends or stopped else "", count, run.t_end))
+    return tuple(legs)

@@ -1,0 +1,90 @@
+"""Motion programs: the start and the steps of a motion and what goes along them, derived and compiled once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import cgraph as cg
+from cgraph import Graph
+from cgraph.extend import Runner, runner
+
+from ...integrators import Method, Problem
+from .linearization import Linearization, Linearized
+from .motion_steps import LOSS, MotionSteps, motion_steps
+
+KEPT = 16  # motions whose programs stay ready for another run
+
+
+@dataclass(frozen=True, eq=False)
+class Along:
+    """Passes and what goes along them: the passes themselves, and their linearization, compiled."""
+
+    passes: Linearization
+    forward: Runner
+    linear: Linearized
+    back: Runner
+
+
+@dataclass(frozen=True, eq=False)
+class MotionPrograms:
+    """The programs of a motion.
+
+    start: from x to what the first step reads.  step: the steps, with the running loss where there is one.
+    failed: a register that is not 0 after steps whose equations were not solved; empty where there is none.
+    """
+
+    start: Along
+    step: Along
+    failed: str
+
+
+@dataclass(frozen=True)
+class Request:
+    """What programs are made of; `running` is known by `key`, its structure."""
+
+    problem: Problem
+    method: Method
+    forces: int
+    each_step: bool
+    wrt: tuple[str, ...]
+    forwards: bool  # tangents pushed on, else cotangents pulled back
+    backend: str
+    key: str = ""
+    running: Graph | None = field(default=None, compare=False)
+
+
+def request_key(running: Graph | None) -> str:
+    """What tells one running loss from another."""
+    return "" if running is None else str(cg.structure_hash(running))
+
+
+@lru_cache(KEPT)
+def motion_programs(request: Request) -> MotionPrograms:
+    """The programs; of the last few requests, those made before."""
+    steps = motion_steps(
+        request.problem,
+        request.method,
+        request.running,
+        forces=request.forces,
+        each_step=request.each_step,
+        wrt=request.wrt,
+    )
+    step, start = steps.step, steps.start
+    if request.forwards:
+        linear = step.tangent(step.inputs)
+        first = start.tangent(start.inputs)
+    else:
+        linear = step.adjoint(["x", LOSS] if LOSS in step.handed else ["x"])
+        first = start.adjoint([name for name in linear.vectors if name in start.handed])
+    made = _along(steps, linear, first, request.backend)
+    return MotionPrograms(made[0], made[1], steps.failed)
+
+
+def _along(steps: MotionSteps, linear: Linearized, first: Linearized, backend: str) -> tuple[Along, Along]:
+    def along(passes: Linearization, linear: Linearized, results: list[str]) -> Along:
+        forward = passes.forward([*linear.program.feed, passes.handed["x"]], results)
+        return Along(passes, runner(forward, backend), linear, runner(linear.program, backend))
+
+    results = [name for name in ("x", LOSS, steps.failed) if name in steps.step.handed]
+    return along(steps.start, first, list(steps.start.handed)), along(steps.step, linear, results)

@@ -1,0 +1,190 @@
+"""Motion run: the steps of a motion, forward, and back or again along what was recorded of them, block by block."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from cgraph.extend import Array, Factor, Record, Runner, Solve, While
+
+from .iteration import UNSOLVED
+from .motion import MotionError, MotionOf
+from .motion_programs import Along, MotionPrograms
+from .motion_steps import LOSS
+
+MOST_RECORDED = 64 * 2**20  # bytes of what is recorded of steps; of more, checkpoints are kept
+PIECE = 4096  # passes between two looks at Python
+
+
+class MotionRun:
+    """A motion from its start to its end, once; then along it.
+
+    checkpoints: steps between two of them; 0 where all that is needed of every step is kept.
+    x: (m,), the end.  loss: the running loss.
+    arrives: whether the last step is still to be fitted, by `tried`, and then made, by `finish`.
+    Raises MotionError for a motion that does not stay finite, or whose equations are not solved.
+    """
+
+    def __init__(self, motion: MotionOf, programs: MotionPrograms, *, arrives: bool = False) -> None:
+        self.motion, self.start, self.step, self.failed = motion, programs.start, programs.step, programs.failed
+        count, width = len(motion.h), self.step.forward.program.width
+        fits = 8 * width * count * max(1, motion.many) <= MOST_RECORDED
+        self.checkpoints = 0 if fits else math.ceil(math.sqrt(count))
+        self._blocks: list[tuple[int, int, Array]] = []  # first and last step, and the rows, or the memory before
+        self._memory = self._begin()
+        self._run(0, count - arrives)
+        if not arrives:
+            self._end()
+
+    def _begin(self) -> Array:
+        """The memory before the first step."""
+        motion, passes, forward = self.motion, self.start.passes, self.start.forward
+        given = {"t": motion.t[:1], "tau": motion.force_at_start, "p": motion.values}
+        memory = _memory(forward, {**given, passes.handed["x"]: motion.x}, motion.many)
+        rows = _run(forward, memory, 1, 1, np.empty((1, 0))).rows
+        self._start_tape = rows[:, : self.start.linear.program.feed_width]
+        self.begin = forward.read(memory, passes.handed["x"]).copy()
+        self._start_constants = {name: forward.read(memory, name).copy() for name in passes.constants}
+        handed = self.step.passes.handed
+        values = {handed.get(name, name): forward.read(memory, after).copy() for name, after in passes.handed.items()}
+        return _memory(self.step.forward, {**given, **values}, motion.many)
+
+    def _feed(self, first: int, last: int) -> Array:
+        """What the steps first .. last - 1 are fed."""
+        motion, part = self.motion, slice(first, last)
+        columns = np.stack([motion.t[:-1][part], motion.h[part]], axis=1)
+        if not motion.each_step:
+            return columns
+        tau = motion.tau[part]
+        wide = np.broadcast_to(columns[..., None], (*columns.shape, motion.many)) if motion.many else columns
+        return np.concatenate([wide, tau], axis=1)
+
+    def tried(self) -> Array:
+        """Where the last step arrives, (m,)."""
+        count, memory = len(self.motion.h), self._memory.copy()
+        self.step.forward.run(memory, 1, 1, self._feed(count - 1, count))
+        return self.step.forward.read(memory, self.step.passes.handed["x"])
+
+    def finish(self) -> None:
+        """Make the last step."""
+        count = len(self.motion.h)
+        self._run(count - 1, count)
+        self._end()
+
+    def _run(self, begin: int, end: int) -> None:
+        forward, memory, size = self.step.forward, self._memory, self.checkpoints or PIECE
+        for first in range(begin, end, size):
+            last = min(first + size, end)
+            before = memory.copy() if self.checkpoints else None
+            every = last - first if self.checkpoints else 1
+            rows = _run(forward, memory, last - first, every, self._feed(first, last)).rows
+            self._blocks.append((first, last, rows if before is None else before))
+
+    def _end(self) -> None:
+        forward, handed, memory = self.step.forward, self.step.passes.handed, self._memory
+        self.x = forward.read(memory, handed["x"]).copy()
+        self.loss = forward.read(memory, handed[LOSS])[0].copy() if LOSS in handed else np.zeros(self.x.shape[1:])
+        if self.failed and forward.read(memory, handed[self.failed])[0]:
+            raise MotionError("the equations of a step were not solved: the step is too long")
+        if not (np.isfinite(self.x).all() and np.isfinite(self.loss).all()) and not self.motion.many:
+            raise MotionError("the motion does not stay finite: shorter steps may help")
+        self._constants = {name: forward.read(memory, name).copy() for name in self.step.passes.constants}
+
+    def recorded(self, *, backwards: bool) -> Iterator[tuple[int, int, Array]]:
+        """(first, last, rows) of what was recorded of the steps first .. last - 1, block by block.
+
+        A row is what goes along the step, and then the state after it.
+        """
+        for first, last, kept in reversed(self._blocks) if backwards else self._blocks:
+            if self.checkpoints:
+                yield first, last, _run(self.step.forward, kept.copy(), last - first, 1, self._feed(first, last)).rows
+            else:
+                yield first, last, kept
+
+    def pulled(self, seeds: Mapping[str, Array | float]) -> tuple[dict[str, Array], Array]:
+        """Cotangents of the start and of the inputs, from those after the last step; and rows, those of each step."""
+        memory = self._linear_memory(self.step, self._constants, seeds)
+        back = self.step.back
+        rows = np.empty((len(self.motion.h), back.program.width, *self.x.shape[1:]))
+        width = back.program.feed_width
+        for first, last, tape in self.recorded(backwards=True):
+            pulled = _run(back, memory, last - first, 1, tape[::-1, :width]).rows
+            rows[first:last] = pulled[::-1] if back.program.record else 0.0
+        bars = self._vectors(self.step, memory)
+        memory = self._linear_memory(self.start, self._start_constants, bars)
+        _run(self.start.back, memory, 1, 1, self._start_tape)
+        return self._vectors(self.start, memory), rows
+
+    def last_slope(self, seed: Array) -> float:
+        """The cotangent of h of the last step, from that of x after it."""
+        memory = self._linear_memory(self.step, self._constants, {"x": seed})
+        _, _, tape = next(self.recorded(backwards=True))
+        row = self.step.back.run(memory, 1, 1, tape[-1:, : self.step.back.program.feed_width]).rows[0]
+        return float(row[self.step.passes.varied.index("h")])
+
+    def pushed(self, directions: Mapping[str, Array]) -> tuple[Array, Array]:
+        """States (steps + 1, m), and their tangents (steps + 1, m, k) along k directions of the start and inputs."""
+        count, m, k = len(self.motion.h), len(self.x), next(iter(directions.values())).shape[1]
+        states, tangents = np.empty((count + 1, m)), np.empty((count + 1, m, k))
+        memory = self._linear_memory(self.start, self._start_constants, directions)
+        _run_all(self.start.back, memory, self._start_tape)
+        memory = self._linear_memory(self.step, self._constants, {**directions, **self._vectors(self.start, memory)})
+        names = self.step.linear.vectors
+        states[0], tangents[0] = self.begin, self.step.back.read(memory, names["x"])
+        width = self.step.back.program.feed_width
+        for first, last, tape in self.recorded(backwards=False):
+            states[first + 1 : last + 1] = tape[:, -m:]
+            tangents[first + 1 : last + 1] = _run_all(self.step.back, memory, tape[:, :width])
+        self._vectors(self.step, memory)
+        return states, tangents
+
+    def _linear_memory(
+        self, along: Along, constants: Mapping[str, Array], vectors: Mapping[str, Array | float]
+    ) -> Array:
+        names = along.linear.vectors
+        placed = {names[name]: np.asarray(vector) for name, vector in vectors.items() if name in names}
+        many = [vector.shape[1] for vector in placed.values() if vector.ndim == 2]
+        return _memory(along.back, {**constants, **placed}, max(many, default=0))
+
+    def _vectors(self, along: Along, memory: Array) -> dict[str, Array]:
+        if np.any(along.back.read(memory, UNSOLVED)):
+            raise MotionError("the equations of a step's derivative were not solved: the step is too long")
+        return {name: along.back.read(memory, register).copy() for name, register in along.linear.vectors.items()}
+
+
+def _run_all(ready: Runner, memories: Array, feed: Array) -> Array:
+    """The rows (passes, width, k) of k memories that are fed the same: side by side, unless the passes branch."""
+    if branch_free(ready):
+        return _run(ready, memories, len(feed), 1, feed).rows
+    rows = np.empty((len(feed), ready.program.width, memories.shape[1]))
+    for k in range(memories.shape[1]):
+        memory = memories[:, k].copy()
+        rows[:, :, k] = ready.run(memory, len(feed), 1, feed).rows
+        memories[:, k] = memory
+    return rows
+
+
+def _memory(ready: Runner, values: Mapping[str, Array], many: int) -> Array:
+    """A memory, or many, with those of the values that the program has registers for; a vector is that of all."""
+    known = {name: value for name, value in values.items() if name in ready.program.registers}
+    if not many:
+        return ready.memory(known)
+    wide = {
+        name: value if value.ndim != 1 else np.repeat(value[:, None], many, axis=1) for name, value in known.items()
+    }
+    return ready.memory(wide, many)
+
+
+def _run(ready: Runner, memory: Array, passes: int, every: int, feed: Array) -> Record:
+    """Passes of one memory, or of many side by side."""
+    if memory.ndim == 1:
+        return ready.run(memory, passes, every, feed)
+    with np.errstate(all="ignore"):
+        return ready.run_many(memory, passes, every, feed if feed.ndim == 3 else feed[:, :, None])
+
+
+def branch_free(ready: Runner) -> bool:
+    """Whether many memories can run side by side."""
+    return not any(isinstance(each, While | Factor | Solve) for each in ready.program.statements())

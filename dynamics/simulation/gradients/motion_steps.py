@@ -1,0 +1,85 @@
+"""Motion steps: the start and the steps of a motion, with its running loss, ready to be linearized."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import cgraph as cg
+from cgraph import Graph
+from cgraph.extend import Call, Statement
+
+from ...integrators import Method, Problem
+from ...integrators.explicit import registers
+from ...systems.arguments import TIME
+from .linearization import Linearization
+from .products import Products
+from .rate_pullback import rate_pullback
+
+LOSS = "loss"  # register: the running loss so far
+
+
+@dataclass(frozen=True, eq=False)
+class MotionSteps:
+    """The steps of a method on a problem.
+
+    start: from x to what the first step reads.  step: one step; fed t, h, and tau where it changes.
+    failed: a register of the step that is not 0 where its equations were not solved, or empty.
+    """
+
+    start: Linearization
+    step: Linearization
+    failed: str
+
+
+def motion_steps(
+    problem: Problem, method: Method, running: Graph | None, *, forces: int, each_step: bool, wrt: tuple[str, ...]
+) -> MotionSteps:
+    """The steps with derivatives by `wrt`: among "tau", "p", "h" and "t", besides the state.
+
+    running: the loss of a step, a graph over the states, t and parameters.  forces: how many of the parameters are
+    applied forces, which come first.  each_step: whether these are new in every step.
+    """
+    assert method.step is not None
+    made = method.step(problem)
+    lengths = {**registers(problem), **made.lengths, "tau": forces, "p": len(problem.parameters) - forces, "arrival": 1}
+    body: list[Statement] = [*made.body, *_arrival(problem)]
+    carried = ["x"]
+    if running is not None:
+        inputs = [*running.inputs, cg.variable(LOSS)]
+        total = Graph(inputs, {LOSS: running.only_output() + cg.variable(LOSS)})
+        body.insert(0, Call(total, ("x", "t", "p", LOSS), (LOSS,)))
+        lengths[LOSS] = 1
+        carried.append(LOSS)
+    pullback = rate_pullback(problem)
+    fed = ("t", "h", "tau") if each_step else ("t", "h")
+    make = partial(
+        Linearization,
+        lengths=lengths,
+        fixed=(*made.fixed, "evaluations", "nonfinite"),
+        renamed={"p": ("tau", "p")},
+        products=Products({} if pullback is None else {id(problem.rate): pullback}),
+    )
+    inputs_of_step, varied = [name for name in wrt if name not in fed], [name for name in wrt if name in fed]
+    step = make(body, fed=fed, inputs=inputs_of_step, varied=varied, carried=carried)
+    read = [name for name in (*step.handed, *step.constants) if name not in ("p", "tau", "t")]
+    begin = [*_normalized(problem, TIME), *made.start]
+    start = make(begin, fed=(), inputs=[name for name in wrt if name != "h"], varied=(), carried=read)
+    return MotionSteps(start, step, made.failed)
+
+
+def _arrival(problem: Problem) -> list[Statement]:
+    """What is done where a step arrived: quaternions get length 1, constraints are met."""
+    normalized = _normalized(problem, "arrival")
+    if not normalized:
+        return []
+    t, h = cg.variables("t h")
+    return [Call(Graph([t, h], {"t": t + h}), ("t", "h"), ("arrival",)), *normalized]
+
+
+def _normalized(problem: Problem, time: str) -> list[Statement]:
+    if problem.projection is not None:
+        return [Call(problem.projection, ("x", time, "p"), ("x",))]
+    if problem.normalization is not None:
+        return [Call(problem.normalization, ("x",), ("x",))]
+    return []

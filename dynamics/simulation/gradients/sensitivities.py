@@ -1,0 +1,166 @@
+"""Sensitivities of motions: how every state of a motion depends on its start and parameters, by forward mode."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph.extend import Array
+
+from ...systems.model import Model
+from ..applied_forces import Constant
+from .legs import Legs
+from .motion import START, TORQUE, VELOCITY, MotionOf, motion_of
+from .motion_programs import Request, motion_programs
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivities:
+    """A motion, and the derivatives of its states.
+
+    Attributes
+    ----------
+    t : ndarray, (T,)
+        Times of the rows: the start, and the end of every step [s].
+    q, qd : ndarray, (T, nq) and (T, n)
+        The motion; of an OdeSystem q is its state and qd has no columns.
+    derivatives : dict of str to ndarray
+        By the names of `wrt`, those of the state x = (q, qd), of m numbers: (T, m, n) by "q", "qd" and "tau", of an
+        OdeSystem (T, m, m) by "q", and (T, m) by a parameter. Where velocities are no rates of coordinates, those by
+        "q" are by small displacements xi, dq = G(q) xi.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm([1.0], [1.0])
+    >>> result = dyn.sensitivities(arm, [0.5], [0.0], t_end=0.1, dt=0.05, wrt="q")
+    >>> result.t.round(3).tolist(), result["q"].shape
+    ([0.0, 0.05, 0.1], (3, 2, 1))
+    """
+
+    t: Array
+    q: Array
+    qd: Array
+    derivatives: dict[str, Array]
+
+    def __getitem__(self, name: str) -> Array:
+        """The derivatives by one of `wrt`. Raises KeyError for another name."""
+        return self.derivatives[name]
+
+
+def sensitivities(
+    model: Model,
+    q: ArrayLike,
+    qd: ArrayLike | None,
+    t_end: float | None = None,
+    method: str = "rk4",
+    *,
+    wrt: str | Iterable[str] | None = None,
+    t0: float = 0.0,
+    t_span: ArrayLike | None = None,
+    dt: float | None = None,
+    max_step: float | None = None,
+    rtol: float | None = None,
+    atol: ArrayLike | None = None,
+    first_step: float | None = None,
+    tau: Constant | Callable[..., Sequence[Node | float]] = 0.0,
+    parameters: Mapping[str, float] | None = None,
+    backend: str = "auto",
+) -> Sensitivities:
+    """A motion and the derivatives of all its states, by forward mode through every step.
+
+    The derivatives are those of the numbers that the method computes, exact to rounding; steps that are chosen by error
+    count as constants. Their cost grows with the number of columns; `gradient` gives one loss by any number of inputs.
+
+    Parameters
+    ----------
+    model : System, OdeSystem, Mechanism or Scene
+        What moves.
+    q, qd, t_end, t0, t_span, dt, max_step, rtol, atol, first_step, parameters, backend
+        As for `simulate`.
+    method : str
+        As for `gradient`.
+    wrt : str or sequence of str, optional
+        What to differentiate by: "q", "qd", "tau" and names of parameters. By default the start and the applied force.
+    tau : float, sequence or callable
+        Applied force [N m or N], constant, or a controller in closed form.
+
+    Returns
+    -------
+    Sensitivities
+        `t`, `q`, `qd`, and the derivatives by each name of `wrt`, as `result["q"]`.
+
+    Raises
+    ------
+    TypeError, ValueError, MotionError, SingularMassMatrixError
+        As `gradient` does.
+
+    Examples
+    --------
+    How a pendulum's angle and velocity depend on its mass after one second and after two:
+
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm(["m"], [1.0], damping=0.5, parameters={"m": 1.0})
+    >>> result = dyn.sensitivities(arm, [0.5], [0.0], t_end=2.0, dt=0.01, wrt=["m"])
+    >>> result["m"][[100, 200]].round(4).tolist()
+    [[-0.1275, 0.4627], [0.0445, -0.6321]]
+    """
+    options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
+    motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options)
+    if motion.each_step:
+        raise ValueError(f"tau must be constant, (n,), got shape {motion.tau.shape}: gradient takes a row a step")
+    by = [TORQUE] if TORQUE in motion.wrt else []
+    by += ["p"] if len(motion.values) else []
+    request = Request(motion.problem, motion.method, motion.forces, False, tuple(by), forwards=True, backend=backend)
+    directions, columns = _directions(motion)
+    run = Legs(motion, motion_programs(request), {}).runs[0]
+    states, tangents = run.pushed(directions)
+    derivatives = {name: tangents[:, :, place] for name, place in columns.items()}
+    nq = motion.problem.nq
+    return Sensitivities(run.motion.t, states[:, :nq], states[:, nq:], derivatives)
+
+
+def _directions(motion: MotionOf) -> tuple[dict[str, Array], dict[str, int | slice]]:
+    """Tangents of x, tau and p, a column for each number of `wrt`; and where the columns of each name are."""
+    problem, nq = motion.problem, motion.problem.nq
+    names = problem.parameters[motion.forces :]
+    blocks: dict[str, tuple[str, Array]] = {}
+    for name in motion.wrt:
+        if name == START:
+            moved = np.zeros((problem.size, problem.size - nq if problem.system is not None else nq))
+            moved[:nq] = _displacements(motion)
+            blocks[name] = "x", moved
+        elif name == VELOCITY:
+            blocks[name] = "x", np.eye(problem.size)[:, nq:]
+        elif name == TORQUE:
+            blocks[name] = TORQUE, np.eye(motion.forces)
+        else:
+            blocks[name] = "p", np.eye(len(names))[:, [names.index(name)]]
+    total = sum([block.shape[1] for _, block in blocks.values()])
+    rows = {"x": problem.size, TORQUE: motion.forces, "p": len(names)}
+    directions = {register: np.zeros((count, total)) for register, count in rows.items()}
+    columns: dict[str, int | slice] = {}
+    at = 0
+    for name, (register, block) in blocks.items():
+        end = at + block.shape[1]
+        directions[register][:, at:end] = block
+        columns[name] = slice(at, end) if name in (START, VELOCITY, TORQUE) else at
+        at = end
+    return directions, columns
+
+
+def _displacements(motion: MotionOf) -> Array:
+    """dq of displacements of the coordinates, (nq, n): G(q), or 1."""
+    system, nq = motion.problem.system, motion.problem.nq
+    if system is None or system.kinematics.quasi is None:
+        return np.eye(nq)
+    rates = cg.jacobian(
+        Graph([*system.q, *system.qd], {f"{k}": rate for k, rate in enumerate(system.q_dot)}), system.qd
+    )
+    values = rates.evaluate(dict(zip(rates.input_names, [*motion.x.tolist()], strict=True)))
+    return np.array(list(values.values()), dtype=np.float64).reshape(nq, system.n)

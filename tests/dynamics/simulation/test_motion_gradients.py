@@ -1,0 +1,431 @@
+"""gradient and sensitivities: derivatives of what a method computes, through every step."""
+
+import math
+import tracemalloc
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+from pytest import approx, mark, raises
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.integrators import METHODS, Tableau, derive, runge_kutta
+from dynamics.simulation.gradients import motion_run
+from dynamics.simulation.gradients.rate_pullback import rate_pullback
+from dynamics.systems.system import System
+from tests.dynamics.mechanisms import random_mechanism
+from tests.dynamics.models import driven_pendulum, magnetic, random_arm, relativistic
+from tests.dynamics.parametrized import parametrized
+from tests.slow import slow
+from tests.tolerances import EQUATIONS, LONG_SUM, SHORT_SUM, SOLVED
+
+DUAL = 1e-12  # of the size of the terms: a gradient beside forward sensitivities
+DIFFERENCES = 2e-8  # central differences over 1e-5 of float64
+DIGITS = 1e-10  # beside differences of 30 digits, of stages that are solved to rounding
+WRT = ["q", "qd", "tau", "m", "k"]
+USUAL = "rk4 dopri5 rodas radau verlet gauss4 yoshida4".split()
+OTHERS = [name for name in (*METHODS, "gauss8") if name not in USUAL and name != "taylor"]
+
+
+def bead(unit: float = 1.0) -> System:
+    """A bead on a wire, with a mass that depends on where it is, and a force that depends on time. unit: of q [m]."""
+
+    def lagrangian(q: Any, qd: Any, t: Any, p: Any) -> Any:
+        x, v = unit * q[0], unit * qd[0]
+        return 0.5 * p["m"] * (1.0 + x**2) * v**2 + p["k"] * cg.cos(x) + 0.1 * cg.sin(3.0 * t) * x
+
+    return System(lagrangian, ["s"], {"m": 1.3, "k": 2.0}, damping=0.2 * unit**2)
+
+
+def loss(q: Any, qd: Any, t: Any, p: Any) -> Any:
+    return q[0] * qd[0] + p["m"] * q[0] ** 2
+
+
+def slope(q: Any, qd: Any) -> Any:
+    """Of `loss`, in the state."""
+    return np.array([qd[0] + 2.0 * 1.3 * q[0], q[0]])
+
+
+def options(method: str) -> dict[str, Any]:
+    """Steps of the same length, whatever the method."""
+    if METHODS[method].adaptive:
+        return {"rtol": 10.0, "atol": 10.0, "max_step": 0.1, "first_step": 0.1}
+    return {"dt": 0.1}
+
+
+@mark.parametrize("method", [*USUAL, *slow(*OTHERS)])
+def test_a_gradient_is_the_end_s_slope_along_forward_sensitivities_and_that_of_differences(method: str) -> None:
+    given = {"t_end": 0.5, "method": method, "tau": [0.3], "backend": "python", **options(method)}
+    result = dyn.gradient(bead(), loss, [0.5], [0.2], wrt=WRT, **given)
+    forward = dyn.sensitivities(bead(), [0.5], [0.2], wrt=WRT, **given)
+    assert len(forward.t) in (6, 7)
+    at_end = slope(forward.q[-1], forward.qd[-1])
+    for name in WRT:
+        rows = forward[name][-1]
+        direct = forward.q[-1, 0] ** 2 if name == "m" else 0.0
+        size = np.abs(at_end) @ np.abs(rows) + abs(direct)
+        assert np.all(np.abs(at_end @ rows + direct - result[name]) <= DUAL * size)
+
+    def value(q: float = 0.5, qd: float = 0.2, tau: float = 0.3, **numbers: float) -> float:
+        changed = {**given, "tau": [tau], "parameters": numbers}
+        return dyn.gradient(bead(), loss, [q], [qd], wrt=WRT, **changed).value
+
+    for name, at in {"q": 0.5, "m": 1.3}.items():
+        difference = (value(**{name: at + 1e-5}) - value(**{name: at - 1e-5})) / 2e-5
+        assert float(np.squeeze(result[name])) == approx(difference, rel=DIFFERENCES, abs=DIFFERENCES)
+
+
+@mark.parametrize("method", [*USUAL, *slow(*OTHERS)])
+def test_adjoint_times_tangent_is_constant_along_the_motion(method: str) -> None:
+    """lam . dx at any step, with lam from the motion that begins there."""
+    given = {"method": method, "backend": "python", **options(method)}
+    forward = dyn.sensitivities(bead(), [0.5], [0.2], 1.0, wrt=["q", "qd"], **given)
+    if "dt" in given:
+        given["dt"] *= 1.0 + 1e-9  # the time that is left is a whole number of steps, to rounding
+    products = []
+    for row in (0, 4, 9):
+        span = (forward.t[row], 1.0)
+        begin = dyn.gradient(bead(), loss, forward.q[row], forward.qd[row], t_span=span, wrt=["q", "qd"], **given)
+        assert len(begin.t) == len(forward.t) - row
+        bar = np.concatenate([begin["q"], begin["qd"]])
+        products.append(bar @ np.concatenate([forward["q"][row], forward["qd"][row]], axis=1))
+    assert np.array(products) == approx(np.tile(products[0], (3, 1)), rel=LONG_SUM)
+
+
+def pendulum_step(x: Any, tau: Any, m: Any, h: float) -> Any:
+    """A step of RK4 for a rod of 1 m, in complex numbers."""
+
+    def rate(x: Any) -> Any:
+        return np.array([x[1], (tau - 0.5 * m * 9.81 * np.sin(x[0]) - 0.1 * x[1]) / (m / 3.0)])
+
+    a = rate(x)
+    b = rate(x + h / 2 * a)
+    c = rate(x + h / 2 * b)
+    return x + h / 6 * (a + 2 * b + 2 * c + rate(x + h * c))
+
+
+@mark.parametrize("backend", ["python", "llvm"])
+def test_torques_a_step_a_running_loss_and_a_parameter_beside_complex_steps(backend: str) -> None:
+    if backend == "llvm":
+        pytest.importorskip("llvmlite")
+    rod = dyn.planar_arm(["m"], [1.0], damping=0.1, parameters={"m": 1.2})
+    tau, h = np.random.default_rng(0).normal(size=(20, 1)), 0.5 / 20
+
+    def total(q: Any, tau: Any, m: Any) -> Any:
+        x, sums = np.array([q, 0.2 + 0j]), 0.0
+        for u in tau:
+            sums = sums + m * u * u + x[0] * u
+            x = pendulum_step(x, u, m, h)
+        return sums + x[0] * x[1]
+
+    given = {"tau": tau, "backend": backend, "running": lambda q, qd, tau, t, p: p["m"] * tau[0] ** 2 + q[0] * tau[0]}
+    final = lambda q, qd, t: q[0] * qd[0]  # noqa: E731
+    result = dyn.gradient(rod, final, [0.5], [0.2], 0.5, wrt=["q", "tau", "m"], **given)
+    tiny, forces = 1e-40, tau[:, 0].astype(complex)
+    assert result.value == approx(total(0.5, forces, 1.2).real, rel=SHORT_SUM)
+    assert result["q"] == approx([total(0.5 + 1j * tiny, forces, 1.2).imag / tiny], rel=LONG_SUM)
+    assert result["m"] == approx(total(0.5, forces, 1.2 + 1j * tiny).imag / tiny, rel=LONG_SUM)
+    assert dyn.gradient(rod, final, [0.5], [0.2], 0.5, wrt="m", **given)["m"] == approx(result["m"], rel=SHORT_SUM)
+    unit = 1j * tiny * np.eye(20)
+    rows = [total(0.5, forces + unit[k], 1.2).imag / tiny for k in range(20)]
+    assert result["tau"][:, 0] == approx(np.array(rows), rel=EQUATIONS, abs=LONG_SUM)
+
+
+def test_a_gradient_through_implicit_steps_beside_differences_of_30_digits() -> None:
+    """Of Radau IIA's equations, at the steps that were accepted."""
+    mpmath = pytest.importorskip("mpmath")
+    result = dyn.gradient(bead(), loss, [0.5], [0.2], 0.6, "radau", wrt=["q", "k"], rtol=1e-3, backend="python")
+    with mpmath.workdps(40):
+        root = mpmath.sqrt(mpmath.mpf(6))
+        a = [
+            [(88 - 7 * root) / 360, (296 - 169 * root) / 1800, (-2 + 3 * root) / 225],
+            [(296 + 169 * root) / 1800, (88 + 7 * root) / 360, (-2 - 3 * root) / 225],
+            [(16 - root) / 36, (16 + root) / 36, mpmath.mpf(1) / 9],
+        ]
+        m, damping = mpmath.mpf(1.3), mpmath.mpf(0.2)
+
+        def rate(q: Any, v: Any, t: Any, k: Any) -> Any:
+            force = mpmath.mpf(0.1) * mpmath.sin(3 * t) - k * mpmath.sin(q) - damping * v - m * q * v * v
+            return v, force / (m * (1 + q * q))
+
+        def value(q: Any, k: Any) -> Any:
+            v = mpmath.mpf(0.2)
+            for begin, h in zip(result.t[:-1], np.diff(result.t), strict=True):
+                t, h = mpmath.mpf(begin), mpmath.mpf(h)
+                stages = [rate(q, v, t, k)] * 3
+                for _ in range(60):  # a fixed point: the steps are short
+                    at = [
+                        [x + h * sum(w * s[j] for w, s in zip(row, stages, strict=True)) for j, x in ((0, q), (1, v))]
+                        for row in a
+                    ]
+                    stages = [rate(*x, t + h * sum(row), k) for x, row in zip(at, a, strict=True)]
+                q, v = at[2]
+            return q * v + m * q * q
+
+        start, k, e = mpmath.mpf(0.5), mpmath.mpf(2.0), mpmath.mpf(10) ** -12
+        by_q = (value(start + e, k) - value(start - e, k)) / (2 * e)
+        by_k = (value(start, k + e) - value(start, k - e)) / (2 * e)
+    assert result["q"][0] == approx(float(by_q), rel=DIGITS)
+    assert result["k"] == approx(float(by_k), rel=DIGITS)
+
+
+@mark.parametrize("method", ["rk4", "radau", "midpoint"])
+def test_gradients_in_other_units_are_the_same(method: str) -> None:
+    unit = 2.0**20
+    given = {"t_end": 0.5, "method": method, "backend": "python", "wrt": ["q", "qd", "k"]}
+    given |= {"dt": 0.05} if method != "radau" else {"rtol": 1e-4}
+    metres = dyn.gradient(bead(), lambda q, qd, t: q[0] * qd[0], [0.5], [0.2], **given)
+    other = dyn.gradient(bead(unit), lambda q, qd, t: unit**2 * q[0] * qd[0], [0.5 / unit], [0.2 / unit], **given)
+    assert (other["q"] / unit).tolist() == approx(metres["q"].tolist(), rel=LONG_SUM)
+    assert (other["qd"] / unit).tolist() == approx(metres["qd"].tolist(), rel=LONG_SUM)
+    assert other["k"] == approx(metres["k"], rel=LONG_SUM)
+
+
+def test_radau_through_a_stiff_spring() -> None:
+    """A mass on a spring of 1e8 N/m with 2e4 N s/m settles at tau / k within a millisecond."""
+
+    def energy(q: Any, qd: Any, t: Any, p: Any) -> Any:
+        return 0.5 * qd[0] ** 2 - 0.5 * p["k"] * q[0] ** 2
+
+    spring = System(energy, ["x"], {"k": 1e8}, damping=2e4)
+    given = {"t_end": 0.1, "method": "radau", "tau": [50.0], "wrt": ["tau", "k", "q"], "rtol": 1e-6}
+    result = dyn.gradient(spring, lambda q, qd, t: q[0], [1e-3], [0.0], **given)
+    forward = dyn.sensitivities(spring, [1e-3], [0.0], **given)
+    assert len(result.t) < 1000
+    assert result["tau"][0] == approx(1e-8, rel=1e-9)
+    assert result["k"] == approx(-50.0 / 1e16, rel=1e-6)
+    for name in ("tau", "k"):
+        assert np.squeeze(forward[name][-1])[0] == approx(float(np.squeeze(result[name])), rel=DUAL)
+
+
+def free_body() -> dyn.Mechanism:
+    base = dyn.Body("base", dyn.Joint("free"), mass="m", center=(0.1, 0.0, 0.05), inertia=(0.1, 0.2, 0.3))
+    hinge = dyn.Joint("revolute", axis=(0.0, 1.0, 0.0), position=(0.0, 0.0, -0.2), damping=0.05)
+    arm = dyn.Body("arm", hinge, "base", 1.0, (0.0, 0.05, -0.3), (0.02, 0.03, 0.04))
+    return dyn.Mechanism([base, arm], parameters={"m": 2.0})
+
+
+def four_bar() -> dyn.Mechanism:
+    def rod(name: str, parent: str, place: tuple[float, float, float], mass: Any) -> dyn.Body:
+        hinge = dyn.Joint("revolute", axis=(0.0, -1.0, 0.0), position=place)
+        return dyn.Body(name, hinge, parent, mass, (0.0, 0.0, -0.5), (0.1, 0.1, 0.1))
+
+    rods = [rod("a", "world", (0, 0, 0), "m"), rod("b", "a", (0, 0, -1), 1.0), rod("c", "world", (1.2, 0, 0), 1.0)]
+    hinge = dyn.Loop("hinge", "b", "c", at=(0, 0, -1.2), to_at=(0, 0, -1), axis=(0, 1, 0), to_axis=(0, 1, 0))
+    return dyn.Mechanism(rods, loops=[hinge], parameters={"m": 1.0})
+
+
+@mark.parametrize("make", [free_body, four_bar])
+def test_quaternions_and_loops_by_displacements_and_through_projections(make: Any) -> None:
+    model = make()
+    rng = np.random.default_rng(1)
+    nq, n = len(model.coordinates), len(model.velocities)
+    if nq == n:
+        q, qd = dyn.consistent_state(model, [0.3, 0.8, 0.2], [0.1, 0.2, 0.3])
+    else:
+        q, qd = rng.normal(size=nq), rng.normal(size=n)
+        q[3:7] /= np.linalg.norm(q[3:7])
+    final = lambda q, qd, t: q[2] * qd[1] + q[-1] ** 2  # noqa: E731
+    given = {"t_end": 0.2, "dt": 0.02, "wrt": ["q", "qd", "m"], "backend": "python"}
+    result, forward = dyn.gradient(model, final, q, qd, **given), dyn.sensitivities(model, q, qd, **given)
+    bar = np.zeros(nq + n)
+    np.add.at(bar, [2, nq - 1, nq + 1], [forward.qd[-1, 1], 2.0 * forward.q[-1, -1], forward.q[-1, 2]])
+    for name in given["wrt"]:
+        rows = forward[name][-1]
+        assert np.all(np.abs(bar @ rows - result[name]) <= DUAL * (np.abs(bar) @ np.abs(rows)))
+    shifts = forward["q"][0, :nq]  # dq of each displacement
+    assert result["q"].shape == (n,) == (shifts.shape[1],)
+    ends = []
+    for sign in (1.0, -1.0):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", dyn.ConstraintWarning)
+            ends.append(dyn.gradient(model, final, q + sign * 1e-6 * shifts @ np.ones(n), qd, **given).value)
+    assert (ends[0] - ends[1]) / 2e-6 == approx(float(result["q"].sum()), rel=1e-6)
+
+
+def falling() -> System:
+    """A ball over a table that moves up and down."""
+
+    def lagrangian(q: Any, qd: Any, t: Any, p: Any) -> Any:
+        return 0.5 * p["m"] * qd[0] ** 2 - p["m"] * 9.81 * q[0]
+
+    return System(lagrangian, ["height"], {"m": 1.0, "e": 0.8}, damping=0.3)
+
+
+def table(q: Any, qd: Any, t: Any) -> Any:
+    return q[0] - 0.02 * cg.sin(3.0 * t)
+
+
+BOUNCE = dyn.Event("bounce", table, direction=-1, reset=lambda q, qd, t, p: (q, [-p["e"] * qd[0] + 0.1 * t]))
+TOP = dyn.Event("top", lambda q, qd, t: qd[0] - 0.2, direction=-1, terminal=True)
+
+
+@mark.parametrize(
+    ("method", "events"), [("rk4", [BOUNCE]), ("dopri5", [BOUNCE, TOP]), *slow(("gauss4", [BOUNCE, TOP]))]
+)
+def test_events_that_reset_the_state_or_end_the_motion(method: str, events: Any) -> None:
+    given = {"t_end": 1.0, "method": method, "events": events, "wrt": ["q", "tau", "m", "e"], "backend": "python"}
+    given |= {"rtol": 1e-7} if METHODS[method].adaptive else {"dt": 0.05}
+
+    def at(q: float = 1.0, tau: float = 0.2, **numbers: float) -> dyn.MotionGradient:
+        final = lambda q, qd, t: q[0] * qd[0] + t * q[0]  # noqa: E731
+        return dyn.gradient(falling(), final, [q], [0.1], tau=[tau], parameters=numbers, **given)
+
+    result = at()
+    assert result.t[-1] == (1.0 if len(events) == 1 else approx(0.785, abs=1e-3))
+    for name, value in {"q": 1.0, "e": 0.8}.items():
+        difference = (at(**{name: value + 1e-6}).value - at(**{name: value - 1e-6}).value) / 2e-6
+        assert float(np.squeeze(result[name])) == approx(difference, rel=DIFFERENCES)
+
+
+def test_a_stopping_time_is_differentiated() -> None:
+    """A fall from rest takes sqrt(2 q / g)."""
+    ground = dyn.Event("ground", lambda q, qd, t: q[0], terminal=True)
+    free = System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 9.81 * q[0], ["height"])
+    result = dyn.gradient(free, lambda q, qd, t: t, [2.0], [0.0], 1.0, dt=0.1, events=ground, backend="python")
+    assert result.value == approx(math.sqrt(4.0 / 9.81), rel=SHORT_SUM)
+    assert result["q"] == approx([1.0 / math.sqrt(4.0 * 9.81)], rel=SHORT_SUM)
+
+
+@mark.parametrize(("method", "backend"), [("rk4", "python"), ("rk4", "llvm"), *slow(("gauss4", "python"))])
+def test_many_gradients_are_those_one_by_one(method: str, backend: str) -> None:
+    if backend == "llvm":
+        pytest.importorskip("llvmlite")
+    rng = np.random.default_rng(3)
+    q, qd, tau, k = (rng.normal(size=shape) for shape in ((9, 1), (9, 1), (9, 4, 1), 9))
+    given = {"t_end": 0.2, "method": method, "wrt": WRT, "backend": backend}
+    running = lambda q, qd, tau, t: q[0] * tau[0]  # noqa: E731
+    many = dyn.gradient_many(bead(), loss, q, qd, tau=tau, parameters={"k": 2.0 + k}, running=running, **given)
+    for row in (0, 4, 8):
+        one = dyn.gradient(
+            bead(), loss, q[row], qd[row], tau=tau[row], parameters={"k": 2.0 + k[row]}, running=running, **given
+        )
+        assert many.value[row] == approx(one.value, rel=SHORT_SUM)
+        assert (many.q[row], many.qd[row]) == (approx(one.q, rel=SHORT_SUM), approx(one.qd, rel=SHORT_SUM))
+        for name in WRT:
+            assert many[name][row] == approx(one[name], rel=LONG_SUM, abs=LONG_SUM)
+
+
+def test_many_gradients_with_what_is_the_same_for_all() -> None:
+    held = {"tau": lambda q, qd, t, p: [p["gain"] * (1.0 - q[0])], "parameters": {"gain": [3.0, 4.0]}}
+    given = {"t_end": 0.2, "dt": 0.05, "backend": "python"}
+    two = dyn.gradient_many(bead(), loss, [0.5], [0.2], wrt=["q", "gain", "m"], **given, **held)
+    held["parameters"] = {"gain": 4.0}
+    one = dyn.gradient(bead(), loss, [0.5], [0.2], wrt=["q", "gain", "m"], **given, **held)
+    assert [two[name][1] for name in ("q", "gain", "m")] == [approx(one[name]) for name in ("q", "gain", "m")]
+    same = dyn.gradient_many(bead(), loss, [[0.5], [0.5]], [0.2], tau=[0.3], **given)
+    assert same["tau"].shape == (2, 1)
+    with raises(ValueError, match="gradient_many needs equal steps"):
+        dyn.gradient_many(bead(), loss, [[0.5]], [0.2], 0.2, "dop853")
+
+
+def test_a_new_tableau_has_gradients(monkeypatch: pytest.MonkeyPatch) -> None:
+    heun = Tableau(2, c=(0.0, 1.0), a=((), (1.0,)), b=(0.5, 0.5))
+    monkeypatch.setitem(METHODS, "heun", runge_kutta(heun))
+    decay = dyn.OdeSystem(lambda x, t: [-2.0 * x[0]], ["x"])
+    result = dyn.gradient(decay, lambda x, t: x[0], [3.0], None, 1.0, "heun", dt=0.25, backend="python")
+    assert result["q"] == approx([(1.0 - 0.5 + 0.125) ** 4], rel=SHORT_SUM)
+
+
+def test_checkpoints_give_the_same_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = {"t_end": 1.0, "dt": 0.01, "wrt": WRT, "backend": "python"}
+    whole = dyn.gradient(bead(), loss, [0.5], [0.2], **given)
+    monkeypatch.setattr(motion_run, "MOST_RECORDED", 1000)
+    again = dyn.gradient(bead(), loss, [0.5], [0.2], **given)
+    assert (whole.checkpoints, again.checkpoints) == (0, 10)
+    assert {name: np.squeeze(again[name]) for name in WRT} == {name: np.squeeze(whole[name]) for name in WRT}
+
+
+def test_a_controller_s_gain_and_a_first_order_system() -> None:
+    held = {"tau": lambda q, qd, t, p: [p["gain"] * (1.0 - q[0])], "parameters": {"gain": 3.0}}
+    given = {"t_end": 0.5, "dt": 0.05, "backend": "python", "wrt": ["q", "gain"], **held}
+    result = dyn.gradient(bead(), loss, [0.5], [0.2], running=lambda q, qd, tau, t: tau[0] ** 2, **given)
+    values = [
+        dyn.gradient(
+            bead(), loss, [0.5], [0.2], running=lambda q, qd, tau, t: tau[0] ** 2,
+            **(given | {"parameters": {"gain": gain}}),
+        ).value
+        for gain in (3.0 + 1e-5, 3.0 - 1e-5)
+    ]  # fmt: skip
+    assert result["gain"] == approx((values[0] - values[1]) / 2e-5, rel=DIFFERENCES)
+    decay = dyn.OdeSystem(lambda x, t, p: [-p["rate"] * x[0]], ["x"], {"rate": 2.0})
+    end = dyn.gradient(decay, lambda x, t: x[0], [3.0], None, 1.0, wrt=["q", "rate"], backend="python")
+    assert end["q"] == approx([math.exp(-2.0)], rel=1e-9)
+    assert end["rate"] == approx(-3.0 * math.exp(-2.0), rel=1e-9)
+    both = dyn.gradient(decay, None, [3.0], None, 1.0, running=lambda x, t: 1e-3 * x[0], backend="python")
+    assert both["q"] == approx([0.5 * (1.0 - math.exp(-2.0))], rel=2e-3)
+
+
+def test_what_is_not_there_is_said_in_a_sentence() -> None:
+    def end(**given: Any) -> Any:
+        return dyn.gradient(bead(), loss, [0.5], [0.2], **({"t_end": 0.1, "dt": 0.05, "backend": "python"} | given))
+
+    with raises(ValueError, match="by method 'taylor' have no derivatives here; those by euler, rk4"):
+        end(method="taylor", dt=None)
+    with raises(ValueError, match="by method 'scipy:Radau' have no derivatives"):
+        end(method="scipy:Radau", dt=None)
+    with raises(TypeError, match="SampledController calls Python"):
+        end(tau=dyn.SampledController(lambda q, qd, t: q, 0.1))
+    with raises(ValueError, match=r"wrt must be among q, qd, tau, m, k, got 'mass'"):
+        end(wrt="mass")
+    with raises(ValueError, match=r"tau must have shape \(n,\) or \(steps, n\) with n = 1"):
+        end(tau=np.zeros((2, 3)))
+    with raises(ValueError, match="tau has 3 rows, and there are 2 steps"):
+        end(tau=np.zeros((3, 1)))
+    with raises(ValueError, match="needs equal steps: method 'dop853'"):
+        end(tau=np.zeros((3, 1)), method="dop853", dt=None)
+    one, two = (dyn.Event(name, lambda q, qd, t: q[0] - 0.5001, reset=lambda q, qd, t: (q, qd)) for name in ("a", "b"))
+    with raises(ValueError, match="events a, b happen at one instant"):
+        end(events=[one, two])
+    with raises(ValueError, match="needs equal steps without events"):
+        end(events=one, tau=np.zeros((2, 1)))
+    with raises(dyn.MotionError, match="does not stay finite"):
+        end(tau=[1e300])
+
+
+@mark.slow
+def test_the_adjoint_of_a_million_steps_takes_at_most_200_mb() -> None:
+    arm = dyn.planar_arm([1.0, 0.8, 0.6], [1.0, 0.8, 0.5], damping=0.1)
+    final = lambda q, qd, t: q[0] ** 2 + q[2]  # noqa: E731
+    start = ([0.5, 0.3, 0.1], [0.0, 0.1, 0.2])
+    dyn.gradient(arm, final, *start, t_end=1e-2)
+    tau = np.zeros((10**6, 3))
+    tracemalloc.start()
+    result = dyn.gradient(arm, final, *start, t_end=100.0, tau=tau)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert result.checkpoints == 1000
+    assert result["tau"].shape == (10**6, 3)
+    assert np.isfinite(result["tau"]).all()
+    assert peak < 200e6
+
+
+PULLED = {
+    "tree": lambda: parametrized(random_mechanism(4, ("revolute", "prismatic"), 2, seed=5), 1, 0.3),
+    "free": free_body,
+    "arm": lambda: random_arm(3),
+    "magnetic": magnetic,
+    "relativistic": relativistic,
+    "driven": driven_pendulum,
+}
+
+
+@mark.parametrize("name", PULLED)
+def test_the_rate_is_pulled_back_by_inverse_dynamics_as_by_its_graph(name: str) -> None:
+    """At states and cotangents of any kind: J^T y_bar of one way and the other."""
+    problem = derive(PULLED[name](), {})
+    by = [node for node in problem.rate.inputs if node.name != "t"]
+    made, plain = rate_pullback(problem), cg.vjp(problem.rate, by)
+    assert made is not None
+    graph, rng = made(by), np.random.default_rng(2)
+    for _ in range(3):
+        numbers = {node.name: rng.uniform(0.2, 0.8) for node in problem.rate.inputs}
+        numbers |= problem.system.parameters
+        values, bars = list(problem.rate.evaluate(numbers).values()), rng.normal(size=problem.size).tolist()
+        direct = plain.evaluate(numbers | dict(zip(plain.input_names[-problem.size :], bars, strict=True)))
+        inputs = zip(graph.input_names, [*numbers.values(), *values, *bars], strict=True)
+        pulled = graph.evaluate(dict(inputs))
+        expected = np.array(list(direct.values()))
+        assert np.array(list(pulled.values())) == approx(expected, rel=SOLVED, abs=SOLVED * np.abs(expected).max())
