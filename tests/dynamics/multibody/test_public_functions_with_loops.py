@@ -44,6 +44,10 @@ def ended(run: Any) -> tuple[Array, Array]:
     return run.q[..., -1, :].ravel(), run.qd[..., -1, :].ravel()
 
 
+def columns(run: dyn.Sensitivities) -> tuple[Array, Array]:
+    return run.q[-1], run["tau"][-1, :3]
+
+
 # A configuration, and what the loop has to let through there: velocities, accelerations from rest, or columns of them.
 HELD: dict[str, Callable[[], tuple[Array, Array]]] = {
     "forward_dynamics": lambda: (Q, at_rest(dyn.forward_dynamics(MODEL))),
@@ -62,10 +66,12 @@ HELD: dict[str, Callable[[], tuple[Array, Array]]] = {
     "attach_with_impact": caught,
     "simulate": lambda: ended(dyn.simulate(MODEL, Q, QD, 0.1)),
     "simulate_many": lambda: ended(dyn.simulate_many(MODEL, [Q], [QD], 0.1, t_eval=[0.1])),
+    "sensitivities": lambda: columns(dyn.sensitivities(MODEL, Q, QD, 0.1, wrt=["tau"])),
     "reference": lambda: tuple(np.split(dyn.reference(MODEL, Q, QD, [0.01], digits=15).x[-1], 2)),
 }
 ELSEWHERE = {
     *("certify", "integrable_rows", "lint_constraints", "raise_if_singular", "release"),  # tests of what they say
+    *("gradient", "gradient_many"),  # tests of gradients, which are compared with sensitivities
     *("to_mjcf", "to_urdf"),  # tests of files
     *("arrays_at", "display_names"),  # numbers and names of any graph
 }
