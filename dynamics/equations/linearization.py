@@ -24,8 +24,8 @@ def state_space(model: Model) -> Graph:
 
     From tau(q, qd, qdd) = const: M dqdd = dtau - (d tau / dx) dx, at the qdd of forward dynamics, with the slopes of
     `inverse_dynamics_derivatives`. M is factored once for all columns: by elimination on the graph of L, which keeps
-    the digits of a long chain, or as a matrix where that saves 15 % of the nodes and no path from the
-    world to a tip has more than 12 coordinates.
+    the digits of a long chain, or as a matrix where that saves a fifth of the nodes and no path from the world to a tip
+    has more than 12 coordinates.
 
     Parameters
     ----------

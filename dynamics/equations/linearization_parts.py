@@ -13,13 +13,13 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, Builder, building, folded
+from cgraph.extend import Array, Builder, building, folded, topological
 
 from ..systems.system import System
 from .equations_of_motion import accelerations
 from .formulations import ONE, ZERO
 from .inverse_dynamics_derivatives import torque_derivatives
-from .mass_matrix_solve import MassSolve, inverse, mass_solve
+from .mass_matrix_solve import MassSolve, inverse, mass_solve, shorter
 
 
 class ColumnGraphs(NamedTuple):
@@ -46,7 +46,8 @@ class LinearizationParts(NamedTuple):
     @property
     def size(self) -> int:
         """How many nodes `written_out` has, about."""
-        return self.solve.size(self.sides)
+        shared = topological([*self.solve.x, *[node for side in self.sides for node in side]])
+        return len(shared) + (len(self.sides) + len(self.brackets)) * len(self.solve.column)
 
     def written_out(self) -> Graph:
         """All entries of A and B."""
@@ -72,14 +73,17 @@ class LinearizationParts(NamedTuple):
 
 def linearization_parts(system: System) -> LinearizationParts:
     """Of a system without constraints. Raises SingularMassMatrixError for a coordinate without inertia."""
+    return shorter(system, lambda method: _parts(system, method))
+
+
+def _parts(system: System, method: str) -> LinearizationParts:
     n, build = system.n, Builder()
-    qdd = accelerations(system)
+    qdd = accelerations(system, method)
     slopes = torque_derivatives(system, folded(list(qdd.outputs.values()), build), build)
     with building(build):
         sides = [[-row[j] for row in rows] for rows in (slopes.by_q, slopes.by_qd) for j in range(n)]
-    return LinearizationParts(
-        qdd.inputs, sides, mass_solve(system, build, sides), system.kinematics.brackets(build), build
-    )
+    solve = mass_solve(system, build, method)
+    return LinearizationParts(qdd.inputs, sides, solve, system.kinematics.brackets(build), build)
 
 
 def assembled(brackets: Array, solutions: Array, n: int) -> tuple[Array, Array]:
