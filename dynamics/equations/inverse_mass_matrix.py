@@ -9,7 +9,7 @@ from cgraph.extend import Builder
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .equations_of_motion import accelerations
-from .mass_matrix_solve import inverse, mass_solve
+from .mass_matrix_solve import inverse, mass_solve, shorter
 from .shorter_form import shorter_form
 
 
@@ -48,7 +48,7 @@ def inverse_mass_matrix(model: Model) -> Graph:
     def derive(system: System) -> Graph:
         system, build = system.without_constraints, Builder()
         accelerations(system)  # raises where M is singular
-        solve = mass_solve(system, build)
+        solve = shorter(system, lambda method: mass_solve(system, build, method))
         rows = inverse(solve, build)
         outputs = {f"Minv_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row)}
         return cg.simplify(system.graph(outputs, system.q, system.qd))

@@ -22,10 +22,10 @@ def state_space(model: Model) -> Graph:
     Of quasi-velocities, qdot = G(q) qd, dx = (xi, dqd) has small displacements xi with dq = G xi, such as a rotation
     vector in the body's axes, so that A and B have no row or column more than there are freedoms.
 
-    From tau(q, qd, qdd) = const: M dqdd = dtau - (d tau / dx) dx, at the qdd of forward dynamics, with the slopes
-    of `inverse_dynamics_derivatives`. M is factored once for all columns: by elimination on the graph of L, which
-    keeps the digits of a long chain, or as a matrix where that saves 15 % of the nodes and no path from the world
-    to a tip has more than 12 coordinates.
+    From tau(q, qd, qdd) = const: M dqdd = dtau - (d tau / dx) dx, at the qdd of forward dynamics, with the slopes of
+    `inverse_dynamics_derivatives`. M is factored once for all columns: by elimination on the graph of L, which keeps
+    the digits of a long chain, or as a matrix where that saves a fifth of the nodes and no path from the world to a tip
+    has more than 12 coordinates.
 
     Rows of constraints z = J qd + a are differentiated with their multipliers, by the same elimination:
     M dqdd - J^T dlambda = dtau - d(tau - J^T lambda)/dx dx,  J dqdd = -d(dz/dt)/dx dx. At a state that meets them A

@@ -13,14 +13,14 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, Builder, building, folded
+from cgraph.extend import Array, Builder, building, folded, topological
 
 from ..systems.system import System
 from .equations_of_motion import accelerations
 from .formulations import ONE, ZERO
 from .held_linearization import held_sides
 from .inverse_dynamics_derivatives import torque_derivatives
-from .mass_matrix_solve import MassSolve, inverse, mass_solve
+from .mass_matrix_solve import MassSolve, inverse, mass_solve, shorter
 
 
 class ColumnGraphs(NamedTuple):
@@ -47,7 +47,8 @@ class LinearizationParts(NamedTuple):
     @property
     def size(self) -> int:
         """How many nodes `written_out` has, about."""
-        return self.solve.size(self.sides)
+        shared = topological([*self.solve.x, *[node for side in self.sides for node in side]])
+        return len(shared) + (len(self.sides) + len(self.brackets)) * len(self.solve.column)
 
     def written_out(self) -> Graph:
         """All entries of A and B."""
@@ -73,15 +74,21 @@ class LinearizationParts(NamedTuple):
 
 def linearization_parts(system: System) -> LinearizationParts:
     """Raises SingularMassMatrixError for a coordinate without inertia."""
+    if not len(system.constraints):
+        return shorter(system, lambda method: _parts(system, method))
+    solved, build = accelerations(system), Builder()
+    sides, solve = held_sides(system, solved, build)
+    return LinearizationParts(solved.inputs, sides, solve, system.kinematics.brackets(build), build)
+
+
+def _parts(system: System, method: str) -> LinearizationParts:
     n, build = system.n, Builder()
-    qdd = accelerations(system)
-    brackets = system.kinematics.brackets(build)
-    if len(system.constraints):
-        return LinearizationParts(qdd.inputs, *held_sides(system, qdd, build), brackets, build)
+    qdd = accelerations(system, method)
     slopes = torque_derivatives(system, folded(list(qdd.outputs.values()), build), build)
     with building(build):
         sides = [[-row[j] for row in rows] for rows in (slopes.by_q, slopes.by_qd) for j in range(n)]
-    return LinearizationParts(qdd.inputs, sides, mass_solve(system, build, sides), brackets, build)
+    solve = mass_solve(system, build, method)
+    return LinearizationParts(qdd.inputs, sides, solve, system.kinematics.brackets(build), build)
 
 
 def assembled(brackets: Array, solutions: Array, n: int) -> tuple[Array, Array]:

@@ -2,20 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import NamedTuple, Protocol, TypeVar
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, building, cotangents, folded, hessian_nodes, ldl_solve, solve_nodes, topological
+from cgraph.extend import (
+    Builder,
+    SingularError,
+    building,
+    cotangents,
+    folded,
+    hessian_nodes,
+    ldl_solve,
+    solve_nodes,
+    topological,
+)
 
 from ..systems.system import System
 from .formulations import ONE, ZERO
+from .singular_mass_matrix import SingularMassMatrixError
 
 DENSE_PATH = 12  # coordinates from the world to a tip; a dense factorization loses digits with about their fourth power
-WORTH = 0.85  # of the nodes by elimination, at most, for the dense one: elimination keeps more digits
+WORTH = 0.8  # of the nodes by elimination, at most, for the dense one: elimination keeps more digits
 
 Rows = Sequence[Sequence[Node]]
+
+
+class HasSize(Protocol):
+    """Something made of nodes."""
+
+    @property
+    def size(self) -> int:
+        """How many."""
+
+
+Sized = TypeVar("Sized", bound=HasSize)
 
 
 class MassSolve(NamedTuple):
@@ -40,10 +63,10 @@ class MassSolve(NamedTuple):
                 result.append([new.get(node, node) for node in self.x])
         return result
 
-    def size(self, sides: Rows) -> int:
-        """How many nodes these right-hand sides, their solutions and the columns of M^-1 take, about."""
-        shared = topological([*self.x, *[node for side in sides for node in side]])
-        return len(shared) + (len(sides) + len(self.x)) * len(self.column)
+    @property
+    def size(self) -> int:
+        """How many nodes the columns of M^-1 take, about."""
+        return len(topological(self.x)) + len(self.x) * len(self.column)
 
     def split(self) -> tuple[list[Node], Graph]:
         """What a column reads of the factorization, and the graph of one: inputs p0.., of those, b0..; outputs x0..."""
@@ -58,20 +81,27 @@ class MassSolve(NamedTuple):
         return factors, Graph([*p, *b], {f"x{i}": new.get(node, node) for i, node in enumerate(self.x)})
 
 
-def mass_solve(system: System, build: Builder, sides: Rows = ()) -> MassSolve:
-    """By elimination on the graph of L, or by LDL^T of the matrix where paths are short and that saves nodes.
+def mass_solve(system: System, build: Builder, method: str) -> MassSolve:
+    """By elimination on the graph of L, "recursive", or by LDL^T of the matrix, "dense".
 
-    sides: right-hand sides that it is for, beside the columns of M^-1.  Raises SingularError for an M that is singular
-    at every state.
+    Raises SingularError for an M that is singular at every state.
     """
     b = cg.variables([f"b{i}#" for i in range(system.n)])
     (lagrangian,) = folded([system.lagrangian], build)
-    solved = linear(b, solve_nodes(lagrangian, system.qd, b, build))
-    if _longest_path(lagrangian, system.qd) <= DENSE_PATH:
-        dense = linear(b, ldl_solve(hessian_nodes(lagrangian, system.qd, build), b, build))
-        if dense.size(sides) < WORTH * solved.size(sides):
+    if method == "dense":
+        return linear(b, ldl_solve(hessian_nodes(lagrangian, system.qd, build), b, build))
+    return linear(b, solve_nodes(lagrangian, system.qd, b, build))
+
+
+def shorter(system: System, make: Callable[[str], Sized]) -> Sized:
+    """What `make` makes by one of the methods: by the dense one where paths are short and that saves nodes."""
+    eliminated = make("recursive")
+    if _longest_path(system.lagrangian, system.qd) > DENSE_PATH:
+        return eliminated
+    with suppress(SingularError, SingularMassMatrixError):  # which needs rows exchanged
+        if (dense := make("dense")).size < WORTH * eliminated.size:
             return dense
-    return solved
+    return eliminated
 
 
 def inverse(solve: MassSolve, build: Builder) -> list[list[Node]]:

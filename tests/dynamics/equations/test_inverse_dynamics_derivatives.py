@@ -36,6 +36,7 @@ KINDS: dict[str, Callable[[], dyn.Mechanism]] = {
     "with parameters": lambda: parametrized(random_mechanism(3, ["revolute", "prismatic"], 2), 1),
     "with base parameters": lambda: replace(random_mechanism(4, ["revolute", "prismatic"], 2), base_parameters=True),
     "in a plane": lambda: random_arm(4),
+    "along one axis": lambda: along_z(random_mechanism(5, ["revolute", "screw", "prismatic"], 2)),
     "turned by quarters": lambda: turned_arm(4),
     "pulled": lambda: replace(random_mechanism(3, ["revolute", "ball"], 1), forces=[wind()]),
     "trees": lambda: forest(random_mechanism(4, ["revolute", "prismatic"], 1)),
@@ -49,6 +50,16 @@ def floating(kind: str, tree: dyn.Mechanism, on: str = "world") -> dyn.Mechanism
     free = random_body("free", kind, on, np.random.default_rng(0), joint=joint)
     carried = [replace(body, parent="free") if on == body.parent == "world" else body for body in tree.bodies]
     return dyn.Mechanism([*carried, free], tree.gravity)
+
+
+def along_z(tree: dyn.Mechanism) -> dyn.Mechanism:
+    """The tree with all joints along z, one of them against it."""
+    signs = [-1.0 if i == 2 else 1.0 for i in range(len(tree.bodies))]
+    turned = [
+        replace(body, joint=replace(body.joint, axis=(0.0, 0.0, sign), orientation=np.eye(3)))
+        for body, sign in zip(tree.bodies, signs, strict=True)
+    ]
+    return dyn.Mechanism(turned, tree.gravity)
 
 
 def forest(tree: dyn.Mechanism) -> dyn.Mechanism:
