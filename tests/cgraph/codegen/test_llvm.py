@@ -4,6 +4,7 @@ import itertools
 import math
 import pickle
 import random
+import re
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
@@ -175,6 +176,28 @@ def test_the_bits_do_not_depend_on_how_code_is_divided_and_optimized(monkeypatch
     monkeypatch.setattr(llvm_engine.host(), "registers", 3)
     assert all(map(same, results()[0], whole))
     assert fma or same(whole[0], evaluated(graph, points[:, 0]))
+
+
+def test_constants_stand_in_a_table_and_divisors_in_instructions():
+    """An instruction with the address of its constant is twice as long; LLVM divides by 2 with a product."""
+    x = cg.variable("x")
+    graph = cg.Graph([x], {"y": cg.sqrt(x * 1.1 + 1.3) / 2.0, "z": (x + 1.3) * x})
+    source = scalar_ir(graph)
+    assert "[2 x double]" in source
+    assert source.count("load ptr, ptr @point.constants") == 1
+    assert "fdiv double" in source
+    assert [line.split()[-1] for line in source.splitlines() if "fdiv" in line] == ["0x4000000000000000"]
+
+
+def test_values_wait_in_memory_where_there_are_more_than_registers():
+    def places(registers):
+        return len(set(re.findall(r"ptr %w, i64 (\d+)", scalar_ir(graph, registers=registers))))
+
+    x = cg.variables([f"x{k}" for k in range(10)])
+    squares = [a * a for a in x]
+    total = sum(squares[1:], squares[0])
+    graph = cg.Graph(x, {f"y{k}": square / total for k, square in enumerate(squares)})
+    assert [places(registers) for registers in (40, 12, 11, 8, 5)] == [0, 0, 0, 3, 6]
 
 
 def test_a_product_goes_into_its_sum_in_every_lane_and_at_a_point():
