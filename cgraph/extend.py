@@ -23,10 +23,9 @@ label may have. `certain_digits` says what rounding leaves of the outputs.
 
 **At the edges**: `real_array`, `real_number`, `is_finite`, `check_name`, `require_graph`, `require_flag`,
 `require_whole`, `require_choice`, `require_sequence`, `require_mapping` and `require_path` check what a caller passed,
-`thread_count` reads `threads=`, `atomic_write` writes a file whole or not at all, `write_files` several, and
-`check_writable` looks beforehand; `install` ends an error about a missing package, `scipy_integrate` gives SciPy's
-module or raises it. `Array` is the type of an array of
-float64.
+`thread_count` reads `threads=`, `share` gives work to threads, `atomic_write` writes a file whole or not at all,
+`write_files` several, and `check_writable` looks beforehand; `install` ends an error about a missing package,
+`scipy_integrate` gives SciPy's module or raises it. `Array` is the type of an array of float64.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, building, cotangents
@@ -76,7 +75,7 @@ from .util.require import (
     require_texts,
     require_whole,
 )
-from .util.threads import thread_count
+from .util.threads import share, thread_count
 
 __all__ = [
     "ADJOINT",
@@ -135,6 +134,7 @@ __all__ = [
     "rewritten",
     "runner",
     "scipy_integrate",
+    "share",
     "shortened",
     "solve_nodes",
     "tangents",

@@ -15,6 +15,7 @@ from .equations.integrability import integrable_rows
 from .equations.inverse_dynamics_derivatives import inverse_dynamics_derivatives
 from .equations.inverse_mass_matrix import inverse_mass_matrix
 from .equations.linearization import linearize, state_space
+from .equations.linearize_many import linearize_many
 from .equations.reduced_linearization import ReducedLinearization, reduced_linearization
 from .equations.singular_mass_matrix import SingularMassMatrixError, raise_if_singular
 from .equations.state_equation import state_equation
@@ -141,6 +142,7 @@ __all__ = [
     "inverse_mass_matrix",
     "kinetic_energy",
     "linearize",
+    "linearize_many",
     "lint_constraints",
     "load_mjcf",
     "load_urdf",

@@ -17,6 +17,7 @@ from ..core.scope import building
 from ..simplify.builder import Builder
 
 Indices = np.ndarray[Any, np.dtype[np.int64]]
+Indices32 = np.ndarray[Any, np.dtype[np.int32]]
 
 
 class Pattern(NamedTuple):
@@ -28,6 +29,11 @@ class Pattern(NamedTuple):
     rows: Indices
     columns: Indices
     shape: tuple[int, int]
+
+    def compressed(self) -> tuple[Indices32, Indices32]:
+        """The columns of the entries, and where in them each row begins: SciPy's form of sparse rows."""
+        starts = np.searchsorted(self.rows, np.arange(self.shape[0] + 1))
+        return self.columns.astype(np.int32), starts.astype(np.int32)
 
     def by_row(self) -> list[list[int]]:
         """The columns of the entries in each row."""
@@ -83,14 +89,8 @@ def sparsity(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None)
     """
     require_graph("sparsity", graph)
     sparse = scipy_sparse("sparsity")
-    return csr(sparse, pattern(graph, graph.select_inputs(wrt)), None)
-
-
-def csr(sparse: Any, entries: Pattern, values: Any) -> Any:
-    """The entries as SciPy's sparse matrix; without values, True."""
-    starts = np.searchsorted(entries.rows, np.arange(entries.shape[0] + 1))
-    data = np.ones(len(entries.rows), dtype=bool) if values is None else values
-    return sparse.csr_array((data, entries.columns.copy(), starts), shape=entries.shape)
+    entries = pattern(graph, graph.select_inputs(wrt))
+    return sparse.csr_array((np.ones(len(entries.rows), dtype=bool), *entries.compressed()), shape=entries.shape)
 
 
 def pattern(graph: Graph, wrt: Sequence[Node]) -> Pattern:

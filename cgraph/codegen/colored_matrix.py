@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from ..autodiff.coloring import NONE, Coloring, star_coloring
-from ..autodiff.sparsity import Indices, Pattern
+from ..autodiff.sparsity import Indices, Indices32, Pattern
 from ..core.evaluate import Array
 from .sweep import Sweep, aligned
 
@@ -77,6 +78,11 @@ class ColoredMatrix:
     def __init__(self, entries: Pattern, parts: Sequence[Part], points: int) -> None:
         self.entries, self._parts, self._points = entries, parts, points
         self._free: dict[bool, list[_Buffers]] = {True: [], False: []}  # pop and append are atomic
+
+    @cached_property
+    def compressed(self) -> tuple[Indices32, Indices32]:
+        """The columns and the starts of rows, see `Pattern.compressed`."""
+        return self.entries.compressed()
 
     def values(self, x: Array, dense: bool) -> Array:
         """The entries, or with `dense` the whole matrix."""

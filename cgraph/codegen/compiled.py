@@ -86,7 +86,8 @@ class Compiled(Differentiable):
     def bind(self, x: Array, y: Array) -> Callable[[], None]:
         """A function of nothing that reads x, (n_in,), and writes y, (n_out,): the fastest call there is.
 
-        The arrays are checked here and never again; the function keeps them alive. One thread at a time may call it.
+        The arrays are checked here and never again; the function keeps them alive. One thread at a time may call it,
+        and Python's other threads wait meanwhile.
         Raises GraphError unless both are contiguous arrays of float64 in these shapes, y can be written and they
         share no memory.
         """

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from ..autodiff.direction_split import DirectionSplit
-from .llvm_ir import Arithmetic, body, point_arithmetic, preamble
+from .arithmetic import Arithmetic
+from .llvm_ir import body, point_arithmetic, preamble
 
 # What the one argument of `sweep` points to: addresses and counts, eight bytes each.
 FIELDS = ("x", "p", "s", "y", "groups", "take", "put", "values", "entries")
 
 
-def sweep_ir(split: DirectionSplit, lanes: int, flags: str = "", *, check: bool) -> str:
+def sweep_ir(split: DirectionSplit, lanes: int, flags: str, registers: int, *, check: bool) -> str:
     """A module with `int sweep(int64_t *fields)`, the derivative y of a point x along directions s.
 
     Directions come in groups of `lanes`: entry k of the group g is the vector s[g][k], and likewise for y. p is room
     for the values between the two parts, zeros behind them up to a whole vector; with `check` the result is 1 if one of
     them is infinite or NaN. Then values[put[e]] = y[take[e]] for e = 0 .. entries - 1, y read as one row of numbers.
     """
-    point, vector = point_arithmetic(flags), Arithmetic(flags, lanes)
+    point, vector = point_arithmetic(flags, registers), Arithmetic(flags, lanes, registers)
     primal = body(split.primal, point, _address, "primal", ["ptr %x", "ptr %y"])
     known = len(split.primal.outputs)
 
@@ -29,14 +30,14 @@ def sweep_ir(split: DirectionSplit, lanes: int, flags: str = "", *, check: bool)
     linear = body(split.linear, vector, address, "linear", ["ptr %p", "ptr %s", "ptr %y"], uniform=known)
     lines = [
         *preamble([split.primal], point),
-        *primal.functions,
+        *primal.definitions,
         "define internal void @primal(ptr noalias %x, ptr noalias %y) nounwind {",
         "start:",
         *primal.start,
         *primal.lines,
         "  ret void",
         "}",
-        *linear.functions,
+        *linear.definitions,
         "define internal void @linear(ptr noalias %p, ptr noalias %s, ptr noalias %y) nounwind {",
         "start:",
         *linear.start,

@@ -16,7 +16,7 @@ from ..autodiff.direction_split import DirectionSplit, direction_split
 from ..autodiff.forward import forward_products
 from ..autodiff.jacobian_entries import entry_graph, written_sizes
 from ..autodiff.reverse import reverse_products
-from ..autodiff.sparsity import Pattern, csr, pattern, symmetric
+from ..autodiff.sparsity import Pattern, pattern, symmetric
 from ..core.evaluate import Array
 from ..core.graph import Graph
 from ..core.node import variable
@@ -131,8 +131,9 @@ class Differentiable(ABC):
     def _matrix(self, matrix: ColoredMatrix, point: Array, sparse: bool) -> Any:
         if not require_flag("sparse", sparse):
             return matrix.values(point, dense=True)
-        module = scipy_sparse("a sparse derivative")
-        return csr(module, matrix.entries, matrix.values(point, dense=False))
+        module, (columns, starts) = scipy_sparse("a sparse derivative"), matrix.compressed
+        values = matrix.values(point, dense=False)
+        return module.csr_array((values, columns.copy(), starts.copy()), shape=matrix.entries.shape)
 
     def _jacobian(self) -> ColoredMatrix:
         return self._once("jacobian", self._make_jacobian)

@@ -12,7 +12,8 @@ from typing import Any
 from ..errors import install
 from .disk_cache import Cache
 
-LEVEL = 2  # of the code generator's optimisation; the text has no redundancy for passes over it to find
+LEVEL = 2  # of the code generator's optimization; the text has no redundancy for passes over it to find
+QUICK = 60_000  # nodes; beyond, level 0: a quarter of the time to compile, code that takes a third longer
 _lock = threading.Lock()  # llvmlite compiles in one context
 
 
@@ -40,7 +41,10 @@ class Code:
 
 
 class Host:
-    """The processor, as LLVM knows it.  lanes: the doubles in one of its vectors."""
+    """The processor, as LLVM knows it.
+
+    lanes: the doubles in one of its vectors.  registers: the values that its registers hold at once, some left over.
+    """
 
     def __init__(self, binding: Any, version: str) -> None:
         self._binding = binding
@@ -48,36 +52,41 @@ class Host:
         binding.initialize_native_asmprinter()
         features = binding.get_host_cpu_features()
         self.lanes = 8 if features.get("avx512f") else 4 if features.get("avx2") else 2
+        self.registers = 29 if features.get("avx512vl") or not features.get("sse2") else 13
         self._name, self._features = binding.get_host_cpu_name(), features.flatten()
         self._target = binding.Target.from_default_triple()
         llvm = (f"llvmlite {version}", f"LLVM {binding.llvm_version_info}")
         self._identity = "\n".join((*llvm, self._target.triple, self._name, self._features))
 
-    def compile(self, text: str, functions: Iterable[str], cache: Cache | None = None) -> Code:
-        """Machine code, made or found in the cache, of a module's text that calls these functions of the C library."""
+    def compile(self, text: str, functions: Iterable[str], nodes: int, cache: Cache | None = None) -> Code:
+        """Machine code, made or found in the cache, of a module's text that calls these functions of the C library.
+
+        nodes: of its graphs.
+        """
+        level = LEVEL if nodes <= QUICK else 0
         with _lock:
             self._find(functions)
             if cache is None:
-                return self._loaded(self._translated(text))
-            recipe = f"{self._identity}\nlevel {LEVEL}\n{text}"
-            return self._loaded(cache.fetch(recipe, lambda: self._translated(text)))
+                return self._loaded(self._translated(text, level))
+            recipe = f"{self._identity}\nlevel {level}\n{text}"
+            return self._loaded(cache.fetch(recipe, lambda: self._translated(text, level)))
 
-    def _translated(self, text: str) -> bytes:
+    def _translated(self, text: str, level: int) -> bytes:
         """An object file of the text. LLVM's own cache wants the text parsed even when it has the object."""
         module = self._binding.parse_assembly(text, self._binding.create_context())
-        return bytes(self._machine().emit_object(module))
+        return bytes(self._machine(level).emit_object(module))
 
     def _loaded(self, object_file: bytes) -> Code:
         """The object file in memory that can be run. LLVM believes what it reads: a damaged one ends the process."""
         binding = self._binding
         nothing = binding.parse_assembly("", binding.create_context())  # an engine begins with a module
-        engine = binding.create_mcjit_compiler(nothing, self._machine())
+        engine = binding.create_mcjit_compiler(nothing, self._machine(LEVEL))
         engine.add_object_file(binding.ObjectFileRef.from_data(object_file))
         engine.finalize_object()
         return Code(engine)
 
-    def _machine(self) -> Any:
-        return self._target.create_target_machine(cpu=self._name, features=self._features, opt=LEVEL, jit=True)
+    def _machine(self, level: int) -> Any:
+        return self._target.create_target_machine(cpu=self._name, features=self._features, opt=level, jit=True)
 
     def _find(self, functions: Iterable[str]) -> None:
         """See that LLVM finds the functions: it would end the process over a missing one."""

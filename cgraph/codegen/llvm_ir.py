@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from ..core.graph import Graph
-from ..core.node import CONSTANT, VARIABLE, Node
-from .parts import Parts
-from .schedule import Joined, joined_calls, needed, schedule
+from ..core.node import CONSTANT, OPS, Node
+from .arithmetic import REGISTERS, Arithmetic, words_of
+from .constants import Constants
+from .parts import Parts, Step
+from .schedule import Joined, Merged, joined_calls, products_of, schedule
 from .vector_math import helpers
 
 TOGETHER = 4  # arguments in a joined call at one point: a vector of them is one register or two on every processor
@@ -18,99 +19,28 @@ TOGETHER = 4  # arguments in a joined call at one point: a vector of them is one
 Address = Callable[[str, str, int], list[str]]
 
 
-class Arithmetic(NamedTuple):
-    """What the instructions of a function may do, and on how many numbers at once."""
-
-    flags: str = ""  # fast-math flags of add, sub, mul and div: none is strict IEEE
-    lanes: int = 1  # doubles in a vector
-    together: int = 1  # at most so many arguments go into one call of a vector function, where lanes is 1
-
-    @property
-    def polynomials(self) -> bool:
-        """Whether vectors have sines, exponentials, .. from polynomials; strict IEEE has libm's bits everywhere."""
-        return bool(self.flags)
-
-    @property
-    def type(self) -> str:
-        """The type of a value."""
-        return "double" if self.lanes == 1 else f"<{self.lanes} x double>"
-
-    def words(self) -> dict[str, str]:
-        """What the column `llvm` of the operation table names."""
-        return {
-            "t": self.type,
-            "b": "i1" if self.lanes == 1 else f"<{self.lanes} x i1>",
-            "s": "f64" if self.lanes == 1 else f"v{self.lanes}f64",
-            "f": f"{self.flags} " if self.flags else "",
-            "zero": self.number(0.0),
-            "one": self.number(1.0),
-            "minus": self.number(-1.0),
-        }
-
-    def number(self, value: float) -> str:
-        """The constant, to the last bit."""
-        bits = f"0x{struct.unpack('>Q', struct.pack('>d', value))[0]:016X}"
-        return bits if self.lanes == 1 else f"splat (double {bits})"
-
-
 def libm_functions(graph: Graph) -> dict[str, int]:
     """The functions of the C library that the graph calls, and how many arguments each takes."""
     calls = {node.op.library: node.op.arity for node in graph.nodes if node.args and node.op.calls_library}
     return dict(sorted(calls.items()))
 
 
-def point_arithmetic(flags: str) -> Arithmetic:
+def point_arithmetic(flags: str, registers: int = REGISTERS) -> Arithmetic:
     """One point at a time."""
-    return Arithmetic(flags, together=TOGETHER)
+    return Arithmetic(flags, registers=registers, together=TOGETHER)
 
 
-def scalar_ir(graph: Graph, flags: str = "") -> str:
+def scalar_ir(graph: Graph, flags: str = "", registers: int = REGISTERS) -> str:
     """A module with `void point(double *x, double *y)`: the outputs y at the inputs x."""
-    arithmetic = point_arithmetic(flags)
+    arithmetic = point_arithmetic(flags, registers)
     written = body(graph, arithmetic, _element, "point", ["ptr %x", "ptr %y"])
-    lines = [*preamble([graph], arithmetic), *written.functions]
+    lines = [*preamble([graph], arithmetic), *written.definitions]
     lines += ["define void @point(ptr noalias %x, ptr noalias %y) nounwind {", "start:"]
     return "\n".join([*lines, *written.start, *written.lines, "  ret void", "}", ""])
 
 
 def _element(base: str, name: str, row: int) -> list[str]:
     return [f"  {name} = getelementptr double, ptr %{base}, i64 {row}"]
-
-
-def batch_ir(graph: Graph, lanes: int, flags: str = "") -> str:
-    """A module with `void batch(double *x, double *y, int64_t n, int64_t x_stride, int64_t y_stride)`.
-
-    Row i of x begins at x + i * x_stride, and likewise for y; n columns, a positive multiple of `lanes`, are read.
-    """
-    arithmetic = Arithmetic(flags, lanes)
-    written = body(graph, arithmetic, _row, "batch", ["ptr %x", "ptr %y", "i64 %dx", "i64 %dy", "i64 %i"])
-    lines = [
-        *written.functions,
-        "define void @batch(ptr noalias %x, ptr noalias %y, i64 %n, i64 %dx, i64 %dy) nounwind {",
-        "start:",
-        *written.start,
-        "  br label %columns",
-        "columns:",
-        "  %i = phi i64 [ 0, %start ], [ %next, %last ]",
-        *written.lines,
-        "  br label %last",
-        "last:",
-        f"  %next = add i64 %i, {lanes}",
-        "  %more = icmp slt i64 %next, %n",
-        "  br i1 %more, label %columns, label %end",
-        "end:",
-        "  ret void",
-        "}",
-    ]
-    return "\n".join([*preamble([graph], arithmetic), *lines, ""])
-
-
-def _row(base: str, name: str, row: int) -> list[str]:
-    return [
-        f"  {name}.row = mul i64 %d{base}, {row}",
-        f"  {name}.at = add i64 {name}.row, %i",
-        f"  {name} = getelementptr double, ptr %{base}, i64 {name}.at",
-    ]
 
 
 def preamble(graphs: Iterable[Graph], arithmetic: Arithmetic) -> list[str]:
@@ -146,103 +76,134 @@ class Body(NamedTuple):
     """The instructions that compute a graph.
 
     start: what stands once at the start of the function.  lines: the rest, which may be in a loop.
-    functions: that they call, for a long graph.
+    definitions: of what they need in the module: the functions that they call, for a long graph, and constants.
     """
 
     start: list[str]
     lines: list[str]
-    functions: list[str]
+    definitions: list[str]
 
 
 def body(
     graph: Graph, arithmetic: Arithmetic, address: Address, name: str, scope: Sequence[str], *, uniform: int = 0
 ) -> Body:
-    """Every node in the order of `schedule`; an output is stored as soon as it is known.
+    """The instructions that compute a graph in the function of that name, in functions of their own if it is long.
 
-    name: of the function.  scope: what the addresses are made from, each with its type.
+    scope: what the addresses are made from, each with its type.  uniform: see `instructions`.
+    """
+    code = instructions(graph, arithmetic, address, name, uniform)
+    memory = [f"  %w = alloca [{code.places} x {arithmetic.type}], align 64"] if code.places else []
+    if len(code.parts) == 1:
+        return Body([*memory, *code.start], code.parts[0], code.definitions)
+    values = [*scope, "ptr %w"] if code.places else scope
+    parameters = ", ".join([each.replace("ptr ", "ptr noalias ") for each in values])
+    definitions, calls = list(code.definitions), []
+    for number, lines in enumerate(code.parts):
+        function = f"@{name}.part{number}"
+        calls.append(f"  call void {function}({', '.join(values)})")
+        definitions += [f"define internal void {function}({parameters}) nounwind noinline {{", "start:"]
+        definitions += [*code.start, *lines, "  ret void", "}"]
+    return Body(memory, calls, definitions)
+
+
+class Code(NamedTuple):
+    """The instructions that compute a graph, part by part.
+
+    start: what stands at the start of every function with a part.  places: how many values pass between parts, in %w.
+    definitions: of constants, for the module.
+    """
+
+    parts: list[list[str]]
+    start: list[str]
+    places: int
+    definitions: list[str]
+
+
+def instructions(graph: Graph, arithmetic: Arithmetic, address: Address, name: str, uniform: int = 0) -> Code:
+    """Every operation in the order of `schedule`; an output is stored as soon as it is known.
+
     uniform: so many inputs, the first, are single numbers in memory, the same for all lanes.
     """
-    words, t = arithmetic.words(), arithmetic.type
-    stored: dict[Node, list[int]] = {}
-    for row, node in enumerate(graph.outputs.values()):
-        stored.setdefault(node, []).append(row)
-    rows = {node: row for row, node in enumerate(graph.inputs)}
-    calls = _joined_calls(graph, arithmetic)
-    prefix = f"lanes{arithmetic.lanes}." if arithmetic.lanes > 1 else ""
-    steps = schedule(graph, calls)
-    parts = Parts(steps, calls, t, 8 * arithmetic.lanes)
-    if parts.starts:
-        steps = list(_results_behind_calls(steps, calls))
-        parts = Parts(steps, calls, t, 8 * arithmetic.lanes)
-    written: list[list[str]] = [[]]
-
-    for number, step in enumerate(steps):
-        r, lines = f"%v{number}", written[-1]
-        if number in parts.starts:
-            parts.begin()
-            written.append(lines := [])
-        args, loads = parts.read(needed(step, calls))
-        lines += loads
-        if isinstance(step, Joined):
-            lines += _call(step, r, args, arithmetic)
-        elif step.op is CONSTANT:
-            assert step.value is not None
-            r = arithmetic.number(step.value)
-        elif step.op is VARIABLE:
-            lines += address("x", f"%x{number}", rows[step])
-            lines += _loaded(r, f"%x{number}", arithmetic, uniform=rows[step] < uniform)
-        elif step in calls:
-            r, more = _result(step, calls[step], r, args[0], arithmetic)
-            lines += more
-        elif step.op.llvm:
-            call = f"@{prefix}{step.op.library}"
-            lines += [f"  {line.format(*args, r=r, call=call, **words)}" for line in step.op.llvm]
-        else:
-            lines.append(f"  {r} = call {t} @{prefix}{step.op.library}({', '.join(f'{t} {arg}' for arg in args)})")
-        lines += parts.write(number, step, r)
-        for row in stored.get(step, ()) if isinstance(step, Node) else ():
-            lines += address("y", f"%y{row}", row)
-            lines.append(f"  store {t} {r}, ptr %y{row}, align 8")
-    return _in_functions(written, name, scope, f"[{parts.places} x {t}]")
-
-
-def _loaded(r: str, place: str, arithmetic: Arithmetic, *, uniform: bool) -> list[str]:
-    """An input from memory: a value, or a number for all lanes."""
     t = arithmetic.type
-    if not uniform or arithmetic.lanes == 1:
-        return [f"  {r} = load {t}, ptr {place}, align 8"]
-    return [
-        f"  {r}.one = load double, ptr {place}, align 8",
-        f"  {r}.first = insertelement {t} poison, double {r}.one, i32 0",
-        f"  {r} = shufflevector {t} {r}.first, {t} poison, <{arithmetic.lanes} x i32> zeroinitializer",
-    ]
+    constants = Constants(graph, arithmetic, name)
+    rows = {node: row for row, node in enumerate(graph.inputs)}
+
+    def leaf(node: Node, r: str) -> tuple[str, list[str]]:
+        if node.op is CONSTANT:
+            return constants.read(node, r)
+        if rows[node] < uniform and arithmetic.lanes > 1:
+            one = f"  {r}.one = load double, ptr {r}.x, align 8"
+            return r, [*address("x", f"{r}.x", rows[node]), one, *arithmetic.splat(r, f"{r}.one")]
+        return r, [*address("x", f"{r}.x", rows[node]), f"  {r} = load {t}, ptr {r}.x, align 8"]
+
+    outputs: dict[Node, list[int]] = {}
+    for row, node in enumerate(graph.outputs.values()):
+        outputs.setdefault(node, []).append(row)
+
+    def store(step: Step, r: str) -> Iterator[str]:
+        for row in outputs.get(step, ()) if isinstance(step, Node) else ():
+            yield from [*address("y", f"%y{row}", row), f"  store {t} {r}, ptr %y{row}, align 8"]
+
+    merged = Merged(_joined_calls(graph, arithmetic), products_of(graph) if arithmetic.fuses else {})
+    steps = _results_behind_calls(schedule(graph, merged), merged.calls)
+    parts = Parts(steps, merged.calls, t, 8 * arithmetic.lanes, arithmetic.registers, leaf)
+    written: list[list[str]] = [[]]
+    for number, (step, reads) in enumerate(steps.items()):
+        if number in parts.starts:
+            written[-1] += parts.forget()
+            written.append([])
+        args, lines = parts.read(reads)
+        if isinstance(step, Joined) or (step not in merged.calls and step.op.calls_library):
+            lines += parts.forget()
+        r, more = _step(step, f"%v{number}", args, merged, arithmetic)
+        written[-1] += [*lines, *more, *parts.write(step, r), *store(step, r)]
+    for node in outputs:
+        if not node.args:
+            r, lines = leaf(node, f"%leaf{outputs[node][0]}")
+            written[-1] += [*lines, *store(node, r)]
+    return Code(written, constants.start(), parts.places, constants.definitions())
 
 
-def _in_functions(written: Sequence[list[str]], name: str, scope: Sequence[str], memory: str) -> Body:
-    """The parts as functions, and their calls; one part stays as it is."""
-    if len(written) == 1:
-        return Body([], written[0], [])
-    names = [f"@{name}.part{k}" for k in range(len(written))]
-    values = [*scope, "ptr %w"]
-    parameters = ", ".join([each.replace("ptr ", "ptr noalias ") for each in values])
-    functions: list[str] = []
-    for function, lines in zip(names, written, strict=True):
-        functions += [f"define internal void {function}({parameters}) nounwind noinline {{", "start:"]
-        functions += [*lines, "  ret void", "}"]
-    calls = [f"  call void {function}({', '.join(values)})" for function in names]
-    return Body([f"  %w = alloca {memory}, align 64"], calls, functions)
+def _step(step: Step, r: str, args: list[str], merged: Merged, arithmetic: Arithmetic) -> tuple[str, list[str]]:
+    """The name of a step's value, r or the value that it is part of, and the lines that compute it."""
+    if isinstance(step, Joined):
+        return r, _call(step, r, args, arithmetic)
+    if step in merged.calls:
+        return _result(step, merged.calls[step], r, args[0], arithmetic)
+    if step in merged.products:
+        return r, _product_and_sum(step, merged.products[step], r, args, arithmetic)
+    t, call = arithmetic.type, f"@{f'lanes{arithmetic.lanes}.' if arithmetic.lanes > 1 else ''}{step.op.library}"
+    if step.op.llvm:
+        words = words_of(arithmetic)
+        return r, [f"  {line.format(*args, r=r, call=call, **words)}" for line in step.op.llvm]
+    return r, [f"  {r} = call {t} {call}({', '.join(f'{t} {arg}' for arg in args)})"]
 
 
-def _results_behind_calls(steps: Sequence[Node | Joined], calls: Mapping[Node, Joined]) -> Iterator[Node | Joined]:
+def _product_and_sum(node: Node, product: Node, r: str, args: list[str], arithmetic: Arithmetic) -> list[str]:
+    """a * b + c, c + a * b, a * b - c or c - a * b, rounded once where the processor can."""
+    t, lines = arithmetic.type, []
+    first = node.args[0] is product
+    a, b, c = args if first else [*args[1:], args[0]]
+    if node.op is OPS["sub"]:
+        lines.append(f"  {r}.minus = fneg {t} {c if first else a}")
+        a, c = (a, f"{r}.minus") if first else (f"{r}.minus", c)
+    return [*lines, f"  {r} = call {t} @llvm.fmuladd.{arithmetic.suffix}({t} {a}, {t} {b}, {t} {c})"]
+
+
+def _results_behind_calls(
+    steps: Mapping[Step, tuple[Step, ...]], calls: Mapping[Node, Joined]
+) -> dict[Step, tuple[Step, ...]]:
     """The steps, the nodes that a joined call gives right behind it."""
     results: dict[Joined, list[Node]] = {}
     for node, call in calls.items():
         results.setdefault(call, []).append(node)
-    for step in steps:
+    order: dict[Step, tuple[Step, ...]] = {}
+    for step, reads in steps.items():
         if step not in calls:
-            yield step
+            order[step] = reads
         if isinstance(step, Joined):
-            yield from results[step]
+            order |= dict.fromkeys(results[step], (step,))
+    return order
 
 
 def _vector(arithmetic: Arithmetic) -> Arithmetic:

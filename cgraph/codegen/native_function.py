@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import threading
 from collections.abc import Callable
-from functools import partial
 from struct import Struct
 from typing import Any
 
@@ -15,14 +14,18 @@ from numpy.typing import ArrayLike
 from ..autodiff.direction_split import DirectionSplit
 from ..core.evaluate import Array
 from ..core.graph import Graph
+from ..util.garbage import without_collection
 from . import llvm_engine as llvm
+from .batch_ir import Batch, batch_ir
+from .bound_call import bound_call
 from .compiled import Compiled
 from .disk_cache import open_cache
-from .llvm_ir import batch_ir, libm_functions, scalar_ir
+from .llvm_ir import libm_functions, scalar_ir
 from .native_sweep import NativeSweep
 
 _POINT = ctypes.PYFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)  # too short a call to give the interpreter away for
-_BATCH = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
+_BATCH = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_int64] * 3, ctypes.c_void_p)
+ALIGNED = 8  # doubles: where the longest vector may begin
 WORK = 2**23  # nodes times columns in a block of a batch: some tenths of a millisecond, several times a thread's start
 _Buffers = tuple[Any, Array, memoryview, Callable[[], None]]  # memory of x; y, as an array and as memory; the call
 _FAST = "reassoc nsz arcp contract afn"  # all but the promise that there is no NaN and no infinity
@@ -44,11 +47,12 @@ class Native(Compiled):
         self._flags = flags_of(options["fast"], options["fma"])
         self._cache = open_cache(options["cache"])
         self._host = llvm.host()
-        self.source = scalar_ir(graph, self._flags)
+        with without_collection():
+            self.source = scalar_ir(graph, self._flags, self._host.registers)
         self._entry = self._compiled(self.source, "point", _POINT)
         self._free: list[_Buffers] = []  # pop and append are atomic: no lock, and a call inside a call is safe
         self._pack, self._unpack = Struct(f"{self.n_in}d").pack_into, Struct(f"{self.n_out}d").unpack_from
-        self._batch_entry: Callable[[int, int, int, int, int], None] | None = None
+        self._batch: _BatchCode | None = None
         self._batch_lock = threading.Lock()
 
     def __call__(self, x: ArrayLike) -> Array:
@@ -77,7 +81,11 @@ class Native(Compiled):
 
     def batch_source(self) -> str:
         """The text in LLVM's language of the function for batches."""
-        return batch_ir(self.graph, self._host.lanes, self._flags)
+        return self._batch_text().source
+
+    def _batch_text(self) -> Batch:
+        with without_collection():
+            return batch_ir(self.graph, self._host.lanes, self._flags, self._host.registers)
 
     def _take(self) -> _Buffers:
         """Where one call at a time puts its point and finds its result."""
@@ -88,38 +96,52 @@ class Native(Compiled):
             return x.data, y, y.data, self._bound(x, y)
 
     def _bound(self, x: Array, y: Array) -> Callable[[], None]:
-        return partial(self._entry, x.ctypes.data_as(ctypes.c_void_p), y.ctypes.data_as(ctypes.c_void_p))
+        return bound_call(self._entry, x, y)
 
     def _columns(self) -> tuple[int, Callable[[Array, Array], None]]:
-        with self._batch_lock:
-            if self._batch_entry is None:
-                self._batch_entry = self._compiled(self.batch_source(), "batch", _BATCH)
         lanes = self._host.lanes
-        return max(WORK // len(self.graph.nodes) // lanes, 1) * lanes, partial(_sweep, self._batch_entry, lanes)
+        with self._batch_lock:
+            if self._batch is None:
+                text = self._batch_text()
+                self._batch = _BatchCode(self._compiled(text.source, "batch", _BATCH), lanes, text.size)
+        return max(WORK // len(self.graph.nodes) // lanes, 1) * lanes, self._batch
 
     def _sweep(self, split: DirectionSplit, guarded: DirectionSplit | None) -> NativeSweep:
         return NativeSweep(split, self._host, self._flags, self._cache, guarded)
 
     def _compiled(self, text: str, name: str, prototype: Any) -> Any:
-        return self._host.compile(text, libm_functions(self.graph), self._cache).function(name, prototype)
+        functions, nodes = libm_functions(self.graph), len(self.graph.nodes)
+        return self._host.compile(text, functions, nodes, self._cache).function(name, prototype)
 
 
-def _sweep(entry: Callable[[int, int, int, int, int], None], lanes: int, points: Array, result: Array) -> None:
-    """Vectors of columns; the last few are filled up to a whole vector by repeating one."""
-    if points.strides[1] != points.itemsize or not points.flags.aligned:
-        points = np.array(points, order="C")
-    count = points.shape[1]
-    whole = count - count % lanes
-    if whole:
-        _run(entry, points, result, whole)
-    if whole < count:
-        filled = np.repeat(points[:, -1:], lanes, axis=1)
-        filled[:, : count - whole] = points[:, whole:]
-        values = np.empty((len(result), lanes))
-        _run(entry, filled, values, lanes)
-        result[:, whole:] = values[:, : count - whole]
+class _BatchCode:
+    """The function of batches; any number of threads may call it at once.  size: of the memory that a call needs."""
 
+    def __init__(self, entry: Any, lanes: int, size: int) -> None:
+        self._entry, self._lanes, self._size = entry, lanes, size
+        self._free: list[Array] = []  # memories
 
-def _run(entry: Callable[[int, int, int, int, int], None], points: Array, result: Array, count: int) -> None:
-    strides = points.strides[0] // points.itemsize, result.strides[0] // result.itemsize
-    entry(points.ctypes.data, result.ctypes.data, count, *strides)
+    def __call__(self, points: Array, result: Array) -> None:
+        """Vectors of columns; the last few are filled up to a whole vector by repeating one."""
+        if points.strides[1] != points.itemsize or not points.flags.aligned:
+            points = np.array(points, order="C")
+        count = points.shape[1]
+        whole = count - count % self._lanes
+        if whole:
+            self._run(points, result, whole)
+        if whole < count:
+            filled = np.repeat(points[:, -1:], self._lanes, axis=1)
+            filled[:, : count - whole] = points[:, whole:]
+            values = np.empty((len(result), self._lanes))
+            self._run(filled, values, self._lanes)
+            result[:, whole:] = values[:, : count - whole]
+
+    def _run(self, points: Array, result: Array, count: int) -> None:
+        try:
+            memory = self._free.pop()
+        except IndexError:
+            memory = np.empty(self._size + ALIGNED)
+        address = -(-memory.ctypes.data // (8 * ALIGNED)) * 8 * ALIGNED
+        strides = points.strides[0] // points.itemsize, result.strides[0] // result.itemsize
+        self._entry(points.ctypes.data, result.ctypes.data, count, *strides, address)
+        self._free.append(memory)

@@ -39,8 +39,9 @@ class NativeSweep(Sweep):
     ) -> None:
         super().__init__(split, host.lanes, guarded)
         self._how = (host, flags, cache)
-        self.source = sweep_ir(split, host.lanes, flags, check=guarded is not None)
-        code = host.compile(self.source, libm_functions(split.primal), cache)
+        self.source = sweep_ir(split, host.lanes, flags, host.registers, check=guarded is not None)
+        nodes = len(split.primal.nodes) + len(split.linear.nodes)
+        code = host.compile(self.source, libm_functions(split.primal), nodes, cache)
         result = None if guarded is None else ctypes.c_int
         # A call that is short is not worth giving the interpreter away for.
         self._short = code.function("sweep", ctypes.PYFUNCTYPE(result, ctypes.c_void_p))

@@ -1,89 +1,131 @@
-"""Parts: the steps of a long graph divided among functions, and the memory through which values pass between them.
+"""Parts: the steps of a long graph divided among functions, and the memory for what does not fit in registers.
 
 Some of LLVM's passes cost calls times calls in a function, others values times values that live at once: seconds at a
-few thousand steps, minutes at ten thousand. What passes between parts would wait in memory anyway.
+few thousand steps, minutes at ten thousand. So a function has some hundred steps, and at most as many values at once as
+the processor has registers: others wait in memory, those that are needed last (Belady 1966; the fewest loads).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from heapq import heappop, heappush
 
 from ..core.node import Node
-from .schedule import Joined, needed
+from .schedule import Joined
 
-STEPS = 1000  # in a function
+STEPS = 400  # in a function
 Step = Node | Joined
 
 
 class Parts:
-    """The names of values while the steps are written in order; in another part a value is read from memory.
+    """The names of values while the steps are written in order.
 
-    steps: what is computed.  calls: {node: the joined call that gives it}.  kind, size: of a value, in LLVM's language
-    and in bytes.
+    steps: what is computed, and what that reads.  calls: {node: the joined call that gives it}.  kind, size: of a
+    value, in LLVM's language and in bytes.  registers: how many values have names at once.  leaf: (a constant or an
+    input, name) -> its name and the lines that make it so.
 
     starts: the numbers of the steps with which a part begins, without the first.  places: how many values the memory
     %w has to hold; one that nothing needs any more leaves its place to others.
     """
 
-    def __init__(self, steps: Sequence[Step], calls: Mapping[Node, Joined], kind: str, size: int) -> None:
+    def __init__(
+        self,
+        steps: Mapping[Step, tuple[Step, ...]],
+        calls: Mapping[Node, Joined],
+        kind: str,
+        size: int,
+        registers: int,
+        leaf: Callable[[Node, str], tuple[str, list[str]]],
+    ) -> None:
         self.kind, self.size, self.places = kind, size, 0
-        self._calls = calls
-        self.starts, self._last = _divided(steps, calls)
-        self._names: dict[Step, str] = {}  # of what this part has
-        self._constants: dict[Step, str] = {}
+        self._leaf, self._registers = leaf, registers
+        self.starts = _starts(steps, calls)
+        self._uses: dict[Step, list[int]] = {}  # numbers of the steps that will need a value, the next one last
+        for number, reads in zip(range(len(steps) - 1, -1, -1), reversed(list(steps.values())), strict=True):
+            for arg in reads:
+                self._uses.setdefault(arg, []).append(number)
+        self._names: dict[Step, str] = {}
+        self._latest: list[tuple[int, int, Step]] = []  # heap by the next use, latest first; some outdated
         self._slots: dict[Step, int] = {}
         self._free: list[int] = []
-        self._count = 0  # of loads and stores
+        self._count = 0  # of names
 
-    def begin(self) -> None:
-        """Another part: nothing is in a register."""
-        self._names = dict(self._constants)
+    def forget(self) -> list[str]:
+        """Nothing is in a register any more: the lines that keep what is needed."""
+        lines = [line for step in self._names for line in self._keep(step)]
+        self._names, self._latest = {}, []
+        return lines
 
     def read(self, steps: Sequence[Step]) -> tuple[list[str], list[str]]:
-        """The names of values, and the lines that bring them from memory."""
+        """The names of values for the next step, and the lines that bring them from memory."""
         lines: list[str] = []
+        names = []
         for step in steps:
-            if step not in self._names:
-                lines += self._address(step)
-                self._names[step] = f"%w{self._count}"
-                lines.append(f"  %w{self._count} = load {self.kind}, ptr %w{self._count}.at, align {self.size}")
-        return [self._names[step] for step in steps], lines
+            name = self._names.get(step)
+            if name is None:
+                name, more = self._fetch(step)
+                self._names[step] = name
+                lines += more
+            names.append(name)
+            self._uses[step].pop()
+        for step in steps:
+            self._used(step)
+        return names, lines
 
-    def write(self, number: int, step: Step, name: str) -> list[str]:
-        """After step `number`: let its value have a name; the lines that keep it for other parts."""
-        for arg in dict.fromkeys(needed(step, self._calls)):
-            if self._last.get(arg) == number:
-                self._free.append(self._slots.pop(arg))
+    def write(self, step: Step, name: str) -> list[str]:
+        """A step's value has a name; the lines that make room for it."""
         self._names[step] = name
-        if isinstance(step, Node) and step.value is not None:
-            self._constants[step] = name
-        if step not in self._last:
+        self._used(step)
+        lines: list[str] = []
+        while len(self._names) > self._registers:
+            next_use, _, latest = heappop(self._latest)
+            if latest in self._names and self._uses[latest][-1] == -next_use:
+                lines += self._keep(latest)
+                del self._names[latest]
+        return lines
+
+    def _used(self, step: Step) -> None:
+        """Its next use is another one; after the last one it goes."""
+        if uses := self._uses.get(step):
+            self._count += 1
+            heappush(self._latest, (-uses[-1], self._count, step))
+            return
+        self._names.pop(step, None)
+        if step in self._slots:
+            self._free.append(self._slots.pop(step))
+
+    def _fetch(self, step: Step) -> tuple[str, list[str]]:
+        self._count += 1
+        name = f"%w{self._count}"
+        if isinstance(step, Node) and not step.args:
+            return self._leaf(step, name)
+        return name, [*self._address(step, name), f"  {name} = load {self.kind}, ptr {name}.at, align {self.size}"]
+
+    def _keep(self, step: Step) -> list[str]:
+        """The lines that put a value into memory, if it is to be there and is not."""
+        if step in self._slots or (isinstance(step, Node) and not step.args):
             return []
         if not self._free:
             self._free.append(self.places)
             self.places += 1
         self._slots[step] = self._free.pop()
-        return [*self._address(step), f"  store {self.kind} {name}, ptr %w{self._count}.at, align {self.size}"]
-
-    def _address(self, step: Step) -> list[str]:
         self._count += 1
-        return [f"  %w{self._count}.at = getelementptr {self.kind}, ptr %w, i64 {self._slots[step]}"]
+        name = f"%w{self._count}"
+        return [
+            *self._address(step, name),
+            f"  store {self.kind} {self._names[step]}, ptr {name}.at, align {self.size}",
+        ]
+
+    def _address(self, step: Step, name: str) -> list[str]:
+        return [f"  {name}.at = getelementptr {self.kind}, ptr %w, i64 {self._slots[step]}"]
 
 
-def _divided(steps: Sequence[Step], calls: Mapping[Node, Joined]) -> tuple[set[int], dict[Step, int]]:
-    """Where parts begin, and {value that another part needs: the number of the step that needs it last}."""
+def _starts(steps: Iterable[Step], calls: Mapping[Node, Joined]) -> set[int]:
+    """Where parts begin, without the first."""
     starts: set[int] = set()
-    part: dict[Step, int] = {}
-    last: dict[Step, int] = {}
-    passed: set[Step] = set()
     begin = 0
     for number, step in enumerate(steps):
         if number - begin >= STEPS and step not in calls:  # the results of a joined call stay in its part
             starts.add(number)
             begin = number
-        part[step] = len(starts)
-        for arg in needed(step, calls):
-            last[arg] = number
-            if part[arg] < len(starts) and (isinstance(arg, Joined) or arg.value is None):
-                passed.add(arg)
-    return starts, {step: last[step] for step in passed}
+    return starts

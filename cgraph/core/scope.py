@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
 
+from ..util.garbage import without_collection
 from .check_name import check_name
 from .label import WRITTEN, Label
 
@@ -96,11 +96,8 @@ def building(build: Build) -> Iterator[Callable[[Label], None]]:
     """
     scope = Scope(current.get().label, build)
     token = current.set(scope)
-    collecting = gc.isenabled()
-    gc.disable()
     try:
-        yield scope.set_label
+        with without_collection():
+            yield scope.set_label
     finally:
-        if collecting:
-            gc.enable()
         current.reset(token)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
-from ..codegen.llvm_ir import Address, Arithmetic, Body, body, libm_functions
+from ..codegen.arithmetic import Arithmetic
+from ..codegen.llvm_ir import Address, Body, body, libm_functions
 from ..core.graph import Graph
 from .lu_solve import factor_text, solve_text
 
@@ -68,7 +69,8 @@ class Functions:
 
         inputs: the shared ones first.
         """
-        arithmetic, known, first = Arithmetic(self.arithmetic.flags, self.width), _numbers(shared), len(shared)
+        arithmetic = self.arithmetic._replace(lanes=self.width, together=1)
+        known, first = _numbers(shared), len(shared)
         t, scalars = arithmetic.type, [k for k, length in enumerate(inputs) if k >= first and length != count]
 
         def address(base: str, name: str, row: int) -> list[str]:
@@ -134,7 +136,7 @@ class Functions:
     ) -> Body:
         """The body of the function that is being defined, those that it calls defined before."""
         written = body(graph, arithmetic, address, next(reversed(self._names.values())), scope, uniform=uniform)
-        self.definitions += written.functions
+        self.definitions += written.definitions
         return written
 
     def _define(

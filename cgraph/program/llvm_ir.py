@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from ..codegen.llvm_ir import Arithmetic, libm_functions, point_arithmetic, preamble
+from ..codegen.arithmetic import REGISTERS, Arithmetic
+from ..codegen.llvm_ir import libm_functions, point_arithmetic, preamble
 from .llvm_functions import Functions, Lengths
 from .program import Call, Factor, If, Map, Program, Solve, Statement, Sum, While
 
@@ -31,7 +32,7 @@ def offsets(program: Program, width: int) -> dict[str, int]:
     return places
 
 
-def program_ir(program: Program, flags: str = "", lanes: int = 1, width: int = 1) -> str:
+def program_ir(program: Program, flags: str = "", lanes: int = 1, width: int = 1, registers: int = REGISTERS) -> str:
     """A module with the function `run`.
 
     int64_t run(double *memory, double *records, int64_t passes, int64_t every, int64_t *done, double *feed)
@@ -41,7 +42,7 @@ def program_ir(program: Program, flags: str = "", lanes: int = 1, width: int = 1
     `feed` is read before every pass.
     width: of the vectors in which `Map` goes through its elements.
     """
-    arithmetic = point_arithmetic(flags) if lanes == 1 else Arithmetic(flags, lanes)
+    arithmetic = point_arithmetic(flags, registers) if lanes == 1 else Arithmetic(flags, lanes, registers)
     functions = Functions(arithmetic, width)
     run = _RunFunction(program, functions).lines()
     return "\n".join([*preamble(program.graphs(), arithmetic), *functions.definitions, *run, ""])

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..codegen import llvm_engine as llvm
 from ..core.evaluate import Array
+from .fuse import fused
 from .llvm_ir import program_functions, program_ir
 from .program import Program
 from .runner import Record, Runner
@@ -24,10 +25,15 @@ class NativeRunner(Runner):
         host = llvm.host()
         super().__init__(program, host.lanes)
         self._flags, self._host = flags, host
-        self.source = program_ir(program, flags, width=host.lanes)
-        self._code = self._host.compile(self.source, program_functions(program))
+        self._fused = fused(program)
+        self.source = program_ir(self._fused, flags, width=host.lanes, registers=host.registers)
+        self._code = self._compiled(self.source)
         self._entry = _RUN(self._code.address("run"))
         self._many: tuple[llvm.Code, Any] | None = None
+
+    def _compiled(self, text: str) -> llvm.Code:
+        nodes = sum([len(graph.nodes) for graph in self._fused.graphs()])
+        return self._host.compile(text, program_functions(self._fused), nodes)
 
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record:
         rows = np.empty((passes // every, self.program.width))
@@ -39,9 +45,7 @@ class NativeRunner(Runner):
     def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record:
         lanes = self._host.lanes
         if self._many is None:
-            code = self._host.compile(
-                program_ir(self.program, self._flags, lanes, self.width), program_functions(self.program)
-            )
+            code = self._compiled(program_ir(self._fused, self._flags, lanes, self.width, self._host.registers))
             self._many = code, _RUN(code.address("run"))
         entry, total = self._many[1], memories.shape[1]
         rows = np.empty((passes // every, self.program.width, total))

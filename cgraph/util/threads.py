@@ -45,6 +45,23 @@ def share(work: Callable[[int], None], items: Iterable[int], threads: int) -> No
     """Run `work(item)` for every item, in whichever thread is free; the caller's thread is one of them.
 
     After an exception, Ctrl-C among them, no thread begins another item; it is raised once all have stopped.
+
+    Parameters
+    ----------
+    work : callable
+        What is done with an item.
+    items : iterable of int
+        Such as where blocks of an array begin.
+    threads : int
+        How many work, at least 1.
+
+    Examples
+    --------
+    >>> from cgraph.extend import share
+    >>> squares = [0] * 4
+    >>> share(lambda i: squares.__setitem__(i, i * i), range(4), threads=2)
+    >>> squares
+    [0, 1, 4, 9]
     """
     waiting = deque(items)
 

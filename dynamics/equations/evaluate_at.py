@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,20 @@ def evaluate_at(
     t: float = 0.0,
     parameters: Mapping[str, float] | None = None,
 ) -> Array:
-    """The outputs, (n_out,) or (N, n_out), at a state {"q": .., "qd": .., "qdd": .., "tau": ..}, (n,) or (N, n) each.
+    """The outputs, (n_out,) or (N, n_out), at a state as `input_values` takes it."""
+    values, shape = input_values(system, graph.input_names, state, t, parameters)
+    outputs = graph.evaluate(values).values()
+    return np.stack([np.broadcast_to(np.asarray(each, dtype=np.float64), shape) for each in outputs], axis=-1)
+
+
+def input_values(
+    system: System,
+    names: Sequence[str],
+    state: Mapping[str, ArrayLike | None],
+    t: float = 0.0,
+    parameters: Mapping[str, float] | None = None,
+) -> tuple[dict[str, Any], tuple[int, ...]]:
+    """Values of those inputs at a state {"q": .., "qd": .., "qdd": .., "tau": ..}, (n,) or (N, n) each; and () or (N,).
 
     What of the state is None or missing is zero, coordinates neutral. Parameters have the system's values unless given.
     Raises ValueError for another shape, what is not finite, or a parameter that the system does not have.
@@ -42,8 +55,7 @@ def evaluate_at(
         rows = _rows(system, name, state.get(name))
         shape = np.broadcast_shapes(shape, rows.shape[:-1])
         values |= {f"{name}{i}": column if rows.ndim == 2 else float(column) for i, column in enumerate(rows.T)}
-    outputs = graph.evaluate({name: values[name] for name in graph.input_names}).values()
-    return np.stack([np.broadcast_to(np.asarray(each, dtype=np.float64), shape) for each in outputs], axis=-1)
+    return {name: values[name] for name in names}, shape
 
 
 def _rows(system: System, name: str, values: ArrayLike | None) -> Array:

@@ -73,10 +73,10 @@ def torque_derivatives(system: System, qdd: Sequence[Node], build: Builder) -> T
         for i, (brake, force) in enumerate(zip(braking, system.forces, strict=True)):
             torque[i] = torque[i] + brake - force
             by_qd[i][i] = by_qd[i][i] + system.damping[i]
-    for i, (slopes, rates) in enumerate(_slopes(system, folded(system.forces, build), build)):
+    for i, slopes in enumerate(state_slopes(system, folded(system.forces, build), build)):
         with building(build):
-            by_q[i] = [entry - slope for entry, slope in zip(by_q[i], slopes, strict=True)]
-            by_qd[i] = [entry - rate for entry, rate in zip(by_qd[i], rates, strict=True)]
+            row = [entry - slope for entry, slope in zip([*by_q[i], *by_qd[i]], slopes, strict=True)]
+        by_q[i], by_qd[i] = row[: system.n], row[system.n :]
     return stated
 
 
@@ -84,7 +84,7 @@ def _derived(system: System, qdd: Sequence[Node], build: Builder) -> TorqueDeriv
     """By differentiation of inverse dynamics, a reverse sweep from each torque; M from that of the energy."""
     at = dict(zip(system.qdd, qdd, strict=True))
     torque = folded(list(cg.simplify(torques(system)).outputs.values()), build)
-    slopes = [[*by_q, *by_qd] for by_q, by_qd in _slopes(system, torque, build)]
+    slopes = state_slopes(system, torque, build)
     n = system.n
     flat = folded(substitute([*torque, *_flat(slopes)], at), build)
     rows = _rows(flat[n:], 2 * n)
@@ -93,11 +93,10 @@ def _derived(system: System, qdd: Sequence[Node], build: Builder) -> TorqueDeriv
     return TorqueDerivatives(flat[:n], [row[:n] for row in rows], [row[n:] for row in rows], mass)
 
 
-def _slopes(system: System, forces: Sequence[Node], build: Builder) -> list[tuple[list[Node], list[Node]]]:
-    """For each force its slopes by displacements and by velocities, (n,) both."""
-    state, split = [*system.q, *system.qd], system.nq
-    bars = [cotangents({force: ONE}, state, build) for force in forces]
-    return [(system.kinematics.pulled_back(row[:split], build), row[split:]) for row in bars]
+def state_slopes(system: System, nodes: Sequence[Node], build: Builder) -> list[list[Node]]:
+    """Rows of d(nodes)/d(q, qd), 2n each; of quasi-velocities by displacements xi, dq = G xi."""
+    split, bars = system.nq, [cotangents({node: ONE}, [*system.q, *system.qd], build) for node in nodes]
+    return [[*system.kinematics.pulled_back(row[:split], build), *row[split:]] for row in bars]
 
 
 def _flat(rows: Rows) -> list[Node]:

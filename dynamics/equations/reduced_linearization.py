@@ -16,7 +16,8 @@ from ..systems.system import System
 from .constraint_rank import DEPENDENT, equilibrated, independent_rows
 from .evaluate_at import Array, evaluate_at
 from .initial_value import initial_value
-from .linearization import linearize, state_slopes
+from .inverse_dynamics_derivatives import state_slopes
+from .linearization import linearize
 
 
 class ReducedLinearization(NamedTuple):

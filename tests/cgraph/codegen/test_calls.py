@@ -1,13 +1,18 @@
 """Calls of a compiled function: arrays of every kind at one point, and arrays bound once."""
 
 import gc
+import pickle
+import sys
 import threading
+import weakref
 from array import array
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
 import cgraph as cg
+from cgraph.codegen import bound_call
 
 
 @pytest.fixture(params=["llvm", "numpy", "python"])
@@ -174,3 +179,59 @@ def test_a_graph_without_inputs_is_called_with_nothing(backend):
     y = np.zeros(1)
     function.bind(np.empty(0), y)()
     assert y[0] == function([])[0] == function(np.empty(0))[0] == function.values([])[0] == 1.5
+
+
+def test_a_bound_function_is_what_it_is_through_ctypes(monkeypatch):
+    """Which is how other Pythons than CPython call it."""
+    pytest.importorskip("llvmlite")
+    direct, converted = np.empty(3), np.empty(3)
+    function = cg.compile(graph(), "llvm")
+    function.bind(POINT, direct)()
+    monkeypatch.setattr(bound_call, "_enter", lambda: None)
+    function.bind(POINT, converted)()
+    assert np.array_equal(direct, converted)
+
+
+def test_a_bound_function_takes_nothing_gives_none_and_stays_in_its_process():
+    pytest.importorskip("llvmlite")
+    run = cg.compile(graph(), "llvm").bind(POINT.copy(), np.empty(3))
+    before = sys.getrefcount(None)
+    results = [run() for _ in range(5000)]
+    assert results == [None] * 5000
+    del results
+    assert abs(sys.getrefcount(None) - before) < 500  # a None too few or too many for each call is seen
+    with pytest.raises(TypeError):
+        run(POINT)
+    with pytest.raises(TypeError, match="pickle the compiled graph and bind it again"):
+        pickle.dumps(run)
+
+
+def test_a_bound_function_lets_its_arrays_go():
+    x, y = POINT.copy(), np.empty(3)
+    run = cg.compile(graph()).bind(x, y)
+    alive = weakref.ref(y)
+    del x, y
+    gc.collect()
+    assert alive() is not None
+    del run
+    gc.collect()
+    assert alive() is None
+
+
+def test_bound_functions_of_many_threads(backend):
+    function = cg.compile(graph(), backend)
+    points = np.random.default_rng(0).uniform(1.0, 2.0, (8, 3))
+    expected = [function(point) for point in points]
+
+    def calls(k):
+        x, y = points[k].copy(), np.empty(3)
+        run = function.bind(x, y)
+        for _ in range(500):
+            y[:] = np.nan
+            run()
+            if not np.array_equal(y, expected[k]):
+                return False
+        return True
+
+    with ThreadPoolExecutor(8) as pool:
+        assert all(pool.map(calls, range(8)))

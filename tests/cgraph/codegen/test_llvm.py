@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 
 import cgraph as cg
-from cgraph.codegen import parts
+from cgraph.codegen import batch_ir, llvm_engine, parts
 from cgraph.codegen.llvm_ir import scalar_ir
 from cgraph.core.node import OPS, apply
 from tests.strategies import cases, examples
@@ -147,20 +147,59 @@ def long_chain(count):
     return cg.Graph([x], {"first": early[0], "y": node, "x": x, "sum": sum(early, node)})
 
 
-def test_a_graph_of_several_parts(monkeypatch):
-    """The bits are those of one function, at a point, in batches and in loops."""
-    graph, points = long_chain(60), np.linspace(0.1, 0.9, 11)[None]
-    whole = {fma: cg.compile(graph, "llvm", fma=fma) for fma in (False, True)}
-    repeated = cg.loop(graph, {"x": "y"}, "llvm")([0.7], 3)
-    monkeypatch.setattr(parts, "STEPS", 7)
-    for fma, function in whole.items():
-        divided = cg.compile(graph, "llvm", fma=fma)
-        assert "part9" in divided.source
-        assert "part9" in divided.batch_source()
-        assert same(divided([0.7]), function([0.7]))
-        assert same(divided.batch(points), function.batch(points))
-    assert same(cg.compile(graph, "llvm", fma=False)([0.7]), evaluated(graph, [0.7]))
-    assert same(cg.loop(graph, {"x": "y"}, "llvm")([0.7], 3), repeated)
+@pytest.mark.parametrize("graph", [long_chain(20), chain()], ids=["long chain", "chain"])
+@pytest.mark.parametrize("fma", [False, True])
+def test_the_bits_do_not_depend_on_how_code_is_divided_and_optimized(monkeypatch, graph, fma):
+    """At a point, in batches of some tiles and a rest, and in loops."""
+    points = np.random.default_rng(0).uniform(0.1, 0.9, (len(graph.inputs), 8 * 5 + 3))
+    carried = {"x": "v" if "v" in graph.outputs else "y"}
+
+    def results():
+        function = cg.compile(graph, "llvm", fma=fma)
+        repeated = cg.loop(graph, carried, "llvm", fma=fma)(points[:, 0], 3)
+        return [function(points[:, 0]), function.batch(points), repeated], function
+
+    whole, function = results()
+    assert "@part1" not in function.batch_source()
+    assert "@point.part1" not in function.source
+    settings = {"steps": (parts, "STEPS", 7), "level": (llvm_engine, "QUICK", 3), "tiles": (batch_ir, "FEW", -1)}
+    settings["tiles of two"] = batch_ir, "VECTORS", 2
+    for name, (module, setting, value) in settings.items():
+        with monkeypatch.context() as patch:
+            patch.setattr(module, setting, value)
+            if name == "tiles of two":
+                patch.setattr(batch_ir, "FEW", -1)
+            other, function = results()
+            assert all(map(same, other, whole)), name
+            assert name != "steps" or ("@part1" in function.batch_source() and "@point.part1" in function.source)
+    monkeypatch.setattr(llvm_engine.host(), "registers", 3)
+    assert all(map(same, results()[0], whole))
+    assert fma or same(whole[0], evaluated(graph, points[:, 0]))
+
+
+def test_a_product_goes_into_its_sum_in_every_lane_and_at_a_point():
+    """Which one is said in the text: of two products, of a product that others need, too."""
+    a, b = cg.variables("a b")
+    product = a * b
+    graph = cg.Graph([a, b], {"two": a * a - b * b, "sum": b + 3.0 * a, "kept": product - 1.0, "product": product})
+    function = cg.compile(graph, "llvm")
+    points = np.random.default_rng(1).normal(size=(2, 43))
+    assert same(function.batch(points), np.array([function(point) for point in points.T]).T)
+
+
+def test_a_batch_in_which_rows_lie_apart_by_a_power_of_two():
+    x = cg.variables([f"x{k}" for k in range(70)])
+    graph = cg.Graph(x, {f"y{k}": x[k] * x[k - 1] + 1.0 for k in range(70)})
+    function = cg.compile(graph, "llvm")
+    points = np.random.default_rng(2).normal(size=(70, 512))
+    assert same(function.batch(points), np.array([function(point) for point in points.T]).T)
+
+
+def test_auto_says_when_a_graph_is_too_large_for_machine_code(monkeypatch):
+    monkeypatch.setattr(sys.modules["cgraph.codegen.compile"], "LARGE", 5)
+    with pytest.warns(RuntimeWarning, match=r"has more than 5; backend='llvm' makes machine code"):
+        function = cg.compile(chain())
+    assert function.source == cg.compile(chain(), "python").source
 
 
 @pytest.mark.parametrize("count", [1000, 4000])

@@ -10,8 +10,9 @@ from hypothesis import given, settings
 
 import cgraph as cg
 from cgraph.codegen import llvm_engine as llvm
-from cgraph.codegen.llvm_ir import TOGETHER, batch_ir, libm_functions
-from cgraph.codegen.schedule import Joined, joined_calls, schedule
+from cgraph.codegen.batch_ir import batch_ir
+from cgraph.codegen.llvm_ir import TOGETHER, libm_functions
+from cgraph.codegen.schedule import Joined, Merged, joined_calls, products_of, schedule
 from cgraph.core.node import OPS, apply
 from tests.strategies import cases, examples
 from tests.tolerances import SHORT_SUM
@@ -88,13 +89,16 @@ def compiled(graph, lanes, processor, flags="contract"):
         opt=llvm.LEVEL,
         jit=True,
     )
-    llvm.host().compile("", libm_functions(graph))  # finds the functions
-    module = binding.parse_assembly(batch_ir(graph, lanes, flags), binding.create_context())
+    llvm.host().compile("", libm_functions(graph), 0)  # finds the functions
+    source, size = batch_ir(graph, lanes, flags)
+    module = binding.parse_assembly(source, binding.create_context())
     if register:
         assert register not in machine.emit_assembly(module)
     engine = binding.create_mcjit_compiler(module, machine)
     engine.finalize_object()
-    entry = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 2, *[ctypes.c_int64] * 3)(engine.get_function_address("batch"))
+    kind = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 2, *[ctypes.c_int64] * 3, ctypes.c_void_p)
+    entry = kind(engine.get_function_address("batch"))
+    memory = np.empty(size + 8)
 
     def function(points):
         count = points.shape[1]
@@ -102,7 +106,8 @@ def compiled(graph, lanes, processor, flags="contract"):
         filled = np.ones((len(graph.inputs), columns))
         filled[:, :count] = points
         result = np.full((len(graph.outputs), columns), math.nan)
-        entry(filled.ctypes.data, result.ctypes.data, columns, columns, columns)
+        aligned = -(-memory.ctypes.data // 64) * 64
+        entry(filled.ctypes.data, result.ctypes.data, columns, columns, columns, aligned)
         return result[:, :count]
 
     function.engine = engine  # which owns the code
@@ -235,15 +240,18 @@ def test_one_at_a_time_only_sine_and_cosine_of_one_angle_are_joined():
 
 
 def assert_complete_and_in_order(graph, together):
-    calls = joined_calls(graph, together)
-    order = schedule(graph, calls)
+    merged = Merged(joined_calls(graph, together), products_of(graph))
+    order = schedule(graph, merged)
     place = {step: k for k, step in enumerate(order)}
     assert len(place) == len(order)
-    assert {step for step in order if not isinstance(step, Joined)} == set(graph.nodes)
-    assert {step for step in order if isinstance(step, Joined)} == set(calls.values())
-    for step in order:
-        needed = step.arguments if isinstance(step, Joined) else [calls[step]] if step in calls else step.args
-        assert all(place[each] < place[step] for each in needed)
+    operations = {node for node in graph.nodes if node.args}
+    inside = set(merged.products.values())
+    assert {step for step in order if not isinstance(step, Joined)} == operations - inside
+    assert {step for step in order if isinstance(step, Joined)} == set(merged.calls.values())
+    for step, reads in order.items():
+        assert all(place[each] < place[step] for each in reads if isinstance(each, Joined) or each.args)
+    for node, product in merged.products.items():
+        assert set(order[node]) == {*product.args, *[arg for arg in node.args if arg is not product]}
 
 
 @given(case=cases(max_operations=30))
@@ -264,12 +272,12 @@ def test_a_call_waits_for_the_calls_that_its_arguments_need():
     assert cg.compile(graph, "llvm")([0.3, 1.2, 0.7]) == pytest.approx(list(expected.values()), rel=SHORT_SUM)
 
 
-def test_the_argument_that_needs_more_registers_is_computed_first():
+def test_the_deeper_argument_is_computed_first():
     a, b, c, d, e = cg.variables("a b c d e")
-    wide = (a * b) / (c * d)
-    for graph in (cg.Graph([a, b, c, d, e], {"y": -e + wide}), cg.Graph([a, b, c, d, e], {"y": wide + -e})):
-        order = schedule(graph, {})
-        assert order.index(wide) < order.index(e)
+    wide, narrow = (a * b) / (c * d), -e
+    for y in (narrow + wide, wide + narrow):
+        order = schedule(cg.Graph([a, b, c, d, e], {"y": y}), Merged({}, {}))
+        assert list(order).index(wide) < list(order).index(narrow)
 
 
 def test_a_schedule_of_a_deep_graph_needs_no_recursion_and_no_square_of_its_size():
@@ -277,4 +285,4 @@ def test_a_schedule_of_a_deep_graph_needs_no_recursion_and_no_square_of_its_size
     for _ in range(30_000):
         node = cg.sin(node) * cg.cos(node)
     graph = cg.Graph([x], {"y": node})
-    assert len(schedule(graph, joined_calls(graph, TOGETHER))) == len(graph.nodes) + 30_000
+    assert len(schedule(graph, Merged(joined_calls(graph, TOGETHER), {}))) == len(graph.nodes) - 1 + 30_000

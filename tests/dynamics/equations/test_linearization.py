@@ -7,10 +7,12 @@ import pytest
 from pytest import approx
 
 import dynamics as dyn
+from dynamics.equations import linearize_many as many
 from dynamics.equations.evaluate_at import evaluate_at
 from dynamics.equations.linearization import linearize, state_space
+from dynamics.equations.linearization_parts import linearization_parts
 from dynamics.systems.model import as_system
-from tests.dynamics.mechanisms import FAMILIES, turned_arm
+from tests.dynamics.mechanisms import FAMILIES, random_mechanism, turned_arm
 from tests.dynamics.models import MODELS, Array, at, random_arm, states
 
 STEP = 1e-3  # of the differences, in units of the state
@@ -98,6 +100,45 @@ def test_the_graph_takes_many_states_and_is_smaller_than_that_of_forward_dynamic
     rows = evaluate_at(arm.system, graph, given)
     one = np.concatenate([each.ravel() for each in linearize(arm, *(given[name][1] for name in ("q", "qd", "tau")))])
     assert rows[1] == approx(one, rel=ONE_BY_ONE, abs=ONE_BY_ONE)
+
+
+FEW = {
+    "planar": lambda: random_arm(2),
+    "arm": lambda: turned_arm(3),
+    "ball": lambda: random_mechanism(2, ["ball", "revolute"], 1),
+    "driven": MODELS["driven pendulum"],
+}
+
+
+@pytest.mark.parametrize("columns", [False, True])
+@pytest.mark.parametrize("name", FEW)
+def test_many_states_are_linearized_as_one(name: str, columns: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Written out, and column by column."""
+    monkeypatch.setattr(many, "WRITTEN_OUT", 0 if columns else many.WRITTEN_OUT)
+    model, rng, count = FEW[name](), np.random.default_rng(0), 2 * many.BLOCK + 3
+    system = as_system(model)
+    q = np.array(system.kinematics.neutral) + rng.uniform(-1.0, 1.0, (count, system.nq))
+    qd, tau = rng.normal(size=(count, system.n)), rng.normal(size=system.n)
+    a, b = dyn.linearize_many(model, q, qd, tau, t=0.3)
+    again = dyn.linearize_many(model, q, qd, tau, t=0.3, threads=2)
+    assert all(map(np.array_equal, (a, b), again))
+    for k in (0, many.BLOCK, count - 1):
+        for found, expected in zip((a[k], b[k]), linearize(model, q[k], qd[k], tau, t=0.3), strict=True):
+            assert np.abs(found - expected).max() < 1e-13 * np.abs(expected).max()
+
+
+def test_of_no_states_there_are_no_matrices_and_one_state_is_refused() -> None:
+    a, b = dyn.linearize_many(random_arm(2), np.zeros((0, 2)), np.zeros((0, 2)))
+    assert a.shape == (0, 4, 4)
+    assert b.shape == (0, 4, 2)
+    with pytest.raises(ValueError, match="rows of states"):
+        dyn.linearize_many(random_arm(2), np.zeros(2), np.zeros(2))
+
+
+def test_a_column_is_a_graph_that_no_number_of_columns_makes_longer() -> None:
+    short, long = (linearization_parts(random_arm(n).system).in_columns() for n in (10, 20))
+    assert len(long.column.nodes) < 2.5 * len(short.column.nodes)
+    assert long.factors < 2.5 * short.factors
 
 
 def test_one_state_at_a_time() -> None:

@@ -33,13 +33,14 @@ GRAPHS: dict[str, Callable[[Any], Graph]] = {
     "energy": dyn.energy,
     "coriolis": dyn.coriolis,
     "regressor": dyn.regressor,
+    "derivatives": dyn.inverse_dynamics_derivatives,
     "state space": dyn.state_space,
     "motion": lambda model: model.motion(model.bodies[-1].name, (0.1, 0.2, 0.3)),
     "position": lambda model: model.position(model.bodies[-1].name),
 }
 
 
-HEAVY = ("inverse dynamics, literal", "state space", "coriolis", "regressor")
+HEAVY = ("inverse dynamics, literal", "derivatives", "state space", "coriolis", "regressor")
 
 
 def slow_cases() -> list[Any]:

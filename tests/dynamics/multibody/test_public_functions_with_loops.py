@@ -55,6 +55,7 @@ HELD: dict[str, Callable[[], tuple[Array, Array]]] = {
         at_rest(dyn.forward_dynamics(dyn.with_controller(MODEL, lambda q, qd, t: [1.0 - q[0], 0.0, 0.0]))),
     ),
     "state_space": lambda: (Q, dyn.arrays_at(MODEL, dyn.state_space(MODEL), Q, QD, **TAU)["B"][3:]),
+    "linearize_many": lambda: (Q, dyn.linearize_many(MODEL, [Q], [QD])[1][0, 3:]),
     "linearize": lambda: (Q, dyn.linearize(MODEL, Q, QD)[1][3:]),
     "reduced_linearization": lambda: (Q, dyn.reduced_linearization(MODEL, Q, QD).displacements[:3]),
     "consistent_state": lambda: dyn.consistent_state(MODEL, Q + 1e-3, QD + 0.1),
@@ -66,7 +67,7 @@ HELD: dict[str, Callable[[], tuple[Array, Array]]] = {
 ELSEWHERE = {
     *("certify", "integrable_rows", "lint_constraints", "raise_if_singular", "release"),  # tests of what they say
     *("to_mjcf", "to_urdf"),  # tests of files
-    "arrays_at",  # numbers of any graph
+    *("arrays_at", "display_names"),  # numbers and names of any graph
 }
 
 
@@ -111,4 +112,4 @@ def test_the_path_from_a_loop_force_to_a_joint_is_told() -> None:
     told = str(cg.why(dyn.forward_dynamics(MODEL), "lambda0", "qd0"))
     assert "lambda0" in told
     assert "qd0" in told
-    assert MODEL.system.display_names["lambda0"] == "lambda.coupler to rocker x"
+    assert dyn.display_names(MODEL)["lambda0"] == "lambda.coupler to rocker x"

@@ -1,0 +1,87 @@
+"""Calls of machine code on fixed arrays, as functions of C's kind: Python enters them without converting anything.
+
+A call through ctypes converts every argument every time, which takes longer than the equations of a small robot.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import struct
+import sys
+from collections.abc import Callable
+from functools import cache, partial
+from typing import Any
+
+from ..core.evaluate import Array
+from . import llvm_engine as llvm
+
+_NO_ARGUMENTS = 4  # METH_NOARGS of CPython's methodobject.h
+
+# What CPython calls: `self` are bytes with the addresses of the function, its arguments, None and Py_IncRef
+_ENTER = """\
+define ptr @enter(ptr %self, ptr %none) nounwind {{
+  %bytes = call ptr inttoptr (i64 {PyBytes_AsString} to ptr)(ptr %self)
+  %x.at = getelementptr ptr, ptr %bytes, i64 1
+  %y.at = getelementptr ptr, ptr %bytes, i64 2
+  %result.at = getelementptr ptr, ptr %bytes, i64 3
+  %function = load ptr, ptr %bytes
+  %x = load ptr, ptr %x.at
+  %y = load ptr, ptr %y.at
+  %result = load ptr, ptr %result.at
+  call void %function(ptr %x, ptr %y)
+  call void inttoptr (i64 {Py_IncRef} to ptr)(ptr %result)
+  ret ptr %result
+}}
+"""
+
+
+class _Method(ctypes.Structure):
+    """PyMethodDef of CPython's methodobject.h."""
+
+    _fields_ = (
+        ("name", ctypes.c_char_p),
+        ("function", ctypes.c_void_p),
+        ("flags", ctypes.c_int),
+        ("text", ctypes.c_char_p),
+    )
+
+
+class _Addresses(bytes):
+    """What a call needs, `self` of its function: as addresses, and as objects that stay alive with it."""
+
+    kept: tuple[Any, ...]
+
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        raise TypeError("a bound call holds addresses of this process: pickle the compiled graph and bind it again")
+
+
+def bound_call(entry: Any, x: Array, y: Array) -> Callable[[], None]:
+    """A function of nothing that calls `entry`, a function of ctypes, with the addresses of two arrays."""
+    if (made := _enter()) is None:
+        return partial(entry, x.ctypes.data_as(ctypes.c_void_p), y.ctypes.data_as(ctypes.c_void_p))
+    new_function, method = made
+    self = _Addresses(struct.pack("4P", _address(entry), x.ctypes.data, y.ctypes.data, id(None)))
+    self.kept = entry, x, y, method
+    function: Callable[[], None] = new_function(ctypes.addressof(method), self, None)
+    return function
+
+
+@cache
+def _enter() -> tuple[Any, _Method] | None:
+    """CPython's PyCFunction_NewEx, and the method that `_ENTER` is; None for another Python."""
+    if sys.implementation.name != "cpython":
+        return None
+    try:
+        names = ("PyBytes_AsString", "Py_IncRef", "PyCFunction_NewEx")
+        addresses = {name: _address(getattr(ctypes.pythonapi, name)) for name in names}
+    except AttributeError:  # a build that does not export them
+        return None
+    code = llvm.host().compile(_ENTER.format(**addresses), (), 0)
+    method = _Method(b"bound", code.address("enter"), _NO_ARGUMENTS, None)
+    method.code = code
+    kind = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p)
+    return kind(addresses["PyCFunction_NewEx"]), method
+
+
+def _address(function: Any) -> int:
+    return ctypes.cast(function, ctypes.c_void_p).value or 0

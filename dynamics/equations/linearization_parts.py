@@ -1,0 +1,97 @@
+"""The parts of a linearization: what the state alone decides, and what every column takes once more.
+
+From tau(q, qd, qdd) = const:  M dqdd = dtau - (d tau / dx) dx, one column for each of the 2n numbers of x and the n of
+tau. M is factored once; a column is then a graph of its own, small, and alike for all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph.extend import Array, Builder, building, folded
+
+from ..systems.system import System
+from .equations_of_motion import accelerations
+from .formulations import ONE, ZERO
+from .held_linearization import held_sides
+from .inverse_dynamics_derivatives import torque_derivatives
+from .mass_matrix_solve import MassSolve, inverse, mass_solve
+
+
+class ColumnGraphs(NamedTuple):
+    """A linearization as two graphs.
+
+    shared: the state to p0.., what columns read, then b_i_0, .., b_i_{k-1} for each row i, the right-hand sides of k =
+    3n columns, then rows of C(qd), xi_dot = dqd + C xi.  column: p0.. and a right-hand side b0.. to x0.., (n,).
+    """
+
+    shared: Graph
+    column: Graph
+    factors: int
+
+
+class LinearizationParts(NamedTuple):
+    """sides: right-hand sides, of displacements, then of velocities.  brackets: rows of C(qd), xi_dot = dqd + C xi."""
+
+    inputs: Sequence[Node]
+    sides: list[list[Node]]
+    solve: MassSolve
+    brackets: list[list[Node]]
+    build: Builder
+
+    @property
+    def size(self) -> int:
+        """How many nodes `written_out` has, about."""
+        return self.solve.size(self.sides)
+
+    def written_out(self) -> Graph:
+        """All entries of A and B."""
+        n = len(self.brackets)
+        columns, by_tau = self.solve.solutions(self.sides, self.build), inverse(self.solve, self.build)
+        rows = [[*row, *_unit(i, n), *[ZERO] * n] for i, row in enumerate(self.brackets)]
+        rows += [[*[column[i] for column in columns], *by_tau[i]] for i in range(n)]
+        outputs = {f"A_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[: 2 * n])}
+        outputs |= {f"B_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[2 * n :])}
+        return cg.simplify(Graph(self.inputs, outputs))
+
+    def in_columns(self) -> ColumnGraphs:
+        """The same with the columns left to a graph of one."""
+        n = len(self.brackets)
+        factors, column = self.solve.split()
+        outputs = {f"p{k}": node for k, node in enumerate(factors)}
+        for i in range(len(self.solve.b)):
+            row = [*[side[i] for side in self.sides], *_unit(i, n)]
+            outputs |= {f"b_{i}_{j}": entry for j, entry in enumerate(row)}
+        outputs |= {f"C_{i}_{j}": entry for i, row in enumerate(self.brackets) for j, entry in enumerate(row)}
+        return ColumnGraphs(cg.simplify(Graph(self.inputs, outputs)), cg.simplify(column), len(factors))
+
+
+def linearization_parts(system: System) -> LinearizationParts:
+    """Raises SingularMassMatrixError for a coordinate without inertia."""
+    n, build = system.n, Builder()
+    qdd = accelerations(system)
+    brackets = system.kinematics.brackets(build)
+    if len(system.constraints):
+        return LinearizationParts(qdd.inputs, *held_sides(system, qdd, build), brackets, build)
+    slopes = torque_derivatives(system, folded(list(qdd.outputs.values()), build), build)
+    with building(build):
+        sides = [[-row[j] for row in rows] for rows in (slopes.by_q, slopes.by_qd) for j in range(n)]
+    return LinearizationParts(qdd.inputs, sides, mass_solve(system, build, sides), brackets, build)
+
+
+def assembled(brackets: Array, solutions: Array, n: int) -> tuple[Array, Array]:
+    """A, (.., 2n, 2n), and B, (.., 2n, n), of C(qd), (.., n n), and the solutions of all columns, (.., n 3n)."""
+    solved = solutions.reshape(*solutions.shape[:-1], n, 3 * n)
+    top = np.zeros_like(solved)
+    top[..., :n], top[..., n : 2 * n] = brackets.reshape(*brackets.shape[:-1], n, n), np.eye(n)
+    rows = np.concatenate([top, solved], axis=-2)
+    return rows[..., : 2 * n], rows[..., 2 * n :]
+
+
+def _unit(i: int, n: int) -> list[Node]:
+    return [ONE if i == j else ZERO for j in range(n)]
