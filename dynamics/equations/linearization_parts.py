@@ -93,7 +93,9 @@ def _parts(system: System, method: str) -> LinearizationParts:
 
 def assembled(brackets: Array, solutions: Array, n: int) -> tuple[Array, Array]:
     """A, (.., 2n, 2n), and B, (.., 2n, n), of C(qd), (.., n n), and the solutions of all columns, (.., n 3n)."""
-    solved = solutions.reshape(*solutions.shape[:-1], n, 3 * n)
+    solved = solutions.reshape(*solutions.shape[:-1], n, 3 * n).copy()
+    by_tau = solved[..., 2 * n :]  # symmetric, to the last bit by the half that is written out, too
+    by_tau[...] = np.triu(by_tau) + np.swapaxes(np.triu(by_tau, 1), -1, -2)
     top = np.zeros_like(solved)
     top[..., :n], top[..., n : 2 * n] = brackets.reshape(*brackets.shape[:-1], n, n), np.eye(n)
     rows = np.concatenate([top, solved], axis=-2)
