@@ -178,7 +178,8 @@ class Differentiable(ABC):
 
     def _guarded_sweep(self, derive: Callable[..., Graph], directions: int) -> Sweep:
         """The sweep in which zeros win over infinite slopes; where that takes long, only where there are such."""
-        plain, guarded = [direction_split(derive(zero_wins=wins), directions) for wins in (False, True)]
+        plain = direction_split(derive(zero_wins=False), directions, divide=False)
+        guarded = direction_split(derive(zero_wins=True), directions)
         saved = len(guarded.linear.nodes) - len(plain.linear.nodes)
         return self._sweep(plain, guarded) if saved > CHECK else self._sweep(guarded, None)
 

@@ -211,6 +211,32 @@ def test_zeros_in_a_direction_win_over_infinite_slopes(backend, check, monkeypat
         assert function.hessian([0.0, 2.0], [1.0, 0.0]).tolist() == [[-inf, 4.0], [4.0, 0.0]]
 
 
+SELECTED = cg.asin(abs(x))
+
+
+@pytest.mark.parametrize(
+    "f",
+    [
+        cg.where(SELECTED, SELECTED, abs(y)),
+        cg.where(SELECTED, SELECTED, abs(y)) / 2.0 + y / x,
+        math.inf * cg.maximum(x, 0.0) + y,
+        cg.cbrt(y) / 3.0 + x * y,
+        cg.sqrt(y) / cg.sqrt(x) + x,
+        cg.hypot(x, y) * 5e-324 / y,
+    ],
+)
+def test_a_look_at_slopes_sees_every_infinite_one(f, monkeypatch):
+    graph, points = cg.Graph([x, y], {"f": f, "g": x * y}), [[1.0, 0.0], [0.0, 1.0], [1.0, 5e-324], [0.5, 0.5]]
+    found = []
+    for check in (-100, math.inf):
+        monkeypatch.setattr(differentiable, "CHECK", check)
+        function = compiled(graph, "python", LANES)
+        found.append([[function.jacobian(p), function.jvp(p, np.eye(2)), function.vjp(p, np.eye(2))] for p in points])
+        found[-1] += [[function.hessian(p, weights) for weights in np.eye(2)] for p in points]
+    for plain, guarded in zip(*found, strict=True):
+        np.testing.assert_allclose(plain, guarded, rtol=LAST_BITS)
+
+
 def test_names_are_no_matter():
     long = cg.variable("u" * 1000)
     taken = cg.Graph([long, cg.variable("f_bar")], {"f": long * cg.variable("f_bar"), "a line": long, "d0/d0": 1.0})
