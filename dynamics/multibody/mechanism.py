@@ -173,8 +173,9 @@ class Mechanism(Structure):
     def _merged(self) -> tuple[tuple[Body, ...], dict[str, Carrier]]:
         moving, carriers = merge_fixed_bodies(self.parts)
         numbers = [bound_body(part, self.parameters) for part in self.parts]
-        shown = [part for body in numbers for part in self.shared.parts(body)]
-        require_inertia(moving if numbers == list(self.parts) else merge_fixed_bodies(shown)[0])
+        if numbers != list(self.parts):
+            numbers = [part for body in numbers for part in self.shared.parts(body)]
+        require_inertia(moving if numbers == list(self.parts) else merge_fixed_bodies(numbers)[0])
         return tuple(moving), carriers
 
     @cached_property

@@ -44,6 +44,8 @@ def snapped(columns: Array) -> Array:
 
     So a component near 1 stays where the others say that it is the cosine of a small angle.
     """
+    if (columns == np.rint(columns)).all():
+        return columns + 0.0
     result = np.where(np.abs(columns) <= SNAP, 0.0, columns)
     along = np.abs(result) > 0.9  # one component of a column at most
     across = np.sum(np.where(along, 0.0, result) ** 2, axis=0)
