@@ -72,10 +72,11 @@ class _Registers:
             self._write(name, [results.pop(0) for _ in range(self._lengths[name])])
 
     def map(self, statement: Map, count: int) -> None:
-        """outputs[i] = graph(inputs[i])."""
+        """outputs[i] = graph(shared, inputs[i])."""
+        shared = [value for name in statement.shared for value in self._values(name)]
         columns = [self._values(name) for name in statement.inputs]
         rows = [
-            _apply(statement.graph, [column[i if len(column) == count else 0] for column in columns])
+            _apply(statement.graph, [*shared, *[column[i if len(column) == count else 0] for column in columns]])
             for i in range(count)
         ]
         for name, values in zip(statement.outputs, zip(*rows, strict=True), strict=True):

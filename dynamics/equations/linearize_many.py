@@ -132,9 +132,8 @@ def _function(system: System) -> _Function:
 
 def linearization_program(graphs: ColumnGraphs, n: int) -> Program:
     """One pass linearizes at the register "state", and records C(qd), then row by row the n solutions of 3n columns."""
-    names, x = graphs.column.input_names, [f"x{i}" for i in range(n)]
-    p, b = names[: graphs.factors], names[graphs.factors :]
-    registers = {"state": len(graphs.shared.inputs), **dict.fromkeys(p, 1), **dict.fromkeys([*b, *x], 3 * n)}
-    first = Call(graphs.shared, ("state",), (*p, *b, "brackets"))
-    columns = Map(graphs.column, (*p, *b), tuple(x))
+    b, x = graphs.column.input_names[graphs.factors :], [f"x{i}" for i in range(n)]
+    registers = {"state": len(graphs.shared.inputs), "factors": graphs.factors, **dict.fromkeys([*b, *x], 3 * n)}
+    first = Call(graphs.shared, ("state",), ("factors", *b, "brackets"))
+    columns = Map(graphs.column, tuple(b), tuple(x), shared=("factors",))
     return Program(registers | {"brackets": n * n}, [first, columns], record=["brackets", *x])

@@ -20,8 +20,8 @@ def oscillators(weights=(0.5, 0.5, 1.0)):
     x, h, *k = cg.variables("x h k0 k1 k2 k3")
     body = [Call(rate, ("x",), ("k0",))]
     for stage, weight in enumerate(weights):
-        move = cg.Graph([x, h, k[stage]], {"at": x + weight * h * k[stage]})
-        body += [Map(move, ("x", "h", f"k{stage}"), ("at",)), Call(rate, ("at",), (f"k{stage + 1}",))]
+        move = cg.Graph([h, x, k[stage]], {"at": x + weight * h * k[stage]})
+        body += [Map(move, ("x", f"k{stage}"), ("at",), shared=("h",)), Call(rate, ("at",), (f"k{stage + 1}",))]
     total = x + h / 6.0 * (k[0] + 2.0 * k[1] + 2.0 * k[2] + k[3])
     body += [Map(cg.Graph([x, h, *k], {"x": total}), ("x", "h", "k0", "k1", "k2", "k3"), ("x",))]
     body += [Sum(cg.Graph([x], {"square": x * x}), ("x",), "energy")]
