@@ -253,9 +253,9 @@ def test_a_joint_is_locked_by_its_body_or_its_coordinate(capsys):
         sizes.append([each["pruned"] for each in content["graphs"]])
     assert sizes[0] == sizes[1]
     assert sizes[0][0]["nodes"] < 171
-    for scene, said in (("spring_mass", "it has no bodies"), ("chain", "its bodies are link 1, link 2")):
+    for scene, said in (("spring_mass", "it has no bodies"), ("chain", "it has joint 1, joint 2")):
         assert cli.main(["report", scene, "--pruning", "--json", "--lock", "elbow=1"]) == 2
-        assert f"{scene} has no joint 'elbow' to lock: {said}" in capsys.readouterr().err
+        assert f"{scene} has no joint 'elbow' to lock; {said}" in capsys.readouterr().err
 
 
 def test_json_of_a_report_writes_no_file_unless_a_folder_is_named(tmp_path, monkeypatch, capsys):

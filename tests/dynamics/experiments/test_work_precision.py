@@ -365,7 +365,10 @@ def test_another_start_has_another_exact_motion() -> None:
     [
         ({"name": "nothing"}, "there is no scene 'nothing'"),
         ({"name": "spring_mass", "options": {"t_end": -1.0}}, "t_end must be positive"),
-        ({"name": "spring_mass", "options": {"start": [1.0]}}, r"the start needs 2 numbers \(q0, qd0\), got 1"),
+        (
+            {"name": "spring_mass", "options": {"start": [1.0]}},
+            r"the start needs 2 numbers \(q.theta, qd.theta\), got 1",
+        ),
         ({"name": "kepler 0.3", "options": {"start": [1.0] * 4}}, "has a start of its own"),
         ({"name": "spring_mass", "methods": ["rk5"]}, "there is no method 'rk5'"),
         ({"name": "spring_mass", "peers": ["Drake"]}, "there is no peer 'Drake'"),

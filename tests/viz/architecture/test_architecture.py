@@ -116,7 +116,7 @@ def test_the_table_is_an_order_that_names_every_folder() -> None:
     ("importer", "imported", "allowed"),
     [
         ("cgraph.explain", "cgraph.core", True),
-        ("cgraph.program", "cgraph.simplify", False),
+        ("cgraph.simplify", "cgraph.autodiff", False),
         ("dynamics.peers", "cgraph.explain", True),
         ("cgraph.core", "dynamics.systems", False),
         ("viz.paper", "dynamics.experiments", True),
