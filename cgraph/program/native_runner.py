@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -41,6 +43,14 @@ class NativeRunner(Runner):
         where = ctypes.addressof(done), fed.ctypes.data
         count = self._entry(memory.ctypes.data, rows.ctypes.data, passes, every, *where)
         return Record(rows[:count], done.value)
+
+    def _bound(self, memory: Array, rows: Array) -> Callable[[], None]:
+        done, fed = np.zeros(1, np.int64), np.empty(1)
+        arrays = memory, rows, done, fed
+        at = [array.ctypes.data for array in arrays]
+        call = partial(self._entry, at[0], at[1], len(rows), 1, at[2], at[3])
+        call.kept = self, arrays  # type: ignore[attr-defined]  # whose addresses it has
+        return call
 
     def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record:
         lanes = self._host.lanes

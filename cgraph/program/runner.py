@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..codegen.differentiable import require_memory
 from ..core.evaluate import Array
 from ..errors import GraphError
 from ..util.require import require_whole
@@ -143,6 +144,40 @@ class Runner(ABC):
         fed = self._fed(feed, (passes, self.program.feed_width))
         with _fitting(passes // every, self.program.width):
             return self._run(memory, passes, every, fed)
+
+    def bind(self, memory: Array, rows: Array) -> Callable[[], None]:
+        """A function of nothing: `run` on this memory, len(rows) passes, which writes the rows.
+
+        The arrays are checked here and never again; the function keeps them alive. One thread at a time may call it.
+
+        Parameters
+        ----------
+        memory : ndarray of float64, shape (size,)
+            Changed in place: write registers, such as through `read`, between calls.
+        rows : ndarray of float64, shape (passes, width)
+            A pass that records nothing leaves the last ones as they were.
+
+        Returns
+        -------
+        callable
+
+        Raises
+        ------
+        GraphError
+            If an array has another shape or type, or the program has a feed.
+        """
+        if self.program.feed:
+            raise GraphError("a bound run takes no feed: give its registers a place in the memory")
+        require_memory("rows", rows, (len(rows), self.program.width))
+        self._check(memory, (self.size,), len(rows), 1)
+        return self._bound(memory, rows)
+
+    def _bound(self, memory: Array, rows: Array) -> Callable[[], None]:
+        def call() -> None:
+            found = self.run(memory, len(rows)).rows
+            rows[: len(found)] = found
+
+        return call
 
     def run_many(self, memories: Array, passes: int, every: int = 1, feed: ArrayLike | None = None) -> Record:
         """As `run`, for N memories at once, in vectors; the program has to be branch-free.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 
 from .casadi import CasadiPeer
-from .case import DERIVATIVES, TASKS, Case
+from .case import DERIVATIVES, MOTIONS, TASKS, Case
 from .contender import MODES, Contender, Peer, UnavailableError
 from .heyoka import HeyokaPeer
 from .jax import JaxPeer
@@ -20,7 +20,8 @@ from .torch import TorchPeer
 CALLS = {(task, mode) for task in ("inverse", "forward") for mode in ("call", "batch")}
 RK4 = {("rk4", mode) for mode in MODES}
 SLOPES = {(task, mode) for task in DERIVATIVES for mode in ("call", "batch")}
-ALL = {(task, mode) for task in TASKS if task not in DERIVATIVES for mode in MODES} | SLOPES
+GRAPHS = CALLS | {(task, "loop") for task in ("inverse", "forward")} | RK4 | SLOPES
+ALL = GRAPHS | {(task, "call") for task in MOTIONS}
 
 
 @dataclass(frozen=True)
@@ -48,13 +49,13 @@ PEERS = {
     "ours-numpy": Kind(
         "our graph as generated NumPy, for where there is no llvmlite",
         "numpy",
-        {(task, "batch") for task in TASKS},
+        {(task, "batch") for task in TASKS if task not in MOTIONS},
         OurNumpy,
     ),
     "ours-gcc": Kind(
         "our graph, written as C code by CasADi and through the C compiler: another code generator, the same graph",
         "casadi",
-        ALL,
+        GRAPHS,
         lambda case: CasadiPeer(case, native=True, own_graph=False),
     ),
     "casadi-gcc": Kind(

@@ -14,7 +14,7 @@ import numpy as np
 
 from cgraph.extend import install
 
-from .case import BATCH, DERIVATIVES, NUDGE, PASSES, Array, Case, rk4_step
+from .case import BATCH, DERIVATIVES, MOTIONS, NUDGE, PASSES, Array, Case, rk4_step
 from .contender import Contender, Peer, UnavailableError
 from .ours import rate_graph, task_graph
 from .translate import lagrangian, quasi_velocities, translated
@@ -43,6 +43,8 @@ class CasadiPeer(Peer):
             return self._step(self.function("rate"))
         if task in DERIVATIVES:
             return self._slopes(task)
+        if task in MOTIONS:
+            return self._motion(task)
         q, qd, last = ca.SX.sym("q", self.case.nq), ca.SX.sym("qd", n), ca.SX.sym("last", n)
         energy, forces = lagrangian(self.case, ca.vertsplit(q), ca.vertsplit(qd), ca, NAMES, ca.SX)
         p, slope = ca.gradient(energy, qd), ca.gradient(energy, q)
@@ -80,7 +82,9 @@ class CasadiPeer(Peer):
         graph = rate_graph(self.case) if task == "rate" else task_graph(self.case, task)
         x = ca.SX.sym("x", len(graph.inputs))
         values = translated(graph.nodes, dict(zip(graph.inputs, ca.vertsplit(x), strict=True)), ca, NAMES, ca.SX)
-        return ca.Function(task, [x], [ca.vertcat(*[values[node] for node in graph.outputs.values()])])
+        return ca.Function(
+            task.replace("-", "_"), [x], [ca.vertcat(*[values[node] for node in graph.outputs.values()])]
+        )
 
     def _step(self, rate: Any) -> Any:
         """One RK4 step that calls the rate of the state four times."""
@@ -89,6 +93,18 @@ class CasadiPeer(Peer):
         after = rk4_step(rate, state)
         step = ca.Function("rk4", [state], [after])
         return step if self.native else step.expand()  # the virtual machine is faster on scalars; gcc inlines by itself
+
+    def _motion(self, task: str) -> Any:
+        """Steps of RK4 by `mapaccum`, a row of torques a step; or the gradient of |q|^2 after them, by its adjoint."""
+        ca, n, width = self.casadi, self.case.n, self.case.width("rk4")
+        y, state, force = ca.SX.sym("y", width + n), ca.MX.sym("state", width), ca.MX.sym("force", n)
+        rate = ca.Function("rate", [y], [ca.vertcat(y[n:width], self.function("forward")(y))])
+        after = rk4_step(lambda at: rate(ca.vertcat(at, force)), state)
+        step = ca.Function("step", [state, force], [after])
+        x = ca.MX.sym("x", self.case.width(task))
+        steps = (step if self.native else step.expand()).mapaccum("steps", PASSES)
+        end = steps(x[:width], ca.reshape(x[width:], n, PASSES))[:, -1]
+        return ca.Function(task, [x], [end if task == "motion" else ca.gradient(ca.sumsqr(end[:n]), x)])
 
     def _pass(self, task: str) -> Any:
         """One pass of a loop: the carry to the carry."""

@@ -29,10 +29,13 @@ TASKS = {
     "rk4": "one RK4 step, (q, qd) -> (q, qd) after dt, tau = 0",
     "inverse-derivatives": "derivatives of inverse dynamics, (q, qd, qdd) -> dtau/dq, dtau/dqd, M",
     "derivatives": "derivatives of forward dynamics, (q, qd, tau) -> dqdd/dq, dqdd/dqd, M^-1",
+    "motion": "1000 RK4 steps, (q, qd, tau of every step) -> (q, qd)",
+    "gradient": "gradient of |q|^2 after them, (q, qd, tau of every step) -> its slopes by all of these",
 }
+MOTIONS = ("motion", "gradient")  # of models whose velocities are rates of coordinates
 DERIVATIVES = {"inverse-derivatives": "inverse", "derivatives": "forward"}  # and what they are of
 BATCH = 4096  # states
-PASSES = 1000  # of a native loop
+PASSES = 1000  # of a native loop, and steps of a motion
 DT = 1e-5  # s, the step of RK4: short, so that a thousand of them do not magnify rounding
 NUDGE = 1e-8  # how far a pass moves each block of its input along its result
 
@@ -77,7 +80,7 @@ class Case:
 
     def width(self, task: str) -> int:
         """How many numbers go into a task."""
-        return self.nq + (1 if task == "rk4" else 2) * self.n
+        return self.nq + {"rk4": 1, **dict.fromkeys(MOTIONS, PASSES + 1)}.get(task, 2) * self.n
 
     def nudges(self, task: str) -> np.ndarray[Any, np.dtype[np.intp]]:
         """Which result moves each input from one pass of a loop to the next."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from cgraph.extend import install, ldl_elimination
 
-from .case import BATCH, DERIVATIVES, NUDGE, PASSES, Array, Case, rk4_step
+from .case import BATCH, DERIVATIVES, MOTIONS, NUDGE, PASSES, Array, Case, rk4_step
 from .contender import Contender, Peer
 from .translate import lagrangian, quasi_velocities
 
@@ -74,9 +74,24 @@ class JaxPeer(Peer):
     def _step(self, x: Any) -> Any:
         return rk4_step(self.rate, x)
 
+    def _motion(self, x: Any) -> Any:
+        """Steps of RK4 by `scan`, a row of torques a step."""
+        join, n = self.np.concatenate, self.case.n
+
+        def step(state: Any, tau: Any) -> tuple[Any, None]:
+            return rk4_step(lambda at: join([at[n:], self._forward(join([at, tau]))]), state), None
+
+        return self.jax.lax.scan(step, x[: 2 * n], x[2 * n :].reshape(PASSES, n))[0]
+
     def _function(self, task: str) -> Callable[[Any], Any]:
         if task in DERIVATIVES:
             return self._slopes(self._function(DERIVATIVES[task]))
+        if task in MOTIONS:
+            return (
+                self._motion
+                if task == "motion"
+                else self.jax.grad(lambda x: (self._motion(x)[: self.case.n] ** 2).sum())
+            )
         return {"inverse": self._inverse, "forward": self._forward, "rk4": self._step}[task]
 
     def _slopes(self, function: Callable[[Any], Any]) -> Callable[[Any], Any]:

@@ -9,14 +9,18 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
+from cgraph.extend import Call, Program, runner
 
 from ..equations.equations_of_motion import forward_dynamics
 from ..equations.formulations import inverse_dynamics
 from ..equations.inverse_dynamics_derivatives import inverse_dynamics_derivatives
 from ..equations.linearization import state_space
+from ..equations.linearization_parts import linearization_parts
+from ..equations.linearize_many import WRITTEN_OUT, linearization_program, linearize_many
 from ..equations.state_equation import state_equation
+from ..simulation.gradients.gradient import gradient
 from ..systems.model import Model
-from .case import NUDGE, PASSES, Array, Case, rk4_step
+from .case import DT, MOTIONS, NUDGE, PASSES, Array, Case, rk4_step
 from .contender import Contender, Peer
 
 
@@ -51,10 +55,11 @@ def rate_graph(case: Case) -> Graph:
 
 
 def step_graph(rate: Graph) -> Graph:
-    """(q0.., qd0..) -> (q0_next.., qd0_next..), one RK4 step."""
-    state = cg.variables(rate.input_names)
-    after = rk4_step(lambda x: np.array([*rate(*x).values()]), np.array(state))
-    return cg.simplify(Graph(state, {f"{node.name}_next": x for node, x in zip(state, after, strict=True)}))
+    """(q0.., qd0.., tau0..) -> (q0_next.., qd0_next..), one RK4 step; torques only where the rate takes them."""
+    x = cg.variables(rate.input_names)
+    width = len(rate.outputs)
+    after = rk4_step(lambda at: np.array([*rate(*at, *x[width:]).values()]), np.array(x[:width]))
+    return cg.simplify(Graph(x, {f"{node.name}_next": y for node, y in zip(x, after, strict=False)}))
 
 
 def carried(case: Case, task: str, graph: Graph) -> tuple[Graph, dict[str, str]]:
@@ -74,10 +79,15 @@ class Ours(Peer):
     def __init__(self, case: Case) -> None:
         super().__init__(case)
         self.graph = cache(lambda task: task_graph(case, task))
+        self.parts = cache(lambda: linearization_parts(case.system))
         self.function = cache(lambda task: cg.compile(self.graph(task)))
 
     def prepare(self, task: str, mode: str) -> Contender:
         """The compiled graph of the task."""
+        if task in MOTIONS:
+            return self._motion() if task == "motion" else self._gradient()
+        if task == "derivatives" and self.parts().size >= WRITTEN_OUT:
+            return self._columns(mode)
         graph, points = self.graph(task), self.case.points(task)
         size = len(graph.nodes)
         if mode == "loop":
@@ -88,6 +98,53 @@ class Ours(Peer):
             return Contender(lambda: function.batch(points), _same, points.shape[1], size)
         y = np.empty(function.n_out)
         return Contender(function.bind(self.case.point(task), y), lambda _: y.copy(), 1, size)
+
+    def _columns(self, mode: str) -> Contender:
+        """Derivatives of a large model: one piece of code for all columns, as `linearize_many` has it."""
+        case, n = self.case, self.case.n
+        graphs = self.parts().in_columns()
+        size = len(graphs.shared.nodes) + len(graphs.column.nodes)
+        if mode == "batch":
+            x = case.points("derivatives").T
+            states = np.split(x, [case.nq, case.nq + n], axis=1)
+            return Contender(lambda: linearize_many(case.model, *states), lambda found: _slopes(*found), len(x), size)
+        run = runner(linearization_program(graphs._replace(shared=case.bound(graphs.shared)), n))
+        memory, row = run.memory({"state": case.point("derivatives")}), np.empty((1, run.program.width))
+        return Contender(run.bind(memory, row), lambda _: row[0, n * n :].copy(), 1, size)
+
+    def _motion(self) -> Contender:
+        """The steps as one program, which is fed a row of torques a step."""
+        step, x, n = (
+            step_graph(self.case.bound(state_equation(self.case.model))),
+            self.case.point("motion"),
+            self.case.n,
+        )
+        registers = {"x": 2 * n, "tau": n}
+        run = runner(Program(registers, [Call(step, ("x", "tau"), ("x",))], record=["x"], feed=["tau"]))
+        start, rows = x[: 2 * n], x[2 * n :].reshape(PASSES, n)
+        return Contender(
+            lambda: run.run(run.memory({"x": start}), PASSES, PASSES, rows), lambda y: y.rows[0], 1, len(step.nodes)
+        )
+
+    def _gradient(self) -> Contender:
+        """`dyn.gradient`."""
+        case, n = self.case, self.case.n
+        q, qd, tau = np.split(case.point("gradient"), [n, 2 * n])
+        rows, end = tau.reshape(PASSES, n), PASSES * DT
+        return Contender(
+            lambda: gradient(case.model, _square, q, qd, t_end=end, tau=rows),
+            lambda found: np.concatenate([found["q"], found["qd"], found["tau"].ravel()]),
+        )
+
+
+def _square(q: Any, qd: Any, t: Any) -> Any:
+    return sum([x * x for x in q])
+
+
+def _slopes(a: Array, b: Array) -> Array:
+    """(n n 3, N) of A and B at N states: rows of accelerations."""
+    n = b.shape[2]
+    return np.concatenate([a, b], axis=2)[:, n:].reshape(len(a), -1).T
 
 
 class OurNumpy(Peer):

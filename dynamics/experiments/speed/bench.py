@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from ...peers import PEERS, Case
-from ...peers.case import TASKS, Array
+from ...peers.case import MOTIONS, TASKS, Array
 from ...peers.contender import MODES
 from .bench_scenes import QUICK, SCENES, load
 from .worker import Load, Prepared, Worker
@@ -18,7 +18,7 @@ from .worker import Load, Prepared, Worker
 OURS = "ours"
 AGREES = 1e-8  # largest relative difference that passes without a flag: rounding on a long chain, and no more
 FEWEST, LONG = 3, 5.0  # turns of a peer that takes longer than so many seconds for all of its turns
-CONTAINS = {"rk4": "forward"}  # who is late with the second is not asked for the first
+CONTAINS = {"rk4": "forward", "gradient": "motion"}  # who is late with the second is not asked for the first
 
 
 @dataclass(frozen=True)
@@ -97,6 +97,9 @@ def _rows(
     for scene, case in cases.items():
         late: dict[str, dict[str, str]] = {}
         for task, modes in asked.items():
+            if task in MOTIONS and case.nq != case.n:
+                say(f"{scene}, {task}: not of quaternions")
+                continue
             late[task] = dict(late.get(CONTAINS.get(task, ""), {}))
             pool = WorkerPool(loads[scene], peers, budget, late[task])
             try:
@@ -138,6 +141,8 @@ def _start(case: Case, task: str, mode: str) -> Array:
         return case.point(task)
     if task == "rk4":
         return case.points(task) if mode == "batch" else case.point(task)
+    if task == "motion":
+        return case.point(task)[: 2 * case.n]
     return np.zeros(1)
 
 

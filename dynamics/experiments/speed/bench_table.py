@@ -96,7 +96,7 @@ def _table(rows: Sequence[Row], read: Callable[[Row], dict[str, tuple[str, str]]
             else:
                 unseen[peer] = reason
     head = ["scene", *(["nodes"] if nodes else []), *shown]
-    of_ours = {row.scene: [str(row.cells[OURS].size)] if nodes else [] for row in rows}
+    of_ours = {row.scene: [str(row.cells[OURS].size or "")] if nodes else [] for row in rows}
     lines = table(
         head, [[scene, *of_ours[scene], *[of.get(peer, "") for peer in shown]] for scene, of in cells.items()]
     )

@@ -51,6 +51,35 @@ def test_loops_side_by_side_are_the_loops_one_by_one(backend: str) -> None:
         assert together[:, :, k].tolist() == run(start, 12, every=5).tolist()
 
 
+def test_a_bound_run_is_the_run_on_the_same_memory(backend: str) -> None:
+    x = cg.variable("x")
+    program = Program({"x": 1}, [Call(cg.Graph([x], {"next": 0.5 * x}), ("x",), ("x",))], record=["x"])
+    run = runner(program, backend)
+    memory, rows = run.memory({"x": 8.0}), np.empty((2, 1))
+    call = run.bind(memory, rows)
+    call()
+    assert rows.ravel().tolist() == [4.0, 2.0]
+    call()
+    assert rows.ravel().tolist() == [1.0, 0.5]
+    run.write(memory, "x", 16.0)
+    call()
+    assert rows.ravel().tolist() == run.run(run.memory({"x": 16.0}), 2).rows.ravel().tolist() == [8.0, 4.0]
+
+
+def test_a_bound_run_needs_memory_that_fits(backend: str) -> None:
+    x = cg.variable("x")
+    body = [Call(cg.Graph([x], {"next": 0.5 * x}), ("x",), ("x",))]
+    run = runner(Program({"x": 1}, body, record=["x"]), backend)
+    for rows in (np.empty((2, 2)), np.empty(2), np.empty((2, 1), np.float32), np.empty((4, 1))[::2]):
+        with pytest.raises(cg.GraphError, match="rows must be"):
+            run.bind(run.memory({}), rows)
+    with pytest.raises(cg.GraphError, match="a memory must"):
+        run.bind(np.empty(run.size + 1), np.empty((1, 1)))
+    fed = runner(Program({"x": 1}, body, record=["x"], feed=["x"]), backend)
+    with pytest.raises(cg.GraphError, match="takes no feed"):
+        fed.bind(fed.memory({}), np.empty((1, 1)))
+
+
 def test_a_carry_that_trades_places(backend: str) -> None:
     a, b = cg.variables("a b")
     swap = cg.loop(cg.Graph([a, b], {"first": b, "second": a}), {"a": "first", "b": "second"}, backend)

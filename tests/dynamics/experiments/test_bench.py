@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 from copy import deepcopy
 from functools import partial
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import pytest
 
 import dynamics as dyn
 from cgraph.extend import ldl_elimination
+from dynamics.equations import linearize_many
 from dynamics.experiments.machine import machine
 from dynamics.experiments.speed import bench as module
 from dynamics.experiments.speed.bench import MODES, PEERS, TASKS, Cell, Row, WorkerPool, bench
@@ -19,11 +21,15 @@ from dynamics.experiments.speed.bench_table import tables
 from dynamics.experiments.speed.worker import Prepared, Refused, Worker
 from dynamics.experiments.text_table import digits
 from dynamics.io.mujoco_twin import MujocoTwin
-from dynamics.peers import Case, UnavailableError
-from dynamics.peers.case import BATCH, DT, NUDGE, PASSES
+from dynamics.peers import Case, UnavailableError, ours
+from dynamics.peers.case import BATCH, DERIVATIVES, DT, MOTIONS, NUDGE, PASSES
+from dynamics.peers.translate import translated
 from viz import cli
 
 ROUNDING = 1e-10  # of a loop: the motion is that much larger than the last bit of the state it is taken from
+DIFFERENCES = (
+    1e-8  # of quotients of differences, with steps of 5e-4: their rounding is 1e-12, what they leave out 1e-10
+)
 SCALAR = 1e-12  # relative: one coordinate, a few operations
 DENSE = 1e-10  # relative: a solve of six rows, well conditioned
 PATIENT = 1e3  # s: a budget that a loaded machine does not exceed; a test has a limit of its own
@@ -64,13 +70,23 @@ class Reference:
         self.order = np.array([self.twin.model.joint(name).id for name in names])
 
     def value(self, task, x):
+        if task in DERIVATIVES:
+            columns = [slope(lambda x: self.value(DERIVATIVES[task], x), x, unit) for unit in np.eye(len(x))]
+            return np.array(columns).T.ravel()
         at = np.argsort(self.order)
+        if task == "motion":
+            state = x[: 2 * self.n]
+            for tau in x[2 * self.n :].reshape(PASSES, self.n):
+                state = self.step(state, tau)
+            return state
         if task != "rk4":
             blocks = [block[at] for block in np.split(x, 3)]
             return (self.twin.inverse if task == "inverse" else self.twin.accelerations)(*blocks)[self.order]
+        return self.step(x, np.zeros(self.n))
 
+    def step(self, x, tau):
         def rate(x):
-            return np.concatenate([x[self.n :], self.value("forward", np.concatenate([x, np.zeros(self.n)]))])
+            return np.concatenate([x[self.n :], self.value("forward", np.concatenate([x, tau]))])
 
         a = rate(x)
         b = rate(x + DT / 2 * a)
@@ -84,6 +100,26 @@ class Reference:
         return x
 
 
+def values(graph):
+    """A function of a vector of numbers, which may be complex."""
+
+    def function(x):
+        found = translated(graph.nodes, dict(zip(graph.inputs, x, strict=True)), np)
+        return np.array([found[node] for node in graph.outputs.values()])
+
+    return function
+
+
+def slope(function, x, direction, h=5e-4):
+    """By differences of the fourth order."""
+    near, far = (function(x + k * h * direction) - function(x - k * h * direction) for k in (1, 2))
+    return (8.0 * near - far) / (12.0 * h)
+
+
+def rounding(task):
+    return DIFFERENCES if task in DERIVATIVES else ROUNDING
+
+
 def difference(found, expected, start=0.0):
     return np.abs(found - expected).max() / np.abs(expected - start).max()
 
@@ -94,8 +130,9 @@ def prepared(name, case, task, mode):
     return contender, contender.result(contender.run())
 
 
+CALLED = ("inverse", "forward")
 OFFERED = [
-    pytest.param(name, task, mode, marks=[pytest.mark.slow] if (name, task) == ("jax", "rk4") else [])
+    pytest.param(name, task, mode, marks=[pytest.mark.slow] if name == "jax" and task not in CALLED else [])
     for name, kind in PEERS.items()
     for task in TASKS
     for mode in MODES
@@ -103,44 +140,111 @@ OFFERED = [
 ]
 
 
-@pytest.mark.parametrize(("name", "task", "mode"), OFFERED)
+@pytest.mark.parametrize(("name", "task", "mode"), [each for each in OFFERED if each.values[1] != "gradient"])
 def test_a_peer_finds_what_mujoco_finds(name, task, mode):
     case = Case("planar 3", load("planar 3").model)
     reference, x = Reference(case), case.point(task)
     contender, found = prepared(name, case, task, mode)
     if mode == "batch":
         points = case.points(task)
-        assert found.shape == (2 * case.n if task == "rk4" else case.n, BATCH)
+        rows = 2 * case.n if task == "rk4" else case.n
+        assert found.shape == (rows * 3 * case.n if task in DERIVATIVES else rows, BATCH)
         for column in (0, 1, BATCH - 1):
             start = points[:, column] if task == "rk4" else 0.0
-            assert difference(found[:, column], reference.value(task, points[:, column]), start) < ROUNDING
+            assert difference(found[:, column], reference.value(task, points[:, column]), start) < rounding(task)
     elif mode == "loop":
         assert difference(found, reference.after_loop(task, x), x) < ROUNDING
     else:
-        assert difference(found, reference.value(task, x), x if task == "rk4" else 0.0) < ROUNDING
+        start = x[: len(found)] if task in ("rk4", "motion") else 0.0
+        assert difference(found, reference.value(task, x), start) < rounding(task)
     assert contender.evaluations == {"call": 1, "loop": PASSES, "batch": BATCH}[mode]
 
 
-@pytest.mark.parametrize("task", TASKS)
-@pytest.mark.parametrize("name", ["ours", "casadi", "pinocchio", "mujoco"])
+@pytest.fixture(scope="module")
+def pushed():
+    """Directions of the start and of the torques, and how far |q|^2 of MuJoCo's motion goes along them."""
+    case = Case("planar 3", load("planar 3").model)
+    reference, x, n = Reference(case), case.point("gradient"), case.n
+    start, torques = np.zeros((2, len(x)))
+    start[: 2 * n], torques[2 * n :] = [0.3, -0.5, 0.2, 1.0, 0.4, -0.7], np.resize([1.0, -1.5, 0.5], PASSES * n)
+
+    def loss(x):
+        return (reference.value("motion", x)[:n] ** 2).sum()
+
+    return case, [(start, slope(loss, x, start)), (torques, slope(loss, x, torques, h=0.5))]
+
+
+@pytest.mark.parametrize(("name", "task", "mode"), [each for each in OFFERED if each.values[1] == "gradient"])
+def test_a_gradient_is_the_slope_of_mujoco_s_motion(name, task, mode, pushed):
+    case, slopes = pushed
+    _, found = prepared(name, case, task, mode)
+    for direction, expected in slopes:
+        assert found @ direction == pytest.approx(expected, rel=DIFFERENCES)
+
+
+@pytest.mark.parametrize(
+    ("name", "task"),
+    [
+        (name, task)
+        for name in ("ours", "casadi", "pinocchio", "mujoco")
+        for task in TASKS
+        if (task, "call") in PEERS[name].offers and task not in MOTIONS
+    ],
+)
 def test_a_peer_knows_springs_armature_slides_and_the_order_of_joints(name, task):
     case = Case("tree", tree())
     _, found = prepared(name, case, task, "call")
     x = case.point(task)
-    assert difference(found, Reference(case).value(task, x), x if task == "rk4" else 0.0) < ROUNDING
+    assert difference(found, Reference(case).value(task, x), x if task == "rk4" else 0.0) < rounding(task)
+
+
+@pytest.mark.parametrize("task", DERIVATIVES)
+@pytest.mark.parametrize("name", ["ours", "casadi", "pinocchio"])
+def test_slopes_of_a_free_base_are_those_along_its_displacements(name, task):
+    limb = dyn.Joint("revolute", axis=(0.0, 1.0, 0.5), damping=0.2, stiffness=1.5, spring_reference=0.3, armature=0.05)
+    kwargs = {"center": (0.05, 0.02, -0.1), "inertia": (0.02, 0.03, 0.025)}
+    base = dyn.Body("base", dyn.Joint("free", damping=0.3, armature=0.07), mass=1.2, **kwargs)
+    case = Case("free", dyn.Mechanism([base, dyn.Body("limb", limb, "base", mass=0.8, **kwargs)]))
+    _, found = prepared(name, case, task, "call")
+    make = {"inverse": dyn.inverse_dynamics, "forward": dyn.forward_dynamics}[DERIVATIVES[task]]
+    function, rate = (values(case.bound(each(case.model))) for each in (make, dyn.state_equation))
+    x, nq, n = case.point(task), case.nq, case.n
+    along = np.zeros((3 * n, len(x)))  # unit displacements, then unit velocities and last arguments
+    for j in range(n):
+        along[j, :nq] = rate([*x[:nq], *np.eye(n)[j], *np.zeros(n)])[:nq]
+    along[n:, nq:] = np.eye(2 * n)
+    columns = [function(x + 1e-30j * each) for each in along]
+    assert difference(found, 1e30 * np.imag(columns).T.ravel()) < SCALAR
+
+
+@pytest.mark.parametrize("mode", ["call", "batch"])
+def test_derivatives_of_a_large_model_by_one_piece_of_code_for_all_columns(mode, monkeypatch):
+    case = Case("free", free_tree(8))
+    expected = prepared("ours", case, "derivatives", mode)[1]
+    for each in (ours, linearize_many):
+        monkeypatch.setattr(each, "WRITTEN_OUT", 0)
+    monkeypatch.setattr(linearize_many, "_functions", WeakKeyDictionary())
+    assert difference(prepared("ours", case, "derivatives", mode)[1], expected) < SCALAR
 
 
 @pytest.fixture(scope="module")
 def floating():
     """A free base with a limb of two links, and the results of our code without LLVM at the states of a batch."""
     case = Case("free", free_tree(8))
-    return case, {task: prepared("ours-numpy", case, task, "batch")[1] for task in TASKS}
+    return case, {task: prepared("ours-numpy", case, task, "batch")[1] for task in TASKS if task not in MOTIONS}
 
 
 @pytest.mark.parametrize(
     ("name", "task", "mode"),
-    [each.values for each in OFFERED if each.values[2] != "loop" and each.values[0] != "jax"]
-    + [pytest.param("jax", task, "batch", marks=pytest.mark.slow) for task in ("inverse", "forward")],
+    [
+        pytest.param(
+            *each.values,
+            marks=[pytest.mark.slow] if each.values[0] == "casadi-gcc" and each.values[1] in DERIVATIVES else [],
+        )
+        for each in OFFERED
+        if not {"loop", "jax", *MOTIONS} & set(each.values)
+    ]
+    + [pytest.param("jax", task, "batch", marks=pytest.mark.slow) for task in CALLED],
 )
 def test_a_peer_moves_a_free_base_as_we_do(name, task, mode, floating):
     case, ours = floating
