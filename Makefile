@@ -10,7 +10,7 @@ INSTALLED = $(VENV)/.installed-
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:  # two pips in one environment spoil it
-.PHONY: help venv paper test check coverage docs bench clean
+.PHONY: help venv paper test check coverage docs pictures bench clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z]*\):.*## /\1	/p' Makefile | expand -t 8
@@ -35,6 +35,9 @@ coverage: $(INSTALLED)test  ## the lines that no test runs: the total, and the W
 
 docs: $(INSTALLED)docs,viz,mujoco  ## the documentation, into docs/_build/html
 	$(BIN)/sphinx-build --fail-on-warning --keep-going -q docs docs/_build/html
+
+pictures: $(INSTALLED)test  ## the pictures that the pages' examples write, into docs/images; ARGS=docs/derivatives.md for one page
+	$(BIN)/python -m tests.page_pictures $(ARGS)
 
 bench: $(INSTALLED)bench  ## the comparisons with other software
 	$(BIN)/cgraph bench

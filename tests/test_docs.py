@@ -41,6 +41,27 @@ def program(page: str) -> str:
     return "\n".join(lines) + "\n"
 
 
+def pictures(name: str) -> dict[str, str]:
+    """{file that the examples of a page write: picture that it shows}, as of docs/x.md y.svg and images/x-y.svg."""
+    found = re.findall(rf"\(images/{Path(name).stem}-([\w-]+\.svg)\)", PAGES[name])
+    return {file: f"images/{Path(name).stem}-{file}" for file in found}
+
+
+def run_examples(name: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """The examples of a page, run in the empty folder "empty" of a folder."""
+    (folder / "page.py").write_text(program(PAGES[name]), encoding="utf-8")
+    (folder / "empty").mkdir()
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-X", "utf8", str(folder / "page.py")],
+        cwd=folder / "empty",
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        encoding="utf-8",
+        timeout=SECONDS,
+        check=False,
+    )
+
+
 def test_an_example_has_the_output_that_follows_it() -> None:
     page = "a\n```python\nx = 1\n```\n```python\nprint(x)\n```\nprints\n```text\n1\n```\n```sh\nls\n```\n"
     assert examples(page) == [(2, "x = 1\n", ""), (5, "print(x)\n", "1\n")]
@@ -49,22 +70,13 @@ def test_an_example_has_the_output_that_follows_it() -> None:
 
 @pytest.mark.parametrize("name", RUN)
 def test_examples_print_what_is_shown(name: str, tmp_path: Path) -> None:
-    """From top to bottom, in one namespace, in an empty folder."""
-    (tmp_path / "page.py").write_text(program(PAGES[name]), encoding="utf-8")
-    (tmp_path / "empty").mkdir()
-    run = subprocess.run(
-        [sys.executable, "-W", "error", "-X", "utf8", str(tmp_path / "page.py")],
-        cwd=tmp_path / "empty",
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        encoding="utf-8",
-        timeout=SECONDS,
-        check=False,
-    )
+    """From top to bottom, in one namespace, in an empty folder, and write the pictures that the page shows."""
+    run = run_examples(name, tmp_path)
     assert run.returncode == 0, run.stderr
     printed = run.stdout.split(f"{MARK}\n")[:-1]
     shown = [(line, output) for line, _, output in examples(PAGES[name])]
     assert [(line, text) for (line, _), text in zip(shown, printed, strict=True)] == shown
+    assert [file for file in pictures(name) if not (tmp_path / "empty" / file).is_file()] == []
 
 
 @pytest.mark.parametrize("name", PAGES)

@@ -19,7 +19,7 @@ WHITE, GRAY = "#FFFFFF", "#8C8C8C"
 SPURIOUS = VERMILLION  # kept for what is wrong, so that it means one thing in every picture
 LINKS = ("#7B3FA0", "#2A62C8", "#CC3333")  # the first, second and third link, as the paper paints them
 TEXT, LINE = "#1A1A1A", "#4D4D4D"
-DARK_TEXT = "#E8E8E4"  # on a dark page
+DARK_TEXT, DARK_PAGE = "#E8E8E4", "#17181A"
 SERIES = (BLUE, ORANGE, GREEN, PURPLE, SKY_BLUE, BLACK, YELLOW)  # curves of a plot, and tags
 
 FONT = "DejaVu Sans"  # its letter widths are known to the Graphviz that comes without fonts, and matplotlib carries it

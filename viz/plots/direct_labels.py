@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from .. import theme
-from .plot import Array as Points, empty_figure, style
+from .plot import GRID, Array as Points, empty_figure, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 COLORS = (theme.BLUE, theme.ORANGE, theme.GREEN, theme.PURPLE, theme.SKY_BLUE)  # seen on white and on black
-GRID: dict[str, Any] = {"color": "#808080", "alpha": 0.25, "linewidth": 0.6}
 LABEL = 8.0  # points
 APART = 1.1  # of a label's height, from one to the next
 GAP = 6.0  # points between the end of a curve and its label

@@ -13,6 +13,7 @@ from cgraph.extend import install
 from .. import theme
 
 if TYPE_CHECKING:
+    from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -25,6 +26,7 @@ STYLE: dict[Any, Any] = {
     "axes.labelcolor": theme.TEXT,
     "svg.hashsalt": "cgraph",  # the same ids in every run
 }
+GRID: dict[str, Any] = {"color": "#808080", "alpha": 0.25, "linewidth": 0.6}  # on white and on black
 
 
 def empty_figure(width: float, height: float) -> Figure:
@@ -56,8 +58,11 @@ def to_svg(figure: Figure) -> str:
     return buffer.getvalue().decode()
 
 
-def to_adaptive_svg(figure: Figure) -> str:
-    """As `to_svg`, without a background and with ink for light and dark pages, as the reader's system asks."""
+def to_adaptive_svg(figure: Figure, *, background: bool = False) -> str:
+    """As `to_svg`, with ink for light and dark pages, as the reader's system asks, and no background.
+
+    background: with one that adapts too, for pages that may have made another choice than the system.
+    """
     buffer = io.BytesIO()
     with style():
         figure.savefig(buffer, format="svg", metadata={"Date": None}, transparent=True)
@@ -65,8 +70,24 @@ def to_adaptive_svg(figure: Figure) -> str:
     for ink in (theme.TEXT, theme.LINE, theme.BLACK):
         svg = svg.replace(ink.lower(), "currentColor")
     head, rest = svg.split("<defs>", 1)
-    dark = f"@media (prefers-color-scheme: dark) {{ svg {{ color: {theme.DARK_TEXT}; }} }}"
-    return f"{head}<style>svg {{ color: {theme.TEXT}; fill: currentColor; }} {dark}</style>\n <defs>{rest}"
+    light, night = (f" background: {color};" if background else "" for color in (theme.WHITE, theme.DARK_PAGE))
+    dark = f"@media (prefers-color-scheme: dark) {{ svg {{ color: {theme.DARK_TEXT};{night} }} }}"
+    return f"{head}<style>svg {{ color: {theme.TEXT}; fill: currentColor;{light} }} {dark}</style>\n <defs>{rest}"
+
+
+def painted_line(points: Array, values: Array, limits: tuple[float, float], colors: Sequence[str]) -> LineCollection:
+    """A line whose pieces are painted by their values, on a logarithmic scale from the first color to the last.
+
+    points: (T, 2).  values: (T - 1,), positive.
+    """
+    from matplotlib.collections import LineCollection
+    from matplotlib.colors import LinearSegmentedColormap, LogNorm
+
+    pieces = np.stack([points[:-1], points[1:]], axis=1)
+    ramp = LinearSegmentedColormap.from_list("ramp", list(colors))
+    return LineCollection(
+        pieces.tolist(), array=values, cmap=ramp, norm=LogNorm(*limits), linewidths=1.6, capstyle="round"
+    )
 
 
 def snapshots(times: Array, positions: Array, instants: Sequence[float], traces: bool = True) -> Figure:
@@ -93,7 +114,7 @@ def snapshots(times: Array, positions: Array, instants: Sequence[float], traces:
             axis.set_aspect("equal")
             axis.set_xlim(-reach, reach)
             axis.set_ylim(low, high)
-            axis.grid(color="#E4E4E4", linewidth=0.6)
+            axis.grid(**GRID)
         for axis in axes[-1]:
             axis.set_xlabel("x [m]")
         for axis in axes[:, 0]:
@@ -170,7 +191,7 @@ def powers(
             axis.set_title(title, fontsize=10, loc="left")
             axis.set_xlabel(x)
             axis.set_ylabel(label)
-            axis.grid(color="#E4E4E4", linewidth=0.6)
+            axis.grid(**GRID)
         figure.legend(
             labels.values(), labels.keys(), loc="outside lower center", ncols=min(4, len(labels)), frameon=False
         )
