@@ -227,6 +227,12 @@ def test_derivatives_of_a_large_model_by_one_piece_of_code_for_all_columns(mode,
     assert difference(prepared("ours", case, "derivatives", mode)[1], expected) < SCALAR
 
 
+def test_a_model_with_quaternions_has_no_motions():
+    told = []
+    assert list(bench(["free 35"], MOTIONS, say=told.append)) == []
+    assert told == [f"free 35, {task}: not of quaternions" for task in MOTIONS]
+
+
 @pytest.fixture(scope="module")
 def floating():
     """A free base with a limb of two links, and the results of our code without LLVM at the states of a batch."""
