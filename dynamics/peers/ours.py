@@ -87,7 +87,8 @@ class Ours(Peer):
         if task in MOTIONS:
             return self._motion() if task == "motion" else self._gradient()
         if task == "derivatives" and self.parts().size >= WRITTEN_OUT:
-            return self._columns(mode)
+            rates = self.case.system.kinematics.quasi is None
+            return self._jacobian() if rates and mode == "call" else self._columns(mode)
         graph, points = self.graph(task), self.case.points(task)
         size = len(graph.nodes)
         if mode == "loop":
@@ -98,6 +99,12 @@ class Ours(Peer):
             return Contender(lambda: function.batch(points), _same, points.shape[1], size)
         y = np.empty(function.n_out)
         return Contender(function.bind(self.case.point(task), y), lambda _: y.copy(), 1, size)
+
+    def _jacobian(self) -> Contender:
+        """Derivatives of a large model by `bind_jacobian` of forward dynamics, where velocities are rates."""
+        function, x = self.function("forward"), self.case.point("derivatives")
+        rows = np.empty((self.case.n, len(x)))
+        return Contender(function.bind_jacobian(x, rows), lambda _: rows.ravel(), 1, len(function.graph.nodes))
 
     def _columns(self, mode: str) -> Contender:
         """Derivatives of a large model: one piece of code for all columns, as `linearize_many` has it."""

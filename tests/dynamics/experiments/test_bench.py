@@ -217,9 +217,9 @@ def test_slopes_of_a_free_base_are_those_along_its_displacements(name, task):
     assert difference(found, 1e30 * np.imag(columns).T.ravel()) < SCALAR
 
 
-@pytest.mark.parametrize("mode", ["call", "batch"])
-def test_derivatives_of_a_large_model_by_one_piece_of_code_for_all_columns(mode, monkeypatch):
-    case = Case("free", free_tree(8))
+@pytest.mark.parametrize(("model", "mode"), [(free_tree(8), "call"), (free_tree(8), "batch"), (tree(), "call")])
+def test_derivatives_of_a_large_model_by_one_piece_of_code_for_all_columns(model, mode, monkeypatch):
+    case = Case("a model", model)
     expected = prepared("ours", case, "derivatives", mode)[1]
     for each in (ours, linearize_many):
         monkeypatch.setattr(each, "WRITTEN_OUT", 0)
