@@ -335,6 +335,11 @@ def test_gradients_where_a_rate_or_its_slopes_do_not_depend_on_the_state(method:
     assert result["qd"] == approx(0.5 * result.q[::-1], rel=1e-12)
 
 
+def test_the_problem_of_quaternions_is_derived_once() -> None:
+    body = free_body()
+    assert derive(body, {}) is derive(body, {})
+
+
 def test_a_new_tableau_has_gradients(monkeypatch: pytest.MonkeyPatch) -> None:
     heun = Tableau(2, c=(0.0, 1.0), a=((), (1.0,)), b=(0.5, 0.5))
     monkeypatch.setitem(METHODS, "heun", runge_kutta(heun))
