@@ -85,7 +85,13 @@ def derive(model: Model, bound: Mapping[str, float]) -> Problem:
         system = as_system(model)
         moving = system.kinematics
         equations = (system.coordinates, system.partial_lagrangians, system.forces, system.damping)
-        equations += (system.lengths, system.velocities, *moving.q_dot, *moving.normalized(moving.q), moving.groups)
+        equations += (
+            system.lengths,
+            system.velocities,
+            *moving.q_dot,
+            moving.quasi and moving.quasi.normalized,
+            moving.groups,
+        )
         equations += (tuple(system.constraints.names), system.constraints.positions, system.constraints.velocities)
     numbers = tuple([(name, float(value).hex()) for name, value in bound.items()])  # 0.0 and -0.0 stay apart
     key = (*equations, inputs.states, inputs.applied, tuple(inputs.parameters), numbers)

@@ -83,6 +83,8 @@ class Adjoint:
             return
         inputs, outputs = (tuple([self.lengths[name] for name in names]) for names in (call.inputs, call.outputs))
         product = self.products.pulled(call.graph, inputs, wanted, outputs, seeded)
+        if product.graph is None:
+            return
         bars = [self._bar(call.inputs[k]) for k in product.kept]
         values = call.outputs if product.with_outputs else ()
         seeds = [self.bars[call.outputs[k]] for k in seeded]
@@ -109,8 +111,10 @@ class Adjoint:
             return
         ones = (1,) * len(inputs)
         product = self.products.pulled(statement.graph, ones, wanted, (1,) * len(statement.graph.outputs), seeded)
-        graph, terms = product.graph, product.graph.outputs.values()
-        for k, term in zip(product.kept, terms, strict=True):
+        graph = product.graph
+        if graph is None:
+            return
+        for k, term in zip(product.kept, graph.outputs.values(), strict=True):
             name = inputs[k]
             alone = Graph(graph.inputs, {"bar": term})
             bar = self._bar(name)

@@ -16,9 +16,12 @@ Pullback = Callable[[Sequence[Node]], Graph]  # inputs to differentiate by -> gr
 
 
 class Product(NamedTuple):
-    """A graph, the registers that are its outputs, and whether its inputs have the values of the outputs in them."""
+    """A graph, the registers that are its outputs, and whether its inputs have the values of the outputs in them.
 
-    graph: Graph
+    Where nothing depends on what moves there is no graph.
+    """
+
+    graph: Graph | None
     kept: Chosen
     with_outputs: bool = False
 
@@ -74,7 +77,8 @@ class Products:
 def _product(inputs: Sequence[Node], results: Mapping[int, Sequence[Node]], with_outputs: bool) -> Product:
     kept = {k: nodes for k, nodes in results.items() if any(node.value != 0.0 for node in nodes)}
     nodes = [node for group in kept.values() for node in group]
-    return Product(Graph(inputs, {f"{k}": node for k, node in enumerate(nodes)}), tuple(kept), with_outputs)
+    graph = Graph(inputs, {f"{k}": node for k, node in enumerate(nodes)}) if nodes else None
+    return Product(graph, tuple(kept), with_outputs)
 
 
 def _split(items: Sequence[T], lengths: Lengths) -> list[Sequence[T]]:

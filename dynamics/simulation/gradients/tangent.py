@@ -63,12 +63,14 @@ class Tangent:
             return
         inputs, outputs = (tuple([self.lengths[name] for name in names]) for names in (call.inputs, call.outputs))
         product = self.products.pushed(call.graph, inputs, moving, outputs)
+        if product.graph is None:
+            return
         dots = [self.dots[call.inputs[k]] for k in moving]
         self.statements.append(
             Call(product.graph, (*call.inputs, *dots), tuple([self._dot(call.outputs[k]) for k in product.kept]))
         )
 
-    def _elements(self, inputs: Sequence[str], graph: Graph) -> tuple[Graph, tuple[str, ...], tuple[int, ...]]:
+    def _elements(self, inputs: Sequence[str], graph: Graph) -> tuple[Graph | None, tuple[str, ...], tuple[int, ...]]:
         moving = self._moving(inputs)
         product = self.products.pushed(graph, (1,) * len(inputs), moving, (1,) * len(graph.outputs))
         return product.graph, (*inputs, *[self.dots[inputs[k]] for k in moving]), product.kept
@@ -78,13 +80,13 @@ class Tangent:
         if self._moving(inputs) and not self.active.isdisjoint(statement.outputs):
             require_no_shared(statement)
             graph, inputs, kept = self._elements(statement.inputs, statement.graph)
-            if kept:
+            if graph is not None:
                 self.statements.append(Map(graph, inputs, tuple([self._dot(statement.outputs[k]) for k in kept])))
 
     def _sum(self, statement: Sum) -> None:
         if self._moving(statement.inputs) and statement.output in self.active:
-            graph, inputs, kept = self._elements(statement.inputs, statement.graph)
-            if kept:
+            graph, inputs, _ = self._elements(statement.inputs, statement.graph)
+            if graph is not None:
                 self.statements.append(Sum(graph, inputs, self._dot(statement.output)))
 
     def _solve(self, solve: Solve, right: str) -> None:

@@ -321,6 +321,25 @@ def test_many_gradients_with_what_is_the_same_for_all() -> None:
         dyn.gradient_many(bead(), loss, [[0.5]], [0.2], 0.2, "dop853")
 
 
+@mark.parametrize("method", ["rk4", "dopri5", "rodas", "radau", "midpoint"])
+def test_gradients_where_a_rate_or_its_slopes_do_not_depend_on_the_state(method: str) -> None:
+    given: dict[str, Any] = {"t_end": 0.5, "method": method, "backend": "python", **options(method)}
+    drift = dyn.OdeSystem(lambda x, t, p: [p["v"]], ["x"], {"v": 2.0})
+    clock = dyn.OdeSystem(lambda x, t: [1.0 + 2.0 * t], ["x"])
+    for system, end in ((drift, 2.0), (clock, 1.75)):
+        assert dyn.gradient(system, lambda x, t: x[0] ** 2, [1.0], None, **given)["q"] == approx([2.0 * end], rel=1e-12)
+        assert dyn.sensitivities(system, [1.0], None, wrt="q", **given)["q"][-1, 0] == approx([1.0], rel=1e-12)
+    assert dyn.sensitivities(drift, [1.0], None, wrt="v", **given)["v"][-1] == approx([0.5], rel=1e-12)
+    thrown = System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2) - 9.81 * q[1], ["x", "y"])
+    result = dyn.gradient(thrown, lambda q, qd, t: q[0] * q[1], [1.0, 2.0], [3.0, 0.0], **given)
+    assert result["qd"] == approx(0.5 * result.q[::-1], rel=1e-12)
+
+
+def test_the_problem_of_quaternions_is_derived_once() -> None:
+    body = free_body()
+    assert derive(body, {}) is derive(body, {})
+
+
 def test_a_new_tableau_has_gradients(monkeypatch: pytest.MonkeyPatch) -> None:
     heun = Tableau(2, c=(0.0, 1.0), a=((), (1.0,)), b=(0.5, 0.5))
     monkeypatch.setitem(METHODS, "heun", runge_kutta(heun))
