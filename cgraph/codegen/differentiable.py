@@ -60,8 +60,8 @@ class Differentiable(ABC):
         """Products y_dot = J x_dot of the Jacobian at x with directions, side by side in vectors: forward mode.
 
         X_dot: (k, n_in), a direction a row; the result is (k, n_out). Of one direction, (n_in,), it is (n_out,). An
-        entry of x_dot that is zero counts for nothing, also where an operation has no slope in it; times a factor that is
-        infinite or NaN it is NaN.
+        entry of x_dot that is zero counts for nothing, also where an operation has no slope in it; times a factor that
+        is infinite or NaN it is NaN.
         Raises GraphError for another shape.
         """
         return self._along(self._forward, x, "X_dot", X_dot, (self.n_in, self.n_out))
