@@ -175,17 +175,17 @@ CALLS = {
         t_eval=None, events=(), dense_output=False, tau=0.0, parameters=None, first_step=None, **RUNS
     ),
     "dyn.gradient": call(
-        dyn.gradient, ARM, lambda q, qd, t: q[0], [0.1], [0.0], 0.02, "rk4", running=lambda q, qd, tau, t: q[0],
-        wrt=["q"], t0=0.0, t_span=None, dt=0.01, max_step=None, rtol=None, atol=None, first_step=None, tau=[0.0],
+        dyn.gradient, ARM, lambda q, qd, t: q[0], [0.1], [0.0], 1.0, "rk4", running=lambda q, qd, tau, t: q[0],
+        wrt=["q"], t0=0.0, t_span=None, dt=0.5, max_step=None, rtol=None, atol=None, first_step=None, tau=[0.0],
         parameters=None, events=(), backend="python"
     ),
     "dyn.gradient_many": call(
-        dyn.gradient_many, ARM, lambda q, qd, t: q[0], [[0.1]], [[0.0]], 0.02, "rk4",
-        running=lambda q, qd, tau, t: q[0], wrt=["q"], t0=0.0, t_span=None, dt=0.01, tau=[[0.0]], parameters={},
+        dyn.gradient_many, ARM, lambda q, qd, t: q[0], [[0.1]], [[0.0]], 1.0, "rk4",
+        running=lambda q, qd, tau, t: q[0], wrt=["q"], t0=0.0, t_span=None, dt=0.5, tau=[[0.0]], parameters={},
         backend="python"
     ),
     "dyn.sensitivities": call(
-        dyn.sensitivities, ARM, [0.1], [0.0], 0.02, "rk4", wrt=["q"], t0=0.0, t_span=None, dt=0.01, max_step=None,
+        dyn.sensitivities, ARM, [0.1], [0.0], 1.0, "rk4", wrt=["q"], t0=0.0, t_span=None, dt=0.5, max_step=None,
         rtol=None, atol=None, first_step=None, tau=[0.0], parameters=None, backend="python"
     ),
     "dyn.simulate_many": call(

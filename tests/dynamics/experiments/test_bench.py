@@ -217,7 +217,7 @@ def test_slopes_of_a_free_base_are_those_along_its_displacements(name, task):
     assert difference(found, 1e30 * np.imag(columns).T.ravel()) < SCALAR
 
 
-@pytest.mark.parametrize(("model", "mode"), [(free_tree(8), "call"), (free_tree(8), "batch"), (tree(), "call")])
+@pytest.mark.parametrize(("model", "mode"), [(free_tree(7), "call"), (free_tree(7), "batch"), (tree(), "call")])
 def test_derivatives_of_a_large_model_by_one_piece_of_code_for_all_columns(model, mode, monkeypatch):
     case = Case("a model", model)
     expected = prepared("ours", case, "derivatives", mode)[1]
@@ -235,8 +235,8 @@ def test_a_model_with_quaternions_has_no_motions():
 
 @pytest.fixture(scope="module")
 def floating():
-    """A free base with a limb of two links, and the results of our code without LLVM at the states of a batch."""
-    case = Case("free", free_tree(8))
+    """A free base with a link, and the results of our code without LLVM at the states of a batch."""
+    case = Case("free", free_tree(7))
     return case, {task: prepared("ours-numpy", case, task, "batch")[1] for task in TASKS if task not in MOTIONS}
 
 
