@@ -38,10 +38,12 @@ def pytest_collection_finish() -> None:
 def quick_machine_code(request: pytest.FixtureRequest) -> Iterator[None]:
     """LLVM's code generator does not optimize, in a quarter of the time, but where its code is what a test is about.
 
-    Products and sums are then not fused, so that last bits are those of a processor without such an instruction.
+    Products and sums are then not fused, so that last bits are those of a processor without such an instruction. With
+    HYPOTHESIS_PROFILE all code is optimized, as users have it.
     """
+    users = "optimized" in request.keywords or "HYPOTHESIS_PROFILE" in os.environ
     with pytest.MonkeyPatch.context() as patch:
-        if not ({"codegen", "program"} & set(request.path.parts) or "optimized" in request.keywords):
+        if not (users or {"codegen", "program"} & set(request.path.parts)):
             patch.setattr(llvm_engine, "LEVEL", 0)
         yield
 

@@ -17,9 +17,8 @@ from ..systems.system import System
 from .evaluate_at import Array, input_values
 from .linearization_parts import ColumnGraphs, LinearizationParts, assembled, linearization_parts
 
-WRITTEN_OUT = (
-    20_000  # nodes: beyond, the columns share one piece of code, which LLVM is done with in a tenth of the time
-)
+# Nodes; beyond, the columns share one piece of code, which LLVM is done with in a tenth of the time.
+WRITTEN_OUT = 20_000
 BLOCK = 64  # states that are run between looks at the keyboard, and that a thread takes at a time
 _functions: WeakKeyDictionary[System, _Function] = WeakKeyDictionary()
 
