@@ -149,6 +149,7 @@ CALLS = {
     "dyn.Mechanism.chain": call(ARM.chain, FIRST),
     "dyn.forward_dynamics": call(dyn.forward_dynamics, ARM, "auto", check=False),
     "dyn.inverse_dynamics": call(dyn.inverse_dynamics, ARM, "chain_rule", simplify=True),
+    "dyn.formulation_sizes": call(dyn.formulation_sizes, ARM),
     "dyn.momentum_rate": call(dyn.momentum_rate, ARM, "chain_rule", simplify=True, keep_momentum=False),
     "dyn.reduced_linearization": call(dyn.reduced_linearization, SYSTEM, [0.0], [0.0], None, t=0.0, parameters=None),
     "dyn.linearize": call(dyn.linearize, SYSTEM, [0.0], [0.0], None, t=0.0, parameters=None),
@@ -244,8 +245,8 @@ CALLS = {
     "viz.render_svg": call(viz.render_svg, "digraph {}", engine="dot", timeout=5.0),
     "viz.render_png": call(viz.render_png, "<svg xmlns='http://www.w3.org/2000/svg' width='1' height='1'/>", scale=2.0),
     "viz.to_dot": call(
-        viz.to_dot, GRAPH, names=None, marked=frozenset(), marked_label="", marked_edges=frozenset(), clusters=True,
-        collapse=(), caption=None, legend=True, rankdir="BT"
+        viz.to_dot, GRAPH, names=None, formulas=None, marked=frozenset(), marked_label="", marked_edges=frozenset(),
+        clusters=True, collapse=(), caption=None, legend=True, rankdir="BT"
     ),
 }  # fmt: skip
 

@@ -10,8 +10,9 @@ from dynamics.experiments.paper_numbers.embedding_error import embedding_errors
 from dynamics.experiments.text_table import csv_text
 
 from ..pages import html
+from ..pages.formulations import TITLES
 from ..plots import plot
-from .part import TITLES, Part, pictures
+from .part import Part, pictures
 
 
 def embedding() -> Part:

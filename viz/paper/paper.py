@@ -14,7 +14,7 @@ from ..pages.document_files import check_folder
 from ..plots import plot
 from .embedding import embedding
 from .free_fall import figures4_and_5
-from .one_joint import equations, figure1, figure2, figure3
+from .one_joint import equations, figure1, figure2, figure3, sizes
 from .part import Part
 from .scaling import scaling_of_counts
 from .timing import figure6
@@ -43,6 +43,7 @@ def paper(folder: Path, say: Callable[[str], None], *, quick: bool = False) -> P
         "Figure 1: by definition, with the Euler relation embedded": figure1,
         "Figure 2: kinetic energy only": figure2,
         "Figure 3: the chain rule": figure3,
+        "Sizes of these graphs, and of those of the whole torque": sizes,
         "The law of the embedding: torque error against dt": embedding,
         "Figures 4 and 5: the three-link arm in free fall, by our graph and by MuJoCo": figures4_and_5,
         "Figure 6 and Table 1: the time of one evaluation": partial(figure6, QUICK_EVALUATIONS) if quick else figure6,

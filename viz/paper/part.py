@@ -4,20 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from .. import theme
 from ..graph_drawing.render import render_png
 from ..plots import plot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-TITLES = {
-    "euler_embedded": "by definition",
-    "kinetic_only": "kinetic only",
-    "chain_rule": "chain rule",
-    "chain_rule_literal": "chain rule, literal",
-}
-COLORS = dict(zip(TITLES.values(), (theme.SPURIOUS, theme.ORANGE, theme.BLUE, theme.PURPLE), strict=True))
 SCALE = 160 / 96  # of a plot as PNG: 160 pixels an inch
 
 

@@ -9,8 +9,9 @@ from dynamics.experiments.text_table import csv_text
 from dynamics.simulation.progress_bar import Progress
 
 from ..pages import html
+from ..pages.formulations import COLORS, TITLES
 from ..plots import plot
-from .part import COLORS, TITLES, Part, pictures
+from .part import Part, pictures
 
 
 def scaling_of_counts(links: Sequence[int] = COUNTS) -> Part:

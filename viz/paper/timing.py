@@ -9,8 +9,9 @@ from dynamics.experiments.paper_numbers.table_1 import PAPER_MS, Row, table_1
 from dynamics.experiments.text_table import csv_text
 
 from ..pages import html
+from ..pages.formulations import COLORS, TITLES
 from ..plots import plot
-from .part import COLORS, TITLES, Part, pictures
+from .part import Part, pictures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
