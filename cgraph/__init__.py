@@ -12,6 +12,7 @@ from .codegen.c import CSource, to_c
 from .core.counts import Counts
 from .core.edge import Edge
 from .core.graph import Graph
+from .core.latex import latex
 from .core.naming import variables, with_name
 from .core.node import Node, constant, variable
 from .core.ops import (
@@ -104,6 +105,7 @@ __all__ = [
     "hypot",
     "jacobian",
     "jvp",
+    "latex",
     "less",
     "less_equal",
     "lint",

@@ -112,6 +112,8 @@ CALLS = {
     "cg.constant": call(cg.constant, 1.0),
     "cg.double_double": call(cg.double_double, GRAPH, low=False),
     "cg.hessian_solve": call(cg.hessian_solve, SQUARES, ["x", "y"], [1.0, 2.0], check=False),
+    "cg.Graph.latex": call(GRAPH.latex, names=None, lines=5),
+    "cg.latex": call(cg.latex, X * Y, names=None, lines=5),
     "cg.lint": call(
         cg.lint, GRAPH, independent=(), depends=None, box=None, at=None, digits=4.0, function="f", names=None
     ),
