@@ -28,6 +28,11 @@ FORMULATIONS = {
     "chain_rule_literal": PURPLE,
     "kinetic_only_exact": GREEN,
 }
+# So has an integrator, by its place: every page draws it by this number.
+METHODS = (
+    *("rk4", "dopri5", "dop853", "taylor", "radau", "rodas", "euler", "verlet", "midpoint", "gauss4", "gauss6"),
+    *("symplectic_euler", "yoshida4", "yoshida6", "yoshida8", "mclachlan4", "mclachlan6", "kahan_li6", "kahan_li8"),
+)
 SERIES = (BLUE, ORANGE, GREEN, PURPLE, SKY_BLUE, BLACK, YELLOW)  # curves of a plot, and tags
 
 FONT = "DejaVu Sans"  # its letter widths are known to the Graphviz that comes without fonts, and matplotlib carries it

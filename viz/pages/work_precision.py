@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..plots.direct_labels import Line, Panel, bars, labeled
+from .. import theme
+from ..plots.direct_labels import COLORS, Line, Panel, bars, labeled
 from ..plots.plot import to_adaptive_svg
 from .document import Block, Document, Paragraph, Picture, Section, Table, left_out
 
@@ -110,14 +111,14 @@ def _panels(content: Content, x: str, name: str) -> tuple[list[Panel], list[str]
                 Panel(
                     f"ours, {kind}",
                     *axes,
-                    [_line(curve, x, "seconds", *_look(k, curve)) for k, curve in enumerate(ours)],
+                    [_line(curve, x, "seconds", *_look(curve)) for curve in ours],
                 )
             )
         if others:
             best = _best(ours, content)
             shown += [curve["name"] for curve in best]
-            drawn = [_line(curve, x, "seconds", *_look(k, curve)) for k, curve in enumerate(others)]
-            drawn += [_line(curve, x, "seconds", 0, True, "ours: ") for curve in best]
+            drawn = [_line(curve, x, "seconds", *_look(curve)) for curve in others]
+            drawn += [_line(curve, x, "seconds", _look(curve)[0], True, "ours: ") for curve in best]
             panels.append(Panel(f"others, {kind}", *axes, drawn))
     return [panel for panel in panels if any(len(line.x) for line in panel.lines)], shown
 
@@ -147,9 +148,13 @@ def _line(curve: Mapping[str, Any], x: str, y: str, color: int, dashed: bool, be
     return Line(name, [a for a, _ in shown], [b for _, b in shown], color, dashed)
 
 
-def _look(number: int, curve: Mapping[str, Any]) -> tuple[int, bool]:
-    """Color and dashes of a curve: one for every curve of ours, and for every maker of the others."""
-    return (number, number >= 5) if curve["ours"] else (_maker(curve["name"]), False)
+def _look(curve: Mapping[str, Any]) -> tuple[int, bool]:
+    """Color and dashes of a curve, the same on every page: one for every method of ours, and every maker of others."""
+    if not curve["ours"]:
+        return _maker(curve["name"]), False
+    name = curve["name"].partition(" ")[0]
+    number = theme.METHODS.index(name) if name in theme.METHODS else len(theme.METHODS)
+    return number, number >= len(COLORS)
 
 
 def _drawn(point: Mapping[str, Any]) -> bool:
@@ -162,8 +167,8 @@ def _orders(content: Content) -> Section:
         for mine in (True, False):
             curves = [curve for curve in content["curves"] if curve["kind"] == kind and curve["ours"] is mine]
             lines = [
-                _line(curve, *(("step", "largest") if kind == EQUAL else ("knob", "error")), *_look(k, curve))
-                for k, curve in enumerate(curves)
+                _line(curve, *(("step", "largest") if kind == EQUAL else ("knob", "error")), *_look(curve))
+                for curve in curves
             ]
             knobs = sorted({point["knob"] for curve in curves for point in curve["points"]}, reverse=True)
             if kind == CHOSEN and len(knobs) > 1:

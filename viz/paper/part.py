@@ -32,5 +32,5 @@ class Pictures(NamedTuple):
 
 def pictures(name: str, picture: Figure) -> Pictures:
     """A plot rendered, once, as SVG, and as PNG from that SVG."""
-    svg = plot.to_svg(picture)
+    svg = plot.to_adaptive_svg(picture, background=True)
     return Pictures(svg, {f"{name}.svg": svg, f"{name}.png": render_png(svg, scale=SCALE)})

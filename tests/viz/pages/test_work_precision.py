@@ -18,7 +18,9 @@ from viz.pages.document import Table, to_html
 pytest.importorskip("matplotlib")
 
 
-from viz.pages.work_precision import _power, _time, work_precision
+from dynamics import METHODS
+from viz import theme
+from viz.pages.work_precision import _look, _power, _time, work_precision
 
 
 def point(knob: float, seconds: float, error: float | None, **others: Any) -> dict[str, Any]:
@@ -97,6 +99,14 @@ def test_the_page_says_what_was_measured(page: str) -> None:
         "heyoka Taylor not installed",
     ):
         assert words in shown(page).replace("A machine", "a machine"), words
+
+
+def test_a_method_has_one_color_on_every_page() -> None:
+    """Whatever else is on the page, and no two of ours look alike."""
+    assert set(theme.METHODS) == set(METHODS)
+    looks = [_look({"name": name, "ours": True}) for name in theme.METHODS]
+    assert len({(number % 5, number // 5) for number, _ in looks}) == len(METHODS)
+    assert _look({"name": "rk4, side by side", "ours": True}) != _look({"name": "dopri5", "ours": True})
 
 
 def test_the_page_needs_no_other_file(page: str) -> None:

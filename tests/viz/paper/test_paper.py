@@ -6,13 +6,17 @@ import json
 import re
 import sys
 
+import numpy as np
 import pytest
 
 from cgraph.extend import write_files
+from dynamics.experiments.paper_numbers.embedding_error import EmbeddingError
+from dynamics.experiments.paper_numbers.table_1 import timing
 from tests.tolerances import SOLVED
 from viz import theme
 from viz.graph_drawing.render import RenderError
 from viz.paper import paper as module
+from viz.paper.embedding import _panels
 
 FIGURES = ("fig1", "fig2", "fig3", "fig4", "fig5", "fig6", "law", "scaling")
 
@@ -98,6 +102,21 @@ def test_edges_grow_linearly_by_the_contracted_chain_rule_and_quadratically_by_t
     _, data, _ = paper
     assert data["scaling"]["chain_rule"]["edges_exponent"] <= 1.11
     assert 1.9 <= data["scaling"]["chain_rule_literal"]["edges_exponent"] <= 2.1
+
+
+def test_one_interruption_moves_no_time():
+    interrupted = timing(np.append(np.full(99, 2e-6), 1.0))
+    assert (interrupted.median, interrupted.lower, interrupted.upper) == pytest.approx((2.0, 2.0, 2.0))
+
+
+def test_the_law_is_drawn_beside_a_line_of_slope_one():
+    steps = np.array([1e-2, 1e-4])
+    law = EmbeddingError("euler_embedded", 2, steps, np.array([3.0, 3.0]), 5.0 * steps, np.ones(2), 1.0)
+    errors, distances = _panels([law])
+    guide = next(line for line in distances.lines if line.name == "slope 1")
+    assert guide.color is None
+    assert np.allclose(np.diff(np.log(guide.y)), np.diff(np.log(guide.x)))
+    assert errors.lines[0].color == distances.lines[0].color == theme.FORMULATIONS["euler_embedded"]
 
 
 def test_the_page_is_self_contained(paper):
