@@ -18,7 +18,7 @@ from .part import Part, pictures
 def embedding() -> Part:
     """The law of the embedding: torque error against dt."""
     laws = embedding_errors()
-    drawn = pictures("law", labeled(_panels(laws), shared=False))
+    drawn = pictures("law", labeled(_panels(laws), shared=False, room=0.5))
     header = ("formulation", "links", "slope", "largest entry of the limit [N m]", "error at dt = 1e-6 s [N m]")
     rows = [
         (

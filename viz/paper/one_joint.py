@@ -86,8 +86,8 @@ def sizes() -> Part:
     table = size_table(counted)
     section = (
         html.paragraph(
-            f"Figures 1 to 3 draw the inertial term dp/dt of {EQUATION}, beside the momentum p = ∂L/∂ω. What `cgraph "
-            "lint` and `cgraph inspect` look at is the whole torque τ. Both are counted by one function."
+            f"Figures 1 to 3 draw the inertial term dp/dt of {EQUATION}, beside the momentum p = ∂L/∂ω. What the commands "
+            "“cgraph lint” and “cgraph inspect” look at is the whole torque τ. Both are counted by one function."
         )
         + html.table(table.caption, table.header, table.rows)
         + html.paragraph(WHY_FEWER)

@@ -21,7 +21,7 @@ def scaling_of_counts(links: Sequence[int] = COUNTS) -> Part:
     """
     with Progress("scaling", 1.0) as progress:
         rows = node_scaling(links, report=progress)
-    drawn = pictures("scaling", labeled(_panels(rows), shared=False, rising=True))
+    drawn = pictures("scaling", labeled(_panels(rows), shared=False, rising=True, room=0.35))
     header, table = _exponents(rows, links[-1])
     caption = f"Inverse dynamics of chains of n equal rods. Exponents are fitted over n = {FITTED_FROM} to {links[-1]}."
     section = (

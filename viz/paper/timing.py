@@ -76,14 +76,14 @@ def _ratios(rows: Sequence[Row]) -> tuple[tuple[str, ...], list[tuple[str, ...]]
 
 def _times(rows: Sequence[Row]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """The times: header and a row for each way of evaluating each formulation; the paper's are of another machine."""
-    header = ("formulation", "evaluated", "median [µs]", "lower quartile [µs]", "upper quartile [µs]")
+    header = ("formulation", "evaluated", "median", "lower quartile", "upper quartile", "unit")
     table = [
-        (TITLES[row.formulation], way, *(f"{time:.3g}" for time in (timing.median, timing.lower, timing.upper)))
+        (TITLES[row.formulation], way, *(f"{time:.3g}" for time in (timing.median, timing.lower, timing.upper)), "µs")
         for row in rows
         for way, timing in row.timings.items()
     ]
     table += [
-        (TITLES[name], "the paper: mean, ∓ one deviation", *(f"{1e3 * t:.3g}" for t in (mean, mean - sd, mean + sd)))
+        (TITLES[name], "the paper: mean, ∓ one deviation", *(f"{t:.3g}" for t in (mean, mean - sd, mean + sd)), "ms")
         for name, (mean, sd) in PAPER_MS.items()
     ]
     return header, table

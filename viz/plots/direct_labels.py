@@ -47,10 +47,13 @@ class Panel:
     lines: list[Line]
 
 
-def labeled(panels: Sequence[Panel], *, columns: int = 2, shared: bool = True, rising: bool = False) -> Figure:
+def labeled(
+    panels: Sequence[Panel], *, columns: int = 2, shared: bool = True, rising: bool = False, room: float = ROOM
+) -> Figure:
     """Panels with logarithmic axes, x from large on the left to small on the right; `rising`, the other way.
 
-    Curves go from the left to the right.  shared: all panels have the same scales.
+    Curves go from the left to the right.  shared: all panels have the same scales.  room: for names, beside the curves,
+    in their width.
     """
     with style():
         rows = -(-len(panels) // columns)
@@ -73,7 +76,7 @@ def labeled(panels: Sequence[Panel], *, columns: int = 2, shared: bool = True, r
             if len(_decades(low, high)) < 2:
                 low, high = 10.0 ** math.floor(math.log10(low)), 10.0 ** math.ceil(math.log10(high))
             left, right = (low, high) if rising else (high, low)
-            axis.set_xlim(left, right * (right / left) ** ROOM)
+            axis.set_xlim(left, right * (right / left) ** room)
             axis.set_xticks(_decades(low, high))
             axis.xaxis.minorticks_off()
         layout = figure.get_layout_engine()

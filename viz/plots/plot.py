@@ -110,7 +110,7 @@ def snapshots(
             for joint in range(1, positions.shape[1]):
                 color = theme.LINKS[(joint - 1) % len(theme.LINKS)]
                 if traces:
-                    axis.plot(*positions[: row + 1, joint].T, color=color, linewidth=0.9, alpha=0.55)
+                    axis.plot(*positions[: row + 1, joint].T, color=color, linewidth=1.1, alpha=0.75)
                 axis.plot(*positions[row, joint - 1 : joint + 1].T, color=color, linewidth=5, solid_capstyle="round")
             axis.plot(*positions[row, :-1].T, "o", color="white", markeredgecolor=theme.LINE, markersize=5.5)
             if dots is not None:
