@@ -22,11 +22,14 @@ from .signals import settled
 
 Commands = argparse._SubParsersAction  # what `add_subparsers` returns has no public name
 READING = ("ignore", "floating")  # options of `scenes.of_file`
+IN_PYTHON = "file.py:name, a model of a Python file, which is executed"
 
 
 def takes_a_scene(command: argparse.ArgumentParser) -> None:
     """The arguments that `scene_of` reads."""
-    command.add_argument("scene", metavar="SCENE", help=f"{', '.join(scenes.names())}, or a model file, MJCF or URDF")
+    command.add_argument(
+        "scene", metavar="SCENE", help=f"{', '.join(scenes.names())}, a model file, MJCF or URDF, or {IN_PYTHON}"
+    )
     reads_files(command)
 
 
