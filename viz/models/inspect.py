@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cgraph.extend import check_writable, require_flag, write_files
+from cgraph.extend import check_writable, require_flag, require_path, write_files
 from dynamics import display_names, scenes
 from dynamics.scenes.inspection import Inspection, inspection
 from dynamics.scenes.start import Start, moving_start, start_text, with_start
@@ -68,16 +67,17 @@ def inspect(
     >>> "joint 1" in page
     True
     """
-    if path is not None:
-        if Path(path).suffix != ".html":
-            raise ValueError(f"the page's file must end in .html, got {os.fspath(path)!r}")
-        check_writable(Path(path))
+    target = None if path is None else require_path("the page's file", path)
+    if target is not None:
+        if target.suffix != ".html":
+            raise ValueError(f"the page's file must end in .html, got {os.fspath(target)!r:.80}")
+        check_writable(target)
     require_flag("forward", forward)
     scene = scenes.of_model(model)
     at = moving_start(scene) if start is None else with_start(scene, start)
     text = inspection_page(at, inspection(at, forward=forward, t_end=t_end), start is None and at is not scene)
-    if path is not None:
-        write_files({Path(path): text})
+    if target is not None:
+        write_files({target: text})
     return text
 
 
