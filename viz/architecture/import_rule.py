@@ -23,9 +23,10 @@ TABLE = {
     "viz": (
         "theme <- graph_drawing, plots <- pages <- inspector, paper <- models <- commands <- cli <- __main__",
         "graph_drawing <- architecture <- commands",
+        "inspector <- lessons <- commands",
     ),
     "": (
-        "cgraph <- dynamics <- viz.paper, viz.models, viz.commands",
+        "cgraph <- dynamics <- viz.paper, viz.models, viz.lessons, viz.commands",
         "cgraph <- viz",
     ),
 }  # fmt: skip
