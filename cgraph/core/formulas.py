@@ -16,10 +16,30 @@ LINES = 40
 
 
 class Notation(NamedTuple):
-    """How formulas are written.
+    """How formulas are written; a text is (formula, how strongly it binds, as in `MathML`).
 
-    names: texts of names, that differ where names do.  number: text of a constant.  operation: text of an operation on
-    texts.  unnamed: of the operation with that %number.
+    Attributes
+    ----------
+    names : callable
+        Of names: {name: formula}; two names never have one formula.
+    number : callable
+        Of a constant: its text.
+    operation : callable
+        Of an operation's row and the texts of its arguments: its text.
+    unnamed : callable
+        Of the %number of an operation without a name: what it is called.
+
+    Examples
+    --------
+    >>> from cgraph.extend import Notation
+    >>> plain = Notation(
+    ...     lambda names: {name: name for name in names},
+    ...     lambda value: (f"{value:g}", 4),
+    ...     lambda op, args: (f"{op.name}({', '.join(text for text, _ in args)})", 3),
+    ...     "v{}".format,
+    ... )
+    >>> plain.number(0.5)
+    ('0.5', 4)
     """
 
     names: Callable[[Iterable[str]], dict[str, str]]
@@ -36,9 +56,34 @@ class Lines(NamedTuple):
 
 
 class Formulas:
-    """The lines of some nodes: which have one, what they are called, and their texts.
+    """The equations of some nodes: which of them have a line, what they are called, and their formulas.
 
-    nodes: all that is reached, arguments first.  outputs: {name: node}.  called: {name: what a person calls it}.
+    Parameters
+    ----------
+    nodes : sequence of Node
+        All that is reached, arguments first, as `Graph.nodes`.
+    outputs : mapping of str to Node
+        {name: node}.
+    notation : Notation
+        How formulas are written.
+    called : mapping of str to str, optional
+        {name of an input, node or output: what a person calls it}.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Formulas, Notation
+    >>> plain = Notation(
+    ...     lambda names: {name: name for name in names},
+    ...     lambda value: (f"{value:g}", 4),
+    ...     lambda op, args: (f"{op.name}({', '.join(text for text, _ in args)})", 3),
+    ...     "v{}".format,
+    ... )
+    >>> x = cg.variable("x")
+    >>> shared = x * x
+    >>> graph = cg.Graph([x], {"y": shared + cg.sin(shared)})
+    >>> Formulas(graph.nodes, graph.outputs, plain).lines(list(graph.outputs.values())).equations
+    [('v1', 'mul(x, x)'), ('y', 'add(v1, sin(v1))')]
     """
 
     def __init__(

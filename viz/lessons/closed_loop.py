@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from html import escape
+
 from cgraph import Graph, Node
-from dynamics import System, forward_dynamics
+from dynamics import System, forward_dynamics, gravity_force
 
 from .screen import Screen, number, table
 from .subject import LARGEST, SHOWN, Subject
@@ -20,8 +22,9 @@ def closed_loop(subject: Subject) -> Screen:
     free, answer = subject.evaluate(free_graph, **still), _solved(subject, held_graph, still)
     multipliers = [answer[name] for name in names]
     first = multipliers[0]
-    weight = f"<b>{shown[0]}</b>"
-    choices, right = _choices(first)
+    weight = f"<b>{escape(shown[0])}</b>"
+    static = 0.0 if own else float(subject.evaluate(gravity_force(subject.system))[-1])
+    choices, right = _choices(first, static)
     rows = [[joint, number(a), number(answer[f"qdd{i}"])]
             for i, (joint, a) in enumerate(zip(subject.joints[:SHOWN], free.tolist(), strict=False))]  # fmt: skip
     states = [f"q{i}" for i in range(min(subject.system.n, SHOWN))]
@@ -34,13 +37,13 @@ def closed_loop(subject: Subject) -> Screen:
         "joints": subject.joints[:SHOWN],
         "multipliers": dict(zip(names, shown, strict=True)),
     }
-    size = len(free_graph.nodes) + len(held_graph.nodes)
+    nodes = len(free_graph.nodes) + len(held_graph.nodes)
     return Screen(
         "closed-loop",
         "A loop closes",
         3,
         ("<p>This system has constraints: rows z(q, q̇) that stay zero." if own else
-         f"<p>We clamp <b>{subject.joints[-1]}</b>: a row z = q̇ that stays zero, the simplest of all loops.") +
+         f"<p>We clamp <b>{escape(subject.joints[-1])}</b>: a row z = q̇ that stays zero, the simplest of all loops.") +
         " Nobody knows beforehand with which force. So the force becomes an unknown, the <b>multiplier</b> λ, beside the "
         "accelerations: M q̈ − Jᵀλ = τ − b and J q̈ = −J̇ q̇. As many equations as unknowns, one elimination.</p>",
         f"At rest, let go, without motors: what does {weight} have to give at this very instant?",
@@ -51,8 +54,8 @@ def closed_loop(subject: Subject) -> Screen:
         + table("Accelerations at rest", ["joint", "free", "held"], rows)
         + table("Multipliers", ["row", "λ"], [[a, number(b)] for a, b in zip(shown, multipliers, strict=True)][:SHOWN]),
         "Find a place where the clamp has nothing to do. Is it where nothing moves at all?"
-        if play["sliders"] else "Press, and see all accelerations with and without the rows.",
-        play if size <= LARGEST else None,
+        if play["sliders"] else "Accelerations without and with the rows, at rest.",
+        play if nodes <= LARGEST else None,
         f"λ = {number(first)}. Where others are free to swing, it differs from the torque that holds the same place still.",
     )  # fmt: skip
 
@@ -81,8 +84,9 @@ def _solved(subject: Subject, graph: Graph, still: dict[str, float]) -> dict[str
     return dict(zip(graph.outputs, subject.evaluate(graph, **still).tolist(), strict=True))
 
 
-def _choices(force: float) -> tuple[tuple[str, ...], int]:
-    """Three numbers, in order, and the place of the right one."""
-    wrong = (0.0, 2.0 * force) if force else (1.0, -1.0)
-    values = sorted([force, *wrong])
+def _choices(force: float, static: float) -> tuple[tuple[str, ...], int]:
+    """Three numbers, in order, and the place of the right one; static: what would hold it if nothing else moved."""
+    size = max(abs(force), abs(static))
+    near = [value for value in (static, -force, 0.0, 2.0 * force, 1.0, -1.0) if abs(value - force) > 0.1 * size]
+    values = sorted([force, *list(dict.fromkeys([value + 0.0 for value in near]))[:2]])
     return tuple([number(value) for value in values]), values.index(force)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from html import escape
+
 import numpy as np
 
 from cgraph.extend import Array
@@ -19,7 +21,7 @@ def elimination(subject: Subject) -> Screen:
     matrix = subject.evaluate(graph).reshape(n, n)
     pivots = _pivots(matrix)
     locked, free = float(matrix[0, 0]), float(pivots[0])
-    first, tip = subject.joints[0], subject.joints[-1]
+    first, tip = escape(subject.joints[0]), escape(subject.joints[-1])
     same = locked - free <= _SAME * locked
     rows = [[name, number(matrix[i, i]), number(pivots[i])] for i, name in enumerate(subject.joints[:SHOWN])]
     states = [f"q{i}" for i in range(min(n, SHOWN))]

@@ -34,6 +34,7 @@ def energy_and_step(subject: Subject) -> Screen:
         "nq": subject.system.nq,
         "n": subject.system.n,
         "t_end": min(subject.scene.t_end, 3.0),
+        "fine": 2000 if len(rate.nodes) < 1000 else 500,
         "colors": [theme.ORANGE, theme.BLUE],
     }
     return Screen(
@@ -51,9 +52,9 @@ def energy_and_step(subject: Subject) -> Screen:
         f"sixteenth of the error, a tenth of the step a ten-thousandth. Measured here: a factor of {number(measured)}. "
         "Euler's error is only halved.</p>"
         + table("rk4: largest error of a coordinate", ["dt [s]", "at the end"], rows),
-        "Move dt. Orange: Euler's energy over time; blue: that of rk4. The dashed line is the energy at the start.",
+        "Move the number of steps. Orange: Euler's energy over time; blue: that of rk4; dashed: that of rk4 with very small steps.",
         play if len(rate.nodes) <= LARGEST else None,
-        "Of a braked system energy falls by right: the line to compare with is then the one of the smallest step.",
+        "Of a braked system energy falls by right: the line to compare with is the dashed one.",
     )
 
 

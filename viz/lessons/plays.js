@@ -45,20 +45,22 @@ function grid(board, header) {
     }))),
   );
 }
+/** The width of what holds a picture, so that its letters are as large as they say. */
+const width = (svg) => svg.parentElement.clientWidth - 16 || 620;
 /** Bars beside one another, in groups: {name: [values]}. */
 function bars(svg, groups, colors) {
   const entries = Object.entries(groups), height = 34;
-  const largest = Math.max(1e-300, ...entries.flatMap(([, values]) => values.map(Math.abs).filter(Number.isFinite)));
-  const wide = 620, middle = 340, scale = 240 / largest;
+  const largest = Math.max(Number.MIN_VALUE, ...entries.flatMap(([, values]) => values.map(Math.abs).filter(Number.isFinite)));
+  const wide = width(svg), names = Math.min(90, wide / 4), middle = names + (wide - names) / 2, scale = (wide - middle) / largest;
   svg.setAttribute("viewBox", `0 0 ${wide} ${entries.length * height + 4}`);
   svg.replaceChildren(
     drawn("line", { x1: middle, x2: middle, y1: 0, y2: entries.length * height, class: "axis" }),
     ...entries.flatMap(([name, values], i) => [
       drawn("text", { x: 0, y: i * height + 20 }, name),
       ...values.flatMap((value, k) => {
-        const width = Number.isFinite(value) ? Math.abs(value) * scale : 0, thick = (height - 8) / values.length;
-        return [drawn("rect", { x: value < 0 ? middle - width : middle, y: i * height + 4 + k * thick, width, height: thick - 1,
-          fill: colors[k % colors.length] })];
+        const long = Number.isFinite(value) ? Math.abs(value) * scale : 0, thick = (height - 8) / values.length;
+        return [drawn("rect", { x: value < 0 ? middle - long : middle, y: i * height + 4 + k * thick, width: long,
+          height: thick - 1, fill: colors[k % colors.length] })];
       }),
     ]),
   );
@@ -149,28 +151,35 @@ const PLAYS = {
   energy(board, play) {
     const rate = evaluator(play.rate), total = evaluator(play.energy);
     const names = [...numbered("q", play.nq), ...numbered("qd", play.n)];
-    let dt = 0.03;
-    slider(board, "dt [s]", -3, -0.7, 0.05, Math.log10(dt), (x) => { dt = 10 ** x; draw(); }, (x) => digits(10 ** x));
-    const svg = board.appendChild(drawn("svg", { role: "img", "aria-label": "Energy over time", viewBox: "0 0 620 260" }));
+    const energies = (method, steps) => motion(rate, play.values, names, play.t_end / steps, steps, method).map((state) => {
+      const at = { ...play.values };
+      names.forEach((name, i) => { at[name] = state[i]; });
+      return total(at).E;
+    });
+    const fine = play.fine, exact = energies("rk4", fine);
+    let steps = 100;
+    slider(board, "steps", 1, 3, 0.05, 2, (x) => { steps = Math.round(10 ** x); draw(); }, (x) => String(Math.round(10 ** x)));
+    const svg = board.appendChild(drawn("svg", { role: "img", "aria-label": "Energy over time" }));
     const words = board.appendChild(element("p", { role: "status" }));
     const draw = () => {
-      const steps = Math.ceil(play.t_end / dt);
-      const curves = ["euler", "rk4"].map((method) => motion(rate, play.values, names, dt, steps, method).map((state) => {
-        const at = { ...play.values };
-        names.forEach((name, i) => { at[name] = state[i]; });
-        return total(at).E;
-      }));
-      const start = curves[1][0], off = curves.map((curve) => curve.map((e) => Math.abs(e - start)));
-      const reach = Math.max(1e-12 * Math.max(1, Math.abs(start)), Math.min(Math.max(...off[0]), 4 * Math.abs(start) + 1e-3));
-      const x = (k) => 50 + (560 * k) / steps, y = (e) => 130 - 110 * Math.max(-1.1, Math.min(1.1, (e - start) / reach));
+      const curves = ["euler", "rk4"].map((method) => energies(method, steps));
+      const right = (i) => exact[Math.round((i * fine) / steps)] ?? NaN;
+      const off = curves.map((curve) => Math.max(...curve.map((e, i) => Math.abs(e - right(i))).filter(Number.isFinite)));
+      const known = exact.filter(Number.isFinite), low = Math.min(...known), high = Math.max(...known);
+      const reach = Math.max((high - low) / 2, Math.min(off[0], 2 * Math.max(Math.abs(low), Math.abs(high))), Number.MIN_VALUE);
+      const wide = width(svg), middle = (low + high) / 2;
+      const x = (share) => 24 + (wide - 30) * share;
+      const y = (e) => 120 - 100 * Math.max(-1.1, Math.min(1.1, (e - middle) / reach));
+      const line = (curve, count, look) => drawn("polyline", { fill: "none", "stroke-width": 2, ...look,
+        points: curve.flatMap((e, i) => (Number.isFinite(e) ? [`${x(i / count).toFixed(1)},${y(e).toFixed(1)}`] : [])).join(" ") });
+      svg.setAttribute("viewBox", `0 0 ${wide} 256`);
       svg.replaceChildren(
-        drawn("line", { x1: 50, x2: 610, y1: 130, y2: 130, class: "axis", "stroke-dasharray": "4 4" }),
-        drawn("text", { x: 0, y: 126 }, "E"), drawn("text", { x: 540, y: 255 }, `t = ${digits(play.t_end)} s`),
-        ...curves.map((curve, k) => drawn("polyline", { fill: "none", stroke: play.colors[k], "stroke-width": 2,
-          points: curve.map((e, i) => `${x(i).toFixed(1)},${y(e).toFixed(1)}`).join(" ") })),
+        drawn("text", { x: 0, y: 124 }, "E"), drawn("text", { x: wide - 80, y: 252 }, `t = ${digits(play.t_end)} s`),
+        ...curves.map((curve, k) => line(curve, steps, { stroke: play.colors[k] })),
+        line(exact.filter((_, i) => i % 10 === 0), fine / 10, { class: "axis", "stroke-dasharray": "5 4", "stroke-width": 1 }),
       );
-      words.textContent = `Energy at the start ${digits(start)} J; largest change by Euler ${digits(Math.max(...off[0]))} J, ` +
-        `by rk4 ${digits(Math.max(...off[1]))} J.`;
+      words.textContent = `Step ${digits(play.t_end / steps)} s. Largest error of the energy: Euler ${digits(off[0])} J, ` +
+        `rk4 ${digits(off[1])} J.`;
     };
     draw();
   },

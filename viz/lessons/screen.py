@@ -10,13 +10,15 @@ from typing import Any
 
 from ..pages import html
 
+TOO_LARGE = "The graphs of this system are too large to be computed many times a second in a page."
+
 
 @dataclass(frozen=True)
 class Screen:
     """A story, a question with choices, what is revealed, and something to play with; texts are HTML.
 
-    answer: the number of the right choice.  play: what the page's script draws, {"kind": .., ..}; none where a system
-    is too large for it, which `play_words` then says.  note: for the teacher, beside the answer.
+    answer: the number of the right choice.  play: what the page's script draws, {"kind": .., ..}; None where a system is
+    too large for it, which the screen then says.  note: for the teacher, beside the answer.
     """
 
     anchor: str
@@ -43,7 +45,7 @@ class Screen:
             f'<div class="predict" role="group" aria-label="Predict"><p><b>Predict.</b> {self.question}</p>'
             f'<div class="choices">{choices}</div><p class="verdict" role="status"></p></div>\n'
             f'<details class="reveal"><summary>Reveal</summary>\n{self.reveal}\n</details>\n'
-            f'<div class="play"><h3>Play</h3><p>{self.play_words}</p><div class="board"></div></div>\n</section>'
+            f'<div class="play"><h3>Play</h3><p>{self.play_words if self.play else TOO_LARGE}</p><div class="board"></div></div>\n</section>'
         )
 
     def answer_html(self, number: int) -> str:

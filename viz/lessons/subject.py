@@ -83,7 +83,7 @@ class Subject:
         """Sliders for inputs, with what they are called."""
         return [
             {"name": name, "shown": self.shown(name), "low": low, "high": high, "value": self.values[name]}
-            for name in names[:SHOWN]
+            for name in names
         ]
 
     def shown(self, name: str) -> str:
@@ -94,9 +94,8 @@ class Subject:
 def subject_of(model: Model) -> Subject:
     """A model in a state that moves at every joint. Raises TypeError for what has no Lagrangian."""
     scene = of_model(model)
-    system = scene.system
-    if not any(scene.q):
-        scene = moving_start(scene)
+    system = scene.system  # a first-order one has none
+    scene = moving_start(scene)
     q, qd, qdd = np.array(scene.q), _in_turn(_SPEEDS, system.n), _in_turn(_ACCELERATIONS, system.n)
     if len(system.constraints):
         q, qd = consistent_state(scene, q, qd)

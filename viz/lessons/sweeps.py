@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import cotangents
@@ -10,7 +12,7 @@ from dynamics import inverse_dynamics
 from .screen import Screen
 from .subject import Subject, lagrangian_graph
 
-ROWS = 40  # nodes that the page walks through
+ROWS = 120  # nodes that the page walks through
 
 
 def sweeps(subject: Subject) -> Screen:
@@ -53,8 +55,8 @@ def _rows(subject: Subject, graph: Graph) -> list[dict[str, object]]:
         {
             "node": number[node],
             "text": _text(node, number, subject),
-            "value": value,
-            "slope": slope,
+            "value": value if math.isfinite(value) else None,
+            "slope": slope if math.isfinite(slope) else None,
             "what": _what(node),
         }
         for node, value, slope in zip(nodes, values.tolist(), slopes.tolist(), strict=True)

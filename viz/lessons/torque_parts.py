@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from html import escape
+
 import numpy as np
 
 from cgraph.extend import Array
@@ -11,6 +13,7 @@ from .screen import Screen, number, table
 from .subject import LARGEST, SHOWN, Subject
 
 PARTS = ("inertia: what q̈ takes", "velocity: Coriolis, centrifugal, damping", "position: weight and springs")
+MOVED = 3  # joints with three sliders
 
 
 def torque_parts(subject: Subject) -> Screen:
@@ -19,15 +22,15 @@ def torque_parts(subject: Subject) -> Screen:
     parts = _parts(subject)
     joint = int(np.abs(parts).sum(axis=0).argmax())
     sizes = np.abs(parts[:, joint])
-    name = subject.joints[joint]
+    name = escape(subject.joints[joint])
     state = ", ".join(
-        f"{subject.shown(f'{kind}{i}')} = {number(subject.values[f'{kind}{i}'])}"
+        f"{escape(subject.shown(f'{kind}{i}'))} = {number(subject.values[f'{kind}{i}'])}"
         for i in range(min(system.n, SHOWN))
         for kind in (("q", "qd", "qdd") if system.nq == system.n else ("qd", "qdd"))
     )
     rows = [[joint_name, *[number(value) for value in column], number(column.sum())]
             for joint_name, column in zip(subject.joints[:SHOWN], parts.T, strict=False)]  # fmt: skip
-    states = [f"{kind}{i}" for i in range(min(system.n, SHOWN)) for kind in ("q", "qd", "qdd")]
+    states = [f"{kind}{i}" for i in range(min(system.n, MOVED)) for kind in ("q", "qd", "qdd")]
     play = {
         "kind": "parts",
         "graph": subject.graph(graph),
