@@ -15,9 +15,12 @@ from ..plots.direct_labels import Line, Panel, labeled
 from .part import Part, pictures
 
 
-def embedding() -> Part:
-    """The law of the embedding: torque error against dt."""
-    laws = embedding_errors()
+LINKS = (1, 2, 3, 6)
+
+
+def embedding(links: Sequence[int] = LINKS) -> Part:
+    """The law of the embedding: torque error against dt.  links: of the arms."""
+    laws = embedding_errors(links)
     drawn = pictures("law", labeled(_panels(laws), shared=False, room=0.5))
     header = ("formulation", "links", "slope", "largest entry of the limit [N m]", "error at dt = 1e-6 s [N m]")
     rows = [

@@ -26,6 +26,7 @@ STYLE: dict[Any, Any] = {
     "axes.labelcolor": theme.TEXT,
     "svg.hashsalt": "cgraph",  # the same ids in every run
 }
+WAY = 400  # points of a way that is drawn, at most
 GRID: dict[str, Any] = {"color": "#808080", "alpha": 0.25, "linewidth": 0.6}  # on white and on black
 
 
@@ -102,6 +103,7 @@ def snapshots(
         reach = 1.08 * np.abs(positions[..., 0]).max()
         low, high = positions[..., 1].min() - 0.15 * reach, positions[..., 1].max() + 0.15 * reach
         columns = -(-len(instants) // 2)
+        stride = max(1, len(times) // WAY)
         panel = 9.0 / columns  # inches; equal scales fix the height
         figure = empty_figure(9.0, 2 * (0.86 * panel * (high - low) / (2 * reach) + 0.42) + 0.3)
         axes = figure.subplots(2, columns, sharex=True, sharey=True)
@@ -110,7 +112,7 @@ def snapshots(
             for joint in range(1, positions.shape[1]):
                 color = theme.LINKS[(joint - 1) % len(theme.LINKS)]
                 if traces:
-                    axis.plot(*positions[: row + 1, joint].T, color=color, linewidth=1.1, alpha=0.75)
+                    axis.plot(*positions[: row + 1, joint][::-stride].T, color=color, linewidth=1.1, alpha=0.75)
                 axis.plot(*positions[row, joint - 1 : joint + 1].T, color=color, linewidth=5, solid_capstyle="round")
             axis.plot(*positions[row, :-1].T, "o", color="white", markeredgecolor=theme.LINE, markersize=5.5)
             if dots is not None:

@@ -68,7 +68,9 @@ def test_a_line_is_a_figure_and_a_long_name_stays_in_one() -> None:
     assert stability._lines(ROWS[3])[0][4] == "nan ✗"
 
 
-def test_success_does_not_stand_in_the_box_of_a_warning() -> None:
+def test_success_does_not_stand_in_the_box_of_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stability, "shares", lambda rows: None)
+    monkeypatch.setattr(stability, "to_adaptive_svg", lambda figure: "<svg/>")
     right = {**CONTENT, "sections": [{"name": "Cases", "about": "", "rows": ROWS[:3]}]}
     assert 'class="warning"' not in to_html(stability.document(right))
     assert '<p class="warning">1 of 4 rows' in to_html(stability.document(CONTENT))

@@ -158,7 +158,7 @@ def test_times_have_units(value: float | None, text: str) -> None:
 MEASURED = ["report", "spring_mass", "--quick", "--methods", "rk4,dop853", "--peers", ""]
 
 
-def test_the_command_writes_whole_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_writes_whole_files(tmp_path: Path, capsys: pytest.CaptureFixture[str], undrawn: None) -> None:
     pytest.importorskip("flint")
     assert cli.main([*MEASURED, "--t-end", "2", "--start", "1,0.5", "--out", str(tmp_path / "r")]) == 0
     assert "spring_mass.html: 2 integrators" in capsys.readouterr().out
