@@ -14,7 +14,6 @@ from ..pages.formulations import COLORS, TITLES
 from ..plots.direct_labels import Line, Panel, labeled
 from .part import Part, pictures
 
-
 LINKS = (1, 2, 3, 6)
 
 
