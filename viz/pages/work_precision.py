@@ -13,7 +13,6 @@ from .document import Block, Document, Paragraph, Picture, Section, Table, left_
 Content = Mapping[str, Any]  # what `to_dict()` of the report gives, or its JSON file
 EQUAL, CHOSEN = "equal steps", "chosen steps"
 DRAWN = 3.0  # errors above are no motion of this kind any more
-MAKERS = {"scipy:": 1, "heyoka": 2, "CVODES": 3, "MuJoCo": 4}  # a color for what comes from one maker; ours is 0
 
 
 def work_precision(content: Content) -> Document:
@@ -123,8 +122,8 @@ def _panels(content: Content, x: str, name: str) -> tuple[list[Panel], list[str]
     return [panel for panel in panels if any(len(line.x) for line in panel.lines)], shown
 
 
-def _maker(name: str) -> int:
-    return next((color for begin, color in MAKERS.items() if name.startswith(begin)), 4)
+def _maker(name: str) -> str:
+    return next((color for begin, color in theme.MAKERS.items() if name.startswith(begin)), theme.GRAY)
 
 
 def _best(ours: Sequence[Mapping[str, Any]], content: Content) -> list[Mapping[str, Any]]:
@@ -141,14 +140,14 @@ def _best(ours: Sequence[Mapping[str, Any]], content: Content) -> list[Mapping[s
     return [reached[min(times)[1]][1]]
 
 
-def _line(curve: Mapping[str, Any], x: str, y: str, color: int, dashed: bool, before: str = "") -> Line:
+def _line(curve: Mapping[str, Any], x: str, y: str, color: int | str, dashed: bool, before: str = "") -> Line:
     """A curve's points in two of their columns, those without a number or far off left out."""
     shown = [(point[x], point[y]) for point in curve["points"] if point[x] and point[y] and _drawn(point)]
     name = before + curve["name"].removeprefix("MuJoCo ")
     return Line(name, [a for a, _ in shown], [b for _, b in shown], color, dashed)
 
 
-def _look(curve: Mapping[str, Any]) -> tuple[int, bool]:
+def _look(curve: Mapping[str, Any]) -> tuple[int | str, bool]:
     """Color and dashes of a curve, the same on every page: one for every method of ours, and every maker of others."""
     if not curve["ours"]:
         return _maker(curve["name"]), False

@@ -20,6 +20,7 @@ pytest.importorskip("matplotlib")
 
 from dynamics import METHODS
 from viz import theme
+from viz.plots.direct_labels import COLORS
 from viz.pages.work_precision import _look, _power, _time, work_precision
 
 
@@ -106,6 +107,11 @@ def test_a_method_has_one_color_on_every_page() -> None:
     assert set(theme.METHODS) == set(METHODS)
     looks = [_look({"name": name, "ours": True}) for name in theme.METHODS]
     assert len({(number % 5, number // 5) for number, _ in looks}) == len(METHODS)
+    ours = {COLORS[number % 5] for number, _ in looks}
+    others = [
+        _look({"name": name, "ours": False})[0] for name in ("scipy:RK45", "heyoka Taylor", "CVODES", "MuJoCo RK4")
+    ]
+    assert len(ours | set(others)) == len(ours) + len(others)
     assert _look({"name": "rk4, side by side", "ours": True}) != _look({"name": "dopri5", "ours": True})
 
 
