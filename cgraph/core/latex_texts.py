@@ -40,7 +40,11 @@ def name_texts(names: Iterable[str]) -> dict[str, str]:
 
 def _name(name: str) -> str:
     r"""q0 is q_{0}, qd.knee is \dot{q}_{knee}, M_0_1 is M_{0,1}, and p0_dot is \dot{p}_{0}."""
-    match = re.fullmatch(r"([A-Za-z]+)(\d*)((?:[_.][A-Za-z0-9]+)*)", name)
+    kind, dot, called = name.partition(".")
+    if dot and re.fullmatch(r"[A-Za-z]+(_[A-Za-z]+)*", kind) and called:
+        text, index = _name(kind), called if len(called) == 1 or called.isdigit() else literal(called)
+        return f"{text[:-1]},{index}}}" if "_{" in text else f"{text}_{{{index}}}"
+    match = re.fullmatch(r"([A-Za-z]+)(\d*)((?:_[A-Za-z0-9]+)*)", name)
     if match is None:
         return literal(name)
     word, digits, rest = match.groups()

@@ -113,7 +113,7 @@ def _teacher(subject: Subject, screens: Sequence[Screen]) -> str:
     equations = "".join([f"<p>{name}</p>{formula(graph, subject.scene_names)}" for name, graph in graphs.items()])
     return (
         '<details class="teacher"><summary>For the teacher: answers, and equations as LaTeX</summary>\n'
-        f"<ol>{answers}</ol>\n<p>About {minutes} minutes: predict alone, tell a neighbor, reveal, explain in one sentence, "
+        f"<ul>{answers}</ul>\n<p>About {minutes} minutes: predict alone, tell a neighbor, reveal, explain in one sentence, "
         "then play. Letters choose, arrows turn the pages, Tab and Enter do all else. The address keeps the guesses: a "
         "bookmark is a score. Printed, every screen has a page for the pupils, and this is the last.</p>\n"
         f"{equations}\n</details>"

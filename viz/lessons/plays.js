@@ -97,11 +97,15 @@ const PLAYS = {
     button(buttons, "All slopes", () => { step = 2 * count; draw(); });
     button(buttons, "Again", () => { step = 0; draw(); });
     const write = grid(board, ["node", "is", "value", "slope of L", ""]);
-    const draw = () => write(
-      rows.map((row, i) => [row.node, row.text, i < step ? digits(row.value) : "·",
-        2 * count - i <= step ? digits(row.slope) : "·", 2 * count - i <= step ? row.what : ""]),
-      (i, j) => (j === 2 && i === step - 1) || (j === 3 && 2 * count - i === step) ? "lit" : "",
-    );
+    const draw = () => {
+      const now = step > count ? 2 * count - step : step - 1; // the row whose value or slope is new
+      write(
+        rows.map((row, i) => [row.node, row.text, i < step ? digits(row.value) : "·",
+          2 * count - i <= step ? digits(row.slope) : "·", 2 * count - i <= step ? row.what : ""]),
+        (i, j) => (i === now && j === (step > count ? 3 : 2) ? "lit" : ""),
+      );
+      rows.forEach((row, i) => document.getElementById(row.box)?.classList.toggle("lit", i === now));
+    };
     draw();
   },
   parts(board, play) {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -32,6 +33,7 @@ class Screen:
     play_words: str
     play: Mapping[str, Any] | None
     note: str
+    picture: str = ""  # what the play is about
 
     def to_html(self, number: int) -> str:
         """The screen as a section of the page."""
@@ -45,7 +47,7 @@ class Screen:
             f'<div class="predict" role="group" aria-label="Predict"><p><b>Predict.</b> {self.question}</p>'
             f'<div class="choices">{choices}</div><p class="verdict" role="status"></p></div>\n'
             f'<details class="reveal"><summary>Reveal</summary>\n{self.reveal}\n</details>\n'
-            f'<div class="play"><h3>Play</h3><p>{self.play_words if self.play else TOO_LARGE}</p><div class="board"></div></div>\n</section>'
+            f'<div class="play"><h3>Play</h3><p>{self.play_words if self.play else TOO_LARGE}</p>{self.picture}<div class="board"></div></div>\n</section>'
         )
 
     def answer_html(self, number: int) -> str:
@@ -66,6 +68,12 @@ def image(svg: str, caption: str) -> str:
         f'<figure><img src="data:image/svg+xml;base64,{data}" alt="{escape(caption)}">'
         f"<figcaption>{escape(caption)}</figcaption></figure>"
     )
+
+
+def inline(svg: str, name: str, about: str) -> str:
+    """A drawing of a graph whose nodes the page's script can light up; its ids begin with the name."""
+    svg = re.sub(r'\bid="', f'id="{name}-', svg)
+    return f'<div class="graph-picture" role="img" aria-label="{escape(about)}">{svg}</div>'
 
 
 def table(caption: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import cotangents
+from cgraph.extend import Names, cotangents
 from dynamics import inverse_dynamics
 
-from .screen import Screen
+from ..graph_drawing.dot import to_dot
+from ..graph_drawing.render import render_svg
+from ..graph_drawing.short_formulas import short_formulas
+from .screen import Screen, inline
 from .subject import Subject, lagrangian_graph
 
 ROWS = 120  # nodes that the page walks through
+DRAWN = 40  # nodes, at most, of a graph that is drawn
 
 
 def sweeps(subject: Subject) -> Screen:
@@ -40,7 +45,17 @@ def sweeps(subject: Subject) -> Screen:
         + (f" Of {len(graph.nodes)} nodes the last {ROWS} are shown." if len(graph.nodes) > ROWS else ""),
         {"kind": "sweeps", "rows": _rows(subject, graph)},
         "Forward mode would take a sweep for each input; backward mode one for each output, and L is one number.",
+        _picture(subject, graph),
     )
+
+
+def _picture(subject: Subject, graph: Graph) -> str:
+    """The graph of L, where it is small enough."""
+    if len(graph.nodes) > DRAWN:
+        return ""
+    formulas = short_formulas(graph, subject.names)
+    drawing = to_dot(graph, names=subject.names, formulas=formulas, clusters=False, legend=False)
+    return inline(render_svg(drawing), "sweep", "The graph of L")
 
 
 def _rows(subject: Subject, graph: Graph) -> list[dict[str, object]]:
@@ -50,11 +65,14 @@ def _rows(subject: Subject, graph: Graph) -> list[dict[str, object]]:
     bars = cotangents({end: cg.constant(1.0)}, nodes)
     values = subject.evaluate(Graph(graph.inputs, {str(k): node for k, node in enumerate(nodes)}))
     slopes = subject.evaluate(Graph(graph.inputs, {str(k): bar for k, bar in enumerate(bars)}))
-    number = {node: f"v{k}" for k, node in enumerate(nodes, start=1)}
+    place = {node: k for k, node in enumerate(graph.nodes)}
+    numbers = Names(graph).number  # those of the listing, and of the equations on the page
+    called = {node: f"v{numbers[node]}" if node.args else subject.shown(str(node.name)) for node in nodes}
     return [
         {
-            "node": number[node],
-            "text": _text(node, number, subject),
+            "node": called[node],
+            "box": f"sweep-n{place[node]}",
+            "text": _text(node, called) if node.args else "",
             "value": value if math.isfinite(value) else None,
             "slope": slope if math.isfinite(slope) else None,
             "what": _what(node),
@@ -63,18 +81,9 @@ def _rows(subject: Subject, graph: Graph) -> list[dict[str, object]]:
     ]
 
 
-def _text(node: Node, number: dict[Node, str], subject: Subject) -> str:
-    """A leaf's name, or the operation on its arguments, these by name or number."""
-    if not node.args:
-        return subject.shown(str(node.name))
-    parts = [
-        f"{arg.value:.4g}"
-        if arg.value is not None
-        else number.get(arg, "…")
-        if arg.args
-        else subject.shown(str(arg.name))
-        for arg in node.args
-    ]
+def _text(node: Node, called: Mapping[Node, str]) -> str:
+    """The operation on its arguments, these by name or number."""
+    parts = [f"{arg.value:.4g}" if arg.value is not None else called.get(arg, "…") for arg in node.args]
     if node.op.infix:
         return f" {node.op.symbol} ".join(parts)
     return f"{node.op.symbol}{parts[0]}" if node.op.signs else f"{node.op.name}({', '.join(parts)})"

@@ -75,6 +75,7 @@ def test_names_become_letters_with_dots_and_indices() -> None:
     expected = {
         "q0": "q_{0}", "qd12": r"\dot{q}_{12}", "qdd1": r"\ddot{q}_{1}", "tau0": r"\tau_{0}", "M_0_1": "M_{0,1}",
         "p0_dot": r"\dot{p}_{0}", "q_bar": r"\bar{q}", "dt": r"\mathrm{dt}", "qd.knee": r"\dot{q}_{\mathrm{knee}}",
+        "q_old.joint 1": r"q_{\mathrm{old},\mathrm{joint~1}}",
         "link 2": r"\mathrm{link~2}", "50%": r"\mathrm{50\%}",
     }  # fmt: skip
     assert name_texts(expected) == expected

@@ -17,6 +17,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 import viz
+from cgraph.extend import OPS
 from tests.tolerances import EQUATIONS
 from viz import cli
 from viz.inspector.operations import operations
@@ -24,7 +25,8 @@ from viz.lessons import lesson as module
 from viz.lessons.closed_loop import closed_loop
 from viz.lessons.elimination import elimination
 from viz.lessons.euler_edge import euler_edge
-from viz.lessons.subject import subject_of
+from viz.lessons.subject import lagrangian_graph, subject_of
+from viz.lessons.sweeps import sweeps
 from viz.lessons.torque_parts import torque_parts
 
 VOID = {"meta", "br", "img", "link", "input", "hr"}
@@ -137,6 +139,21 @@ def test_the_error_by_definition_tends_to_the_slope_of_the_lagrangian(subject):
     if slope > 1e-6:
         (last,) = re.findall(r"largest error is ([−\d.e]+)\.", screen.note)
         assert float(last.replace("−", "-")) == pytest.approx(slope, rel=1e-3)
+
+
+def test_slopes_of_the_sweeps_are_momenta_under_the_numbers_of_the_listing(subject):
+    rows = sweeps(subject).play["rows"]
+    momenta = subject.evaluate(dyn.momentum(subject.system))
+    slopes = {row["node"]: row["slope"] for row in rows if row["what"].startswith("p")}
+    assert all(slopes[subject.shown(f"qd{i}")] == pytest.approx(p, rel=1e-9, abs=1e-12) for i, p in enumerate(momenta)
+               if subject.shown(f"qd{i}") in slopes)  # fmt: skip
+    assert slopes
+    listing = lagrangian_graph(subject.system).listing()
+    operations = [row for row in rows if row["node"][0] == "v" and row["text"]]
+    for row in operations[-3:]:
+        (line,) = re.findall(rf"^%{row['node'][1:]} = .*$", listing, re.MULTILINE)
+        (op,) = re.findall(r"= (\w+)", line)
+        assert OPS[op].symbol in row["text"] or op in row["text"]
 
 
 def test_parts_of_a_torque_add_up(subject):

@@ -20,8 +20,8 @@ pytest.importorskip("matplotlib")
 
 from dynamics import METHODS
 from viz import theme
-from viz.plots.direct_labels import COLORS
 from viz.pages.work_precision import _look, _power, _time, work_precision
+from viz.plots.direct_labels import COLORS
 
 
 def point(knob: float, seconds: float, error: float | None, **others: Any) -> dict[str, Any]:
