@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -221,6 +223,35 @@ class Trajectory:
         if self.dense is None:
             raise ValueError("the run kept its rows alone: simulate(.., dense_output=True) keeps what is between them")
         return self.dense(t)
+
+    def to_csv(self) -> str:
+        """The rows as CSV: t, coordinates, velocities and energy by their names, every digit of the numbers.
+
+        Returns
+        -------
+        str
+            A line of names, as "t", "q.elbow", "qd.elbow", "energy" (of an OdeSystem "t" and its states), and a line
+            for each row.
+
+        Examples
+        --------
+        >>> import dynamics as dyn
+        >>> run = dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.5], [0.0], t_end=1.0, t_eval=[0.0, 1.0])
+        >>> run.to_csv().splitlines()[0]
+        't,q.joint 1,qd.joint 1,energy'
+        """
+        names, columns = ["t"], [self.t[:, np.newaxis], self.q]
+        if self.velocities:
+            names += [f"q.{name}" for name in self.coordinates] + [f"qd.{name}" for name in self.velocities]
+            columns += [self.qd, self.energy[:, np.newaxis]]
+            names.append("energy")
+        else:
+            names += self.coordinates
+        text = io.StringIO()
+        rows = csv.writer(text, lineterminator="\n")
+        rows.writerow(names)
+        rows.writerows(np.concatenate(columns, axis=1).tolist())
+        return text.getvalue()
 
     @cached_property
     def qdd(self) -> Array:
