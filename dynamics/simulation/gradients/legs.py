@@ -84,7 +84,7 @@ class Legs:
     def pulled(self, end: Bars) -> tuple[Array, Array, Array]:
         """Cotangents of the start of the motion, of its inputs, and rows of each step, from those of its end."""
         inputs = end.inputs.copy()
-        names, forces, values = self.programs.step.passes.varied, self.motion.forces, len(self.motion.values)
+        names, lengths = self.programs.step.passes.varied, self.motion.equations.lengths
         last = self.motion.legs[-1].event
         if last and self.events[last].reset is not None:
             end = self._before(len(self.runs), end, inputs)
@@ -94,7 +94,7 @@ class Legs:
             if leg.event:
                 end, later = self._through(run, self.events[leg.event], end, inputs)
             bars, rows = run.pulled({"x": end.x, LOSS: 1.0})
-            more = [bars.get(name, np.zeros((n, *inputs.shape[1:]))) for name, n in (("tau", forces), ("p", values))]
+            more = [bars.get(name, np.zeros((n, *inputs.shape[1:]))) for name, n in lengths.items()]
             inputs += np.concatenate(more)
             if k == 0:
                 return bars["x"], inputs, rows

@@ -23,6 +23,7 @@ from ..run_options import RunOptions, time_span
 from ..sampled_controller import SampledController
 from ..simulate import simulate
 from ..trajectory import Trajectory
+from .motion_equations import PARAMETERS, MotionEquations, motion_equations
 
 START, VELOCITY, TORQUE = "q", "qd", "tau"
 
@@ -60,22 +61,47 @@ class MotionOf:
     x: (m,), where it starts.
     legs: its parts.  t, h: (steps + 1,), where the steps begin and the last one ends, and (steps,), their lengths.
     tau: the applied forces that are inputs, (forces,), or where they change with the steps, (steps, forces).
-    values: of the parameters that stay inputs.  wrt: names.  applied: the whole applied force as nodes.
+    values: of the parameters p that stay inputs, and of the numbers c.  wrt: names.
+    applied: the whole applied force as nodes.  backend: of what is compiled.
     Of N motions side by side x, tau and values have an axis of N besides, the last.
     """
 
-    problem: Problem
+    equations: MotionEquations
     method: Method
     x: Array
     legs: tuple[Leg, ...]
     t: Array
     h: Array
     tau: Array
-    forces: int
     each_step: bool
     values: Array
     wrt: tuple[str, ...]
     applied: Sequence[Node] | None
+    backend: str
+
+    @property
+    def problem(self) -> Problem:
+        """What moves."""
+        return self.equations.problem
+
+    @property
+    def forces(self) -> int:
+        """How many of the applied forces are inputs."""
+        return self.equations.forces
+
+    def at_end(self, x: Array, t: float) -> Array:
+        """The inputs of a graph over the states, t and parameters, at a state and an instant of the last step."""
+        return np.concatenate([x, np.full((1, *x.shape[1:]), t), self.force_at_end, self.values])
+
+    @property
+    def by_parameters(self) -> bool:
+        """Whether derivatives by parameters are wanted."""
+        return not set(self.wrt).isdisjoint(self.equations.names)
+
+    def parameters_at(self, tau: Array) -> dict[str, Array]:
+        """The registers of forces and parameters."""
+        count = len(self.equations.names)
+        return dict(zip(PARAMETERS, (tau, self.values[:count], self.values[count:]), strict=True))
 
     @property
     def many(self) -> int:
@@ -134,21 +160,22 @@ def motion_of(
     else:
         legs = (equal_leg(run, None if rows is None else len(rows)),)
     constant = np.array([start.bound[name] for name in inputs])
-    values = np.array([start.bound[name] for name in problem.parameters if name not in inputs])
+    equations = motion_equations(problem, len(inputs))
+    values = np.array([start.bound[name] for name in equations.names])
     forces = constant if rows is None else rows
     return MotionOf(
-        problem,
+        equations,
         METHODS[method],
         start.x,
         legs,
         np.empty(0),  # of steps, before the legs are run
         np.empty(0),
         forces,
-        len(inputs),
         rows is not None,
-        values,
+        equations.values(values, run.backend),
         chosen,
         applied.nodes,
+        run.backend,
     )
 
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 
-import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Runner, runner
 
-from ...integrators import Method, Problem
+from ...integrators import Method
 from .linearization import Linearization, Linearized
+from .motion_equations import MotionEquations
 from .motion_steps import LOSS, MotionSteps, motion_steps
 
 KEPT = 16  # motions whose programs stay ready for another run
@@ -41,32 +41,24 @@ class MotionPrograms:
 
 @dataclass(frozen=True)
 class Request:
-    """What programs are made of; `running` is known by `key`, its structure."""
+    """What programs are made of."""
 
-    problem: Problem
+    equations: MotionEquations
     method: Method
-    forces: int
     each_step: bool
     wrt: tuple[str, ...]
     forwards: bool  # tangents pushed on, else cotangents pulled back
     backend: str
-    key: str = ""
-    running: Graph | None = field(default=None, compare=False)
-
-
-def request_key(running: Graph | None) -> str:
-    """What tells one running loss from another."""
-    return "" if running is None else str(cg.structure_hash(running))
+    running: Graph | None = None
 
 
 @lru_cache(KEPT)
 def motion_programs(request: Request) -> MotionPrograms:
     """The programs; of the last few requests, those made before."""
     steps = motion_steps(
-        request.problem,
+        request.equations,
         request.method,
         request.running,
-        forces=request.forces,
         each_step=request.each_step,
         wrt=request.wrt,
     )

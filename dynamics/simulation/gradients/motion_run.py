@@ -41,7 +41,7 @@ class MotionRun:
     def _begin(self) -> Array:
         """The memory before the first step."""
         motion, passes, forward = self.motion, self.start.passes, self.start.forward
-        given = {"t": motion.t[:1], "tau": motion.force_at_start, "p": motion.values}
+        given = {"t": motion.t[:1], **motion.parameters_at(motion.force_at_start)}
         memory = _memory(forward, {**given, passes.handed["x"]: motion.x}, motion.many)
         rows = _run(forward, memory, 1, 1, np.empty((1, 0))).rows
         self._start_tape = rows[:, : self.start.linear.program.feed_width]

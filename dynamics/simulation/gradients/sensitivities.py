@@ -115,8 +115,8 @@ def sensitivities(
     if motion.each_step:
         raise ValueError(f"tau must be constant, (n,), got shape {motion.tau.shape}: gradient takes a row a step")
     by = [TORQUE] if TORQUE in motion.wrt else []
-    by += ["p"] if len(motion.values) else []
-    request = Request(motion.problem, motion.method, motion.forces, False, tuple(by), forwards=True, backend=backend)
+    by += ["p", "c"] if motion.by_parameters else []
+    request = Request(motion.equations, motion.method, False, tuple(by), forwards=True, backend=backend)
     directions, columns = _directions(motion)
     run = Legs(motion, motion_programs(request), {}).runs[0]
     states, tangents = run.pushed(directions)
@@ -127,8 +127,9 @@ def sensitivities(
 
 def _directions(motion: MotionOf) -> tuple[dict[str, Array], dict[str, int | slice]]:
     """Tangents of x, tau and p, a column for each number of `wrt`; and where the columns of each name are."""
-    problem, nq = motion.problem, motion.problem.nq
-    names = problem.parameters[motion.forces :]
+    problem, nq, equations = motion.problem, motion.problem.nq, motion.equations
+    names = equations.names
+    along = equations.columns(motion.values[: len(names)], motion.backend) if motion.by_parameters else np.empty(0)
     blocks: dict[str, tuple[str, Array]] = {}
     for name in motion.wrt:
         if name == START:
@@ -140,9 +141,9 @@ def _directions(motion: MotionOf) -> tuple[dict[str, Array], dict[str, int | sli
         elif name == TORQUE:
             blocks[name] = TORQUE, np.eye(motion.forces)
         else:
-            blocks[name] = "p", np.eye(len(names))[:, [names.index(name)]]
+            blocks[name] = "p", along[:, [names.index(name)]]
     total = sum([block.shape[1] for _, block in blocks.values()])
-    rows = {"x": problem.size, TORQUE: motion.forces, "p": len(names)}
+    rows = {"x": problem.size, TORQUE: motion.forces, "p": len(along)}
     directions = {register: np.zeros((count, total)) for register, count in rows.items()}
     columns: dict[str, int | slice] = {}
     at = 0
@@ -151,6 +152,7 @@ def _directions(motion: MotionOf) -> tuple[dict[str, Array], dict[str, int | sli
         directions[register][:, at:end] = block
         columns[name] = slice(at, end) if name in (START, VELOCITY, TORQUE) else at
         at = end
+    directions |= {"p": directions["p"][: len(names)], "c": directions["p"][len(names) :]}
     return directions, columns
 
 
