@@ -103,7 +103,7 @@ class Legs:
             if leg.event:
                 h[-1] = 0.0  # which the event determines
             by_t, by_h = _slopes(leg)
-            begin = float(t @ by_t + h @ by_h) + float(bars["t"][0])
+            begin = float(t @ by_t + h @ by_h) + (float(bars["t"][0]) if "t" in bars else 0.0)
             end = self._before(k, Bars(bars["x"], begin, np.zeros(0)), inputs)
         raise AssertionError("a motion has at least one leg")
 

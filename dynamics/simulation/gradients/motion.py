@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,9 +24,10 @@ from ..run_options import RunOptions, time_span
 from ..sampled_controller import SampledController
 from ..simulate import simulate
 from ..trajectory import Trajectory
-from .motion_equations import PARAMETERS, MotionEquations, motion_equations
+from .motion_equations import KEPT, PARAMETERS, MotionEquations, motion_equations
 
 START, VELOCITY, TORQUE = "q", "qd", "tau"
+_PLAIN = (float, int, str, type(None))
 
 
 class Leg(NamedTuple):
@@ -181,7 +183,14 @@ def motion_of(
 
 def options_of(t_end: float, method: str, t0: float, options: Mapping[str, Any]) -> RunOptions:
     """The options of a run, by a method whose motions have derivatives. Raises ValueError for another."""
-    run = RunOptions(t_end, method, t0=t0, **options)
+    given = (t_end, method, t0, *options.items())
+    plain = all([type(each) in _PLAIN for each in (t_end, method, t0, *options.values())])
+    return _checked_options(*given) if plain else _checked_options.__wrapped__(*given)
+
+
+@lru_cache(KEPT)
+def _checked_options(t_end: float, method: str, t0: float, *options: tuple[str, Any]) -> RunOptions:
+    run = RunOptions(t_end, method, t0=t0, **dict(options))
     if run.scipy_solver is not None or METHODS[method].step is None:
         names = ", ".join([name for name, each in METHODS.items() if each.step is not None])
         raise ValueError(f"motions by method {method!r} have no derivatives here; those by {names} have")
@@ -208,7 +217,7 @@ def names_of(model: Model, wrt: str | Iterable[str] | None, *, closed: bool) -> 
     if wrt is None:
         return tuple(usual)
     names = [wrt] if isinstance(wrt, str) else require_sequence("wrt", wrt, "names")
-    known = [*usual, *inputs.parameters]
+    known = dict.fromkeys([*usual, *inputs.parameters])
     for name in names:
         if not isinstance(name, str) or name not in known:
             raise ValueError(f"wrt must be among {', '.join(known)}, got {name!r:.60}")

@@ -30,11 +30,11 @@ class Along:
 class MotionPrograms:
     """The programs of a motion.
 
-    start: from x to what the first step reads.  step: the steps, with the running loss where there is one.
+    start: from x to what the first step reads, if that is not x.  step: the steps, with the running loss where there is one.
     failed: a register that is not 0 after steps whose equations were not solved; empty where there is none.
     """
 
-    start: Along
+    start: Along | None
     step: Along
     failed: str
 
@@ -65,18 +65,15 @@ def motion_programs(request: Request) -> MotionPrograms:
     step, start = steps.step, steps.start
     if request.forwards:
         linear = step.tangent(step.inputs)
-        first = start.tangent(start.inputs)
+        first = start and start.tangent(start.inputs)
     else:
         linear = step.adjoint(["x", LOSS] if LOSS in step.handed else ["x"])
-        first = start.adjoint([name for name in linear.vectors if name in start.handed])
-    made = _along(steps, linear, first, request.backend)
-    return MotionPrograms(made[0], made[1], steps.failed)
+        first = start and start.adjoint([name for name in linear.vectors if name in start.handed])
+    results = [name for name in ("x", LOSS, steps.failed) if name in step.handed]
+    begins = start and first and _along(start, first, list(start.handed), request.backend)
+    return MotionPrograms(begins, _along(step, linear, results, request.backend), steps.failed)
 
 
-def _along(steps: MotionSteps, linear: Linearized, first: Linearized, backend: str) -> tuple[Along, Along]:
-    def along(passes: Linearization, linear: Linearized, results: list[str]) -> Along:
-        forward = passes.forward([*linear.program.feed, passes.handed["x"]], results)
-        return Along(passes, runner(forward, backend), linear, runner(linear.program, backend))
-
-    results = [name for name in ("x", LOSS, steps.failed) if name in steps.step.handed]
-    return along(steps.start, first, list(steps.start.handed)), along(steps.step, linear, results)
+def _along(passes: Linearization, linear: Linearized, results: list[str], backend: str) -> Along:
+    forward = passes.forward([*linear.program.feed, passes.handed["x"]], results)
+    return Along(passes, runner(forward, backend), linear, runner(linear.program, backend))

@@ -40,11 +40,15 @@ class MotionRun:
 
     def _begin(self) -> Array:
         """The memory before the first step."""
-        motion, passes, forward = self.motion, self.start.passes, self.start.forward
+        motion, start = self.motion, self.start
         given = {"t": motion.t[:1], **motion.parameters_at(motion.force_at_start)}
+        if start is None:
+            self.begin = motion.x
+            return _memory(self.step.forward, {**given, self.step.passes.handed["x"]: motion.x}, motion.many)
+        passes, forward = start.passes, start.forward
         memory = _memory(forward, {**given, passes.handed["x"]: motion.x}, motion.many)
         rows = _run(forward, memory, 1, 1, np.empty((1, 0))).rows
-        self._start_tape = rows[:, : self.start.linear.program.feed_width]
+        self._start_tape = rows[:, : start.linear.program.feed_width]
         self.begin = forward.read(memory, passes.handed["x"]).copy()
         self._start_constants = {name: forward.read(memory, name).copy() for name in passes.constants}
         handed = self.step.passes.handed
@@ -107,12 +111,14 @@ class MotionRun:
         """Cotangents of the start and of the inputs, from those after the last step; and rows, those of each step."""
         memory = self._linear_memory(self.step, self._constants, seeds)
         back = self.step.back
-        rows = np.empty((len(self.motion.h), back.program.width, *self.x.shape[1:]))
-        width = back.program.feed_width
+        width, parts = back.program.feed_width, []
         for first, last, tape in self.recorded(backwards=True):
-            pulled = _run(back, memory, last - first, 1, tape[::-1, :width]).rows
-            rows[first:last] = pulled[::-1] if back.program.record else 0.0
+            parts.append(_run(back, memory, last - first, 1, tape[::-1, :width]).rows)
+        count = (len(self.motion.h), back.program.width)
+        rows = (parts[0] if len(parts) == 1 else np.concatenate(parts))[::-1] if back.program.record else np.empty(count)
         bars = self._vectors(self.step, memory)
+        if self.start is None:
+            return bars, rows
         memory = self._linear_memory(self.start, self._start_constants, bars)
         _run(self.start.back, memory, 1, 1, self._start_tape)
         return self._vectors(self.start, memory), rows
@@ -128,9 +134,11 @@ class MotionRun:
         """States (steps + 1, m), and their tangents (steps + 1, m, k) along k directions of the start and inputs."""
         count, m, k = len(self.motion.h), len(self.x), next(iter(directions.values())).shape[1]
         states, tangents = np.empty((count + 1, m)), np.empty((count + 1, m, k))
-        memory = self._linear_memory(self.start, self._start_constants, directions)
-        _run_all(self.start.back, memory, self._start_tape)
-        memory = self._linear_memory(self.step, self._constants, {**directions, **self._vectors(self.start, memory)})
+        if self.start is not None:
+            memory = self._linear_memory(self.start, self._start_constants, directions)
+            _run_all(self.start.back, memory, self._start_tape)
+            directions = {**directions, **self._vectors(self.start, memory)}
+        memory = self._linear_memory(self.step, self._constants, directions)
         names = self.step.linear.vectors
         states[0], tangents[0] = self.begin, self.step.back.read(memory, names["x"])
         width = self.step.back.program.feed_width

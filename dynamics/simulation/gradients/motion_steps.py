@@ -24,11 +24,11 @@ LOSS = "loss"  # register: the running loss so far
 class MotionSteps:
     """The steps of a method.
 
-    start: from x to what the first step reads.  step: one step; fed t, h, and tau where it changes.
-    failed: a register of the step that is not 0 where its equations were not solved, or empty.
+    start: from x to what the first step reads; None where that is x.  step: one step; fed t, h, and tau where it
+    changes.  failed: a register of the step that is not 0 where its equations were not solved, or empty.
     """
 
-    start: Linearization
+    start: Linearization | None
     step: Linearization
     failed: str
 
@@ -66,7 +66,8 @@ def motion_steps(
     step = make(body, fed=fed, inputs=inputs_of_step, varied=varied, carried=carried)
     read = [name for name in (*step.handed, *step.constants) if name not in (*PARAMETERS, "t")]
     begin = [*_normalized(problem, TIME), *made.start]
-    start = make(begin, fed=(), inputs=[name for name in wrt if name != "h"], varied=(), carried=read)
+    inputs_of_start = [name for name in wrt if name != "h"]
+    start = make(begin, fed=(), inputs=inputs_of_start, varied=(), carried=read) if begin else None
     return MotionSteps(start, step, made.failed)
 
 
