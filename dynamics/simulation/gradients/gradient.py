@@ -176,6 +176,7 @@ def differentiated(
         tuple(by),
         forwards=False,
         backend=motion.backend,
+        many=motion.many > 0,
         running=total,
     )
     program = event_program(problem, watched)
@@ -197,7 +198,7 @@ def _final(graph: Graph | None, motion: MotionOf, legs: Legs) -> tuple[Any, Bars
 
 def _gradients(motion: MotionOf, start: Array, inputs: Array, rows: Array, end: Bars) -> dict[str, Any]:
     """By the names of `wrt`, from the cotangents of the start, of the inputs, and of the forces of each step."""
-    nq, forces, equations = motion.problem.nq, motion.forces, motion.equations
+    nq, forces, equations, many = motion.problem.nq, motion.forces, motion.equations, motion.many
     by_name: dict[str, Any] = {}
     if motion.by_parameters:
         p = motion.values[: len(equations.names)]
@@ -214,7 +215,7 @@ def _gradients(motion: MotionOf, start: Array, inputs: Array, rows: Array, end: 
         elif name == TORQUE:
             result[name] = inputs[:forces]
         else:
-            result[name] = by_name[name] if motion.many else float(by_name[name])
+            result[name] = by_name[name] if many else float(by_name[name])
     return result
 
 

@@ -59,8 +59,9 @@ class Legs:
             x, begin = run.x, float(t[-1])
             if leg.event and (reset := self.events[leg.event].reset) is not None:
                 x = values_at(reset, motion, x, begin)
-        self.x, self.t = x, np.concatenate([run.motion.t[:-1] for run in self.runs] + [[begin]])
-        self.loss = np.sum([run.loss for run in self.runs], axis=0)
+        times = [run.motion.t[:-1] for run in self.runs]
+        self.x, self.t = x, np.append(times[0] if len(times) == 1 else np.concatenate(times), begin)
+        self.loss = sum([run.loss for run in self.runs[1:]], self.runs[0].loss)
 
     def _arrive(self, run: MotionRun, event: WatchedEvent) -> None:
         """The last step of a leg, as long as it takes to where the event happens."""
@@ -126,13 +127,16 @@ class Legs:
 
 def _steps(leg: Leg, begin: float) -> tuple[Array, Array]:
     """Times and lengths of the steps of a leg that begins at this instant."""
+    count = len(leg.t) - 1
+    if leg.equal and not leg.event and leg.t[0] == begin:
+        return leg.t, np.full(count, (leg.end - begin) / leg.equal)
     t = leg.t.copy()
     t[0] = begin
     if leg.equal:
-        t[:-1] = begin + np.arange(len(t) - 1) * ((leg.end - begin) / leg.equal)
+        t[:-1] = begin + np.arange(count) * ((leg.end - begin) / leg.equal)
     h = np.diff(t)
     if leg.equal:
-        h[: len(h) - bool(leg.event)] = (leg.end - begin) / leg.equal
+        h[: count - bool(leg.event)] = (leg.end - begin) / leg.equal
     return t, h
 
 

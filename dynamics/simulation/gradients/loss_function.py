@@ -16,23 +16,30 @@ from .point_functions import KEPT
 
 @dataclass(frozen=True)
 class _Quantity:
-    """A quantity of a problem, known by its structure, so that what is derived from it is derived once."""
+    """A quantity of a problem, known by its operations, so that what is derived from it is derived once."""
 
     problem: Problem
-    key: str
-    graph: Graph = field(compare=False)
+    key: tuple[object, ...]
+    node: Node = field(compare=False)
 
 
 def loss_graph(problem: Problem, node: Node) -> Graph:
     """The loss over the states, t and parameters; the same object for an equal one."""
-    inputs = [each for each in topological([node]) if each.op.name == "variable"]
-    graph = Graph(inputs, {"loss": node})
-    return _bound(_Quantity(problem, cg.structure_hash(graph), graph))
+    order = topological([node])
+    places = {each: k for k, each in enumerate(order)}
+    key: list[object] = []
+    for each in order:
+        if each.args:
+            key.append((each.op.name, *[places[arg] for arg in each.args]))
+        else:
+            key.append(each.name if each.value is None else float(each.value).hex())  # 0.0 and -0.0 stay apart
+    return _bound(_Quantity(problem, tuple(key), node))
 
 
 @lru_cache(KEPT)
 def _bound(quantity: _Quantity) -> Graph:
-    return quantity.problem.bind(quantity.problem.states, quantity.graph)
+    inputs = [each for each in topological([quantity.node]) if each.op.name == "variable"]
+    return quantity.problem.bind(quantity.problem.states, Graph(inputs, {"loss": quantity.node}))
 
 
 @lru_cache(KEPT)

@@ -233,8 +233,14 @@ def equal_leg(run: RunOptions, rows: int | None) -> Leg:
     count = step_count(run.length, run.step) if rows is None or run.dt is not None else rows
     if rows is not None and rows != count:
         raise ValueError(f"tau has {rows} rows, and there are {count} steps of dt = {run.step:g} s: leave out dt")
-    h = (run.t_end - run.t0) / count
-    return Leg(np.append(run.t0 + np.arange(count) * h, run.t_end), equal=count, end=run.t_end)
+    return _equal_leg(run.t0, run.t_end, count)
+
+
+@lru_cache(KEPT)
+def _equal_leg(t0: float, t_end: float, count: int) -> Leg:
+    t = np.append(t0 + np.arange(count) * ((t_end - t0) / count), t_end)
+    t.flags.writeable = False  # of all who have it
+    return Leg(t, equal=count, end=t_end)
 
 
 def _legs(motion: Trajectory, run: RunOptions, events: Sequence[Event]) -> tuple[Leg, ...]:

@@ -18,8 +18,9 @@ from cgraph.extend import Array, Builder, folded, topological
 
 from ...integrators import Problem
 from .point_functions import at, compiled, pulled_back
-from .rate_pullback import RatePullback, new_variables, rate_pullback
+from .rate_pullback import RatePullback, new_variables, rate_pullback, rebuilt
 
+ARITHMETIC = ("add", "sub", "mul", "neg")
 PARAMETERS = ("tau", "p", "c")  # registers: what the parameters of the problem are, end to end
 KEPT = 16  # problems whose equations stay for another run
 
@@ -30,6 +31,7 @@ class MotionEquations:
 
     forces: how many of the parameters are applied forces.  names: of p.  numbers: c, a graph over p, if there are any.
     pullback: of the rate, where there is one.
+    sharing_rate, sharing_pullback: the same two, where the one records for the other what both need.
     """
 
     problem: Problem
@@ -37,6 +39,8 @@ class MotionEquations:
     names: tuple[str, ...]
     numbers: Graph | None
     pullback: RatePullback | None
+    sharing_rate: Graph
+    sharing_pullback: RatePullback | None
 
     @property
     def lengths(self) -> dict[str, int]:
@@ -69,25 +73,39 @@ class MotionEquations:
 def motion_equations(problem: Problem, forces: int) -> MotionEquations:
     """The equations of a problem whose first `forces` parameters are applied forces."""
     names, pullback = problem.parameters[forces:], rate_pullback(problem)
-    if not names:
-        return MotionEquations(problem, forces, names, None, pullback)
-    graphs = {"rate": problem.rate} | ({} if problem.projection is None else {"projection": problem.projection})
-    parts = [node for graph in graphs.values() for node in graph.outputs.values()]
+    graphs = [problem.rate] if problem.projection is None else [problem.rate, problem.projection]
+    parts = [node for graph in graphs for node in graph.outputs.values()]
     if pullback is not None:
         parts += [pullback.power, *pullback.solved, *pullback.q_dot]
     numbers, changed = _apart(parts, cg.variables(list(names)), problem.rate.input_names)
     new = dict(zip(parts, changed, strict=True))
-    for name, graph in graphs.items():
-        graphs[name] = Graph([*graph.inputs, *numbers], {key: new[node] for key, node in graph.outputs.items()})
+    rate, *projection = [
+        Graph([*graph.inputs, *numbers], {name: new[node] for name, node in graph.outputs.items()}) for graph in graphs
+    ]
     if pullback is not None:
         solved, q_dot = ([new[node] for node in nodes] for nodes in (pullback.solved, pullback.q_dot))
-        pullback = replace(
-            pullback, inputs=graphs["rate"].inputs, power=new[pullback.power], solved=solved, q_dot=q_dot
-        )
+        pullback = replace(pullback, inputs=rate.inputs, power=new[pullback.power], solved=solved, q_dot=q_dot)
     outputs = {str(variable.name): node for variable, node in numbers.items()}
-    made = replace(problem, parameters=(*problem.parameters, *outputs), **graphs)
-    graph = Graph(cg.variables(list(names)), outputs) if outputs else None
-    return MotionEquations(made, forces, names, graph, pullback)
+    parameters, projected = (*problem.parameters, *outputs), projection[0] if projection else None
+    made = replace(problem, parameters=parameters, rate=rate, projection=projected, multipliers=None)
+    over_p = Graph(cg.variables(list(names)), outputs) if outputs else None
+    return MotionEquations(made, forces, names, over_p, pullback, *_sharing(rate, pullback))
+
+
+def _sharing(rate: Graph, pullback: RatePullback | None) -> tuple[Graph, RatePullback | None]:
+    """The rate with what its pullback can take over from it as outputs besides, and the pullback that does."""
+    if pullback is None:
+        return rate, None
+    here = {node for node in rate.nodes if node.args}
+    edge: dict[Node, None] = {}
+    for node in topological(pullback.solved):
+        if node not in here:
+            edge |= {arg: None for arg in node.args if arg in here}
+    edge |= {node: None for node in topological([pullback.power]) if node in here and node.op.name not in ARITHMETIC}
+    variables = new_variables("shared", len(edge), rate.input_names)
+    shared = dict(zip(edge, variables, strict=True))
+    more = {str(variable.name): node for node, variable in shared.items()}
+    return Graph(rate.inputs, {**rate.outputs, **more}), replace(pullback, shared=shared)
 
 
 def _apart(
@@ -108,8 +126,4 @@ def _apart(
             edge |= dict.fromkeys(node.args)
     used = [node for node in edge if node in alone]
     numbers = dict(zip(used, new_variables("number", len(used), taken), strict=True))
-    new: dict[Node, Node] = dict(numbers)
-    for node in order:
-        if node not in new:
-            new[node] = build(node.op, tuple([new[arg] for arg in node.args]), node.label) if node.args else node
-    return {variable: node for node, variable in numbers.items()}, [new[node] for node in copies]
+    return {variable: node for node, variable in numbers.items()}, rebuilt(copies, numbers, build)

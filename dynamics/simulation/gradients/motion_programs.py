@@ -11,7 +11,7 @@ from cgraph.extend import Runner, runner
 from ...integrators import Method
 from .linearization import Linearization, Linearized
 from .motion_equations import MotionEquations
-from .motion_steps import LOSS, MotionSteps, motion_steps
+from .motion_steps import LOSS, motion_steps
 
 KEPT = 16  # motions whose programs stay ready for another run
 
@@ -30,7 +30,8 @@ class Along:
 class MotionPrograms:
     """The programs of a motion.
 
-    start: from x to what the first step reads, if that is not x.  step: the steps, with the running loss where there is one.
+    start: from x to what the first step reads, if that is not x.
+    step: the steps, with the running loss where there is one.
     failed: a register that is not 0 after steps whose equations were not solved; empty where there is none.
     """
 
@@ -49,6 +50,7 @@ class Request:
     wrt: tuple[str, ...]
     forwards: bool  # tangents pushed on, else cotangents pulled back
     backend: str
+    many: bool = False  # motions side by side
     running: Graph | None = None
 
 
@@ -61,17 +63,19 @@ def motion_programs(request: Request) -> MotionPrograms:
         request.running,
         each_step=request.each_step,
         wrt=request.wrt,
+        sharing=not request.forwards and not request.many,
     )
-    step, start = steps.step, steps.start
+    step, start, first = steps.step, steps.start, None
     if request.forwards:
         linear = step.tangent(step.inputs)
-        first = start and start.tangent(start.inputs)
     else:
         linear = step.adjoint(["x", LOSS] if LOSS in step.handed else ["x"])
-        first = start and start.adjoint([name for name in linear.vectors if name in start.handed])
+    if start is not None:
+        seeds = [name for name in linear.vectors if name in start.handed]
+        pass_on = start.tangent(start.inputs) if request.forwards else start.adjoint(seeds)
+        first = _along(start, pass_on, list(start.handed), request.backend)
     results = [name for name in ("x", LOSS, steps.failed) if name in step.handed]
-    begins = start and first and _along(start, first, list(start.handed), request.backend)
-    return MotionPrograms(begins, _along(step, linear, results, request.backend), steps.failed)
+    return MotionPrograms(first, _along(step, linear, results, request.backend), steps.failed)
 
 
 def _along(passes: Linearization, linear: Linearized, results: list[str], backend: str) -> Along:

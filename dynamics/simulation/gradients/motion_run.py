@@ -115,7 +115,9 @@ class MotionRun:
         for first, last, tape in self.recorded(backwards=True):
             parts.append(_run(back, memory, last - first, 1, tape[::-1, :width]).rows)
         count = (len(self.motion.h), back.program.width)
-        rows = (parts[0] if len(parts) == 1 else np.concatenate(parts))[::-1] if back.program.record else np.empty(count)
+        rows = (
+            (parts[0] if len(parts) == 1 else np.concatenate(parts))[::-1] if back.program.record else np.empty(count)
+        )
         bars = self._vectors(self.step, memory)
         if self.start is None:
             return bars, rows

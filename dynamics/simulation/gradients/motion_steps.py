@@ -34,12 +34,18 @@ class MotionSteps:
 
 
 def motion_steps(
-    equations: MotionEquations, method: Method, running: Graph | None, *, each_step: bool, wrt: tuple[str, ...]
+    equations: MotionEquations,
+    method: Method,
+    running: Graph | None,
+    *,
+    each_step: bool,
+    wrt: tuple[str, ...],
+    sharing: bool,
 ) -> MotionSteps:
     """The steps with derivatives by `wrt`: among "tau", "p", "c", "h" and "t", besides the state.
 
     running: the loss of a step, a graph over the states, t and parameters.  each_step: whether the applied forces are
-    new in every step.
+    new in every step.  sharing: whether the rate records what its pullback needs of it.
     """
     problem = equations.problem
     assert method.step is not None
@@ -53,14 +59,16 @@ def motion_steps(
         body.insert(0, Call(total, ("x", "t", "p", LOSS), (LOSS,)))
         lengths[LOSS] = 1
         carried.append(LOSS)
-    pullback = equations.pullback
+    pullbacks = {id(problem.rate): equations.pullback, id(equations.sharing_rate): equations.sharing_pullback}
+    if sharing and equations.sharing_pullback is not None:
+        body = _sharing(body, equations, lengths)
     fed = ("t", "h", "tau") if each_step else ("t", "h")
     make = partial(
         Linearization,
         lengths=lengths,
         fixed=(*made.fixed, "evaluations", "nonfinite"),
         renamed={"p": PARAMETERS},
-        products=Products({} if pullback is None else {id(problem.rate): pullback}),
+        products=Products({key: pullback for key, pullback in pullbacks.items() if pullback is not None}),
     )
     inputs_of_step, varied = [name for name in wrt if name not in fed], [name for name in wrt if name in fed]
     step = make(body, fed=fed, inputs=inputs_of_step, varied=varied, carried=carried)
@@ -69,6 +77,18 @@ def motion_steps(
     inputs_of_start = [name for name in wrt if name != "h"]
     start = make(begin, fed=(), inputs=inputs_of_start, varied=(), carried=read) if begin else None
     return MotionSteps(start, step, made.failed)
+
+
+def _sharing(body: list[Statement], equations: MotionEquations, lengths: dict[str, int]) -> list[Statement]:
+    """The statements, of which those that call the rate record what its pullback shares with it."""
+    result: list[Statement] = []
+    for k, statement in enumerate(body):
+        if isinstance(statement, Call) and statement.graph is equations.problem.rate:
+            register = f"shared{k}"
+            lengths[register] = len(equations.sharing_rate.outputs) - len(statement.graph.outputs)
+            statement = Call(equations.sharing_rate, statement.inputs, (*statement.outputs, register))
+        result.append(statement)
+    return result
 
 
 def _arrival(problem: Problem) -> list[Statement]:

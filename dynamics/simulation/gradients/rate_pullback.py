@@ -7,15 +7,14 @@ reverse sweep over the virtual power of inverse dynamics, in place of one over i
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, SingularError, building, cotangents, folded, solve_nodes, tangents
+from cgraph.extend import Builder, SingularError, building, cotangents, folded, solve_nodes, tangents, topological
 
 from ...equations.bias_terms import bias_terms
-from ...equations.substitute import substitute
 from ...integrators import Problem
 from ...systems.system import System
 
@@ -24,10 +23,11 @@ ONE, ZERO = cg.constant(1.0), cg.constant(0.0)
 
 @dataclass(frozen=True, eq=False)
 class RatePullback:
-    """Inputs to differentiate by -> graph: inputs those of the rate, its outputs' values, their cotangents.
+    """Inputs to differentiate by -> graph: inputs those of the rate, values, cotangents of the rate's outputs.
 
     inputs: of the rate.  values, bars: of its outputs.  mu: variables.  power: -mu . r over these and the inputs.
     solved: what mu is, over the inputs and bars.  q_dot: rates of the coordinates.
+    shared: {node of the rate and of these: variable}, which are values besides.
     """
 
     inputs: Sequence[Node]
@@ -37,18 +37,23 @@ class RatePullback:
     power: Node
     solved: Sequence[Node]
     q_dot: Sequence[Node]
+    shared: Mapping[Node, Node] = field(default_factory=dict)
 
     def __call__(self, wrt: Sequence[Node]) -> Graph:
         """The graph for these inputs."""
         build = Builder()
-        power, *q_dot = folded([self.power, *self.q_dot], build)
+        n = len(self.mu)
+        power, *rest = folded([self.power, *self.solved, *self.q_dot, *self.shared], build)
+        solved, q_dot, shared = rest[:n], rest[n : len(rest) - len(self.shared)], rest[len(rest) - len(self.shared) :]
         seeds: dict[Node, Node] = {power: ONE}
         with building(build):
             for node, bar in zip(q_dot, self.bars, strict=False):  # the other bars are those of accelerations
                 seeds[node] = seeds[node] + bar if node in seeds else bar
-        pulled = substitute(cotangents(seeds, wrt, build), dict(zip(self.mu, self.solved, strict=True)))
+        known = dict(zip(shared, self.shared.values(), strict=True))
+        known |= dict(zip(self.mu, rebuilt(solved, known, build), strict=True))
+        pulled = rebuilt(cotangents(seeds, wrt, build), known, build)
         outputs = {f"{k}": node for k, node in enumerate(pulled)}
-        return cg.simplify(Graph([*self.inputs, *self.values, *self.bars], outputs))
+        return cg.simplify(Graph([*self.inputs, *self.values, *self.shared.values(), *self.bars], outputs))
 
 
 def rate_pullback(problem: Problem) -> RatePullback | None:
@@ -72,6 +77,15 @@ def rate_pullback(problem: Problem) -> RatePullback | None:
     bound = problem.bind(names, Graph(inputs, {f"{k}": node for k, node in enumerate(nodes)}))
     power, *others = bound.outputs.values()
     return RatePullback(problem.rate.inputs, values, bars, mu, power, others[: system.n], others[system.n :])
+
+
+def rebuilt(nodes: Sequence[Node], replacement: Mapping[Node, Node], build: Builder) -> list[Node]:
+    """Copies of nodes with others in place of some that they reach."""
+    new = dict(replacement)
+    for node in topological(nodes):
+        if node not in new:
+            new[node] = build(node.op, tuple([new[arg] for arg in node.args]), node.label) if node.args else node
+    return [new[node] for node in nodes]
 
 
 def new_variables(stem: str, count: int, taken: Collection[str]) -> list[Node]:
