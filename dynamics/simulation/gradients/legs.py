@@ -103,7 +103,7 @@ class Legs:
             t[-1] += later
             if leg.event:
                 h[-1] = 0.0  # which the event determines
-            by_t, by_h = _slopes(leg)
+            by_t, by_h = leg_slopes(leg)
             begin = float(t @ by_t + h @ by_h) + (float(bars["t"][0]) if "t" in bars else 0.0)
             end = self._before(k, Bars(bars["x"], begin, np.zeros(0)), inputs)
         raise AssertionError("a motion has at least one leg")
@@ -140,7 +140,7 @@ def _steps(leg: Leg, begin: float) -> tuple[Array, Array]:
     return t, h
 
 
-def _slopes(leg: Leg) -> tuple[Array, Array]:
+def leg_slopes(leg: Leg) -> tuple[Array, Array]:
     """How the times of the steps of a leg and their lengths depend on where it begins."""
     count = len(leg.t) - 1
     if leg.equal:

@@ -67,7 +67,7 @@ def motion_programs(request: Request) -> MotionPrograms:
     )
     step, start, first = steps.step, steps.start, None
     if request.forwards:
-        linear = step.tangent(step.inputs)
+        linear = step.tangent([*step.inputs, *step.varied])
     else:
         linear = step.adjoint(["x", LOSS] if LOSS in step.handed else ["x"])
     if start is not None:

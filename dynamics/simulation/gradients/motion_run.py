@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping
 
@@ -132,23 +133,28 @@ class MotionRun:
         row = self.step.back.run(memory, 1, 1, tape[-1:, : self.step.back.program.feed_width]).rows[0]
         return float(row[self.step.passes.varied.index("h")])
 
-    def pushed(self, directions: Mapping[str, Array]) -> tuple[Array, Array]:
-        """States (steps + 1, m), and their tangents (steps + 1, m, k) along k directions of the start and inputs."""
-        count, m, k = len(self.motion.h), len(self.x), next(iter(directions.values())).shape[1]
-        states, tangents = np.empty((count + 1, m)), np.empty((count + 1, m, k))
+    def pushed(self, directions: Mapping[str, Array], lengths: Array) -> tuple[Array, Array]:
+        """States (steps + 1, m), and their tangents (steps + 1, m, k) along k directions of the start and inputs.
+
+        lengths: (steps, k), tangents of the lengths of the steps; none where these are constants.
+        """
+        back, names = self.step.back, self.step.linear.vectors
         if self.start is not None:
             memory = self._linear_memory(self.start, self._start_constants, directions)
             _run_all(self.start.back, memory, self._start_tape)
             directions = {**directions, **self._vectors(self.start, memory)}
         memory = self._linear_memory(self.step, self._constants, directions)
-        names = self.step.linear.vectors
-        states[0], tangents[0] = self.begin, self.step.back.read(memory, names["x"])
-        width = self.step.back.program.feed_width
+        m, width = len(self.x), back.program.feed_width
+        states, tangents = [self.begin[None]], [back.read(memory, names["x"])[None].copy()]
+        changes = set((np.flatnonzero((np.diff(lengths, axis=0) != 0.0).any(axis=1)) + 1).tolist())
         for first, last, tape in self.recorded(backwards=False):
-            states[first + 1 : last + 1] = tape[:, -m:]
-            tangents[first + 1 : last + 1] = _run_all(self.step.back, memory, tape[:, :width])
+            states.append(tape[:, -m:])
+            for begin, end in itertools.pairwise([first, *[k for k in range(first + 1, last) if k in changes], last]):
+                if len(lengths):
+                    back.write(memory, names["h"], lengths[None, begin])
+                tangents.append(_run_all(back, memory, tape[begin - first : end - first, :width]))
         self._vectors(self.step, memory)
-        return states, tangents
+        return np.concatenate(states), np.concatenate(tangents)
 
     def _linear_memory(
         self, along: Along, constants: Mapping[str, Array], vectors: Mapping[str, Array | float]
