@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from cgraph import Node
 from cgraph.extend import Array, real_array
 
-from ...equations.state_equation import state_inputs
 from ...integrators import METHODS, derive
 from ...systems.model import Model
 from ..applied_forces import with_applied
@@ -20,7 +19,7 @@ from ..ensembles.initial_states import starts
 from ..run_options import time_span
 from ..sampled_controller import SampledController
 from .gradient import Loss, differentiated
-from .motion import TORQUE, MotionOf, equal_leg, names_of, options_of
+from .motion import TORQUE, MotionOf, changing_forces, equal_leg, names_of, options_of
 from .motion_equations import motion_equations
 
 WIDE = 16  # motions side by side: whole vectors of any processor, of which what is recorded stays in its caches
@@ -171,8 +170,9 @@ def _motions(
     start = starts(moving, q, qd, constant, parameters, t0)
     run.check(start.states)
     chosen, count = names_of(moving, wrt, closed=callable(tau)), len(start.x)
-    inputs = state_inputs(moving).applied if rows is not None or TORQUE in chosen or np.ndim(constant) == 2 else ()
-    free = {*inputs, *chosen, *start.varied}
+    forced = rows is not None or TORQUE in chosen or np.ndim(constant) == 2
+    inputs = changing_forces(moving, start.same, forced=forced)
+    free = {*inputs, *chosen, *start.varied, *(parameters or ())}
     problem = derive(moving, {name: value for name, value in start.same.items() if name not in free})
     columns, equations = start.same | start.varied, motion_equations(problem, len(inputs))
     forces, values = (

@@ -149,8 +149,9 @@ def motion_of(
     start = initial_value(moving, q, qd, applied.constant, parameters, t0)
     run.check(start.states)
     chosen = names_of(moving, wrt, closed=callable(tau))
-    inputs = state_inputs(moving).applied if rows is not None or TORQUE in chosen else ()
-    free = {*inputs, *chosen}
+    forced = rows is not None or TORQUE in chosen
+    inputs = changing_forces(moving, start.bound, forced=forced)
+    free = {*inputs, *chosen, *(parameters or ())}  # what a caller changes from call to call stays an input
     problem = derive(moving, {name: value for name, value in start.bound.items() if name not in free})
     if run.adaptive or events:
         if rows is not None:
@@ -179,6 +180,12 @@ def motion_of(
         applied.nodes,
         run.backend,
     )
+
+
+def changing_forces(model: Model, bound: Mapping[str, float], *, forced: bool) -> tuple[str, ...]:
+    """The applied forces that are inputs: none where they are 0, unless `forced`."""
+    applied = state_inputs(model).applied
+    return applied if forced or any([bound.get(name, 0.0) != 0.0 for name in applied]) else ()
 
 
 def options_of(t_end: float, method: str, t0: float, options: Mapping[str, Any]) -> RunOptions:
