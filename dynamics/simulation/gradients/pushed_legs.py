@@ -52,7 +52,8 @@ def pushed_legs(legs: Legs, directions: Mapping[str, Array]) -> Rows:
         x_dot, t_dot = tangents[-1], times[-1]
         if leg.event and legs.events[leg.event].reset is not None:
             x_dot = _reset(legs, run, leg.event, x_dot, t_dot, inputs)
-    if x_dot is not tangents[-1]:  # after the last reset
+    last = motion.legs[-1].event
+    if last and legs.events[last].reset is not None:
         parts.append(Rows(legs.t[-1:], legs.x[None], t_dot[None], x_dot[None]))
     return Rows(*[np.concatenate(column) for column in zip(*parts, strict=True)])
 
