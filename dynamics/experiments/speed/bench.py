@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from ...multibody.mechanism import as_mechanism
 from ...peers import PEERS, Case
 from ...peers.case import MOTIONS, TASKS, Array
 from ...peers.contender import MODES
@@ -99,6 +100,9 @@ def _rows(
         for task, modes in asked.items():
             if task in MOTIONS and case.nq != case.n:
                 say(f"{scene}, {task}: not of quaternions")
+                continue
+            if task == "inertial-gradient" and as_mechanism(case.model) is None:
+                say(f"{scene}, {task}: not without bodies")
                 continue
             late[task] = dict(late.get(CONTAINS.get(task, ""), {}))
             pool = WorkerPool(loads[scene], peers, budget, late[task])

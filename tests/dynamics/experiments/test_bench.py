@@ -23,6 +23,7 @@ from dynamics.experiments.text_table import digits
 from dynamics.io.mujoco_twin import MujocoTwin
 from dynamics.peers import Case, UnavailableError, ours
 from dynamics.peers.case import BATCH, DERIVATIVES, DT, MOTIONS, NUDGE, PASSES
+from dynamics.peers.inertial_parameters import with_inertial_parameters
 from dynamics.peers.translate import translated
 from viz import cli
 
@@ -140,7 +141,7 @@ OFFERED = [
 ]
 
 
-@pytest.mark.parametrize(("name", "task", "mode"), [each for each in OFFERED if each.values[1] != "gradient"])
+@pytest.mark.parametrize(("name", "task", "mode"), [each for each in OFFERED if "gradient" not in each.values[1]])
 def test_a_peer_finds_what_mujoco_finds(name, task, mode):
     case = Case("planar 3", load("planar 3").model)
     reference, x = Reference(case), case.point(task)
@@ -174,12 +175,35 @@ def pushed():
     return case, [(start, slope(loss, x, start)), (torques, slope(loss, x, torques, h=0.5))]
 
 
-@pytest.mark.parametrize(("name", "task", "mode"), [each for each in OFFERED if each.values[1] == "gradient"])
+@pytest.mark.parametrize(("name", "task", "mode"), [each for each in OFFERED if "gradient" in each.values[1]])
 def test_a_gradient_is_the_slope_of_mujoco_s_motion(name, task, mode, pushed):
     case, slopes = pushed
     _, found = prepared(name, case, task, mode)
+    x = case.point(task)
     for direction, expected in slopes:
-        assert found @ direction == pytest.approx(expected, rel=DIFFERENCES)
+        assert found[: len(x)] @ direction == pytest.approx(expected, rel=DIFFERENCES)
+    if task == "inertial-gradient":
+        assert len(found) == len(x) + 10 * case.n
+
+
+def test_a_gradient_by_inertial_numbers_is_that_of_motions_with_other_numbers():
+    case = Case("planar 3", load("planar 3").model)
+    _, found = prepared("ours", case, "inertial-gradient", "call")
+    model, numbers = with_inertial_parameters(case.model)
+    q, qd, tau = np.split(case.point("gradient"), [3, 6])
+    given = {"t_end": PASSES * DT, "tau": tau.reshape(PASSES, 3), "wrt": "q"}
+    weights = np.random.default_rng(4).uniform(size=(3, 10))
+    weights[:, 4:] = weights[:, 4:5]  # inertias as a whole, so that they stay those of bodies
+    along = 0.3 * weights.ravel() * [*numbers.values()]
+
+    def loss(scale):
+        values = dict(zip(numbers, [*numbers.values()] + scale * along, strict=True))
+        return dyn.gradient(
+            model, lambda q, qd, t: q[0] ** 2 + q[1] ** 2 + q[2] ** 2, q, qd, parameters=values, **given
+        ).value
+
+    expected = slope(loss, 0.0, 1.0, h=1e-2)
+    assert found[len(case.point("gradient")) :] @ along == pytest.approx(expected, rel=DIFFERENCES)
 
 
 @pytest.mark.parametrize(
