@@ -14,6 +14,7 @@ from ..core.graph import Graph
 from ..errors import GraphError
 from ..util.real_arrays import real_array
 from ..util.threads import share, thread_count
+from .bound_call import bound
 from .differentiable import Differentiable, require_memory
 
 
@@ -97,7 +98,7 @@ class Compiled(Differentiable):
             raise GraphError("y must be an array that can be written, got one that is read-only")
         if np.may_share_memory(x, y):
             raise GraphError("x and y must not share memory")
-        return self._bound(x, y)
+        return bound(self._bound(x, y))
 
     @abstractmethod
     def _columns(self) -> tuple[int, Callable[[Array, Array], None]]:

@@ -17,6 +17,7 @@ from dynamics.reference.flint_numbers import flint, working
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 DIGITS = 60
+A_BODY = 2  # digits more that its bounds of errors take
 LOST = 1e-30  # a bound on the error of an entry, or there were too few digits
 
 
@@ -34,7 +35,7 @@ class Exact(NamedTuple):
 def exact_slopes(tree: dyn.Mechanism, q: Array, qd: Array, qdd: Array, tau: Array) -> Exact:
     """Of quasi-velocities by displacements."""
     mat, n = flint().arb_mat, len(qd)
-    with working(DIGITS):
+    with working(DIGITS + A_BODY * len(tree.bodies)):
         u = mat(n, 1, _listed(qd))
         motion = _Sweep(tree, q, u, mat(n, 1, _listed(qdd)))
         still = _Sweep(tree, q, u, mat(n, 1))
@@ -83,7 +84,7 @@ def errors(found: Slopes, exact: Exact) -> Errors:
 
 def difference(exact: Any, *parts: Array) -> Array:
     """The errors of numbers that are the sum of parts."""
-    with working(DIGITS):
+    with working(2 * DIGITS):
         result = exact
         for part in parts:
             result = result - flint().arb_mat(part.tolist())

@@ -24,8 +24,8 @@ from tests.dynamics.mechanisms import (
 
 pytest.importorskip("flint")
 
-# Of the largest entry of a matrix of slopes of torques; and, of slopes X of accelerations, M X = dtau, of what a relative
-# change of M and of dtau may do to X: of the largest entry of |M^-1| (|M| |X| + |dtau|).
+# Of the largest entry of a matrix of slopes of torques; and, of slopes X of accelerations, M X = dtau, of what a
+# relative change of M and of dtau may do to X: of the largest entry of |M^-1| (|M| |X| + |dtau|).
 ROUNDING = 4e-15
 CONDITIONED = 1e-15
 
