@@ -15,6 +15,7 @@ from ..errors import GraphError
 from ..util.html_text import html_table, html_text
 from ..util.real_arrays import real_array
 from ..util.threads import share, thread_count
+from .bound_call import bound
 from .differentiable import Differentiable, require_memory
 
 
@@ -98,7 +99,7 @@ class Compiled(Differentiable):
             raise GraphError("y must be an array that can be written, got one that is read-only")
         if np.may_share_memory(x, y):
             raise GraphError("x and y must not share memory")
-        return self._bound(x, y)
+        return bound(self._bound(x, y))
 
     @abstractmethod
     def _columns(self) -> tuple[int, Callable[[Array, Array], None]]:

@@ -111,16 +111,16 @@ class Graph:
             return self.inputs
         if not isinstance(wrt, (str, Node, Iterable)):
             raise TypeError(f"wrt must name inputs by strings or variables, got {type(wrt).__name__}: {wrt!r:.60}")
-        chosen = []
+        inputs, chosen = set(self.inputs), dict[Node, None]()
         for name in (wrt,) if isinstance(wrt, (str, Node)) else wrt:
             node = variable(name) if isinstance(name, str) else name
             if not isinstance(node, Node):
                 raise TypeError(f"wrt must name inputs by strings or variables, got {node!r:.60}")
-            if node not in self.inputs:
+            if node not in inputs:
                 raise GraphError(f"the graph has no input {node.name or node!r} (it has {', '.join(self.input_names)})")
             if node in chosen:
                 raise GraphError(f"wrt names the input {node.name} twice")
-            chosen.append(node)
+            chosen[node] = None
         if not chosen:
             raise GraphError(
                 f"wrt must name at least one input (the graph has {', '.join(self.input_names) or 'none'})"

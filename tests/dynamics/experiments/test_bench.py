@@ -372,6 +372,8 @@ def test_what_a_peer_s_own_code_raises_is_a_reason():
         ({"modes": ["gpu"]}, "there is no mode 'gpu'"),
         ({"peers": ["matlab"]}, "there is no peer 'matlab'"),
         ({"budget": 0.0}, "the budget must be positive, got 0.0 s"),
+        ({"scenes": ["free 35"], "tasks": ["motion"]}, "nothing to measure of motion in the modes .* on free 35"),
+        ({"scenes": ["planar 3"], "tasks": ["gradient"], "modes": ["batch"]}, "nothing to measure of gradient"),
     ],
 )
 def test_a_wrong_choice_is_told_before_anything_is_measured(choice, said):
@@ -410,6 +412,33 @@ def test_what_was_not_measured_has_its_reason_below():
     assert "a: not ready within 60 s" in text
     assert "without sympy: not ready within 60 s" in text
     assert "without heyoka: broken" in text
+
+
+def test_a_row_without_ours_says_so_and_has_no_ratios():
+    late = {"ours": "not ready within 1 s"}
+    text = tables([row("arm 7", late, mujoco=cell(3.0, None)), row("planar 3", ours=cell(0.2, 0.0), mujoco=cell(3.0))])
+    (line,) = [line for line in text.splitlines() if line.startswith("arm 7") and "3.00" in line][:1]
+    assert line.split() == ["arm", "7", "-", "a", "3.00", "*"]
+    assert "a: not ready within 1 s" in text
+    assert "without ours: not ready within 1 s" in tables([row("arm 7", late)])
+
+
+def test_the_bench_goes_on_without_ours(monkeypatch):
+    rows = [Prepared(0.1, np.ones(2), 3), Refused("not ready within 1 s")]
+    pool = WorkerPool(None, ["mujoco", "ours"], 1.0, {})
+    answers = dict(zip(pool.peers, rows, strict=True))
+
+    class Answering:
+        alive = False
+
+        def __init__(self, _, peer):
+            self.prepare = lambda *_: answers[peer]
+            self.turn = lambda *_: 1e-6
+
+    monkeypatch.setattr(module, "Worker", Answering)
+    found = module._row(Case("planar 3", SCENES["planar 3"]()), "forward", "call", pool, 3)
+    assert found.skipped == {"ours": "not ready within 1 s"}
+    assert found.cells["mujoco"].difference is None
 
 
 def test_tables_fit_a_terminal_of_120_columns():
