@@ -10,10 +10,13 @@ from typing import Any
 import numpy as np
 
 from ..codegen import llvm_engine as llvm
+from ..codegen.batch_code import BatchCode
 from ..core.evaluate import Array
+from ..util.garbage import without_collection
 from .fuse import fused
 from .llvm_ir import program_functions, program_ir
 from .program import Program
+from .rows_ir import program_rows_ir
 from .runner import Record, Runner
 
 _POINTER, _COUNT = ctypes.c_void_p, ctypes.c_int64
@@ -32,6 +35,7 @@ class NativeRunner(Runner):
         self._code = self._compiled(self.source)
         self._entry = _RUN(self._code.address("run"))
         self._many: tuple[llvm.Code, Any] | None = None
+        self._batches: dict[str, BatchCode] = {}  # by the register that varies
 
     def _compiled(self, text: str) -> llvm.Code:
         nodes = sum([len(graph.nodes) for graph in self._fused.graphs()])
@@ -51,6 +55,16 @@ class NativeRunner(Runner):
         call = partial(self._entry, at[0], at[1], len(rows), 1, at[2], at[3])
         call.kept = self, arrays  # type: ignore[attr-defined]  # whose addresses it has
         return call
+
+    def _write_rows(self, name: str, values: Array, rows: Array) -> None:
+        self._batches[name](values.T, rows.T)
+
+    def _prepare_rows(self, name: str) -> None:
+        if name not in self._batches:
+            lanes, registers = self._host.lanes, self._host.registers
+            with without_collection():
+                text = program_rows_ir(self._fused, name, lanes, self._flags, registers)
+            self._batches[name] = BatchCode(self._compiled(text.source), lanes, text.size, columns=False)
 
     def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record:
         lanes = self._host.lanes
