@@ -12,7 +12,7 @@ from typing import NamedTuple
 from ..core.graph import Graph
 from .arithmetic import REGISTERS, Arithmetic
 from .llvm_ir import instructions, preamble
-from .transposed_ir import rows_ir
+from .transposed_ir import Place, rows_ir
 
 MEMORY = 2**18  # bytes for inputs and outputs of a tile: a part of a core's second cache
 VECTORS = 16  # in a tile, at most
@@ -64,7 +64,7 @@ def batch_ir(graph: Graph, lanes: int, flags: str = "", registers: int = REGISTE
         parts="\n".join([_CALL.format(number=number) for number in range(len(code.parts))]),
     )
     calls = [_CALL_IN_ROWS.format(number=number, lanes=lanes) for number in range(len(code.parts))]
-    lines += rows_ir(arithmetic, code.places, n_in, n_out, calls)
+    lines += rows_ir(arithmetic, Place(code.places, n_in), [Place(code.places + n_in, n_out)], calls)
     return Batch("\n".join([*lines, text]), lanes * (code.places + max(1, vectors) * (n_in + n_out)))
 
 
@@ -73,7 +73,7 @@ define internal void @part{number}(ptr noalias %x, ptr noalias %y, i64 %dx, i64 
     nounwind noinline alignstack({bytes}) {{
 start:"""
 _CALL = "  call void @part{number}(ptr %x.at, ptr %y.at, i64 %dx, i64 %dy, ptr %w)"
-_CALL_IN_ROWS = "  call void @part{number}(ptr %points, ptr %results, i64 {lanes}, i64 {lanes}, ptr %w)"
+_CALL_IN_ROWS = "  call void @part{number}(ptr %point, ptr %result0, i64 {lanes}, i64 {lanes}, ptr %w)"
 
 _DIRECT = """\
 define void @batch(ptr noalias %x, ptr noalias %y, i64 %n, i64 %dx, i64 %dy, ptr noalias %w) nounwind {{

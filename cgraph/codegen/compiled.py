@@ -79,7 +79,7 @@ class Compiled(Differentiable):
         order = "F" if self.takes_rows and lies_in_rows(points) else "C"
         result = np.empty((self.n_out, total), order=order) if out is None else out  # type: ignore[call-overload]
         if out is not None:
-            _require_out(out, (self.n_out, total), points)
+            require_out(out, (self.n_out, total), points)
         width, columns = self._columns()
 
         def block(start: int) -> None:
@@ -132,7 +132,8 @@ def lies_in_rows(points: Array) -> bool:
     return points.flags.f_contiguous and not points.flags.c_contiguous
 
 
-def _require_out(out: Array, shape: tuple[int, int], points: Array) -> None:
+def require_out(out: Array, shape: tuple[int, int], points: Array) -> None:
+    """Raise GraphError unless results of that shape can be written there while the points are read."""
     if not isinstance(out, np.ndarray) or out.dtype != np.float64 or out.shape != shape:
         raise GraphError(f"out must be an array of float64 in shape {shape}, got {describe(out)}")
     if not out.flags.writeable:

@@ -6,26 +6,41 @@ A block of as many numbers of as many points as a vector has lanes is a square, 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from .arithmetic import Arithmetic
 
 
+class Place(NamedTuple):
+    """Where numbers lie in the memory w: so many vectors, from that one on."""
+
+    start: int
+    count: int
+
+
 def rows_ir(
-    arithmetic: Arithmetic, places: int, n_in: int, n_out: int, calls: Sequence[str], start: Sequence[str] = ()
+    arithmetic: Arithmetic, points: Place, results: Sequence[Place], calls: Sequence[str], start: Sequence[str] = ()
 ) -> list[str]:
     """`void rows(double *x, double *y, int64_t n, int64_t dx, int64_t dy, double *w)`, where point i begins at x + i dx.
 
-    calls: what computes %results of %points, (n_in, lanes) to (n_out, lanes), which lie in w behind so many places.
-    start: what stands once before it.
+    calls: what computes the results of the points, whose first vectors are %point and %result0, %result1, ..; end to
+    end they are a row of y.  start: what stands once before it.
     """
     t, lanes = arithmetic.type, arithmetic.lanes
+    counts = sorted({place.count for place in results})
+    pointers, moves, column = [], [], 0
+    for k, place in enumerate(results):
+        pointers.append(f"  %result{k} = getelementptr {t}, ptr %w, i64 {place.start}")
+        moves.append(f"  %y.at{k} = getelementptr double, ptr %y.at, i64 {column}")
+        moves.append(f"  call void @scatter{place.count}(ptr %y.at{k}, ptr %result{k}, i64 %dy)")
+        column += place.count
     return [
-        *_mover("gather", n_in, arithmetic, filling=True),
-        *_mover("scatter", n_out, arithmetic, filling=False),
+        *_mover("gather", points.count, arithmetic, filling=True),
+        *[line for count in counts for line in _mover(f"scatter{count}", count, arithmetic, filling=False)],
         "define void @rows(ptr noalias %x, ptr noalias %y, i64 %n, i64 %dx, i64 %dy, ptr noalias %w) nounwind {",
         "start:",
-        f"  %points = getelementptr {t}, ptr %w, i64 {places}",
-        f"  %results = getelementptr {t}, ptr %points, i64 {n_in}",
+        f"  %point = getelementptr {t}, ptr %w, i64 {points.start}",
+        *pointers,
         *start,
         "  br label %vector",
         "vector:",
@@ -34,9 +49,9 @@ def rows_ir(
         "  %y.row = mul i64 %i, %dy",
         "  %x.at = getelementptr double, ptr %x, i64 %x.row",
         "  %y.at = getelementptr double, ptr %y, i64 %y.row",
-        "  call void @gather(ptr %x.at, ptr %points, i64 %dx)",
+        "  call void @gather(ptr %x.at, ptr %point, i64 %dx)",
         *calls,
-        "  call void @scatter(ptr %y.at, ptr %results, i64 %dy)",
+        *moves,
         f"  %next = add i64 %i, {lanes}",
         "  %more = icmp slt i64 %next, %n",
         "  br i1 %more, label %vector, label %end",

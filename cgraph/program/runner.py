@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..codegen.compiled import require_out
 from ..codegen.differentiable import require_memory
 from ..core.evaluate import Array
 from ..errors import GraphError
@@ -226,7 +227,7 @@ class Runner(ABC):
         threads : int, optional
             How many may share the work; None: one for each core.
         out : ndarray of float64, shape (N, width), optional
-            Where they go, contiguous; a new one by default.
+            Where they go, sharing no memory with `values`; a new one by default.
 
         Returns
         -------
@@ -251,7 +252,7 @@ class Runner(ABC):
         self._prepare_rows(name)
         shape = len(rows), self.program.width
         result = np.empty(shape) if out is None else out
-        require_memory("out", result, shape)
+        require_out(result, shape, rows)
 
         def block(start: int) -> None:
             here = slice(start, start + BLOCK)

@@ -124,30 +124,52 @@ def _written_out(parts: LinearizationParts) -> Write:
 
 def _in_columns(parts: LinearizationParts) -> Write:
     n = len(parts.brackets)
-    run = runner(linearization_program(parts.in_columns(), n))
+    program = linearization_program(parts.in_columns(), n)
+    run, same = runner(program), 6 * n * n - program.width
 
     def write(values: Array, matrices: Array, threads: int) -> None:
-        run.batch("state", values, threads, out=matrices.reshape(-1, 6 * n * n))
+        run.batch("state", values, threads, out=matrices.reshape(-1, 6 * n * n)[:, same:])
+        if same:
+            matrices[:, :n] = np.eye(n, 3 * n, n)
 
     return write
 
 
 def linearization_program(graphs: ColumnGraphs, n: int) -> Program:
-    """One pass linearizes at the register "state", and records the matrices (A B), (2n, 3n), row by row."""
-    b, x = graphs.column.input_names[graphs.factors :], [f"x{i}" for i in range(n)]
-    registers = {"state": len(graphs.shared.inputs), "factors": graphs.factors, **dict.fromkeys([*b, *x], 3 * n)}
-    first = Call(graphs.shared, ("state",), ("factors", *b, "brackets"))
-    columns = Map(graphs.column, tuple(b), tuple(x), shared=("factors",))
-    last = Call(_arranged(n), ("brackets", *x), ("matrices",))
-    registers |= {"brackets": n * n, "matrices": 6 * n * n}
-    return Program(registers, [first, columns, last], record=["matrices"])
+    """One pass linearizes at the register "state", and records (A B), (2n, 3n), row by row.
+
+    Without the upper half, (0 1 0), where velocities are rates of coordinates. Columns by tau are for themselves: of
+    their solutions the upper triangle counts, so that they are symmetric to the last bit.
+    """
+    outputs, factors = list(graphs.shared.outputs.values()), graphs.factors
+    k, brackets = len(graphs.column.inputs) - factors, outputs[len(outputs) - n * n :]
+    by_state, by_tau = ([f"{name}{i}" for i in range(k)] for name in ("b", "e"))
+    slopes, inverse, symmetric = ([f"{name}{i}" for i in range(n)] for name in ("A", "x", "B"))
+    registers = {"state": len(graphs.shared.inputs), "factors": factors, "brackets": n * n}
+    registers |= dict.fromkeys([*by_state, *slopes], 2 * n) | dict.fromkeys([*by_tau, *inverse, *symmetric], n)
+    sides = [each for pair in zip(by_state, by_tau, strict=True) for each in pair]
+    body = [
+        Call(graphs.shared, ("state",), ("factors", *sides, "brackets")),
+        Map(graphs.column, tuple(by_state), tuple(slopes), shared=("factors",)),
+        Map(graphs.column, tuple(by_tau), tuple(inverse), shared=("factors",)),
+        Call(_symmetric(n), tuple(inverse), tuple(symmetric)),
+    ]
+    record = [each for pair in zip(slopes, symmetric, strict=True) for each in pair]
+    if any([entry.value != 0.0 for entry in brackets]):
+        body.append(Call(_upper(n), ("brackets",), ("upper",)))
+        registers["upper"] = 3 * n * n
+        record = ["upper", *record]
+    return Program(registers, body, record=record)
 
 
-def _arranged(n: int) -> Graph:
-    """Rows of C(qd), then the n solutions of 3n columns, to rows of (A B); the slopes by tau symmetric to the last bit."""
-    brackets = [cg.variables([f"C_{i}_{j}" for j in range(n)]) for i in range(n)]
-    x = [cg.variables([f"x_{i}_{j}" for j in range(3 * n)]) for i in range(n)]
-    rows = [[*row, *[ONE if i == j else ZERO for j in range(n)], *[ZERO] * n] for i, row in enumerate(brackets)]
-    rows += [[*row[: 2 * n], *[x[min(i, j)][2 * n + max(i, j)] for j in range(n)]] for i, row in enumerate(x)]
-    inputs = [each for row in [*brackets, *x] for each in row]
-    return Graph(inputs, {str(k): entry for k, entry in enumerate([entry for row in rows for entry in row])})
+def _symmetric(n: int) -> Graph:
+    """The matrix, (n, n), whose upper triangle is that of another."""
+    x = cg.variables([f"x_{i}_{j}" for i in range(n) for j in range(n)])
+    return Graph(x, {f"B_{i}_{j}": x[min(i, j) * n + max(i, j)] for i in range(n) for j in range(n)})
+
+
+def _upper(n: int) -> Graph:
+    """The upper half of (A B), (C(qd) 1 0)."""
+    c = cg.variables([f"C_{i}_{j}" for i in range(n) for j in range(n)])
+    rows = [[*c[i * n : i * n + n], *[ONE if i == j else ZERO for j in range(n)], *[ZERO] * n] for i in range(n)]
+    return Graph(c, {str(k): entry for k, entry in enumerate([entry for row in rows for entry in row])})
