@@ -71,6 +71,11 @@ class Host:
             recipe = f"{self._identity}\nlevel {level}\n{text}"
             return self._loaded(cache.fetch(recipe, lambda: self._translated(text, level)))
 
+    def require(self, functions: Iterable[str]) -> None:
+        """Raise MissingFunctionError unless the C library has them."""
+        with _lock:
+            self._find(functions)
+
     def _translated(self, text: str, level: int) -> bytes:
         """An object file of the text. LLVM's own cache wants the text parsed even when it has the object."""
         module = self._binding.parse_assembly(text, self._binding.create_context())

@@ -119,7 +119,7 @@ class Ours(Peer):
             return Contender(lambda: linearize_many(case.model, *states), lambda found: _slopes(*found), len(x), size)
         run = runner(linearization_program(graphs._replace(shared=case.bound(graphs.shared)), n))
         memory, row = run.memory({"state": case.point("derivatives")}), np.empty((1, run.program.width))
-        return Contender(run.bind(memory, row), lambda _: row[0, n * n :].copy(), 1, size)
+        return Contender(run.bind(memory, row), lambda _: row[0, -3 * n * n :].copy(), 1, size)
 
     def _motion(self) -> Contender:
         """The steps as one program, which is fed a row of torques a step."""
