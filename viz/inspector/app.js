@@ -140,10 +140,10 @@ function toggle(app, kind, key) {
 
 function redraw(app, fit) {
   app.drawn = draw(app.svg, app.record, app.plan, app.version, app.view);
+  announce(app); // first: its words may take a line from the picture
   if (fit || !app.seen) fitView(app); else setView(app, app.seen);
   compute(app);
   refresh(app);
-  announce(app);
 }
 
 function refresh(app) {
@@ -181,6 +181,7 @@ function choose(app, i) {
     button.tabIndex = k === i ? 0 : -1;
   });
   const was = room(app).height;
+  showLegend(app);
   byId("about").textContent = app.version.about;
   byId("about").hidden = !app.version.about;
   byId("about").classList.toggle("flawed", app.version.marked.size > 0);
@@ -190,7 +191,6 @@ function choose(app, i) {
   const resized = room(app).height !== was; // by the words above it
   if (resized && !app.chosen) app.view = firstView(app);
   redraw(app, !app.seen || resized || Boolean(app.version.drawing));
-  showLegend(app);
   showCounts(app);
   stepTo(app, -1);
 }
