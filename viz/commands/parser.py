@@ -20,6 +20,7 @@ from . import (
     paper,
     report,
     scenes,
+    simulate,
     why,
 )
 
@@ -32,6 +33,7 @@ COMMANDS = (
     draw,
     certify,
     inspect,
+    simulate,
     lint,
     why,
     compare,

@@ -7,17 +7,18 @@ import argparse
 import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Names, cotangents
-from dynamics import display_names, forward_dynamics, inverse_dynamics, scenes
+from dynamics import display_names, scenes
 
 from .. import theme
 from .arguments import (
     Commands,
     answer_and_draw,
     check_picture,
+    equations_of,
     may_draw_and_print,
     scene_of,
-    takes_a_formulation,
     takes_a_scene,
+    takes_equations,
     unless_json,
     whole,
 )
@@ -30,9 +31,7 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
     takes_a_scene(parser)
     parser.add_argument("output", metavar="OUTPUT", help="such as tau0, or tau.knee of a joint by its name")
     parser.add_argument("input", metavar="INPUT", help="such as q2, or q.hip")
-    which = parser.add_mutually_exclusive_group()
-    takes_a_formulation(which)
-    which.add_argument("--forward", action="store_true", help="of forward dynamics, with outputs such as qdd0")
+    takes_equations(parser)
     parser.add_argument("--k", type=whole, default=10, metavar="K", help="paths to list, heaviest first (default: 10)")
     parser.add_argument("--at", type=point, default={}, metavar="A=1,B=2", help=f"where paths are weighed; {REST}")
     may_draw_and_print(parser)
@@ -43,7 +42,7 @@ def run(options: argparse.Namespace) -> None:
     """Print the paths and what they add up to; of two that are not connected, where the chain stops."""
     check_picture(options)
     scene = scene_of(options)
-    graph = forward_dynamics(scene) if options.forward else inverse_dynamics(scene, options.formulation)
+    graph, _ = equations_of(options, scene)
     names = Names(graph, display_names(scene))
     at = filled(graph, scene, options.at)
     found = cg.why(graph, options.output, options.input, at=at, k=options.k, names=display_names(scene))
