@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ..core.evaluate import Array
 from ..core.graph import Graph
 from ..errors import GraphError
+from ..util.html_text import html_table, html_text
 from ..util.real_arrays import real_array
 from ..util.threads import share, thread_count
 from .differentiable import Differentiable, require_memory
@@ -115,6 +116,11 @@ class Compiled(Differentiable):
         if point.shape != (self.n_in,):
             raise GraphError(f"x must have shape ({self.n_in},), one value for each input, got {point.shape}")
         return point
+
+    def _repr_html_(self) -> str:
+        rows = [("back end", self.backend), ("inputs", str(self.n_in)), ("outputs", str(self.n_out))]
+        rows += [("nodes", str(len(self.graph.nodes))), ("lines of generated text", str(self.source.count("\n")))]
+        return html_text("A compiled graph") + html_table(("", ""), rows)
 
     def __repr__(self) -> str:
         return f"<compiled {self.graph!r}, backend {self.backend!r}>"
