@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from cgraph import __version__
 
 from . import (
+    animate,
     architecture,
     bench,
     certify,
@@ -36,6 +37,7 @@ COMMANDS = (
     certify,
     inspect,
     simulate,
+    animate,
     lint,
     why,
     compare,
