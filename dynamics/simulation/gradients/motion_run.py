@@ -15,7 +15,7 @@ from .motion import MotionError, MotionOf
 from .motion_programs import Along, MotionPrograms
 from .motion_steps import LOSS
 
-MOST_RECORDED = 64 * 2**20  # bytes of what is recorded of steps; of more, checkpoints are kept
+MOST_RECORDED = 128 * 2**20  # bytes of what is recorded of steps; of more, checkpoints are kept
 PIECE = 4096  # passes between two looks at Python
 
 
