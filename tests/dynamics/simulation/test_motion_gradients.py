@@ -42,6 +42,9 @@ def bead(unit: float = 1.0) -> System:
     return System(lagrangian, ["s"], {"m": 1.3, "k": 2.0}, damping=0.2 * unit**2)
 
 
+BEAD = bead()  # what is derived of it is derived once
+
+
 def loss(q: Any, qd: Any, t: Any, p: Any) -> Any:
     return q[0] * qd[0] + p["m"] * q[0] ** 2
 
@@ -62,8 +65,8 @@ def options(method: str) -> dict[str, Any]:
 def test_what_gradients_of_every_method_are(method: str) -> None:
     """The end's slope along forward sensitivities; the same in any order; lam . dx at any step; differences."""
     given = {"t_end": 0.5, "method": method, "tau": [0.3], "backend": "python", **options(method)}
-    result = dyn.gradient(bead(), loss, [0.5], [0.2], wrt=WRT, **given)
-    forward = dyn.sensitivities(bead(), [0.5], [0.2], wrt=WRT, **given)
+    result = dyn.gradient(BEAD, loss, [0.5], [0.2], wrt=WRT, **given)
+    forward = dyn.sensitivities(BEAD, [0.5], [0.2], wrt=WRT, **given)
     assert len(forward.t) in (6, 7)
     at_end = slope(forward.q[-1], forward.qd[-1])
     for name in WRT:
@@ -72,7 +75,7 @@ def test_what_gradients_of_every_method_are(method: str) -> None:
         size = np.abs(at_end) @ np.abs(rows) + abs(direct)
         assert np.all(np.abs(at_end @ rows + direct - result[name]) <= DUAL * size)
         assert not forward.times[name].any()
-    turned = dyn.gradient(bead(), loss, [0.5], [0.2], wrt=WRT[::-1], **given)
+    turned = dyn.gradient(BEAD, loss, [0.5], [0.2], wrt=WRT[::-1], **given)
     assert [np.squeeze(turned[name]) for name in WRT] == [np.squeeze(result[name]) for name in WRT]
 
     later = {name: value for name, value in given.items() if name != "t_end"}
@@ -81,7 +84,7 @@ def test_what_gradients_of_every_method_are(method: str) -> None:
     products = [np.squeeze([result["q"], result["qd"]])]
     for row in (2, 4):
         span, start = (forward.t[row], 0.5), (forward.q[row], forward.qd[row])
-        bar = dyn.gradient(bead(), loss, *start, t_span=span, wrt=WRT, **later)
+        bar = dyn.gradient(BEAD, loss, *start, t_span=span, wrt=WRT, **later)
         assert len(bar.t) == len(forward.t) - row
         products.append(
             np.squeeze([bar["q"], bar["qd"]]) @ np.concatenate([forward["q"][row], forward["qd"][row]], axis=1)
@@ -90,7 +93,7 @@ def test_what_gradients_of_every_method_are(method: str) -> None:
 
     def value(q: float = 0.5, m: float = 1.3) -> float:
         changed = {**given, "parameters": {"m": m}}
-        return dyn.gradient(bead(), loss, [q], [0.2], wrt=WRT, **changed).value
+        return dyn.gradient(BEAD, loss, [q], [0.2], wrt=WRT, **changed).value
 
     for name, at in {"q": 0.5, "m": 1.3}.items():
         difference = (value(**{name: at + 1e-5}) - value(**{name: at - 1e-5})) / 2e-5
@@ -103,7 +106,7 @@ def exact_slopes() -> Any:
     pytest.importorskip("flint")
 
     def value(q: float = 0.5, k: float = 2.0) -> Fraction:
-        numbers = dyn.reference(bead(), [q], [0.2], [0.5], parameters={"k": k}, digits=28).decimal[0]
+        numbers = dyn.reference(BEAD, [q], [0.2], [0.5], parameters={"k": k}, digits=28).decimal[0]
         q_end, qd_end = (Fraction(number) for number in numbers)
         return q_end * qd_end + Fraction(1.3) * q_end**2
 
@@ -124,7 +127,7 @@ def test_a_gradient_of_short_steps_beside_differences_of_30_digits(
     method: str, accuracy: dict[str, float], exact_slopes: Any
 ) -> None:
     given = {"wrt": ["q", "k"], "backend": "python", **accuracy}
-    result = dyn.gradient(bead(), loss, [0.5], [0.2], 0.5, method, **given)
+    result = dyn.gradient(BEAD, loss, [0.5], [0.2], 0.5, method, **given)
     assert [result["q"][0], result["k"]] == approx(exact_slopes, rel=DIGITS)
 
 
@@ -159,6 +162,7 @@ def test_torques_a_step_a_running_loss_and_a_parameter_beside_complex_steps(back
     result = dyn.gradient(rod, final, [0.5], [0.2], 0.5, wrt=["q", "tau", "m"], **given)
     tiny, forces = 1e-40, tau[:, 0].astype(complex)
     assert result.value == approx(total(0.5, forces, 1.2).real, rel=SHORT_SUM)
+    assert result["tau"].flags.c_contiguous
     assert result["q"] == approx([total(0.5 + 1j * tiny, forces, 1.2).imag / tiny], rel=LONG_SUM)
     assert result["m"] == approx(total(0.5, forces, 1.2 + 1j * tiny).imag / tiny, rel=LONG_SUM)
     assert dyn.gradient(rod, final, [0.5], [0.2], 0.5, wrt="m", **given)["m"] == approx(result["m"], rel=SHORT_SUM)
@@ -288,6 +292,9 @@ def falling() -> System:
     return System(lagrangian, ["height"], {"m": 1.0, "e": 0.8}, damping=0.3)
 
 
+FALLING = falling()
+
+
 def table(q: Any, qd: Any, t: Any) -> Any:
     return q[0] - 0.02 * cg.sin(3.0 * t)
 
@@ -305,10 +312,10 @@ def test_events_that_reset_the_state_or_end_the_motion(method: str, events: Any)
 
     def at(q: float = 1.0, tau: float = 0.2, **numbers: float) -> dyn.MotionGradient:
         final = lambda q, qd, t: q[0] * qd[0] + t * q[0]  # noqa: E731
-        return dyn.gradient(falling(), final, [q], [0.1], tau=[tau], parameters=numbers, **given)
+        return dyn.gradient(FALLING, final, [q], [0.1], tau=[tau], parameters=numbers, **given)
 
     result = at()
-    forward = dyn.sensitivities(falling(), [1.0], [0.1], tau=[0.2], **given)
+    forward = dyn.sensitivities(FALLING, [1.0], [0.1], tau=[0.2], **given)
     q, qd, t = forward.q[-1, 0], forward.qd[-1, 0], forward.t[-1]
     for name in given["wrt"]:
         rows, times = forward[name], forward.times[name]
@@ -342,10 +349,10 @@ def test_many_gradients_are_those_one_by_one(method: str, backend: str) -> None:
     q, qd, tau, k = (rng.normal(size=shape) for shape in ((9, 1), (9, 1), (9, 4, 1), 9))
     given = {"t_end": 0.2, "method": method, "wrt": WRT, "backend": backend}
     running = lambda q, qd, tau, t: q[0] * tau[0]  # noqa: E731
-    many = dyn.gradient_many(bead(), loss, q, qd, tau=tau, parameters={"k": 2.0 + k}, running=running, **given)
+    many = dyn.gradient_many(BEAD, loss, q, qd, tau=tau, parameters={"k": 2.0 + k}, running=running, **given)
     for row in (0, 4, 8):
         one = dyn.gradient(
-            bead(), loss, q[row], qd[row], tau=tau[row], parameters={"k": 2.0 + k[row]}, running=running, **given
+            BEAD, loss, q[row], qd[row], tau=tau[row], parameters={"k": 2.0 + k[row]}, running=running, **given
         )
         assert many.value[row] == approx(one.value, rel=SHORT_SUM)
         assert (many.q[row], many.qd[row]) == (approx(one.q, rel=SHORT_SUM), approx(one.qd, rel=SHORT_SUM))
@@ -356,14 +363,14 @@ def test_many_gradients_are_those_one_by_one(method: str, backend: str) -> None:
 def test_many_gradients_with_what_is_the_same_for_all() -> None:
     held = {"tau": lambda q, qd, t, p: [p["gain"] * (1.0 - q[0])], "parameters": {"gain": [3.0, 4.0]}}
     given = {"t_end": 0.2, "dt": 0.05, "backend": "python"}
-    two = dyn.gradient_many(bead(), loss, [0.5], [0.2], wrt=["q", "gain", "m"], **given, **held)
+    two = dyn.gradient_many(BEAD, loss, [0.5], [0.2], wrt=["q", "gain", "m"], **given, **held)
     held["parameters"] = {"gain": 4.0}
-    one = dyn.gradient(bead(), loss, [0.5], [0.2], wrt=["q", "gain", "m"], **given, **held)
+    one = dyn.gradient(BEAD, loss, [0.5], [0.2], wrt=["q", "gain", "m"], **given, **held)
     assert [two[name][1] for name in ("q", "gain", "m")] == [approx(one[name]) for name in ("q", "gain", "m")]
-    same = dyn.gradient_many(bead(), loss, [[0.5], [0.5]], [0.2], tau=[0.3], **given)
+    same = dyn.gradient_many(BEAD, loss, [[0.5], [0.5]], [0.2], tau=[0.3], **given)
     assert same["tau"].shape == (2, 1)
     with raises(ValueError, match="gradient_many needs equal steps"):
-        dyn.gradient_many(bead(), loss, [[0.5]], [0.2], 0.2, "dop853")
+        dyn.gradient_many(BEAD, loss, [[0.5]], [0.2], 0.2, "dop853")
 
 
 @mark.parametrize("method", ["rk4", "dopri5", "rodas", "radau", "midpoint"])
@@ -435,9 +442,9 @@ def test_a_new_tableau_has_gradients(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_checkpoints_give_the_same_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     given = {"t_end": 1.0, "dt": 0.01, "wrt": WRT, "backend": "python"}
-    whole = dyn.gradient(bead(), loss, [0.5], [0.2], **given)
+    whole = dyn.gradient(BEAD, loss, [0.5], [0.2], **given)
     monkeypatch.setattr(motion_run, "MOST_RECORDED", 1000)
-    again = dyn.gradient(bead(), loss, [0.5], [0.2], **given)
+    again = dyn.gradient(BEAD, loss, [0.5], [0.2], **given)
     assert (whole.checkpoints, again.checkpoints) == (0, 10)
     assert {name: np.squeeze(again[name]) for name in WRT} == {name: np.squeeze(whole[name]) for name in WRT}
 
@@ -445,10 +452,10 @@ def test_checkpoints_give_the_same_numbers(monkeypatch: pytest.MonkeyPatch) -> N
 def test_a_controller_s_gain_and_a_first_order_system() -> None:
     held = {"tau": lambda q, qd, t, p: [p["gain"] * (1.0 - q[0])], "parameters": {"gain": 3.0}}
     given = {"t_end": 0.5, "dt": 0.05, "backend": "python", "wrt": ["q", "gain"], **held}
-    result = dyn.gradient(bead(), loss, [0.5], [0.2], running=lambda q, qd, tau, t: tau[0] ** 2, **given)
+    result = dyn.gradient(BEAD, loss, [0.5], [0.2], running=lambda q, qd, tau, t: tau[0] ** 2, **given)
     values = [
         dyn.gradient(
-            bead(), loss, [0.5], [0.2], running=lambda q, qd, tau, t: tau[0] ** 2,
+            BEAD, loss, [0.5], [0.2], running=lambda q, qd, tau, t: tau[0] ** 2,
             **(given | {"parameters": {"gain": gain}}),
         ).value
         for gain in (3.0 + 1e-5, 3.0 - 1e-5)
@@ -464,7 +471,7 @@ def test_a_controller_s_gain_and_a_first_order_system() -> None:
 
 def test_what_is_not_there_is_said_in_a_sentence() -> None:
     def end(**given: Any) -> Any:
-        return dyn.gradient(bead(), loss, [0.5], [0.2], **({"t_end": 0.1, "dt": 0.05, "backend": "python"} | given))
+        return dyn.gradient(BEAD, loss, [0.5], [0.2], **({"t_end": 0.1, "dt": 0.05, "backend": "python"} | given))
 
     with raises(ValueError, match="by method 'taylor' have no derivatives here; those by euler, rk4"):
         end(method="taylor", dt=None)
