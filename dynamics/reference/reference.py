@@ -137,8 +137,8 @@ def _converged(
         before, step = rows, max(STEP, math.ceil(missing))
     raise ReferenceFailedError(
         f"{MOST} digits are not enough for {digits} digits at t = {times[-1]:.6g}: the last two runs differ by "
-        f"{error:.0e} of the largest value of {state}, so that it is zero but for rounding, or what is before decides it "
-        "no more, as beyond a configuration where a linkage can go on in two ways"
+        f"{error:.0e} of the largest value of {state}, so that it is zero but for rounding, or the start does "
+        "not decide it, as beyond a configuration where a linkage can go on in two ways"
     )
 
 
