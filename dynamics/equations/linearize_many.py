@@ -14,11 +14,13 @@ from cgraph.extend import Call, Map, Program, runner, share, thread_count
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
+from .equations_of_motion import forward_dynamics
 from .evaluate_at import Array, input_values
 from .linearization_parts import ColumnGraphs, LinearizationParts, assembled, linearization_parts
 
 # Nodes; beyond, the columns share one piece of code, which LLVM is done with in a tenth of the time.
 WRITTEN_OUT = 20_000
+SHARE = 3  # of the nodes of all entries, at most one in so many is forward dynamics
 BLOCK = 64  # states that are run between looks at the keyboard, and that a thread takes at a time
 _functions: WeakKeyDictionary[System, _Function] = WeakKeyDictionary()
 
@@ -35,10 +37,12 @@ def linearize_many(
 ) -> tuple[Array, Array]:
     """`linearize` at N states, such as those of a horizon: machine code, made at the first call and kept.
 
-    Of small systems all entries are written out, and states lie side by side in vectors. Of others, what the state
-    alone decides, the slopes of `inverse_dynamics_derivatives` and the factorization of M, is one piece of code and a
-    column of A and B another, through which all columns of a state run side by side. The matrices of a state whose mass
-    matrix is singular, or with a quaternion of length 0, have entries that are infinite or NaN.
+    Of small systems all entries are written out, and states lie side by side in vectors. Of larger ones, state after
+    state, it is the Jacobian of the compiled `forward_dynamics`, whose columns run side by side through one piece of
+    code; it keeps the digits of long chains, too, whatever the condition of M. With quasi-velocities or constraints,
+    what the state alone decides, the slopes of `inverse_dynamics_derivatives` and the factorization of M, is one such
+    piece, and a column of A and B another. The matrices of a state whose mass matrix is singular, or with a quaternion
+    of length 0, have entries that are infinite or NaN.
 
     Parameters
     ----------
@@ -102,6 +106,30 @@ class _WrittenOut(_Function):
         return rows[:, :split].reshape(count, 2 * n, 2 * n), rows[:, split:].reshape(count, 2 * n, n)
 
 
+class _ByJacobian(_Function):
+    """One state after another, by the Jacobian of forward dynamics: of systems whose velocities are rates."""
+
+    def __init__(self, system: System) -> None:
+        graph, self.n = forward_dynamics(system), system.n
+        self.names, self.compiled = graph.input_names, cg.compile(graph)
+        self.wrt = [*system.q, *system.qd, *system.tau]
+
+    def __call__(self, values: Array, threads: int) -> tuple[Array, Array]:
+        n, count = self.n, values.shape[1]
+        rows = np.empty((count, n, 3 * n))
+
+        def block(start: int) -> None:
+            x, slopes = np.empty(len(values)), np.empty((n, 3 * n))
+            run = self.compiled.bind_jacobian(x, slopes, wrt=self.wrt)
+            for k in range(start, min(start + BLOCK, count)):
+                x[:] = values[:, k]
+                run()
+                rows[k] = slopes
+
+        share(block, range(0, count, BLOCK), threads)
+        return assembled(np.zeros((count, n * n)), rows.reshape(count, 3 * n * n), n)
+
+
 class _InColumns(_Function):
     """One state after another, its columns side by side in vectors."""
 
@@ -125,9 +153,18 @@ class _InColumns(_Function):
 
 def _function(system: System) -> _Function:
     if system not in _functions:
-        parts = linearization_parts(system)
-        _functions[system] = (_WrittenOut if parts.size < WRITTEN_OUT else _InColumns)(parts)
+        _functions[system] = _made(system)
     return _functions[system]
+
+
+def _made(system: System) -> _Function:
+    rates = system.kinematics.quasi is None and not len(system.constraints)
+    if rates and len(forward_dynamics(system).nodes) >= WRITTEN_OUT // SHARE:
+        return _ByJacobian(system)
+    parts = linearization_parts(system)
+    if parts.size < WRITTEN_OUT:
+        return _WrittenOut(parts)
+    return _ByJacobian(system) if rates else _InColumns(parts)
 
 
 def linearization_program(graphs: ColumnGraphs, n: int) -> Program:
