@@ -25,6 +25,7 @@ class PinocchioPeer(Peer):
         super().__init__(case)
         self.pinocchio = pinocchio()
         mechanism = bodies(case)
+        self.loops = mechanism.loops
         self.of = PinocchioModel(mechanism)
         self.twin = self.of.model
         self.data = self.twin.createData()
@@ -84,6 +85,8 @@ class PinocchioPeer(Peer):
 
     def prepare(self, task: str, mode: str) -> Contender:
         """Pinocchio's rnea or aba, at one state or over states."""
+        if self.loops and DERIVATIVES.get(task, task) != "inverse":
+            raise UnavailableError("has no loops in aba; `cgraph bench closed-chains` has its constraintDynamics")
         if task == "rk4":
             return self._step()
         if task in DERIVATIVES:
