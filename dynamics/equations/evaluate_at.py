@@ -96,9 +96,7 @@ def _numbers(system: System, t: float, parameters: Mapping[str, float] | None) -
     return {TIME: real_number("t", t), **system.parameters, **parameters}
 
 
-def _arrays(
-    system: System, state: Mapping[str, ArrayLike | None]
-) -> tuple[dict[str, Array], tuple[int, ...]]:
+def _arrays(system: System, state: Mapping[str, ArrayLike | None]) -> tuple[dict[str, Array], tuple[int, ...]]:
     """The parts of a state, checked, (n,) or (N, n) each, and () or (N,)."""
     arrays = {name: _rows(system, name, state.get(name)) for name in STATE}
     return arrays, np.broadcast_shapes(*[rows.shape[:-1] for rows in arrays.values()])

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Call, Map, Program, runner, thread_count
+from cgraph.extend import Call, Map, Program, Statement, runner, thread_count
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
@@ -18,7 +18,8 @@ from .evaluate_at import Array, InputRows
 from .formulations import ONE, ZERO
 from .linearization_parts import ColumnGraphs, LinearizationParts, linearization_parts
 
-# Nodes; beyond, the columns share one piece of code, which LLVM is done with in a tenth of the time.
+# Nodes; beyond, the columns share one piece of code: of 18 000 nodes, machine code is made in half the time and takes a
+# third longer, of 200 000 in a fifth of the time, and takes no longer.
 WRITTEN_OUT = 20_000
 _functions: WeakKeyDictionary[System, _Function] = WeakKeyDictionary()
 
@@ -148,7 +149,7 @@ def linearization_program(graphs: ColumnGraphs, n: int) -> Program:
     registers = {"state": len(graphs.shared.inputs), "factors": factors, "brackets": n * n}
     registers |= dict.fromkeys([*by_state, *slopes], 2 * n) | dict.fromkeys([*by_tau, *inverse, *symmetric], n)
     sides = [each for pair in zip(by_state, by_tau, strict=True) for each in pair]
-    body = [
+    body: list[Statement] = [
         Call(graphs.shared, ("state",), ("factors", *sides, "brackets")),
         Map(graphs.column, tuple(by_state), tuple(slopes), shared=("factors",)),
         Map(graphs.column, tuple(by_tau), tuple(inverse), shared=("factors",)),
