@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
+from functools import lru_cache
 from itertools import groupby
 
 import numpy as np
@@ -82,24 +83,27 @@ def arrays_at(
         flat = function.batch(x.T).T if x.ndim == 2 else function(x)
     arrays: dict[str, Array] = {}
     start = 0
-    for name, shape in _shapes(graph.outputs):
+    for name, shape in _shapes(tuple(graph.outputs)):
         end = start + math.prod(shape)
         arrays[name] = flat[..., start:end].reshape((*flat.shape[:-1], *shape))
         start = end
     return arrays
 
 
-def _shapes(outputs: Iterable[str]) -> Iterator[tuple[str, tuple[int, ...]]]:
+@lru_cache(maxsize=64)
+def _shapes(outputs: tuple[str, ...]) -> list[tuple[str, tuple[int, ...]]]:
     """Name and shape of the arrays that names of outputs spell, one after another."""
+    arrays: list[tuple[str, tuple[int, ...]]] = []
     for stem, run in groupby(outputs, key=lambda name: _split(name)[0]):
         names = list(run)
         indices = [_split(name)[1] for name in names]
         if len({len(index) for index in indices}) == 1:
             shape = tuple([1 + max(axis) for axis in zip(*indices, strict=True)])
             if list(np.ndindex(*shape)) == indices:
-                yield stem, shape
+                arrays.append((stem, shape))
                 continue
-        yield from [(name, ()) for name in names]  # an array with entries left out
+        arrays += [(name, ()) for name in names]  # an array with entries left out
+    return arrays
 
 
 def _split(name: str) -> tuple[str, tuple[int, ...]]:
