@@ -50,7 +50,7 @@ def test_the_embedded_step_ends_in_the_state_of_the_others():
 def test_shares_of_the_torque_add_up():
     found = inspection(dyn.scenes.load("triple_pendulum"))
     parts, graph = found.shares.parts, found.shares.graph
-    assert parts == ("link 1", "link 2", "link 3", "damping and forces", "all")
+    assert parts == ("link 1", "link 2", "link 3", "damping", "all")
     values = graph.evaluate(values_of(found, graph))
     shares = np.array(
         [[np.broadcast_to(values[name], found.t.shape) for name in found.shares.row(i)] for i in range(3)]
@@ -92,3 +92,9 @@ def test_a_mechanism_hangs_together():
 def test_a_time_out_of_range_is_refused():
     with pytest.raises(ValueError, match="t_end"):
         inspection(Scene("x", "", dyn.planar_arm([1.0], [1.0]), (0.0,), (0.0,), 1.0), t_end=-1.0)
+
+
+def test_a_motion_that_does_not_begin_is_told():
+    weightless = dyn.System(lambda q, qd, t, p: p["m"] * qd[0] ** 2 - q[0] ** 2, ["x"], {"m": 0.0})
+    with pytest.raises(ValueError, match=r"accelerations that are not finite: the motion stopped at t = 0 s: "):
+        inspection(Scene("weightless", "", weightless, (1.0,), (0.0,), 1.0))

@@ -78,6 +78,12 @@ def test_a_scene_that_would_rest_for_ever_starts_where_it_moves(name):
     assert start_text(scene) != "0"
 
 
+def test_many_joints_are_not_wound_up():
+    scene = moving_start(scenes.of_model(dyn.planar_arm([1.0] * 20, [1.0] * 20)))
+    assert sum(scene.q) == pytest.approx(np.pi)
+    assert start_text(scene).endswith(", and 16 more")
+
+
 @pytest.mark.parametrize("name", scenes.names())
 def test_a_scene_that_moves_keeps_its_start(name):
     scene = scenes.load(name)
