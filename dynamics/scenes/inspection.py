@@ -14,6 +14,7 @@ from cgraph.extend import real_number
 
 from ..equations.equations_of_motion import forward_dynamics
 from ..equations.formulations import inverse_dynamics, spurious_nodes
+from ..equations.state_equation import state_equation
 from ..equations.torque_decomposition import torque_by_link
 from ..multibody.display_units import display_units
 from ..multibody.joint_positions import Skeleton, skeleton
@@ -73,15 +74,18 @@ def inspection(
 ) -> Inspection:
     """The scene's inverse dynamics by the three formulations, or its forward dynamics, along its free motion.
 
-    say: told of each stage before it begins.
+    Of an OdeSystem it is the state equation.  say: told of each stage before it begins.
 
     Raises ValueError for t_end out of range, and as `simulate` does.
     """
-    system, end = scene.system, scene.t_end if t_end is None else real_number("t_end", t_end)
+    end = scene.t_end if t_end is None else real_number("t_end", t_end)
     if not 0.0 < end < np.inf:
         raise ValueError(f"t_end must be positive and finite, got {end!r} s")
     frames = int(min(FRAMES, max(2.0, RATE * end))) if np.isfinite(end) else 2
     times = np.linspace(0.0, end, frames) if end > 0.0 else None
+    if scene.ode is not None:
+        return _first_order(scene, end, times)
+    system = scene.system
     say(f"{scene.name}: deriving the equations of {system.n} coordinates, compiling them, and a motion of {end:g} s")
     run = simulate(system, scene.q, scene.qd, end, "dopri5", rtol=1e-6, t_eval=times)
     say(f"{scene.name}: deriving forward dynamics")
@@ -111,6 +115,17 @@ def inspection(
     at = {name: value for name, value in state.items() if name in inputs}
     units = units | {"t": "s", "dt": "s"}
     return Inspection(tuple(versions), run.t, places, at, derived, shares, stopped, units)
+
+
+def _first_order(scene: Scene, end: float, times: Array | None) -> Inspection:
+    graph = state_equation(scene)
+    run = simulate(scene, scene.q, None, end, "dopri5", rtol=1e-6, t_eval=times)
+    state = dict(zip(scene.coordinates, run.q.T, strict=True)) | dict(scene.parameters) | {"t": run.t}
+    about = f"The rates of {len(scene.coordinates)} states: {len(graph.nodes)} nodes."
+    at = {name: state[name] for name in graph.input_names}
+    stopped = "" if run.stats.success else run.stats.message
+    version = Equations("state equation", graph, about, frozenset())
+    return Inspection((version,), run.t, None, at, stopped=stopped, units={"t": "s"})
 
 
 def _derived(system: System) -> Graph:
