@@ -106,7 +106,10 @@ def takes_equations(command: argparse.ArgumentParser) -> None:
 
 
 def equations_of(options: argparse.Namespace, scene: scenes.Scene) -> tuple[Graph, str]:
-    """The graph that the arguments choose, of an OdeSystem its rates; and what it is: "inverse dynamics, chain rule"."""
+    """The graph that the arguments choose, and what it is: "inverse dynamics, chain rule".
+
+    Of an OdeSystem it is the state equation.
+    """
     if scene.ode is not None:
         return state_equation(scene), "state equation"
     if options.forward:

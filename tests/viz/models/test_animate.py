@@ -114,7 +114,7 @@ def test_a_notebook_plays_it():
         ((ARM, FALL), {"speed": 1e9}, "a film has 2 to 1000 frames"),
         ((ARM, FALL, "film.avi"), {}, "kind must be one of .gif, .png, .apng, .mp4, got '.avi'"),
         ((ARM, FALL), {"marked": ["a"]}, "there is no motion 'a'"),
-        ((ARM, FALL), {"wanted": lambda t: t}, r"coordinates \(T, nq\) = \(6, 2\), got shape \(6,\)"),
+        ((ARM, FALL), {"wanted": lambda t: t}, r"coordinates \(T, nq\) = \(21, 2\), got shape \(21,\)"),
     ],
 )
 def test_what_cannot_be_shown_is_told(arguments, named, message):
