@@ -307,6 +307,9 @@ def test_a_feed_is_read_before_every_pass(backend: str) -> None:
     feed = np.arange(12.0).reshape(3, 4)
     assert ready.run(ready.memory({"x": 1.0}), 3, 1, feed).rows.tolist() == [[1, 2, 3], [5, 6, 7], [13, 10, 11]]
     assert ready.run(ready.memory({"x": 1.0}), 2, 2, feed[:2]).rows.tolist() == [[5, 6, 7]]
+    wide = np.stack([feed, -feed], axis=1).reshape(3, 8)
+    for view in (wide[::-1, :4], np.asfortranarray(feed)[::-1], wide.astype(np.float32)[::-1, :4]):
+        assert ready.run(ready.memory({"x": 1.0}), 3, 1, view).rows[:, 0].tolist() == [9, 13, 13]
     many = np.stack([feed, 2.0 * feed], axis=2)
     memories = ready.memory({"x": np.array([[1.0, 0.0]])}, 2)
     assert ready.run_many(memories.copy(), 3, 1, many).rows[:, 0].tolist() == [[1, 0], [5, 8], [13, 24]]
