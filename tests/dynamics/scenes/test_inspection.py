@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from dynamics.scenes.inspection import DT, FORMULATIONS, Inspection, inspection
 from dynamics.scenes.scenes import Scene
 from tests.tolerances import EQUATIONS
 
+ARM = cache(lambda: inspection(dyn.scenes.load("triple_pendulum")))
 INTEGRATED = 1e-9  # N m: the state is one that the equations hold at, whatever the error of the motion
 
 
@@ -26,7 +28,7 @@ def values_of(found: Inspection, graph: Graph) -> dict[str, Any]:
 
 
 def test_the_free_motion_takes_no_torque_by_the_chain_rule_alone():
-    found = inspection(dyn.scenes.load("triple_pendulum"))
+    found = ARM()
     assert tuple(each.name for each in found.versions) == FORMULATIONS
     wrong = []
     for each in found.versions:
@@ -39,7 +41,7 @@ def test_the_free_motion_takes_no_torque_by_the_chain_rule_alone():
 
 
 def test_the_embedded_step_ends_in_the_state_of_the_others():
-    found = inspection(dyn.scenes.load("triple_pendulum"))
+    found = ARM()
     at = values_of(found, found.versions[0].graph)
     for i in range(3):
         qd = at[f"qd{i}_old"] + DT * at[f"qdd{i}"]
@@ -48,7 +50,7 @@ def test_the_embedded_step_ends_in_the_state_of_the_others():
 
 
 def test_shares_of_the_torque_add_up():
-    found = inspection(dyn.scenes.load("triple_pendulum"))
+    found = ARM()
     parts, graph = found.shares.parts, found.shares.graph
     assert parts == ("link 1", "link 2", "link 3", "damping", "all")
     values = graph.evaluate(values_of(found, graph))
