@@ -23,7 +23,7 @@ KINDS = (".gif", ".png", ".apng", ".mp4")
 COLORS = 64  # of a palette
 _FINE = 2  # pixels drawn for one that is kept, in each direction
 _NEAR = 24  # of 765: how far apart two colors may be that cannot be told apart
-_SAMPLES = 8  # frames that the palette is chosen from
+_SAMPLES = 4  # frames that the palette is chosen from
 
 Point = tuple[float, float]
 

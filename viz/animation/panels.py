@@ -18,13 +18,14 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 SIDE, TITLE, CLOCK, MARGIN = 340, 30, 26, 14  # pixels: of a panel, its title, the time below, and around
 SIZE, SMALL = 14, 12  # of letters
 FOLLOW = 5.0  # how much larger than the mechanism its way is where the frame goes with it
-TRACE = RATE  # frames that the tip's way is shown for
+FINE = 4  # instants a frame, of the ways and curves that are drawn
+TRACE = RATE * FINE  # instants that the tip's way is shown for
 NAMED = 7  # curves at most
 
 
 @dataclass(frozen=True)
 class Motion:
-    """What a panel shows.  values: (F, k, 2) points [m] or (F, m) curves, a row for each frame.  wrong: painted so."""
+    """What a panel shows.  values: (T, k, 2) points [m] or (T, m) curves, `FINE` rows a frame.  wrong: painted so."""
 
     title: str
     values: Array
@@ -40,7 +41,7 @@ class Panel(ABC):
 
     @abstractmethod
     def draw(self, canvas: Canvas, motion: Motion, k: int, colors: Colors) -> None:
-        """Frame k of a motion, in the square of `SIDE` below its title, whose left side is at 0."""
+        """Row k of a motion, in the square of `SIDE` below its title, whose left side is at 0."""
 
 
 class Sticks(Panel):
@@ -73,7 +74,7 @@ class Sticks(Panel):
             self._sticks(canvas, [at(place) for place in self.wanted[k]], at(np.zeros(2)), [colors.faint], None)
         tip = motion.values[max(0, k - TRACE) : k + 1, -1]
         paint = [colors.wrong] if motion.wrong else list(colors.links)
-        canvas.line([at(place) for place in tip], paint[(len(points) - 1) % len(paint)], 1.2)
+        canvas.line([at(place) for place in tip], paint[max(self.parents[-1], 0) % len(paint)], 1.2)
         if not self.follows:
             x, y = at(np.zeros(2))
             canvas.line([(x - 12.0, y), (x + 12.0, y)], colors.text, 2.0)
@@ -111,7 +112,7 @@ class Sticks(Panel):
 
 
 class Curves(Panel):
-    """Coordinates over time: what has been, and where each is now.  names: of the curves, (m,).  t: (F,) [s]."""
+    """Coordinates over time: what has been, and where each is now.  names: of the curves, (m,).  t: (T,) [s]."""
 
     def __init__(self, motions: Sequence[Motion], wanted: Array | None, names: Sequence[str], t: Array) -> None:
         super().__init__(motions, wanted)
@@ -122,7 +123,7 @@ class Curves(Panel):
             self.low, self.high = self.low - 0.5, self.high + 0.5
 
     def draw(self, canvas: Canvas, motion: Motion, k: int, colors: Colors) -> None:
-        """Axes with their numbers, and the curves up to frame k."""
+        """Axes with their numbers, and the curves up to row k."""
         step = nice((self.high - self.low) / 3.0)
         ticks = [i * step for i in range(math.ceil(self.low / step), math.floor(self.high / step) + 1)]
         left = MARGIN + 8.0 + max([canvas.width_of(_number(tick), SMALL) for tick in ticks], default=0.0)
@@ -157,7 +158,7 @@ class Curves(Panel):
 def film(panel: Panel, t: Array, dark: bool = False, title: str = "") -> Callable[[int], Canvas]:
     """What draws a frame: the panels of the motions side by side, the time below.
 
-    title: above all, empty for none.  t: (F,) [s].
+    title: above all, empty for none.  t: (T,) [s], of which every `FINE`th is a frame.
     """
     colors = DARK if dark else LIGHT
     wide = SIDE + 2 * MARGIN
@@ -171,12 +172,12 @@ def film(panel: Panel, t: Array, dark: bool = False, title: str = "") -> Callabl
         canvas = blank.copy()
         for i, motion in enumerate(panel.motions):
             part = Canvas(wide, TITLE + SIDE, colors.page)
-            panel.draw(part, motion, k, colors)
+            panel.draw(part, motion, FINE * k, colors)
             part.text(
                 (wide / 2.0, TITLE / 2.0), motion.title, colors.wrong if motion.wrong else colors.text, SIZE, "mm"
             )
             canvas.put(part, i * wide, head)
-        canvas.text((width / 2.0, height - CLOCK / 2.0), f"t = {t[k]:.2f} s", colors.text, SMALL, "mm")
+        canvas.text((width / 2.0, height - CLOCK / 2.0), f"t = {t[FINE * k]:.2f} s", colors.text, SMALL, "mm")
         return canvas
 
     return frame

@@ -46,7 +46,7 @@ def box(text: str) -> dict[str, tuple[float, float]]:
 def filled(graph: Graph, scene: Scene, given: dict[str, float]) -> dict[str, float]:
     """The given numbers with the rest that the graph's inputs need, by the graph's names. Raises for unknown names."""
     chosen = np.random.default_rng(SEED)
-    parameters = scene.system.parameters
+    parameters = scene.parameters
     values = {}
     for name in graph.input_names:
         drawn = round(chosen.uniform(-1.0, 1.0), DIGITS)

@@ -27,7 +27,7 @@ from dynamics.multibody.mechanism import as_mechanism
 from dynamics.systems.model import Model
 
 from ..animation.canvas import KINDS, RATE, check_can_animate, encode
-from ..animation.panels import Curves, Motion, Panel, Sticks, film
+from ..animation.panels import FINE, Curves, Motion, Panel, Sticks, film
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 MOST_FRAMES, MOST_MOTIONS = 1000, 4
@@ -125,7 +125,8 @@ def animate(
         raise ValueError(f"marked: there is no motion {unknown[0]!r:.80} (there are {', '.join(known)})")
     times = _times(known.values(), speed)
     panel = _panel(model, known, times, wanted, set(wrong))
-    made = Animation(encode(film(panel, times, require_flag("dark", dark), title), len(times), kind))
+    count = (len(times) - 1) // FINE + 1
+    made = Animation(encode(film(panel, times, require_flag("dark", dark), title), count, kind))
     made.kind = kind
     if target is not None:
         write_files({target: made})
@@ -157,12 +158,13 @@ def _motions(model: Model, motions: object) -> dict[str, Trajectory]:
 
 
 def _times(motions: Collection[Trajectory], speed: float) -> Array:
-    """The instant of each frame, from the first start to the last end."""
+    """The instants of the frames, and those between, from the first start to the last end."""
     if not 0.0 < real_number("speed", speed) < math.inf:
         raise ValueError(f"speed must be positive and finite, got {speed!r}")
     start = min(float(min(each.t[0], each.t[-1])) for each in motions)
     end = max(float(max(each.t[0], each.t[-1])) for each in motions)
-    return np.asarray(start + speed / RATE * np.arange(frames(end - start, speed)), dtype=np.float64)
+    count = FINE * (frames(end - start, speed) - 1) + 1
+    return np.asarray(start + speed / (RATE * FINE) * np.arange(count), dtype=np.float64)
 
 
 def frames(length: float, speed: float) -> int:

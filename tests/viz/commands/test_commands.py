@@ -240,6 +240,14 @@ def test_a_model_of_a_python_file_stands_where_a_scene_does(own, capsys, command
     assert "made" not in text
 
 
+@pytest.mark.parametrize(
+    "command",
+    ["inspect {} --t-end 0.1 --out a.html", "lint {}", "why {} decay_dot decay", "draw {} --out a.dot", "simulate {}"],
+)
+def test_a_system_of_first_order_has_its_state_equation(own, capsys, command):
+    assert said(capsys, *command.format("own.py:slow").split())
+
+
 def test_the_ten_lines_of_the_readme_are_a_page(own, capsys):
     readme = Path(cli.__file__).parents[1].joinpath("README.md").read_text(encoding="utf-8")
     lines = readme.partition("```python\n")[2].partition("```")[0]

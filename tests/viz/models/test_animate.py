@@ -17,10 +17,10 @@ from viz.models.animate import _at, frames
 
 Image = pytest.importorskip("PIL.Image")
 ARM = dyn.planar_arm([1.0, 0.5], [1.0, 0.8])
-FALL = dyn.simulate(ARM, [1.0, 0.2], [0.0, 0.0], t_end=0.2)
+FALL = dyn.simulate(ARM, [1.0, 0.2], [0.0, 0.0], t_end=0.08)
 SYSTEM = dyn.System(lambda q, qd, t: qd[0] ** 2 + qd[1] ** 2 - q[0] ** 2 - q[0] * q[1], "x y")
 ONE = dyn.planar_arm([1.0], [1.0])
-SWING = dyn.simulate(SYSTEM, [1.0, 0.2], [0.0, 0.0], t_end=0.2)
+SWING = dyn.simulate(SYSTEM, [1.0, 0.2], [0.0, 0.0], t_end=0.08)
 
 
 def opened(film: bytes):
@@ -46,8 +46,8 @@ def test_a_film_takes_the_time_of_the_motion(model, motion, kind, tmp_path):
     film = viz.animate(model, motion, path)
     assert path.read_bytes() == film
     found, seconds = opened(film)
-    assert sum(seconds) == pytest.approx(0.24)  # 0.2 s, and the frame of the end
-    assert len(found) == frames(0.2, 1.0) == 6
+    assert sum(seconds) == pytest.approx(0.12)  # 0.08 s, and the frame of the end
+    assert len(found) == frames(0.08, 1.0) == 3
     assert np.ptp(found, axis=0).max() > 100
 
 
@@ -66,9 +66,9 @@ def test_two_side_by_side_and_the_wrong_one_in_its_color(dark):
 
 
 def test_speed_and_a_motion_that_ends_early():
-    short = dyn.simulate(ARM, [1.0, 0.2], [0.0, 0.0], t_end=0.1)
+    short = dyn.simulate(ARM, [1.0, 0.2], [0.0, 0.0], t_end=0.04)
     found, seconds = opened(viz.animate(ARM, [FALL, short], speed=0.5))
-    assert sum(seconds) == pytest.approx(0.44)
+    assert sum(seconds) == pytest.approx(0.2)
     left, right = zip(*[np.array_split(frame[:350], 2, axis=1) for frame in found], strict=True)
     assert (left[-1] != left[-2]).any()
     assert (right[-1] == right[-2]).all()
@@ -110,11 +110,11 @@ def test_a_notebook_plays_it():
         ),
         ((ARM, []), {}, "1 to 4 motions side by side, got 0"),
         ((ARM, [FALL] * 5), {}, "1 to 4 motions side by side, got 5"),
-        ((ARM, FALL), {"speed": 1e-9}, "at speed 1e-09 are 5e[+]09; speed 0.02 makes it 10 s long"),
+        ((ARM, FALL), {"speed": 1e-9}, "at speed 1e-09 are 2e[+]09; speed 0.008 makes it 10 s long"),
         ((ARM, FALL), {"speed": 1e9}, "a film has 2 to 1000 frames"),
         ((ARM, FALL, "film.avi"), {}, "kind must be one of .gif, .png, .apng, .mp4, got '.avi'"),
         ((ARM, FALL), {"marked": ["a"]}, "there is no motion 'a'"),
-        ((ARM, FALL), {"wanted": lambda t: t}, r"coordinates \(T, nq\) = \(6, 2\), got shape \(6,\)"),
+        ((ARM, FALL), {"wanted": lambda t: t}, r"coordinates \(T, nq\) = \(9, 2\), got shape \(9,\)"),
     ],
 )
 def test_what_cannot_be_shown_is_told(arguments, named, message):
@@ -139,7 +139,7 @@ def test_mp4_gets_every_frame_and_ffmpeg_is_heard(monkeypatch, tmp_path):
     program.write_text(f"#!{sys.executable}\nimport sys\n{count}\n")
     program.chmod(0o755)
     monkeypatch.setattr(shutil, "which", lambda name: str(program))
-    assert bytes(viz.animate(ARM, FALL, tmp_path / "a.mp4")) == str(6 * 368 * 396 * 3).encode()
+    assert bytes(viz.animate(ARM, FALL, tmp_path / "a.mp4")) == str(3 * 368 * 396 * 3).encode()
     program.write_text(f"#!{sys.executable}\nimport sys\nsys.exit('no such codec')\n")
     with pytest.raises(RuntimeError, match="ffmpeg cannot write this film: no such codec"):
         viz.animate(ARM, FALL, tmp_path / "a.mp4")
