@@ -7,6 +7,7 @@ is kept stable.
 
 **Build**: `Builder` folds and shares; `with building(Builder()):` sends every formula inside through it. `folded`
 copies nodes through a builder, `topological` gives all nodes that some nodes reach, arguments first.
+`with_reciprocals` leaves one division for a divisor.
 
 **Differentiate**: `cotangents` pulls from outputs, `tangents` pushes from inputs, `hessian_nodes` gives the lower
 triangle of second derivatives, all as nodes. `compressed_jacobian` gives the parts of a loop over colors of columns.
@@ -25,7 +26,8 @@ label may have. `certain_digits` says what rounding leaves of the outputs.
 **At the edges**: `real_array`, `real_number`, `is_finite`, `check_name`, `require_graph`, `require_flag`,
 `require_whole`, `require_choice`, `require_sequence`, `require_mapping` and `require_path` check what a caller passed,
 `thread_count` reads `threads=`, `share` gives work to threads, `atomic_write` writes a file whole or not at all,
-`write_files` several, and `check_writable` looks beforehand; `install` ends an error about a missing package,
+`write_files` several, and `check_writable` looks beforehand; `html_table`, `html_text`, `html_lines` and `picture` are
+what a notebook shows of a result; `install` ends an error about a missing package,
 `scipy_integrate` gives SciPy's module or raises it. `Array` is the type of an array of float64.
 
     >>> import cgraph as cg
@@ -65,7 +67,9 @@ from .program import Call, Factor, If, Map, Program, Record, Runner, Solve, Stat
 from .simplify.builder import Builder, folded
 from .simplify.identities import rewritten, shortened
 from .simplify.polynomial import Polynomial, expand, format_polynomial
+from .simplify.reciprocals import with_reciprocals
 from .util.atomic_write import atomic_write, check_writable, write_files
+from .util.html_text import html_lines, html_table, html_text, picture
 from .util.nearest import nearest, or_nearest
 from .util.real_arrays import is_finite, real_array, real_number
 from .util.require import (
@@ -118,12 +122,16 @@ __all__ = [
     "folded",
     "format_polynomial",
     "hessian_nodes",
+    "html_lines",
+    "html_table",
+    "html_text",
     "install",
     "is_finite",
     "ldl_elimination",
     "ldl_solve",
     "nearest",
     "or_nearest",
+    "picture",
     "real_array",
     "real_number",
     "register",
@@ -144,5 +152,6 @@ __all__ = [
     "tangents",
     "thread_count",
     "topological",
+    "with_reciprocals",
     "write_files",
 ]

@@ -12,6 +12,7 @@ from ..core.graph import Graph, require_graph
 from ..core.node import Node
 from ..core.source_lines import lines_text
 from ..errors import GraphError
+from ..util.html_text import html_table, html_text
 from .edge_partials import Point, edge_slopes
 from .names import Name, Names, many
 from .paths import best_paths, by_target, path_count
@@ -95,22 +96,28 @@ class Why:
         return frozenset([edge for path in self.paths for edge in path.edges])
 
     def __str__(self) -> str:
-        if not self.count:
-            return f"{self.output} does not depend on {self.input}; cg.why_not tells where it stops."
-        lines = [f"{self.output} depends on {self.input} along {count_text(self.count)}."]
-        if self.derivative is not None:
-            lines.append(f"d {self.output} / d {self.input} = {self.derivative:.6g}, the sum over all of them.")
-        values = [f"{path.value:+.4g}" if path.value is not None else "" for path in self.paths]
+        before, after = self._sentences()
+        values = [_weight(path) for path in self.paths]
         width = max(map(len, values), default=0)
-        lines += [f"  {value:>{width}}  {path.text}" for value, path in zip(values, self.paths, strict=True)]
-        if self.derivative is None:
-            if len(self.paths) < self.count:
-                lines.append(
-                    f"These are the shortest {len(self.paths)}; with a point, at={{...}}, the heaviest are listed."
-                )
-        else:
-            lines.append(self._balance())
-        return "\n".join(lines)
+        rows = [f"  {value:>{width}}  {path.text}" for value, path in zip(values, self.paths, strict=True)]
+        return "\n".join([*before, *rows, *after])
+
+    def _repr_html_(self) -> str:
+        before, after = self._sentences()
+        rows = [(path.text, _weight(path)) for path in self.paths]
+        table = html_table(("path", "weight" if self.derivative is not None else ""), rows) if rows else ""
+        return "".join([html_text(each) for each in before]) + table + "".join([html_text(each) for each in after])
+
+    def _sentences(self) -> tuple[list[str], list[str]]:
+        """What is said before the paths are listed, and after."""
+        if not self.count:
+            return [f"{self.output} does not depend on {self.input}; cg.why_not tells where it stops."], []
+        said = [f"{self.output} depends on {self.input} along {count_text(self.count)}."]
+        if self.derivative is not None:
+            said.append(f"d {self.output} / d {self.input} = {self.derivative:.6g}, the sum over all of them.")
+            return said, [self._balance()]
+        cut = f"These are the shortest {len(self.paths)}; with a point, at={{...}}, the heaviest are listed."
+        return said, [cut] if len(self.paths) < self.count else []
 
     def _balance(self) -> str:
         if self.weight == 0.0:
@@ -303,6 +310,10 @@ def digits_of(count: int) -> str:
 def count_text(count: int) -> str:
     """`1 path`, `12 paths`, `3.21e+41 paths`."""
     return many(count, "path") if count <= EXACT else f"{digits_of(count)} paths"
+
+
+def _weight(path: Path) -> str:
+    return "" if path.value is None else f"{path.value:+.4g}"
 
 
 def _json(value: float | None) -> float | None:

@@ -18,10 +18,12 @@ from ..equations.linearization import state_space
 from ..equations.linearization_parts import linearization_parts
 from ..equations.linearize_many import WRITTEN_OUT, linearization_program, linearize_many
 from ..equations.state_equation import state_equation
+from ..multibody.mechanism import as_mechanism
 from ..simulation.gradients.gradient import gradient
 from ..systems.model import Model
 from .case import DT, MOTIONS, NUDGE, PASSES, Array, Case, rk4_step
-from .contender import Contender, Peer
+from .contender import Contender, Peer, UnavailableError
+from .inertial_parameters import with_inertial_parameters
 
 
 def task_graph(case: Case, task: str) -> Graph:
@@ -38,7 +40,7 @@ def slope_graph(case: Case) -> Graph:
     """(q0.., qd0.., tau0..) -> dqdd/d(q, qd, tau), row by row."""
     matrices, n = case.bound(state_space(case.model)), case.n
     names = [f"A_{i}_{j}" if j < 2 * n else f"B_{i}_{j - 2 * n}" for i in range(n, 2 * n) for j in range(3 * n)]
-    return cg.simplify(Graph(matrices.inputs, {name: matrices.outputs[name] for name in names}))
+    return Graph(matrices.inputs, {name: matrices.outputs[name] for name in names})
 
 
 def _inverse_derivatives(model: Model) -> Graph:
@@ -85,10 +87,11 @@ class Ours(Peer):
     def prepare(self, task: str, mode: str) -> Contender:
         """The compiled graph of the task."""
         if task in MOTIONS:
-            return self._motion() if task == "motion" else self._gradient()
+            return self._motion() if task == "motion" else self._gradient(task)
+        if task == "derivatives" and mode == "batch":
+            return self._many()
         if task == "derivatives" and self.parts().size >= WRITTEN_OUT:
-            rates = self.case.system.kinematics.quasi is None
-            return self._jacobian() if rates and mode == "call" else self._columns(mode)
+            return self._jacobian() if self.case.system.kinematics.quasi is None else self._columns()
         graph, points = self.graph(task), self.case.points(task)
         size = len(graph.nodes)
         if mode == "loop":
@@ -106,18 +109,22 @@ class Ours(Peer):
         rows = np.empty((self.case.n, len(x)))
         return Contender(function.bind_jacobian(x, rows), lambda _: rows.ravel(), 1, len(function.graph.nodes))
 
-    def _columns(self, mode: str) -> Contender:
+    def _many(self) -> Contender:
+        """Derivatives at the states of a batch, rows of it, as anybody calls them."""
+        case = self.case
+        x = np.ascontiguousarray(case.points("derivatives").T)
+        states = np.split(x, [case.nq, case.nq + case.n], axis=1)
+        size = self.parts().size
+        return Contender(lambda: linearize_many(case.model, *states), lambda found: _slopes(*found), len(x), size)
+
+    def _columns(self) -> Contender:
         """Derivatives of a large model: one piece of code for all columns, as `linearize_many` has it."""
         case, n = self.case, self.case.n
         graphs = self.parts().in_columns()
         size = len(graphs.shared.nodes) + len(graphs.column.nodes)
-        if mode == "batch":
-            x = case.points("derivatives").T
-            states = np.split(x, [case.nq, case.nq + n], axis=1)
-            return Contender(lambda: linearize_many(case.model, *states), lambda found: _slopes(*found), len(x), size)
         run = runner(linearization_program(graphs._replace(shared=case.bound(graphs.shared)), n))
         memory, row = run.memory({"state": case.point("derivatives")}), np.empty((1, run.program.width))
-        return Contender(run.bind(memory, row), lambda _: row[0, n * n :].copy(), 1, size)
+        return Contender(run.bind(memory, row), lambda _: row[0, -3 * n * n :].copy(), 1, size)
 
     def _motion(self) -> Contender:
         """The steps as one program, which is fed a row of torques a step."""
@@ -133,14 +140,20 @@ class Ours(Peer):
             lambda: run.run(run.memory({"x": start}), PASSES, PASSES, rows), lambda y: y.rows[0], 1, len(step.nodes)
         )
 
-    def _gradient(self) -> Contender:
+    def _gradient(self, task: str) -> Contender:
         """`dyn.gradient`."""
         case, n = self.case, self.case.n
-        q, qd, tau = np.split(case.point("gradient"), [n, 2 * n])
-        rows, end = tau.reshape(PASSES, n), PASSES * DT
+        model: Model = case.model
+        numbers: dict[str, float] = {}
+        if task == "inertial-gradient":
+            if (mechanism := as_mechanism(model)) is None:
+                raise UnavailableError("the model has no bodies")
+            model, numbers = with_inertial_parameters(mechanism)
+        q, qd, tau = np.split(case.point(task), [n, 2 * n])
+        rows, end, wrt = tau.reshape(PASSES, n), PASSES * DT, ["q", "qd", "tau", *numbers]
         return Contender(
-            lambda: gradient(case.model, _square, q, qd, t_end=end, tau=rows),
-            lambda found: np.concatenate([found["q"], found["qd"], found["tau"].ravel()]),
+            lambda: gradient(model, _square, q, qd, t_end=end, tau=rows, wrt=wrt),
+            lambda found: np.concatenate([np.ravel(found[name]) for name in wrt]),
         )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
-from cgraph.extend import Array, or_nearest
+from cgraph.extend import Array, or_nearest, picture
 
 from .row_values import row_values
 from .sampled_controller import HeldForces
@@ -327,6 +327,10 @@ class Trajectory:
     def nlu(self) -> int:
         """LU factorizations."""
         return self.stats.nlu
+
+    def _repr_html_(self) -> str | None:
+        """The plot that a notebook shows, when a drawing package is installed (extra `viz`)."""
+        return picture("trajectory", self)
 
     def __repr__(self) -> str:
         n, stats = self.q.shape[1], self.stats

@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-
-import numpy as np
-from numpy.typing import NDArray
 
 from cgraph.extend import check_writable, require_flag, require_path, write_files
 from dynamics import display_names, scenes
-from dynamics.scenes.inspection import Inspection, inspection
+from dynamics.scenes.inspection import Inspection, Shares, inspection
 from dynamics.scenes.start import Start, moving_start, start_text, with_start
 from dynamics.systems.model import Model
 
-from .. import theme
-from ..inspector import Motion, Page, Table, Version, page
-
-ROUNDING = 1e-12  # of the largest torque: smaller ones are what is left of a difference
+from ..inspector import Motion, Page, StateTable, Version, page
 
 
 def inspect(
@@ -33,7 +26,7 @@ def inspect(
     Parameters
     ----------
     model : Model
-        A System, a Mechanism or a Scene.
+        A System, a Mechanism or a Scene; of an OdeSystem the page shows the state equation.
     path : str or path, optional
         The file to write the page to, .html.
     start : mapping of str to float, or sequence of float, optional
@@ -53,7 +46,7 @@ def inspect(
     Raises
     ------
     TypeError
-        For what is no model, and for a system of first order, which has no Lagrangian.
+        For what is no model.
     ValueError
         For a path that does not end in .html, a start that does not fit, or a time that is not positive and finite.
     OSError
@@ -83,35 +76,30 @@ def inspect(
 
 def inspection_page(scene: scenes.Scene, content: Inspection, moved: bool = False) -> Page:
     """The page of a scene.  moved: whether its start was chosen for it, which the page then says."""
-    bones = content.skeleton
-    cut = f"The motion is not whole: it {content.stopped}." if content.stopped else ""
-    forward = content.versions[0].name == "forward dynamics"
-    said = [f"Left out of the model: {'; '.join(scene.left_out)}."] if scene.left_out else []
-    said += [f"At rest nothing moves, so it starts at {start_text(scene)}."] if moved else []
+    bones, mechanism = content.skeleton, scene.mechanism
+    what = "inverse dynamics" if len(content.versions) > 1 else content.versions[0].name
+    notices = [f"The model leaves out {text}." for text in scene.left_out]
+    notices += [f"At rest nothing moves, so it starts at {start_text(scene)}."] if moved else []
     return page(
-        [
-            Version(version.name.replace("_", " "), version.graph, f"{cut} {version.about}".strip(), *version[3:])
-            for version in content.versions
-        ],
-        title=f"{scene.name}: {'forward' if forward else 'inverse'} dynamics",
-        about=" ".join(said),
-        motion=Motion(content.t, bones.points, bones.parents) if bones else Motion(content.t, None, ()),
-        tables=[_torques(scene, content.shares, content.units)] if content.shares else [],
+        [Version(each.name.replace("_", " "), *each[1:]) for each in content.versions],
+        title=f"{scene.name}: {what}",
+        at=content.at,
+        derived=content.derived,
+        motion=Motion(content.t, bones.points, bones.parents) if bones else Motion(content.t),
+        tables=[_torques(scene, content.shares)] if content.shares else [],
         names=display_names(scene),
         units=content.units,
+        columns={body.name: body.parent for body in mechanism.moving} if mechanism else None,
+        notices=[*notices, *([cut_short(content)] if content.stopped else [])],
     )
 
 
-def _torques(scene: scenes.Scene, shares: Mapping[str, NDArray[np.float64]], units: Mapping[str, str]) -> Table:
-    """A row for each velocity, a column for each part; what is rounding beside the largest number is said to be."""
-    largest = max(float(np.abs(torques).max()) for torques in shares.values())
+def cut_short(content: Inspection) -> str:
+    """That the motion ends before its time, and why."""
+    return f"The motion is not whole: it {content.stopped}."
 
-    def text(value: float) -> str:
-        return "≈0" if 0.0 < abs(value) <= ROUNDING * largest else f"{value:.4g}".replace("-", "−")
 
-    names = theme.called(display_names(scene))
-    rows = [
-        [f"{names[f'tau{i}']} [{units.get(f'tau{i}', 'N m')}]", *[text(torques[i]) for torques in shares.values()]]
-        for i in range(scene.system.n)
-    ]
-    return Table("Torques and forces that each part takes at t = 0", ["", *shares], rows)
+def _torques(scene: scenes.Scene, shares: Shares) -> StateTable:
+    """A row for each velocity, a column for each part."""
+    rows = {f"tau{i}": shares.row(i) for i in range(scene.system.n)}
+    return StateTable("Torques and forces that each part takes", shares.graph, shares.parts, rows)
