@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -102,6 +103,19 @@ def test_edges_grow_linearly_by_the_contracted_chain_rule_and_quadratically_by_t
     _, data, _ = paper
     assert data["scaling"]["chain_rule"]["edges_exponent"] <= 1.11
     assert 1.9 <= data["scaling"]["chain_rule_literal"]["edges_exponent"] <= 2.1
+
+
+def test_the_readme_shows_figure_1_as_it_is_drawn(paper):
+    """Its texts and nodes; where they lie is Graphviz's matter, of whatever version."""
+    folder, _, _ = paper
+    old, new = (
+        [
+            sorted(re.findall(pattern, (place / "fig1.svg").read_text()))
+            for pattern in (r">([^<]+)</text>", r'id="(\w+)"')
+        ]
+        for place in (Path(__file__).parents[3] / "docs" / "images", folder)
+    )
+    assert old == new
 
 
 def test_one_interruption_moves_no_time():
