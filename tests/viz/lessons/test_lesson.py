@@ -24,6 +24,7 @@ from viz.inspector.operations import operations
 from viz.lessons import lesson as module
 from viz.lessons.closed_loop import closed_loop
 from viz.lessons.elimination import elimination
+from viz.lessons.energy_and_step import energy_and_step
 from viz.lessons.euler_edge import euler_edge
 from viz.lessons.subject import lagrangian_graph, subject_of
 from viz.lessons.sweeps import sweeps
@@ -191,6 +192,20 @@ def test_a_multiplier_holds_its_row(subject):
     held = subject.evaluate(forward, **still, **{f"tau{n - 1}": force})
     free = subject.evaluate(forward, **still)
     assert abs(held[-1]) <= 1e-3 * max(1.0, abs(free[-1]))
+
+
+def test_half_the_step_leaves_a_sixteenth_of_the_error(subject):
+    screen = energy_and_step(subject)
+    assert screen.choices[screen.answer] == "16"
+    factors = [float(text) for text in re.findall(r"a factor of ([\d.]+)\.", screen.reveal)]
+    assert factors or "rounding" in screen.reveal
+    assert all(12.0 < factor < 24.0 for factor in factors)
+
+
+def test_a_chain_that_whips_is_watched_for_a_shorter_time():
+    """Ten rods are off after a second: the order is measured where it shows, and no warning is left."""
+    (factor,) = re.findall(r"a factor of ([\d.]+)\.", energy_and_step(subject_of(dyn.scenes.load("chain", n=6))).reveal)
+    assert 12.0 < float(factor) < 24.0
 
 
 @pytest.fixture(scope="module")
