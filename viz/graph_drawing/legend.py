@@ -21,7 +21,7 @@ def kinds_in(graph: Graph, marked: Collection[Node] = frozenset()) -> list[Paint
     return [*kinds, theme.OUTPUT, *([theme.MARKED] if marked else [])]
 
 
-def legend_svg(kinds: Sequence[Paint], columns: int = 3) -> str:
+def legend_svg(kinds: Sequence[Paint], columns: int = 2) -> str:
     """The colors and words of the kinds, in so many columns.  Dark as `to_adaptive` makes it."""
     size = theme.SMALL_FONT_SIZE + 2
     column = SWATCH + 3 * GAP + max(len(kind.words) for kind in kinds) * LETTER * size
