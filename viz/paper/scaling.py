@@ -46,7 +46,7 @@ def scaling_of_counts(links: Sequence[int] = COUNTS) -> Part:
 
 
 def _panels(rows: Sequence[NodeScaling]) -> list[Panel]:
-    """Edges and times over the number of links, the edges beside lines of slope 1 and 2."""
+    """Edges and times over the number of links, beside lines of slope 1 and 2."""
     panels = []
     for title, y, of in (("edges", "edges", "edges"), ("one compiled evaluation", "time [µs]", "microseconds")):
         lines = [
@@ -54,8 +54,11 @@ def _panels(rows: Sequence[NodeScaling]) -> list[Panel]:
                  COLORS[TITLES[row.formulation]])
             for row in rows
         ]  # fmt: skip
-        links, least = rows[0].n, min(min(line.y) for line in lines)
-        lines += [Line(f"slope {p}", links, [0.5 * least * n**p for n in links], None) for p in (1, 2)]
+        # guides over the fitted part: slope 1 below all curves, slope 2 above them
+        links = [n for n in rows[0].n if n >= FITTED_FROM]
+        at = [line.y[rows[0].n.index(links[0])] for line in lines]
+        for power, start in ((1, 0.5 * min(at)), (2, 2.0 * max(at))):
+            lines.append(Line(f"slope {power}", links, [start * (n / links[0]) ** power for n in links], None))
         panels.append(Panel(title, "links n", y, lines))
     return panels
 
