@@ -11,6 +11,7 @@ from dynamics.scenes.start import Start, moving_start, start_text, with_start
 from dynamics.systems.model import Model
 
 from ..inspector import Motion, Page, StateTable, Version, page
+from .open_loops import tree_alone
 
 
 def inspect(
@@ -78,7 +79,8 @@ def inspection_page(scene: scenes.Scene, content: Inspection, moved: bool = Fals
     """The page of a scene.  moved: whether its start was chosen for it, which the page then says."""
     bones, mechanism = content.skeleton, scene.mechanism
     forward = content.versions[0].name == "forward dynamics"
-    notices = [f"The model leaves out {text}." for text in scene.left_out]
+    notices = [f"Left out of the model: {'; '.join(scene.left_out)}."] if scene.left_out else []
+    notices += [tree_alone(scene)] if not forward and tree_alone(scene) else []
     notices += [f"At rest nothing moves, so it starts at {start_text(scene)}."] if moved else []
     return page(
         [Version(each.name.replace("_", " "), *each[1:]) for each in content.versions],
