@@ -45,7 +45,7 @@ function showRecord(app, record) {
   const state = makeState(record, () => stateChanged(app)); // first, so that a bad record leaves the page as it is
   const plan = makePlan(record, state.versions);
   Object.assign(app, { record, state, plan, units: new Map(record.units), from: "", seen: null, chosen: false });
-  Object.assign(app, { picked: -1, before: -1, path: null, sweep: -1, index: 0, version: state.versions[0] });
+  Object.assign(app, { picked: -1, before: -1, path: null, sweep: -1, lesson: -1, index: 0, version: state.versions[0] });
   app.largest = Math.max(...state.versions.map((version) => version.ops.length));
   byId("title").textContent = document.title = record.title;
   byId("introduction").textContent = record.introduction;
@@ -68,6 +68,7 @@ function showRecord(app, record) {
 function stateChanged(app) {
   compute(app);
   showTime(app);
+  tellLesson(app);
   if (app.playing) { showValues(app); showResults(app); } else refresh(app);
   app.callbacks.forEach((callback) => callback(app.state.values()));
 }
@@ -146,6 +147,7 @@ function redraw(app, fit) {
 function refresh(app) {
   const bars = showValues(app);
   paintSweep(app);
+  paintLesson(app);
   paintPath(app);
   markPicked(app);
   showNode(app, bars);
@@ -172,7 +174,7 @@ function choose(app, i) {
   const places = app.plan.place[app.index];
   const keep = (node) => (node < 0 ? -1 : app.plan.place[i].indexOf(places[node]));
   const [picked, before] = [keep(app.picked), keep(app.before)];
-  Object.assign(app, { index: i, version: versions[i], picked, before, path: null, sweep: -1 });
+  Object.assign(app, { index: i, version: versions[i], picked, before, path: null, sweep: -1, lesson: -1 });
   [...byId("versions").children].forEach((button, k) => {
     button.setAttribute("aria-checked", k === i);
     button.tabIndex = k === i ? 0 : -1;
@@ -189,6 +191,7 @@ function choose(app, i) {
   if (resized && !app.chosen) app.view = firstView(app);
   redraw(app, !app.seen || resized || Boolean(app.version.drawing));
   showCounts(app);
+  makeLesson(app);
   stepTo(app, -1);
 }
 
