@@ -15,6 +15,7 @@
 
 const READABLE = 100; // nodes that are drawn one by one at first
 const DRAWABLE = 2500; // more than these are never drawn one by one at once
+const BOXES = 48; // clusters that are drawn at first; of more, bodies
 const SMALL = 60; // nodes of a graph that shows its values at first
 
 function start(first = JSON.parse(byId("data").textContent)) {
@@ -103,7 +104,9 @@ function firstView(app) {
   if (drawn) return view("nodes");
   const scale = (level) => fitting(size, arrange(app.plan, view(level)));
   const order = [...(app.largest <= READABLE ? ["nodes"] : []), "clusters", ...(app.plan.columns.length > 1 ? ["bodies"] : [])];
-  return view(order.find((level) => scale(level) >= READ) ?? order.sort((a, b) => scale(b) - scale(a))[0]);
+  const boxes = Math.max(...app.plan.place.map((places) => new Set(places.map((place) => app.plan.cluster[place])).size));
+  const clear = (level) => scale(level) >= READ && (level !== "clusters" || boxes <= BOXES);
+  return view(order.find(clear) ?? order.sort((a, b) => scale(b) - scale(a))[0]);
 }
 
 /** One level of detail more (1) or less (-1). */

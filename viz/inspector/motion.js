@@ -36,7 +36,9 @@ function pointsAt(app) {
   return app.record.motion.parents.map((_, i) => [found[2 * i], found[2 * i + 1]]);
 }
 
-/** Torques of the first table that has a row for every joint, at the joints: by parts where these are few. */
+/** Torques of the first table that has a row for every joint, at the joints: by parts where these are few.
+ *
+ * Not forces, which turn nothing, and not the torques of a joint of several velocities, whose axes lie in space. */
 function paintTorques(app) {
   const { joints } = app.record.motion;
   const found = app.state.tables.find((each) => joints.length && each.rows.length === joints.length);
@@ -47,8 +49,9 @@ function paintTorques(app) {
   if (!found) { app.arm.paint([]); return; }
   const values = app.state.evaluate(found);
   const torques = found.rows.map(([, outputs]) => (parts ? outputs.slice(0, -1) : outputs.slice(-1)).map((out) => values[found.outputs[out][2]]));
-  app.largestTorque = Math.max(app.largestTorque, largestOf(torques.flat()));
-  app.arm.paint(torques.map((own, i) => [joints[i], own.map((each) => each / (app.largestTorque || 1))]));
+  const turns = joints.map((joint, i) => joints.filter((each) => each === joint).length === 1 && (app.units.get(found.rows[i][0]) ?? "N m") === "N m");
+  app.largestTorque = Math.max(app.largestTorque, largestOf(torques.filter((_, i) => turns[i]).flat()));
+  app.arm.paint(torques.map((own, i) => [joints[i], own.map((each) => each / (app.largestTorque || 1))]).filter((_, i) => turns[i]));
 }
 
 function play(app, on) {

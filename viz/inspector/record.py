@@ -36,7 +36,7 @@ from .content import Motion, State, StateTable, Version
 STAGES = {PRIMAL: "as written", ADJOINT: "reverse sweep", TANGENT: "forward sweep"}
 SMALL = 60  # nodes of a graph that is laid out by Graphviz
 NODE_HEIGHT, LEAF_HEIGHT = 34.0, 30.0  # pixels, as in arrange.js
-FEW = 24  # inputs and outputs whose boxes have room for what a person calls them
+LONGEST = 24  # letters of a name for which a box has room
 Letters = Callable[[str], str]
 
 
@@ -60,7 +60,7 @@ def record(
     inputs = state.inputs([*graphs, *moved])
     known = {each.name for graph in graphs for each in (*graph.inputs, *graph.nodes) if each.name}
     known |= {name for graph in graphs for name in graph.outputs} | set(inputs)
-    letters = _letters(graphs, names or {})
+    letters = _letters(names or {})
     drawings = _drawings(graphs, letters)
     for version in versions:
         version.check()
@@ -113,10 +113,9 @@ def slopes(op: Op) -> dict[str, Any]:
     return {"code": code, "out": [number[node] for node in partials]}
 
 
-def _letters(graphs: Sequence[Graph], names: Mapping[str, str]) -> Letters:
-    """What the picture shows of a name: what a person calls it, or letters where there are many."""
-    leaves = {name for graph in graphs for name in (*graph.input_names, *graph.outputs)}
-    shown = theme.called(names) if len(leaves) <= FEW else {}
+def _letters(names: Mapping[str, str]) -> Letters:
+    """What the picture shows of a name: what a person calls it, or letters where that is long."""
+    shown = {name: text for name, text in theme.called(names).items() if len(text) <= LONGEST}
     return lambda name: shown.get(name) or theme.pretty(name)
 
 
