@@ -27,7 +27,7 @@ def inspect(
     Parameters
     ----------
     model : Model
-        A System, a Mechanism or a Scene.
+        A System, a Mechanism or a Scene; of an OdeSystem the page shows the state equation.
     path : str or path, optional
         The file to write the page to, .html.
     start : mapping of str to float, or sequence of float, optional
@@ -47,7 +47,7 @@ def inspect(
     Raises
     ------
     TypeError
-        For what is no model, and for a system of first order, which has no Lagrangian.
+        For what is no model.
     ValueError
         For a path that does not end in .html, a start that does not fit, or a time that is not positive and finite.
     OSError
@@ -78,16 +78,16 @@ def inspect(
 def inspection_page(scene: scenes.Scene, content: Inspection, moved: bool = False) -> Page:
     """The page of a scene.  moved: whether its start was chosen for it, which the page then says."""
     bones, mechanism = content.skeleton, scene.mechanism
-    forward = content.versions[0].name == "forward dynamics"
+    inverse = len(content.versions) > 1
     notices = [f"Left out of the model: {'; '.join(scene.left_out)}."] if scene.left_out else []
-    notices += [tree_alone(scene)] if not forward and tree_alone(scene) else []
+    notices += [tree_alone(scene)] if inverse and tree_alone(scene) else []
     notices += [f"At rest nothing moves, so it starts at {start_text(scene)}."] if moved else []
     return page(
         [
             Version(each.name.replace("_", " "), *each[1:4], [Step(*step) for step in each.steps])
             for each in content.versions
         ],
-        title=f"{scene.name}: {'forward' if forward else 'inverse'} dynamics",
+        title=f"{scene.name}: {'inverse dynamics' if inverse else content.versions[0].name}",
         at=content.at,
         derived=content.derived,
         motion=Motion(content.t, *bones) if bones else Motion(content.t),
