@@ -120,9 +120,7 @@ class Motion:
         if any(not 0 <= joint < len(self.parents) for joint in self.joints):
             raise ValueError(f"joints must be points, 0 to {len(self.parents) - 1}, got {list(self.joints)}")
         if self.turns and (len(self.turns) != len(self.joints) or set(self.turns) - {-1, 0, 1}):
-            raise ValueError(
-                f"turns must be 1, -1 or 0 for each of the {len(self.joints)} joints, got {list(self.turns)}"
-            )
+            raise ValueError(f"turns must be 1, -1 or 0 for {len(self.joints)} joints, got {list(self.turns)}")
         wanted_names = [f"{axis}{i}" for i in range(len(self.parents)) for axis in "xy"]
         if self.places is not None and list(self.places.outputs) != wanted_names:
             raise ValueError(f"places must have the outputs x0, y0, .. of {len(self.parents)} points")
