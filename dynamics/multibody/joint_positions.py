@@ -57,16 +57,21 @@ def skeleton(mechanism: Bodies, q: ArrayLike) -> Skeleton:
         raise ValueError(f"q must have shape (T, {n}) or ({n},), one for each coordinate, got {q.shape}")
     values = {f"q{i}": q[:, i] for i in range(q.shape[1])}
     points: list[Array] = []
-    places: list[tuple[str, ArrayLike]] = [(body.name, (0.0, 0.0, 0.0)) for body in mechanism.moving]
-    for body, at in [*places, *_tips(mechanism)]:
+    marks = places(mechanism)
+    for body, at, _ in marks:
         graph = mechanism.position(body, at)
         place = graph.evaluate({name: values[name] for name in graph.input_names})
         points.append(np.stack([np.broadcast_to(place[axis], len(q)) for axis in "xyz"], axis=-1))
+    seen = np.stack(points, axis=1)
+    return Skeleton(seen @ view(seen).T, tuple([parent for _, _, parent in marks]))
+
+
+def places(mechanism: Bodies) -> list[tuple[str, ArrayLike, int]]:
+    """Body and place in it of joints and tips, and the number of the earlier one that each hangs on, or -1."""
     index = {body.name: i for i, body in enumerate(mechanism.moving)}
     above = _above(mechanism)
-    parents = [index.get(above[body.name], -1) for body in mechanism.moving]
-    parents += [index.get(body, index.get(above[body], -1)) for body, _ in _tips(mechanism)]
-    return Skeleton(_seen(np.stack(points, axis=1)), tuple(parents))
+    joints = [(body.name, (0.0, 0.0, 0.0), index.get(above[body.name], -1)) for body in mechanism.moving]
+    return [*joints, *[(body, at, index.get(body, index.get(above[body], -1))) for body, at in _tips(mechanism)]]
 
 
 def _above(mechanism: Bodies) -> dict[str, str]:
@@ -104,15 +109,14 @@ def _tips(mechanism: Bodies) -> Iterator[tuple[str, ArrayLike]]:
                 yield name, (0.0, 0.0, 0.0)
 
 
-def _seen(points: Array) -> Array:
-    """Points (T, k, 3) as (T, k, 2)."""
+def view(points: Array) -> Array:
+    """From which side points, (.., 3), are looked at: (2, 3), right and up of the picture."""
     extent = np.ptp(points.reshape(-1, 3), axis=0)
     flat = extent <= _FLAT * extent.max()
-    x, y, z = np.moveaxis(points, -1, 0)
     if flat[1]:
-        return np.stack([x, z], axis=-1)
+        return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     if flat[0]:
-        return np.stack([y, z], axis=-1)
+        return np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     if flat[2]:
-        return np.stack([x, y], axis=-1)
-    return np.stack([0.9 * y - 0.45 * x, z - 0.25 * x - 0.12 * y], axis=-1)
+        return np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    return np.array([[-0.45, 0.9, 0.0], [-0.25, -0.12, 1.0]])

@@ -23,6 +23,7 @@ TABLE = {
     "viz": (
         "theme <- graph_drawing, plots <- pages <- inspector, paper <- commands <- cli <- __main__",
         "graph_drawing <- architecture <- commands",
+        "theme <- live <- inspector",
     ),
     "": (
         "cgraph <- dynamics <- viz.paper, viz.commands",
