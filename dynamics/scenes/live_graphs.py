@@ -44,14 +44,14 @@ class LiveGraphs(NamedTuple):
     """
 
     rate: Graph
+    start: dict[str, float]
     shown: Graph
     meters: tuple[Meter, ...]
     parents: tuple[int, ...]
-    start: dict[str, float]
     scales: dict[str, float]
+    dt: float
     names: dict[str, str]
     units: dict[str, str]
-    dt: float
 
 
 def live_graphs(scene: Scene) -> LiveGraphs:
@@ -73,7 +73,7 @@ def live_graphs(scene: Scene) -> LiveGraphs:
     torques = [abs(float(value)) for name, value in shown.evaluate({**start}).items() if name.startswith("gravity")]
     weight = max(torques, default=0.0)
     scales = {name: _scale(name, value, units.get(name, ""), weight) for name, value in start.items()}
-    return LiveGraphs(rate, shown, meters, parents, start, scales, display_names(scene), units, _step(scene))
+    return LiveGraphs(rate, start, shown, meters, parents, scales, _step(scene), display_names(scene), units)
 
 
 def _adjustable(mechanism: Mechanism) -> Mechanism:

@@ -22,6 +22,7 @@ from . import (
     paper,
     report,
     scenes,
+    simulate,
     why,
 )
 
@@ -36,6 +37,7 @@ COMMANDS = (
     certify,
     inspect,
     live,
+    simulate,
     lint,
     why,
     compare,

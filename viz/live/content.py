@@ -55,13 +55,13 @@ class Live:
     Examples
     --------
     >>> import cgraph as cg
-    >>> import viz
+    >>> from viz.live import Live
     >>> from dynamics.integrators import TABLEAUS
     >>> x, v = cg.variables("x v")
     >>> spring = cg.Graph([x, v], {"x_dot": v, "v_dot": -x})
     >>> energies = cg.Graph([x, v], {"K": v * v / 2, "P": x * x / 2, "E": (v * v + x * x) / 2})
     >>> meters = [(name, "J", "energy") for name in energies.outputs]
-    >>> viz.Live(spring, {"x": 1.0, "v": 0.0}, energies, meters, dt=0.01, methods=TABLEAUS).to_dict()["states"]
+    >>> Live(spring, {"x": 1.0, "v": 0.0}, energies, meters, dt=0.01, methods=TABLEAUS).to_dict()["states"]
     2
     """
 

@@ -31,6 +31,13 @@ class Panel(NamedTuple):
     script: str
     style: str
 
+    def folded(self) -> str:
+        """Elements for the end of a page: the panel, closed at first, and its data."""
+        return (
+            f'<details id="live"><summary>Live: computed as you watch</summary>\n{self.html}</details>\n'
+            f'<script id="live-data" type="application/json">{self.data}</script>\n'
+        )
+
 
 def panel(live: Live) -> Panel:
     """The panel."""
@@ -63,7 +70,7 @@ class LivePage(str):
         )
 
 
-def live_page(live: Live, *, title: str = "A motion, live", about: str = "") -> LivePage:
+def page_text(live: Live, *, title: str = "A motion, live", about: str = "") -> LivePage:
     """One page on which a motion is computed as it is watched, with sliders, meters of energy and error, and a link.
 
     The equations and the steps are a WebAssembly module in the page; nothing is loaded from anywhere, and the policy
@@ -87,23 +94,9 @@ def live_page(live: Live, *, title: str = "A motion, live", about: str = "") -> 
     ------
     TypeError
         For what is no Live, or a title or about that is no text.
-
-    Examples
-    --------
-    >>> import cgraph as cg
-    >>> import viz
-    >>> from dynamics.integrators import TABLEAUS
-    >>> x, v = cg.variables("x v")
-    >>> energies = cg.Graph([x, v], {"K": v * v / 2, "P": x * x / 2, "E": (v * v + x * x) / 2})
-    >>> rate = cg.Graph([x, v], {"x_dot": v, "v_dot": -x})
-    >>> meters = [(name, "J", "energy") for name in energies.outputs]
-    >>> live = viz.Live(rate, {"x": 1.0, "v": 0.0}, energies, meters, dt=0.01, methods=TABLEAUS)
-    >>> page = viz.live_page(live, title="A spring")
-    >>> "<h1>A spring</h1>" in page, len(page.encode()) < 40_000
-    (True, True)
     """
     if not isinstance(live, Live):
-        raise TypeError(f"live_page needs a viz.Live, got {type(live).__name__}: {live!r:.60}")
+        raise TypeError(f"page_text needs a Live, got {type(live).__name__}: {live!r:.60}")
     for what, text in (("title", title), ("about", about)):
         if not isinstance(text, str):
             raise TypeError(f"{what} of a page must be text, got {type(text).__name__}: {text!r:.60}")

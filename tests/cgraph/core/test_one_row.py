@@ -27,7 +27,7 @@ TABLE = (
     "tests/cgraph/codegen/test_wasm.py",
     "tests/cgraph/explain/lint/test_lint.py",
     "tests/viz/graph_drawing/test_dot.py",
-    "tests/viz/inspector/test_page.py",
+    "tests/viz/inspector/test_script.py",
     "tests/dynamics/reference/test_taylor_series.py",
 )
 

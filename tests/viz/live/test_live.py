@@ -14,12 +14,12 @@ from py_mini_racer import MiniRacer
 
 import cgraph as cg
 import dynamics as dyn
-import viz
 from dynamics.integrators import TABLEAUS
 from dynamics.scenes.live_graphs import live_graphs
 from viz import cli
-from viz.commands.live import live_of
+from viz.live import Live, page_text
 from viz.live.page import scripts
+from viz.models.live import live_of
 
 ROUNDING = 1e-12  # relative: a few hundred steps of sines that differ in the last bit
 PENDULUM = dyn.scenes.load("triple_pendulum")
@@ -251,8 +251,8 @@ def test_names_stay_texts():
     rate = cg.Graph([x, v], {"a": v, "b": -x})
     energies = cg.Graph([x, v], {"K": v * v / 2, "P": x * x / 2, "E": (v * v + x * x) / 2})
     meters = [(HOSTILE, HOSTILE, HOSTILE), ("P", "J", "energy"), ("E", "J", "energy")]
-    live = viz.Live(rate, {"x": 1.0, "v": 0.0}, energies, meters, dt=0.1, methods=TABLEAUS, names={"x": HOSTILE})
-    page = viz.live_page(live, title=HOSTILE, about=HOSTILE)
+    live = Live(rate, {"x": 1.0, "v": 0.0}, energies, meters, dt=0.1, methods=TABLEAUS, names={"x": HOSTILE})
+    page = page_text(live, title=HOSTILE, about=HOSTILE)
     assert page.count("<script") == 2
     data = json.loads(re.search(r'<script id="live-data" type="application/json">(.*?)</script>', page, re.DOTALL)[1])
     assert data["inputs"][0]["called"] == HOSTILE
@@ -268,7 +268,7 @@ def made(**changed):
         "meters": [("K", "J", "energy")] * 3,
         "methods": TABLEAUS,
     }
-    return viz.Live(**fields | changed)
+    return Live(**fields | changed)
 
 
 @pytest.mark.parametrize(
