@@ -207,7 +207,7 @@ async function startLive() {
     $("play").setAttribute("aria-pressed", String(playing));
     if (playing) { last = performance.now(); requestAnimationFrame(frame); } else keep();
   }
-  motion.reset();
+  $("panel").addEventListener("keydown", (event) => event.stopPropagation()); // keys of the page around it
   read();
   show();
   $("panel").dataset.ready = "true";
