@@ -240,6 +240,7 @@ CALLS = {
     "dyn.cases.load": call(dyn.cases.load, "exponential decay"),
     "viz.graph_svg": call(viz.graph_svg, GRAPH),
     "viz.inspect": call(viz.inspect, ARM, None, start=[0.1, 0.0], t_end=0.1, forward=False),
+    "viz.live_page": call(viz.live_page, ARM, None, start=[0.1, 0.0]),
     "viz.page": call(
         viz.page, GRAPH, title="t", about="", at=None, marked=(), motion=None, tables=(), names=None, units=None
     ),
