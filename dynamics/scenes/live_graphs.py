@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -19,11 +20,13 @@ from ..multibody.display_units import display_units
 from ..multibody.joint_positions import places, view
 from ..multibody.mechanism import Mechanism
 from ..simulation.simulate import simulate
+from ..simulation.trajectory import SimulationWarning
 from ..systems.display_names import display_names
 from .scenes import Scene
 
 MOST_BODIES = 4  # of a mechanism whose masses become parameters by themselves
 SAMPLES = 16  # states at which the extent of a mechanism is looked at
+MOST_STEPS = 1000  # of the motion by which dt is chosen
 SHARE = 0.25  # of the steps that a method of order 5 chooses
 
 
@@ -161,7 +164,10 @@ def _round(value: float) -> float:
 
 
 def _step(scene: Scene) -> float:
-    """A step that is short enough: a share of those that an adaptive method takes, rounded."""
-    run = simulate(scene, scene.q, scene.qd, min(scene.t_end, 1.0), "dopri5", rtol=1e-4)
-    steps = np.diff(run.t) if run.stats.success and len(run.t) > 1 else np.array([1e-3])
-    return _round(SHARE * float(np.median(steps))) / 2.0
+    """A step that is short enough: a share of those that an adaptive method takes at first, rounded."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SimulationWarning)  # the page shows what an equal step does to a stiff system
+        run = simulate(scene, scene.q, scene.qd, min(scene.t_end, 1.0), "dopri5", rtol=1e-4, max_steps=MOST_STEPS)
+    steps = np.diff(run.t)
+    usual = float(np.median(steps)) if run.stats.steps and steps.size else 1e-2 * scene.t_end
+    return float(f"{_round(SHARE * usual) / 2.0:.3g}")
