@@ -70,9 +70,10 @@ def test_a_slider_moves_energy_and_torque_before_the_next_frame(show):
     before = meter(page, "energy"), meter(page, "gravity.joint 1")
     moved = page.evaluate(
         """() => new Promise((done) => requestAnimationFrame(() => {
-          const slider = document.querySelector('input[aria-label="g, slider"]'),
+          const slider = document.querySelector('input[aria-label="g, slider"]');
+          const read = (name) => document.querySelector(`td[data-meter="${name}"]`).textContent;
           slider.value = 3; slider.dispatchEvent(new Event("input"));
-          const texts = ["energy", "gravity.joint 1"].map((name) => document.querySelector(`td[data-meter="${name}"]`).textContent);
+          const texts = ["energy", "gravity.joint 1"].map(read);
           requestAnimationFrame(() => done(texts));
         }))"""
     )
@@ -89,7 +90,9 @@ def test_too_long_a_dt_shows_its_error_and_the_two_arms_part(show):
     page.click("#live-play")
     until(page, lambda: page.get_attribute("#live-since", "data-large") == "true")
     page.click("#live-play")
-    assert page.locator(".live-stick").nth(3).get_attribute("d") != page.locator(".live-reference").nth(3).get_attribute("d")
+    assert page.locator(".live-stick").nth(3).get_attribute("d") != page.locator(".live-reference").nth(
+        3
+    ).get_attribute("d")
 
 
 def test_a_link_opens_what_was_left_and_reset_forgets_it(show):
