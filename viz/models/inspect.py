@@ -11,7 +11,10 @@ from dynamics.scenes.start import Start, moving_start, start_text, with_start
 from dynamics.systems.model import Model
 
 from ..inspector import Motion, Page, StateTable, Step, Version, page
+from .live import live_of
 from .open_loops import tree_alone
+
+LIVELY = 10  # velocities: larger models have a page of their motion alone, `live_page`
 
 
 def inspect(
@@ -96,6 +99,7 @@ def inspection_page(scene: scenes.Scene, content: Inspection, moved: bool = Fals
         units=content.units,
         columns={body.name: body.parent for body in mechanism.moving} if mechanism else None,
         notices=[*notices, *([cut_short(content)] if content.stopped else [])],
+        live=live_of(scene) if scene.system.n <= LIVELY else None,
     )
 
 
