@@ -1,8 +1,9 @@
 """LLVM's text for a batch: the graph on one vector of columns after another.
 
-Points lie in columns, side by side, or in rows, one after another (see `transposed_ir`). Rows of a large batch lie far apart, each in a page of memory of its own, often by a power of two, where few of them fit
-in a cache at once. So where there are many rows, the inputs of some vectors, a tile, are brought together at a time,
-and results go out together.
+Points lie in columns, side by side, or in rows, one after another (see `transposed_ir`). The numbers of points in
+columns lie far apart in a large batch, each in a page of memory of its own, often by a power of two, where few of them
+fit in a cache at once. So where there are many, the inputs of some vectors, a tile, are brought together at a time, and
+results go out together.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""LLVM's text for a batch that lies row by row, a point after another: vectors are filled from rows and emptied into them.
+"""LLVM's text for a batch that lies in rows, a point after another: vectors filled from rows and emptied into rows.
 
 A block of as many numbers of as many points as a vector has lanes is a square, which some shuffles transpose.
 """
@@ -12,30 +12,30 @@ from .arithmetic import Arithmetic
 
 
 class Place(NamedTuple):
-    """Where numbers lie in the memory w: so many vectors, from that one on."""
+    """Where numbers lie in the memory w: `size` vectors, from the vector `start` on."""
 
     start: int
-    count: int
+    size: int
 
 
 def rows_ir(
     arithmetic: Arithmetic, points: Place, results: Sequence[Place], calls: Sequence[str], start: Sequence[str] = ()
 ) -> list[str]:
-    """`void rows(double *x, double *y, int64_t n, int64_t dx, int64_t dy, double *w)`, where point i begins at x + i dx.
+    """`void rows(double *x, double *y, int64_t n, int64_t dx, int64_t dy, double *w)`; point i begins at x + i dx.
 
     calls: what computes the results of the points, whose first vectors are %point and %result0, %result1, ..; end to
     end they are a row of y.  start: what stands once before it.
     """
     t, lanes = arithmetic.type, arithmetic.lanes
-    counts = sorted({place.count for place in results})
+    counts = sorted({place.size for place in results})
     pointers, moves, column = [], [], 0
     for k, place in enumerate(results):
         pointers.append(f"  %result{k} = getelementptr {t}, ptr %w, i64 {place.start}")
         moves.append(f"  %y.at{k} = getelementptr double, ptr %y.at, i64 {column}")
-        moves.append(f"  call void @scatter{place.count}(ptr %y.at{k}, ptr %result{k}, i64 %dy)")
-        column += place.count
+        moves.append(f"  call void @scatter{place.size}(ptr %y.at{k}, ptr %result{k}, i64 %dy)")
+        column += place.size
     return [
-        *_mover("gather", points.count, arithmetic, filling=True),
+        *_mover("gather", points.size, arithmetic, filling=True),
         *[line for count in counts for line in _mover(f"scatter{count}", count, arithmetic, filling=False)],
         "define void @rows(ptr noalias %x, ptr noalias %y, i64 %n, i64 %dx, i64 %dy, ptr noalias %w) nounwind {",
         "start:",

@@ -40,9 +40,9 @@ class NativeRunner(Runner):
         self._many: Any = None
         self._batches: dict[str, BatchCode] = {}  # by the register that varies
 
-    def _compiled(self, text: str) -> llvm.Code:
+    def _compiled(self, text: str, *, looped: bool = False) -> llvm.Code:
         nodes = sum([len(graph.nodes) for graph in self._fused.graphs()])
-        return self._host.compile(text, self._functions, nodes)
+        return self._host.compile(text, self._functions, nodes, looped=looped)
 
     @property
     def _entry(self) -> Any:
@@ -79,17 +79,18 @@ class NativeRunner(Runner):
         call.kept = self, arrays  # type: ignore[attr-defined]  # whose addresses it has
         return call
 
-    def _write_rows(self, name: str, values: Array, rows: Array) -> None:
-        self._batches[name](values.T, rows.T)
-
-    def _prepare_rows(self, name: str) -> None:
+    def _rows_writer(self, name: str) -> Callable[[Array, Array], None]:
         with self._lock:
-            if name in self._batches:
-                return
-            lanes, registers = self._host.lanes, self._host.registers
-            with without_collection():
-                text = program_rows_ir(self._fused, name, lanes, self._flags, registers)
-            self._batches[name] = BatchCode(self._compiled(text.source), lanes, text.size, columns=False)
+            if name not in self._batches:
+                self._batches[name] = self._batch_code(name)
+            code = self._batches[name]
+        return lambda values, rows: code(values.T, rows.T)
+
+    def _batch_code(self, name: str) -> BatchCode:
+        lanes, registers = self._host.lanes, self._host.registers
+        with without_collection():
+            text = program_rows_ir(self._fused, name, lanes, self._flags, registers)
+        return BatchCode(self._compiled(text.source, looped=True), lanes, text.size, columns=False)
 
     def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record:
         lanes = self._host.lanes

@@ -249,25 +249,26 @@ class Runner(ABC):
             raise GraphError("a batch takes no feed: give its registers a place in the one that varies")
         if (unset := _first_unset(self.program, name)) is not None:
             raise GraphError(f"a batch needs a pass that sets what it reads: register {unset!r} is read before")
-        self._prepare_rows(name)
+        write = self._rows_writer(name)
         shape = len(rows), self.program.width
         result = np.empty(shape) if out is None else out
         require_out(result, shape, rows)
 
         def block(start: int) -> None:
             here = slice(start, start + BLOCK)
-            self._write_rows(name, rows[here], result[here])
+            write(rows[here], result[here])
 
         share(block, range(0, len(rows), BLOCK), count)
         return result
 
-    def _prepare_rows(self, name: str) -> None:
-        """Make what `_write_rows` needs, before threads ask for it."""
+    def _rows_writer(self, name: str) -> Callable[[Array, Array], None]:
+        """A function of values of a register, and of where the rows of their record go."""
 
-    def _write_rows(self, name: str, values: Array, rows: Array) -> None:
-        """Rows of the record at values, of the register of that name."""
-        memories = self.memory({name: values.T}, len(values))
-        rows[...] = self._run_many(memories, 1, 1, np.empty((1, 0, len(values)))).rows[0].T
+        def write(values: Array, rows: Array) -> None:
+            memories = self.memory({name: values.T}, len(values))
+            rows[...] = self._run_many(memories, 1, 1, np.empty((1, 0, len(values)))).rows[0].T
+
+        return write
 
     def _require_branch_free(self) -> None:
         program = self.program

@@ -102,10 +102,12 @@ def _numbers(system: System, t: float, parameters: Mapping[str, float] | None) -
 
 def _arrays(system: System, state: Mapping[str, ArrayLike | None]) -> tuple[dict[str, Array], tuple[int, ...]]:
     """The parts of a state, checked, (n,) or (N, n) each, and () or (N,)."""
-    arrays: dict[str, Array] = {}
+    arrays = {name: _rows(system, name, state.get(name)) for name in STATE}
+    shapes = {(), *[rows.shape[:-1] for rows in arrays.values()]}
+    if len(shapes) <= 2:
+        return arrays, max(shapes)  # () and (N,)
     shape: tuple[int, ...] = ()
-    for name in STATE:
-        arrays[name] = rows = _rows(system, name, state.get(name))
+    for name, rows in arrays.items():
         try:
             shape = np.broadcast_shapes(shape, rows.shape[:-1])
         except ValueError:
@@ -128,7 +130,7 @@ def _rows(system: System, name: str, values: ArrayLike | None) -> Array:
             f"{name} must have the shape ({n},) or (N, {n}), one number for each of {names}; got {rows.shape}"
         )
     finite = np.isfinite(rows)
-    if not finite.all():
+    if not np.logical_and.reduce(finite, axis=None):
         at = tuple(np.argwhere(~finite)[0].tolist())
         where = f" in row {at[0]}" if rows.ndim == 2 else ""
         raise ValueError(f"{name} must be finite, got {rows[at]} for {known[at[-1]]!r}{where}")
