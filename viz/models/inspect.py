@@ -10,7 +10,8 @@ from dynamics.scenes.inspection import Inspection, Shares, inspection
 from dynamics.scenes.start import Start, moving_start, start_text, with_start
 from dynamics.systems.model import Model
 
-from ..inspector import Motion, Page, StateTable, Version, page
+from ..inspector import Motion, Page, StateTable, Step, Version, page
+from .open_loops import tree_alone
 
 
 def inspect(
@@ -81,15 +82,20 @@ def inspect(
 def inspection_page(scene: scenes.Scene, content: Inspection, moved: bool = False, title: str | None = None) -> Page:
     """The page of a scene.  moved: whether its start was chosen for it, which the page then says."""
     bones, mechanism = content.skeleton, scene.mechanism
-    what = "inverse dynamics" if len(content.versions) > 1 else content.versions[0].name
-    notices = [f"The model leaves out {text}." for text in scene.left_out]
+    inverse = len(content.versions) > 1
+    what = "inverse dynamics" if inverse else content.versions[0].name
+    notices = [f"Left out of the model: {'; '.join(scene.left_out)}."] if scene.left_out else []
+    notices += [tree_alone(scene)] if inverse and tree_alone(scene) else []
     notices += [f"At rest nothing moves, so it starts at {start_text(scene)}."] if moved else []
     return page(
-        [Version(each.name.replace("_", " "), *each[1:]) for each in content.versions],
+        [
+            Version(each.name.replace("_", " "), *each[1:4], [Step(*step) for step in each.steps])
+            for each in content.versions
+        ],
         title=f"{scene.name}: {what}" if title is None else title,
         at=content.at,
         derived=content.derived,
-        motion=Motion(content.t, bones.points, bones.parents) if bones else Motion(content.t),
+        motion=Motion(content.t, *bones) if bones else Motion(content.t),
         tables=[_torques(scene, content.shares)] if content.shares else [],
         names=display_names(scene),
         units=content.units,
