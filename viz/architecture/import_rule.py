@@ -25,9 +25,10 @@ TABLE = {
         "theme <- animation <- models",
         "graph_drawing <- architecture <- commands",
         "theme <- live <- inspector",
+        "inspector <- lessons <- commands",
     ),
     "": (
-        "cgraph <- dynamics <- viz.paper, viz.models, viz.commands",
+        "cgraph <- dynamics <- viz.paper, viz.models, viz.lessons, viz.commands",
         "cgraph <- viz",
     ),
 }  # fmt: skip
