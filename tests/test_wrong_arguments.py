@@ -248,7 +248,8 @@ CALLS = {
         marked=(), speed=1.0, dark=False, title=""
     ),
     "dyn.scenes.driven": call(dyn.scenes.driven, ARM, "chain_rule", 0.1),
-    "viz.inspect": call(viz.inspect, ARM, None, start=[0.1, 0.0], t_end=0.1, forward=False),
+    "viz.inspect": call(viz.inspect, ARM, None, start=[0.1, 0.0], t_end=0.1, forward=False, title=None),
+    "viz.live_page": call(viz.live_page, ARM, None, start=[0.1, 0.0]),
     "viz.page": call(
         viz.page, GRAPH, title="t", about="", at=None, marked=(), motion=None, tables=(), names=None, units=None
     ),

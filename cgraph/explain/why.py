@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..core.edge import Edge
@@ -20,7 +21,6 @@ from .reachability import between
 
 EXACT = 10**15  # up to here a number of paths is printed digit by digit
 LENGTH = 90  # characters up to which a path is written out; a longer one is written by its tags
-STEPS = 12  # neighbors in tags that such a path names; of more, the first and the last
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,8 @@ class Path:
     value : float or None
         The product of the partials along it; None without a point.
     text : str
-        Its products and functions by name and tag; sums are left out.
+        Its products and functions by name, %number and tag. Sums are left out, but where two paths would read the same:
+        then `%7.2` is the second argument of node %7, for every step.
     """
 
     edges: tuple[Edge, ...]
@@ -213,14 +214,16 @@ def why(
     count = path_count(nodes, edges, source, sink) if nodes else 0
     if at is None:
         shortest = best_paths(nodes, edges, source, sink, k, lambda edge: 1.0) if count else []
-        return Why(graph, to, origin, count, tuple([_path(known, to, path, None) for path in shortest]))
+        return Why(
+            graph, to, origin, count, tuple(_told_apart(known, [_path(known, to, path, None) for path in shortest]))
+        )
     slopes = dict(zip(edges, edge_slopes(known, edges, at), strict=True))
     edges = _contributing(known, nodes, edges, slopes, sink)
     derivative, weight = _path_sums(nodes, edges, slopes, source, sink)
     # The largest |product| of partials has the least sum of -log |partial|.
     heaviest = best_paths(nodes, edges, source, sink, k, lambda edge: -math.log(abs(slopes[edge]))) if count else []
     paths = [_path(known, to, path, math.prod([slopes[edge] for edge in path])) for path in heaviest]
-    return Why(graph, to, origin, count, tuple(paths), derivative, weight)
+    return Why(graph, to, origin, count, tuple(_told_apart(known, paths)), derivative, weight)
 
 
 def _contributing(
@@ -291,10 +294,20 @@ def _route(names: Names, nodes: Sequence[Node]) -> list[str]:
             tags = f"[{', '.join(sorted(node.tags))}]"
             if not steps or steps[-1][0] != tags:
                 steps.append((tags, []))
-            steps[-1][1].append(node.op.name)
-    if len(steps) > STEPS:
-        steps = [*steps[: STEPS // 2], ("...", []), *steps[-(STEPS // 2) :]]
-    return [" ".join([*(ops if len(ops) <= 3 else [many(len(ops), "operation")]), name]) for name, ops in steps]
+            steps[-1][1].append(f"{node.op.name} %{names.number[node]}")
+    return [" ".join([*ops, name]) for name, ops in steps]
+
+
+def _told_apart(names: Names, paths: Sequence[Path]) -> list[Path]:
+    """The paths; of those that read the same, with all their sums, and by which argument each operation is reached."""
+    times = Counter([path.text for path in paths])
+    return [
+        replace(path, text=f"{path.text}  ({_edges(names, path)})") if times[path.text] > 1 else path for path in paths
+    ]
+
+
+def _edges(names: Names, path: Path) -> str:
+    return " ".join([f"%{names.number[edge.target]}.{edge.slot + 1}" for edge in path.edges])
 
 
 def digits_of(count: int) -> str:

@@ -24,6 +24,7 @@ TABLE = {
         "theme <- graph_drawing, plots <- pages <- inspector, paper <- models <- commands <- cli <- __main__",
         "theme <- animation <- models",
         "graph_drawing <- architecture <- commands",
+        "theme <- live <- inspector",
         "inspector <- lessons <- commands",
     ),
     "": (

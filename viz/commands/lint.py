@@ -8,6 +8,7 @@ import cgraph as cg
 from dynamics import ConstraintLint, display_names, lint_constraints
 
 from .. import theme
+from ..models.open_loops import tree_alone
 from .arguments import (
     Commands,
     answer_and_draw,
@@ -63,7 +64,9 @@ def run(options: argparse.Namespace) -> int:
     held = lint_constraints(scene) if scene.ode is None else ConstraintLint({}, {})
     if str(held):
         proof = f"{proof}\n{held}"
-    data = {"scene": scene.name, "equations": what} | report.to_dict()
+    alone = "" if options.forward else tree_alone(scene)
+    proof = f"{proof}\n{alone}" if alone else proof
+    data = {"scene": scene.name, "equations": what, "of_the_tree": bool(alone)} | report.to_dict()
     data |= {"constraints": held.to_dict(), "ok": report.ok and held.ok}
     answer_and_draw(
         options,

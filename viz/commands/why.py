@@ -10,6 +10,7 @@ from cgraph.extend import Names, cotangents
 from dynamics import display_names, scenes
 
 from .. import theme
+from ..models.open_loops import tree_alone
 from .arguments import (
     Commands,
     answer_and_draw,
@@ -57,10 +58,12 @@ def run(options: argparse.Namespace) -> None:
     gap = abs(total - derivative)
     balance = {"sum_over_all_paths": total, "derivative_by_reverse_sweep": derivative, "difference": gap}
     what = "sum of path products" if all_listed else f"sum over all {found.count} path products"
+    alone = "" if options.forward else tree_alone(scene)
     text = f"At {point_text(shown)}:\n{found}\n|{what} - derivative by a reverse sweep| = {gap:.2g}"
+    text = f"{text}\n{alone}" if alone else text
     answer_and_draw(
         options,
-        unless_json(options, {"depends": True, "at": at} | found.to_dict() | balance, text),
+        unless_json(options, {"depends": True, "of_the_tree": bool(alone), "at": at} | found.to_dict() | balance, text),
         graph,
         marked_edges=found.edges,
         names=theme.called(display_names(scene)),
@@ -70,10 +73,13 @@ def run(options: argparse.Namespace) -> None:
 
 def _not_connected(options: argparse.Namespace, scene: scenes.Scene, graph: Graph) -> None:
     stops = cg.why_not(graph, options.output, options.input, names=display_names(scene))
+    alone = "" if options.forward else tree_alone(scene)
     here = set(graph.nodes)  # an input that nothing uses is none of the graph's nodes
     answer_and_draw(
         options,
-        unless_json(options, {"depends": False} | stops.to_dict(), stops),
+        unless_json(
+            options, {"depends": False, "of_the_tree": bool(alone)} | stops.to_dict(), f"{stops}\n{alone}".strip()
+        ),
         graph,
         marked={
             f"made from {stops.input}": stops.reached & here,

@@ -15,14 +15,16 @@ from cgraph import Graph, Node, __version__
 from cgraph.extend import require_graph, require_mapping, require_sequence, require_texts
 
 from .. import theme
+from ..live import EVALUATION, Live, panel
 from ..pages import html
 from .content import Motion, State, StateTable, Table, Version
 from .operations import operations
 from .record import record
 
 SCRIPTS = (
-    "elements.js", "values.js", "state.js", "paths.js", "formula.js", "layers.js", "places.js", "arrange.js",
-    "picture.js", "view.js", "marks.js", "panels.js", "sweeps.js", "arm.js", "motion.js", "keys.js", "app.js",
+    "elements.js", "values.js", "state.js", "paths.js", "formula.js", "layers.js", "places.js",
+    "arrange.js", "picture.js", "view.js", "marks.js", "panels.js", "sweeps.js", "lesson.js", "arm.js", "motion.js",
+    "keys.js", "app.js",
 )  # fmt: skip
 FRAME_HEIGHT = 720  # pixels in a notebook
 # Nothing may be fetched, and no script or style runs but the page's own, known by its digest.
@@ -57,6 +59,7 @@ def page(
     derived: Graph | None = None,
     columns: Mapping[str, str | None] | None = None,
     notices: Sequence[str] = (),
+    live: Live | None = None,
 ) -> Page:
     """The page on which a graph is looked at: it folds by tags, and shows values, paths, sweeps and equations.
 
@@ -89,6 +92,8 @@ def page(
         "kinetic" or "potential", or those that end in a number.
     notices : sequence of str
         What stands above everything, such as what a model lacks of its file.
+    live : viz.live.Live, optional
+        A motion that the page computes as it is watched, in a panel below.
 
     Returns
     -------
@@ -129,16 +134,17 @@ def page(
         motion.check()
     introduction = "" if isinstance(graph, Graph) else about
     data = {"title": title, "introduction": introduction, "notices": list(notices)}
-    live = [table for table in tables if isinstance(table, StateTable)]
-    data |= record(versions, motion, *texts, state=State(at or {}, derived), columns=columns, tables=live)
-    return Page(_html(title, data, [table for table in tables if isinstance(table, Table)]))
+    following = [table for table in tables if isinstance(table, StateTable)]
+    data |= record(versions, motion, *texts, state=State(at or {}, derived), columns=columns, tables=following)
+    return Page(_html(title, data, [table for table in tables if isinstance(table, Table)], live))
 
 
-def _html(title: str, data: Mapping[str, Any], tables: Sequence[Table]) -> str:
+def _html(title: str, data: Mapping[str, Any], tables: Sequence[Table], live: Live | None) -> str:
     """The file: its policy, style, body, data and script."""
-    script = f'"use strict";\n{scripts()}\nconst inspector = start();'
-    style = f"{_colors()}{_asset('page.css')}"
-    policy = _POLICY.format(script=_digest(script), style=_digest(style))
+    moving = None if live is None else panel(live)
+    script = f'"use strict";\n{scripts()}\nconst inspector = start();{moving.script if moving else ""}'
+    style = f"{_colors()}{_asset('page.css')}{moving.style if moving else ''}"
+    policy = _POLICY.format(script=f"{_digest(script)}{f' {EVALUATION}' if moving else ''}", style=_digest(style))
     # "<" in the data could end the element that holds it
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
     shown = "".join(html.table(table.caption, table.header, table.rows) for table in tables)
@@ -147,7 +153,7 @@ def _html(title: str, data: Mapping[str, Any], tables: Sequence[Table]) -> str:
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
-        f"<style>{style}</style>\n</head>\n<body>\n{body}\n"
+        f"<style>{style}</style>\n</head>\n<body>\n{body}\n{moving.folded() if moving else ''}"
         f'<script id="data" type="application/json">{text}</script>\n'
         f"<script>{script}</script>\n"
         "</body>\n</html>\n"
@@ -190,4 +196,5 @@ def _colors() -> str:
     """The theme's colors as the style sheet names them."""
     roles = {role: paint.line for role, paint in theme.ROLES.items()} | {"input": theme.YELLOW}
     names = roles | {"wrong": theme.SPURIOUS, "up": theme.BLUE, "down": theme.GREEN, "path": theme.PURPLE}
-    return ":root{" + "".join(f"--{name}:{color};" for name, color in names.items()) + "}\n"
+    parts = "".join(f".part{i}{{--c:{color}}}" for i, color in enumerate((*theme.LINKS, *theme.SERIES[1:5])))
+    return parts + ":root{" + "".join(f"--{name}:{color};" for name, color in names.items()) + "}\n"

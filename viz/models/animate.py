@@ -192,7 +192,7 @@ def _panel(
     make: Callable[..., Panel] = partial(Curves, names=list(model.coordinates), t=times)
     shown = rows
     if mechanism is not None:  # all at once, so that they are seen from one side
-        points, parents = skeleton(mechanism.bind(), np.concatenate(rows))
+        points, parents, *_ = skeleton(mechanism.bind(), np.concatenate(rows))
         shown, make = np.split(points, len(rows)), partial(Sticks, parents=parents)
     motions = [Motion(name, values, name in wrong) for name, values in zip(known, shown, strict=False)]
     return make(motions, None if wanted is None else shown[-1])

@@ -63,7 +63,8 @@ def test_it_has_all_formulations_with_their_counts_and_spurious_nodes(pendulum):
         assert names <= set(data["inputs"]) | {name for name, *_ in data["derived"]["outputs"]}
     assert [len(row) for row in data["rows"]] == [len(data["inputs"])] * len(data["motion"]["t"])
     (table,) = data["tables"]
-    assert table["header"] == ["link 1", "link 2", "link 3", "damping and forces", "all"]
+    assert table["header"][:3] == ["link 1", "link 2", "link 3"]
+    assert table["header"][-1] == "all"
     assert [row[0] for row in table["rows"]] == ["tau0", "tau1", "tau2"]
 
 
@@ -120,7 +121,7 @@ def test_no_text_of_a_graph_becomes_markup_or_script():
 def test_the_policy_lets_no_script_and_no_style_run_but_the_page_s_own(pendulum):
     found = Elements(pendulum)
     (policy,) = [each["content"] for name, each in found.elements if "http-equiv" in each]
-    assert "unsafe" not in policy
+    assert "'unsafe" not in policy
     run = [text for text in found.texts["script"] if not text.startswith("{")]  # the data are no script
     assert len(run) == len(found.texts["style"]) == 1
     for kind, (text,) in (("script", run), ("style", found.texts["style"])):
