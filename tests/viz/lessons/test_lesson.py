@@ -22,12 +22,8 @@ from tests.tolerances import EQUATIONS
 from viz import cli
 from viz.inspector.operations import operations
 from viz.lessons import lesson as module
-from viz.lessons.closed_loop import closed_loop
-from viz.lessons.elimination import elimination
 from viz.lessons.energy_and_step import energy_and_step
-from viz.lessons.euler_edge import euler_edge
 from viz.lessons.subject import lagrangian_graph, subject_of
-from viz.lessons.sweeps import sweeps
 from viz.lessons.torque_parts import torque_parts
 
 VOID = {"meta", "br", "img", "link", "input", "hr"}
@@ -75,9 +71,19 @@ def subject(request):
 
 
 @pytest.fixture(scope="module")
-def text(subject) -> str:
+def screens(subject):
+    """The screens of that system, {anchor: screen}; of the wheel alone with pictures, which take most of the time."""
+    with pytest.MonkeyPatch.context() as patched:
+        if subject.system.n > 1 or not subject.system.parameters:
+            patched.setattr("viz.lessons.euler_edge.DRAWN", 0)
+            patched.setattr("viz.lessons.sweeps.DRAWN", 0)
+        return {screen.anchor: screen for screen in [make(subject) for make in module.SCREENS]}
+
+
+@pytest.fixture(scope="module")
+def text(subject, screens) -> str:
     """The page of that system."""
-    return module.page(subject, [screen(subject) for screen in module.SCREENS])
+    return module.page(subject, list(screens.values()))
 
 
 class Reader(HTMLParser):
@@ -127,7 +133,7 @@ def test_the_teacher_s_answers_are_those_of_the_page(text):
     assert ["ABCDEF".index(letter) for letter in listed] == data["answers"]
 
 
-def test_the_error_by_definition_tends_to_the_slope_of_the_lagrangian(subject):
+def test_the_error_by_definition_tends_to_the_slope_of_the_lagrangian(subject, screens):
     """Whether it vanishes is what L says, by differences of L of its own."""
     system = subject.system
     energy = system.graph({"L": system.lagrangian}, system.q, system.qd)
@@ -135,15 +141,15 @@ def test_the_error_by_definition_tends_to_the_slope_of_the_lagrangian(subject):
         return  # slopes along a quaternion are no differences of L
     at = [subject.evaluate(energy, **{f"q{i}": subject.q[i] + h})[0] for i in range(system.n) for h in (1e-5, -1e-5)]
     slope = np.abs(np.subtract(at[::2], at[1::2])).max() / 2e-5
-    screen = euler_edge(subject)
+    screen = screens["euler-edge"]
     assert screen.answer == int(slope > 1e-6)
     if slope > 1e-6:
         (last,) = re.findall(r"largest error is ([−\d.e]+)\.", screen.note)
         assert float(last.replace("−", "-")) == pytest.approx(slope, rel=1e-3)
 
 
-def test_slopes_of_the_sweeps_are_momenta_under_the_numbers_of_the_listing(subject):
-    rows = sweeps(subject).play["rows"]
+def test_slopes_of_the_sweeps_are_momenta_under_the_numbers_of_the_listing(subject, screens):
+    rows = screens["sweeps"].play["rows"]
     momenta = subject.evaluate(dyn.momentum(subject.system))
     slopes = {row["node"]: row["slope"] for row in rows if row["what"].startswith("p")}
     assert all(slopes[subject.shown(f"qd{i}")] == pytest.approx(p, rel=1e-9, abs=1e-12) for i, p in enumerate(momenta)
@@ -157,8 +163,8 @@ def test_slopes_of_the_sweeps_are_momenta_under_the_numbers_of_the_listing(subje
         assert OPS[op].symbol in row["text"] or op in row["text"]
 
 
-def test_parts_of_a_torque_add_up(subject):
-    screen = torque_parts(subject)
+def test_parts_of_a_torque_add_up(subject, screens):
+    screen = screens["why-this-torque"]
     numbers = [
         [float(cell.replace("−", "-")) for cell in re.findall(r"<td>([−\d.e]+)</td>", row)]
         for row in re.findall(r"<tr><td>.*?</tr>", screen.reveal)
@@ -168,20 +174,20 @@ def test_parts_of_a_torque_add_up(subject):
     assert np.allclose([sum(row[:3]) for row in numbers], torque, rtol=2e-3, atol=2e-3 * np.abs(torque).max())
 
 
-def test_a_pivot_is_the_inertia_with_all_others_free(subject):
+def test_a_pivot_is_the_inertia_with_all_others_free(subject, screens):
     """By the inverse of M: the first joint's acceleration for a unit torque at it."""
     n = subject.system.n
     matrix = subject.evaluate(dyn.mass_matrix(subject.system)).reshape(n, n)
-    screen = elimination(subject)
+    screen = screens["elimination"]
     free = 1.0 / np.linalg.inv(matrix)[0, 0]
     (told,) = re.findall(r"The pivot is ([\d.e]+)\.", screen.note)
     assert float(told) == pytest.approx(free, rel=1e-3)
     assert screen.answer == int(free < matrix[0, 0] * (1.0 - 1e-9))
 
 
-def test_a_multiplier_holds_its_row(subject):
+def test_a_multiplier_holds_its_row(subject, screens):
     """Pushed by the force that the page tells, the free system moves as if it were held."""
-    screen = closed_loop(subject)
+    screen = screens["closed-loop"]
     assert len(set(screen.choices)) == len(screen.choices) >= 2
     if len(subject.system.constraints):
         return
@@ -194,8 +200,8 @@ def test_a_multiplier_holds_its_row(subject):
     assert abs(held[-1]) <= 1e-3 * max(1.0, abs(free[-1]))
 
 
-def test_half_the_step_leaves_a_sixteenth_of_the_error(subject):
-    screen = energy_and_step(subject)
+def test_half_the_step_leaves_a_sixteenth_of_the_error(subject, screens):
+    screen = screens["energy-and-step"]
     assert screen.choices[screen.answer] == "16"
     factors = [float(text) for text in re.findall(r"a factor of ([\d.]+)\.", screen.reveal)]
     assert factors or "rounding" in screen.reveal
@@ -216,9 +222,9 @@ def v8():
     return engine
 
 
-def test_the_page_computes_what_the_graphs_do(subject, v8):
+def test_the_page_computes_what_the_graphs_do(subject, screens, v8):
     """To the last bits: only functions of the C library may differ in them."""
-    plays = [screen(subject).play for screen in (euler_edge, torque_parts, elimination, closed_loop)]
+    plays = [screens[name].play for name in ("euler-edge", "why-this-torque", "elimination", "closed-loop")]
     graphs = [play[name] for play in plays for name in ("right", "wrong", "graph", "free", "held") if name in play]
     assert len(graphs) == 6
     direct = [

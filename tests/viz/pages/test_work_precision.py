@@ -21,7 +21,7 @@ pytest.importorskip("matplotlib")
 from dynamics import METHODS
 from viz import theme
 from viz.pages.work_precision import _look, _power, _time, work_precision
-from viz.plots.direct_labels import COLORS
+from viz.plots.direct_labels import COLORS, labeled
 
 
 def point(knob: float, seconds: float, error: float | None, **others: Any) -> dict[str, Any]:
@@ -83,7 +83,16 @@ def shown(page: str) -> str:
 
 @pytest.fixture(scope="module")
 def page() -> str:
-    return to_html(work_precision(content()))
+    """The page, one picture of panels drawn for all of them: drawing takes seconds."""
+    kept: list[Any] = []
+
+    def once(panels: Any, **options: Any) -> Any:
+        kept.extend([] if kept else [labeled(panels, **options)])
+        return kept[0]
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("viz.pages.work_precision.labeled", once)
+        return to_html(work_precision(content()))
 
 
 def test_the_page_says_what_was_measured(page: str) -> None:
