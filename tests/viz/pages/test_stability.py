@@ -9,7 +9,7 @@ import pytest
 
 from viz import cli
 from viz.pages import stability
-from viz.pages.document import to_html
+from viz.pages.document import Document, to_html
 from viz.pages.document_files import document_files
 
 pytest.importorskip("matplotlib")
@@ -51,8 +51,21 @@ CONTENT = {
 }
 
 
-def test_the_page_counts_verdicts_and_gives_every_reason_once() -> None:
-    page = to_html(stability.document(CONTENT))
+@pytest.fixture(scope="module")
+def document() -> Document:
+    """The document, drawn once."""
+    return stability.document(CONTENT)
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures are empty, where only words and tables are looked at."""
+    monkeypatch.setattr(stability, "shares", lambda rows: None)
+    monkeypatch.setattr(stability, "to_adaptive_svg", lambda figure: "<svg/>")
+
+
+def test_the_page_counts_verdicts_and_gives_every_reason_once(document: Document) -> None:
+    page = to_html(document)
     assert "1 of 4 rows meet their bounds; limits with a known reason: 2; unexplained: 1." in page
     assert page.count("A known &lt;reason&gt;.") == 1
     assert "Unexplained. stopped at t = 1 s" in page
@@ -68,12 +81,10 @@ def test_a_line_is_a_figure_and_a_long_name_stays_in_one() -> None:
     assert stability._lines(ROWS[3])[0][4] == "nan ✗"
 
 
-def test_success_does_not_stand_in_the_box_of_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stability, "shares", lambda rows: None)
-    monkeypatch.setattr(stability, "to_adaptive_svg", lambda figure: "<svg/>")
+def test_success_does_not_stand_in_the_box_of_a_warning(document: Document, undrawn: None) -> None:
     right = {**CONTENT, "sections": [{"name": "Cases", "about": "", "rows": ROWS[:3]}]}
     assert 'class="warning"' not in to_html(stability.document(right))
-    assert '<p class="warning">1 of 4 rows' in to_html(stability.document(CONTENT))
+    assert '<p class="warning">1 of 4 rows' in to_html(document)
 
 
 @pytest.mark.parametrize(
@@ -99,8 +110,8 @@ def test_what_is_beyond_its_bound_is_drawn_in_the_color_of_what_is_wrong() -> No
     assert [label.get_text() for label in axis.get_yticklabels()] == [each["case"] for each in ROWS]
 
 
-def test_files_are_written_and_the_page_needs_no_other(tmp_path: Path) -> None:
-    files = document_files(tmp_path, "stability", stability.document(CONTENT), CONTENT, "section,case\n")
+def test_files_are_written_and_the_page_needs_no_other(tmp_path: Path, document: Document) -> None:
+    files = document_files(tmp_path, "stability", document, CONTENT, "section,case\n")
     assert {each.name for each in files} == {
         "stability.html",
         "stability.md",
@@ -121,7 +132,7 @@ def test_a_report_of_nothing_is_refused(capsys: pytest.CaptureFixture[str]) -> N
 
 
 def test_the_command_writes_the_table_and_fails_for_an_unexplained_row(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, undrawn: None
 ) -> None:
     """Two cases in place of all, one by a method that does not suit it."""
     from dynamics.experiments.stability import case_runs
