@@ -23,6 +23,7 @@ TABLE = {
     "viz": (
         "theme <- graph_drawing, plots <- pages <- inspector, paper <- commands <- cli <- __main__",
         "graph_drawing <- architecture <- commands",
+        "inspector <- typed <- commands",
     ),
     "": (
         "cgraph <- dynamics <- viz.paper, viz.commands",

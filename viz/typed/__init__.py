@@ -1,0 +1,1 @@
+"""A Lagrangian that is typed: its equations, counted, checked and moving, in one page."""
