@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+import cgraph as cg
 from cgraph import Graph, Node
 
 from ..equations.equations_of_motion import forward_dynamics
@@ -15,7 +16,6 @@ from ..equations.formulations import inverse_dynamics, spurious_nodes
 from ..multibody.display_units import display_units
 from ..multibody.joint_positions import Skeleton, skeleton
 from ..simulation.simulate import simulate
-from ..simulation.trajectory import Trajectory
 from ..systems.system import System
 from .scenes import Scene
 
@@ -26,20 +26,32 @@ DT = 1e-3  # s, the step that the embedded formulations take
 
 
 class Equations(NamedTuple):
-    """A graph of the equations.  about: what to see.  marked: spurious nodes.  at: {input: (T,) or a number}."""
+    """A graph of the equations.  about: what to see.  marked: spurious nodes."""
 
     name: str
     graph: Graph
     about: str
     marked: frozenset[Node]
-    at: Mapping[str, Any]
+
+
+class Shares(NamedTuple):
+    """Torques by partial Lagrangians.  graph: outputs tau0_part0 ..  parts: their names, then the rest and the sum."""
+
+    graph: Graph
+    parts: tuple[str, ...]
+
+    def row(self, i: int) -> list[str]:
+        """The outputs for coordinate i, one a part."""
+        return [f"tau{i}_part{k}" for k in range(len(self.parts))]
 
 
 @dataclass(frozen=True)
 class Inspection:
     """versions: the equations.  t: (T,) [s].  skeleton: joints along the motion, None where the model has no places.
 
-    shares: {part: torques (n,) [N m or N] at t = 0}, what each partial Lagrangian takes, and the rest; {} for one part.
+    at: {input: (T,) or a number}, the one state of all versions.  derived: the inputs of embedded formulations from it,
+    q0_old = q0 - dt q_dot0 and qd0_old = qd0 - dt qdd0; None where there are none.
+    shares: what each partial Lagrangian takes of the torques, None for one part.
     stopped: why the motion ends before its time, empty where it does not.
     units: {name in the graphs: unit}, where they are known.
     """
@@ -47,7 +59,9 @@ class Inspection:
     versions: tuple[Equations, ...]
     t: Array
     skeleton: Skeleton | None
-    shares: Mapping[str, Array]
+    at: Mapping[str, Any]
+    derived: Graph | None = None
+    shares: Shares | None = None
     stopped: str = ""
     units: Mapping[str, str] = field(default_factory=dict)
 
@@ -71,27 +85,39 @@ def inspection(
     say(f"{scene.name}: deriving forward dynamics")
     rate = forward_dynamics(system)
     state = _named(q=run.q, qd=run.qd, tau=np.zeros_like(run.qd)) | system.parameters | {"t": run.t}
+    derived = shares = None
     if forward:
         about = "Accelerations from torques: solved joint by joint from the tip to the base, then back out to the tip."
         about += " With them come the forces that hold the constraints." if system.constraints else ""
-        versions = [Equations("forward dynamics", rate, about, frozenset(), _needed(rate, state))]
+        versions = [Equations("forward dynamics", rate, about, frozenset())]
     else:
-        found = rate.evaluate(_needed(rate, state))
+        found = rate.evaluate({name: state[name] for name in rate.input_names})
         qdd = np.stack([np.broadcast_to(found[f"qdd{i}"], len(run.t)) for i in range(system.n)], axis=1)
-        old = {"q": run.q - DT * _coordinate_rates(system, run), "qd": run.qd - DT * qdd}
         state |= _named(qdd=qdd) | {"dt": DT}
-        state |= {f"{name}{i}_old": column for name, table in old.items() for i, column in enumerate(table.T)}
         versions = []
         for name in FORMULATIONS:
             say(f"{scene.name}: deriving inverse dynamics, {name.replace('_', ' ')}")
-            versions.append(_version(system, name, state))
+            versions.append(_version(system, name))
+        derived, shares = _derived(system), _shares(scene)
     places = None if scene.mechanism is None else skeleton(scene.mechanism.bind(), run.q)
     stopped = "" if run.stats.success else run.stats.message
     units = {} if scene.mechanism is None else display_units(scene.mechanism.moving)
-    return Inspection(tuple(versions), run.t, places, _shares(scene, state), stopped, units | {"t": "s", "dt": "s"})
+    graphs = [each.graph for each in versions] + [each for each in (derived,) if each]
+    inputs = {name for graph in graphs for name in graph.input_names}
+    at = {name: value for name, value in state.items() if name in inputs}
+    units = units | {"t": "s", "dt": "s"}
+    return Inspection(tuple(versions), run.t, places, at, derived, shares, stopped, units)
 
 
-def _version(system: System, name: str, state: Mapping[str, Any]) -> Equations:
+def _derived(system: System) -> Graph:
+    """The state that embedded formulations start from: q0_old .., qd0_old .. of q, qd, qdd and dt."""
+    dt, qdd = cg.variable("dt"), cg.variables([f"qdd{i}" for i in range(system.n)])
+    old = {f"q{i}_old": q - dt * rate for i, (q, rate) in enumerate(zip(system.q, system.q_dot, strict=True))}
+    old |= {f"qd{i}_old": qd - dt * rate for i, (qd, rate) in enumerate(zip(system.qd, qdd, strict=True))}
+    return Graph([*system.q, *system.qd, *qdd, dt], old)
+
+
+def _version(system: System, name: str) -> Equations:
     graph = inverse_dynamics(system, name)
     wrong = spurious_nodes(graph)
     if wrong:
@@ -107,53 +133,35 @@ def _version(system: System, name: str, state: Mapping[str, Any]) -> Equations:
         about += " Nothing drives the joints here: these torques are those of the constraints alone."
     elif not wrong:
         about += " Nothing drives the joints here, so the torques should be 0."
-    return Equations(name, graph, about, wrong, _needed(graph, state))
-
-
-def _coordinate_rates(system: System, run: Trajectory) -> Array:
-    """Rates of the coordinates along a motion, (T, nq)."""
-    if system.kinematics.quasi is None:
-        return run.qd
-    rates = Graph([*system.q, *system.qd], {str(i): node for i, node in enumerate(system.q_dot)})
-    values = rates.evaluate(_named(q=run.q, qd=run.qd)).values()
-    return np.stack([np.broadcast_to(value, len(run.t)) for value in values], axis=1)
+    return Equations(name, graph, about, wrong)
 
 
 def _named(**tables: Array) -> dict[str, Any]:
     return {f"{name}{i}": table[:, i] for name, table in tables.items() for i in range(table.shape[1])}
 
 
-def _needed(graph: Graph, state: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: state[name] for name in graph.input_names}
-
-
-def _shares(scene: Scene, state: Mapping[str, Any]) -> dict[str, Array]:
+def _shares(scene: Scene) -> Shares | None:
     """Inverse dynamics of each partial Lagrangian alone, which adds up to the whole but for damping and forces."""
-    system = scene.system
+    system, mechanism = scene.system, scene.mechanism
     parts = system.partial_lagrangians
-    mechanism = scene.mechanism
-    if len(parts) < 2 or "qdd0" not in state or (mechanism is not None and mechanism.base_parameters):
-        return {}
+    if len(parts) < 2 or (mechanism is not None and mechanism.base_parameters):
+        return None
     names = [body.name for body in mechanism.moving] if mechanism is not None else []
     if len(names) != len(parts):
         names = [f"link {i + 1}" for i in range(len(parts))]
 
-    def torques(model: System) -> Array:
+    def torques(model: System) -> list[Node]:
         graph = inverse_dynamics(model)
-        at = {name: np.atleast_1d(value)[0] for name, value in _needed(graph, state).items()}
-        return np.array([float(graph.evaluate(at)[f"tau{i}"]) for i in range(system.n)])
+        return [graph.outputs[f"tau{i}"] for i in range(system.n)]
 
     # the parts are nodes over the system's own variables, so a function that gives one makes a system of it
-    shares = {
-        name: torques(
-            System(
-                lambda *_, part=part: part,
-                system.coordinates,
-                system.parameters,
-                quasi_velocities=system.kinematics.quasi,
-            )
-        )
-        for name, part in zip(names, parts, strict=True)
-    }
-    total = torques(system)
-    return shares | {"damping and forces": total - sum(shares.values()), "all": total}
+    quasi = system.kinematics.quasi
+    columns = [
+        torques(System(lambda *_, part=part: part, system.coordinates, system.parameters, quasi_velocities=quasi))
+        for part in parts
+    ]
+    whole = inverse_dynamics(system)
+    every = [whole.outputs[f"tau{i}"] for i in range(system.n)]
+    columns += [[tau - sum(own) for tau, own in zip(every, zip(*columns, strict=True), strict=True)], every]
+    outputs = {f"tau{i}_part{k}": node for k, column in enumerate(columns) for i, node in enumerate(column)}
+    return Shares(Graph(whole.inputs, outputs), (*names, "damping and forces", "all"))

@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
 from pathlib import Path
-
-import numpy as np
-from numpy.typing import NDArray
 
 from cgraph.extend import check_writable
 from dynamics import display_names, scenes
-from dynamics.scenes.inspection import FRAMES, inspection
+from dynamics.scenes.inspection import FRAMES, Inspection, Shares, inspection
 
-from .. import theme
-from ..inspector import Motion, Table, Version, page
+from ..inspector import Motion, Page, StateTable, Version, page
 from .arguments import Commands, answer, positive, say, scene_of, takes_a_scene, unless_json
 
-ROUNDING = 1e-12  # of the largest torque: smaller ones are what is left of a difference
 LONGEST = 1000.0  # s: seconds of work for an arm of ten links
 
 
@@ -44,21 +38,8 @@ def run(options: argparse.Namespace) -> int:
     say(f"reading {options.scene}")
     scene = scene_of(options)
     content = inspection(scene, forward=options.forward, t_end=options.t_end, say=say)
-    bones = content.skeleton
-    cut = f"The motion is not whole: it {content.stopped}." if content.stopped else ""
     say(f"{scene.name}: writing the page of {sum(len(each.graph.nodes) for each in content.versions)} nodes")
-    text = page(
-        [
-            Version(version.name.replace("_", " "), version.graph, f"{cut} {version.about}".strip(), *version[3:])
-            for version in content.versions
-        ],
-        title=f"{scene.name}: {'forward' if options.forward else 'inverse'} dynamics",
-        about=f"Left out of the model: {'; '.join(scene.left_out)}." if scene.left_out else "",
-        motion=Motion(content.t, bones.points, bones.parents) if bones else Motion(content.t, None, ()),
-        tables=[_torques(scene, content.shares, content.units)] if content.shares else [],
-        names=display_names(scene),
-        units=content.units,
-    )
+    text = inspection_page(scene, content)
     sizes = {
         version.name: {
             "nodes": len(version.graph.nodes),
@@ -71,21 +52,35 @@ def run(options: argparse.Namespace) -> int:
     counts = ", ".join(f"{name} {version['nodes']} nodes" for name, version in sizes.items())
     data = {"scene": scene.name, "bytes": size, "stopped": content.stopped, "versions": sizes}
     answer(unless_json(options, data, f"{options.out}: {counts}; {size / 1e6:.2f} MB"), {options.out: text})
-    if cut:
-        say(cut)
-    return 1 if cut else 0
+    if content.stopped:
+        say(_cut(content))
+    return 1 if content.stopped else 0
 
 
-def _torques(scene: scenes.Scene, shares: Mapping[str, NDArray[np.float64]], units: Mapping[str, str]) -> Table:
-    """A row for each velocity, a column for each part; what is rounding beside the largest number is said to be."""
-    largest = max(float(np.abs(torques).max()) for torques in shares.values())
+def inspection_page(scene: scenes.Scene, content: Inspection) -> Page:
+    """The page of what there is to inspect in a scene."""
+    bones, mechanism = content.skeleton, scene.mechanism
+    forward = content.versions[0].name == "forward dynamics"
+    notices = [f"The model leaves out {text}." for text in scene.left_out]
+    return page(
+        [Version(each.name.replace("_", " "), *each[1:]) for each in content.versions],
+        title=f"{scene.name}: {'forward' if forward else 'inverse'} dynamics",
+        at=content.at,
+        derived=content.derived,
+        motion=Motion(content.t, bones.points, bones.parents) if bones else Motion(content.t),
+        tables=[_torques(scene, content.shares)] if content.shares else [],
+        names=display_names(scene),
+        units=content.units,
+        columns={body.name: body.parent for body in mechanism.moving} if mechanism else None,
+        notices=[*notices, *([_cut(content)] if content.stopped else [])],
+    )
 
-    def text(value: float) -> str:
-        return "≈0" if 0.0 < abs(value) <= ROUNDING * largest else f"{value:.4g}".replace("-", "−")
 
-    names = theme.called(display_names(scene))
-    rows = [
-        [f"{names[f'tau{i}']} [{units.get(f'tau{i}', 'N m')}]", *[text(torques[i]) for torques in shares.values()]]
-        for i in range(scene.system.n)
-    ]
-    return Table("Torques and forces that each part takes at t = 0", ["", *shares], rows)
+def _cut(content: Inspection) -> str:
+    return f"The motion is not whole: it {content.stopped}."
+
+
+def _torques(scene: scenes.Scene, shares: Shares) -> StateTable:
+    """A row for each velocity, a column for each part."""
+    rows = {f"tau{i}": shares.row(i) for i in range(scene.system.n)}
+    return StateTable("Torques and forces that each part takes", shares.graph, shares.parts, rows)

@@ -1,6 +1,6 @@
 """The inspector: one page on which a graph is unfolded, stepped through, asked and seen moving."""
 
-from .content import Motion, Table, Version
+from .content import Motion, StateTable, Table, Version
 from .page import Page, page
 
-__all__ = ["Motion", "Page", "Table", "Version", "page"]
+__all__ = ["Motion", "Page", "StateTable", "Table", "Version", "page"]

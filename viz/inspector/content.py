@@ -1,9 +1,9 @@
-"""What an inspector shows: graphs that are versions of one another, a motion, tables."""
+"""What an inspector shows: graphs that are versions of one another, their one state, a motion, tables."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,33 +20,55 @@ class Version:
     """One of the graphs that the page switches among, and what to see in it.
 
     about: a sentence or two.  marked: nodes in the one color of what is wrong.
-    at: {input: value (T,) along the motion, or one number}; an input without a value is `UNKNOWN`.
     """
 
     name: str
     graph: Graph
     about: str = ""
     marked: Collection[Node] = frozenset()
-    at: Mapping[str, Any] = field(default_factory=dict)
 
-    def rows(self, length: int) -> Array:
-        """Values of the inputs, (length, number of inputs).
-
-        Raises ValueError for a name that is no input, values that are not finite, or another length.
-        """
-        names = self.graph.input_names
-        if unknown := [name for name in self.at if name not in names]:
-            raise ValueError(f"version {self.name!r} has values for {unknown[0]!r}, which is not an input of its graph")
+    def check(self) -> None:
+        """Raises ValueError for a marked node that is not in the graph."""
         if strange := set(self.marked) - set(self.graph.nodes):
             raise ValueError(f"version {self.name!r}: {next(iter(strange))!r} is marked, but not in its graph")
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """The one state of all versions: values of inputs, and how to compute the inputs that only some versions have.
+
+    at: {input: value (T,) along the motion, or one number}; an input without a value is `UNKNOWN`.
+    derived: a graph from inputs of the state to inputs of versions, such as q0_old = q0 - dt qd0; these have no value.
+    """
+
+    at: Mapping[str, Any]
+    derived: Graph | None = None
+
+    def inputs(self, graphs: Sequence[Graph]) -> list[str]:
+        """Names of the inputs whose values the state holds: all inputs of the graphs but the derived ones.
+
+        Raises ValueError for a derived name that is no input of any graph, and a value for what is not in the state.
+        """
+        computed = set(self.derived.outputs) if self.derived is not None else set()
+        needed = dict.fromkeys([name for graph in graphs for name in graph.input_names])
+        if strange := computed - set(needed):
+            raise ValueError(f"{min(strange)!r} is derived, but is no input of any version")
+        first = self.derived.input_names if self.derived is not None else ()
+        names = [name for name in dict.fromkeys([*first, *needed]) if name not in computed]
+        if unknown := [name for name in self.at if name not in names]:
+            raise ValueError(f"there is a value for {unknown[0]!r}, which is not an input of any version")
+        return names
+
+    def rows(self, names: Sequence[str], length: int) -> Array:
+        """Values of the inputs of these names, (length, number of names).
+
+        Raises ValueError for values that are not finite, or of another length.
+        """
         table = np.full((length, len(names)), UNKNOWN)
         for i, name in enumerate(names):
-            value = real_array(f"version {self.name!r}: input {name!r}", self.at.get(name, UNKNOWN))
+            value = real_array(f"input {name!r}", self.at.get(name, UNKNOWN))
             if value.shape not in ((), (length,)) or not np.isfinite(value).all():
-                raise ValueError(
-                    f"version {self.name!r}: input {name!r} needs one finite number or {length} of them, "
-                    f"got shape {value.shape}"
-                )
+                raise ValueError(f"input {name!r} needs one finite number or {length} of them, got shape {value.shape}")
             table[:, i] = value
         return table
 
@@ -82,3 +104,26 @@ class Table:
     caption: str
     header: Sequence[str]
     rows: Sequence[Sequence[str]]
+
+
+@dataclass(frozen=True, eq=False)
+class StateTable:
+    """A table of numbers that follow the state: outputs of a graph of its inputs.
+
+    header: of the columns of numbers.  rows: {name of an output of the versions: outputs of the graph, a column each}.
+    """
+
+    caption: str
+    graph: Graph
+    header: Sequence[str]
+    rows: Mapping[str, Sequence[str]]
+
+    def check(self, state: Sequence[str]) -> None:
+        """Raises ValueError for an input that is not in the state, and a row that does not fit header and graph."""
+        if unknown := [name for name in self.graph.input_names if name not in state]:
+            raise ValueError(f"table {self.caption!r}: {unknown[0]!r} is not an input of the state")
+        for row, outputs in self.rows.items():
+            if len(outputs) != len(self.header) or set(outputs) - set(self.graph.outputs):
+                raise ValueError(
+                    f"table {self.caption!r}: row {row!r} needs {len(self.header)} outputs of its graph, got {outputs}"
+                )

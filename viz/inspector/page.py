@@ -11,16 +11,19 @@ from importlib.resources import files
 from string import Template
 from typing import Any
 
-from cgraph import Graph, Node
+from cgraph import Graph, Node, __version__
 from cgraph.extend import require_graph, require_mapping, require_sequence, require_texts
 
 from .. import theme
 from ..pages import html
-from .content import Motion, Table, Version
+from .content import Motion, State, StateTable, Table, Version
 from .operations import operations
 from .record import record
 
-SCRIPTS = ("values.js", "paths.js", "formula.js", "picture.js", "arm.js", "app.js")
+SCRIPTS = (
+    "elements.js", "values.js", "state.js", "paths.js", "formula.js", "layers.js", "places.js", "arrange.js",
+    "picture.js", "view.js", "marks.js", "panels.js", "sweeps.js", "arm.js", "motion.js", "keys.js", "app.js",
+)  # fmt: skip
 FRAME_HEIGHT = 720  # pixels in a notebook
 # Nothing may be fetched, and no script or style runs but the page's own, known by its digest.
 _POLICY = (
@@ -48,9 +51,12 @@ def page(
     at: Mapping[str, Any] | None = None,
     marked: Collection[Node] = frozenset(),
     motion: Motion | None = None,
-    tables: Sequence[Table] = (),
+    tables: Sequence[Table | StateTable] = (),
     names: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
+    derived: Graph | None = None,
+    columns: Mapping[str, str | None] | None = None,
+    notices: Sequence[str] = (),
 ) -> Page:
     """The page on which a graph is looked at: it folds by tags, and shows values, paths, sweeps and equations.
 
@@ -63,18 +69,26 @@ def page(
     about : str
         What to see, a sentence or two.
     at : mapping of str to float or array (T,), optional
-        {input: value}, or values along the motion, of one graph. An input without a value is 0.5.
+        {input: value}, or values along the motion: the one state of all versions. An input without a value is 0.5.
     marked : collection of Node
         Nodes of one graph in the color of what is wrong.
     motion : Motion, optional
         Instants to play [s], and points that move beside the graph [m].
-    tables : sequence of Table
-        Texts in rows, shown below the graph.
+    tables : sequence of Table or StateTable
+        Texts in rows, or numbers that follow the state, shown beside the graph.
     names : mapping of str to str, optional
         {name of an input, output or node: what a person calls it}, such as `dynamics.display_names(model)`. Tables and
         panels show it, and boxes of small graphs; those of larger ones have letters, as q₀.
     units : mapping of str to str, optional
         {name of an input or output: its unit}, shown beside the name.
+    derived : Graph, optional
+        Inputs that only some versions have, as a graph of the state: its outputs are computed, not asked for, and all
+        versions are in one state.
+    columns : mapping of str to str or None, optional
+        {tag that is a column of the picture: tag of its parent}, bodies of a tree from its base. By default tags beside
+        "kinetic" or "potential", or those that end in a number.
+    notices : sequence of str
+        What stands above everything, such as what a model lacks of its file.
 
     Returns
     -------
@@ -84,8 +98,8 @@ def page(
     Raises
     ------
     ValueError
-        For no version, two of one name, `at` or `marked` beside versions, a value for a name that is no input, a number
-        that is not finite, a marked node of another graph, or shapes that do not fit the motion.
+        For no version, two of one name, `marked` beside versions, a value for a name that is no input or is derived, a
+        number that is not finite, a marked node of another graph, or shapes that do not fit the motion.
 
     Examples
     --------
@@ -102,23 +116,34 @@ def page(
         require_mapping("at", at, "input: value")
     texts = require_texts("names", names), require_texts("units", units)
     nodes, tables = frozenset(require_sequence("marked", marked, "nodes")), require_sequence("tables", tables, "Table")
-    if not all([isinstance(table, Table) for table in tables]):
-        raise TypeError(f"tables must be a sequence of Table, got {tables!r:.60}")
-    versions = _versions(graph, about, at, nodes)
+    if not all([isinstance(table, (Table, StateTable)) for table in tables]):
+        raise TypeError(f"tables must be a sequence of Table or StateTable, got {tables!r:.60}")
+    if not all([isinstance(text, str) for text in require_sequence("notices", notices, "texts")]):
+        raise TypeError(f"notices must be texts, got {notices!r:.60}")
+    if derived is not None:
+        require_graph("derived", derived)
+    versions = _versions(graph, about, nodes)
     if motion is not None:
         if not isinstance(motion, Motion):
             raise TypeError(f"motion must be a Motion, got {type(motion).__name__}: {motion!r:.60}")
         motion.check()
     introduction = "" if isinstance(graph, Graph) else about
-    data = {"title": title, "introduction": introduction} | record(versions, motion, *texts)
-    script = f'"use strict";\n{scripts()}\nstart();'
+    data = {"title": title, "introduction": introduction, "notices": list(notices)}
+    live = [table for table in tables if isinstance(table, StateTable)]
+    data |= record(versions, motion, *texts, state=State(at or {}, derived), columns=columns, tables=live)
+    return Page(_html(title, data, [table for table in tables if isinstance(table, Table)]))
+
+
+def _html(title: str, data: Mapping[str, Any], tables: Sequence[Table]) -> str:
+    """The file: its policy, style, body, data and script."""
+    script = f'"use strict";\n{scripts()}\nconst inspector = start();'
     style = f"{_colors()}{_asset('page.css')}"
     policy = _POLICY.format(script=_digest(script), style=_digest(style))
     # "<" in the data could end the element that holds it
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
     shown = "".join(html.table(table.caption, table.header, table.rows) for table in tables)
-    body = Template(_asset("page.html")).substitute(title=escape(title), tables=shown)
-    return Page(
+    body = Template(_asset("page.html")).substitute(title=escape(title), tables=shown, version=f"cgraph {__version__}")
+    return (
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
@@ -129,20 +154,18 @@ def page(
     )
 
 
-def _versions(
-    graph: Graph | Sequence[Version], about: str, at: Mapping[str, Any] | None, marked: frozenset[Node]
-) -> list[Version]:
+def _versions(graph: Graph | Sequence[Version], about: str, marked: frozenset[Node]) -> list[Version]:
     """The versions to switch among, checked; a graph alone is one."""
     if isinstance(graph, Graph):
-        return [Version("graph", graph, about, marked, at or {})]
+        return [Version("graph", graph, about, marked)]
     if (
         isinstance(graph, str)
         or not isinstance(graph, Sequence)
         or not all(isinstance(each, Version) for each in graph)
     ):
         require_graph("page", graph)
-    if at is not None or marked:
-        raise ValueError("with versions, give each its own at and marked")
+    if marked:
+        raise ValueError("with versions, give each its own marked nodes")
     names = [version.name for version in graph]
     if not names or len(set(names)) < len(names):
         raise ValueError(f"a page needs versions with names of their own, got {names}")

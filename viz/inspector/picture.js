@@ -1,136 +1,12 @@
-// The picture: clusters in columns by body and rows by stage, folded or not, and the lines between what is shown.
-
-const SVG = "http://www.w3.org/2000/svg";
-const BOX = { width: 116, height: 46, gap: 12, title: 18, pad: 8 };
-const CELL = { gap: 38, title: 24, aspect: 1.35 };
-const LEAF = { height: 30, gap: 8, row: 44 };
-const NODE = 34; // height of a node's ellipse or box
-
-function element(name, attributes, parent) {
-  const made = document.createElementNS(SVG, name);
-  for (const key in attributes) made.setAttribute(key, attributes[key]);
-  if (parent) parent.appendChild(made);
-  return made;
-}
-
-const titleOf = (cluster) => [cluster.marked ? "spurious" : "", cluster.title].filter(Boolean).join(" ");
-
-/** Where everything goes, for the clusters that are folded; the same for all versions. */
-function arrange(data, folded) {
-  const sizes = data.clusters.map((cluster, c) => (folded.has(c) ? { w: BOX.width, h: BOX.height }
-    : { w: Math.max(cluster.width + 2 * BOX.pad, 7 * titleOf(cluster).length + 54), h: cluster.height + BOX.title + BOX.pad }));
-  const cells = new Map();
-  data.clusters.forEach((cluster, c) => {
-    const key = `${data.columns.indexOf(cluster.column)} ${data.stages.indexOf(cluster.stage)}`;
-    cells.set(key, [...(cells.get(key) ?? []), c]);
-  });
-  const flowed = new Map([...cells].map(([key, own]) => [key, flow(own, sizes)]));
-  const cell = (column, stage) => flowed.get(`${column} ${stage}`) ?? { w: 0, h: 0, at: [] };
-  const boxes = [], titles = [];
-  const stages = data.stages.map((_, i) => i);
-  const widths = data.columns.map((_, i) => Math.max(90, ...stages.map((stage) => cell(i, stage).w)));
-  const bands = data.bands ??= bandsFor(widths, stages.map((stage) => Math.max(...widths.map((_, i) => cell(i, stage).h))), data.aspect);
-  const perBand = Math.ceil(data.columns.length / bands);
-  const inputs = new Map(), outputs = new Map(); // place: width; name: width
-  for (const version of data.versions) {
-    for (const [, node] of version.inputs) {
-      if (node < 0) continue;
-      const place = version.place[node];
-      if (data.places[place][0] < 0) inputs.set(place, data.places[place][3]);
-    }
-    for (const [name, pretty] of version.outputs) outputs.set(name, Math.max(46, 8 * pretty.length + 18));
-  }
-  let total = 0;
-  for (let band = 0; band < bands; band++) {
-    const own = widths.slice(band * perBand, (band + 1) * perBand);
-    total = Math.max(total, own.reduce((sum, each) => sum + each + CELL.gap, 0));
-  }
-  total = Math.max(total, 420);
-  let y = 12;
-  const top = line(outputs, total, y);
-  y = top.end + 6;
-  for (let band = bands - 1; band >= 0; band--) { // the last bodies on top
-    const own = data.columns.map((_, i) => i).slice(band * perBand, (band + 1) * perBand);
-    let x = (total - own.reduce((sum, i) => sum + widths[i] + CELL.gap, -CELL.gap)) / 2;
-    const left = own.map((i) => { const at = x; x += widths[i] + CELL.gap; return at; });
-    const start = y;
-    y += CELL.title;
-    for (const stage of [...stages].reverse()) {
-      const height = Math.max(0, ...own.map((i) => cell(i, stage).h));
-      if (!height) continue;
-      own.forEach((i, k) => {
-        const { w, h, at } = cell(i, stage);
-        for (const [c, dx, dy] of at) {
-          boxes[c] = { x: left[k] + (widths[i] - w) / 2 + dx, y: y + height - h + dy, ...sizes[c] };
-        }
-      });
-      titles.push({ stage, x: 0, y, h: height });
-      y += height + CELL.gap;
-    }
-    own.forEach((i, k) => titles.push({ column: i, x: left[k], y: start, w: widths[i], h: y - start - CELL.gap / 2 }));
-  }
-  const bottom = line(inputs, total, y + 8);
-  return { boxes, titles, inputs: bottom.at, outputs: top.at, width: total, height: bottom.end + 8 };
-}
-
-/** Into how many bands columns of these widths are broken: one, unless the picture is much larger with more. */
-function bandsFor(widths, heights, aspect = CELL.aspect) {
-  const high = heights.reduce((sum, each) => sum + (each ? each + CELL.gap : 0), CELL.title);
-  const scale = (bands) => {
-    const per = Math.ceil(widths.length / bands);
-    let most = 0;
-    for (let i = 0; i < widths.length; i += per) {
-      most = Math.max(most, widths.slice(i, i + per).reduce((sum, each) => sum + each + CELL.gap, 0));
-    }
-    return Math.min(aspect / (most + 150), 1 / (bands * high + 2 * LEAF.row));
-  };
-  let best = 1;
-  for (let bands = 2; bands <= widths.length; bands++) if (scale(bands) > 1.7 * scale(1) && scale(bands) > 1.05 * scale(best)) best = bands;
-  return best;
-}
-
-/** Boxes of a cell from left to right, in lines. */
-function flow(own, sizes) {
-  const limit = Math.max(2 * BOX.width + BOX.gap,
-    1.5 * Math.sqrt(own.reduce((sum, c) => sum + sizes[c].w * sizes[c].h, 0)));
-  const at = [];
-  let x = 0, y = 0, high = 0, w = 0;
-  for (const c of own) {
-    if (x && x + sizes[c].w > limit) { x = 0; y += high + BOX.gap; high = 0; }
-    at.push([c, x, y]);
-    w = Math.max(w, x + sizes[c].w);
-    high = Math.max(high, sizes[c].h);
-    x += sizes[c].w + BOX.gap;
-  }
-  return { w, h: y + high, at };
-}
-
-/** Leaves in centred lines: Map from each to its box. */
-function line(leaves, total, y) {
-  const at = new Map();
-  let row = [], width = 0;
-  const put = () => {
-    let x = (total - width + LEAF.gap) / 2;
-    for (const [key, w] of row) { at.set(key, { x, y, w, h: LEAF.height }); x += w + LEAF.gap; }
-    y += row.length ? LEAF.row : 0;
-    row = []; width = 0;
-  };
-  for (const [key, w] of leaves) {
-    if (width + w > total) put();
-    row.push([key, w]);
-    width += w + LEAF.gap;
-  }
-  put();
-  return { at, end: y };
-}
+// The picture: shapes for bodies, clusters, nodes and outputs, and arrows between what is shown.
 
 /** What a person calls an input, output or node of that name. */
-const called = (data, name) => data.called.get(name) ?? name;
+const calledIn = (record, name) => new Map(record.called).get(name) ?? name;
 
 /** What the operation of a node shows: its symbol, with the constants among its arguments. */
-function caption(data, version, node) {
+function caption(record, version, node) {
   const name = version.names[node];
-  const symbol = data.ops[version.ops[node]]?.[0] ?? "";
+  const symbol = record.ops[version.ops[node]]?.[0] ?? "";
   if (version.constants.has(node)) return brief(version.constants.get(node));
   if (!version.args[node].length) return name ? name[1] : "";
   const numbers = version.args[node].map((arg) => (version.constants.has(arg) ? brief(version.constants.get(arg)) : ""));
@@ -143,138 +19,228 @@ function caption(data, version, node) {
   return name ? `${name[1]}: ${shown}` : shown;
 }
 
-function brief(value) {
-  if (Number.isNaN(value)) return "NaN";
-  if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
-  const size = Math.abs(value);
-  if (size < 1e-12) return size ? "≈0" : "0";
-  const text = size && (size < 1e-3 || size >= 1e5) ? value.toExponential(1) : String(+value.toPrecision(3));
-  return text.replace("-", "−").replace("e−", "e-");
-}
-
-/** Draw a version; returns the items by id, and of each node the id of the item that shows it. */
-function draw(svg, data, version, folded) {
-  const layout = arrange(data, folded);
+/** Draw a version; returns its items by id, of each node the id of the item that shows it, and the arrows.
+ *
+ * view: { folded, closed, unbundled, aspect }.  A version with a drawing has that while nothing is folded. */
+function draw(svg, record, plan, version, view) {
   svg.replaceChildren();
   const scene = element("g", { id: "scene" }, svg);
   const frames = element("g", {}, scene), lines = element("g", { class: "lines" }, scene), shapes = element("g", {}, scene);
+  const canvas = { record, plan, version, view, frames, lines, shapes, items: new Map(), shownBy: [], called: new Map(record.called) };
+  const own = version.drawing && !view.folded.size && !view.closed.size ? version.drawing : null;
+  const layout = own ? asLayout(own, version) : arrange(plan, view);
+  canvas.layout = layout;
+  if (!own) {
+    drawTitles(canvas);
+    drawBodies(canvas);
+    drawClusters(canvas);
+  }
+  drawNodes(canvas);
+  drawOutputs(canvas);
+  const arrows = drawArrows(canvas, own);
+  return { items: canvas.items, shownBy: canvas.shownBy, arrows, layout, scene };
+}
+
+/** A drawing as boxes: of every node that is no constant, and of the outputs. */
+function asLayout(drawing, version) {
+  const nodes = drawing.nodes.map((at) => at && { x: at[0] - at[2] / 2, y: at[1] - NODE / 2, w: at[2], h: NODE });
+  const outputs = new Map(version.outputs.map(([name], i) => {
+    const [x, y, w] = drawing.outputs[i];
+    return [name, { x: x - w / 2, y: y - LEAF.height / 2, w, h: LEAF.height }];
+  }));
+  return { nodes, outputs, width: drawing.width, height: drawing.height, bundles: new Map() };
+}
+
+function drawTitles({ plan, layout, frames, version }) {
+  const here = new Set(version.ops.map((_, node) => clusterOf(plan, version, node)).filter((c) => c >= 0));
+  const used = new Set([...here].map((c) => plan.clusters[c].column)), rows = new Set([...here].map((c) => plan.clusters[c].stage));
   for (const each of layout.titles) {
-    if (each.column === undefined) continue;
-    element("rect", { class: "column", x: each.x - 9, y: each.y, width: each.w + 18, height: each.h, rx: 8 }, frames);
-    const words = element("text", { class: "column-title", x: each.x + each.w / 2, y: each.y + 16 }, frames);
-    words.textContent = fitted(data.columns[each.column] || "no tag", (each.w + 18) / 8.6);
-    element("title", {}, words).textContent = data.columns[each.column];
+    if (each.column === undefined || !used.has(plan.columns[each.column])) continue; // an empty column is not drawn
+    const name = plan.columns[each.column];
+    const group = element("g", { class: "column", "data-column": each.column, tabindex: -1, role: "button" }, frames);
+    group.setAttribute("aria-label", `fold ${name || "no tag"} to one box`);
+    element("rect", { x: each.x - 6, y: each.y, width: each.w + 12, height: each.h, rx: 8 }, group);
+    const words = element("text", { class: "column-title", x: each.x + each.w / 2, y: each.y + 17 }, group);
+    words.textContent = fitted(name || "no tag", each.w / 8);
+    element("title", {}, group).textContent = name;
   }
   for (const each of layout.titles) {
-    if (each.stage === undefined) continue;
-    const words = element("text", { class: "stage", x: -14, y: each.y + each.h / 2 }, frames);
-    words.textContent = data.stages[each.stage];
+    if (each.stage !== undefined && rows.has(each.stage)) element("text", { class: "stage", x: each.x, y: each.y }, frames).textContent = each.stage;
   }
-  const items = new Map(), shownBy = [];
-  const inside = data.clusters.map(() => []);
+}
+
+const clusterOf = (plan, version, node) => plan.cluster[plan.place[version.index][node]];
+
+/** Bodies that are folded: a box, with a bar that says which sweeps its nodes are of, and how many are spurious. */
+function drawBodies(canvas) {
+  const { plan, version, layout, view, shapes } = canvas;
+  const inside = new Map();
   version.ops.forEach((_, node) => {
-    const c = data.places[version.place[node]][0];
-    if (c >= 0) inside[c].push(node);
+    const c = clusterOf(plan, version, node), column = c >= 0 ? plan.columns.indexOf(plan.clusters[c].column) : -1;
+    if (view.closed.has(column)) inside.set(column, [...(inside.get(column) ?? []), node]);
   });
-  data.clusters.forEach((cluster, c) => {
+  for (const [column, nodes] of [...inside].sort((a, b) => a[0] - b[0])) {
+    const name = plan.columns[column] || "no tag", at = layout.bodies[column];
+    const wrong = nodes.filter((node) => version.marked.has(node)).length;
+    const second = `${counted(nodes.length, "node")}${wrong ? `, ${wrong} spurious` : ""}`;
+    const item = shape(shapes, `b${column}`, at, `body${wrong ? " wrong" : " several"}`, `▸ ${fitted(name, 16)}`, second);
+    item.group.setAttribute("data-column", column);
+    item.group.setAttribute("aria-label", `${name}, ${second}, folded`);
+    element("title", {}, item.group).textContent = name;
+    share(item.group, at, nodes.map((node) => roleOf(version, node)));
+    keep(canvas, `b${column}`, item, nodes, second);
+  }
+}
+
+/** A bar along the foot of a box: a piece for every role of its nodes, as long as they are many. */
+function share(group, at, roles) {
+  const many = new Map(), order = ["primal", "adjoint", "tangent", "several", "wrong"];
+  for (const role of roles) many.set(role, (many.get(role) ?? 0) + 1);
+  let x = at.x + 6;
+  for (const role of order.filter((each) => many.has(each))) {
+    const width = (at.w - 12) * many.get(role) / roles.length;
+    element("rect", { class: `share ${role}`, x, y: at.y + at.h - 9, width, height: 5 }, group);
+    x += width;
+  }
+}
+
+const roleOf = (version, node) => (version.marked.has(node) ? "wrong" : version.labels[version.label[node]][1]);
+
+function keep(canvas, id, item, nodes, second) {
+  canvas.items.set(id, { ...item, nodes, second });
+  for (const node of nodes) canvas.shownBy[node] = id;
+}
+
+function drawClusters(canvas) {
+  const { plan, version, layout, view, frames, shapes } = canvas;
+  const inside = plan.clusters.map(() => []);
+  version.ops.forEach((_, node) => { const c = clusterOf(plan, version, node); if (c >= 0 && canvas.shownBy[node] === undefined) inside[c].push(node); });
+  plan.clusters.forEach((cluster, c) => {
     if (!inside[c].length) return;
-    const at = layout.boxes[c], id = `c${c}`;
-    const role = cluster.marked ? "wrong" : commonRole(version, inside[c]);
-    const many = inside[c].length;
-    const words = titleOf(cluster);
-    const count = `${many} node${many > 1 ? "s" : ""}`;
-    const title = words ? `${words} (${many})` : count;
-    if (!folded.has(c)) {
+    const at = layout.boxes[c], roles = new Set(inside[c].map((node) => roleOf(version, node)));
+    const role = cluster.marked ? "wrong" : roles.size === 1 ? [...roles][0] : "several";
+    const words = titleOf(cluster), count = counted(inside[c].length, "node");
+    if (!view.folded.has(c)) {
       const group = element("g", { class: `frame ${role}`, "data-cluster": c, tabindex: -1, role: "button" }, frames);
-      group.setAttribute("aria-label", `fold ${cluster.column} ${title}`);
+      group.setAttribute("aria-label", `fold ${cluster.column} ${words}, ${count}`);
       element("rect", { x: at.x, y: at.y, width: at.w, height: at.h, rx: 6 }, group);
-      const label = element("text", { x: at.x + 6, y: at.y + 13 }, group);
-      label.textContent = `▾ ${title}`;
+      element("text", { x: at.x + 6, y: at.y + 13 }, group).textContent = `▾ ${words ? `${words} (${inside[c].length})` : count}`;
       return;
     }
-    const first = cluster.marked ? "spurious" : cluster.title || cluster.column || "no tag";
-    const second = cluster.marked && cluster.title ? `${cluster.title} (${many})` : count;
-    const item = shape(shapes, id, { ...at }, `box ${role}`, `▸ ${fitted(first, 13)}`, true);
+    const first = cluster.marked ? "spurious" : cluster.title || cluster.column || "nodes";
+    const item = shape(shapes, `c${c}`, at, `box ${role}`, `${fitted(first, 10)} ${inside[c].length}`, count);
     item.group.setAttribute("data-cluster", c);
     item.group.setAttribute("aria-expanded", "false");
     item.group.setAttribute("aria-label", [cluster.column, cluster.stage, words, count, "folded"].filter(Boolean).join(", "));
-    items.set(id, { ...item, nodes: inside[c], second });
-    for (const node of inside[c]) shownBy[node] = id;
+    element("title", {}, item.group).textContent = [cluster.column, words, cluster.stage, count].filter(Boolean).join(", ");
+    keep(canvas, `c${c}`, item, inside[c], count);
   });
+}
+
+function drawNodes(canvas) {
+  const { record, plan, version, layout, shapes, called } = canvas;
+  drawBundles(canvas, "i", version.inputs.filter(([, node]) => node >= 0).map(([name, node]) => [name, node]));
+  const sums = new Map(); // place a sum under the first output that it is
+  for (const [name, , node] of version.outputs) if (!sums.has(node)) sums.set(node, name);
   version.ops.forEach((op, node) => {
-    if (version.constants.has(node) || shownBy[node]) return;
-    const [c, dx, dy, w] = data.places[version.place[node]];
-    const at = c < 0 ? layout.inputs.get(version.place[node])
-      : { x: layout.boxes[c].x + BOX.pad + dx - w / 2, y: layout.boxes[c].y + BOX.title + dy - NODE / 2, w, h: NODE };
-    const role = version.marked.has(node) ? "wrong" : version.labels[version.label[node]][1];
-    const leaf = !version.args[node].length;
-    const item = shape(shapes, `n${node}`, at, `${leaf ? "leaf" : "node"} ${role}`, caption(data, version, node), leaf);
+    if (version.constants.has(node) || canvas.shownBy[node] !== undefined) return;
+    const place = plan.place[version.index][node], c = plan.cluster[place], w = plan.width[place];
+    const leaf = !version.args[node].length, key = sums.get(node);
+    let at;
+    if (layout.nodes) at = layout.nodes[node];
+    else if (leaf) at = layout.inputs.get(version.names[node][0]);
+    else if (c === RESULT_PLACE) {
+      const box = layout.outputs.get(key);
+      if (!box) return; // its output is in a box of many, and so is it
+      at = { x: box.x + box.w / 2 - w / 2, y: box.y + LEAF.sum, w, h: NODE };
+    } else {
+      const { local, x, y } = innerOf(plan, c), i = local.get(place), box = layout.boxes[c];
+      at = { x: box.x + (box.w - innerOf(plan, c).width) / 2 + x[i] - w / 2, y: box.y + BOX.title + y[i] - NODE / 2, w, h: NODE };
+    }
+    const role = roleOf(version, node);
+    const item = shape(shapes, `n${node}`, at, `${leaf ? "leaf" : "node"} ${role}`, caption(record, version, node), "", !leaf);
     item.group.setAttribute("data-node", node);
-    const name = version.names[node] && called(data, version.names[node][0]);
-    item.group.setAttribute("aria-label", `n${node}, ${name ?? op}${role === "wrong" ? ", spurious" : ""}`);
-    if (name) element("title", {}, item.group).textContent = name;
-    items.set(`n${node}`, { ...item, nodes: [node] });
-    shownBy[node] = `n${node}`;
+    const name = version.names[node] && (called.get(version.names[node][0]) ?? version.names[node][0]);
+    const words = [leaf ? "" : `%${version.number[node]}`, name ?? op, role === "wrong" ? "spurious" : ""].filter(Boolean).join(", ");
+    item.group.setAttribute("aria-label", words);
+    element("title", {}, item.group).textContent = words;
+    keep(canvas, `n${node}`, item, [node], "");
   });
-  for (const [name, pretty, node] of version.outputs) {
-    const item = shape(shapes, `o${name}`, layout.outputs.get(name), "output", pretty, true);
-    item.group.setAttribute("data-node", node);
-    item.group.setAttribute("aria-label", `output ${called(data, name)}`);
-    element("title", {}, item.group).textContent = called(data, name);
-    items.set(`o${name}`, { ...item, nodes: [node], output: true });
+}
+
+/** Inputs or outputs that are many, a box for each kind. */
+function drawBundles(canvas, side, leaves) {
+  const { layout, shapes, version } = canvas, node = new Map(leaves);
+  for (const [key, names] of layout.bundles) {
+    const own = names.filter((name) => node.has(name));
+    if (key[0] !== side || !own.length) continue;
+    const kind = key.slice(1).replace("_old", " old").replace(/^q(d*)/, (_, dots) => `q${["", "\u0307", "\u0308"][dots.length]}`).replace("tau", "τ");
+    const at = layout[side === "i" ? "inputs" : "outputs"].get(key);
+    const item = shape(shapes, `k${key}`, at, side === "i" ? "box input" : "box output", `▸ ${kind}: ${counted(own.length, side === "i" ? "input" : "output")}`, "");
+    item.group.setAttribute("data-bundle", key);
+    item.group.setAttribute("aria-label", `${kind}, ${own.length}, folded`);
+    const nodes = own.map((name) => node.get(name));
+    if (side === "i") keep(canvas, `k${key}`, item, nodes, "");
+    else {
+      canvas.items.set(`k${key}`, { ...item, nodes, second: "", output: true, names: own });
+      for (const each of nodes) if (clusterOf(canvas.plan, version, each) === RESULT_PLACE) canvas.shownBy[each] ??= `k${key}`;
+    }
   }
-  const arrows = drawLines(lines, version, items, shownBy);
-  return { items, shownBy, arrows, layout, scene };
 }
 
-function commonRole(version, nodes) {
-  const roles = new Set(nodes.map((node) => version.labels[version.label[node]][1]));
-  return roles.size === 1 ? [...roles][0] : "several";
-}
-
-/** A text of at most so many letters: of a longer one, its ends. */
-function fitted(text, most) {
-  const letters = [...text], room = Math.max(4, Math.floor(most) - 1);
-  if (letters.length <= room + 1) return text;
-  return `${letters.slice(0, Math.ceil(room / 2)).join("")}…${letters.slice(letters.length - Math.floor(room / 2)).join("")}`;
+function drawOutputs(canvas) {
+  const { version, layout, shapes, called } = canvas;
+  drawBundles(canvas, "o", version.outputs.map(([name, , node]) => [name, node]));
+  for (const [name, pretty, node] of version.outputs) {
+    const at = layout.outputs.get(name);
+    if (!at) continue;
+    const item = shape(shapes, `o${name}`, at, "output", pretty, "");
+    item.group.setAttribute("data-node", node);
+    item.group.setAttribute("aria-label", `output ${called.get(name) ?? name}`);
+    element("title", {}, item.group).textContent = called.get(name) ?? name;
+    canvas.items.set(`o${name}`, { ...item, nodes: [node], output: true, names: [name] });
+  }
 }
 
 /** One shape with its text, and a line for its value. */
-function shape(parent, id, at, kind, words, square) {
+function shape(parent, id, at, kind, words, second, round = false) {
   const group = element("g", { id, class: `item ${kind}`, tabindex: -1, role: "button" }, parent);
-  const form = { class: "shape", x: at.x, y: at.y, width: at.w, height: at.h, rx: square ? 5 : at.h / 2 };
-  element("rect", form, group);
-  const label = element("text", { class: "label", x: at.x + at.w / 2, y: at.y + at.h / 2 - (at.h > 40 ? 4 : 2) }, group);
+  element("rect", { class: "shape", x: at.x, y: at.y, width: at.w, height: at.h, rx: round ? at.h / 2 : 5 }, group);
+  const tall = at.h > 40;
+  const label = element("text", { class: "label", x: at.x + at.w / 2, y: at.y + (tall ? 18 : at.h / 2 - 2) }, group);
   label.textContent = words;
-  const value = element("text", { class: "value", x: at.x + at.w / 2, y: at.y + at.h - (at.h > 40 ? 9 : 6) }, group);
+  const value = element("text", { class: "value", x: at.x + at.w / 2, y: at.y + (tall ? 34 : at.h - 4) }, group);
+  value.textContent = second;
   return { group, value, at };
 }
 
-function drawLines(parent, version, items, shownBy) {
+function drawArrows({ version, items, shownBy, lines, layout }, drawing) {
   const merged = new Map();
   const add = (from, to, pair) => {
-    if (from === undefined || from === to) return;
+    if (from === undefined || to === undefined || from === to) return;
     const key = `${from} ${to}`;
     if (!merged.has(key)) merged.set(key, { from, to, pairs: [] });
     merged.get(key).pairs.push(pair);
   };
   for (const [source, target] of version.edges) add(shownBy[source], shownBy[target], [source, target]);
-  for (const [name, , node] of version.outputs) add(shownBy[node], `o${name}`, [node, node]);
-  const arrows = [];
-  for (const { from, to, pairs } of merged.values()) {
-    const a = items.get(from).at, b = items.get(to).at;
-    const x1 = a.x + a.w / 2, x2 = b.x + b.w / 2;
-    const y1 = a.y, y2 = b.y + b.h;
-    const bend = Math.max(14, Math.min(80, Math.abs(y1 - y2) / 2));
+  const bundle = new Map([...layout.bundles].flatMap(([key, names]) => (key[0] === "o" ? names.map((name) => [name, `k${key}`]) : [])));
+  for (const [name, , node] of version.outputs) add(shownBy[node], bundle.get(name) ?? `o${name}`, [node, node]);
+  return [...merged.values()].map(({ from, to, pairs }) => {
     const wrong = pairs.some(([source]) => version.marked.has(source));
-    const near = Math.hypot(x1 - x2, y1 - y2) < 120 ? " near" : "";
+    const [d, near] = drawing?.lines[`${from} ${to}`] ? [drawing.lines[`${from} ${to}`], true] : curve(items.get(from).at, items.get(to).at);
+    const width = Math.min(5, 1.1 + 0.6 * Math.log2(pairs.length)).toFixed(1);
     const path = element("path", {
-      class: `line${wrong ? " wrong" : ""}${near}`,
-      d: `M${x1} ${y1}C${x1} ${y1 - bend} ${x2} ${y2 + bend} ${x2} ${y2}`,
-      "stroke-width": Math.min(5, 0.9 + 0.6 * Math.log2(pairs.length)).toFixed(1),
-      "data-from": from, "data-to": to,
-    }, parent);
-    arrows.push({ path, from, to, pairs });
-  }
-  return arrows;
+      class: `line${wrong ? " wrong" : ""}${near ? " near" : ""}`, d, "stroke-width": width, "data-from": from, "data-to": to,
+    }, lines);
+    if (pairs.length > 1) element("title", {}, path).textContent = `${pairs.length} edges`;
+    return { path, from, to, pairs };
+  });
+}
+
+/** A line from the top of one box to the foot of another with its arrowhead, and whether they are near one another. */
+function curve(a, b) {
+  const x1 = a.x + a.w / 2, x2 = b.x + b.w / 2, y1 = a.y, y2 = b.y + b.h;
+  const bend = Math.max(14, Math.min(80, Math.abs(y1 - y2) / 2));
+  const head = `M${x2 - 4} ${y2 + 7}L${x2} ${y2 + 1}L${x2 + 4} ${y2 + 7}`;
+  return [`M${x1} ${y1}C${x1} ${y1 - bend} ${x2} ${y2 + bend} ${x2} ${y2 + 1}${head}`, Math.hypot(x1 - x2, y1 - y2) < 120];
 }

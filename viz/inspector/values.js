@@ -1,6 +1,6 @@
 // Values of nodes, slopes of edges and adjoints of a version at a point.
 
-/** A version made ready: constants as numbers, uses of each node, edges in the order of evaluation. */
+/** A graph made ready: constants as numbers, uses of each node, edges in the order of evaluation, numbers as listed. */
 function prepare(version) {
   const constants = new Map();
   const args = version.args.map((each, i) => {
@@ -14,7 +14,10 @@ function prepare(version) {
     users[source].push(target);
     edges.push([source, target, slot]);
   }));
-  return { ...version, args, constants, users, edges, marked: new Set(version.marked) };
+  let operations = 0;
+  const number = args.map((own) => (own.length ? ++operations : 0)); // as in Graph.listing(): %1 is the first operation
+  const byNumber = new Map(number.map((each, node) => [each, node]).filter(([each]) => each));
+  return { ...version, args, constants, users, edges, number, byNumber, operations, marked: new Set(version.marked) };
 }
 
 /** The value of every node, inputs in the order of the version's. */
@@ -54,4 +57,17 @@ function adjoints(version, slopes, output, steps = version.ops.length) {
     version.args[node].forEach((arg, slot) => { bars[arg] += VALUE.zero_safe_mul(bars[node], slopes[node][slot]); });
   }
   return bars;
+}
+
+const ROUNDING = 2 ** -53; // relative error of a rounded number
+
+/** What rounding can make of every value, to first order: errors of arguments through the slopes, and one's own. */
+function errorBounds(version, slopes, values) {
+  const bounds = new Float64Array(values.length);
+  version.args.forEach((args, node) => {
+    let sum = version.constants.has(node) ? 0 : ROUNDING * Math.abs(values[node]);
+    args.forEach((arg, slot) => { sum += VALUE.zero_safe_mul(Math.abs(slopes[node][slot]), bounds[arg]); });
+    bounds[node] = Number.isFinite(sum) ? sum : 0;
+  });
+  return bounds;
 }

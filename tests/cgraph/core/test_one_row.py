@@ -26,7 +26,7 @@ TABLE = (
     "tests/cgraph/codegen/test_c.py",
     "tests/cgraph/explain/lint/test_lint.py",
     "tests/viz/graph_drawing/test_dot.py",
-    "tests/viz/inspector/test_page.py",
+    "tests/viz/inspector/test_script.py",
     "tests/dynamics/reference/test_taylor_series.py",
 )
 

@@ -272,8 +272,9 @@ def test_a_page_shows_them() -> None:
     assert found.skeleton is not None
     assert numbers.skeleton is not None
     assert found.skeleton.points == approx(numbers.skeleton.points)
-    assert found.shares["lower"] == approx(numbers.shares["lower"])
-    assert "load" in found.versions[0].at
+    assert found.shares is not None
+    assert "lower" in found.shares.parts
+    assert "load" in found.at
 
 
 def test_they_are_read_by_their_names() -> None:

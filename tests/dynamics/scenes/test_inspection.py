@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import dynamics as dyn
+from cgraph import Graph
 from dynamics.multibody.joint_positions import skeleton
-from dynamics.scenes.inspection import DT, FORMULATIONS, inspection
+from dynamics.scenes.inspection import DT, FORMULATIONS, Inspection, inspection
 from dynamics.scenes.scenes import Scene
 from tests.tolerances import EQUATIONS
 
 INTEGRATED = 1e-9  # N m: the state is one that the equations hold at, whatever the error of the motion
+
+
+def values_of(found: Inspection, graph: Graph) -> dict[str, Any]:
+    """The inputs of a version along the motion, derived ones too."""
+    known = dict(found.at)
+    if found.derived is not None:
+        known |= found.derived.evaluate({name: known[name] for name in found.derived.input_names})
+    return {name: known[name] for name in graph.input_names}
 
 
 def test_the_free_motion_takes_no_torque_by_the_chain_rule_alone():
@@ -19,7 +30,7 @@ def test_the_free_motion_takes_no_torque_by_the_chain_rule_alone():
     assert tuple(each.name for each in found.versions) == FORMULATIONS
     wrong = []
     for each in found.versions:
-        tau = np.stack(list(each.graph.evaluate(each.at).values()))
+        tau = np.stack(list(each.graph.evaluate(values_of(found, each.graph)).values()))
         wrong.append(np.abs(tau).max())
         assert bool(each.marked) == (wrong[-1] > INTEGRATED)
         assert ("vermillion" in each.about) == bool(each.marked)
@@ -28,28 +39,32 @@ def test_the_free_motion_takes_no_torque_by_the_chain_rule_alone():
 
 
 def test_the_embedded_step_ends_in_the_state_of_the_others():
-    embedded, _, chain = inspection(dyn.scenes.load("triple_pendulum")).versions
+    found = inspection(dyn.scenes.load("triple_pendulum"))
+    at = values_of(found, found.versions[0].graph)
     for i in range(3):
-        qd = embedded.at[f"qd{i}_old"] + DT * embedded.at[f"qdd{i}"]
-        assert np.allclose(qd, chain.at[f"qd{i}"], rtol=0, atol=EQUATIONS)
-        assert np.allclose(embedded.at[f"q{i}_old"] + DT * qd, chain.at[f"q{i}"], rtol=0, atol=EQUATIONS)
+        qd = at[f"qd{i}_old"] + DT * at[f"qdd{i}"]
+        assert np.allclose(qd, found.at[f"qd{i}"], rtol=0, atol=EQUATIONS)
+        assert np.allclose(at[f"q{i}_old"] + DT * qd, found.at[f"q{i}"], rtol=0, atol=EQUATIONS)
 
 
 def test_shares_of_the_torque_add_up():
-    shares = dict(inspection(dyn.scenes.load("triple_pendulum")).shares)
-    total = shares.pop("all")
-    assert set(shares) == {"link 1", "link 2", "link 3", "damping and forces"}
-    assert sum(shares.values()) == pytest.approx(total, abs=EQUATIONS)
-    assert shares["damping and forces"] == pytest.approx(np.zeros(3), abs=EQUATIONS)  # at rest
-    assert shares["link 1"][1:] == pytest.approx([0.0, 0.0])  # the first link does not load the others' joints
+    found = inspection(dyn.scenes.load("triple_pendulum"))
+    parts, graph = found.shares.parts, found.shares.graph
+    assert parts == ("link 1", "link 2", "link 3", "damping and forces", "all")
+    values = graph.evaluate(values_of(found, graph))
+    shares = np.array(
+        [[np.broadcast_to(values[name], found.t.shape) for name in found.shares.row(i)] for i in range(3)]
+    )
+    assert np.abs(shares[:, :-1].sum(axis=1) - shares[:, -1]).max() < EQUATIONS
+    assert np.abs(shares[:, 3, 0]).max() < EQUATIONS  # no damping at rest
+    assert np.abs(shares[1:, 0]).max() < EQUATIONS  # the first link does not load the others' joints
 
 
 def test_forward_dynamics_and_a_system_without_places():
     found = inspection(dyn.scenes.load("spring_mass"), forward=True, t_end=np.pi)
     (version,) = found.versions
-    assert found.skeleton is None
-    assert found.shares == {}
-    qdd = version.graph.evaluate(version.at)["qdd0"]
+    assert found.skeleton is found.shares is found.derived is None
+    qdd = version.graph.evaluate(found.at)["qdd0"]
     assert np.allclose(qdd, -np.cos(found.t), atol=1e-5)  # I = k = 1, let go at 1
 
 

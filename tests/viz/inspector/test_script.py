@@ -1,0 +1,289 @@
+"""What the page's script computes, in V8: it is what the library computes, in one state for all versions."""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+
+import numpy as np
+import pytest
+
+import cgraph as cg
+import dynamics as dyn
+from cgraph.core.ops import OPS
+from dynamics.scenes.inspection import inspection
+from tests.page_script import run_script
+from tests.tolerances import SUMS
+from viz.inspector.content import State, StateTable, Version
+from viz.inspector.record import record, slopes
+
+JAVASCRIPT_LIBM = 1e-12  # relative: a browser's sin and exp may differ from the C library's in the last bits
+
+
+@pytest.fixture(scope="module")
+def pendulum() -> list[Version]:
+    return [Version(*each) for each in inspection(dyn.scenes.load("triple_pendulum")).versions]
+
+
+# Where nodes are.
+
+PLACES = """(record) => {
+  const versions = makeState(record).versions, plan = placesOf(record, versions);
+  return { place: plan.place, cluster: plan.cluster, clusters: plan.clusters, columns: plan.columns };
+}"""
+
+
+def test_nodes_that_compute_the_same_keep_their_place(pendulum):
+    own = run_script(PLACES, record(pendulum, None))["place"]
+    assert all(len(set(places)) == len(places) for places in own)
+    euler, kinetic, chain = map(set, own)
+    assert len(euler & kinetic) > 0.7 * len(euler)
+    assert len(euler & chain) > 0.4 * len(chain)  # dL/dq, and what both derivatives are made of
+
+
+def test_marked_nodes_have_clusters_of_their_own_and_bodies_their_order(pendulum):
+    names = {"link 3": None, "link 1": "link 3", "link 2": "link 1"}  # not alphabetical
+    data = record(pendulum, None, columns=names)
+    plan = run_script(PLACES, data)
+    for each, places in zip(data["versions"], plan["place"], strict=True):
+        for node, place in enumerate(places):
+            cluster = plan["cluster"][place]
+            assert cluster < 0 or plan["clusters"][cluster]["marked"] == (node in each["marked"])
+    assert plan["columns"][:3] == list(names)
+    assert run_script(PLACES, record(pendulum, None))["columns"][:3] == ["link 1", "link 2", "link 3"]
+
+
+def test_a_sum_that_is_a_result_stands_under_it(pendulum):
+    """And in no cluster of what it adds last, such as damping."""
+    data = record(pendulum, None)
+    plan = run_script(PLACES, data)
+    for each, places in zip(data["versions"], plan["place"], strict=True):
+        used = {arg for args in each["args"] if isinstance(args, list) for arg in args}
+        for _, _, node in each["outputs"]:
+            assert (plan["cluster"][places[node]] == -2) == (node not in used)
+
+
+# Values, slopes, paths.
+
+
+def test_slopes_are_the_differences_of_every_operation():
+    for op in OPS.values():
+        program = slopes(op)
+        for sample in op.samples:
+            work = [op.scalar(*sample), *sample]
+            for line in program["code"]:
+                work.append(line if isinstance(line, float) else OPS[line[0]].scalar(*[work[i] for i in line[1:]]))
+            for slot, result in enumerate(program["out"]):
+                h = 1e-6
+                up, down = [[v + sign * h * (i == slot) for i, v in enumerate(sample)] for sign in (1, -1)]
+                difference = (op.scalar(*up) - op.scalar(*down)) / (2 * h)
+                assert work[result] == pytest.approx(difference, abs=SUMS), op.name
+
+
+def test_the_script_knows_every_operation():
+    cases = [[op.name, list(sample)] for op in OPS.values() for sample in op.samples]
+    found = run_script("(cases) => cases.map(([op, args]) => VALUE[op](...args))", cases)
+    for (name, sample), value in zip(cases, found, strict=True):
+        assert value == pytest.approx(OPS[name].scalar(*sample), rel=JAVASCRIPT_LIBM), name
+
+
+SPECIAL = [0.0, -0.0, 1.0, -1.0, 0.5, -2.0, math.inf, -math.inf, math.nan, 1e300]
+
+
+def test_the_script_agrees_where_numbers_are_special():
+    cases = [[op.name, [*a]] for op in OPS.values() for a in product(SPECIAL, repeat=op.arity)]
+    texts = [[name, [repr(each).replace("inf", "Infinity").replace("nan", "NaN") for each in a]] for name, a in cases]
+    found = run_script("(cases) => cases.map(([op, args]) => String(VALUE[op](...args.map(Number))))", texts)
+    for (name, args), text in zip(cases, found, strict=True):
+        expected = OPS[name].scalar(*args)
+        value = float(text.replace("Infinity", "inf"))
+        assert value == pytest.approx(expected, rel=JAVASCRIPT_LIBM, nan_ok=True), (name, args)
+
+
+POINT = """(record) => {
+  const state = makeState(record);
+  return state.versions.map((version) => {
+    const values = state.evaluate(version), slopes = slopesAt(version, record.slopes, values);
+    const out = version.outputs[0][2], bars = adjoints(version, slopes, out);
+    const each = (f) => version.inputs.map(([, node]) => (node < 0 ? null : f(node)));
+    return { values: version.outputs.map(([, , node]) => values[node]), bars: each((node) => bars[node]),
+      paths: each((node) => pathCount(version, node, out).toString()),
+      heaviest: each((node) => heaviest(version, slopes, node, out, 3).map((path) => path.product)) };
+  });
+}"""
+
+
+def test_values_adjoints_and_paths_of_the_script_are_those_of_the_library(pendulum):
+    rng = np.random.default_rng(1)
+    at = {name: rng.uniform(-1, 1) for name in dict.fromkeys(n for each in pendulum for n in each.graph.input_names)}
+    for version, found in zip(pendulum, run_script(POINT, record(pendulum, None, state=State(at))), strict=True):
+        graph = version.graph
+        own = {name: at[name] for name in graph.input_names}
+        values = graph.evaluate(own)
+        scale = max(abs(value) for value in values.values())
+        assert found["values"] == pytest.approx(list(values.values()), abs=JAVASCRIPT_LIBM * scale)
+        step = 1e-6
+        for i, name in enumerate(graph.input_names):
+            up, down = [graph.evaluate(own | {name: own[name] + sign * step})["tau0"] for sign in (1, -1)]
+            assert found["bars"][i] == pytest.approx((up - down) / (2 * step), abs=1e-6 * max(1.0, scale))
+            why = cg.why(graph, "tau0", name, at=own, k=3)
+            assert int(found["paths"][i]) == why.count
+            assert [abs(p) for p in found["heaviest"][i]] == pytest.approx(
+                [abs(path.value) for path in why.paths], rel=SUMS
+            )
+
+
+def test_huge_numbers_of_paths_are_exact():
+    x = y = cg.variable("x")
+    for _ in range(200):
+        y = y * y
+    [found] = run_script(POINT, record([Version("squares", cg.Graph([x], {"y": y}))], None, state=State({"x": 1.0})))
+    assert int(found["paths"][0]) == 2**200
+
+
+def test_operations_have_the_numbers_of_the_listing(pendulum):
+    numbers = run_script("(record) => makeState(record).versions.map((each) => each.number)", record(pendulum, None))
+    for version, found in zip(pendulum, numbers, strict=True):
+        lines = version.graph.listing().splitlines()
+        for node, number in zip(version.graph.nodes, found, strict=True):
+            assert bool(number) == bool(node.args)
+            assert not number or lines[number].startswith(f"%{number} = {node.op.name} ")
+
+
+# One state.
+
+SHARED = """(record, changes) => {
+  const told = [], state = makeState(record, () => told.push(state.edited));
+  const results = () => state.versions.map((version) => {
+    const values = state.evaluate(version);
+    return version.outputs.map(([, , node]) => values[node]);
+  });
+  const first = results();
+  state.set(changes);
+  const second = results(), values = state.values();
+  state.show(state.frame);
+  return { first, second, values, third: results(), told };
+}"""
+
+
+def spring(at: dict[str, float]) -> tuple[list[Version], State, dict[str, float]]:
+    found = inspection(dyn.scenes.load("spring_mass"))
+    return [Version(*each) for each in found.versions], State(found.at | at, found.derived), dict(found.at)
+
+
+def test_all_versions_are_in_one_state_and_reset_restores_it():
+    versions, state, _ = spring({"q0": 0.3, "qd0": 0.2, "qdd0": 0.1, "k": 2.0})
+    found = run_script(SHARED, record(versions, None, state=state), {"q0": 0.7, "dt": 0.25})
+    assert found["first"] == found["third"]
+    assert found["told"] == [True, False]
+    q, qd, qdd, dt = 0.7, 0.2, 0.1, 0.25
+    assert found["values"]["q0_old"] == pytest.approx(q - dt * qd)
+    assert found["values"]["qd0_old"] == pytest.approx(qd - dt * qdd)
+    for version, before, after in zip(versions, found["first"], found["second"], strict=True):
+        assert before != after, version.name
+        at = {name: found["values"][name] for name in version.graph.input_names}
+        assert after == pytest.approx(list(version.graph.evaluate(at).values()))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [({"q0_old": 1.0}, "follows from q0, qd0"), ({"nobody": 1.0}, "no input nobody"), ({"q0": "x"}, "finite number")],
+)
+def test_a_change_that_means_nothing_is_one_sentence_and_changes_nothing(change, said):
+    versions, state, _ = spring({"q0": 0.3, "qd0": 0.2, "qdd0": 0.1})
+    program = """(record, change) => {
+      const state = makeState(record), before = JSON.stringify(state.values());
+      try { state.set({ dt: 0.5, ...change }); }
+      catch (error) { return [error.message, before === JSON.stringify(state.values())]; }
+      return ["", false];
+    }"""
+    message, same = run_script(program, record(versions, None, state=state), change)
+    assert said in message
+    assert "\n" not in message
+    assert same
+
+
+def test_a_state_and_its_tables_are_checked():
+    versions, state, _ = spring({"q0": 0.3, "qd0": 0.2, "qdd0": 0.1})
+    for changed, said in (
+        (State({"q0_old": 1.0}, state.derived), "q0_old"),
+        (State({}, cg.Graph(cg.variables("q0"), {"nobody": cg.variable("q0")})), "nobody"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            record(versions, None, state=changed)
+    graph = cg.Graph(cg.variables("w"), {"a": cg.variable("w")})
+    with pytest.raises(ValueError, match="'w' is not an input"):
+        record(versions, None, state=state, tables=[StateTable("t", graph, ["a"], {"tau0": ["a"]})])
+    graph = cg.Graph(cg.variables("q0"), {"a": cg.variable("q0")})
+    with pytest.raises(ValueError, match="row 'tau0'"):
+        record(versions, None, state=state, tables=[StateTable("t", graph, ["a"], {"tau0": ["a", "b"]})])
+
+
+# Noise.
+
+
+def test_what_rounding_leaves_is_told_from_what_is_small():
+    """A difference of equal sums is noise, in any unit; a small number is not."""
+    x, y = cg.variables("x y")
+    graph = cg.Graph(
+        [x, y], {"zero": (x + y) - y - x, "small": x * 1e-9 * y, "sine": cg.sin(x) ** 2 + cg.cos(x) ** 2 - 1.0}
+    )
+    program = """(record) => {
+      const state = makeState(record), [version] = state.versions, values = state.evaluate(version);
+      const noise = errorBounds(version, slopesAt(version, record.slopes, values), values);
+      return version.outputs.map(([, , node]) => [brief(values[node], noise[node]), values[node], noise[node]]);
+    }"""
+    for unit in (1.0, 1e-9, 1e12):
+        found = run_script(
+            program, record([Version("v", graph)], None, state=State({"x": 0.1 * unit, "y": 0.7 * unit}))
+        )
+        assert found[0][0] == "0"
+        assert found[1][0] != "0"
+        assert found[2][0] == "0"
+        assert abs(found[0][1]) <= found[0][2] < 1e-14 * unit
+
+
+def test_the_free_motion_takes_torques_of_zero_and_the_page_says_0():
+    found = inspection(dyn.scenes.load("triple_pendulum"))
+    program = """(record) => record.rows.map((_, frame) => {
+      const state = makeState(record), version = state.versions[0];
+      state.show(frame);
+      const values = state.evaluate(version);
+      const noise = errorBounds(version, slopesAt(version, record.slopes, values), values);
+      return version.outputs.map(([, , node]) => brief(values[node], noise[node]));
+    })"""
+    at = {name: value[::10] if np.ndim(value) else value for name, value in found.at.items()}
+    from viz.inspector import Motion
+
+    data = record(
+        [Version(*found.versions[2])],
+        Motion(found.t[::10]),
+        state=State({n: at[n] for n in found.versions[2].graph.input_names}),
+    )
+    assert {text for row in run_script(program, data) for text in row} == {"0"}
+
+
+# The mechanism in motion.
+
+STICKS = """(motions) => motions.map((motion) => {
+  const svg = document.createElement("svg"), { show, words } = armView(svg, motion);
+  return [words, motion.points.map((_, frame) => { show(frame); return svg.at.viewBox.split(" ").map(Number); })];
+})"""
+
+
+def test_every_frame_of_a_motion_has_the_whole_mechanism_in_it_and_large_enough_to_see():
+    """Whatever the size, falling, flying or held: the points are inside, and take a tenth of the frame."""
+    t = np.linspace(0.0, 3.0, 20)[:, None, None]
+    body = np.array([[[0.0, 0.0], [0.3, -0.2], [-0.3, -0.2]]])
+    falling = body + np.concatenate([0.0 * t, -4.905 * t**2], axis=-1)
+    turning = np.concatenate([np.zeros((20, 1, 2)), np.concatenate([np.sin(t), -np.cos(t)], axis=-1)], axis=1)
+    motions = [1e-3 * falling, falling, 1e3 * falling + 7e3, turning, 1e-9 * turning, np.zeros((3, 2, 2))]
+    given = [{"points": each.tolist(), "parents": [-1, *[0] * (each.shape[1] - 1)]} for each in motions]
+    for points, (words, boxes) in zip(motions, run_script(STICKS, given), strict=True):
+        for frame, (x, y, width, height) in zip(points, boxes, strict=True):
+            assert (frame[:, 0] >= x).all()
+            assert (frame[:, 0] <= x + width).all()
+            assert (-frame[:, 1] >= y).all()
+            assert (-frame[:, 1] <= y + height).all()
+            assert np.ptp(frame, axis=0).max() >= 0.1 * width or np.ptp(frame) == 0.0
+        assert bool(words) == bool(np.ptp(points[:, 0], axis=0).max() > 2.0 * np.ptp(points[0]))

@@ -1,0 +1,104 @@
+// Marks in the picture: what a node needs and what needs it, paths, steps of a sweep, what was found.
+
+const clear = (app, ...names) => names.forEach((name) => app.svg.querySelectorAll(`.${name}`).forEach((each) => each.classList.remove(name)));
+
+/** Give an element its part in the trace, "ancestor", "descendant", "on" or ""; only what changes is touched. */
+function part(element, name) {
+  const old = element.dataset.part ?? "";
+  if (old !== name) element.dataset.part = name;
+}
+
+function trace(app, id) {
+  const { drawn } = app, item = drawn.items.get(id);
+  app.svg.classList.toggle("tracing", Boolean(item) || Boolean(app.path));
+  if (!item) {
+    drawn.items.forEach((each) => part(each.group, ""));
+    for (const { path } of drawn.arrows) part(path, "");
+    return;
+  }
+  const { args, users } = app.version, up = new Uint8Array(args.length), down = new Uint8Array(args.length);
+  const add = (marks, neighbours, node) => { if (!marks[node] || item.nodes.length === 1) reach(neighbours, node).forEach((yes, i) => { marks[i] |= yes; }); };
+  for (const node of item.nodes) {
+    add(up, args, node);
+    if (!item.output) add(down, users, node);
+  }
+  drawn.items.forEach((each, other) => {
+    if (other === id) { part(each.group, "on"); return; }
+    const above = each.nodes.some((node) => down[node]) && !(item.output && each.output);
+    const below = !each.output && each.nodes.some((node) => up[node]);
+    part(each.group, below ? "ancestor" : above ? "descendant" : "");
+  });
+  for (const { path, to, pairs } of drawn.arrows) {
+    const out = drawn.items.get(to).output;
+    const below = !(out && to !== id) && pairs.some(([, t]) => up[t]) && (!out || item.output);
+    const above = !item.output && pairs.some(([s]) => down[s]);
+    part(path, below ? "ancestor" : above ? "descendant" : "");
+  }
+}
+
+/** What shows a node: itself or the box that it is in, and the outputs that it is. */
+function shapesOf(app, node) {
+  const { drawn } = app;
+  const outputs = [...drawn.items.values()].filter((item) => item.output && item.nodes.includes(node));
+  return [drawn.items.get(drawn.shownBy[node]), ...outputs].filter(Boolean);
+}
+
+function markPicked(app) {
+  clear(app, "picked");
+  for (const node of [app.picked, app.before]) shapesOf(app, node).forEach((item) => item.group.classList.add("picked"));
+}
+
+const nodeAtStep = (app) => (app.sweep <= app.values.length ? app.sweep - 1 : 2 * app.values.length - app.sweep);
+const passed = (app, node) => (app.sweep <= app.values.length ? node < app.sweep : node >= 2 * app.values.length - app.sweep);
+
+function paintSweep(app) {
+  clear(app, "current", "done");
+  app.svg.classList.toggle("stepping", app.sweep >= 0);
+  if (app.sweep < 0) return;
+  app.drawn.items.forEach((item) => { if (item.nodes.some((node) => passed(app, node))) item.group.classList.add("done"); });
+  const node = nodeAtStep(app);
+  if (node >= 0) app.drawn.items.get(app.drawn.shownBy[node])?.group.classList.add("current");
+}
+
+function paintPath(app) {
+  clear(app, "onpath");
+  app.svg.classList.toggle("tracing", Boolean(app.path));
+  if (!app.path) return;
+  const last = app.path.at(-1), { drawn } = app;
+  app.path.slice(0, -1).forEach((node) => drawn.items.get(drawn.shownBy[node])?.group.classList.add("onpath"));
+  shapesOf(app, last).forEach((item) => item.group.classList.add("onpath"));
+  const steps = new Set([...app.path.slice(1).map((node, i) => `${app.path[i]} ${node}`), `${last} ${last}`]); // to an output
+  for (const { path, pairs } of drawn.arrows) if (pairs.some(([s, t]) => steps.has(`${s} ${t}`))) path.classList.add("onpath");
+}
+
+/** Nodes by a name, a tag, an operation, or their number in the listing, %7 or v7; marks them. The first, or null. */
+function find(app, text) {
+  clear(app, "found");
+  const wanted = text.trim().toLowerCase(), { version, drawn, state } = app;
+  if (!wanted) { announce(app); return null; }
+  const number = /^[%v]?(\d+)$/.exec(wanted)?.[1];
+  const hits = [];
+  version.ops.forEach((op, node) => {
+    if (version.constants.has(node)) return;
+    const [tags, role] = version.labels[version.label[node]], names = version.names[node] ?? [];
+    const words = [...names, ...names.map((name) => state.called.get(name) ?? name), ...tags];
+    if (number ? version.byNumber.get(+number) === node : words.some((word) => word.toLowerCase().includes(wanted))
+      || [op, role].includes(wanted) || (wanted === "spurious" && version.marked.has(node))) hits.push(node);
+  });
+  version.outputs.forEach(([name, shown, node]) => {
+    if (number || ![name, shown, state.called.get(name) ?? name].some((each) => each.toLowerCase().includes(wanted))) return;
+    [...drawn.items.values()].filter((item) => item.names?.includes(name)).forEach((item) => item.group.classList.add("found"));
+    hits.push(node);
+  });
+  new Set(hits.map((node) => drawn.shownBy[node])).forEach((id) => drawn.items.get(id)?.group.classList.add("found"));
+  byId("trail").textContent = `${counted(hits.length, "node")} found`;
+  return hits[0] ?? null;
+}
+
+/** How much of the graph is seen node by node. */
+function announce(app) {
+  const { version, drawn } = app;
+  const one = [...drawn.items.values()].filter((item) => item.group.dataset.node !== undefined && !item.output).length;
+  const constants = version.constants.size;
+  byId("trail").textContent = `${one} of ${version.ops.length - constants} nodes unfolded${constants ? `; ${counted(constants, "constant")}` : ""}`;
+}

@@ -1,0 +1,143 @@
+// Words and numbers beside the picture: the node, why, results, inputs, counts, the legend.
+
+const PATHS = 5, DEPTH = 4;
+const OFF = 0.01; // relative: what differs by more from the right version is marked
+
+const shownName = (app, name, letters) => app.state.called.get(name) ?? letters ?? name;
+const unitOf = (app, name) => (app.units.has(name) ? [" ", tag("span", { class: "unit" }, `[${app.units.get(name)}]`)] : []);
+
+/** What a node is called: its name, that of its output, or its number in the listing. */
+function nameOf(app, node) {
+  const { version } = app;
+  const [name, letters] = version.names[node] ?? version.outputs.find(([, , out]) => out === node) ?? [`%${version.number[node]}`];
+  return shownName(app, name, letters);
+}
+function told(app, node) {
+  const operation = app.version.args[node].length > 0;
+  const number = operation && !nameOf(app, node).startsWith("%") ? `%${app.version.number[node]}, ` : "";
+  return `${nameOf(app, node)}${operation ? ` (${number}${caption(app.record, app.version, node)})` : ""}`;
+}
+
+function showNode(app, bars) {
+  const { picked: node, version } = app;
+  if (node < 0) byId("node").replaceChildren(quiet("Click a node to see its equation and value. Click a box to unfold it."));
+  else {
+    const [tags, role] = version.labels[version.label[node]];
+    const bar = bars ?? adjoints(version, app.partials(), app.output());
+    const number = version.number[node] ? [`%${version.number[node]}`] : [];
+    const words = [[...number, version.ops[node], version.marked.has(node) ? `spurious, ${role}` : role].join(", "),
+      ...(tags.length ? [tag("br"), `tags: ${tags.join(", ")}`] : []), tag("br"),
+      `value ${brief(app.values[node], app.noise()[node])}, ∂${nameOf(app, app.output())} by it ${brief(bar[node])}`];
+    byId("node").replaceChildren(scrolled(equation(version, node, DEPTH)), tag("p", {}, ...words));
+  }
+  showWhy(app);
+}
+
+function showWhy(app) {
+  const [a, b] = [app.before, app.picked].sort((one, other) => one - other);
+  if (a < 0) {
+    byId("why").replaceChildren(quiet("Click two nodes, such as an input and an output: how many paths lead from one to the other, and which weigh most?"));
+    return;
+  }
+  const { version } = app, count = pathCount(version, a, b);
+  const head = tag("p", {}, tag("b", {}, nameOf(app, a)), " → ", tag("b", {}, nameOf(app, b)), `: ${digits(count)} path${count === 1n ? "" : "s"}`);
+  byId("why").replaceChildren(head);
+  if (!count) { head.append("; the one does not depend on the other."); return; }
+  const bars = adjoints(version, app.partials(), b);
+  const found = heaviest(version, app.partials(), a, b, PATHS);
+  head.append(`. The derivative here is ${brief(bars[a])}, the sum of their products of partials.`,
+    ` ${found.length ? "The heaviest:" : "Here a partial on each is zero."}`);
+  found.forEach(({ nodes, product }) => {
+    const crossed = nodes.filter((node) => version.marked.has(node)).length, on = app.path?.join() === nodes.join();
+    const button = tag("button", { type: "button", class: `path${on ? " on" : ""}` },
+      `${brief(product)}: ${nodes.map((node) => told(app, node)).join(" → ")}${crossed ? `  (${crossed} spurious)` : ""}`);
+    button.onclick = () => { app.path = on ? null : nodes; paintPath(app); showWhy(app); };
+    byId("why").append(button);
+  });
+}
+
+/** Results of all versions at the one state, and what differs from the version without spurious nodes. */
+function showResults(app) {
+  const { versions } = app.state;
+  const names = [...new Map(versions.flatMap((each) => each.outputs.map(([name, letters]) => [name, shownName(app, name, letters)])))];
+  const found = versions.map((each, i) => {
+    const own = i === app.index ? app.values : app.state.evaluate(each), noise = noiseIn(app, each, own);
+    return new Map(each.outputs.map(([name, , node]) => [name, [own[node], noise[node]]]));
+  });
+  const right = versions.findLastIndex((each) => !each.marked.size && versions.some((other) => other.marked.size));
+  const rows = names.map(([name, words]) => tag("tr", {}, rowHead(words, ...unitOf(app, name)), ...found.map((each) => {
+    if (!each.has(name)) return tag("td", {}, "");
+    const [value, noise] = each.get(name), [truth, blur] = found[right]?.get(name) ?? [value, 0];
+    const off = Math.abs(value - truth) > noise + blur + OFF * Math.max(Math.abs(value), Math.abs(truth));
+    return tag("td", { class: off ? "off" : "" }, brief(value, noise));
+  })));
+  byId("results").replaceChildren(scrolled(table(versions.map((each) => each.name), rows)),
+    ...(right < 0 ? [] : [quiet(`In vermillion: differs from ${versions[right].name}. All at one state; 0 is what is below rounding.`)]));
+  showTables(app);
+}
+
+/** Tables that follow the state. */
+function showTables(app) {
+  byId("statetables").replaceChildren(...app.state.tables.map((each) => {
+    const values = app.state.evaluate(each), noise = noiseIn(app, each, values);
+    const rows = each.rows.map(([name, outputs]) => tag("tr", {}, rowHead(shownName(app, name), ...unitOf(app, name)),
+      ...outputs.map((out) => { const node = each.outputs[out][2]; return tag("td", {}, brief(values[node], noise[node])); })));
+    const made = table(each.header, rows);
+    made.prepend(tag("caption", {}, each.caption));
+    return scrolled(made);
+  }));
+}
+
+/** Fields for the inputs of the state, and what follows from them: the same for all versions. */
+function makeInputs(app) {
+  const { state } = app;
+  app.fields = new Map();
+  const rows = state.names.map((name) => {
+    const field = tag("input", { type: "number", step: "any", "aria-label": shownName(app, name) });
+    field.onchange = () => {
+      if (!Number.isFinite(field.valueAsNumber)) { showInputs(app); return; }
+      play(app, false);
+      state.set({ [name]: field.valueAsNumber });
+    };
+    app.fields.set(name, field);
+    const users = state.versions.filter((each) => each.inputs.some(([own]) => own === name));
+    const only = users.length && users.length < state.versions.length && !state.derived?.inputs.some(([own]) => own === name)
+      ? [tag("br"), tag("span", { class: "unit" }, `only in ${users.map((each) => each.name).join(", ")}`)] : [];
+    return tag("tr", {}, tag("td", {}, shownName(app, name), ...unitOf(app, name), ...only), tag("td", {}, field));
+  });
+  const follow = (state.derived?.outputs ?? []).map(([name, letters]) => {
+    const shown = tag("output", { "aria-label": shownName(app, name, letters) });
+    app.fields.set(name, shown);
+    return tag("tr", {}, tag("td", {}, shownName(app, name, letters), ...unitOf(app, name)), tag("td", {}, shown));
+  });
+  const from = state.derived ? state.derived.inputs.map(([name]) => shownName(app, name)).join(", ") : "";
+  const told = follow.length ? [tag("details", {}, tag("summary", {}, `${follow.length} that follow`),
+    quiet(`Computed from ${fitted(from, 90)}; the other versions do not have them.`), scrolled(tag("table", {}, tag("tbody", {}, ...follow))))] : [];
+  byId("inputs").replaceChildren(quiet("One state for all versions."), scrolled(tag("table", {}, tag("tbody", {}, ...rows))), ...told);
+  showInputs(app);
+}
+function showInputs(app) {
+  for (const [name, field] of app.fields) {
+    const value = app.state.get(name);
+    if (field.tagName === "INPUT") field.value = +value.toPrecision(5); else field.textContent = brief(value);
+  }
+  byId("reset").hidden = byId("edited").hidden = !app.state.edited;
+}
+
+function showCounts(app) {
+  const { version } = app;
+  const rows = app.state.versions.map((each) => tag("tr", {}, rowHead(each.name),
+    ...[each.ops.length, each.edges.length, each.marked.size].map((count) => tag("td", {}, String(count)))));
+  const ops = new Map();
+  version.ops.forEach((op) => { ops.set(op, (ops.get(op) ?? 0) + 1); });
+  const kinds = [...ops].sort((a, b) => b[1] - a[1]).map(([op, many]) => `${op} ${many}`);
+  byId("counts").replaceChildren(table(["nodes", "edges", "spurious"], rows),
+    quiet(`Constants (${version.constants.size}) are written where they are used. ${kinds.join(", ")}.`));
+}
+
+function showLegend(app) {
+  const kinds = [["input", "input"], ["primal", "as written"], ["adjoint", "adjoint: reverse"], ["tangent", "tangent: forward"], ["several", "several roles"], ["wrong", "spurious"]];
+  const present = new Set(app.version.labels.map(([, role]) => role));
+  if (app.version.marked.size) present.add("wrong");
+  byId("legend").replaceChildren(...kinds.filter(([kind]) => present.has(kind)).map(([kind, words]) => tag("span", { class: kind }, words)));
+}

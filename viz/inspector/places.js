@@ -1,0 +1,94 @@
+// One place for what the versions share, and clusters of places: by body, sweep, energy, and whether it is spurious.
+
+const ENERGIES = ["kinetic", "potential"]; // a tag beside one of these is a body
+const OTHER = "other"; // of a body, what carries no energy's tag
+const MANY = 60; // clusters; above, they are not split by energy
+const STAGES = ["as written", "reverse sweep", "forward sweep", "both sweeps"];
+const natural = new Intl.Collator("en", { numeric: true }).compare; // link 2 before link 10
+
+/** { clusters, columns, parents, place, cluster }: of each version the place of every node, of each place its cluster.
+ *
+ * A cluster is { column, stage, title, marked }. LEAF and RESULT stand for one: inputs, and sums that are outputs. */
+const LEAF_PLACE = -1, RESULT_PLACE = -2;
+function placesOf(record, versions) {
+  const bodies = bodiesOf(record, versions);
+  let groups = versions.map((version) => version.ops.map((_, node) => groupOf(version, node, bodies)));
+  if (new Set(groups.flat().map((each) => JSON.stringify(each))).size > MANY) {
+    groups = groups.map((own) => own.map((each) => (typeof each === "number" ? each : { ...each, title: "" })));
+  }
+  const found = new Map(), meaning = new Map(), keys = new Map(), clusterKeys = [], first = [];
+  const place = versions.map((version, v) => {
+    const means = meanings(record, versions, version, meaning), seen = new Map();
+    return version.ops.map((_, node) => {
+      const group = JSON.stringify(groups[v][node]);
+      const kind = `${means[node]} ${group}`, again = seen.get(kind) ?? 0;
+      seen.set(kind, again + 1);
+      const key = `${again} ${kind}`;
+      if (!found.has(key)) {
+        found.set(key, found.size);
+        first.push([v, node]);
+        clusterKeys.push(group);
+        if (typeof groups[v][node] !== "number") keys.set(group, groups[v][node]);
+      }
+      return found.get(key);
+    });
+  });
+  const columns = columnsOf(bodies, [...keys.values()], versions, groups);
+  const order = (a, b) => columns.indexOf(a.column) - columns.indexOf(b.column) || STAGES.indexOf(a.stage) - STAGES.indexOf(b.stage)
+    || a.marked - b.marked || natural(a.title, b.title);
+  const clusters = [...keys.values()].sort(order), number = new Map(clusters.map((each, c) => [JSON.stringify(each), c]));
+  const parents = new Map(record.columns);
+  return {
+    clusters, columns, place, first,
+    parents: columns.map((name) => columns.indexOf(parents.get(name))),
+    tree: columns.map((name) => parents.has(name)),
+    cluster: clusterKeys.map((key) => number.get(key) ?? Number(key)),
+  };
+}
+
+/** Columns that are bodies: as the record says, else tags beside an energy, else tags with a number. */
+function bodiesOf(record, versions) {
+  const tags = versions.flatMap((version) => version.labels.map(([own]) => own));
+  const used = new Set(tags.flat());
+  const told = record.columns.map(([name]) => name).filter((name) => used.has(name));
+  if (told.length) return told;
+  const beside = new Set(tags.filter((own) => ENERGIES.some((energy) => own.includes(energy))).flat().filter((each) => !ENERGIES.includes(each)));
+  return [...(beside.size ? beside : [...used].filter((each) => /\d$/.test(each)))].sort(natural);
+}
+
+function groupOf(version, node, bodies) {
+  if (!version.args[node].length) return LEAF_PLACE;
+  if (!version.users[node].length) return RESULT_PLACE; // nothing but an output needs it
+  const [tags, , stage] = version.labels[version.label[node]];
+  const own = bodies.filter((body) => tags.includes(body));
+  const rest = tags.filter((each) => !own.includes(each));
+  const column = own[0] ?? rest.shift() ?? "";
+  return { column, stage, title: rest.join(", ") || (own.length ? OTHER : ""), marked: version.marked.has(node) };
+}
+
+/** Of every node a number that nodes have in common that compute the same; a named node stands for the input of that name. */
+function meanings(record, versions, version, meaning) {
+  const inputs = new Set(versions.flatMap((each) => each.inputs.map(([name]) => name)));
+  const means = [];
+  version.ops.forEach((op, node) => {
+    const name = version.names[node]?.[0];
+    let key;
+    if (name !== undefined && inputs.has(name)) key = `name ${name}`;
+    else if (version.constants.has(node)) key = `value ${Object.is(version.constants.get(node), -0) ? "-0" : version.constants.get(node)}`;
+    else {
+      const args = version.args[node].map((arg) => means[arg]);
+      key = `${op} ${record.ops[op][1] ? args.sort((a, b) => a - b) : args}`;
+    }
+    if (!meaning.has(key)) meaning.set(key, meaning.size);
+    means.push(meaning.get(key));
+  });
+  return means;
+}
+
+/** Columns in their order: bodies, then other tags, those first that all versions have, so that none leaves a gap. */
+function columnsOf(bodies, clusters, versions, groups) {
+  const used = new Set(clusters.map((each) => each.column));
+  const held = (column) => groups.filter((own) => own.some((each) => each.column === column)).length;
+  const rest = [...used].filter((each) => !bodies.includes(each));
+  return [...bodies.filter((body) => used.has(body)), ...rest.sort((a, b) => held(b) - held(a) || natural(a, b))];
+}

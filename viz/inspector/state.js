@@ -1,0 +1,50 @@
+// The one state of the page: values of inputs by name, from which every version, derived input and table is computed.
+
+/** The state of a record, and its graphs made ready.  told: called whenever a value has changed. */
+function makeState(record, told = () => {}) {
+  const versions = record.versions.map((each, index) => ({ ...prepare(each), index })), tables = (record.tables ?? []).map(prepare);
+  const derived = record.derived ? prepare(record.derived) : null;
+  const called = new Map(record.called), meant = new Map(record.called.map(([name, text]) => [text, name]));
+  let frame = 0, edited = false, values = null;
+
+  /** All values by name, derived ones too. */
+  function settle(given) {
+    values = new Map(given);
+    if (!derived) return;
+    const found = evaluate(derived, rowOf(derived));
+    for (const [name, , node] of derived.outputs) values.set(name, found[node]);
+  }
+  const rowOf = (graph) => graph.inputs.map(([name]) => values.get(name));
+  const atFrame = () => record.inputs.map((name, i) => [name, record.rows[frame][i]]);
+
+  function set(given) {
+    const next = new Map(record.inputs.map((name) => [name, values.get(name)]));
+    for (const [who, value] of Object.entries(given)) {
+      const name = next.has(who) ? who : meant.get(who) ?? who;
+      if (!next.has(name)) {
+        throw new Error(values.has(name) ? `${who} follows from ${derived.inputs.map(([each]) => each).join(", ")}: set these`
+          : `the state has no input ${who}`);
+      }
+      if (typeof value !== "number" || !Number.isFinite(value)) throw new Error(`${who} needs a finite number, got ${value}`);
+      next.set(name, value);
+    }
+    edited = true;
+    settle(next);
+    told();
+  }
+  function show(at) {
+    frame = at;
+    edited = false;
+    settle(atFrame());
+    told();
+  }
+  settle(atFrame());
+  return {
+    versions, tables, derived, called, rowOf, set, show, names: record.inputs,
+    get frame() { return frame; },
+    get edited() { return edited; },
+    get: (name) => values.get(name),
+    values: () => Object.fromEntries(values),
+    evaluate: (graph) => evaluate(graph, rowOf(graph)),
+  };
+}
