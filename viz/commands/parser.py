@@ -20,6 +20,7 @@ from . import (
     paper,
     report,
     scenes,
+    type as type_,
     why,
 )
 
@@ -32,6 +33,7 @@ COMMANDS = (
     draw,
     certify,
     inspect,
+    type_,
     lint,
     why,
     compare,

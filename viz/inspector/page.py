@@ -9,7 +9,7 @@ from collections.abc import Collection, Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from string import Template
-from typing import Any
+from typing import Any, NamedTuple
 
 from cgraph import Graph, Node, __version__
 from cgraph.extend import require_graph, require_mapping, require_sequence, require_texts
@@ -43,6 +43,20 @@ class Page(str):
         )
 
 
+class Panel(NamedTuple):
+    """A part that stands beside the picture: markup, style, and scripts before and after the page's start.
+
+    first: JavaScript for the record that the page shows first, where its own data are none.  run: JavaScript that
+    begins the panel; `inspector` is what app.js lends to other scripts.
+    """
+
+    body: str
+    style: str
+    script: str
+    first: str
+    run: str
+
+
 def page(
     graph: Graph | Sequence[Version],
     *,
@@ -57,6 +71,7 @@ def page(
     derived: Graph | None = None,
     columns: Mapping[str, str | None] | None = None,
     notices: Sequence[str] = (),
+    panels: Sequence[Panel] = (),
 ) -> Page:
     """The page on which a graph is looked at: it folds by tags, and shows values, paths, sweeps and equations.
 
@@ -89,6 +104,8 @@ def page(
         "kinetic" or "potential", or those that end in a number.
     notices : sequence of str
         What stands above everything, such as what a model lacks of its file.
+    panels : sequence of Panel
+        Parts that other modules add, such as the box of `viz.typed_page`.
 
     Returns
     -------
@@ -131,18 +148,26 @@ def page(
     data = {"title": title, "introduction": introduction, "notices": list(notices)}
     live = [table for table in tables if isinstance(table, StateTable)]
     data |= record(versions, motion, *texts, state=State(at or {}, derived), columns=columns, tables=live)
-    return Page(_html(title, data, [table for table in tables if isinstance(table, Table)]))
+    return Page(compose(title, data, [table for table in tables if isinstance(table, Table)], panels))
 
 
-def _html(title: str, data: Mapping[str, Any], tables: Sequence[Table]) -> str:
-    """The file: its policy, style, body, data and script."""
-    script = f'"use strict";\n{scripts()}\nconst inspector = start();'
-    style = f"{_colors()}{_asset('page.css')}"
+def compose(title: str, data: Mapping[str, Any] | None, tables: Sequence[Table], panels: Sequence[Panel] = ()) -> str:
+    """The file: its policy, style, body, data and script. Without data a panel says what is shown first."""
+    first = "".join([panel.first for panel in panels])
+    begin = "".join([f"\n{panel.run}" for panel in panels])
+    added = "\n".join([panel.script for panel in panels])
+    script = f'"use strict";\n{scripts()}\n{added}\nconst inspector = start({first});{begin}'
+    style = f"{_colors()}{_asset('page.css')}{''.join([panel.style for panel in panels])}"
     policy = _POLICY.format(script=_digest(script), style=_digest(style))
     # "<" in the data could end the element that holds it
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
     shown = "".join(html.table(table.caption, table.header, table.rows) for table in tables)
-    body = Template(_asset("page.html")).substitute(title=escape(title), tables=shown, version=f"cgraph {__version__}")
+    body = Template(_asset("page.html")).substitute(
+        title=escape(title),
+        tables=shown,
+        version=f"cgraph {__version__}",
+        panels="".join([panel.body for panel in panels]),
+    )
     return (
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'

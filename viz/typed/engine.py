@@ -7,6 +7,7 @@ from importlib.resources import files
 
 from cgraph.extend import OPS
 
+from .. import theme
 from ..inspector.operations import operations
 from ..inspector.record import slopes
 
@@ -21,6 +22,8 @@ FILES = (
     "equations.js",
     "lint.js",
     "motion.js",
+    "record.js",
+    "examples.js",
     "interface.js",
 )
 
@@ -32,6 +35,7 @@ def engine() -> str:
     """
     rows = {
         op.name: {
+            "symbol": op.symbol,
             "arity": op.arity,
             "commutative": op.commutative,
             "selects": op.selects,
@@ -41,8 +45,9 @@ def engine() -> str:
         for op in OPS.values()
     }
     parts = "\n".join([files(__package__).joinpath(name).read_text(encoding="utf-8") for name in FILES])
-    table = json.dumps(rows, separators=(",", ":"), allow_nan=False)
-    return f"const TYPED = (() => {{\nconst ROWS = {table};\n{parts}\n}})();\n"
+    table = json.dumps(rows, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    letters = json.dumps(theme.LETTERS, separators=(",", ":"), ensure_ascii=False)
+    return f"const TYPED = (() => {{\nconst ROWS = {table};\nconst LETTERS = {letters};\n{parts}\n}})();\n"
 
 
 def script() -> str:

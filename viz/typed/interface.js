@@ -1,3 +1,6 @@
 // What the page takes of the engine.
 
-return { parse, explained, TextError, inverseDynamics, forwardDynamics, spuriousNodes, lint, motionOf, rods, compiled, displayNames, massMatrix };
+return {
+  parse, explained, TextError, inverseDynamics, forwardDynamics, spuriousNodes, lint, motionOf, recordOf, rods, compiled,
+  FORMULATIONS: Object.keys(FORMULATIONS), EXAMPLES,
+};

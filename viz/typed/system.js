@@ -35,13 +35,14 @@ class Meaning {
     const found = !dots && !this.defined.has(name) && !this.coordinates?.includes(name) && RATE.exec(name);
     return found ? { base: found[1] + found[3], dots: found[2] ? 2 : 1 } : { base: name, dots };
   }
-  /** Those of a line q:, or all that have a dot somewhere and no definition. */
+  /** Those of a line q:, or all that have a dot or a start somewhere and no definition. */
   findCoordinates() {
     const lists = this.statements.filter(({ kind, name }) => kind === "list" && name === "q");
     const listed = lists.flatMap(({ items }) => items.map(({ text, at, end }) => ({ name: text, at, end })));
     const used = this.statements.flatMap(({ items, kind, name }) => (kind === "list" && name === "q" ? [] : items.flat()));
-    const rates = used.filter(({ kind }) => kind === "name").map((each) => ({ ...each, ...this.undotted(each) })).filter(({ dots }) => dots);
-    const inferred = rates.map((each) => ({ ...each, name: each.base })).filter(({ name }) => !this.defined.has(name));
+    const known = [...used.filter(({ kind }) => kind === "name"), ...this.statements.filter(({ kind }) => kind === "start")];
+    const bases = known.map((each) => ({ ...each, ...this.undotted(each) })).filter(({ dots, kind }) => dots || kind === "start");
+    const inferred = bases.map((each) => ({ ...each, name: each.base })).filter(({ name }) => !this.defined.has(name));
     const found = new Map((listed.length ? listed : inferred).map((each) => [each.name, each]));
     for (const { name, at, end } of listed) {
       if (RESERVED.test(name) || isFunction(name)) throw new TextError(`${quoted(name)} has a meaning of its own; choose another name.`, at, end);
@@ -82,7 +83,7 @@ class Meaning {
       if (topological([node]).some((inner) => this.qd.includes(inner))) {
         throw new TextError(`${quoted(each.name)} has velocities in it, so its rate would have accelerations.`, each.at, each.end);
       }
-      [each.rate] = within({ label: PRIMAL }, () => tangents(seeds, [node], new Builder(), PRIMAL));
+      [each.rate] = tangents(seeds, [node], new Builder(), PRIMAL);
     }
     return each.rate;
   }
@@ -94,7 +95,7 @@ class Meaning {
     if (each.busy) throw new TextError(`${quoted(each.name)} is defined by itself.`, each.at, each.end);
     if (each.value === undefined) {
       each.busy = true;
-      const tag = each.name === "T" ? KINETIC : each.name === "V" ? POTENTIAL : 0;
+      const tag = each.name === "T" ? KINETIC : each.name === "V" ? POTENTIAL : each.name === "L" ? 0 : DEFINITION;
       each.value = this.formula(each.items[0], PRIMAL | tag);
       each.busy = false;
     }

@@ -33,7 +33,12 @@ def trees(n: int) -> st.SearchStrategy[Any]:
             | st.tuples(st.just("pow"), inner, st.sampled_from(POWERS))
         )
 
-    return st.recursive(leaves, larger, max_leaves=8)
+    return st.recursive(leaves, larger, max_leaves=8).filter(has_names)
+
+
+def has_names(tree: Any) -> bool:
+    """Whether it is no number: a line of numbers is a parameter."""
+    return isinstance(tree, str) or (isinstance(tree, tuple) and any(has_names(arg) for arg in tree[1:]))
 
 
 def as_text(tree: Any) -> str:
@@ -93,20 +98,29 @@ def function(name: str, a: Any) -> Any:
 def both(tree: Any, n: int) -> tuple[str, dyn.System]:
     """A text with that formula in L, beside a kinetic energy that moves every coordinate, and its System."""
     single = f"0.5 * m * (20 + {as_text(tree)}^2)^-1 * u'^2"
-    kinetic = single if n == 1 else "0.5 * m * u'^2 + 20 * v'^2 + u' * v' * cos(v)"
+    several = "0.5 * m * u'^2 + 20 * v'^2 + u' * v' * cos(v)"
     lines = ["q: " + ", ".join(COORDINATES[:n]), *[f"{name} = {value}" for name, value in PARAMETERS.items()]]
-    lines += [f"L = {kinetic} + 0.1 * sin({as_text(tree)})", f"damping {COORDINATES[n - 1]} = k", "tau u = sin(t) * u'"]
+    lines += (
+        [f"L = {single} + 0.1 * sin({as_text(tree)})"]
+        if n == 1
+        else [f"T = {several}", "V = 0.1 * sin(d)", f"d = {as_text(tree)}"]
+    )
+    lines += [f"damping {COORDINATES[n - 1]} = k", "tau u = sin(t) * u'"]
 
     def lagrangian(q: Any, qd: Any, t: Any, p: Any) -> Any:
         moving = dict(zip(COORDINATES, q, strict=False))
         moving |= {f"{name}'": node for name, node in zip(COORDINATES, qd, strict=False)}
-        value = as_node(tree, moving | {"t": t, **p})
+        moving |= {"t": t, **p}
         if n == 1:
-            kinetic = 0.5 * p["m"] * (20.0 + value**2) ** -1.0 * qd[0] ** 2.0
-            value = as_node(tree, moving | {"t": t, **p})
-        else:
+            kinetic = 0.5 * p["m"] * (20.0 + as_node(tree, moving) ** 2) ** -1.0 * qd[0] ** 2.0
+            return kinetic + 0.1 * function("sin", as_node(tree, moving))
+        with cg.tag("kinetic"):
             kinetic = 0.5 * p["m"] * qd[0] ** 2.0 + 20.0 * qd[1] ** 2.0 + qd[0] * qd[1] * cg.cos(q[1])
-        return kinetic + 0.1 * function("sin", value)
+        with cg.tag("definition"):
+            defined = as_node(tree, moving)
+        with cg.tag("potential"):
+            potential = 0.1 * function("sin", defined)
+        return kinetic - potential
 
     damping = [0.0] * (n - 1) + [cg.variable("k")]
     system = dyn.System(
