@@ -24,7 +24,8 @@ label may have. `certain_digits` says what rounding leaves of the outputs.
 **At the edges**: `real_array`, `real_number`, `is_finite`, `check_name`, `require_graph`, `require_flag`,
 `require_whole`, `require_choice`, `require_sequence`, `require_mapping` and `require_path` check what a caller passed,
 `thread_count` reads `threads=`, `share` gives work to threads, `atomic_write` writes a file whole or not at all,
-`write_files` several, and `check_writable` looks beforehand; `install` ends an error about a missing package,
+`write_files` several, and `check_writable` looks beforehand; `html_table`, `html_text`, `html_lines` and `picture` are
+what a notebook shows of a result; `install` ends an error about a missing package,
 `scipy_integrate` gives SciPy's module or raises it. `Array` is the type of an array of float64.
 
     >>> import cgraph as cg
@@ -64,6 +65,7 @@ from .simplify.builder import Builder, folded
 from .simplify.identities import rewritten, shortened
 from .simplify.polynomial import Polynomial, expand, format_polynomial
 from .util.atomic_write import atomic_write, check_writable, write_files
+from .util.html_text import html_lines, html_table, html_text, picture
 from .util.nearest import nearest, or_nearest
 from .util.real_arrays import is_finite, real_array, real_number
 from .util.require import (
@@ -114,12 +116,16 @@ __all__ = [
     "folded",
     "format_polynomial",
     "hessian_nodes",
+    "html_lines",
+    "html_table",
+    "html_text",
     "install",
     "is_finite",
     "ldl_elimination",
     "ldl_solve",
     "nearest",
     "or_nearest",
+    "picture",
     "real_array",
     "real_number",
     "register",

@@ -238,6 +238,7 @@ CALLS = {
     "dyn.scenes.triple_pendulum": call(dyn.scenes.triple_pendulum, "rod"),
     "dyn.cases.load": call(dyn.cases.load, "exponential decay"),
     "viz.graph_svg": call(viz.graph_svg, GRAPH),
+    "viz.inspect": call(viz.inspect, ARM, None, start=[0.1, 0.0], t_end=0.1, forward=False),
     "viz.page": call(
         viz.page, GRAPH, title="t", about="", at=None, marked=(), motion=None, tables=(), names=None, units=None
     ),

@@ -8,9 +8,10 @@ if TYPE_CHECKING:
     from .graph_drawing.dot import to_dot
     from .graph_drawing.render import graph_svg, render_png, render_svg
     from .inspector import page  # type: ignore[no-redef]  # the name of a module there, too
+    from .models.inspect import inspect
     from .typed import typed_page, typed_text
 
-__all__ = ["graph_svg", "page", "render_png", "render_svg", "to_dot", "typed_page", "typed_text"]
+__all__ = ["graph_svg", "inspect", "page", "render_png", "render_svg", "to_dot", "typed_page", "typed_text"]
 
 if not TYPE_CHECKING:  # loaded when asked for: the command line has to await Ctrl-C before it loads anything
 
@@ -18,6 +19,7 @@ if not TYPE_CHECKING:  # loaded when asked for: the command line has to await Ct
         from importlib import import_module
 
         homes = {"__version__": "cgraph", "to_dot": ".graph_drawing.dot", "page": ".inspector"}
+        homes |= {"inspect": ".models.inspect"}
         homes |= dict.fromkeys(["graph_svg", "render_png", "render_svg"], ".graph_drawing.render")
         homes |= dict.fromkeys(["typed_page", "typed_text"], ".typed")
         if name not in homes:

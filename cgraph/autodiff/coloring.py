@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .sparsity import Pattern
+from .sparsity import Pattern, full
 
 NONE = -1  # the color of what takes part in no sweep
 
@@ -116,6 +116,8 @@ def star_coloring(entries: Pattern) -> list[int]:
     of two orders: as the columns come, and those with the most entries first.
     """
     n = entries.shape[1]
+    if full(entries):
+        return list(range(n))
     neighbors = [[j for j in row if j != i] for i, row in enumerate(entries.by_row())]
     orders = [range(n), sorted(range(n), key=lambda k: -len(neighbors[k]))]
     return min([_star(neighbors, order) for order in orders], key=lambda colors: max(colors, default=NONE))

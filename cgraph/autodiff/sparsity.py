@@ -121,10 +121,17 @@ def dependence(graph: Graph, wrt: Sequence[Node]) -> Iterator[tuple[Node, int]]:
 
 def symmetric(entries: Pattern) -> Pattern:
     """The entries and their mirror images."""
+    if full(entries):
+        return entries
     i, j = np.concatenate([entries.rows, entries.columns]), np.concatenate([entries.columns, entries.rows])
     n = entries.shape[1]
     rows, columns = np.divmod(np.unique(i * n + j), max(n, 1))
     return Pattern(rows, columns, entries.shape)
+
+
+def full(entries: Pattern) -> bool:
+    """Whether no entry is left out."""
+    return len(entries.rows) == entries.shape[0] * entries.shape[1]
 
 
 def _places(bits: int) -> Indices:

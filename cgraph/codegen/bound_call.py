@@ -10,11 +10,13 @@ import struct
 import sys
 from collections.abc import Callable
 from functools import cache, partial
+from types import BuiltinFunctionType
 from typing import Any
 
 from ..core.evaluate import Array
 from . import llvm_engine as llvm
 
+_STAYS = "a bound call holds addresses of this process: pickle the compiled graph and bind it again"
 _NO_ARGUMENTS = 4  # METH_NOARGS of CPython's methodobject.h
 
 # What CPython calls: `self` are bytes with the addresses of the function, its arguments, None and Py_IncRef
@@ -52,7 +54,19 @@ class _Addresses(bytes):
     kept: tuple[Any, ...]
 
     def __reduce_ex__(self, protocol: Any) -> Any:
-        raise TypeError("a bound call holds addresses of this process: pickle the compiled graph and bind it again")
+        raise TypeError(_STAYS)
+
+
+class _Bound(partial[None]):
+    """A call of a function of Python, as little to be copied."""
+
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        raise TypeError(_STAYS)
+
+
+def bound(run: Callable[[], None]) -> Callable[[], None]:
+    """The call, which says of itself that it stays in its process. What `bound_call` made does already."""
+    return run if isinstance(run, BuiltinFunctionType) else _Bound(run)
 
 
 def bound_call(entry: Any, x: Array, y: Array) -> Callable[[], None]:

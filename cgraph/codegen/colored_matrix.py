@@ -121,9 +121,12 @@ class ColoredMatrix:
 
 
 def colored_jacobian(
-    entries: Pattern, coloring: Coloring, forward: Callable[[], Sweep], reverse: Callable[[], Sweep]
+    entries: Pattern, coloring: Coloring, forward: Callable[[], Sweep], reverse: Callable[[], Sweep], points: int
 ) -> ColoredMatrix:
-    """The Jacobian: forward sweeps along sums of columns, reverse ones along sums of rows, asked for where needed."""
+    """The Jacobian: forward sweeps along sums of columns, reverse ones along sums of rows, asked for where needed.
+
+    points: the numbers in a point.
+    """
     parts = []
     for make, colors, mine, keys, others in (
         (forward, coloring.columns, ~coloring.by_row, entries.columns, entries.rows),
@@ -134,7 +137,7 @@ def colored_jacobian(
             sweep = make()
             take = _places(sweep, np.array(colors)[keys[numbers]], others[numbers])
             parts.append(SweepPart(sweep, _seeds(sweep, colors), take, numbers))
-    return ColoredMatrix(entries, parts, entries.shape[1])
+    return ColoredMatrix(entries, parts, points)
 
 
 def colored_hessian(entries: Pattern, sweep: Sweep, points: int) -> ColoredMatrix:

@@ -12,8 +12,10 @@ from numpy.typing import ArrayLike
 from ..core.evaluate import Array
 from ..core.graph import Graph
 from ..errors import GraphError
+from ..util.html_text import html_table, html_text
 from ..util.real_arrays import real_array
 from ..util.threads import share, thread_count
+from .bound_call import bound
 from .differentiable import Differentiable, require_memory
 
 
@@ -97,7 +99,7 @@ class Compiled(Differentiable):
             raise GraphError("y must be an array that can be written, got one that is read-only")
         if np.may_share_memory(x, y):
             raise GraphError("x and y must not share memory")
-        return self._bound(x, y)
+        return bound(self._bound(x, y))
 
     @abstractmethod
     def _columns(self) -> tuple[int, Callable[[Array, Array], None]]:
@@ -115,6 +117,11 @@ class Compiled(Differentiable):
         if point.shape != (self.n_in,):
             raise GraphError(f"x must have shape ({self.n_in},), one value for each input, got {point.shape}")
         return point
+
+    def _repr_html_(self) -> str:
+        rows = [("back end", self.backend), ("inputs", str(self.n_in)), ("outputs", str(self.n_out))]
+        rows += [("nodes", str(len(self.graph.nodes))), ("lines of generated text", str(self.source.count("\n")))]
+        return html_text("A compiled graph") + html_table(("", ""), rows)
 
     def __repr__(self) -> str:
         return f"<compiled {self.graph!r}, backend {self.backend!r}>"

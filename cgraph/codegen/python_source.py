@@ -33,17 +33,17 @@ def source(graph: Graph, text_of: Callable[[Op], str], helpers: Iterable[str]) -
 
 
 def _names(graph: Graph, helpers: Iterable[str]) -> dict[Node, str]:
-    """An identifier for each input and operation, x0 and v0 and so on, and the text of each constant."""
+    """An identifier for each input, x0 and so on, and operation, by its number in the listing, and constants' texts."""
     mark = ""
     while any([re.fullmatch(f"[xv]{mark}[0-9]+", name) for name in helpers]):  # a row of the table may be called x0
         mark += "_"
-    names = {node: f"x{mark}{i}" for i, node in enumerate(graph.inputs)}
+    names, number = {node: f"x{mark}{i}" for i, node in enumerate(graph.inputs)}, 0
     for node in graph.nodes:
         if node.op is CONSTANT:
             assert node.value is not None
             names[node] = _number(node.value)
         elif node not in names:
-            names[node] = f"v{mark}{len(names)}"
+            names[node] = f"v{mark}{(number := number + 1)}"
     return names
 
 

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from ..util.html_text import html_table
 from .node import Node
 
 
@@ -54,6 +55,12 @@ class Counts:
                 row("by role", self.by_role),
             )
         )
+
+    def _repr_html_(self) -> str:
+        sizes = [(name, str(getattr(self, name))) for name in ("nodes", "edges", "depth", "width")]
+        groups = {"operation": self.by_operation, "tag": self.by_tag, "role": self.by_role}
+        rows = [(f"{kind} {name}", str(n)) for kind, counts in groups.items() for name, n in counts.items()]
+        return html_table(("", "count"), sizes + rows)
 
 
 def count(nodes: Iterable[Node]) -> Counts:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
-from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any
 
 from ..errors import GraphError
+from ..util.html_text import picture
 from .check_name import check_name
 from .counts import Counts, count
 from .edge import Edge
@@ -111,16 +111,16 @@ class Graph:
             return self.inputs
         if not isinstance(wrt, (str, Node, Iterable)):
             raise TypeError(f"wrt must name inputs by strings or variables, got {type(wrt).__name__}: {wrt!r:.60}")
-        chosen = []
+        inputs, chosen = set(self.inputs), dict[Node, None]()
         for name in (wrt,) if isinstance(wrt, (str, Node)) else wrt:
             node = variable(name) if isinstance(name, str) else name
             if not isinstance(node, Node):
                 raise TypeError(f"wrt must name inputs by strings or variables, got {node!r:.60}")
-            if node not in self.inputs:
+            if node not in inputs:
                 raise GraphError(f"the graph has no input {node.name or node!r} (it has {', '.join(self.input_names)})")
             if node in chosen:
                 raise GraphError(f"wrt names the input {node.name} twice")
-            chosen.append(node)
+            chosen[node] = None
         if not chosen:
             raise GraphError(
                 f"wrt must name at least one input (the graph has {', '.join(self.input_names) or 'none'})"
@@ -205,14 +205,9 @@ class Graph:
             f"{len(self.nodes)} nodes, {sum(len(node.args) for node in self.nodes)} edges>"
         )
 
-    def _repr_svg_(self) -> str | None:
+    def _repr_html_(self) -> str | None:
         """The drawing that a notebook shows, when a drawing package is installed (extra `viz`)."""
-        for renderer in entry_points(group="cgraph.renderers", name="svg"):
-            try:
-                return str(renderer.load()(self))
-            except (ImportError, RuntimeError):  # no renderer here: the notebook falls back to the text form
-                return None
-        return None
+        return picture("graph", self)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _restore, (self.input_names, tuple(_records(self.nodes)), self._output_numbers())

@@ -79,8 +79,8 @@ def with_name(node: Node, name: str) -> Node:
 
 def free_suffix(suffix: str, taken: Collection[str], names: Sequence[str]) -> str:
     """`suffix`, numbered if need be, so that no name + suffix is taken."""
-    candidate, number = suffix, 1
-    while any(name + candidate in taken for name in names):
+    candidate, number, known = suffix, 1, set(taken)
+    while any(name + candidate in known for name in names):
         number += 1
         candidate = f"{suffix}{number}"
     return candidate

@@ -11,6 +11,7 @@ from ..core.graph import Graph, require_graph
 from ..core.node import VARIABLE, Node, variable
 from ..core.structure_hash import node_hashes
 from ..errors import GraphError
+from ..util.html_text import html_lines
 from ..util.require import require_choice, require_sequence, require_texts
 from .names import Names, joined, many
 
@@ -97,6 +98,9 @@ class Comparison:
 
     def _shown(self, outputs: Sequence[str]) -> list[str]:
         return [self.names.get(name, name) for name in outputs]
+
+    def _repr_html_(self) -> str:
+        return html_lines(str(self))
 
     def to_dict(self) -> dict[str, Any]:
         """The same for JSON; nodes are numbered as in `graph.nodes` of their graph."""

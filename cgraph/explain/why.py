@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..core.edge import Edge
@@ -12,6 +13,7 @@ from ..core.graph import Graph, require_graph
 from ..core.node import Node
 from ..core.source_lines import lines_text
 from ..errors import GraphError
+from ..util.html_text import html_table, html_text
 from .edge_partials import Point, edge_slopes
 from .names import Name, Names, many
 from .paths import best_paths, by_target, path_count
@@ -19,7 +21,6 @@ from .reachability import between
 
 EXACT = 10**15  # up to here a number of paths is printed digit by digit
 LENGTH = 90  # characters up to which a path is written out; a longer one is written by its tags
-STEPS = 12  # neighbors in tags that such a path names; of more, the first and the last
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +34,8 @@ class Path:
     value : float or None
         The product of the partials along it; None without a point.
     text : str
-        Its products and functions by name and tag; sums are left out.
+        Its products and functions by name, %number and tag. Sums are left out, but where two paths would read the same:
+        then `%7.2` is the second argument of node %7, for every step.
     """
 
     edges: tuple[Edge, ...]
@@ -95,22 +97,28 @@ class Why:
         return frozenset([edge for path in self.paths for edge in path.edges])
 
     def __str__(self) -> str:
-        if not self.count:
-            return f"{self.output} does not depend on {self.input}; cg.why_not tells where it stops."
-        lines = [f"{self.output} depends on {self.input} along {count_text(self.count)}."]
-        if self.derivative is not None:
-            lines.append(f"d {self.output} / d {self.input} = {self.derivative:.6g}, the sum over all of them.")
-        values = [f"{path.value:+.4g}" if path.value is not None else "" for path in self.paths]
+        before, after = self._sentences()
+        values = [_weight(path) for path in self.paths]
         width = max(map(len, values), default=0)
-        lines += [f"  {value:>{width}}  {path.text}" for value, path in zip(values, self.paths, strict=True)]
-        if self.derivative is None:
-            if len(self.paths) < self.count:
-                lines.append(
-                    f"These are the shortest {len(self.paths)}; with a point, at={{...}}, the heaviest are listed."
-                )
-        else:
-            lines.append(self._balance())
-        return "\n".join(lines)
+        rows = [f"  {value:>{width}}  {path.text}" for value, path in zip(values, self.paths, strict=True)]
+        return "\n".join([*before, *rows, *after])
+
+    def _repr_html_(self) -> str:
+        before, after = self._sentences()
+        rows = [(path.text, _weight(path)) for path in self.paths]
+        table = html_table(("path", "weight" if self.derivative is not None else ""), rows) if rows else ""
+        return "".join([html_text(each) for each in before]) + table + "".join([html_text(each) for each in after])
+
+    def _sentences(self) -> tuple[list[str], list[str]]:
+        """What is said before the paths are listed, and after."""
+        if not self.count:
+            return [f"{self.output} does not depend on {self.input}; cg.why_not tells where it stops."], []
+        said = [f"{self.output} depends on {self.input} along {count_text(self.count)}."]
+        if self.derivative is not None:
+            said.append(f"d {self.output} / d {self.input} = {self.derivative:.6g}, the sum over all of them.")
+            return said, [self._balance()]
+        cut = f"These are the shortest {len(self.paths)}; with a point, at={{...}}, the heaviest are listed."
+        return said, [cut] if len(self.paths) < self.count else []
 
     def _balance(self) -> str:
         if self.weight == 0.0:
@@ -206,14 +214,16 @@ def why(
     count = path_count(nodes, edges, source, sink) if nodes else 0
     if at is None:
         shortest = best_paths(nodes, edges, source, sink, k, lambda edge: 1.0) if count else []
-        return Why(graph, to, origin, count, tuple([_path(known, to, path, None) for path in shortest]))
+        return Why(
+            graph, to, origin, count, tuple(_told_apart(known, [_path(known, to, path, None) for path in shortest]))
+        )
     slopes = dict(zip(edges, edge_slopes(known, edges, at), strict=True))
     edges = _contributing(known, nodes, edges, slopes, sink)
     derivative, weight = _path_sums(nodes, edges, slopes, source, sink)
     # The largest |product| of partials has the least sum of -log |partial|.
     heaviest = best_paths(nodes, edges, source, sink, k, lambda edge: -math.log(abs(slopes[edge]))) if count else []
     paths = [_path(known, to, path, math.prod([slopes[edge] for edge in path])) for path in heaviest]
-    return Why(graph, to, origin, count, tuple(paths), derivative, weight)
+    return Why(graph, to, origin, count, tuple(_told_apart(known, paths)), derivative, weight)
 
 
 def _contributing(
@@ -284,10 +294,20 @@ def _route(names: Names, nodes: Sequence[Node]) -> list[str]:
             tags = f"[{', '.join(sorted(node.tags))}]"
             if not steps or steps[-1][0] != tags:
                 steps.append((tags, []))
-            steps[-1][1].append(node.op.name)
-    if len(steps) > STEPS:
-        steps = [*steps[: STEPS // 2], ("...", []), *steps[-(STEPS // 2) :]]
-    return [" ".join([*(ops if len(ops) <= 3 else [many(len(ops), "operation")]), name]) for name, ops in steps]
+            steps[-1][1].append(f"{node.op.name} %{names.number[node]}")
+    return [" ".join([*ops, name]) for name, ops in steps]
+
+
+def _told_apart(names: Names, paths: Sequence[Path]) -> list[Path]:
+    """The paths; of those that read the same, with all their sums, and by which argument each operation is reached."""
+    times = Counter([path.text for path in paths])
+    return [
+        replace(path, text=f"{path.text}  ({_edges(names, path)})") if times[path.text] > 1 else path for path in paths
+    ]
+
+
+def _edges(names: Names, path: Path) -> str:
+    return " ".join([f"%{names.number[edge.target]}.{edge.slot + 1}" for edge in path.edges])
 
 
 def digits_of(count: int) -> str:
@@ -303,6 +323,10 @@ def digits_of(count: int) -> str:
 def count_text(count: int) -> str:
     """`1 path`, `12 paths`, `3.21e+41 paths`."""
     return many(count, "path") if count <= EXACT else f"{digits_of(count)} paths"
+
+
+def _weight(path: Path) -> str:
+    return "" if path.value is None else f"{path.value:+.4g}"
 
 
 def _json(value: float | None) -> float | None:

@@ -9,6 +9,7 @@ from typing import Any
 from ..core.graph import Graph, require_graph
 from ..core.node import Node
 from ..errors import GraphError
+from ..util.html_text import html_lines
 from .names import Name, Names, joined, many
 from .reachability import ancestors, descendants
 
@@ -71,6 +72,9 @@ class WhyNot:
             shown = "; ".join([names.line(node) for node in self.meetings[:3]])
             lines.append(f"The two meet where {self.output} does not look: {shown}.")
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return html_lines(str(self))
 
     def to_dict(self) -> dict[str, Any]:
         """The same for JSON; nodes are numbered as in `graph.nodes`."""

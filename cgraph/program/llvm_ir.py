@@ -35,11 +35,13 @@ def offsets(program: Program, width: int) -> dict[str, int]:
 def program_ir(program: Program, flags: str = "", lanes: int = 1, width: int = 1, registers: int = REGISTERS) -> str:
     """A module with the function `run`.
 
-    int64_t run(double *memory, double *records, int64_t passes, int64_t every, int64_t *done, double *feed)
+    int64_t run(
+        double *memory, double *records, int64_t passes, int64_t every, int64_t *done, double *feed, int64_t stride
+    )
 
     The registers lie in `memory` as `offsets` says, each number a vector of `lanes`. A row is written to `records`
     after every `every`th pass; the result is how many; the number of passes that were run goes to `done`. A row of
-    `feed` is read before every pass.
+    `feed` is read before every pass, `stride` numbers after the last one.
     width: of the vectors in which `Map` goes through its elements.
     """
     arithmetic = point_arithmetic(flags, registers) if lanes == 1 else Arithmetic(flags, lanes, registers)
@@ -48,7 +50,8 @@ def program_ir(program: Program, flags: str = "", lanes: int = 1, width: int = 1
     return "\n".join([*preamble(program.graphs(), arithmetic), *functions.definitions, *run, ""])
 
 
-_ARGUMENTS = "ptr noalias %memory, ptr noalias %records, i64 %passes, i64 %every, ptr %done, ptr noalias %feed"
+_ARGUMENTS = "ptr noalias %memory, ptr noalias %records, i64 %passes, i64 %every, ptr %done, ptr noalias %feed, "
+_ARGUMENTS += "i64 %stride"
 
 
 class _RunFunction:
@@ -111,7 +114,7 @@ class _RunFunction:
         if not self.program.feed:
             return []
         lines = [
-            f"  %fed = mul i64 %before, {self.program.feed_width}",
+            "  %fed = mul i64 %before, %stride",
             f"  %fed0 = getelementptr {self.type}, ptr %feed, i64 %fed",
         ]
         for k, name in enumerate(self.program.feed):

@@ -16,8 +16,9 @@ from .llvm_ir import program_functions, program_ir
 from .program import Program
 from .runner import Record, Runner
 
+_NUMBER = 8  # bytes
 _POINTER, _COUNT = ctypes.c_void_p, ctypes.c_int64
-_RUN = ctypes.CFUNCTYPE(_COUNT, _POINTER, _POINTER, _COUNT, _COUNT, _POINTER, _POINTER)
+_RUN = ctypes.CFUNCTYPE(_COUNT, _POINTER, _POINTER, _COUNT, _COUNT, _POINTER, _POINTER, _COUNT)
 
 
 class NativeRunner(Runner):
@@ -39,8 +40,10 @@ class NativeRunner(Runner):
 
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record:
         rows = np.empty((passes // every, self.program.width))
-        done, fed = ctypes.c_int64(), np.ascontiguousarray(feed)
-        where = ctypes.addressof(done), fed.ctypes.data
+        done, (between, within) = ctypes.c_int64(), feed.strides
+        if within != _NUMBER or between % _NUMBER:
+            feed, between = np.ascontiguousarray(feed), _NUMBER * self.program.feed_width
+        where = ctypes.addressof(done), feed.ctypes.data, between // _NUMBER
         count = self._entry(memory.ctypes.data, rows.ctypes.data, passes, every, *where)
         return Record(rows[:count], done.value)
 
@@ -48,7 +51,7 @@ class NativeRunner(Runner):
         done, fed = np.zeros(1, np.int64), np.empty(1)
         arrays = memory, rows, done, fed
         at = [array.ctypes.data for array in arrays]
-        call = partial(self._entry, at[0], at[1], len(rows), 1, at[2], at[3])
+        call = partial(self._entry, at[0], at[1], len(rows), 1, at[2], at[3], 0)
         call.kept = self, arrays  # type: ignore[attr-defined]  # whose addresses it has
         return call
 
@@ -71,6 +74,7 @@ class NativeRunner(Runner):
             block[:, :width], block[:, width:] = memories[:, here], memories[:, start : start + 1]
             if feed.shape[2] > 1:
                 fed[:, :, :width], fed[:, :, width:] = feed[:, :, here], feed[:, :, start : start + 1]
-            entry(block.ctypes.data, part.ctypes.data, passes, every, ctypes.addressof(done), fed.ctypes.data)
+            where = ctypes.addressof(done), fed.ctypes.data, feed.shape[1]
+            entry(block.ctypes.data, part.ctypes.data, passes, every, *where)
             memories[:, here], rows[:, :, here] = block[:, :width], part[:, :, :width]
         return Record(rows, passes)

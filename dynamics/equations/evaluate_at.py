@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -49,11 +50,19 @@ def input_values(
         raise ValueError(f"the system has no parameter {unknown[0]!r} (it has {has})")
     if parameters:
         system.require_values({**system.parameters, **parameters})
-    values: dict[str, Any] = {TIME: real_number("t", t), **system.parameters, **parameters}
+    time = real_number("t", t)
+    if not math.isfinite(time):
+        raise ValueError(f"t must be finite, got {time!r}")
+    values: dict[str, Any] = {TIME: time, **system.parameters, **parameters}
     shape: tuple[int, ...] = ()
     for name in STATE:
         rows = _rows(system, name, state.get(name))
-        shape = np.broadcast_shapes(shape, rows.shape[:-1])
+        try:
+            shape = np.broadcast_shapes(shape, rows.shape[:-1])
+        except ValueError:
+            raise ValueError(
+                f"the arrays of a state must have as many rows, or one, got {len(rows)} of {name} after {shape[0]}"
+            ) from None
         values |= {f"{name}{i}": column if rows.ndim == 2 else float(column) for i, column in enumerate(rows.T)}
     return {name: values[name] for name in names}, shape
 

@@ -11,9 +11,12 @@ from cgraph import Graph
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
+from .equations_of_motion import forward_dynamics
 from .evaluate_at import Array, evaluate_at
+from .initial_value import normalized
 from .linearization_parts import assembled, linearization_parts
 from .shorter_form import shorter_form
+from .singular_mass_matrix import raise_if_singular
 
 
 def state_space(model: Model) -> Graph:
@@ -84,8 +87,8 @@ def linearize(
     ----------
     model : Model
         A system, a mechanism or a scene with n coordinates.
-    q, qd, tau : array_like, (n,)
-        Coordinates [rad or m], their velocities, and applied forces [N m or N].
+    q, qd, tau : array_like, (nq,) and (n,)
+        Coordinates [rad or m], velocities, and applied forces [N m or N].
     t : float
         Time [s], for a model that depends on it.
     parameters : mapping of str to float
@@ -99,9 +102,10 @@ def linearize(
     Raises
     ------
     ValueError
-        For arrays of another shape, a number that is not finite, or an unknown parameter.
+        For arrays of another shape, a number that is not finite, an unknown parameter, a quaternion of length 0, or
+        entries that are not finite.
     SingularMassMatrixError
-        For a coordinate without inertia.
+        For a coordinate without inertia, or a mass matrix that is singular at this state.
 
     Examples
     --------
@@ -115,10 +119,22 @@ def linearize(
     graphs = linearization_parts(system).in_columns()
     flat = evaluate_at(system, graphs.shared, {"q": q, "qd": qd, "tau": tau}, t, parameters)
     if flat.ndim != 1:
-        raise ValueError(
-            f"linearize takes one state, q, qd and tau of the shape ({system.n},), got several rows; see linearize_many"
-        )
+        raise ValueError("linearize takes one state, got rows of several; see linearize_many")
     factors, sides, brackets = np.split(flat, [graphs.factors, len(flat) - system.n**2])
     rows = [*factors, *sides.reshape(-1, 3 * system.n)]
     solved = graphs.column.evaluate(dict(zip(graphs.column.input_names, rows, strict=True))).values()
-    return assembled(brackets, np.concatenate([np.broadcast_to(x, 3 * system.n) for x in solved]), system.n)
+    a, b = assembled(brackets, np.concatenate([np.broadcast_to(x, 3 * system.n) for x in solved]), system.n)
+    if not (np.isfinite(a).all() and np.isfinite(b).all()):
+        _raise_what_is_not_finite(system, {"q": q, "qd": qd, "tau": tau}, t, parameters)
+    return a, b
+
+
+def _raise_what_is_not_finite(
+    system: System, state: Mapping[str, ArrayLike | None], t: float, parameters: Mapping[str, float] | None
+) -> None:
+    """The state has a quaternion without a length, or a mass matrix that is singular, or numbers leave float64."""
+    normalized(system, np.concatenate([np.asarray(state[name], dtype=np.float64) for name in ("q", "qd")]))
+    info = evaluate_at(system, forward_dynamics(system, check=True), state, t, parameters)[-1]
+    if np.isfinite(info):
+        raise_if_singular(system, info)
+    raise ValueError("there is no linearization at this state: its numbers leave the range of float64")

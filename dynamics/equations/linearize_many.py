@@ -37,14 +37,15 @@ def linearize_many(
 
     Of small systems all entries are written out, and states lie side by side in vectors. Of others, what the state
     alone decides, the slopes of `inverse_dynamics_derivatives` and the factorization of M, is one piece of code and a
-    column of A and B another, through which all columns of a state run side by side.
+    column of A and B another, through which all columns of a state run side by side. The matrices of a state whose mass
+    matrix is singular, or with a quaternion of length 0, have entries that are infinite or NaN.
 
     Parameters
     ----------
     model : Model
         A system, a mechanism or a scene with n velocities.
-    q, qd, tau : array_like, (N, n)
-        Coordinates [rad or m], their velocities, and applied forces [N m or N]; one row, (n,), is the same for all.
+    q, qd, tau : array_like, (N, nq) and (N, n)
+        Coordinates [rad or m], their velocities, and applied forces [N m or N]; one row is the same for all.
     t : float
         Time [s], for a model that depends on it.
     parameters : mapping of str to float
@@ -74,7 +75,7 @@ def linearize_many(
     function = _function(system)
     values, shape = input_values(system, function.names, {"q": q, "qd": qd, "tau": tau}, t, parameters)
     if len(shape) != 1:
-        raise ValueError(f"linearize_many takes rows of states, (N, {system.n}), got one state; see linearize")
+        raise ValueError("linearize_many takes rows of states, got one state; see linearize")
     given = [np.broadcast_to(np.asarray(values[name], dtype=np.float64), shape) for name in function.names]
     return function(np.array(given).reshape(len(given), *shape), thread_count(threads))
 

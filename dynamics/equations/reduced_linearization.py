@@ -107,11 +107,11 @@ def reduced_linearization(
     """
     system, start = as_system(model), initial_value(model, q, qd, 0.0, parameters, t)
     n, at = system.n, (start.x[: system.nq], start.x[system.nq :])
-    a, b = linearize(model, *at, tau, t=t, parameters=parameters)
     kept = independent_rows(system.constraints) if len(system.constraints) else ()
     slopes = _slopes(system, kept, dict(zip(("q", "qd"), at, strict=True)), t, parameters)
     holonomic = sum(k < len(system.constraints.positions) for k in kept)
     following = _following(system, kept, slopes[:, n:])
+    a, b = linearize(model, *at, tau, t=t, parameters=parameters)
     rows = np.vstack([np.hstack([slopes[:holonomic, n:], np.zeros((holonomic, n))]), slopes])
     rows = rows / np.abs(rows).max(axis=1, keepdims=True, initial=0.0)
     rest = [*following[:holonomic], *[n + j for j in following]]

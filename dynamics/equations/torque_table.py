@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph, Node
-from cgraph.extend import Names, require_whole, topological
+from cgraph.extend import Names, html_table, require_whole, topological
 
 from ..systems.display_names import display_names
 from ..systems.system import System
@@ -121,6 +121,10 @@ class TorqueTable:
 
     def __str__(self) -> str:
         return self.to_text().rstrip("\n")
+
+    def _repr_html_(self) -> str:
+        head, *rows = self._cells(4)
+        return html_table(head, rows, title=self.title)
 
     def to_markdown(self, digits: int = 4) -> str:
         """The same as a Markdown table."""

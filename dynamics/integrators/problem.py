@@ -172,7 +172,7 @@ def quantity(problem: Problem, what: str, function: Callable[..., Any], tau: Seq
     else:
         q, qd, *rest = arguments
         node = call_user_function(what, function, q, qd, list(tau), *rest, state="q, qd, tau")
-    known = set(quantity_inputs(problem))
+    known = _known(problem)
     if not isinstance(node, Node) or any(
         other.op.name == "variable" and other not in known for other in topological([node])
     ):
@@ -182,10 +182,21 @@ def quantity(problem: Problem, what: str, function: Callable[..., Any], tau: Seq
 
 def state_arguments(problem: Problem) -> tuple[Any, ...]:
     """What a function of the state is called with: (q, qd, t, p) as nodes, or (x, t, p) of a first-order system."""
-    p = Parameters(state_inputs(problem.model).parameters)
+    p = Parameters(())
+    p.update(_parameters(problem))  # a copy, which a caller may change
     if problem.system is None:
         return cg.variables(list(problem.states)), cg.variable(TIME), p
     return problem.system.q, problem.system.qd, problem.system.t, p
+
+
+@lru_cache(KEPT)
+def _parameters(problem: Problem) -> Parameters:
+    return Parameters(state_inputs(problem.model).parameters)
+
+
+@lru_cache(KEPT)
+def _known(problem: Problem) -> frozenset[Node]:
+    return frozenset(quantity_inputs(problem))
 
 
 def quantity_inputs(problem: Problem) -> list[Node]:

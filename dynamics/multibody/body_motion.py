@@ -13,7 +13,7 @@ from cgraph.extend import Builder, as_node, building
 
 from . import spatial
 from .inertial_numbers import Link
-from .joints import AxialJoint, JointType, SpatialJoint
+from .joints import AxialJoint, MovingJoint, SpatialJoint
 from .spatial import STILL, ZERO, Array, Triple
 
 
@@ -59,13 +59,12 @@ def ground(gravity: Array, *, in_plane: bool = False) -> Motion:
         return Motion(STILL, STILL, spatial.constant(0.0 - gravity), ZERO)
 
 
-def propagate_motion(parent: Motion, link: Link, joint: JointType, q: Sequence[Node], u: Sequence[Node]) -> Motion:
+def propagate_motion(parent: Motion, link: Link, joint: MovingJoint, q: Sequence[Node], u: Sequence[Node]) -> Motion:
     """The motion of a link from that of its parent; q and u are the coordinates and velocities of its joint."""
     parent = carrier_motion(parent, link, joint)
     offset = joint_translation(link, joint, q)
     if isinstance(joint, AxialJoint):
         return _about_axis(parent, link, joint, offset, q[0], u[0])
-    assert isinstance(joint, SpatialJoint)
     return _in_space(parent, link, joint, offset, q, u)
 
 
@@ -120,19 +119,18 @@ def _about_axis(parent: Motion, link: Link, joint: AxialJoint, offset: Triple, q
     return Motion((x, y, z + joint.angle(qd)), velocity, vertical, depth, parent.strength)
 
 
-def carrier_motion(parent: Motion, link: Link, joint: JointType) -> Motion:
+def carrier_motion(parent: Motion, link: Link, joint: MovingJoint) -> Motion:
     """The parent's motion in the axes that the link is carried in: those of a plane where it stays in the plane."""
     if parent.plane and isinstance(joint, AxialJoint) and link.parallel:
         return parent
     return in_body_axes(parent)
 
 
-def joint_translation(link: Link, joint: JointType, q: Sequence[Node]) -> Triple:
+def joint_translation(link: Link, joint: MovingJoint, q: Sequence[Node]) -> Triple:
     """Where the link's origin is from its parent's, in the parent's axes."""
     if isinstance(joint, AxialJoint):
         x, y, z = (row[2] * joint.shift(q[0]) for row in link.turn)
         return spatial.plus(link.place, (x, y, z))
-    assert isinstance(joint, SpatialJoint)
     return spatial.plus(link.place, spatial.rotate(link.turn, joint.translation(q)))
 
 
@@ -153,7 +151,7 @@ def _in_plane_axes(motion: Motion, vector: Triple) -> Triple:
     return spatial.rotate_about_z(motion.plane.cos, -motion.plane.sin, vector) if motion.plane else vector
 
 
-def energy(motion: Motion, link: Link, joint: JointType, q: Sequence[Node], u: Sequence[Node]) -> Node:
+def energy(motion: Motion, link: Link, joint: MovingJoint, q: Sequence[Node], u: Sequence[Node]) -> Node:
     """L_i = K_i - P_i with the first moment m c and the inertia J about the joint, without the center's velocity.
 
     K = m v.v / 2 + m c . (v x w) + w . J w / 2,  P = m g h + g u . m c + spring.
@@ -180,12 +178,12 @@ def energy(motion: Motion, link: Link, joint: JointType, q: Sequence[Node], u: S
     return kinetic - potential
 
 
-def spring_forces(link: Link, joint: JointType, q: Sequence[Node], u: Sequence[Node]) -> list[tuple[Node, Node]]:
+def spring_forces(link: Link, joint: MovingJoint, q: Sequence[Node], u: Sequence[Node]) -> list[tuple[Node, Node]]:
     """The velocities that the joint's spring works on, and its forces."""
     return [(velocity, link.stiffness * x) for velocity, x in zip(u, _stretches(link, joint, q), strict=False)]
 
 
-def _stretches(link: Link, joint: JointType, q: Sequence[Node]) -> Sequence[Node]:
+def _stretches(link: Link, joint: MovingJoint, q: Sequence[Node]) -> Sequence[Node]:
     """One for each velocity, or none where there is no spring."""
     absent = not isinstance(link.stiffness, Node) and not link.stiffness
     return [] if absent else joint.stretches(q, link.spring_reference)

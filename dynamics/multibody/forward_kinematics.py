@@ -17,7 +17,7 @@ from .body import Body
 from .body_motion import joint_translation
 from .inertial_numbers import Link, axes_of
 from .joint_coordinates import parts
-from .joints import AxialJoint, JointType, SpatialJoint
+from .joints import AxialJoint, MovingJoint, moving_type
 from .kinematic_tree import Carrier
 from .spatial import STILL, Array, Triple
 
@@ -26,7 +26,7 @@ class Step(NamedTuple):
     """One joint on the way from a body to the world: the link that it carries, and its coordinates."""
 
     link: Link
-    joint: JointType
+    joint: MovingJoint
     q: Sequence[Node]
     u: Sequence[Node]
 
@@ -65,7 +65,6 @@ class KinematicChain:
                 velocity = (u - spin * y, v + spin * x, w + step.joint.shift(step.u[0]))
                 omega = (omega[0], omega[1], omega[2] + spin)
             else:
-                assert isinstance(step.joint, SpatialJoint)
                 turning = step.joint.angular_velocity(step.q, step.u)
                 moving = spatial.plus(step.joint.linear_velocity(step.q, step.u), spatial.cross(turning, point))
                 velocity, omega = spatial.plus(velocity, moving), spatial.plus(omega, turning)
@@ -91,7 +90,6 @@ def _in_parent_axes(step: Step, vector: Triple) -> Triple:
         if angle.value != 0.0:
             vector = spatial.rotate_about_z(cg.cos(angle), -cg.sin(angle), vector)
     else:
-        assert isinstance(step.joint, SpatialJoint)
         vector = spatial.rotate(step.joint.rotation(step.q), vector)
     return spatial.rotate(step.link.turn, vector)
 
@@ -106,7 +104,7 @@ def kinematic_chain(
     name, states = carrier.name, parts(moving, q, qd)
     while name in index:
         i = index[name]
-        steps.append(Step(links[i], moving[i].joint.type, *states[i]))
+        steps.append(Step(links[i], moving_type(moving[i].joint.type), *states[i]))
         name = moving[i].parent
     position = spatial.product(axes.T, carrier.position)
     return KinematicChain(position, spatial.snapped(axes.T @ carrier.orientation), tuple(steps))

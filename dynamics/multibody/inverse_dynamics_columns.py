@@ -27,7 +27,7 @@ from .body_motion import spring_forces
 from .composite_motion import Composite, body_motion
 from .inertial_numbers import Link
 from .joint_coordinates import Places, places
-from .joints import AxialJoint, JointType
+from .joints import AxialJoint, MovingJoint, moving_type
 from .motion_columns import Column, Frame, Freedoms, Tags, next_frame, root_frame
 from .newton_euler import KINETIC, POTENTIAL
 from .spatial import ZERO, Triple, dot
@@ -95,12 +95,12 @@ def torque_derivatives(
                     result.torques[k] = result.torques[k] + link.armature * state[2][k]
                     result.mass[k][k] = result.mass[k][k] + link.armature
             with cg.tag(body.name, POTENTIAL):
-                _add_spring(result, link, body.joint.type, place, state, build)
+                _add_spring(result, link, moving_type(body.joint.type), place, state, build)
     return result
 
 
 def _add_spring(
-    result: TorqueDerivatives, link: Link, joint: JointType, place: Places, state: MotionState, build: Builder
+    result: TorqueDerivatives, link: Link, joint: MovingJoint, place: Places, state: MotionState, build: Builder
 ) -> None:
     """A spring's forces, and their slopes by displacements: of its energy G^T d/dq."""
     q, u = state[0][place.q], state[1][place.u]
@@ -130,9 +130,9 @@ def _frames(
         joint = Freedoms(place.u.start, q[place.q], u[place.u], u_dot[place.u], tags)
         with cg.tag(body.name):
             if parent < 0:
-                frames.append(root_frame(up, link, body.joint.type, joint, in_plane=flat))
+                frames.append(root_frame(up, link, moving_type(body.joint.type), joint, in_plane=flat))
             else:
-                frames.append(next_frame(frames[parent], link, body.joint.type, joint, in_plane=flat))
+                frames.append(next_frame(frames[parent], link, moving_type(body.joint.type), joint, in_plane=flat))
     return frames
 
 

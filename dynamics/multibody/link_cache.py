@@ -16,6 +16,7 @@ from .body import Body, checked
 from .body_motion import Motion, energy, propagate_motion
 from .composed_joints import parts_of
 from .inertial_numbers import Link, axes_of, link
+from .joints import moving_type
 
 
 class Moved(NamedTuple):
@@ -60,9 +61,10 @@ class SharedParts:
 
     def moved(self, parent: Motion, body: Body, link: Link, q: Sequence[Node], u: Sequence[Node]) -> Moved:
         """The motion and energy of a body whose parent moves so. `parent` is one of these motions, or the ground's."""
-        key = (id(parent), body.name, body.joint.type, *[node.name for node in (*q, *u)], *link.numbers)
+        joint = moving_type(body.joint.type)
+        key = (id(parent), body.name, joint, *[node.name for node in (*q, *u)], *link.numbers)
         if key not in self._moved:
             with cg.tag(body.name):
-                motion = propagate_motion(parent, link, body.joint.type, q, u)
-                self._moved[key] = Moved(parent, motion, energy(motion, link, body.joint.type, q, u))
+                motion = propagate_motion(parent, link, joint, q, u)
+                self._moved[key] = Moved(parent, motion, energy(motion, link, joint, q, u))
         return self._moved[key]

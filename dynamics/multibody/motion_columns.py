@@ -25,7 +25,7 @@ from cgraph.extend import as_node
 from . import spatial
 from .composite_motion import Entries, combined
 from .inertial_numbers import Link
-from .joints import AxialJoint, JointType, SpatialJoint
+from .joints import AxialJoint, MovingJoint, SpatialJoint
 from .newton_euler import KINETIC
 from .spatial import STILL, ZERO, Matrix, Triple
 from .spatial_vectors import REST, Twist
@@ -75,7 +75,7 @@ class Freedoms(NamedTuple):
     tags: Tags
 
 
-def root_frame(up: Triple, link: Link, joint: JointType, state: Freedoms, *, in_plane: bool) -> Frame:
+def root_frame(up: Triple, link: Link, joint: MovingJoint, state: Freedoms, *, in_plane: bool) -> Frame:
     """Of a body on the world.  up: the acceleration against free fall.  in_plane: so move all that it carries.
 
     All that a tree needs is alike in any axes, so they are those that this body has just now, or, of a tree in a plane
@@ -100,7 +100,7 @@ def root_frame(up: Triple, link: Link, joint: JointType, state: Freedoms, *, in_
     return _moved(joint, state, UNIT, turned, Frame(STILL, turned, REST, Twist(STILL, up), (), UNIT, angle))
 
 
-def next_frame(parent: Frame, link: Link, joint: JointType, state: Freedoms, *, in_plane: bool) -> Frame:
+def next_frame(parent: Frame, link: Link, joint: MovingJoint, state: Freedoms, *, in_plane: bool) -> Frame:
     """Of a body that another carries."""
     before = _product(parent.axes, link.turn)
     offset, angle = combined(parent.axes, link.place), ZERO
@@ -108,7 +108,6 @@ def next_frame(parent: Frame, link: Link, joint: JointType, state: Freedoms, *, 
         offset = spatial.plus(offset, combined(before, joint.translation(state.q)))
         axes = _product(before, joint.rotation(state.q))
     else:
-        assert isinstance(joint, AxialJoint)
         offset = spatial.plus(offset, spatial.scaled(joint.shift(state.q[0]), before[2]))
         angle = joint.angle(state.q[0])
         if in_plane:
@@ -121,7 +120,7 @@ def next_frame(parent: Frame, link: Link, joint: JointType, state: Freedoms, *, 
     return _moved(joint, state, before, axes, Frame(offset, axes, velocity, acceleration, (), before, angle))
 
 
-def _moved(joint: JointType, state: Freedoms, before: Entries, axes: Entries, frame: Frame) -> Frame:
+def _moved(joint: MovingJoint, state: Freedoms, before: Entries, axes: Entries, frame: Frame) -> Frame:
     """The frame with the motion of the joint, as long as it has that of the body that carries it.
 
     before: the axes of the joint.
@@ -129,7 +128,6 @@ def _moved(joint: JointType, state: Freedoms, before: Entries, axes: Entries, fr
     if isinstance(joint, AxialJoint):
         turn, shift = joint.angle(ONE), joint.shift(ONE)
         return _stage(frame, 0, [Twist(spatial.scaled(turn, axes[2]), spatial.scaled(shift, axes[2]))], state)
-    assert isinstance(joint, SpatialJoint)
     sliding = joint.sliding
     if sliding:
         frame = _stage(frame, 0, [Twist(STILL, axis) for axis in before[:sliding]], state)

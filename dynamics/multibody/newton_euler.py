@@ -19,7 +19,7 @@ from ..systems.system import BiasForce
 from . import spatial
 from .body_motion import Motion, carrier_motion, joint_translation, spring_forces
 from .inertial_numbers import Link
-from .joints import AxialJoint, JointType, SpatialJoint
+from .joints import AxialJoint, MovingJoint, SpatialJoint
 from .spatial import STILL, ZERO, Triple
 
 KINETIC, POTENTIAL = "kinetic", "potential"
@@ -53,7 +53,7 @@ def propagate_acceleration(
     before: Motion,
     after: Motion,
     link: Link,
-    joint: JointType,
+    joint: MovingJoint,
     q: Sequence[Node],
     u: Sequence[Node],
 ) -> Acceleration:
@@ -71,7 +71,6 @@ def propagate_acceleration(
     if isinstance(joint, AxialJoint):
         linear, angular = _about_axis(parent.tags, after, joint, q[0], u[0], linear, angular)
     else:
-        assert isinstance(joint, SpatialJoint)
         omega = spatial.rotate_transpose(link.turn, before.omega)
         linear, angular = _in_space(parent.tags, joint, q, u, omega, linear, angular)
     with cg.tag(KINETIC):
@@ -125,7 +124,7 @@ def _about_axis(
 
 
 def bias_wrench(
-    acceleration: Acceleration, motion: Motion, link: Link, joint: JointType, q: Sequence[Node], u: Sequence[Node]
+    acceleration: Acceleration, motion: Motion, link: Link, joint: MovingJoint, q: Sequence[Node], u: Sequence[Node]
 ) -> list[BiasForce]:
     """Bias wrench, each component paired with the velocity it works on; and the spring's force, with its velocity.
 

@@ -22,7 +22,7 @@ from cgraph.extend import Builder, building, cotangents, real_array, tangents
 from .body_motion import Motion, energy, ground, propagate_motion
 from .inertial_numbers import Link
 from .joint_coordinates import places
-from .joints import JointType
+from .joints import MovingJoint, moving_type
 from .mechanism import Mechanism, require_mechanism
 from .spatial import Array
 
@@ -63,7 +63,7 @@ class RecursiveInverseDynamics:
         self.n = len(mechanism.velocities)
         self._parents = mechanism.parents
         self._links = [[float(number) for number in link.numbers] for link in mechanism.links]
-        self._kernels = [_kernels(body.joint.type) for body in mechanism.moving]
+        self._kernels = [_kernels(moving_type(body.joint.type)) for body in mechanism.moving]
         self._places = places(mechanism.moving)
         self._ground = [float(each) for each in (*rest.omega, *rest.velocity, *rest.vertical, rest.depth)] + [
             0.0
@@ -100,7 +100,7 @@ class _Kernels(NamedTuple):
 
 
 @cache
-def _kernels(joint: JointType) -> _Kernels:
+def _kernels(joint: MovingJoint) -> _Kernels:
     """What a link with that type of joint needs, whatever its numbers are."""
     parent, rates, bars, bar_rates = (_variables(name, MOTION) for name in ("s", "s_dot", "bar", "bar_dot"))
     q = _variables("q", len(joint.coordinates))

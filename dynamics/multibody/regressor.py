@@ -18,6 +18,7 @@ from .body import WORLD, quantities
 from .body_motion import energy, ground, propagate_motion
 from .inertial_numbers import Link, axes_of, link
 from .joint_coordinates import parts, quasi_velocities
+from .joints import moving_type
 from .mechanism import Mechanism, as_mechanism
 from .spatial import Array
 
@@ -118,11 +119,11 @@ def _partial_lagrangians(mechanism: Mechanism, q: list[Node], qd: list[Node], pi
         states = parts(mechanism.moving, q, qd)
         for i, body in enumerate(mechanism.moving):
             axes[body.name] = axes_of(body)
-            known = link(body, axes[body.parent])
+            known, joint = link(body, axes[body.parent]), moving_type(body.joint.type)
             with cg.tag(body.name):
-                motions[body.name] = propagate_motion(motions[body.parent], known, body.joint.type, *states[i])
+                motions[body.name] = propagate_motion(motions[body.parent], known, joint, *states[i])
                 unknown = _symbolic(known, axes[body.name], pi[10 * i : 10 * i + 10])
-                partials.append(energy(motions[body.name], unknown, body.joint.type, *states[i]))
+                partials.append(energy(motions[body.name], unknown, joint, *states[i]))
     return partials
 
 

@@ -17,7 +17,7 @@ from .body_motion import joint_translation
 from .forward_kinematics import Step
 from .inertial_numbers import Link, axes_of
 from .joint_coordinates import parts
-from .joints import AxialJoint, SpatialJoint
+from .joints import AxialJoint, SpatialJoint, moving_type
 from .kinematic_tree import Carrier
 from .spatial import STILL, ZERO, Array, Triple
 
@@ -78,7 +78,7 @@ def _through(run: Sequence[Step], vector: Triple, points: bool) -> Triple:
         for step in run:
             if points and step is not first:
                 total = spatial.plus(total, _turned(angle, joint_translation(step.link, step.joint, step.q)))
-            assert isinstance(step.joint, AxialJoint)
+            assert isinstance(step.joint, AxialJoint)  # as of all runs of several
             angle = angle + step.joint.angle(step.q[0])
         total = spatial.plus(total, _turned(angle, vector))
     total = spatial.rotate(first.link.turn, total)
@@ -105,7 +105,10 @@ def relative_placements(
     result = []
     for carrier, path in zip(carriers, paths, strict=True):
         names = path[: path.index(common)]
-        steps = [Step(links[index[each]], moving[index[each]].joint.type, states[index[each]][0], ()) for each in names]
+        steps = [
+            Step(links[index[each]], moving_type(moving[index[each]].joint.type), states[index[each]][0], ())
+            for each in names
+        ]
         own = axes_of(moving[index[carrier.name]]) if carrier.name in index else np.eye(3)
         orientation = spatial.snapped(own.T @ carrier.orientation)
         result.append(

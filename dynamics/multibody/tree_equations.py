@@ -20,7 +20,7 @@ from .body_motion import Motion, ground
 from .inertial_numbers import Link
 from .inverse_dynamics_columns import torque_derivatives
 from .joint_coordinates import parts
-from .joints import AxialJoint
+from .joints import AxialJoint, moving_type
 from .link_cache import Moved
 from .mechanism_fields import Structure
 from .spatial import Array
@@ -79,11 +79,12 @@ class TreeEquations:
             accelerations = {WORLD: newton_euler.base_acceleration(self.ground)}
             rows = zip(self.bodies, self.links, self._moved(q, qd), parts(self.bodies, q, qd), strict=True)
             for body, link, moved, (x, u) in rows:
+                joint = moving_type(body.joint.type)
                 with cg.tag(body.name):
                     acceleration = accelerations[body.name] = newton_euler.propagate_acceleration(
-                        accelerations[body.parent], moved.parent, moved.motion, link, body.joint.type, x, u
+                        accelerations[body.parent], moved.parent, moved.motion, link, joint, x, u
                     )
-                    forces += newton_euler.bias_wrench(acceleration, moved.motion, link, body.joint.type, x, u)
+                    forces += newton_euler.bias_wrench(acceleration, moved.motion, link, joint, x, u)
         return forces
 
     def torque_derivatives(self, state: MotionState, build: Builder) -> TorqueDerivatives:

@@ -23,6 +23,7 @@ from .body import WORLD, MechanismError
 from .body_motion import Motion, energy, propagate_motion
 from .frames import jacobian_rows
 from .joint_coordinates import parts
+from .joints import moving_type
 from .mechanism import Mechanism, require_mechanism
 from .spatial import ZERO, Triple
 
@@ -172,10 +173,11 @@ def _moments(mechanism: Mechanism) -> Moments:
         mass: Node = ZERO
         rows = zip(mechanism.moving, mechanism.links, parts(mechanism.moving, system.q, system.qd), strict=True)
         for body, link, (q, u) in rows:
+            joint = moving_type(body.joint.type)
             with cg.tag(body.name):
-                motion = propagate_motion(motions[body.parent], link, body.joint.type, q, u)
+                motion = propagate_motion(motions[body.parent], link, joint, q, u)
                 motions[body.name] = motion
-                total = total + energy(motion, link, body.joint.type, q, u)
+                total = total + energy(motion, link, joint, q, u)
                 mass = mass + link.mass
     bars = cotangents({total: ONE}, ground, build)
     still = folded(substitute(bars, dict.fromkeys(ground, ZERO)), build)

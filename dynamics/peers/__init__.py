@@ -21,7 +21,7 @@ CALLS = {(task, mode) for task in ("inverse", "forward") for mode in ("call", "b
 RK4 = {("rk4", mode) for mode in MODES}
 SLOPES = {(task, mode) for task in DERIVATIVES for mode in ("call", "batch")}
 GRAPHS = CALLS | {(task, "loop") for task in ("inverse", "forward")} | RK4 | SLOPES
-ALL = GRAPHS | {(task, "call") for task in MOTIONS}
+ALL = GRAPHS | {("motion", "call"), ("gradient", "call")}
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Kind:
 
 # In the order of the tables' columns; the packages themselves are imported when a peer is made.
 PEERS = {
-    "ours": Kind("our graph as machine code through LLVM", "cgraph", ALL, Ours),
+    "ours": Kind("our graph as machine code through LLVM", "cgraph", ALL | {("inertial-gradient", "call")}, Ours),
     "ours-numpy": Kind(
         "our graph as generated NumPy, for where there is no llvmlite",
         "numpy",

@@ -31,8 +31,9 @@ TASKS = {
     "derivatives": "derivatives of forward dynamics, (q, qd, tau) -> dqdd/dq, dqdd/dqd, M^-1",
     "motion": "1000 RK4 steps, (q, qd, tau of every step) -> (q, qd)",
     "gradient": "gradient of |q|^2 after them, (q, qd, tau of every step) -> its slopes by all of these",
+    "inertial-gradient": "the same, and its slopes by ten inertial numbers of every body",
 }
-MOTIONS = ("motion", "gradient")  # of models whose velocities are rates of coordinates
+MOTIONS = ("motion", "gradient", "inertial-gradient")  # of models whose velocities are rates of coordinates
 DERIVATIVES = {"inverse-derivatives": "inverse", "derivatives": "forward"}  # and what they are of
 BATCH = 4096  # states
 PASSES = 1000  # of a native loop, and steps of a motion

@@ -18,10 +18,12 @@ from ..equations.linearization import state_space
 from ..equations.linearization_parts import linearization_parts
 from ..equations.linearize_many import WRITTEN_OUT, linearization_program, linearize_many
 from ..equations.state_equation import state_equation
+from ..multibody.mechanism import as_mechanism
 from ..simulation.gradients.gradient import gradient
 from ..systems.model import Model
 from .case import DT, MOTIONS, NUDGE, PASSES, Array, Case, rk4_step
-from .contender import Contender, Peer
+from .contender import Contender, Peer, UnavailableError
+from .inertial_parameters import with_inertial_parameters
 
 
 def task_graph(case: Case, task: str) -> Graph:
@@ -85,7 +87,7 @@ class Ours(Peer):
     def prepare(self, task: str, mode: str) -> Contender:
         """The compiled graph of the task."""
         if task in MOTIONS:
-            return self._motion() if task == "motion" else self._gradient()
+            return self._motion() if task == "motion" else self._gradient(task)
         if task == "derivatives" and self.parts().size >= WRITTEN_OUT:
             rates = self.case.system.kinematics.quasi is None
             return self._jacobian() if rates and mode == "call" else self._columns(mode)
@@ -133,14 +135,20 @@ class Ours(Peer):
             lambda: run.run(run.memory({"x": start}), PASSES, PASSES, rows), lambda y: y.rows[0], 1, len(step.nodes)
         )
 
-    def _gradient(self) -> Contender:
+    def _gradient(self, task: str) -> Contender:
         """`dyn.gradient`."""
         case, n = self.case, self.case.n
-        q, qd, tau = np.split(case.point("gradient"), [n, 2 * n])
-        rows, end = tau.reshape(PASSES, n), PASSES * DT
+        model: Model = case.model
+        numbers: dict[str, float] = {}
+        if task == "inertial-gradient":
+            if (mechanism := as_mechanism(model)) is None:
+                raise UnavailableError("the model has no bodies")
+            model, numbers = with_inertial_parameters(mechanism)
+        q, qd, tau = np.split(case.point(task), [n, 2 * n])
+        rows, end, wrt = tau.reshape(PASSES, n), PASSES * DT, ["q", "qd", "tau", *numbers]
         return Contender(
-            lambda: gradient(case.model, _square, q, qd, t_end=end, tau=rows),
-            lambda found: np.concatenate([found["q"], found["qd"], found["tau"].ravel()]),
+            lambda: gradient(model, _square, q, qd, t_end=end, tau=rows, wrt=wrt),
+            lambda found: np.concatenate([np.ravel(found[name]) for name in wrt]),
         )
 
 

@@ -112,27 +112,42 @@ class PinocchioPeer(Peer):
             lambda: algorithm(1, pool, *columns, y), lambda found: result(y if found is None else found), BATCH
         )
 
-    def _slopes(self, task: str) -> Contender:
-        """The derivatives of rnea or aba; those of dampers and springs are added outside what is timed."""
-        forward, n, x = task == "derivatives", self.case.n, self.case.point(task)
+    def slopes(self, x: Array, task: str) -> Array:
+        """The derivatives at one state, (n, 3n), with those of dampers and springs."""
         q, v, last = self.arguments(x, DERIVATIVES[task])
-        algorithm = getattr(self.pinocchio, f"compute{'ABA' if forward else 'RNEA'}Derivatives")
-        model, data, stretched = self.twin, self.data, self.stiffness != 0.0
+        self._algorithm(task)(self.twin, self.data, q, v, last)
+        return self._with_passive(q, v, last, task)
+
+    def _algorithm(self, task: str) -> Callable[..., Any]:
+        stretched = self.stiffness != 0.0
         if any([stretched[place.u].any() for place in self.balls]):
             raise UnavailableError("has no slopes of the springs of ball joints")
+        pin = self.pinocchio
+        result: Callable[..., Any] = {
+            "derivatives": pin.computeABADerivatives,
+            "inverse-derivatives": pin.computeRNEADerivatives,
+        }[task]
+        return result
 
-        def result(_: Any) -> Array:
-            if forward:
-                found = data.ddq_dq, data.ddq_dv, _symmetric(data.Minv)
-            else:
-                found = data.dtau_dq, data.dtau_dv, _symmetric(data.M)
-            rows = self.of.our_slopes(q, v, last, data.ddq if forward else data.tau, found, forward=forward)
-            by_q, by_u, by_last = (rows[:, k * n : (k + 1) * n] for k in range(3))
-            passive = -by_last if forward else np.eye(n)
-            rows = np.hstack([by_q + passive * self.stiffness, by_u + passive * self.damping, by_last])
-            return rows.ravel()
+    def _with_passive(self, q: Array, v: Array, last: Array, task: str) -> Array:
+        """Our derivatives of those in Pinocchio's data."""
+        forward, n, data = task == "derivatives", self.case.n, self.data
+        if forward:
+            found = data.ddq_dq, data.ddq_dv, _symmetric(data.Minv)
+        else:
+            found = data.dtau_dq, data.dtau_dv, _symmetric(data.M)
+        rows = self.of.our_slopes(q, v, last, data.ddq if forward else data.tau, found, forward=forward)
+        by_q, by_u, by_last = (rows[:, k * n : (k + 1) * n] for k in range(3))
+        passive = -by_last if forward else np.eye(n)
+        return np.hstack([by_q + passive * self.stiffness, by_u + passive * self.damping, by_last])
 
-        return Contender(lambda: algorithm(model, data, q, v, last), result)
+    def _slopes(self, task: str) -> Contender:
+        """The derivatives of rnea or aba; those of dampers and springs are added outside what is timed."""
+        q, v, last = self.arguments(self.case.point(task), DERIVATIVES[task])
+        algorithm, model, data = self._algorithm(task), self.twin, self.data
+        return Contender(
+            lambda: algorithm(model, data, q, v, last), lambda _: self._with_passive(q, v, last, task).ravel()
+        )
 
     def _step(self) -> Contender:
         """RK4 in Python over aba."""

@@ -1,5 +1,15 @@
-"""Scenes: named models and models of files with a start."""
+"""Scenes: named models, models of files and models in Python, with a start."""
 
-from .scenes import Scene, chain, load, names, of_file, spring_mass, triple_pendulum
+from .scenes import Scene, chain, is_model_file, load, names, of_file, of_model, spring_mass, triple_pendulum
 
-__all__ = ["Scene", "chain", "load", "names", "of_file", "spring_mass", "triple_pendulum"]
+__all__ = [
+    "Scene",
+    "chain",
+    "is_model_file",
+    "load",
+    "names",
+    "of_file",
+    "of_model",
+    "spring_mass",
+    "triple_pendulum",
+]

@@ -10,6 +10,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
+from cgraph.extend import real_number
 
 from ..equations.equations_of_motion import forward_dynamics
 from ..equations.formulations import inverse_dynamics, spurious_nodes
@@ -75,7 +76,7 @@ def inspection(
 
     Raises ValueError for t_end out of range, and as `simulate` does.
     """
-    system, end = scene.system, scene.t_end if t_end is None else t_end
+    system, end = scene.system, scene.t_end if t_end is None else real_number("t_end", t_end)
     if not 0.0 < end < np.inf:
         raise ValueError(f"t_end must be positive and finite, got {end!r} s")
     frames = int(min(FRAMES, max(2.0, RATE * end))) if np.isfinite(end) else 2

@@ -24,6 +24,7 @@ from ..multibody.planar_arm import planar_arm
 from ..systems.model import Model, as_ode, as_system
 from ..systems.ode_system import OdeSystem
 from ..systems.system import System
+from .python_model import is_python, python_model, short_name
 
 
 @dataclass(frozen=True)
@@ -166,10 +167,29 @@ def of_file(path: str | os.PathLike[str], ignore: bool = False, floating: bool =
     return Scene(Path(path).stem, about, mechanism, q, (0.0,) * mechanism.system.n, 3.0)
 
 
-def _is_path(name: object) -> bool:
-    if not (isinstance(name, str | os.PathLike) and name):
+def of_model(model: Model, name: str = "model") -> Scene:
+    """A model at rest at its zero, of which a ball or free joint's is no turn, watched for 3 s; a scene as it is.
+
+    Raises TypeError for what is no model.
+    """
+    if all([hasattr(model, each) for each in ("model", "t_end")]):
+        return model  # type: ignore[return-value]  # with the attributes of a scene
+    if as_ode(model) is not None:
+        return Scene(name, f"{len(model.coordinates)} states", model, (0.0,) * len(model.coordinates), (), 3.0)
+    system = as_system(model)
+    about = f"{len(system.velocities)} coordinate(s): {', '.join(system.velocities[:12])}"
+    return Scene(name, about, model, tuple(system.kinematics.neutral), (0.0,) * system.n, 3.0)
+
+
+def is_model_file(name: object) -> bool:
+    """Whether a name stands for a model file, MJCF or URDF."""
+    if not (isinstance(name, str | os.PathLike) and name) or name in _SCENES or is_python(os.fspath(name)):
         return False
     return Path(name).suffix.lower() in _SUFFIXES or Path(name).exists()
+
+
+def _of_python(name: str, /) -> Scene:
+    return of_model(python_model(name), short_name(name))
 
 
 def names() -> list[str]:
@@ -178,22 +198,26 @@ def names() -> list[str]:
 
 
 def load(name: str | os.PathLike[str], /, **options: Any) -> Scene:
-    """The scene of that name, or of the MJCF or URDF file at that path; options go to its function.
+    """The scene of a name, of the MJCF or URDF file at a path, or of a model in Python; options go to its function.
 
-    As in `load("chain", n=20)` and `load("robot.xml", ignore=True)`. A path is what ends in .xml or .urdf, or is
-    there as a file.
+    As in `load("chain", n=20)`, `load("robot.xml", ignore=True)` and `load("arm.py:system")`. A path is what ends in
+    .xml or .urdf, or is there as a file. FILE.py:NAME and MODULE:NAME are any model, a scene, or a function without
+    arguments that returns one: the file is executed, so that it must be one that you trust.
 
-    Raises ValueError for a name that is neither, TypeError for an option that its function has not, and as `of_file`.
+    Raises ValueError for a name that is neither, for a Python file without that model or that raises, TypeError for an
+    option that its function has not, and as `of_file`.
     """
     make: Callable[..., Scene]
     if isinstance(name, str) and name in _SCENES:
         make = _SCENES[name]
-    elif _is_path(name):
+    elif is_model_file(name):
         make = partial(of_file, name)
+    elif isinstance(name, str | os.PathLike) and is_python(text := os.fspath(name)):
+        make = partial(_of_python, text)
     else:
         raise ValueError(
             f"there is no scene {name!r:.200}; the scenes are {', '.join(_SCENES)}, "
-            f"and any file that ends in {' or '.join(_SUFFIXES)}"
+            f"any file that ends in {' or '.join(_SUFFIXES)}, and a model in Python as file.py:name"
         )
     known = list(inspect.signature(make).parameters)
     if unknown := [option for option in options if option not in known]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -11,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
-from cgraph.extend import Array, or_nearest
+from cgraph.extend import Array, or_nearest, picture
 
 from .row_values import row_values
 from .sampled_controller import HeldForces
@@ -222,6 +224,35 @@ class Trajectory:
             raise ValueError("the run kept its rows alone: simulate(.., dense_output=True) keeps what is between them")
         return self.dense(t)
 
+    def to_csv(self) -> str:
+        """The rows as CSV: t, coordinates, velocities and energy by their names, every digit of the numbers.
+
+        Returns
+        -------
+        str
+            A line of names, as "t", "q.elbow", "qd.elbow", "energy" (of an OdeSystem "t" and its states), and a line
+            for each row.
+
+        Examples
+        --------
+        >>> import dynamics as dyn
+        >>> run = dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.5], [0.0], t_end=1.0, t_eval=[0.0, 1.0])
+        >>> run.to_csv().splitlines()[0]
+        't,q.joint 1,qd.joint 1,energy'
+        """
+        names, columns = ["t"], [self.t[:, np.newaxis], self.q]
+        if self.velocities:
+            names += [f"q.{name}" for name in self.coordinates] + [f"qd.{name}" for name in self.velocities]
+            columns += [self.qd, self.energy[:, np.newaxis]]
+            names.append("energy")
+        else:
+            names += self.coordinates
+        text = io.StringIO()
+        rows = csv.writer(text, lineterminator="\n")
+        rows.writerow(names)
+        rows.writerows(np.concatenate(columns, axis=1).tolist())
+        return text.getvalue()
+
     @cached_property
     def qdd(self) -> Array:
         """Accelerations at the rows, (T, n); of an OdeSystem without columns."""
@@ -296,6 +327,10 @@ class Trajectory:
     def nlu(self) -> int:
         """LU factorizations."""
         return self.stats.nlu
+
+    def _repr_html_(self) -> str | None:
+        """The plot that a notebook shows, when a drawing package is installed (extra `viz`)."""
+        return picture("trajectory", self)
 
     def __repr__(self) -> str:
         n, stats = self.q.shape[1], self.stats

@@ -7,6 +7,7 @@ import math
 import numbers
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from types import FunctionType
 from typing import Any, NoReturn
 
 import cgraph as cg
@@ -92,14 +93,23 @@ def call_user_function(what: str, function: Callable[..., Any], *arguments: Any,
     names = "(q, qd, t) or (q, qd, t, p)" if len(arguments) == 4 else f"({state}, t) or ({state}, t, p)"
     if not callable(function):
         raise TypeError(f"{what} must be a function of {names}, got {function!r:.60}")
-    signature = inspect.signature(function)
     for chosen in (arguments, arguments[:-1]):
-        try:
-            signature.bind(*chosen)
-        except TypeError:
-            continue
-        return function(*chosen)
-    raise TypeError(f"{what} must take {names}, got {signature}")
+        if _takes(function, len(chosen)):
+            return function(*chosen)
+    raise TypeError(f"{what} must take {names}, got {inspect.signature(function)}")
+
+
+def _takes(function: Callable[..., Any], count: int) -> bool:
+    """Whether it can be called with so many arguments."""
+    if type(function) is FunctionType and not hasattr(function, "__wrapped__"):
+        code = function.__code__
+        if not code.co_kwonlyargcount and not code.co_flags & inspect.CO_VARARGS:
+            return 0 <= code.co_argcount - count <= len(function.__defaults__ or ())
+    try:
+        inspect.signature(function).bind(*[None] * count)
+    except TypeError:
+        return False
+    return True
 
 
 def sequence(what: str, value: Any) -> list[Any]:

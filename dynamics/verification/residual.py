@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph.extend import Array, html_lines, html_table
 
 
 @dataclass(frozen=True)
@@ -79,11 +79,21 @@ class Certificate:
             + (f"  ({each.note})" if each.note else "")
             for each in self.residuals
         ]
-        lines.append(f"{self.states} random states, seed {self.seed}. Bounds:")
+        return "\n".join(lines + self._remarks())
+
+    def _repr_html_(self) -> str:
+        rows = [
+            ("ok" if each.passed else "FAIL", each.equation, each.note, each.bound.name, f"{each.value:.1e}")
+            for each in self.residuals
+        ]
+        table = html_table(("", "equation", "", "bound", "residual"), rows, texts=4)
+        return table + html_lines("\n".join(self._remarks()))
+
+    def _remarks(self) -> list[str]:
         bounds = dict.fromkeys([each.bound for each in self.residuals])
+        lines = [f"{self.states} random states, seed {self.seed}. Bounds:"]
         lines += [f"  {each.name}, {each.value:g}: {each.reason}" for each in bounds]
-        lines += [f"left out: {each}" for each in self.left_out]
-        return "\n".join(lines)
+        return lines + [f"left out: {each}" for each in self.left_out]
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""

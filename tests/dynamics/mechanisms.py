@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 import dynamics as dyn
+from dynamics.multibody.joint_coordinates import places
 from dynamics.multibody.mechanism import WORLD, Body, Joint, Mechanism
 from dynamics.multibody.spatial import rotation
 
@@ -84,3 +86,64 @@ def turned_tree(n: int) -> Mechanism:
     """n revolute joints, two on each until there are n."""
     rng = np.random.default_rng(n)
     return dyn.tree([(i - 1) // 2 for i in range(n)], [turned_link(i, rng) for i in range(n)])
+
+
+TREE_KINDS = ["revolute", "prismatic", "ball", "fixed"]
+
+
+def random_tree(seed: int, n: int) -> Mechanism:
+    """n bodies of some kinds on chains, branches or all on one, two in five on a base that is free.
+
+    Joints have damping, armature where they can, and springs where they can have any.
+    """
+    rng = np.random.default_rng((seed, n))
+    kinds = ["revolute", *rng.permutation(TREE_KINDS)[: rng.integers(1, 4)].tolist()]
+    base = rng.choice(["free", "free (body axes)", "", "", ""])
+    reach, bodies = int(rng.choice([1, 2, 4, n])), []
+    for i in range(n):
+        kind = str(base or "revolute") if i == 0 else str(rng.choice(kinds))
+        parent = f"b{rng.integers(max(0, i - reach), i)}" if i else WORLD
+        sprung = {"stiffness": 0.0, "spring_reference": 0.0} if kind in ("ball", "free", "free (body axes)") else {}
+        others = sprung | ({"armature": 0.0} if kind in ("free (body axes)", "fixed") else {})
+        bodies.append(random_body(f"b{i}", kind, parent, rng, joint=random_joint(kind, rng, **others)))
+    return Mechanism(bodies, 5.0 * rng.normal(size=3))
+
+
+def random_state(tree: Mechanism, seed: int) -> tuple[Array, Array, Array, Array]:
+    """q, quaternions of length 1, and normal qd, qdd and tau."""
+    rng, system = np.random.default_rng(seed), tree.system
+    q = np.array(system.kinematics.neutral) + rng.uniform(-1.0, 1.0, system.nq)
+    for body, place in zip(tree.moving, places(tree.moving), strict=True):
+        if len(body.joint.type.coordinates) > 3:
+            turn = q[place.q][-4:]
+            turn /= np.linalg.norm(turn)
+    qd, qdd, tau = rng.normal(size=(3, system.n))
+    return q, qd, qdd, tau
+
+
+def floating(kind: str, tree: Mechanism, on: str = "world") -> Mechanism:
+    """The tree on a body that moves freely, or that body on one of the tree."""
+    joint = Joint(kind, position=(0.1, 0.2, 0.3), orientation=tree.bodies[0].joint.orientation, damping=0.3)
+    free = random_body("free", kind, on, np.random.default_rng(0), joint=joint)
+    carried = [replace(body, parent="free") if on == body.parent == "world" else body for body in tree.bodies]
+    return Mechanism([*carried, free], tree.gravity)
+
+
+def forest(tree: Mechanism) -> Mechanism:
+    """The mechanism with its third body, and what that carries, on the world."""
+    first, second, third, *others = tree.bodies
+    return Mechanism([first, second, replace(third, parent="world"), *others], tree.gravity)
+
+
+TREES: dict[str, Callable[[], Mechanism]] = {
+    "hinges": lambda: random_mechanism(4, ["revolute"], 1),
+    "hinges and slides": lambda: random_mechanism(5, ["revolute", "prismatic"], 3),
+    "balls": lambda: random_mechanism(3, ["ball", "revolute"], 2),
+    "a ball on a slide": lambda: random_mechanism(2, ["prismatic", "ball"], 1),
+    "a free base": lambda: floating("free", random_mechanism(3, ["revolute", "prismatic"], 2)),
+    "a free base in its own axes": lambda: floating("free (body axes)", random_mechanism(2, ["revolute"], 1)),
+    "free on a hinge": lambda: floating("free", random_mechanism(1, ["revolute"], 1), on="b0"),
+    "fixed": lambda: random_mechanism(5, ["revolute", "fixed", "prismatic"], 2),
+    "turned by quarters": lambda: turned_arm(4),
+    "trees": lambda: forest(random_mechanism(4, ["revolute", "prismatic"], 1)),
+}

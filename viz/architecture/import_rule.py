@@ -21,12 +21,12 @@ TABLE = {
         "scenes, reference <- peers <- verification, experiments",
     ),
     "viz": (
-        "theme <- graph_drawing, plots <- pages <- inspector, paper <- commands <- cli <- __main__",
+        "theme <- graph_drawing, plots <- pages <- inspector, paper <- models <- commands <- cli <- __main__",
         "graph_drawing <- architecture <- commands",
-        "inspector <- typed <- commands",
+        "inspector <- typed <- models, commands",
     ),
     "": (
-        "cgraph <- dynamics <- viz.paper, viz.commands",
+        "cgraph <- dynamics <- viz.paper, viz.models, viz.commands",
         "cgraph <- viz",
     ),
 }  # fmt: skip

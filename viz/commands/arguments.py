@@ -14,7 +14,7 @@ from typing import Any
 
 from cgraph import Graph
 from cgraph.extend import check_writable, write_files
-from dynamics import FORMULATIONS, scenes
+from dynamics import FORMULATIONS, forward_dynamics, inverse_dynamics, scenes
 
 from ..graph_drawing.dot import to_dot
 from ..graph_drawing.render import check_can_draw, render_svg, tags_to_collapse
@@ -22,11 +22,14 @@ from .signals import settled
 
 Commands = argparse._SubParsersAction  # what `add_subparsers` returns has no public name
 READING = ("ignore", "floating")  # options of `scenes.of_file`
+IN_PYTHON = "file.py:name, a model of a Python file, which is executed"
 
 
 def takes_a_scene(command: argparse.ArgumentParser) -> None:
     """The arguments that `scene_of` reads."""
-    command.add_argument("scene", metavar="SCENE", help=f"{', '.join(scenes.names())}, or a model file, MJCF or URDF")
+    command.add_argument(
+        "scene", metavar="SCENE", help=f"{', '.join(scenes.names())}, a model file, MJCF or URDF, or {IN_PYTHON}"
+    )
     reads_files(command)
 
 
@@ -93,11 +96,21 @@ def show_warnings() -> Iterator[None]:
         yield
 
 
-def takes_a_formulation(command: argparse._ActionsContainer) -> None:
-    """The argument `--formulation`."""
-    command.add_argument(
-        "--formulation", default="chain_rule", choices=sorted(FORMULATIONS), help="default: chain_rule"
+def takes_equations(command: argparse.ArgumentParser) -> None:
+    """The arguments that `equations_of` reads, of which one may be given."""
+    which = command.add_mutually_exclusive_group()
+    which.add_argument(
+        "--formulation", default="chain_rule", choices=sorted(FORMULATIONS), help="of inverse dynamics (chain_rule)"
     )
+    which.add_argument("--forward", action="store_true", help="forward dynamics, with outputs such as qdd0")
+
+
+def equations_of(options: argparse.Namespace, scene: scenes.Scene) -> tuple[Graph, str]:
+    """The graph that the arguments choose, and what it is: "inverse dynamics, chain rule"."""
+    if options.forward:
+        return forward_dynamics(scene), "forward dynamics"
+    graph = inverse_dynamics(scene, options.formulation)
+    return graph, f"inverse dynamics, {options.formulation.replace('_', ' ')}"
 
 
 def whole(text: str) -> int:

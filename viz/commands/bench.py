@@ -11,7 +11,7 @@ from dynamics.experiments.speed.bench import MODES, PEERS, QUICK, SCENES, TASKS,
 from dynamics.experiments.speed.bench_figures import FIGURES
 from dynamics.experiments.speed.bench_table import tables
 
-from .arguments import READING, Commands, positive, reading, reads_files, say, whole
+from .arguments import IN_PYTHON, READING, Commands, positive, reading, reads_files, say, whole
 
 SPEED = "speed"
 OF_SPEED = (*READING, "tasks", "modes", "peers", "quick", "budget", "json")  # options of speed alone
@@ -40,7 +40,7 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
         nargs="*",
         metavar="FIGURE | SCENE",
         help=f"a figure of those below, {SPEED} if none; its scenes: {', '.join(SCENES)} (default: all of these), a "
-        "name that `cgraph scenes` lists, or a model file",
+        f"name that `cgraph scenes` lists, a model file, or {IN_PYTHON}",
     )
     reads_files(parser)
     for what, known in (("tasks", TASKS), ("modes", MODES), ("peers", PEERS)):

@@ -38,8 +38,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _twin(scene: str, floating: bool) -> Any:
-    """MuJoCo's own model of a file; None for a scene by name, and where MuJoCo cannot read the file."""
-    if scene in scenes.names():
+    """MuJoCo's own model of a file; None for other scenes, and where MuJoCo cannot read the file."""
+    if not scenes.is_model_file(scene):
         return None
     try:
         return compiled(scene, floating=floating)

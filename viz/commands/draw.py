@@ -8,12 +8,12 @@ from pathlib import Path
 
 from cgraph import Graph
 from cgraph.extend import check_writable
-from dynamics import display_names, inverse_dynamics, spurious_nodes
+from dynamics import display_names, spurious_nodes
 
 from .. import theme
 from ..graph_drawing.dot import to_dot
 from ..graph_drawing.render import check_can_draw, render_png, render_svg
-from .arguments import Commands, answer, collapsed, scene_of, takes_a_formulation, takes_a_scene
+from .arguments import Commands, answer, collapsed, equations_of, scene_of, takes_a_scene, takes_equations
 
 PICTURES = (".svg", ".png")
 KINDS = (*PICTURES, ".dot", ".txt")
@@ -25,7 +25,7 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
         "draw", help="draw the graph of a scene's equations (SVG, PNG or DOT) or list it (TXT)"
     )
     takes_a_scene(parser)
-    takes_a_formulation(parser)
+    takes_equations(parser)
     parser.add_argument("--out", type=Path, required=True, help="file to write: .svg, .png, .dot or .txt")
     parser.add_argument(
         "--collapse",
@@ -45,8 +45,8 @@ def run(options: argparse.Namespace) -> None:
     if kind in PICTURES:
         check_can_draw(png=kind == ".png")
     scene = scene_of(options)
-    graph = inverse_dynamics(scene, options.formulation)
-    caption = f"{scene.name}: inverse dynamics, {options.formulation.replace('_', ' ')}"
+    graph, what = equations_of(options, scene)
+    caption = f"{scene.name}: {what}"
     names = theme.called(display_names(scene))
     content = graph.listing() if kind == ".txt" else _drawn(graph, kind, options.collapse, caption, names)
     counts = graph.counts()

@@ -6,11 +6,11 @@ import argparse
 from pathlib import Path
 
 from cgraph.extend import check_writable
-from dynamics import display_names, scenes
-from dynamics.scenes.inspection import FRAMES, Inspection, Shares, inspection
+from dynamics.scenes.inspection import FRAMES, inspection
 
-from ..inspector import Motion, Page, StateTable, Version, page
-from .arguments import Commands, answer, positive, say, scene_of, takes_a_scene, unless_json
+from ..models.inspect import cut_short, inspection_page
+from .arguments import Commands, answer, positive, say, takes_a_scene, unless_json
+from .point_arguments import started, takes_a_start
 
 LONGEST = 1000.0  # s: seconds of work for an arm of ten links
 
@@ -23,6 +23,7 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
     takes_a_scene(parser)
     parser.add_argument("--out", type=Path, required=True, help="file to write: .html")
     parser.add_argument("--forward", action="store_true", help="forward dynamics, in place of the three formulations")
+    takes_a_start(parser)
     parser.add_argument("--t-end", type=positive, metavar="S", help="how long it moves, in place of the scene's time")
     parser.add_argument("--json", action="store_true", help="print the sizes as JSON")
     parser.set_defaults(run=run)
@@ -36,10 +37,10 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError(f"--t-end must be at most {LONGEST:g} s, got {options.t_end:g} s: a page has {FRAMES} times")
     check_writable(options.out)
     say(f"reading {options.scene}")
-    scene = scene_of(options)
+    scene, moved = started(options)
     content = inspection(scene, forward=options.forward, t_end=options.t_end, say=say)
     say(f"{scene.name}: writing the page of {sum(len(each.graph.nodes) for each in content.versions)} nodes")
-    text = inspection_page(scene, content)
+    text = inspection_page(scene, content, moved)
     sizes = {
         version.name: {
             "nodes": len(version.graph.nodes),
@@ -53,34 +54,5 @@ def run(options: argparse.Namespace) -> int:
     data = {"scene": scene.name, "bytes": size, "stopped": content.stopped, "versions": sizes}
     answer(unless_json(options, data, f"{options.out}: {counts}; {size / 1e6:.2f} MB"), {options.out: text})
     if content.stopped:
-        say(_cut(content))
+        say(cut_short(content))
     return 1 if content.stopped else 0
-
-
-def inspection_page(scene: scenes.Scene, content: Inspection) -> Page:
-    """The page of what there is to inspect in a scene."""
-    bones, mechanism = content.skeleton, scene.mechanism
-    forward = content.versions[0].name == "forward dynamics"
-    notices = [f"The model leaves out {text}." for text in scene.left_out]
-    return page(
-        [Version(each.name.replace("_", " "), *each[1:]) for each in content.versions],
-        title=f"{scene.name}: {'forward' if forward else 'inverse'} dynamics",
-        at=content.at,
-        derived=content.derived,
-        motion=Motion(content.t, bones.points, bones.parents) if bones else Motion(content.t),
-        tables=[_torques(scene, content.shares)] if content.shares else [],
-        names=display_names(scene),
-        units=content.units,
-        columns={body.name: body.parent for body in mechanism.moving} if mechanism else None,
-        notices=[*notices, *([_cut(content)] if content.stopped else [])],
-    )
-
-
-def _cut(content: Inspection) -> str:
-    return f"The motion is not whole: it {content.stopped}."
-
-
-def _torques(scene: scenes.Scene, shares: Shares) -> StateTable:
-    """A row for each velocity, a column for each part."""
-    rows = {f"tau{i}": shares.row(i) for i in range(scene.system.n)}
-    return StateTable("Torques and forces that each part takes", shares.graph, shares.parts, rows)

@@ -5,18 +5,20 @@ from __future__ import annotations
 import argparse
 
 import cgraph as cg
-from dynamics import display_names, inverse_dynamics, lint_constraints
+from dynamics import display_names, lint_constraints
 
 from .. import theme
+from ..models.open_loops import tree_alone
 from .arguments import (
     Commands,
     answer_and_draw,
     check_picture,
+    equations_of,
     may_draw_and_print,
     scene_of,
     state_names,
-    takes_a_formulation,
     takes_a_scene,
+    takes_equations,
     unless_json,
 )
 from .point_arguments import REST, box, filled, point
@@ -29,7 +31,7 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
         help="check that q and qd are independent in a scene's equations; status 1 and the blame if they are not",
     )
     takes_a_scene(parser)
-    takes_a_formulation(parser)
+    takes_equations(parser)
     parser.add_argument(
         "--box",
         type=box,
@@ -47,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
     """Print the proof or the blame; 1 where anything is not as declared."""
     check_picture(options)
     scene = scene_of(options)
-    graph = inverse_dynamics(scene, options.formulation)
+    graph, what = equations_of(options, scene)
     q, qd = state_names(graph, scene)
     report = cg.lint(
         graph,
@@ -61,7 +63,9 @@ def run(options: argparse.Namespace) -> int:
     held = lint_constraints(scene)
     if str(held):
         proof = f"{proof}\n{held}"
-    data = {"scene": scene.name, "formulation": options.formulation} | report.to_dict()
+    alone = "" if options.forward else tree_alone(scene)
+    proof = f"{proof}\n{alone}" if alone else proof
+    data = {"scene": scene.name, "equations": what, "of_the_tree": bool(alone)} | report.to_dict()
     data |= {"constraints": held.to_dict(), "ok": report.ok and held.ok}
     answer_and_draw(
         options,
@@ -71,6 +75,6 @@ def run(options: argparse.Namespace) -> int:
         marked_label="to blame",
         marked_edges=report.edges,
         names=theme.called(display_names(scene)),
-        caption=f"{scene.name}: inverse dynamics, {options.formulation.replace('_', ' ')}",
+        caption=f"{scene.name}: {what}",
     )
     return 0 if report.ok and held.ok else 1

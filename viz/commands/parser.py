@@ -20,6 +20,7 @@ from . import (
     paper,
     report,
     scenes,
+    simulate,
     type as type_,
     why,
 )
@@ -33,6 +34,7 @@ COMMANDS = (
     draw,
     certify,
     inspect,
+    simulate,
     type_,
     lint,
     why,

@@ -1,4 +1,4 @@
-"""Points and boxes of a graph's inputs, from the command line: `q.knee=0.1,qd0=2` and `q0=-1:1`."""
+"""Points and boxes of a graph's inputs and starts, from the command line: `q.knee=0.1,qd0=2` and `q0=-1:1`."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from cgraph import Graph
 from cgraph.extend import Names
 from dynamics import display_names
 from dynamics.scenes.scenes import Scene
+from dynamics.scenes.start import Start, moving_start, start_text, with_start
 
-from .arguments import number
+from .arguments import number, say, scene_of
 
 SEED, DIGITS = 20250814, 3  # of the numbers that nobody gave: always the same, and short enough to be typed again
 DT = 1e-3  # s, the step of an embedded relation
@@ -51,6 +52,33 @@ def filled(graph: Graph, scene: Scene, given: dict[str, float]) -> dict[str, flo
         drawn = round(chosen.uniform(-1.0, 1.0), DIGITS)
         values[name] = parameters[name] if name in parameters else {"dt": DT, "t": 0.0}.get(name, drawn)
     return values | Names(graph, display_names(scene)).inputs_of("--at", given)
+
+
+def takes_a_start(command: argparse.ArgumentParser) -> None:
+    """The argument `--start`, which `started` reads."""
+    command.add_argument(
+        "--start",
+        type=start,
+        metavar="A=1,B=2",
+        help="in place of the scene's start: what differs from it, by names such as q0, qd.knee or knee, or all "
+        "numbers of q and qd; without it, a scene that would only rest starts half a radian away",
+    )
+
+
+def start(text: str) -> Start:
+    """`q0=0.3,qd.knee=1` as numbers by name, or `0.3,0,0,1` as all of them, for argparse."""
+    return point(text) if "=" in text else [number(each) for each in text.split(",")]
+
+
+def started(options: argparse.Namespace) -> tuple[Scene, bool]:
+    """The scene that the arguments name, from the start that they name or one that shows something; True if so."""
+    scene = scene_of(options)
+    if options.start is not None:
+        return with_start(scene, options.start), False
+    moving = moving_start(scene)
+    if moving is not scene:
+        say(f"{scene.name}: at rest nothing moves, so it starts at {start_text(moving)}; --start chooses another")
+    return moving, moving is not scene
 
 
 def point_text(at: Mapping[str, float]) -> str:

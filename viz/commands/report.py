@@ -22,7 +22,8 @@ from ..pages import work_precision as page
 from ..pages.document_files import check_folder, document_files
 from ..plots.plot import check_can_plot
 from . import pruning_report, stability_report
-from .arguments import READING, Commands, answer, number, positive, reading, reads_files, say, unless_json
+from .arguments import IN_PYTHON, READING, Commands, answer, number, positive, reading, reads_files, say, unless_json
+from .point_arguments import start
 
 CURVES, STABILITY, PRUNING, COMPARE = "a report of run times", "--stability", "--pruning", "--compare"
 GO_WITH = {  # options that not every kind of report has
@@ -48,7 +49,8 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
         "scenes",
         nargs="*",
         metavar="SCENE",
-        help=f"{', '.join([*scenes.names(), *named_settings.names()])}, a model file, MJCF or URDF, or a case",
+        help=f"{', '.join([*scenes.names(), *named_settings.names()])}, a model file, MJCF or URDF, a case, or "
+        f"{IN_PYTHON}",
     )
     parser.add_argument(
         "--stability", action="store_true", help="the table of stiff and extreme cases; status 1 for an unexplained row"
@@ -56,7 +58,9 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
     reads_files(parser)
     parser.add_argument("--out", type=Path, help=f"folder to fill (default: {FOLDER}; with --json, none)")
     parser.add_argument("--t-end", type=positive, metavar="S", help="how long, instead of the scene's own time")
-    parser.add_argument("--start", type=_state, metavar="A,B", help="q and then qd, instead of the scene's own start")
+    parser.add_argument(
+        "--start", type=start, metavar="A=1,B=2", help="instead of the scene's own: by names, or all numbers"
+    )
     parser.add_argument("--methods", metavar="A,B", help=f"only these of {', '.join(METHODS)}")
     parser.add_argument("--peers", metavar="A,B", help=f"only these of {', '.join(PEERS)}; '' for none")
     parser.add_argument("--quick", action="store_true", help="fewer turns, shorter runs, and no cold starts")
@@ -100,10 +104,6 @@ def run(options: argparse.Namespace) -> int | None:
     if options.out is not None:
         check_folder(options.out)
     return runs[kind](options)
-
-
-def _state(text: str) -> list[float]:
-    return [number(each) for each in text.split(",")]
 
 
 def _locked(text: str) -> tuple[str, float]:

@@ -7,17 +7,19 @@ import argparse
 import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Names, cotangents
-from dynamics import display_names, forward_dynamics, inverse_dynamics, scenes
+from dynamics import display_names, scenes
 
 from .. import theme
+from ..models.open_loops import tree_alone
 from .arguments import (
     Commands,
     answer_and_draw,
     check_picture,
+    equations_of,
     may_draw_and_print,
     scene_of,
-    takes_a_formulation,
     takes_a_scene,
+    takes_equations,
     unless_json,
     whole,
 )
@@ -30,9 +32,7 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
     takes_a_scene(parser)
     parser.add_argument("output", metavar="OUTPUT", help="such as tau0, or tau.knee of a joint by its name")
     parser.add_argument("input", metavar="INPUT", help="such as q2, or q.hip")
-    which = parser.add_mutually_exclusive_group()
-    takes_a_formulation(which)
-    which.add_argument("--forward", action="store_true", help="of forward dynamics, with outputs such as qdd0")
+    takes_equations(parser)
     parser.add_argument("--k", type=whole, default=10, metavar="K", help="paths to list, heaviest first (default: 10)")
     parser.add_argument("--at", type=point, default={}, metavar="A=1,B=2", help=f"where paths are weighed; {REST}")
     may_draw_and_print(parser)
@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> None:
     """Print the paths and what they add up to; of two that are not connected, where the chain stops."""
     check_picture(options)
     scene = scene_of(options)
-    graph = forward_dynamics(scene) if options.forward else inverse_dynamics(scene, options.formulation)
+    graph, _ = equations_of(options, scene)
     names = Names(graph, display_names(scene))
     at = filled(graph, scene, options.at)
     found = cg.why(graph, options.output, options.input, at=at, k=options.k, names=display_names(scene))
@@ -58,10 +58,12 @@ def run(options: argparse.Namespace) -> None:
     gap = abs(total - derivative)
     balance = {"sum_over_all_paths": total, "derivative_by_reverse_sweep": derivative, "difference": gap}
     what = "sum of path products" if all_listed else f"sum over all {found.count} path products"
+    alone = "" if options.forward else tree_alone(scene)
     text = f"At {point_text(shown)}:\n{found}\n|{what} - derivative by a reverse sweep| = {gap:.2g}"
+    text = f"{text}\n{alone}" if alone else text
     answer_and_draw(
         options,
-        unless_json(options, {"depends": True, "at": at} | found.to_dict() | balance, text),
+        unless_json(options, {"depends": True, "of_the_tree": bool(alone), "at": at} | found.to_dict() | balance, text),
         graph,
         marked_edges=found.edges,
         names=theme.called(display_names(scene)),
@@ -71,10 +73,13 @@ def run(options: argparse.Namespace) -> None:
 
 def _not_connected(options: argparse.Namespace, scene: scenes.Scene, graph: Graph) -> None:
     stops = cg.why_not(graph, options.output, options.input, names=display_names(scene))
+    alone = "" if options.forward else tree_alone(scene)
     here = set(graph.nodes)  # an input that nothing uses is none of the graph's nodes
     answer_and_draw(
         options,
-        unless_json(options, {"depends": False} | stops.to_dict(), stops),
+        unless_json(
+            options, {"depends": False, "of_the_tree": bool(alone)} | stops.to_dict(), f"{stops}\n{alone}".strip()
+        ),
         graph,
         marked={
             f"made from {stops.input}": stops.reached & here,

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from cgraph import Edge, Graph, Node
+from cgraph.extend import Names
 
 from .. import theme
 from ..theme import Paint
@@ -46,9 +47,16 @@ class _Subject:
     marked_edges: frozenset[Edge]
     number: dict[Node, int]
     part: dict[Node, str]  # id of the collapsed box that a node is in
+    listed: Names  # who has the %number of the listing
 
     def id(self, node: Node) -> str:
         return self.part.get(node, f"n{self.number[node]}")
+
+    def told(self, node: Node) -> str:
+        """What a tooltip calls a node: the name of its part, the %number of the listing, its name or its value."""
+        if node in self.part:
+            return self.part[node]
+        return f"%{self.listed.number[node]}" if node.args else self.listed.short(node)
 
     def shown(self, name: str) -> str:
         return self.names[name] if name in self.names else theme.pretty(name)
@@ -73,7 +81,7 @@ def plan_of(
     strange = [node for node in marks if node not in number]
     if strange:
         raise ValueError(f"{len(strange)} of {len(marks)} marked nodes are not in the graph, such as {strange[0]!r}")
-    subject = _Subject(graph, names, marks, marked_edges, number, _parts(graph, collapse))
+    subject = _Subject(graph, names, marks, marked_edges, number, _parts(graph, collapse), Names(graph))
     plan = Plan()
     plan.boxes.extend(_part_boxes(subject, collapse))
     for node in graph.nodes:
@@ -136,7 +144,7 @@ def _node_box(subject: _Subject, node: Node, box_id: str, cluster: str | None) -
 
 
 def _output_box(subject: _Subject, name: str, box_id: str) -> Box:
-    about = f"output {name}, computed by {subject.id(subject.graph.outputs[name])}"
+    about = f"output {name}, computed by {subject.told(subject.graph.outputs[name])}"
     return Box(box_id, theme.OUTPUT, {**_OUTPUT, "label": subject.shown(name), "tooltip": about})
 
 
@@ -145,9 +153,10 @@ def _weight(heavy: bool) -> Attributes:
 
 
 def _about(subject: _Subject, node: Node) -> str:
-    """One line on a node, for the tooltip: number, operation and name, roles, tags."""
+    """One line on a node, for the tooltip: %number of the listing, operation and name, roles, tags."""
     what = repr(node.value) if node.value is not None else (node.name or "")
-    lines = [f"n{subject.number[node]}: {node.op.name} {what}".rstrip()]
+    number = f"{subject.told(node)}: " if node.args else ""
+    lines = [f"{number}{node.op.name} {what}".rstrip()]
     if node.roles:
         lines.append(", ".join(sorted(node.roles)))
     if node.tags:
@@ -168,7 +177,8 @@ def _arrows(subject: _Subject) -> Iterator[Arrow]:
             yield _node_arrow(subject, edge)
     for (tail, head), edges in merged.items():
         mark = next(filter(None, [subject.mark_of(edge) for edge in edges]), None)
-        about = f"{len(edges)} edge{'s' if len(edges) > 1 else ''} from {tail} to {head}"
+        ends = f"from {subject.told(edges[0].source)} to {subject.told(edges[0].target)}"
+        about = f"{len(edges)} edge{'s' if len(edges) > 1 else ''} {ends}"
         attributes = {"id": f"e{tail.removeprefix('n')}-{head.removeprefix('n')}", "edgetooltip": about}
         if len(edges) > 1:
             attributes["label"] = f"×{len(edges)}"
@@ -183,7 +193,10 @@ def _node_arrow(subject: _Subject, edge: Edge) -> Arrow:
     source, target, slot = subject.number[edge.source], subject.number[edge.target], edge.slot
     op = edge.target.op
     tail = f"n{source}" if edge.source.value is None else f"n{source}-{target}-{slot}"
-    attributes = {"id": f"e{source}-{target}-{slot}", "edgetooltip": f"argument {slot + 1} of n{target}: {op.name}"}
+    attributes = {
+        "id": f"e{source}-{target}-{slot}",
+        "edgetooltip": f"argument {slot + 1} of {subject.told(edge.target)}: {op.name}",
+    }
     if op.arity > 1 and not op.commutative:
         attributes["headlabel"] = str(slot + 1)
     return Arrow(tail, f"n{target}", {**attributes, **_line(subject.mark_of(edge))})

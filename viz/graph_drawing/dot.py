@@ -39,8 +39,9 @@ def to_dot(
     each use, so that shared numbers make no long edges. An output is a box above the node that computes it. The order
     of arguments is written at an edge where it matters. An input that no output needs is not drawn.
 
-    Ids are stable: node i of `graph.nodes` is `n<i>`, a constant's copy `n<i>-<use>-<slot>`, output j `o<j>`, collapsed
-    box k `c<k>`; an edge is `e<source>-<target>-<slot>`. The same graph gives the same text in every run.
+    Tooltips call operations by their numbers in `graph.listing()`. Ids are stable: node i of `graph.nodes` is `n<i>`, a
+    constant's copy `n<i>-<use>-<slot>`, output j `o<j>`, collapsed box k `c<k>`; an edge is
+    `e<source>-<target>-<slot>`. The same graph gives the same text in every run.
     Up to some 500 nodes this draws well. Above, collapse tags.
 
     Parameters

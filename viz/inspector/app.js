@@ -22,7 +22,7 @@ function start(first = JSON.parse(byId("data").textContent)) {
   const app = { svg: byId("picture"), callbacks, playing: false };
   app.output = () => (app.version.outputs.find(([name]) => name === app.from) ?? app.version.outputs[0])[2];
   app.partials = () => (app.slopes ??= slopesAt(app.version, app.record.slopes, app.values));
-  app.noise = () => (app.bounds ??= errorBounds(app.version, app.partials(), app.values));
+  app.noise = () => (app.bounds ??= errorBounds(app.version, app.partials(), app.values, app.state.errorsOf(app.version)));
   app.refresh = () => refresh(app);
   listen(app);
   showRecord(app, first);
@@ -80,9 +80,9 @@ function compute(app) {
 /** Noise of a graph's values: computed only where an output may be noise. */
 function noiseIn(app, graph, values) {
   if (values === app.values) return app.noise();
-  const largest = values.reduce((most, value) => (Number.isFinite(value) ? Math.max(most, Math.abs(value)) : most), 0);
-  const small = graph.outputs.some(([, , node]) => Math.abs(values[node]) < 1e-6 * largest);
-  return small ? errorBounds(graph, slopesAt(graph, app.record.slopes, values), values) : new Float64Array(values.length);
+  const small = 1e-6 * largestOf(values);
+  if (!graph.outputs.some(([, , node]) => Math.abs(values[node]) < small)) return new Float64Array(values.length);
+  return errorBounds(graph, slopesAt(graph, app.record.slopes, values), values, app.state.errorsOf(graph));
 }
 
 // Detail: nodes, clusters or bodies
@@ -99,13 +99,10 @@ function firstView(app) {
   const size = room(app), aspect = Math.min(2.5, Math.max(0.4, size.width / size.height)), all = levels(app);
   const view = (level) => ({ ...all[level], unbundled: new Set(), aspect });
   const drawn = app.state.versions.every((version) => version.drawing);
-  const layouts = { nodes: () => (drawn ? app.state.versions[0].drawing : arrange(app.plan, view("nodes"))),
-    clusters: () => arrange(app.plan, view("clusters")) };
   if (drawn) return view("nodes");
-  for (const level of app.largest <= READABLE ? ["nodes", "clusters"] : ["clusters"]) {
-    if (fitting(size, layouts[level]()) >= READ) return view(level);
-  }
-  return view(app.plan.columns.length > 1 ? "bodies" : "clusters");
+  const scale = (level) => fitting(size, arrange(app.plan, view(level)));
+  const order = [...(app.largest <= READABLE ? ["nodes"] : []), "clusters", ...(app.plan.columns.length > 1 ? ["bodies"] : [])];
+  return view(order.find((level) => scale(level) >= READ) ?? order.sort((a, b) => scale(b) - scale(a))[0]);
 }
 
 /** One level of detail more (1) or less (-1). */

@@ -1,20 +1,19 @@
 // Where everything is in the picture: columns by body, rows by sweep, folded or not; the same for all versions.
 
-const BOX = { width: 100, height: 30, gap: 8, title: 18, pad: 8 };
-const BODY = { width: 148, height: 52, gap: 40, beside: 16 }; // a body as one box
-const CELL = { gap: 26, beside: 14, title: 24, aspect: 1.35 };
-const LEAF = { height: 30, gap: 8, row: 44, sum: 46 };
+const BOX = { width: 100, height: 28, gap: 6, title: 18, pad: 8 };
+const BODY = { width: 148, height: 48, gap: 34, beside: 26 }; // a body as one box
+const CELL = { gap: 22, beside: 14, title: 24, aspect: 1.35 };
+const LEAF = { height: 30, gap: 6, row: 38, sum: 42 };
 const NODE = 34; // height of a node's ellipse or box
-const FEW_LEAVES = 24; // inputs or outputs; more of them are boxes by kind
-const KINDS = /^(qdd|qd|q|tau|lambda|p)\d+(_old)?$/;
+const FEW_LEAVES = [10, 24]; // inputs or outputs beside bodies, and beside parts of them; more of them are boxes by kind
 
 const titleOf = (cluster) => [cluster.marked ? "spurious" : "", cluster.title].filter(Boolean).join(" ");
-const widthOf = (words) => Math.max(46, 7.5 * [...words.replace(/[\u0307\u0308]/g, "")].length + 16);
+const widthOf = (words) => Math.max(46, 7.4 * [...words.replace(/[\u0307\u0308]/g, "")].length + 10);
 
 /** What the layout reads and keeps of a record: places, widths of nodes, nodes inside clusters, kinds of leaves. */
 function makePlan(record, versions) {
   const plan = { ...placesOf(record, versions), inner: new Map() };
-  plan.width = plan.first.map(([v, node]) => widthOf(caption(record, versions[v], node)));
+  plan.width = plan.first.map(([v, node]) => Math.max(58, widthOf(caption(record, versions[v], node)))); // room for a value
   plan.members = plan.clusters.map(() => []);
   plan.cluster.forEach((c, place) => { if (c >= 0) plan.members[c].push(place); });
   plan.lines = plan.clusters.map(() => new Map());
@@ -43,8 +42,8 @@ function innerOf(plan, c) {
 }
 
 /** Leaves as drawn: of many one for every kind that is not unfolded, [[key, width, names]]. */
-function leavesOf(widths, side, unbundled) {
-  if (widths.size <= FEW_LEAVES) return [...widths].map(([name, width]) => [name, width, null]);
+function leavesOf(widths, side, unbundled, few) {
+  if (widths.size <= few) return [...widths].map(([name, width]) => [name, width, null]);
   const kinds = new Map();
   for (const name of widths.keys()) {
     const [, kind, old] = name.match(KINDS) ?? [];
@@ -57,10 +56,12 @@ function leavesOf(widths, side, unbundled) {
 
 /** Boxes of clusters, columns, leaves and titles. folded: clusters; closed: columns; unbundled: kinds of leaves. */
 function arrange(plan, { folded, closed, unbundled, aspect }) {
-  const inputs = leavesOf(plan.inputs, "i", unbundled), outputs = leavesOf(plan.outputs, "o", unbundled);
-  const inside = closed.size === plan.columns.length ? overview(plan, aspect) : columnsIn(plan, folded, closed, aspect);
-  const narrow = Math.max(0, ...[...inputs, ...outputs].map(([, width]) => width));
-  const total = Math.max(inside.width, Math.min(420, [...inputs, ...outputs].reduce((sum, [, width]) => sum + width + LEAF.gap, 0)), narrow);
+  const whole = plan.columns.length > 0 && closed.size === plan.columns.length;
+  const [inputs, outputs] = [["i", plan.inputs], ["o", plan.outputs]].map(([side, own]) => leavesOf(own, side, unbundled, FEW_LEAVES[whole ? 0 : 1]));
+  const inside = whole ? overview(plan, aspect) : columnsIn(plan, folded, closed, aspect);
+  const leaves = [inputs, outputs].map((own) => own.reduce((sum, [, width]) => sum + width + LEAF.gap, 0));
+  const widest = Math.max(0, ...[...inputs, ...outputs].map(([, width]) => width));
+  const total = Math.max(inside.width, Math.min(Math.max(420, 1.05 * inside.width), ...leaves.filter((each) => each > inside.width)), widest);
   const top = leafLines(outputs, total, 8, plan.sums ? LEAF.sum : 0);
   const shift = (box) => ({ ...box, x: box.x + (total - inside.width) / 2, y: box.y + top.end + 4 });
   const bottom = leafLines(inputs, total, top.end + inside.height + 14, 0);
@@ -71,43 +72,32 @@ function arrange(plan, { folded, closed, unbundled, aspect }) {
   };
 }
 
-/** All columns as one box each: bodies as their tree, its base at the bottom, then what is no body. */
+/** All columns as one box each: bodies as their tree, its base at the bottom, or in lines where that is larger; then
+ * what is no body. */
 function overview(plan, aspect = CELL.aspect) {
-  const all = plan.columns.map((_, i) => i), bodies = [];
-  const put = (i, x, y) => { bodies[i] = { column: i, x, y, w: BODY.width, h: BODY.height }; };
-  const tree = all.filter((i) => plan.tree[i]), rest = all.filter((i) => !plan.tree[i]);
-  let width = 0, height = 0;
-  if (tree.length && tree.some((i) => plan.parents[i] >= 0)) {
-    const local = new Map(tree.map((i, k) => [i, k]));
-    const edges = tree.filter((i) => local.has(plan.parents[i])).map((i) => [local.get(plan.parents[i]), local.get(i)]);
-    const deep = layered(tree.map(() => BODY.width + BODY.beside - LAYERS.gap), edges, BODY.height + BODY.gap);
-    const narrowed = snake(tree.length, deep, aspect);
-    tree.forEach((i, k) => {
-      if (narrowed) put(i, ...narrowed(k)); else put(i, deep.x[k] - BODY.width / 2, deep.y[k] - BODY.height / 2);
-    });
-    width = Math.max(...tree.map((i) => bodies[i].x)) + BODY.width;
-    height = Math.max(...tree.map((i) => bodies[i].y)) + BODY.height;
-  } else rest.unshift(...tree);
-  if (rest.length) {
-    const per = Math.max(1, Math.round(width ? (width + BODY.beside) / (BODY.width + BODY.beside) : Math.sqrt(rest.length * aspect / 2)));
-    const lines = Math.ceil(rest.length / per), start = height ? height + BODY.gap : 0;
-    const across = Math.min(per, rest.length) * (BODY.width + BODY.beside) - BODY.beside;
-    const left = Math.max(0, (width - across) / 2);
-    rest.forEach((i, k) => put(i, left + (k % per) * (BODY.width + BODY.beside), start + Math.floor(k / per) * (BODY.height + BODY.gap)));
-    width = Math.max(width, across);
-    height = start + lines * (BODY.height + BODY.gap) - BODY.gap;
+  const all = plan.columns.map((_, i) => i), tree = all.filter((i) => plan.tree[i]), rest = all.filter((i) => !plan.tree[i]);
+  const local = new Map(tree.map((i, k) => [i, k]));
+  const edges = tree.filter((i) => local.has(plan.parents[i])).map((i) => [local.get(plan.parents[i]), local.get(i)]);
+  const across = BODY.width + BODY.beside, down = BODY.height + BODY.gap;
+  const deep = layered(tree.map(() => across - LAYERS.gap), edges, down);
+  const spots = [tree.map((_, k) => [deep.x[k] - across / 2, deep.y[k] - down / 2])];
+  for (let per = 1; per <= tree.length; per++) {
+    const lines = Math.ceil(tree.length / per);
+    spots.push(tree.map((_, k) => [(k % per) * across, (lines - 1 - Math.floor(k / per)) * down])); // the base at the bottom left
   }
-  return { boxes: [], bodies, titles: [], width, height: height + CELL.gap / 2 };
-}
-
-/** A tree that is much higher or wider than the picture goes in lines instead, the base at the bottom left. */
-function snake(count, deep, aspect) {
-  const per = Math.max(1, Math.round(Math.sqrt(count * aspect * (BODY.height + BODY.gap) / (BODY.width + BODY.beside))));
-  const lines = Math.ceil(count / per);
-  const scale = (w, h) => Math.min(aspect / w, 1 / (h + 2 * LEAF.row));
-  const wide = per * (BODY.width + BODY.beside), high = lines * (BODY.height + BODY.gap);
-  if (scale(wide, high) < 1.5 * scale(deep.width, deep.height)) return null;
-  return (k) => [(k % per) * (BODY.width + BODY.beside), (lines - 1 - Math.floor(k / per)) * (BODY.height + BODY.gap)];
+  const sizeOf = (at) => [Math.max(0, ...at.map(([x]) => x + BODY.width)), Math.max(0, ...at.map(([, y]) => y + down))];
+  const found = spots.map((at) => {
+    const [wide, high] = sizeOf(at), per = Math.max(1, Math.floor((Math.max(wide, 3 * across) + BODY.beside) / across));
+    const shift = Math.max(0, wide - Math.min(per, rest.length) * across + BODY.beside) / 2;
+    const below = rest.map((_, k) => [shift + (k % per) * across, high + Math.floor(k / per) * down]);
+    const [w, h] = sizeOf([...at, ...below]);
+    return { at: [...at, ...below], w, h, scale: Math.min(aspect / w, 1 / (h + 2 * LEAF.row + LEAF.sum)) };
+  });
+  const best = found.reduce((a, b) => (b.scale > a.scale ? b : a));
+  const { at, w, h } = edges.length && found[0].scale > 0.85 * best.scale ? found[0] : best;
+  const bodies = [];
+  [...tree, ...rest].forEach((i, k) => { bodies[i] = { column: i, x: at[k][0], y: at[k][1], w: BODY.width, h: BODY.height }; });
+  return { boxes: [], bodies, titles: [], width: w, height: h };
 }
 
 /** Columns side by side, in as few bands as the picture needs; rows by sweep. */

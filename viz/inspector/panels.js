@@ -56,6 +56,8 @@ function showWhy(app) {
   });
 }
 
+const largestOf = (values) => values.reduce((most, value) => (Number.isFinite(value) ? Math.max(most, Math.abs(value)) : most), 0);
+
 /** Results of all versions at the one state, and what differs from the version without spurious nodes. */
 function showResults(app) {
   const { versions } = app.state;

@@ -82,10 +82,10 @@ function drawBodies(canvas) {
   for (const [column, nodes] of [...inside].sort((a, b) => a[0] - b[0])) {
     const name = plan.columns[column] || "no tag", at = layout.bodies[column];
     const wrong = nodes.filter((node) => version.marked.has(node)).length;
-    const second = `${counted(nodes.length, "node")}${wrong ? `, ${wrong} spurious` : ""}`;
-    const item = shape(shapes, `b${column}`, at, `body${wrong ? " wrong" : " several"}`, `▸ ${fitted(name, 16)}`, second);
+    const second = wrong ? `${nodes.length}, ${wrong} spurious` : counted(nodes.length, "node");
+    const item = shape(shapes, `b${column}`, at, `body${wrong ? " wrong" : " several"}`, fitted(name, 15), second);
     item.group.setAttribute("data-column", column);
-    item.group.setAttribute("aria-label", `${name}, ${second}, folded`);
+    item.group.setAttribute("aria-label", `${name}, ${counted(nodes.length, "node")}${wrong ? `, ${wrong} spurious` : ""}, folded`);
     element("title", {}, item.group).textContent = name;
     share(item.group, at, nodes.map((node) => roleOf(version, node)));
     keep(canvas, `b${column}`, item, nodes, second);
@@ -226,15 +226,27 @@ function drawArrows({ version, items, shownBy, lines, layout }, drawing) {
   const bundle = new Map([...layout.bundles].flatMap(([key, names]) => (key[0] === "o" ? names.map((name) => [name, `k${key}`]) : [])));
   for (const [name, , node] of version.outputs) add(shownBy[node], bundle.get(name) ?? `o${name}`, [node, node]);
   return [...merged.values()].map(({ from, to, pairs }) => {
-    const wrong = pairs.some(([source]) => version.marked.has(source));
-    const [d, near] = drawing?.lines[`${from} ${to}`] ? [drawing.lines[`${from} ${to}`], true] : curve(items.get(from).at, items.get(to).at);
-    const width = Math.min(5, 1.1 + 0.6 * Math.log2(pairs.length)).toFixed(1);
+    const wrong = pairs.filter(([source]) => version.marked.has(source)).length * 2 >= pairs.length;
+    const [d, near] = drawing?.lines[`${from} ${to}`] ? [drawing.lines[`${from} ${to}`], true] : [from, to].every((id) => id[0] === "b") ? between(items.get(from).at, items.get(to).at) : curve(items.get(from).at, items.get(to).at);
+    const width = Math.min(4, 1.1 + 0.4 * Math.log2(pairs.length)).toFixed(1);
     const path = element("path", {
       class: `line${wrong ? " wrong" : ""}${near ? " near" : ""}`, d, "stroke-width": width, "data-from": from, "data-to": to,
     }, lines);
     if (pairs.length > 1) element("title", {}, path).textContent = `${pairs.length} edges`;
     return { path, from, to, pairs };
   });
+}
+
+/** A line between two bodies, from border to border, a little to the right of the other way's. */
+function between(a, b) {
+  const [x1, y1, x2, y2] = [a.x + a.w / 2, a.y + a.h / 2, b.x + b.w / 2, b.y + b.h / 2];
+  const long = Math.hypot(x2 - x1, y2 - y1), [ex, ey] = [(x2 - x1) / long, (y2 - y1) / long];
+  const side = 7, [ox, oy] = [-ey * side, ex * side];
+  const out = (box) => Math.min(Math.abs(box.w / 2 / (ex || 1e-9)), Math.abs(box.h / 2 / (ey || 1e-9)));
+  const [fx, fy] = [x1 + ex * out(a) + ox, y1 + ey * out(a) + oy], [tx, ty] = [x2 - ex * (out(b) + 2) + ox, y2 - ey * (out(b) + 2) + oy];
+  const bend = Math.min(30, 0.12 * long), foot = (s) => `${tx - 7 * ex - 4 * s * ey} ${ty - 7 * ey + 4 * s * ex}`;
+  const middle = `${(fx + tx) / 2 - ey * bend} ${(fy + ty) / 2 + ex * bend}`;
+  return [`M${fx} ${fy}Q${middle} ${tx} ${ty}M${foot(1)}L${tx} ${ty}L${foot(-1)}`, long < 1.2 * (BODY.width + BODY.beside)];
 }
 
 /** A line from the top of one box to the foot of another with its arrowhead, and whether they are near one another. */

@@ -28,9 +28,13 @@ from cgraph import Graph, Node
 from cgraph.extend import ADJOINT, OPS, PRIMAL, TANGENT, Op
 
 from .. import theme
+from ..graph_drawing.positions import Positions, positions
+from ..graph_drawing.render import RenderError
 from .content import Motion, State, StateTable, Version
 
 STAGES = {PRIMAL: "as written", ADJOINT: "reverse sweep", TANGENT: "forward sweep"}
+SMALL = 60  # nodes of a graph that is laid out by Graphviz
+NODE_HEIGHT, LEAF_HEIGHT = 34.0, 30.0  # pixels, as in arrange.js
 FEW = 24  # inputs and outputs whose boxes have room for what a person calls them
 Letters = Callable[[str], str]
 
@@ -55,6 +59,7 @@ def record(
     known = {each.name for graph in graphs for each in (*graph.inputs, *graph.nodes) if each.name}
     known |= {name for graph in graphs for name in graph.outputs} | set(inputs)
     letters = _letters(graphs, names or {})
+    drawings = _drawings(graphs, letters)
     for version in versions:
         version.check()
     for table in tables:
@@ -68,7 +73,10 @@ def record(
         "rows": state.rows(inputs, len(motion.t) if motion else 1).tolist(),
         "derived": None if state.derived is None else _graph(state.derived, letters),
         "columns": [[tag, parent] for tag, parent in (columns or {}).items()],
-        "versions": [_version(version, letters) for version in versions],
+        "versions": [
+            _version(version, letters) | {"drawing": drawing}
+            for version, drawing in zip(versions, drawings, strict=True)
+        ],
         "tables": [_table(table, letters) for table in tables],
         "motion": None
         if motion is None
@@ -135,6 +143,65 @@ def _version(version: Version, letters: Letters) -> dict[str, Any]:
         "labels": [[list(tags), *rest] for tags, *rest in labels],
         "marked": [i for i, node in enumerate(version.graph.nodes) if node in marked],
     }
+
+
+def _drawings(graphs: Sequence[Graph], letters: Letters) -> list[dict[str, Any] | None]:
+    """Small graphs as Graphviz lays them out, if it is there: {width, height, nodes, outputs, lines}.
+
+    nodes: [x, y, width] of every node, null for a constant, which is written where it is used; outputs the same.
+    lines: {"n<source> n<target>" or "n<source> o<name>": path}.
+    """
+    if max([len(graph.nodes) for graph in graphs], default=0) > SMALL:
+        return [None] * len(graphs)
+    planned = [_planned(graph, letters) for graph in graphs]
+    try:
+        drawn = positions([(sizes, lines) for _, sizes, lines in planned])
+    except RenderError:
+        return [None] * len(graphs)
+    return [_drawing(graph, *plan, where) for graph, plan, where in zip(graphs, planned, drawn, strict=True)]
+
+
+_Plan = tuple[list[Node | str], list[tuple[float, float]], list[tuple[int, int]]]
+
+
+def _planned(graph: Graph, letters: Letters) -> _Plan:
+    """What is drawn of a graph, its nodes but constants and its outputs, their sizes, and the lines between them."""
+    shown: list[Node | str] = [node for node in graph.nodes if node.value is None]
+    at = {node: i for i, node in enumerate(shown)}
+    lines = [(at[edge.source], at[edge.target]) for edge in graph.edges if edge.source.value is None]
+    for name, node in graph.outputs.items():
+        if node in at:
+            lines.append((at[node], len(shown)))
+        shown.append(name)
+    sizes = [(_width(each, letters), LEAF_HEIGHT if isinstance(each, str) else NODE_HEIGHT) for each in shown]
+    return shown, sizes, list(dict.fromkeys(lines))
+
+
+def _drawing(
+    graph: Graph, shown: list[Node | str], sizes: list[tuple[float, float]], lines: object, where: Positions
+) -> dict[str, Any]:
+    boxes = {each: [x, y, w] for each, (x, y), (w, _) in zip(shown, where.centers, sizes, strict=True)}
+    number = {node: f"n{i}" for i, node in enumerate(graph.nodes)}
+    ids = [number[each] if isinstance(each, Node) else f"o{each}" for each in shown]
+    return {
+        "width": where.size[0],
+        "height": where.size[1],
+        "nodes": [boxes.get(node) for node in graph.nodes],
+        "outputs": [boxes[name] for name in graph.outputs],
+        "lines": {f"{ids[source]} {ids[target]}": path for (source, target), path in where.lines.items()},
+    }
+
+
+def _width(shown: Node | str, letters: Letters) -> float:
+    """Pixels that a label needs."""
+    if isinstance(shown, str):
+        text = letters(shown)
+    else:
+        text = letters(shown.name) if shown.name else ""
+        text += "".join([f" {arg.value:.3g}" for arg in shown.args if arg.value is not None])
+        text += f": {shown.op.symbol}" if shown.args and shown.name else shown.op.symbol if shown.args else ""
+    letters_wide = len(text.replace("\u0307", "").replace("\u0308", ""))
+    return max(58.0, 7.4 * letters_wide + 14.0)
 
 
 def _stage(node: Node) -> str:

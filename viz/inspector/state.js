@@ -1,5 +1,8 @@
 // The one state of the page: values of inputs by name, from which every version, derived input and table is computed.
 
+const GROWN = 2 ** 12; // how many times larger rounding becomes along a motion
+const KINDS = /^(qdd|qd|q|tau|lambda|p)\d+(_old)?$/; // of inputs and outputs: letters with a number
+
 /** The state of a record, and its graphs made ready.  told: called whenever a value has changed. */
 function makeState(record, told = () => {}) {
   const versions = record.versions.map((each, index) => ({ ...prepare(each), index })), tables = (record.tables ?? []).map(prepare);
@@ -13,6 +16,16 @@ function makeState(record, told = () => {}) {
     if (!derived) return;
     const found = evaluate(derived, rowOf(derived));
     for (const [name, , node] of derived.outputs) values.set(name, found[node]);
+  }
+  /** Errors of a graph's inputs. Coordinates of one kind are solved for together: their errors are those of the largest,
+   * times their number, as of a linear system that is solved with rounding. */
+  function errorsOf(graph) {
+    const grown = edited || !frame ? 1 : GROWN, most = new Map(), kind = (name) => KINDS.exec(name)?.[1] ?? name;
+    for (const [name, value] of values) {
+      const [largest, many] = most.get(kind(name)) ?? [0, 0];
+      most.set(kind(name), [Math.max(largest, Math.abs(value)), many + 1]);
+    }
+    return graph.inputs.map(([name]) => { const [largest, many] = most.get(kind(name)); return grown * ROUNDING * many * largest; });
   }
   const rowOf = (graph) => graph.inputs.map(([name]) => values.get(name));
   const atFrame = () => record.inputs.map((name, i) => [name, record.rows[frame][i]]);
@@ -40,7 +53,7 @@ function makeState(record, told = () => {}) {
   }
   settle(atFrame());
   return {
-    versions, tables, derived, called, rowOf, set, show, names: record.inputs,
+    versions, tables, derived, called, errorsOf, set, show, names: record.inputs,
     get frame() { return frame; },
     get edited() { return edited; },
     get: (name) => values.get(name),

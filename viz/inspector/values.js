@@ -61,11 +61,13 @@ function adjoints(version, slopes, output, steps = version.ops.length) {
 
 const ROUNDING = 2 ** -53; // relative error of a rounded number
 
-/** What rounding can make of every value, to first order: errors of arguments through the slopes, and one's own. */
-function errorBounds(version, slopes, values) {
-  const bounds = new Float64Array(values.length);
+/** What rounding can make of every value, to first order: errors of arguments through the slopes, and one's own.
+ *
+ * errors: of the inputs, in their order; by default that of a rounded number. */
+function errorBounds(version, slopes, values, errors = []) {
+  const bounds = new Float64Array(values.length), given = new Map(version.inputs.map(([, node], i) => [node, errors[i]]));
   version.args.forEach((args, node) => {
-    let sum = version.constants.has(node) ? 0 : ROUNDING * Math.abs(values[node]);
+    let sum = version.constants.has(node) ? 0 : given.get(node) ?? ROUNDING * Math.abs(values[node]);
     args.forEach((arg, slot) => { sum += VALUE.zero_safe_mul(Math.abs(slopes[node][slot]), bounds[arg]); });
     bounds[node] = Number.isFinite(sum) ? sum : 0;
   });

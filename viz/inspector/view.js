@@ -1,16 +1,18 @@
 // What of the picture is seen: fitting, zooming, moving, with wheel, pointer, two fingers.
 
 const READ = 11 / 13; // the least scale at which the smallest text, of 13 px, has 11
+const NARROW = 820, TALLEST = 1.3; // pixels; of the window, the picture where the page is one column
 
 function setView(app, view) {
   app.seen = view;
   app.drawn.scene.setAttribute("transform", `translate(${view.x} ${view.y}) scale(${view.k})`);
 }
 
-/** The size of the place for the picture, in pixels. */
+/** The size of the place for the picture, in pixels; in one column it may be higher than the window. */
 function room(app) {
   const { width, height } = app.svg.getBoundingClientRect();
-  return { width: width || 900, height: height || 600 };
+  if (innerWidth > NARROW) return { width: width || 900, height: height || 600 };
+  return { width: width || innerWidth, height: TALLEST * innerHeight };
 }
 
 /** The scale at which a layout is seen whole. */
@@ -18,7 +20,9 @@ const fitting = ({ width, height }, layout) => Math.min(1.6, (width - 24) / layo
 
 function fitView(app) {
   const size = room(app), { layout } = app.drawn;
-  const k = fitting(size, layout);
+  const k = fitting(size, layout), narrow = innerWidth <= NARROW;
+  size.height = narrow ? Math.max(240, layout.height * k + 16) : size.height;
+  app.svg.style.height = narrow ? `${size.height}px` : "";
   setView(app, { k, x: (size.width - layout.width * k) / 2, y: (size.height - layout.height * k) / 2 });
 }
 
@@ -32,7 +36,7 @@ function zoom(app, factor, x, y) {
 function center(app, node) {
   const at = app.drawn.items.get(app.drawn.shownBy[node])?.at;
   if (!at) return;
-  const { width, height } = room(app), { k } = app.seen;
+  const { width, height } = app.svg.getBoundingClientRect(), { k } = app.seen;
   const x = app.seen.x + (at.x + at.w / 2) * k, y = app.seen.y + (at.y + at.h / 2) * k;
   if (x < 40 || y < 40 || x > width - 40 || y > height - 40) {
     setView(app, { ...app.seen, x: app.seen.x + width / 2 - x, y: app.seen.y + height / 2 - y });

@@ -22,8 +22,8 @@ function firstTyped(text) {
   return (typedRecord(linkedText() ?? text).record ?? typedRecord(text).record);
 }
 
-/** The box at work. text: what it holds at first, where the address has none; without it, the page keeps its record. */
-function startTyped(inspector, text) {
+/** The box at work. text: what it holds at first, where the address has none.  shown: whether the page shows that. */
+function startTyped(inspector, text, shownFirst) {
   const before = inspector.record(), box = byId("text"), opener = openingButton();
   let waiting = 0;
   const shown = () => {
@@ -35,7 +35,7 @@ function startTyped(inspector, text) {
     inspector.showRecord(found.record);
     showDerived(found);
     keepLink(box.value);
-    byId("back-to").hidden = text !== null;
+    byId("back-to").hidden = shownFirst;
   };
   byId("examples").replaceChildren(tag("option", { value: "" }, "an example"), ...[...TYPED.EXAMPLES.keys()].map((name) => tag("option", { value: name }, name)));
   byId("examples").onchange = () => {
@@ -62,9 +62,10 @@ function startTyped(inspector, text) {
     opener(true);
     shown();
   });
-  box.value = linkedText() ?? text ?? "";
-  if (box.value) shown();
-  opener(text !== null || linkedText() !== null);
+  const linked = linkedText();
+  box.value = linked ?? text;
+  if (shownFirst || linked !== null) shown();
+  opener(shownFirst || linked !== null);
 }
 /** The button in the page's head that opens and closes the box. */
 function openingButton() {

@@ -45,12 +45,12 @@ def typed_page(text: str | None = None) -> Page:
     if text is not None and not isinstance(text, str):
         raise TypeError(f"a Lagrangian is typed as text, got {type(text).__name__}: {text!r:.60}")
     held = 'TYPED.EXAMPLES.get("double pendulum")' if text is None else _literal(text)
-    return Page(compose(TITLE, None, (), [_panel(f"firstTyped({held})", held, "")]))
+    return Page(compose(TITLE, None, (), [_panel(f"firstTyped({held})", f"{held}, true", "")]))
 
 
-def box() -> Panel:
-    """The box for a page that shows something else first: closed, with a button that opens it."""
-    return _panel("", "null", " hidden")
+def box(text: str = "") -> Panel:
+    """The box for a page that shows something else first: closed, with a button that opens it, and this text in it."""
+    return _panel("", f"{_literal(text)}, false", " hidden")
 
 
 def _panel(first: str, held: str, hidden: str) -> Panel:

@@ -63,6 +63,14 @@ def typed_text(model: Any, q: Sequence[float] | None = None, qd: Sequence[float]
     return _Writer(system).text(q, qd)
 
 
+def text_or_none(model: Any, q: Sequence[float], qd: Sequence[float]) -> str:
+    """The text of a model, or an empty one where it has none."""
+    try:
+        return typed_text(model, q, qd)
+    except ValueError:
+        return ""
+
+
 class _Writer:
     """Names and texts of one system's nodes."""
 

@@ -10,6 +10,7 @@ from typing import Any
 from ...core.edge import Edge
 from ...core.graph import Graph, require_graph
 from ...core.node import Node
+from ...util.html_text import html_table, html_text
 from ...util.require import require_mapping, require_sequence
 from ..edge_partials import Point
 from ..names import Name, Names, many
@@ -71,6 +72,11 @@ class Lint:
         parts += [f"Holds: {proof}" for proof in self.proofs]
         parts += [f"Note: {note}" for note in self.notes]
         return "\n".join(parts) or "Nothing was declared, and every input is used."
+
+    def _repr_html_(self) -> str:
+        rows = [("Finding", str(each)) for each in self.findings] + [("Holds", proof) for proof in self.proofs]
+        rows += [("Note", str(each)) for each in self.notes]
+        return html_table(("", ""), rows, texts=2) if rows else html_text(str(self))
 
     def to_dict(self) -> dict[str, Any]:
         """The same for JSON; nodes are numbered as in `graph.nodes`, an edge is (source, target, argument slot)."""

@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from ...multibody.mechanism import as_mechanism
 from ...peers import PEERS, Case
 from ...peers.case import MOTIONS, TASKS, Array
 from ...peers.contender import MODES
@@ -26,7 +27,8 @@ class Cell:
     """One peer on one task of one scene in one mode.
 
     micros: median time of an evaluation [us].  low, high: quartiles.  made: from the model to the first result [s].
-    difference: largest, from ours, over the largest entry of ours; of a step or a loop, that of the motion.
+    difference: largest, from ours, over the largest entry of ours; of a step or a loop, that of the motion; None where
+    ours was not ready.
     size: nodes or instructions, where they can be counted.
     """
 
@@ -34,7 +36,7 @@ class Cell:
     low: float
     high: float
     made: float
-    difference: float
+    difference: float | None
     size: int | None
 
 
@@ -66,7 +68,7 @@ def bench(
     scenes: names among `SCENES`, of `dynamics.scenes`, or paths of model files.  repeats: turns of each peer.
     budget: seconds that a peer may take to make one task in one mode.  reading: options of `scenes.of_file`.
     say: takes lines of progress.
-    Raises ValueError for an unknown name or a budget that is not positive, RuntimeError when ours is not ready in time.
+    Raises ValueError for an unknown name, a budget that is not positive, and where there is nothing to measure.
     """
     for what, names, known in (("task", tasks, TASKS), ("mode", modes, MODES), ("peer", peers, PEERS)):
         if unknown := [name for name in names if name not in known]:
@@ -82,7 +84,17 @@ def bench(
     asked = {
         task: [mode for mode in MODES if mode in modes and (task, mode) in ours] for task in TASKS if task in tasks
     }
+    if not any([modes and _has(case, task) for case in cases.values() for task, modes in asked.items()]):
+        raise ValueError(
+            f"there is nothing to measure of {', '.join(asked)} in the modes {', '.join(modes)} on {', '.join(cases)}; "
+            f"motions and gradients are called, and not of models with quaternions"
+        )
     return _rows(cases, loads, asked, wanted, repeats, budget, say)
+
+
+def _has(case: Case, task: str) -> bool:
+    """Whether there is such a task of the model."""
+    return task not in MOTIONS or case.nq == case.n
 
 
 def _rows(
@@ -97,8 +109,11 @@ def _rows(
     for scene, case in cases.items():
         late: dict[str, dict[str, str]] = {}
         for task, modes in asked.items():
-            if task in MOTIONS and case.nq != case.n:
+            if not _has(case, task):
                 say(f"{scene}, {task}: not of quaternions")
+                continue
+            if task == "inertial-gradient" and as_mechanism(case.model) is None:
+                say(f"{scene}, {task}: not without bodies")
                 continue
             late[task] = dict(late.get(CONTAINS.get(task, ""), {}))
             pool = WorkerPool(loads[scene], peers, budget, late[task])
@@ -124,13 +139,13 @@ def _row(case: Case, task: str, mode: str, pool: WorkerPool, repeats: int) -> Ro
                 row.skipped[peer] = str(error)
                 del ready[peer]
             used[peer] += time.perf_counter() - begin
-    if OURS not in ready:
-        raise RuntimeError(f"{case.name}, {task}, {mode}: no figures of ours to compare with: {row.skipped[OURS]}")
     start = _start(case, task, mode)
-    expected = ready[OURS].values - start
     for peer, prepared in ready.items():
         low, middle, high = np.percentile(samples[peer], (25, 50, 75)).tolist()
-        difference = float(np.abs(prepared.values - start - expected).max() / np.abs(expected).max())
+        difference = None
+        if OURS in ready:
+            expected = ready[OURS].values - start
+            difference = float(np.abs(prepared.values - start - expected).max() / np.abs(expected).max())
         row.cells[peer] = Cell(middle, low, high, prepared.seconds, difference, prepared.size)
     return row
 

@@ -87,9 +87,9 @@ def load(name: str, **reading: bool) -> Scene:
     """
     if name in SCENES:
         return SCENES[name]()
-    if name not in scenes.names() and not Path(name).suffix:
+    if name not in scenes.names() and not Path(name).suffix and ":" not in name:
         raise ValueError(
             f"there is no scene {name!r}; the bench has {', '.join(SCENES)}, the scenes {', '.join(scenes.names())}, "
-            "and files are those that end in .xml or .urdf"
+            "files end in .xml or .urdf, and models in Python are file.py:name"
         )
     return scenes.load(name, **({} if name in scenes.names() else reading))

@@ -44,11 +44,11 @@ def tables(rows: Sequence[Row], where: str = "") -> str:
 
 def _times(row: Row) -> dict[str, tuple[str, str]]:
     """Time, and ratio with marks, of each peer."""
-    ours = row.cells[OURS].micros
-    best = min(cell.micros for cell in row.cells.values())
+    ours = row.cells.get(OURS)
+    best = min([cell.micros for cell in row.cells.values()], default=0.0)
     result = {}
     for peer, cell in row.cells.items():
-        ratio = "" if peer == OURS else f"[{digits(cell.micros / ours, 2)}]"
+        ratio = f"[{digits(cell.micros / ours.micros, 2)}]" if ours and peer != OURS else ""
         marks = ("*" if cell.micros == best else "") + ("" if agrees(cell) else "!")
         result[peer] = digits(cell.micros, 3), ratio + marks
     return result
@@ -62,7 +62,7 @@ def _differences(row: Row) -> dict[str, tuple[str, str]]:
     return {
         peer: (f"{cell.difference:.0e}", "" if agrees(cell) else "!")
         for peer, cell in row.cells.items()
-        if peer != OURS
+        if peer != OURS and cell.difference is not None
     }
 
 
@@ -72,14 +72,15 @@ def _worst(rows: Sequence[Row]) -> list[Row]:
     for row in rows:
         kept = result.setdefault(row.scene, Row(row.scene, row.task, row.mode, row.coordinates))
         for peer, cell in row.cells.items():
-            if peer not in kept.cells or not cell.difference <= kept.cells[peer].difference:
+            worst = kept.cells[peer].difference if peer in kept.cells else None
+            if worst is None or not (cell.difference is None or cell.difference <= worst):
                 kept.cells[peer] = cell
     return list(result.values())
 
 
 def agrees(cell: Cell) -> bool:
-    """The difference is that of rounding; NaN is not."""
-    return cell.difference <= AGREES
+    """The difference, where one is known, is that of rounding; NaN is not."""
+    return cell.difference is None or cell.difference <= AGREES
 
 
 def _table(rows: Sequence[Row], read: Callable[[Row], dict[str, tuple[str, str]]], nodes: bool = False) -> list[str]:
@@ -96,7 +97,8 @@ def _table(rows: Sequence[Row], read: Callable[[Row], dict[str, tuple[str, str]]
             else:
                 unseen[peer] = reason
     head = ["scene", *(["nodes"] if nodes else []), *shown]
-    of_ours = {row.scene: [str(row.cells[OURS].size or "")] if nodes else [] for row in rows}
+    sizes = {row.scene: row.cells[OURS].size if OURS in row.cells else None for row in rows}
+    of_ours = {scene: [str(size or "")] if nodes else [] for scene, size in sizes.items()}
     lines = table(
         head, [[scene, *of_ours[scene], *[of.get(peer, "") for peer in shown]] for scene, of in cells.items()]
     )
@@ -111,6 +113,8 @@ def _spread(rows: Sequence[Row]) -> list[str]:
         for row in rows
         for peer, cell in row.cells.items()
     }
+    if not spreads:
+        return []
     worst = max(spreads, key=lambda each: spreads[each])
     usual, most = digits(statistics.median(spreads.values()), 2), digits(spreads[worst], 2)
     return [f"spread between quartiles: {usual} % of the median as a rule, {most} % at most ({', '.join(worst)})"]

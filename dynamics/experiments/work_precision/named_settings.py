@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from ... import scenes
-from ...equations.state_equation import state_inputs
-from ...systems.display_names import display_names
+from ...scenes.start import Start, with_start
 from ..setting import Setting
 from ..stability import cases
 from ..stability.cases.orbits import kepler
@@ -32,7 +31,7 @@ def load(
     name: str,
     *,
     t_end: float | None = None,
-    start: Sequence[float] | None = None,
+    start: Start | None = None,
     reading: Mapping[str, bool] | None = None,
 ) -> Setting:
     """The setting of that name: of `SETTINGS`, a scene, a case, or an MJCF or URDF file.
@@ -43,25 +42,19 @@ def load(
     fixed = SETTINGS.get(name) or (partial(cases.load, name) if name in cases.names() else None)
     if fixed is not None:
         setting = fixed()
-    elif name in scenes.names() or Path(name).suffix:
+    elif name in scenes.names() or Path(name).suffix or ":" in name:
         setting = Setting(**vars(scenes.load(name, **({} if name in scenes.names() else reading or {}))))
     else:
         raise ValueError(
             f"there is no scene {name!r}; there are {', '.join([*scenes.names(), *SETTINGS])}, the cases "
-            f"({', '.join(cases.names()[:3])}, ..), and files that end in .xml or .urdf"
+            f"({', '.join(cases.names()[:3])}, ..), files that end in .xml or .urdf, and models as file.py:name"
         )
     if t_end is not None:
         if not (math.isfinite(t_end) and t_end > 0.0):
             raise ValueError(f"t_end must be positive and finite, got {t_end!r} s")
         setting = replace(setting, t_end=float(t_end))
     if start is not None:
-        states = state_inputs(setting.model).states
-        if len(start) != len(states):
-            called = display_names(setting.model)
-            shown = ", ".join([called.get(name, name) for name in states[:12]]) + (", .." if len(states) > 12 else "")
-            raise ValueError(f"the start needs {len(states)} numbers ({shown}), got {len(start)}")
         if fixed is not None:
             raise ValueError(f"{name!r} has a start of its own; scenes and files take others")
-        n = len(setting.q)
-        setting = replace(setting, q=tuple(map(float, start[:n])), qd=tuple(map(float, start[n:])))
+        setting = with_start(setting, start)
     return setting

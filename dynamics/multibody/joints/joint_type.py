@@ -131,3 +131,12 @@ class SpatialJoint(JointType):
     def linear_acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
         """Of the body's origin against the joint, at constant velocities u [m/s^2]. The angular one is 0."""
         return STILL
+
+
+MovingJoint = AxialJoint | SpatialJoint  # every type but that of a joint without coordinates
+
+
+def moving_type(joint: JointType) -> MovingJoint:
+    """The type of a joint that has coordinates."""
+    assert isinstance(joint, AxialJoint | SpatialJoint)
+    return joint

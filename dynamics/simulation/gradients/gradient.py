@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -14,14 +14,17 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Array, Builder
 
-from ...integrators import Problem, quantity, quantity_inputs
+from ...integrators import quantity
 from ...systems.model import Model
+from ...systems.system import System
 from ..applied_forces import Constant
 from ..event import Event, as_events
 from ..event_program import event_program
-from .legs import Bars, Legs, pulled_at, values_at
+from .legs import Bars, Legs
+from .loss_function import loss_graph, with_slopes
 from .motion import START, TORQUE, VELOCITY, MotionOf, motion_of
-from .motion_programs import KEPT, Request, motion_programs, request_key
+from .motion_programs import KEPT, Request, motion_programs
+from .point_functions import at
 
 Loss = Callable[..., Node]
 
@@ -149,32 +152,31 @@ def gradient(
     options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
     watched = as_events(events)
     motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, watched)
-    value, gradients, legs = differentiated(motion, loss, running, backend, watched)
+    value, gradients, legs = differentiated(motion, loss, running, watched)
     nq, checkpoints = motion.problem.nq, max([run.checkpoints for run in legs.runs])
     return MotionGradient(float(value), gradients, legs.t, legs.x[:nq], legs.x[nq:], checkpoints)
 
 
 def differentiated(
-    motion: MotionOf, loss: Loss | None, running: Loss | None, backend: str, watched: Sequence[Event] = ()
+    motion: MotionOf, loss: Loss | None, running: Loss | None, watched: Sequence[Event] = ()
 ) -> tuple[Any, dict[str, Any], Legs]:
     """The loss of a motion, its gradient by names, and the motion; of N motions side by side an axis more, the last."""
     problem = motion.problem
     if loss is None and running is None:
         raise ValueError("a loss is needed: of the end of the motion, `loss`, of how it goes, `running`, or both")
-    final = None if loss is None else _graph(problem, quantity(problem, "loss", loss))
-    total = None if running is None else _graph(problem, quantity(problem, "running", running, motion.applied))
+    final = None if loss is None else loss_graph(problem, quantity(problem, "loss", loss))
+    total = None if running is None else loss_graph(problem, quantity(problem, "running", running, motion.applied))
     by = [TORQUE] if TORQUE in motion.wrt else []
-    by += ["p"] if len(motion.values) else []
+    by += ["p", "c"] if motion.by_parameters else []
     by += ["t", "h"] if watched else []
     request = Request(
-        problem,
+        motion.equations,
         motion.method,
-        motion.forces,
         motion.each_step,
         tuple(by),
         forwards=False,
-        backend=backend,
-        key=request_key(total),
+        backend=motion.backend,
+        many=motion.many > 0,
         running=total,
     )
     program = event_program(problem, watched)
@@ -184,62 +186,50 @@ def differentiated(
     return value + legs.loss, _gradients(motion, start, inputs, rows, end), legs
 
 
-@dataclass(frozen=True)
-class _Quantity:
-    """A quantity of a problem, known by its structure, so that what is derived from it is derived once."""
-
-    problem: Problem
-    key: str
-    graph: Graph = field(compare=False)
-
-
-def _graph(problem: Problem, node: Node) -> Graph:
-    """The loss over the states, t and parameters."""
-    graph = Graph(quantity_inputs(problem), {"loss": node})
-    return _bound(_Quantity(problem, str(cg.structure_hash(graph)), graph))
-
-
-@lru_cache(KEPT)
-def _bound(quantity: _Quantity) -> Graph:
-    return quantity.problem.bind(quantity.problem.states, quantity.graph)
-
-
 def _final(graph: Graph | None, motion: MotionOf, legs: Legs) -> tuple[Any, Bars]:
     """The final loss, and its slopes."""
-    t, more = float(legs.t[-1]), legs.x.shape[1:]
+    m = len(legs.x)
     if graph is None:
-        return 0.0, Bars(np.zeros_like(legs.x), 0.0, np.zeros((len(motion.problem.parameters), *more)))
-    (value,) = values_at(graph, motion, legs.x, t)
-    return value, pulled_at(graph, motion, legs.x, t, [1.0])
+        inputs = np.zeros((motion.forces + len(motion.values), *legs.x.shape[1:]))
+        return 0.0, Bars(np.zeros_like(legs.x), 0.0, inputs)
+    value, *bars = at(with_slopes(graph, motion.backend), motion.at_end(legs.x, float(legs.t[-1])))
+    return value, Bars(np.array(bars[:m]), bars[m], np.array(bars[m + 1 :]))
 
 
 def _gradients(motion: MotionOf, start: Array, inputs: Array, rows: Array, end: Bars) -> dict[str, Any]:
     """By the names of `wrt`, from the cotangents of the start, of the inputs, and of the forces of each step."""
-    problem = motion.problem
-    nq, forces, names = problem.nq, motion.forces, list(problem.parameters)
+    nq, forces, equations, many = motion.problem.nq, motion.forces, motion.equations, motion.many
+    by_name: dict[str, Any] = {}
+    if motion.by_parameters:
+        p = motion.values[: len(equations.names)]
+        by_name = dict(zip(equations.names, equations.by_parameters(p, inputs[forces:], motion.backend), strict=True))
     result: dict[str, Any] = {}
     for name in motion.wrt:
         if name == START:
-            result[name] = _displaced(problem, motion.x, start)
+            result[name] = _displaced(motion, start)
         elif name == VELOCITY:
             result[name] = start[nq:]
         elif name == TORQUE and motion.each_step:
             rows[-1] += end.inputs[:forces]  # what the final loss has of the force itself
             result[name] = rows
+        elif name == TORQUE:
+            result[name] = inputs[:forces]
         else:
-            result[name] = inputs[:forces] if name == TORQUE else inputs[names.index(name)]
-            if not motion.many and name != TORQUE:
-                result[name] = float(result[name])
+            result[name] = by_name[name] if many else float(by_name[name])
     return result
 
 
-def _displaced(problem: Problem, x: Array, bar: Array) -> Array:
+def _displaced(motion: MotionOf, bar: Array) -> Array:
     """The cotangent of the coordinates; of quasi-velocities by displacements, G^T q_bar."""
-    system, nq = problem.system, problem.nq
+    system, nq = motion.problem.system, motion.problem.nq
     if system is None or system.kinematics.quasi is None:
         return bar[:nq]
-    bars = cg.variables([f"bar{k}" for k in range(nq)])
+    return at(_by_displacements(system, motion.backend), np.concatenate([motion.x[:nq], bar[:nq]]))
+
+
+@lru_cache(KEPT)
+def _by_displacements(system: System, backend: str) -> Any:
+    """(q, q_bar) -> G^T q_bar as a function."""
+    bars = cg.variables([f"bar{k}" for k in range(system.nq)])
     pulled = system.kinematics.pulled_back(bars, Builder())
-    graph = Graph([*system.q, *bars], {f"{k}": node for k, node in enumerate(pulled)})
-    values = graph.evaluate(dict(zip(graph.input_names, [*x[:nq], *bar[:nq]], strict=True)))
-    return np.array([np.broadcast_to(value, x.shape[1:]) for value in values.values()], dtype=np.float64)
+    return cg.compile(Graph([*system.q, *bars], {f"{k}": node for k, node in enumerate(pulled)}), backend)

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from cgraph import Node
 from cgraph.extend import Array, real_array
 
-from ...equations.state_equation import state_inputs
 from ...integrators import METHODS, derive
 from ...systems.model import Model
 from ..applied_forces import with_applied
@@ -20,7 +19,8 @@ from ..ensembles.initial_states import starts
 from ..run_options import time_span
 from ..sampled_controller import SampledController
 from .gradient import Loss, differentiated
-from .motion import TORQUE, MotionOf, equal_leg, names_of, options_of
+from .motion import TORQUE, MotionOf, changing_forces, equal_leg, names_of, options_of
+from .motion_equations import motion_equations
 
 WIDE = 16  # motions side by side: whole vectors of any processor, of which what is recorded stays in its caches
 
@@ -125,7 +125,7 @@ def gradient_many(
         parts = [slice(k, k + WIDE) for k in range(0, motions.many, WIDE)]
     values, gradients, ends = [], [], []
     for part in parts:
-        value, by_name, legs = differentiated(_some(motions, part), loss, running, backend)
+        value, by_name, legs = differentiated(_some(motions, part), loss, running)
         values.append(np.atleast_1d(value))
         gradients.append({name: _by_motion(array, part) for name, array in by_name.items()})
         ends.append(_by_motion(legs.x, part))
@@ -170,29 +170,30 @@ def _motions(
     start = starts(moving, q, qd, constant, parameters, t0)
     run.check(start.states)
     chosen, count = names_of(moving, wrt, closed=callable(tau)), len(start.x)
-    inputs = state_inputs(moving).applied if rows is not None or TORQUE in chosen or np.ndim(constant) == 2 else ()
-    free = {*inputs, *chosen, *start.varied}
+    forced = rows is not None or TORQUE in chosen or np.ndim(constant) == 2
+    inputs = changing_forces(moving, start.same, forced=forced)
+    free = {*inputs, *chosen, *start.varied, *(parameters or ())}
     problem = derive(moving, {name: value for name, value in start.same.items() if name not in free})
-    columns = start.same | start.varied
+    columns, equations = start.same | start.varied, motion_equations(problem, len(inputs))
     forces, values = (
         np.array([np.broadcast_to(columns[name], count) for name in names], dtype=np.float64).reshape(len(names), count)
-        for names in (inputs, [name for name in problem.parameters if name not in inputs])
+        for names in (inputs, equations.names)
     )
     if rows is not None:
         forces = np.broadcast_to(np.moveaxis(rows, 0, -1), (*rows.shape[1:], count))
     return MotionOf(
-        problem,
+        equations,
         METHODS[method],
         start.x.T.copy(),
         (equal_leg(run, None if rows is None else rows.shape[1]),),
         np.empty(0),
         np.empty(0),
         forces,
-        len(inputs),
         rows is not None,
-        values,
+        equations.values(values, run.backend),
         chosen,
         applied.nodes,
+        run.backend,
     )
 
 

@@ -59,8 +59,9 @@ class Legs:
             x, begin = run.x, float(t[-1])
             if leg.event and (reset := self.events[leg.event].reset) is not None:
                 x = values_at(reset, motion, x, begin)
-        self.x, self.t = x, np.concatenate([run.motion.t[:-1] for run in self.runs] + [[begin]])
-        self.loss = np.sum([run.loss for run in self.runs], axis=0)
+        times = [run.motion.t[:-1] for run in self.runs]
+        self.x, self.t = x, np.append(times[0] if len(times) == 1 else np.concatenate(times), begin)
+        self.loss = sum([run.loss for run in self.runs[1:]], self.runs[0].loss)
 
     def _arrive(self, run: MotionRun, event: WatchedEvent) -> None:
         """The last step of a leg, as long as it takes to where the event happens."""
@@ -84,7 +85,7 @@ class Legs:
     def pulled(self, end: Bars) -> tuple[Array, Array, Array]:
         """Cotangents of the start of the motion, of its inputs, and rows of each step, from those of its end."""
         inputs = end.inputs.copy()
-        names, forces, values = self.programs.step.passes.varied, self.motion.forces, len(self.motion.values)
+        names, lengths = self.programs.step.passes.varied, self.motion.equations.lengths
         last = self.motion.legs[-1].event
         if last and self.events[last].reset is not None:
             end = self._before(len(self.runs), end, inputs)
@@ -94,7 +95,7 @@ class Legs:
             if leg.event:
                 end, later = self._through(run, self.events[leg.event], end, inputs)
             bars, rows = run.pulled({"x": end.x, LOSS: 1.0})
-            more = [bars.get(name, np.zeros((n, *inputs.shape[1:]))) for name, n in (("tau", forces), ("p", values))]
+            more = [bars.get(name, np.zeros((n, *inputs.shape[1:]))) for name, n in lengths.items()]
             inputs += np.concatenate(more)
             if k == 0:
                 return bars["x"], inputs, rows
@@ -102,8 +103,8 @@ class Legs:
             t[-1] += later
             if leg.event:
                 h[-1] = 0.0  # which the event determines
-            by_t, by_h = _slopes(leg)
-            begin = float(t @ by_t + h @ by_h) + float(bars["t"][0])
+            by_t, by_h = leg_slopes(leg)
+            begin = float(t @ by_t + h @ by_h) + (float(bars["t"][0]) if "t" in bars else 0.0)
             end = self._before(k, Bars(bars["x"], begin, np.zeros(0)), inputs)
         raise AssertionError("a motion has at least one leg")
 
@@ -126,17 +127,20 @@ class Legs:
 
 def _steps(leg: Leg, begin: float) -> tuple[Array, Array]:
     """Times and lengths of the steps of a leg that begins at this instant."""
+    count = len(leg.t) - 1
+    if leg.equal and not leg.event and leg.t[0] == begin:
+        return leg.t, np.full(count, (leg.end - begin) / leg.equal)
     t = leg.t.copy()
     t[0] = begin
     if leg.equal:
-        t[:-1] = begin + np.arange(len(t) - 1) * ((leg.end - begin) / leg.equal)
+        t[:-1] = begin + np.arange(count) * ((leg.end - begin) / leg.equal)
     h = np.diff(t)
     if leg.equal:
-        h[: len(h) - bool(leg.event)] = (leg.end - begin) / leg.equal
+        h[: count - bool(leg.event)] = (leg.end - begin) / leg.equal
     return t, h
 
 
-def _slopes(leg: Leg) -> tuple[Array, Array]:
+def leg_slopes(leg: Leg) -> tuple[Array, Array]:
     """How the times of the steps of a leg and their lengths depend on where it begins."""
     count = len(leg.t) - 1
     if leg.equal:

@@ -99,9 +99,9 @@ class Linearization:
         return self._program(lengths, [*pulled.statements, *after], results, ends, list(rows.values()))
 
     def tangent(self, directions: Sequence[str]) -> Linearized:
-        """A pass that pushes tangents on, of what it hands on and of the inputs `directions`.
+        """A pass that pushes tangents on, of what it hands on and of `directions`, inputs or varied registers.
 
-        It is fed what was recorded, and records the tangent of `x`.
+        It is fed what was recorded, and records the tangent of `x`. Those of t grow by those of h.
         """
         lengths = dict(self._lengths)
         moving = [name for name in self.handed if name in self._active]
@@ -113,6 +113,8 @@ class Linearization:
         for name in moving:
             dot = pushed.dots.get(self.handed[name])
             after.append(Map(ZERO, (dots[name],), (dots[name],)) if dot is None else Map(SAME, (dot,), (dots[name],)))
+        if {"t", "h"} <= set(directions):
+            after.append(add_to(dots["t"], dots["h"]))
         results = {*dots.values(), UNSOLVED}
         return self._program(lengths, [*pushed.statements, *after], results, dots, [dots["x"]])
 

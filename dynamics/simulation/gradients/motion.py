@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,8 +24,10 @@ from ..run_options import RunOptions, time_span
 from ..sampled_controller import SampledController
 from ..simulate import simulate
 from ..trajectory import Trajectory
+from .motion_equations import KEPT, PARAMETERS, MotionEquations, motion_equations
 
 START, VELOCITY, TORQUE = "q", "qd", "tau"
+_PLAIN = (float, int, str, type(None))
 
 
 class Leg(NamedTuple):
@@ -60,22 +63,47 @@ class MotionOf:
     x: (m,), where it starts.
     legs: its parts.  t, h: (steps + 1,), where the steps begin and the last one ends, and (steps,), their lengths.
     tau: the applied forces that are inputs, (forces,), or where they change with the steps, (steps, forces).
-    values: of the parameters that stay inputs.  wrt: names.  applied: the whole applied force as nodes.
+    values: of the parameters p that stay inputs, and of the numbers c.  wrt: names.
+    applied: the whole applied force as nodes.  backend: of what is compiled.
     Of N motions side by side x, tau and values have an axis of N besides, the last.
     """
 
-    problem: Problem
+    equations: MotionEquations
     method: Method
     x: Array
     legs: tuple[Leg, ...]
     t: Array
     h: Array
     tau: Array
-    forces: int
     each_step: bool
     values: Array
     wrt: tuple[str, ...]
     applied: Sequence[Node] | None
+    backend: str
+
+    @property
+    def problem(self) -> Problem:
+        """What moves."""
+        return self.equations.problem
+
+    @property
+    def forces(self) -> int:
+        """How many of the applied forces are inputs."""
+        return self.equations.forces
+
+    def at_end(self, x: Array, t: float) -> Array:
+        """The inputs of a graph over the states, t and parameters, at a state and an instant of the last step."""
+        return np.concatenate([x, np.full((1, *x.shape[1:]), t), self.force_at_end, self.values])
+
+    @property
+    def by_parameters(self) -> bool:
+        """Whether derivatives by parameters are wanted."""
+        return not set(self.wrt).isdisjoint(self.equations.names)
+
+    def parameters_at(self, tau: Array) -> dict[str, Array]:
+        """The registers of forces and parameters."""
+        count = len(self.equations.names)
+        return dict(zip(PARAMETERS, (tau, self.values[:count], self.values[count:]), strict=True))
 
     @property
     def many(self) -> int:
@@ -121,8 +149,9 @@ def motion_of(
     start = initial_value(moving, q, qd, applied.constant, parameters, t0)
     run.check(start.states)
     chosen = names_of(moving, wrt, closed=callable(tau))
-    inputs = state_inputs(moving).applied if rows is not None or TORQUE in chosen else ()
-    free = {*inputs, *chosen}
+    forced = rows is not None or TORQUE in chosen
+    inputs = changing_forces(moving, start.bound, forced=forced)
+    free = {*inputs, *chosen, *(parameters or ())}  # what a caller changes from call to call stays an input
     problem = derive(moving, {name: value for name, value in start.bound.items() if name not in free})
     if run.adaptive or events:
         if rows is not None:
@@ -134,27 +163,41 @@ def motion_of(
     else:
         legs = (equal_leg(run, None if rows is None else len(rows)),)
     constant = np.array([start.bound[name] for name in inputs])
-    values = np.array([start.bound[name] for name in problem.parameters if name not in inputs])
+    equations = motion_equations(problem, len(inputs))
+    values = np.array([start.bound[name] for name in equations.names])
     forces = constant if rows is None else rows
     return MotionOf(
-        problem,
+        equations,
         METHODS[method],
         start.x,
         legs,
         np.empty(0),  # of steps, before the legs are run
         np.empty(0),
         forces,
-        len(inputs),
         rows is not None,
-        values,
+        equations.values(values, run.backend),
         chosen,
         applied.nodes,
+        run.backend,
     )
+
+
+def changing_forces(model: Model, bound: Mapping[str, float], *, forced: bool) -> tuple[str, ...]:
+    """The applied forces that are inputs: none where they are 0, unless `forced`."""
+    applied = state_inputs(model).applied
+    return applied if forced or any([bound.get(name, 0.0) != 0.0 for name in applied]) else ()
 
 
 def options_of(t_end: float, method: str, t0: float, options: Mapping[str, Any]) -> RunOptions:
     """The options of a run, by a method whose motions have derivatives. Raises ValueError for another."""
-    run = RunOptions(t_end, method, t0=t0, **options)
+    given = (t_end, method, t0, *options.items())
+    plain = all([type(each) in _PLAIN for each in (t_end, method, t0, *options.values())])
+    return _checked_options(*given) if plain else _checked_options.__wrapped__(*given)
+
+
+@lru_cache(KEPT)
+def _checked_options(t_end: float, method: str, t0: float, *options: tuple[str, Any]) -> RunOptions:
+    run = RunOptions(t_end, method, t0=t0, **dict(options))
     if run.scipy_solver is not None or METHODS[method].step is None:
         names = ", ".join([name for name, each in METHODS.items() if each.step is not None])
         raise ValueError(f"motions by method {method!r} have no derivatives here; those by {names} have")
@@ -181,7 +224,7 @@ def names_of(model: Model, wrt: str | Iterable[str] | None, *, closed: bool) -> 
     if wrt is None:
         return tuple(usual)
     names = [wrt] if isinstance(wrt, str) else require_sequence("wrt", wrt, "names")
-    known = [*usual, *inputs.parameters]
+    known = dict.fromkeys([*usual, *inputs.parameters])
     for name in names:
         if not isinstance(name, str) or name not in known:
             raise ValueError(f"wrt must be among {', '.join(known)}, got {name!r:.60}")
@@ -197,8 +240,14 @@ def equal_leg(run: RunOptions, rows: int | None) -> Leg:
     count = step_count(run.length, run.step) if rows is None or run.dt is not None else rows
     if rows is not None and rows != count:
         raise ValueError(f"tau has {rows} rows, and there are {count} steps of dt = {run.step:g} s: leave out dt")
-    h = (run.t_end - run.t0) / count
-    return Leg(np.append(run.t0 + np.arange(count) * h, run.t_end), equal=count, end=run.t_end)
+    return _equal_leg(run.t0, run.t_end, count)
+
+
+@lru_cache(KEPT)
+def _equal_leg(t0: float, t_end: float, count: int) -> Leg:
+    t = np.append(t0 + np.arange(count) * ((t_end - t0) / count), t_end)
+    t.flags.writeable = False  # of all who have it
+    return Leg(t, equal=count, end=t_end)
 
 
 def _legs(motion: Trajectory, run: RunOptions, events: Sequence[Event]) -> tuple[Leg, ...]:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 
-import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Runner, runner
 
-from ...integrators import Method, Problem
+from ...integrators import Method
 from .linearization import Linearization, Linearized
-from .motion_steps import LOSS, MotionSteps, motion_steps
+from .motion_equations import MotionEquations
+from .motion_steps import LOSS, motion_steps
 
 KEPT = 16  # motions whose programs stay ready for another run
 
@@ -30,61 +30,54 @@ class Along:
 class MotionPrograms:
     """The programs of a motion.
 
-    start: from x to what the first step reads.  step: the steps, with the running loss where there is one.
+    start: from x to what the first step reads, if that is not x.
+    step: the steps, with the running loss where there is one.
     failed: a register that is not 0 after steps whose equations were not solved; empty where there is none.
     """
 
-    start: Along
+    start: Along | None
     step: Along
     failed: str
 
 
 @dataclass(frozen=True)
 class Request:
-    """What programs are made of; `running` is known by `key`, its structure."""
+    """What programs are made of."""
 
-    problem: Problem
+    equations: MotionEquations
     method: Method
-    forces: int
     each_step: bool
     wrt: tuple[str, ...]
     forwards: bool  # tangents pushed on, else cotangents pulled back
     backend: str
-    key: str = ""
-    running: Graph | None = field(default=None, compare=False)
-
-
-def request_key(running: Graph | None) -> str:
-    """What tells one running loss from another."""
-    return "" if running is None else str(cg.structure_hash(running))
+    many: bool = False  # motions side by side
+    running: Graph | None = None
 
 
 @lru_cache(KEPT)
 def motion_programs(request: Request) -> MotionPrograms:
     """The programs; of the last few requests, those made before."""
     steps = motion_steps(
-        request.problem,
+        request.equations,
         request.method,
         request.running,
-        forces=request.forces,
         each_step=request.each_step,
         wrt=request.wrt,
+        sharing=not request.forwards and not request.many,
     )
-    step, start = steps.step, steps.start
+    step, start, first = steps.step, steps.start, None
     if request.forwards:
-        linear = step.tangent(step.inputs)
-        first = start.tangent(start.inputs)
+        linear = step.tangent([*step.inputs, *step.varied])
     else:
         linear = step.adjoint(["x", LOSS] if LOSS in step.handed else ["x"])
-        first = start.adjoint([name for name in linear.vectors if name in start.handed])
-    made = _along(steps, linear, first, request.backend)
-    return MotionPrograms(made[0], made[1], steps.failed)
+    if start is not None:
+        seeds = [name for name in linear.vectors if name in start.handed]
+        pass_on = start.tangent(start.inputs) if request.forwards else start.adjoint(seeds)
+        first = _along(start, pass_on, list(start.handed), request.backend)
+    results = [name for name in ("x", LOSS, steps.failed) if name in step.handed]
+    return MotionPrograms(first, _along(step, linear, results, request.backend), steps.failed)
 
 
-def _along(steps: MotionSteps, linear: Linearized, first: Linearized, backend: str) -> tuple[Along, Along]:
-    def along(passes: Linearization, linear: Linearized, results: list[str]) -> Along:
-        forward = passes.forward([*linear.program.feed, passes.handed["x"]], results)
-        return Along(passes, runner(forward, backend), linear, runner(linear.program, backend))
-
-    results = [name for name in ("x", LOSS, steps.failed) if name in steps.step.handed]
-    return along(steps.start, first, list(steps.start.handed)), along(steps.step, linear, results)
+def _along(passes: Linearization, linear: Linearized, results: list[str], backend: str) -> Along:
+    forward = passes.forward([*linear.program.feed, passes.handed["x"]], results)
+    return Along(passes, runner(forward, backend), linear, runner(linear.program, backend))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping
 
@@ -40,11 +41,15 @@ class MotionRun:
 
     def _begin(self) -> Array:
         """The memory before the first step."""
-        motion, passes, forward = self.motion, self.start.passes, self.start.forward
-        given = {"t": motion.t[:1], "tau": motion.force_at_start, "p": motion.values}
+        motion, start = self.motion, self.start
+        given = {"t": motion.t[:1], **motion.parameters_at(motion.force_at_start)}
+        if start is None:
+            self.begin = motion.x
+            return _memory(self.step.forward, {**given, self.step.passes.handed["x"]: motion.x}, motion.many)
+        passes, forward = start.passes, start.forward
         memory = _memory(forward, {**given, passes.handed["x"]: motion.x}, motion.many)
         rows = _run(forward, memory, 1, 1, np.empty((1, 0))).rows
-        self._start_tape = rows[:, : self.start.linear.program.feed_width]
+        self._start_tape = rows[:, : start.linear.program.feed_width]
         self.begin = forward.read(memory, passes.handed["x"]).copy()
         self._start_constants = {name: forward.read(memory, name).copy() for name in passes.constants}
         handed = self.step.passes.handed
@@ -107,12 +112,16 @@ class MotionRun:
         """Cotangents of the start and of the inputs, from those after the last step; and rows, those of each step."""
         memory = self._linear_memory(self.step, self._constants, seeds)
         back = self.step.back
-        rows = np.empty((len(self.motion.h), back.program.width, *self.x.shape[1:]))
-        width = back.program.feed_width
+        width, parts = back.program.feed_width, []
         for first, last, tape in self.recorded(backwards=True):
-            pulled = _run(back, memory, last - first, 1, tape[::-1, :width]).rows
-            rows[first:last] = pulled[::-1] if back.program.record else 0.0
+            parts.append(_run(back, memory, last - first, 1, tape[::-1, :width]).rows)
+        count = (len(self.motion.h), back.program.width)
+        rows = (
+            (parts[0] if len(parts) == 1 else np.concatenate(parts))[::-1] if back.program.record else np.empty(count)
+        )
         bars = self._vectors(self.step, memory)
+        if self.start is None:
+            return bars, rows
         memory = self._linear_memory(self.start, self._start_constants, bars)
         _run(self.start.back, memory, 1, 1, self._start_tape)
         return self._vectors(self.start, memory), rows
@@ -124,21 +133,28 @@ class MotionRun:
         row = self.step.back.run(memory, 1, 1, tape[-1:, : self.step.back.program.feed_width]).rows[0]
         return float(row[self.step.passes.varied.index("h")])
 
-    def pushed(self, directions: Mapping[str, Array]) -> tuple[Array, Array]:
-        """States (steps + 1, m), and their tangents (steps + 1, m, k) along k directions of the start and inputs."""
-        count, m, k = len(self.motion.h), len(self.x), next(iter(directions.values())).shape[1]
-        states, tangents = np.empty((count + 1, m)), np.empty((count + 1, m, k))
-        memory = self._linear_memory(self.start, self._start_constants, directions)
-        _run_all(self.start.back, memory, self._start_tape)
-        memory = self._linear_memory(self.step, self._constants, {**directions, **self._vectors(self.start, memory)})
-        names = self.step.linear.vectors
-        states[0], tangents[0] = self.begin, self.step.back.read(memory, names["x"])
-        width = self.step.back.program.feed_width
+    def pushed(self, directions: Mapping[str, Array], lengths: Array) -> tuple[Array, Array]:
+        """States (steps + 1, m), and their tangents (steps + 1, m, k) along k directions of the start and inputs.
+
+        lengths: (steps, k), tangents of the lengths of the steps; none where these are constants.
+        """
+        back, names = self.step.back, self.step.linear.vectors
+        if self.start is not None:
+            memory = self._linear_memory(self.start, self._start_constants, directions)
+            _run_all(self.start.back, memory, self._start_tape)
+            directions = {**directions, **self._vectors(self.start, memory)}
+        memory = self._linear_memory(self.step, self._constants, directions)
+        m, width = len(self.x), back.program.feed_width
+        states, tangents = [self.begin[None]], [back.read(memory, names["x"])[None].copy()]
+        changes = set((np.flatnonzero((np.diff(lengths, axis=0) != 0.0).any(axis=1)) + 1).tolist())
         for first, last, tape in self.recorded(backwards=False):
-            states[first + 1 : last + 1] = tape[:, -m:]
-            tangents[first + 1 : last + 1] = _run_all(self.step.back, memory, tape[:, :width])
+            states.append(tape[:, -m:])
+            for begin, end in itertools.pairwise([first, *[k for k in range(first + 1, last) if k in changes], last]):
+                if len(lengths):
+                    back.write(memory, names["h"], lengths[None, begin])
+                tangents.append(_run_all(back, memory, tape[begin - first : end - first, :width]))
         self._vectors(self.step, memory)
-        return states, tangents
+        return np.concatenate(states), np.concatenate(tangents)
 
     def _linear_memory(
         self, along: Along, constants: Mapping[str, Array], vectors: Mapping[str, Array | float]

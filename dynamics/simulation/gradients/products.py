@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple, TypeVar
 
 import cgraph as cg
 from cgraph import Graph, Node
 
+from .rate_pullback import RatePullback
+
 T = TypeVar("T")
 Lengths = tuple[int, ...]  # of the registers that are the inputs of a graph, or its outputs
 Chosen = tuple[int, ...]  # some of them
-Pullback = Callable[[Sequence[Node]], Graph]  # inputs to differentiate by -> graph over inputs, outputs and cotangents
 
 
 class Product(NamedTuple):
@@ -32,7 +33,7 @@ class Products:
     pullbacks: {id of a graph: what gives its J^T y_bar in a shorter way}, which may read the outputs' values.
     """
 
-    def __init__(self, pullbacks: Mapping[int, Pullback]) -> None:
+    def __init__(self, pullbacks: Mapping[int, RatePullback]) -> None:
         self._pullbacks = pullbacks
         self._made: dict[tuple[object, ...], Product] = {}
         self._graphs: list[Graph] = []  # whose ids are keys
@@ -51,9 +52,10 @@ class Products:
     def _pull(self, graph: Graph, inputs: Lengths, wanted: Chosen, outputs: Lengths, seeded: Chosen) -> Product:
         groups = [group for k, group in enumerate(_split(graph.inputs, inputs)) if k in wanted]
         by = [node for group in groups for node in group]
-        known = id(graph) in self._pullbacks and len(seeded) == len(outputs)
-        if known:
-            pulled = self._pullbacks[id(graph)](by)
+        pullback = self._pullbacks.get(id(graph))
+        known = pullback is not None and len(seeded) == len(outputs) - bool(pullback.shared)
+        if pullback is not None and known:
+            pulled = pullback(by)
         else:
             names = [
                 name for k, part in enumerate(_split(list(graph.outputs), outputs)) if k in seeded for name in part

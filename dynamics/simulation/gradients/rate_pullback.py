@@ -7,63 +7,92 @@ reverse sweep over the virtual power of inverse dynamics, in place of one over i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, SingularError, building, cotangents, folded, solve_nodes, tangents
+from cgraph.extend import Builder, SingularError, building, cotangents, folded, solve_nodes, tangents, topological
 
 from ...equations.bias_terms import bias_terms
-from ...equations.substitute import substitute
 from ...integrators import Problem
 from ...systems.system import System
 
 ONE, ZERO = cg.constant(1.0), cg.constant(0.0)
 
 
-def rate_pullback(problem: Problem) -> Callable[[Sequence[Node]], Graph] | None:
-    """Inputs to differentiate by -> graph: inputs those of the rate, its outputs' values, their cotangents.
+@dataclass(frozen=True, eq=False)
+class RatePullback:
+    """Inputs to differentiate by -> graph: inputs those of the rate, values, cotangents of the rate's outputs.
 
-    None for a system of first order, and where constraints or a singular mass matrix need more.
+    inputs: of the rate.  values, bars: of its outputs.  mu: variables.  power: -mu . r over these and the inputs.
+    solved: what mu is, over the inputs and bars.  q_dot: rates of the coordinates.
+    shared: {node of the rate and of these: variable}, which are values besides.
     """
-    system = problem.system
-    if system is None or len(system.constraints):
-        return None
-    try:
-        return _Pullback(problem, system)
-    except SingularError:
-        return None
 
-
-class _Pullback:
-    """power: -mu . r over variables mu, qdd.  mu: M^-1 of variables, the cotangents of the accelerations."""
-
-    def __init__(self, problem: Problem, system: System) -> None:
-        self.problem, self.system, n = problem, system, system.n
-        m = problem.size
-        self.values = cg.variables([f"value{k}" for k in range(m)])
-        self.bars = cg.variables([f"value{k}_bar" for k in range(m)])
-        self.mu = cg.variables([f"mu{k}" for k in range(n)])
-        build = Builder()
-        (lagrangian,) = folded([system.lagrangian], build)
-        self.solved = solve_nodes(lagrangian, system.qd, self.bars[m - n :], build)
-        self.power = _power(system, self.mu, self.values[m - n :])
+    inputs: Sequence[Node]
+    values: Sequence[Node]
+    bars: Sequence[Node]
+    mu: Sequence[Node]
+    power: Node
+    solved: Sequence[Node]
+    q_dot: Sequence[Node]
+    shared: Mapping[Node, Node] = field(default_factory=dict)
 
     def __call__(self, wrt: Sequence[Node]) -> Graph:
         """The graph for these inputs."""
-        system, nq = self.system, self.problem.nq
         build = Builder()
-        q_dot = folded(system.q_dot, build)
-        seeds: dict[Node, Node] = {self.power: ONE}
+        n = len(self.mu)
+        power, *rest = folded([self.power, *self.solved, *self.q_dot, *self.shared], build)
+        solved, q_dot, shared = rest[:n], rest[n : len(rest) - len(self.shared)], rest[len(rest) - len(self.shared) :]
+        seeds: dict[Node, Node] = {power: ONE}
         with building(build):
-            for node, bar in zip(q_dot, self.bars[:nq], strict=True):
+            for node, bar in zip(q_dot, self.bars, strict=False):  # the other bars are those of accelerations
                 seeds[node] = seeds[node] + bar if node in seeds else bar
-        pulled = substitute(cotangents(seeds, wrt, build), dict(zip(self.mu, self.solved, strict=True)))
+        known = dict(zip(shared, self.shared.values(), strict=True))
+        known |= dict(zip(self.mu, rebuilt(solved, known, build), strict=True))
+        pulled = rebuilt(cotangents(seeds, wrt, build), known, build)
         outputs = {f"{k}": node for k, node in enumerate(pulled)}
-        rate, names = self.problem.rate, [str(node.name) for node in (*self.values, *self.bars)]
-        more = [*system.q, *system.qd, *self.values, *self.bars, *system.tau, *system.extra_inputs]
-        bound = self.problem.bind([*self.problem.states, *names], Graph(more, outputs))
-        return cg.simplify(Graph([*rate.inputs, *self.values, *self.bars], bound.outputs))
+        return cg.simplify(Graph([*self.inputs, *self.values, *self.shared.values(), *self.bars], outputs))
+
+
+def rate_pullback(problem: Problem) -> RatePullback | None:
+    """None for a system of first order, and where constraints or a singular mass matrix need more."""
+    system, m = problem.system, problem.size
+    if system is None or len(system.constraints):
+        return None
+    taken = problem.rate.input_names
+    values, bars, mu = (new_variables(what, n, taken) for what, n in (("value", m), ("bar", m), ("mu", system.n)))
+    build = Builder()
+    accelerations = slice(m - system.n, m)
+    try:
+        (lagrangian,) = folded([system.lagrangian], build)
+        solved = solve_nodes(lagrangian, system.qd, bars[accelerations], build)
+        power = _power(system, mu, values[accelerations])
+    except SingularError:
+        return None
+    nodes, more = [power, *solved, *system.q_dot], [*values, *bars, *mu]
+    inputs = [*system.q, *system.qd, *more, *system.tau, *system.extra_inputs]
+    names = [*problem.states, *[str(node.name) for node in more]]
+    bound = problem.bind(names, Graph(inputs, {f"{k}": node for k, node in enumerate(nodes)}))
+    power, *others = bound.outputs.values()
+    return RatePullback(problem.rate.inputs, values, bars, mu, power, others[: system.n], others[system.n :])
+
+
+def rebuilt(nodes: Sequence[Node], replacement: Mapping[Node, Node], build: Builder) -> list[Node]:
+    """Copies of nodes with others in place of some that they reach."""
+    new = dict(replacement)
+    for node in topological(nodes):
+        if node not in new:
+            new[node] = build(node.op, tuple([new[arg] for arg in node.args]), node.label) if node.args else node
+    return [new[node] for node in nodes]
+
+
+def new_variables(stem: str, count: int, taken: Collection[str]) -> list[Node]:
+    """Variables of this stem and a number, with more underscores where a name is taken."""
+    while any(f"{stem}{k}" in taken for k in range(count)):
+        stem += "_"
+    return cg.variables([f"{stem}{k}" for k in range(count)])
 
 
 def _power(system: System, mu: Sequence[Node], qdd: Sequence[Node]) -> Node:

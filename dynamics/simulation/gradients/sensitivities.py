@@ -14,9 +14,12 @@ from cgraph.extend import Array
 
 from ...systems.model import Model
 from ..applied_forces import Constant
+from ..event import Event, as_events
+from ..event_program import event_program
 from .legs import Legs
 from .motion import START, TORQUE, VELOCITY, MotionOf, motion_of
 from .motion_programs import Request, motion_programs
+from .pushed_legs import pushed_legs
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +36,9 @@ class Sensitivities:
         By the names of `wrt`, those of the state x = (q, qd), of m numbers: (T, m, n) by "q", "qd" and "tau", of an
         OdeSystem (T, m, m) by "q", and (T, m) by a parameter. Where velocities are no rates of coordinates, those by
         "q" are by small displacements xi, dq = G(q) xi.
+    times : dict of str to ndarray
+        Those of `t`, (T, n), (T, m) or (T,): 0 but where an event is, and at equal steps after it. What a row has at a
+        fixed time is `derivatives` less the rate of the state times this.
 
     Examples
     --------
@@ -47,6 +53,7 @@ class Sensitivities:
     q: Array
     qd: Array
     derivatives: dict[str, Array]
+    times: dict[str, Array]
 
     def __getitem__(self, name: str) -> Array:
         """The derivatives by one of `wrt`. Raises KeyError for another name."""
@@ -70,6 +77,7 @@ def sensitivities(
     first_step: float | None = None,
     tau: Constant | Callable[..., Sequence[Node | float]] = 0.0,
     parameters: Mapping[str, float] | None = None,
+    events: Event | Iterable[Event] = (),
     backend: str = "auto",
 ) -> Sensitivities:
     """A motion and the derivatives of all its states, by forward mode through every step.
@@ -89,6 +97,8 @@ def sensitivities(
         What to differentiate by: "q", "qd", "tau" and names of parameters. By default the start and the applied force.
     tau : float, sequence or callable
         Applied force [N m or N], constant, or a controller in closed form.
+    events : Event or iterable of Event
+        As for `gradient`. Where one resets the state there are two rows, before and after.
 
     Returns
     -------
@@ -111,44 +121,53 @@ def sensitivities(
     [[-0.1275, 0.4627], [0.0445, -0.6321]]
     """
     options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
-    motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options)
+    watched = as_events(events)
+    motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, watched)
     if motion.each_step:
         raise ValueError(f"tau must be constant, (n,), got shape {motion.tau.shape}: gradient takes a row a step")
     by = [TORQUE] if TORQUE in motion.wrt else []
-    by += ["p"] if len(motion.values) else []
-    request = Request(motion.problem, motion.method, motion.forces, False, tuple(by), forwards=True, backend=backend)
+    by += ["p", "c"] if motion.by_parameters else []
+    by += ["t", "h"] if watched else []
+    request = Request(motion.equations, motion.method, False, tuple(by), forwards=True, backend=backend)
     directions, columns = _directions(motion)
-    run = Legs(motion, motion_programs(request), {}).runs[0]
-    states, tangents = run.pushed(directions)
-    derivatives = {name: tangents[:, :, place] for name, place in columns.items()}
+    program = event_program(motion.problem, watched)
+    legs = Legs(motion, motion_programs(request), {event.name: event for event in program.events})
+    t, x, t_dot, x_dot = pushed_legs(legs, directions)
+    derivatives = {name: x_dot[:, :, place] for name, place in columns.items()}
+    times = {name: t_dot[:, place] for name, place in columns.items()}
     nq = motion.problem.nq
-    return Sensitivities(run.motion.t, states[:, :nq], states[:, nq:], derivatives)
+    return Sensitivities(t, x[:, :nq], x[:, nq:], derivatives, times)
 
 
 def _directions(motion: MotionOf) -> tuple[dict[str, Array], dict[str, int | slice]]:
     """Tangents of x, tau and p, a column for each number of `wrt`; and where the columns of each name are."""
-    problem, nq = motion.problem, motion.problem.nq
-    names = problem.parameters[motion.forces :]
-    blocks: dict[str, tuple[str, Array]] = {}
+    problem, nq, equations = motion.problem, motion.problem.nq, motion.equations
+    names = equations.names
+    along = equations.columns(motion.values[: len(names)], motion.backend) if motion.by_parameters else np.empty(0)
+    count = len(names)
+    blocks: dict[str, dict[str, Array]] = {}
     for name in motion.wrt:
         if name == START:
             moved = np.zeros((problem.size, problem.size - nq if problem.system is not None else nq))
             moved[:nq] = _displacements(motion)
-            blocks[name] = "x", moved
+            blocks[name] = {"x": moved}
         elif name == VELOCITY:
-            blocks[name] = "x", np.eye(problem.size)[:, nq:]
+            blocks[name] = {"x": np.eye(problem.size)[:, nq:]}
         elif name == TORQUE:
-            blocks[name] = TORQUE, np.eye(motion.forces)
+            blocks[name] = {TORQUE: np.eye(motion.forces)}
         else:
-            blocks[name] = "p", np.eye(len(names))[:, [names.index(name)]]
-    total = sum([block.shape[1] for _, block in blocks.values()])
-    rows = {"x": problem.size, TORQUE: motion.forces, "p": len(names)}
-    directions = {register: np.zeros((count, total)) for register, count in rows.items()}
+            column = along[:, [names.index(name)]]
+            blocks[name] = {"p": column[:count], "c": column[count:]}
+    widths = {name: next(iter(block.values())).shape[1] for name, block in blocks.items()}
+    total = sum(widths.values())
+    lengths = {"x": problem.size, **equations.lengths}
+    directions = {register: np.zeros((length, total)) for register, length in lengths.items()}
     columns: dict[str, int | slice] = {}
     at = 0
-    for name, (register, block) in blocks.items():
-        end = at + block.shape[1]
-        directions[register][:, at:end] = block
+    for name, block in blocks.items():
+        end = at + widths[name]
+        for register, values in block.items():
+            directions[register][:, at:end] = values
         columns[name] = slice(at, end) if name in (START, VELOCITY, TORQUE) else at
         at = end
     return directions, columns

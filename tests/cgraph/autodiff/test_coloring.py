@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from cgraph.autodiff import coloring
 from cgraph.autodiff.coloring import NONE, jacobian_coloring, star_coloring
-from cgraph.autodiff.sparsity import Pattern
+from cgraph.autodiff.sparsity import Pattern, symmetric
+from cgraph.core.naming import free_suffix
 
 LANES = 8
 
@@ -127,3 +129,25 @@ def test_nothing_needs_no_directions():
     for shape in ((0, 0), (3, 0), (0, 3), (3, 4)):
         assert jacobian_coloring(pattern(np.zeros(shape, dtype=bool)), LANES).counts == (0, 0)
     assert star_coloring(pattern(np.zeros((3, 3), dtype=bool))) == [0, 0, 0]
+
+
+def test_a_full_matrix_is_not_searched(monkeypatch):
+    """What would take n^2 steps of Python for each of two orders."""
+    monkeypatch.setattr(coloring, "_star", None)
+    entries = pattern(np.ones((4, 4), dtype=bool))
+    assert star_coloring(entries) == [0, 1, 2, 3]
+    assert symmetric(entries) is entries
+
+
+def test_names_are_looked_up_and_not_compared():
+    class Name(str):
+        compared = 0
+        __hash__ = str.__hash__
+
+        def __eq__(self, other):
+            Name.compared += 1
+            return str.__eq__(self, other)
+
+    names = [Name(f"x{k}") for k in range(100)]
+    assert free_suffix("_dot", tuple(names), [str(name) for name in names]) == "_dot"
+    assert Name.compared < len(names)

@@ -237,6 +237,47 @@ def test_a_look_at_slopes_sees_every_infinite_one(f, monkeypatch):
         np.testing.assert_allclose(plain, guarded, rtol=LAST_BITS)
 
 
+@pytest.mark.parametrize("cost", [LANES, WRITTEN])
+@pytest.mark.parametrize("wrt", [["z", "x"], "y", ["unused"], ["x", "y", "unused", "z"]])
+def test_derivatives_by_chosen_inputs_are_columns_of_those_by_all(backend, cost, wrt):
+    function, rng = compiled(example(), backend, cost), np.random.default_rng(0)
+    names = [wrt] if isinstance(wrt, str) else wrt
+    places = [example().input_names.index(name) for name in names]
+    whole, weights = function.jacobian(POINT), rng.normal(size=8)
+    np.testing.assert_allclose(function.jacobian(POINT, wrt=wrt), whole[:, places], rtol=LAST_BITS)
+    np.testing.assert_allclose(function.jacobian(POINT, wrt=wrt, sparse=True).toarray(), whole[:, places], LAST_BITS)
+    values = np.empty((8, len(names)))
+    function.bind_jacobian(POINT.copy(), values, wrt=[cg.variable(name) for name in names])()
+    np.testing.assert_allclose(values, whole[:, places], rtol=LAST_BITS)
+    X_dot = rng.normal(size=(3, len(names)))
+    np.testing.assert_allclose(function.jvp(POINT, X_dot, wrt=wrt), X_dot @ whole[:, places].T, rtol=SHORT_SUM)
+    np.testing.assert_allclose(function.vjp(POINT, weights, wrt=wrt), function.vjp(POINT, weights)[places], LAST_BITS)
+    second = function.hessian(POINT, weights)[np.ix_(places, places)]
+    np.testing.assert_allclose(function.hessian(POINT, weights, wrt=wrt), second, rtol=SHORT_SUM)
+
+
+def test_inputs_to_differentiate_by_are_checked(backend):
+    function = compiled(example(), backend)
+    for wrt, message in ((["w"], "no input 'w'"), (["x", "x"], "twice"), ([], "at least one")):
+        with pytest.raises(GraphError, match=message):
+            function.jacobian(POINT, wrt=wrt)
+    with pytest.raises(TypeError, match="wrt must name inputs"):
+        function.vjp(POINT, np.ones(8), wrt=3)
+    with pytest.raises(GraphError, match=r"X_dot must have shape \(k, 2\) or \(2,\), got \(4,\)"):
+        function.jvp(POINT, np.ones(4), wrt=["x", "y"])
+    with pytest.raises(GraphError, match=r"in shape \(8, 2\)"):
+        function.bind_jacobian(POINT, np.empty((8, 4)), wrt=["x", "y"])
+
+
+@pytest.mark.parametrize("cost", [LANES, WRITTEN])
+def test_bound_calls_stay_in_their_process(backend, cost):
+    function = compiled(example(), backend, cost)
+    point, values = POINT.copy(), np.empty(8)
+    for run in (function.bind(point, values), *[function.bind_jacobian(point, np.empty(k)) for k in ((8, 4), 12)]):
+        with pytest.raises(TypeError, match="a bound call holds addresses of this process"):
+            pickle.dumps(run)
+
+
 def test_names_are_no_matter():
     long = cg.variable("u" * 1000)
     taken = cg.Graph([long, cg.variable("f_bar")], {"f": long * cg.variable("f_bar"), "a line": long, "d0/d0": 1.0})

@@ -57,6 +57,8 @@ def test_every_path_is_counted_weighed_and_listed_in_order(case: Case):
         assert [abs(path.value) for path in few.paths] == pytest.approx(heaviest[:2], rel=SUMS)
         shortest = why(case.graph, "f0", str(node.name), k=len(paths))
         assert [len(path.edges) for path in shortest.paths] == sorted(map(len, paths))
+        for told in (found, shortest):  # no two of them read the same
+            assert len({path.text for path in told.paths}) == len(told.paths)
 
 
 @settings(max_examples=examples(60))

@@ -141,6 +141,27 @@ def test_a_column_is_a_graph_that_no_number_of_columns_makes_longer() -> None:
     assert long.factors < 2.5 * short.factors
 
 
-def test_one_state_at_a_time() -> None:
-    with pytest.raises(ValueError, match="one state"):
-        linearize(random_arm(2), np.zeros((3, 2)), np.zeros((3, 2)))
+def bead(q, qd, t):  # type: ignore[no-untyped-def]
+    """Without inertia at 0."""
+    return 0.5 * q[0] ** 2 * qd[0] ** 2 - q[0]
+
+
+REFUSED = {
+    "several": (random_arm(2), [[0.0, 0.0]], [[0.0, 0.0]], {}, "one state, got rows of several"),
+    "a time": (random_arm(2), [0.0, 0.0], [0.0, 0.0], {"t": np.nan}, "t must be finite, got nan"),
+    "no turn": (random_mechanism(1, ["ball"], 1), [0.0] * 4, [0.0] * 3, {}, "need a length whose square"),
+    "no inertia": (dyn.System(bead, ["x"]), [0.0], [0.0], {}, "coordinate 'x' has an inertia that is not positive"),
+    "too large": (random_arm(2), [1.0, 1.0], [1e200, 0.0], {}, "leave the range of float64"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_state_that_cannot_be_linearized_is_refused(name: str) -> None:
+    model, q, qd, others, message = REFUSED[name]
+    with pytest.raises(ValueError, match=message):
+        linearize(model, q, qd, **others)  # type: ignore[arg-type]
+
+
+def test_rows_of_a_horizon_are_as_many() -> None:
+    with pytest.raises(ValueError, match="as many rows, or one, got 2 of qd after 3"):
+        dyn.linearize_many(random_arm(2), np.zeros((3, 2)), np.zeros((2, 2)))

@@ -23,6 +23,7 @@ from dynamics.experiments.text_table import digits
 from dynamics.io.mujoco_twin import MujocoTwin
 from dynamics.peers import Case, UnavailableError, ours
 from dynamics.peers.case import BATCH, DERIVATIVES, DT, MOTIONS, NUDGE, PASSES
+from dynamics.peers.inertial_parameters import with_inertial_parameters
 from dynamics.peers.translate import translated
 from viz import cli
 
@@ -140,7 +141,7 @@ OFFERED = [
 ]
 
 
-@pytest.mark.parametrize(("name", "task", "mode"), [each for each in OFFERED if each.values[1] != "gradient"])
+@pytest.mark.parametrize(("name", "task", "mode"), [each for each in OFFERED if "gradient" not in each.values[1]])
 def test_a_peer_finds_what_mujoco_finds(name, task, mode):
     case = Case("planar 3", load("planar 3").model)
     reference, x = Reference(case), case.point(task)
@@ -174,12 +175,35 @@ def pushed():
     return case, [(start, slope(loss, x, start)), (torques, slope(loss, x, torques, h=0.5))]
 
 
-@pytest.mark.parametrize(("name", "task", "mode"), [each for each in OFFERED if each.values[1] == "gradient"])
+@pytest.mark.parametrize(("name", "task", "mode"), [each for each in OFFERED if "gradient" in each.values[1]])
 def test_a_gradient_is_the_slope_of_mujoco_s_motion(name, task, mode, pushed):
     case, slopes = pushed
     _, found = prepared(name, case, task, mode)
+    x = case.point(task)
     for direction, expected in slopes:
-        assert found @ direction == pytest.approx(expected, rel=DIFFERENCES)
+        assert found[: len(x)] @ direction == pytest.approx(expected, rel=DIFFERENCES)
+    if task == "inertial-gradient":
+        assert len(found) == len(x) + 10 * case.n
+
+
+def test_a_gradient_by_inertial_numbers_is_that_of_motions_with_other_numbers():
+    case = Case("planar 3", load("planar 3").model)
+    _, found = prepared("ours", case, "inertial-gradient", "call")
+    model, numbers = with_inertial_parameters(case.model)
+    q, qd, tau = np.split(case.point("gradient"), [3, 6])
+    given = {"t_end": PASSES * DT, "tau": tau.reshape(PASSES, 3), "wrt": "q"}
+    weights = np.random.default_rng(4).uniform(size=(3, 10))
+    weights[:, 4:] = weights[:, 4:5]  # inertias as a whole, so that they stay those of bodies
+    along = 0.3 * weights.ravel() * [*numbers.values()]
+
+    def loss(scale):
+        values = dict(zip(numbers, [*numbers.values()] + scale * along, strict=True))
+        return dyn.gradient(
+            model, lambda q, qd, t: q[0] ** 2 + q[1] ** 2 + q[2] ** 2, q, qd, parameters=values, **given
+        ).value
+
+    expected = slope(loss, 0.0, 1.0, h=1e-2)
+    assert found[len(case.point("gradient")) :] @ along == pytest.approx(expected, rel=DIFFERENCES)
 
 
 @pytest.mark.parametrize(
@@ -348,6 +372,8 @@ def test_what_a_peer_s_own_code_raises_is_a_reason():
         ({"modes": ["gpu"]}, "there is no mode 'gpu'"),
         ({"peers": ["matlab"]}, "there is no peer 'matlab'"),
         ({"budget": 0.0}, "the budget must be positive, got 0.0 s"),
+        ({"scenes": ["free 35"], "tasks": ["motion"]}, "nothing to measure of motion in the modes .* on free 35"),
+        ({"scenes": ["planar 3"], "tasks": ["gradient"], "modes": ["batch"]}, "nothing to measure of gradient"),
     ],
 )
 def test_a_wrong_choice_is_told_before_anything_is_measured(choice, said):
@@ -386,6 +412,33 @@ def test_what_was_not_measured_has_its_reason_below():
     assert "a: not ready within 60 s" in text
     assert "without sympy: not ready within 60 s" in text
     assert "without heyoka: broken" in text
+
+
+def test_a_row_without_ours_says_so_and_has_no_ratios():
+    late = {"ours": "not ready within 1 s"}
+    text = tables([row("arm 7", late, mujoco=cell(3.0, None)), row("planar 3", ours=cell(0.2, 0.0), mujoco=cell(3.0))])
+    (line,) = [line for line in text.splitlines() if line.startswith("arm 7") and "3.00" in line][:1]
+    assert line.split() == ["arm", "7", "-", "a", "3.00", "*"]
+    assert "a: not ready within 1 s" in text
+    assert "without ours: not ready within 1 s" in tables([row("arm 7", late)])
+
+
+def test_the_bench_goes_on_without_ours(monkeypatch):
+    rows = [Prepared(0.1, np.ones(2), 3), Refused("not ready within 1 s")]
+    pool = WorkerPool(None, ["mujoco", "ours"], 1.0, {})
+    answers = dict(zip(pool.peers, rows, strict=True))
+
+    class Answering:
+        alive = False
+
+        def __init__(self, _, peer):
+            self.prepare = lambda *_: answers[peer]
+            self.turn = lambda *_: 1e-6
+
+    monkeypatch.setattr(module, "Worker", Answering)
+    found = module._row(Case("planar 3", SCENES["planar 3"]()), "forward", "call", pool, 3)
+    assert found.skipped == {"ours": "not ready within 1 s"}
+    assert found.cells["mujoco"].difference is None
 
 
 def test_tables_fit_a_terminal_of_120_columns():

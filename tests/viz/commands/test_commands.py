@@ -196,6 +196,90 @@ def test_compare_has_totals_that_add_up_and_a_class_for_every_node(capsys):
     assert "spurious" not in text
 
 
+OWN = """import cgraph as cg
+import dynamics as dyn
+
+def lagrangian(q, qd, t):
+    return 0.5 * qd[0] ** 2 + qd[1] ** 2 + cg.cos(q[0] - q[1]) + cg.cos(q[0])
+
+print("made")
+system = dyn.System(lagrangian, "hip knee")
+slow = dyn.OdeSystem(lambda x, t: [-x[0]], ["decay"])
+runaway = dyn.System(lambda q, qd, t: qd[0] ** 2 / 2 + q[0] ** 4, "x")
+late = dyn.Scene("late", "it ends at infinity", runaway, (1.0,), (0.0,), 9.0)
+"""
+
+
+@pytest.fixture
+def own(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("own.py").write_text(OWN)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("command", "word"),
+    [
+        ("inspect {} --t-end 0.1 --start knee=1 --out a.html", "chain_rule"),
+        ("simulate {} --start qd.hip=1,knee=0.2 --t-end 0.1 --csv a.csv", "q.knee = "),
+        ("lint {}", "q.hip"),
+        ("lint {} --forward", "q.hip"),
+        ("why {} tau.hip q.knee", "q.knee"),
+        ("why {} qdd.hip q.knee --forward", "q.knee"),
+        ("draw {} --out a.dot", "nodes"),
+        ("draw {} --forward --out a.dot", "nodes"),
+        ("certify {} --states 1", "energy"),
+        ("compare {} --formulations chain_rule chain_rule", "left: chain_rule"),
+        ("report {} --pruning", "own.system-pruning.html"),
+    ],
+)
+def test_a_model_of_a_python_file_stands_where_a_scene_does(own, capsys, command, word):
+    text = said(capsys, *command.format("own.py:system").split())
+    assert word in text
+    assert "made" not in text
+
+
+def test_the_ten_lines_of_the_readme_are_a_page(own, capsys):
+    readme = Path(cli.__file__).parents[1].joinpath("README.md").read_text(encoding="utf-8")
+    lines = readme.partition("```python\n")[2].partition("```")[0]
+    Path("pendulum.py").write_text(lines)
+    assert len([line for line in lines.splitlines() if line]) <= 10
+    sizes = figures(capsys, "inspect", "pendulum.py:system", "--out", "a.html")
+    assert sizes["bytes"] == Path("a.html").stat().st_size < 500_000
+    assert sizes["versions"]["chain_rule"]["spurious"] == 0 < sizes["versions"]["euler_embedded"]["spurious"]
+    assert dyn.scenes.load("pendulum.py:system").coordinates == ("shoulder", "elbow")
+
+
+def test_a_resting_model_is_told_where_it_starts(own, capsys):
+    assert cli.main("inspect own.py:system --t-end 0.1 --out a.html".split()) == 0
+    line = "nothing moves, so it starts at q.hip=0.5, q.knee=0.5"
+    assert line in capsys.readouterr().err
+    assert line in Path("a.html").read_text(encoding="utf-8")
+
+
+def test_a_motion_is_written_as_csv_and_summed_up(own, capsys):
+    command = ["simulate", "own.py:system", "--start", "hip=1", "--every", "0.5", "--t-end", "1.2", "--csv", "a.csv"]
+    found = figures(capsys, *command)
+    run = dyn.simulate(dyn.scenes.load("own.py:system"), [1.0, 0.0], [0.0, 0.0], 1.2, t_eval=[0.0, 0.5, 1.0, 1.2])
+    names, *rows = [line.split(",") for line in Path("a.csv").read_text().splitlines()]
+    assert names == ["t", "q.hip", "q.knee", "qd.hip", "qd.knee", "energy"]
+    assert [[float(number) for number in row[:3]] for row in rows] == np.column_stack([run.t, run.q]).tolist()
+    assert found["end"]["q.hip"] == run.q[-1, 0]
+    assert found["energy_drift"] == np.abs(run.energy - run.energy[0]).max()
+    assert found["rows"] == 4
+    assert found["steps"] == run.stats.steps
+
+
+def test_a_motion_cut_short_is_a_finding(own, capsys):
+    assert cli.main(["simulate", "own.py:late", "--csv", "a.csv"]) == 1
+    printed = capsys.readouterr()
+    assert "the motion is not whole: it stopped at t = " in printed.err
+    assert Path("a.csv").read_text().startswith("t,q.x,qd.x,energy\n0.0,1.0,0.0,")
+    found = figures(capsys, "simulate", "own.py:slow", "--start", "decay=1", "--t-end", "1")
+    assert found["end"] == {"decay": pytest.approx(np.exp(-1.0))}
+    assert "energy" not in found
+
+
 def test_two_runs_print_the_same_bytes(capsys):
     """In processes with other hashes of text: this one has a seed that is random."""
     arguments = ["compare", "spring_mass", "--json"]
@@ -243,6 +327,11 @@ def test_the_answer_is_drawn(tmp_path, capsys):
         (["lint", "spring_mass", "--box", "zz=0:1"], "the graph has no input zz"),
         (["inspect", "spring_mass", "--out", "x.html", "--t-end", "1e9"], "--t-end must be at most 1000 s"),
         (["compare", "nowhere"], "there is no scene 'nowhere'"),
+        (["lint", "nowhere.py:system"], "there is no file 'nowhere.py'"),
+        (["simulate", "chain", "--start", "joint 11=1"], "there is no joint 11; did you mean"),
+        (["simulate", "chain", "--every", "1e-300"], "--every 1e-300 makes "),
+        (["simulate", "chain", "--csv", "nowhere/a.csv"], "cannot write"),
+        (["simulate", "chain", "--method", "rk5"], "method must be one of "),
         (["lesson", "--out", "lesson.txt"], "--out must end in .html"),
     ],
 )
@@ -274,6 +363,11 @@ def test_a_mistake_gets_one_line_and_exit_status_2(capsys, arguments, message):
         ["compare", "spring_mass", "--formulations", "chain_rule"],
         ["compare", "spring_mass", "--formulations", "chain_rule", "none"],
         ["lesson"],
+        ["simulate", "chain", "--start", "a,b"],
+        ["simulate", "chain", "--start", "q0=1,q0=2"],
+        ["simulate", "chain", "--t-end", "-1"],
+        ["simulate", "chain", "--rtol", "0"],
+        ["draw", "chain", "--out", "a.dot", "--forward", "--formulation", "kinetic_only"],
     ],
 )
 def test_wrong_usage_has_exit_status_2(capsys, arguments):

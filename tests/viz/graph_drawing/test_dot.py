@@ -314,7 +314,7 @@ def test_a_caption_counts_nodes_and_edges() -> None:
 def test_tooltips_tell_operation_roles_and_tags() -> None:
     graph = spring()
     i = next(i for i, node in enumerate(graph.nodes) if "kinetic" in node.tags)
-    assert boxes(graph)[f"n{i}"]["tooltip"] == f"n{i}: mul; primal; tags: kinetic"
+    assert boxes(graph)[f"n{i}"]["tooltip"] == "%1: mul; primal; tags: kinetic"
 
 
 NASTY = ['a"b', r"back\slash", r"\N", "<b>bold</b>", "<html", 'quote\\"', "{record|x}", "a;b", "ω₀"]

@@ -149,7 +149,8 @@ def test_detail_goes_from_nodes_to_bodies_and_back(show):
     bodies = page.locator(".item.body")
     assert bodies.count() == 5
     counts = [
-        re.search(r"(\d+) nodes?(?:, (\d+) spurious)?", text) for text in bodies.locator(".value").all_text_contents()
+        re.search(r"(\d+)(?: nodes?)?(?:, (\d+) spurious)?", text)
+        for text in bodies.locator(".value").all_text_contents()
     ]
     assert sum(int(found[2] or 0) for found in counts) == 55
     drawn = sum(int(found[1]) for found in counts) + sums + len(graph_of(EMBEDDED).inputs)

@@ -104,17 +104,17 @@ class Elements(HTMLParser):
             self.texts[self._open[-1]][-1] += data
 
 
-@pytest.mark.parametrize("text", HOSTILE)
-def test_no_text_of_a_graph_becomes_markup_or_script(text):
+def test_no_text_of_a_graph_becomes_markup_or_script():
     plain = Elements(viz.page(cg.Graph([], {"y": 1.0}), tables=[Table("c", ["a", "b"], [["c", "d"]])]))
-    page = hostile_page(text)
-    found = Elements(page)
-    assert [name for name, _ in found.elements] == [name for name, _ in plain.elements]
-    assert not [key for _, attributes in found.elements for key in attributes if key.startswith("on")]
-    assert found.texts["title"] == found.texts["h1"] == [text]
-    assert found.texts["caption"] == [text]
-    assert found.texts["td"] == [text, text]
-    assert data_of(page)["versions"][0]["names"]["0"][0] == text.replace(" ", "_")
+    for text in HOSTILE:
+        page = hostile_page(text)
+        found = Elements(page)
+        assert [name for name, _ in found.elements] == [name for name, _ in plain.elements]
+        assert not [key for _, attributes in found.elements for key in attributes if key.startswith("on")]
+        assert found.texts["title"] == found.texts["h1"] == [text]
+        assert found.texts["caption"] == [text]
+        assert found.texts["td"] == [text, text]
+        assert data_of(page)["versions"][0]["names"]["0"][0] == text.replace(" ", "_")
 
 
 def test_the_policy_lets_no_script_and_no_style_run_but_the_page_s_own(pendulum):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from itertools import product
 
 import numpy as np
@@ -10,7 +11,10 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+import viz
+from cgraph.codegen.python_source import source
 from cgraph.core.ops import OPS
+from cgraph.extend import Names
 from dynamics.scenes.inspection import inspection
 from tests.page_script import run_script
 from tests.tolerances import SUMS
@@ -141,13 +145,21 @@ def test_huge_numbers_of_paths_are_exact():
     assert int(found["paths"][0]) == 2**200
 
 
-def test_operations_have_the_numbers_of_the_listing(pendulum):
+def test_a_node_has_one_number_everywhere(pendulum):
+    """In the listing, in what explains, in drawings, in C and Python, and on the page."""
     numbers = run_script("(record) => makeState(record).versions.map((each) => each.number)", record(pendulum, None))
-    for version, found in zip(pendulum, numbers, strict=True):
-        lines = version.graph.listing().splitlines()
-        for node, number in zip(version.graph.nodes, found, strict=True):
+    for version, found in zip(pendulum[1:], numbers[1:], strict=True):
+        graph = version.graph
+        lines, tooltips = graph.listing().splitlines(), viz.to_dot(graph).source
+        names, c, python = Names(graph), cg.to_c(graph).source, source(graph, lambda op: op.python, ())
+        for node, number in zip(graph.nodes, found, strict=True):
             assert bool(number) == bool(node.args)
-            assert not number or lines[number].startswith(f"%{number} = {node.op.name} ")
+            if number:
+                assert lines[number].startswith(f"%{number} = {node.op.name} ")
+                assert names.line(node).startswith(f"%{number} = ")
+                assert f'tooltip="%{number}: {node.op.name}' in tooltips
+                assert f"v{number} = " in python
+        assert set(re.findall(r"const double v([0-9]+) = ", c)) <= {str(each) for each in found if each}
 
 
 # One state.

@@ -1,0 +1,119 @@
+"""HTML that a notebook shows of results: tables, and text in its lines; colors are the notebook's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from importlib.metadata import entry_points
+
+LEFT, RIGHT = "text-align:left", "text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap"
+
+
+def html_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, title: str = "", texts: int = 1) -> str:
+    """A table of texts.
+
+    Parameters
+    ----------
+    header : sequence of str
+        Names of the columns; of empty ones no line is drawn.
+    rows : sequence of sequence of str
+        The cells.
+    title : str
+        What stands above.
+    texts : int
+        How many of the first columns are words, read from the left; the others are numbers.
+
+    Returns
+    -------
+    str
+        HTML; what the texts hold is shown as it is, never run.
+
+    Examples
+    --------
+    >>> from cgraph.extend import html_table
+    >>> "&lt;b&gt;" in html_table(["name", "size"], [["<b>", "3"]])
+    True
+    """
+
+    def line(cells: Sequence[str], kind: str) -> str:
+        styles = [LEFT if i < texts else RIGHT for i in range(len(cells))]
+        inside = [f'<{kind} style="{style}">{escape(cell)}</{kind}>' for style, cell in zip(styles, cells, strict=True)]
+        return f"<tr>{''.join(inside)}</tr>"
+
+    above = f'<caption style="{LEFT}">{escape(title)}</caption>' if title else ""
+    head = f"<thead>{line(header, 'th')}</thead>" if any(header) else ""
+    body = "".join([line(row, "td") for row in rows])
+    return f'<div style="overflow-x:auto"><table>{above}{head}<tbody>{body}</tbody></table></div>'
+
+
+def html_lines(text: str) -> str:
+    """Text in its lines, in letters of equal width.
+
+    Parameters
+    ----------
+    text : str
+        What is shown.
+
+    Returns
+    -------
+    str
+        HTML.
+
+    Examples
+    --------
+    >>> from cgraph.extend import html_lines
+    >>> html_lines("x < y")
+    '<pre>x &lt; y</pre>'
+    """
+    return f"<pre>{escape(text)}</pre>"
+
+
+def html_text(text: str) -> str:
+    """A paragraph of text.
+
+    Parameters
+    ----------
+    text : str
+        What is said.
+
+    Returns
+    -------
+    str
+        HTML.
+
+    Examples
+    --------
+    >>> from cgraph.extend import html_text
+    >>> html_text("x < y")
+    '<p>x &lt; y</p>'
+    """
+    return f"<p>{escape(text)}</p>"
+
+
+def picture(kind: str, what: object) -> str | None:
+    """The HTML that a drawing package makes of something (entry point `kind` of the group `cgraph.renderers`), if any.
+
+    Parameters
+    ----------
+    kind : str
+        "graph" or "trajectory".
+    what : object
+        What is drawn.
+
+    Returns
+    -------
+    str or None
+        HTML; None where no package is installed that draws it, or where it cannot: the notebook shows text then.
+
+    Examples
+    --------
+    >>> from cgraph.extend import picture
+    >>> picture("sculpture", 3) is None
+    True
+    """
+    for renderer in entry_points(group="cgraph.renderers", name=kind):
+        try:
+            return str(renderer.load()(what))
+        except (ImportError, RuntimeError):
+            return None
+    return None

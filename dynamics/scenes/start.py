@@ -1,0 +1,113 @@
+"""Starts: a scene from a start that somebody chose by names, or from one that shows something where rest does not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+
+from cgraph import Graph
+from cgraph.extend import or_nearest, real_array, real_number
+
+from ..equations.consistent_state import consistent_state
+from ..equations.state_equation import state_equation
+from ..multibody.display_units import display_units
+from .scenes import Scene
+
+Known = TypeVar("Known", bound=Scene)
+Start = Mapping[str, float] | Sequence[float]
+AWAY = 0.5  # rad, and the unit of any other coordinate: how far from a place of rest a motion starts
+_ROUNDING = 1e-9  # of the largest acceleration nearby: less is what is left of a difference
+
+
+def with_start(scene: Known, start: Start) -> Known:
+    """The scene from another start.
+
+    start: {name: value} of what differs from the scene's own, as "q0", "q.knee", "qd.knee" or a coordinate's name; or
+    all numbers of q and then qd. Raises ValueError for a name that is none, or twice, or another number of numbers.
+    """
+    states = [*scene.coordinates, *(() if scene.ode else scene.velocities)]
+    values = [*scene.q, *scene.qd]
+    if not isinstance(start, Mapping):
+        given = real_array("start", start)
+        if given.shape != (len(values),):
+            shown = ", ".join(_names(scene)[:12]) + (", .." if len(states) > 12 else "")
+            raise ValueError(f"the start needs {len(values)} numbers ({shown}), got {given.size}")
+        values = given.tolist()
+    else:
+        meant = _meant(scene)
+        taken: dict[int, str] = {}
+        for name, value in start.items():
+            if name not in meant:
+                raise ValueError(f"start: there is no {name!s:.80}; {or_nearest(str(name), _names(scene))}")
+            if meant[name] in taken:
+                raise ValueError(f"start: {name} is given twice, once as {taken[meant[name]]}")
+            taken[meant[name]] = name
+            values[meant[name]] = real_number(f"start: {name}", value)
+    nq = len(scene.q)
+    return replace(scene, q=tuple(values[:nq]), qd=tuple(values[nq:]))
+
+
+def moving_start(scene: Scene) -> Scene:
+    """The scene; where it would rest at its start for ever, from a start that shows something.
+
+    That is half a radian from there at every joint, or half a unit of coordinates without one, or such a velocity.
+    """
+    if any(scene.qd):
+        return scene
+    rate = state_equation(scene)
+    starts = [scene, *_nearby(scene)]
+    found = [_rates(rate, each) for each in starts]
+    largest = max((rates for rates in found if np.isfinite(rates)), default=0.0)
+    for each, rates in zip(starts, found, strict=True):
+        if np.isfinite(rates) and (rates > _ROUNDING * largest or any(each.qd)):
+            return each
+    return scene
+
+
+def start_text(scene: Scene) -> str:
+    """`q.shoulder=0.5, qd.elbow=0.5`: what of the start is not zero."""
+    shown = [f"{name}={value:.4g}" for name, value in zip(_names(scene), (*scene.q, *scene.qd), strict=True) if value]
+    return ", ".join(shown[:12] + ([f"and {len(shown) - 12} more"] if len(shown) > 12 else [])) or "0"
+
+
+def _names(scene: Scene) -> list[str]:
+    """What a person calls the states, in the order of q and qd."""
+    if scene.ode:
+        return list(scene.coordinates)
+    return [f"q.{name}" for name in scene.coordinates] + [f"qd.{name}" for name in scene.velocities]
+
+
+def _meant(scene: Scene) -> dict[str, int]:
+    """{name that a start may have: its place among q and qd}; the graphs' names come first."""
+    nq = len(scene.q)
+    meant = {name: i for i, name in enumerate(scene.coordinates)} | {name: i for i, name in enumerate(_names(scene))}
+    return meant | {f"q{i}": i for i in range(nq)} | {f"qd{i}": nq + i for i in range(len(scene.qd))}
+
+
+def _nearby(scene: Scene) -> list[Scene]:
+    """The scene a little away from its start, at rest and then moving; only from what can be reached."""
+    units = {} if scene.mechanism is None else display_units(scene.mechanism.moving)
+    away = [AWAY * (units.get(f"q{i}", "rad") == "rad") for i in range(len(scene.q))]
+    q = tuple([value + step for value, step in zip(scene.q, away, strict=True)])
+    starts = []
+    for qd in ((0.0,) * len(scene.qd), (AWAY,) * len(scene.qd)):
+        try:
+            place, velocity = (q, qd) if scene.ode else consistent_state(scene, q, qd)
+        except (ValueError, ArithmeticError):
+            continue
+        starts.append(replace(scene, q=tuple(map(float, place)), qd=tuple(map(float, velocity))))
+    return starts
+
+
+def _rates(rate: Graph, scene: Scene) -> float:
+    """The largest rate of the state at the start without forces; not finite where there is none."""
+    states = zip(rate.input_names, (*scene.q, *scene.qd), strict=False)
+    values = dict.fromkeys(rate.input_names, 0.0) | dict(scene.parameters) | dict(states)
+    try:
+        with np.errstate(all="ignore"):
+            return max(abs(float(value)) for value in rate.evaluate(values).values())
+    except (ValueError, ArithmeticError):
+        return np.inf

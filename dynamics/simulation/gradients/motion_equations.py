@@ -1,0 +1,129 @@
+"""Motion equations: what steps and their derivatives read of a problem, with what parameters alone decide apart.
+
+Of xdot = f(x, t, p) = g(x, t, c(p)) the numbers c, such as products of masses and lengths, are computed once for a
+motion, and cotangents are collected by c at every stage and pulled back to p once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph.extend import Array, Builder, folded, topological
+
+from ...integrators import Problem
+from .point_functions import at, compiled, pulled_back
+from .rate_pullback import RatePullback, new_variables, rate_pullback, rebuilt
+
+ARITHMETIC = ("add", "sub", "mul", "neg")
+PARAMETERS = ("tau", "p", "c")  # registers: what the parameters of the problem are, end to end
+KEPT = 16  # problems whose equations stay for another run
+
+
+@dataclass(frozen=True, eq=False)
+class MotionEquations:
+    """A problem whose parameters are applied forces, p, and c.
+
+    forces: how many of the parameters are applied forces.  names: of p.  numbers: c, a graph over p, if there are any.
+    pullback: of the rate, where there is one.
+    sharing_rate, sharing_pullback: the same two, where the one records for the other what both need.
+    """
+
+    problem: Problem
+    forces: int
+    names: tuple[str, ...]
+    numbers: Graph | None
+    pullback: RatePullback | None
+    sharing_rate: Graph
+    sharing_pullback: RatePullback | None
+
+    @property
+    def lengths(self) -> dict[str, int]:
+        """Of the registers of the parameters."""
+        count = len(self.problem.parameters) - self.forces - len(self.names)
+        return dict(zip(PARAMETERS, (self.forces, len(self.names), count), strict=True))
+
+    def values(self, p: Array, backend: str) -> Array:
+        """p and c, (P + C,), or (P + C, N) of N motions, from p."""
+        if self.numbers is None:
+            return p
+        return np.concatenate([p, at(compiled(self.numbers, backend), p)])
+
+    def by_parameters(self, p: Array, bars: Array, backend: str) -> Array:
+        """Cotangents of p from those of p and c."""
+        if self.numbers is None:
+            return bars
+        count = len(self.names)
+        return bars[:count] + at(pulled_back(self.numbers, backend), np.concatenate([p, bars[count:]]))
+
+    def columns(self, p: Array, backend: str) -> Array:
+        """Tangents of p and c along every one of p, (P + C, P)."""
+        unit = np.eye(len(self.names))
+        if self.numbers is None:
+            return unit
+        return np.concatenate([unit, compiled(self.numbers, backend).jacobian(p)])
+
+
+@lru_cache(KEPT)
+def motion_equations(problem: Problem, forces: int) -> MotionEquations:
+    """The equations of a problem whose first `forces` parameters are applied forces."""
+    names, pullback = problem.parameters[forces:], rate_pullback(problem)
+    graphs = [problem.rate] if problem.projection is None else [problem.rate, problem.projection]
+    parts = [node for graph in graphs for node in graph.outputs.values()]
+    if pullback is not None:
+        parts += [pullback.power, *pullback.solved, *pullback.q_dot]
+    numbers, changed = _apart(parts, cg.variables(list(names)), problem.rate.input_names)
+    new = dict(zip(parts, changed, strict=True))
+    rate, *projection = [
+        Graph([*graph.inputs, *numbers], {name: new[node] for name, node in graph.outputs.items()}) for graph in graphs
+    ]
+    if pullback is not None:
+        solved, q_dot = ([new[node] for node in nodes] for nodes in (pullback.solved, pullback.q_dot))
+        pullback = replace(pullback, inputs=rate.inputs, power=new[pullback.power], solved=solved, q_dot=q_dot)
+    outputs = {str(variable.name): node for variable, node in numbers.items()}
+    parameters, projected = (*problem.parameters, *outputs), projection[0] if projection else None
+    made = replace(problem, parameters=parameters, rate=rate, projection=projected, multipliers=None)
+    over_p = Graph(cg.variables(list(names)), outputs) if outputs else None
+    return MotionEquations(made, forces, names, over_p, pullback, *_sharing(rate, pullback))
+
+
+def _sharing(rate: Graph, pullback: RatePullback | None) -> tuple[Graph, RatePullback | None]:
+    """The rate with what its pullback can take over from it as outputs besides, and the pullback that does."""
+    if pullback is None:
+        return rate, None
+    here = {node for node in rate.nodes if node.args}
+    edge: dict[Node, None] = {}
+    for node in topological(pullback.solved):
+        if node not in here:
+            edge |= {arg: None for arg in node.args if arg in here}
+    edge |= {node: None for node in topological([pullback.power]) if node in here and node.op.name not in ARITHMETIC}
+    variables = new_variables("shared", len(edge), rate.input_names)
+    shared = dict(zip(edge, variables, strict=True))
+    more = {str(variable.name): node for node, variable in shared.items()}
+    return Graph(rate.inputs, {**rate.outputs, **more}), replace(pullback, shared=shared)
+
+
+def _apart(
+    nodes: Sequence[Node], parameters: Sequence[Node], taken: Sequence[str]
+) -> tuple[dict[Node, Node], list[Node]]:
+    """{variable c: what it is of the parameters alone, where others use it}, and the nodes over these variables.
+
+    taken: names that the variables do not get.
+    """
+    build = Builder()
+    copies = folded(nodes, build)
+    order = topological(copies)
+    alone, edge = set(parameters), dict.fromkeys(copies)
+    for node in order:
+        if node.args and all([arg in alone or arg.op.name == "constant" for arg in node.args]):
+            alone.add(node)
+        else:
+            edge |= dict.fromkeys(node.args)
+    used = [node for node in edge if node in alone]
+    numbers = dict(zip(used, new_variables("number", len(used), taken), strict=True))
+    return {variable: node for node, variable in numbers.items()}, rebuilt(copies, numbers, build)

@@ -1,0 +1,147 @@
+"""Derivatives of random trees of bodies against 60 digits of Newton-Euler equations, and beside Pinocchio's errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cgraph as cg
+import dynamics as dyn
+from tests.dynamics.exact_slopes import Errors, Slopes, difference, errors, exact_slopes
+from tests.dynamics.mechanisms import (
+    TREES,
+    Array,
+    floating,
+    random_mechanism,
+    random_state,
+    random_tree,
+    turned_arm,
+)
+
+pytest.importorskip("flint")
+
+# Of the largest entry of a matrix of slopes of torques; and, of slopes X of accelerations, M X = dtau, of what a
+# relative change of M and of dtau may do to X: of the largest entry of |M^-1| (|M| |X| + |dtau|).
+ROUNDING = 4e-15
+CONDITIONED = 1e-15
+
+
+def ours(tree: dyn.Mechanism, state: tuple[Array, ...]) -> Slopes:
+    q, qd, qdd, tau = state
+    found = dyn.arrays_at(tree, dyn.inverse_dynamics_derivatives(tree), q, qd, qdd)
+    A, B = dyn.linearize(tree, q, qd, tau)
+    n = len(qd)
+    return Slopes(np.hstack([found[name] for name in ("dtau_dq", "dtau_dqd", "M")]), np.hstack([A[n:], B[n:]]))
+
+
+def pinocchios(tree: dyn.Mechanism, state: tuple[Array, ...]) -> Slopes:
+    from dynamics.peers import Case
+    from dynamics.peers.pinocchio import PinocchioPeer
+
+    peer, (q, qd, qdd, tau) = PinocchioPeer(Case("tree", tree)), state
+    return Slopes(
+        peer.slopes(np.concatenate([q, qd, qdd]), "inverse-derivatives"),
+        peer.slopes(np.concatenate([q, qd, tau]), "derivatives"),
+    )
+
+
+def require_exact(off: Errors) -> None:
+    assert max(off.torques) < ROUNDING
+    assert max(off.conditioned) < CONDITIONED
+
+
+@pytest.mark.parametrize("name", TREES)
+def test_slopes_of_every_kind_of_joint_are_exact(name: str) -> None:
+    tree = TREES[name]()
+    state = random_state(tree, 0)
+    require_exact(errors(ours(tree, state), exact_slopes(tree, *state)))
+
+
+def size(seed: int) -> int:
+    """Bodies, from 1 to 31, as many trees of up to 5 as beyond."""
+    return round(10 ** np.random.default_rng(seed).uniform(0.0, 1.5))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(200))
+def test_slopes_of_random_trees_are_exact(seed: int, record_property: Any) -> None:
+    """Chains and branches of hinges, slides, balls and welds, on fixed and free bases; Pinocchio's if installed."""
+    tree = random_tree(seed, size(seed))
+    state = random_state(tree, seed)
+    exact, found = exact_slopes(tree, *state), {"ours": ours(tree, state)}
+    with suppress(ImportError):
+        found["Pinocchio"] = pinocchios(tree, state)
+    for name, each in found.items():
+        off = errors(each, exact)
+        print(name, tree.system.n, off)  # noqa: T201
+        record_property(name, off)
+    require_exact(errors(found["ours"], exact))
+
+
+LONG: dict[str, Callable[[], dyn.Mechanism]] = {
+    "planar 60": lambda: dyn.planar_arm([0.2 + 0.05 * (i % 3) for i in range(60)], [0.3] * 60, damping=0.1),
+    "arm 60": lambda: turned_arm(60),
+    "arm 100": lambda: turned_arm(100),
+    "free 100": lambda: floating("free", random_mechanism(99, ["revolute", "prismatic"], 2)),
+    "mixed 100": lambda: random_mechanism(100, ["revolute", "prismatic", "ball"], 3),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LONG)
+def test_slopes_of_a_hundred_bodies_are_exact(name: str) -> None:
+    """By graphs and by the machine code of `linearize_many`; no warning, as of an engine that is not that of others."""
+    tree = LONG[name]()
+    q, qd, _, tau = state = random_state(tree, 0)
+    exact, found = exact_slopes(tree, *state), ours(tree, state)
+    off = errors(found, exact)
+    print(name, off)  # noqa: T201
+    require_exact(off)
+    (A,), (B,) = dyn.linearize_many(tree, q[None], qd[None], tau)
+    n = len(qd)
+    require_exact(errors(Slopes(found.torques, np.hstack([A[n:], B[n:]])), exact))
+
+
+def test_slopes_agree_with_complex_steps() -> None:
+    """tau(x + i h) / h is exact to rounding: h is 1e-200, and its square nothing."""
+    tree = random_mechanism(4, ["revolute", "prismatic"], 2)
+    q, qd, qdd, _ = random_state(tree, 0)
+    graph, n = dyn.inverse_dynamics(tree), len(qd)
+    point = np.concatenate([q, qd, qdd])[:, None] + 1e-200j * np.eye(3 * n)
+    values: dict[cg.Node, Any] = dict(zip(graph.inputs, point, strict=True))
+    functions: dict[str, Any] = {"sin": np.sin, "cos": np.cos, "sqrt": np.sqrt}
+    for node in graph.nodes:
+        if node.value is not None:
+            values[node] = node.value
+        elif node.args:
+            values[node] = (node.op.operator or functions[node.op.name])(*[values[arg] for arg in node.args])
+    steps = np.array([values[node].imag for node in graph.outputs.values()]) / 1e-200
+    found = dyn.arrays_at(tree, dyn.inverse_dynamics_derivatives(tree), q, qd, qdd)
+    for name, expected in zip(("dtau_dq", "dtau_dqd", "M"), np.hsplit(steps, 3), strict=True):
+        assert np.abs(found[name] - expected).max() < ROUNDING * np.abs(expected).max()
+
+
+def test_slopes_in_double_double_have_twice_the_digits() -> None:
+    """A ball on a slide needs no sines, and constants are not folded in float64 where some numbers are inputs."""
+    numbers = {"m": 2.0, "x": 0.5, "I": 0.625}
+    ball = {"mass": "m", "center": ("x", -0.25, 0.125), "inertia": (0.5, 0.75, "I")}
+    bodies = [
+        dyn.Body("a", dyn.Joint("prismatic", (0.0, 0.0, 1.0), damping=0.25), mass=1.5),
+        dyn.Body("b", dyn.Joint("ball", position=(0.5, 0.25, -1.0), armature=0.5), "a", **ball),
+    ]
+    named = dyn.Mechanism(bodies, (1.0, 2.0, -9.5), parameters=numbers)
+    tree = named.bind()
+    q, qd, qdd, tau = random_state(tree, 0)
+    exact = exact_slopes(tree, q, qd, qdd, tau)
+    graph, n = cg.double_double(dyn.state_space(named), low=True), len(qd)
+    at = numbers | {
+        f"{kind}{i}": x for kind, row in {"q": q, "qd": qd, "tau": tau}.items() for i, x in enumerate(row.tolist())
+    }
+    values = graph.evaluate({name: at[name] for name in graph.input_names})
+    names = [[f"{'A' if j < 2 * n else 'B'}_{n + i}_{j % (2 * n)}" for j in range(3 * n)] for i in range(n)]
+    halves = [np.array([[values[name + low] for name in row] for row in names]) for low in ("", "_low")]
+    assert np.abs(difference(exact.accelerations, *halves)).max() < 1e-28 * np.abs(halves[0]).max()

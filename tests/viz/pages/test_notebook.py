@@ -1,0 +1,112 @@
+"""What a notebook shows of results: HTML that holds what the text holds, pictures that fit, names that stay text."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from html import unescape
+from importlib.metadata import entry_points
+
+import numpy as np
+import pytest
+
+import cgraph as cg
+import dynamics as dyn
+from viz.graph_drawing.render import LARGE
+from viz.pages.notebook import COLUMNS, graph_html, trajectory_html
+
+EVIL = "<script>alert(1)</script>"
+
+
+def words_of_text(text: str) -> list[str]:
+    """Without the marks that stand for a column."""
+    return re.findall(r"[^\s:()]+", text)
+
+
+def words(text: str) -> list[str]:
+    return unescape(re.sub(r"<[^>]*>", " ", text)).split()
+
+
+@cache
+def results() -> dict[str, object]:
+    x, y = cg.variables("x y")
+    with cg.tag(EVIL):
+        product = x * cg.sin(y)
+    graph = cg.Graph([x, y], {"f": product})
+    arm = dyn.planar_arm([1.0, 0.5], [1.0, 1.0])
+    table = dyn.torque_by_link(arm)
+    return {
+        "counts": graph.counts(),
+        "why": cg.why(graph, "f", "y", at={"x": 1.0, "y": 2.0}, names={"y": EVIL}),
+        "why, shortest": cg.why(graph, "f", "y"),
+        "why not": cg.why_not(cg.Graph([x, y], {"f": x}), "f", "y"),
+        "lint": cg.lint(graph, independent=("x", "y"), names={"x": EVIL}),
+        "nothing declared": cg.lint(graph),
+        "compare": cg.compare(graph, cg.Graph([x], {"f": x})),
+        "compiled": cg.compile(graph, "python"),
+        "table": table,
+        "table at a state": table.at([0.1, 0.2]),
+        "certificate": dyn.certify(dyn.scenes.load("spring_mass"), states=2),
+    }
+
+
+@pytest.mark.parametrize(("name", "result"), results().items())
+def test_a_result_shows_in_a_notebook_what_it_prints(name, result):
+    shown = result._repr_html_()
+    assert "<script" not in shown
+    if name not in {"counts", "compiled"}:
+        assert not set(words_of_text(str(result))) - set(words_of_text(unescape(re.sub(r"<[^>]*>", " ", shown))))
+
+
+def test_counts_and_compiled_graphs_show_their_sizes():
+    shown = {name: words(result._repr_html_()) for name, result in results().items()}
+    assert shown["counts"][:9] == ["count", "nodes", "4", "edges", "3", "depth", "2", "width", "2"]
+    assert "back end python inputs 2 outputs 1 nodes 4 lines" in " ".join(shown["compiled"])
+
+
+def test_a_large_graph_is_folded_and_the_way_to_its_page_is_said():
+    x = cg.variable("x")
+    with cg.tag("long"):
+        y = x
+        for _ in range(LARGE):
+            y = cg.sin(y)
+    folded = graph_html(cg.Graph([x], {"y": y}))
+    assert folded.count("<svg") == 1
+    assert "viz.page(graph)" in folded
+    assert len(folded) < 20_000
+
+
+def test_a_large_graph_without_tags_is_told_in_words():
+    y = x = cg.variable("x")
+    for _ in range(LARGE):
+        y = cg.sin(y)
+    told = graph_html(cg.Graph([x], {"y": y}))
+    assert "<svg" not in told
+    assert f"{LARGE + 1} nodes" in told
+
+
+def test_a_motion_is_plotted_and_says_how_it_went():
+    run = dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.1], [0.0], 0.1)
+    shown = trajectory_html(run)
+    assert shown.count("<svg") == 1
+    assert "max-width:100%" in shown
+    assert unescape(shown).endswith(f"<p>{run!r}</p>")
+
+
+def test_states_of_an_ode_are_plotted_and_what_is_left_out_is_said():
+    many = COLUMNS + 3
+    ode = dyn.OdeSystem(lambda x, t: [-x[i] for i in range(many)], [f"x{i}" for i in range(many)])
+    run = dyn.simulate(ode, np.ones(many), None, t_end=0.1)
+    assert f"the first {COLUMNS} of {many}" in trajectory_html(run)
+
+
+def test_the_package_tells_notebooks_what_draws():
+    installed = {entry.name: entry.value for entry in entry_points(group="cgraph.renderers")}
+    assert installed["graph"] == "viz.pages.notebook:graph_html"
+    assert installed["trajectory"] == "viz.pages.notebook:trajectory_html"
+
+
+def test_a_graph_and_a_motion_find_what_draws_them():
+    x = cg.variable("x")
+    assert "<svg" in cg.Graph([x], {"y": x + 1.0})._repr_html_()
+    assert "<svg" in dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.1], [0.0], 0.1)._repr_html_()

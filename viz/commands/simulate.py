@@ -1,0 +1,119 @@
+"""`cgraph simulate`: the motion of a scene, in a summary and as CSV."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cgraph.extend import check_writable
+from dynamics import METHODS, Trajectory, simulate
+
+from .arguments import Commands, answer, positive, say, takes_a_scene, unless_json
+from .point_arguments import started, takes_a_start
+
+METHOD = "dop853"
+SHOWN = 12  # states that the summary names
+MOST_ROWS = 10_000_000
+
+
+def add(commands: Commands[argparse.ArgumentParser]) -> None:
+    """The command's arguments."""
+    parser = commands.add_parser(
+        "simulate", help="the motion of a scene: how the run went, its energy, and as CSV; status 1 if it is cut short"
+    )
+    takes_a_scene(parser)
+    takes_a_start(parser)
+    parser.add_argument("--t-end", type=positive, metavar="S", help="how long, in place of the scene's time")
+    parser.add_argument(
+        "--method",
+        default=METHOD,
+        metavar="NAME",
+        help=f"{', '.join(METHODS)}, or a solver of SciPy, as scipy:Radau (default: {METHOD})",
+    )
+    parser.add_argument("--dt", type=positive, metavar="S", help="the largest of equal steps (default: 0.001)")
+    parser.add_argument("--rtol", type=positive, metavar="R", help="relative error of a chosen step (default: 1e-9)")
+    parser.add_argument("--every", type=positive, metavar="S", help="a row so often (default: every step is one)")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="write t, q, qd and energy, a line for each row")
+    parser.add_argument("--json", action="store_true", help="print as JSON")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print how the run went; 1 where it ends before its time."""
+    if options.csv is not None:
+        check_writable(options.csv)
+    scene, _ = started(options)
+    end = scene.t_end if options.t_end is None else options.t_end
+    at = None if options.every is None else _every(options.every, end)
+    run = simulate(
+        scene,
+        scene.q,
+        None if scene.ode else scene.qd,
+        end,
+        options.method,
+        rtol=options.rtol,
+        dt=options.dt,
+        t_eval=at,
+    )
+    data = {"scene": scene.name, "rows": len(run.t)} | _summary(run)
+    files: dict[Path, str | bytes] = {} if options.csv is None else {options.csv: run.to_csv()}
+    answer(unless_json(options, data, f"{scene.name}: {_text(run, data)}"), files)
+    if not run.stats.success:
+        say(f"the motion is not whole: it {run.stats.message}")
+    return 0 if run.stats.success else 1
+
+
+def _summary(run: Trajectory) -> dict[str, Any]:
+    """How a run went, as data."""
+    stats = run.stats
+    names = [f"q.{name}" for name in run.coordinates] if run.velocities else list(run.coordinates)
+    names += [f"qd.{name}" for name in run.velocities]
+    energy: dict[str, float] = {}
+    if np.isfinite(run.energy).all():  # of a system of first order it is NaN
+        energy = {
+            "energy": float(run.energy[0]),
+            "energy_at_end": float(run.energy[-1]),
+            "energy_drift": float(np.abs(run.energy - run.energy[0]).max()),
+        }
+    return {
+        "success": stats.success,
+        "status": stats.status,
+        "message": stats.message,
+        "method": stats.method,
+        "t_end": float(run.t[-1]),
+        "steps": stats.steps,
+        "rejected": stats.rejected,
+        "evaluations": stats.nfev,
+        "seconds": stats.seconds,
+        **energy,
+        "end": dict(zip(names, [*run.q[-1].tolist(), *run.qd[-1].tolist()], strict=True)),
+    }
+
+
+def _text(run: Trajectory, data: dict[str, Any]) -> str:
+    """The summary in words."""
+    at_end = ", ".join([f"{name} = {value:.6g}" for name, value in [*data["end"].items()][:SHOWN]])
+    more = len(data["end"]) - SHOWN
+    work = f"{data['steps']} steps, {data['rejected']} rejected, {data['evaluations']} evaluations"
+    lines = [
+        f"{data['message']}, {data['t_end']:g} s" if run.success else f"{data['message']}",
+        f"  method  {data['method']}: {work}, {data['seconds']:.3g} s",
+        f"  end     {at_end}{f', and {more} more' if more > 0 else ''}",
+    ]
+    if "energy" in data:
+        lines.append(
+            f"  energy  {data['energy']:.6g} J at the start, {data['energy_at_end']:.6g} J at the end, "
+            f"{data['energy_drift']:.2g} J off at most"
+        )
+    return "\n".join(lines)
+
+
+def _every(step: float, end: float) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Times so far apart up to the end, which is one of them. Raises ValueError for more than can be kept."""
+    count = end / step
+    if count > MOST_ROWS:
+        raise ValueError(f"--every {step:g} makes {count:.3g} rows of {end:g} s, and {MOST_ROWS} are the most")
+    return np.append(step * np.arange(int(np.ceil(count * (1.0 - 1e-12)))), end)

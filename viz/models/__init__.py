@@ -1,0 +1,1 @@
+"""What is shown of a model, in a line: its page, its motion."""

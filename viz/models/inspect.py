@@ -1,0 +1,109 @@
+"""The page of a model: its equations as graphs along a motion, with the torques of its parts."""
+
+from __future__ import annotations
+
+import os
+
+from cgraph.extend import check_writable, require_flag, require_path, write_files
+from dynamics import display_names, scenes
+from dynamics.scenes.inspection import Inspection, Shares, inspection
+from dynamics.scenes.start import Start, moving_start, start_text, with_start
+from dynamics.systems.model import Model
+
+from ..inspector import Motion, Page, StateTable, Version, page
+from ..typed import box, text_or_none
+from .open_loops import tree_alone
+
+
+def inspect(
+    model: Model,
+    path: str | os.PathLike[str] | None = None,
+    *,
+    start: Start | None = None,
+    t_end: float | None = None,
+    forward: bool = False,
+) -> Page:
+    """The page on which a model's equations unfold, move and answer: one HTML file that loads nothing.
+
+    Parameters
+    ----------
+    model : Model
+        A System, a Mechanism or a Scene.
+    path : str or path, optional
+        The file to write the page to, .html.
+    start : mapping of str to float, or sequence of float, optional
+        {name: value} of what differs from the model's start, its zero at rest: "q0", "qd.knee" or a coordinate's name;
+        or all numbers of q and then qd [rad or m, per second]. By default a model that would rest there for ever
+        starts half a radian away.
+    t_end : float, optional
+        How long it moves [s]; 3 s of what is no scene.
+    forward : bool
+        Forward dynamics, in place of inverse dynamics by the paper's three formulations.
+
+    Returns
+    -------
+    Page
+        The HTML text; a notebook shows it in a frame.
+
+    Raises
+    ------
+    TypeError
+        For what is no model, and for a system of first order, which has no Lagrangian.
+    ValueError
+        For a path that does not end in .html, a start that does not fit, or a time that is not positive and finite.
+    OSError
+        For a path that cannot be written.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> import viz
+    >>> page = viz.inspect(dyn.planar_arm([1.0], [1.0]), start={"joint 1": 1.0}, t_end=0.1)
+    >>> "joint 1" in page
+    True
+    """
+    target = None if path is None else require_path("the page's file", path)
+    if target is not None:
+        if target.suffix != ".html":
+            raise ValueError(f"the page's file must end in .html, got {os.fspath(target)!r:.80}")
+        check_writable(target)
+    require_flag("forward", forward)
+    scene = scenes.of_model(model)
+    at = moving_start(scene) if start is None else with_start(scene, start)
+    text = inspection_page(at, inspection(at, forward=forward, t_end=t_end), start is None and at is not scene)
+    if target is not None:
+        write_files({target: text})
+    return text
+
+
+def inspection_page(scene: scenes.Scene, content: Inspection, moved: bool = False) -> Page:
+    """The page of a scene.  moved: whether its start was chosen for it, which the page then says."""
+    bones, mechanism = content.skeleton, scene.mechanism
+    forward = content.versions[0].name == "forward dynamics"
+    notices = [f"Left out of the model: {'; '.join(scene.left_out)}."] if scene.left_out else []
+    notices += [tree_alone(scene)] if not forward and tree_alone(scene) else []
+    notices += [f"At rest nothing moves, so it starts at {start_text(scene)}."] if moved else []
+    return page(
+        [Version(each.name.replace("_", " "), *each[1:]) for each in content.versions],
+        title=f"{scene.name}: {'forward' if forward else 'inverse'} dynamics",
+        at=content.at,
+        derived=content.derived,
+        motion=Motion(content.t, bones.points, bones.parents) if bones else Motion(content.t),
+        tables=[_torques(scene, content.shares)] if content.shares else [],
+        names=display_names(scene),
+        units=content.units,
+        columns={body.name: body.parent for body in mechanism.moving} if mechanism else None,
+        notices=[*notices, *([cut_short(content)] if content.stopped else [])],
+        panels=[box(text_or_none(scene, scene.q, scene.qd))],
+    )
+
+
+def cut_short(content: Inspection) -> str:
+    """That the motion ends before its time, and why."""
+    return f"The motion is not whole: it {content.stopped}."
+
+
+def _torques(scene: scenes.Scene, shares: Shares) -> StateTable:
+    """A row for each velocity, a column for each part."""
+    rows = {f"tau{i}": shares.row(i) for i in range(scene.system.n)}
+    return StateTable("Torques and forces that each part takes", shares.graph, shares.parts, rows)

@@ -1,0 +1,21 @@
+"""What is said where a model has loops or other constraints, and inverse dynamics is that of its tree."""
+
+from __future__ import annotations
+
+from dynamics import scenes
+
+SHOWN = 4  # names; more are counted
+
+
+def tree_alone(scene: scenes.Scene) -> str:
+    """A sentence: torques are those of the tree, without the forces of its constraints; empty where nothing is held."""
+    loops = scene.mechanism.loops if scene.mechanism is not None else ()
+    held = list(dict.fromkeys([loop.label for loop in loops])) or list(scene.system.constraints.names)
+    if not held:
+        return ""
+    more = f" and {len(held) - SHOWN} more" if len(held) > SHOWN else ""
+    what = f"{'loop' if loops else 'constraint'}{'s' if len(held) > 1 else ''}"
+    names = f"{', '.join(held[:SHOWN])}{more}"
+    return (
+        f"Inverse dynamics is that of the tree, without the forces of the {what} {names}: forward dynamics has these."
+    )

@@ -1,0 +1,119 @@
+"""What a notebook shows of a graph and of a motion: pictures that fit the cell, and how to see more."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from cgraph.extend import Array, require_graph
+
+from .. import theme
+from ..graph_drawing.dot import to_dot
+from ..graph_drawing.render import LARGE, render_svg, tags_to_collapse
+
+if TYPE_CHECKING:
+    from cgraph import Graph
+
+SECONDS = 20.0  # for Graphviz; a cell that takes longer shows text
+COLUMNS = 12  # curves that are told apart in one picture
+HALF = 4.0  # inches, of a panel
+
+
+class Rows(Protocol):
+    """What is plotted of a `dynamics.Trajectory`."""
+
+    t: Array
+    q: Array
+    qd: Array
+    coordinates: tuple[str, ...]
+    velocities: tuple[str, ...]
+
+
+def graph_html(graph: Graph) -> str:
+    """The drawing of a graph, as wide as the cell at most; a large one folded by its tags, and the way to its page.
+
+    Parameters
+    ----------
+    graph : Graph
+        What is drawn.
+
+    Returns
+    -------
+    str
+        HTML with the picture inside.
+
+    Raises
+    ------
+    RenderError
+        Where Graphviz is missing or does not end; the notebook shows the text form then.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x = cg.variable("x")
+    >>> "<svg" in graph_html(cg.Graph([x], {"y": cg.sin(x)}))
+    True
+    """
+    require_graph("graph_html", graph)
+    tags = tags_to_collapse(graph)
+    said = f"{len(graph.nodes)} nodes; <code>viz.page(graph)</code> unfolds them, and shows values and paths."
+    if len(graph.nodes) > LARGE and not tags:
+        return f"<p>{escape(repr(graph))}: {said}</p>"
+    svg = render_svg(to_dot(graph, collapse=tags), timeout=SECONDS)
+    note = f"<p>Folded by tags: {said}</p>" if tags else ""
+    return f'<div style="max-width:100%;overflow-x:auto;background:{theme.WHITE}">{_fitting(svg)}</div>{note}'
+
+
+def trajectory_html(run: Rows) -> str:
+    """The plot of a motion over time: coordinates and velocities, or states, and how the run went.
+
+    Parameters
+    ----------
+    run : dynamics.Trajectory
+        What `dynamics.simulate` gives.
+
+    Returns
+    -------
+    str
+        HTML with the picture inside.
+
+    Raises
+    ------
+    ImportError
+        Without matplotlib; the notebook shows the text form then.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> run = dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.1], [0.0], 1.0)
+    >>> "<svg" in trajectory_html(run)
+    True
+    """
+    from ..plots.plot import GRID, empty_figure, style, to_adaptive_svg
+
+    tables = [("state" if not run.qd.shape[1] else "coordinates", run.q, run.coordinates)]
+    if run.qd.shape[1]:
+        tables.append(("velocities", run.qd, run.velocities))
+    with style():
+        figure = empty_figure(2 * HALF if len(tables) == 2 else 1.5 * HALF, 2.8)
+        for axis, (what, values, names) in zip(
+            np.atleast_1d(figure.subplots(1, len(tables))).flat, tables, strict=True
+        ):
+            for i in range(min(COLUMNS, values.shape[1])):
+                color, dashes = theme.SERIES[i % len(theme.SERIES)], ("-", "--", ":")[i // len(theme.SERIES) % 3]
+                axis.plot(run.t, values[:, i], color=color, linestyle=dashes, label=names[i] if names else str(i))
+            more = values.shape[1] - COLUMNS
+            axis.set_title(what + (f", the first {COLUMNS} of {values.shape[1]}" if more > 0 else ""), loc="left")
+            axis.set_xlabel("t [s]")
+            axis.grid(**GRID)
+            if values.shape[1] > 0:
+                axis.legend(frameon=False, fontsize=8, ncols=2 if values.shape[1] > 6 else 1)
+        svg = to_adaptive_svg(figure, background=True)
+    return f"{_fitting(svg[svg.index('<svg') :])}<p>{escape(repr(run))}</p>"
+
+
+def _fitting(svg: str) -> str:
+    """The picture, scaled down to the width of the cell and never up."""
+    return svg.replace("<svg ", '<svg style="max-width:100%;height:auto" ', 1)
