@@ -9,7 +9,8 @@ if TYPE_CHECKING:
     from .graph_drawing.render import graph_svg, render_png, render_svg
     from .inspector import page  # type: ignore[no-redef]  # the name of a module there, too
     from .models.inspect import inspect
-    from .typed import typed_page, typed_text
+    from .models.typed_text import typed_text
+    from .typed import typed_page
 
 __all__ = ["graph_svg", "inspect", "page", "render_png", "render_svg", "to_dot", "typed_page", "typed_text"]
 
@@ -19,9 +20,8 @@ if not TYPE_CHECKING:  # loaded when asked for: the command line has to await Ct
         from importlib import import_module
 
         homes = {"__version__": "cgraph", "to_dot": ".graph_drawing.dot", "page": ".inspector"}
-        homes |= {"inspect": ".models.inspect"}
+        homes |= {"inspect": ".models.inspect", "typed_page": ".typed", "typed_text": ".models.typed_text"}
         homes |= dict.fromkeys(["graph_svg", "render_png", "render_svg"], ".graph_drawing.render")
-        homes |= dict.fromkeys(["typed_page", "typed_text"], ".typed")
         if name not in homes:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         return getattr(import_module(homes[name], __name__), name)

@@ -11,8 +11,9 @@ from dynamics.scenes.start import Start, moving_start, start_text, with_start
 from dynamics.systems.model import Model
 
 from ..inspector import Motion, Page, StateTable, Version, page
-from ..typed import box, text_or_none
+from ..typed import box
 from .open_loops import tree_alone
+from .typed_text import text_or_none
 
 
 def inspect(

@@ -52,7 +52,7 @@ def test_a_system_written_as_text_means_the_same(name):
 @pytest.mark.parametrize(
     ("model", "kind", "words"),
     [
-        (3, TypeError, "typed_text needs a model with a Lagrangian, got int: 3"),
+        (3, TypeError, "expected a System, a mechanism or a scene, got int: 3"),
         (dyn.scenes.load("chain", n=5), ValueError, "the page takes up to 4 coordinates"),
         (
             dyn.System(lambda q, qd, t: cg.where(q[0] < 0.0, 1.0, 2.0) * qd[0] ** 2, "x"),

@@ -6,10 +6,11 @@ import math
 import re
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any
 
 from cgraph import Node
 from cgraph.extend import OPS, topological
+from dynamics.systems.model import Model, as_system
+from dynamics.systems.system import System
 
 MOST = 4  # coordinates that the page takes
 _NAME = re.compile(r"[^\W\d_][A-Za-z0-9_]*")
@@ -18,7 +19,7 @@ _NO_FUNCTION = ("where", "less", "less_equal", "equal", "not_equal", "zero_safe_
 _SUM, _POWER, _WHOLE = 1, 8, 9  # how strongly a sign binds, a power, and a name or a function
 
 
-def typed_text(model: Any, q: Sequence[float] | None = None, qd: Sequence[float] | None = None) -> str:
+def typed_text(model: Model, q: Sequence[float] | None = None, qd: Sequence[float] | None = None) -> str:
     """The Lagrangian of a system as text, as `typed_page` takes it: coordinates, parameters, L, damping and forces.
 
     What a Lagrangian uses more than once becomes a line of its own. The text means the same graph, node for node.
@@ -38,7 +39,7 @@ def typed_text(model: Any, q: Sequence[float] | None = None, qd: Sequence[float]
     Raises
     ------
     TypeError
-        For what has no Lagrangian.
+        For what is no model, or has no Lagrangian.
     ValueError
         For more coordinates, constraints, quasi-velocities, or an operation that has no text, such as `where`.
 
@@ -48,14 +49,12 @@ def typed_text(model: Any, q: Sequence[float] | None = None, qd: Sequence[float]
     >>> spring = dyn.System(lambda q, qd, t, p: 0.5 * qd[0] ** 2 - p["k"] * q[0] ** 2, ["x"], {"k": 2.0}, damping=0.1)
     >>> print(typed_text(spring, q=[1.0]))
     q: x
-    k = 2.0
-    L = 0.5 * x'^2.0 - k * x^2.0
+    k = 2
+    L = 0.5 * x'^2 - k * x^2
     damping x = 0.1
-    x(0) = 1.0
+    x(0) = 1
     """
-    system: Any = getattr(model, "system", None)
-    if not hasattr(system, "lagrangian"):
-        raise TypeError(f"typed_text needs a model with a Lagrangian, got {type(model).__name__}: {model!r:.60}")
+    system = as_system(model)
     if system.n > MOST or system.n != system.nq or system.kinematics.quasi is not None or len(system.constraints):
         raise ValueError(
             f"the page takes up to {MOST} coordinates whose rates are velocities, without constraints; got {system!r}"
@@ -63,7 +62,7 @@ def typed_text(model: Any, q: Sequence[float] | None = None, qd: Sequence[float]
     return _Writer(system).text(q, qd)
 
 
-def text_or_none(model: Any, q: Sequence[float], qd: Sequence[float]) -> str:
+def text_or_none(model: Model, q: Sequence[float], qd: Sequence[float]) -> str:
     """The text of a model, or an empty one where it has none."""
     try:
         return typed_text(model, q, qd)
@@ -74,7 +73,7 @@ def text_or_none(model: Any, q: Sequence[float], qd: Sequence[float]) -> str:
 class _Writer:
     """Names and texts of one system's nodes."""
 
-    def __init__(self, system: Any) -> None:
+    def __init__(self, system: System) -> None:
         self.system = system
         self.taken: set[str] = set()
         self.coordinates = [self._free(name, f"c{i + 1}") for i, name in enumerate(system.coordinates)]
@@ -82,7 +81,7 @@ class _Writer:
         self.known: dict[str, str] = {"t": "t", **parameters}
         for i, name in enumerate(self.coordinates):
             self.known |= {f"q{i}": name, f"qd{i}": f"{name}'"}
-        self.parameters = [f"{parameters[name]} = {value!r}" for name, value in system.parameters.items()]
+        self.parameters = [f"{parameters[name]} = {_number(value)}" for name, value in system.parameters.items()]
         self.definitions: list[str] = []
         self.written: dict[Node, tuple[str, int]] = {}
 
@@ -101,11 +100,11 @@ class _Writer:
         lines.append(f"L = {self.written[system.lagrangian][0]}")
         for kind, values in (("damping", system.damping), ("tau", system.forces)):
             for name, value in zip(self.coordinates, values, strict=True):
-                text = self.written[value][0] if isinstance(value, Node) else repr(float(value))
-                lines += [f"{kind} {name} = {text}"] if text not in ("0.0", "-0.0") else []
+                text = self.written[value][0] if isinstance(value, Node) else _number(value)
+                lines += [f"{kind} {name} = {text}"] if text not in ("0", "-0") else []
         for dots, start in (("", q), ("'", qd)):
-            values = zip(self.coordinates, start, strict=True) if start is not None else ()
-            lines += [f"{name}{dots}(0) = {float(value)!r}" for name, value in values]
+            pairs = zip(self.coordinates, start, strict=True) if start is not None else ()
+            lines += [f"{name}{dots}(0) = {_number(value)}" for name, value in pairs]
         return "\n".join(lines)
 
     def _free(self, wanted: str, otherwise: str) -> str:
@@ -124,7 +123,7 @@ class _Writer:
         if node.value is not None:
             if not math.isfinite(node.value):
                 raise ValueError(f"the Lagrangian has the number {node.value}, which cannot be typed")
-            return repr(node.value), _WHOLE if math.copysign(1.0, node.value) > 0.0 else _SUM
+            return _number(node.value), _WHOLE if math.copysign(1.0, node.value) > 0.0 else _SUM
         if not node.args:
             return self.known[str(node.name)], _WHOLE
         if node.op.name in _NO_FUNCTION:
@@ -144,3 +143,8 @@ class _Writer:
         """A text in parentheses, unless it binds as strongly as its place asks for and has no sign in front."""
         text, binds = part
         return text if binds >= least and not text.startswith("-") else f"({text})"
+
+
+def _number(value: float) -> str:
+    """All digits, and no point where none is needed."""
+    return repr(float(value)).removesuffix(".0")
