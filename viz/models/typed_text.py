@@ -109,6 +109,7 @@ class _Writer:
 
     def _free(self, wanted: str, otherwise: str) -> str:
         """The name, if a text may have it and no other has it, or a free one with a number."""
+        wanted = re.sub(r"[^\w]", "", wanted)
         if not _NAME.fullmatch(wanted) or _RESERVED.fullmatch(wanted) or wanted in OPS:
             wanted = otherwise
         stem, number = wanted.rstrip("0123456789"), 1

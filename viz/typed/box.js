@@ -69,7 +69,7 @@ function startTyped(inspector, text, shownFirst) {
 }
 /** The button in the page's head that opens and closes the box. */
 function openingButton() {
-  const button = tag("button", { type: "button", id: "opentyped", "aria-controls": "typed" }, "type your own");
+  const button = tag("button", { type: "button", id: "opentyped", "aria-controls": "typed", title: "type your own Lagrangian" }, "type L");
   const open = (on) => {
     byId("typed").hidden = !on;
     button.setAttribute("aria-expanded", on);

@@ -30,6 +30,7 @@ time = 8`],
   ["spring and mass", `# Figure 1 of the paper, on a line
 m = 1, k = 4
 L = 1/2*m*x'^2 - 1/2*k*x^2
+x1 = x, y1 = 0
 x(0) = 1
 time = 6`],
   ["Kepler", `# a planet in the plane, the sun at the origin

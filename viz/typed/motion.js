@@ -1,6 +1,7 @@
 // Numbers: values of nodes, and a motion by Runge and Kutta with as many steps as its error asks for.
 
 const FRAMES = 150, WORK = 2e7, OVERHEAD = 60; // instants; operations at most, and those that a rate takes beside its own
+const AWAY = 0.5; // where coordinates start that would rest, as nobody said where
 const TOLERANCE = 1e-6, UNSURE = 1e-2; // relative change by halving the step that is little enough, and too much to be shown
 
 /** Values of nodes for Map {name of a variable: number}. */
@@ -44,7 +45,15 @@ function motionOf(system, parameters = system.parameters) {
     if (time >= 0) values[time] = t;
     return values;
   };
-  const start = Float64Array.of(...system.start.q, ...system.start.qd), first = run(at(start, 0));
+  const start = Float64Array.of(...system.start.q, ...system.start.qd);
+  let first = run(at(start, 0)), moved = false;
+  if (!system.start.said && !first.slice(0, n).some((qdd) => Number.isFinite(qdd) && qdd)) { // at rest nothing is to be seen
+    start.fill(AWAY, 0, n);
+    first = run(at(start, 0));
+    moved = true;
+  }
+  const infinite = system.coordinates.find((_, i) => !Number.isFinite(first[i]));
+  if (infinite && first.slice(n, 2 * n).every((pivot) => pivot > 0)) return { error: `At the start the acceleration of ${infinite} is not finite.` };
   const singular = system.coordinates.findLast((_, i) => !(first[n + i] > 0));
   if (singular) return { error: `At the start ${singular} has no inertia left: the mass matrix is not positive definite.` };
   const rate = (state, t) => run(at(state, t));
@@ -60,7 +69,7 @@ function motionOf(system, parameters = system.parameters) {
   const t = states.map((_, k) => (system.time * k) / (FRAMES - 1)), rows = states.map((state, k) => run(at(state, t[k])));
   return {
     t, q: states.map((state) => [...state.slice(0, n)]), qd: states.map((state) => [...state.slice(n)]), qdd: rows.map((row) => row.slice(0, n)),
-    energy: rows.map((row) => row[2 * n]), steps: each * (FRAMES - 1), change: sure.change, stopped: states.length < FRAMES,
+    energy: rows.map((row) => row[2 * n]), steps: each * (FRAMES - 1), change: sure.change, stopped: states.length < FRAMES, moved,
     points: states.map((state, k) => { const all = draw(at(state, t[k])); return system.points.map((_, i) => all.slice(2 * i, 2 * i + 2)); }),
   };
 }

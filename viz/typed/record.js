@@ -95,9 +95,10 @@ function aboutOf(name, { nodes }, wrong) {
 }
 function noticesOf(system, motion) {
   if (motion.error) return [motion.error];
-  if (!motion.stopped) return [];
+  const rest = motion.moved ? [`At rest nothing moves, so all coordinates start at ${AWAY}; for another start write ${system.coordinates[0]}(0) = ....`] : [];
+  if (!motion.stopped) return rest;
   const last = motion.t.at(-1).toPrecision(3);
-  return [`The motion is shown up to ${last} s of ${system.time} s: from there half the step changes it by more than ${100 * UNSURE} %.`];
+  return [...rest, `The motion is shown up to ${last} s of ${system.time} s: from there half the step changes it by more than ${100 * UNSURE} %.`];
 }
 /** Values of the inputs at all instants; without a motion at the start, at rest. */
 function rowsOf(system, motion, inputs) {
@@ -109,12 +110,7 @@ function rowsOf(system, motion, inputs) {
     return inputs.map((name) => values.get(name) ?? 0);
   });
 }
-/** Points with the origin where a rod hangs on it. */
+/** The origin and the points, where there are any. */
 function shownMotion({ t, points }) {
-  if (!points[0].length) return { t, points: null, parents: [] };
-  const parents = rods(points), origin = parents.slice(1).includes(0);
-  return {
-    t, points: points.map((frame) => (origin ? [[0, 0], ...frame] : frame)),
-    parents: origin ? parents : parents.slice(1).map((each) => (each > 0 ? each - 1 : -1)),
-  };
+  return points[0].length ? { t, points: points.map((frame) => [[0, 0], ...frame]), parents: rods(points) } : { t, points: null, parents: [] };
 }

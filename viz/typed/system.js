@@ -184,8 +184,9 @@ class Meaning {
     }
   }
   start() {
-    const start = { q: this.coordinates.map(() => 0), qd: this.coordinates.map(() => 0) };
+    const start = { q: this.coordinates.map(() => 0), qd: this.coordinates.map(() => 0), said: false };
     for (const each of this.statements.filter(({ kind }) => kind === "start")) {
+      start.said = true;
       const { base, dots } = this.undotted(each), i = this.coordinates.indexOf(base);
       if (i < 0) throw this.unknown(each, base, 1);
       if (dots > 1) throw new TextError("An acceleration has no start: it follows from the forces.", each.at, each.end);

@@ -64,6 +64,28 @@ def test_a_motion_that_ends_before_its_time_says_so(text, end):
     assert all(np.isfinite(row).all() for row in (found["q"], found["qd"], found["qdd"], found["energy"]))
 
 
-def test_without_inertia_there_is_no_motion():
-    found = run_typed(MOTION, "L = x'*y' - y^2")
-    assert found["error"] == "At the start y has no inertia left: the mass matrix is not positive definite."
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("L = x'*y' - y^2", "At the start y has no inertia left: the mass matrix is not positive definite."),
+        ("L = x'^2 + 1/x, x(0) = 0", "At the start the acceleration of x is not finite."),
+    ],
+)
+def test_what_cannot_start_says_why(text, words):
+    assert run_typed(MOTION, text)["error"] == words
+    notices = run_typed(
+        "(text) => { const s = parsed(text); return TYPED.recordOf(s, TYPED.motionOf(s)).notices; }", text
+    )
+    assert notices == [words]
+
+
+def test_what_would_rest_starts_elsewhere_unless_told():
+    """At rest every product is zero, and nothing is to be seen."""
+    for text in ("L = x'^2 + cos(x)", "L = x'^2 + y'^2 + 1/sqrt(x^2 + y^2)"):
+        found = run_typed(MOTION, text)
+        assert found["moved"]
+        assert set(found["q"][0]) == {0.5}
+    for text in ("L = x'^2 + cos(x), x(0) = 0", "L = x'^2 - x"):
+        found = run_typed(MOTION, text)
+        assert not found["moved"]
+        assert found["q"][0] == [0]

@@ -61,7 +61,7 @@ def test_a_text_says_what_a_system_has():
         }""",
         PENDULUM + "time = 2*pi\ntau theta = 0.5",
     )
-    expected = [["theta"], [["m", 2], ["l", 0.5], ["g", 9.81]], [0.1], {"q": [1.2], "qd": [0]}, 1]
+    expected = [["theta"], [["m", 2], ["l", 0.5], ["g", 9.81]], [0.1], {"q": [1.2], "qd": [0], "said": True}, 1]
     assert found == [*expected, pytest.approx(6.283185307179586), [0.5]]
 
 
