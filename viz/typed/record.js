@@ -33,7 +33,7 @@ function recordOf(system, motion, forward) {
 
 function accelerations(system) {
   const graph = forwardDynamics(system);
-  return graphOf(graph.inputs, new Map([...graph.outputs].filter(([name]) => !name.startsWith("pivot"))));
+  return graphOf(graph.inputs, new Map([...graph.outputs].filter(([name]) => name.startsWith("qdd"))));
 }
 /** The state that embedded formulations start from: q - dt qd and qd - dt qdd. */
 function earlier({ q, qd, qdd }) {
@@ -89,7 +89,7 @@ function aboutOf(name, { nodes }, wrong) {
     return `Look at what is vermillion: ${wrong.size} of ${nodes.length} nodes. The velocity derivative ${ABOUT[name]}was taken through `
       + "q = qd dt + q_old, so it reached q as well, and a branch that does not belong there runs into the torques. No smaller dt takes it away.";
   }
-  if (name === "forward dynamics") return `Accelerations and energy: the mass matrix is derived and eliminated, ${nodes.length} nodes.`;
+  if (name === "forward dynamics") return `Accelerations from torques: the mass matrix is derived and eliminated, ${nodes.length} nodes.`;
   const free = name === "kinetic_only" ? " This way out is right here, because the kinetic energy does not depend on q." : "";
   return `No spurious branch: ${nodes.length} nodes, and the torques that the motion takes.${free} Nothing else drives it, so they should be 0.`;
 }
