@@ -9,6 +9,7 @@ from .autodiff.reverse import gradient, vjp
 from .autodiff.sparsity import sparsity
 from .codegen import Compiled, clear_cache, compile
 from .codegen.c import CSource, to_c
+from .codegen.wasm import to_wasm
 from .core.counts import Counts
 from .core.edge import Edge
 from .core.graph import Graph
@@ -131,6 +132,7 @@ __all__ = [
     "tan",
     "tanh",
     "to_c",
+    "to_wasm",
     "variable",
     "variables",
     "vjp",

@@ -7,6 +7,7 @@ is kept stable.
 
 **Build**: `Builder` folds and shares; `with building(Builder()):` sends every formula inside through it. `folded`
 copies nodes through a builder, `topological` gives all nodes that some nodes reach, arguments first.
+`with_reciprocals` leaves one division for a divisor.
 
 **Differentiate**: `cotangents` pulls from outputs, `tangents` pushes from inputs, `hessian_nodes` gives the lower
 triangle of second derivatives, all as nodes. `compressed_jacobian` gives the parts of a loop over colors of columns.
@@ -64,6 +65,7 @@ from .program import Call, Factor, If, Map, Program, Record, Runner, Solve, Stat
 from .simplify.builder import Builder, folded
 from .simplify.identities import rewritten, shortened
 from .simplify.polynomial import Polynomial, expand, format_polynomial
+from .simplify.reciprocals import with_reciprocals
 from .util.atomic_write import atomic_write, check_writable, write_files
 from .util.html_text import html_lines, html_table, html_text, picture
 from .util.nearest import nearest, or_nearest
@@ -146,5 +148,6 @@ __all__ = [
     "tangents",
     "thread_count",
     "topological",
+    "with_reciprocals",
     "write_files",
 ]

@@ -119,6 +119,7 @@ CALLS = {
     "cg.specialize": call(cg.specialize, GRAPH, {"x": 1.0}, outputs=None),
     "cg.tag": call(tagged, "a"),
     "cg.to_c": call(cg.to_c, GRAPH, "f", fma=False, names=None),
+    "cg.to_wasm": call(cg.to_wasm, GRAPH, None, time="t", host=()),
     "cg.variable": call(cg.variable, "x"),
     "cg.variables": call(cg.variables, "x y"),
     "cg.why": call(cg.why, GRAPH, "r", "x", at=None, k=10, names=None),
@@ -238,6 +239,11 @@ CALLS = {
     "dyn.scenes.triple_pendulum": call(dyn.scenes.triple_pendulum, "rod"),
     "dyn.cases.load": call(dyn.cases.load, "exponential decay"),
     "viz.graph_svg": call(viz.graph_svg, GRAPH),
+    "viz.animate": call(
+        viz.animate, ARM, dyn.simulate(ARM, [0.1], [0.0], 0.04), None, kind=None, wanted=lambda t: t[:, np.newaxis],
+        marked=(), speed=1.0, dark=False, title=""
+    ),
+    "dyn.scenes.driven": call(dyn.scenes.driven, ARM, "chain_rule", 0.1),
     "viz.inspect": call(viz.inspect, ARM, None, start=[0.1, 0.0], t_end=0.1, forward=False),
     "viz.page": call(
         viz.page, GRAPH, title="t", about="", at=None, marked=(), motion=None, tables=(), names=None, units=None
@@ -357,6 +363,7 @@ GRAPH_FIRST = [
     (cg.specialize, ({},)),
     (cg.structure_hash, ()),
     (cg.to_c, ()),
+    (cg.to_wasm, ()),
     (cg.vjp, ()),
     (cg.why, ("y", "x")),
     (cg.why_not, ("y", "x")),

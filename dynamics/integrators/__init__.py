@@ -98,6 +98,7 @@ METHODS: dict[str, Method] = Methods(
 
 __all__ = [
     "METHODS",
+    "TABLEAUS",
     "Mechanics",
     "Method",
     "Problem",

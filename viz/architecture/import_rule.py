@@ -22,6 +22,7 @@ TABLE = {
     ),
     "viz": (
         "theme <- graph_drawing, plots <- pages <- inspector, paper <- models <- commands <- cli <- __main__",
+        "theme <- animation <- models",
         "graph_drawing <- architecture <- commands",
         "inspector <- typed <- models, commands",
     ),

@@ -8,9 +8,11 @@ from collections.abc import Sequence
 from cgraph import __version__
 
 from . import (
+    animate,
     architecture,
     bench,
     certify,
+    code,
     compare,
     completion,
     draw,
@@ -32,9 +34,11 @@ COMMANDS = (
     report,
     scenes,
     draw,
+    code,
     certify,
     inspect,
     simulate,
+    animate,
     type_,
     lint,
     why,

@@ -29,7 +29,7 @@ def inspect(
     Parameters
     ----------
     model : Model
-        A System, a Mechanism or a Scene.
+        A System, a Mechanism or a Scene; of an OdeSystem the page shows the state equation.
     path : str or path, optional
         The file to write the page to, .html.
     start : mapping of str to float, or sequence of float, optional
@@ -49,7 +49,7 @@ def inspect(
     Raises
     ------
     TypeError
-        For what is no model, and for a system of first order, which has no Lagrangian.
+        For what is no model.
     ValueError
         For a path that does not end in .html, a start that does not fit, or a time that is not positive and finite.
     OSError
@@ -80,13 +80,13 @@ def inspect(
 def inspection_page(scene: scenes.Scene, content: Inspection, moved: bool = False) -> Page:
     """The page of a scene.  moved: whether its start was chosen for it, which the page then says."""
     bones, mechanism = content.skeleton, scene.mechanism
-    forward = content.versions[0].name == "forward dynamics"
-    notices = [f"Left out of the model: {'; '.join(scene.left_out)}."] if scene.left_out else []
-    notices += [tree_alone(scene)] if not forward and tree_alone(scene) else []
+    what = "inverse dynamics" if len(content.versions) > 1 else content.versions[0].name
+    notices = [f"The model leaves out {text}." for text in scene.left_out]
+    notices += [tree_alone(scene)] if what == "inverse dynamics" and tree_alone(scene) else []
     notices += [f"At rest nothing moves, so it starts at {start_text(scene)}."] if moved else []
     return page(
         [Version(each.name.replace("_", " "), *each[1:]) for each in content.versions],
-        title=f"{scene.name}: {'forward' if forward else 'inverse'} dynamics",
+        title=f"{scene.name}: {what}",
         at=content.at,
         derived=content.derived,
         motion=Motion(content.t, bones.points, bones.parents) if bones else Motion(content.t),

@@ -66,7 +66,7 @@ def text_or_none(model: Model, q: Sequence[float], qd: Sequence[float]) -> str:
     """The text of a model, or an empty one where it has none."""
     try:
         return typed_text(model, q, qd)
-    except ValueError:
+    except (TypeError, ValueError):
         return ""
 
 

@@ -25,6 +25,7 @@ from cgraph.explain.names import Names
 from cgraph.extend import OPS
 from tests.page_script import run_script
 from tests.viz.typed.typed_script import run_typed
+from tests.wasm import instance
 from viz.inspector.content import State, Version
 from viz.inspector.record import record
 
@@ -86,6 +87,12 @@ def test_c(tmp_path):
     x, y = (ctypes.c_double * 1)(27.0), (ctypes.c_double * 1)()
     ctypes.CDLL(str(library)).area(x, y)
     assert y[0] == GRAPH.evaluate({"x": 27.0})["y"]
+
+
+def test_web_assembly_imports_it_from_the_host():
+    module = instance(GRAPH)
+    assert module.imports == ["asinh"]
+    assert module(27.0) == [GRAPH.evaluate({"x": 27.0})["y"]]
 
 
 def test_double_double_passes_low_parts_on():

@@ -24,6 +24,7 @@ TABLE = (
     "tests/cgraph/core/test_operations.py",
     "tests/cgraph/codegen/test_llvm.py",
     "tests/cgraph/codegen/test_c.py",
+    "tests/cgraph/codegen/test_wasm.py",
     "tests/cgraph/explain/lint/test_lint.py",
     "tests/viz/graph_drawing/test_dot.py",
     "tests/viz/inspector/test_script.py",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from dynamics.scenes.inspection import DT, FORMULATIONS, Inspection, inspection
 from dynamics.scenes.scenes import Scene
 from tests.tolerances import EQUATIONS
 
+ARM = cache(lambda: inspection(dyn.scenes.load("triple_pendulum")))
 INTEGRATED = 1e-9  # N m: the state is one that the equations hold at, whatever the error of the motion
 
 
@@ -26,7 +28,7 @@ def values_of(found: Inspection, graph: Graph) -> dict[str, Any]:
 
 
 def test_the_free_motion_takes_no_torque_by_the_chain_rule_alone():
-    found = inspection(dyn.scenes.load("triple_pendulum"))
+    found = ARM()
     assert tuple(each.name for each in found.versions) == FORMULATIONS
     wrong = []
     for each in found.versions:
@@ -39,7 +41,7 @@ def test_the_free_motion_takes_no_torque_by_the_chain_rule_alone():
 
 
 def test_the_embedded_step_ends_in_the_state_of_the_others():
-    found = inspection(dyn.scenes.load("triple_pendulum"))
+    found = ARM()
     at = values_of(found, found.versions[0].graph)
     for i in range(3):
         qd = at[f"qd{i}_old"] + DT * at[f"qdd{i}"]
@@ -48,9 +50,9 @@ def test_the_embedded_step_ends_in_the_state_of_the_others():
 
 
 def test_shares_of_the_torque_add_up():
-    found = inspection(dyn.scenes.load("triple_pendulum"))
+    found = ARM()
     parts, graph = found.shares.parts, found.shares.graph
-    assert parts == ("link 1", "link 2", "link 3", "damping and forces", "all")
+    assert parts == ("link 1", "link 2", "link 3", "damping", "all")
     values = graph.evaluate(values_of(found, graph))
     shares = np.array(
         [[np.broadcast_to(values[name], found.t.shape) for name in found.shares.row(i)] for i in range(3)]
@@ -92,3 +94,9 @@ def test_a_mechanism_hangs_together():
 def test_a_time_out_of_range_is_refused():
     with pytest.raises(ValueError, match="t_end"):
         inspection(Scene("x", "", dyn.planar_arm([1.0], [1.0]), (0.0,), (0.0,), 1.0), t_end=-1.0)
+
+
+def test_a_motion_that_does_not_begin_is_told():
+    weightless = dyn.System(lambda q, qd, t, p: p["m"] * qd[0] ** 2 - q[0] ** 2, ["x"], {"m": 0.0})
+    with pytest.raises(ValueError, match=r"accelerations that are not finite: the motion stopped at t = 0 s: "):
+        inspection(Scene("weightless", "", weightless, (1.0,), (0.0,), 1.0))

@@ -1,0 +1,67 @@
+"""Functions that WebAssembly has no instruction for: the module's own, with the same bits on every machine.
+
+Their largest errors, over all of float64, are asserted in tests/cgraph/codegen/test_wasm_functions.py.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Collection, Iterable
+from functools import cache
+
+from ...core.node import Op
+from .elementary_functions import DIGITS, TEXT
+from .instructions import INTRINSICS
+from .other_functions import TEXT as OTHERS
+
+HELPERS = {"wave", "product", "quickly", "scaled", "growth", "exponential", "logarithm", "logarithm_by"}
+HELPERS |= {"by_series", "by_fraction"}
+PRIMITIVES = {*INTRINSICS, "load", "store", "word", "address"}
+HOST = "math."  # before the name of a function that the host supplies
+
+
+@cache
+def table() -> bytes:
+    """What `wave` reads at TABLE: the digits of 2/pi, the last ones first."""
+    one = 1 << 1300
+    pi = 4 * (4 * _arctan_of_inverse(5, one) - _arctan_of_inverse(239, one))
+    return ((2 * one << DIGITS) // pi).to_bytes(DIGITS // 8, "little")
+
+
+def _arctan_of_inverse(n: int, one: int) -> int:
+    """arctan(1 / n) times one, to a few units (Machin 1706)."""
+    term, total, k = one // n, 0, 0
+    while term:
+        total += (-1) ** k * (term // (2 * k + 1))
+        term, k = term // (n * n), k + 1
+    return total
+
+
+@cache
+def library(at: int) -> dict[str, ast.FunctionDef]:
+    """{name: function}, for a table at this place in memory."""
+    found = ast.parse((TEXT + OTHERS).replace("TABLE", str(at))).body
+    return {each.name: each for each in found if isinstance(each, ast.FunctionDef)}
+
+
+def text_of(op: Op, imported: Collection[str]) -> ast.expr:
+    """The operation on _0, _1, ..: its row's text in Python, with the host's functions marked as such."""
+    text = ast.parse(op.python.format(*[f"_{slot}" for slot in range(op.arity)]), mode="eval").body
+    own = {*library(0), "abs", "ceil", "floor", "round", "sqrt", "float"} - HELPERS - {*imported}
+    for node in ast.walk(text):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id not in own:
+            node.func.id = HOST + node.func.id
+    return text
+
+
+def called(texts: Iterable[ast.AST], at: int) -> dict[str, int]:
+    """{name: number of arguments} of the functions that the texts call, directly or not."""
+    found: dict[str, int] = {}
+    waiting = [*texts]
+    while waiting:
+        for node in ast.walk(waiting.pop()):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id not in PRIMITIVES:
+                if node.func.id in library(at) and node.func.id not in found:
+                    waiting.append(library(at)[node.func.id])
+                found[node.func.id] = len(node.args)
+    return found

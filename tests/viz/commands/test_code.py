@@ -1,0 +1,93 @@
+"""`cgraph code`: files that compute the equations of a scene."""
+
+from __future__ import annotations
+
+import math
+import re
+import shutil
+import subprocess
+
+import pytest
+
+import cgraph as cg
+import dynamics as dyn
+from cgraph.core.node import OPS, apply
+from tests.tolerances import SUMS
+from tests.wasm import Instance
+from viz import cli
+from viz.commands.code import EQUATIONS, python_text
+
+SCENE = dyn.scenes.load("triple_pendulum")
+
+
+def point(graph):
+    return [math.sin(1.0 + k) for k in range(len(graph.inputs))]
+
+
+@pytest.mark.parametrize("what", EQUATIONS)
+def test_python_is_the_graph(what, capsys):
+    """With what it calls above it: the text alone runs."""
+    assert cli.main(["code", "triple_pendulum", "--python", "--what", what]) == 0
+    names: dict = {}
+    exec(capsys.readouterr().out, names)
+    graph = EQUATIONS[what](SCENE)
+    expected = graph.evaluate(dict(zip(graph.input_names, point(graph), strict=True)))
+    assert names["function"](point(graph)) == tuple(expected.values())
+
+
+def test_operations_that_python_lacks_are_taken_from_the_table():
+    inputs = cg.variables("a b c")
+    graph = cg.Graph(inputs, {name: apply(op, *inputs[: op.arity]) for name, op in OPS.items()})
+    names: dict = {}
+    exec(python_text(graph), names)
+    at = [0.3, 0.6, 0.2]
+    assert names["function"](at) == tuple(graph.evaluate(dict(zip("abc", at, strict=True))).values())
+
+
+def test_wasm_has_steps_with_the_state_equation(tmp_path, capsys):
+    out = tmp_path / "arm.wasm"
+    assert cli.main(["code", "triple_pendulum", "--wasm", "--what", "state_equation", "--out", str(out)]) == 0
+    assert "inputs at byte 0, 9, outputs at byte 72, 6" in capsys.readouterr().out
+    graph = dyn.state_equation(SCENE)
+    made = Instance(out.read_bytes(), graph)
+    assert made(*point(graph)) == pytest.approx(
+        list(graph.evaluate(dict(zip(graph.input_names, point(graph), strict=True))).values()), rel=SUMS
+    )
+    assert {"euler", "rk4", "dopri5"} <= set(made.exports)
+
+
+def test_c_is_one_text_or_two_files(tmp_path, capsys):
+    assert cli.main(["code", "spring_mass", "--c"]) == 0
+    text = capsys.readouterr().out
+    assert "#include <math.h>" in text
+    assert '#include "' not in text
+    assert cli.main(["code", "spring_mass", "--c", "--out", str(tmp_path / "spring.c")]) == 0
+    assert {path.name for path in tmp_path.iterdir()} == {"spring.c", "spring.h"}
+    if compiler := shutil.which("cc"):
+        (tmp_path / "alone.c").write_text(text, encoding="utf-8")
+        for name in ("alone.c", "spring.c"):
+            subprocess.run([compiler, "-c", "-Werror", name, "-o", "out.o"], cwd=tmp_path, check=True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ("--wasm", "--wasm needs --out"),
+        ("--wasm --out a.c", "--out must end in .wasm for --wasm, got a.c"),
+        ("--c --out 2.c", "must be a letter"),
+        ("--c --out sin.c", "must not be a word of C"),
+    ],
+)
+def test_a_mistake_is_told_in_one_line_and_writes_nothing(arguments, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["code", "spring_mass", *arguments.split()]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert re.search(re.escape(said), line)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_help_names_what_there_is(capsys):
+    with pytest.raises(SystemExit):
+        cli.main(["code", "--help"])
+    shown = capsys.readouterr().out
+    assert all(name in shown for name in EQUATIONS)

@@ -1,0 +1,102 @@
+"""`cgraph code`: the equations of a scene as C, as WebAssembly or as Python."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import cgraph as cg
+from cgraph import Graph
+from cgraph.extend import check_writable
+from dynamics import (
+    display_names,
+    energy,
+    forward_dynamics,
+    inverse_dynamics,
+    mass_matrix,
+    state_equation,
+)
+from dynamics.integrators import TABLEAUS
+from dynamics.scenes.scenes import Scene
+
+from .arguments import Commands, answer, scene_of, takes_a_scene
+
+EQUATIONS: dict[str, Callable[[Scene], Graph]] = {
+    "forward_dynamics": forward_dynamics,
+    "inverse_dynamics": inverse_dynamics,
+    "state_equation": state_equation,
+    "mass_matrix": mass_matrix,
+    "energy": energy,
+}
+SUFFIXES = {"c": ".c", "wasm": ".wasm", "python": ".py"}
+
+
+def add(commands: Commands[argparse.ArgumentParser]) -> None:
+    """The command's arguments."""
+    parser = commands.add_parser("code", help="write a scene's equations as C, WebAssembly or Python")
+    takes_a_scene(parser)
+    language = parser.add_mutually_exclusive_group(required=True)
+    language.add_argument("--c", dest="language", action="store_const", const="c", help="C99, with its header")
+    language.add_argument(
+        "--wasm",
+        dest="language",
+        action="store_const",
+        const="wasm",
+        help=f"a WebAssembly module; of the state equation with steps of {', '.join(TABLEAUS)}",
+    )
+    language.add_argument(
+        "--python", dest="language", action="store_const", const="python", help="a Python function of a list"
+    )
+    parser.add_argument(
+        "--what", default="forward_dynamics", choices=tuple(EQUATIONS), help="default: forward_dynamics"
+    )
+    parser.add_argument(
+        "--out", type=Path, help="file to write, in place of standard output: .c (and .h), .wasm or .py"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Write or print the code."""
+    out: Path | None = options.out
+    suffix = SUFFIXES[options.language]
+    if out is None and options.language == "wasm":
+        raise ValueError("--wasm needs --out: a module is no text")
+    if out is not None and out.suffix != suffix:
+        raise ValueError(f"--out must end in {suffix} for --{options.language}, got {out}")
+    if out is not None:
+        check_writable(out)
+    scene = scene_of(options)
+    graph = EQUATIONS[options.what](scene)
+    name = re.sub("[^A-Za-z0-9_]", "_", scene.name) if out is None else out.stem
+    if options.language == "wasm":
+        methods = TABLEAUS if options.what == "state_equation" else None
+        files: dict[str, str | bytes] = {suffix: cg.to_wasm(graph, methods)}
+    elif options.language == "python":
+        files = {suffix: python_text(graph)}
+    else:
+        text = cg.to_c(graph, name, names=display_names(scene))
+        whole = text.source.replace(f'#include "{name}.h"\n', text.header)  # one text for standard output
+        files = {suffix: whole} if out is None else {suffix: text.source, ".h": text.header}
+    if out is None:
+        answer(str(files[suffix]).rstrip("\n"))
+        return
+    written = {out.with_suffix(end): content for end, content in files.items()}
+    sizes = ", ".join(f"{path}: {len(content)} bytes" for path, content in written.items())
+    places = f"; inputs at byte 0, {len(graph.inputs)}, outputs at byte {8 * len(graph.inputs)}, {len(graph.outputs)}"
+    answer(f"{sizes}{places if options.language == 'wasm' else ''}", written)
+
+
+def python_text(graph: Graph) -> str:
+    """The generated function, and before it the functions that it calls."""
+    ops = sorted({node.op for node in graph.nodes if node.args}, key=lambda op: op.name)
+    called = [op for op in ops if re.match(rf"{op.name}\(", op.python)]
+    known = [op.name for op in called if op.raising is getattr(math, op.name, None)]
+    others = [op.name for op in called if op.name not in known and op.name not in ("abs", "float")]
+    lines = [f"from math import {', '.join(known)}"] if known else []
+    lines += ["from cgraph.extend import OPS", ""] if others else []
+    lines += [f'{name} = OPS["{name}"].scalar' for name in others]
+    return "\n".join([*lines, "", "", cg.compile(graph, "python").source]).lstrip("\n")
