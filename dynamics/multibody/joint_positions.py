@@ -8,11 +8,12 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph import Graph
+import cgraph as cg
+from cgraph import Graph, Node
 from cgraph.extend import real_array
 
 from .body import Body
-from .joint_coordinates import coordinate_names
+from .joint_coordinates import coordinate_names, places
 from .loops import Loop
 from .spatial import Array
 
@@ -39,10 +40,15 @@ class Bodies(Protocol):
 
 
 class Skeleton(NamedTuple):
-    """points: (T, k, 2) [m], x to the right, y up.  parents: (k,), the earlier point each hangs on, or -1."""
+    """points: (T, k, 2) [m], x to the right, y up.  parents: (k,), the earlier point each hangs on, or -1.
+
+    graph: the points at any q, outputs x0, y0, x1, ..  joints: for every velocity the point where its joint is.
+    """
 
     points: Array
     parents: tuple[int, ...]
+    graph: Graph
+    joints: tuple[int, ...]
 
 
 def skeleton(mechanism: Bodies, q: ArrayLike) -> Skeleton:
@@ -57,16 +63,27 @@ def skeleton(mechanism: Bodies, q: ArrayLike) -> Skeleton:
         raise ValueError(f"q must have shape (T, {n}) or ({n},), one for each coordinate, got {q.shape}")
     values = {f"q{i}": q[:, i] for i in range(q.shape[1])}
     points: list[Array] = []
-    places: list[tuple[str, ArrayLike]] = [(body.name, (0.0, 0.0, 0.0)) for body in mechanism.moving]
-    for body, at in [*places, *_tips(mechanism)]:
+    nodes: list[Sequence[Node]] = []
+    spots: list[tuple[str, ArrayLike]] = [(body.name, (0.0, 0.0, 0.0)) for body in mechanism.moving]
+    for body, at in [*spots, *_tips(mechanism)]:
         graph = mechanism.position(body, at)
         place = graph.evaluate({name: values[name] for name in graph.input_names})
+        nodes.append([graph.outputs[axis] for axis in "xyz"])
         points.append(np.stack([np.broadcast_to(place[axis], len(q)) for axis in "xyz"], axis=-1))
     index = {body.name: i for i, body in enumerate(mechanism.moving)}
     above = _above(mechanism)
     parents = [index.get(above[body.name], -1) for body in mechanism.moving]
     parents += [index.get(body, index.get(above[body], -1)) for body, _ in _tips(mechanism)]
-    return Skeleton(_seen(np.stack(points, axis=1)), tuple(parents))
+    in_space = np.stack(points, axis=1)
+    axes = _axes(in_space)
+    shown = {
+        f"{name}{i}": axis @ np.array(point)
+        for i, point in enumerate(nodes)
+        for name, axis in zip("xy", axes, strict=True)
+    }
+    joints = [i for i, place in enumerate(places(mechanism.moving)) for _ in range(place.u.stop - place.u.start)]
+    inputs = cg.variables([f"q{i}" for i in range(n)])
+    return Skeleton(in_space @ axes.T, tuple(parents), cg.simplify(Graph(inputs, shown)), tuple(joints))
 
 
 def _above(mechanism: Bodies) -> dict[str, str]:
@@ -104,15 +121,15 @@ def _tips(mechanism: Bodies) -> Iterator[tuple[str, ArrayLike]]:
                 yield name, (0.0, 0.0, 0.0)
 
 
-def _seen(points: Array) -> Array:
-    """Points (T, k, 3) as (T, k, 2)."""
+def _axes(points: Array) -> Array:
+    """What is drawn to the right and up, (2, 3), of points (T, k, 3): their plane, or a view from above and a side."""
     extent = np.ptp(points.reshape(-1, 3), axis=0)
     flat = extent <= _FLAT * extent.max()
-    x, y, z = np.moveaxis(points, -1, 0)
+    x, y, z = np.eye(3)
     if flat[1]:
-        return np.stack([x, z], axis=-1)
+        return np.stack([x, z])
     if flat[0]:
-        return np.stack([y, z], axis=-1)
+        return np.stack([y, z])
     if flat[2]:
-        return np.stack([x, y], axis=-1)
-    return np.stack([0.9 * y - 0.45 * x, z - 0.25 * x - 0.12 * y], axis=-1)
+        return np.stack([x, y])
+    return np.stack([0.9 * y - 0.45 * x, z - 0.25 * x - 0.12 * y])

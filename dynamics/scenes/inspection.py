@@ -19,7 +19,9 @@ from ..equations.torque_decomposition import torque_by_link
 from ..multibody.display_units import display_units
 from ..multibody.joint_positions import Skeleton, skeleton
 from ..simulation.simulate import simulate
+from ..systems.display_names import display_names
 from ..systems.system import System
+from .elimination import EliminationStep, elimination
 from .scenes import Scene
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -29,12 +31,13 @@ DT = 1e-3  # s, the step that the embedded formulations take
 
 
 class Equations(NamedTuple):
-    """A graph of the equations.  about: what to see.  marked: spurious nodes."""
+    """A graph of the equations.  about: what to see.  marked: spurious nodes.  steps: of an elimination."""
 
     name: str
     graph: Graph
     about: str
     marked: frozenset[Node]
+    steps: tuple[EliminationStep, ...] = ()
 
 
 class Shares(NamedTuple):
@@ -95,7 +98,9 @@ def inspection(
     if forward:
         about = "Accelerations from torques: solved joint by joint from the tip to the base, then back out to the tip."
         about += " With them come the forces that hold the constraints." if system.constraints else ""
-        versions = [Equations("forward dynamics", rate, about, frozenset())]
+        versions = [
+            Equations("forward dynamics", rate, about, frozenset(), tuple(elimination(rate, display_names(scene))))
+        ]
     else:
         found = rate.evaluate({name: state[name] for name in rate.input_names})
         qdd = np.stack([np.broadcast_to(found[f"qdd{i}"], len(run.t)) for i in range(system.n)], axis=1)
@@ -111,6 +116,7 @@ def inspection(
     stopped = "" if run.stats.success else run.stats.message
     units = {} if scene.mechanism is None else display_units(scene.mechanism.moving)
     graphs = [each.graph for each in versions] + [each for each in (derived,) if each]
+    graphs += [places.graph] if places is not None else []
     inputs = {name for graph in graphs for name in graph.input_names}
     at = {name: value for name, value in state.items() if name in inputs}
     units = units | {"t": "s", "dt": "s"}

@@ -5,7 +5,7 @@ const BODY = { width: 148, height: 48, gap: 34, beside: 26 }; // a body as one b
 const CELL = { gap: 22, beside: 14, title: 24, aspect: 1.35 };
 const LEAF = { height: 30, gap: 6, row: 38, sum: 42 };
 const NODE = 34; // height of a node's ellipse or box
-const FEW_LEAVES = [10, 24]; // inputs or outputs beside bodies, and beside parts of them; more of them are boxes by kind
+const FEW_LEAVES = [8, 24]; // inputs or outputs beside bodies, and beside parts of them; more of them are boxes by kind
 
 const titleOf = (cluster) => [cluster.marked ? "spurious" : "", cluster.title].filter(Boolean).join(" ");
 const widthOf = (words) => Math.max(46, 7.4 * [...words.replace(/[\u0307\u0308]/g, "")].length + 10);

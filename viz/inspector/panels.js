@@ -56,6 +56,7 @@ function showWhy(app) {
   });
 }
 
+const namedHead = (words, ...unit) => tag("th", { scope: "row", class: words.length > 16 ? "long" : "" }, words, ...unit);
 const largestOf = (values) => values.reduce((most, value) => (Number.isFinite(value) ? Math.max(most, Math.abs(value)) : most), 0);
 
 /** Results of all versions at the one state, and what differs from the version without spurious nodes. */
@@ -67,7 +68,7 @@ function showResults(app) {
     return new Map(each.outputs.map(([name, , node]) => [name, [own[node], noise[node]]]));
   });
   const right = versions.findLastIndex((each) => !each.marked.size && versions.some((other) => other.marked.size));
-  const rows = names.map(([name, words]) => tag("tr", {}, rowHead(words, ...unitOf(app, name)), ...found.map((each) => {
+  const rows = names.map(([name, words]) => tag("tr", {}, namedHead(words, ...unitOf(app, name)), ...found.map((each) => {
     if (!each.has(name)) return tag("td", {}, "");
     const [value, noise] = each.get(name), [truth, blur] = found[right]?.get(name) ?? [value, 0];
     const off = Math.abs(value - truth) > noise + blur + OFF * Math.max(Math.abs(value), Math.abs(truth));
@@ -82,11 +83,9 @@ function showResults(app) {
 function showTables(app) {
   byId("statetables").replaceChildren(...app.state.tables.map((each) => {
     const values = app.state.evaluate(each), noise = noiseIn(app, each, values);
-    const rows = each.rows.map(([name, outputs]) => tag("tr", {}, rowHead(shownName(app, name), ...unitOf(app, name)),
+    const rows = each.rows.map(([name, outputs]) => tag("tr", {}, namedHead(shownName(app, name), ...unitOf(app, name)),
       ...outputs.map((out) => { const node = each.outputs[out][2]; return tag("td", {}, brief(values[node], noise[node])); })));
-    const made = table(each.header, rows);
-    made.prepend(tag("caption", {}, each.caption));
-    return scrolled(made);
+    return tag("div", {}, tag("h2", {}, each.caption), scrolled(table(each.header, rows)));
   }));
 }
 

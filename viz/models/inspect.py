@@ -10,7 +10,7 @@ from dynamics.scenes.inspection import Inspection, Shares, inspection
 from dynamics.scenes.start import Start, moving_start, start_text, with_start
 from dynamics.systems.model import Model
 
-from ..inspector import Motion, Page, StateTable, Version, page
+from ..inspector import Motion, Page, StateTable, Step, Version, page
 from ..typed import box
 from .open_loops import tree_alone
 from .typed_text import text_or_none
@@ -85,11 +85,14 @@ def inspection_page(scene: scenes.Scene, content: Inspection, moved: bool = Fals
     notices += [tree_alone(scene)] if what == "inverse dynamics" and tree_alone(scene) else []
     notices += [f"At rest nothing moves, so it starts at {start_text(scene)}."] if moved else []
     return page(
-        [Version(each.name.replace("_", " "), *each[1:]) for each in content.versions],
+        [
+            Version(each.name.replace("_", " "), *each[1:4], [Step(*step) for step in each.steps])
+            for each in content.versions
+        ],
         title=f"{scene.name}: {what}",
         at=content.at,
         derived=content.derived,
-        motion=Motion(content.t, bones.points, bones.parents) if bones else Motion(content.t),
+        motion=Motion(content.t, *bones) if bones else Motion(content.t),
         tables=[_torques(scene, content.shares)] if content.shares else [],
         names=display_names(scene),
         units=content.units,

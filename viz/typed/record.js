@@ -1,6 +1,7 @@
 // What the inspector is handed of a system: its graphs as viz/inspector/record.py describes them, one state, a motion.
 
 const KINDS = { q: "q", qd: "q\u0307", qdd: "q\u0308", tau: "τ" };
+const LONGEST = 24; // letters of a name for which a box has room
 const ABOUT = { euler_embedded: "", kinetic_only: "of the kinetic energy " };
 
 /** A name in mathematical letters: theta1 is θ₁. */
@@ -12,9 +13,10 @@ function recordOf(system, motion, forward) {
   const graphs = forward ? [["forward dynamics", accelerations(system)]]
     : Object.keys(FORMULATIONS).map((name) => [name, inverseDynamics(system, name)]);
   const derived = forward ? null : earlier(system), computed = new Set(derived?.outputs.keys());
-  const needed = [...(derived?.inputs ?? []), ...graphs.flatMap(([, graph]) => graph.inputs)].map(({ name }) => name);
+  const places = placesOf(system), shownGraphs = [...graphs.map(([, graph]) => graph), ...(places ? [places] : [])];
+  const needed = [...(derived?.inputs ?? []), ...shownGraphs.flatMap((graph) => graph.inputs)].map(({ name }) => name);
   const inputs = [...new Set(needed)].filter((name) => !computed.has(name));
-  const letters = lettersOf(system, graphs.map(([, graph]) => graph));
+  const letters = lettersOf(system);
   const known = new Set(graphs.flatMap(([, graph]) => [...graph.inputs, ...graph.nodes]).map(({ name }) => name));
   graphs.forEach(([, graph]) => [...graph.outputs.keys()].forEach((name) => known.add(name)));
   return {
@@ -27,7 +29,7 @@ function recordOf(system, motion, forward) {
     inputs, rows: rowsOf(system, motion, inputs), columns: [], tables: [],
     derived: derived && listed(derived, letters),
     versions: graphs.map(([name, graph]) => versionOf(name, graph, letters)),
-    motion: motion.error ? null : shownMotion(motion),
+    motion: motion.error ? null : { ...shownMotion(motion), joints: [], places: places && listed(places, letters) },
   };
 }
 
@@ -46,13 +48,11 @@ function calledOf(system) {
   const more = system.coordinates.map((name, i) => [`qdd${i}`, `qdd.${name}`]);
   return new Map([...displayNames(system), ...more].map(([name, text]) => [name, shown(text)]));
 }
-/** What the picture shows of a name: what a person calls it, or letters where there are many. */
-function lettersOf(system, graphs) {
-  const leaves = new Set(graphs.flatMap((graph) => [...graph.inputs.map(({ name }) => name), ...graph.outputs.keys()]));
-  const shown = leaves.size <= FEW ? calledOf(system) : new Map();
-  return (name) => shown.get(name) ?? pretty(name);
+/** What the picture shows of a name: what a person calls it, or letters where that is long. */
+function lettersOf(system) {
+  const called = calledOf(system);
+  return (name) => (called.get(name)?.length <= LONGEST ? called.get(name) : pretty(name));
 }
-const FEW = 24;
 
 function listed(graph, letters) {
   const number = new Map(graph.nodes.map((node, i) => [node, i]));
@@ -72,7 +72,7 @@ function versionOf(name, graph, letters) {
   });
   return {
     name: name.replace("_", " "), about: aboutOf(name, graph, wrong), ...listed(graph, letters), label, labels: [...kinds.values()].map(({ kind }) => kind),
-    marked: graph.nodes.flatMap((node, i) => (wrong.has(node) ? [i] : [])),
+    marked: graph.nodes.flatMap((node, i) => (wrong.has(node) ? [i] : [])), steps: [],
   };
 }
 function roleOf({ args, value, label }) {
@@ -109,6 +109,11 @@ function rowsOf(system, motion, inputs) {
     system.q.forEach((_, i) => [["q", q], ["qd", qd], ["qdd", qdd]].forEach(([kind, table]) => values.set(`${kind}${i}`, table[k][i])));
     return inputs.map((name) => values.get(name) ?? 0);
   });
+}
+/** The origin and the points as a graph of the state, which shows them where a person changes it. */
+function placesOf({ q, qd, extra, points }) {
+  const named = points.flatMap(([x, y], i) => [[`x${i + 1}`, x], [`y${i + 1}`, y]]);
+  return points.length ? graphOf([...q, ...qd, ...extra], new Map([["x0", constant(0)], ["y0", constant(0)], ...named])) : null;
 }
 /** The origin and the points, where there are any. */
 function shownMotion({ t, points }) {

@@ -72,7 +72,10 @@ def test_forward_dynamics_and_a_system_without_places():
 
 def test_joints_of_a_planar_arm_are_a_link_apart():
     q = np.random.default_rng(0).uniform(-3, 3, (5, 3))
-    points, parents = skeleton(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7]), q)
+    points, parents, graph, joints = skeleton(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7]), q)
+    assert joints == (0, 1, 2)
+    again = graph.evaluate({f"q{i}": q[:, i] for i in range(3)})
+    assert np.stack(list(again.values()), axis=1) == pytest.approx(points[..., :].reshape(5, -1))
     assert parents == (-1, 0, 1, 2)
     assert np.linalg.norm(np.diff(points, axis=1), axis=2) == pytest.approx(np.tile([1.0, 0.8, 0.7], (5, 1)))
     assert points[:, 1] == pytest.approx(np.stack([np.sin(q[:, 0]), -np.cos(q[:, 0])], axis=1))
@@ -84,7 +87,7 @@ def test_a_mechanism_hangs_together():
         dyn.Body("a", joint, mass=1.0, center=(0, 0, -0.25)),
         dyn.Body("b", joint, "a", mass=1.0, center=(0, 0, -0.25)),
     ]
-    points, parents = skeleton(dyn.Mechanism(bodies), [[0.3, 0.2]])
+    points, parents, *_ = skeleton(dyn.Mechanism(bodies), [[0.3, 0.2]])
     assert parents == (-1, 0, 1)
     a = np.array([np.sin(0.3), -np.cos(0.3)]) * 0.5
     tip = np.array([np.sin(0.5), -np.cos(0.5)]) * 0.25
