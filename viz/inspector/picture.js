@@ -28,7 +28,7 @@ function draw(svg, record, plan, version, view) {
   const frames = element("g", {}, scene), lines = element("g", { class: "lines" }, scene), shapes = element("g", {}, scene);
   const canvas = { record, plan, version, view, frames, lines, shapes, items: new Map(), shownBy: [], called: new Map(record.called) };
   const own = version.drawing && !view.folded.size && !view.closed.size ? version.drawing : null;
-  const layout = own ? asLayout(own, version) : arrange(plan, view);
+  const layout = own ? asLayout(own, version) : arrange(plan, view, version.index);
   canvas.layout = layout;
   if (!own) {
     drawTitles(canvas);
