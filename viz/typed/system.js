@@ -142,7 +142,7 @@ class Meaning {
     const time = this.statements.find(({ name, kind }) => kind === "define" && name === "time");
     result.time = time ? this.number(time) : TIME;
     if (!(result.time > 0)) throw new TextError("The time of a motion must be positive.", time.at, time.end);
-    result.extra = topological([lagrangian, ...result.forces]).includes(this.t) ? [this.t] : [];
+    result.extra = topological([lagrangian, ...result.forces, ...result.points.flat()]).includes(this.t) ? [this.t] : [];
     result.extra.push(...[...this.parameters.keys()].map(variable));
     return result;
   }
