@@ -138,6 +138,9 @@ def page(
         raise TypeError(f"tables must be a sequence of Table or StateTable, got {tables!r:.60}")
     if not all([isinstance(text, str) for text in require_sequence("notices", notices, "texts")]):
         raise TypeError(f"notices must be texts, got {notices!r:.60}")
+    panels = require_sequence("panels", panels, "Panel")
+    if not all([isinstance(panel, Panel) for panel in panels]):
+        raise TypeError(f"panels must be a sequence of Panel, got {panels!r:.60}")
     if derived is not None:
         require_graph("derived", derived)
     versions = _versions(graph, about, nodes)

@@ -7,8 +7,10 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
+import numpy as np
+
 from cgraph import Node
-from cgraph.extend import OPS, topological
+from cgraph.extend import OPS, real_array, topological
 from dynamics.systems.model import Model, as_system
 from dynamics.systems.system import System
 
@@ -39,9 +41,10 @@ def typed_text(model: Model, q: Sequence[float] | None = None, qd: Sequence[floa
     Raises
     ------
     TypeError
-        For what is no model, or has no Lagrangian.
+        For what is no model, or has no Lagrangian, and a start that is not of numbers.
     ValueError
-        For more coordinates, constraints, quasi-velocities, or an operation that has no text, such as `where`.
+        For a start of another length, more coordinates, constraints, quasi-velocities, or an operation that has no
+        text, such as `where`.
 
     Examples
     --------
@@ -59,7 +62,17 @@ def typed_text(model: Model, q: Sequence[float] | None = None, qd: Sequence[floa
         raise ValueError(
             f"the page takes up to {MOST} coordinates whose rates are velocities, without constraints; got {system!r}"
         )
-    return _Writer(system).text(q, qd)
+    return _Writer(system).text(_start("q", q, system), _start("qd", qd, system))
+
+
+def _start(what: str, values: Sequence[float] | None, system: System) -> list[float]:
+    """Numbers for every coordinate; none where nothing is said."""
+    if values is None:
+        return []
+    found = real_array(what, values)
+    if found.shape != (system.n,) or not np.isfinite(found).all():
+        raise ValueError(f"{what} needs {system.n} finite numbers, got {values!r:.60}")
+    return list(map(float, found))
 
 
 def text_or_none(model: Model, q: Sequence[float], qd: Sequence[float]) -> str:
@@ -85,7 +98,7 @@ class _Writer:
         self.definitions: list[str] = []
         self.written: dict[Node, tuple[str, int]] = {}
 
-    def text(self, q: Sequence[float] | None, qd: Sequence[float] | None) -> str:
+    def text(self, q: Sequence[float], qd: Sequence[float]) -> str:
         """All lines."""
         system, damping = self.system, [node for node in self.system.damping if isinstance(node, Node)]
         order = topological([system.lagrangian, *system.forces, *damping])
@@ -103,8 +116,9 @@ class _Writer:
                 text = self.written[value][0] if isinstance(value, Node) else _number(value)
                 lines += [f"{kind} {name} = {text}"] if text not in ("0", "-0") else []
         for dots, start in (("", q), ("'", qd)):
-            pairs = zip(self.coordinates, start, strict=True) if start is not None else ()
-            lines += [f"{name}{dots}(0) = {_number(value)}" for name, value in pairs]
+            lines += [
+                f"{name}{dots}(0) = {_number(value)}" for name, value in zip(self.coordinates, start, strict=False)
+            ]
         return "\n".join(lines)
 
     def _free(self, wanted: str, otherwise: str) -> str:

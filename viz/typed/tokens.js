@@ -9,6 +9,7 @@ const PATTERNS = {
   sign: /\*\*|[-+*/^()=,:;\n·⋅×∗−–÷∕]/y,
 };
 const SIGNS = new Map([["**", "^"], ["·", "*"], ["⋅", "*"], ["×", "*"], ["∗", "*"], ["−", "-"], ["–", "-"], ["÷", "/"], ["∕", "/"]]);
+const CONTINUED = ["+", "-", "*", "/", "^", "("]; // after these a formula goes on in the next line
 const digitsAmong = (digits) => (text) => [...text].map((each) => (digits.includes(each) ? digits.indexOf(each) : each)).join("");
 const raised = digitsAmong("⁰¹²³⁴⁵⁶⁷⁸⁹"), lowered = digitsAmong("₀₁₂₃₄₅₆₇₈₉");
 
@@ -37,7 +38,8 @@ function tokensOf(text) {
       if (found) break;
     }
     if (!found) throw notUnderstood(text, at);
-    if (kind !== "space") tokens.push({ at, end: at + found[0].length, ...TOKENS[kind](found) });
+    const open = tokens.length && tokens.at(-1).kind === "sign" && CONTINUED.includes(tokens.at(-1).text);
+    if (kind !== "space" && !(found[0] === "\n" && open)) tokens.push({ at, end: at + found[0].length, ...TOKENS[kind](found) });
     at += found[0].length;
   }
   return [...tokens, { kind: "end", text: "", at, end: at }];

@@ -25,6 +25,7 @@ COUNTS = "(text) => { const { nodes, edges } = formulation(parsed(text), 'euler_
         "L = 0.5*m*l**2*thetadot**2 + m*g*l*cos(theta)",
         "L = 0.5·m·l²·θ̇² + m·g·l·cos(θ)",
         "L = 0.5 * m × l^(+2) * θ′^2 − −m*g*l*cos(θ)",
+        "L = 0.5*m*l²*θ'² +  # goes on\n\n   m*g*l*cos(\nθ)",
         "L = T - V\nT = 0.5*m*l²*theta_dot²\nV = −m*g*l*cos(theta)",
         "V = -m*g*l*cos(theta); T = 0.5*m*l²*theta'²",
         "q: phi\nL = 0.5*m*l**2*phi'**2 + m*g*l*cos(phi) // the same angle",
