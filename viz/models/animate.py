@@ -192,8 +192,8 @@ def _panel(
     make: Callable[..., Panel] = partial(Curves, names=list(model.coordinates), t=times)
     shown = rows
     if mechanism is not None:  # all at once, so that they are seen from one side
-        bones = skeleton(mechanism.bind(), np.concatenate(rows))
-        shown, make = np.split(bones.points, len(rows)), partial(Sticks, parents=bones.parents)
+        points, parents, *_ = skeleton(mechanism.bind(), np.concatenate(rows))
+        shown, make = np.split(points, len(rows)), partial(Sticks, parents=parents)
     motions = [Motion(name, values, name in wrong) for name, values in zip(known, shown, strict=False)]
     return make(motions, None if wanted is None else shown[-1])
 

@@ -80,16 +80,16 @@ def inspect(
 def inspection_page(scene: scenes.Scene, content: Inspection, moved: bool = False) -> Page:
     """The page of a scene.  moved: whether its start was chosen for it, which the page then says."""
     bones, mechanism = content.skeleton, scene.mechanism
-    what = "inverse dynamics" if len(content.versions) > 1 else content.versions[0].name
-    notices = [f"The model leaves out {text}." for text in scene.left_out]
-    notices += [tree_alone(scene)] if what == "inverse dynamics" and tree_alone(scene) else []
+    inverse = len(content.versions) > 1
+    notices = [f"Left out of the model: {'; '.join(scene.left_out)}."] if scene.left_out else []
+    notices += [tree_alone(scene)] if inverse and tree_alone(scene) else []
     notices += [f"At rest nothing moves, so it starts at {start_text(scene)}."] if moved else []
     return page(
         [
             Version(each.name.replace("_", " "), *each[1:4], [Step(*step) for step in each.steps])
             for each in content.versions
         ],
-        title=f"{scene.name}: {what}",
+        title=f"{scene.name}: {'inverse dynamics' if inverse else content.versions[0].name}",
         at=content.at,
         derived=content.derived,
         motion=Motion(content.t, *bones) if bones else Motion(content.t),

@@ -27,7 +27,6 @@ pytest.importorskip("flint")
 # Of the largest entry of a matrix of slopes of torques; and, of slopes X of accelerations, M X = dtau, of what a
 # relative change of M and of dtau may do to X: of the largest entry of |M^-1| (|M| |X| + |dtau|).
 ROUNDING = 4e-15
-CONDITIONED = 1e-15
 LONG_CHAIN = 1e-14  # of the largest entry, of slopes of forward dynamics by elimination itself
 
 
@@ -52,7 +51,7 @@ def pinocchios(tree: dyn.Mechanism, state: tuple[Array, ...]) -> Slopes:
 
 def require_exact(off: Errors) -> None:
     assert max(off.torques) < ROUNDING
-    assert max(off.conditioned) < CONDITIONED
+    assert max(off.conditioned) < ROUNDING
 
 
 @pytest.mark.parametrize("name", TREES)
