@@ -22,6 +22,7 @@ COMMANDS = (
     "live",
     "simulate",
     "animate",
+    "type",
     "lint",
     "why",
     "compare",

@@ -46,7 +46,9 @@ def test_the_page_and_the_commands_say_so(tmp_path, capsys):
         assert json.loads(capsys.readouterr().out)["of_the_tree"] is True
     for forward in (False, True):
         page = inspection_page(scene, inspection(scene, forward=forward))
-        assert (said in json.loads(re.search(r'json">(.*?)</script>', page)[1])["notices"]) is not forward
+        assert (
+            said in json.loads(re.search(r'id="data" type="application/json">(.*?)</script>', page)[1])["notices"]
+        ) is not forward
 
 
 @pytest.mark.parametrize("many", [1, 9])
