@@ -19,10 +19,12 @@ from . import (
     inspect,
     lesson,
     lint,
+    live,
     paper,
     report,
     scenes,
     simulate,
+    type as type_,
     why,
 )
 
@@ -36,8 +38,10 @@ COMMANDS = (
     code,
     certify,
     inspect,
+    live,
     simulate,
     animate,
+    type_,
     lint,
     why,
     compare,
