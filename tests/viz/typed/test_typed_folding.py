@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hypothesis import given, settings, strategies as st
+from hypothesis import example, given, settings, strategies as st
 
 import cgraph as cg
 from cgraph.core.node import apply
@@ -63,7 +63,17 @@ IN_PAGE = """(programs) => programs.map((program) => {
 })"""
 
 
-@given(st.lists(steps(), min_size=12, max_size=12))
+RARE = [
+    ["x", 1.0, ["div", [1, 2]], 2.0, ["mul", [1, 2]]],  # 2 (1 / x)
+    ["x", "y", 0.5, ["mul", [1, 3]], ["mul", [1, 3]], 2.0, ["mul", [1, 2]]],  # 2 ((0.5 x) y)
+    ["x", "y", -0.5, ["mul", [1, 3]], ["mul", [3, 1]], 2.0, ["mul", [1, 2]]],  # 2 (y (-0.5 x))
+    ["x", 1e-200, ["mul", [1, 2]], ["mul", [2, 1]]],  # the product of the numbers is 0
+    ["x", 1e200, ["add", [1, 2]], ["sub", [2, 1]], ["mul", [3, 3]], ["mul", [1, 4]]],  # and infinite
+]
+
+
+@example(programs=RARE)
+@given(programs=st.lists(steps(), min_size=12, max_size=12))
 @settings(max_examples=examples(60))
 def test_folding_is_that_of_the_library(programs):
     for program, found in zip(programs, run_typed(IN_PAGE, programs), strict=True):
