@@ -15,7 +15,8 @@ triangle of second derivatives, all as nodes. `compressed_jacobian` gives the pa
 **Solve**: `solve_nodes` is `cg.hessian_solve` on nodes, `ldl_solve` the dense factorization; both raise
 `SingularError`. `ldl_elimination` does the same over any numbers.
 
-**Read**: `expand` and `format_polynomial` write a polynomial out, `Names` tells nodes in a person's words, `OPS` is
+**Read**: `expand` and `format_polynomial` write a polynomial out, `Names` tells nodes in a person's words,
+`Formulas` gives the equations of nodes in a `Notation`, `OPS` is
 the table of operations, `register` adds a row to it, an `Op`, and `ADJOINT`, `PRIMAL`, `TANGENT` are the roles that a
 label may have. `certain_digits` says what rounding leaves of the outputs.
 
@@ -49,6 +50,7 @@ from .autodiff.reverse import cotangents
 from .autodiff.symmetric_elimination import SingularError
 from .core.check_name import check_name
 from .core.evaluate import Array
+from .core.formulas import Formulas, Notation
 from .core.graph import require_graph
 from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED
 from .core.node import as_node
@@ -92,10 +94,12 @@ __all__ = [
     "Call",
     "CompressedJacobian",
     "Factor",
+    "Formulas",
     "If",
     "Map",
     "MathML",
     "Names",
+    "Notation",
     "Op",
     "Polynomial",
     "Program",

@@ -78,7 +78,7 @@ def driven(model: Model, formulation: str = "chain_rule", t_end: float | None = 
     >>> errors = []
     >>> for formulation in ("chain_rule", "euler_embedded"):
     ...     run, wanted = dyn.scenes.driven(arm, formulation, t_end=1.0)
-    ...     errors.append(abs(run.q - wanted(run.t)).max())
+    ...     errors.append(float(abs(run.q - wanted(run.t)).max()))
     >>> errors[0] < 1e-6, errors[1] > 0.1
     (True, True)
     """

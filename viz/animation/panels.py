@@ -21,6 +21,8 @@ FOLLOW = 5.0  # how much larger than the mechanism its way is where the frame go
 FINE = 4  # instants a frame, of the ways and curves that are drawn
 TRACE = RATE * FINE  # instants that the tip's way is shown for
 NAMED = 7  # curves at most
+SMALLEST = 1e-300  # what float64 has room for, with a product to spare
+ROUNDING = 1e-12  # of the largest value of a curve: a change that is none
 
 
 @dataclass(frozen=True)
@@ -119,8 +121,12 @@ class Curves(Panel):
         self.names, self.t = names[:NAMED], t
         shown = self.all[:, :NAMED]
         self.low, self.high = float(shown.min()), float(shown.max())
-        if self.high <= self.low:
-            self.low, self.high = self.low - 0.5, self.high + 0.5
+        largest = max(abs(self.low), abs(self.high))
+        if largest > 1.0 / SMALLEST:
+            raise ValueError(f"coordinates up to {largest:.3g} are too large to be drawn")
+        if self.high - self.low <= max(ROUNDING * largest, SMALLEST):  # nothing moves
+            pad = 0.5 * (largest if largest > SMALLEST else 1.0)
+            self.low, self.high = self.low - pad, self.high + pad
 
     def draw(self, canvas: Canvas, motion: Motion, k: int, colors: Colors) -> None:
         """Axes with their numbers, and the curves up to row k."""

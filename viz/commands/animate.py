@@ -54,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
     check_can_animate(options.out.suffix)
     scene, _ = started(options, free=not options.driven)
     end = scene.t_end if options.t_end is None else options.t_end
-    frames(end, options.speed)
+    frames(end, options.speed)  # before the work
     say(f"{scene.name}: a motion of {end:g} s")
     motions: dict[str, Trajectory] = {}
     marked: list[str] = []
@@ -67,6 +67,7 @@ def run(options: argparse.Namespace) -> int:
                 marked.append(words)
     else:
         motions[scene.name] = simulate(scene, scene.q, None if scene.ode else scene.qd, end)
+    say(f"{scene.name}: drawing {frames(max(each.t[-1] for each in motions.values()), options.speed)} frames")
     title = f"{scene.name}: the gray motion is wanted" if options.driven else ""
     film = animate(
         scene, motions, kind=options.out.suffix, wanted=wanted, marked=marked, speed=options.speed, dark=options.dark,

@@ -25,10 +25,14 @@ READING = ("ignore", "floating")  # options of `scenes.of_file`
 IN_PYTHON = "file.py:name, a model of a Python file, which is executed"
 
 
-def takes_a_scene(command: argparse.ArgumentParser) -> None:
-    """The arguments that `scene_of` reads."""
+def takes_a_scene(command: argparse.ArgumentParser, default: str | None = None) -> None:
+    """The arguments that `scene_of` reads.  default: the scene where none is named."""
     command.add_argument(
-        "scene", metavar="SCENE", help=f"{', '.join(scenes.names())}, a model file, MJCF or URDF, or {IN_PYTHON}"
+        "scene",
+        metavar="SCENE",
+        nargs=None if default is None else "?",
+        default=default,
+        help=f"{', '.join(scenes.names())}, a model file, MJCF or URDF, or {IN_PYTHON}",
     )
     reads_files(command)
 

@@ -118,7 +118,10 @@ function detail(app, way) {
   if (way < 0 && folded.size < app.plan.clusters.length && now === "clusters") to += 1; // first fold what is unfolded
   if (way > 0 && closed.size < app.plan.columns.length && now === "bodies") to = order.indexOf("clusters");
   const level = order[Math.max(0, Math.min(order.length - 1, to))];
-  if (level === "nodes" && app.largest > DRAWABLE) return;
+  if (level === "nodes" && app.largest > DRAWABLE) {
+    byId("trail").textContent = `More than ${DRAWABLE} nodes: click boxes to unfold them one by one.`;
+    return;
+  }
   Object.assign(app.view, all[level]);
   app.chosen = true;
   redraw(app, true);

@@ -1,7 +1,7 @@
 // Where everything is in the picture: columns by body, rows by sweep, folded or not; the same for all versions.
 
 const BOX = { width: 100, height: 28, gap: 6, title: 18, pad: 8 };
-const BODY = { width: 148, height: 48, gap: 34, beside: 26 }; // a body as one box
+const BODY = { width: 148, height: 46, gap: 28, beside: 26 }; // a body as one box
 const CELL = { gap: 22, beside: 14, title: 24, aspect: 1.35 };
 const LEAF = { height: 30, gap: 6, row: 38, sum: 42 };
 const NODE = 34; // height of a node's ellipse or box

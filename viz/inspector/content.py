@@ -95,7 +95,8 @@ class Motion:
 
     t: (T,) [s].  points: (T, k, 2) [m], x to the right, y up, or None.  parents: (k,), the point each hangs on, or -1.
     places: the points as a graph of inputs of the state, outputs x0, y0, x1, .., shown when a person changes the state.
-    joints: for every velocity the point where its joint is.
+    joints: for every velocity the point where its joint is.  turns: whether it turns what is seen, 1 counterclockwise,
+    -1 the other way, or 0: torques are painted at the first two.
     """
 
     t: Array
@@ -103,6 +104,7 @@ class Motion:
     parents: Sequence[int] = ()
     places: Graph | None = None
     joints: Sequence[int] = ()
+    turns: Sequence[int] = ()
 
     def check(self) -> None:
         """Raises ValueError for shapes that do not fit, or values that are not finite."""
@@ -117,6 +119,8 @@ class Motion:
             raise ValueError(f"parents must be -1 or an earlier point, got {list(self.parents)}")
         if any(not 0 <= joint < len(self.parents) for joint in self.joints):
             raise ValueError(f"joints must be points, 0 to {len(self.parents) - 1}, got {list(self.joints)}")
+        if self.turns and (len(self.turns) != len(self.joints) or set(self.turns) - {-1, 0, 1}):
+            raise ValueError(f"turns must be 1, -1 or 0 for {len(self.joints)} joints, got {list(self.turns)}")
         wanted_names = [f"{axis}{i}" for i in range(len(self.parents)) for axis in "xy"]
         if self.places is not None and list(self.places.outputs) != wanted_names:
             raise ValueError(f"places must have the outputs x0, y0, .. of {len(self.parents)} points")

@@ -36,12 +36,11 @@ function pointsAt(app) {
   return app.record.motion.parents.map((_, i) => [found[2 * i], found[2 * i + 1]]);
 }
 
-/** Torques of the first table that has a row for every joint, at the joints: by parts where these are few.
- *
- * Not forces, which turn nothing, and not the torques of a joint of several velocities, whose axes lie in space. */
+/** Torques of the first table that has a row for every joint, at the joints that turn what is seen: by parts where these
+ * are few. */
 function paintTorques(app) {
-  const { joints } = app.record.motion;
-  const found = app.state.tables.find((each) => joints.length && each.rows.length === joints.length);
+  const { joints, turns } = app.record.motion;
+  const found = app.state.tables.find((each) => turns.some(Boolean) && each.rows.length === turns.length);
   const parts = found && found.header.length <= PARTS ? found.header.slice(0, -1) : null;
   app.arm.color(parts);
   byId("parts").replaceChildren(...(parts ?? []).map((name, k) => tag("span", { class: `part${k % 7}` }, name)));
@@ -49,9 +48,8 @@ function paintTorques(app) {
   if (!found) { app.arm.paint([]); return; }
   const values = app.state.evaluate(found);
   const torques = found.rows.map(([, outputs]) => (parts ? outputs.slice(0, -1) : outputs.slice(-1)).map((out) => values[found.outputs[out][2]]));
-  const turns = joints.map((joint, i) => joints.filter((each) => each === joint).length === 1 && (app.units.get(found.rows[i][0]) ?? "N m") === "N m");
   app.largestTorque = Math.max(app.largestTorque, largestOf(torques.filter((_, i) => turns[i]).flat()));
-  app.arm.paint(torques.map((own, i) => [joints[i], own.map((each) => each / (app.largestTorque || 1))]).filter((_, i) => turns[i]));
+  app.arm.paint(torques.map((own, i) => [joints[i], own.map((each) => turns[i] * each / (app.largestTorque || 1))]));
 }
 
 function play(app, on) {

@@ -45,17 +45,19 @@ class Page(str):
 
 
 class Panel(NamedTuple):
-    """A part that stands beside the picture: markup, style, and scripts before and after the page's start.
+    """A part that another module adds: markup beside the picture or at the end, style, scripts before and after start.
 
     first: JavaScript for the record that the page shows first, where its own data are none.  run: JavaScript that
-    begins the panel; `inspector` is what app.js lends to other scripts.
+    begins the panel; `inspector` is what app.js lends to other scripts.  allowed: what the policy lets scripts do.
     """
 
-    body: str
-    style: str
-    script: str
-    first: str
-    run: str
+    body: str = ""
+    style: str = ""
+    script: str = ""
+    first: str = ""
+    run: str = ""
+    end: str = ""
+    allowed: str = ""
 
 
 def page(
@@ -162,7 +164,8 @@ def compose(title: str, data: Mapping[str, Any] | None, tables: Sequence[Table],
     added = "\n".join([panel.script for panel in panels])
     script = f'"use strict";\n{scripts()}\n{added}\nconst inspector = start({first});{begin}'
     style = f"{_colors()}{_asset('page.css')}{''.join([panel.style for panel in panels])}"
-    policy = _POLICY.format(script=_digest(script), style=_digest(style))
+    allowed = "".join([f" {panel.allowed}" for panel in panels if panel.allowed])
+    policy = _POLICY.format(script=f"{_digest(script)}{allowed}", style=_digest(style))
     # "<" in the data could end the element that holds it
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
     shown = "".join(html.table(table.caption, table.header, table.rows) for table in tables)
@@ -178,7 +181,7 @@ def compose(title: str, data: Mapping[str, Any] | None, tables: Sequence[Table],
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
         f"<style>{style}</style>\n</head>\n<body>\n{body}\n"
         f'<script id="data" type="application/json">{text}</script>\n'
-        f"<script>{script}</script>\n"
+        f"{''.join([panel.end for panel in panels])}<script>{script}</script>\n"
         "</body>\n</html>\n"
     )
 

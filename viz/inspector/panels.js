@@ -47,10 +47,12 @@ function showWhy(app) {
   const found = heaviest(version, app.partials(), a, b, PATHS);
   head.append(`. The derivative here is ${brief(bars[a])}, the sum of their products of partials.`,
     ` ${found.length ? "The heaviest:" : "Here a partial on each is zero."}`);
-  found.forEach(({ nodes, product }) => {
+  const alike = (nodes) => found.filter((each) => each.nodes.join() === nodes.join()).length > 1;
+  found.forEach(({ nodes, slots, product }) => {
+    const words = nodes.map((node, i) => (i && alike(nodes) ? `argument ${slots[i - 1] + 1} of ` : "") + told(app, node));
     const crossed = nodes.filter((node) => version.marked.has(node)).length, on = app.path?.join() === nodes.join();
     const button = tag("button", { type: "button", class: `path${on ? " on" : ""}` },
-      `${brief(product)}: ${nodes.map((node) => told(app, node)).join(" → ")}${crossed ? `  (${crossed} spurious)` : ""}`);
+      `${brief(product)}: ${words.join(" → ")}${crossed ? `  (${crossed} spurious)` : ""}`);
     button.onclick = () => { app.path = on ? null : nodes; paintPath(app); showWhy(app); };
     byId("why").append(button);
   });

@@ -83,7 +83,7 @@ function drawBodies(canvas) {
     const name = plan.columns[column] || "no tag", at = layout.bodies[column];
     const wrong = nodes.filter((node) => version.marked.has(node)).length;
     const second = wrong ? `${nodes.length}, ${wrong} spurious` : counted(nodes.length, "node");
-    const item = shape(shapes, `b${column}`, at, `body${wrong ? " wrong" : " several"}`, fitted(name, 15), second);
+    const item = shape(shapes, `b${column}`, at, `body${wrong ? " wrong" : " several"}`, fitted(name, 17), second);
     item.group.setAttribute("data-column", column);
     item.group.setAttribute("aria-label", `${name}, ${counted(nodes.length, "node")}${wrong ? `, ${wrong} spurious` : ""}, folded`);
     element("title", {}, item.group).textContent = name;

@@ -9,7 +9,7 @@
     columns               [[tag, tag of its parent or null]] in the order of the picture; [] leaves it to the page
     versions              [{name, about, labels, label, marked, steps, drawing} and a graph], see below
     tables                [{caption, header, rows: [[name, [numbers of nodes]]]} and a graph]: they follow the state
-    motion                null, or {t, points: null or [[[x, y]]], parents, joints, places: null or a graph}
+    motion                null, or {t, points: null or [[[x, y]]], parents, joints, turns, places: null or a graph}
 
 A graph is {ops, args, names, inputs, outputs}: for every node, arguments before uses, the name of its operation and the
 numbers of its arguments, or the value of a constant; {node: [name, letters]} of named ones; [[name, node or -1 where
@@ -92,6 +92,7 @@ def _motion(motion: Motion, letters: Letters) -> dict[str, Any]:
         else [[[_short(x), _short(y)] for x, y in each] for each in motion.points],
         "parents": list(motion.parents),
         "joints": list(motion.joints),
+        "turns": list(motion.turns),
         "places": _graph(motion.places, letters) if motion.places is not None else None,
     }
 

@@ -12,8 +12,11 @@ from dynamics.systems.model import Model
 
 from ..inspector import Motion, Page, StateTable, Step, Version, page
 from ..typed import box
+from .live import live_panel
 from .open_loops import tree_alone
 from .typed_text import text_or_none
+
+LIVELY = 10  # velocities: larger models have a page of their motion alone, `live_page`
 
 
 def inspect(
@@ -23,6 +26,7 @@ def inspect(
     start: Start | None = None,
     t_end: float | None = None,
     forward: bool = False,
+    title: str | None = None,
 ) -> Page:
     """The page on which a model's equations unfold, move and answer: one HTML file that loads nothing.
 
@@ -40,6 +44,8 @@ def inspect(
         How long it moves [s]; 3 s of what is no scene.
     forward : bool
         Forward dynamics, in place of inverse dynamics by the paper's three formulations.
+    title : str, optional
+        Heading of the page, by default what it shows.
 
     Returns
     -------
@@ -71,16 +77,18 @@ def inspect(
     require_flag("forward", forward)
     scene = scenes.of_model(model)
     at = moving_start(scene) if start is None else with_start(scene, start)
-    text = inspection_page(at, inspection(at, forward=forward, t_end=t_end), start is None and at is not scene)
+    content = inspection(at, forward=forward, t_end=t_end)
+    text = inspection_page(at, content, moved=start is None and at is not scene, title=title)
     if target is not None:
         write_files({target: text})
     return text
 
 
-def inspection_page(scene: scenes.Scene, content: Inspection, moved: bool = False) -> Page:
+def inspection_page(scene: scenes.Scene, content: Inspection, moved: bool = False, title: str | None = None) -> Page:
     """The page of a scene.  moved: whether its start was chosen for it, which the page then says."""
-    bones, mechanism = content.skeleton, scene.mechanism
+    bones, mechanism, n = content.skeleton, scene.mechanism, scene.system.n
     inverse = len(content.versions) > 1
+    what = "inverse dynamics" if inverse else content.versions[0].name
     notices = [f"Left out of the model: {'; '.join(scene.left_out)}."] if scene.left_out else []
     notices += [tree_alone(scene)] if inverse and tree_alone(scene) else []
     notices += [f"At rest nothing moves, so it starts at {start_text(scene)}."] if moved else []
@@ -89,7 +97,7 @@ def inspection_page(scene: scenes.Scene, content: Inspection, moved: bool = Fals
             Version(each.name.replace("_", " "), *each[1:4], [Step(*step) for step in each.steps])
             for each in content.versions
         ],
-        title=f"{scene.name}: {'inverse dynamics' if inverse else content.versions[0].name}",
+        title=f"{scene.name}: {what}" if title is None else title,
         at=content.at,
         derived=content.derived,
         motion=Motion(content.t, *bones) if bones else Motion(content.t),
@@ -98,7 +106,7 @@ def inspection_page(scene: scenes.Scene, content: Inspection, moved: bool = Fals
         units=content.units,
         columns={body.name: body.parent for body in mechanism.moving} if mechanism else None,
         notices=[*notices, *([cut_short(content)] if content.stopped else [])],
-        panels=[box(text_or_none(scene, scene.q, scene.qd))],
+        panels=[box(text_or_none(scene, scene.q, scene.qd)), *([live_panel(scene)] if n <= LIVELY else [])],
     )
 
 

@@ -15,7 +15,7 @@ from cgraph.codegen.wasm.functions import library, text_of
 from cgraph.core.node import OPS, apply
 from dynamics.experiments.speed.bench_scenes import turned_arm
 from dynamics.integrators import TABLEAUS
-from tests.strategies import cases
+from tests.strategies import cases, examples
 from tests.tolerances import SUMS
 from tests.ulps import same, ulps_apart
 from tests.wasm import Instance, instance
@@ -58,7 +58,7 @@ def single():
 
 
 @given(case=cases(max_operations=30))
-@settings(max_examples=25)
+@settings(max_examples=examples(40))
 def test_random_graphs_agree_to_the_last_bit_with_operations_one_by_one(case, single):
     """Those of evaluation, and in place of the C library's functions the modules' own."""
     values = {}

@@ -9,6 +9,7 @@ import pytest
 import cgraph as cg
 from cgraph.core.node import OPS, apply
 from tests import high_precision
+from tests.strategies import examples
 from tests.wasm import instance
 
 # Largest errors [ulp]: those of the C library are 0.5 to 2.4 at the same points.
@@ -49,7 +50,7 @@ def test_errors_are_below_what_is_said(name):
     call = instance(cg.Graph(inputs, {"y": apply(op, *inputs)}))
     worst = 0.0
     with mpmath.workdps(400 if name in MORE else DIGITS):
-        for point in points(op, 150) + hard(op):
+        for point in points(op, examples(200)) + hard(op):
             near = float(op.scalar(*point))
             (found,) = call(*point)
             if math.isfinite(near) and near != 0.0:

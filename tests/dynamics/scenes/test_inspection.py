@@ -72,8 +72,9 @@ def test_forward_dynamics_and_a_system_without_places():
 
 def test_joints_of_a_planar_arm_are_a_link_apart():
     q = np.random.default_rng(0).uniform(-3, 3, (5, 3))
-    points, parents, graph, joints = skeleton(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7]), q)
+    points, parents, graph, joints, turns = skeleton(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7]), q)
     assert joints == (0, 1, 2)
+    assert turns == (1, 1, 1)
     again = graph.evaluate({f"q{i}": q[:, i] for i in range(3)})
     assert np.stack(list(again.values()), axis=1) == pytest.approx(points[..., :].reshape(5, -1))
     assert parents == (-1, 0, 1, 2)
@@ -92,6 +93,21 @@ def test_a_mechanism_hangs_together():
     a = np.array([np.sin(0.3), -np.cos(0.3)]) * 0.5
     tip = np.array([np.sin(0.5), -np.cos(0.5)]) * 0.25
     assert points[0] == pytest.approx(np.array([[0.0, -0.5], [0.0, -0.5] + a, [0.0, -0.5] + a + tip]))
+
+
+@pytest.mark.parametrize(
+    ("axis", "turns"), [((0, 1, 0), (-1,)), ((0, -1, 0), (1,)), ((1, 0, 0), (1,)), ((0, 0, 1), (1,))]
+)
+def test_a_joint_turns_the_picture_one_way_or_the_other(axis, turns):
+    """About y, x goes to the right and z up, so that a positive turn is clockwise; the others as they are seen."""
+    hinge = dyn.Joint("revolute", axis=axis)
+    body = dyn.Body("a", hinge, mass=1.0, center=0.3 * (1.0 - np.abs(axis)), inertia=(0.1, 0.1, 0.1))
+    model = dyn.Mechanism([body], gravity=(0.0, 0.0, 0.0))
+    q = np.linspace(0.0, 1.0, 5)[:, None]
+    found = skeleton(model, q)
+    assert found.turns == turns
+    slide = dyn.Mechanism([dyn.Body("a", dyn.Joint("prismatic", axis=(1, 0, 0)), mass=1.0)])
+    assert skeleton(slide, q).turns == (0,)
 
 
 def test_a_time_out_of_range_is_refused():

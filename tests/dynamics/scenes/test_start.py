@@ -45,6 +45,18 @@ def test_a_start_that_does_not_fit_is_told(start, message):
         with_start(ARM, start)
 
 
+@pytest.mark.parametrize("scene", [*map(scenes.load, scenes.names()), FIRST], ids=lambda scene: scene.name)
+def test_every_name_of_a_state_sets_that_one_alone(scene):
+    names = [f"q{i}" for i in range(len(scene.q))] + [f"qd{i}" for i in range(len(scene.qd))]
+    called = dyn.display_names(scene)
+    for i, name in enumerate(names):
+        wanted = [*scene.q, *scene.qd]
+        wanted[i] = 7.0
+        for each in {name, called.get(name, name), *scene.coordinates[i : i + 1]}:
+            started = with_start(scene, {each: 7.0})
+            assert [*started.q, *started.qd] == wanted
+
+
 def system(energy, **more):
     return scenes.of_model(dyn.System(energy, "x y", **more))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import shutil
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -93,6 +94,14 @@ def test_a_robot_that_flies_away_stays_in_the_frame():
     middle = [frame[30:370] for frame in (first, last)]
     assert all((each != 255).any() for each in middle)
     assert (middle[0] != middle[1]).any()
+
+
+@pytest.mark.parametrize("value", [0.0, 5e-324, -3.0, 1e20])
+def test_what_stands_still_is_drawn(value):
+    still = replace(SWING, q=np.full_like(SWING.q, value), qd=np.zeros_like(SWING.qd))
+    assert len(opened(viz.animate(SYSTEM, still))[0]) >= 1
+    with pytest.raises(ValueError, match=r"coordinates up to 1e\+308 are too large to be drawn"):
+        viz.animate(SYSTEM, replace(still, q=np.full_like(SWING.q, 1e308)))
 
 
 def test_a_notebook_plays_it():

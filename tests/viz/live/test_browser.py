@@ -1,0 +1,160 @@
+"""The live motion in a browser, where Playwright and a Chromium are installed."""
+
+from __future__ import annotations
+
+import shutil
+
+import pytest
+
+from viz import cli
+
+
+@pytest.fixture(scope="module")
+def browser():
+    api = pytest.importorskip("playwright.sync_api", reason="the browser extra has it")
+    program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if program is None:
+        pytest.skip("there is no Chromium on PATH")
+    with api.sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """The pages, by command."""
+    folder = tmp_path_factory.mktemp("pages")
+    for command in ("live", "inspect"):
+        assert cli.main([command, "triple_pendulum", "--out", str(folder / f"{command}.html")]) == 0
+    return folder
+
+
+@pytest.fixture
+def show(browser, written):
+    """Open a page; it must neither ask for anything nor complain."""
+    pages, said, asked = [], [], []
+
+    def opened(command="live", fragment="", width=1280, height=800, **options):
+        page = browser.new_page(viewport={"width": width, "height": height}, **options)
+        page.on("console", lambda message: said.append(message.text))
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto((written / f"{command}.html").as_uri() + fragment)
+        page.wait_for_selector("#live-panel[data-ready]", state="attached")
+        pages.append(page)
+        return page
+
+    yield opened
+    for page in pages:
+        page.close()
+    assert said == []
+    assert [url for url in asked if not url.startswith(("file:", "data:"))] == []
+
+
+def until(page, holds):
+    """Wait for it; the page's policy lets no test put its own script in."""
+    for _ in range(200):
+        if holds():
+            return
+        page.wait_for_timeout(50)
+    raise AssertionError("it did not come")
+
+
+def meter(page, name):
+    return page.locator(f'td[data-meter="{name}"]').inner_text()
+
+
+def test_a_slider_moves_energy_and_torque_before_the_next_frame(show):
+    page = show()
+    before = meter(page, "energy"), meter(page, "gravity.joint 1")
+    moved = page.evaluate(
+        """() => new Promise((done) => requestAnimationFrame(() => {
+          const slider = document.querySelector('input[aria-label="g, slider"]');
+          const read = (name) => document.querySelector(`td[data-meter="${name}"]`).textContent;
+          slider.value = 3; slider.dispatchEvent(new Event("input"));
+          const texts = ["energy", "gravity.joint 1"].map(read);
+          requestAnimationFrame(() => done(texts));
+        }))"""
+    )
+    assert moved[1] != before[1]
+    page.locator('input[aria-label="q.joint 1"]').fill("0.4")
+    assert meter(page, "energy") != before[0]
+
+
+def test_too_long_a_dt_shows_its_error_and_the_two_arms_part(show):
+    page = show()
+    assert page.get_attribute("#live-ahead", "data-large") == "false"
+    page.locator("#live-dt-field").fill("0.2")
+    assert page.get_attribute("#live-ahead", "data-large") == "true"
+    page.click("#live-play")
+    until(page, lambda: page.get_attribute("#live-since", "data-large") == "true")
+    page.click("#live-play")
+    assert page.locator(".live-stick").nth(3).get_attribute("d") != page.locator(".live-reference").nth(
+        3
+    ).get_attribute("d")
+
+
+def test_a_link_opens_what_was_left_and_reset_forgets_it(show):
+    page = show()
+    page.locator('input[aria-label="q.joint 2"]').fill("0.123456789012345")
+    page.select_option("#live-method", "dopri5")
+    for _ in range(3):
+        page.click("#live-step")
+    page.click("#live-link")
+    url, state = page.url, page.evaluate("[...live.machine.run]")
+    other = show(fragment=url[url.index("#") :])
+    assert other.evaluate("[...live.machine.run]") == state
+    assert other.input_value("#live-method") == "dopri5"
+    assert other.inner_text("#live-clock") == page.inner_text("#live-clock") != "0.00 s"
+    other.click("#live-reset")
+    assert other.inner_text("#live-clock") == "0.00 s"
+    assert other.evaluate("[...live.machine.run]") == [each["value"] for each in data(other)["inputs"]]
+
+
+def data(page):
+    return page.evaluate("JSON.parse(document.getElementById('live-data').textContent)")
+
+
+@pytest.mark.parametrize("fragment", ["#live=%", "#live=", "#live=5", "#nothing", "#live=%7B%22dt%22%3A%22x%22%7D"])
+def test_a_link_that_says_nothing_opens_the_page_as_it_is(fragment, show):
+    page = show(fragment=fragment)
+    assert page.evaluate("[...live.machine.run]") == [each["value"] for each in data(page)["inputs"]]
+
+
+def test_it_is_used_by_keys_alone(show):
+    page = show()
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.id") == "live-play"
+    page.keyboard.press("Space")
+    until(page, lambda: page.inner_text("#live-clock") > "0.05 s")
+    page.keyboard.press("Space")
+    assert page.inner_text("#live-play") == "▶ run"
+    for _ in range(5):
+        page.keyboard.press("Tab")
+    before = page.input_value("#live-dt-field")
+    page.keyboard.press("ArrowRight")
+    assert page.input_value("#live-dt-field") > before
+
+
+@pytest.mark.parametrize("command", ["live", "inspect"])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_narrow_and_dark_pages_have_all_of_it(command, scheme, show):
+    page = show(command, width=390, color_scheme=scheme)
+    if command == "inspect":
+        page.click("#live > summary")
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    ink, back = (page.evaluate(f"getComputedStyle(document.body).{each}") for each in ("color", "backgroundColor"))
+    assert ink != back
+    assert page.locator("#live-picture").bounding_box()["width"] > 300
+    assert page.locator(".live-control").count() == len(data(page)["inputs"])
+
+
+def test_in_the_inspector_it_leaves_the_keys_to_the_page(show):
+    page = show("inspect")
+    page.click("#live > summary")
+    recorded = page.inner_text("#clock")
+    page.focus("#live-play")
+    page.keyboard.press("Space")
+    until(page, lambda: page.inner_text("#live-clock") > "0.02 s")
+    assert page.inner_text("#clock") == recorded

@@ -1,0 +1,292 @@
+"""The live motion: its script in V8 computes what the library does; the page is one small strict file."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import math
+import re
+
+import numpy as np
+import pytest
+from py_mini_racer import MiniRacer
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.integrators import TABLEAUS
+from dynamics.scenes.live_graphs import live_graphs
+from viz.live import Live, page_text
+from viz.live.page import scripts
+from viz.models.live import live_of
+
+ROUNDING = 1e-12  # relative: a few hundred steps of sines that differ in the last bit
+PENDULUM = dyn.scenes.load("triple_pendulum")
+
+
+@pytest.fixture(scope="module")
+def live():
+    return live_of(PENDULUM)
+
+
+@pytest.fixture(scope="module")
+def text(live):
+    return page_text(live, title="An arm, live", about="It falls.")
+
+
+class Script:
+    """The panel's script in V8, without a page: a machine and a run on data."""
+
+    def __init__(self, data: dict) -> None:
+        self.engine = MiniRacer()
+        self.engine.eval(f'"use strict";\n{scripts()}\nvar data = {json.dumps(data)}, machine, run;')
+        module = "new WebAssembly.Instance(new WebAssembly.Module(decoded(data.{})), LIVE_IMPORTS)"
+        self.engine.eval(f"machine = liveMachine(data, [{module.format('rate')}, {module.format('shown')}])")
+        self.engine.eval("run = liveRun(machine, data)")
+
+    def __call__(self, program: str) -> object:
+        """The value of an expression, through JSON."""
+        return json.loads(self.engine.eval(f"JSON.stringify({program})"))
+
+
+@pytest.fixture(scope="module")
+def engine(live):
+    started = Script(live.to_dict())
+    yield started
+    started.engine.close()
+
+
+@pytest.fixture
+def script(engine):
+    engine.engine.eval("run.reset()")
+    return engine
+
+
+def states(motion):
+    return [*motion.q[-1], *motion.qd[-1]]
+
+
+# What the script computes.
+
+
+@pytest.mark.parametrize("method", ["rk4", "dopri5"])
+def test_steps_in_a_page_are_those_of_the_library(method, script, live):
+    """Half a second; the library's dopri5 chooses its steps, so this one is compared with a solution."""
+    reference = {"rk4": "rk4", "dopri5": "dop853"}[method]
+    options = {"dt": 0.001, "backend": "python"} if method == "rk4" else {"rtol": 1e-12}
+    motion = dyn.simulate(PENDULUM, PENDULUM.q, PENDULUM.qd, 0.5, reference, **options)
+    assert motion.stats.success
+    script.engine.eval(f"run.state.method = '{method}'; run.state.dt = 0.001; run.steps(500)")
+    tolerance = ROUNDING if method == "rk4" else 1e-9
+    np.testing.assert_allclose(script("[...machine.run].slice(0, 6)"), states(motion), rtol=0, atol=tolerance * 10)
+    assert script("run.state.time") == pytest.approx(0.5)
+
+
+def test_meters_and_points_are_those_of_the_library(script, live):
+    values = {name: value + 0.1 * k for k, (name, value) in enumerate(live.start.items())}
+    script.engine.eval(f"{json.dumps(list(values.values()))}.forEach((value, i) => run.set(i, value))")
+    expected = live.shown.evaluate(values)
+    np.testing.assert_allclose(script("[...run.now().values]"), list(expected.values()), rtol=ROUNDING)
+    arm = dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7], damping=0.1)
+    (energy,) = dyn.energy(arm).evaluate({name: live.start[name] for name in dyn.energy(arm).input_names}).values()
+    script.engine.eval("run.reset()")
+    assert script("run.now().values[data.energy]") == pytest.approx(energy, abs=ROUNDING * 30)
+
+
+def test_a_slider_moves_energy_and_torque_at_once(script):
+    """In the same call: no frame goes by."""
+    before = script("[...run.now().values]")
+    names = [each["called"] for each in script("data.meters")]
+    script.engine.eval("run.set(data.inputs.findIndex(({ name }) => name === 'g'), 3.0); run.set(0, 0.4)")
+    after = script("[...run.now().values]")
+    moved = {name for name, a, b in zip(names, before, after, strict=False) if a != b}
+    assert {"potential", "energy", "gravity.joint 1", "dp/dt.joint 1"} <= moved
+
+
+def test_too_long_a_step_shows_its_error_at_once(script):
+    """Nothing has moved yet; the error ahead grows with the order of the method, and is small at the page's dt."""
+    errors = []
+    for dt in (0.005, 0.01, 0.02, 0.04, 0.2):
+        script.engine.eval(f"run.state.dt = {dt}")
+        errors.append(script("run.now().ahead.most"))
+        assert script("run.now().since.most") == 0.0
+    assert errors[0] < 1e-6
+    assert errors == sorted(errors)
+    assert math.log2(errors[2] / errors[1]) == pytest.approx(4.0, abs=1.0)
+    assert errors[-1] > 1e-2
+
+
+def test_the_error_since_the_start_is_the_distance_from_the_solution(script):
+    script.engine.eval("run.state.dt = 0.05; run.steps(20)")
+    motion = dyn.simulate(PENDULUM, PENDULUM.q, PENDULUM.qd, 1.0, "dop853", rtol=1e-12)
+    assert motion.stats.success
+    off = np.abs(np.array(script("[...machine.run].slice(0, 6)")) - states(motion))
+    found = script("run.now().since")
+    assert found["most"] == pytest.approx(off.max(), rel=0.05)
+    assert found["index"] == off.argmax()
+
+
+def test_a_motion_that_leaves_the_numbers_says_so_and_comes_back(script):
+    script.engine.eval("run.state.method = 'euler'; run.state.dt = 1e3; run.steps(60)")
+    found = script("(({ finite, since }) => ({ finite, most: String(since.most) }))(run.now())")
+    assert found == {"finite": False, "most": "NaN"}
+    script.engine.eval("run.reset()")
+    assert script("run.now().finite") is True
+    assert script("[run.state.dt, run.state.time]") == [script("data.dt"), 0]
+
+
+def test_a_link_brings_back_the_whole_state_to_the_last_bit(script):
+    script.engine.eval("run.set(0, 0.1 + 0.2); run.state.method = 'dopri5'; run.state.dt = 0.0125; run.steps(7)")
+    script.engine.eval("var link = run.link(), kept = [...machine.run], at = { ...run.state }; run.reset()")
+    assert re.fullmatch("[-A-Za-z0-9_.!~*'()%]*", script("link"))
+    assert script("[...machine.run]") != script("kept")
+    assert script("run.open(link)") is True
+    assert script("[...machine.run]") == script("kept")
+    assert script("[run.state.dt, run.state.method, run.state.time]") == script("[at.dt, at.method, at.time]")
+    assert script("run.now().since.most") == 0.0
+
+
+@pytest.mark.parametrize("link", ["", "%", "null", "[1]", "{", '{"dt":-1,"q0":"a","method":"x","time":null,"zz":3}'])
+def test_a_link_that_says_nothing_changes_nothing(link, script):
+    before = script("[[...machine.run], run.state.dt, run.state.method]")
+    script.engine.eval(f"run.open({json.dumps(link)})")
+    assert script("[[...machine.run], run.state.dt, run.state.method]") == before
+
+
+@pytest.mark.parametrize("seconds", [[0.016] * 50, [0.1, 0.0, 0.7]])
+def test_the_clock_keeps_up_with_real_time_and_says_where_it_cannot(seconds, script):
+    for each in seconds:
+        script.engine.eval(f"run.advance({each})")
+    assert abs(script("run.state.time") - sum(seconds)) <= script("data.dt") * 1.01
+    assert script("run.state.slow") is False
+    script.engine.eval("run.state.dt = 1e-6; run.advance(0.1)")
+    assert script("run.state.slow") is True
+
+
+@pytest.mark.parametrize("dt", [1e-7, 1e-3, 0.1, 10.0, 1e6])
+def test_a_frame_takes_so_many_steps_at_most_whatever_dt_is(dt, script):
+    counted = "{ ...machine, step: (inputs, method, h, count) => { steps += count; } }"
+    script.engine.eval(f"var steps = 0, counting = liveRun({counted}, data); counting.state.dt = {dt}")
+    script.engine.eval("counting.advance(0.1); counting.advance(10)")
+    assert script("steps") <= 2 * 4500
+
+
+def test_a_value_that_is_no_number_is_not_taken(script):
+    assert script("[run.set(0, NaN), run.set(0, Infinity), machine.run[0] === data.inputs[0].value]") == [
+        False,
+        False,
+        True,
+    ]
+
+
+def test_the_script_reads_base64_of_any_length(script):
+    for length in range(7):
+        raw = bytes(range(250, 250 + length)) if length < 6 else bytes(range(200))
+        assert script(f"[...decoded('{base64.b64encode(raw).decode()}')]") == list(raw)
+
+
+# What is made of a scene.
+
+
+@pytest.mark.parametrize("name", ["spring_mass", "triple_pendulum", "chain"])
+def test_the_graphs_of_a_scene_say_what_the_library_says(name):
+    scene = dyn.scenes.load(name) if name != "chain" else dyn.scenes.load(name, n=3)
+    found = live_graphs(scene)
+    assert len(found.meters) + 2 * len(found.parents) == len(found.shown.outputs)
+    assert set(found.start) == set(found.rate.input_names) == set(found.scales)
+    rate = dyn.state_equation(scene)
+    expected = rate.evaluate({name: found.start[name] for name in rate.input_names})
+    assert list(found.rate.evaluate(found.start).values()) == pytest.approx(
+        list(expected.values()), rel=ROUNDING, abs=1e-9
+    )
+    shown = found.shown.evaluate(found.start)
+    assert shown["energy"] == pytest.approx(shown["kinetic"] + shown["potential"])
+
+
+def test_masses_and_gravity_of_a_small_mechanism_are_parameters(live):
+    assert {"g", "mass.link_1", "mass.link_2", "mass.link_3"} <= set(live.start)
+    large = live_graphs(dyn.scenes.load("chain", n=5))
+    assert "g" not in large.start
+
+
+def test_a_denser_body_is_the_same_body():
+    """Its inertia grows with its mass: twice the masses, the same motion."""
+    found = live_graphs(dyn.scenes.load("chain", n=2))
+    heavy = {name: 2.0 * value if name.startswith("mass.") else value for name, value in found.start.items()}
+    assert list(found.rate.evaluate(heavy).values()) == pytest.approx(list(found.rate.evaluate(found.start).values()))
+
+
+# The page.
+
+
+def test_the_page_is_one_small_file_that_loads_nothing(text):
+    assert len(text.encode()) < 60_000
+    assert set(re.findall(r"https?://[^\s\"'<]+", text)) == {"http://www.w3.org/2000/svg"}
+    assert not re.search(
+        r"@import|url\(|fetch\(|XMLHttpRequest|import\(|localStorage|\beval\(|new Function|innerHTML", text
+    )
+    assert re.findall(r'(?:src|href)="([^"]*)"', text) == ["data:,"]
+    assert not re.search(r"<[^>]* (on\w+|style)=", text)
+
+
+def test_the_policy_allows_webassembly_and_nothing_else(text):
+    (policy,) = re.findall(r'Security-Policy" content="([^"]*)"', text)
+    assert "'unsafe" not in policy
+    assert policy.count("'wasm-unsafe-eval'") == 1
+    (script,) = re.findall(r"<script>(.*?)</script>", text, re.DOTALL)
+    (style,) = re.findall(r"<style>(.*?)</style>", text, re.DOTALL)
+    for kind, content in (("script", script), ("style", style)):
+        digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
+        assert f"{kind}-src 'sha256-{digest}'" in policy
+
+
+HOSTILE = "</script><script>alert(1)</script>"
+
+
+def test_names_stay_texts():
+    x, v = cg.variables(["x", "v"])
+    rate = cg.Graph([x, v], {"a": v, "b": -x})
+    energies = cg.Graph([x, v], {"K": v * v / 2, "P": x * x / 2, "E": (v * v + x * x) / 2})
+    meters = [(HOSTILE, HOSTILE, HOSTILE), ("P", "J", "energy"), ("E", "J", "energy")]
+    live = Live(rate, {"x": 1.0, "v": 0.0}, energies, meters, dt=0.1, methods=TABLEAUS, names={"x": HOSTILE})
+    page = page_text(live, title=HOSTILE, about=HOSTILE)
+    assert page.count("<script") == 2
+    data = json.loads(re.search(r'<script id="live-data" type="application/json">(.*?)</script>', page, re.DOTALL)[1])
+    assert data["inputs"][0]["called"] == HOSTILE
+    assert page._repr_html_().count('"') == 8
+
+
+def made(**changed):
+    x, v = cg.variables(["x", "v"])
+    fields = {
+        "rate": cg.Graph([x, v], {"a": v, "b": -x}),
+        "start": {"x": 1.0, "v": 0.0},
+        "shown": cg.Graph([x, v], {"K": v, "P": x, "E": v + x}),
+        "meters": [("K", "J", "energy")] * 3,
+        "methods": TABLEAUS,
+    }
+    return Live(**fields | changed)
+
+
+@pytest.mark.parametrize(
+    ("changed", "kind", "said"),
+    [
+        ({"rate": 3}, TypeError, "needs a cg.Graph, got int"),
+        (
+            {"shown": cg.Graph([cg.variable("v")], {"K": cg.variable("v")})},
+            cg.GraphError,
+            "must have the inputs of rate",
+        ),
+        ({"start": {"x": 1.0}}, ValueError, "has none of v"),
+        ({"start": {"x": 1.0, "v": math.nan}}, ValueError, "has none of v"),
+        ({"dt": 0.0}, ValueError, "dt must be positive"),
+        ({"methods": {"rk4": TABLEAUS["rk4"]}}, ValueError, "must have dopri5"),
+        ({"meters": [("K", "J", "energy")]}, ValueError, "three energies first"),
+        ({"parents": [0]}, ValueError, "an output for each meter"),
+    ],
+)
+def test_a_mistake_is_told_in_one_sentence(changed, kind, said):
+    with pytest.raises(kind, match=said) as caught:
+        made(**changed)
+    assert "\n" not in str(caught.value)
+    assert made().to_dict()["states"] == 2

@@ -1,0 +1,215 @@
+// The panel of a live motion: sliders, fields, meters and the moving picture.
+
+const DECADES = [-5, 0]; // of dt on its slider
+const KEPT = 240; // instants in the strip of energies
+const TRACE = 120; // places of the tip
+
+/** An element around others; texts stay texts. */
+function liveTag(name, attributes = {}, ...inside) {
+  const made = document.createElement(name);
+  for (const key in attributes) made.setAttribute(key, attributes[key]);
+  made.append(...inside);
+  return made;
+}
+function liveShape(name, attributes, parent) {
+  const made = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const key in attributes) made.setAttribute(key, attributes[key]);
+  parent.appendChild(made);
+  return made;
+}
+/** A number with four digits, and a minus that is one. */
+function liveNumber(value) {
+  if (!Number.isFinite(value)) return "—";
+  const size = Math.abs(value);
+  const text = size !== 0 && (size < 1e-3 || size >= 1e5) ? value.toExponential(2) : String(+value.toPrecision(4));
+  return text.replaceAll("-", "−");
+}
+
+async function startLive() {
+  const data = JSON.parse(document.getElementById("live-data").textContent);
+  const $ = (id) => document.getElementById(`live-${id}`);
+  const machine = liveMachine(data, await liveModules(data));
+  const motion = liveRun(machine, data);
+  const { state } = motion;
+  let playing = false, last = 0;
+  const strip = [];
+  const controls = [];
+
+  // Controls
+
+  function control(i, { called, unit, low, high }) {
+    const step = (high - low) / 400;
+    const slider = liveTag("input", { type: "range", min: low, max: high, step, "aria-label": `${called}, slider` });
+    const field = liveTag("input", { type: "number", step: "any", "aria-label": called });
+    const take = (text) => { if (text !== "" && motion.set(i, Number(text))) changed(); };
+    slider.oninput = () => take(slider.value);
+    field.oninput = () => take(field.value);
+    controls.push(() => {
+      if (document.activeElement !== slider) slider.value = machine.run[i];
+      if (document.activeElement !== field) field.value = +machine.run[i].toPrecision(5);
+    });
+    return liveTag("label", { class: "live-control" }, liveTag("span", {}, called, ...(unit ? [liveTag("small", {}, ` [${unit}]`)] : [])), slider, field);
+  }
+  const groups = new Map();
+  data.inputs.forEach((input, i) => {
+    if (i === data.time) return;
+    if (!groups.has(input.group)) groups.set(input.group, []);
+    groups.get(input.group).push(control(i, input));
+  });
+  for (const [group, rows] of groups) {
+    const open = rows.length <= 8 ? { open: "" } : {};
+    $("controls").append(liveTag("details", open, liveTag("summary", {}, group), ...rows));
+  }
+  $("method").append(...data.methods.map((name) => liveTag("option", { value: name }, name)));
+  $("method").onchange = () => { state.method = $("method").value; changed(); };
+  const setStep = (dt) => { if (dt > 0 && Number.isFinite(dt)) { state.dt = dt; state.owed = 0; changed(); } };
+  Object.assign($("dt"), { min: DECADES[0], max: DECADES[1], step: 0.01 });
+  $("dt").oninput = () => setStep(+(10 ** $("dt").value).toPrecision(2));
+  $("dt-field").oninput = () => setStep(Number($("dt-field").value));
+  $("play").onclick = () => play(!playing);
+  $("step").onclick = () => { play(false); motion.steps(1); show(); keep(); };
+  $("reset").onclick = () => { play(false); motion.reset(); strip.length = 0; changed(); };
+  $("link").onclick = () => {
+    keep();
+    const done = (said) => { $("said").textContent = said; };
+    if (navigator.clipboard) navigator.clipboard.writeText(location.href).then(() => done("Copied."), () => done("The link is in the address bar."));
+    else done("The link is in the address bar.");
+  };
+
+  // The link
+
+  function keep() {
+    const rest = location.hash.slice(1).split("&").filter((part) => part && !part.startsWith("live="));
+    try {
+      history.replaceState(null, "", `#${[...rest, `live=${motion.link()}`].join("&")}`);
+    } catch { /* a frame in a notebook has no address */ }
+  }
+  function read() {
+    const part = location.hash.slice(1).split("&").find((each) => each.startsWith("live="));
+    if (part === undefined) return;
+    $("said").textContent = motion.open(part.slice(5)) ? "" : "The link has no state that could be read.";
+    strip.length = 0;
+    show();
+  }
+  addEventListener("hashchange", read);
+  let waiting = 0;
+  function changed() {
+    $("said").textContent = "";
+    show();
+    clearTimeout(waiting); // browsers allow the address to change a hundred times in half a minute
+    waiting = setTimeout(keep, 400);
+  }
+
+  // Pictures
+
+  const svg = $("picture"), points = data.parents.length;
+  const first = data.meters.length;
+  const place = (values, k) => [values[first + 2 * k], -values[first + 2 * k + 1]];
+  const reference = data.parents.map(() => liveShape("path", { class: "live-reference" }, svg));
+  const trace = liveShape("path", { class: "live-trace" }, svg);
+  const sticks = data.parents.map(() => liveShape("path", { class: "live-stick" }, svg));
+  const joints = data.parents.map(() => liveShape("circle", { class: "live-joint" }, svg));
+  let reach = 0;
+  const past = [];
+  if (!points) svg.setAttribute("hidden", "");
+  function draw({ values, reference: right }) {
+    if (!points) return;
+    for (let k = 0; k < points; k++) for (const each of place(values, k)) if (Number.isFinite(each)) reach = Math.max(reach, Math.abs(each));
+    const half = 1.1 * (reach || 1), r = half / 40;
+    svg.setAttribute("viewBox", `${-half} ${-half} ${2 * half} ${2 * half}`);
+    [[sticks, values, 1.6 * r], [reference, right, 0.7 * r]].forEach(([paths, at, width]) => paths.forEach((path, k) => {
+      const [x, y] = place(at, k), parent = data.parents[k];
+      const [px, py] = parent < 0 ? [x, y] : place(at, parent);
+      const whole = [x, y, px, py].every(Number.isFinite);
+      path.setAttribute("d", whole ? `M${px} ${py}L${x} ${y}` : "");
+      path.setAttribute("stroke-width", width);
+    }));
+    joints.forEach((circle, k) => {
+      const [x, y] = place(values, k);
+      circle.setAttribute("r", Number.isFinite(x) ? r : 0);
+      circle.setAttribute("stroke-width", r / 3);
+      if (Number.isFinite(x)) { circle.setAttribute("cx", x); circle.setAttribute("cy", y); }
+    });
+    if (playing) past.push(place(values, points - 1));
+    if (past.length > TRACE) past.shift();
+    if (!state.time) past.length = 0;
+    const drawn = past.filter((each) => each.every(Number.isFinite));
+    trace.setAttribute("d", drawn.length > 1 ? `M${drawn.map(([x, y]) => `${x} ${y}`).join("L")}` : "");
+    trace.setAttribute("stroke-width", r / 3);
+  }
+  const curves = ["kinetic", "potential", "energy"].map((name) => liveShape("path", { class: `live-${name}` }, $("strip")));
+  function drawStrip(values) {
+    if (playing || !strip.length) strip.push(values.slice(0, 3));
+    if (strip.length > KEPT) strip.shift();
+    const all = strip.flatMap((each) => [...each]).filter(Number.isFinite);
+    const low = Math.min(0, ...all), high = Math.max(0, ...all), size = high - low || 1;
+    curves.forEach((curve, k) => {
+      const line = strip.filter((each) => Number.isFinite(each[k])).map((each, i) => `${((300 * i) / KEPT).toFixed(1)} ${(76 - (72 * (each[k] - low)) / size).toFixed(2)}`);
+      curve.setAttribute("d", line.length > 1 ? `M${line.join("L")}` : "");
+    });
+  }
+
+  // Meters
+
+  const cells = [];
+  const meterGroups = new Map();
+  data.meters.forEach(({ called, unit, group }, k) => {
+    if (!meterGroups.has(group)) meterGroups.set(group, []);
+    const cell = liveTag("td", { "data-meter": called });
+    cells.push([cell, k]);
+    meterGroups.get(group).push(liveTag("tr", {}, liveTag("th", { scope: "row" }, called), cell, liveTag("td", {}, unit)));
+  });
+  for (const [group, rows] of meterGroups) {
+    const open = rows.length <= 8 ? { open: "" } : {};
+    $("meters").append(liveTag("details", open, liveTag("summary", {}, group), liveTag("table", {}, liveTag("tbody", {}, ...rows))));
+  }
+  const unitOf = (i) => data.inputs[i].unit;
+  function error(id, { index, most }) {
+    const share = most > 0 ? Math.min(1, Math.max(0, (Math.log10(most) + 12) / 12)) : most === 0 ? 0 : 1;
+    $(`${id}-bar`).value = share;
+    $(id).textContent = most === most ? `${liveNumber(most)} ${unitOf(index)} in ${data.inputs[index].called}` : "no number any more";
+    $(id).dataset.large = String(!(most < 0.01));
+  }
+  function show() {
+    const now = motion.now();
+    cells.forEach(([cell, k]) => { cell.textContent = liveNumber(now.values[k]); });
+    error("ahead", now.ahead);
+    error("since", now.since);
+    $("horizon").textContent = `${liveNumber(now.ahead.seconds)} s ahead`;
+    $("drift").textContent = `${liveNumber(now.energyOff)} J`;
+    $("clock").textContent = `${state.time.toFixed(2)} s`;
+    $("slow").textContent = state.slow ? "Slower than real time: the steps are many." : "";
+    controls.forEach((each) => each());
+    $("method").value = state.method;
+    if (document.activeElement !== $("dt")) $("dt").value = Math.log10(state.dt);
+    if (document.activeElement !== $("dt-field")) $("dt-field").value = state.dt;
+    draw(now);
+    drawStrip(now.values);
+    if (!now.finite && playing) {
+      play(false);
+      $("said").textContent = `The motion has left the numbers: dt = ${liveNumber(state.dt)} s is too long for it, or a mass is 0. Reset it.`;
+    }
+    return now;
+  }
+
+  // Time
+
+  function frame(time) {
+    if (!playing) return;
+    if (motion.advance(Math.min(0.1, (time - last) / 1000))) show();
+    last = time;
+    requestAnimationFrame(frame);
+  }
+  function play(on) {
+    if (on === playing) return;
+    playing = on;
+    $("play").textContent = playing ? "❚❚ stop" : "▶ run";
+    $("play").setAttribute("aria-pressed", String(playing));
+    if (playing) { last = performance.now(); requestAnimationFrame(frame); } else keep();
+  }
+  $("panel").addEventListener("keydown", (event) => event.stopPropagation()); // keys of the page around it
+  read();
+  show();
+  $("panel").dataset.ready = "true";
+  globalThis.live = { machine, motion, show, play };
+}

@@ -1,0 +1,70 @@
+// The module's memory and its steps: what computes, and nothing that is shown.
+
+const FINER = 4, FINEST = 500; // steps of the reference beside one: a limit, so that any dt is answered within a frame
+const HORIZON = 1500; // steps at most that the error ahead takes
+
+/** The bytes behind base64. */
+function decoded(text) {
+  const digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  const found = new Uint8Array(Math.floor((text.length * 3) / 4) - (text.match(/=*$/)[0].length));
+  let bits = 0, held = 0, at = 0;
+  for (const letter of text.replaceAll("=", "")) {
+    held = (held << 6) | digits.indexOf(letter);
+    bits += 6;
+    if (bits >= 8) found[at++] = (held >> (bits -= 8)) & 255;
+  }
+  return found;
+}
+
+const LIVE_IMPORTS = { math: Math };
+
+/** The two modules, of the rate and of what is shown. */
+async function liveModules(data) {
+  return Promise.all([data.rate, data.shown].map(async (text) => (await WebAssembly.instantiate(decoded(text), LIVE_IMPORTS)).instance));
+}
+
+/** Two runs of one system from one start: `run` by the steps that are asked for, `fine` by much shorter ones. */
+function liveMachine(data, instances) {
+  const [rate, shown] = instances.map((each) => each.exports);
+  const n = data.inputs.length, size = 8 * n;
+  const base = rate.memory.buffer.byteLength;
+  rate.memory.grow(Math.ceil((4 * size) / 65536));
+  const array = (k) => new Float64Array(rate.memory.buffer, base + k * size, n);
+  const [run, fine, ahead, beside] = [0, 1, 2, 3].map(array);
+  const places = new Map([run, fine, ahead, beside].map((each, k) => [each, base + k * size]));
+  const seen = new Float64Array(shown.memory.buffer, 0, n);
+  const results = new Float64Array(shown.memory.buffer, size, data.shownCount);
+  const step = (inputs, method, h, count) => rate[method](places.get(inputs), h, count);
+  const finer = (dt) => Math.min(FINEST, Math.max(FINER, Math.ceil((2 * dt) / data.dt)));
+
+  /** What is shown at a state: a copy. */
+  function look(inputs) {
+    seen.set(inputs);
+    shown.evaluate(0, size);
+    return results.slice();
+  }
+
+  /** The state in which two runs differ most, and by how much; NaN where one is none. */
+  function apart(a, b) {
+    let index = 0, most = 0;
+    for (let i = 0; i < data.states; i++) {
+      const off = Math.abs(a[i] - b[i]);
+      if (off > most || off !== off) [index, most] = [i, off];
+      if (off !== off) break;
+    }
+    return { index, most };
+  }
+
+  /** How far a run by these steps is off after `seconds` from here on. */
+  function errorAhead(method, dt, seconds) {
+    const k = finer(dt);
+    const count = Math.max(1, Math.min(Math.floor(HORIZON / (k + 1)), Math.round(seconds / dt)));
+    ahead.set(run);
+    beside.set(run);
+    step(ahead, method, dt, count);
+    step(beside, "dopri5", dt / k, count * k);
+    return { ...apart(ahead, beside), seconds: count * dt };
+  }
+
+  return { run, fine, step, finer, look, apart, errorAhead };
+}
