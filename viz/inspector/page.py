@@ -22,8 +22,8 @@ from .record import record
 
 SCRIPTS = (
     "elements.js", "values.js", "state.js", "paths.js", "formula.js", "layers.js", "places.js",
-    "arrange.js", "picture.js", "view.js", "marks.js", "panels.js", "sweeps.js", "lesson.js", "arm.js", "motion.js",
-    "keys.js", "app.js",
+    "arrange.js", "picture.js", "view.js", "marks.js", "panels.js", "results.js", "sweeps.js", "lesson.js", "arm.js",
+    "motion.js", "keys.js", "app.js",
 )  # fmt: skip
 FRAME_HEIGHT = 720  # pixels in a notebook
 # Nothing may be fetched, and no script or style runs but the page's own, known by its digest.

@@ -24,6 +24,8 @@ from viz.inspector.record import record
 
 JAVASCRIPT_LIBM = 1e-12  # relative: a browser's sin and exp may differ from the C library's in the last bits
 
+pytestmark = pytest.mark.usefixtures("without_graphviz")
+
 
 def data_of(text: str) -> dict:
     """The JSON that the script of a page reads."""
