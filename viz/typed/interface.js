@@ -2,5 +2,5 @@
 
 return {
   parse, explained, TextError, inverseDynamics, forwardDynamics, spuriousNodes, lint, motionOf, recordOf, rods, compiled,
-  FORMULATIONS: Object.keys(FORMULATIONS), EXAMPLES,
+  ROWS, apply, constant, variable, folded, topological, FORMULATIONS: Object.keys(FORMULATIONS), EXAMPLES,
 };
