@@ -13,6 +13,7 @@ from .codegen.wasm import to_wasm
 from .core.counts import Counts
 from .core.edge import Edge
 from .core.graph import Graph
+from .core.latex import latex
 from .core.naming import variables, with_name
 from .core.node import Node, constant, variable
 from .core.ops import (
@@ -105,6 +106,7 @@ __all__ = [
     "hypot",
     "jacobian",
     "jvp",
+    "latex",
     "less",
     "less_equal",
     "lint",

@@ -7,6 +7,7 @@ is kept stable.
 
 **Build**: `Builder` folds and shares; `with building(Builder()):` sends every formula inside through it. `folded`
 copies nodes through a builder, `topological` gives all nodes that some nodes reach, arguments first.
+`with_reciprocals` leaves one division for a divisor.
 
 **Differentiate**: `cotangents` pulls from outputs, `tangents` pushes from inputs, `hessian_nodes` gives the lower
 triangle of second derivatives, all as nodes. `compressed_jacobian` gives the parts of a loop over colors of columns.
@@ -14,7 +15,8 @@ triangle of second derivatives, all as nodes. `compressed_jacobian` gives the pa
 **Solve**: `solve_nodes` is `cg.hessian_solve` on nodes, `ldl_solve` the dense factorization; both raise
 `SingularError`. `ldl_elimination` does the same over any numbers.
 
-**Read**: `expand` and `format_polynomial` write a polynomial out, `Names` tells nodes in a person's words, `OPS` is
+**Read**: `expand` and `format_polynomial` write a polynomial out, `Names` tells nodes in a person's words,
+`Formulas` gives the equations of nodes in a `Notation`, `OPS` is
 the table of operations, `register` adds a row to it, an `Op`, and `ADJOINT`, `PRIMAL`, `TANGENT` are the roles that a
 label may have. `certain_digits` says what rounding leaves of the outputs.
 
@@ -48,6 +50,7 @@ from .autodiff.reverse import cotangents
 from .autodiff.symmetric_elimination import SingularError
 from .core.check_name import check_name
 from .core.evaluate import Array
+from .core.formulas import Formulas, Notation
 from .core.graph import require_graph
 from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED
 from .core.node import as_node
@@ -64,6 +67,7 @@ from .program import Call, Factor, If, Map, Program, Record, Runner, Solve, Stat
 from .simplify.builder import Builder, folded
 from .simplify.identities import rewritten, shortened
 from .simplify.polynomial import Polynomial, expand, format_polynomial
+from .simplify.reciprocals import with_reciprocals
 from .util.atomic_write import atomic_write, check_writable, write_files
 from .util.html_text import html_lines, html_table, html_text, picture
 from .util.nearest import nearest, or_nearest
@@ -90,10 +94,12 @@ __all__ = [
     "Call",
     "CompressedJacobian",
     "Factor",
+    "Formulas",
     "If",
     "Map",
     "MathML",
     "Names",
+    "Notation",
     "Op",
     "Polynomial",
     "Program",
@@ -146,5 +152,6 @@ __all__ = [
     "tangents",
     "thread_count",
     "topological",
+    "with_reciprocals",
     "write_files",
 ]

@@ -1,9 +1,14 @@
 """How Sphinx builds these pages; `make docs` runs it with warnings as errors."""
 
+import argparse
 import re
 from textwrap import indent
 
+from docutils import nodes
+from docutils.parsers.rst import Directive
+
 from cgraph import __version__
+from viz.commands.parser import parser
 
 project = "cgraph"
 author = "the cgraph authors"
@@ -74,8 +79,36 @@ def skip_fields(app, what, name, obj, skip, options):
     return True if (getattr(obj, "__doc__", None) or "").startswith("Alias for field number") else None
 
 
+class CommandReference(Directive):
+    """Every command with its arguments, from the parser: no text that could be out of date."""
+
+    def run(self):
+        whole = parser()
+        (commands,) = [action for action in whole._actions if isinstance(action, argparse._SubParsersAction)]
+        about = {each.dest: each.help for each in commands._choices_actions}
+        return [_command(name, about[name], command) for name, command in commands.choices.items()]
+
+
+def _command(name, about, command):
+    section = nodes.section(ids=[f"cgraph-{name}"], names=[f"cgraph {name}"])
+    section += nodes.title(text=f"cgraph {name}")
+    section += nodes.paragraph(text=about)
+    listed = nodes.definition_list()
+    shown = command._get_formatter()
+    for action in command._actions:
+        if "--help" not in action.option_strings:
+            term = nodes.term("", "", nodes.literal(text=shown._format_action_invocation(action)))
+            text = shown._expand_help(action) if action.help else ""
+            listed += nodes.definition_list_item("", term, nodes.definition("", nodes.paragraph(text=text)))
+    section += listed
+    if command.epilog:
+        section += nodes.line_block("", *[nodes.line(text=line) for line in command.epilog.splitlines()])
+    return section
+
+
 def setup(app):
     """Called by Sphinx."""
+    app.add_directive("command-reference", CommandReference)
     app.connect("autodoc-skip-member", skip_fields)
     app.connect("autodoc-process-docstring", docstring_to_rst, priority=400)  # before napoleon
     app.connect("autodoc-process-signature", name_aliases)

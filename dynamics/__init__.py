@@ -10,6 +10,7 @@ from .equations.constraint_rank import ConstraintWarning
 from .equations.coriolis import coriolis, damping_force
 from .equations.energies import kinetic_energy, potential_energy
 from .equations.equations_of_motion import bias, energy, forward_dynamics, gravity_force, mass_matrix, momentum
+from .equations.formulation_sizes import formulation_sizes
 from .equations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious_nodes
 from .equations.integrability import integrable_rows
 from .equations.inverse_dynamics_derivatives import inverse_dynamics_derivatives
@@ -125,6 +126,7 @@ __all__ = [
     "damping_force",
     "display_names",
     "energy",
+    "formulation_sizes",
     "forward_dynamics",
     "frame_acceleration",
     "frame_bias_acceleration",

@@ -43,7 +43,7 @@ def program(page: str) -> str:
 
 def pictures(name: str) -> dict[str, str]:
     """{file that the examples of a page write: picture that it shows}, as of docs/x.md y.svg and images/x-y.svg."""
-    found = re.findall(rf"\(images/{Path(name).stem}-([\w-]+\.svg)\)", PAGES[name])
+    found = re.findall(rf"\(images/{Path(name).stem}-([\w-]+\.(?:svg|gif))\)", PAGES[name])
     return {file: f"images/{Path(name).stem}-{file}" for file in found}
 
 

@@ -112,6 +112,8 @@ CALLS = {
     "cg.constant": call(cg.constant, 1.0),
     "cg.double_double": call(cg.double_double, GRAPH, low=False),
     "cg.hessian_solve": call(cg.hessian_solve, SQUARES, ["x", "y"], [1.0, 2.0], check=False),
+    "cg.Graph.latex": call(GRAPH.latex, names=None, lines=5),
+    "cg.latex": call(cg.latex, X * Y, names=None, lines=5),
     "cg.lint": call(
         cg.lint, GRAPH, independent=(), depends=None, box=None, at=None, digits=4.0, function="f", names=None
     ),
@@ -150,6 +152,7 @@ CALLS = {
     "dyn.Mechanism.chain": call(ARM.chain, FIRST),
     "dyn.forward_dynamics": call(dyn.forward_dynamics, ARM, "auto", check=False),
     "dyn.inverse_dynamics": call(dyn.inverse_dynamics, ARM, "chain_rule", simplify=True),
+    "dyn.formulation_sizes": call(dyn.formulation_sizes, ARM),
     "dyn.momentum_rate": call(dyn.momentum_rate, ARM, "chain_rule", simplify=True, keep_momentum=False),
     "dyn.reduced_linearization": call(dyn.reduced_linearization, SYSTEM, [0.0], [0.0], None, t=0.0, parameters=None),
     "dyn.linearize": call(dyn.linearize, SYSTEM, [0.0], [0.0], None, t=0.0, parameters=None),
@@ -239,7 +242,13 @@ CALLS = {
     "dyn.scenes.triple_pendulum": call(dyn.scenes.triple_pendulum, "rod"),
     "dyn.cases.load": call(dyn.cases.load, "exponential decay"),
     "viz.graph_svg": call(viz.graph_svg, GRAPH),
-    "viz.inspect": call(viz.inspect, ARM, None, start=[0.1, 0.0], t_end=0.1, forward=False),
+    "viz.lesson": call(viz.lesson, ARM, None),
+    "viz.animate": call(
+        viz.animate, ARM, dyn.simulate(ARM, [0.1], [0.0], 0.04), None, kind=None, wanted=lambda t: t[:, np.newaxis],
+        marked=(), speed=1.0, dark=False, title=""
+    ),
+    "dyn.scenes.driven": call(dyn.scenes.driven, ARM, "chain_rule", 0.1),
+    "viz.inspect": call(viz.inspect, ARM, None, start=[0.1, 0.0], t_end=0.1, forward=False, title=None),
     "viz.live_page": call(viz.live_page, ARM, None, start=[0.1, 0.0]),
     "viz.page": call(
         viz.page, GRAPH, title="t", about="", at=None, marked=(), motion=None, tables=(), names=None, units=None
@@ -247,8 +256,8 @@ CALLS = {
     "viz.render_svg": call(viz.render_svg, "digraph {}", engine="dot", timeout=5.0),
     "viz.render_png": call(viz.render_png, "<svg xmlns='http://www.w3.org/2000/svg' width='1' height='1'/>", scale=2.0),
     "viz.to_dot": call(
-        viz.to_dot, GRAPH, names=None, marked=frozenset(), marked_label="", marked_edges=frozenset(), clusters=True,
-        collapse=(), caption=None, legend=True, rankdir="BT"
+        viz.to_dot, GRAPH, names=None, formulas=None, marked=frozenset(), marked_label="", marked_edges=frozenset(),
+        clusters=True, collapse=(), caption=None, legend=True, rankdir="BT"
     ),
 }  # fmt: skip
 

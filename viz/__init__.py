@@ -8,10 +8,12 @@ if TYPE_CHECKING:
     from .graph_drawing.dot import to_dot
     from .graph_drawing.render import graph_svg, render_png, render_svg
     from .inspector import page  # type: ignore[no-redef]  # the name of a module there, too
+    from .lessons.lesson import lesson
+    from .models.animate import animate
     from .models.inspect import inspect
     from .models.live import live_page
 
-__all__ = ["graph_svg", "inspect", "live_page", "page", "render_png", "render_svg", "to_dot"]
+__all__ = ["animate", "graph_svg", "inspect", "lesson", "live_page", "page", "render_png", "render_svg", "to_dot"]
 
 if not TYPE_CHECKING:  # loaded when asked for: the command line has to await Ctrl-C before it loads anything
 
@@ -19,7 +21,8 @@ if not TYPE_CHECKING:  # loaded when asked for: the command line has to await Ct
         from importlib import import_module
 
         homes = {"__version__": "cgraph", "to_dot": ".graph_drawing.dot", "page": ".inspector"}
-        homes |= {"inspect": ".models.inspect", "live_page": ".models.live"}
+        homes |= {"inspect": ".models.inspect", "animate": ".models.animate", "live_page": ".models.live"}
+        homes |= {"lesson": ".lessons.lesson"}
         homes |= dict.fromkeys(["graph_svg", "render_png", "render_svg"], ".graph_drawing.render")
         if name not in homes:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

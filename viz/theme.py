@@ -19,7 +19,21 @@ WHITE, GRAY = "#FFFFFF", "#8C8C8C"
 SPURIOUS = VERMILLION  # kept for what is wrong, so that it means one thing in every picture
 LINKS = ("#7B3FA0", "#2A62C8", "#CC3333")  # the first, second and third link, as the paper paints them
 TEXT, LINE = "#1A1A1A", "#4D4D4D"
-DARK_TEXT, DARK_PAGE = "#E8E8E4", "#17181A"
+DARK_TEXT, DARK_LINE, DARK_PAGE = "#E8E8E4", "#B4B4AE", "#17181A"
+# A formulation has one color on every page; the one that is wrong everywhere has that of what is wrong.
+FORMULATIONS = {
+    "euler_embedded": SPURIOUS,
+    "kinetic_only": ORANGE,
+    "chain_rule": BLUE,
+    "chain_rule_literal": PURPLE,
+    "kinetic_only_exact": GREEN,
+}
+# So has an integrator, by its place: every page draws it by this number.
+METHODS = (
+    *("rk4", "dopri5", "dop853", "taylor", "radau", "rodas", "euler", "verlet", "midpoint", "gauss4", "gauss6"),
+    *("symplectic_euler", "yoshida4", "yoshida6", "yoshida8", "mclachlan4", "mclachlan6", "kahan_li6", "kahan_li8"),
+)
+MAKERS = {"scipy:": GRAY, "heyoka": "#A6761D", "CVODES": "#7A8B00", "MuJoCo": "#B5507A"}  # of others, none of ours
 SERIES = (BLUE, ORANGE, GREEN, PURPLE, SKY_BLUE, BLACK, YELLOW)  # curves of a plot, and tags
 
 FONT = "DejaVu Sans"  # its letter widths are known to the Graphviz that comes without fonts, and matplotlib carries it
@@ -103,7 +117,8 @@ ONE_JOINT = {
     "q0_old": "θ old",
     "qd0_old": "ω old",
     "p0": "p = ∂L/∂ω",
-    "p0_dot": "τ = dp/dt",
+    "p0_dot": "dp/dt",  # the inertial term; the torque is τ = dp/dt − ∂L/∂θ
+    "tau0": "τ",
 }
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 _WORD = re.compile(r"(?<![A-Za-z0-9])([A-Za-z]+)([0-9]*)(?![A-Za-z0-9])")

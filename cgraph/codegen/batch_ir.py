@@ -1,8 +1,9 @@
 """LLVM's text for a batch: the graph on one vector of columns after another.
 
-Rows of a large batch lie far apart, each in a page of memory of its own, often by a power of two, where few of them fit
-in a cache at once. So where there are many rows, the inputs of some vectors, a tile, are brought together at a time,
-and results go out together.
+Points lie in columns, side by side, or in rows, one after another (see `transposed_ir`). The numbers of points in
+columns lie far apart in a large batch, each in a page of memory of its own, often by a power of two, where few of them
+fit in a cache at once. So where there are many, the inputs of some vectors, a tile, are brought together at a time, and
+results go out together.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from typing import NamedTuple
 from ..core.graph import Graph
 from .arithmetic import REGISTERS, Arithmetic
 from .llvm_ir import instructions, preamble
+from .transposed_ir import Place, rows_ir
 
 MEMORY = 2**18  # bytes for inputs and outputs of a tile: a part of a core's second cache
 VECTORS = 16  # in a tile, at most
@@ -22,6 +24,7 @@ class Batch(NamedTuple):
     """A module with `void batch(double *x, double *y, int64_t n, int64_t x_stride, int64_t y_stride, double *w)`.
 
     Row i of x begins at x + i * x_stride, and likewise for y; n columns, a positive multiple of the lanes, are read.
+    `rows` takes the same, the point i at x + i * x_stride.
     size: how many doubles w takes; it is aligned to a vector.
     """
 
@@ -61,7 +64,9 @@ def batch_ir(graph: Graph, lanes: int, flags: str = "", registers: int = REGISTE
         x_tile=n_in * vectors,
         parts="\n".join([_CALL.format(number=number) for number in range(len(code.parts))]),
     )
-    return Batch("\n".join([*lines, text]), lanes * (code.places + vectors * (n_in + n_out)))
+    calls = [_CALL_IN_ROWS.format(number=number, lanes=lanes) for number in range(len(code.parts))]
+    lines += rows_ir(arithmetic, Place(code.places, n_in), [Place(code.places + n_in, n_out)], calls)
+    return Batch("\n".join([*lines, text]), lanes * (code.places + max(1, vectors) * (n_in + n_out)))
 
 
 _PART = """\
@@ -69,6 +74,7 @@ define internal void @part{number}(ptr noalias %x, ptr noalias %y, i64 %dx, i64 
     nounwind noinline alignstack({bytes}) {{
 start:"""
 _CALL = "  call void @part{number}(ptr %x.at, ptr %y.at, i64 %dx, i64 %dy, ptr %w)"
+_CALL_IN_ROWS = "  call void @part{number}(ptr %point, ptr %result0, i64 {lanes}, i64 {lanes}, ptr %w)"
 
 _DIRECT = """\
 define void @batch(ptr noalias %x, ptr noalias %y, i64 %n, i64 %dx, i64 %dy, ptr noalias %w) nounwind {{

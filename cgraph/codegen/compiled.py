@@ -16,7 +16,7 @@ from ..util.html_text import html_table, html_text
 from ..util.real_arrays import real_array
 from ..util.threads import share, thread_count
 from .bound_call import bound
-from .differentiable import Differentiable, require_memory
+from .differentiable import Differentiable, describe, require_memory
 
 
 class Compiled(Differentiable):
@@ -47,6 +47,7 @@ class Compiled(Differentiable):
     """
 
     source: str
+    takes_rows = False  # whether batches of points that lie one after another are read and written as they lie
 
     def __init__(self, graph: Graph, backend: str, options: dict[str, Any]) -> None:
         super().__init__()
@@ -62,19 +63,25 @@ class Compiled(Differentiable):
     def values(self, x: list[float]) -> tuple[float, ...]:
         """The outputs as floats at a list of n_in floats: the fastest way in from lists; nothing is checked."""
 
-    def batch(self, X: ArrayLike, threads: int | None = 1) -> Array:
+    def batch(self, X: ArrayLike, threads: int | None = 1, *, out: Array | None = None) -> Array:
         """Values of the outputs, (n_out, N), at N points X, (n_in, N).
 
+        Machine code reads and writes points that lie one after another, such as `rows.T` of rows (N, n_in), as they
+        lie: `.T` of the result then is rows, too.
+        out: where they go, an array of float64 (n_out, N) that shares no memory with X; a new one by default.
         threads: how many may share the work; None: one for each core. A batch too small to gain by it takes fewer, and
         generated Python (backend "python") takes one. They change nothing in the values.
-        Raises GraphError for another shape, ValueError for less than one thread.
+        Raises GraphError for another shape or an `out` that is none, ValueError for less than one thread.
         """
         count = thread_count(threads)
         points = real_array("X", X)
         if points.ndim != 2 or points.shape[0] != self.n_in:
             raise GraphError(f"X must have shape ({self.n_in}, N), one row for each input, got {points.shape}")
         total = points.shape[1]
-        result = np.empty((self.n_out, total))
+        order = "F" if self.takes_rows and lies_in_rows(points) else "C"
+        result = np.empty((self.n_out, total), order=order) if out is None else out  # type: ignore[call-overload]
+        if out is not None:
+            require_out(out, (self.n_out, total), points)
         width, columns = self._columns()
 
         def block(start: int) -> None:
@@ -125,3 +132,18 @@ class Compiled(Differentiable):
 
     def __repr__(self) -> str:
         return f"<compiled {self.graph!r}, backend {self.backend!r}>"
+
+
+def lies_in_rows(points: Array) -> bool:
+    """Whether points, (n, N), lie in memory one after another, n numbers each."""
+    return points.flags.f_contiguous and not points.flags.c_contiguous
+
+
+def require_out(out: Array, shape: tuple[int, int], points: Array) -> None:
+    """Raise GraphError unless results of that shape can be written there while the points are read."""
+    if not isinstance(out, np.ndarray) or out.dtype != np.float64 or out.shape != shape:
+        raise GraphError(f"out must be an array of float64 in shape {shape}, got {describe(out)}")
+    if not out.flags.writeable:
+        raise GraphError("out must be an array that can be written, got one that is read-only")
+    if np.may_share_memory(out, points):
+        raise GraphError("out and X must not share memory")

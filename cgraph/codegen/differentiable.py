@@ -249,7 +249,11 @@ def require_memory(name: str, array: Any, *shapes: tuple[int, ...]) -> None:
     """Raise GraphError unless machine code can use the array as it lies."""
     wanted = " or ".join(map(str, shapes))
     if not isinstance(array, np.ndarray) or array.dtype != np.float64 or array.shape not in shapes:
-        given = f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
-        raise GraphError(f"{name} must be an array of float64 in shape {wanted}, got {given}")
+        raise GraphError(f"{name} must be an array of float64 in shape {wanted}, got {describe(array)}")
     if not array.flags.c_contiguous or not array.flags.aligned:
         raise GraphError(f"{name} must be contiguous and aligned, got strides {array.strides}")
+
+
+def describe(value: Any) -> str:
+    """What a value is that should have been an array of float64 of some shape."""
+    return f"{value.dtype} {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__

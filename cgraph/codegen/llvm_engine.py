@@ -13,7 +13,9 @@ from ..errors import install
 from .disk_cache import Cache
 
 LEVEL = 2  # of the code generator's optimization; the text has no redundancy for passes over it to find
-QUICK = 60_000  # nodes; beyond, level 0: a quarter of the time to compile, code that takes a third longer
+# Nodes; beyond, level 0: a quarter of the time to compile, code that takes a third longer, or a tenth where it waits
+# for memory.
+QUICK = 60_000
 _lock = threading.Lock()  # llvmlite compiles in one context
 
 
@@ -58,18 +60,25 @@ class Host:
         llvm = (f"llvmlite {version}", f"LLVM {binding.llvm_version_info}")
         self._identity = "\n".join((*llvm, self._target.triple, self._name, self._features))
 
-    def compile(self, text: str, functions: Iterable[str], nodes: int, cache: Cache | None = None) -> Code:
+    def compile(
+        self, text: str, functions: Iterable[str], nodes: int, cache: Cache | None = None, *, looped: bool = False
+    ) -> Code:
         """Machine code, made or found in the cache, of a module's text that calls these functions of the C library.
 
-        nodes: of its graphs.
+        nodes: of its graphs.  looped: whether they are loops over vectors that wait for memory.
         """
-        level = LEVEL if nodes <= QUICK else 0
+        level = LEVEL if nodes <= (QUICK // 3 if looped else QUICK) else 0
         with _lock:
             self._find(functions)
             if cache is None:
                 return self._loaded(self._translated(text, level))
             recipe = f"{self._identity}\nlevel {level}\n{text}"
             return self._loaded(cache.fetch(recipe, lambda: self._translated(text, level)))
+
+    def require(self, functions: Iterable[str]) -> None:
+        """Raise MissingFunctionError unless the C library has them."""
+        with _lock:
+            self._find(functions)
 
     def _translated(self, text: str, level: int) -> bytes:
         """An object file of the text. LLVM's own cache wants the text parsed even when it has the object."""

@@ -16,6 +16,7 @@ from ..core.evaluate import Array
 from ..core.graph import Graph
 from ..util.garbage import without_collection
 from . import llvm_engine as llvm
+from .batch_code import BatchCode
 from .batch_ir import Batch, batch_ir
 from .bound_call import bound_call
 from .compiled import Compiled
@@ -24,8 +25,6 @@ from .llvm_ir import libm_functions, scalar_ir
 from .native_sweep import NativeSweep
 
 _POINT = ctypes.PYFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)  # too short a call to give the interpreter away for
-_BATCH = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_int64] * 3, ctypes.c_void_p)
-ALIGNED = 8  # doubles: where the longest vector may begin
 WORK = 2**23  # nodes times columns in a block of a batch: some tenths of a millisecond, several times a thread's start
 _Buffers = tuple[Any, Array, memoryview, Callable[[], None]]  # memory of x; y, as an array and as memory; the call
 _FAST = "reassoc nsz arcp contract afn"  # all but the promise that there is no NaN and no infinity
@@ -42,6 +41,8 @@ class Native(Compiled):
     options: fast, fma and cache, see `compile`. Any number of threads may call it at once.
     """
 
+    takes_rows = True
+
     def __init__(self, graph: Graph, backend: str, options: dict[str, Any]) -> None:
         super().__init__(graph, backend, options)
         self._flags = flags_of(options["fast"], options["fma"])
@@ -49,10 +50,10 @@ class Native(Compiled):
         self._host = llvm.host()
         with without_collection():
             self.source = scalar_ir(graph, self._flags, self._host.registers)
-        self._entry = self._compiled(self.source, "point", _POINT)
+        self._entry = self._code(self.source).function("point", _POINT)
         self._free: list[_Buffers] = []  # pop and append are atomic: no lock, and a call inside a call is safe
         self._pack, self._unpack = Struct(f"{self.n_in}d").pack_into, Struct(f"{self.n_out}d").unpack_from
-        self._batch: _BatchCode | None = None
+        self._batch: BatchCode | None = None
         self._batch_lock = threading.Lock()
 
     def __call__(self, x: ArrayLike) -> Array:
@@ -103,45 +104,11 @@ class Native(Compiled):
         with self._batch_lock:
             if self._batch is None:
                 text = self._batch_text()
-                self._batch = _BatchCode(self._compiled(text.source, "batch", _BATCH), lanes, text.size)
+                self._batch = BatchCode(self._code(text.source), lanes, text.size)
         return max(WORK // len(self.graph.nodes) // lanes, 1) * lanes, self._batch
 
     def _sweep(self, split: DirectionSplit, guarded: DirectionSplit | None) -> NativeSweep:
         return NativeSweep(split, self._host, self._flags, self._cache, guarded)
 
-    def _compiled(self, text: str, name: str, prototype: Any) -> Any:
-        functions, nodes = libm_functions(self.graph), len(self.graph.nodes)
-        return self._host.compile(text, functions, nodes, self._cache).function(name, prototype)
-
-
-class _BatchCode:
-    """The function of batches; any number of threads may call it at once.  size: of the memory that a call needs."""
-
-    def __init__(self, entry: Any, lanes: int, size: int) -> None:
-        self._entry, self._lanes, self._size = entry, lanes, size
-        self._free: list[Array] = []  # memories
-
-    def __call__(self, points: Array, result: Array) -> None:
-        """Vectors of columns; the last few are filled up to a whole vector by repeating one."""
-        if points.strides[1] != points.itemsize or not points.flags.aligned:
-            points = np.array(points, order="C")
-        count = points.shape[1]
-        whole = count - count % self._lanes
-        if whole:
-            self._run(points, result, whole)
-        if whole < count:
-            filled = np.repeat(points[:, -1:], self._lanes, axis=1)
-            filled[:, : count - whole] = points[:, whole:]
-            values = np.empty((len(result), self._lanes))
-            self._run(filled, values, self._lanes)
-            result[:, whole:] = values[:, : count - whole]
-
-    def _run(self, points: Array, result: Array, count: int) -> None:
-        try:
-            memory = self._free.pop()
-        except IndexError:
-            memory = np.empty(self._size + ALIGNED)
-        address = -(-memory.ctypes.data // (8 * ALIGNED)) * 8 * ALIGNED
-        strides = points.strides[0] // points.itemsize, result.strides[0] // result.itemsize
-        self._entry(points.ctypes.data, result.ctypes.data, count, *strides, address)
-        self._free.append(memory)
+    def _code(self, text: str) -> llvm.Code:
+        return self._host.compile(text, libm_functions(self.graph), len(self.graph.nodes), self._cache)

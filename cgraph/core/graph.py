@@ -12,7 +12,9 @@ from .check_name import check_name
 from .counts import Counts, count
 from .edge import Edge
 from .evaluate import Value, evaluate
+from .formulas import LINES
 from .label import label
+from .latex import graph_latex
 from .listing import listing
 from .networkx_queries import to_networkx
 from .node import CONSTANT, VARIABLE, Node, Op, Scalar, as_node, variable
@@ -178,6 +180,13 @@ class Graph:
     def listing(self) -> str:
         """The graph as text, a node a line, the same in every run."""
         return listing(self.input_names, self.nodes, self.outputs)
+
+    def latex(self, *, names: Mapping[str, str] | None = None, lines: int = LINES) -> str:
+        """The equations as LaTeX, an aligned block; a node that several need, or that has a name, has a line.
+
+        names: {name in the graph: what a person calls it}.  lines: at most; a last one says how many are left out.
+        """
+        return graph_latex(self.nodes, self.outputs, names, lines)
 
     def check(self) -> None:
         """Raise GraphError unless every node is well formed and the order is topological."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import threading
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -10,10 +11,13 @@ from typing import Any
 import numpy as np
 
 from ..codegen import llvm_engine as llvm
+from ..codegen.batch_code import BatchCode
 from ..core.evaluate import Array
+from ..util.garbage import without_collection
 from .fuse import fused
 from .llvm_ir import program_functions, program_ir
 from .program import Program
+from .rows_ir import program_rows_ir
 from .runner import Record, Runner
 
 _NUMBER = 8  # bytes
@@ -29,14 +33,34 @@ class NativeRunner(Runner):
         super().__init__(program, host.lanes)
         self._flags, self._host = flags, host
         self._fused = fused(program)
-        self.source = program_ir(self._fused, flags, width=host.lanes, registers=host.registers)
-        self._code = self._compiled(self.source)
-        self._entry = _RUN(self._code.address("run"))
-        self._many: tuple[llvm.Code, Any] | None = None
+        self._functions = program_functions(self._fused)
+        host.require(self._functions)
+        self._lock = threading.Lock()
+        self._one: Any = None  # what runs one memory, and a vector of them
+        self._many: Any = None
+        self._batches: dict[str, BatchCode] = {}  # by the register that varies
 
-    def _compiled(self, text: str) -> llvm.Code:
+    def _compiled(self, text: str, *, looped: bool = False) -> llvm.Code:
         nodes = sum([len(graph.nodes) for graph in self._fused.graphs()])
-        return self._host.compile(text, program_functions(self._fused), nodes)
+        return self._host.compile(text, self._functions, nodes, looped=looped)
+
+    @property
+    def _entry(self) -> Any:
+        """What runs one memory, made at its first use."""
+        with self._lock:
+            if self._one is None:
+                text = program_ir(self._fused, self._flags, width=self.width, registers=self._host.registers)
+                self._one = self._compiled(text).function("run", _RUN)
+        return self._one
+
+    @property
+    def _entry_of_lanes(self) -> Any:
+        """What runs a vector of memories, made at its first use."""
+        with self._lock:
+            if self._many is None:
+                text = program_ir(self._fused, self._flags, self._host.lanes, self.width, self._host.registers)
+                self._many = self._compiled(text).function("run", _RUN)
+        return self._many
 
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record:
         rows = np.empty((passes // every, self.program.width))
@@ -55,12 +79,22 @@ class NativeRunner(Runner):
         call.kept = self, arrays  # type: ignore[attr-defined]  # whose addresses it has
         return call
 
+    def _rows_writer(self, name: str) -> Callable[[Array, Array], None]:
+        with self._lock:
+            if name not in self._batches:
+                self._batches[name] = self._batch_code(name)
+            code = self._batches[name]
+        return lambda values, rows: code(values.T, rows.T)
+
+    def _batch_code(self, name: str) -> BatchCode:
+        lanes, registers = self._host.lanes, self._host.registers
+        with without_collection():
+            text = program_rows_ir(self._fused, name, lanes, self._flags, registers)
+        return BatchCode(self._compiled(text.source, looped=True), lanes, text.size, columns=False)
+
     def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record:
         lanes = self._host.lanes
-        if self._many is None:
-            code = self._compiled(program_ir(self._fused, self._flags, lanes, self.width, self._host.registers))
-            self._many = code, _RUN(code.address("run"))
-        entry, total = self._many[1], memories.shape[1]
+        entry, total = self._entry_of_lanes, memories.shape[1]
         rows = np.empty((passes // every, self.program.width, total))
         block, part = np.empty((self.size, lanes)), np.empty((*rows.shape[:2], lanes))
         fed = np.empty((*feed.shape[:2], lanes))

@@ -10,12 +10,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..codegen.compiled import require_out
 from ..codegen.differentiable import require_memory
 from ..core.evaluate import Array
 from ..errors import GraphError
+from ..util.real_arrays import real_array
 from ..util.require import require_whole
+from ..util.threads import share, thread_count
 from .llvm_ir import offsets
-from .program import Program
+from .program import Call, Map, Program, Sum
+
+BLOCK = 64  # states of a batch that are run between looks at the keyboard, and that a thread takes at a time
 
 
 class Record(NamedTuple):
@@ -204,15 +209,73 @@ class Runner(ABC):
         if not memories.ndim == 2:
             raise GraphError(f"memories must have shape ({self.size}, N), got {memories.shape}")
         self._check(memories, (self.size, memories.shape[1]), passes, every)
+        self._require_branch_free()
+        count = memories.shape[1]
+        fed = self._fed(feed, (passes, self.program.feed_width, count))
+        with _fitting(passes // every, self.program.width * count):
+            return self._run_many(memories, passes, every, fed)
+
+    def batch(self, name: str, values: ArrayLike, threads: int | None = 1, *, out: Array | None = None) -> Array:
+        """What one pass records at each of N values of a register, side by side in vectors.
+
+        Parameters
+        ----------
+        name : str
+            The register.
+        values : array_like, shape (N, length)
+            A value a row.
+        threads : int, optional
+            How many may share the work; None: one for each core.
+        out : ndarray of float64, shape (N, width), optional
+            Where they go, sharing no memory with `values`; a new one by default.
+
+        Returns
+        -------
+        ndarray, shape (N, width)
+            A row of the record for each value.
+
+        Raises
+        ------
+        GraphError
+            For another shape; if the program has branches or a feed; if a pass reads or records a register, other than
+            this one, that it has not set before.
+        """
+        count, rows = thread_count(threads), np.ascontiguousarray(real_array(name, values))
+        length = len(self.read(np.empty(self.size), name))
+        if rows.ndim != 2 or rows.shape[1] != length:
+            raise GraphError(f"register {name!r} needs values of shape (N, {length}), got {rows.shape}")
+        self._require_branch_free()
+        if self.program.feed:
+            raise GraphError("a batch takes no feed: give its registers a place in the one that varies")
+        if (unset := _first_unset(self.program, name)) is not None:
+            raise GraphError(f"a batch needs a pass that sets what it reads: register {unset!r} is read before")
+        write = self._rows_writer(name)
+        shape = len(rows), self.program.width
+        result = np.empty(shape) if out is None else out
+        require_out(result, shape, rows)
+
+        def block(start: int) -> None:
+            here = slice(start, start + BLOCK)
+            write(rows[here], result[here])
+
+        share(block, range(0, len(rows), BLOCK), count)
+        return result
+
+    def _rows_writer(self, name: str) -> Callable[[Array, Array], None]:
+        """A function of values of a register, and of where the rows of their record go."""
+
+        def write(values: Array, rows: Array) -> None:
+            memories = self.memory({name: values.T}, len(values))
+            rows[...] = self._run_many(memories, 1, 1, np.empty((1, 0, len(values)))).rows[0].T
+
+        return write
+
+    def _require_branch_free(self) -> None:
         program = self.program
         kinds = {type(statement).__name__ for statement in program.statements()} & {"While", "If", "Factor", "Solve"}
         kinds |= {name for name in ("record_if", "stop") if getattr(program, name) is not None}
         if kinds:
             raise GraphError(f"runs side by side need a branch-free program: no {', '.join(sorted(kinds))}")
-        count = memories.shape[1]
-        fed = self._fed(feed, (passes, self.program.feed_width, count))
-        with _fitting(passes // every, self.program.width * count):
-            return self._run_many(memories, passes, every, fed)
 
     def _fed(self, feed: ArrayLike | None, shape: tuple[int, ...]) -> Array:
         """The rows of a feed, of that shape; the last dimension may be one for all."""
@@ -234,3 +297,16 @@ class Runner(ABC):
 
     @abstractmethod
     def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record: ...
+
+
+def _first_unset(program: Program, known: str) -> str | None:
+    """A register that a pass without branches reads or records before it sets it, if there is one besides `known`."""
+    is_set = {known}
+    for statement in program.body:
+        assert isinstance(statement, Call | Map | Sum)
+        shared = statement.shared if isinstance(statement, Map) else ()
+        for name in (*shared, *statement.inputs):
+            if name not in is_set:
+                return name
+        is_set |= {statement.output} if isinstance(statement, Sum) else {*statement.outputs}
+    return next((name for name in program.record if name not in is_set), None)

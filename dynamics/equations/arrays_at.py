@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
+from functools import lru_cache
 from itertools import groupby
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph import Graph
+from cgraph import Compiled, Graph
 
 from ..systems.model import Model, as_system
-from .evaluate_at import Array, evaluate_at
+from .evaluate_at import Array, InputRows, evaluate_at
 
 _ENTRY = re.compile(r"(.*?[^\d_])((?:_\d+)+|\d+)")  # M_0_1, h_2, tau0
 
 
 def arrays_at(
     model: Model,
-    graph: Graph,
+    graph: Graph | Compiled,
     q: ArrayLike | None = None,
     qd: ArrayLike | None = None,
     qdd: ArrayLike | None = None,
@@ -31,13 +32,13 @@ def arrays_at(
 ) -> dict[str, Array]:
     """The outputs of a graph at a state, or at many, as arrays by name: M_0_0, M_0_1, .. are the matrix "M".
 
-    For a loop over many states, compile the graph.
+    Compiled, a graph is evaluated by machine code, many states side by side in vectors.
 
     Parameters
     ----------
     model : Model
         A system, a mechanism or a scene with n velocities, and nq coordinates.
-    graph : Graph
+    graph : Graph or Compiled
         Of the model, such as `mass_matrix(model)`: inputs among q0.., qd0.., qdd0.., tau0.., t and the parameters.
     q : array_like, (nq,) or (N, nq)
         Coordinates [rad or m]; by default 0, quaternions neutral.
@@ -68,33 +69,41 @@ def arrays_at(
     >>> dyn.arrays_at(arm, dyn.mass_matrix(arm), q=[0.0, 0.0])["M"].round(12).tolist()
     [[2.666666666667, 0.833333333333], [0.833333333333, 0.333333333333]]
     """
+    function, graph = (graph, graph.graph) if isinstance(graph, Compiled) else (None, graph)
     if not isinstance(graph, Graph):
         raise TypeError(f"graph must be a Graph, such as mass_matrix(model), got {type(graph).__name__}: {graph!r:.60}")
     system, state = as_system(model), {"q": q, "qd": qd, "qdd": qdd, "tau": tau}
     known = {*system.q, *system.qd, *system.qdd, *system.tau, system.t, *system.extra_inputs}
     if unknown := [node.name for node in graph.inputs if node not in known]:
         raise ValueError(f"the graph has the input {unknown[0]!r}, which is no state or parameter of the model")
-    flat = evaluate_at(system, graph, state, t, parameters)
+    if function is None:
+        flat = evaluate_at(system, graph, state, t, parameters)
+    else:
+        x = InputRows(system, graph.input_names)(state, t, parameters)
+        flat = function.batch(x.T).T if x.ndim == 2 else function(x)
     arrays: dict[str, Array] = {}
     start = 0
-    for name, shape in _shapes(graph.outputs):
+    for name, shape in _shapes(tuple(graph.outputs)):
         end = start + math.prod(shape)
         arrays[name] = flat[..., start:end].reshape((*flat.shape[:-1], *shape))
         start = end
     return arrays
 
 
-def _shapes(outputs: Iterable[str]) -> Iterator[tuple[str, tuple[int, ...]]]:
+@lru_cache(maxsize=64)
+def _shapes(outputs: tuple[str, ...]) -> list[tuple[str, tuple[int, ...]]]:
     """Name and shape of the arrays that names of outputs spell, one after another."""
+    arrays: list[tuple[str, tuple[int, ...]]] = []
     for stem, run in groupby(outputs, key=lambda name: _split(name)[0]):
         names = list(run)
         indices = [_split(name)[1] for name in names]
         if len({len(index) for index in indices}) == 1:
             shape = tuple([1 + max(axis) for axis in zip(*indices, strict=True)])
             if list(np.ndindex(*shape)) == indices:
-                yield stem, shape
+                arrays.append((stem, shape))
                 continue
-        yield from [(name, ()) for name in names]  # an array with entries left out
+        arrays += [(name, ()) for name in names]  # an array with entries left out
+    return arrays
 
 
 def _split(name: str) -> tuple[str, tuple[int, ...]]:

@@ -81,7 +81,7 @@ def linearize(
     Of quasi-velocities dx is of displacements, see `state_space`. With constraints the state has to meet them (see
     `consistent_state`), and `reduced_linearization` has the matrices of independent displacements.
 
-    For many states there is `linearize_many`.
+    For many states, and for all digits of long chains, there is `linearize_many`.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, Builder, building, folded, topological
+from cgraph.extend import Array, Builder, building, folded, topological, with_reciprocals
 
 from ..systems.system import System
 from .equations_of_motion import accelerations
@@ -58,7 +58,7 @@ class LinearizationParts(NamedTuple):
         rows += [[*[column[i] for column in columns], *by_tau[i]] for i in range(n)]
         outputs = {f"A_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[: 2 * n])}
         outputs |= {f"B_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[2 * n :])}
-        return cg.simplify(Graph(self.inputs, outputs))
+        return with_reciprocals(cg.simplify(Graph(self.inputs, outputs)))
 
     def in_columns(self) -> ColumnGraphs:
         """The same with the columns left to a graph of one."""
@@ -69,7 +69,8 @@ class LinearizationParts(NamedTuple):
             row = [*[side[i] for side in self.sides], *_unit(i, n)]
             outputs |= {f"b_{i}_{j}": entry for j, entry in enumerate(row)}
         outputs |= {f"C_{i}_{j}": entry for i, row in enumerate(self.brackets) for j, entry in enumerate(row)}
-        return ColumnGraphs(cg.simplify(Graph(self.inputs, outputs)), cg.simplify(column), len(factors))
+        shared = with_reciprocals(cg.simplify(Graph(self.inputs, outputs)))
+        return ColumnGraphs(shared, cg.simplify(column), len(factors))
 
 
 def linearization_parts(system: System) -> LinearizationParts:

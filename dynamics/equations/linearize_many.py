@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 import cgraph as cg
-from cgraph.extend import Call, Map, Program, runner, share, thread_count
+from cgraph import Graph, Node
+from cgraph.extend import Call, Map, Program, Statement, runner, share, thread_count
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
-from .evaluate_at import Array, input_values
-from .linearization_parts import ColumnGraphs, LinearizationParts, assembled, linearization_parts
+from .equations_of_motion import forward_dynamics
+from .evaluate_at import Array, InputRows
+from .formulations import ONE, ZERO
+from .linearization_parts import ColumnGraphs, LinearizationParts, linearization_parts
 
-# Nodes; beyond, the columns share one piece of code, which LLVM is done with in a tenth of the time.
+# Nodes; beyond, the columns share one piece of code: of 18 000 nodes, machine code is made in half the time and takes a
+# third longer, of 200 000 in a fifth of the time, and takes no longer.
 WRITTEN_OUT = 20_000
+SHARE = 3  # of the nodes of all entries, at most one in so many is forward dynamics
 BLOCK = 64  # states that are run between looks at the keyboard, and that a thread takes at a time
 _functions: WeakKeyDictionary[System, _Function] = WeakKeyDictionary()
 
@@ -35,10 +39,12 @@ def linearize_many(
 ) -> tuple[Array, Array]:
     """`linearize` at N states, such as those of a horizon: machine code, made at the first call and kept.
 
-    Of small systems all entries are written out, and states lie side by side in vectors. Of others, what the state
-    alone decides, the slopes of `inverse_dynamics_derivatives` and the factorization of M, is one piece of code and a
-    column of A and B another, through which all columns of a state run side by side. The matrices of a state whose mass
-    matrix is singular, or with a quaternion of length 0, have entries that are infinite or NaN.
+    Of small systems all entries are written out, and states lie side by side in vectors. Of larger ones, state after
+    state, it is the Jacobian of the compiled `forward_dynamics`, whose columns run side by side through one piece of
+    code; it keeps the digits of long chains, too, whatever the condition of M. With quasi-velocities or constraints,
+    what the state alone decides, the slopes of `inverse_dynamics_derivatives` and the factorization of M, is one such
+    piece, and a column of A and B another. The matrices of a state whose mass matrix is singular, or with a quaternion
+    of length 0, have entries that are infinite or NaN.
 
     Parameters
     ----------
@@ -72,68 +78,137 @@ def linearize_many(
     ([-15.0, 15.0], (2, 2, 1))
     """
     system = as_system(model)
-    function = _function(system)
-    values, shape = input_values(system, function.names, {"q": q, "qd": qd, "tau": tau}, t, parameters)
-    if len(shape) != 1:
+    function, count = _function(system), thread_count(threads)
+    values = function.inputs({"q": q, "qd": qd, "tau": tau}, t, parameters)
+    if values.ndim != 2:
         raise ValueError("linearize_many takes rows of states, got one state; see linearize")
-    given = [np.broadcast_to(np.asarray(values[name], dtype=np.float64), shape) for name in function.names]
-    return function(np.array(given).reshape(len(given), *shape), thread_count(threads))
+    return function(values, count)
 
 
-class _Function(ABC):
-    """A, (N, 2n, 2n), and B, (N, 2n, n), of values, (n_in, N), of the inputs of those names."""
+class _Function:
+    """A and B of many states, in machine code.
 
-    names: Sequence[str]
+    write: rows (N, n_in) of the inputs and a number of threads to (A B), (N, 2n, 3n).
+    """
 
-    @abstractmethod
-    def __call__(self, values: Array, threads: int) -> tuple[Array, Array]: ...
-
-
-class _WrittenOut(_Function):
-    """All entries in one graph, N states side by side in vectors."""
-
-    def __init__(self, parts: LinearizationParts) -> None:
-        graph, self.n = parts.written_out(), len(parts.brackets)
-        self.names, self.compiled = graph.input_names, cg.compile(graph)
+    def __init__(self, system: System) -> None:
+        inputs, self._write = _way(system)
+        self._n, self.inputs = system.n, InputRows(system, [str(each.name) for each in inputs])
 
     def __call__(self, values: Array, threads: int) -> tuple[Array, Array]:
-        rows, n = self.compiled.batch(values, threads).T, self.n
-        count, split = len(rows), 4 * n * n
-        return rows[:, :split].reshape(count, 2 * n, 2 * n), rows[:, split:].reshape(count, 2 * n, n)
-
-
-class _InColumns(_Function):
-    """One state after another, its columns side by side in vectors."""
-
-    def __init__(self, parts: LinearizationParts) -> None:
-        graphs, self.n = parts.in_columns(), len(parts.brackets)
-        self.names, self.run = graphs.shared.input_names, runner(linearization_program(graphs, self.n))
-
-    def __call__(self, values: Array, threads: int) -> tuple[Array, Array]:
-        rows = np.empty((values.shape[1], self.run.program.width))
-
-        def block(start: int) -> None:
-            memory = self.run.memory({})
-            for k in range(start, min(start + BLOCK, len(rows))):
-                self.run.write(memory, "state", values[:, k])
-                rows[k] = self.run.run(memory, 1).rows[0]
-
-        share(block, range(0, len(rows), BLOCK), threads)
-        brackets, solutions = np.split(rows, [self.n**2], axis=-1)
-        return assembled(brackets, solutions, self.n)
+        matrices = np.empty((len(values), 2 * self._n, 3 * self._n))
+        self._write(values, matrices, threads)
+        return matrices[:, :, : 2 * self._n], matrices[:, :, 2 * self._n :]
 
 
 def _function(system: System) -> _Function:
     if system not in _functions:
-        parts = linearization_parts(system)
-        _functions[system] = (_WrittenOut if parts.size < WRITTEN_OUT else _InColumns)(parts)
+        _functions[system] = _Function(system)
     return _functions[system]
 
 
+Write = Callable[[Array, Array, int], None]
+
+
+def _way(system: System) -> tuple[Sequence[Node], Write]:
+    """The inputs, and what writes: by entries where they are few, else by columns."""
+    rates = system.kinematics.quasi is None and not len(system.constraints)
+    if rates and len(forward_dynamics(system).nodes) >= WRITTEN_OUT // SHARE:
+        return _by_jacobian(system)
+    parts = linearization_parts(system)
+    if parts.size < WRITTEN_OUT:
+        return parts.inputs, _written_out(parts)
+    return _by_jacobian(system) if rates else (parts.inputs, _in_columns(parts))
+
+
+def _written_out(parts: LinearizationParts) -> Write:
+    """Rows that are the same at every state are no business of the machine code's."""
+    graph, n = parts.written_out(), len(parts.brackets)
+    rows = [
+        [graph.outputs[f"A_{i}_{j}" if j < 2 * n else f"B_{i}_{j - 2 * n}"] for j in range(3 * n)] for i in range(2 * n)
+    ]
+    first = next((i for i in range(n) if any([entry.value is None for entry in rows[i]])), n)
+    same = np.array([[entry.value for entry in row] for row in rows[:first]]).reshape(first, 3 * n)
+    outputs = {str(k): entry for k, entry in enumerate([entry for row in rows[first:] for entry in row])}
+    compiled = cg.compile(Graph(graph.inputs, outputs))
+
+    def write(values: Array, matrices: Array, threads: int) -> None:
+        compiled.batch(values.T, threads, out=matrices.reshape(-1, 6 * n * n)[:, first * 3 * n :].T)
+        matrices[:, :first] = same
+
+    return write
+
+
+def _by_jacobian(system: System) -> tuple[Sequence[Node], Write]:
+    """One state after another, by the Jacobian of forward dynamics: of systems whose velocities are rates."""
+    graph, n = forward_dynamics(system), system.n
+    compiled, wrt = cg.compile(graph), [*system.q, *system.qd, *system.tau]
+    i, j = np.tril_indices(n, -1)  # B is M^-1: of its entries the upper triangle counts
+
+    def write(values: Array, matrices: Array, threads: int) -> None:
+        def block(start: int) -> None:
+            x, slopes = np.empty(values.shape[1]), np.empty((n, 3 * n))
+            run = compiled.bind_jacobian(x, slopes, wrt=wrt)
+            for k in range(start, min(start + BLOCK, len(values))):
+                x[:] = values[k]
+                run()
+                matrices[k, n:] = slopes
+
+        share(block, range(0, len(values), BLOCK), threads)
+        matrices[:, :n] = np.eye(n, 3 * n, n)
+        matrices[:, n + i, 2 * n + j] = matrices[:, n + j, 2 * n + i]
+
+    return graph.inputs, write
+
+
+def _in_columns(parts: LinearizationParts) -> Write:
+    n = len(parts.brackets)
+    program = linearization_program(parts.in_columns(), n)
+    run, same = runner(program), 6 * n * n - program.width
+
+    def write(values: Array, matrices: Array, threads: int) -> None:
+        run.batch("state", values, threads, out=matrices.reshape(-1, 6 * n * n)[:, same:])
+        if same:
+            matrices[:, :n] = np.eye(n, 3 * n, n)
+
+    return write
+
+
 def linearization_program(graphs: ColumnGraphs, n: int) -> Program:
-    """One pass linearizes at the register "state", and records C(qd), then row by row the n solutions of 3n columns."""
-    b, x = graphs.column.input_names[graphs.factors :], [f"x{i}" for i in range(n)]
-    registers = {"state": len(graphs.shared.inputs), "factors": graphs.factors, **dict.fromkeys([*b, *x], 3 * n)}
-    first = Call(graphs.shared, ("state",), ("factors", *b, "brackets"))
-    columns = Map(graphs.column, tuple(b), tuple(x), shared=("factors",))
-    return Program(registers | {"brackets": n * n}, [first, columns], record=["brackets", *x])
+    """One pass linearizes at the register "state", and records (A B), (2n, 3n), row by row.
+
+    Without the upper half, (0 1 0), where velocities are rates of coordinates. Columns by tau are for themselves: of
+    their solutions the upper triangle counts, so that they are symmetric to the last bit.
+    """
+    outputs, factors = list(graphs.shared.outputs.values()), graphs.factors
+    k, brackets = len(graphs.column.inputs) - factors, outputs[len(outputs) - n * n :]
+    by_state, by_tau = ([f"{name}{i}" for i in range(k)] for name in ("b", "e"))
+    slopes, inverse, symmetric = ([f"{name}{i}" for i in range(n)] for name in ("A", "x", "B"))
+    registers = {"state": len(graphs.shared.inputs), "factors": factors, "brackets": n * n}
+    registers |= dict.fromkeys([*by_state, *slopes], 2 * n) | dict.fromkeys([*by_tau, *inverse, *symmetric], n)
+    sides = [each for pair in zip(by_state, by_tau, strict=True) for each in pair]
+    body: list[Statement] = [
+        Call(graphs.shared, ("state",), ("factors", *sides, "brackets")),
+        Map(graphs.column, tuple(by_state), tuple(slopes), shared=("factors",)),
+        Map(graphs.column, tuple(by_tau), tuple(inverse), shared=("factors",)),
+        Call(_symmetric(n), tuple(inverse), tuple(symmetric)),
+    ]
+    record = [each for pair in zip(slopes, symmetric, strict=True) for each in pair]
+    if any([entry.value != 0.0 for entry in brackets]):
+        body.append(Call(_upper(n), ("brackets",), ("upper",)))
+        registers["upper"] = 3 * n * n
+        record = ["upper", *record]
+    return Program(registers, body, record=record)
+
+
+def _symmetric(n: int) -> Graph:
+    """The matrix, (n, n), whose upper triangle is that of another."""
+    x = cg.variables([f"x_{i}_{j}" for i in range(n) for j in range(n)])
+    return Graph(x, {f"B_{i}_{j}": x[min(i, j) * n + max(i, j)] for i in range(n) for j in range(n)})
+
+
+def _upper(n: int) -> Graph:
+    """The upper half of (A B), (C(qd) 1 0)."""
+    c = cg.variables([f"C_{i}_{j}" for i in range(n) for j in range(n)])
+    rows = [[*c[i * n : i * n + n], *[ONE if i == j else ZERO for j in range(n)], *[ZERO] * n] for i in range(n)]
+    return Graph(c, {str(k): entry for k, entry in enumerate([entry for row in rows for entry in row])})

@@ -9,6 +9,7 @@ from typing import NamedTuple, Protocol, TypeVar
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import (
+    OPS,
     Builder,
     SingularError,
     building,
@@ -119,10 +120,18 @@ def _longest_path(lagrangian: Node, velocities: Sequence[Node]) -> int:
 
 
 def linear(b: list[Node], x: list[Node]) -> MassSolve:
-    """Of nodes x that are linear in b."""
+    """Of nodes x that are linear in b; what divides a column multiplies it, once inverted for all."""
     moving, column = set(b), []
+    new: dict[Node, Node] = {}
+    inverses: dict[Node, Node] = {}
     for node in topological(x):
-        if any([arg in moving for arg in node.args]):
-            moving.add(node)
-            column.append(node)
-    return MassSolve(b, x, column)
+        if not any([arg in moving for arg in node.args]):
+            continue
+        moving.add(node)
+        args, op = tuple([new.get(arg, arg) for arg in node.args]), node.op
+        if op is OPS["div"]:  # of numbers that are linear in b, by one that is not
+            inverse = inverses.setdefault(args[1], Node(op, (ONE, args[1]), node.label))
+            args, op = (args[0], inverse), OPS["mul"]
+        new[node] = Node(op, args, node.label)
+        column.append(new[node])
+    return MassSolve(b, [new.get(node, node) for node in x], column)

@@ -8,14 +8,16 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph import Graph
+import cgraph as cg
+from cgraph import Graph, Node
 from cgraph.extend import real_array
 
 from .body import Body
-from .joint_coordinates import coordinate_names
+from .joint_coordinates import coordinate_names, places
 from .loops import Loop
 from .spatial import Array
 
+_SEEN = 1e-6  # of the way that points go: how near to the plane of the picture they turn
 _FLAT = 1e-9  # of the largest extent: a direction in which nothing moves or lies
 
 
@@ -39,10 +41,18 @@ class Bodies(Protocol):
 
 
 class Skeleton(NamedTuple):
-    """points: (T, k, 2) [m], x to the right, y up.  parents: (k,), the earlier point each hangs on, or -1."""
+    """points: (T, k, 2) [m], x to the right, y up.  parents: (k,), the earlier point each hangs on, or -1.
+
+    graph: the points at any q, outputs x0, y0, x1, ..  joints: for every velocity the point where its joint is.
+    turns: for every velocity, whether it turns what hangs on it in the plane that is seen, 1 counterclockwise, -1 the
+    other way, or 0.
+    """
 
     points: Array
     parents: tuple[int, ...]
+    graph: Graph
+    joints: tuple[int, ...]
+    turns: tuple[int, ...]
 
 
 def skeleton(mechanism: Bodies, q: ArrayLike) -> Skeleton:
@@ -57,21 +67,62 @@ def skeleton(mechanism: Bodies, q: ArrayLike) -> Skeleton:
         raise ValueError(f"q must have shape (T, {n}) or ({n},), one for each coordinate, got {q.shape}")
     values = {f"q{i}": q[:, i] for i in range(q.shape[1])}
     points: list[Array] = []
-    marks = places(mechanism)
+    nodes: list[Sequence[Node]] = []
+    marks = drawn_points(mechanism)
     for body, at, _ in marks:
         graph = mechanism.position(body, at)
         place = graph.evaluate({name: values[name] for name in graph.input_names})
+        nodes.append([graph.outputs[axis] for axis in "xyz"])
         points.append(np.stack([np.broadcast_to(place[axis], len(q)) for axis in "xyz"], axis=-1))
-    seen = np.stack(points, axis=1)
-    return Skeleton(seen @ view(seen).T, tuple([parent for _, _, parent in marks]))
+    in_space = np.stack(points, axis=1)
+    axes, parents = view(in_space), tuple([parent for _, _, parent in marks])
+    shown = {
+        f"{name}{i}": axis @ np.array(point)
+        for i, point in enumerate(nodes)
+        for name, axis in zip("xy", axes, strict=True)
+    }
+    found = cg.simplify(Graph(cg.variables([f"q{i}" for i in range(n)]), shown))
+    joints = [i for i, place in enumerate(places(mechanism.moving)) for _ in range(place.u.stop - place.u.start)]
+    return Skeleton(in_space @ axes.T, parents, found, tuple(joints), _turns(mechanism.moving, found, q[0], parents))
 
 
-def places(mechanism: Bodies) -> list[tuple[str, ArrayLike, int]]:
+def drawn_points(mechanism: Bodies) -> list[tuple[str, ArrayLike, int]]:
     """Body and place in it of joints and tips, and the number of the earlier one that each hangs on, or -1."""
     index = {body.name: i for i, body in enumerate(mechanism.moving)}
     above = _above(mechanism)
     joints = [(body.name, (0.0, 0.0, 0.0), index.get(above[body.name], -1)) for body in mechanism.moving]
     return [*joints, *[(body, at, index.get(body, index.get(above[body], -1))) for body, at in _tips(mechanism)]]
+
+
+def _turns(bodies: Sequence[Body], graph: Graph, q: Array, parents: Sequence[int]) -> tuple[int, ...]:
+    """For every velocity: a quarter of a turn of its joint turns the points that hang on it by as much, if seen so."""
+
+    def points(at: Array) -> Array:
+        values = graph.evaluate({f"q{i}": float(value) for i, value in enumerate(at)})
+        return np.array(list(values.values())).reshape(-1, 2)
+
+    turns: list[int] = []
+    before = points(q)
+    for i, place in enumerate(places(bodies)):
+        sign = 0
+        if place.q.stop - place.q.start == 1 and bodies[i].joint.type.units == ("rad",):
+            turned = q.copy()
+            turned[place.q] += 0.5 * np.pi
+            after, hung = points(turned), _hung(parents, i)
+            (x, y), seen = (before[hung] - before[i]).T, after[hung] - after[i]
+            off = [np.abs(seen - way * np.stack([-y, x], axis=1)).max() for way in (1, -1)]
+            sign = int(np.sign(off[1] - off[0])) if min(off) <= _SEEN * max(off) else 0
+        turns += [sign] * (place.u.stop - place.u.start)
+    return tuple(turns)
+
+
+def _hung(parents: Sequence[int], root: int) -> list[int]:
+    """The points that hang on one, and it."""
+    found = {root}
+    for i, parent in enumerate(parents):
+        if parent in found:
+            found.add(i)
+    return sorted(found)
 
 
 def _above(mechanism: Bodies) -> dict[str, str]:

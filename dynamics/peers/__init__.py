@@ -68,7 +68,7 @@ PEERS = {
     "pinocchio": Kind(
         "Pinocchio's rnea and aba and their derivatives, C++; the step of RK4 is written in Python",
         "pinocchio",
-        CALLS | {("rk4", "call")} | {(task, "call") for task in DERIVATIVES},
+        CALLS | SLOPES | {("rk4", "call")},
         PinocchioPeer,
     ),
     "mujoco": Kind(

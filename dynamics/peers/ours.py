@@ -40,7 +40,7 @@ def slope_graph(case: Case) -> Graph:
     """(q0.., qd0.., tau0..) -> dqdd/d(q, qd, tau), row by row."""
     matrices, n = case.bound(state_space(case.model)), case.n
     names = [f"A_{i}_{j}" if j < 2 * n else f"B_{i}_{j - 2 * n}" for i in range(n, 2 * n) for j in range(3 * n)]
-    return cg.simplify(Graph(matrices.inputs, {name: matrices.outputs[name] for name in names}))
+    return Graph(matrices.inputs, {name: matrices.outputs[name] for name in names})
 
 
 def _inverse_derivatives(model: Model) -> Graph:
@@ -88,9 +88,10 @@ class Ours(Peer):
         """The compiled graph of the task."""
         if task in MOTIONS:
             return self._motion() if task == "motion" else self._gradient(task)
+        if task == "derivatives" and mode == "batch":
+            return self._many()
         if task == "derivatives" and self.parts().size >= WRITTEN_OUT:
-            rates = self.case.system.kinematics.quasi is None
-            return self._jacobian() if rates and mode == "call" else self._columns(mode)
+            return self._jacobian() if self.case.system.kinematics.quasi is None else self._columns()
         graph, points = self.graph(task), self.case.points(task)
         size = len(graph.nodes)
         if mode == "loop":
@@ -108,18 +109,22 @@ class Ours(Peer):
         rows = np.empty((self.case.n, len(x)))
         return Contender(function.bind_jacobian(x, rows), lambda _: rows.ravel(), 1, len(function.graph.nodes))
 
-    def _columns(self, mode: str) -> Contender:
+    def _many(self) -> Contender:
+        """Derivatives at the states of a batch, rows of it, as anybody calls them."""
+        case = self.case
+        x = np.ascontiguousarray(case.points("derivatives").T)
+        states = np.split(x, [case.nq, case.nq + case.n], axis=1)
+        size = self.parts().size
+        return Contender(lambda: linearize_many(case.model, *states), lambda found: _slopes(*found), len(x), size)
+
+    def _columns(self) -> Contender:
         """Derivatives of a large model: one piece of code for all columns, as `linearize_many` has it."""
         case, n = self.case, self.case.n
         graphs = self.parts().in_columns()
         size = len(graphs.shared.nodes) + len(graphs.column.nodes)
-        if mode == "batch":
-            x = case.points("derivatives").T
-            states = np.split(x, [case.nq, case.nq + n], axis=1)
-            return Contender(lambda: linearize_many(case.model, *states), lambda found: _slopes(*found), len(x), size)
         run = runner(linearization_program(graphs._replace(shared=case.bound(graphs.shared)), n))
         memory, row = run.memory({"state": case.point("derivatives")}), np.empty((1, run.program.width))
-        return Contender(run.bind(memory, row), lambda _: row[0, n * n :].copy(), 1, size)
+        return Contender(run.bind(memory, row), lambda _: row[0, -3 * n * n :].copy(), 1, size)
 
     def _motion(self) -> Contender:
         """The steps as one program, which is fed a row of torques a step."""

@@ -25,6 +25,7 @@ class PinocchioPeer(Peer):
         super().__init__(case)
         self.pinocchio = pinocchio()
         mechanism = bodies(case)
+        self.loops = mechanism.loops
         self.of = PinocchioModel(mechanism)
         self.twin = self.of.model
         self.data = self.twin.createData()
@@ -84,10 +85,12 @@ class PinocchioPeer(Peer):
 
     def prepare(self, task: str, mode: str) -> Contender:
         """Pinocchio's rnea or aba, at one state or over states."""
+        if self.loops and DERIVATIVES.get(task, task) != "inverse":
+            raise UnavailableError("has no loops in aba; `cgraph bench closed-chains` has its constraintDynamics")
         if task == "rk4":
             return self._step()
         if task in DERIVATIVES:
-            return self._slopes(task)
+            return self._slopes(task) if mode == "call" else self._slopes_of_batch(task)
         x = self.case.point(task) if mode == "call" else self.case.points(task)
         arguments = self.arguments(x, task)
 
@@ -114,40 +117,57 @@ class PinocchioPeer(Peer):
 
     def slopes(self, x: Array, task: str) -> Array:
         """The derivatives at one state, (n, 3n), with those of dampers and springs."""
-        q, v, last = self.arguments(x, DERIVATIVES[task])
-        self._algorithm(task)(self.twin, self.data, q, v, last)
-        return self._with_passive(q, v, last, task)
+        arguments = self.arguments(x, DERIVATIVES[task])
+        self._derivatives(task)(self.twin, self.data, *arguments)
+        return self._their_slopes(task, arguments).reshape(self.case.n, 3 * self.case.n)
 
-    def _algorithm(self, task: str) -> Callable[..., Any]:
+    def _slopes(self, task: str) -> Contender:
+        """The derivatives of rnea or aba; those of dampers and springs are added outside what is timed."""
+        arguments = self.arguments(self.case.point(task), DERIVATIVES[task])
+        algorithm = self._derivatives(task)
+        model, data = self.twin, self.data
+        return Contender(lambda: algorithm(model, data, *arguments), lambda _: self._their_slopes(task, arguments))
+
+    def _slopes_of_batch(self, task: str) -> Contender:
+        """A call for every state; what it leaves in Pinocchio's memory is read outside what is timed."""
+        states = [self.arguments(x, DERIVATIVES[task]) for x in self.case.points(task).T]
+        algorithm = self._derivatives(task)
+        model, data = self.twin, self.data
+
+        def run() -> None:
+            for q, v, last in states:
+                algorithm(model, data, q, v, last)
+
+        def result(_: None) -> Array:
+            rows = []
+            for arguments in states:
+                algorithm(model, data, *arguments)
+                rows.append(self._their_slopes(task, arguments))
+            return np.array(rows).T
+
+        return Contender(run, result, len(states))
+
+    def _derivatives(self, task: str) -> Callable[..., Any]:
+        """Pinocchio's function. Raises UnavailableError for a model that has more than it knows."""
         stretched = self.stiffness != 0.0
         if any([stretched[place.u].any() for place in self.balls]):
             raise UnavailableError("has no slopes of the springs of ball joints")
-        pin = self.pinocchio
-        result: Callable[..., Any] = {
-            "derivatives": pin.computeABADerivatives,
-            "inverse-derivatives": pin.computeRNEADerivatives,
-        }[task]
-        return result
+        derivatives: Callable[..., Any] = getattr(
+            self.pinocchio, f"compute{'ABA' if task == 'derivatives' else 'RNEA'}Derivatives"
+        )
+        return derivatives
 
-    def _with_passive(self, q: Array, v: Array, last: Array, task: str) -> Array:
-        """Our derivatives of those in Pinocchio's data."""
+    def _their_slopes(self, task: str, arguments: tuple[Array, Array, Array]) -> Array:
+        """What the last call has left, in our order."""
         forward, n, data = task == "derivatives", self.case.n, self.data
         if forward:
             found = data.ddq_dq, data.ddq_dv, _symmetric(data.Minv)
         else:
             found = data.dtau_dq, data.dtau_dv, _symmetric(data.M)
-        rows = self.of.our_slopes(q, v, last, data.ddq if forward else data.tau, found, forward=forward)
+        rows = self.of.our_slopes(*arguments, data.ddq if forward else data.tau, found, forward=forward)
         by_q, by_u, by_last = (rows[:, k * n : (k + 1) * n] for k in range(3))
         passive = -by_last if forward else np.eye(n)
-        return np.hstack([by_q + passive * self.stiffness, by_u + passive * self.damping, by_last])
-
-    def _slopes(self, task: str) -> Contender:
-        """The derivatives of rnea or aba; those of dampers and springs are added outside what is timed."""
-        q, v, last = self.arguments(self.case.point(task), DERIVATIVES[task])
-        algorithm, model, data = self._algorithm(task), self.twin, self.data
-        return Contender(
-            lambda: algorithm(model, data, q, v, last), lambda _: self._with_passive(q, v, last, task).ravel()
-        )
+        return np.hstack([by_q + passive * self.stiffness, by_u + passive * self.damping, by_last]).ravel()
 
     def _step(self) -> Contender:
         """RK4 in Python over aba."""

@@ -107,7 +107,7 @@ def reference(
         def run(wanted: int) -> tuple[list[list[Number]], str]:
             return solver(graph, start.states, x, times, values, wanted)
 
-        return _converged(run, times, digits, FIRST[method](digits))
+        return _converged(run, times, digits, FIRST[method](digits), start.states)
 
     if folder is None:
         return solve()
@@ -116,14 +116,18 @@ def reference(
 
 
 def _converged(
-    run: Callable[[int], tuple[list[list[Number]], str]], times: Sequence[float], digits: int, first: int
+    run: Callable[[int], tuple[list[list[Number]], str]],
+    times: Sequence[float],
+    digits: int,
+    first: int,
+    states: Sequence[str],
 ) -> Reference:
     wanted = max(first, FEWEST)
     before, _ = run(wanted)
     step = STEP
     while (wanted := wanted + step) <= MOST:
         rows, how = run(wanted)
-        error = _difference(before, rows)
+        error, state = max(zip(_differences(before, rows), states, strict=True))
         if error <= 10.0**-digits:
             how = f"{how}; error: its difference from a run with 10^{step} times the tolerance"
             written = digits + SPARE
@@ -131,15 +135,19 @@ def _converged(
             return from_text(times, [[text(value, written) for value in row] for row in rows], error, how)
         missing = digits + math.log10(error) if error < math.inf else digits
         before, step = rows, max(STEP, math.ceil(missing))
-    raise ReferenceFailedError(f"{MOST} digits are not enough for {digits} digits at t = {times[-1]:.6g}")
+    raise ReferenceFailedError(
+        f"{MOST} digits are not enough for {digits} digits at t = {times[-1]:.6g}: the last two runs differ by "
+        f"{error:.0e} of the largest value of {state}, so that it is zero but for rounding, or the start does "
+        "not decide it, as beyond a configuration where a linkage can go on in two ways"
+    )
 
 
-def _difference(a: list[list[Number]], b: list[list[Number]]) -> float:
-    """The largest difference, relative to the largest value of the same state in b."""
-    worst = 0.0
+def _differences(a: list[list[Number]], b: list[list[Number]]) -> list[float]:
+    """Of each state the largest difference, relative to the largest value of it in b."""
+    result = []
     for first, second in zip(zip(*a, strict=True), zip(*b, strict=True), strict=True):
         largest = max([abs(value) for value in second])
         difference = max([abs(p - q) for p, q in zip(first, second, strict=True)])
         relative = float(difference / largest) if largest != 0 else float(difference)
-        worst = max(worst, relative) if relative == relative else math.inf
-    return worst
+        result.append(relative if relative == relative else math.inf)
+    return result

@@ -21,6 +21,7 @@ from .taylor_series import Series
 GUARD = 12  # digits of arithmetic beyond the tolerance
 SAMPLES = 16  # places in a step at which a switch is looked for
 STUCK = 3  # steps of no length one after another
+PROBE, MANY = 50, 1e6  # steps between looks at how many there will be, and how many are too many
 SMALLEST = -1000.0  # log2 of a step that no motion needs
 
 
@@ -39,8 +40,8 @@ def taylor(
     """The states at `times` from `start` at t = 0, with a relative truncation error of 10^-digits a step.
 
     Where a piecewise operation switches, the step ends there. Returns rows of numbers, and a sentence on the run.
-    Raises ReferenceFailedError when the solution leaves the domain of f, runs into a singularity, or slides along a
-    switch.
+    Raises ReferenceFailedError when the solution leaves the domain of f, runs into a singularity, slides along a
+    switch, or would take more than a million steps.
     """
     order = math.ceil(1.15 * digits) + 2
     with working(digits + GUARD) as number:
@@ -67,6 +68,12 @@ def taylor(
                 h = times[-1] - t
             x, t = [_at(row, h) for row in coefficients], (t + h).mid()
             steps += 1
+            if steps % PROBE == 0 and steps * abs(times[-1]) > MANY * abs(float(t)):
+                raise ReferenceFailedError(
+                    f"the first {steps} steps come to t = {float(t):.3g} s, so that {times[-1]:g} s would take some "
+                    f"{steps * times[-1] / float(t):.0e}: the motion is too fast for so long a time, or starts near a "
+                    "singularity, as where a linkage is folded"
+                )
         return rows, f"Taylor series of order {order}, {steps} steps"
 
 

@@ -14,10 +14,14 @@ from cgraph.extend import real_number
 
 from ..equations.equations_of_motion import forward_dynamics
 from ..equations.formulations import inverse_dynamics, spurious_nodes
+from ..equations.state_equation import state_equation
+from ..equations.torque_decomposition import torque_by_link
 from ..multibody.display_units import display_units
 from ..multibody.joint_positions import Skeleton, skeleton
 from ..simulation.simulate import simulate
+from ..systems.display_names import display_names
 from ..systems.system import System
+from .elimination import EliminationStep, elimination
 from .scenes import Scene
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -27,12 +31,13 @@ DT = 1e-3  # s, the step that the embedded formulations take
 
 
 class Equations(NamedTuple):
-    """A graph of the equations.  about: what to see.  marked: spurious nodes."""
+    """A graph of the equations.  about: what to see.  marked: spurious nodes.  steps: of an elimination."""
 
     name: str
     graph: Graph
     about: str
     marked: frozenset[Node]
+    steps: tuple[EliminationStep, ...] = ()
 
 
 class Shares(NamedTuple):
@@ -72,15 +77,18 @@ def inspection(
 ) -> Inspection:
     """The scene's inverse dynamics by the three formulations, or its forward dynamics, along its free motion.
 
-    say: told of each stage before it begins.
+    Of an OdeSystem it is the state equation.  say: told of each stage before it begins.
 
     Raises ValueError for t_end out of range, and as `simulate` does.
     """
-    system, end = scene.system, scene.t_end if t_end is None else real_number("t_end", t_end)
+    end = scene.t_end if t_end is None else real_number("t_end", t_end)
     if not 0.0 < end < np.inf:
         raise ValueError(f"t_end must be positive and finite, got {end!r} s")
     frames = int(min(FRAMES, max(2.0, RATE * end))) if np.isfinite(end) else 2
     times = np.linspace(0.0, end, frames) if end > 0.0 else None
+    if scene.ode is not None:
+        return _first_order(scene, end, times)
+    system = scene.system
     say(f"{scene.name}: deriving the equations of {system.n} coordinates, compiling them, and a motion of {end:g} s")
     run = simulate(system, scene.q, scene.qd, end, "dopri5", rtol=1e-6, t_eval=times)
     say(f"{scene.name}: deriving forward dynamics")
@@ -90,10 +98,14 @@ def inspection(
     if forward:
         about = "Accelerations from torques: solved joint by joint from the tip to the base, then back out to the tip."
         about += " With them come the forces that hold the constraints." if system.constraints else ""
-        versions = [Equations("forward dynamics", rate, about, frozenset())]
+        versions = [
+            Equations("forward dynamics", rate, about, frozenset(), tuple(elimination(rate, display_names(scene))))
+        ]
     else:
         found = rate.evaluate({name: state[name] for name in rate.input_names})
         qdd = np.stack([np.broadcast_to(found[f"qdd{i}"], len(run.t)) for i in range(system.n)], axis=1)
+        if not np.isfinite(qdd).all():
+            raise ValueError(f"{scene.name} has accelerations that are not finite: the motion {run.stats.message}")
         state |= _named(qdd=qdd) | {"dt": DT}
         versions = []
         for name in FORMULATIONS:
@@ -104,10 +116,22 @@ def inspection(
     stopped = "" if run.stats.success else run.stats.message
     units = {} if scene.mechanism is None else display_units(scene.mechanism.moving)
     graphs = [each.graph for each in versions] + [each for each in (derived,) if each]
+    graphs += [places.graph] if places is not None else []
     inputs = {name for graph in graphs for name in graph.input_names}
     at = {name: value for name, value in state.items() if name in inputs}
     units = units | {"t": "s", "dt": "s"}
     return Inspection(tuple(versions), run.t, places, at, derived, shares, stopped, units)
+
+
+def _first_order(scene: Scene, end: float, times: Array | None) -> Inspection:
+    graph = state_equation(scene)
+    run = simulate(scene, scene.q, None, end, "dopri5", rtol=1e-6, t_eval=times)
+    state = dict(zip(scene.coordinates, run.q.T, strict=True)) | dict(scene.parameters) | {"t": run.t}
+    about = f"The rates of {len(scene.coordinates)} states: {len(graph.nodes)} nodes."
+    at = {name: state[name] for name in graph.input_names}
+    stopped = "" if run.stats.success else run.stats.message
+    version = Equations("state equation", graph, about, frozenset())
+    return Inspection((version,), run.t, None, at, stopped=stopped, units={"t": "s"})
 
 
 def _derived(system: System) -> Graph:
@@ -142,27 +166,12 @@ def _named(**tables: Array) -> dict[str, Any]:
 
 
 def _shares(scene: Scene) -> Shares | None:
-    """Inverse dynamics of each partial Lagrangian alone, which adds up to the whole but for damping and forces."""
+    """What each partial Lagrangian takes of the torques, and damping and forces where there are any; the sum of all."""
     system, mechanism = scene.system, scene.mechanism
-    parts = system.partial_lagrangians
-    if len(parts) < 2 or (mechanism is not None and mechanism.base_parameters):
+    if len(system.partial_lagrangians) < 2 or (mechanism is not None and mechanism.base_parameters):
         return None
-    names = [body.name for body in mechanism.moving] if mechanism is not None else []
-    if len(names) != len(parts):
-        names = [f"link {i + 1}" for i in range(len(parts))]
-
-    def torques(model: System) -> list[Node]:
-        graph = inverse_dynamics(model)
-        return [graph.outputs[f"tau{i}"] for i in range(system.n)]
-
-    # the parts are nodes over the system's own variables, so a function that gives one makes a system of it
-    quasi = system.kinematics.quasi
-    columns = [
-        torques(System(lambda *_, part=part: part, system.coordinates, system.parameters, quasi_velocities=quasi))
-        for part in parts
-    ]
-    whole = inverse_dynamics(system)
-    every = [whole.outputs[f"tau{i}"] for i in range(system.n)]
-    columns += [[tau - sum(own) for tau, own in zip(every, zip(*columns, strict=True), strict=True)], every]
+    table, whole = torque_by_link(system), inverse_dynamics(system)
+    columns = [[table.graph.outputs[f"tau{i}_{k}"] for i in range(system.n)] for k in range(len(table.rows))]
+    columns.append([whole.outputs[f"tau{i}"] for i in range(system.n)])
     outputs = {f"tau{i}_part{k}": node for k, column in enumerate(columns) for i, node in enumerate(column)}
-    return Shares(Graph(whole.inputs, outputs), (*names, "damping and forces", "all"))
+    return Shares(Graph(whole.inputs, outputs), (*table.rows, "all"))

@@ -17,7 +17,7 @@ from ..equations.equations_of_motion import gravity_force, momentum
 from ..equations.formulations import momentum_rate
 from ..equations.state_equation import state_equation, state_inputs
 from ..multibody.display_units import display_units
-from ..multibody.joint_positions import places, view
+from ..multibody.joint_positions import drawn_points, view
 from ..multibody.mechanism import Mechanism
 from ..simulation.simulate import simulate
 from ..simulation.trajectory import SimulationWarning
@@ -131,7 +131,7 @@ def _places(scene: Scene, rate: Graph, start: dict[str, float]) -> tuple[dict[st
     if scene.mechanism is None:
         return {}, ()
     inputs = dict(zip(rate.input_names, rate.inputs, strict=True))
-    marks = places(scene.mechanism)
+    marks = drawn_points(scene.mechanism)
     graphs = [scene.mechanism.position(body, at) for body, at, _ in marks]
     turns = np.linspace(0.0, 3.0, SAMPLES)
     at = {name: start[name] + np.sin((k + 2.0) * turns) for k, name in enumerate(start)}

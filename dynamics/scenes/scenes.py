@@ -157,10 +157,25 @@ _SUFFIXES = (".xml", ".urdf")
 
 
 def of_file(path: str | os.PathLike[str], ignore: bool = False, floating: bool = False) -> Scene:
-    """The mechanism of a file, MJCF or URDF, at rest where the file has it; named as the file is, without its suffix.
+    """The mechanism of a model file, at rest where the file has it, named as the file is without its suffix.
 
-    ignore: leave out what a mechanism cannot have; `left_out` says what.  floating: of URDF, whether the root link
-    moves freely. Raises as `load_mjcf` and `load_urdf` do, and for `floating` of MJCF.
+    Parameters
+    ----------
+    path : str or path
+        MJCF or URDF.
+    ignore : bool
+        Leave out what a mechanism cannot have; `left_out` says what.
+    floating : bool
+        Of URDF, whether the root link moves freely.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    ValueError
+        As `load_mjcf` and `load_urdf` do, and for `floating` of MJCF.
     """
     mechanism, q = load_at_start(path, ignore=ignore, floating=floating)
     about = f"{len(mechanism.moving)} moving bodies of {os.fspath(path)}"
@@ -168,9 +183,30 @@ def of_file(path: str | os.PathLike[str], ignore: bool = False, floating: bool =
 
 
 def of_model(model: Model, name: str = "model") -> Scene:
-    """A model at rest at its zero, of which a ball or free joint's is no turn, watched for 3 s; a scene as it is.
+    """The scene of a model: at rest at its zero, watched for 3 s.
 
-    Raises TypeError for what is no model.
+    Parameters
+    ----------
+    model : Model
+        A System, an OdeSystem or a Mechanism; a Scene is given back as it is.
+    name : str
+        What pages and files call it.
+
+    Returns
+    -------
+    Scene
+        Quaternions of ball and free joints start as no turn.
+
+    Raises
+    ------
+    TypeError
+        For what is no model.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> dyn.scenes.of_model(dyn.planar_arm([1.0, 0.5], [1.0, 0.8])).q
+    (0.0, 0.0)
     """
     if all([hasattr(model, each) for each in ("model", "t_end")]):
         return model  # type: ignore[return-value]  # with the attributes of a scene
@@ -182,7 +218,14 @@ def of_model(model: Model, name: str = "model") -> Scene:
 
 
 def is_model_file(name: object) -> bool:
-    """Whether a name stands for a model file, MJCF or URDF."""
+    """Whether a name stands for a model file, MJCF or URDF: it ends in .xml or .urdf, or is there as a file.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> dyn.scenes.is_model_file("robot.urdf"), dyn.scenes.is_model_file("chain")
+    (True, False)
+    """
     if not (isinstance(name, str | os.PathLike) and name) or name in _SCENES or is_python(os.fspath(name)):
         return False
     return Path(name).suffix.lower() in _SUFFIXES or Path(name).exists()
@@ -198,14 +241,33 @@ def names() -> list[str]:
 
 
 def load(name: str | os.PathLike[str], /, **options: Any) -> Scene:
-    """The scene of a name, of the MJCF or URDF file at a path, or of a model in Python; options go to its function.
+    """The scene of a name, of the MJCF or URDF file at a path, or of a model in Python.
 
-    As in `load("chain", n=20)`, `load("robot.xml", ignore=True)` and `load("arm.py:system")`. A path is what ends in
-    .xml or .urdf, or is there as a file. FILE.py:NAME and MODULE:NAME are any model, a scene, or a function without
-    arguments that returns one: the file is executed, so that it must be one that you trust.
+    Parameters
+    ----------
+    name : str or path
+        One of `names()`, "robot.xml", or a model in Python as "arm.py:system" or "package.module:system": any model, or
+        a function without arguments that returns one. The file is executed, so that it must be one that you trust.
+    **options
+        Of the scene's function, as `load("chain", n=20)`, or of a model file, `load("robot.xml", ignore=True)`.
 
-    Raises ValueError for a name that is neither, for a Python file without that model or that raises, TypeError for an
-    option that its function has not, and as `of_file`.
+    Returns
+    -------
+    Scene
+        A model that has no start of its own is at rest, at its zero or where its file has it.
+
+    Raises
+    ------
+    ValueError
+        For a name that is none of these, a Python file without that model or that raises, and as `of_file` does.
+    TypeError
+        For an option that the scene's function has not.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> dyn.scenes.load("chain", n=2).coordinates
+    ('joint 1', 'joint 2')
     """
     make: Callable[..., Scene]
     if isinstance(name, str) and name in _SCENES:

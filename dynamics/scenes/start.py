@@ -18,7 +18,8 @@ from .scenes import Scene
 
 Known = TypeVar("Known", bound=Scene)
 Start = Mapping[str, float] | Sequence[float]
-AWAY = 0.5  # rad, and the unit of any other coordinate: how far from a place of rest a motion starts
+AWAY, IN_ALL = 0.5, np.pi  # rad, and the unit of any other coordinate: how far from a place of rest a motion starts
+SHOWN = 4  # values of a start that a line of text names
 _ROUNDING = 1e-9  # of the largest acceleration nearby: less is what is left of a difference
 
 
@@ -53,7 +54,8 @@ def with_start(scene: Known, start: Start) -> Known:
 def moving_start(scene: Scene) -> Scene:
     """The scene; where it would rest at its start for ever, from a start that shows something.
 
-    That is half a radian from there at every joint, or half a unit of coordinates without one, or such a velocity.
+    That is half a radian from there at every joint, of many joints half a turn in all, or half a unit of coordinates
+    without one, or such a velocity.
     """
     if any(scene.qd):
         return scene
@@ -70,7 +72,7 @@ def moving_start(scene: Scene) -> Scene:
 def start_text(scene: Scene) -> str:
     """`q.shoulder=0.5, qd.elbow=0.5`: what of the start is not zero."""
     shown = [f"{name}={value:.4g}" for name, value in zip(_names(scene), (*scene.q, *scene.qd), strict=True) if value]
-    return ", ".join(shown[:12] + ([f"and {len(shown) - 12} more"] if len(shown) > 12 else [])) or "0"
+    return ", ".join(shown[:SHOWN] + ([f"and {len(shown) - SHOWN} more"] if len(shown) > SHOWN else [])) or "0"
 
 
 def _names(scene: Scene) -> list[str]:
@@ -90,10 +92,11 @@ def _meant(scene: Scene) -> dict[str, int]:
 def _nearby(scene: Scene) -> list[Scene]:
     """The scene a little away from its start, at rest and then moving; only from what can be reached."""
     units = {} if scene.mechanism is None else display_units(scene.mechanism.moving)
-    away = [AWAY * (units.get(f"q{i}", "rad") == "rad") for i in range(len(scene.q))]
-    q = tuple([value + step for value, step in zip(scene.q, away, strict=True)])
+    step = min(AWAY, IN_ALL / len(scene.q))
+    away = [step * (units.get(f"q{i}", "rad") == "rad") for i in range(len(scene.q))]
+    q = tuple([value + more for value, more in zip(scene.q, away, strict=True)])
     starts = []
-    for qd in ((0.0,) * len(scene.qd), (AWAY,) * len(scene.qd)):
+    for qd in ((0.0,) * len(scene.qd), (step,) * len(scene.qd)):
         try:
             place, velocity = (q, qd) if scene.ode else consistent_state(scene, q, qd)
         except (ValueError, ArithmeticError):

@@ -19,6 +19,8 @@ from .row_values import row_values
 from .sampled_controller import HeldForces
 from .solution import Solution
 
+_ROWS = 10_000  # of a text, written at once
+
 
 class SimulationWarning(UserWarning):
     """A run that has ended, but whose result should not be trusted as it is; `Stats.warnings` has the same text.
@@ -250,7 +252,9 @@ class Trajectory:
         text = io.StringIO()
         rows = csv.writer(text, lineterminator="\n")
         rows.writerow(names)
-        rows.writerows(np.concatenate(columns, axis=1).tolist())
+        table = np.concatenate(columns, axis=1)
+        for i in range(0, len(table), _ROWS):  # as Python's numbers they are four times as large
+            rows.writerows(table[i : i + _ROWS].tolist())
         return text.getvalue()
 
     @cached_property

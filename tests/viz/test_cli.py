@@ -21,7 +21,8 @@ import viz
 from dynamics import scenes
 from dynamics.scenes import scenes as registry
 from viz import cli
-from viz.commands.parser import COMMANDS, parse
+from viz.commands.arguments import IN_PYTHON
+from viz.commands.parser import COMMANDS, parse, parser
 
 
 def run(*arguments: str, cwd=None) -> subprocess.CompletedProcess[str]:
@@ -148,6 +149,18 @@ def test_every_command_is_in_the_help_and_has_help(capsys):
     for name in NAMES:
         assert re.search(rf"^    {name}\s", shown[""], re.MULTILINE), name
         assert shown[name].startswith(f"usage: cgraph {name} ")
+
+
+def test_every_command_that_takes_a_scene_says_that_a_python_file_will_do():
+    (commands,) = [action for action in parser()._actions if isinstance(action.choices, dict)]
+    taking = {
+        name: action.help
+        for name, command in commands.choices.items()
+        for action in command._actions
+        if "SCENE" in str(action.metavar) and not action.option_strings
+    }
+    assert {"inspect", "simulate", "animate", "lint", "why", "draw", "certify", "compare", "report"} <= set(taking)
+    assert [name for name, said in taking.items() if IN_PYTHON not in said] == []
 
 
 def test_every_file_of_commands_is_listed_or_helps_one_that_is():

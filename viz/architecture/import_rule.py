@@ -22,11 +22,13 @@ TABLE = {
     ),
     "viz": (
         "theme <- graph_drawing, plots <- pages <- inspector, paper <- models <- commands <- cli <- __main__",
+        "theme <- animation <- models",
         "graph_drawing <- architecture <- commands",
         "theme <- live <- inspector",
+        "inspector <- lessons <- commands",
     ),
     "": (
-        "cgraph <- dynamics <- viz.paper, viz.models, viz.commands",
+        "cgraph <- dynamics <- viz.paper, viz.models, viz.lessons, viz.commands",
         "cgraph <- viz",
     ),
 }  # fmt: skip

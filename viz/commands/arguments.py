@@ -14,7 +14,7 @@ from typing import Any
 
 from cgraph import Graph
 from cgraph.extend import check_writable, write_files
-from dynamics import FORMULATIONS, forward_dynamics, inverse_dynamics, scenes
+from dynamics import FORMULATIONS, forward_dynamics, inverse_dynamics, scenes, state_equation
 
 from ..graph_drawing.dot import to_dot
 from ..graph_drawing.render import check_can_draw, render_svg, tags_to_collapse
@@ -25,10 +25,14 @@ READING = ("ignore", "floating")  # options of `scenes.of_file`
 IN_PYTHON = "file.py:name, a model of a Python file, which is executed"
 
 
-def takes_a_scene(command: argparse.ArgumentParser) -> None:
-    """The arguments that `scene_of` reads."""
+def takes_a_scene(command: argparse.ArgumentParser, default: str | None = None) -> None:
+    """The arguments that `scene_of` reads.  default: the scene where none is named."""
     command.add_argument(
-        "scene", metavar="SCENE", help=f"{', '.join(scenes.names())}, a model file, MJCF or URDF, or {IN_PYTHON}"
+        "scene",
+        metavar="SCENE",
+        nargs=None if default is None else "?",
+        default=default,
+        help=f"{', '.join(scenes.names())}, a model file, MJCF or URDF, or {IN_PYTHON}",
     )
     reads_files(command)
 
@@ -106,7 +110,12 @@ def takes_equations(command: argparse.ArgumentParser) -> None:
 
 
 def equations_of(options: argparse.Namespace, scene: scenes.Scene) -> tuple[Graph, str]:
-    """The graph that the arguments choose, and what it is: "inverse dynamics, chain rule"."""
+    """The graph that the arguments choose, and what it is: "inverse dynamics, chain rule".
+
+    Of an OdeSystem it is the state equation.
+    """
+    if scene.ode is not None:
+        return state_equation(scene), "state equation"
     if options.forward:
         return forward_dynamics(scene), "forward dynamics"
     graph = inverse_dynamics(scene, options.formulation)
@@ -178,6 +187,8 @@ def collapsed(graph: Graph) -> list[str]:
 
 def state_names(graph: Graph, scene: scenes.Scene) -> tuple[list[str], list[str]]:
     """Names of the coordinates and of the velocities that the graph has, as inputs or as inner nodes."""
+    if scene.ode is not None:
+        return [], []
     known = {node.name for node in (*graph.inputs, *graph.nodes)}
     q, qd = ([str(node.name) for node in nodes if node.name in known] for nodes in (scene.system.q, scene.system.qd))
     return q, qd

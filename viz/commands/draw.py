@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cgraph import Graph
 from cgraph.extend import check_writable
-from dynamics import display_names, spurious_nodes
+from dynamics import display_names, scenes, spurious_nodes
 
 from .. import theme
 from ..graph_drawing.dot import to_dot
@@ -48,9 +48,16 @@ def run(options: argparse.Namespace) -> None:
     graph, what = equations_of(options, scene)
     caption = f"{scene.name}: {what}"
     names = theme.called(display_names(scene))
-    content = graph.listing() if kind == ".txt" else _drawn(graph, kind, options.collapse, caption, names)
+    content = _listed(graph, scene) if kind == ".txt" else _drawn(graph, kind, options.collapse, caption, names)
     counts = graph.counts()
     answer(f"{options.out}: {counts.nodes} nodes, {counts.edges} edges", {options.out: content})
+
+
+def _listed(graph: Graph, scene: scenes.Scene) -> str:
+    """The listing, and above it what a person calls inputs and outputs."""
+    called = display_names(scene)
+    names = [name for name in (*graph.input_names, *graph.outputs) if name in called]
+    return "".join([f"# {name} is {called[name]}\n" for name in names]) + graph.listing()
 
 
 def _drawn(

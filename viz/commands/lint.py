@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 import cgraph as cg
-from dynamics import display_names, lint_constraints
+from dynamics import ConstraintLint, display_names, lint_constraints
 
 from .. import theme
 from ..models.open_loops import tree_alone
@@ -59,8 +59,9 @@ def run(options: argparse.Namespace) -> int:
         function="L",
         names=display_names(scene),
     )
-    proof = report if q and qd else f"Holds: the equations have no {'coordinates' if qd else 'velocities'}.\n{report}"
-    held = lint_constraints(scene)
+    none = "coordinates" if qd else "velocities"
+    proof = str(report) if q and qd else f"Holds: the equations have no {none}.\n{report}"
+    held = lint_constraints(scene) if scene.ode is None else ConstraintLint({}, {})
     if str(held):
         proof = f"{proof}\n{held}"
     alone = "" if options.forward else tree_alone(scene)

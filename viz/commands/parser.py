@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from cgraph import __version__
 
 from . import (
+    animate,
     architecture,
     bench,
     certify,
@@ -38,6 +39,7 @@ COMMANDS = (
     inspect,
     live,
     simulate,
+    animate,
     lint,
     why,
     compare,

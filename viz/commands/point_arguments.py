@@ -46,7 +46,7 @@ def box(text: str) -> dict[str, tuple[float, float]]:
 def filled(graph: Graph, scene: Scene, given: dict[str, float]) -> dict[str, float]:
     """The given numbers with the rest that the graph's inputs need, by the graph's names. Raises for unknown names."""
     chosen = np.random.default_rng(SEED)
-    parameters = scene.system.parameters
+    parameters = scene.parameters
     values = {}
     for name in graph.input_names:
         drawn = round(chosen.uniform(-1.0, 1.0), DIGITS)
@@ -70,12 +70,15 @@ def start(text: str) -> Start:
     return point(text) if "=" in text else [number(each) for each in text.split(",")]
 
 
-def started(options: argparse.Namespace) -> tuple[Scene, bool]:
-    """The scene that the arguments name, from the start that they name or one that shows something; True if so."""
+def started(options: argparse.Namespace, *, free: bool = True) -> tuple[Scene, bool]:
+    """The scene that the arguments name, from the start that they name or one that shows something; True if so.
+
+    free: whether nothing drives it, so that it may rest for ever.
+    """
     scene = scene_of(options)
     if options.start is not None:
         return with_start(scene, options.start), False
-    moving = moving_start(scene)
+    moving = moving_start(scene) if free else scene
     if moving is not scene:
         say(f"{scene.name}: at rest nothing moves, so it starts at {start_text(moving)}; --start chooses another")
     return moving, moving is not scene

@@ -16,7 +16,7 @@ from .point_arguments import started, takes_a_start
 
 METHOD = "dop853"
 SHOWN = 12  # states that the summary names
-MOST_ROWS = 10_000_000
+MOST_ROWS = 1_000_000
 
 
 def add(commands: Commands[argparse.ArgumentParser]) -> None:

@@ -43,6 +43,7 @@ class _Subject:
 
     graph: Graph
     names: Mapping[str, str]
+    formulas: Mapping[Node, str]
     marks: Mapping[Node, Paint]
     marked_edges: frozenset[Edge]
     number: dict[Node, int]
@@ -71,6 +72,7 @@ class _Subject:
 def plan_of(
     graph: Graph,
     names: Mapping[str, str],
+    formulas: Mapping[Node, str],
     marks: Mapping[Node, Paint],
     marked_edges: frozenset[Edge],
     cluster_of: ClusterRule,
@@ -81,7 +83,7 @@ def plan_of(
     strange = [node for node in marks if node not in number]
     if strange:
         raise ValueError(f"{len(strange)} of {len(marks)} marked nodes are not in the graph, such as {strange[0]!r}")
-    subject = _Subject(graph, names, marks, marked_edges, number, _parts(graph, collapse), Names(graph))
+    subject = _Subject(graph, names, formulas, marks, marked_edges, number, _parts(graph, collapse), Names(graph))
     plan = Plan()
     plan.boxes.extend(_part_boxes(subject, collapse))
     for node in graph.nodes:
@@ -132,7 +134,7 @@ def _part_boxes(subject: _Subject, collapse: Sequence[str]) -> Iterator[Box]:
 
 def _node_box(subject: _Subject, node: Node, box_id: str, cluster: str | None) -> Box:
     kind = subject.kind(node)
-    name = subject.shown(node.name) if node.name else ""
+    name = subject.shown(node.name) if node.name else subject.formulas.get(node, "")
     if node.value is not None:
         look, label = _CONSTANT, f"{node.value:.4g}"
     elif not node.args:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 from cgraph import Edge, Graph, Node
-from cgraph.extend import require_choice, require_flag, require_graph, require_sequence, require_texts
+from cgraph.extend import require_choice, require_flag, require_graph, require_mapping, require_sequence, require_texts
 
 from .. import theme
 from ..theme import Paint
@@ -24,6 +24,7 @@ def to_dot(
     graph: Graph,
     *,
     names: Mapping[str, str] | None = None,
+    formulas: Mapping[Node, str] | None = None,
     marked: Collection[Node] | Mapping[str, Collection[Node]] = frozenset(),
     marked_label: str = theme.MARKED.words,
     marked_edges: Collection[Edge] = frozenset(),
@@ -50,6 +51,8 @@ def to_dot(
         What is drawn, its inputs at the bottom.
     names : mapping of str to str, optional
         {name of an input, an output or a node: text to show}. Other names are shown by `theme.pretty`, q0 as q₀.
+    formulas : mapping of Node to str, optional
+        {node without a name: text to show above its symbol}, such as of `short_formulas`.
     marked : collection of Node, or mapping of str to collection of Node
         Nodes to draw thick in the one color of what is wrong, with the edges out of them; or
         {what the legend calls them: nodes} for two groups, the second in another color.
@@ -99,6 +102,7 @@ def to_dot(
     plan = plan_of(
         graph,
         require_texts("names", names),
+        {} if formulas is None else require_mapping("formulas", formulas, "node: text"),
         _marks(marked, marked_label),
         _edges(marked_edges),
         _cluster_rule(clusters),

@@ -1,6 +1,6 @@
 """The inspector: one page on which a graph is unfolded, stepped through, asked and seen moving."""
 
-from .content import Motion, StateTable, Table, Version
+from .content import Motion, StateTable, Step, Table, Version
 from .page import Page, page
 
-__all__ = ["Motion", "Page", "StateTable", "Table", "Version", "page"]
+__all__ = ["Motion", "Page", "StateTable", "Step", "Table", "Version", "page"]

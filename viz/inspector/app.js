@@ -15,6 +15,7 @@
 
 const READABLE = 100; // nodes that are drawn one by one at first
 const DRAWABLE = 2500; // more than these are never drawn one by one at once
+const BOXES = 48; // clusters that are drawn at first; of more, bodies
 const SMALL = 60; // nodes of a graph that shows its values at first
 
 function start(first = JSON.parse(byId("data").textContent)) {
@@ -45,7 +46,7 @@ function showRecord(app, record) {
   const state = makeState(record, () => stateChanged(app)); // first, so that a bad record leaves the page as it is
   const plan = makePlan(record, state.versions);
   Object.assign(app, { record, state, plan, units: new Map(record.units), from: "", seen: null, chosen: false });
-  Object.assign(app, { picked: -1, before: -1, path: null, sweep: -1, index: 0, version: state.versions[0] });
+  Object.assign(app, { picked: -1, before: -1, path: null, sweep: -1, lesson: -1, index: 0, version: state.versions[0] });
   app.largest = Math.max(...state.versions.map((version) => version.ops.length));
   byId("title").textContent = document.title = record.title;
   byId("introduction").textContent = record.introduction;
@@ -68,6 +69,7 @@ function showRecord(app, record) {
 function stateChanged(app) {
   compute(app);
   showTime(app);
+  tellLesson(app);
   if (app.playing) { showValues(app); showResults(app); } else refresh(app);
   app.callbacks.forEach((callback) => callback(app.state.values()));
 }
@@ -102,7 +104,9 @@ function firstView(app) {
   if (drawn) return view("nodes");
   const scale = (level) => fitting(size, arrange(app.plan, view(level)));
   const order = [...(app.largest <= READABLE ? ["nodes"] : []), "clusters", ...(app.plan.columns.length > 1 ? ["bodies"] : [])];
-  return view(order.find((level) => scale(level) >= READ) ?? order.sort((a, b) => scale(b) - scale(a))[0]);
+  const boxes = Math.max(...app.plan.place.map((places) => new Set(places.map((place) => app.plan.cluster[place])).size));
+  const clear = (level) => scale(level) >= READ && (level !== "clusters" || boxes <= BOXES);
+  return view(order.find(clear) ?? order.sort((a, b) => scale(b) - scale(a))[0]);
 }
 
 /** One level of detail more (1) or less (-1). */
@@ -114,7 +118,10 @@ function detail(app, way) {
   if (way < 0 && folded.size < app.plan.clusters.length && now === "clusters") to += 1; // first fold what is unfolded
   if (way > 0 && closed.size < app.plan.columns.length && now === "bodies") to = order.indexOf("clusters");
   const level = order[Math.max(0, Math.min(order.length - 1, to))];
-  if (level === "nodes" && app.largest > DRAWABLE) return;
+  if (level === "nodes" && app.largest > DRAWABLE) {
+    byId("trail").textContent = `More than ${DRAWABLE} nodes: click boxes to unfold them one by one.`;
+    return;
+  }
   Object.assign(app.view, all[level]);
   app.chosen = true;
   redraw(app, true);
@@ -146,6 +153,7 @@ function redraw(app, fit) {
 function refresh(app) {
   const bars = showValues(app);
   paintSweep(app);
+  paintLesson(app);
   paintPath(app);
   markPicked(app);
   showNode(app, bars);
@@ -172,7 +180,7 @@ function choose(app, i) {
   const places = app.plan.place[app.index];
   const keep = (node) => (node < 0 ? -1 : app.plan.place[i].indexOf(places[node]));
   const [picked, before] = [keep(app.picked), keep(app.before)];
-  Object.assign(app, { index: i, version: versions[i], picked, before, path: null, sweep: -1 });
+  Object.assign(app, { index: i, version: versions[i], picked, before, path: null, sweep: -1, lesson: -1 });
   [...byId("versions").children].forEach((button, k) => {
     button.setAttribute("aria-checked", k === i);
     button.tabIndex = k === i ? 0 : -1;
@@ -189,6 +197,7 @@ function choose(app, i) {
   if (resized && !app.chosen) app.view = firstView(app);
   redraw(app, !app.seen || resized || Boolean(app.version.drawing));
   showCounts(app);
+  makeLesson(app);
   stepTo(app, -1);
 }
 

@@ -1,11 +1,11 @@
 // Where everything is in the picture: columns by body, rows by sweep, folded or not; the same for all versions.
 
 const BOX = { width: 100, height: 28, gap: 6, title: 18, pad: 8 };
-const BODY = { width: 148, height: 48, gap: 34, beside: 26 }; // a body as one box
+const BODY = { width: 148, height: 46, gap: 28, beside: 26 }; // a body as one box
 const CELL = { gap: 22, beside: 14, title: 24, aspect: 1.35 };
 const LEAF = { height: 30, gap: 6, row: 38, sum: 42 };
 const NODE = 34; // height of a node's ellipse or box
-const FEW_LEAVES = [10, 24]; // inputs or outputs beside bodies, and beside parts of them; more of them are boxes by kind
+const FEW_LEAVES = [8, 24]; // inputs or outputs beside bodies, and beside parts of them; more of them are boxes by kind
 
 const titleOf = (cluster) => [cluster.marked ? "spurious" : "", cluster.title].filter(Boolean).join(" ");
 const widthOf = (words) => Math.max(46, 7.4 * [...words.replace(/[\u0307\u0308]/g, "")].length + 10);
@@ -21,12 +21,10 @@ function makePlan(record, versions) {
     const s = plan.place[v][source], t = plan.place[v][target], c = plan.cluster[t];
     if (c >= 0 && plan.cluster[s] === c && s < t) plan.lines[c].set(`${s} ${t}`, [s, t]);
   }));
-  plan.inputs = new Map(); // name: width
-  plan.outputs = new Map();
-  for (const version of versions) {
-    for (const [name, node] of version.inputs) if (node >= 0) plan.inputs.set(name, widthOf(version.names[node][1]));
-    for (const [name, pretty] of version.outputs) plan.outputs.set(name, widthOf(pretty) + 6);
-  }
+  plan.leaves = versions.map((version) => ({ // name: width
+    i: new Map(version.inputs.filter(([, node]) => node >= 0).map(([name, node]) => [name, widthOf(version.names[node][1])])),
+    o: new Map(version.outputs.map(([name, pretty]) => [name, widthOf(pretty) + 6])),
+  }));
   plan.sums = plan.cluster.includes(RESULT_PLACE);
   return plan;
 }
@@ -54,14 +52,17 @@ function leavesOf(widths, side, unbundled, few) {
     ? names.map((name) => [name, widths.get(name), null]) : [[key, 150, names]]));
 }
 
-/** Boxes of clusters, columns, leaves and titles. folded: clusters; closed: columns; unbundled: kinds of leaves. */
-function arrange(plan, { folded, closed, unbundled, aspect }) {
+/** Boxes of clusters, columns, leaves and titles. folded: clusters; closed: columns; unbundled: kinds of leaves.
+ *
+ * Of the versions only the leaves differ in place: each has its own, in as much room. */
+function arrange(plan, { folded, closed, unbundled, aspect }, index = 0) {
   const whole = plan.columns.length > 0 && closed.size === plan.columns.length;
-  const [inputs, outputs] = [["i", plan.inputs], ["o", plan.outputs]].map(([side, own]) => leavesOf(own, side, unbundled, FEW_LEAVES[whole ? 0 : 1]));
+  const leaves = plan.leaves.map((own) => ["i", "o"].map((side) => leavesOf(own[side], side, unbundled, FEW_LEAVES[whole ? 0 : 1])));
   const inside = whole ? overview(plan, aspect) : columnsIn(plan, folded, closed, aspect);
-  const leaves = [inputs, outputs].map((own) => own.reduce((sum, [, width]) => sum + width + LEAF.gap, 0));
-  const widest = Math.max(0, ...[...inputs, ...outputs].map(([, width]) => width));
-  const total = Math.max(inside.width, Math.min(Math.max(420, 1.05 * inside.width), ...leaves.filter((each) => each > inside.width)), widest);
+  const sums = leaves.flat().map((own) => own.reduce((sum, [, width]) => sum + width + LEAF.gap, 0));
+  const widest = Math.max(0, ...leaves.flat(2).map(([, width]) => width));
+  const total = Math.max(inside.width, Math.min(Math.max(420, 1.05 * inside.width), Math.max(...sums)), widest);
+  const [inputs, outputs] = leaves[index];
   const top = leafLines(outputs, total, 8, plan.sums ? LEAF.sum : 0);
   const shift = (box) => ({ ...box, x: box.x + (total - inside.width) / 2, y: box.y + top.end + 4 });
   const bottom = leafLines(inputs, total, top.end + inside.height + 14, 0);

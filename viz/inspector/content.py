@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,22 +15,38 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 UNKNOWN = 0.5  # an input's value where none is given: a product with 0 would show nothing
 
 
+class Step(NamedTuple):
+    """A step of what the page explains.  words: what is done.  nodes: computed in it.  value: its result.
+
+    joint: the number of the velocity that it is about, whose joint the picture of the motion shows; -1 for none.
+    """
+
+    words: str
+    nodes: Sequence[Node]
+    value: Node
+    joint: int = -1
+
+
 @dataclass(frozen=True, eq=False)
 class Version:
     """One of the graphs that the page switches among, and what to see in it.
 
-    about: a sentence or two.  marked: nodes in the one color of what is wrong.
+    about: a sentence or two.  marked: nodes in the one color of what is wrong.  steps: to be gone through one by one.
     """
 
     name: str
     graph: Graph
     about: str = ""
     marked: Collection[Node] = frozenset()
+    steps: Sequence[Step] = ()
 
     def check(self) -> None:
-        """Raises ValueError for a marked node that is not in the graph."""
-        if strange := set(self.marked) - set(self.graph.nodes):
-            raise ValueError(f"version {self.name!r}: {next(iter(strange))!r} is marked, but not in its graph")
+        """Raises ValueError for a marked node, or one of a step, that is not in the graph."""
+        known = set(self.graph.nodes)
+        stepped = {node for step in self.steps for node in (*step.nodes, step.value)}
+        for what, nodes in (("marked", set(self.marked)), ("in a step", stepped)):
+            if strange := nodes - known:
+                raise ValueError(f"version {self.name!r}: {next(iter(strange))!r} is {what}, but not in its graph")
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,11 +94,17 @@ class Motion:
     """The instants that the page plays, and points that move, drawn beside the graph as sticks.
 
     t: (T,) [s].  points: (T, k, 2) [m], x to the right, y up, or None.  parents: (k,), the point each hangs on, or -1.
+    places: the points as a graph of inputs of the state, outputs x0, y0, x1, .., shown when a person changes the state.
+    joints: for every velocity the point where its joint is.  turns: whether it turns what is seen, 1 counterclockwise, -1
+    the other way, or 0: torques are painted at the first two.
     """
 
     t: Array
     points: Array | None = None
     parents: Sequence[int] = ()
+    places: Graph | None = None
+    joints: Sequence[int] = ()
+    turns: Sequence[int] = ()
 
     def check(self) -> None:
         """Raises ValueError for shapes that do not fit, or values that are not finite."""
@@ -95,6 +117,13 @@ class Motion:
             raise ValueError(f"a motion needs finite points (T, k, 2) = {wanted}, got shape {self.points.shape}")
         if any(not -1 <= parent < i for i, parent in enumerate(self.parents)):
             raise ValueError(f"parents must be -1 or an earlier point, got {list(self.parents)}")
+        if any(not 0 <= joint < len(self.parents) for joint in self.joints):
+            raise ValueError(f"joints must be points, 0 to {len(self.parents) - 1}, got {list(self.joints)}")
+        if self.turns and (len(self.turns) != len(self.joints) or set(self.turns) - {-1, 0, 1}):
+            raise ValueError(f"turns must be 1, -1 or 0 for {len(self.joints)} joints, got {list(self.turns)}")
+        wanted_names = [f"{axis}{i}" for i in range(len(self.parents)) for axis in "xy"]
+        if self.places is not None and list(self.places.outputs) != wanted_names:
+            raise ValueError(f"places must have the outputs x0, y0, .. of {len(self.parents)} points")
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,7 @@ function letGo(app) {
   clear(app, "found");
   Object.assign(app, { picked: -1, before: -1, path: null });
   stepTo(app, -1);
+  teach(app, -1);
   trace(app, null);
   refresh(app);
 }
@@ -81,6 +82,9 @@ function listen(app) {
     goTo(app, node);
     find(app, byId("search").value);
   };
+  byId("lessonback").onclick = () => teach(app, app.lesson - 1);
+  byId("lessonon").onclick = () => teach(app, app.lesson + 1);
+  byId("lessonstep").oninput = () => teach(app, +byId("lessonstep").value - 1);
   byId("sweep").oninput = () => stepTo(app, +byId("sweep").value);
   byId("from").onchange = () => { app.from = byId("from").value; refresh(app); stepTo(app, app.sweep); };
   byId("time").oninput = () => { play(app, false); app.state.show(+byId("time").value); };

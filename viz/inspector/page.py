@@ -22,8 +22,9 @@ from .operations import operations
 from .record import record
 
 SCRIPTS = (
-    "elements.js", "values.js", "state.js", "paths.js", "formula.js", "layers.js", "places.js", "arrange.js",
-    "picture.js", "view.js", "marks.js", "panels.js", "sweeps.js", "arm.js", "motion.js", "keys.js", "app.js",
+    "elements.js", "values.js", "state.js", "paths.js", "formula.js", "layers.js", "places.js",
+    "arrange.js", "picture.js", "view.js", "marks.js", "panels.js", "sweeps.js", "lesson.js", "arm.js", "motion.js",
+    "keys.js", "app.js",
 )  # fmt: skip
 FRAME_HEIGHT = 720  # pixels in a notebook
 # Nothing may be fetched, and no script or style runs but the page's own, known by its digest.
@@ -195,4 +196,5 @@ def _colors() -> str:
     """The theme's colors as the style sheet names them."""
     roles = {role: paint.line for role, paint in theme.ROLES.items()} | {"input": theme.YELLOW}
     names = roles | {"wrong": theme.SPURIOUS, "up": theme.BLUE, "down": theme.GREEN, "path": theme.PURPLE}
-    return ":root{" + "".join(f"--{name}:{color};" for name, color in names.items()) + "}\n"
+    parts = "".join(f".part{i}{{--c:{color}}}" for i, color in enumerate((*theme.LINKS, *theme.SERIES[1:5])))
+    return parts + ":root{" + "".join(f"--{name}:{color};" for name, color in names.items()) + "}\n"

@@ -47,15 +47,18 @@ function showWhy(app) {
   const found = heaviest(version, app.partials(), a, b, PATHS);
   head.append(`. The derivative here is ${brief(bars[a])}, the sum of their products of partials.`,
     ` ${found.length ? "The heaviest:" : "Here a partial on each is zero."}`);
-  found.forEach(({ nodes, product }) => {
+  const alike = (nodes) => found.filter((each) => each.nodes.join() === nodes.join()).length > 1;
+  found.forEach(({ nodes, slots, product }) => {
+    const words = nodes.map((node, i) => (i && alike(nodes) ? `argument ${slots[i - 1] + 1} of ` : "") + told(app, node));
     const crossed = nodes.filter((node) => version.marked.has(node)).length, on = app.path?.join() === nodes.join();
     const button = tag("button", { type: "button", class: `path${on ? " on" : ""}` },
-      `${brief(product)}: ${nodes.map((node) => told(app, node)).join(" → ")}${crossed ? `  (${crossed} spurious)` : ""}`);
+      `${brief(product)}: ${words.join(" → ")}${crossed ? `  (${crossed} spurious)` : ""}`);
     button.onclick = () => { app.path = on ? null : nodes; paintPath(app); showWhy(app); };
     byId("why").append(button);
   });
 }
 
+const namedHead = (words, ...unit) => tag("th", { scope: "row", class: words.length > 16 ? "long" : "" }, words, ...unit);
 const largestOf = (values) => values.reduce((most, value) => (Number.isFinite(value) ? Math.max(most, Math.abs(value)) : most), 0);
 
 /** Results of all versions at the one state, and what differs from the version without spurious nodes. */
@@ -67,7 +70,7 @@ function showResults(app) {
     return new Map(each.outputs.map(([name, , node]) => [name, [own[node], noise[node]]]));
   });
   const right = versions.findLastIndex((each) => !each.marked.size && versions.some((other) => other.marked.size));
-  const rows = names.map(([name, words]) => tag("tr", {}, rowHead(words, ...unitOf(app, name)), ...found.map((each) => {
+  const rows = names.map(([name, words]) => tag("tr", {}, namedHead(words, ...unitOf(app, name)), ...found.map((each) => {
     if (!each.has(name)) return tag("td", {}, "");
     const [value, noise] = each.get(name), [truth, blur] = found[right]?.get(name) ?? [value, 0];
     const off = Math.abs(value - truth) > noise + blur + OFF * Math.max(Math.abs(value), Math.abs(truth));
@@ -82,11 +85,9 @@ function showResults(app) {
 function showTables(app) {
   byId("statetables").replaceChildren(...app.state.tables.map((each) => {
     const values = app.state.evaluate(each), noise = noiseIn(app, each, values);
-    const rows = each.rows.map(([name, outputs]) => tag("tr", {}, rowHead(shownName(app, name), ...unitOf(app, name)),
+    const rows = each.rows.map(([name, outputs]) => tag("tr", {}, namedHead(shownName(app, name), ...unitOf(app, name)),
       ...outputs.map((out) => { const node = each.outputs[out][2]; return tag("td", {}, brief(values[node], noise[node])); })));
-    const made = table(each.header, rows);
-    made.prepend(tag("caption", {}, each.caption));
-    return scrolled(made);
+    return tag("div", {}, tag("h2", {}, each.caption), scrolled(table(each.header, rows)));
   }));
 }
 

@@ -24,7 +24,9 @@ function pathCount(version, source, sink) {
   return counts.get(sink) ?? 0n;
 }
 
-/** The k paths of the greatest |product of slopes|, as [{ nodes, product }]; those with a zero are left out. */
+/** The k paths of the greatest |product of slopes|, as [{ nodes, slots, product }]; those with a zero are left out.
+ *
+ * slots: by which argument each node but the first is reached. */
 function heaviest(version, slopes, source, sink, k) {
   const needed = reach(version.args, sink);
   const best = new Map([[source, [{ node: source, weight: 0, product: 1, before: null }]]]);
@@ -35,15 +37,18 @@ function heaviest(version, slopes, source, sink, k) {
       const slope = slopes[node][slot];
       if (slope === 0 || !Number.isFinite(slope)) return;
       for (const way of best.get(arg) ?? []) {
-        ways.push({ node, weight: way.weight + Math.log(Math.abs(slope)), product: way.product * slope, before: way });
+        ways.push({ node, slot, weight: way.weight + Math.log(Math.abs(slope)), product: way.product * slope, before: way });
       }
     });
     if (ways.length) best.set(node, ways.sort((a, b) => b.weight - a.weight).slice(0, k));
   }
   return (best.get(sink) ?? []).map((end) => {
-    const nodes = [];
-    for (let way = end; way; way = way.before) nodes.unshift(way.node);
-    return { nodes, product: end.product };
+    const nodes = [], slots = [];
+    for (let way = end; way; way = way.before) {
+      nodes.unshift(way.node);
+      if (way.before) slots.unshift(way.slot);
+    }
+    return { nodes, slots, product: end.product };
   });
 }
 

@@ -28,7 +28,7 @@ function draw(svg, record, plan, version, view) {
   const frames = element("g", {}, scene), lines = element("g", { class: "lines" }, scene), shapes = element("g", {}, scene);
   const canvas = { record, plan, version, view, frames, lines, shapes, items: new Map(), shownBy: [], called: new Map(record.called) };
   const own = version.drawing && !view.folded.size && !view.closed.size ? version.drawing : null;
-  const layout = own ? asLayout(own, version) : arrange(plan, view);
+  const layout = own ? asLayout(own, version) : arrange(plan, view, version.index);
   canvas.layout = layout;
   if (!own) {
     drawTitles(canvas);
@@ -83,7 +83,7 @@ function drawBodies(canvas) {
     const name = plan.columns[column] || "no tag", at = layout.bodies[column];
     const wrong = nodes.filter((node) => version.marked.has(node)).length;
     const second = wrong ? `${nodes.length}, ${wrong} spurious` : counted(nodes.length, "node");
-    const item = shape(shapes, `b${column}`, at, `body${wrong ? " wrong" : " several"}`, fitted(name, 15), second);
+    const item = shape(shapes, `b${column}`, at, `body${wrong ? " wrong" : " several"}`, fitted(name, 17), second);
     item.group.setAttribute("data-column", column);
     item.group.setAttribute("aria-label", `${name}, ${counted(nodes.length, "node")}${wrong ? `, ${wrong} spurious` : ""}, folded`);
     element("title", {}, item.group).textContent = name;
@@ -127,8 +127,8 @@ function drawClusters(canvas) {
       element("text", { x: at.x + 6, y: at.y + 13 }, group).textContent = `▾ ${words ? `${words} (${inside[c].length})` : count}`;
       return;
     }
-    const first = cluster.marked ? "spurious" : cluster.title || cluster.column || "nodes";
-    const item = shape(shapes, `c${c}`, at, `box ${role}`, `${fitted(first, 10)} ${inside[c].length}`, count);
+    const first = cluster.marked ? "spurious" : cluster.title;
+    const item = shape(shapes, `c${c}`, at, `box ${role}`, first ? `${fitted(first, 10)} ${inside[c].length}` : count, count);
     item.group.setAttribute("data-cluster", c);
     item.group.setAttribute("aria-expanded", "false");
     item.group.setAttribute("aria-label", [cluster.column, cluster.stage, words, count, "folded"].filter(Boolean).join(", "));
@@ -241,12 +241,14 @@ function drawArrows({ version, items, shownBy, lines, layout }, drawing) {
 function between(a, b) {
   const [x1, y1, x2, y2] = [a.x + a.w / 2, a.y + a.h / 2, b.x + b.w / 2, b.y + b.h / 2];
   const long = Math.hypot(x2 - x1, y2 - y1), [ex, ey] = [(x2 - x1) / long, (y2 - y1) / long];
-  const side = 7, [ox, oy] = [-ey * side, ex * side];
-  const out = (box) => Math.min(Math.abs(box.w / 2 / (ex || 1e-9)), Math.abs(box.h / 2 / (ey || 1e-9)));
-  const [fx, fy] = [x1 + ex * out(a) + ox, y1 + ey * out(a) + oy], [tx, ty] = [x2 - ex * (out(b) + 2) + ox, y2 - ey * (out(b) + 2) + oy];
-  const bend = Math.min(30, 0.12 * long), foot = (s) => `${tx - 7 * ex - 4 * s * ey} ${ty - 7 * ey + 4 * s * ex}`;
-  const middle = `${(fx + tx) / 2 - ey * bend} ${(fy + ty) / 2 + ex * bend}`;
-  return [`M${fx} ${fy}Q${middle} ${tx} ${ty}M${foot(1)}L${tx} ${ty}L${foot(-1)}`, long < 1.2 * (BODY.width + BODY.beside)];
+  const side = 6, [ox, oy] = [-ey * side, ex * side];
+  const out = (box, way) => Math.min((box.w / 2 - way * Math.sign(ex) * ox) / Math.abs(ex || 1e-9), (box.h / 2 - way * Math.sign(ey) * oy) / Math.abs(ey || 1e-9));
+  const [leave, arrive] = [out(a, 1), out(b, -1) + 2];
+  const [fx, fy, tx, ty] = [x1 + ex * leave + ox, y1 + ey * leave + oy, x2 - ex * arrive + ox, y2 - ey * arrive + oy];
+  const bend = 0.1 * Math.hypot(tx - fx, ty - fy), [mx, my] = [(fx + tx) / 2 - ey * bend, (fy + ty) / 2 + ex * bend];
+  const end = Math.hypot(tx - mx, ty - my) || 1, [hx, hy] = [(tx - mx) / end, (ty - my) / end];
+  const foot = (s) => `${tx - 7 * hx - 4 * s * hy} ${ty - 7 * hy + 4 * s * hx}`;
+  return [`M${fx} ${fy}Q${mx} ${my} ${tx} ${ty}M${foot(1)}L${tx} ${ty}L${foot(-1)}`, long < 1.2 * (BODY.width + BODY.beside)];
 }
 
 /** A line from the top of one box to the foot of another with its arrowhead, and whether they are near one another. */

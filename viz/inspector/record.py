@@ -7,14 +7,15 @@
     inputs, rows          names of the state's values, and these at every instant of the motion (one without a motion)
     derived               null, or a graph that computes other inputs of versions from the state
     columns               [[tag, tag of its parent or null]] in the order of the picture; [] leaves it to the page
-    versions              [{name, about, labels, label, marked, drawing} and a graph], see below
+    versions              [{name, about, labels, label, marked, steps, drawing} and a graph], see below
     tables                [{caption, header, rows: [[name, [numbers of nodes]]]} and a graph]: they follow the state
-    motion                null, or {t, points: null or [[[x, y]]], parents}
+    motion                null, or {t, points: null or [[[x, y]]], parents, joints, turns, places: null or a graph}
 
 A graph is {ops, args, names, inputs, outputs}: for every node, arguments before uses, the name of its operation and the
 numbers of its arguments, or the value of a constant; {node: [name, letters]} of named ones; [[name, node or -1 where
 nothing uses it]]; [[name, letters, node]]. labels are the [tags, role, sweep] that occur, label which of them a node
-has, and marked the nodes in the color of what is wrong. Where nodes stand is the page's business, but for a `drawing`.
+has, marked the nodes in the color of what is wrong, steps [{words, nodes, value, joint}]. Where nodes stand is the
+page's business, but for a `drawing`.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from .content import Motion, State, StateTable, Version
 STAGES = {PRIMAL: "as written", ADJOINT: "reverse sweep", TANGENT: "forward sweep"}
 SMALL = 60  # nodes of a graph that is laid out by Graphviz
 NODE_HEIGHT, LEAF_HEIGHT = 34.0, 30.0  # pixels, as in arrange.js
-FEW = 24  # inputs and outputs whose boxes have room for what a person calls them
+LONGEST = 24  # letters of a name for which a box has room
 Letters = Callable[[str], str]
 
 
@@ -54,11 +55,12 @@ def record(
     names, units: {name in a graph: what a person calls it, and its unit}.  columns: {tag: tag of its parent}.
     """
     state = state or State({})
-    inputs = state.inputs([version.graph for version in versions])
     graphs = [version.graph for version in versions]
+    moved = [motion.places] if motion is not None and motion.places is not None else []
+    inputs = state.inputs([*graphs, *moved])
     known = {each.name for graph in graphs for each in (*graph.inputs, *graph.nodes) if each.name}
     known |= {name for graph in graphs for name in graph.outputs} | set(inputs)
-    letters = _letters(graphs, names or {})
+    letters = _letters(names or {})
     drawings = _drawings(graphs, letters)
     for version in versions:
         version.check()
@@ -78,15 +80,20 @@ def record(
             for version, drawing in zip(versions, drawings, strict=True)
         ],
         "tables": [_table(table, letters) for table in tables],
-        "motion": None
-        if motion is None
-        else {
-            "t": [_short(t) for t in motion.t],
-            "points": None
-            if motion.points is None
-            else [[[_short(x), _short(y)] for x, y in each] for each in motion.points],
-            "parents": list(motion.parents),
-        },
+        "motion": None if motion is None else _motion(motion, letters),
+    }
+
+
+def _motion(motion: Motion, letters: Letters) -> dict[str, Any]:
+    return {
+        "t": [_short(t) for t in motion.t],
+        "points": None
+        if motion.points is None
+        else [[[_short(x), _short(y)] for x, y in each] for each in motion.points],
+        "parents": list(motion.parents),
+        "joints": list(motion.joints),
+        "turns": list(motion.turns),
+        "places": _graph(motion.places, letters) if motion.places is not None else None,
     }
 
 
@@ -107,10 +114,9 @@ def slopes(op: Op) -> dict[str, Any]:
     return {"code": code, "out": [number[node] for node in partials]}
 
 
-def _letters(graphs: Sequence[Graph], names: Mapping[str, str]) -> Letters:
-    """What the picture shows of a name: what a person calls it, or letters where there are many."""
-    leaves = {name for graph in graphs for name in (*graph.input_names, *graph.outputs)}
-    shown = theme.called(names) if len(leaves) <= FEW else {}
+def _letters(names: Mapping[str, str]) -> Letters:
+    """What the picture shows of a name: what a person calls it, or letters where that is long."""
+    shown = {name: text for name, text in theme.called(names).items() if len(text) <= LONGEST}
     return lambda name: shown.get(name) or theme.pretty(name)
 
 
@@ -134,14 +140,23 @@ def _version(version: Version, letters: Letters) -> dict[str, Any]:
     for node in version.graph.nodes:
         kind = (tuple(sorted(node.tags, key=theme.natural_order)), theme.role_of(node), _stage(node))
         label.append(labels.setdefault(kind, len(labels)))
-    marked = set(version.marked)
+    marked, number = set(version.marked), {node: i for i, node in enumerate(version.graph.nodes)}
     return {
         "name": version.name,
         "about": version.about,
         **_graph(version.graph, letters),
         "label": label,
         "labels": [[list(tags), *rest] for tags, *rest in labels],
-        "marked": [i for i, node in enumerate(version.graph.nodes) if node in marked],
+        "marked": [number[node] for node in version.graph.nodes if node in marked],
+        "steps": [
+            {
+                "words": step.words,
+                "nodes": [number[node] for node in step.nodes],
+                "value": number[step.value],
+                "joint": step.joint,
+            }
+            for step in version.steps
+        ],
     }
 
 

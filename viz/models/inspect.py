@@ -10,7 +10,7 @@ from dynamics.scenes.inspection import Inspection, Shares, inspection
 from dynamics.scenes.start import Start, moving_start, start_text, with_start
 from dynamics.systems.model import Model
 
-from ..inspector import Motion, Page, StateTable, Version, page
+from ..inspector import Motion, Page, StateTable, Step, Version, page
 from .live import live_of
 from .open_loops import tree_alone
 
@@ -24,13 +24,14 @@ def inspect(
     start: Start | None = None,
     t_end: float | None = None,
     forward: bool = False,
+    title: str | None = None,
 ) -> Page:
     """The page on which a model's equations unfold, move and answer: one HTML file that loads nothing.
 
     Parameters
     ----------
     model : Model
-        A System, a Mechanism or a Scene.
+        A System, a Mechanism or a Scene; of an OdeSystem the page shows the state equation.
     path : str or path, optional
         The file to write the page to, .html.
     start : mapping of str to float, or sequence of float, optional
@@ -41,6 +42,8 @@ def inspect(
         How long it moves [s]; 3 s of what is no scene.
     forward : bool
         Forward dynamics, in place of inverse dynamics by the paper's three formulations.
+    title : str, optional
+        Heading of the page, by default what it shows.
 
     Returns
     -------
@@ -50,7 +53,7 @@ def inspect(
     Raises
     ------
     TypeError
-        For what is no model, and for a system of first order, which has no Lagrangian.
+        For what is no model.
     ValueError
         For a path that does not end in .html, a start that does not fit, or a time that is not positive and finite.
     OSError
@@ -72,25 +75,30 @@ def inspect(
     require_flag("forward", forward)
     scene = scenes.of_model(model)
     at = moving_start(scene) if start is None else with_start(scene, start)
-    text = inspection_page(at, inspection(at, forward=forward, t_end=t_end), start is None and at is not scene)
+    content = inspection(at, forward=forward, t_end=t_end)
+    text = inspection_page(at, content, moved=start is None and at is not scene, title=title)
     if target is not None:
         write_files({target: text})
     return text
 
 
-def inspection_page(scene: scenes.Scene, content: Inspection, moved: bool = False) -> Page:
+def inspection_page(scene: scenes.Scene, content: Inspection, moved: bool = False, title: str | None = None) -> Page:
     """The page of a scene.  moved: whether its start was chosen for it, which the page then says."""
     bones, mechanism = content.skeleton, scene.mechanism
-    forward = content.versions[0].name == "forward dynamics"
+    inverse = len(content.versions) > 1
+    what = "inverse dynamics" if inverse else content.versions[0].name
     notices = [f"Left out of the model: {'; '.join(scene.left_out)}."] if scene.left_out else []
-    notices += [tree_alone(scene)] if not forward and tree_alone(scene) else []
+    notices += [tree_alone(scene)] if inverse and tree_alone(scene) else []
     notices += [f"At rest nothing moves, so it starts at {start_text(scene)}."] if moved else []
     return page(
-        [Version(each.name.replace("_", " "), *each[1:]) for each in content.versions],
-        title=f"{scene.name}: {'forward' if forward else 'inverse'} dynamics",
+        [
+            Version(each.name.replace("_", " "), *each[1:4], [Step(*step) for step in each.steps])
+            for each in content.versions
+        ],
+        title=f"{scene.name}: {what}" if title is None else title,
         at=content.at,
         derived=content.derived,
-        motion=Motion(content.t, bones.points, bones.parents) if bones else Motion(content.t),
+        motion=Motion(content.t, *bones) if bones else Motion(content.t),
         tables=[_torques(scene, content.shares)] if content.shares else [],
         names=display_names(scene),
         units=content.units,

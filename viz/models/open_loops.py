@@ -9,6 +9,8 @@ SHOWN = 4  # names; more are counted
 
 def tree_alone(scene: scenes.Scene) -> str:
     """A sentence: torques are those of the tree, without the forces of its constraints; empty where nothing is held."""
+    if scene.ode is not None:
+        return ""
     loops = scene.mechanism.loops if scene.mechanism is not None else ()
     held = list(dict.fromkeys([loop.label for loop in loops])) or list(scene.system.constraints.names)
     if not held:

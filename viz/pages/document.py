@@ -10,10 +10,11 @@ from . import html
 
 @dataclass(frozen=True)
 class Paragraph:
-    """Words.  point: the one thing to see in a section, set apart."""
+    """Words.  point: the one thing to see in a section, set apart.  warning: set apart, as what is wrong."""
 
     text: str
     point: bool = False
+    warning: bool = False
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ class Document:
 
 def left_out(what: Sequence[str]) -> list[Block]:
     """What the model of a page has not of the file that it was read from; it stands at the top."""
-    return [Paragraph(f"Left out of the model: {'; '.join(what)}.", point=True)] if what else []
+    return [Paragraph(f"Left out of the model: {'; '.join(what)}.", warning=True)] if what else []
 
 
 def to_html(document: Document) -> str:
@@ -76,8 +77,8 @@ def _html(blocks: Sequence[Block]) -> str:
     parts = []
     for block in blocks:
         match block:
-            case Paragraph(text, point):
-                parts.append(html.point(text) if point else html.paragraph(text))
+            case Paragraph(text, point, warning):
+                parts.append(html.point(text, warning=warning) if point or warning else html.paragraph(text))
             case Table(caption, header, rows, folded):
                 table = html.table(caption, header, rows)
                 parts.append(html.folded(caption, table) if folded else table)
@@ -98,8 +99,8 @@ def _markdown(blocks: Sequence[Block], folder: str) -> list[str]:
     lines: list[str] = []
     for block in blocks:
         match block:
-            case Paragraph(text, point):
-                lines += [f"> {text}" if point else text, ""]
+            case Paragraph(text, point, warning):
+                lines += [f"> {text}" if point or warning else text, ""]
             case Table(caption, header, rows, _):
                 lines += [
                     f"**{caption}**",

@@ -19,16 +19,20 @@ body {{ margin: 0 auto; padding: 1.5rem; max-width: 64rem; color: var(--text); b
 h1 {{ font-size: 1.7rem; line-height: 1.25; }} h2 {{ margin-top: 2.6rem; border-top: 1px solid var(--line); padding-top: 1.2rem; }}
 nav a {{ margin-right: 1rem; white-space: nowrap; }} a {{ color: inherit; }}
 figure {{ margin: 1.2rem 0; }} figcaption {{ font-size: 0.95rem; margin-top: 0.5rem; }}
+figure {{ overflow-x: auto; }} figcaption {{ position: sticky; left: 0; }}
 figure img {{ display: block; max-width: 100%; height: auto; margin: 0 auto; background: #FFFFFF; border-radius: 4px; }}
+figure img.plot {{ min-width: 40rem; }} /* its letters stay legible: a narrow screen scrolls */
 .scroll {{ overflow-x: auto; }}
 table {{ border-collapse: collapse; margin: 1rem 0; font-size: 0.95rem; font-variant-numeric: tabular-nums; }}
-th, td {{ padding: 0.35rem 0.5rem; border-bottom: 1px solid var(--line); text-align: right; }} td {{ white-space: nowrap; }}
+th, td {{ padding: 0.35rem 0.5rem; border-bottom: 1px solid var(--line); text-align: right; }}
+td + td {{ white-space: nowrap; }} td:first-child {{ min-width: 7rem; }}
 th {{ vertical-align: bottom; }}
 th:first-child, td:first-child {{ text-align: left; }} thead th {{ border-bottom: 2px solid var(--text); }}
 caption {{ text-align: left; font-weight: 600; padding-bottom: 0.4rem; }}
 summary {{ cursor: pointer; font-weight: 600; }} details caption {{ display: none; }}
 pre {{ background: var(--soft); padding: 0.8rem 1rem; overflow-x: auto; border-radius: 4px; }}
-.point {{ background: var(--soft); border-left: 5px solid {theme.SPURIOUS}; padding: 0.6rem 1rem; }}
+.point, .warning {{ background: var(--soft); border-left: 5px solid {theme.BLUE}; padding: 0.6rem 1rem; }}
+.warning {{ border-left-color: {theme.SPURIOUS}; }}
 """
 
 
@@ -54,8 +58,9 @@ def figure(svg: str, caption: str, width: str = "100%", *, adapts: bool = False)
     """
     data = base64.b64encode(svg.encode()).decode()
     style = f"width:{width};background:none" if adapts else f"width:{width}"
+    kind = ' class="plot"' if width == "100%" else ""
     return (
-        f'<figure><img src="data:image/svg+xml;base64,{data}" alt="{escape(caption)}" style="{style}">'
+        f'<figure><img{kind} src="data:image/svg+xml;base64,{data}" alt="{escape(caption)}" style="{style}">'
         f"<figcaption>{escape(caption)}</figcaption></figure>"
     )
 
@@ -80,9 +85,9 @@ def paragraph(text: str) -> str:
     return f"<p>{escape(text)}</p>"
 
 
-def point(text: str) -> str:
-    """The one thing to see in a section, set apart."""
-    return f'<p class="point">{escape(text)}</p>'
+def point(text: str, *, warning: bool = False) -> str:
+    """The one thing to see in a section, set apart; a warning in the color of what is wrong."""
+    return f'<p class="{"warning" if warning else "point"}">{escape(text)}</p>'
 
 
 def preformatted(text: str) -> str:

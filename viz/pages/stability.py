@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
 import re
-import textwrap
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -20,7 +18,6 @@ Content = Mapping[str, Any]  # what `to_dict()` of the report gives, or its JSON
 Row = Mapping[str, Any]
 FROM, TO = 1e-12, 1e13  # shares of a bound that are drawn; what is outside is drawn at the border
 WIDTH, LINE, FRAME = 10.0, 0.17, 1.0  # inches: of a picture, of each case, and for the axis
-NAMES = 34  # letters of a case's name on a line
 
 
 def document(content: Content) -> Document:
@@ -40,7 +37,7 @@ def _introduction(content: Content) -> list[Block]:
     quick = " A quick run: some of the cases, shorter runs, shorter arms." if content["quick"] else ""
     load = "" if content["load"] is None else f" The load of the machine was {content['load']:.1f} at the end."
     return [
-        Paragraph(f"{verdict}.", point=True),
+        Paragraph(f"{verdict}.", point=True, warning=counts["unexplained"] > 0),
         Paragraph(
             "Every row is a case that is hard for arithmetic or for an integrator: what was measured, the bound that "
             f"was set beforehand, and whether the one is within the other.{quick}"
@@ -93,23 +90,17 @@ def _section(section: Mapping[str, Any]) -> Section:
 
 
 def _lines(row: Row, missed: bool = False) -> list[list[str]]:
-    """A line of cells for each figure, or for those beyond their bounds; what they share stands in the first.
-
-    A long name goes on in the lines below.
-    """
+    """A line of cells for each figure, or for those beyond their bounds; what they share stands in the first."""
     measured: list[list[str]] = []
     for figure in row["measurements"]:
         if not (missed and figure["meets"]):
             bound = "" if figure["bound"] == "inf" else _number(figure["bound"])
             value = _number(figure["value"]) + ("" if figure["meets"] else " ✗")
             measured.append([figure["quantity"] + _unit(figure), value, bound])
-    name = textwrap.wrap(row["case"], NAMES)
-    shared = [row["method"], row["verdict"]], _run(row)
-    lines: list[list[str]] = []
-    for first, cells in itertools.zip_longest(name, measured, fillvalue=None):
-        (method, verdict), run = shared if not lines else (["", ""], ["", ""])
-        lines.append([first or "", method, verdict, *(cells or ["", "", ""]), *run])
-    return lines
+    first, *others = measured or [["", "", ""]]
+    return [[row["case"], row["method"], row["verdict"], *first, *_run(row)]] + [
+        ["", "", "", *cells, "", ""] for cells in others
+    ]
 
 
 def _unit(figure: Mapping[str, Any]) -> str:

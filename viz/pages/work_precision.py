@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..plots.direct_labels import Line, Panel, bars, labeled
+from .. import theme
+from ..plots.direct_labels import COLORS, Line, Panel, bars, labeled
 from ..plots.plot import to_adaptive_svg
 from .document import Block, Document, Paragraph, Picture, Section, Table, left_out
 
 Content = Mapping[str, Any]  # what `to_dict()` of the report gives, or its JSON file
 EQUAL, CHOSEN = "equal steps", "chosen steps"
 DRAWN = 3.0  # errors above are no motion of this kind any more
-MAKERS = {"scipy:": 1, "heyoka": 2, "CVODES": 3, "MuJoCo": 4}  # a color for what comes from one maker; ours is 0
 
 
 def work_precision(content: Content) -> Document:
@@ -110,20 +110,20 @@ def _panels(content: Content, x: str, name: str) -> tuple[list[Panel], list[str]
                 Panel(
                     f"ours, {kind}",
                     *axes,
-                    [_line(curve, x, "seconds", *_look(k, curve)) for k, curve in enumerate(ours)],
+                    [_line(curve, x, "seconds", *_look(curve)) for curve in ours],
                 )
             )
         if others:
             best = _best(ours, content)
             shown += [curve["name"] for curve in best]
-            drawn = [_line(curve, x, "seconds", *_look(k, curve)) for k, curve in enumerate(others)]
-            drawn += [_line(curve, x, "seconds", 0, True, "ours: ") for curve in best]
+            drawn = [_line(curve, x, "seconds", *_look(curve)) for curve in others]
+            drawn += [_line(curve, x, "seconds", _look(curve)[0], True, "ours: ") for curve in best]
             panels.append(Panel(f"others, {kind}", *axes, drawn))
     return [panel for panel in panels if any(len(line.x) for line in panel.lines)], shown
 
 
-def _maker(name: str) -> int:
-    return next((color for begin, color in MAKERS.items() if name.startswith(begin)), 4)
+def _maker(name: str) -> str:
+    return next((color for begin, color in theme.MAKERS.items() if name.startswith(begin)), theme.GRAY)
 
 
 def _best(ours: Sequence[Mapping[str, Any]], content: Content) -> list[Mapping[str, Any]]:
@@ -140,16 +140,20 @@ def _best(ours: Sequence[Mapping[str, Any]], content: Content) -> list[Mapping[s
     return [reached[min(times)[1]][1]]
 
 
-def _line(curve: Mapping[str, Any], x: str, y: str, color: int, dashed: bool, before: str = "") -> Line:
+def _line(curve: Mapping[str, Any], x: str, y: str, color: int | str, dashed: bool, before: str = "") -> Line:
     """A curve's points in two of their columns, those without a number or far off left out."""
     shown = [(point[x], point[y]) for point in curve["points"] if point[x] and point[y] and _drawn(point)]
     name = before + curve["name"].removeprefix("MuJoCo ")
     return Line(name, [a for a, _ in shown], [b for _, b in shown], color, dashed)
 
 
-def _look(number: int, curve: Mapping[str, Any]) -> tuple[int, bool]:
-    """Color and dashes of a curve: one for every curve of ours, and for every maker of the others."""
-    return (number, number >= 5) if curve["ours"] else (_maker(curve["name"]), False)
+def _look(curve: Mapping[str, Any]) -> tuple[int | str, bool]:
+    """Color and dashes of a curve, the same on every page: one for every method of ours, and every maker of others."""
+    if not curve["ours"]:
+        return _maker(curve["name"]), False
+    name = curve["name"].partition(" ")[0]
+    number = theme.METHODS.index(name) if name in theme.METHODS else len(theme.METHODS)
+    return number, number >= len(COLORS)
 
 
 def _drawn(point: Mapping[str, Any]) -> bool:
@@ -162,8 +166,8 @@ def _orders(content: Content) -> Section:
         for mine in (True, False):
             curves = [curve for curve in content["curves"] if curve["kind"] == kind and curve["ours"] is mine]
             lines = [
-                _line(curve, *(("step", "largest") if kind == EQUAL else ("knob", "error")), *_look(k, curve))
-                for k, curve in enumerate(curves)
+                _line(curve, *(("step", "largest") if kind == EQUAL else ("knob", "error")), *_look(curve))
+                for curve in curves
             ]
             knobs = sorted({point["knob"] for curve in curves for point in curve["points"]}, reverse=True)
             if kind == CHOSEN and len(knobs) > 1:

@@ -6,26 +6,21 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dynamics.experiments.paper_numbers.embedding_error import embedding_errors
+from dynamics.experiments.paper_numbers.embedding_error import EmbeddingError, embedding_errors
 from dynamics.experiments.text_table import csv_text
 
 from ..pages import html
-from ..plots import plot
-from .part import TITLES, Part, pictures
+from ..pages.formulations import COLORS, TITLES
+from ..plots.direct_labels import Line, Panel, labeled
+from .part import Part, pictures
+
+LINKS = (1, 2, 3, 6)
 
 
-def embedding() -> Part:
-    """The law of the embedding: torque error against dt."""
-    laws = embedding_errors()
-    panels: dict[str, dict[str, tuple[Sequence[float], Sequence[float]]]] = {
-        "error of the torque": {},
-        "distance from its limit": {},
-    }
-    for law in laws:
-        name = f"{TITLES[law.formulation]}, n = {law.n}"
-        panels["error of the torque"][name] = (law.dt.tolist(), law.error.tolist())
-        panels["distance from its limit"][name] = (law.dt.tolist(), law.distance.tolist())
-    drawn = pictures("law", plot.powers(panels, "dt [s]", ["largest |Δτ| [N m]"] * 2, kinds=2))
+def embedding(links: Sequence[int] = LINKS) -> Part:
+    """The law of the embedding: torque error against dt.  links: of the arms."""
+    laws = embedding_errors(links)
+    drawn = pictures("law", labeled(_panels(laws), shared=False, room=0.5))
     header = ("formulation", "links", "slope", "largest entry of the limit [N m]", "error at dt = 1e-6 s [N m]")
     rows = [
         (
@@ -45,7 +40,7 @@ def embedding() -> Part:
         html.point(
             "A smaller time step does not help: by definition the whole term ∂L/∂q is lost, kinetic only the part ∂K/∂q."
         )
-        + html.figure(drawn.svg, caption)
+        + html.figure(drawn.svg, caption, adapts=True)
         + html.table("The law of the embedding", header, rows)
         + html.paragraph(
             "Kinetic only is exact for one joint, where K does not depend on q, and wrong for a real arm under this plain "
@@ -59,6 +54,24 @@ def embedding() -> Part:
         for law in laws
     }
     return Part("law", "How wrong, and why dt does not help", files, data, section)
+
+
+def _panels(laws: Sequence[EmbeddingError]) -> list[Panel]:
+    """The errors, and the distances from their limits beside a line of slope 1."""
+    x = "dt [s] (smaller to the right)"
+    panels = []
+    for title, of in (("error of the torque", "error"), ("distance from its limit", "distance")):
+        lines = [
+            Line(f"{TITLES[law.formulation]}, n = {law.n}", law.dt.tolist(), getattr(law, of).tolist(),
+                 COLORS[TITLES[law.formulation]], law.formulation == "kinetic_only")
+            for law in laws
+            if getattr(law, of).min() > 0.0
+        ]  # fmt: skip
+        panels.append(Panel(title, x, "largest |Δτ| [N m]", lines))
+    steps = laws[0].dt.tolist()
+    top = 4.0 * max(max(line.y) for line in panels[1].lines)
+    panels[1].lines.append(Line("slope 1", steps, [top * dt / steps[0] for dt in steps], None))
+    return panels
 
 
 def _finite(value: float) -> float | None:

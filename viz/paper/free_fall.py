@@ -2,29 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from dynamics import scenes
 from dynamics.experiments.paper_numbers.free_fall import (
-    MujocoFreeFall,
     free_fall,
     largest_differences,
     mujoco_free_fall,
 )
 from dynamics.experiments.text_table import csv_text
-from dynamics.io.mujoco_render import frames
-from dynamics.systems.model import Model
 
 from ..pages import html
 from ..plots import plot
 from .part import Part, pictures
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SNAPSHOTS = 6
 
@@ -42,38 +34,31 @@ def figures4_and_5() -> Part:
     )
     drawn4 = pictures("fig4", ours)
     files = dict(drawn4.files)
-    section = html.figure(drawn4.svg, caption4)
+    section = html.figure(drawn4.svg, caption4, adapts=True)
     data: dict[str, Any] = {"q_end": run.trajectory.q[-1].tolist()}
     try:
         other = mujoco_free_fall(run)
     except ImportError as error:
-        section += html.point(f"Figure 5 is missing on this machine. {error}")
+        section += html.point(f"Figure 5 is missing on this machine. {error}", warning=True)
         return Part("fall", "Figures 4 and 5: the fall", files, data | {"mujoco": None}, section)
 
-    theirs, source = _mujoco_figure(scene.model, run.trajectory.t, other, instants)
-    caption5 = f"Figure 5. The same arm in MuJoCo {other.version} (RK4, same step) at the same instants, {source}."
+    theirs = plot.snapshots(run.trajectory.t, run.positions, instants.tolist(), dots=other.positions)
+    caption5 = (
+        f"Figure 5. The same arm in MuJoCo {other.version} (RK4, same step), as dots, over ours, as lines: joints at the "
+        "same instants, and their ways."
+    )
     differences = largest_differences(run, other)
     header = ("up to t [s]", "largest |difference in q| [rad]")
     rows = [(f"{t:.2f}", f"{difference:.2e}") for t, difference in differences]
     drawn5 = pictures("fig5", theirs)
     files |= {**drawn5.files, "fig5.csv": csv_text(header, rows)}
     section += (
-        html.figure(drawn5.svg, caption5)
+        html.figure(drawn5.svg, caption5, adapts=True)
         + html.table("Our trajectory and MuJoCo's", header, rows)
         + html.paragraph(
             "Both integrate by the classical Runge-Kutta method with the same step, so what differs is the equations of motion: "
             "ours from a Lagrangian by automatic differentiation, MuJoCo's from its composite-rigid-body algorithm."
         )
     )
-    data |= {"mujoco": other.version, "figure5": source, "largest_difference": differences[-1][1]}
+    data |= {"mujoco": other.version, "largest_difference": differences[-1][1]}
     return Part("fall", "Figures 4 and 5: the fall", files, data, section)
-
-
-def _mujoco_figure(model: Model, times: Array, other: MujocoFreeFall, instants: Array) -> tuple[Figure, str]:
-    """MuJoCo's pictures at the instants, drawn here where its renderer finds no OpenGL; and by what they were made."""
-    rendered = frames(model, other.q[[int(np.abs(times - instant).argmin()) for instant in instants]])
-    if rendered is None:
-        figure = plot.snapshots(times, other.positions, instants.tolist())
-        return figure, "drawn from MuJoCo's body positions, as its renderer found no OpenGL on this machine"
-    titles = [f"({letter})  t = {instant:.1f} s" for letter, instant in zip("abcdef", instants, strict=True)]
-    return plot.images(rendered, titles), "by MuJoCo's own renderer"

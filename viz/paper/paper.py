@@ -14,12 +14,13 @@ from ..pages.document_files import check_folder
 from ..plots import plot
 from .embedding import embedding
 from .free_fall import figures4_and_5
-from .one_joint import equations, figure1, figure2, figure3
+from .one_joint import equations, figure1, figure2, figure3, sizes
 from .part import Part
 from .scaling import scaling_of_counts
 from .timing import figure6
 
 QUICK_EVALUATIONS = 100  # of each formulation, for Figure 6
+QUICK_ARMS = (1, 2, 3)  # links, for the law of the embedding
 QUICK_LINKS = (1, 2, 3, 6, 10, 20)  # of the chains of the last part
 
 
@@ -43,7 +44,8 @@ def paper(folder: Path, say: Callable[[str], None], *, quick: bool = False) -> P
         "Figure 1: by definition, with the Euler relation embedded": figure1,
         "Figure 2: kinetic energy only": figure2,
         "Figure 3: the chain rule": figure3,
-        "The law of the embedding: torque error against dt": embedding,
+        "Sizes of these graphs, and of those of the whole torque": sizes,
+        "The law of the embedding: torque error against dt": partial(embedding, QUICK_ARMS) if quick else embedding,
         "Figures 4 and 5: the three-link arm in free fall, by our graph and by MuJoCo": figures4_and_5,
         "Figure 6 and Table 1: the time of one evaluation": partial(figure6, QUICK_EVALUATIONS) if quick else figure6,
         "Scaling: nodes, edges and time over the number of links": (

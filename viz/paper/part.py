@@ -4,20 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from .. import theme
 from ..graph_drawing.render import render_png
 from ..plots import plot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-TITLES = {
-    "euler_embedded": "by definition",
-    "kinetic_only": "kinetic only",
-    "chain_rule": "chain rule",
-    "chain_rule_literal": "chain rule, literal",
-}
-COLORS = dict(zip(TITLES.values(), (theme.SPURIOUS, theme.ORANGE, theme.BLUE, theme.PURPLE), strict=True))
 SCALE = 160 / 96  # of a plot as PNG: 160 pixels an inch
 
 
@@ -40,5 +32,5 @@ class Pictures(NamedTuple):
 
 def pictures(name: str, picture: Figure) -> Pictures:
     """A plot rendered, once, as SVG, and as PNG from that SVG."""
-    svg = plot.to_svg(picture)
+    svg = plot.to_adaptive_svg(picture, background=True)
     return Pictures(svg, {f"{name}.svg": svg, f"{name}.png": render_png(svg, scale=SCALE)})

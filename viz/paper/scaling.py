@@ -9,8 +9,9 @@ from dynamics.experiments.text_table import csv_text
 from dynamics.simulation.progress_bar import Progress
 
 from ..pages import html
-from ..plots import plot
-from .part import COLORS, TITLES, Part, pictures
+from ..pages.formulations import COLORS, TITLES
+from ..plots.direct_labels import Line, Panel, labeled
+from .part import Part, pictures
 
 
 def scaling_of_counts(links: Sequence[int] = COUNTS) -> Part:
@@ -20,11 +21,7 @@ def scaling_of_counts(links: Sequence[int] = COUNTS) -> Part:
     """
     with Progress("scaling", 1.0) as progress:
         rows = node_scaling(links, report=progress)
-    panels: dict[str, plot.Curves] = {
-        "edges": {TITLES[row.formulation]: (row.n, [float(count) for count in row.edges]) for row in rows},
-        "one compiled evaluation": {TITLES[row.formulation]: (row.n, row.microseconds) for row in rows},
-    }
-    drawn = pictures("scaling", plot.powers(panels, "links n", ["edges", "time [µs]"], colors=COLORS))
+    drawn = pictures("scaling", labeled(_panels(rows), shared=False, rising=True, room=0.35))
     header, table = _exponents(rows, links[-1])
     caption = f"Inverse dynamics of chains of n equal rods. Exponents are fitted over n = {FITTED_FROM} to {links[-1]}."
     section = (
@@ -32,7 +29,7 @@ def scaling_of_counts(links: Sequence[int] = COUNTS) -> Part:
             "The embedding is not what makes a graph grow quadratically: by definition and the contracted chain rule both grow "
             "linearly. The chain rule taken literally, with the gradient of every momentum, is the quadratic one."
         )
-        + html.figure(drawn.svg, caption)
+        + html.figure(drawn.svg, caption, adapts=True)
         + html.table("Fitted exponents", header, table)
     )
     points = [
@@ -46,6 +43,21 @@ def scaling_of_counts(links: Sequence[int] = COUNTS) -> Part:
         for row in rows
     }
     return Part("scaling", "Scaling with the number of links", files, data, section)
+
+
+def _panels(rows: Sequence[NodeScaling]) -> list[Panel]:
+    """Edges and times over the number of links, the edges beside lines of slope 1 and 2."""
+    panels = []
+    for title, y, of in (("edges", "edges", "edges"), ("one compiled evaluation", "time [µs]", "microseconds")):
+        lines = [
+            Line(TITLES[row.formulation], row.n, [float(value) for value in getattr(row, of)],
+                 COLORS[TITLES[row.formulation]])
+            for row in rows
+        ]  # fmt: skip
+        links, least = rows[0].n, min(min(line.y) for line in lines)
+        lines += [Line(f"slope {p}", links, [0.5 * least * n**p for n in links], None) for p in (1, 2)]
+        panels.append(Panel(title, "links n", y, lines))
+    return panels
 
 
 def _exponents(rows: Sequence[NodeScaling], longest: int) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:

@@ -9,8 +9,9 @@ from dynamics.experiments.paper_numbers.table_1 import PAPER_MS, Row, table_1
 from dynamics.experiments.text_table import csv_text
 
 from ..pages import html
+from ..pages.formulations import COLORS, TITLES
 from ..plots import plot
-from .part import COLORS, TITLES, Part, pictures
+from .part import Part, pictures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,18 +25,18 @@ def figure6(evaluations: int = EVALUATIONS) -> Part:
     evaluations: random states, each evaluated once by each formulation in turn.
     """
     rows = table_1(evaluations)
-    header, table = _table(rows)
+    ratios, times = _ratios(rows), _times(rows)
     drawn = pictures("fig6", _bars(rows))
     caption = (
-        f"Figure 6. Mean time of one evaluation of the three-link arm's inverse dynamics over {evaluations} random "
-        "states, with one standard deviation. Each panel has its own scale; the paper's own figures are on the right."
+        f"Figure 6. Median time of one evaluation of the three-link arm's inverse dynamics over {evaluations} random "
+        "states; the lines reach from the lower to the upper quartile. Each panel has its own scale. The paper's own "
+        "figures, on the right, are means with one standard deviation."
     )
     section = (
-        html.table(
-            "Table 1: ratios of medians to the chain rule's, sizes, and mean ± standard deviation", header, table
-        )
+        html.table("Table 1: ratios of medians to the chain rule's, and sizes", *ratios)
         + html.point(_why(rows))
-        + html.figure(drawn.svg, caption)
+        + html.figure(drawn.svg, caption, adapts=True)
+        + html.table("Times of one evaluation", *times)
         + html.paragraph(
             "Interpreted: node by node in Python. Compiled: one generated Python function. PyTorch eager, measured where torch "
             "is installed, builds and differentiates its graph anew at every evaluation. "
@@ -43,45 +44,47 @@ def figure6(evaluations: int = EVALUATIONS) -> Part:
             "∂L/∂q alone."
         )
     )
-    files = drawn.files | {"table1.csv": csv_text(header, table)}
+    files = drawn.files | {"table1.csv": csv_text(*ratios), "table1-times.csv": csv_text(*times)}
     data = {row.formulation: _figures(row) for row in rows}
     return Part("table1", "Figure 6 and Table 1: the cost", files, data, section)
 
 
 def _bars(rows: Sequence[Row]) -> Figure:
     """A panel for each way of evaluating, and one for the paper's own times."""
-    groups = {
-        f"{way} [µs]": {TITLES[row.formulation]: (row.timings[way].mean, row.timings[way].deviation) for row in rows}
-        for way in rows[0].timings
-    }
-    groups["the paper [ms]"] = {TITLES[name]: value for name, value in PAPER_MS.items()}
-    return plot.bars(groups, COLORS)
+    groups = {f"{way} [µs]": {TITLES[row.formulation]: row.timings[way] for row in rows} for way in rows[0].timings}
+    bars = {panel: {name: (t.median, t.lower, t.upper) for name, t in group.items()} for panel, group in groups.items()}
+    bars["the paper [ms]"] = {TITLES[name]: (mean, mean - sd, mean + sd) for name, (mean, sd) in PAPER_MS.items()}
+    return plot.bars(bars, COLORS)
 
 
-def _table(rows: Sequence[Row]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def _ratios(rows: Sequence[Row]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Table 1: header and rows; ratios are of medians, to the chain rule's, which is the last row."""
     ways = list(rows[0].timings)
     base = {way: rows[-1].timings[way].median for way in ways}
-    header = (
-        "formulation",
-        *(f"{way}, ratio" for way in ways),
-        "paper, ratio",
-        "nodes",
-        "edges",
-        "depth",
-        *(f"{way} [µs]" for way in ways),
-        "paper [ms]",
-    )
+    header = ("formulation", *(f"{way}, ratio" for way in ways), "paper, ratio", "nodes", "edges", "depth")
     table = [
         (
             TITLES[row.formulation],
             *(f"{row.timings[way].median / base[way]:.2f}" for way in ways),
             f"{PAPER_MS[row.formulation][0] / PAPER_MS['chain_rule'][0]:.2f}",
             *(str(count) for count in (row.counts.nodes, row.counts.edges, row.counts.depth)),
-            *(f"{row.timings[way].mean:.3g} ± {row.timings[way].deviation:.2g}" for way in ways),
-            "{:.3g} ± {:.3g}".format(*PAPER_MS[row.formulation]),
         )
         for row in rows
+    ]
+    return header, table
+
+
+def _times(rows: Sequence[Row]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """The times: header and a row for each way of evaluating each formulation; the paper's are of another machine."""
+    header = ("formulation", "evaluated", "median", "lower quartile", "upper quartile", "unit")
+    table = [
+        (TITLES[row.formulation], way, *(f"{time:.3g}" for time in (timing.median, timing.lower, timing.upper)), "µs")
+        for row in rows
+        for way, timing in row.timings.items()
+    ]
+    table += [
+        (TITLES[name], "the paper: mean, ∓ one deviation", *(f"{t:.3g}" for t in (mean, mean - sd, mean + sd)), "ms")
+        for name, (mean, sd) in PAPER_MS.items()
     ]
     return header, table
 
@@ -89,7 +92,7 @@ def _table(rows: Sequence[Row]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]
 def _figures(row: Row) -> dict[str, Any]:
     """A row as plain data."""
     times = {
-        way: {"mean_us": timing.mean, "sd_us": timing.deviation, "median_us": timing.median}
+        way: {"median_us": timing.median, "lower_quartile_us": timing.lower, "upper_quartile_us": timing.upper}
         for way, timing in row.timings.items()
     }
     return {"nodes": row.counts.nodes, "edges": row.counts.edges, "depth": row.counts.depth} | times

@@ -28,12 +28,12 @@ ROOM = 0.2  # of the axis, for the names
 
 @dataclass(frozen=True)
 class Line:
-    """A curve.  color: a number, the same for what belongs together; None: a thin guide in the color of the text."""
+    """A curve.  color: a color, or a number, the same for what belongs together; None: a thin guide in ink."""
 
     name: str
     x: Sequence[float]
     y: Sequence[float]
-    color: int | None = 0
+    color: int | str | None = 0
     dashed: bool = False
 
 
@@ -44,13 +44,16 @@ class Panel:
     title: str
     x: str
     y: str
-    lines: Sequence[Line]
+    lines: list[Line]
 
 
-def labeled(panels: Sequence[Panel], *, columns: int = 2, shared: bool = True) -> Figure:
-    """Panels with logarithmic axes, x from large on the left to small on the right.
+def labeled(
+    panels: Sequence[Panel], *, columns: int = 2, shared: bool = True, rising: bool = False, room: float = ROOM
+) -> Figure:
+    """Panels with logarithmic axes, x from large on the left to small on the right; `rising`, the other way.
 
-    shared: all panels have the same scales.
+    Curves go from the left to the right.  shared: all panels have the same scales.  room: for names, beside the curves,
+    in their width.
     """
     with style():
         rows = -(-len(panels) // columns)
@@ -72,7 +75,8 @@ def labeled(panels: Sequence[Panel], *, columns: int = 2, shared: bool = True) -
             low, high = axis.get_xlim()
             if len(_decades(low, high)) < 2:
                 low, high = 10.0 ** math.floor(math.log10(low)), 10.0 ** math.ceil(math.log10(high))
-            axis.set_xlim(high, low * (low / high) ** ROOM)
+            left, right = (low, high) if rising else (high, low)
+            axis.set_xlim(left, right * (right / left) ** room)
             axis.set_xticks(_decades(low, high))
             axis.xaxis.minorticks_off()
         layout = figure.get_layout_engine()
@@ -95,11 +99,12 @@ def _draw(axis: Axes, line: Line) -> None:
     if line.color is None:
         axis.plot(line.x, line.y, color=theme.LINE, linewidth=0.8, linestyle=(0, (1, 2)))
         return
+    number, color = (0, line.color) if isinstance(line.color, str) else (line.color, COLORS[line.color % len(COLORS)])
     axis.plot(
         line.x,
         line.y,
-        color=COLORS[line.color % len(COLORS)],
-        marker="osD^v"[line.color // len(COLORS) % 5],
+        color=color,
+        marker="osD^v"[number // len(COLORS) % 5],
         markersize=3.2,
         linewidth=1.4,
         linestyle="--" if line.dashed else "-",

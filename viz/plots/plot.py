@@ -26,6 +26,7 @@ STYLE: dict[Any, Any] = {
     "axes.labelcolor": theme.TEXT,
     "svg.hashsalt": "cgraph",  # the same ids in every run
 }
+WAY = 400  # points of a way that is drawn, at most
 GRID: dict[str, Any] = {"color": "#808080", "alpha": 0.25, "linewidth": 0.6}  # on white and on black
 
 
@@ -90,15 +91,19 @@ def painted_line(points: Array, values: Array, limits: tuple[float, float], colo
     )
 
 
-def snapshots(times: Array, positions: Array, instants: Sequence[float], traces: bool = True) -> Figure:
+def snapshots(
+    times: Array, positions: Array, instants: Sequence[float], traces: bool = True, dots: Array | None = None
+) -> Figure:
     """Poses of an arm at `instants`, a panel each, with the way each joint has come.
 
-    times: (T,) [s].  positions: (T, n + 1, 2) [m], base, joints and tip.
+    times: (T,) [s].  positions: (T, n + 1, 2) [m], base, joints and tip.  dots: another's positions at the same times,
+    drawn as dots on the joints and, a tenth of the time between instants apart, on their ways.
     """
     with style():
         reach = 1.08 * np.abs(positions[..., 0]).max()
         low, high = positions[..., 1].min() - 0.15 * reach, positions[..., 1].max() + 0.15 * reach
         columns = -(-len(instants) // 2)
+        stride = max(1, len(times) // WAY)
         panel = 9.0 / columns  # inches; equal scales fix the height
         figure = empty_figure(9.0, 2 * (0.86 * panel * (high - low) / (2 * reach) + 0.42) + 0.3)
         axes = figure.subplots(2, columns, sharex=True, sharey=True)
@@ -107,9 +112,14 @@ def snapshots(times: Array, positions: Array, instants: Sequence[float], traces:
             for joint in range(1, positions.shape[1]):
                 color = theme.LINKS[(joint - 1) % len(theme.LINKS)]
                 if traces:
-                    axis.plot(*positions[: row + 1, joint].T, color=color, linewidth=0.9, alpha=0.55)
+                    axis.plot(*positions[: row + 1, joint][::-stride].T, color=color, linewidth=1.1, alpha=0.75)
                 axis.plot(*positions[row, joint - 1 : joint + 1].T, color=color, linewidth=5, solid_capstyle="round")
-            axis.plot(*positions[row, :-1].T, "o", color="white", markeredgecolor=theme.TEXT, markersize=4.5)
+            axis.plot(*positions[row, :-1].T, "o", color="white", markeredgecolor=theme.LINE, markersize=5.5)
+            if dots is not None:
+                every = max(1, len(times) // (10 * len(instants)))
+                passed = dots[: row + 1][::-every, 1:].reshape(-1, 2)
+                axis.plot(*passed.T, ".", color=theme.TEXT, markersize=2.5)
+                axis.plot(*dots[row].T, ".", color=theme.TEXT, markersize=5)
             axis.set_title(f"({letter})  t = {times[row]:.1f} s", fontsize=10, loc="left")
             axis.set_aspect("equal")
             axis.set_xlim(-reach, reach)
@@ -122,20 +132,8 @@ def snapshots(times: Array, positions: Array, instants: Sequence[float], traces:
     return figure
 
 
-def images(pictures: Sequence[Array], titles: Sequence[str]) -> Figure:
-    """Pictures, (height, width, 3) each, in two rows under their titles."""
-    with style():
-        shape = pictures[0].shape
-        figure = empty_figure(9.0, 2 * (9.0 / -(-len(pictures) // 2) * shape[0] / shape[1] + 0.3))
-        for axis, picture, title in zip(figure.subplots(2, -(-len(pictures) // 2)).flat, pictures, titles, strict=True):
-            axis.imshow(picture)
-            axis.set_title(title, fontsize=10, loc="left")
-            axis.set_axis_off()
-    return figure
-
-
-def bars(groups: Mapping[str, Mapping[str, tuple[float, float]]], colors: Mapping[str, str]) -> Figure:
-    """Means with standard deviations, {panel: {bar: (mean, deviation)}}, a panel with its own scale for each group.
+def bars(groups: Mapping[str, Mapping[str, tuple[float, float, float]]], colors: Mapping[str, str]) -> Figure:
+    """Bars with a range, {panel: {bar: (height, low, high)}}, a panel with its own scale for each group.
 
     colors: {bar: color}.
     """
@@ -144,55 +142,15 @@ def bars(groups: Mapping[str, Mapping[str, tuple[float, float]]], colors: Mappin
         for axis, (title, values) in zip(
             np.atleast_1d(figure.subplots(1, len(groups))).flat, groups.items(), strict=True
         ):
-            means = [mean for mean, _ in values.values()]
-            drawn = axis.bar(
-                range(len(values)),
-                means,
-                yerr=[[min(mean, deviation) for mean, deviation in values.values()], [d for _, d in values.values()]],
-                color=[colors[name] for name in values],
-                error_kw={"elinewidth": 1, "capsize": 3, "ecolor": theme.TEXT},
-                width=0.62,
-            )
-            for label in axis.bar_label(drawn, [f"{mean:.3g}" for mean in means], label_type="center"):
-                label.set_bbox({"facecolor": "white", "edgecolor": "none", "boxstyle": "round,pad=0.2"})
-            axis.set_xticks(range(len(values)), [name.replace(" ", "\n", 1) for name in values])
+            heights, low, high = (np.array(each) for each in zip(*values.values(), strict=True))
+            places = np.arange(len(values))
+            axis.bar(places, heights, color=[colors[name] for name in values], width=0.62)
+            axis.errorbar(places, heights, [heights - low, high - heights], fmt="none", ecolor=theme.TEXT, capsize=3)
+            for place, height, top in zip(places, heights, high, strict=True):
+                axis.annotate(
+                    f"{height:.3g}", (place, top), xytext=(0, 4), textcoords="offset points", ha="center", fontsize=9
+                )
+            axis.set_xticks(places, [name.replace(" ", "\n", 1) for name in values])
             axis.set_title(title, fontsize=10, loc="left")
-            axis.set_ylim(bottom=0)
-    return figure
-
-
-Curves = Mapping[str, tuple[Sequence[float], Sequence[float]]]  # {name: (x, y)}
-
-
-def powers(
-    panels: Mapping[str, Curves], x: str, y: Sequence[str], kinds: int = 1, colors: Mapping[str, str] | None = None
-) -> Figure:
-    """Curves on logarithmic axes, {panel: curves}; zeros are left out. One legend serves all panels.
-
-    kinds: curves come in groups of so many, one color a group and one line style a place in the group.
-    colors: {curve: color} in place of a color for each group.
-    """
-    with style():
-        figure = empty_figure(9.0, 3.9)
-        axes = np.atleast_1d(figure.subplots(1, len(panels)))
-        labels: dict[str, Any] = {}
-        for axis, label, (title, curves) in zip(axes.flat, y, panels.items(), strict=True):
-            for number, (name, (at, values)) in enumerate(curves.items()):
-                kept = [(a, b) for a, b in zip(at, values, strict=True) if b > 0]
-                if kept:
-                    (labels[name],) = axis.loglog(
-                        *zip(*kept, strict=True),
-                        marker="osD^v"[number // kinds % 5],
-                        markersize=4,
-                        linestyle=("-", "--", ":")[number % kinds],
-                        color=colors[name] if colors else theme.SERIES[number // kinds % len(theme.SERIES)],
-                        label=name,
-                    )
-            axis.set_title(title, fontsize=10, loc="left")
-            axis.set_xlabel(x)
-            axis.set_ylabel(label)
-            axis.grid(**GRID)
-        figure.legend(
-            labels.values(), labels.keys(), loc="outside lower center", ncols=min(4, len(labels)), frameon=False
-        )
+            axis.set_ylim(0.0, 1.12 * high.max())
     return figure

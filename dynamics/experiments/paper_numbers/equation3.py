@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from cgraph import Graph
 from cgraph.extend import Polynomial, expand, format_polynomial
 
-from ...equations.formulations import momentum_rate
+from ...equations.formulations import inverse_dynamics, momentum_rate
 from ...scenes.scenes import spring_mass
 
 # The paper's right-hand side, I qdd - k (qdd dt^2 + 2 qd dt + q_old), as coefficients.
@@ -32,8 +33,16 @@ class Equation:
 
 def equation3(formulation: str) -> Equation:
     """The terms of the graph of that formulation; qd0 stands for the embedded velocity qdd0 dt + qd0_old."""
-    graph = momentum_rate(spring_mass(), formulation)
-    velocity = {node: "qd0" for node in graph.nodes if node.args and node.name == "qd0"}
-    terms = expand(graph.only_output(), velocity)
+    terms = _terms(momentum_rate(spring_mass(), formulation))
     inertial = (("I", 1), ("qdd0", 1))
     return Equation(formulation, terms, {key: c for key, c in terms.items() if key != inertial})
+
+
+def torque_terms(formulation: str) -> Polynomial:
+    """The terms of the whole torque, d/dt dL/dqd - dL/dq, of that formulation."""
+    return _terms(inverse_dynamics(spring_mass(), formulation))
+
+
+def _terms(graph: Graph) -> Polynomial:
+    velocity = {node: "qd0" for node in graph.nodes if node.args and node.name == "qd0"}
+    return expand(graph.only_output(), velocity)

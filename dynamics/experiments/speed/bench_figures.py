@@ -10,6 +10,7 @@ from ..trust.trust import trust
 from .agreement import agreement
 from .build_time import build_time
 from .closed_chains import closed_chains
+from .compile_time import compile_time
 from .ensembles import ensembles
 from .long_chains import long_chains
 from .node_counts import node_counts
@@ -27,6 +28,7 @@ class BenchFigure(NamedTuple):
 FIGURES = {
     "counts": BenchFigure("nodes of forward dynamics, and what leaving out one idea adds", node_counts, ("links",)),
     "build": BenchFigure("time to build the graph of forward dynamics", build_time, ("links", "repeats")),
+    "compile": BenchFigure("time to compile chains, and derivatives of them", compile_time, ("links",)),
     "agreement": BenchFigure("largest differences from MuJoCo and Pinocchio", agreement, ("links", "count")),
     "ensembles": BenchFigure("many pendulums beside MuJoCo's rollout and JAX's vmap", ensembles, ("count", "repeats")),
     "reconfiguration": BenchFigure("first torque after a change of structure", reconfiguration, ("links", "repeats")),

@@ -95,7 +95,7 @@ def gradient(
 
     The discrete adjoint: the exact derivative of the numbers that the method computes, to rounding. Steps that are
     chosen by error are those of `simulate`, and count as constants. Every step is run once and pulled back once, as
-    machine code; where what that needs of all of them would take more than 64 MB, one state in every sqrt(steps) is
+    machine code; where what that needs of all of them would take more than 128 MB, one state in every sqrt(steps) is
     kept, and the steps between are made again.
 
     Parameters

@@ -15,7 +15,7 @@ from .motion import MotionError, MotionOf
 from .motion_programs import Along, MotionPrograms
 from .motion_steps import LOSS
 
-MOST_RECORDED = 64 * 2**20  # bytes of what is recorded of steps; of more, checkpoints are kept
+MOST_RECORDED = 128 * 2**20  # bytes of what is recorded of steps; of more, checkpoints are kept
 PIECE = 4096  # passes between two looks at Python
 
 
@@ -115,10 +115,8 @@ class MotionRun:
         width, parts = back.program.feed_width, []
         for first, last, tape in self.recorded(backwards=True):
             parts.append(_run(back, memory, last - first, 1, tape[::-1, :width]).rows)
-        count = (len(self.motion.h), back.program.width)
-        rows = (
-            (parts[0] if len(parts) == 1 else np.concatenate(parts))[::-1] if back.program.record else np.empty(count)
-        )
+        none = np.empty((len(self.motion.h), 0))
+        rows = np.concatenate([part[::-1] for part in reversed(parts)]) if back.program.record else none
         bars = self._vectors(self.step, memory)
         if self.start is None:
             return bars, rows

@@ -120,6 +120,42 @@ def test_a_batch_that_is_not_contiguous_or_not_of_doubles(view):
     assert same(function.batch(points), function.batch(np.array(points, dtype=float, order="C")))
 
 
+@pytest.mark.parametrize("lanes", [lanes for lanes in (2, 4, 8) if lanes <= llvm_engine.host().lanes])
+@pytest.mark.parametrize(("n_in", "n_out"), [(2, 1), (3, 7), (8, 8), (9, 17), (30, 41)])
+def test_points_in_rows_are_read_and_written_as_they_lie(n_in, n_out, lanes, monkeypatch):
+    """Bit by bit what points in columns give, into part of an array too, whatever the vectors."""
+    monkeypatch.setattr(llvm_engine.host(), "lanes", lanes)
+    x = cg.variables([f"x{i}" for i in range(n_in)])
+    function = cg.compile(cg.Graph(x, {f"y{k}": x[k % n_in] * x[(3 * k + 1) % n_in] + float(k) for k in range(n_out)}))
+    for count in (0, 1, 7, 8, 19):
+        rows = np.random.default_rng(count).normal(size=(count, n_in))
+        expected, found = function.batch(np.ascontiguousarray(rows.T)), function.batch(rows.T)
+        assert np.array_equal(found, expected)
+        assert found.T.flags.c_contiguous
+        wide = np.full((count, n_out + 5), 7.0)
+        assert function.batch(rows.T, out=wide[:, 2:-3].T).base is wide
+        assert np.array_equal(wide[:, 2:-3].T, expected)
+        assert (np.delete(wide, np.s_[2:-3], axis=1) == 7.0).all()
+
+
+@pytest.mark.parametrize("engine", ["python", "numpy", "llvm"])
+def test_results_go_where_they_are_to_go(engine):
+    function, points = cg.compile(chain(), engine), np.random.default_rng(0).normal(size=(3, 9))
+    expected = function.batch(points)
+    for order in "CF":
+        out = np.empty((5, 9), order=order)
+        assert function.batch(points, out=out) is out
+        assert np.array_equal(out, expected)
+    frozen = np.empty((5, 9))
+    frozen.flags.writeable = False
+    for wrong, says in ((np.empty((5, 8)), "shape"), (np.empty((5, 9), np.float32), "float64"), (frozen, "read-only")):
+        with pytest.raises(cg.GraphError, match=says):
+            function.batch(points, out=wrong)
+    both = np.zeros((5, 9))
+    with pytest.raises(cg.GraphError, match="must not share memory"):
+        function.batch(both[:3], out=both)
+
+
 def test_inputs_are_left_alone_and_results_are_fresh():
     function = cg.compile(chain(), "llvm")
     x = np.array([0.3, 0.1, -0.2])

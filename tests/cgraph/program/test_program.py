@@ -307,6 +307,9 @@ def test_a_feed_is_read_before_every_pass(backend: str) -> None:
     feed = np.arange(12.0).reshape(3, 4)
     assert ready.run(ready.memory({"x": 1.0}), 3, 1, feed).rows.tolist() == [[1, 2, 3], [5, 6, 7], [13, 10, 11]]
     assert ready.run(ready.memory({"x": 1.0}), 2, 2, feed[:2]).rows.tolist() == [[5, 6, 7]]
+    wide = np.stack([feed, -feed], axis=1).reshape(3, 8)
+    for view in (wide[::-1, :4], np.asfortranarray(feed)[::-1], wide.astype(np.float32)[::-1, :4]):
+        assert ready.run(ready.memory({"x": 1.0}), 3, 1, view).rows[:, 0].tolist() == [9, 13, 13]
     many = np.stack([feed, 2.0 * feed], axis=2)
     memories = ready.memory({"x": np.array([[1.0, 0.0]])}, 2)
     assert ready.run_many(memories.copy(), 3, 1, many).rows[:, 0].tolist() == [[1, 0], [5, 8], [13, 24]]
@@ -318,3 +321,27 @@ def test_a_feed_is_read_before_every_pass(backend: str) -> None:
         Program({"u": 1}, [], record=[], feed=["u", "u"])
     with pytest.raises(cg.GraphError, match="the feed names register 'w'"):
         Program({"u": 1}, [], record=[], feed=["w"])
+
+
+@pytest.mark.parametrize("backend", ["python", "llvm"])
+def test_a_batch_records_what_a_pass_records_from_every_value(backend):
+    a, b, y, s = cg.variables("a b y s")
+    body = [
+        Call(cg.Graph([a, b], {"u": cg.sin(a) * b, "v": a / b, "s": a + b}), ("x",), ("u", "s")),
+        Map(cg.Graph([s, y], {"z": y * y + s}), ("u",), ("z",), shared=("s",)),
+        Sum(cg.Graph([y], {"t": 2.0 * y}), ("z",), "t"),
+    ]
+    program = Program({"x": 2, "u": 2, "z": 2, "s": 1, "t": 1}, body, record=["z", "x", "t"])
+    run, values = runner(program, backend), np.random.default_rng(0).normal(size=(131, 2))
+    found, one = run.batch("x", values), runner(program, "python")
+    assert np.array_equal(found, run.batch("x", values, threads=2))
+    expected = [one.run(one.memory({"x": value}), 1).rows[0] for value in values]
+    assert found == pytest.approx(np.array(expected), rel=1e-13)
+    wide = np.zeros((131, 9))
+    run.batch("x", values, out=wide[:, 2:7])
+    assert np.array_equal(wide[:, 2:7], found)
+    assert not wide[:, [0, 1, 7, 8]].any()
+    with pytest.raises(cg.GraphError, match="register 's' is read before"):
+        runner(Program({"x": 2, "u": 2, "z": 2, "s": 1}, body[1:2], record=["z"]), backend).batch("u", values)
+    with pytest.raises(cg.GraphError, match=r"shape \(N, 2\)"):
+        run.batch("x", values[0])

@@ -27,7 +27,7 @@ pytest.importorskip("flint")
 # Of the largest entry of a matrix of slopes of torques; and, of slopes X of accelerations, M X = dtau, of what a
 # relative change of M and of dtau may do to X: of the largest entry of |M^-1| (|M| |X| + |dtau|).
 ROUNDING = 4e-15
-CONDITIONED = 1e-15
+LONG_CHAIN = 1e-14  # of the largest entry, of slopes of forward dynamics by elimination itself
 
 
 def ours(tree: dyn.Mechanism, state: tuple[Array, ...]) -> Slopes:
@@ -51,7 +51,7 @@ def pinocchios(tree: dyn.Mechanism, state: tuple[Array, ...]) -> Slopes:
 
 def require_exact(off: Errors) -> None:
     assert max(off.torques) < ROUNDING
-    assert max(off.conditioned) < CONDITIONED
+    assert max(off.conditioned) < ROUNDING
 
 
 @pytest.mark.parametrize("name", TREES)
@@ -103,7 +103,11 @@ def test_slopes_of_a_hundred_bodies_are_exact(name: str) -> None:
     require_exact(off)
     (A,), (B,) = dyn.linearize_many(tree, q[None], qd[None], tau)
     n = len(qd)
-    require_exact(errors(Slopes(found.torques, np.hstack([A[n:], B[n:]])), exact))
+    again = errors(Slopes(found.torques, np.hstack([A[n:], B[n:]])), exact)
+    print(name, again)  # noqa: T201
+    require_exact(again)
+    if tree.system.kinematics.quasi is None:  # elimination differentiated loses nothing to the condition of M
+        assert max(again.accelerations) < LONG_CHAIN
 
 
 def test_slopes_agree_with_complex_steps() -> None:

@@ -11,6 +11,7 @@ from dynamics.equations import linearize_many as many
 from dynamics.equations.evaluate_at import evaluate_at
 from dynamics.equations.linearization import linearize, state_space
 from dynamics.equations.linearization_parts import linearization_parts
+from dynamics.peers.translate import translated
 from dynamics.systems.model import as_system
 from tests.dynamics.mechanisms import FAMILIES, random_mechanism, turned_arm
 from tests.dynamics.models import MODELS, Array, at, random_arm, states
@@ -115,16 +116,37 @@ FEW = {
 def test_many_states_are_linearized_as_one(name: str, columns: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Written out, and column by column."""
     monkeypatch.setattr(many, "WRITTEN_OUT", 0 if columns else many.WRITTEN_OUT)
-    model, rng, count = FEW[name](), np.random.default_rng(0), 2 * many.BLOCK + 3
+    model, rng, count = FEW[name](), np.random.default_rng(0), 131
     system = as_system(model)
     q = np.array(system.kinematics.neutral) + rng.uniform(-1.0, 1.0, (count, system.nq))
     qd, tau = rng.normal(size=(count, system.n)), rng.normal(size=system.n)
     a, b = dyn.linearize_many(model, q, qd, tau, t=0.3)
     again = dyn.linearize_many(model, q, qd, tau, t=0.3, threads=2)
     assert all(map(np.array_equal, (a, b), again))
-    for k in (0, many.BLOCK, count - 1):
+    for k in (0, 64, count - 1):
         for found, expected in zip((a[k], b[k]), linearize(model, q[k], qd[k], tau, t=0.3), strict=True):
             assert np.abs(found - expected).max() < 1e-13 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("columns", [False, True])
+def test_many_states_have_the_slopes_of_complex_steps(columns: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Written out, and column by column; B symmetric to the last bit, matrices as linear algebra takes them."""
+    monkeypatch.setattr(many, "WRITTEN_OUT", 0 if columns else many.WRITTEN_OUT)
+    arm, n, step = turned_arm(4), 4, 1e-30
+    accelerations, given = dyn.forward_dynamics(arm), states(arm, 9)
+    x = np.hstack([given[name] for name in ("q", "qd", "tau")])
+    a, b = dyn.linearize_many(arm, *np.split(x, 3, axis=1))
+    for k in (0, 8):
+        columns_of_k = []
+        for unit in np.eye(3 * n):
+            at = dict(zip(accelerations.inputs, x[k] + 1j * step * unit, strict=True))
+            values = translated(accelerations.nodes, at, np)
+            columns_of_k.append([values[node].imag / step for node in accelerations.outputs.values()])
+        expected = np.array(columns_of_k).T
+        assert np.hstack([a[k], b[k]])[n:] == approx(expected, abs=1e-13 * abs(expected).max())
+        assert np.array_equal(b[k, n:], b[k, n:].T)
+        assert np.array_equal(a[k, :n], np.eye(n, 2 * n, n))
+    assert a.strides[2] == b.strides[2] == 8
 
 
 def test_of_no_states_there_are_no_matrices_and_one_state_is_refused() -> None:

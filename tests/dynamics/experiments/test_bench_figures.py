@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
-from dynamics.experiments.speed import closed_chains, ensembles, long_chains, reconfiguration
+from dynamics.experiments.speed import closed_chains, compile_time, ensembles, long_chains, reconfiguration
 from dynamics.experiments.speed.agreement import QUANTITIES, differences, random_arm
 from dynamics.experiments.speed.bench_figures import FIGURES
 from dynamics.experiments.speed.bench_scenes import turned_arm
@@ -53,6 +53,14 @@ def test_pendulums_of_an_ensemble_end_where_those_of_mujoco_and_jax_do() -> None
     for name in ("mujoco", "jax"):
         if PEERS[name].installed:
             assert getattr(ensembles, name)(q, qd)() == pytest.approx(expected, rel=1e-9, abs=1e-9)  # 1000 steps
+
+
+def test_the_time_to_compile_is_told_by_stages_of_a_chain(capsys: pytest.CaptureFixture[str]) -> None:
+    compile_time.cost("planar", 2)
+    nodes, *seconds = capsys.readouterr().out.split()
+    assert int(nodes) == len(dyn.forward_dynamics(long_chains.MODELS["planar"](2)).nodes)
+    assert len(seconds) == len(compile_time.HEADER) - 3
+    assert all(float(value) > 0.0 for value in seconds)
 
 
 def test_elimination_is_accurate_on_long_chains_and_dense_solves_are_less_so() -> None:

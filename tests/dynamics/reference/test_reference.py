@@ -1,5 +1,6 @@
 """Reference solutions: both methods against closed forms, published values and each other."""
 
+import importlib
 import itertools
 import math
 from collections.abc import Callable
@@ -17,6 +18,7 @@ from dynamics.equations.initial_value import split_state
 from dynamics.equations.state_equation import state_equation, state_inputs
 from dynamics.experiments.stability import cases
 from dynamics.reference import REFERENCE_METHODS, Reference, ReferenceFailedError, closed_forms, reference
+from dynamics.reference.flint_numbers import working
 from dynamics.systems.ode_system import OdeSystem
 from tests.slow import slow
 
@@ -240,6 +242,24 @@ def test_a_singularity_on_the_way_is_an_error_that_says_where() -> None:
         reference(OdeSystem(lambda x, t: [x[0] * x[0]], "x"), [1.0], None, [2.0], digits=10)
     with raises(ReferenceFailedError, match="domain"):
         reference(OdeSystem(lambda x, t: [cg.log(x[0])], "x"), [-1.0], None, [2.0], digits=10)
+
+
+def test_a_motion_that_would_take_a_million_steps_is_refused_after_a_few() -> None:
+    fast = OdeSystem(lambda x, t: [x[1], -1e18 * x[0]], ["x", "v"])
+    with raises(ReferenceFailedError, match=r"the first 50 steps come to t = .*, so that 1 s would take some .e\+0"):
+        reference(fast, [1.0, 0.0], None, [1.0])
+
+
+def test_the_state_that_does_not_settle_is_named() -> None:
+    """As one that is zero but for rounding."""
+    module = importlib.import_module("dynamics.reference.reference")
+    with working(50) as number:
+
+        def run(wanted: int) -> tuple[list[list[Any]], str]:
+            return [[number(1), number(10) ** -wanted]], ""
+
+        with raises(ReferenceFailedError, match=r"of the largest value of q1, so that it is zero but for rounding"):
+            module._converged(run, [2.0], 30, 30, ["q0", "q1"])
 
 
 def test_deviation_is_told_below_the_rounding_of_the_reference() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from dynamics.scenes.inspection import DT, FORMULATIONS, Inspection, inspection
 from dynamics.scenes.scenes import Scene
 from tests.tolerances import EQUATIONS
 
+ARM = cache(lambda: inspection(dyn.scenes.load("triple_pendulum")))
 INTEGRATED = 1e-9  # N m: the state is one that the equations hold at, whatever the error of the motion
 
 
@@ -26,7 +28,7 @@ def values_of(found: Inspection, graph: Graph) -> dict[str, Any]:
 
 
 def test_the_free_motion_takes_no_torque_by_the_chain_rule_alone():
-    found = inspection(dyn.scenes.load("triple_pendulum"))
+    found = ARM()
     assert tuple(each.name for each in found.versions) == FORMULATIONS
     wrong = []
     for each in found.versions:
@@ -39,7 +41,7 @@ def test_the_free_motion_takes_no_torque_by_the_chain_rule_alone():
 
 
 def test_the_embedded_step_ends_in_the_state_of_the_others():
-    found = inspection(dyn.scenes.load("triple_pendulum"))
+    found = ARM()
     at = values_of(found, found.versions[0].graph)
     for i in range(3):
         qd = at[f"qd{i}_old"] + DT * at[f"qdd{i}"]
@@ -48,9 +50,9 @@ def test_the_embedded_step_ends_in_the_state_of_the_others():
 
 
 def test_shares_of_the_torque_add_up():
-    found = inspection(dyn.scenes.load("triple_pendulum"))
+    found = ARM()
     parts, graph = found.shares.parts, found.shares.graph
-    assert parts == ("link 1", "link 2", "link 3", "damping and forces", "all")
+    assert parts == ("link 1", "link 2", "link 3", "damping", "all")
     values = graph.evaluate(values_of(found, graph))
     shares = np.array(
         [[np.broadcast_to(values[name], found.t.shape) for name in found.shares.row(i)] for i in range(3)]
@@ -70,7 +72,11 @@ def test_forward_dynamics_and_a_system_without_places():
 
 def test_joints_of_a_planar_arm_are_a_link_apart():
     q = np.random.default_rng(0).uniform(-3, 3, (5, 3))
-    points, parents = skeleton(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7]), q)
+    points, parents, graph, joints, turns = skeleton(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7]), q)
+    assert joints == (0, 1, 2)
+    assert turns == (1, 1, 1)
+    again = graph.evaluate({f"q{i}": q[:, i] for i in range(3)})
+    assert np.stack(list(again.values()), axis=1) == pytest.approx(points[..., :].reshape(5, -1))
     assert parents == (-1, 0, 1, 2)
     assert np.linalg.norm(np.diff(points, axis=1), axis=2) == pytest.approx(np.tile([1.0, 0.8, 0.7], (5, 1)))
     assert points[:, 1] == pytest.approx(np.stack([np.sin(q[:, 0]), -np.cos(q[:, 0])], axis=1))
@@ -82,13 +88,34 @@ def test_a_mechanism_hangs_together():
         dyn.Body("a", joint, mass=1.0, center=(0, 0, -0.25)),
         dyn.Body("b", joint, "a", mass=1.0, center=(0, 0, -0.25)),
     ]
-    points, parents = skeleton(dyn.Mechanism(bodies), [[0.3, 0.2]])
+    points, parents, *_ = skeleton(dyn.Mechanism(bodies), [[0.3, 0.2]])
     assert parents == (-1, 0, 1)
     a = np.array([np.sin(0.3), -np.cos(0.3)]) * 0.5
     tip = np.array([np.sin(0.5), -np.cos(0.5)]) * 0.25
     assert points[0] == pytest.approx(np.array([[0.0, -0.5], [0.0, -0.5] + a, [0.0, -0.5] + a + tip]))
 
 
+@pytest.mark.parametrize(
+    ("axis", "turns"), [((0, 1, 0), (-1,)), ((0, -1, 0), (1,)), ((1, 0, 0), (1,)), ((0, 0, 1), (1,))]
+)
+def test_a_joint_turns_the_picture_one_way_or_the_other(axis, turns):
+    """About y, x goes to the right and z up, so that a positive turn is clockwise; the others as they are seen."""
+    hinge = dyn.Joint("revolute", axis=axis)
+    body = dyn.Body("a", hinge, mass=1.0, center=0.3 * (1.0 - np.abs(axis)), inertia=(0.1, 0.1, 0.1))
+    model = dyn.Mechanism([body], gravity=(0.0, 0.0, 0.0))
+    q = np.linspace(0.0, 1.0, 5)[:, None]
+    found = skeleton(model, q)
+    assert found.turns == turns
+    slide = dyn.Mechanism([dyn.Body("a", dyn.Joint("prismatic", axis=(1, 0, 0)), mass=1.0)])
+    assert skeleton(slide, q).turns == (0,)
+
+
 def test_a_time_out_of_range_is_refused():
     with pytest.raises(ValueError, match="t_end"):
         inspection(Scene("x", "", dyn.planar_arm([1.0], [1.0]), (0.0,), (0.0,), 1.0), t_end=-1.0)
+
+
+def test_a_motion_that_does_not_begin_is_told():
+    weightless = dyn.System(lambda q, qd, t, p: p["m"] * qd[0] ** 2 - q[0] ** 2, ["x"], {"m": 0.0})
+    with pytest.raises(ValueError, match=r"accelerations that are not finite: the motion stopped at t = 0 s: "):
+        inspection(Scene("weightless", "", weightless, (1.0,), (0.0,), 1.0))

@@ -35,6 +35,12 @@ def leave():
 
 def nothing():
     pass
+
+class Signal(SystemExit):
+    pass
+
+def stopped():
+    raise Signal(130)
 """
 
 
@@ -115,6 +121,11 @@ def test_what_is_no_model_is_told_in_one_sentence(name, message):
     assert str(raised.value).startswith(message)
     assert "\n" not in str(raised.value)
     assert sys.path == path
+
+
+def test_what_a_signal_raises_is_no_error_of_the_file():
+    with pytest.raises(SystemExit, match="130"):
+        scenes.load("models.py:stopped")
 
 
 def test_a_file_that_changes_is_executed_anew(folder):

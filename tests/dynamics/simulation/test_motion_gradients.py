@@ -3,6 +3,7 @@
 import math
 import tracemalloc
 import warnings
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics.integrators import METHODS, Tableau, derive, runge_kutta
 from dynamics.simulation.gradients import motion_run
+from dynamics.simulation.gradients.motion_equations import motion_equations
+from dynamics.simulation.gradients.motion_programs import motion_programs
 from dynamics.simulation.gradients.rate_pullback import rate_pullback
 from dynamics.systems.system import System
 from tests.dynamics.mechanisms import random_mechanism
@@ -39,6 +42,9 @@ def bead(unit: float = 1.0) -> System:
     return System(lagrangian, ["s"], {"m": 1.3, "k": 2.0}, damping=0.2 * unit**2)
 
 
+BEAD = bead()  # what is derived of it is derived once
+
+
 def loss(q: Any, qd: Any, t: Any, p: Any) -> Any:
     return q[0] * qd[0] + p["m"] * q[0] ** 2
 
@@ -56,10 +62,11 @@ def options(method: str) -> dict[str, Any]:
 
 
 @mark.parametrize("method", [*USUAL, *slow(*OTHERS)])
-def test_a_gradient_is_the_end_s_slope_along_forward_sensitivities_and_that_of_differences(method: str) -> None:
+def test_what_gradients_of_every_method_are(method: str) -> None:
+    """The end's slope along forward sensitivities; the same in any order; lam . dx at any step; differences."""
     given = {"t_end": 0.5, "method": method, "tau": [0.3], "backend": "python", **options(method)}
-    result = dyn.gradient(bead(), loss, [0.5], [0.2], wrt=WRT, **given)
-    forward = dyn.sensitivities(bead(), [0.5], [0.2], wrt=WRT, **given)
+    result = dyn.gradient(BEAD, loss, [0.5], [0.2], wrt=WRT, **given)
+    forward = dyn.sensitivities(BEAD, [0.5], [0.2], wrt=WRT, **given)
     assert len(forward.t) in (6, 7)
     at_end = slope(forward.q[-1], forward.qd[-1])
     for name in WRT:
@@ -67,31 +74,61 @@ def test_a_gradient_is_the_end_s_slope_along_forward_sensitivities_and_that_of_d
         direct = forward.q[-1, 0] ** 2 if name == "m" else 0.0
         size = np.abs(at_end) @ np.abs(rows) + abs(direct)
         assert np.all(np.abs(at_end @ rows + direct - result[name]) <= DUAL * size)
+        assert not forward.times[name].any()
+    turned = dyn.gradient(BEAD, loss, [0.5], [0.2], wrt=WRT[::-1], **given)
+    assert [np.squeeze(turned[name]) for name in WRT] == [np.squeeze(result[name]) for name in WRT]
 
-    def value(q: float = 0.5, qd: float = 0.2, tau: float = 0.3, **numbers: float) -> float:
-        changed = {**given, "tau": [tau], "parameters": numbers}
-        return dyn.gradient(bead(), loss, [q], [qd], wrt=WRT, **changed).value
+    later = {name: value for name, value in given.items() if name != "t_end"}
+    if "dt" in later:
+        later["dt"] *= 1.0 + 1e-9  # the time that is left is a whole number of steps, to rounding
+    products = [np.squeeze([result["q"], result["qd"]])]
+    for row in (2, 4):
+        span, start = (forward.t[row], 0.5), (forward.q[row], forward.qd[row])
+        bar = dyn.gradient(BEAD, loss, *start, t_span=span, wrt=WRT, **later)
+        assert len(bar.t) == len(forward.t) - row
+        products.append(
+            np.squeeze([bar["q"], bar["qd"]]) @ np.concatenate([forward["q"][row], forward["qd"][row]], axis=1)
+        )
+    assert np.array(products) == approx(np.tile(products[0], (3, 1)), rel=LONG_SUM, abs=LONG_SUM)
+
+    def value(q: float = 0.5, m: float = 1.3) -> float:
+        changed = {**given, "parameters": {"m": m}}
+        return dyn.gradient(BEAD, loss, [q], [0.2], wrt=WRT, **changed).value
 
     for name, at in {"q": 0.5, "m": 1.3}.items():
         difference = (value(**{name: at + 1e-5}) - value(**{name: at - 1e-5})) / 2e-5
         assert float(np.squeeze(result[name])) == approx(difference, rel=DIFFERENCES, abs=DIFFERENCES)
 
 
-@mark.parametrize("method", [*USUAL, *slow(*OTHERS)])
-def test_adjoint_times_tangent_is_constant_along_the_motion(method: str) -> None:
-    """lam . dx at any step, with lam from the motion that begins there."""
-    given = {"method": method, "backend": "python", **options(method)}
-    forward = dyn.sensitivities(bead(), [0.5], [0.2], 1.0, wrt=["q", "qd"], **given)
-    if "dt" in given:
-        given["dt"] *= 1.0 + 1e-9  # the time that is left is a whole number of steps, to rounding
-    products = []
-    for row in (0, 4, 9):
-        span = (forward.t[row], 1.0)
-        begin = dyn.gradient(bead(), loss, forward.q[row], forward.qd[row], t_span=span, wrt=["q", "qd"], **given)
-        assert len(begin.t) == len(forward.t) - row
-        bar = np.concatenate([begin["q"], begin["qd"]])
-        products.append(bar @ np.concatenate([forward["q"][row], forward["qd"][row]], axis=1))
-    assert np.array(products) == approx(np.tile(products[0], (3, 1)), rel=LONG_SUM)
+@pytest.fixture(scope="module")
+def exact_slopes() -> Any:
+    """Of `loss` after 0.5 s, by q and k: differences of solutions of 30 digits."""
+    pytest.importorskip("flint")
+
+    def value(q: float = 0.5, k: float = 2.0) -> Fraction:
+        numbers = dyn.reference(BEAD, [q], [0.2], [0.5], parameters={"k": k}, digits=28).decimal[0]
+        q_end, qd_end = (Fraction(number) for number in numbers)
+        return q_end * qd_end + Fraction(1.3) * q_end**2
+
+    e = 2.0**-24
+    by_q, by_k = value(0.5 + e) - value(0.5 - e), value(k=2.0 + e) - value(k=2.0 - e)
+    return [float(by_q / Fraction(2.0 * e)), float(by_k / Fraction(2.0 * e))]
+
+
+@mark.parametrize(
+    ("method", "accuracy"),
+    [
+        ("dop853", {"rtol": 1e-12}),
+        *slow(*[(name, {"rtol": 1e-12}) for name in ("dopri5", "rodas", "radau")]),
+        *slow(*[(name, {"dt": 0.005}) for name in ("gauss6", "yoshida8", "kahan_li8")]),
+    ],
+)
+def test_a_gradient_of_short_steps_beside_differences_of_30_digits(
+    method: str, accuracy: dict[str, float], exact_slopes: Any
+) -> None:
+    given = {"wrt": ["q", "k"], "backend": "python", **accuracy}
+    result = dyn.gradient(BEAD, loss, [0.5], [0.2], 0.5, method, **given)
+    assert [result["q"][0], result["k"]] == approx(exact_slopes, rel=DIGITS)
 
 
 def pendulum_step(x: Any, tau: Any, m: Any, h: float) -> Any:
@@ -125,6 +162,7 @@ def test_torques_a_step_a_running_loss_and_a_parameter_beside_complex_steps(back
     result = dyn.gradient(rod, final, [0.5], [0.2], 0.5, wrt=["q", "tau", "m"], **given)
     tiny, forces = 1e-40, tau[:, 0].astype(complex)
     assert result.value == approx(total(0.5, forces, 1.2).real, rel=SHORT_SUM)
+    assert result["tau"].flags.c_contiguous
     assert result["q"] == approx([total(0.5 + 1j * tiny, forces, 1.2).imag / tiny], rel=LONG_SUM)
     assert result["m"] == approx(total(0.5, forces, 1.2 + 1j * tiny).imag / tiny, rel=LONG_SUM)
     assert dyn.gradient(rod, final, [0.5], [0.2], 0.5, wrt="m", **given)["m"] == approx(result["m"], rel=SHORT_SUM)
@@ -254,6 +292,9 @@ def falling() -> System:
     return System(lagrangian, ["height"], {"m": 1.0, "e": 0.8}, damping=0.3)
 
 
+FALLING = falling()
+
+
 def table(q: Any, qd: Any, t: Any) -> Any:
     return q[0] - 0.02 * cg.sin(3.0 * t)
 
@@ -271,9 +312,20 @@ def test_events_that_reset_the_state_or_end_the_motion(method: str, events: Any)
 
     def at(q: float = 1.0, tau: float = 0.2, **numbers: float) -> dyn.MotionGradient:
         final = lambda q, qd, t: q[0] * qd[0] + t * q[0]  # noqa: E731
-        return dyn.gradient(falling(), final, [q], [0.1], tau=[tau], parameters=numbers, **given)
+        return dyn.gradient(FALLING, final, [q], [0.1], tau=[tau], parameters=numbers, **given)
 
     result = at()
+    forward = dyn.sensitivities(FALLING, [1.0], [0.1], tau=[0.2], **given)
+    q, qd, t = forward.q[-1, 0], forward.qd[-1, 0], forward.t[-1]
+    for name in given["wrt"]:
+        rows, times = forward[name], forward.times[name]
+        direct = np.array([qd + t, q]) @ rows[-1] + q * times[-1]
+        assert direct == approx(result[name], rel=DUAL, abs=DUAL)
+    resets = np.flatnonzero(np.diff(forward.t) == 0.0)
+    assert len(forward.t) == len(result.t) + len(resets)
+    assert len(resets) == 1
+    assert forward.times["e"][: resets[0] + 1].any() == 0  # the first bounce is when it is, whatever comes after it
+    assert forward.times["q"][resets[0]] != 0.0
     assert result.t[-1] == (1.0 if len(events) == 1 else approx(0.785, abs=1e-3))
     for name, value in {"q": 1.0, "e": 0.8}.items():
         difference = (at(**{name: value + 1e-6}).value - at(**{name: value - 1e-6}).value) / 2e-6
@@ -297,10 +349,10 @@ def test_many_gradients_are_those_one_by_one(method: str, backend: str) -> None:
     q, qd, tau, k = (rng.normal(size=shape) for shape in ((9, 1), (9, 1), (9, 4, 1), 9))
     given = {"t_end": 0.2, "method": method, "wrt": WRT, "backend": backend}
     running = lambda q, qd, tau, t: q[0] * tau[0]  # noqa: E731
-    many = dyn.gradient_many(bead(), loss, q, qd, tau=tau, parameters={"k": 2.0 + k}, running=running, **given)
+    many = dyn.gradient_many(BEAD, loss, q, qd, tau=tau, parameters={"k": 2.0 + k}, running=running, **given)
     for row in (0, 4, 8):
         one = dyn.gradient(
-            bead(), loss, q[row], qd[row], tau=tau[row], parameters={"k": 2.0 + k[row]}, running=running, **given
+            BEAD, loss, q[row], qd[row], tau=tau[row], parameters={"k": 2.0 + k[row]}, running=running, **given
         )
         assert many.value[row] == approx(one.value, rel=SHORT_SUM)
         assert (many.q[row], many.qd[row]) == (approx(one.q, rel=SHORT_SUM), approx(one.qd, rel=SHORT_SUM))
@@ -311,14 +363,14 @@ def test_many_gradients_are_those_one_by_one(method: str, backend: str) -> None:
 def test_many_gradients_with_what_is_the_same_for_all() -> None:
     held = {"tau": lambda q, qd, t, p: [p["gain"] * (1.0 - q[0])], "parameters": {"gain": [3.0, 4.0]}}
     given = {"t_end": 0.2, "dt": 0.05, "backend": "python"}
-    two = dyn.gradient_many(bead(), loss, [0.5], [0.2], wrt=["q", "gain", "m"], **given, **held)
+    two = dyn.gradient_many(BEAD, loss, [0.5], [0.2], wrt=["q", "gain", "m"], **given, **held)
     held["parameters"] = {"gain": 4.0}
-    one = dyn.gradient(bead(), loss, [0.5], [0.2], wrt=["q", "gain", "m"], **given, **held)
+    one = dyn.gradient(BEAD, loss, [0.5], [0.2], wrt=["q", "gain", "m"], **given, **held)
     assert [two[name][1] for name in ("q", "gain", "m")] == [approx(one[name]) for name in ("q", "gain", "m")]
-    same = dyn.gradient_many(bead(), loss, [[0.5], [0.5]], [0.2], tau=[0.3], **given)
+    same = dyn.gradient_many(BEAD, loss, [[0.5], [0.5]], [0.2], tau=[0.3], **given)
     assert same["tau"].shape == (2, 1)
     with raises(ValueError, match="gradient_many needs equal steps"):
-        dyn.gradient_many(bead(), loss, [[0.5]], [0.2], 0.2, "dop853")
+        dyn.gradient_many(BEAD, loss, [[0.5]], [0.2], 0.2, "dop853")
 
 
 @mark.parametrize("method", ["rk4", "dopri5", "rodas", "radau", "midpoint"])
@@ -333,6 +385,46 @@ def test_gradients_where_a_rate_or_its_slopes_do_not_depend_on_the_state(method:
     thrown = System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2) - 9.81 * q[1], ["x", "y"])
     result = dyn.gradient(thrown, lambda q, qd, t: q[0] * q[1], [1.0, 2.0], [3.0, 0.0], **given)
     assert result["qd"] == approx(0.5 * result.q[::-1], rel=1e-12)
+
+
+def test_a_parameter_may_have_the_name_of_anything_inside() -> None:
+    given = {"t_end": 0.1, "dt": 0.05, "backend": "python"}
+
+    def slopes(name: str) -> list[Any]:
+        rod = dyn.planar_arm([name, 0.5], [1.0, 0.5], damping=0.1, parameters={name: 1.2})
+        held = {"running": lambda q, qd, tau, t, p: q[0] * p[name], "wrt": ["q", "qd", name]}
+        result = dyn.gradient(rod, lambda q, qd, t: q[0] * qd[1], [0.5, 0.1], [0.2, 0.0], **held, **given)
+        return [result.value, *result["q"], *result["qd"], result[name]]
+
+    usual = slopes("m")
+    for name in ("loss", "value0_bar", "mu0", "number0", "shared0"):
+        assert slopes(name) == usual
+
+
+@mark.parametrize("make", [free_body, four_bar])
+def test_what_parameters_alone_decide_is_in_no_step(make: Any) -> None:
+    problem = derive(make(), {})
+    equations = motion_equations(problem, problem.system.n)
+    fixed = set(cg.variables([*equations.names, *equations.numbers.outputs]))
+    for graph in (equations.problem.rate, equations.problem.projection):
+        for node in [] if graph is None else graph.nodes:
+            assert not node.args or any([arg not in fixed and arg.value is None for arg in node.args])
+    assert len(equations.numbers.outputs) > len(equations.names)
+
+
+def test_forces_and_parameters_that_a_call_gives_make_nothing_anew() -> None:
+    model = bead()
+
+    def run(tau: float, k: float) -> list[Any]:
+        given = {"t_end": 0.1, "dt": 0.05, "wrt": "q", "tau": tau, "parameters": {"k": k}, "backend": "python"}
+        one = dyn.gradient(model, loss, [0.5], [0.2], **given)
+        many = dyn.gradient_many(model, loss, [[0.5]], [0.2], **given)
+        return [one["q"][0], many["q"][0, 0], dyn.sensitivities(model, [0.5], [0.2], **given)["q"][-1, 0, 0]]
+
+    first, made = run(0.3, 2.0), motion_programs.cache_info().misses
+    again = run(0.4, 2.5)
+    assert motion_programs.cache_info().misses == made
+    assert all(a != b for a, b in zip(first, again, strict=True))
 
 
 def test_the_problem_of_quaternions_is_derived_once() -> None:
@@ -350,9 +442,9 @@ def test_a_new_tableau_has_gradients(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_checkpoints_give_the_same_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     given = {"t_end": 1.0, "dt": 0.01, "wrt": WRT, "backend": "python"}
-    whole = dyn.gradient(bead(), loss, [0.5], [0.2], **given)
+    whole = dyn.gradient(BEAD, loss, [0.5], [0.2], **given)
     monkeypatch.setattr(motion_run, "MOST_RECORDED", 1000)
-    again = dyn.gradient(bead(), loss, [0.5], [0.2], **given)
+    again = dyn.gradient(BEAD, loss, [0.5], [0.2], **given)
     assert (whole.checkpoints, again.checkpoints) == (0, 10)
     assert {name: np.squeeze(again[name]) for name in WRT} == {name: np.squeeze(whole[name]) for name in WRT}
 
@@ -360,10 +452,10 @@ def test_checkpoints_give_the_same_numbers(monkeypatch: pytest.MonkeyPatch) -> N
 def test_a_controller_s_gain_and_a_first_order_system() -> None:
     held = {"tau": lambda q, qd, t, p: [p["gain"] * (1.0 - q[0])], "parameters": {"gain": 3.0}}
     given = {"t_end": 0.5, "dt": 0.05, "backend": "python", "wrt": ["q", "gain"], **held}
-    result = dyn.gradient(bead(), loss, [0.5], [0.2], running=lambda q, qd, tau, t: tau[0] ** 2, **given)
+    result = dyn.gradient(BEAD, loss, [0.5], [0.2], running=lambda q, qd, tau, t: tau[0] ** 2, **given)
     values = [
         dyn.gradient(
-            bead(), loss, [0.5], [0.2], running=lambda q, qd, tau, t: tau[0] ** 2,
+            BEAD, loss, [0.5], [0.2], running=lambda q, qd, tau, t: tau[0] ** 2,
             **(given | {"parameters": {"gain": gain}}),
         ).value
         for gain in (3.0 + 1e-5, 3.0 - 1e-5)
@@ -379,7 +471,7 @@ def test_a_controller_s_gain_and_a_first_order_system() -> None:
 
 def test_what_is_not_there_is_said_in_a_sentence() -> None:
     def end(**given: Any) -> Any:
-        return dyn.gradient(bead(), loss, [0.5], [0.2], **({"t_end": 0.1, "dt": 0.05, "backend": "python"} | given))
+        return dyn.gradient(BEAD, loss, [0.5], [0.2], **({"t_end": 0.1, "dt": 0.05, "backend": "python"} | given))
 
     with raises(ValueError, match="by method 'taylor' have no derivatives here; those by euler, rk4"):
         end(method="taylor", dt=None)

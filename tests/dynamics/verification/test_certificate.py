@@ -14,7 +14,6 @@ import dynamics as dyn
 from cgraph.core.node import OPS
 from dynamics.equations import equations_of_motion
 from dynamics.equations.constraints import multiplier_outputs
-from dynamics.io.mujoco_render import drawn_mjcf
 from dynamics.io.write_mjcf import to_mjcf
 from dynamics.systems.constraints import Constraints
 from dynamics.verification import certificate
@@ -186,9 +185,10 @@ def test_rods_are_told_from_capsules_by_their_inertia() -> None:
     """The masses of capsules, whose inertia MuJoCo takes from their shape."""
     pytest.importorskip("mujoco")
     arm = dyn.scenes.load("triple_pendulum").model
-    masses = iter([body.mass for body in arm.moving])
-    text = drawn_mjcf(arm).replace('inertiafromgeom="false"', 'inertiafromgeom="true"')
-    text = re.sub('type="capsule"', lambda found: f'{found[0]} mass="{next(masses)}"', text)
+    lengths = iter([1.0, 0.8, 0.7])  # and masses
+    rod = '<geom type="capsule" fromto="0 0 0 0 0 -{0}" size="0.05" mass="{0}"/>'
+    text = to_mjcf(arm).replace('inertiafromgeom="false"', 'inertiafromgeom="true"')
+    text = re.sub("<inertial [^>]*/>", lambda found: found[0] + rod.format(next(lengths)), text, count=3)
     found = failed(certify(arm, FEW, twin=text))
     assert found == {"inverse dynamics = MuJoCo's": "they agree without inertia about the centers of mass"}
 

@@ -101,8 +101,9 @@ def test_the_page_of_a_file_tells_forces_from_torques(tmp_path, capsys):
     model.write_text(MODEL)
     said(capsys, "inspect", str(model), "--t-end", "0.1", "--out", str(page))
     text = page.read_text(encoding="utf-8")
-    assert "<td>τ.slide [N]</td>" in text
-    assert "<td>τ.hinge [N m]</td>" in text
+    for name, called, unit in (("tau0", "τ.slide", "N"), ("tau1", "τ.hinge", "N m")):
+        assert f'["{name}","{called}"]' in text
+        assert f'["{name}","{unit}"]' in text
 
 
 @pytest.mark.filterwarnings("always::dynamics.MechanismWarning")
@@ -124,7 +125,7 @@ def test_pages_say_at_the_top_what_the_model_lacks(tmp_path, monkeypatch, capsys
     assert cli.main([name, "cart.xml", *options]) == 0
     what = "actuators that act with no input (servo: -50 length)"
     assert f"cgraph: warning: 'cart.xml': left out {what}\n" in capsys.readouterr().err
-    assert f"Left out of the model: {what}." in (tmp_path / "out" / page).read_text(encoding="utf-8")
+    assert f" {what}." in (tmp_path / "out" / page).read_text(encoding="utf-8")
 
 
 def test_lint_looks_in_a_box_and_at_a_point(capsys):
@@ -237,6 +238,14 @@ def test_a_model_of_a_python_file_stands_where_a_scene_does(own, capsys, command
     text = said(capsys, *command.format("own.py:system").split())
     assert word in text
     assert "made" not in text
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["inspect {} --t-end 0.1 --out a.html", "lint {}", "why {} decay_dot decay", "draw {} --out a.dot", "simulate {}"],
+)
+def test_a_system_of_first_order_has_its_state_equation(own, capsys, command):
+    assert said(capsys, *command.format("own.py:slow").split())
 
 
 def test_the_ten_lines_of_the_readme_are_a_page(own, capsys):

@@ -274,7 +274,7 @@ def test_a_box_is_called_by_its_tags_and_says_how_many_nodes_it_has(show):
     sums = set(graph.outputs.values())
     damping = sum("damping" in node.tags and node.value is None and node not in sums for node in graph.nodes)
     box = page.locator(f'[aria-label="damping, as written, {damping} nodes, folded"]')
-    assert box.locator("text").first.text_content() == f"damping {damping}"
+    assert box.locator("text").first.text_content() == f"{damping} nodes"  # its column has the name
     drawn = sum(node.value is None for node in graph.nodes)
     said = f"{len(graph.inputs) + len(sums)} of {drawn} nodes unfolded; {len(graph.nodes) - drawn} constants"
     assert page.inner_text("#trail") == said
@@ -287,6 +287,39 @@ def test_the_motion_moves_the_values_and_the_tables(show):
     assert page.inner_text("#results") != before[0]
     assert page.inner_text("#statetables") != before[1]
     assert page.inner_text("#clock") == f"{80 * 3.0 / 89:.2f} s"
+
+
+def test_the_elimination_is_gone_through_joint_by_joint(show, written):
+    assert cli.main(["inspect", "triple_pendulum", "--forward", "--out", str(written / "forward.html")]) == 0
+    page = show("forward")
+    said, lit = [], []
+    for _ in range(6):
+        page.click("#lessonon")
+        said.append(page.inner_text("#lessonwords"))
+        lit.append(
+            page.eval_on_selector_all("#arm circle", "(all) => all.findIndex((e) => e.classList.contains('marked'))")
+        )
+        assert page.locator(".item.result").count() > 0 or "1 of 6" in said[-1]  # the tip's pivot is a constant
+    assert lit == [2, 1, 0, 0, 1, 2]  # from the tip to the base, and back out
+    assert [text.split("joint ")[1][0] for text in said] == ["3", "2", "1", "1", "2", "3"]
+    page.keyboard.press("Escape")
+    assert page.locator("#picture.teaching, .joint.marked, .item.lit").count() == 0
+    assert not show("spring_mass").locator("#lesson").is_visible()
+
+
+def test_the_mechanism_follows_the_state_and_carries_its_torques(show):
+    page = show()
+    sticks = "() => [...document.querySelectorAll('#arm .stick')].map((each) => each.getAttribute('d'))"
+    before = page.evaluate(sticks)
+    turns = page.locator("#arm .turn").count()
+    assert turns >= 4
+    page.evaluate("inspector.setState({ q0: 0.0, q1: 0.0, q2: 0.0 })")
+    hanging = page.evaluate(sticks)
+    assert hanging != before
+    numbers = [float(each) for each in re.findall(r"-?[0-9.]+(?:e-?[0-9]+)?", " ".join(hanging))]
+    assert max(map(abs, numbers[::2])) < 1e-9  # x
+    page.click("#reset")
+    assert page.evaluate(sticks) == before
 
 
 # Ways to look at it.

@@ -63,7 +63,8 @@ def test_it_has_all_formulations_with_their_counts_and_spurious_nodes(pendulum):
         assert names <= set(data["inputs"]) | {name for name, *_ in data["derived"]["outputs"]}
     assert [len(row) for row in data["rows"]] == [len(data["inputs"])] * len(data["motion"]["t"])
     (table,) = data["tables"]
-    assert table["header"] == ["link 1", "link 2", "link 3", "damping and forces", "all"]
+    assert table["header"][:3] == ["link 1", "link 2", "link 3"]
+    assert table["header"][-1] == "all"
     assert [row[0] for row in table["rows"]] == ["tau0", "tau1", "tau2"]
 
 

@@ -59,15 +59,21 @@ def test_the_page_counts_verdicts_and_gives_every_reason_once() -> None:
     assert "Empty" not in page
 
 
-def test_a_line_is_a_figure_and_a_long_name_goes_on_below() -> None:
-    assert [line[0] for line in stability._lines(ROWS[1])] == [
-        "a name that is longer than there",
-        "is room for",
-    ]
+def test_a_line_is_a_figure_and_a_long_name_stays_in_one() -> None:
+    (line,) = stability._lines(ROWS[1])
+    assert line[0] == ROWS[1]["case"]
     first, second = stability._lines(ROWS[0])
     assert first == ["Robertson", "radau", "meets", "error [ulp]", "1.0e-09", "1", "12 + 3", "0.25"]
     assert second == ["", "", "", "error [ulp]", "0.5", "", "", ""]
     assert stability._lines(ROWS[3])[0][4] == "nan ✗"
+
+
+def test_success_does_not_stand_in_the_box_of_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stability, "shares", lambda rows: None)
+    monkeypatch.setattr(stability, "to_adaptive_svg", lambda figure: "<svg/>")
+    right = {**CONTENT, "sections": [{"name": "Cases", "about": "", "rows": ROWS[:3]}]}
+    assert 'class="warning"' not in to_html(stability.document(right))
+    assert '<p class="warning">1 of 4 rows' in to_html(stability.document(CONTENT))
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,10 @@ from viz.pages.document import Table, to_html
 pytest.importorskip("matplotlib")
 
 
-from viz.pages.work_precision import _power, _time, work_precision
+from dynamics import METHODS
+from viz import theme
+from viz.pages.work_precision import _look, _power, _time, work_precision
+from viz.plots.direct_labels import COLORS
 
 
 def point(knob: float, seconds: float, error: float | None, **others: Any) -> dict[str, Any]:
@@ -99,6 +102,19 @@ def test_the_page_says_what_was_measured(page: str) -> None:
         assert words in shown(page).replace("A machine", "a machine"), words
 
 
+def test_a_method_has_one_color_on_every_page() -> None:
+    """Whatever else is on the page, and no two of ours look alike."""
+    assert set(theme.METHODS) == set(METHODS)
+    looks = [_look({"name": name, "ours": True}) for name in theme.METHODS]
+    assert len({(number % 5, number // 5) for number, _ in looks}) == len(METHODS)
+    ours = {COLORS[number % 5] for number, _ in looks}
+    others = [
+        _look({"name": name, "ours": False})[0] for name in ("scipy:RK45", "heyoka Taylor", "CVODES", "MuJoCo RK4")
+    ]
+    assert len(ours | set(others)) == len(ours) + len(others)
+    assert _look({"name": "rk4, side by side", "ours": True}) != _look({"name": "dopri5", "ours": True})
+
+
 def test_the_page_needs_no_other_file(page: str) -> None:
     links = re.findall(r"""(?:src|href)=["']([^"']+)""", page)
     assert links
@@ -148,7 +164,7 @@ def test_times_have_units(value: float | None, text: str) -> None:
 MEASURED = ["report", "spring_mass", "--quick", "--methods", "rk4,dop853", "--peers", ""]
 
 
-def test_the_command_writes_whole_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_writes_whole_files(tmp_path: Path, capsys: pytest.CaptureFixture[str], undrawn: None) -> None:
     pytest.importorskip("flint")
     assert cli.main([*MEASURED, "--t-end", "2", "--start", "1,0.5", "--out", str(tmp_path / "r")]) == 0
     assert "spring_mass.html: 2 integrators" in capsys.readouterr().out

@@ -5,14 +5,19 @@ from __future__ import annotations
 import json
 import re
 import sys
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from cgraph.extend import write_files
+from dynamics.experiments.paper_numbers.embedding_error import EmbeddingError
+from dynamics.experiments.paper_numbers.table_1 import timing
 from tests.tolerances import SOLVED
 from viz import theme
 from viz.graph_drawing.render import RenderError
 from viz.paper import paper as module
+from viz.paper.embedding import _panels
 
 FIGURES = ("fig1", "fig2", "fig3", "fig4", "fig5", "fig6", "law", "scaling")
 
@@ -43,7 +48,7 @@ def test_every_figure_is_there_as_svg_and_png(paper):
 
 def test_there_is_a_progress_line_for_each_part(paper):
     _, _, lines = paper
-    assert [line[:5] for line in lines if line.endswith("...")] == [f"[{k}/8]" for k in range(1, 9)]
+    assert [line[:5] for line in lines if line.endswith("...")] == [f"[{k}/9]" for k in range(1, 10)]
 
 
 def test_equation_3_is_read_off_the_graph(paper):
@@ -51,14 +56,22 @@ def test_equation_3_is_read_off_the_graph(paper):
     assert data["equations"]["equal_to_paper"] is True
     assert data["equations"]["euler_embedded"] == "I*qdd0 - k*q0_old - 2*dt*k*qd0 - dt^2*k*qdd0"
     assert data["equations"]["chain_rule"] == data["equations"]["kinetic_only"] == "I*qdd0"
+    torques = data["equations"]["torques"]  # by definition the spring is gone but for dt, by the chain rule it is there
+    assert torques == {
+        "euler_embedded": "I*qdd0 - dt*k*qd0 - dt^2*k*qdd0",
+        "kinetic_only": "I*qdd0 + k*q0_old + dt*k*qd0",
+        "chain_rule": "I*qdd0 + k*q0",
+    }
     assert data["equations"]["euler_embedded"] in (folder / "equations.txt").read_text()
 
 
 def test_the_spurious_branch_is_half_of_figure_1_and_absent_elsewhere(paper):
     folder, data, _ = paper
-    assert data["fig1"] == {"nodes": 20, "edges": 28, "depth": 7, "spurious_nodes": 10, "spurious_edges": 12}
-    assert data["fig2"] == {"nodes": 8, "edges": 8, "depth": 3}
-    assert data["fig3"] == {"nodes": 5, "edges": 4, "depth": 1}
+    counts = {
+        name: tuple(data[name].values()) for name in FIGURES[:3]
+    }  # nodes, edges, depth, and the nodes and edges that are there by mistake
+    assert counts == {"fig1": (20, 28, 7, 10, 12), "fig2": (8, 8, 3, 0, 0), "fig3": (5, 4, 1, 0, 0)}
+    assert list(data["sizes"].values())[:3] == [data[name] for name in FIGURES[:3]]
     painted = {name: theme.SPURIOUS.lower() in (folder / f"{name}.svg").read_text().lower() for name in FIGURES[:3]}
     assert painted == {"fig1": True, "fig2": False, "fig3": False}
 
@@ -66,7 +79,7 @@ def test_the_spurious_branch_is_half_of_figure_1_and_absent_elsewhere(paper):
 def test_the_figures_show_the_letters_of_the_papers_captions(paper):
     folder, _, _ = paper
     shown = {name: set(re.findall(r">([^<]+)</text>", (folder / f"{name}.svg").read_text())) for name in FIGURES[:3]}
-    assert {"ω", "α", "I", "k", "dt"} <= shown["fig1"]
+    assert {"ω", "α", "I", "k", "dt", "dp/dt", "k θ", "I α"} <= shown["fig1"]
     assert {"ω", "α", "I", "dt"} <= shown["fig2"]
     assert "k" not in shown["fig2"]
     assert {"ω", "α", "I"} <= shown["fig3"]
@@ -92,12 +105,40 @@ def test_edges_grow_linearly_by_the_contracted_chain_rule_and_quadratically_by_t
     assert 1.9 <= data["scaling"]["chain_rule_literal"]["edges_exponent"] <= 2.1
 
 
+def test_the_readme_shows_figure_1_as_it_is_drawn(paper):
+    """Its texts and nodes; where they lie is Graphviz's matter, of whatever version."""
+    folder, _, _ = paper
+    old, new = (
+        [
+            sorted(re.findall(pattern, (place / "fig1.svg").read_text()))
+            for pattern in (r">([^<]+)</text>", r'id="(\w+)"')
+        ]
+        for place in (Path(__file__).parents[3] / "docs" / "images", folder)
+    )
+    assert old == new
+
+
+def test_one_interruption_moves_no_time():
+    interrupted = timing(np.append(np.full(99, 2e-6), 1.0))
+    assert (interrupted.median, interrupted.lower, interrupted.upper) == pytest.approx((2.0, 2.0, 2.0))
+
+
+def test_the_law_is_drawn_beside_a_line_of_slope_one():
+    steps = np.array([1e-2, 1e-4])
+    law = EmbeddingError("euler_embedded", 2, steps, np.array([3.0, 3.0]), 5.0 * steps, np.ones(2), 1.0)
+    errors, distances = _panels([law])
+    guide = next(line for line in distances.lines if line.name == "slope 1")
+    assert guide.color is None
+    assert np.allclose(np.diff(np.log(guide.y)), np.diff(np.log(guide.x)))
+    assert errors.lines[0].color == distances.lines[0].color == theme.FORMULATIONS["euler_embedded"]
+
+
 def test_the_page_is_self_contained(paper):
     folder, data, _ = paper
     text = (folder / "index.html").read_text()
     assert set(re.findall(r'src="(data:image/svg\+xml;base64,|[^"]*)', text)) == {"data:image/svg+xml;base64,"}
     assert not re.search(r'(href|src|url)\s*[=(]\s*"?(https?:)?//', text)
-    assert text.count("<figure>") == len(FIGURES)
+    assert text.count("<figure>") == len(FIGURES) + 1  # and the legend
     assert "<script" not in text
     assert json.loads((folder / "figures.json").read_text()) == json.loads(json.dumps(data))
 

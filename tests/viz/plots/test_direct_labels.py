@@ -33,3 +33,11 @@ def test_a_narrow_axis_has_two_powers_of_ten() -> None:
     figure = labeled([Panel("narrow", "x", "y", [Line("a", [3e-5, 2e-5], [1.0, 2.0])])], columns=1)
     (axis,) = figure.axes
     assert [tick for tick in axis.get_xticks() if 1e-6 < tick < 1e-3] == pytest.approx([1e-4, 1e-5])
+
+
+def test_an_axis_may_rise_and_a_curve_have_its_own_color() -> None:
+    line = Line("chain rule", [1.0, 10.0, 100.0], [1.0, 2.0, 3.0], "#123456")
+    left, right = (labeled([Panel("p", "x", "y", [line])], columns=1, rising=up).axes[0] for up in (False, True))
+    assert left.get_xlim()[0] > left.get_xlim()[1]
+    assert right.get_xlim()[0] < 1.0 < 100.0 < right.get_xlim()[1]
+    assert right.lines[0].get_color() == "#123456"

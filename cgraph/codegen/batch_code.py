@@ -1,0 +1,62 @@
+"""BatchCode: machine code for batches as a function of arrays."""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+
+from ..core.evaluate import Array
+from .compiled import lies_in_rows
+from .llvm_engine import Code
+from .sweep import aligned
+
+_BATCH = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_int64] * 3, ctypes.c_void_p)
+
+
+class BatchCode:
+    """The function of batches of a module; any number of threads may call it at once.
+
+    size: of the memory that a call needs.  columns: whether it takes points in columns, too, and not rows alone.
+    """
+
+    def __init__(self, code: Code, lanes: int, size: int, *, columns: bool = True) -> None:
+        self._rows = code.function("rows", _BATCH)
+        self._columns = code.function("batch", _BATCH) if columns else None
+        self._lanes, self._size = lanes, size
+        self._free: list[Array] = []  # memories
+
+    def __call__(self, points: Array, result: Array) -> None:
+        """Results, (n_out, k), of points, (n_in, k), both in rows or both in columns.
+
+        Vectors of points; the last few are filled up to a whole vector by repeating one.
+        """
+        rows = self._columns is None or lies_in_rows(points)
+        axis, order = (1, "F") if rows else (0, "C")
+        if points.strides[1 - axis] != points.itemsize or not points.flags.aligned:
+            points = np.array(points, order=order)  # type: ignore[call-overload]
+        if result.strides[1 - axis] != result.itemsize or not result.flags.aligned:
+            values = np.empty(result.shape, order=order)  # type: ignore[call-overload]
+            self(points, values)
+            result[...] = values
+            return
+        count = points.shape[1]
+        whole = count - count % self._lanes
+        if whole:
+            self._run(points, result, whole, axis)
+        if whole < count:
+            filled = np.empty((len(points), self._lanes), order=order)  # type: ignore[call-overload]
+            filled[:, : count - whole], filled[:, count - whole :] = points[:, whole:], points[:, -1:]
+            values = np.empty((len(result), self._lanes), order=order)  # type: ignore[call-overload]
+            self._run(filled, values, self._lanes, axis)
+            result[:, whole:] = values[:, : count - whole]
+
+    def _run(self, points: Array, result: Array, count: int, axis: int) -> None:
+        try:
+            memory = self._free.pop()
+        except IndexError:
+            memory = aligned((self._size,))
+        entry = self._rows if axis else self._columns
+        strides = points.strides[axis] // points.itemsize, result.strides[axis] // result.itemsize
+        entry(points.ctypes.data, result.ctypes.data, count, *strides, memory.ctypes.data)  # type: ignore[misc]
+        self._free.append(memory)

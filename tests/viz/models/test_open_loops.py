@@ -1,0 +1,59 @@
+"""Where a model has loops, the page and the commands say that inverse dynamics is that of its tree."""
+
+import json
+import re
+
+import pytest
+
+import dynamics as dyn
+from dynamics.scenes.inspection import inspection
+from tests.dynamics.linkages import four_bar
+from viz import cli
+from viz.models.inspect import inspection_page
+from viz.models.open_loops import tree_alone
+
+SCENE = """
+from tests.dynamics.linkages import four_bar
+import dynamics as dyn
+model = four_bar()
+q, qd = dyn.consistent_state(model, [0.9, 0.3, 1.4], [1.0, 0.0, 0.0])
+linkage = dyn.scenes.Scene("linkage", "", model, tuple(q), tuple(qd), 0.1)
+"""
+
+
+def test_a_tree_needs_no_word_and_constraints_of_a_lagrangian_do():
+    assert tree_alone(dyn.scenes.load("triple_pendulum")) == ""
+    bead = dyn.System(
+        lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2),
+        "x y",
+        constraints=lambda q, t: {"ring": q[0] ** 2 + q[1] ** 2 - 1},
+    )
+    assert "the constraint ring:" in tree_alone(dyn.scenes.Scene("bead", "", bead, (1.0, 0.0), (0.0, 0.0), 0.1))
+
+
+def test_the_page_and_the_commands_say_so(tmp_path, capsys):
+    path = tmp_path / "model.py"
+    path.write_text(SCENE)
+    q, qd = dyn.consistent_state(four_bar(), [0.9, 0.3, 1.4], [1.0, 0.0, 0.0])
+    scene = dyn.scenes.Scene("linkage", "", four_bar(), tuple(q), tuple(qd), 0.1)
+    said = tree_alone(scene)
+    assert "the loop coupler to rocker:" in said
+    for arguments in (["lint"], ["why", "tau0", "q0"], ["why", "tau2", "q1"]):
+        command, *names = arguments
+        cli.main([command, f"{path}:linkage", *names])
+        assert said in capsys.readouterr().out
+        cli.main([command, f"{path}:linkage", *names, "--json"])
+        assert json.loads(capsys.readouterr().out)["of_the_tree"] is True
+    for forward in (False, True):
+        page = inspection_page(scene, inspection(scene, forward=forward))
+        assert (said in json.loads(re.search(r'json">(.*?)</script>', page)[1])["notices"]) is not forward
+
+
+@pytest.mark.parametrize("many", [1, 9])
+def test_few_names_are_told_and_more_are_counted(many):
+    system = dyn.System(
+        lambda q, qd, t: 0.5 * sum(each**2 for each in qd), [f"x{i}" for i in range(9)],
+        constraints=lambda q, t: {f"row {i}": q[i] for i in range(many)},
+    )  # fmt: skip
+    said = tree_alone(dyn.scenes.Scene("s", "", system, (0.0,) * 9, (0.0,) * 9, 0.1))
+    assert ("and 5 more" in said) == (many > 4)

@@ -1,0 +1,77 @@
+"""One table of counts: the figures, the lesson, lint, the inspector and the page on the paper say the same."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.equations.formulation_sizes import PAPER, TERMS, TORQUE
+from dynamics.scenes.inspection import inspection
+from viz import theme
+from viz.graph_drawing.legend import kinds_in, legend_svg
+from viz.graph_drawing.short_formulas import short_formulas
+from viz.pages.document import Document, to_markdown
+from viz.pages.formulations import COLORS, TITLES, size_table
+
+DOCS = Path(__file__).parents[3] / "docs"
+
+
+def test_the_page_on_the_paper_has_the_table() -> None:
+    table = size_table(dyn.formulation_sizes(dyn.scenes.load("spring_mass")))
+    text = to_markdown(Document("", [table]))
+    assert text[text.index("|  |") :].strip() in (DOCS / "paper.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", ["spring_mass", "triple_pendulum"])
+def test_lint_and_the_inspector_count_what_the_table_has(name: str) -> None:
+    scene = dyn.scenes.load(name)
+    sizes = {formulation: size for (term, formulation), size in dyn.formulation_sizes(scene).items() if term == TORQUE}
+    graph = dyn.inverse_dynamics(scene, "euler_embedded")
+    n = scene.system.n
+    report = cg.lint(graph, independent=[([f"q{i}" for i in range(n)], [f"qd{i}" for i in range(n)])])
+    size = sizes["euler_embedded"]
+    assert len(report.findings[0].data["nodes_for_this_alone"]) == size.spurious_nodes
+    assert f"{size.spurious_nodes} nodes of {size.nodes} serve nothing else" in str(report)
+    versions = inspection(scene, t_end=0.1).versions
+    shown = {each.name: (len(each.graph.nodes), len(each.marked)) for each in versions}
+    assert shown == {name: (sizes[name].nodes, sizes[name].spurious_nodes) for name in PAPER}
+
+
+def test_a_spurious_edge_starts_at_a_spurious_node() -> None:
+    scene = dyn.scenes.load("chain", n=2)
+    for (term, formulation), size in dyn.formulation_sizes(scene).items():
+        graph = TERMS[term](scene, formulation)
+        wrong = dyn.spurious_nodes(graph)
+        assert size == (
+            len(graph.nodes),
+            len(graph.edges),
+            graph.counts().depth,
+            len(wrong),
+            sum(len({edge.source} & wrong) for edge in graph.edges),
+        )
+
+
+def test_every_formulation_has_a_name_and_a_color_of_its_own() -> None:
+    assert list(TITLES) == list(theme.FORMULATIONS)
+    assert set(TITLES) == set(dyn.FORMULATIONS)
+    assert len(set(COLORS.values())) == len(TITLES)
+
+
+def test_inner_nodes_are_called_what_they_are() -> None:
+    graph = dyn.momentum_rate(dyn.scenes.load("spring_mass"), "euler_embedded", keep_momentum=True)
+    formulas = short_formulas(graph, theme.ONE_JOINT)
+    assert {"I α", "I ω", "k θ", "ω dt", "k θ dt"} <= set(formulas.values())
+    assert all(len(text) <= 10 and node.name is None for node, text in formulas.items())
+
+
+def test_a_legend_has_the_kinds_that_are_there_and_is_small() -> None:
+    graph = dyn.momentum_rate(dyn.scenes.load("spring_mass"), "chain_rule", keep_momentum=True)
+    words = [paint.words for paint in kinds_in(graph)]
+    assert words == [theme.ROLES[role].words for role in ("input", "adjoint", "several")] + [theme.OUTPUT.words]
+    assert kinds_in(graph, graph.nodes[-1:])[-1] is theme.MARKED
+    svg = legend_svg(kinds_in(graph))
+    assert 'height="40pt"' in svg
+    assert all(f">{text}</text>" in svg for text in words)

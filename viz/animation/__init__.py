@@ -1,0 +1,1 @@
+"""Animations: frames drawn from points and curves, and files of them."""

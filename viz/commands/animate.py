@@ -1,0 +1,80 @@
+"""`cgraph animate`: a film of a scene's motion, or of two, one driven by the right torque and one by the flawed."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+
+from cgraph.extend import check_writable
+from dynamics import FORMULATIONS, Trajectory, inverse_dynamics, scenes, simulate, spurious_nodes
+
+from ..animation.canvas import KINDS, check_can_animate
+from ..models.animate import Array, animate, frames
+from .arguments import Commands, answer, positive, say, takes_a_scene
+from .point_arguments import started, takes_a_start
+
+DRIVEN = ("euler_embedded", "chain_rule")
+WORDS = {"euler_embedded": "by definition", "chain_rule": "by the chain rule"}  # others by their names
+
+
+def add(commands: Commands[argparse.ArgumentParser]) -> None:
+    """The command's arguments."""
+    parser = commands.add_parser(
+        "animate", help="a film of a scene in motion (GIF, APNG or MP4); status 1 for a motion cut short"
+    )
+    takes_a_scene(parser)
+    takes_a_start(parser)
+    parser.add_argument("--out", type=Path, required=True, help=f"file to write: {', '.join(KINDS)}, MP4 by ffmpeg")
+    parser.add_argument(
+        "--driven", action="store_true", help="two side by side: the same motion is wanted, driven by two torques"
+    )
+    parser.add_argument(
+        "--formulations",
+        nargs=2,
+        choices=sorted(FORMULATIONS),
+        metavar=("LEFT", "RIGHT"),
+        help=f"with --driven: whose torques (default: {' '.join(DRIVEN)})",
+    )
+    parser.add_argument("--t-end", type=positive, metavar="S", help="how long, in place of the scene's time")
+    parser.add_argument(
+        "--speed", type=positive, default=1.0, metavar="X", help="seconds of the motion in one of the film"
+    )
+    parser.add_argument("--dark", action="store_true", help="on a dark page")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write the film; 1 where a motion ends before its time."""
+    if options.out.suffix not in KINDS:
+        raise ValueError(f"--out must end in {', '.join(KINDS[:-1])} or {KINDS[-1]}, got {options.out}")
+    if options.formulations and not options.driven:
+        raise ValueError("--formulations goes with --driven")
+    check_writable(options.out)
+    check_can_animate(options.out.suffix)
+    scene, _ = started(options, free=not options.driven)
+    end = scene.t_end if options.t_end is None else options.t_end
+    frames(end, options.speed)  # before the work
+    say(f"{scene.name}: a motion of {end:g} s")
+    motions: dict[str, Trajectory] = {}
+    marked: list[str] = []
+    wanted: Callable[[Array], Array] | None = None
+    if options.driven:
+        for name in options.formulations or DRIVEN:
+            words = f"torque {WORDS.get(name, name.replace('_', ' '))}"
+            motions[words], wanted = scenes.driven(scene, name, end)
+            if spurious_nodes(inverse_dynamics(scene, name)):
+                marked.append(words)
+    else:
+        motions[scene.name] = simulate(scene, scene.q, None if scene.ode else scene.qd, end)
+    say(f"{scene.name}: drawing {frames(max(each.t[-1] for each in motions.values()), options.speed)} frames")
+    title = f"{scene.name}: the gray motion is wanted" if options.driven else ""
+    film = animate(
+        scene, motions, kind=options.out.suffix, wanted=wanted, marked=marked, speed=options.speed, dark=options.dark,
+        title=title,
+    )  # fmt: skip
+    answer(f"{options.out}: {len(film) / 1e3:.0f} kB", {options.out: film})
+    cut = {words: each.stats.message for words, each in motions.items() if not each.stats.success}
+    for words, message in cut.items():
+        say(f"{words}: the motion is not whole: it {message}")
+    return 1 if cut else 0

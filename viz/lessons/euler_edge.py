@@ -1,0 +1,142 @@
+"""The Euler edge: a time step inside the graph, and what it does to the torque, however small it is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cgraph import Graph
+from dynamics import formulation_sizes, inverse_dynamics, momentum_rate, spurious_nodes
+
+from .. import theme
+from ..graph_drawing.dark import to_adaptive
+from ..graph_drawing.dot import to_dot
+from ..graph_drawing.legend import kinds_in, legend_svg
+from ..graph_drawing.render import render_svg
+from ..graph_drawing.short_formulas import short_formulas
+from ..pages.formulations import TITLES, WHY_FEWER, size_table
+from ..pages.mathml import equations
+from .screen import Screen, image, number, table
+from .subject import LARGEST, SHOWN, Subject, lagrangian_graph
+
+STEPS = (1.0, 0.1, 0.01, 1e-3, 1e-6)  # s
+DRAWN = 60  # nodes, at most, of a graph that is drawn
+_GONE = 1e-4  # of the torque: an error below, at the smallest step, has gone
+
+
+def euler_edge(subject: Subject) -> Screen:
+    """The screen of a system."""
+    right, wrong = (inverse_dynamics(subject.system, name) for name in ("chain_rule", "euler_embedded"))
+    torque = subject.evaluate(right)
+    errors = [(dt, _after_a_step(subject, wrong, dt) - torque) for dt in STEPS]
+    kinetic = _after_a_step(subject, inverse_dynamics(subject.system, "kinetic_only"), STEPS[-1]) - torque
+    last = float(np.abs(errors[-1][1]).max())
+    stays = last > _GONE * float(np.abs(torque).max())
+    return Screen(
+        "euler-edge",
+        "A time step in the graph",
+        4,
+        _story(subject),
+        "We shrink dt from a second to a millionth of a second. The error of the torque by definition …",
+        ("vanishes with dt", "tends to something that is not zero", "grows beyond all bounds"),
+        1 if stays else 0,
+        _reveal(subject, errors, stays) + _second_try(float(np.abs(kinetic).max()), float(np.abs(torque).max())),
+        "Move dt, and the state. Both torques are those of the graphs, computed in this page.",
+        _play(subject, right, wrong),
+        f"At dt = 1e-6 s the largest error is {number(last)}. Expect hands for A: a smaller step cures almost every "
+        "other error of a simulation. Listen for “but velocity does move position!” True along a motion, and the chain "
+        "rule uses it; not in ∂L/∂q̇, where a state is varied that nothing has moved yet.",
+    )
+
+
+def _after_a_step(subject: Subject, wrong: Graph, dt: float) -> np.ndarray:
+    """The torques of an embedded graph at the same state after a step dt."""
+    moved = {name: value for name, value in subject.values.items() if name.endswith("_old")}
+    shrunk = {
+        name: now + (value - now) * dt / subject.values["dt"]
+        for name, value in moved.items()
+        for now in [subject.values[name.removesuffix("_old")]]
+    }
+    return subject.evaluate(wrong, dt=dt, **shrunk)
+
+
+def _story(subject: Subject) -> str:
+    return (
+        "<p>The Lagrangian, motion minus what is stored:</p>"
+        + equations(lagrangian_graph(subject.system), subject.names)
+        + "<p>Lagrange's equation asks for the torque <b>τ = dp/dt − ∂L/∂q</b> with the momentum p = ∂L/∂q̇. Its first "
+        "term dp/dt is the <b>inertial term</b>. But nothing in a graph of L is called “time”. So somebody writes into "
+        "the graph what a simulation does, q̇ = q̈ dt + q̇<sub>old</sub> and <b>q = q̇ dt + q<sub>old</sub></b>, and "
+        "differentiates by dt. The books call that “by definition”.</p>"
+    )
+
+
+def _reveal(subject: Subject, errors: list[tuple[float, np.ndarray]], stays: bool) -> str:
+    said = (
+        "<p><b>B.</b> q = q̇ dt + q<sub>old</sub> is an edge from velocity to position. Turning the knob q̇ now turns q "
+        "as well, so p gains dt · ∂L/∂q. A small dt makes that small. But then we differentiate <em>by</em> dt, and the "
+        "derivative of dt · ∂L/∂q has a plain ∂L/∂q in it, at any step: the inertial term tends to dp/dt + ∂L/∂q. In the "
+        "whole torque this meets the −∂L/∂q of Lagrange's equation, which is right, and takes it away. Weight and "
+        "springs are in ∂L/∂q: <b>at rest the arm weighs nothing.</b></p>"
+        if stays
+        else "<p><b>A.</b> The edge q̇ → q is there and does its damage, but here L hardly depends on q: ∂L/∂q is what "
+        "stays of the error, and it is zero at this state.</p>"
+    )
+    joints = subject.joints[:SHOWN]
+    rows = [[f"{dt:g}", *[number(error) for error in each[: len(joints)]]] for dt, each in errors]
+    steps = table("Error of the torque by definition", ["dt [s]", *joints], rows)
+    sizes = size_table(formulation_sizes(subject.system))
+    return said + _drawing(subject) + steps + table(sizes.caption, sizes.header, sizes.rows) + f"<p>{WHY_FEWER}</p>"
+
+
+def _second_try(error: float, torque: float) -> str:
+    """The kinetic energy alone, which is right by luck."""
+    told = (
+        f"Here the torque is then right, to {number(error)} of {number(torque)} N m: K does not change with the place."
+        if error <= _GONE * torque
+        else f"Here the torque is then still off by {number(error)} of {number(torque)} N m: how hard a joint is to turn "
+        "depends on how the others are bent, so K contains positions, and the edge does its damage there."
+    )
+    return (
+        "<p><b>A second try</b> keeps the step and takes the kinetic energy K alone for the momentum, since weight and springs "
+        f"have no place in it. {told} The chain rule needs neither trick.</p>"
+    )
+
+
+def _drawing(subject: Subject) -> str:
+    """The inertial term by definition and by the chain rule, where they are small enough for a picture."""
+    pictures = ""
+    for formulation in ("euler_embedded", "chain_rule"):
+        graph = momentum_rate(subject.system, formulation, keep_momentum=True)
+        wrong = spurious_nodes(graph)
+        if len(graph.nodes) > DRAWN:
+            return ""
+        if not pictures:
+            pictures = image(to_adaptive(legend_svg(kinds_in(graph, wrong))), "The colors of both pictures.")
+        dot = to_dot(
+            graph,
+            names=subject.names,
+            formulas=short_formulas(graph, subject.names),
+            marked=wrong,
+            clusters=False,
+            legend=False,
+        )
+        caption = (
+            f"The inertial term, {TITLES[formulation]}: {len(wrong)} of {len(graph.nodes)} nodes are there by mistake."
+        )
+        pictures += image(to_adaptive(render_svg(dot)), caption)
+    return pictures
+
+
+def _play(subject: Subject, right: Graph, wrong: Graph) -> dict[str, object] | None:
+    if len(right.nodes) + len(wrong.nodes) > LARGEST:
+        return None
+    states = [f"q{i}" for i in range(min(subject.system.nq, SHOWN))]
+    return {
+        "kind": "step",
+        "right": subject.graph(right),
+        "wrong": subject.graph(wrong),
+        "values": subject.values,
+        "sliders": subject.sliders(states, -3.2, 3.2) if subject.system.kinematics.quasi is None else [],
+        "joints": subject.joints[:SHOWN],
+        "colors": [theme.FORMULATIONS["chain_rule"], theme.FORMULATIONS["euler_embedded"]],
+    }

@@ -1,0 +1,190 @@
+// What there is to play with on the screens: sliders, and what the graphs make of them.
+
+function element(name, attributes = {}, ...inside) {
+  const made = document.createElement(name);
+  for (const key in attributes) made.setAttribute(key, attributes[key]);
+  made.append(...inside);
+  return made;
+}
+function drawn(name, attributes, ...inside) {
+  const made = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const key in attributes) made.setAttribute(key, attributes[key]);
+  made.append(...inside);
+  return made;
+}
+
+/** A slider with its name and value. */
+function slider(board, shown, low, high, step, value, change, text = digits) {
+  const input = element("input", { type: "range", min: low, max: high, step, "aria-label": shown });
+  const output = element("output", {}, text(value));
+  input.value = value;
+  input.addEventListener("input", () => { output.textContent = text(+input.value); change(+input.value); });
+  board.append(element("label", {}, shown, input, output));
+}
+function sliders(board, play, at, draw) {
+  for (const each of play.sliders)
+    slider(board, each.shown, each.low, each.high, 0.01, each.value, (x) => { at[each.name] = x; draw(); });
+}
+function button(board, text, press) {
+  const made = element("button", { type: "button" }, text);
+  made.addEventListener("click", press);
+  board.append(made);
+  return made;
+}
+/** A table whose cells can be written anew: {write(rows), cells}. */
+function grid(board, header) {
+  const body = element("tbody");
+  const head = element("thead", {}, element("tr", {}, ...header.map((name) => element("th", {}, name))));
+  board.append(element("div", { class: "scroll" }, element("table", {}, head, body)));
+  return (rows, classes = () => "") => body.replaceChildren(
+    ...rows.map((row, i) => element("tr", {}, ...row.map((text, j) => {
+      const cell = element("td", {}, text);
+      const kind = classes(i, j);
+      if (kind) cell.className = kind;
+      return cell;
+    }))),
+  );
+}
+/** The width of what holds a picture, so that its letters are as large as they say. */
+const width = (svg) => svg.parentElement.clientWidth - 16 || 620;
+/** Bars beside one another, in groups: {name: [values]}. */
+function bars(svg, groups, colors) {
+  const entries = Object.entries(groups), height = 34;
+  const largest = Math.max(Number.MIN_VALUE, ...entries.flatMap(([, values]) => values.map(Math.abs).filter(Number.isFinite)));
+  const wide = width(svg), names = Math.min(90, wide / 4), middle = names + (wide - names) / 2, scale = (wide - middle) / largest;
+  svg.setAttribute("viewBox", `0 0 ${wide} ${entries.length * height + 4}`);
+  svg.replaceChildren(
+    drawn("line", { x1: middle, x2: middle, y1: 0, y2: entries.length * height, class: "axis" }),
+    ...entries.flatMap(([name, values], i) => [
+      drawn("text", { x: 0, y: i * height + 20 }, name),
+      ...values.flatMap((value, k) => {
+        const long = Number.isFinite(value) ? Math.abs(value) * scale : 0, thick = (height - 8) / values.length;
+        return [drawn("rect", { x: value < 0 ? middle - long : middle, y: i * height + 4 + k * thick, width: long,
+          height: thick - 1, fill: colors[k % colors.length] })];
+      }),
+    ]),
+  );
+}
+
+const PLAYS = {
+  step(board, play) {
+    const right = evaluator(play.right), wrong = evaluator(play.wrong), at = { ...play.values };
+    const names = numbered("tau", play.joints.length), old = Object.keys(at).filter((name) => name.endsWith("_old"));
+    const rate = {}; // of what is old, by a second
+    for (const name of old) rate[name] = (play.values[name.slice(0, -4)] - play.values[name]) / play.values.dt;
+    let still = false;
+    slider(board, "dt [s]", -6, 0, 0.1, -3, (x) => { at.dt = 10 ** x; draw(); }, (x) => digits(10 ** x));
+    sliders(board, play, at, () => draw());
+    const rest = button(board, "Let it rest", () => { still = !still; rest.setAttribute("aria-pressed", still); draw(); });
+    const write = grid(board, ["joint", "torque", "by definition", "error"]);
+    const svg = board.appendChild(drawn("svg", { role: "img", "aria-label": "Torques, right and by definition" }));
+    const draw = () => {
+      const now = { ...at };
+      if (still) for (const name in now) if (/^qd+\d+$/.test(name)) now[name] = 0;
+      for (const name of old) now[name] = now[name.slice(0, -4)] - (still ? 0 : rate[name]) * at.dt;
+      const good = right(now), bad = wrong(now);
+      write(names.map((name, i) => [play.joints[i], ...[good[name], bad[name], bad[name] - good[name]].map(digits)]));
+      bars(svg, Object.fromEntries(names.map((name, i) => [play.joints[i], [good[name], bad[name]]])), play.colors);
+    };
+    draw();
+  },
+  sweeps(board, play) {
+    const rows = play.rows, count = rows.length;
+    let step = 0;
+    const buttons = board.appendChild(element("div", { class: "buttons" }));
+    button(buttons, "Next", () => { step = Math.min(step + 1, 2 * count); draw(); });
+    button(buttons, "All values", () => { step = Math.max(step, count); draw(); });
+    button(buttons, "All slopes", () => { step = 2 * count; draw(); });
+    button(buttons, "Again", () => { step = 0; draw(); });
+    const write = grid(board, ["node", "is", "value", "slope of L", ""]);
+    const draw = () => {
+      const now = step > count ? 2 * count - step : step - 1; // the row whose value or slope is new
+      write(
+        rows.map((row, i) => [row.node, row.text, i < step ? digits(row.value) : "·",
+          2 * count - i <= step ? digits(row.slope) : "·", 2 * count - i <= step ? row.what : ""]),
+        (i, j) => (i === now && j === (step > count ? 3 : 2) ? "lit" : ""),
+      );
+      rows.forEach((row, i) => document.getElementById(row.box)?.classList.toggle("lit", i === now));
+    };
+    draw();
+  },
+  parts(board, play) {
+    const torque = evaluator(play.graph), at = { ...play.values };
+    const names = numbered("tau", play.joints.length);
+    const zero = (kind) => Object.fromEntries(Object.keys(at).filter((name) => new RegExp(`^${kind}\\d+$`).test(name)).map((name) => [name, 0]));
+    sliders(board, play, at, () => draw());
+    const write = grid(board, ["joint", ...play.parts, "torque"]);
+    const svg = board.appendChild(drawn("svg", { role: "img", "aria-label": "Parts of the torques" }));
+    const draw = () => {
+      const held = torque({ ...at, ...zero("qd"), ...zero("qdd") });
+      const steady = torque({ ...at, ...zero("qdd") }), still = torque({ ...at, ...zero("qd") });
+      const parts = names.map((name) => [still[name] - held[name], steady[name] - held[name], held[name]]);
+      write(parts.map((row, i) => [play.joints[i], ...row.map(digits), digits(row[0] + row[1] + row[2])]));
+      bars(svg, Object.fromEntries(parts.map((row, i) => [play.joints[i], row])), ["#56B4E9", "#E69F00", "#009E73"]);
+    };
+    draw();
+  },
+  elimination(board, play) {
+    const mass = evaluator(play.graph), at = { ...play.values }, n = play.n;
+    let step = 0;
+    sliders(board, play, at, () => { step = 0; draw(); });
+    const buttons = board.appendChild(element("div", { class: "buttons" }));
+    button(buttons, "Take out the next joint", () => { step = Math.min(step + 1, n - 1); draw(); });
+    button(buttons, "Again", () => { step = 0; draw(); });
+    const write = grid(board, ["", ...play.joints]);
+    const draw = () => {
+      const found = mass(at), name = (i, j) => found[`M_${i}_${j}`];
+      const matrix = play.joints.map((_, i) => play.joints.map((_, j) => name(i, j)));
+      const shown = stages(matrix)[step], pivot = n - 1 - step;
+      write(shown.map((row, i) => [play.joints[i], ...row.map((x, j) => (Math.max(i, j) > pivot && i !== j ? "" : digits(x)))]),
+        (i, j) => (j === 0 ? "" : i === j - 1 && i === pivot ? "lit" : Math.max(i, j - 1) > pivot ? "gone" : ""));
+    };
+    draw();
+  },
+  loop(board, play) {
+    const free = evaluator(play.free), held = evaluator(play.held), at = { ...play.values };
+    sliders(board, play, at, () => draw());
+    const write = grid(board, ["", "free", "held"]);
+    const draw = () => {
+      const a = free(at), b = held(at);
+      write([...play.joints.map((name, i) => [name, digits(a[`qdd${i}`]), digits(b[`qdd${i}`])]),
+        ...Object.entries(play.multipliers).map(([name, shown]) => [`λ, ${shown}`, "", digits(b[name])])]);
+    };
+    draw();
+  },
+  energy(board, play) {
+    const rate = evaluator(play.rate), total = evaluator(play.energy);
+    const names = [...numbered("q", play.nq), ...numbered("qd", play.n)];
+    const energies = (method, steps) => motion(rate, play.values, names, play.t_end / steps, steps, method).map((state) => {
+      const at = { ...play.values };
+      names.forEach((name, i) => { at[name] = state[i]; });
+      return total(at).E;
+    });
+    const fine = play.fine, exact = energies("rk4", fine);
+    let steps = 100;
+    slider(board, "steps", 1, 3, 0.05, 2, (x) => { steps = Math.round(10 ** x); draw(); }, (x) => String(Math.round(10 ** x)));
+    const svg = board.appendChild(drawn("svg", { role: "img", "aria-label": "Energy over time" }));
+    const words = board.appendChild(element("p", { role: "status" }));
+    const draw = () => {
+      const curves = ["euler", "rk4"].map((method) => energies(method, steps));
+      const right = (i) => exact[Math.round((i * fine) / steps)] ?? NaN;
+      const off = curves.map((curve) => Math.max(...curve.map((e, i) => Math.abs(e - right(i))).filter(Number.isFinite)));
+      const known = exact.filter(Number.isFinite), low = Math.min(...known), high = Math.max(...known);
+      const reach = Math.max((high - low) / 2, Math.min(off[0], 2 * Math.max(Math.abs(low), Math.abs(high))), Number.MIN_VALUE);
+      const wide = width(svg), middle = (low + high) / 2;
+      const x = (share) => 24 + (wide - 30) * share;
+      const y = (e) => 120 - 100 * Math.max(-1.1, Math.min(1.1, (e - middle) / reach));
+      const line = (curve, count, look) => drawn("polyline", { fill: "none", "stroke-width": 2, ...look,
+        points: curve.flatMap((e, i) => (Number.isFinite(e) ? [`${x(i / count).toFixed(1)},${y(e).toFixed(1)}`] : [])).join(" ") });
+      svg.setAttribute("viewBox", `0 0 ${wide} 256`);
+      svg.replaceChildren(
+        drawn("text", { x: 0, y: 124 }, "E"), drawn("text", { x: wide - 80, y: 252 }, `t = ${digits(play.t_end)} s`),
+        ...curves.map((curve, k) => line(curve, steps, { stroke: play.colors[k] })),
+        line(exact.filter((_, i) => i % 10 === 0), fine / 10, { class: "axis", "stroke-dasharray": "5 4", "stroke-width": 1 }),
+      );
+      words.textContent = `Step ${digits(play.t_end / steps)} s. Largest error of the energy: Euler ${digits(off[0])} J, ` +
+        `rk4 ${digits(off[1])} J.`;
+    };
+    draw();
+  },
+};

@@ -1,0 +1,125 @@
+"""What a lesson is about: a model in a moving state, its names, and its graphs as the page's script takes them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from html import escape
+from typing import Any
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Graph
+from cgraph.extend import Array
+from dynamics import consistent_state, display_names
+from dynamics.scenes.scenes import Scene, of_model
+from dynamics.scenes.start import moving_start
+from dynamics.systems.model import Model
+from dynamics.systems.system import System
+
+from .. import theme
+
+DT = 1e-3  # s, of the embedded formulations
+LARGEST = 4000  # nodes that the page computes many times a second
+SHOWN = 6  # joints with a slider or a row of their own; of more, the first
+_SPEEDS, _ACCELERATIONS, _BENDS = (1.0, -0.8, 0.6), (0.5, 1.0, -0.7), (0.0, -0.5, 0.8)  # in turn, for the joints
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A system at a state.  q: (nq,).  qd, qdd: (n,).  names: {name in graphs: what a person reads}."""
+
+    scene: Scene
+    q: Array
+    qd: Array
+    qdd: Array
+    names: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def system(self) -> System:
+        """The Lagrangian system."""
+        return self.scene.system
+
+    @property
+    def joints(self) -> list[str]:
+        """Names of the velocities, as a person reads them."""
+        return [theme.pretty(name) for name in self.system.velocities]
+
+    @property
+    def scene_names(self) -> dict[str, str]:
+        """What a person calls the inputs and outputs, in plain letters."""
+        return display_names(self.scene)
+
+    @cached_property
+    def values(self) -> dict[str, float]:
+        """All inputs of the graphs at the state, without applied torques, at t = 0."""
+        rates = Graph([*self.system.q, *self.system.qd], {str(i): rate for i, rate in enumerate(self.system.q_dot)})
+        known: dict[str, float] = {"t": 0.0, "dt": DT, **self.system.parameters}
+        for name, array in (("q", self.q), ("qd", self.qd), ("qdd", self.qdd), ("tau", 0.0 * self.qd)):
+            known |= {f"{name}{i}": float(value) for i, value in enumerate(array)}
+        moved = rates.evaluate({name: known[name] for name in rates.input_names})
+        known |= {f"q{i}_old": known[f"q{i}"] - DT * float(moved[str(i)]) for i in range(len(self.q))}
+        return known | {f"qd{i}_old": known[f"qd{i}"] - DT * known[f"qdd{i}"] for i in range(len(self.qd))}
+
+    def evaluate(self, graph: Graph, **other: float) -> Array:
+        """Outputs of a graph at the state, some of its inputs others."""
+        values = self.values | other
+        found = graph.evaluate({name: values[name] for name in graph.input_names})
+        return np.array([float(value) for value in found.values()])
+
+    def graph(self, graph: Graph) -> dict[str, Any]:
+        """A graph for the page's script: inputs, and nodes as a number, an input's name or [operation, places]."""
+        place = {node: k for k, node in enumerate(graph.nodes)}
+        nodes = [
+            node.value if node.value is not None else [node.op.name, *[place[arg] for arg in node.args]]
+            if node.args else node.name
+            for node in graph.nodes
+        ]  # fmt: skip
+        return {"nodes": nodes, "outputs": {name: place[node] for name, node in graph.outputs.items()}}
+
+    def sliders(self, names: Sequence[str], low: float, high: float) -> list[dict[str, Any]]:
+        """Sliders for inputs, with what they are called."""
+        return [
+            {"name": name, "shown": self.shown(name), "low": low, "high": high, "value": self.values[name]}
+            for name in names
+        ]
+
+    def shown(self, name: str) -> str:
+        """What a person reads for an input, output or node of that name."""
+        return self.names.get(name, theme.pretty(name))
+
+
+def subject_of(model: Model) -> Subject:
+    """A model in a state that moves at every joint. Raises TypeError for what has no Lagrangian."""
+    scene = of_model(model)
+    system = scene.system  # a first-order one has none
+    scene = moving_start(scene)
+    q, qd, qdd = np.array(scene.q), _in_turn(_SPEEDS, system.n), _in_turn(_ACCELERATIONS, system.n)
+    if system.n > 1 and system.kinematics.quasi is None:
+        q = q + _in_turn(_BENDS, system.n)  # a straight arm is a special place
+    if len(system.constraints):
+        q, qd = consistent_state(scene, q, qd)
+    return Subject(scene, q, qd, qdd, _letters(scene))
+
+
+def _in_turn(values: Sequence[float], n: int) -> Array:
+    return np.array([values[i % len(values)] for i in range(n)])
+
+
+def _letters(scene: Scene) -> dict[str, str]:
+    """Names in the letters of a textbook: those of the paper for one angle, else q with the coordinate's name."""
+    if scene.coordinates == ("theta",):
+        return dict(theme.ONE_JOINT)
+    return dict(theme.called(display_names(scene)))
+
+
+def formula(graph: Graph, names: Mapping[str, str], lines: int = 12) -> str:
+    """The LaTeX of a graph, to be copied."""
+    return f"<pre>{escape(graph.latex(names=names, lines=lines))}</pre>"
+
+
+def lagrangian_graph(system: System) -> Graph:
+    """The Lagrangian, simplified."""
+    return cg.simplify(system.graph({"L": system.lagrangian}, system.q, system.qd))

@@ -1,0 +1,225 @@
+"""Animations of a model: motions side by side, of a mechanism as sticks, of other systems as curves over time."""
+
+from __future__ import annotations
+
+import base64
+import math
+import os
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from cgraph.extend import (
+    check_writable,
+    real_array,
+    real_number,
+    require_choice,
+    require_flag,
+    require_path,
+    require_sequence,
+    write_files,
+)
+from dynamics import Trajectory, scenes
+from dynamics.multibody.joint_positions import skeleton
+from dynamics.multibody.mechanism import as_mechanism
+from dynamics.systems.model import Model
+
+from ..animation.canvas import KINDS, RATE, check_can_animate, encode
+from ..animation.panels import FINE, Curves, Motion, Panel, Sticks, film
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+MOST_FRAMES, MOST_MOTIONS = 1000, 4
+FILM = 10.0  # s, a length that is offered
+
+
+class Animation(bytes):
+    """The bytes of an animation; a notebook plays it.  kind: how its file ends, such as ".gif"."""
+
+    kind: str = ".gif"
+
+    def _repr_html_(self) -> str:
+        media = {".gif": "image/gif", ".mp4": "video/mp4"}.get(self.kind, "image/apng")
+        source = f'src="data:{media};base64,{base64.b64encode(self).decode()}" style="max-width:100%"'
+        return f"<video {source} controls autoplay loop muted></video>" if self.kind == ".mp4" else f"<img {source}>"
+
+
+def animate(
+    model: Model,
+    motions: Trajectory | Sequence[Trajectory] | Mapping[str, Trajectory],
+    path: str | os.PathLike[str] | None = None,
+    *,
+    kind: str | None = None,
+    wanted: Callable[[Array], Any] | None = None,
+    marked: Collection[str] = (),
+    speed: float = 1.0,
+    dark: bool = False,
+    title: str = "",
+) -> Animation:
+    """A film of one motion of a model, or of several side by side, in real time.
+
+    A mechanism is drawn as sticks between its joints, any other system as its coordinates over time.
+
+    Parameters
+    ----------
+    model : Model
+        What moves.
+    motions : Trajectory, sequence of Trajectory, or mapping of str to Trajectory
+        What `simulate` gave; a mapping has the words above each, up to four. One that ends early stays as it is.
+    path : str or path, optional
+        The file to write: .gif, .png or .apng for an animated PNG, or .mp4, which needs the program ffmpeg.
+    kind : str, optional
+        How a film without a path is written: ".gif" by default.
+    wanted : callable, optional
+        The motion that was wanted, drawn faint behind each: a function of times (T,) that gives coordinates (T, nq).
+    marked : collection of str
+        Words of the motions that are wrong, in the color of what is wrong.
+    speed : float
+        Seconds of the motion in one of the film.
+    dark : bool
+        On a dark page.
+    title : str
+        Words above all.
+
+    Returns
+    -------
+    Animation
+        The file's bytes; a notebook plays it.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For motions of another model, more than four or none, a path that ends otherwise, and for a film of fewer than 2
+        frames or more than 1000, which are 40 s.
+    ImportError
+        Without Pillow.
+    RuntimeError
+        For .mp4 without ffmpeg.
+    OSError
+        For a path that cannot be written.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> import viz
+    >>> arm = dyn.planar_arm([1.0, 0.5], [1.0, 0.8])
+    >>> fall = dyn.simulate(arm, [1.5, 0.0], [0.0, 0.0], t_end=0.2)
+    >>> film = viz.animate(arm, fall)
+    >>> film.kind, film[:6]
+    ('.gif', b'GIF89a')
+    """
+    target = None if path is None else require_path("the film's file", path)
+    if kind is None:
+        kind = KINDS[0] if target is None else target.suffix
+    require_choice("kind", kind, KINDS)
+    if target is not None:
+        check_writable(target)
+    check_can_animate(kind)
+    if not isinstance(title, str):
+        raise TypeError(f"title must be text, got {type(title).__name__}: {title!r:.60}")
+    model = scenes.of_model(model)
+    known = _motions(model, motions)
+    wrong = require_sequence("marked", marked, "words of motions")
+    if unknown := [each for each in wrong if each not in known]:
+        raise ValueError(f"marked: there is no motion {unknown[0]!r:.80} (there are {', '.join(known)})")
+    times = _times(known.values(), speed)
+    panel = _panel(model, known, times, wanted, set(wrong))
+    count = (len(times) - 1) // FINE + 1
+    made = Animation(encode(film(panel, times, require_flag("dark", dark), title), count, kind))
+    made.kind = kind
+    if target is not None:
+        write_files({target: made})
+    return made
+
+
+def _motions(model: Model, motions: object) -> dict[str, Trajectory]:
+    """The motions by their words, checked."""
+    if isinstance(motions, Trajectory):
+        known: dict[Any, Any] = {"": motions}
+    elif isinstance(motions, Mapping):
+        known = dict(motions)
+    else:
+        several = require_sequence("motions", motions, "Trajectory")
+        known = {str(i + 1) if len(several) > 1 else "": each for i, each in enumerate(several)}
+    if not 1 <= len(known) <= MOST_MOTIONS:
+        raise ValueError(f"a film shows 1 to {MOST_MOTIONS} motions side by side, got {len(known)}")
+    nq = len(model.coordinates)
+    for name, each in known.items():
+        if not isinstance(name, str) or not isinstance(each, Trajectory):
+            raise TypeError(f"motions must be what simulate gives, with words, got {each!r:.60} for {name!r:.40}")
+        if each.q.shape[1] != nq:
+            raise ValueError(
+                f"a motion of this model has {nq} coordinate(s), motion {name!r:.40} has {each.q.shape[1]}"
+            )
+        if not len(each.t) or not np.isfinite(each.q).all():
+            raise ValueError(f"motion {name!r:.40} has no rows, or one that is not finite")
+    return known
+
+
+def _times(motions: Collection[Trajectory], speed: float) -> Array:
+    """The instants of the frames, and those between, from the first start to the last end."""
+    if not 0.0 < real_number("speed", speed) < math.inf:
+        raise ValueError(f"speed must be positive and finite, got {speed!r}")
+    start = min(float(min(each.t[0], each.t[-1])) for each in motions)
+    end = max(float(max(each.t[0], each.t[-1])) for each in motions)
+    count = FINE * (frames(end - start, speed) - 1) + 1
+    return np.asarray(start + speed / (RATE * FINE) * np.arange(count), dtype=np.float64)
+
+
+def frames(length: float, speed: float) -> int:
+    """How many frames a film of some seconds has. Raises ValueError for fewer than 2, or too many."""
+    count = length * RATE / speed
+    if not 1.0 <= count < MOST_FRAMES:
+        raise ValueError(
+            f"a film has 2 to {MOST_FRAMES} frames, {RATE} a second, and {length:g} s at speed {speed:g} are "
+            f"{count + 1.0:.4g}" + (f"; speed {length / FILM:.2g} makes it {FILM:g} s long" if length > 0.0 else "")
+        )
+    return int(count + 1e-9) + 1
+
+
+def _panel(
+    model: Model,
+    known: Mapping[str, Trajectory],
+    times: Array,
+    wanted: Callable[[Array], Any] | None,
+    wrong: Collection[str],
+) -> Panel:
+    rows = [_at(each, times) for each in known.values()]
+    if wanted is not None:
+        rows.append(_wanted(wanted, times, len(model.coordinates)))
+    mechanism = as_mechanism(model)
+    make: Callable[..., Panel] = partial(Curves, names=list(model.coordinates), t=times)
+    shown = rows
+    if mechanism is not None:  # all at once, so that they are seen from one side
+        points, parents, *_ = skeleton(mechanism.bind(), np.concatenate(rows))
+        shown, make = np.split(points, len(rows)), partial(Sticks, parents=parents)
+    motions = [Motion(name, values, name in wrong) for name, values in zip(known, shown, strict=False)]
+    return make(motions, None if wanted is None else shown[-1])
+
+
+def _wanted(wanted: Callable[[Array], Any], times: Array, nq: int) -> Array:
+    if not callable(wanted) or isinstance(wanted, type):
+        raise TypeError(f"wanted must be a function of times, got {type(wanted).__name__}: {wanted!r:.60}")
+    found = real_array("wanted", wanted(times))
+    if found.shape != (len(times), nq) or not np.isfinite(found).all():
+        raise ValueError(f"wanted must give finite coordinates (T, nq) = ({len(times)}, {nq}), got shape {found.shape}")
+    return found
+
+
+def _at(motion: Trajectory, times: Array) -> Array:
+    """Coordinates at times, (T, nq): cubic between rows where velocities are their rates; beyond, the nearest row."""
+    order = np.argsort(motion.t, kind="stable")  # of a run back in time
+    t, q = motion.t[order], motion.q[order]
+    if len(t) == 1:
+        return np.repeat(q, len(times), axis=0)
+    k = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 2)
+    h = t[k + 1] - t[k]
+    s = np.clip(np.divide(times - t[k], h, out=np.ones_like(h), where=h > 0.0), 0.0, 1.0)[:, np.newaxis]
+    straight: Array = (1.0 - s) * q[k] + s * q[k + 1]
+    if motion.coordinates != motion.velocities:
+        return straight
+    v, h = motion.qd[order], h[:, np.newaxis]
+    slope = q[k + 1] - q[k]
+    curved: Array = straight + s * (1.0 - s) * ((1.0 - s) * (h * v[k] - slope) - s * (h * v[k + 1] - slope))
+    return curved
