@@ -104,7 +104,7 @@ def inspection_page(scene: scenes.Scene, content: Inspection, moved: bool = Fals
         units=content.units,
         columns={body.name: body.parent for body in mechanism.moving} if mechanism else None,
         notices=[*notices, *([cut_short(content)] if content.stopped else [])],
-        live=live_of(scene) if scene.system.n <= LIVELY else None,
+        live=live_of(scene) if scene.ode is None and scene.system.n <= LIVELY else None,
     )
 
 
