@@ -24,6 +24,7 @@ from . import (
     report,
     scenes,
     simulate,
+    type as type_,
     why,
 )
 
@@ -40,6 +41,7 @@ COMMANDS = (
     live,
     simulate,
     animate,
+    type_,
     lint,
     why,
     compare,
