@@ -253,6 +253,8 @@ CALLS = {
     "viz.page": call(
         viz.page, GRAPH, title="t", about="", at=None, marked=(), motion=None, tables=(), names=None, units=None
     ),
+    "viz.typed_page": call(viz.typed_page, "L = x'^2"),
+    "viz.typed_text": call(viz.typed_text, ARM, [0.1], [0.0]),
     "viz.render_svg": call(viz.render_svg, "digraph {}", engine="dot", timeout=5.0),
     "viz.render_png": call(viz.render_png, "<svg xmlns='http://www.w3.org/2000/svg' width='1' height='1'/>", scale=2.0),
     "viz.to_dot": call(

@@ -12,8 +12,22 @@ if TYPE_CHECKING:
     from .models.animate import animate
     from .models.inspect import inspect
     from .models.live import live_page
+    from .models.typed_text import typed_text
+    from .typed import typed_page
 
-__all__ = ["animate", "graph_svg", "inspect", "lesson", "live_page", "page", "render_png", "render_svg", "to_dot"]
+__all__ = [
+    "animate",
+    "graph_svg",
+    "inspect",
+    "lesson",
+    "live_page",
+    "page",
+    "render_png",
+    "render_svg",
+    "to_dot",
+    "typed_page",
+    "typed_text",
+]
 
 if not TYPE_CHECKING:  # loaded when asked for: the command line has to await Ctrl-C before it loads anything
 
@@ -21,8 +35,8 @@ if not TYPE_CHECKING:  # loaded when asked for: the command line has to await Ct
         from importlib import import_module
 
         homes = {"__version__": "cgraph", "to_dot": ".graph_drawing.dot", "page": ".inspector"}
-        homes |= {"inspect": ".models.inspect", "animate": ".models.animate", "live_page": ".models.live"}
-        homes |= {"lesson": ".lessons.lesson"}
+        homes |= {name: f".models.{name}" for name in ("animate", "inspect", "typed_text")}
+        homes |= {"lesson": ".lessons.lesson", "live_page": ".models.live", "typed_page": ".typed"}
         homes |= dict.fromkeys(["graph_svg", "render_png", "render_svg"], ".graph_drawing.render")
         if name not in homes:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

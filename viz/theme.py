@@ -108,7 +108,7 @@ _GREEK = dict(
         strict=True,
     )
 )
-_LETTERS = {**_GREEK, "q": "q", "qd": "q\u0307", "qdd": "q\u0308"}  # the dots of a time derivative combine with q
+LETTERS = {**_GREEK, "q": "q", "qd": "q\u0307", "qdd": "q\u0308"}  # the dots of a time derivative combine with q
 # The paper's letters for one joint: angular velocity, angular acceleration, torque.
 ONE_JOINT = {
     "q0": "θ",
@@ -136,8 +136,8 @@ def called(names: Mapping[str, str]) -> dict[str, str]:
 
 def _pretty_word(match: re.Match[str]) -> str:
     word, digits = match.groups()
-    if word in _LETTERS:
-        word = _LETTERS[word]
-    elif word[0] == "d" and word[1:] in _LETTERS:
-        word = "d" + _LETTERS[word[1:]]
+    if word in LETTERS:
+        word = LETTERS[word]
+    elif word[0] == "d" and word[1:] in LETTERS:
+        word = "d" + LETTERS[word[1:]]
     return word + digits.translate(_SUBSCRIPTS)

@@ -102,7 +102,8 @@ class Op:
         Units of rounding, 2**-53, of its own result. Default two, as for a function of the C library.
     python, numpy : str
         Text over floats and over arrays, with {} or {0}, {1} for arguments. Default name(..), with `scalar` and `array`
-        behind the name; of a ufunc np.ufunc(..).
+        behind the name; of a ufunc np.ufunc(..). WebAssembly is made of the one in Python; a function that it calls and
+        a module has not is imported from `math`, which in a page is Math.
     library : str
         Its function in the C library. Default of that name.
     llvm : tuple of str

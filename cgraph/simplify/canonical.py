@@ -56,10 +56,16 @@ class Canonical:
         self._atoms: dict[object, int] = {}
         self._leading: dict[int, float] = {}
         self._units: dict[Powers, set[float]] = {}
-        for _ in range(2):  # the first time to learn which multiples of an angle there are
-            self._sums: dict[Node, Sum] = {}
-            for node in self.order:
-                self._sums[node] = self._sum(node)
+        self._units_used: dict[Angle, float] = {}
+        self._sums = self._sums_of_all()
+        if any([self._unit(*angle) != unit for angle, unit in self._units_used.items()]):
+            self._sums = self._sums_of_all()  # now that it is known which multiples of an angle there are
+
+    def _sums_of_all(self) -> dict[Node, Sum]:
+        self._sums: dict[Node, Sum] = {}
+        for node in self.order:
+            self._sums[node] = self._sum(node)
+        return self._sums
 
     def __getitem__(self, node: Node) -> Sum:
         return self._sums[node]
@@ -196,7 +202,7 @@ class Canonical:
         for powers, term in argument.items():
             size = abs(term.value)
             self._units.setdefault(powers, set()).add(size)
-            unit = self._unit(powers, size)
+            unit = self._units_used[powers, size] = self._unit(powers, size)
             c, s = self._multiple((powers, unit), round(size / unit), term.label)
             if term.value < 0.0:
                 s = scaled(s, -1.0)

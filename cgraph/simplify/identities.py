@@ -18,6 +18,7 @@ from .rounding_growth import as_accurate
 LONGEST = 250  # nodes; beyond, sums of products would be too long to be of use
 
 Factor = int | tuple[str, tuple[Angle, ...]]  # an atom, or the cosine or sine of a sum of angles
+Wave = tuple[tuple[Angle, int], ...]  # angles and how often they are added: exp(i sum k angle)
 
 
 class Product(NamedTuple):
@@ -66,6 +67,7 @@ class _Writer:
     def __init__(self, canonical: Canonical, set_label: Callable[[Label], None]) -> None:
         self.canonical, self.set_label = canonical, set_label
         self._nodes: dict[Factor, Node] = {}
+        self._expanded: dict[Powers, dict[Wave, complex]] = {}
 
     def node(self, a: Sum) -> Node:
         """The node of a sum."""
@@ -104,6 +106,8 @@ class _Writer:
         for atom, (angle, sine) in self.canonical.angles.items():
             if sine:
                 continue
+            if not any([name == atom and power > 1 for powers in a for name, power in powers]):
+                continue
             (sine_atom,) = [
                 other for other, (its, is_sine) in self.canonical.angles.items() if is_sine and its == angle
             ]
@@ -114,22 +118,10 @@ class _Writer:
 
     def _fourier(self, a: Sum) -> list[Product]:
         """As a sum of sines and cosines of sums of angles."""
-        waves: dict[tuple[tuple[Angle, int], ...], tuple[complex, float, Label]] = {}
+        waves: dict[Wave, tuple[complex, float, Label]] = {}
         for powers, term in a.items():
-            parts: dict[tuple[tuple[Angle, int], ...], complex] = {(): complex(term.value)}
-            for atom, power in powers:
-                angle, sine = self.canonical.angles[atom]
-                for _ in range(power):
-                    turned: dict[tuple[tuple[Angle, int], ...], complex] = {}
-                    for wave, value in parts.items():
-                        for sign in (1, -1):
-                            shifted = dict(wave)
-                            shifted[angle] = shifted.get(angle, 0) + sign
-                            name = tuple(sorted([(each, k) for each, k in shifted.items() if k]))
-                            part = value * (-0.5j * sign if sine else 0.5)
-                            turned[name] = turned.get(name, 0.0) + part
-                    parts = turned
-            for wave, value in parts.items():
+            for wave, part in self._waves(powers).items():
+                value = term.value * part
                 old, size, label = waves.get(wave, (0j, 0.0, term.label))
                 waves[wave] = old + value, size + abs(value), label.union(term.label)
         products = []
@@ -143,6 +135,24 @@ class _Writer:
                     factors: dict[Factor, int] = {(function, _signed(angles)): 1} if wave else {}
                     products.append(Product(weight * part, factors, label))
         return products
+
+    def _waves(self, powers: Powers) -> dict[Wave, complex]:
+        """A product of sines and cosines as a sum of exp(i wave)."""
+        if powers not in self._expanded:
+            parts: dict[Wave, complex] = {(): 1.0 + 0.0j}
+            for atom, power in powers:
+                angle, sine = self.canonical.angles[atom]
+                for _ in range(power):
+                    turned: dict[Wave, complex] = {}
+                    for wave, value in parts.items():
+                        for sign in (1, -1):
+                            shifted = dict(wave)
+                            shifted[angle] = shifted.get(angle, 0) + sign
+                            name = tuple(sorted([(each, k) for each, k in shifted.items() if k]))
+                            turned[name] = turned.get(name, 0.0) + value * (-0.5j * sign if sine else 0.5)
+                    parts = turned
+            self._expanded[powers] = parts
+        return self._expanded[powers]
 
     def _sum(self, products: list[Product]) -> Node:
         """Products added up, the factor that most of them share taken out first."""

@@ -121,7 +121,7 @@ def _meters(scene: Scene, rate: Graph) -> tuple[dict[str, Node], tuple[Meter, ..
     for group, graph in groups.items():
         for name, node in over(graph).items():
             outputs[name] = node
-            shown = called.get(name, name).replace("p_dot", "dp/dt")
+            shown = called.get(name, name).replace("p_dot", "dp/dt").replace("gravity", "holding")
             meters.append(Meter(shown, units.get(name, ""), "torque" if group == "rate" else group))
     return outputs, tuple(meters)
 

@@ -136,7 +136,7 @@ def test_wrong_usage_gets_the_usage_and_exit_status_2(capsys, arguments):
     assert "usage: cgraph" in capsys.readouterr().err
 
 
-NAMES = [command.__name__.rpartition(".")[2] for command in COMMANDS]
+NAMES = [*COMMANDS]
 
 
 def test_every_command_is_in_the_help_and_has_help(capsys):
@@ -161,6 +161,20 @@ def test_every_command_that_takes_a_scene_says_that_a_python_file_will_do():
     }
     assert {"inspect", "simulate", "animate", "lint", "why", "draw", "certify", "compare", "report"} <= set(taking)
     assert [name for name, said in taking.items() if IN_PYTHON not in said] == []
+
+
+def test_a_command_is_loaded_alone(monkeypatch):
+    asked = []
+
+    def load(name, package):
+        asked.append(name)
+        return import_module(name, package)
+
+    monkeypatch.setattr("viz.commands.parser.import_module", load)
+    parse(["draw", "chain", "--out", "a.dot"])
+    assert asked == [".draw"]
+    parse(["completion", "bash"])
+    assert asked[1:] == [f".{name}" for name in COMMANDS]
 
 
 def test_every_file_of_commands_is_listed_or_helps_one_that_is():

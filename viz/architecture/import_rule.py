@@ -24,8 +24,9 @@ TABLE = {
         "theme <- graph_drawing, plots <- pages <- inspector, paper <- models <- commands <- cli <- __main__",
         "theme <- animation <- models",
         "graph_drawing <- architecture <- commands",
-        "theme <- live <- inspector",
+        "theme <- live <- models",
         "inspector <- lessons <- commands",
+        "inspector <- typed <- models, commands",
     ),
     "": (
         "cgraph <- dynamics <- viz.paper, viz.models, viz.lessons, viz.commands",

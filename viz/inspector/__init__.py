@@ -1,6 +1,6 @@
 """The inspector: one page on which a graph is unfolded, stepped through, asked and seen moving."""
 
 from .content import Motion, StateTable, Step, Table, Version
-from .page import Page, page
+from .page import Page, Panel, page
 
-__all__ = ["Motion", "Page", "StateTable", "Step", "Table", "Version", "page"]
+__all__ = ["Motion", "Page", "Panel", "StateTable", "Step", "Table", "Version", "page"]

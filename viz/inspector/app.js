@@ -20,7 +20,7 @@ const SMALL = 60; // nodes of a graph that shows its values at first
 
 function start(first = JSON.parse(byId("data").textContent)) {
   const callbacks = new Set();
-  const app = { svg: byId("picture"), callbacks, playing: false };
+  const app = { svg: byId("picture"), callbacks, playing: false, noises: new WeakMap() };
   app.output = () => (app.version.outputs.find(([name]) => name === app.from) ?? app.version.outputs[0])[2];
   app.partials = () => (app.slopes ??= slopesAt(app.version, app.record.slopes, app.values));
   app.noise = () => (app.bounds ??= errorBounds(app.version, app.partials(), app.values, app.state.errorsOf(app.version)));
@@ -53,12 +53,12 @@ function showRecord(app, record) {
   byId("introduction").hidden = !record.introduction;
   byId("notices").replaceChildren(...record.notices.map((each) => tag("li", {}, each)));
   byId("notices").hidden = !record.notices.length;
-  byId("statetables").hidden = !state.tables.length;
   byId("tables").hidden = !byId("tables").querySelector("table");
   app.svg.classList.toggle("values", app.largest <= SMALL);
   byId("values").setAttribute("aria-pressed", app.largest <= SMALL);
   makeVersions(app);
   makeMotion(app);
+  makeResults(app);
   makeInputs(app);
   app.view = firstView(app);
   choose(app, 0);
@@ -76,15 +76,20 @@ function stateChanged(app) {
 
 function compute(app) {
   app.values = app.state.evaluate(app.version);
-  app.slopes = app.bounds = null;
+  app.slopes = null;
+  if (!app.playing) app.bounds = null; // while it plays, noise is that of where it began
 }
 
 /** Noise of a graph's values: computed only where an output may be noise. */
 function noiseIn(app, graph, values) {
   if (values === app.values) return app.noise();
+  if (app.playing && app.noises.has(graph)) return app.noises.get(graph);
   const small = 1e-6 * largestOf(values);
-  if (!graph.outputs.some(([, , node]) => Math.abs(values[node]) < small)) return new Float64Array(values.length);
-  return errorBounds(graph, slopesAt(graph, app.record.slopes, values), values, app.state.errorsOf(graph));
+  const faint = graph.outputs.some(([, , node]) => Math.abs(values[node]) < small);
+  const found = faint ? errorBounds(graph, slopesAt(graph, app.record.slopes, values), values, app.state.errorsOf(graph))
+    : new Float64Array(values.length);
+  app.noises.set(graph, found);
+  return found;
 }
 
 // Detail: nodes, clusters or bodies
@@ -180,6 +185,7 @@ function choose(app, i) {
   const places = app.plan.place[app.index];
   const keep = (node) => (node < 0 ? -1 : app.plan.place[i].indexOf(places[node]));
   const [picked, before] = [keep(app.picked), keep(app.before)];
+  app.bounds = null;
   Object.assign(app, { index: i, version: versions[i], picked, before, path: null, sweep: -1, lesson: -1 });
   [...byId("versions").children].forEach((button, k) => {
     button.setAttribute("aria-checked", k === i);

@@ -23,7 +23,7 @@ function makePlan(record, versions) {
   }));
   plan.leaves = versions.map((version) => ({ // name: width
     i: new Map(version.inputs.filter(([, node]) => node >= 0).map(([name, node]) => [name, widthOf(version.names[node][1])])),
-    o: new Map(version.outputs.map(([name, pretty]) => [name, widthOf(pretty) + 6])),
+    o: new Map(version.outputs.map(([name, pretty]) => [name, Math.max(66, widthOf(pretty) + 6)])),
   }));
   plan.sums = plan.cluster.includes(RESULT_PLACE);
   return plan;

@@ -95,8 +95,8 @@ class Motion:
 
     t: (T,) [s].  points: (T, k, 2) [m], x to the right, y up, or None.  parents: (k,), the point each hangs on, or -1.
     places: the points as a graph of inputs of the state, outputs x0, y0, x1, .., shown when a person changes the state.
-    joints: for every velocity the point where its joint is.  turns: whether it turns what is seen, 1 counterclockwise, -1
-    the other way, or 0: torques are painted at the first two.
+    joints: for every velocity the point where its joint is.  turns: whether it turns what is seen, 1 counterclockwise,
+    -1 the other way, or 0: torques are painted at the first two.
     """
 
     t: Array

@@ -39,7 +39,7 @@ function pointsAt(app) {
 /** Torques of the first table that has a row for every joint, at the joints that turn what is seen: by parts where these
  * are few. */
 function paintTorques(app) {
-  const { joints, turns } = app.record.motion;
+  const { joints = [], turns = [] } = app.record.motion;
   const found = app.state.tables.find((each) => turns.some(Boolean) && each.rows.length === turns.length);
   const parts = found && found.header.length <= PARTS ? found.header.slice(0, -1) : null;
   app.arm.color(parts);

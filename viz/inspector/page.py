@@ -9,13 +9,12 @@ from collections.abc import Collection, Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from string import Template
-from typing import Any
+from typing import Any, NamedTuple
 
 from cgraph import Graph, Node, __version__
 from cgraph.extend import require_graph, require_mapping, require_sequence, require_texts
 
 from .. import theme
-from ..live import EVALUATION, Live, panel
 from ..pages import html
 from .content import Motion, State, StateTable, Table, Version
 from .operations import operations
@@ -23,8 +22,8 @@ from .record import record
 
 SCRIPTS = (
     "elements.js", "values.js", "state.js", "paths.js", "formula.js", "layers.js", "places.js",
-    "arrange.js", "picture.js", "view.js", "marks.js", "panels.js", "sweeps.js", "lesson.js", "arm.js", "motion.js",
-    "keys.js", "app.js",
+    "arrange.js", "picture.js", "view.js", "marks.js", "panels.js", "results.js", "sweeps.js", "lesson.js", "arm.js",
+    "motion.js", "keys.js", "app.js",
 )  # fmt: skip
 FRAME_HEIGHT = 720  # pixels in a notebook
 # Nothing may be fetched, and no script or style runs but the page's own, known by its digest.
@@ -45,6 +44,22 @@ class Page(str):
         )
 
 
+class Panel(NamedTuple):
+    """A part that another module adds: markup beside the picture or at the end, style, scripts before and after start.
+
+    first: JavaScript for the record that the page shows first, where its own data are none.  run: JavaScript that
+    begins the panel; `inspector` is what app.js lends to other scripts.  allowed: what the policy lets scripts do.
+    """
+
+    body: str = ""
+    style: str = ""
+    script: str = ""
+    first: str = ""
+    run: str = ""
+    end: str = ""
+    allowed: str = ""
+
+
 def page(
     graph: Graph | Sequence[Version],
     *,
@@ -59,7 +74,7 @@ def page(
     derived: Graph | None = None,
     columns: Mapping[str, str | None] | None = None,
     notices: Sequence[str] = (),
-    live: Live | None = None,
+    panels: Sequence[Panel] = (),
 ) -> Page:
     """The page on which a graph is looked at: it folds by tags, and shows values, paths, sweeps and equations.
 
@@ -92,8 +107,8 @@ def page(
         "kinetic" or "potential", or those that end in a number.
     notices : sequence of str
         What stands above everything, such as what a model lacks of its file.
-    live : viz.live.Live, optional
-        A motion that the page computes as it is watched, in a panel below.
+    panels : sequence of Panel
+        Parts that other modules add, such as the box of `viz.typed_page`.
 
     Returns
     -------
@@ -125,6 +140,9 @@ def page(
         raise TypeError(f"tables must be a sequence of Table or StateTable, got {tables!r:.60}")
     if not all([isinstance(text, str) for text in require_sequence("notices", notices, "texts")]):
         raise TypeError(f"notices must be texts, got {notices!r:.60}")
+    panels = require_sequence("panels", panels, "Panel")
+    if not all([isinstance(panel, Panel) for panel in panels]):
+        raise TypeError(f"panels must be a sequence of Panel, got {panels!r:.60}")
     if derived is not None:
         require_graph("derived", derived)
     versions = _versions(graph, about, nodes)
@@ -134,28 +152,36 @@ def page(
         motion.check()
     introduction = "" if isinstance(graph, Graph) else about
     data = {"title": title, "introduction": introduction, "notices": list(notices)}
-    following = [table for table in tables if isinstance(table, StateTable)]
-    data |= record(versions, motion, *texts, state=State(at or {}, derived), columns=columns, tables=following)
-    return Page(_html(title, data, [table for table in tables if isinstance(table, Table)], live))
+    live = [table for table in tables if isinstance(table, StateTable)]
+    data |= record(versions, motion, *texts, state=State(at or {}, derived), columns=columns, tables=live)
+    return Page(compose(title, data, [table for table in tables if isinstance(table, Table)], panels))
 
 
-def _html(title: str, data: Mapping[str, Any], tables: Sequence[Table], live: Live | None) -> str:
-    """The file: its policy, style, body, data and script."""
-    moving = None if live is None else panel(live)
-    script = f'"use strict";\n{scripts()}\nconst inspector = start();{moving.script if moving else ""}'
-    style = f"{_colors()}{_asset('page.css')}{moving.style if moving else ''}"
-    policy = _POLICY.format(script=f"{_digest(script)}{f' {EVALUATION}' if moving else ''}", style=_digest(style))
+def compose(title: str, data: Mapping[str, Any] | None, tables: Sequence[Table], panels: Sequence[Panel] = ()) -> str:
+    """The file: its policy, style, body, data and script. Without data a panel says what is shown first."""
+    first = "".join([panel.first for panel in panels])
+    begin = "".join([f"\n{panel.run}" for panel in panels])
+    added = "\n".join([panel.script for panel in panels])
+    script = f'"use strict";\n{scripts()}\n{added}\nconst inspector = start({first});{begin}'
+    style = f"{_colors()}{_asset('page.css')}{''.join([panel.style for panel in panels])}"
+    allowed = "".join([f" {panel.allowed}" for panel in panels if panel.allowed])
+    policy = _POLICY.format(script=f"{_digest(script)}{allowed}", style=_digest(style))
     # "<" in the data could end the element that holds it
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
     shown = "".join(html.table(table.caption, table.header, table.rows) for table in tables)
-    body = Template(_asset("page.html")).substitute(title=escape(title), tables=shown, version=f"cgraph {__version__}")
+    body = Template(_asset("page.html")).substitute(
+        title=escape(title),
+        tables=shown,
+        version=f"cgraph {__version__}",
+        panels="".join([panel.body for panel in panels]),
+    )
     return (
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
-        f"<style>{style}</style>\n</head>\n<body>\n{body}\n{moving.folded() if moving else ''}"
+        f"<style>{style}</style>\n</head>\n<body>\n{body}\n"
         f'<script id="data" type="application/json">{text}</script>\n'
-        f"<script>{script}</script>\n"
+        f"{''.join([panel.end for panel in panels])}<script>{script}</script>\n"
         "</body>\n</html>\n"
     )
 

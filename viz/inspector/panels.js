@@ -1,7 +1,6 @@
 // Words and numbers beside the picture: the node, why, results, inputs, counts, the legend.
 
 const PATHS = 5, DEPTH = 4;
-const OFF = 0.01; // relative: what differs by more from the right version is marked
 
 const shownName = (app, name, letters) => app.state.called.get(name) ?? letters ?? name;
 const unitOf = (app, name) => (app.units.has(name) ? [" ", tag("span", { class: "unit" }, `[${app.units.get(name)}]`)] : []);
@@ -56,39 +55,6 @@ function showWhy(app) {
     button.onclick = () => { app.path = on ? null : nodes; paintPath(app); showWhy(app); };
     byId("why").append(button);
   });
-}
-
-const namedHead = (words, ...unit) => tag("th", { scope: "row", class: words.length > 16 ? "long" : "" }, words, ...unit);
-const largestOf = (values) => values.reduce((most, value) => (Number.isFinite(value) ? Math.max(most, Math.abs(value)) : most), 0);
-
-/** Results of all versions at the one state, and what differs from the version without spurious nodes. */
-function showResults(app) {
-  const { versions } = app.state;
-  const names = [...new Map(versions.flatMap((each) => each.outputs.map(([name, letters]) => [name, shownName(app, name, letters)])))];
-  const found = versions.map((each, i) => {
-    const own = i === app.index ? app.values : app.state.evaluate(each), noise = noiseIn(app, each, own);
-    return new Map(each.outputs.map(([name, , node]) => [name, [own[node], noise[node]]]));
-  });
-  const right = versions.findLastIndex((each) => !each.marked.size && versions.some((other) => other.marked.size));
-  const rows = names.map(([name, words]) => tag("tr", {}, namedHead(words, ...unitOf(app, name)), ...found.map((each) => {
-    if (!each.has(name)) return tag("td", {}, "");
-    const [value, noise] = each.get(name), [truth, blur] = found[right]?.get(name) ?? [value, 0];
-    const off = Math.abs(value - truth) > noise + blur + OFF * Math.max(Math.abs(value), Math.abs(truth));
-    return tag("td", { class: off ? "off" : "" }, brief(value, noise));
-  })));
-  byId("results").replaceChildren(scrolled(table(versions.map((each) => each.name), rows)),
-    ...(right < 0 ? [] : [quiet(`In vermillion: differs from ${versions[right].name}. All at one state; 0 is what is below rounding.`)]));
-  showTables(app);
-}
-
-/** Tables that follow the state. */
-function showTables(app) {
-  byId("statetables").replaceChildren(...app.state.tables.map((each) => {
-    const values = app.state.evaluate(each), noise = noiseIn(app, each, values);
-    const rows = each.rows.map(([name, outputs]) => tag("tr", {}, namedHead(shownName(app, name), ...unitOf(app, name)),
-      ...outputs.map((out) => { const node = each.outputs[out][2]; return tag("td", {}, brief(values[node], noise[node])); })));
-    return tag("div", {}, tag("h2", {}, each.caption), scrolled(table(each.header, rows)));
-  }));
 }
 
 /** Fields for the inputs of the state, and what follows from them: the same for all versions. */

@@ -17,7 +17,8 @@ function prepare(version) {
   let operations = 0;
   const number = args.map((own) => (own.length ? ++operations : 0)); // as in Graph.listing(): %1 is the first operation
   const byNumber = new Map(number.map((each, node) => [each, node]).filter(([each]) => each));
-  return { ...version, args, constants, users, edges, number, byNumber, operations, marked: new Set(version.marked) };
+  const functions = version.ops.map((op) => VALUE[op]);
+  return { ...version, args, functions, constants, users, edges, number, byNumber, operations, marked: new Set(version.marked) };
 }
 
 /** The value of every node, inputs in the order of the version's. */
@@ -27,9 +28,9 @@ function evaluate(version, row) {
   version.constants.forEach((value, node) => { found[node] = value; });
   for (let i = 0; i < found.length; i++) {
     const a = version.args[i];
-    if (a.length === 1) found[i] = VALUE[version.ops[i]](found[a[0]]);
-    else if (a.length === 2) found[i] = VALUE[version.ops[i]](found[a[0]], found[a[1]]);
-    else if (a.length) found[i] = VALUE[version.ops[i]](...a.map((arg) => found[arg]));
+    if (a.length === 2) found[i] = version.functions[i](found[a[0]], found[a[1]]);
+    else if (a.length === 1) found[i] = version.functions[i](found[a[0]]);
+    else if (a.length) found[i] = version.functions[i](...a.map((arg) => found[arg]));
   }
   return found;
 }

@@ -111,9 +111,37 @@ async function startLive() {
   const joints = data.parents.map(() => liveShape("circle", { class: "live-joint" }, svg));
   let reach = 0;
   const past = [];
-  if (!points) svg.setAttribute("hidden", "");
+  /** Of a system without places: the first coordinate to the right and its velocity up, and thin the reference. */
+  const thin = liveShape("path", { class: "live-reference live-phase" }, svg), beside = [], extent = [0, 0];
+  function drawPhase() {
+    const [q, v] = data.phase;
+    if (!state.time) [past.length, beside.length] = [0, 0];
+    if (playing || !past.length) {
+      past.push([machine.run[q], -machine.run[v]]);
+      beside.push([machine.fine[q], -machine.fine[v]]);
+    }
+    for (const [x, y] of [...past, ...beside]) {
+      if (Number.isFinite(x + y)) [extent[0], extent[1]] = [Math.max(extent[0], Math.abs(x)), Math.max(extent[1], Math.abs(y))];
+    }
+    const at = ([x, y]) => [x / (extent[0] || 1), y / (extent[1] || 1)];
+    svg.setAttribute("viewBox", "-1.1 -1.1 2.2 2.2");
+    [[trace, past, 0.012], [thin, beside, 0.006]].forEach(([path, way, width]) => {
+      const shown = way.slice(-600).map(at).filter((each) => each.every(Number.isFinite));
+      path.setAttribute("d", shown.length > 1 ? `M${shown.map(([x, y]) => `${x.toFixed(4)} ${y.toFixed(4)}`).join("L")}` : "");
+      path.setAttribute("stroke-width", width);
+    });
+    const [x, y] = at([machine.run[q], -machine.run[v]]);
+    joints[0].setAttribute("r", Number.isFinite(x + y) ? 0.03 : 0);
+    if (Number.isFinite(x + y)) { joints[0].setAttribute("cx", x); joints[0].setAttribute("cy", y); }
+    joints[0].setAttribute("stroke-width", 0.01);
+  }
+  if (!points) {
+    joints.push(liveShape("circle", { class: "live-joint" }, svg));
+    const [q, v] = data.phase.map((i) => data.inputs[i].called);
+    $("words").textContent = `${q} to the right, ${v} up. Thick: steps of dt. Thin and green: much shorter steps.`;
+  }
   function draw({ values, reference: right }) {
-    if (!points) return;
+    if (!points) { drawPhase(); return; }
     for (let k = 0; k < points; k++) for (const each of place(values, k)) if (Number.isFinite(each)) reach = Math.max(reach, Math.abs(each));
     const half = 1.1 * (reach || 1), r = half / 40;
     svg.setAttribute("viewBox", `${-half} ${-half} ${2 * half} ${2 * half}`);

@@ -11,8 +11,10 @@ from dynamics.scenes.start import Start, moving_start, start_text, with_start
 from dynamics.systems.model import Model
 
 from ..inspector import Motion, Page, StateTable, Step, Version, page
-from .live import live_of
+from ..typed import box
+from .live import live_panel
 from .open_loops import tree_alone
+from .typed_text import text_or_none
 
 LIVELY = 10  # velocities: larger models have a page of their motion alone, `live_page`
 
@@ -85,6 +87,7 @@ def inspect(
 def inspection_page(scene: scenes.Scene, content: Inspection, moved: bool = False, title: str | None = None) -> Page:
     """The page of a scene.  moved: whether its start was chosen for it, which the page then says."""
     bones, mechanism = content.skeleton, scene.mechanism
+    lively = scene.ode is None and scene.system.n <= LIVELY
     inverse = len(content.versions) > 1
     what = "inverse dynamics" if inverse else content.versions[0].name
     notices = [f"Left out of the model: {'; '.join(scene.left_out)}."] if scene.left_out else []
@@ -104,7 +107,7 @@ def inspection_page(scene: scenes.Scene, content: Inspection, moved: bool = Fals
         units=content.units,
         columns={body.name: body.parent for body in mechanism.moving} if mechanism else None,
         notices=[*notices, *([cut_short(content)] if content.stopped else [])],
-        live=live_of(scene) if scene.system.n <= LIVELY else None,
+        panels=[box(text_or_none(scene, scene.q, scene.qd)), *([live_panel(scene)] if lively else [])],
     )
 
 

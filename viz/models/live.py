@@ -11,7 +11,8 @@ from dynamics.scenes.live_graphs import live_graphs
 from dynamics.scenes.start import Start, with_start
 from dynamics.systems.model import Model
 
-from ..live import Live, LivePage, page_text
+from ..inspector import Panel
+from ..live import EVALUATION, Live, LivePage, page_text, panel
 
 
 def live_page(model: Model, path: str | os.PathLike[str] | None = None, *, start: Start | None = None) -> LivePage:
@@ -69,3 +70,9 @@ def live_of(scene: scenes.Scene) -> Live:
     """What the panel of a scene computes."""
     graphs = live_graphs(scene)
     return Live(*graphs[:7], TABLEAUS, *graphs[7:])
+
+
+def live_panel(scene: scenes.Scene) -> Panel:
+    """The motion of a scene as a panel at the end of another page, closed at first."""
+    live = panel(live_of(scene))
+    return Panel(style=live.style, run=live.script, end=live.folded(), allowed=EVALUATION)

@@ -12,7 +12,7 @@ from .elementary_functions import ROOM
 from .evaluation import evaluation
 from .functions import HOST, called, library, table, text_of
 from .instructions import F64, I32
-from .steps import Tableau, steps, work
+from .steps import Layout, Tableau, chosen_steps, equal_steps
 from .translate import Body, Signature, types_of
 
 PAGE = 65536  # bytes of memory
@@ -34,6 +34,9 @@ def to_wasm(
         Outputs at byte y of inputs at byte x.
     name(x, h, n), of each method
         n steps of size h from the inputs at x, where the state and the time are those at the end afterwards.
+    name_to(x, span, h, rtol, atol, most), of each method with one estimate of its error
+        Over the span by steps that the estimate chooses, the first h: its root mean square over the state, each by
+        atol + rtol size, is at most 1. Returns the step to go on with, and NaN where `most` trials were not enough.
 
     Arithmetic is that of `evaluate`, in the same order and without fused multiply-add: where no function of the C
     library intervenes, to the last bit. sin, cos, exp, log and the others are the module's own, the same bits on every
@@ -89,8 +92,12 @@ def to_wasm(
     data = table() if "wave" in needed else b""
     free = place + (ROOM + 7) // 8 * 8 * bool(data)
     at = graph.input_names.index(time) if time in graph.input_names else None
-    own += [steps(f"steps {k}", each, inputs, states, at, free) for k, each in enumerate(chosen.values())]
-    end = free + max([work(inputs, states, len(each.b)) for each in chosen.values()], default=0)
+    layout = Layout(inputs, states, at, free)
+    stepping = {name: equal_steps(f"steps {name}", each, layout) for name, each in chosen.items()}
+    embedded = {name: each for name, each in chosen.items() if len(getattr(each, "error", ())) == 1}
+    stepping |= {f"{name}_to": chosen_steps(f"steps {name}_to", each, layout) for name, each in embedded.items()}
+    own += stepping.values()
+    end = layout.slope(1 + max([len(each.b) for each in chosen.values()])) if chosen else free
 
     kinds = [*[((F64,) * needed[name], (F64,)) for name in imported], EVALUATE, *[types_of(text) for text in own]]
     names = [*imported, "evaluate", *[text.name for text in own]]
@@ -100,7 +107,7 @@ def to_wasm(
         parameters = [(each.arg, kind) for each, kind in zip(text.args.args, types_of(text)[0], strict=True)]
         codes.append(Body(signatures, parameters).function(text))
     exported = {"evaluate": len(imported)}
-    exported |= {name: signatures[f"steps {k}"].number for k, name in enumerate(chosen)}
+    exported |= {name: signatures[text.name].number for name, text in stepping.items()}
     return _module(kinds, [name.removeprefix(HOST) for name in imported], codes, exported, end, (place, data))
 
 

@@ -193,6 +193,41 @@ def test_the_order_of_a_method_is_its_own(method):
     assert math.log2(errors[0] / errors[1]) == pytest.approx(TABLEAUS[method].order, abs=0.35)
 
 
+def reached(made, inputs, span, h, rtol, most=10_000):
+    """The inputs after a span by chosen steps, and the step to go on with."""
+    made.write(inputs)
+    step = made.exports["dopri5_to"](made._store, 0, span, h, rtol, rtol, float(most))
+    return made.read(0, made.sizes[0]), step
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-7, 1e-10])
+@pytest.mark.parametrize("h", [1e-6, 0.1, 50.0])
+def test_chosen_steps_keep_the_tolerance_whatever_the_first_is(h, rtol):
+    (x, y), _ = reached(instance(STATE, TABLEAUS), [1.0, 0.0], 10.0, h, rtol)
+    assert math.hypot(x - math.cos(10.0), y + math.sin(10.0)) <= 10.0 * rtol
+
+
+def test_chosen_steps_end_at_the_end_and_go_on_with_the_step_they_had():
+    t = cg.variable("t")
+    made = instance(cg.Graph([X, t], {"x_dot": cg.cos(t)}), TABLEAUS)
+    (x, end), step = reached(made, [0.0, 0.0], 2.0, 0.1, 1e-8)
+    assert end == pytest.approx(2.0, rel=1e-15)
+    assert x == pytest.approx(math.sin(2.0), abs=1e-7)
+    (_, end), again = reached(made, [x, end], 1e-3, step, 1e-8)
+    assert again >= step  # a span that is short says nothing about the step
+    assert end == pytest.approx(2.001, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    "rate", [X * X, cg.sqrt(-X), 1.0 / (X - X)], ids=["blows up", "leaves the domain", "is nowhere"]
+)
+def test_chosen_steps_that_cannot_arrive_end_and_say_so(rate):
+    made = instance(cg.Graph([X], {"x_dot": rate}), TABLEAUS)
+    (x,), step = reached(made, [1.0], 2.0, 0.1, 1e-6, most=500)
+    assert math.isnan(step)
+    assert math.isfinite(x)  # the last state that was accepted
+
+
 def test_memory_has_room_for_all_that_is_documented():
     """Inputs at 0, outputs behind them; steps spoil neither outputs nor the digits that sines need."""
     wide = [cg.variable(f"x{k}") for k in range(700)]

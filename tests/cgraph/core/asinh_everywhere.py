@@ -16,6 +16,7 @@ import pytest
 from mpmath import mpf
 
 import cgraph as cg
+import dynamics as dyn
 import viz
 from cgraph.core.node import apply
 from cgraph.explain.lint.cancellation import UNIT, rounded
@@ -23,6 +24,7 @@ from cgraph.explain.lint.singular import intervals
 from cgraph.explain.names import Names
 from cgraph.extend import OPS
 from tests.page_script import run_script
+from tests.viz.typed.typed_script import run_typed
 from tests.wasm import instance
 from viz.inspector.content import State, Version
 from viz.inspector.record import record
@@ -172,6 +174,14 @@ def test_the_page_computes_and_writes_the_formula():
     assert slope == pytest.approx(float(mpmath.diff(deep, 0.7)), rel=1e-10)
     texts = re.findall(r"'inside': \['([^']*)'\]", str(formula))
     assert texts[texts.index("asinh") + 1] == "("
+
+
+def test_it_can_be_typed_and_the_page_differentiates_it():
+    system = dyn.System(lambda q, qd, t: cg.asinh(q[0] + 2.0) * qd[0] ** 2, ["x"])
+    at = {"q0": 0.3, "qd0": 1.5, "qdd0": -0.7}
+    program = "(text, at) => outputsAt(TYPED.inverseDynamics(parsed(text), 'chain_rule'), at).at"
+    expected = dyn.inverse_dynamics(system).evaluate(at)
+    assert run_typed(program, "L = asinh(x + 2)*x'^2", at) == pytest.approx(expected, rel=SEVERAL)
 
 
 def test_reference_solutions_take_it_and_ask_for_a_multiprecision_value_that_they_lack():

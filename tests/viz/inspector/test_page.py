@@ -8,6 +8,7 @@ import json
 import math
 import re
 from html.parser import HTMLParser
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -19,10 +20,12 @@ from dynamics.scenes.inspection import FORMULATIONS, inspection
 from tests.hostile_texts import HOSTILE, hostile_page
 from viz import cli
 from viz.inspector import Motion, Table, Version
-from viz.inspector.page import scripts
+from viz.inspector.page import SCRIPTS, scripts
 from viz.inspector.record import record
 
 JAVASCRIPT_LIBM = 1e-12  # relative: a browser's sin and exp may differ from the C library's in the last bits
+
+pytestmark = pytest.mark.usefixtures("without_graphviz")
 
 
 def data_of(text: str) -> dict:
@@ -129,6 +132,10 @@ def test_the_policy_lets_no_script_and_no_style_run_but_the_page_s_own(pendulum)
         assert f"{kind}-src 'sha256-{digest}'" in policy
     assert not re.search(r"(inner|outer|insertAdjacent)HTML|document\.write|\beval\(|new Function", scripts())
     assert not any(key.startswith("on") or key == "style" for _, attributes in found.elements for key in attributes)
+
+
+def test_no_script_is_longer_than_a_file_may_be():
+    assert max(len(files("viz.inspector").joinpath(name).read_text().splitlines()) for name in SCRIPTS) <= 350
 
 
 def test_a_notebook_shows_it_in_a_frame():

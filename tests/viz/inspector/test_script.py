@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -15,12 +16,13 @@ import viz
 from cgraph.codegen.python_source import source
 from cgraph.core.ops import OPS
 from cgraph.extend import Names
-from dynamics.scenes.inspection import inspection
+from dynamics.scenes.inspection import Inspection, inspection
 from tests.page_script import run_script
 from tests.tolerances import SUMS
 from viz.inspector.content import State, StateTable, Version
 from viz.inspector.record import record, slopes
 
+pytestmark = pytest.mark.usefixtures("without_graphviz")
 JAVASCRIPT_LIBM = 1e-12  # relative: a browser's sin and exp may differ from the C library's in the last bits
 
 
@@ -178,13 +180,18 @@ SHARED = """(record, changes) => {
 }"""
 
 
-def spring(at: dict[str, float]) -> tuple[list[Version], State, dict[str, float]]:
-    found = inspection(dyn.scenes.load("spring_mass"))
-    return [Version(*each) for each in found.versions], State(found.at | at, found.derived), dict(found.at)
+@cache
+def found_in_spring() -> Inspection:
+    return inspection(dyn.scenes.load("spring_mass"))
+
+
+def spring(at: dict[str, float]) -> tuple[list[Version], State]:
+    found = found_in_spring()
+    return [Version(*each) for each in found.versions], State(dict(found.at) | at, found.derived)
 
 
 def test_all_versions_are_in_one_state_and_reset_restores_it():
-    versions, state, _ = spring({"q0": 0.3, "qd0": 0.2, "qdd0": 0.1, "k": 2.0})
+    versions, state = spring({"q0": 0.3, "qd0": 0.2, "qdd0": 0.1, "k": 2.0})
     found = run_script(SHARED, record(versions, None, state=state), {"q0": 0.7, "dt": 0.25})
     assert found["first"] == found["third"]
     assert found["told"] == [True, False]
@@ -202,7 +209,7 @@ def test_all_versions_are_in_one_state_and_reset_restores_it():
     [({"q0_old": 1.0}, "follows from q0, qd0"), ({"nobody": 1.0}, "no input nobody"), ({"q0": "x"}, "finite number")],
 )
 def test_a_change_that_means_nothing_is_one_sentence_and_changes_nothing(change, said):
-    versions, state, _ = spring({"q0": 0.3, "qd0": 0.2, "qdd0": 0.1})
+    versions, state = spring({"q0": 0.3, "qd0": 0.2, "qdd0": 0.1})
     program = """(record, change) => {
       const state = makeState(record), before = JSON.stringify(state.values());
       try { state.set({ dt: 0.5, ...change }); }
@@ -216,7 +223,7 @@ def test_a_change_that_means_nothing_is_one_sentence_and_changes_nothing(change,
 
 
 def test_a_state_and_its_tables_are_checked():
-    versions, state, _ = spring({"q0": 0.3, "qd0": 0.2, "qdd0": 0.1})
+    versions, state = spring({"q0": 0.3, "qd0": 0.2, "qdd0": 0.1})
     for changed, said in (
         (State({"q0_old": 1.0}, state.derived), "q0_old"),
         (State({}, cg.Graph(cg.variables("q0"), {"nobody": cg.variable("q0")})), "nobody"),

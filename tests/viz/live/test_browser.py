@@ -67,13 +67,13 @@ def meter(page, name):
 
 def test_a_slider_moves_energy_and_torque_before_the_next_frame(show):
     page = show()
-    before = meter(page, "energy"), meter(page, "gravity.joint 1")
+    before = meter(page, "energy"), meter(page, "holding.joint 1")
     moved = page.evaluate(
         """() => new Promise((done) => requestAnimationFrame(() => {
           const slider = document.querySelector('input[aria-label="g, slider"]');
           const read = (name) => document.querySelector(`td[data-meter="${name}"]`).textContent;
           slider.value = 3; slider.dispatchEvent(new Event("input"));
-          const texts = ["energy", "gravity.joint 1"].map(read);
+          const texts = ["energy", "holding.joint 1"].map(read);
           requestAnimationFrame(() => done(texts));
         }))"""
     )

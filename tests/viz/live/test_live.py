@@ -100,7 +100,7 @@ def test_a_slider_moves_energy_and_torque_at_once(script):
     script.engine.eval("run.set(data.inputs.findIndex(({ name }) => name === 'g'), 3.0); run.set(0, 0.4)")
     after = script("[...run.now().values]")
     moved = {name for name, a, b in zip(names, before, after, strict=False) if a != b}
-    assert {"potential", "energy", "gravity.joint 1", "dp/dt.joint 1"} <= moved
+    assert {"potential", "energy", "holding.joint 1", "dp/dt.joint 1"} <= moved
 
 
 def test_too_long_a_step_shows_its_error_at_once(script):

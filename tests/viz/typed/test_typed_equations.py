@@ -1,0 +1,199 @@
+"""Equations of typed Lagrangians are those of the library: torques, accelerations, counts of nodes, lint in words."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given, settings, strategies as st
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.equations.formulations import torques
+from tests.strategies import examples
+from tests.viz.typed.typed_script import run_typed
+
+ROUNDING = 1e-12  # of the largest number in a graph: two orders of sums, and sines of two libraries
+COORDINATES, PARAMETERS = ("u", "v"), {"m": 1.3, "k": 0.7}
+ONE = ("sin", "cos", "tanh", "atan", "exp", "neg", "abs", "cbrt")
+TWO = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
+POWERS = (2.0, 3.0, 0.5, 1.0)
+
+
+def trees(n: int) -> st.SearchStrategy[Any]:
+    """Formulas over q, qd, t, parameters and numbers, smooth where their values stay small."""
+    names = [*COORDINATES[:n], *[f"{name}'" for name in COORDINATES[:n]], *PARAMETERS, "t"]
+    leaves = st.sampled_from(names) | st.sampled_from([0.5, 2.0, 3.25, 1.0, 0.0])
+
+    def larger(inner: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
+        return (
+            st.tuples(st.sampled_from(ONE), inner)
+            | st.tuples(st.sampled_from(list(TWO)), inner, inner)
+            | st.tuples(st.just("pow"), inner, st.sampled_from(POWERS))
+        )
+
+    return st.recursive(leaves, larger, max_leaves=8).filter(has_names)
+
+
+def has_names(tree: Any) -> bool:
+    """Whether it is no number: a line of numbers is a parameter."""
+    return isinstance(tree, str) or (isinstance(tree, tuple) and any(has_names(arg) for arg in tree[1:]))
+
+
+def as_text(tree: Any) -> str:
+    """The formula as one types it; what could be singular is kept away from it."""
+    if isinstance(tree, str | float):
+        return str(tree)
+    op, *args = tree
+    texts = [as_text(arg) for arg in args]
+    if op == "neg":
+        return f"(-{texts[0]})"
+    if op == "div":
+        return f"({texts[0]} / (1.5 + {texts[1]}^2))"
+    if op == "pow":
+        return f"((1.5 + {texts[0]}²)^{texts[1]})"
+    if op == "exp":
+        return f"exp(sin({texts[0]}))"
+    if op == "cbrt":
+        return f"cbrt(2 + cos({texts[0]}))"
+    return f"({texts[0]} {TWO[op]} {texts[1]})" if op in TWO else f"{op}({texts[0]})"
+
+
+def as_node(tree: Any, named: dict[str, Any]) -> Any:
+    """The same in Python."""
+    if isinstance(tree, str):
+        return named[tree]
+    if isinstance(tree, float):
+        return tree
+    op, *args = tree
+    a, b = [*[as_node(arg, named) for arg in args], None][:2]
+    match op:
+        case "neg":
+            return -a
+        case "add":
+            return a + b
+        case "sub":
+            return a - b
+        case "mul":
+            return a * b
+        case "div":
+            return a / (1.5 + b**2)
+        case "pow":
+            return (1.5 + a**2) ** b
+        case "exp":
+            return function("exp", function("sin", a))
+        case "cbrt":
+            return function("cbrt", 2.0 + function("cos", a))
+    return function(op, a)
+
+
+def function(name: str, a: Any) -> Any:
+    """Of a number a number, as in a text."""
+    if isinstance(a, cg.Node):
+        return cg.cbrt(a) if name == "cbrt" else abs(a) if name == "abs" else getattr(cg, name)(a)
+    return getattr(math, {"abs": "fabs"}.get(name, name))(a)
+
+
+def both(tree: Any, n: int) -> tuple[str, dyn.System]:
+    """A text with that formula in L, beside a kinetic energy that moves every coordinate, and its System."""
+    single = f"0.5 * m * (20 + {as_text(tree)}^2)^-1 * u'^2"
+    several = "0.5 * m * u'^2 + 20 * v'^2 + u' * v' * cos(v)"
+    lines = ["q: " + ", ".join(COORDINATES[:n]), *[f"{name} = {value}" for name, value in PARAMETERS.items()]]
+    lines += (
+        [f"L = {single} + 0.1 * sin({as_text(tree)})"]
+        if n == 1
+        else [f"T = {several}", "V = 0.1 * sin(d)", f"d = {as_text(tree)}"]
+    )
+    lines += [f"damping {COORDINATES[n - 1]} = k", "tau u = sin(t) * u'"]
+
+    def lagrangian(q: Any, qd: Any, t: Any, p: Any) -> Any:
+        moving = dict(zip(COORDINATES, q, strict=False))
+        moving |= {f"{name}'": node for name, node in zip(COORDINATES, qd, strict=False)}
+        moving |= {"t": t, **p}
+        if n == 1:
+            kinetic = 0.5 * p["m"] * (20.0 + as_node(tree, moving) ** 2) ** -1.0 * qd[0] ** 2.0
+            return kinetic + 0.1 * function("sin", as_node(tree, moving))
+        with cg.tag("kinetic"):
+            kinetic = 0.5 * p["m"] * qd[0] ** 2.0 + 20.0 * qd[1] ** 2.0 + qd[0] * qd[1] * cg.cos(q[1])
+        with cg.tag("definition"):
+            defined = as_node(tree, moving)
+        with cg.tag("potential"):
+            potential = 0.1 * function("sin", defined)
+        return kinetic - potential
+
+    damping = [0.0] * (n - 1) + [cg.variable("k")]
+    system = dyn.System(
+        lagrangian,
+        COORDINATES[:n],
+        PARAMETERS,
+        forces=lambda q, qd, t: [cg.sin(t) * qd[0], *[0.0] * (n - 1)],
+        damping=damping,
+    )
+    return "\n".join(lines), system
+
+
+def point(graph: cg.Graph, numbers: list[float]) -> dict[str, float]:
+    values = {name: numbers[i % len(numbers)] for i, name in enumerate(graph.input_names)}
+    return values | {name: value for name, value in (PARAMETERS | {"dt": 1e-3}).items() if name in values}
+
+
+@given(st.integers(1, 2).flatmap(lambda n: st.tuples(st.just(n), trees(n))))
+@settings(max_examples=examples(30))
+def test_typed_equations_are_those_of_the_library(case):
+    n, tree = case
+    text, system = both(tree, n)
+    expected = {name: dyn.inverse_dynamics(system, name) for name in ("euler_embedded", "kinetic_only")}
+    # By the chain rule the library also writes L anew by identities such as sin^2 + cos^2 = 1; the page does not.
+    expected["chain_rule"] = cg.simplify(torques(system))
+    at = {name: point(graph, [0.3, -0.7, 0.45, 0.9, -0.2]) for name, graph in expected.items()}
+    found = run_typed(
+        """(text, at) => {
+          const system = parsed(text);
+          return Object.fromEntries(Object.entries(at).map(([name, values]) => {
+            const { graph, ...rest } = formulation(system, name);
+            return [name, { ...rest, ...outputsAt(graph, values), inputs: graph.inputs.map(({ name }) => name) }];
+          }));
+        }""",
+        text,
+        at,
+    )
+    for name, graph in expected.items():
+        mine = found[name]
+        assert mine["inputs"] == list(graph.input_names)
+        wrong = dyn.spurious_nodes(graph)
+        assert [mine["nodes"], mine["edges"], mine["spurious"]] == [len(graph.nodes), len(graph.edges), len(wrong)], (
+            name
+        )
+        q, qd = ([f"{kind}{i}" for i in range(n)] for kind in ("q", "qd"))
+        known = {node.name for node in (*graph.inputs, *graph.nodes)}
+        if known.issuperset(q):
+            lint = cg.lint(
+                graph,
+                independent=[(q, [each for each in qd if each in known])],
+                function="L",
+                names=dyn.display_names(system),
+            )
+            assert "\n".join(mine["lint"]) == str(lint)
+        if mine["largest"] is None:  # infinite on the way
+            continue
+        for output, value in graph.evaluate(at[name]).items():
+            assert mine["at"][output] == pytest.approx(value, rel=0.0, abs=ROUNDING * max(1.0, mine["largest"]))
+
+
+@given(st.integers(1, 2).flatmap(lambda n: st.tuples(st.just(n), trees(n))))
+@settings(max_examples=examples(20))
+def test_typed_accelerations_are_those_of_the_library(case):
+    n, tree = case
+    text, system = both(tree, n)
+    graph = dyn.forward_dynamics(system, "dense", check=True)
+    at = point(graph, [0.3, -0.7, 0.45, 0.9, -0.2])
+    expected = graph.evaluate(at)
+    found = run_typed("(text, at) => outputsAt(TYPED.forwardDynamics(parsed(text)), at)", text, at)
+    if expected["info"] != 0.0 or found["largest"] is None:
+        return
+    for i in range(n):
+        bound = ROUNDING * max(1.0, found["largest"])
+        assert found["at"][f"qdd{i}"] == pytest.approx(expected[f"qdd{i}"], rel=0.0, abs=bound)
+    energy = dyn.energy(system).evaluate({name: at[name] for name in dyn.energy(system).input_names})["E"]
+    assert found["at"]["E"] == pytest.approx(energy, rel=0.0, abs=ROUNDING * max(1.0, found["largest"]))

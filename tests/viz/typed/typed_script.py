@@ -1,0 +1,55 @@
+"""The engine of the typed page in V8, without a browser."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from typing import Any
+
+from py_mini_racer import MiniRacer
+
+from viz.typed.engine import script
+
+HELPERS = """
+const edges = (graph) => graph.nodes.reduce((sum, node) => sum + node.args.length, 0);
+/** What a text says, or what is wrong with it. Any other error is a defect. */
+function read(text) {
+  try {
+    return { system: TYPED.parse(text) };
+  } catch (error) {
+    if (!(error instanceof TYPED.TextError)) return { defect: `${error.stack}` };
+    return { wrong: TYPED.explained(text, error) };
+  }
+}
+function parsed(text) {
+  const { system, wrong, defect } = read(text);
+  if (!system) throw new Error(wrong?.sentence ?? defect);
+  return system;
+}
+const formulation = (system, name) => {
+  const graph = TYPED.inverseDynamics(system, name), wrong = TYPED.spuriousNodes(graph);
+  const { lines } = TYPED.lint(system, graph);
+  return { nodes: graph.nodes.length, edges: edges(graph), spurious: wrong.size, lint: lines, graph };
+};
+/** Outputs of a graph at {input: number}, and the largest number on the way. */
+function outputsAt(graph, at) {
+  const values = TYPED.compiled(graph.inputs, graph.nodes)(graph.inputs.map(({ name }) => at[name]));
+  const place = new Map(graph.nodes.map((node, i) => [node, i]));
+  return { at: Object.fromEntries([...graph.outputs].map(([name, node]) => [name, values[place.get(node)]])),
+    largest: Math.max(...values.map(Math.abs)) };
+}
+"""
+
+
+@cache
+def machine() -> MiniRacer:
+    """V8 with the engine."""
+    engine = MiniRacer()
+    engine.eval(f"{script()}\n{HELPERS}")
+    return engine
+
+
+def run_typed(function: str, *given: Any) -> Any:
+    """What a function of JavaScript returns for arguments that JSON can hold, as JSON holds it."""
+    texts = ", ".join([json.dumps(each) for each in given])
+    return json.loads(machine().eval(f"JSON.stringify((({function}))({texts}))"))

@@ -1,0 +1,29 @@
+"""`cgraph type`: a page that a Lagrangian is typed into, and that derives, checks, draws and moves it offline."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from cgraph.extend import check_writable
+
+from ..typed import typed_page
+from .arguments import Commands, answer
+
+
+def add(commands: Commands[argparse.ArgumentParser]) -> None:
+    """The command's arguments."""
+    parser = commands.add_parser("type", help="a page that a Lagrangian is typed into: derived, checked, drawn, moving")
+    parser.add_argument("--out", type=Path, required=True, help="file to write: .html")
+    parser.add_argument("--text", type=Path, metavar="FILE", help="what the box holds at first, by default an example")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Write the page."""
+    if options.out.suffix != ".html":
+        raise ValueError(f"--out must end in .html, got {options.out}")
+    check_writable(options.out)
+    text = None if options.text is None else options.text.read_text(encoding="utf-8")
+    page = typed_page(text)
+    answer(f"{options.out}: a box for a Lagrangian; {len(page.encode()) / 1e6:.2f} MB", {options.out: page})

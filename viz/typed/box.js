@@ -1,0 +1,132 @@
+// The box that a Lagrangian is typed into: what it says goes to the inspector, what is wrong under the box.
+
+const TYPED_KEY = "text"; // in the fragment of the page's address
+const TYPED_WAIT = 400; // ms after the last key
+
+/** The text in the page's address, or nothing. */
+function linkedText() {
+  return new URLSearchParams(location.hash.slice(1)).get(TYPED_KEY);
+}
+/** The record of a text, or what is wrong with it: one sentence. */
+function typedRecord(text, forward = false) {
+  try {
+    const system = TYPED.parse(text), motion = TYPED.motionOf(system);
+    return { system, motion, record: TYPED.recordOf(system, motion, forward) };
+  } catch (error) {
+    if (!(error instanceof TYPED.TextError)) throw error;
+    return { wrong: TYPED.explained(text, error) };
+  }
+}
+/** What a page that has nothing else shows first. */
+function firstTyped(text) {
+  return (typedRecord(linkedText() ?? text).record ?? typedRecord(text).record);
+}
+
+/** The box at work. text: what it holds at first, where the address has none.  shown: whether the page shows that. */
+function startTyped(inspector, text, shownFirst) {
+  const before = inspector.record(), box = byId("text"), opener = openingButton();
+  let waiting = 0;
+  const shown = () => {
+    clearTimeout(waiting);
+    const found = typedRecord(box.value, byId("which").value !== "");
+    box.setAttribute("aria-invalid", Boolean(found.wrong));
+    showWrong(found.wrong);
+    if (found.wrong) return;
+    inspector.showRecord(found.record);
+    showDerived(found);
+    keepLink(box.value);
+    byId("back-to").hidden = shownFirst;
+  };
+  byId("examples").replaceChildren(tag("option", { value: "" }, "an example"), ...[...TYPED.EXAMPLES.keys()].map((name) => tag("option", { value: name }, name)));
+  byId("examples").onchange = () => {
+    if (!byId("examples").value) return;
+    box.value = TYPED.EXAMPLES.get(byId("examples").value);
+    shown();
+  };
+  box.oninput = () => {
+    byId("examples").value = "";
+    clearTimeout(waiting);
+    waiting = setTimeout(shown, TYPED_WAIT);
+  };
+  box.onkeydown = (event) => {
+    if (event.key === "Enter" && (event.ctrlKey || event.metaKey)) shown();
+    event.stopPropagation(); // the page's keys are letters here
+  };
+  byId("which").onchange = shown;
+  byId("link").onclick = () => copyLink(box.value);
+  byId("back-to").onclick = () => { inspector.showRecord(before); byId("back-to").hidden = true; keepLink(null); };
+  addEventListener("hashchange", () => {
+    const linked = linkedText();
+    if (linked === null || linked === box.value) return;
+    box.value = linked;
+    opener(true);
+    shown();
+  });
+  const linked = linkedText();
+  box.value = linked ?? text;
+  if (shownFirst || linked !== null) shown();
+  opener(shownFirst || linked !== null);
+}
+/** The button in the page's head that opens and closes the box. */
+function openingButton() {
+  const button = tag("button", { type: "button", id: "opentyped", "aria-controls": "typed", title: "type your own Lagrangian" }, "type L");
+  const open = (on) => {
+    byId("typed").hidden = !on;
+    button.setAttribute("aria-expanded", on);
+    button.setAttribute("aria-pressed", on);
+    dispatchEvent(new Event("resize")); // the picture has other room
+  };
+  button.onclick = () => { open(byId("typed").hidden); if (!byId("typed").hidden) byId("text").focus(); };
+  byId("versions").after(button);
+  return open;
+}
+
+/** The sentence, and the line that it is about with the place marked. */
+function showWrong(wrong) {
+  if (!wrong) { byId("wrong").replaceChildren(); return; }
+  const { sentence, source, column, length } = wrong;
+  byId("wrong").replaceChildren(tag("p", {}, sentence),
+    tag("pre", {}, source.slice(0, column), tag("mark", {}, source.slice(column, column + length) || " "), source.slice(column + length)));
+}
+/** Counts, lint in words, and how exact the motion is. */
+function showDerived({ system, motion, record }) {
+  const rows = record.versions.map(({ name, ops, args, marked }) => {
+    const edges = args.reduce((sum, each) => sum + (Array.isArray(each) ? each.length : 0), 0);
+    return tag("tr", {}, rowHead(name), ...[ops.length, edges, marked.length].map((count, k) => tag("td", { class: k === 2 && count ? "off" : "" }, String(count))));
+  });
+  const lint = TYPED.FORMULATIONS.map((name) => {
+    const { ok, lines } = TYPED.lint(system, TYPED.inverseDynamics(system, name));
+    return tag("details", {}, tag("summary", {}, `lint, ${name.replace("_", " ")}: ${ok ? "holds" : "q depends on qd"}`), tag("pre", {}, lines.join("\n")));
+  });
+  byId("derived").replaceChildren(table(["nodes", "edges", "spurious"], rows), ...lint, ...(motion.error ? [] : motionWords(system, motion)));
+}
+function motionWords(system, motion) {
+  const [first, last] = [motion.energy[0], motion.energy.at(-1)], exact = Number.isFinite(motion.change) ? `; half the step changes it by ${brief(motion.change)} of its size` : "";
+  return [tag("h3", {}, "Motion"), curves(system, motion),
+    tag("p", {}, `${motion.steps} steps of Runge and Kutta${exact}. Energy ${brief(first)} at the start, ${brief(last)} at the end.`)];
+}
+/** Coordinates over time. */
+function curves({ coordinates }, { t, q }) {
+  const svg = element("svg", { id: "curves", viewBox: "0 0 320 130", role: "img", "aria-label": `${coordinates.join(", ")} over time` });
+  const all = q.flat(), low = Math.min(...all), size = Math.max(...all) - low || 1;
+  const place = (k, i) => `${(310 * t[k] / (t.at(-1) || 1) + 5).toFixed(1)} ${(122 - 94 * (q[k][i] - low) / size).toFixed(1)}`;
+  coordinates.forEach((name, i) => {
+    element("path", { class: `curve${i}`, d: `M${t.map((_, k) => place(k, i)).join("L")}` }, svg);
+    element("path", { class: `curve${i}`, d: `M${5 + 78 * i} 11h14` }, svg);
+    element("text", { x: 23 + 78 * i, y: 15 }, svg).textContent = fitted(name, 7);
+  });
+  return svg;
+}
+
+function keepLink(text) {
+  if (location.protocol === "about:") return; // a frame in a notebook has no address
+  const parts = new URLSearchParams(location.hash.slice(1));
+  if (text === null) parts.delete(TYPED_KEY); else parts.set(TYPED_KEY, text);
+  history.replaceState(null, "", `#${parts}`);
+}
+function copyLink(text) {
+  keepLink(text);
+  const told = (words) => { byId("link").textContent = words; setTimeout(() => { byId("link").textContent = "copy link"; }, 1500); };
+  if (!navigator.clipboard) { told("it is in the address"); return; }
+  navigator.clipboard.writeText(location.href).then(() => told("copied"), () => told("it is in the address"));
+}

@@ -1,0 +1,106 @@
+// Equations of motion of a system: three formulations of inverse dynamics, forward dynamics, energy.
+
+const DT = 1e-3; // s, the step that the embedded formulations take
+const ONE = () => constant(1);
+const pairs = (keys, values) => new Map(keys.map((key, i) => [key, values[i]]));
+
+/** By the chain rule: d/dt p for p = dL/dqd along (qd, qdd), one reverse sweep and one forward. */
+function chainRule(system) {
+  const { q, qd, qdd } = system, build = new Builder();
+  const bars = cotangents(new Map([[system.lagrangian, ONE()]]), [...q, ...qd], build);
+  const momentum = bars.slice(q.length);
+  const rate = tangents(pairs([...q, ...qd, ...timeOf(system)], [...qd, ...qdd, ONE()]), momentum, build);
+  return { inputs: [...q, ...qd, ...qdd], q, qd, rate, gradient: bars.slice(0, q.length) };
+}
+const timeOf = (system) => system.extra.filter((node) => node === system.t);
+
+/** By definition: dL/dqd is taken through q = qd dt + q_old, which is wrong; or of the kinetic energy alone. */
+function embedded(system, energyOf) {
+  const { q, qd, qdd } = system, dt = variable("dt");
+  const old = (kind) => q.map((_, i) => variable(`${kind}${i}_old`)), qOld = old("q"), qdOld = old("qd");
+  const step = (label, rates, from, kind) => rates.map((rate, i) => {
+    const moved = within({ label, build: null }, () => mul(rate, dt));
+    return new Node("add", [moved, from[i]], PRIMAL | EULER, null, `${kind}${i}`);
+  });
+  const qdNew = step(PRIMAL | EULER, qdd, qdOld, "qd");
+  const qNew = step(PRIMAL | EULER | COUPLING, qdNew, qOld, "q");
+  const replace = pairs([...q, ...qd], [...qNew, ...qdNew]);
+  const [lagrangian, energy] = substitute([system.lagrangian, energyOf(system)], replace);
+  const momentum = cotangents(new Map([[energy, ONE()]]), qdNew); // through q as well: the unwanted coupling
+  const gradient = cotangents(new Map([[lagrangian, ONE()]]), qNew);
+  const rate = tangents(pairs([dt, ...timeOf(system)], [ONE(), ONE()]), momentum);
+  return { inputs: [...qOld, ...qdOld, ...qdd, dt], q: qNew, qd: qdNew, rate, gradient };
+}
+const FORMULATIONS = {
+  euler_embedded: (system) => embedded(system, ({ lagrangian }) => lagrangian),
+  kinetic_only: (system) => embedded(system, kineticEnergy),
+  chain_rule: chainRule,
+};
+
+/** K: the terms of L that depend on velocities. */
+function kineticEnergy({ lagrangian, qd }) {
+  const moving = new Set(qd);
+  for (const node of topological([lagrangian])) if (node.args.some((arg) => moving.has(arg))) moving.add(node);
+  const stack = [[1, lagrangian]], terms = [];
+  while (stack.length) {
+    const [sign, node] = stack.pop();
+    if (!moving.has(node)) continue;
+    if (isSum(node)) stack.push([node.op === "sub" ? -sign : sign, node.args[1]], [sign, node.args[0]]);
+    else if (node.op === "neg") stack.push([-sign, node.args[0]]);
+    else terms.push(sign > 0 ? node : neg(node));
+  }
+  return terms.reduce((sum, term) => add(sum, term));
+}
+
+/** tau = d/dt dL/dqd - dL/dq + damping qd - forces, simplified. */
+function inverseDynamics(system, formulation) {
+  const terms = FORMULATIONS[formulation](system);
+  const applied = terms.q === system.q ? system.forces
+    : substitute(system.forces, pairs([...system.q, ...system.qd], [...terms.q, ...terms.qd]));
+  const outputs = within({ build: new Builder() }, () => terms.rate.map((rate, i) => {
+    const tau = sub(rate, terms.gradient[i]);
+    return sub(within({ label: PRIMAL | DAMPING }, () => add(tau, mul(system.damping[i], terms.qd[i]))), applied[i]);
+  }));
+  return simplified(graphOf([...terms.inputs, ...system.extra], new Map(outputs.map((node, i) => [`tau${i}`, node]))));
+}
+
+/** Nodes that serve only derivatives taken through q = qd dt + q_old. */
+function spuriousNodes(graph) {
+  const coupling = new Set(graph.nodes.filter(({ label }) => label & COUPLING && label & ADJOINT));
+  const needed = new Set(), stack = [...graph.outputs.values()].filter((node) => !coupling.has(node));
+  while (stack.length) {
+    const node = stack.pop();
+    if (needed.has(node)) continue;
+    needed.add(node);
+    stack.push(...node.args.filter((arg) => !coupling.has(arg)));
+  }
+  return new Set(graph.nodes.filter((node) => !needed.has(node)));
+}
+
+/** Lower triangle of M = d2L/dqd2. */
+function massMatrix({ lagrangian, qd }, build = new Builder()) {
+  const momentum = cotangents(new Map([[lagrangian, ONE()]]), qd, build);
+  return momentum.map((p, i) => qd.slice(0, i + 1).map((x) => tangents(new Map([[x, ONE()]]), [p], build)[0]));
+}
+
+/** qdd = M^-1 (tau - tau at qdd = 0), by elimination from the last row up; with the pivots, and the energy. */
+function forwardDynamics(system) {
+  const { q, qd, qdd, tau } = system, build = new Builder(), n = q.length;
+  const atRest = substitute([...inverseDynamics(system, "chain_rule").outputs.values()], new Map(qdd.map((a) => [a, constant(0)])));
+  const [lagrangian, ...bias] = folded([system.lagrangian, ...atRest], build);
+  const a = massMatrix({ lagrangian, qd }, build), momentum = cotangents(new Map([[lagrangian, ONE()]]), qd, build);
+  return within({ build }, () => {
+    const b = tau.map((each, i) => sub(each, bias[i])), gain = a.map(() => []), x = [];
+    for (let i = n - 1; i >= 0; i--) {
+      for (let j = 0; j < i; j++) gain[i][j] = div(a[i][j], a[i][i]);
+      for (let j = 0; j < i; j++) {
+        for (let k = 0; k <= j; k++) a[j][k] = sub(a[j][k], mul(gain[i][j], a[i][k]));
+        b[j] = sub(b[j], mul(gain[i][j], b[i]));
+      }
+    }
+    for (let i = 0; i < n; i++) x.push(x.reduce((total, known, j) => sub(total, mul(gain[i][j], known)), div(b[i], a[i][i])));
+    const energy = momentum.reduce((sum, p, i) => add(sum, mul(p, qd[i])), constant(0));
+    const outputs = [...x.map((each, i) => [`qdd${i}`, each]), ...a.map((row, i) => [`pivot${i}`, row[i]]), ["E", sub(energy, lagrangian)]];
+    return simplified(graphOf([...q, ...qd, ...tau, ...system.extra], new Map(outputs)));
+  });
+}

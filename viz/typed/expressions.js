@@ -1,0 +1,148 @@
+// From tokens to formulas, in postfix order, so that a long one needs no deep recursion.
+
+const MOST_NESTED = 100;
+const ALIASES = { ln: "log", arcsin: "asin", arccos: "acos", arctan: "atan", arctan2: "atan2", min: "minimum", max: "maximum" };
+const HIDDEN = ["add", "sub", "mul", "div", "neg", "zero_safe_mul", "where", "less", "less_equal", "equal", "not_equal"];
+const isFunction = (name) => Object.hasOwn(ALIASES, name) || (Object.hasOwn(ROWS, name) && !HIDDEN.includes(name));
+const functionNames = () => [...Object.keys(ROWS).filter(isFunction), ...Object.keys(ALIASES)];
+
+/** Reads one text's tokens from left to right. */
+class Reader {
+  constructor(tokens) {
+    this.tokens = tokens;
+    this.next = 0;
+  }
+  get token() {
+    return this.tokens[this.next];
+  }
+  peek(offset) {
+    return this.tokens[Math.min(this.next + offset, this.tokens.length - 1)];
+  }
+  is(...texts) {
+    return this.token.kind === "sign" && texts.includes(this.token.text);
+  }
+  take() {
+    const { token } = this;
+    if (this.next < this.tokens.length - 1) this.next++;
+    return token;
+  }
+  /** The sign, or what was needed in its place. */
+  expect(text, words) {
+    if (!this.is(text)) throw wrongAt(this.token, words);
+    return this.take();
+  }
+}
+function wrongAt(token, words) {
+  const here = token.kind === "end" ? "the line ends here" : `${quoted(token.text)} is here`;
+  return new TextError(`${words}, but ${here}.`, token.at, Math.max(token.end, token.at + 1));
+}
+
+/** A formula as steps {kind: number | name | apply, ...} in postfix order. */
+function readFormula(reader) {
+  const steps = [];
+  readSum(reader, steps, 0);
+  requireOperator(reader);
+  return steps;
+}
+function readSum(reader, steps, depth) {
+  readProduct(reader, steps, depth);
+  while (reader.is("+", "-")) binary(reader, steps, depth, reader.token.text === "+" ? "add" : "sub", readProduct);
+}
+function readProduct(reader, steps, depth) {
+  readSigned(reader, steps, depth);
+  while (reader.is("*", "/")) binary(reader, steps, depth, reader.token.text === "*" ? "mul" : "div", readSigned);
+  requireOperator(reader);
+}
+function binary(reader, steps, depth, op, read) {
+  const { at, end } = reader.take();
+  read(reader, steps, depth);
+  steps.push({ kind: "apply", op, count: 2, at, end });
+}
+function readSigned(reader, steps, depth) {
+  if (depth > MOST_NESTED) throw new TextError(`More than ${MOST_NESTED} parentheses and signs stand within one another.`, reader.token.at);
+  if (reader.is("+")) {
+    reader.take();
+    readSigned(reader, steps, depth + 1);
+  } else if (reader.is("-")) {
+    const { at, end } = reader.take();
+    readSigned(reader, steps, depth + 1);
+    steps.push({ kind: "apply", op: "neg", count: 1, at, end });
+  } else readPower(reader, steps, depth);
+}
+function readPower(reader, steps, depth) {
+  readOperand(reader, steps, depth);
+  if (reader.token.kind === "power") {
+    const { at, end, value } = reader.take();
+    steps.push({ kind: "number", value, at, end }, { kind: "apply", op: "pow", count: 2, at, end });
+  } else if (reader.is("^")) {
+    const { at, end } = reader.take();
+    readSigned(reader, steps, depth + 1);
+    steps.push({ kind: "apply", op: "pow", count: 2, at, end });
+  }
+}
+function readOperand(reader, steps, depth) {
+  const token = reader.take();
+  const { text, at, end } = token;
+  if (token.kind === "number") {
+    if (!Number.isFinite(token.value)) throw new TextError(`${quoted(text)} is too large a number.`, at, end);
+    steps.push({ kind: "number", value: token.value, at, end });
+  } else if (token.kind === "name" && reader.is("(")) readCall(reader, steps, depth, token);
+  else if (token.kind === "name") {
+    if (isFunction(text) && !token.dots) {
+      throw new TextError(`${quoted(text)} is a function: write what it is of in parentheses, ${text}(...).`, at, end);
+    }
+    steps.push({ kind: "name", name: text, dots: token.dots, at, end });
+  } else if (token.kind === "sign" && text === "(") {
+    readSum(reader, steps, depth + 1);
+    closed(reader, token);
+  } else throw wrongAt(token, "A number, a name or a parenthesis is needed");
+}
+function readCall(reader, steps, depth, { text, dots, at, end }) {
+  if (!isFunction(text) || dots) {
+    const near = nearest(text, functionNames());
+    const hint = near ? ` did you mean ${near}, or is` : " is";
+    throw new TextError(`There is no function ${quoted(text)}:${hint} a * missing before the parenthesis?`, at, end);
+  }
+  const open = reader.take(), op = ALIASES[text] ?? text;
+  let count = 0;
+  do {
+    if (count) reader.take();
+    readSum(reader, steps, depth + 1);
+    count++;
+  } while (reader.is(","));
+  closed(reader, open);
+  const { arity } = ROWS[op];
+  if (count !== arity) throw new TextError(`${text} takes ${arity} argument${arity > 1 ? "s" : ""}, not ${count}.`, at, end);
+  steps.push({ kind: "apply", op, count, at, end });
+}
+function closed(reader, open) {
+  if (reader.is(")")) reader.take();
+  else if (reader.token.kind === "end") throw new TextError("This parenthesis is not closed.", open.at, open.end);
+  else throw wrongAt(reader.token, "A closing parenthesis or an operator such as + or * is needed");
+}
+/** What may follow an operand: anything but another one. */
+function requireOperator(reader) {
+  const { token } = reader, before = reader.peek(-1);
+  const operand = token.kind === "number" || token.kind === "name" || reader.is("(");
+  if (operand) {
+    throw new TextError(`Between ${quoted(before.text)} and ${quoted(token.text)} an operator is missing: write * for a product.`, token.at, token.end);
+  }
+  if (token.kind === "power") throw new TextError("A power needs parentheses here, such as (x²)².", token.at, token.end);
+}
+
+/** The known name that is spelled most like one, or nothing where none is near. */
+function nearest(name, known) {
+  const scored = known.map((other) => [distance(name.toLowerCase(), other.toLowerCase()), other]).sort((a, b) => a[0] - b[0]);
+  return scored.length && scored[0][0] <= Math.max(1, name.length / 3) && scored[0][0] < name.length ? scored[0][1] : "";
+}
+/** How many letters differ, are missing or too many. */
+function distance(a, b) {
+  if (Math.abs(a.length - b.length) > 3) return Infinity;
+  let row = Array.from({ length: b.length + 1 }, (_, j) => j);
+  for (let i = 1; i <= a.length; i++) {
+    const next = [i];
+    for (let j = 1; j <= b.length; j++) next.push(Math.min(row[j] + 1, next[j - 1] + 1, row[j - 1] + (a[i - 1] === b[j - 1] ? 0 : 1)));
+    row = next;
+  }
+  return row[b.length];
+}

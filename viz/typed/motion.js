@@ -1,0 +1,128 @@
+// Numbers: values of nodes, and a motion by Runge and Kutta with as many steps as its error asks for.
+
+const FRAMES = 150, WORK = 2e7, OVERHEAD = 60; // instants; operations at most, and those that a rate takes beside its own
+const AWAY = 0.5; // where coordinates start that would rest, as nobody said where
+const TOLERANCE = 1e-6, UNSURE = 1e-2; // relative change by halving the step that is little enough, and too much to be shown
+
+/** Values of nodes for Map {name of a variable: number}. */
+function valuesOf(nodes, at) {
+  const found = new Map();
+  for (const node of topological(nodes)) {
+    const value = node.value ?? (node.op === "variable" ? at.get(node.name) : VALUE[node.op](...node.args.map((arg) => found.get(arg))));
+    found.set(node, value);
+  }
+  return nodes.map((node) => found.get(node));
+}
+
+/** A function from numbers of the inputs, in order, to numbers of some nodes. */
+function compiled(inputs, nodes) {
+  const order = topological(nodes), place = new Map(order.map((node, i) => [node, i]));
+  const work = new Float64Array(order.length), fed = [], steps = [];
+  inputs.forEach((node, i) => { if (place.has(node)) fed.push([place.get(node), i]); });
+  order.forEach((node, i) => {
+    if (node.value !== null) work[i] = node.value;
+    else if (node.args.length) steps.push({ value: VALUE[node.op], i, args: node.args.map((arg) => place.get(arg)) });
+  });
+  const out = nodes.map((node) => place.get(node));
+  const run = (values) => {
+    for (const [i, from] of fed) work[i] = values[from];
+    for (const { value, i, args } of steps) {
+      work[i] = args.length === 1 ? value(work[args[0]]) : args.length === 2 ? value(work[args[0]], work[args[1]]) : value(...args.map((arg) => work[arg]));
+    }
+    return out.map((i) => work[i]);
+  };
+  run.size = steps.length;
+  return run;
+}
+
+/** The free motion of a system from its start: instants, states, accelerations, energies, points, and how exact it is. */
+function motionOf(system, parameters = system.parameters) {
+  const n = system.q.length, graph = forwardDynamics(system);
+  const run = compiled(graph.inputs, [...graph.outputs.values()]), draw = compiled(graph.inputs, system.points.flat());
+  const values = Float64Array.from(graph.inputs, ({ name }) => parameters.get(name) ?? 0), time = graph.inputs.indexOf(system.t);
+  const at = (state, t) => {
+    values.set(state);
+    if (time >= 0) values[time] = t;
+    return values;
+  };
+  const start = Float64Array.of(...system.start.q, ...system.start.qd);
+  let first = run(at(start, 0)), moved = false;
+  if (!system.start.said && !first.slice(0, n).some((qdd) => Number.isFinite(qdd) && qdd)) { // at rest nothing is to be seen
+    start.fill(AWAY, 0, n);
+    first = run(at(start, 0));
+    moved = true;
+  }
+  const infinite = system.coordinates.find((_, i) => !Number.isFinite(first[i]));
+  if (infinite && first.slice(n, 2 * n).every((pivot) => pivot > 0)) return { error: `At the start the acceleration of ${infinite} is not finite.` };
+  const singular = system.coordinates.findLast((_, i) => !(first[n + i] > 0));
+  if (singular) return { error: `At the start ${singular} has no inertia left: the mass matrix is not positive definite.` };
+  const rate = (state, t) => run(at(state, t));
+  const most = WORK / (run.size + OVERHEAD) / 4 / FRAMES;
+  let each = 1, states = integrate(rate, start, system.time, each), sure;
+  do {
+    each *= 2;
+    const finer = integrate(rate, start, system.time, each);
+    sure = difference(states, finer);
+    states = finer;
+  } while (each * 2 <= most && !(sure.change < TOLERANCE));
+  states.length = sure.frames;
+  const t = states.map((_, k) => (system.time * k) / (FRAMES - 1)), rows = states.map((state, k) => run(at(state, t[k])));
+  return {
+    t, q: states.map((state) => [...state.slice(0, n)]), qd: states.map((state) => [...state.slice(n)]), qdd: rows.map((row) => row.slice(0, n)),
+    energy: rows.map((row) => row[2 * n]), steps: each * (FRAMES - 1), change: sure.change, stopped: states.length < FRAMES, moved,
+    points: states.map((state, k) => { const all = draw(at(state, t[k])); return system.points.map((_, i) => all.slice(2 * i, 2 * i + 2)); }),
+  };
+}
+/** States at the frames by RK4 with so many steps a frame, as far as they are finite. */
+function integrate(rate, start, time, each) {
+  const h = time / (FRAMES - 1) / each, n = start.length / 2, states = [start], middle = new Float64Array(2 * n);
+  const moved = (x, k, c) => {
+    for (let i = 0; i < n; i++) { middle[i] = x[i] + c * (k ? k.x[n + i] : 0); middle[n + i] = x[n + i] + c * (k ? k.qdd[i] : 0); }
+    return middle;
+  };
+  const stage = (x, t) => ({ x: Float64Array.from(x), qdd: rate(x, t) });
+  let x = start;
+  for (let frame = 1; frame < FRAMES; frame++) {
+    for (let step = 0; step < each; step++) {
+      const t = ((frame - 1) * each + step) * h;
+      const k1 = stage(x, t), k2 = stage(moved(x, k1, h / 2), t + h / 2), k3 = stage(moved(x, k2, h / 2), t + h / 2), k4 = stage(moved(x, k3, h), t + h);
+      const next = Float64Array.from(x);
+      for (let i = 0; i < n; i++) {
+        next[i] += (h / 6) * (k1.x[n + i] + 2 * (k2.x[n + i] + k3.x[n + i]) + k4.x[n + i]);
+        next[n + i] += (h / 6) * (k1.qdd[i] + 2 * (k2.qdd[i] + k3.qdd[i]) + k4.qdd[i]);
+      }
+      x = next;
+    }
+    if (!x.every(Number.isFinite)) break;
+    states.push(x);
+  }
+  return states;
+}
+/** How far two motions differ, over the frames where that is little: beside the largest value that an entry has had,
+ * and at least a millionth of the largest of its kind, since an entry may be rounding alone. */
+function difference(coarse, fine) {
+  const sizes = new Float64Array(fine[0].length), n = sizes.length / 2;
+  let change = 0, frames = 0;
+  for (; frames < Math.min(coarse.length, fine.length); frames++) {
+    fine[frames].forEach((value, i) => { sizes[i] = Math.max(sizes[i], Math.abs(value)); });
+    const least = [sizes.slice(0, n), sizes.slice(n)].map((kind) => 1e-6 * Math.max(...kind));
+    const off = sizes.map((size, i) => Math.abs(fine[frames][i] - coarse[frames][i]) / Math.max(size, least[i < n ? 0 : 1]) || 0);
+    const most = Math.max(...off);
+    if (!(most < UNSURE)) return { frames, change: Infinity };
+    change = Math.max(change, most);
+  }
+  return { frames, change: frames < FRAMES ? Infinity : change };
+}
+
+/** For each point the earlier one that it keeps its distance from, nearest in the list first; -1 for none. 0: the origin. */
+function rods(points) {
+  const places = points.map((frame) => [[0, 0], ...frame]);
+  const length = (k, i, j) => Math.hypot(places[k][i][0] - places[k][j][0], places[k][i][1] - places[k][j][1]);
+  return places[0].map((_, i) => {
+    for (let j = i - 1; j >= 0; j--) {
+      const first = length(0, i, j);
+      if (first && places.every((_, k) => Math.abs(length(k, i, j) - first) < TOLERANCE * first)) return j;
+    }
+    return -1;
+  });
+}

@@ -1,0 +1,121 @@
+// What the inspector is handed of a system: its graphs as viz/inspector/record.py describes them, one state, a motion.
+
+const KINDS = { q: "q", qd: "q\u0307", qdd: "q\u0308", tau: "τ" };
+const LONGEST = 24; // letters of a name for which a box has room
+const ABOUT = { euler_embedded: "", kinetic_only: "of the kinetic energy " };
+
+/** A name in mathematical letters: theta1 is θ₁. */
+const pretty = (name) => name.replace(/(?<![A-Za-z0-9])([A-Za-z]+)([0-9]*)(?![A-Za-z0-9])/g, (_, word, digits) => (
+  (LETTERS[word] ?? word) + [...digits].map((each) => "₀₁₂₃₄₅₆₇₈₉"[each]).join("")));
+
+/** Inverse dynamics by all formulations, or forward dynamics, along a motion. */
+function recordOf(system, motion, forward) {
+  const graphs = forward ? [["forward dynamics", accelerations(system)]]
+    : Object.keys(FORMULATIONS).map((name) => [name, inverseDynamics(system, name)]);
+  const derived = forward ? null : earlier(system), computed = new Set(derived?.outputs.keys());
+  const places = placesOf(system), shownGraphs = [...graphs.map(([, graph]) => graph), ...(places ? [places] : [])];
+  const needed = [...(derived?.inputs ?? []), ...shownGraphs.flatMap((graph) => graph.inputs)].map(({ name }) => name);
+  const inputs = [...new Set(needed)].filter((name) => !computed.has(name));
+  const letters = lettersOf(system);
+  const known = new Set(graphs.flatMap(([, graph]) => [...graph.inputs, ...graph.nodes]).map(({ name }) => name));
+  graphs.forEach(([, graph]) => [...graph.outputs.keys()].forEach((name) => known.add(name)));
+  return {
+    title: "Your Lagrangian", introduction: "",
+    notices: noticesOf(system, motion),
+    ops: Object.fromEntries(Object.entries(ROWS).map(([name, { symbol, commutative }]) => [name, [symbol, commutative]])),
+    slopes: Object.fromEntries(Object.entries(ROWS).map(([name, row]) => [name, row.slopes])),
+    called: [...calledOf(system)].filter(([name]) => known.has(name)),
+    units: [["t", "s"], ["dt", "s"]].filter(([name]) => known.has(name)),
+    inputs, rows: rowsOf(system, motion, inputs), columns: [], tables: [],
+    derived: derived && listed(derived, letters),
+    versions: graphs.map(([name, graph]) => versionOf(name, graph, letters)),
+    motion: motion.error ? null : { ...shownMotion(motion), joints: [], places: places && listed(places, letters) },
+  };
+}
+
+function accelerations(system) {
+  const graph = forwardDynamics(system);
+  return graphOf(graph.inputs, new Map([...graph.outputs].filter(([name]) => name.startsWith("qdd"))));
+}
+/** The state that embedded formulations start from: q - dt qd and qd - dt qdd. */
+function earlier({ q, qd, qdd }) {
+  const dt = variable("dt"), back = (kind, from, rates) => from.map((x, i) => [`${kind}${i}_old`, sub(x, mul(dt, rates[i]))]);
+  return graphOf([...q, ...qd, ...qdd, dt], new Map([...back("q", q, qd), ...back("qd", qd, qdd)]));
+}
+/** What a person calls the names of a graph: q̇.theta for qd0. */
+function calledOf(system) {
+  const shown = (text) => { const [kind, name] = text.split("."), [word, old] = kind.split("_"); return `${KINDS[word] ?? word}${old ? `_${old}` : ""}.${name}`; };
+  const more = system.coordinates.map((name, i) => [`qdd${i}`, `qdd.${name}`]);
+  return new Map([...displayNames(system), ...more].map(([name, text]) => [name, shown(text)]));
+}
+/** What the picture shows of a name: what a person calls it, or letters where that is long. */
+function lettersOf(system) {
+  const called = calledOf(system);
+  return (name) => (called.get(name)?.length <= LONGEST ? called.get(name) : pretty(name));
+}
+
+function listed(graph, letters) {
+  const number = new Map(graph.nodes.map((node, i) => [node, i]));
+  return {
+    ops: graph.nodes.map(({ op }) => op), args: graph.nodes.map(({ value, args }) => value ?? args.map((arg) => number.get(arg))),
+    names: Object.fromEntries(graph.nodes.map((node, i) => [i, node.name]).filter(([, name]) => name).map(([i, name]) => [i, [name, letters(name)]])),
+    inputs: graph.inputs.map((node) => [node.name, number.get(node) ?? -1]),
+    outputs: [...graph.outputs].map(([name, node]) => [name, letters(name), number.get(node)]),
+  };
+}
+function versionOf(name, graph, letters) {
+  const wrong = spuriousNodes(graph), kinds = new Map();
+  const label = graph.nodes.map((node) => {
+    const kind = [tagNames.filter((_, i) => node.label & (16 << i)), roleOf(node), stageOf(node)], key = JSON.stringify(kind);
+    if (!kinds.has(key)) kinds.set(key, { i: kinds.size, kind });
+    return kinds.get(key).i;
+  });
+  return {
+    name: name.replace("_", " "), about: aboutOf(name, graph, wrong), ...listed(graph, letters), label, labels: [...kinds.values()].map(({ kind }) => kind),
+    marked: graph.nodes.flatMap((node, i) => (wrong.has(node) ? [i] : [])), steps: [],
+  };
+}
+function roleOf({ args, value, label }) {
+  if (!args.length) return value === null ? "input" : "constant";
+  const found = [[PRIMAL, "primal"], [ADJOINT, "adjoint"], [TANGENT, "tangent"]].filter(([role]) => label & role);
+  return found.length > 1 ? "several" : found[0]?.[1] ?? "primal";
+}
+function stageOf({ label }) {
+  if (label & PRIMAL || !(label & (ADJOINT | TANGENT))) return "as written";
+  return label & ADJOINT ? (label & TANGENT ? "both sweeps" : "reverse sweep") : "forward sweep";
+}
+function aboutOf(name, { nodes }, wrong) {
+  if (wrong.size) {
+    return `Look at what is vermillion: ${wrong.size} of ${nodes.length} nodes. The velocity derivative ${ABOUT[name]}was taken through `
+      + "q = qd dt + q_old, so it reached q as well, and a branch that does not belong there runs into the torques. No smaller dt takes it away.";
+  }
+  if (name === "forward dynamics") return `Accelerations from torques: the mass matrix is derived and eliminated, ${nodes.length} nodes.`;
+  const free = name === "kinetic_only" ? " This way out is right here, because the kinetic energy does not depend on q." : "";
+  return `No spurious branch: ${nodes.length} nodes, and the torques that the motion takes.${free} Nothing else drives it, so they should be 0.`;
+}
+function noticesOf(system, motion) {
+  if (motion.error) return [motion.error];
+  const rest = motion.moved ? [`At rest nothing moves, so all coordinates start at ${AWAY}; for another start write ${system.coordinates[0]}(0) = ....`] : [];
+  if (!motion.stopped) return rest;
+  const last = motion.t.at(-1).toPrecision(3);
+  return [...rest, `The motion is shown up to ${last} s of ${system.time} s: from there half the step changes it by more than ${100 * UNSURE} %.`];
+}
+/** Values of the inputs at all instants; without a motion at the start, at rest. */
+function rowsOf(system, motion, inputs) {
+  const still = { t: [0], q: [system.start.q], qd: [system.start.qd], qdd: [system.q.map(() => 0)] };
+  const { t, q, qd, qdd } = motion.error ? still : motion;
+  return t.map((instant, k) => {
+    const values = new Map([...system.parameters, ["dt", DT], ["t", instant]]);
+    system.q.forEach((_, i) => [["q", q], ["qd", qd], ["qdd", qdd]].forEach(([kind, table]) => values.set(`${kind}${i}`, table[k][i])));
+    return inputs.map((name) => values.get(name) ?? 0);
+  });
+}
+/** The origin and the points as a graph of the state, which shows them where a person changes it. */
+function placesOf({ q, qd, extra, points }) {
+  const named = points.flatMap(([x, y], i) => [[`x${i + 1}`, x], [`y${i + 1}`, y]]);
+  return points.length ? graphOf([...q, ...qd, ...extra], new Map([["x0", constant(0)], ["y0", constant(0)], ...named])) : null;
+}
+/** The origin and the points, where there are any. */
+function shownMotion({ t, points }) {
+  return points[0].length ? { t, points: points.map((frame) => [[0, 0], ...frame]), parents: rods(points) } : { t, points: null, parents: [] };
+}
