@@ -47,8 +47,8 @@ def evaluate(
                 env[node] = node.value
             else:
                 args = [env[arg] for arg in node.args]
-                for arg in args:
-                    if type(arg) is not float:
+                for value in args:
+                    if type(value) is not float:
                         env[node] = op.array(*args)
                         break
                 else:
