@@ -20,6 +20,13 @@ RUN = [name for name, page in PAGES.items() if "```python\n" in page]
 FENCE = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 MARK = "-- end of example --"
 SECONDS = 120  # for one page; each takes a few
+# A page's program, whose machine code is made in a quarter of the time, as in most tests.
+QUICKLY = """
+import runpy, sys
+from cgraph.codegen import llvm_engine
+llvm_engine.LEVEL = 0
+runpy.run_path(sys.argv[1], run_name="__main__")
+"""
 
 
 def examples(page: str) -> list[tuple[int, str, str]]:
@@ -47,12 +54,12 @@ def pictures(name: str) -> dict[str, str]:
     return {file: f"images/{Path(name).stem}-{file}" for file in found}
 
 
-def run_examples(name: str, folder: Path) -> subprocess.CompletedProcess[str]:
+def run_examples(name: str, folder: Path, *, quickly: bool = False) -> subprocess.CompletedProcess[str]:
     """The examples of a page, run in the empty folder "empty" of a folder."""
     (folder / "page.py").write_text(program(PAGES[name]), encoding="utf-8")
     (folder / "empty").mkdir()
     return subprocess.run(
-        [sys.executable, "-W", "error", "-X", "utf8", str(folder / "page.py")],
+        [sys.executable, "-W", "error", "-X", "utf8", *(["-c", QUICKLY] if quickly else []), str(folder / "page.py")],
         cwd=folder / "empty",
         env=os.environ | {"PYTHONPATH": str(ROOT)},
         capture_output=True,
@@ -71,7 +78,7 @@ def test_an_example_has_the_output_that_follows_it() -> None:
 @pytest.mark.parametrize("name", RUN)
 def test_examples_print_what_is_shown(name: str, tmp_path: Path) -> None:
     """From top to bottom, in one namespace, in an empty folder, and write the pictures that the page shows."""
-    run = run_examples(name, tmp_path)
+    run = run_examples(name, tmp_path, quickly="HYPOTHESIS_PROFILE" not in os.environ)
     assert run.returncode == 0, run.stderr
     printed = run.stdout.split(f"{MARK}\n")[:-1]
     shown = [(line, output) for line, _, output in examples(PAGES[name])]

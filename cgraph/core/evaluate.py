@@ -34,10 +34,7 @@ def evaluate(
         raise GraphError(f"the graph has no input {', '.join(map(str, unknown))} (it has {', '.join(names) or 'none'})")
     shape = _common_shape(read)
 
-    last_use: dict[Node, Node] = {}
-    for node in nodes:
-        for arg in node.args:
-            last_use[arg] = node
+    last_use = {} if shape is None else {arg: node for node in nodes for arg in node.args}
     kept = set(outputs.values())
     env: dict[Node, Value] = {}
     with np.errstate(all="ignore"):
@@ -50,11 +47,16 @@ def evaluate(
                 env[node] = node.value
             else:
                 args = [env[arg] for arg in node.args]
-                scalar = all([type(arg) is float for arg in args])
-                env[node] = (op.scalar if scalar else op.array)(*args)
-                for arg in node.args:  # free an array after its last use
-                    if last_use[arg] is node and arg not in kept:
-                        env.pop(arg, None)
+                for value in args:
+                    if type(value) is not float:
+                        env[node] = op.array(*args)
+                        break
+                else:
+                    env[node] = op.scalar(*args)
+                if last_use:
+                    for arg in node.args:  # free an array after its last use
+                        if last_use[arg] is node and arg not in kept:
+                            env.pop(arg, None)
     results = {name: env[node] for name, node in outputs.items()}
     if shape is None:
         return results

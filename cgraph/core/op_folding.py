@@ -70,15 +70,16 @@ def mul(a: Node, b: Node) -> Node | None:
         if b.op.name == "mul":
             return _cancelled(c, b)
         return _times_quotient(a, *b.args) if b.op.name == "div" else None
-    if a.op.name == "neg":
-        return a.args[0] * b.args[0] if b.op.name == "neg" else -(a.args[0] * b)
-    if b.op.name == "neg":
+    left, right = a.op.name, b.op.name
+    if left == "neg":
+        return a.args[0] * b.args[0] if right == "neg" else -(a.args[0] * b)
+    if right == "neg":
         return -(a * b.args[0])
-    if b.op.name == "div" and (quotient := _times_quotient(a, *b.args)) is not None:
+    if right == "div" and (quotient := _times_quotient(a, *b.args)) is not None:
         return quotient
-    if a.op.name == "div" and (quotient := _times_quotient(b, *a.args)) is not None:
+    if left == "div" and (quotient := _times_quotient(b, *a.args)) is not None:
         return quotient
-    if a.op.name != "mul" or b.op.name != "mul":
+    if left != "mul" or right != "mul":
         return None
     c, d = a.args[0].value, b.args[0].value
     if c is None or d is None or not math.isfinite(c * d) or not c * d:

@@ -43,9 +43,12 @@ class Builder:
         # One order for both a*b and b*a: a constant first, else as first met.
         if op.commutative and args[1].op is CONSTANT and args[0].op is not CONSTANT:
             args = args[::-1]
-        key: tuple[str | int, ...] = (op.name, *map(id, args))  # no objects, which the garbage collector would follow
-        if op.commutative and key[1] > key[2]:  # type: ignore[operator]
-            key = (op.name, key[2], key[1])
+        key: tuple[str | int, ...]  # no objects, which the garbage collector would follow
+        if len(args) == 2:
+            first, second = id(args[0]), id(args[1])
+            key = (op.name, second, first) if op.commutative and first > second else (op.name, first, second)
+        else:
+            key = (op.name, *map(id, args))
         node = self._made.get(key)
         if node is None:
             if not label.has_tags:

@@ -57,15 +57,14 @@ class Canonical:
         self._leading: dict[int, float] = {}
         self._units: dict[Powers, set[float]] = {}
         self._units_used: dict[Angle, float] = {}
-        self._sums = self._sums_of_all()
-        if any([self._unit(*angle) != unit for angle, unit in self._units_used.items()]):
-            self._sums = self._sums_of_all()  # now that it is known which multiples of an angle there are
-
-    def _sums_of_all(self) -> dict[Node, Sum]:
         self._sums: dict[Node, Sum] = {}
+        self._sum_all()
+        if any([self._unit(*angle) != unit for angle, unit in self._units_used.items()]):
+            self._sum_all()  # now that it is known which multiples of an angle there are
+
+    def _sum_all(self) -> None:
         for node in self.order:
             self._sums[node] = self._sum(node)
-        return self._sums
 
     def __getitem__(self, node: Node) -> Sum:
         return self._sums[node]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from functools import cache
 
 Row = tuple[float, ...]
 
@@ -105,6 +106,7 @@ DOPRI5 = Tableau(
 )
 
 
+@cache
 def real_stability(tableau: Tableau) -> float:
     """Where on the negative real axis stability ends: the smallest z > 0 with |R(-z)| > 1, to a sixty-fourth."""
     for k in itertools.count(1):

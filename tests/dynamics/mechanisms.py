@@ -13,6 +13,7 @@ import dynamics as dyn
 from dynamics.multibody.joint_coordinates import places
 from dynamics.multibody.mechanism import WORLD, Body, Joint, Mechanism
 from dynamics.multibody.spatial import rotation
+from tests.slow import slow
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -66,6 +67,8 @@ FAMILIES: dict[str, Callable[[int], Mechanism]] = {
     "branched": lambda n: random_mechanism(n, ["revolute"], 4),
     "welded": lambda n: random_mechanism(n, ["revolute", "prismatic", "fixed"], 3),
 }
+PLAIN = ("serial", "branched")  # of hinges alone, which the others have too
+EVERY_FAMILY = [*[name for name in FAMILIES if name not in PLAIN], *slow(*PLAIN)]
 
 
 def turned_link(i: int, rng: np.random.Generator) -> dict[str, Any]:

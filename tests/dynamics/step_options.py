@@ -1,8 +1,14 @@
-"""Step options: a length of step, and a tolerance, as the arguments that a method takes them by."""
+"""Step options: a length of step, and a tolerance, as the arguments that a method takes them by; and all methods."""
 
 from typing import Any
 
 from dynamics.integrators import METHODS
+from dynamics.integrators.composition import COMPOSITIONS
+from tests.slow import slow
+
+# Compositions differ in their coefficients alone: of those a short and a long one, for what holds of every method.
+LIKE_OTHERS = [name for name in COMPOSITIONS if name not in ("yoshida4", "kahan_li6")]
+EVERY_METHOD = [*[name for name in METHODS if name not in LIKE_OTHERS], *slow(*LIKE_OTHERS)]
 
 
 def step(method: str, h: float, **tolerances: float) -> dict[str, Any]:

@@ -18,6 +18,7 @@ import dynamics as dyn
 from cgraph.codegen.c import c_statements as body
 from cgraph.core.node import OPS, apply
 from cgraph.util.atomic_write import atomic_write
+from tests.slow import slow
 from tests.strategies import cases
 from tests.tolerances import EQUATIONS
 
@@ -98,7 +99,7 @@ def operations(tmp_path_factory):
 
 
 @needs_cc
-@pytest.mark.parametrize("level", ["O0", "O3"])
+@pytest.mark.parametrize("level", ["O3", *slow("O0")])
 @pytest.mark.parametrize("op", ROWS)
 def test_an_operation_is_that_of_evaluate_to_the_last_bit(op, level, operations):
     graph, points = graph_of(op), points_of(op)
@@ -121,7 +122,7 @@ def test_random_graphs_agree_with_evaluate_to_the_last_bit(batch, part, tmp_path
 
 
 @needs_cc
-@pytest.mark.parametrize("links", [3, 20])
+@pytest.mark.parametrize("links", [3, 8, *slow(20)])
 def test_forward_dynamics_agree_with_evaluate_to_the_last_bit(links, tmp_path):
     graph = dyn.forward_dynamics(dyn.planar_arm([1.0] * links, [0.7] * links, damping=0.1))
     points = np.random.default_rng(links).normal(size=(100, len(graph.inputs)))

@@ -320,7 +320,7 @@ for each in graphs:
 def test_processes_may_fill_one_folder_at_once(folder):
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "cwd": ROOT}
     command = [sys.executable, "-W", "error", "-c", WORKER, str(folder)]
-    workers = [subprocess.Popen(command, **pipes) for _ in range(3)]
+    workers = [subprocess.Popen(command, **pipes) for _ in range(2)]
     for worker in workers:
         assert worker.stdout.readline() == "ready\n"
     for worker in workers:

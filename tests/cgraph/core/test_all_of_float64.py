@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from functools import cache
 
 import pytest
 from mpmath import mp, mpf
@@ -28,13 +29,20 @@ def condition(op, point):
     return 1.0 + abs(point[1] * math.log(abs(point[0]))) if op.name == "pow" else 1.0
 
 
+@cache
+def derived(op):
+    """The operation, its gradient and its Hessian, of a, b, .."""
+    inputs = cg.variables(["a", "b", "c"][: op.arity])
+    graph = cg.Graph(inputs, {"y": apply(op, *inputs)})
+    return graph, (cg.gradient(graph), cg.hessian(graph))
+
+
 def wrong(op, point):
     """What is off at a point by more than its rounding, relative to the largest entry; nothing where that overflows.
 
     A second derivative also counts by how far it changes the first, over one and over the size of the argument.
     """
-    inputs = cg.variables(["a", "b", "c"][: op.arity])
-    graph = cg.Graph(inputs, {"y": apply(op, *inputs)})
+    graph, slopes = derived(op)
     values = dict(zip("abc", point, strict=False))
     y = graph.evaluate(values)["y"]
     if not math.isfinite(y):
@@ -42,16 +50,16 @@ def wrong(op, point):
     if op.name == "pow" and (y == 0.0 or abs(point[1]) < 1e-100):  # it underflows, or a ** (b - 2) alone overflows
         return []
     result, floor = [], 0.0
-    for derived in (cg.gradient(graph), cg.hessian(graph)):
+    for slope in slopes:
         try:
-            exact = {name: mpf(value) for name, value in high_precision.evaluate(derived, values, DIGITS).items()}
+            exact = {name: mpf(value) for name, value in high_precision.evaluate(slope, values, DIGITS).items()}
         except ZeroDivisionError:  # an infinite slope
             break
         scale = max(map(abs, exact.values()))
         if mp.isnan(scale) or scale > LARGEST:
             break
         bound = ULPS * condition(op, point) * max(float(scale), floor) + 4 * math.ulp(0.0)
-        found = derived.evaluate(values)
+        found = slope.evaluate(values)
         result += [(point, k, found[k], float(exact[k])) for k in found if not abs(found[k] - exact[k]) <= bound]
         floor = float(scale) * min(1.0, 1.0 / max(map(abs, point)))
     return result

@@ -12,7 +12,7 @@ from dynamics.equations.coriolis import coriolis, damping_force
 from dynamics.equations.evaluate_at import evaluate_at
 from dynamics.multibody.planar_arm import planar_links
 from dynamics.systems.model import as_system
-from tests.dynamics.mechanisms import FAMILIES
+from tests.dynamics.mechanisms import EVERY_FAMILY, FAMILIES
 from tests.dynamics.models import MODELS, Array, magnetic, random_arm, relativistic, states
 
 STEP = 1e-3  # of differences of fourth order: they are right to some 1e-11
@@ -29,7 +29,7 @@ def matrix(graph: cg.Graph, model: object, **state: Array) -> Array:
     return evaluate_at(as_system(model), graph, state).reshape(-1, n, n)
 
 
-@pytest.mark.parametrize("name", FAMILIES)
+@pytest.mark.parametrize("name", EVERY_FAMILY)
 def test_its_entries_are_christoffel_s_symbols_times_the_velocities(name: str) -> None:
     mechanism, mass = MECHANISMS[name](), dyn.mass_matrix(MECHANISMS[name]())
     given, n = states(mechanism, 3, 1), mechanism.system.n

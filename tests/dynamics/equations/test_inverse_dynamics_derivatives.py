@@ -17,7 +17,7 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics.systems.model import as_system
 from tests import high_precision
-from tests.dynamics.mechanisms import FAMILIES, TREES, Array, random_mechanism, turned_arm
+from tests.dynamics.mechanisms import EVERY_FAMILY, FAMILIES, TREES, Array, random_mechanism, turned_arm
 from tests.dynamics.models import MODELS, random_arm
 from tests.dynamics.parametrized import parametrized
 
@@ -161,7 +161,7 @@ def test_the_inverse_of_the_mass_matrix() -> None:
         assert np.abs(mass @ inverse - np.eye(system.n)).max() < 1e-14 * np.linalg.cond(mass)
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", EVERY_FAMILY)
 def test_pinocchio_s_derivatives_of_rnea_are_the_same(family: str) -> None:
     pinocchio = pytest.importorskip("pinocchio", reason="the bench extra has it")
     from tests.dynamics.pinocchio_twin import PinocchioTwin

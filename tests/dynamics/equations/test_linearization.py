@@ -123,7 +123,7 @@ def test_many_states_are_linearized_as_one(name: str, columns: bool, monkeypatch
     a, b = dyn.linearize_many(model, q, qd, tau, t=0.3)
     again = dyn.linearize_many(model, q, qd, tau, t=0.3, threads=2)
     assert all(map(np.array_equal, (a, b), again))
-    for k in (0, 64, count - 1):
+    for k in (0, count - 1):
         for found, expected in zip((a[k], b[k]), linearize(model, q[k], qd[k], tau, t=0.3), strict=True):
             assert np.abs(found - expected).max() < 1e-13 * np.abs(expected).max()
 

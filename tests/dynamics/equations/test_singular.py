@@ -142,7 +142,7 @@ def quadratic(rng: np.random.Generator, unit: np.ndarray, signs: list[float]) ->
     return dyn.System(lagrangian, [f"x{i}" for i in range(n)])
 
 
-@pytest.mark.parametrize("seed", [*range(15), *slow(*range(15, 40))])
+@pytest.mark.parametrize("seed", [*range(8), *slow(*range(8, 40))])
 def test_of_random_lagrangians_the_singular_ones_are_refused_and_the_others_solved(seed):
     rng = np.random.default_rng(seed)
     n = int(rng.integers(2, 4))

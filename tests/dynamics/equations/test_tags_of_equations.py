@@ -23,15 +23,10 @@ def untagged(graph: cg.Graph) -> list[cg.Node]:
 
 @pytest.mark.parametrize("graph", GRAPHS)
 @pytest.mark.parametrize("model", MODELS)
-def test_every_operation_has_a_tag(model: str, graph: str) -> None:
-    assert untagged(GRAPHS[graph](MODELS[model]())) == []
-
-
-@pytest.mark.parametrize("graph", GRAPHS)
-@pytest.mark.parametrize("model", MODELS)
-def test_some_operations_come_of_the_potential(model: str, graph: str) -> None:
-    nodes = GRAPHS[graph](MODELS[model]()).nodes
-    assert [node for node in nodes if "potential" in node.tags]
+def test_every_operation_has_a_tag_and_some_come_of_the_potential(model: str, graph: str) -> None:
+    derived = GRAPHS[graph](MODELS[model]())
+    assert untagged(derived) == []
+    assert [node for node in derived.nodes if "potential" in node.tags]
 
 
 def test_every_gravity_force_is_made_of_products_that_come_of_the_potential() -> None:

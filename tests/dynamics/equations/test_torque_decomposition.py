@@ -14,8 +14,9 @@ from dynamics.equations.torque_decomposition import torque_by_joint_motion, torq
 from dynamics.equations.torque_table import TorqueTable
 from dynamics.multibody.planar_arm import planar_links
 from dynamics.systems.model import as_system
-from tests.dynamics.mechanisms import FAMILIES, turned_tree
+from tests.dynamics.mechanisms import FAMILIES, PLAIN, turned_tree
 from tests.dynamics.models import MODELS, Array, at, random_arm, states
+from tests.slow import slow
 
 ROUNDING = 1e-12  # of the largest torque
 NOTHING = 1e-13  # kg and kg m^2: what is left of a link that is taken away, for no link may weigh nothing
@@ -26,7 +27,7 @@ EVERY = QUADRATIC | {name: lambda make=make: make(5) for name, make in FAMILIES.
 
 
 @pytest.mark.parametrize("table", TABLES)
-@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.parametrize("name", [*[name for name in EVERY if name not in PLAIN], *slow(*PLAIN)])
 def test_the_cells_add_up_to_inverse_dynamics(name: str, table: str) -> None:
     model = EVERY[name]()
     state = at(states(model, 1), 0)

@@ -18,6 +18,7 @@ from dynamics.reference import reference
 from tests import high_precision
 from tests.dynamics.experiments import sensitivity
 from tests.dynamics.models import Array
+from tests.slow import slow
 
 Rate = Callable[[Array, float], Any]  # of the state and t, written without the library
 
@@ -299,7 +300,7 @@ def test_invariants_do_not_change_along_the_motion(name: str) -> None:
             assert abs(float(change[key])) <= ROUNDING * size[key], key  # constants of both graphs are rounded
 
 
-@mark.parametrize("name", cases.names())
+@mark.parametrize("name", [*[name for name in cases.names() if name != "1000 links"], *slow("1000 links")])
 def test_what_is_watched_can_be_measured(name: str) -> None:
     case = cases.load(name)
     invariants = (

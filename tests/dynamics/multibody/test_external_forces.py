@@ -160,8 +160,8 @@ def test_mujoco_s_applied_force_agrees(body: str, frame: str) -> None:
     compiled = [cg.compile(graph, "python") for graph in graphs]
     place = cg.compile(mechanism.position(body, HAND), "python")
     index = model.body(body).id
-    given_states = states(mechanism, 100)
-    for row in range(100):
+    given_states = states(mechanism, 20)
+    for row in range(20):
         state = at(given_states, row)
         rng = np.random.default_rng(row)
         value, torque = rng.normal(size=(2, 3))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -38,16 +39,21 @@ def dense_kkt(model: Any, at: dict[str, float], rate: cg.Graph) -> tuple[Array, 
     """
     system = dyn.as_system(model)
     n, m = system.n, len(rate.outputs)
-    mass = values(dyn.mass_matrix(model), at).reshape(n, n)
+    mass, bias = (values(graph, at) for graph in mass_and_bias(model))
     u = np.array([at[f"qd{i}"] for i in range(n)])
-    force = np.array([at[f"tau{i}"] for i in range(n)]) - np.array(system.damping) * u - values(dyn.bias(model), at)
+    force = np.array([at[f"tau{i}"] for i in range(n)]) - np.array(system.damping) * u - bias
     basis = [at | {f"qd{i}": float(i == k) for i in range(n)} for k in range(n)]
     rows = np.array([values(rate, each) for each in basis]).T
     along = at | {f"q{i}_dot": x for i, x in enumerate(values(q_dot(system), at))}
     change = values(cg.jvp(rate, [f"q{i}" for i in range(system.nq)]), along)
-    matrix = np.block([[mass, -rows.T], [rows, np.zeros((m, m))]])
+    matrix = np.block([[mass.reshape(n, n), -rows.T], [rows, np.zeros((m, m))]])
     solved = np.linalg.lstsq(matrix, np.concatenate([force, -change]), rcond=1e-13)[0]
     return solved[:n], rows.T @ solved[n:]
+
+
+@cache
+def mass_and_bias(model: dyn.Mechanism) -> tuple[cg.Graph, cg.Graph]:
+    return dyn.mass_matrix(model), dyn.bias(model)
 
 
 def q_dot(system: dyn.System) -> cg.Graph:
@@ -78,13 +84,19 @@ def velocity_rows(model: dyn.Mechanism, loop: dyn.Loop) -> cg.Graph:
     return cg.Graph(state, rows)
 
 
-def closed_tree(kind: str, seed: int = 0) -> tuple[dyn.Mechanism, dyn.Loop, dict[str, float]]:
-    """Two chains, of 3 and 4 joints, on one of 2, held together by a loop; and a state where it is closed."""
+@cache
+def open_tree(seed: int) -> dyn.Mechanism:
+    """Two chains, of 3 and 4 joints, on one of 2."""
     rng, parents = np.random.default_rng(seed), ["world", "b0", "b1", "b2", "b3", "b1", "b5", "b6", "b7"]
     kinds = ["revolute", "free", "prismatic"] + ["revolute", "ball", "prismatic"] * 2
     joints = [random_joint(kind, rng, stiffness=0.0) for kind in kinds]
     bodies = [random_body(f"b{i}", "", parent, rng, joint=joints[i]) for i, parent in enumerate(parents)]
-    tree = dyn.Mechanism(bodies, 5.0 * rng.normal(size=3))
+    return dyn.Mechanism(bodies, 5.0 * rng.normal(size=3))
+
+
+def closed_tree(kind: str, seed: int = 0) -> tuple[dyn.Mechanism, dyn.Loop, dict[str, float]]:
+    """The two chains held together by a loop, and a state where it is closed."""
+    tree, rng = open_tree(seed), np.random.default_rng(seed + 100)
     at = state_of(tree, seed)
     motions = [values(tree.motion(name), at) for name in ("b8", "b4")]
     (place, turn), (place_to, turn_to) = ((each[:3], each[9:].reshape(3, 3)) for each in motions)
@@ -116,7 +128,7 @@ def held_still(model: dyn.Mechanism, rate: cg.Graph, at: dict[str, float]) -> di
 @pytest.mark.parametrize("kind", ["point", "hinge", "weld", "distance"])
 def test_accelerations_and_loop_forces_solve_the_defining_equations(kind: str) -> None:
     model, loop, at = closed_tree(kind)
-    tree = dyn.Mechanism(model.bodies, model.gravity)
+    tree = open_tree(0)
     expected, forces = dense_kkt(tree, at, velocity_rows(tree, loop))
     for method in ("recursive", "dense") if kind == "point" else ("recursive",):
         graph = dyn.forward_dynamics(model, method)

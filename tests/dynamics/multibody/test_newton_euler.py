@@ -11,7 +11,7 @@ from pytest import approx, mark
 import dynamics as dyn
 from cgraph import Graph
 from dynamics.multibody.mechanism import WORLD, Body, Joint, Mechanism
-from tests.dynamics.mechanisms import FAMILIES, random_body, random_mechanism, turned_arm, turned_tree
+from tests.dynamics.mechanisms import FAMILIES, PLAIN, random_body, random_mechanism, turned_arm, turned_tree
 from tests.dynamics.models import Array
 from tests.slow import slow
 
@@ -60,7 +60,7 @@ def values(graph: Graph, seed: int) -> Array:
     return np.array([float(y) for y in graph.evaluate(dict(zip(graph.input_names, x, strict=True))).values()])
 
 
-@mark.parametrize("name", MODELS)
+@mark.parametrize("name", [*[name for name in MODELS if name not in PLAIN], *slow(*PLAIN)])
 def test_the_bias_is_that_of_lagrange_s_equation(name: str) -> None:
     mechanism = MODELS[name]()
     found, derived = dyn.bias(mechanism), dyn.bias(by_lagrange(mechanism))
@@ -71,8 +71,9 @@ def test_the_bias_is_that_of_lagrange_s_equation(name: str) -> None:
 
 @mark.parametrize(
     ("name", "method"),
-    [(name, "recursive") for name in MODELS]
+    [(name, "recursive") for name in MODELS if name not in PLAIN]
     + [
+        *slow(*[(name, "recursive") for name in PLAIN]),
         ("mixed", "dense"),
         ("welded", "dense"),
         *slow(*[(name, "dense") for name in MODELS if name not in ("mixed", "welded")]),

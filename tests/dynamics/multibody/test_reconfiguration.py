@@ -83,7 +83,7 @@ def test_unlock_gives_the_free_mechanism_back() -> None:
     assert structure_hash(dyn.inverse_dynamics(again)) == structure_hash(dyn.inverse_dynamics(free))
 
 
-@mark.parametrize("seed", [*range(2), *slow(*range(2, 6))])
+@mark.parametrize("seed", [0, *slow(*range(1, 6))])
 def test_detach_then_attach_gives_the_same_graph(seed: int) -> None:
     whole = random_mechanism(9, ("revolute", "prismatic"), 3, seed)
     rng = np.random.default_rng(seed)

@@ -9,7 +9,7 @@ from pytest import approx
 import dynamics as dyn
 from dynamics.equations.evaluate_at import evaluate_at
 from dynamics.multibody.regressor import inertial_parameters, regressor
-from tests.dynamics.mechanisms import FAMILIES, turned_arm
+from tests.dynamics.mechanisms import EVERY_FAMILY, FAMILIES, turned_arm
 from tests.dynamics.models import Array, at, states
 
 ROUNDING = 1e-12
@@ -20,7 +20,7 @@ def value(mechanism: dyn.Mechanism, state: dict[str, Array]) -> Array:
     return evaluate_at(mechanism.system, regressor(mechanism), state).reshape(-1, n, n, 10)
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", EVERY_FAMILY)
 def test_times_the_parameters_it_is_the_torque_of_the_bodies(family: str) -> None:
     mechanism = FAMILIES[family](6)
     given = states(mechanism, 20)
@@ -45,7 +45,7 @@ def test_of_a_pendulum_it_is_the_textbook_s() -> None:
     assert inertial_parameters(arm)[0] == approx(np.array([3, 0, 0, -3, 4, 0, 4, 0, 0, 0]))
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", EVERY_FAMILY)
 def test_it_is_pinocchio_s(family: str) -> None:
     pinocchio = pytest.importorskip("pinocchio", reason="the bench extra has it")
     from tests.dynamics.pinocchio_twin import PinocchioTwin
@@ -61,7 +61,7 @@ def test_it_is_pinocchio_s(family: str) -> None:
     assert inertial_parameters(mechanism) == approx(parameters, abs=ROUNDING)
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", EVERY_FAMILY)
 def test_pinocchio_s_coriolis_matrix_and_gravity_are_ours(family: str) -> None:
     """Its matrix is that of Christoffel's symbols too, entry by entry."""
     pinocchio = pytest.importorskip("pinocchio", reason="the bench extra has it")

@@ -101,9 +101,18 @@ def apart(a: Reference, b: Reference) -> float:
         )
 
 
+LONG = (("cosine", "taylor"), ("kepler", "radau"), ("pendulum, turned", "radau"), ("two modes", "taylor"))
+
+
 # Constants of these graphs that are no float64 (1/3, 1e-8 and so on) are the same float64 in the closed forms.
-@mark.parametrize("method", REFERENCE_METHODS)
-@mark.parametrize("name", CLOSED)
+@mark.parametrize(
+    ("name", "method"),
+    [
+        pytest.param(name, method, marks=mark.slow if (name, method) in LONG else ())
+        for name in CLOSED
+        for method in REFERENCE_METHODS
+    ],
+)
 def test_both_methods_meet_closed_forms_within_their_stated_error(name: str, method: str) -> None:
     model, start, exact = CLOSED[name]
     digits = {"taylor": 24, "radau": 14}[method]

@@ -16,6 +16,7 @@ from dynamics.simulation.equal_steps import equal_steps
 from dynamics.simulation.error_estimate import second_run
 from dynamics.simulation.stepping import NativeIntegration
 from tests.dynamics.models import random_arm
+from tests.dynamics.step_options import LIKE_OTHERS
 from tests.slow import slow
 
 EQUAL = [name for name, method in METHODS.items() if not method.adaptive]
@@ -31,7 +32,11 @@ def spring() -> dyn.System:
 
 
 PAIRS = [(grid, method) for grid in range(len(GRIDS)) for method in EQUAL]
-FEW = [(grid, method) for grid, method in PAIRS if grid == EQUAL.index(method) % len(GRIDS) or method == "rk4"]
+FEW = [
+    (grid, method)
+    for grid, method in PAIRS
+    if (grid == EQUAL.index(method) % len(GRIDS) and method not in LIKE_OTHERS) or method == "rk4"
+]
 
 
 @mark.parametrize(("grid", "method"), FEW + slow(*[pair for pair in PAIRS if pair not in FEW]))

@@ -35,7 +35,7 @@ def circle(events: list[dyn.Event], t_end: float = 10.0, method: str = "dop853",
     return dyn.simulate(CIRCLE, [1.0, 0.0], None, t_end, method, events=events, **{**chosen, **options})
 
 
-@mark.parametrize("method", ["dop853", "taylor", "radau", "verlet", *slow("dopri5", "rodas", "rk4")])
+@mark.parametrize("method", ["dop853", "radau", "verlet", *slow("taylor", "dopri5", "rodas", "rk4")])
 def test_events_are_found_where_they_are(method: str) -> None:
     pytest.importorskip("llvmlite")
     crossing = dyn.Event("axis", lambda q, qd, t: q[1])
@@ -70,7 +70,7 @@ def test_an_event_between_the_times_asked_for() -> None:
         assert run.events["ground"].qd[0] == approx([-math.sqrt(2 * 9.81 * 0.5)], rel=SHARP)
 
 
-@mark.parametrize("method", ["dop853", "dopri5", "rk4", "radau", "gauss6"])
+@mark.parametrize("method", ["dop853", "dopri5", "taylor", "rk4", "radau", "gauss6"])
 def test_two_crossings_in_one_step_are_both_found(method: str) -> None:
     """x = sin t touches 0.999 and goes back 0.09 s later; steps are longer."""
     over = dyn.Event("over", lambda x, t: x[0] - 0.99)
@@ -162,7 +162,7 @@ def _oscillations(a: float, w: float, c: float) -> tuple[Any, Any]:
 @mark.parametrize("method", KINDS)
 def test_random_oscillations_cross_zero_where_they_do(method: str) -> None:
     """Number, instants and directions, of quantities of the time and of the state, by closed forms."""
-    rng, count = np.random.default_rng(len(method)), 100 if method == "dop853" else 10
+    rng, count = np.random.default_rng(len(method)), 40 if method == "dop853" else 10
     amplitude, phase = 10.0 ** rng.uniform(-12, 12, count), rng.uniform(0.1, 3.0, count)
     rate, directions = np.exp(rng.uniform(-1.0, 4.0, count)), rng.integers(-1, 2, count)
     events = []

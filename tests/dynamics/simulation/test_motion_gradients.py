@@ -28,7 +28,7 @@ DUAL = 1e-12  # of the size of the terms: a gradient beside forward sensitivitie
 DIFFERENCES = 2e-8  # central differences over 1e-5 of float64
 DIGITS = 1e-10  # beside differences of 30 digits, of stages that are solved to rounding
 WRT = ["q", "qd", "tau", "m", "k"]
-USUAL = "rk4 dopri5 rodas radau verlet gauss4 yoshida4".split()
+USUAL = "rk4 dopri5 rodas radau verlet gauss4".split()
 OTHERS = [name for name in (*METHODS, "gauss8") if name not in USUAL and name != "taylor"]
 
 

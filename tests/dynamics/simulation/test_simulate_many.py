@@ -16,7 +16,8 @@ from dynamics.systems.model import as_system
 from dynamics.systems.system import System
 from tests.dynamics.ensembles import arms, same
 from tests.dynamics.models import oscillator, random_arm
-from tests.dynamics.step_options import step
+from tests.dynamics.step_options import LIKE_OTHERS, step
+from tests.slow import slow
 
 RK4_ERROR = 1e-11  # of a period at dt = 1 ms: (w dt)^4 w t / 120
 VERLET_ERROR = 1e-6  # (w dt)^2 w t / 24
@@ -70,8 +71,9 @@ def test_arms_move_as_mujoco_s_do() -> None:
 @mark.parametrize(
     ("model", "method"),
     [
-        *((oscillator(), method) for method in METHODS),
+        *((oscillator(), method) for method in METHODS if method not in LIKE_OTHERS),
         *((random_arm(2), method) for method in ("rk4", "verlet", "dopri5")),
+        *slow(*[(oscillator(), method) for method in LIKE_OTHERS]),
     ],
 )
 def test_every_method_gives_what_simulate_gives(model: Any, method: str) -> None:

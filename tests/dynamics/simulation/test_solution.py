@@ -10,7 +10,8 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics.integrators import METHODS
 from tests.dynamics.models import oscillator, random_arm
-from tests.dynamics.step_options import step
+from tests.dynamics.step_options import LIKE_OTHERS, step
+from tests.slow import slow
 
 FREQUENCY = np.sqrt(1.5)  # rad/s, of the oscillator
 BETWEEN = {"bs23": 1e-3, "euler": 0.1, "symplectic_euler": 0.05, "verlet": 1e-3, "midpoint": 1e-3}  # at 0.02 s
@@ -30,7 +31,11 @@ def pulled() -> dyn.System:
 
 @mark.parametrize(
     ("method", "t_eval"),
-    [*((method, [0.1, 0.5, 1.7]) for method in (*METHODS, "scipy:DOP853")), ("rk4", None), ("dop853", None)],
+    [
+        *((method, [0.1, 0.5, 1.7]) for method in (*METHODS, "scipy:DOP853") if method not in LIKE_OTHERS),
+        *(("rk4", None), ("dop853", None)),
+        *slow(*[(method, [0.1, 0.5, 1.7]) for method in LIKE_OTHERS]),
+    ],
 )
 def test_a_solution_is_the_motion(method: str, t_eval: Any) -> None:
     options: dict[str, Any] = {"t_eval": t_eval, "backend": "python", **step(method, 0.02)}

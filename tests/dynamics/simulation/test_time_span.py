@@ -12,10 +12,10 @@ import dynamics as dyn
 from dynamics.integrators import METHODS
 from dynamics.simulation.stepping import NativeIntegration
 from tests.dynamics.models import oscillator
-from tests.dynamics.step_options import step
+from tests.dynamics.step_options import EVERY_METHOD, LIKE_OTHERS, step
+from tests.slow import slow
 
 EQUAL = [name for name, method in METHODS.items() if not method.adaptive]
-CHOSEN = [name for name, method in METHODS.items() if method.adaptive]
 ROUNDING = 1e-13  # of some tens of steps of order 1
 BACK = 1e-5  # there and back by a symmetric method, or by steps within 1e-9
 
@@ -36,7 +36,7 @@ def shifted(by: float) -> dyn.System:
     )
 
 
-@mark.parametrize("method", [*EQUAL, *CHOSEN, "scipy:DOP853", "scipy:LSODA"])
+@mark.parametrize("method", [*EVERY_METHOD, "scipy:DOP853", "scipy:LSODA"])
 def test_a_run_goes_to_t_end_whatever_is_recorded(method: str) -> None:
     """What ends the run after the last recorded time is seen, and the run says that it was there."""
     late = dyn.Event("late", lambda q, qd, t: t - 0.8, terminal=True)
@@ -68,7 +68,7 @@ def test_what_goes_wrong_after_the_last_recorded_time_is_said(method: str) -> No
         assert many.stats.message[0] == run.stats.message
 
 
-@mark.parametrize("method", [*EQUAL, "scipy:DOP853"])
+@mark.parametrize("method", [*[name for name in EQUAL if name not in LIKE_OTHERS], "scipy:DOP853", *slow(*LIKE_OTHERS)])
 def test_only_the_equations_know_where_time_begins(method: str) -> None:
     times = np.linspace(0.0, 1.0, 5)
     options = step(method, 0.0625) | {"backend": "python"}

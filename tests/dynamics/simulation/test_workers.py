@@ -55,7 +55,7 @@ def optimize(level: int) -> None:
     llvm_engine.LEVEL = level
 
 
-@mark.parametrize("method", ["rk4", "dopri5"])
+@mark.parametrize("method", ["dopri5", *slow("rk4")])
 def test_processes_change_nothing_and_make_the_code_once(method: str) -> None:
     arguments, options = case(method)
     alone = simulate_many(*arguments, **options)
