@@ -1,22 +1,44 @@
 """How Sphinx builds these pages; `make docs` runs it with warnings as errors."""
 
 import re
+import sys
+import tomllib
+from pathlib import Path
 from textwrap import indent
 
-from cgraph import __version__
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+
+from cgraph import __version__  # noqa: E402 (the extensions beside this file are found by the path above)
 
 project = "cgraph"
 author = "the cgraph authors"
 copyright = "2026, the cgraph authors"
 version = release = __version__
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx.ext.napoleon"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_extensions.mathml",
+    "sphinx_extensions.names",
+    "sphinx_extensions.command_reference",
+]
+html_math_renderer = "mathml"
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build"]
 
 html_theme = "furo"
-html_title = "cgraph"
+html_title = f"cgraph {version}"
+html_theme_options = {"top_of_page_buttons": []}  # the source is named below the page
+html_static_path = ["_static"]
+html_css_files = ["pages.css"]
+templates_path = ["_templates"]
+html_show_search_summary = False  # would be fetched, which a page that is opened as a file may not
+html_context = {  # shown below every page; where the repository is, is said in pyproject.toml
+    "urls": tomllib.loads((HERE.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"].get("urls", {})
+}
 
 suppress_warnings = ["ref.python"]  # a word of a type that is some attribute: the n of "n sequences of Node"
 napoleon_google_docstring = False
