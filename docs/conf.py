@@ -1,27 +1,44 @@
 """How Sphinx builds these pages; `make docs` runs it with warnings as errors."""
 
-import argparse
 import re
+import sys
+import tomllib
+from pathlib import Path
 from textwrap import indent
 
-from docutils import nodes
-from docutils.parsers.rst import Directive
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
 
-from cgraph import __version__
-from viz.commands.parser import parser
+from cgraph import __version__  # noqa: E402 (the extensions beside this file are found by the path above)
 
 project = "cgraph"
 author = "the cgraph authors"
 copyright = "2026, the cgraph authors"
 version = release = __version__
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx.ext.napoleon"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_extensions.mathml",
+    "sphinx_extensions.names",
+    "sphinx_extensions.command_reference",
+]
+html_math_renderer = "mathml"
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build"]
 
 html_theme = "furo"
-html_title = "cgraph"
+html_title = f"cgraph {version}"
+html_theme_options = {"top_of_page_buttons": []}  # the source is named below the page
+html_static_path = ["_static"]
+html_css_files = ["pages.css"]
+templates_path = ["_templates"]
+html_show_search_summary = False  # would be fetched, which a page that is opened as a file may not
+html_context = {  # shown below every page; where the repository is, is said in pyproject.toml
+    "urls": tomllib.loads((HERE.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"].get("urls", {})
+}
 
 suppress_warnings = ["ref.python"]  # a word of a type that is some attribute: the n of "n sequences of Node"
 napoleon_google_docstring = False
@@ -79,36 +96,19 @@ def skip_fields(app, what, name, obj, skip, options):
     return True if (getattr(obj, "__doc__", None) or "").startswith("Alias for field number") else None
 
 
-class CommandReference(Directive):
-    """Every command with its arguments, from the parser: no text that could be out of date."""
+def break_names(app, pagename, templatename, context, doctree):
+    """A long name in code may go on in the next line, after a dot, a slash, colons or an underscore."""
 
-    def run(self):
-        whole = parser()
-        (commands,) = [action for action in whole._actions if isinstance(action, argparse._SubParsersAction)]
-        about = {each.dest: each.help for each in commands._choices_actions}
-        return [_command(name, about[name], command) for name, command in commands.choices.items()]
+    def broken(match):
+        return match[0] if len(match[1]) < 12 else re.sub(r"([._/]|::)(?=\w)", r"\1<wbr>", match[0])
 
-
-def _command(name, about, command):
-    section = nodes.section(ids=[f"cgraph-{name}"], names=[f"cgraph {name}"])
-    section += nodes.title(text=f"cgraph {name}")
-    section += nodes.paragraph(text=about)
-    listed = nodes.definition_list()
-    shown = command._get_formatter()
-    for action in command._actions:
-        if "--help" not in action.option_strings:
-            term = nodes.term("", "", nodes.literal(text=shown._format_action_invocation(action)))
-            text = shown._expand_help(action) if action.help else ""
-            listed += nodes.definition_list_item("", term, nodes.definition("", nodes.paragraph(text=text)))
-    section += listed
-    if command.epilog:
-        section += nodes.line_block("", *[nodes.line(text=line) for line in command.epilog.splitlines()])
-    return section
+    if "body" in context:
+        context["body"] = re.sub(r'<span class="pre">([^<]*)(?=</span>)', broken, context["body"])
 
 
 def setup(app):
     """Called by Sphinx."""
-    app.add_directive("command-reference", CommandReference)
     app.connect("autodoc-skip-member", skip_fields)
     app.connect("autodoc-process-docstring", docstring_to_rst, priority=400)  # before napoleon
+    app.connect("html-page-context", break_names)
     app.connect("autodoc-process-signature", name_aliases)

@@ -2,6 +2,8 @@
 
 import os
 import re
+import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -10,11 +12,18 @@ from pkgutil import resolve_name
 import pytest
 
 import cgraph as cg
+import dynamics as dyn
+import viz
+from docs.sphinx_extensions.command_reference import markdown
+from viz.commands.parser import parse, parser
 
 ROOT = Path(__file__).parents[1]
 PAGES = {
     path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
-    for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+    for path in (
+        ROOT / "README.md",
+        *sorted([*(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "reference").glob("*.md")]),
+    )
 }
 RUN = [name for name, page in PAGES.items() if "```python\n" in page]
 FENCE = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -50,8 +59,24 @@ def program(page: str) -> str:
 
 def pictures(name: str) -> dict[str, str]:
     """{file that the examples of a page write: picture that it shows}, as of docs/x.md y.svg and images/x-y.svg."""
-    found = re.findall(rf"\(images/{Path(name).stem}-([\w-]+\.(?:svg|gif))\)", PAGES[name])
+    found = re.findall(rf"\(images/{Path(name).stem}-([\w-]+\.(?:svg|gif|png))\)", PAGES[name])
     return {file: f"images/{Path(name).stem}-{file}" for file in found}
+
+
+def commands(page: str) -> list[str]:
+    """The commands `cgraph ...` that a page shows to a shell, without their first word."""
+    blocks = [text for kind, text in FENCE.findall(page) if kind == "sh"]
+    return re.findall(r"^(?:\S*/)?cgraph ([^#\n|]+?) *(?:[#|].*)?$", "\n".join(blocks), re.MULTILINE)
+
+
+def chromium() -> str | None:
+    """The program, where there is one."""
+    return next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+
+def texts(svg: Path) -> list[str]:
+    """The texts of a drawing."""
+    return sorted(re.findall(r"<text[^>]*>([^<]*)", svg.read_text(encoding="utf-8")))
 
 
 def run_examples(name: str, folder: Path, *, quickly: bool = False) -> subprocess.CompletedProcess[str]:
@@ -83,7 +108,10 @@ def test_examples_print_what_is_shown(name: str, tmp_path: Path) -> None:
     printed = run.stdout.split(f"{MARK}\n")[:-1]
     shown = [(line, output) for line, _, output in examples(PAGES[name])]
     assert [(line, text) for (line, _), text in zip(shown, printed, strict=True)] == shown
-    assert [file for file in pictures(name) if not (tmp_path / "empty" / file).is_file()] == []
+    folder = tmp_path / "empty"
+    assert [file for file in pictures(name) if not (folder / file).is_file()] == []
+    drawings = {folder / file: ROOT / "docs" / image for file, image in pictures(name).items() if ".svg" in file}
+    assert [file.name for file, image in drawings.items() if texts(file) != texts(image)] == []  # else: make pictures
 
 
 @pytest.mark.parametrize("name", PAGES)
@@ -106,6 +134,36 @@ def test_named_tests_exist(name: str) -> None:
     for file, test in re.findall(r"`(tests/[\w/]+\.py)(?:::(\w+))?`", PAGES[name]):
         text = (ROOT / file).read_text(encoding="utf-8")
         assert not test or f"def {test}(" in text, f"{file}::{test}"
+
+
+@pytest.mark.parametrize("name", [name for name in PAGES if commands(PAGES[name])])
+def test_shown_commands_are_commands(name: str) -> None:
+    for command in commands(PAGES[name]):
+        parse(shlex.split(command))
+
+
+def test_the_command_reference_has_all_that_the_parsers_have() -> None:
+    """Every argument of every command is there, with what it is; what a help says in words of its own stays text."""
+    page = markdown(parser())
+    (subparsers,) = parser()._subparsers._group_actions
+    assert re.findall(r"^## cgraph (.*)$", page, re.MULTILINE) == list(subparsers.choices)
+    for section, command in zip(page.split("\n## "), subparsers.choices.values(), strict=True):
+        listed = re.findall(r"^`(.*)`\n: (.+)$", section, re.MULTILINE)
+        arguments = [action for action in command._actions if action.dest != "help"]
+        assert len(listed) == len(arguments)
+        for (name, said), action in zip(listed, arguments, strict=True):
+            assert set(action.option_strings) <= set(re.findall(r"--?[\w-]+", name))
+            assert said.rstrip(".") or not action.help
+
+
+def test_the_reference_has_every_public_name_once() -> None:
+    listed = [
+        (package, name)
+        for page in PAGES.values()
+        for package, names in re.findall(r"^```{names} (\w+)\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+        for name in names.split()
+    ]
+    assert sorted(listed) == sorted((each.__name__, name) for each in (cg, dyn, viz) for name in each.__all__)
 
 
 def test_the_tests_of_the_paper_s_equations_are_named() -> None:

@@ -1,0 +1,47 @@
+"""The page of all commands: their usage and arguments, as the parsers have them."""
+
+import argparse
+import re
+from functools import partial
+
+WIDTH = 88  # columns of the usage
+
+
+def markdown(parser):
+    """Sections in Markdown, one for each command of a parser."""
+    (commands,) = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
+    help_of = {action.dest: action.help for action in commands._choices_actions}
+    return "\n".join(_section(name, help_of[name], command) for name, command in commands.choices.items())
+
+
+def _section(name, summary, command):
+    command.formatter_class = partial(argparse.HelpFormatter, width=WIDTH)
+    formatter = command._get_formatter()
+    usage = command.format_usage().removeprefix("usage: ").strip()
+    lines = [f"## cgraph {name}", "", _sentence(summary), "", "```sh", re.sub(r"\n {7}", "\n", usage), "```", ""]
+    for action in command._actions:
+        if action.dest != "help":
+            lines += [f"`{formatter._format_action_invocation(action)}`"]
+            lines += [f": {_sentence(formatter._expand_help(action)) if action.help else ''}", ""]
+    return "\n".join(lines)
+
+
+def _sentence(text):
+    """Text of a help as Markdown: a capital first where it is a word, a period last, no character that means more."""
+    text = re.sub(r"([\\*_${}\[\]<>|])", r"\\\1", text.strip())
+    first = text.split(" ", 1)[0]
+    start = text[:1].upper() if first.isalpha() and first.islower() else text[:1]
+    return start + text[1:] + ("" if text[-1:] in ".?!" else ".")
+
+
+def _append(app, name, source):
+    from viz.commands.parser import parser
+
+    if name == "command-reference":
+        source[0] += "\n" + markdown(parser())
+
+
+def setup(app):
+    """Called by Sphinx."""
+    app.connect("source-read", _append)
+    return {"parallel_read_safe": True}
