@@ -1,11 +1,17 @@
 // The box that a Lagrangian is typed into: what it says goes to the inspector, what is wrong under the box.
 
-const TYPED_KEY = "text"; // in the fragment of the page's address
+const TYPED_PART = "text="; // of the fragment of the page's address, between &
 const TYPED_WAIT = 400; // ms after the last key
 
+const linkParts = () => location.hash.slice(1).split("&").filter(Boolean);
 /** The text in the page's address, or nothing. */
 function linkedText() {
-  return new URLSearchParams(location.hash.slice(1)).get(TYPED_KEY);
+  const part = linkParts().find((each) => each.startsWith(TYPED_PART))?.slice(TYPED_PART.length);
+  try {
+    return part === undefined ? null : decodeURIComponent(part);
+  } catch {
+    return part; // no such % is made by a page
+  }
 }
 /** The record of a text, or what is wrong with it: one sentence. */
 function typedRecord(text, forward = false) {
@@ -36,6 +42,7 @@ function startTyped(inspector, text, shownFirst) {
     showDerived(found);
     keepLink(box.value);
     byId("back-to").hidden = shownFirst;
+    byId("live")?.toggleAttribute("hidden", true); // it moves the page's model, which is not this one
   };
   byId("examples").replaceChildren(tag("option", { value: "" }, "an example"), ...[...TYPED.EXAMPLES.keys()].map((name) => tag("option", { value: name }, name)));
   byId("examples").onchange = () => {
@@ -54,7 +61,12 @@ function startTyped(inspector, text, shownFirst) {
   };
   byId("which").onchange = shown;
   byId("link").onclick = () => copyLink(box.value);
-  byId("back-to").onclick = () => { inspector.showRecord(before); byId("back-to").hidden = true; keepLink(null); };
+  byId("back-to").onclick = () => {
+    inspector.showRecord(before);
+    byId("back-to").hidden = true;
+    byId("live")?.toggleAttribute("hidden", false);
+    keepLink(null);
+  };
   addEventListener("hashchange", () => {
     const linked = linkedText();
     if (linked === null || linked === box.value) return;
@@ -120,9 +132,8 @@ function curves({ coordinates }, { t, q }) {
 
 function keepLink(text) {
   if (location.protocol === "about:") return; // a frame in a notebook has no address
-  const parts = new URLSearchParams(location.hash.slice(1));
-  if (text === null) parts.delete(TYPED_KEY); else parts.set(TYPED_KEY, text);
-  history.replaceState(null, "", `#${parts}`);
+  const rest = linkParts().filter((each) => !each.startsWith(TYPED_PART));
+  history.replaceState(null, "", `#${[...(text === null ? [] : [TYPED_PART + encodeURIComponent(text)]), ...rest].join("&")}`);
 }
 function copyLink(text) {
   keepLink(text);

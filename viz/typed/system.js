@@ -19,7 +19,10 @@ class Meaning {
     [this.q, this.qd, this.qdd, this.tau] = ["q", "qd", "qdd", "tau"].map((kind) => Array.from({ length }, (_, i) => variable(kind + i)));
     this.t = variable("t");
     this.parameters = new Map();
-    for (const [name, each] of this.defined) if (isNumber(each)) this.parameters.set(name, this.number(each));
+    const used = new Set(this.statements.flatMap(({ items }) => items.flat()).map(({ name }) => name));
+    for (const [name, each] of this.defined) { // where a point stays, as in y1 = 0, is no parameter
+      if (isNumber(each) && (used.has(name) || !this.pointNames().flat().includes(name))) this.parameters.set(name, this.number(each));
+    }
   }
   define(each) {
     const { name, at, end } = each;
@@ -194,11 +197,13 @@ class Meaning {
     }
     return start;
   }
+  pointNames() {
+    const names = [...new Set([...this.coordinates, ...this.defined.keys()])];
+    return names.filter((name) => name[0] === "x").map((name) => [name, `y${name.slice(1)}`]).filter(([, y]) => names.includes(y));
+  }
   /** Points to draw: x and y, x1 and y1, and so on, of which one at least moves. */
   points() {
-    const known = (name) => this.coordinates.includes(name) || this.defined.has(name);
-    const names = [...new Set([...this.coordinates, ...this.defined.keys()])].filter((name) => /^x/.test(name) && known(`y${name.slice(1)}`));
-    const pairs = names.map((name) => [name, `y${name.slice(1)}`].map((each) => this.resolve({ name: each, dots: 0 })));
+    const pairs = this.pointNames().map((pair) => pair.map((name) => this.resolve({ name, dots: 0 })));
     return pairs.filter((pair) => pair.some((each) => each instanceof Node && !this.parameters.has(each.name))).map((pair) => pair.map(asNode));
   }
 }

@@ -14,18 +14,12 @@ from viz.typed import box
 BROWSER = """
 const byIds = new Map();
 document.getElementById = (id) => {
-  if (!byIds.has(id)) byIds.set(id, Object.assign(made("", id), { value: "", after() {}, focus() {} }));
+  const more = { value: "", after() {}, focus() {}, toggleAttribute() {} };
+  if (!byIds.has(id)) byIds.set(id, Object.assign(made("", id), more));
   return byIds.get(id);
 };
 globalThis.location = { hash: "", protocol: "file:", href: "file:///page.html" };
 globalThis.history = { replaceState: (_, __, hash) => { location.hash = hash; } };
-globalThis.URLSearchParams = class extends Map {
-  constructor(text) {
-    super(text.split("&").filter(Boolean).map((part) => part.split("=").map(decodeURIComponent)));
-  }
-  get(key) { return super.get(key) ?? null; }
-  toString() { return [...this].map((pair) => pair.map(encodeURIComponent).join("=")).join("&"); }
-};
 globalThis.Event = class {};
 globalThis.dispatchEvent = globalThis.addEventListener = globalThis.setTimeout = globalThis.clearTimeout = () => {};
 globalThis.navigator = {};
@@ -58,7 +52,13 @@ def test_the_box_shows_what_is_typed_and_says_what_is_wrong():
     wrong = "x(0) = 1\nL = x'^2 - k*x^2"
     found = said(f"press({json.dumps(wrong)}); return [shown.length, text(byId('wrong')), location.hash];")
     assert found == [2, WORDS + wrong.splitlines()[1], LINK]
-    assert said('byId("back-to").onclick(); return [shown.at(-1).title, location.hash];') == ["before", "#"]
+    other = "location.hash = '#live=a:1,b&text=L%3D'; keepLink('m = 1 &'); return [location.hash, linkedText()];"
+    assert said(other) == ["#text=m%20%3D%201%20%26&live=a:1,b", "m = 1 &"]  # the rest stays as it is
+    assert said("location.hash = '#text=%'; return [linkedText()];") == ["%"]
+    assert said('location.hash = "#"; byId("back-to").onclick(); return [shown.at(-1).title, location.hash];') == [
+        "before",
+        "#",
+    ]
     # A link opens the box; with nothing else on the page, its text is what is shown first, if it means something.
     found = said(f"""location.hash = "{LINK}"; startTyped(inspector, "", false); return state();""")
     assert found == [False, GOOD, 4, "Your Lagrangian"]

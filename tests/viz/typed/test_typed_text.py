@@ -66,6 +66,13 @@ def test_a_text_says_what_a_system_has():
     assert found == [*expected, pytest.approx(6.283185307179586), [0.5]]
 
 
+def test_where_a_point_stays_is_no_parameter_unless_a_formula_has_it():
+    names = "(text) => { const { parameters, points } = parsed(text); return [[...parameters.keys()], points.length]; }"
+    assert run_typed(names, "L = m*u'^2, m = 1, x1 = u, y1 = 0") == [["m"], 1]
+    assert run_typed(names, "L = u'^2 + y1, x1 = u, y1 = 0") == [["y1"], 1]
+    assert run_typed(names, "L = u'^2, x1 = 1, y1 = 0, k = 3") == [["k"], 0]
+
+
 L = "L = x'^2\n"
 
 
