@@ -175,7 +175,7 @@ CALLS = {
     ),
     "dyn.simulate": call(
         dyn.simulate, ARM, [0.1], [0.0], 0.02, "rk4", t0=0.0, t_span=None, max_step=None, rtol=None, atol=None,
-        t_eval=None, events=(), dense_output=False, tau=0.0, parameters=None, first_step=None, **RUNS
+        t_eval=None, events=(), dense_output=False, tau=0.0, parameters=None, first_step=None, form="velocity", **RUNS
     ),
     "dyn.gradient": call(
         dyn.gradient, ARM, lambda q, qd, t: q[0], [0.1], [0.0], 1.0, "rk4", running=lambda q, qd, tau, t: q[0],

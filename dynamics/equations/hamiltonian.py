@@ -120,6 +120,13 @@ def hamilton_equations(model: Model, *, iterations: int = ITERATIONS, check: boo
     return shorter_form(as_system(model), lambda system: _equations(system, count, check))
 
 
+def velocities(system: System) -> Graph:
+    """The velocities qd0.. of momenta: inputs q0.., p0.., t if needed, parameters."""
+    transform = Legendre(system, Builder(), ITERATIONS)
+    outputs = {f"qd{i}": node for i, node in enumerate(transform.velocities)}
+    return cg.simplify(system.graph(outputs, system.q, transform.p))
+
+
 def _equations(system: System, iterations: int, check: bool) -> Graph:
     build = Builder()
     transform = Legendre(system, build, iterations)
