@@ -12,8 +12,9 @@ copies nodes through a builder, `topological` gives all nodes that some nodes re
 **Differentiate**: `cotangents` pulls from outputs, `tangents` pushes from inputs, `hessian_nodes` gives the lower
 triangle of second derivatives, all as nodes. `compressed_jacobian` gives the parts of a loop over colors of columns.
 
-**Solve**: `solve_nodes` is `cg.hessian_solve` on nodes, `ldl_solve` the dense factorization; both raise
-`SingularError`. `ldl_elimination` does the same over any numbers.
+**Solve**: `solve_nodes` is `cg.hessian_solve` on nodes, `solve_tangents` the same with the tangents of all that lies
+between, `ldl_solve` the dense factorization; all raise `SingularError`. `ldl_elimination` does the same over any
+numbers.
 
 **Read**: `expand` and `format_polynomial` write a polynomial out, `Names` tells nodes in a person's words,
 `Formulas` gives the equations of nodes in a `Notation`, `OPS` is
@@ -43,7 +44,7 @@ what a notebook shows of a result; `install` ends an error about a missing packa
 
 from .autodiff.compressed_jacobian import CompressedJacobian, compressed_jacobian
 from .autodiff.forward import tangents
-from .autodiff.hessian_solve import solve_nodes
+from .autodiff.hessian_solve import solve_nodes, solve_tangents
 from .autodiff.jacobian import hessian_nodes
 from .autodiff.ldl_solve import ldl_elimination, ldl_solve
 from .autodiff.reverse import cotangents
@@ -149,6 +150,7 @@ __all__ = [
     "share",
     "shortened",
     "solve_nodes",
+    "solve_tangents",
     "tangents",
     "thread_count",
     "topological",

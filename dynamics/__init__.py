@@ -12,6 +12,7 @@ from .equations.energies import kinetic_energy, potential_energy
 from .equations.equations_of_motion import bias, energy, forward_dynamics, gravity_force, mass_matrix, momentum
 from .equations.formulation_sizes import formulation_sizes
 from .equations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious_nodes
+from .equations.hamiltonian import hamilton_equations, hamiltonian
 from .equations.integrability import integrable_rows
 from .equations.inverse_dynamics_derivatives import inverse_dynamics_derivatives
 from .equations.inverse_mass_matrix import inverse_mass_matrix
@@ -137,6 +138,8 @@ __all__ = [
     "gradient",
     "gradient_many",
     "gravity_force",
+    "hamilton_equations",
+    "hamiltonian",
     "inertial_parameters",
     "integrable_rows",
     "inverse_dynamics",

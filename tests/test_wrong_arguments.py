@@ -151,6 +151,8 @@ CALLS = {
     "dyn.spatial_momentum": call(dyn.spatial_momentum, ARM, "origin"),
     "dyn.Mechanism.chain": call(ARM.chain, FIRST),
     "dyn.forward_dynamics": call(dyn.forward_dynamics, ARM, "auto", check=False),
+    "dyn.hamiltonian": call(dyn.hamiltonian, ARM, iterations=4),
+    "dyn.hamilton_equations": call(dyn.hamilton_equations, ARM, iterations=4, check=False),
     "dyn.inverse_dynamics": call(dyn.inverse_dynamics, ARM, "chain_rule", simplify=True),
     "dyn.formulation_sizes": call(dyn.formulation_sizes, ARM),
     "dyn.momentum_rate": call(dyn.momentum_rate, ARM, "chain_rule", simplify=True, keep_momentum=False),
@@ -176,7 +178,7 @@ CALLS = {
     ),
     "dyn.simulate": call(
         dyn.simulate, ARM, [0.1], [0.0], 0.02, "rk4", t0=0.0, t_span=None, max_step=None, rtol=None, atol=None,
-        t_eval=None, events=(), dense_output=False, tau=0.0, parameters=None, first_step=None, **RUNS
+        t_eval=None, events=(), dense_output=False, tau=0.0, parameters=None, first_step=None, form="velocity", **RUNS
     ),
     "dyn.gradient": call(
         dyn.gradient, ARM, lambda q, qd, t: q[0], [0.1], [0.0], 1.0, "rk4", running=lambda q, qd, tau, t: q[0],
@@ -275,6 +277,7 @@ RECORDS = """
 # at nothing.
 LEFT_OUT = """cg.recording_lines cg.clear_cache cg.Compiled.bind cg.Compiled.values cg.Graph.check cg.Graph.counts
     cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.bias_forces dyn.System.require_values
+    dyn.System.momentum_rates
     dyn.System.torque_derivatives
     dyn.JointForce.along dyn.JointForce.check dyn.JointLimit.along dyn.JointLimit.check dyn.JointFriction.along
     dyn.JointFriction.check dyn.Actuator.along dyn.Actuator.check"""

@@ -132,9 +132,60 @@ def solve_nodes(
     True
     """
     build = build or Builder()
-    order = _dependent([output, *(at or ())], wrt)
+    equations = _solved(output, wrt, rhs, build, at or {}, multipliers)
+    x = [equations.dots[node] for node in wrt]
+    if check:
+        with building(build) as set_label:
+            set_label(output.label.derived(ADJOINT))
+            x.append(equations.info(multipliers))
+    return x
+
+
+def solve_tangents(
+    output: Node, wrt: Sequence[Node], rhs: Sequence[Node], build: Builder | None = None
+) -> dict[Node, Node]:
+    """Tangents (dz/dw) x of the nodes z that f is made from, for the x of `solve_nodes`, which has them anyway.
+
+    Parameters
+    ----------
+    output, wrt, rhs, build
+        As of `solve_nodes`.
+
+    Returns
+    -------
+    dict of Node to Node
+        {z: (dz/dw) x}, x itself at w. A product within a rotation may be left out.
+
+    Raises
+    ------
+    SingularError
+        As `solve_nodes`.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import solve_tangents
+    >>> v, tau = cg.variables("v tau")
+    >>> twice = 2.0 * v
+    >>> tangents = solve_tangents(0.125 * twice * twice, [v], [tau])
+    >>> tangents[v], tangents[twice]
+    (<node variable tau>, <node mul>)
+    """
+    return _solved(output, wrt, rhs, build or Builder(), {}, ()).dots
+
+
+def _solved(
+    output: Node,
+    wrt: Sequence[Node],
+    rhs: Sequence[Node],
+    build: Builder,
+    at: Mapping[Node, Node],
+    multipliers: Collection[Node],
+) -> EdgePushing:
+    """W t = b, solved: all tangents."""
+    order = _dependent([output, *at], wrt)
     with building(build) as set_label:
-        equations = EdgePushing(build, output, dict(zip(wrt, rhs, strict=True)), at or {}, order)
+        equations = EdgePushing(build, output, dict(zip(wrt, rhs, strict=True)), at, order)
         plan = elimination_steps(equations.arguments(_rows(output, multipliers, wrt)), equations.rotations)
         for step in plan:
             set_label(_node_of(step).label.derived(ADJOINT))
@@ -143,11 +194,7 @@ def solve_nodes(
         for step in reversed(plan):
             set_label(_node_of(step).label.derived(TANGENT))
             equations.substitute(step)
-        x = [equations.dots[node] for node in wrt]
-        if check:
-            set_label(output.label.derived(ADJOINT))
-            x.append(equations.info(multipliers))
-    return x
+    return equations
 
 
 def _rows(output: Node, multipliers: Collection[Node], wrt: Sequence[Node]) -> dict[Node, list[Node]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 from ..core.label import Label
 from ..core.node import CONSTANT, Node, Op, constant
@@ -63,7 +63,7 @@ class Builder:
         return node
 
 
-def folded(nodes: Collection[Node], build: Builder) -> list[Node]:
+def folded(nodes: Collection[Node], build: Builder, replace: Mapping[Node, Node] | None = None) -> list[Node]:
     """Copies of nodes, and of all that they reach, made by a builder.
 
     Once is enough: a rule sees the very arguments that the copy keeps, so a copy of the copy would come out alike.
@@ -74,6 +74,8 @@ def folded(nodes: Collection[Node], build: Builder) -> list[Node]:
         What to copy.
     build : Builder
         What the copies are made by, and shared with.
+    replace : mapping of Node to Node, optional
+        Nodes to put in the place of others, variables or inner nodes, as they are.
 
     Returns
     -------
@@ -94,5 +96,5 @@ def folded(nodes: Collection[Node], build: Builder) -> list[Node]:
             labelled(node.label)
             return build(node.op, args, node.label, node.name)
 
-        new = rebuild(nodes, {}, make)
+        new = rebuild(nodes, dict(replace or {}), make)
     return [new[node] for node in nodes]

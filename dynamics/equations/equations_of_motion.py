@@ -15,7 +15,7 @@ from .constraints import DenseSolver, constraint_rows, multiplier_outputs, solve
 from .formulations import ONE, ZERO
 from .inertia_rank import without_inertia
 from .shorter_form import shorter_form
-from .singular_mass_matrix import SingularMassMatrixError
+from .singular_mass_matrix import SingularMassMatrixError, no_inertia
 from .substitute import substitute
 
 
@@ -266,14 +266,8 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
     return shorter_form(as_system(model), lambda system: accelerations(system, method, check))
 
 
-def _without_inertia(system: System, error: SingularError) -> str:
-    name = system.velocities[error.index]
-    if error.regular:
-        return f"the mass matrix is not positive definite: coordinate {name!r} has an inertia that is not positive"
-    return f"the mass matrix is singular: coordinate {name!r} has no inertia, or none that others do not share"
-
-
-def _require_inertia(system: System, accelerations: Graph) -> None:
+def require_inertia(system: System, accelerations: Graph) -> None:
+    """Raises SingularMassMatrixError where M is singular at every state, though no pivot is the constant zero."""
     moving = without_inertia(accelerations, lambda: mass_matrix(system), system.n)
     if moving:
         names = " and ".join([repr(system.velocities[i]) for i in moving])
@@ -289,7 +283,7 @@ def _require_inertia_without_constraints(system: System) -> None:
         graph = _solved(free, bias_terms(free), "recursive", check=False)
     except SingularError:
         return
-    _require_inertia(free, graph)
+    require_inertia(free, graph)
 
 
 def accelerations(system: System, method: str = "auto", check: bool = False) -> Graph:
@@ -313,13 +307,13 @@ def accelerations(system: System, method: str = "auto", check: bool = False) -> 
             "without inertia"
         ) from None
     if not graphs:
-        raise SingularMassMatrixError(_without_inertia(system, failure)) from None
+        raise SingularMassMatrixError(no_inertia(system, failure)) from None
     chosen = graphs[-1] if len(graphs[-1].nodes) < WORTH * len(graphs[0].nodes) else graphs[0]
     if not isinstance(system, BodySystem):  # bodies have masses; of another Lagrangian nobody knows
         if held:
             _require_inertia_without_constraints(system)
         else:
-            _require_inertia(system, chosen)
+            require_inertia(system, chosen)
     return chosen
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import real_array
+from cgraph.extend import SingularError, real_array
 
 from ..systems.model import Model, as_system
+from ..systems.system import System
 from .constraints import unknown_names
 
 
@@ -68,3 +69,11 @@ def raise_if_singular(model: Model, info: ArrayLike) -> None:
         raise SingularMassMatrixError(
             f"the mass matrix is not positive definite{where}: {name} has an inertia that is not positive"
         )
+
+
+def no_inertia(system: System, error: SingularError) -> str:
+    """What a pivot that is not positive says of a coordinate."""
+    name = system.velocities[error.index]
+    if error.regular:
+        return f"the mass matrix is not positive definite: coordinate {name!r} has an inertia that is not positive"
+    return f"the mass matrix is singular: coordinate {name!r} has no inertia, or none that others do not share"

@@ -7,6 +7,7 @@ from .dop853 import DOP853
 from .explicit import explicit, explicit_step
 from .jacobian_statements import jacobian_statements
 from .method import Method
+from .momentum_form import MomentumForm, momentum_form
 from .momentum_graphs import Mechanics, mechanics
 from .partitioned_tableau import PARTITIONED, Partitioned, gauss
 from .problem import (
@@ -101,6 +102,7 @@ __all__ = [
     "TABLEAUS",
     "Mechanics",
     "Method",
+    "MomentumForm",
     "Problem",
     "Step",
     "Tableau",
@@ -108,6 +110,7 @@ __all__ = [
     "force",
     "jacobian_statements",
     "mechanics",
+    "momentum_form",
     "quantity",
     "quantity_inputs",
     "runge_kutta",

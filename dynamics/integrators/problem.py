@@ -34,6 +34,7 @@ class Problem:
     constraints.
     multipliers: of the constraints, by name; inputs the states, t, parameters. None without constraints.
     system: the Lagrangian system; None for a first-order one.
+    momenta: whether the states are q and p = dL/dqd in place of q and qd.
     """
 
     model: Model
@@ -46,6 +47,7 @@ class Problem:
     projection: Graph | None
     multipliers: Graph | None
     system: System | None
+    momenta: bool = False
 
     @property
     def size(self) -> int:
@@ -62,6 +64,14 @@ class Problem:
         """Whether momenta dL/dqd belong to the coordinates: velocities are their rates, and nothing holds them."""
         system = self.system
         return system is not None and system.kinematics.quasi is None and not len(system.constraints)
+
+    @property
+    def lengths(self) -> tuple[float, ...]:
+        """What 1 of a state counts beside 1 of others, see `System.lengths`; of momenta the inverse of their qd's."""
+        if self.system is None:
+            return (1.0,) * self.size
+        q, qd = self.system.lengths[: self.nq], self.system.lengths[self.nq :]
+        return (*q, *[1.0 / length if length else 0.0 for length in qd]) if self.momenta else (*q, *qd)
 
     @property
     def timed(self) -> bool:

@@ -29,7 +29,7 @@ from .elementwise import SAME, compensated, function, weighted
 from .explicit import advance, registers, stage_time
 from .momentum_graphs import Mechanics, mechanics
 from .partitioned_tableau import MIDPOINT, SYMPLECTIC_EULER, VERLET, Partitioned, Row, over
-from .problem import Problem
+from .problem import Problem, reaches
 from .step import Step
 from .step_control import count, first_pass
 
@@ -52,14 +52,24 @@ def partitioned(method: Partitioned, problem: Problem) -> Program:
 
 def composed_step(composition: Composition, problem: Problem) -> Step:
     """One step, of steps of `verlet` where it is explicit, else of `midpoint`."""
-    explicit = problem.canonical and mechanics(problem).separable
+    explicit = problem.canonical and _separable(problem)
     return partitioned_step(VERLET if explicit else MIDPOINT, problem, composition)
 
 
 def partitioned_step(method: Partitioned, problem: Problem, composition: Composition = ONCE) -> Step:
     """One step of coordinates and momenta; where there are none, of the state by a method of Gauss's."""
-    make = _of_momenta if problem.canonical else _of_states
-    return make(method, problem, composition)
+    if problem.canonical:
+        return (_of_phase if problem.momenta else _of_momenta)(method, problem, composition)
+    return _of_states(method, problem, composition)
+
+
+def _separable(problem: Problem) -> bool:
+    """Whether the rates of the coordinates depend on momenta alone, and the rates of these on coordinates."""
+    if not problem.momenta:
+        return mechanics(problem).separable
+    states, rates = cg.variables(list(problem.states)), list(problem.rate.outputs.values())
+    nq = problem.nq
+    return not (reaches(rates[:nq], states[:nq]) or reaches(rates[nq:], states[nq:]))
 
 
 def _of_momenta(method: Partitioned, problem: Problem, composition: Composition) -> Step:
@@ -83,6 +93,47 @@ def _of_momenta(method: Partitioned, problem: Problem, composition: Composition)
         body += [stage_time("later", 1.0), *_settled(graphs)]
     body = [*_in_turn(composition, body), _copied(problem.size, ("q", "v"), ("x",))]
     return _step(method, lengths, [*start, *_guess_at_rest(method, "v")], body)
+
+
+def _of_phase(method: Partitioned, problem: Problem, composition: Composition) -> Step:
+    """States q and p: both rates come of one graph, and stages are iterated on them."""
+    n, stages = problem.nq, range(len(method.w))
+    lengths = {f"{name}{i}": n for name in ("Q", "P", "V", "F", "W") for i in stages}
+    lengths |= dict.fromkeys(("q", "momentum", "q_rounding", "momentum_rounding"), n)
+    both = ("V0", "F0")
+    start: list[Statement] = [
+        _copied(problem.size, ("x",), ("q", "momentum")),
+        Call(problem.rate, ("q", "momentum", "t", "p"), both),
+        *_guess_at_rest(method, "V0"),
+        *[Map(SAME, ("F0",), (f"F{i}",)) for i in stages],
+    ]
+    body: list[Statement]
+    if method in (SYMPLECTIC_EULER, VERLET) and _separable(problem):
+        half = method is VERLET
+        kick = _stage(over(2, 1 if half else 2), "momentum", "F", "momentum")
+        body = [
+            Call(problem.rate, ("q", "momentum", "t", "p"), both),
+            kick,
+            Call(problem.rate, ("q", "momentum", "t", "p"), both),
+            _added("q", "q_rounding", "V", (Fraction(1),)),
+            stage_time("later", 1.0),
+        ]
+        if half:
+            body += [Call(problem.rate, ("q", "momentum", "later", "p"), both), kick]
+        body.append(count(3 if half else 2))
+    else:
+        turn: list[Statement] = [count(len(stages))]
+        for velocity in ("V", "W"):  # twice, since an error of V comes back to V by F
+            for i in stages:
+                turn.append(_stage(method.a[i], "q", "V", f"Q{i}"))
+                turn.append(_stage(method.b[i], "momentum", "F", f"P{i}"))
+            turn += [
+                Call(problem.rate, (f"Q{i}", f"P{i}", f"time{i}", "p"), (f"{velocity}{i}", f"F{i}")) for i in stages
+            ]
+        body = _iterated(method, turn)
+        body += [_added("q", "q_rounding", "V", method.w), _added("momentum", "momentum_rounding", "F", method.w)]
+    body = [*_in_turn(composition, body), _copied(problem.size, ("q", "momentum"), ("x",))]
+    return _step(method, lengths, start, body)
 
 
 def _of_states(method: Partitioned, problem: Problem, composition: Composition) -> Step:

@@ -91,11 +91,11 @@ def _about_axis(parent: Motion, link: Link, joint: AxialJoint, offset: Triple, q
     along = link.turn[2][2]  # the joint's axis on the parent's
     with cg.tag("kinetic"):
         omega = spatial.rotate_transpose(link.turn, parent.omega)
-        relative = _in_plane_axes(parent, spatial.cross(parent.omega, offset))
+        relative = in_plane_axes(parent, spatial.cross(parent.omega, offset))
         velocity = spatial.rotate_transpose(link.turn, spatial.plus(parent.velocity, relative))
     with cg.tag("potential"):
         vertical = spatial.rotate_transpose(link.turn, parent.vertical)
-        depth = parent.depth + spatial.dot(parent.vertical, _in_plane_axes(parent, offset))
+        depth = parent.depth + spatial.dot(parent.vertical, in_plane_axes(parent, offset))
     angle = joint.angle(q)
     with cg.tag("kinetic"):
         velocity = velocity[0], velocity[1], velocity[2] + joint.shift(qd)
@@ -146,7 +146,7 @@ def in_body_axes(motion: Motion) -> Motion:
     return Motion(motion.omega, velocity, vertical, motion.depth, motion.strength)
 
 
-def _in_plane_axes(motion: Motion, vector: Triple) -> Triple:
+def in_plane_axes(motion: Motion, vector: Triple) -> Triple:
     """A vector in the body's axes, in those of its motion."""
     return spatial.rotate_about_z(motion.plane.cos, -motion.plane.sin, vector) if motion.plane else vector
 

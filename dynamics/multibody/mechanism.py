@@ -195,8 +195,7 @@ class Mechanism(Structure):
         if not self.moving:
             raise MechanismError("the mechanism has no joint that moves")
         return BodySystem(
-            self._equations.bias_forces,
-            self._equations.torque_derivatives,
+            self._equations,
             lambda q, qd, t: self._equations.partial_lagrangians(q, qd),
             self.coordinates,
             self.parameter_values,

@@ -17,9 +17,10 @@ from . import newton_euler, spatial
 from .base_parameters import base_parameter_links
 from .body import WORLD, Body, quantities
 from .body_motion import Motion, ground
+from .composite_momentum import CompositeMomentum, about_parent, body_momentum, momentum_rates, stated
 from .inertial_numbers import Link
 from .inverse_dynamics_columns import torque_derivatives
-from .joint_coordinates import parts
+from .joint_coordinates import parts, places
 from .joints import AxialJoint, moving_type
 from .link_cache import Moved
 from .mechanism_fields import Structure
@@ -62,6 +63,13 @@ class TreeEquations:
             return base_parameter_links(links, [body.joint.type for body in self.bodies], self.parents)
         return links, np.zeros(3)
 
+    @cached_property
+    def _fewest(self) -> list[Link]:
+        """The links in as few inertial numbers as there can be, unless these would have to be computed in the graph."""
+        if any([isinstance(number, Node) for link in self.links for number in link.numbers]):
+            return self.links
+        return base_parameter_links(self.links, [body.joint.type for body in self.bodies], self.parents)[0]
+
     def partial_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
         """One for each body, tagged with its name and energy."""
         with building(Builder()):
@@ -86,6 +94,26 @@ class TreeEquations:
                     )
                     forces += newton_euler.bias_wrench(acceleration, moved.motion, link, joint, x, u)
         return forces
+
+    def momentum_rates(self, q: Sequence[Node], qd: Sequence[Node], p: Sequence[Node]) -> list[Node]:
+        """dp/dt without applied forces at velocities qd that belong to p, by composite momentum."""
+        with building(Builder()):
+            rows = list(zip(self.bodies, self._fewest, self._moved(q, qd), parts(self.bodies, q, qd), strict=True))
+            composites: list[CompositeMomentum] = []
+            for body, link, moved, _ in rows:
+                with cg.tag(body.name):
+                    composites.append(body_momentum(moved.motion, link))
+            rates, at = list[Node](), places(self.bodies)
+            for i in reversed(range(len(rows))):
+                body, link, moved, (x, u) = rows[i]
+                joint = moving_type(body.joint.type)
+                with cg.tag(body.name):
+                    composites[i] = stated(composites[i], link, joint, x, u, p[at[i].u])
+                    rates[:0] = momentum_rates(composites[i], moved.motion, link, joint, x, u)
+                    if (k := self.parents[i]) >= 0:
+                        carried = about_parent(composites[i], moved.parent, moved.motion, link, joint, x)
+                        composites[k] = composites[k].plus(carried)
+        return rates
 
     def torque_derivatives(self, state: MotionState, build: Builder) -> TorqueDerivatives:
         """Of all bodies, with their springs."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
-from cgraph.extend import Array
+from cgraph.extend import Array, require_flag
 
 from ..equations.initial_value import initial_value
 from ..integrators import METHODS, Problem, derive, force, total_energy
@@ -32,10 +32,13 @@ from .run_options import METHOD, TABLES, RunOptions, time_span
 from .sampled_controller import HeldForces, Hold
 from .scipy_solvers import ScipyIntegration, scipy_solver
 from .solution import Solution
+from .state_form import StateForm
 from .step_program import compile_steps, step_program
 from .stepping import FixedStepIntegration, Integration
 from .trajectory import SimulationWarning, Stats, Trajectory
 from .watched import WatchedIntegration
+
+ENDS = (1, 3)  # rows that are kept at the end: an event cuts the last step, and of the others one in two is compared
 
 
 def simulate(
@@ -61,6 +64,7 @@ def simulate(
     estimate_error: bool | None = None,
     backend: str = "auto",
     progress: bool | None = None,
+    form: str = "velocity",
 ) -> Trajectory:
     """The motion of a system from (q, qd) at t0 to t_end.
 
@@ -126,6 +130,10 @@ def simulate(
         "llvm", "python", or "auto" for machine code where llvmlite is installed; the steps are the same.
     progress : bool, optional
         A progress line on standard error; None shows it on a terminal, for runs over a second.
+    form : {"velocity", "momentum"}
+        What the steps are of: q and qd, or q and the momenta p = dL/dqd by Hamilton's equations, on which symplectic
+        methods then act as they are written. The rows have qd all the same, and p besides; `atol` of (m,) is for q and
+        then p. Not with constraints, events, dense output and sampled controllers.
 
     Returns
     -------
@@ -153,9 +161,7 @@ def simulate(
     t0, t_end = time_span(t_end, t0, t_span)
     arguments = (dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
     options = RunOptions(t_end, method, *arguments, t0, estimate_error)
-    watched = as_events(events)
-    if not isinstance(dense_output, bool):
-        raise TypeError(f"dense_output must be True or False, got {dense_output!r:.40}")
+    watched, dense_output = as_events(events), require_flag("dense_output", dense_output)
     model, applied = with_applied(model, tau, parameters)
     start = initial_value(model, q, qd, applied.constant, parameters, t0)
     options.check(start.states)
@@ -165,26 +171,27 @@ def simulate(
     problem = derive(model, applied.bound(start.bound))
     energy, log = total_energy(problem), EventLog(event_program(problem, watched)) if watched else None
     hold = applied.hold(options)
+    state = StateForm(problem, form, needs=[bool(watched), dense_output, hold is not None])
 
-    # Write the steps of the method over these graphs, and compile them
-    leg = _compiled(problem, options, hold, between=bool(watched) or dense_output)
+    # Write the steps of the method over these graphs, or those of Hamilton's equations, and compile them
+    leg, x = _compiled(state.problem, options, hold, between=bool(watched) or dense_output), state.start(start.x, t0)
 
     # Integrate, noting rows and events
     run = WatchedIntegration(leg, options, log) if log else leg(options)
-    ends = 3 if watched else 1  # an event cuts the last step, and of the others one in two is compared
-    recorder = Recorder(start.x, options.times, options.t0, options.direction, ends)
+    recorder = Recorder(x, options.times, options.t0, options.direction, ENDS[bool(watched)])
     steps: list[StepBlock] | None = [] if dense_output else None
-    outcome = _integrate(run, start.x, recorder, options, problem.rate, steps)
+    outcome = _integrate(run, x, recorder, options, state.problem.rate, steps)
 
     # Put the result together
-    (times, states), nq, held = recorder.table(), problem.nq, None if hold is None else hold.held
+    times, states, momenta = state.rows(*recorder.table())
+    nq, held = problem.nq, None if hold is None else hold.held
     stats = _stats(run, options.method, outcome)
     for text in stats.warnings:
         warnings.warn(text, SimulationWarning, stacklevel=2)
     dense = None if steps is None else Solution(options.t0, start.x, steps, nq)
     rows = (times, states[:, :nq], states[:, nq:], _energies(energy, times, states, held))
     kept = (log.crossings(nq) if log else {}, _graphs(problem, applied), dense, held)
-    return Trajectory(*rows, stats, *kept, model.coordinates, model.velocities)
+    return Trajectory(*rows, stats, *kept, model.coordinates, model.velocities, momenta)
 
 
 def _compiled(

@@ -70,7 +70,7 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
         method.finest,
         method.starts,
         kinds,
-        tuple([size or 1.0 for size in problem.system.lengths]) if problem.system else (1.0,) * problem.size,
+        tuple([size or 1.0 for size in problem.lengths]),
         groups,
         between(problem),
     )
@@ -88,7 +88,7 @@ def _kinds(problem: Problem) -> tuple[tuple[int, ...], tuple[int, ...]]:
     groups = [system.kinematics.groups.index(group) for group in system.kinematics.groups]  # by their first
     alone = [group if groups.count(group) > 1 else None for group in groups] + [None] * system.n
     kinds = [
-        (k < problem.nq, not size, group) for k, (size, group) in enumerate(zip(system.lengths, alone, strict=True))
+        (k < problem.nq, not size, group) for k, (size, group) in enumerate(zip(problem.lengths, alone, strict=True))
     ]
     return tuple([kinds.index(kind) for kind in kinds]), (*groups, *every[problem.nq :])
 

@@ -147,6 +147,8 @@ class Trajectory:
         What a SampledController has given, `held.t` and `held.tau`, a row for each period.
     coordinates, velocities : tuple of str
         Names of the columns of q and of those of qd, qdd, tau and forces: `run["q.elbow"]` is such a column.
+    p : ndarray, optional
+        Momenta dL/dqd, (T, n), of a run with `form="momentum"`; `run["p.elbow"]` is a column.
 
     Examples
     --------
@@ -169,6 +171,7 @@ class Trajectory:
     held: HeldForces | None = None
     coordinates: tuple[str, ...] = ()
     velocities: tuple[str, ...] = ()
+    p: Array | None = None
 
     def __getitem__(self, name: str) -> Array:
         """A column by its name, (T,): "q.elbow", "qd.elbow", "qdd.elbow", "tau.elbow", "forces.elbow", or a state.
@@ -185,6 +188,7 @@ class Trajectory:
         if not isinstance(name, str):
             raise TypeError(f"a column of a trajectory has a name, got {type(name).__name__}: {name!r:.60}")
         known = {"q": self.coordinates} | dict.fromkeys(("qd", "qdd", "tau", "forces"), self.velocities)
+        known |= {} if self.p is None else {"p": self.velocities}
         places = {f"{kind}.{each}": (kind, i) for kind, names in known.items() for i, each in enumerate(names)}
         by_number = {f"{kind}{i}": (kind, i) for kind, names in known.items() for i in range(len(names))}
         states = {} if self.velocities else {each: ("q", i) for i, each in enumerate(self.coordinates)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 from numpy.typing import ArrayLike
 
@@ -14,21 +14,32 @@ from .system import BiasForce, System
 from .torque_derivatives import MotionState, TorqueDerivatives
 
 
+class BodyEquations(Protocol):
+    """What bodies know of their equations; see the methods of `System` of the same names."""
+
+    def bias_forces(self, q: Sequence[Node], qd: Sequence[Node]) -> Sequence[BiasForce]:
+        """The pairs (velocity, force) of the bias."""
+
+    def momentum_rates(self, q: Sequence[Node], qd: Sequence[Node], p: Sequence[Node]) -> list[Node]:
+        """Rates of the momenta p of velocities qd."""
+
+    def torque_derivatives(self, state: MotionState, build: Builder) -> TorqueDerivatives:
+        """Derivatives of the torques of a motion."""
+
+
 class BodySystem(System):
-    """The system of bodies that give their bias themselves, by bias_forces(q, qd), and derivatives, likewise."""
+    """The system of bodies that give bias, derivatives and rates of momenta themselves, by equations of theirs."""
 
     def __init__(
         self,
-        bias_forces: Callable[[Sequence[Node], Sequence[Node]], Sequence[BiasForce]],
-        torque_derivatives: Callable[[MotionState, Builder], TorqueDerivatives],
+        equations: BodyEquations,
         *of_system: Any,
         require_values: Callable[[Mapping[str, ArrayLike]], None],
         lengths: tuple[float, ...],
         **more: Any,
     ) -> None:
         super().__init__(*of_system, **more)
-        self._bias_forces, self._require_values, self._lengths = bias_forces, require_values, lengths
-        self._torque_derivatives = torque_derivatives
+        self._equations, self._require_values, self._lengths = equations, require_values, lengths
 
     @property
     def lengths(self) -> tuple[float, ...]:
@@ -44,8 +55,12 @@ class BodySystem(System):
 
     def bias_forces(self) -> Sequence[BiasForce]:
         """The pairs (velocity, force) that the bodies state; see `System.bias_forces`."""
-        return self._bias_forces(self.q, self.qd)
+        return self._equations.bias_forces(self.q, self.qd)
+
+    def momentum_rates(self, p: Sequence[Node]) -> list[Node]:
+        """By composite momentum; see `System.momentum_rates`."""
+        return self._equations.momentum_rates(self.q, self.qd, p)
 
     def torque_derivatives(self, qdd: Sequence[Node], build: Builder) -> TorqueDerivatives:
         """In closed form; see `System.torque_derivatives`."""
-        return self._torque_derivatives((self.q, self.qd, qdd), build)
+        return self._equations.torque_derivatives((self.q, self.qd, qdd), build)

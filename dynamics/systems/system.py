@@ -270,6 +270,10 @@ class System:
         """
         return None
 
+    def momentum_rates(self, p: Sequence[Node]) -> Sequence[Node] | None:
+        """dL/dq, of quasi-velocities as `Kinematics.slopes` has it, at velocities qd of momenta p; None likewise."""
+        return None
+
     def torque_derivatives(self, qdd: Sequence[Node], build: Builder) -> TorqueDerivatives | None:
         """Torques of a motion and their derivatives, without damping and applied forces; None as for `bias_forces`."""
         return None
