@@ -96,8 +96,19 @@ def skip_fields(app, what, name, obj, skip, options):
     return True if (getattr(obj, "__doc__", None) or "").startswith("Alias for field number") else None
 
 
+def break_names(app, pagename, templatename, context, doctree):
+    """A long name in code may go on in the next line, after a dot, a slash, colons or an underscore."""
+
+    def broken(match):
+        return match[0] if len(match[1]) < 12 else re.sub(r"([._/]|::)(?=\w)", r"\1<wbr>", match[0])
+
+    if "body" in context:
+        context["body"] = re.sub(r'<span class="pre">([^<]*)(?=</span>)', broken, context["body"])
+
+
 def setup(app):
     """Called by Sphinx."""
     app.connect("autodoc-skip-member", skip_fields)
     app.connect("autodoc-process-docstring", docstring_to_rst, priority=400)  # before napoleon
+    app.connect("html-page-context", break_names)
     app.connect("autodoc-process-signature", name_aliases)
