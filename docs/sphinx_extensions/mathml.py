@@ -11,7 +11,8 @@ def _inline(translator, node):
 
 def _display(translator, node):
     """In a box of its own, which scrolls where the formula is wider than a phone."""
-    formula = convert(node.astext(), display="block")
+    text = node.astext().replace("{aligned}", "{align*}")  # the name that the converter has for it
+    formula = convert(text, display="block")
     translator.body.append(f'<div class="formula">{formula}</div>\n')
     raise nodes.SkipNode
 

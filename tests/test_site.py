@@ -1,0 +1,141 @@
+"""The built pages in a browser, where Sphinx, Playwright and a Chromium are installed."""
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import cgraph as cg
+from tests.test_docs import ROOT, chromium
+
+# Boxes that are cut, or wider than the article, and whether the page itself can be moved sideways. What scrolls inside
+# its box has the box's mark; of the elements inside such a box only the box counts.
+WIDE = """() => {
+  const article = document.querySelector("article"), column = article.getBoundingClientRect();
+  const boxes = [...article.querySelectorAll("pre, .table-wrapper, .formula, table, img, .sig")];
+  const scrolls = (box) => box.scrollWidth > box.clientWidth + 1;
+  const marked = (box) => getComputedStyle(box).backgroundImage.includes("gradient");
+  const inside = (box) => box.parentElement.closest(".table-wrapper, .formula");
+  const over = boxes.filter((box) => !inside(box) && box.getBoundingClientRect().right > column.right + 1);
+  const scrolling = boxes.filter((box) => box.tagName != "TABLE" && scrolls(box) && (WIDTH > 1000 || !marked(box)));
+  const sideways = document.scrollingElement.scrollWidth - innerWidth;
+  return [...(sideways > 0 ? [sideways] : []), ...[...over, ...scrolling].map((box) => box.outerHTML.slice(0, 200))];
+}"""
+LOCAL = ("file:", "data:")
+
+pytestmark = pytest.mark.timeout(600)  # s: the pages are built first
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The pages, built with warnings as errors."""
+    for package in ("sphinx", "myst_parser", "furo", "latex2mathml"):
+        pytest.importorskip(package, reason="the docs extra has it")
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "sphinx", "--fail-on-warning", "--keep-going", "-q"]
+    built = subprocess.run(
+        [*command, str(ROOT / "docs"), str(folder)],
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        encoding="utf-8",
+        check=False,
+    )
+    assert built.returncode == 0, built.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def pages(site: Path) -> list[Path]:
+    return sorted(path for path in site.rglob("*.html") if "_static" not in path.parts)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    api = pytest.importorskip("playwright.sync_api", reason="the browser extra has it")
+    program = chromium()
+    if program is None:
+        pytest.skip("there is no Chromium on PATH")
+    with api.sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def new_page(browser: Any) -> Iterator[Any]:
+    """A function that opens an empty page; it may neither ask the net for anything nor complain."""
+    said: list[str] = []
+
+    def opened(**options: Any) -> Any:
+        page = browser.new_page(**options)
+        page.on("console", lambda message: said.append(message.text))
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.on("request", lambda request: said.append(request.url) if request.url[:5] not in LOCAL else None)
+        return page
+
+    yield opened
+    for context in browser.contexts:
+        context.close()
+    assert said == []
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (390, "dark")])
+def test_nothing_is_wider_than_its_column(new_page: Any, pages: list[Path], width: int, scheme: str) -> None:
+    """On a wide page nothing scrolls; on a narrow one a table or formula may, if its box shows it."""
+    page, wide = new_page(viewport={"width": width, "height": 900}, color_scheme=scheme), {}
+    for path in pages:
+        page.goto(path.as_uri())
+        if found := page.evaluate(WIDE.replace("WIDTH", str(width))):
+            wide[path.name] = found
+    assert wide == {}
+
+
+WORDS = {
+    "floating base": "Mechanisms and joints",
+    "animation": "Gallery",
+    "LaTeX": "Tables: what",
+    "export C": "Code from graphs",
+}
+
+
+@pytest.mark.parametrize("words", WORDS)
+def test_search_finds(new_page: Any, site: Path, words: str) -> None:
+    page = new_page()
+    page.goto(f"{(site / 'search.html').as_uri()}?q={words.replace(' ', '+')}")
+    page.wait_for_selector("#search-results li a")
+    titles = page.locator("#search-results li a").all_text_contents()[:8]
+    assert any(WORDS[words] in title for title in titles), titles
+
+
+def test_every_page_says_its_version_and_where_changes_and_its_source_are(site: Path, pages: list[Path]) -> None:
+    for path in pages:
+        page = path.read_text(encoding="utf-8")
+        (about,) = re.findall(r'<p class="about">(.*?)</p>', page, re.DOTALL)
+        assert f"cgraph {cg.__version__}" in about
+        targets = re.findall(r'href="([^"#]+)"', about)
+        assert any(target.endswith("changelog.html") for target in targets) or path.name == "changelog.html"
+        local = [target for target in targets if "://" not in target]
+        assert [target for target in local if not path.parent.joinpath(target).is_file()] == []
+
+
+def test_no_page_shows_latex(pages: list[Path]) -> None:
+    """Formulas are MathML; what is left of LaTeX would stand in the text."""
+    formulas = 0
+    for path in pages:
+        page = path.read_text(encoding="utf-8")
+        formulas += page.count("<math")
+        assert re.findall(r"<mi>(?:&|&amp;|\\\w*)</mi>", page) == [], path.name  # what the converter does not know
+        text = re.sub(r"<pre.*?</pre>|<code.*?</code>|<script.*?</script>", "", page, flags=re.DOTALL)
+        assert re.findall(r"\\(?:frac|dot|partial|begin|tau)\b.{0,40}", text) == [], path.name
+    assert formulas > 150
+
+
+def test_the_command_reference_is_built(site: Path) -> None:
+    page = (site / "command-reference.html").read_text(encoding="utf-8")
+    assert page.count("<h2>cgraph ") > 10
+    assert '<span class="pre">--start</span>' in page
