@@ -4,6 +4,7 @@ from cgraph import __version__ as __version__
 
 from . import scenes
 from .equations.arrays_at import arrays_at
+from .equations.conserved_momenta import conserved_momenta
 from .equations.consistent_state import consistent_state
 from .equations.constraint_lint import ConstraintLint, lint_constraints
 from .equations.constraint_rank import ConstraintWarning
@@ -122,6 +123,7 @@ __all__ = [
     "center_of_mass",
     "center_of_mass_jacobian",
     "certify",
+    "conserved_momenta",
     "consistent_state",
     "coriolis",
     "damping_force",

@@ -21,7 +21,7 @@ from cgraph import Node
 from cgraph.extend import as_node
 
 from . import spatial
-from .body_motion import Motion, carrier_motion, in_plane_axes, joint_translation, spring_forces
+from .body_motion import Motion, carrier_motion, in_body_axes, in_plane_axes, joint_translation, spring_forces
 from .inertial_numbers import Link
 from .joints import AxialJoint, MovingJoint, SpatialJoint
 from .newton_euler import KINETIC, POTENTIAL
@@ -70,7 +70,7 @@ def stated(
     torque, force = list(composite.momentum.torque), list(composite.momentum.force)
     own = [momentum - link.armature * velocity for momentum, velocity in zip(p, u, strict=True)]
     sliding = joint.sliding if isinstance(joint, SpatialJoint) else 0
-    if isinstance(joint, SpatialJoint) and sliding == 3:
+    if isinstance(joint, SpatialJoint) and sliding:
         force = list(spatial.rotate_transpose(joint.rotation(q), (own[0], own[1], own[2])))
     for twist, momentum in list(zip(_along(joint, q), own, strict=True))[sliding:]:
         shares = [each.value for each in (*twist.angular, *twist.linear)]
@@ -81,25 +81,31 @@ def stated(
 
 
 def momentum_rates(
-    composite: CompositeMomentum, motion: Motion, link: Link, joint: MovingJoint, q: Sequence[Node], u: Sequence[Node]
+    composite: CompositeMomentum,
+    parent: Motion,
+    motion: Motion,
+    link: Link,
+    joint: MovingJoint,
+    q: Sequence[Node],
+    u: Sequence[Node],
+    p: Sequence[Node],
 ) -> list[Node]:
-    """The rates of the momenta of a joint's velocities, without applied forces; the spring's among them."""
+    """The rates of the momenta p of a joint's velocities u, without applied forces; the spring's among them."""
+    rates: list[Node] = []
+    if isinstance(joint, SpatialJoint) and joint.sliding:  # along the joint's axes, which turn with the parent
+        carrier = in_body_axes(parent)
+        with cg.tag(KINETIC):
+            x, y, z = (p[k] - link.armature * u[k] for k in range(3))
+            turned = cross(spatial.rotate_transpose(link.turn, carrier.omega), (x, y, z))
+        with cg.tag(POTENTIAL):
+            up = spatial.rotate_transpose(link.turn, scaled(parent.strength, carrier.vertical))
+            rates = [-(a + composite.mass * b) for a, b in zip(turned, up, strict=True)]
     with cg.tag(KINETIC):
         carried = composite.momentum.carried(Twist(motion.omega, motion.velocity))
     with cg.tag(POTENTIAL):
         up = scaled(motion.strength, motion.vertical)  # gravity is -up
-        weight = Wrench(cross(composite.moment, up), scaled(composite.mass, up))
-    loss, rates = carried.plus(weight), []
-    sliding = joint.sliding if isinstance(joint, SpatialJoint) else 0
-    for k, twist in enumerate(_along(joint, q)):
-        if k < sliding:  # along an axis that turns with the parent, not with the body
-            assert isinstance(joint, SpatialJoint)
-            with cg.tag(KINETIC):
-                relative = joint.angular_velocity(q, u)
-                omega = plus(motion.omega, scaled(-1.0, relative))
-                rates.append(-spatial.dot(twist.linear, plus(cross(omega, composite.momentum.force), weight.force)))
-        else:
-            rates.append(-twist.power(loss))
+        loss = carried.plus(Wrench(cross(composite.moment, up), scaled(composite.mass, up)))
+    rates += [-twist.power(loss) for twist in _along(joint, q)[len(rates) :]]
     with cg.tag(POTENTIAL):
         springs = [force for _, force in spring_forces(link, joint, q, u)] or [ZERO] * len(rates)
         return [rate - spring for rate, spring in zip(rates, springs, strict=True)]

@@ -109,9 +109,10 @@ class TreeEquations:
                 joint = moving_type(body.joint.type)
                 with cg.tag(body.name):
                     composites[i] = stated(composites[i], link, joint, x, u, p[at[i].u])
-                    rates[:0] = momentum_rates(composites[i], moved.motion, link, joint, x, u)
+                    motions = (moved.parent, moved.motion)
+                    rates[:0] = momentum_rates(composites[i], *motions, link, joint, x, u, p[at[i].u])
                     if (k := self.parents[i]) >= 0:
-                        carried = about_parent(composites[i], moved.parent, moved.motion, link, joint, x)
+                        carried = about_parent(composites[i], *motions, link, joint, x)
                         composites[k] = composites[k].plus(carried)
         return rates
 
