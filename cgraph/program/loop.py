@@ -61,7 +61,7 @@ class Loop:
         )
         registers = {"carry": len(moving), "held": len(held), "invariant": len(stand_ins)}
         program = Program(registers, [Call(one_pass, ("carry", "held", "invariant"), ("carry",))], record=["carry"])
-        self._runner = runner(program, backend, fast=fast, fma=fma)
+        self._runner = runner(program, backend, fast=fast, fma=fma).prepared()
 
     def __call__(self, x: ArrayLike, passes: int, every: int = 1) -> Array:
         """Run the passes from one start.

@@ -40,6 +40,11 @@ class NativeRunner(Runner):
         self._many: Any = None
         self._batches: dict[str, BatchCode] = {}  # by the register that varies
 
+    def prepared(self) -> NativeRunner:
+        """The machine code of one memory, which is otherwise made at its first use."""
+        assert self._entry is not None
+        return self
+
     def _compiled(self, text: str, *, looped: bool = False) -> llvm.Code:
         nodes = sum([len(graph.nodes) for graph in self._fused.graphs()])
         return self._host.compile(text, self._functions, nodes, looped=looped)

@@ -123,4 +123,4 @@ def pickled_steps(program: StepProgram) -> bytes:
 @lru_cache(KEPT)
 def compile_steps(program: StepProgram, backend: str) -> CompiledSteps:
     """The steps, ready to run; of the last few, those compiled before."""
-    return CompiledSteps(program, runner(program.steps, backend))
+    return CompiledSteps(program, runner(program.steps, backend).prepared())

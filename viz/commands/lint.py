@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 import cgraph as cg
-from dynamics import ConstraintLint, display_names, lint_constraints
+from dynamics import ConstraintLint, conserved_momenta, display_names, lint_constraints
 
 from .. import theme
 from ..models.open_loops import tree_alone
@@ -64,10 +64,14 @@ def run(options: argparse.Namespace) -> int:
     held = lint_constraints(scene) if scene.ode is None else ConstraintLint({}, {})
     if str(held):
         proof = f"{proof}\n{held}"
+    conserved = conserved_momenta(scene) if scene.ode is None else ()
+    proof += "".join(
+        [f"\nThe momentum of {name!r} is constant: neither L nor a force depends on it." for name in conserved]
+    )
     alone = "" if options.forward else tree_alone(scene)
     proof = f"{proof}\n{alone}" if alone else proof
     data = {"scene": scene.name, "equations": what, "of_the_tree": bool(alone)} | report.to_dict()
-    data |= {"constraints": held.to_dict(), "ok": report.ok and held.ok}
+    data |= {"constraints": held.to_dict(), "conserved": list(conserved), "ok": report.ok and held.ok}
     answer_and_draw(
         options,
         unless_json(options, data, proof),

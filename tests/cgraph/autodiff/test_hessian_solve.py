@@ -14,7 +14,8 @@ import pytest
 import cgraph as cg
 from cgraph import GraphError
 from cgraph.autodiff.elimination_order import elimination_steps
-from cgraph.autodiff.hessian_solve import solve_nodes
+from cgraph.autodiff.forward import tangents
+from cgraph.autodiff.hessian_solve import solve_nodes, solve_tangents
 from cgraph.autodiff.jacobian import hessian_nodes
 from cgraph.autodiff.ldl_solve import ldl_elimination, ldl_solve
 from cgraph.autodiff.rotation_pairs import rotations
@@ -54,6 +55,24 @@ def test_solves_with_the_hessian(name):
         expected = np.linalg.solve(hessian, right)
         found = cg.compile(graph)(np.concatenate([point, right]))
         assert found == pytest.approx(expected, rel=LONG_SUM, abs=LONG_SUM * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_tangents_are_those_of_the_solution_at_every_node(name):
+    """By forward mode along it."""
+    function, n = FUNCTIONS[name]
+    x, dots = (cg.variables([f"{letter}{i}" for i in range(n)]) for letter in "xd")
+    output = function(cg, *x)
+    found = solve_tangents(output, x, [cg.constant(1.0 + i) for i in range(n)])
+    solution = [found[node] for node in x]
+    known = [node for node in found if node.args]
+    pushed = tangents(dict(zip(x, dots, strict=True)), known)
+    graph = cg.Graph([*x, *dots], {f"{i}": pushed[node] for i, node in enumerate(known)})
+    solved = cg.Graph(x, {f"{i}": node for i, node in enumerate([*solution, *[found[node] for node in known]])})
+    point = dict(zip(solved.input_names, np.random.default_rng(5).uniform(-0.6, 0.6, n), strict=True))
+    values = list(solved.evaluate(point).values())
+    along = dict(zip([f"d{i}" for i in range(n)], values[:n], strict=True))
+    assert values[n:] == pytest.approx(list(graph.evaluate(point | along).values()), rel=1e-12, abs=1e-12)
 
 
 @pytest.mark.parametrize("n", [10, 40, 160])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
-from dynamics.experiments.speed import closed_chains, compile_time, ensembles, long_chains, reconfiguration
+from dynamics.experiments.speed import both_forms, closed_chains, compile_time, ensembles, long_chains, reconfiguration
 from dynamics.experiments.speed.agreement import QUANTITIES, differences, random_arm
 from dynamics.experiments.speed.bench_figures import FIGURES
 from dynamics.experiments.speed.bench_scenes import turned_arm
@@ -148,3 +148,13 @@ def test_columns_that_do_not_fit_go_below_under_the_first_one_again() -> None:
 
 def test_csv_has_empty_cells_for_what_is_not_known() -> None:
     assert csv_text(["a", "b"], [[1, None], ["x,y", 0.1]]) == 'a,b\n1,\n"x,y",0.1\n'
+
+
+def test_both_forms_are_counted_and_timed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(both_forms, "SECONDS", 1e-4)
+    plain, canonical, ratios = both_forms.rows("planar 3", 1)
+    for row, derive in ((plain, dyn.state_equation), (canonical, dyn.hamilton_equations)):
+        counts = derive(both_forms.MODELS["planar 3"]()).counts()
+        assert row[1:5] == tuple(map(str, (counts.nodes, counts.edges, counts.depth, counts.width)))
+    assert float(ratios[1]) == pytest.approx(int(canonical[1]) / int(plain[1]), abs=1e-3)
+    assert all(float(each) > 0.0 for each in ratios[1:])

@@ -112,6 +112,8 @@ def read(result: Any) -> Any:
     """A graph, a table or an array as something to compare."""
     if isinstance(result, np.ndarray):
         return result.tolist()
+    if isinstance(result, dict):
+        return result
     return getattr(result, "graph", result).listing()  # tags too
 
 

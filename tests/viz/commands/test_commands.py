@@ -85,6 +85,18 @@ def test_lint_takes_a_file_with_a_coordinate_that_nothing_uses(tmp_path, capsys)
     assert "qd.hinge * dt -> q.hinge" in [cut["text"] for cut in found["findings"][0]["cut"]]
 
 
+def test_lint_names_momenta_that_are_constant(tmp_path, capsys):
+    model = tmp_path / "planet.py"
+    model.write_text(
+        "import dynamics as dyn\n"
+        "L = lambda q, qd, t: 0.5 * (qd[0] ** 2 + (q[0] * qd[1]) ** 2) + 1.0 / q[0]\n"
+        "system = dyn.System(L, 'r phi')\n"
+    )
+    assert "momentum of 'phi' is constant" in said(capsys, "lint", f"{model}:system")
+    assert figures(capsys, "lint", f"{model}:system")["conserved"] == ["phi"]
+    assert "is constant" not in said(capsys, "lint", "spring_mass")
+
+
 def test_compare_takes_a_file_with_a_coordinate_that_nothing_uses(tmp_path, capsys):
     pytest.importorskip("mujoco")
     model = tmp_path / "cart.xml"
