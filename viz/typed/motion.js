@@ -46,11 +46,12 @@ function motionOf(system, parameters = system.parameters) {
     return values;
   };
   const start = Float64Array.of(...system.start.q, ...system.start.qd);
-  let first = run(at(start, 0)), moved = false;
+  let first = run(at(start, 0)), moved = "";
   if (!system.start.said && !first.slice(0, n).some((qdd) => Number.isFinite(qdd) && qdd)) { // at rest nothing is to be seen
+    moved = first.slice(0, n).every(Number.isFinite) ? "at rest" : "past";
     start.fill(AWAY, 0, n);
+    if (moved === "past") for (let i = 0; i < n; i++) start[n + i] = i % 2 ? -AWAY : AWAY; // from rest it would fall into such a place
     first = run(at(start, 0));
-    moved = true;
   }
   const infinite = system.coordinates.find((_, i) => !Number.isFinite(first[i]));
   if (infinite && first.slice(n, 2 * n).every((pivot) => pivot > 0)) return { error: `At the start the acceleration of ${infinite} is not finite.` };

@@ -95,7 +95,9 @@ function aboutOf(name, { nodes }, wrong) {
 }
 function noticesOf(system, motion) {
   if (motion.error) return [motion.error];
-  const rest = motion.moved ? [`At rest nothing moves, so all coordinates start at ${AWAY}; for another start write ${system.coordinates[0]}(0) = ....`] : [];
+  const why = { "at rest": `At rest nothing moves, so all coordinates start at ${AWAY}`,
+    past: `At 0 the accelerations are not finite, so all coordinates start at ${AWAY}, their rates at ${AWAY} and -${AWAY} in turn` }[motion.moved];
+  const rest = why ? [`${why}; for another start write ${system.coordinates[0]}(0) = ....`] : [];
   if (!motion.stopped) return rest;
   const last = motion.t.at(-1).toPrecision(3);
   return [...rest, `The motion is shown up to ${last} s of ${system.time} s: from there half the step changes it by more than ${100 * UNSURE} %.`];

@@ -58,6 +58,7 @@ def test_every_path_is_counted_weighed_and_listed_in_order(case: Case):
         shortest = why(case.graph, "f0", str(node.name), k=len(paths))
         assert [len(path.edges) for path in shortest.paths] == sorted(map(len, paths))
         for told in (found, shortest):  # no two of them read the same
+            assert not any("[]" in path.text for path in told.paths)  # nor has any an empty list of tags
             assert len({path.text for path in told.paths}) == len(told.paths)
 
 

@@ -51,6 +51,18 @@ def test_energy_is_kept_where_nothing_takes_it():
     assert found["rods"] == [-1, -1]
 
 
+def test_a_center_that_attracts_is_passed_by():
+    """Where nobody said a start and the place of rest has no accelerations; its library says the same."""
+    planet = "mu = 1\nL = 0.5*(x'^2 + y'^2) + mu/sqrt(x^2 + y^2)"
+    found = run_typed(MOTION, planet)
+    assert (found["moved"], found["stopped"]) == ("past", False)
+    assert (found["q"][0], found["qd"][0]) == ([0.5, 0.5], [0.5, -0.5])
+    (said,) = run_typed(
+        "(text) => { const s = parsed(text); return TYPED.recordOf(s, TYPED.motionOf(s)).notices; }", planet
+    )
+    assert said.startswith("At 0 the accelerations are not finite, so all coordinates start at 0.5, their rates")
+
+
 @pytest.mark.parametrize(
     ("text", "end"),
     [
