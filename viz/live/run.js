@@ -27,7 +27,7 @@ function liveRun(machine, data) {
   }
   /** Real time goes by. Returns the steps made. */
   function advance(seconds) {
-    state.owed += seconds;
+    state.owed += Math.max(0, seconds); // a frame may begin before the moment that asked for it
     const due = Math.floor(state.owed / state.dt), k = machine.finer(state.dt);
     const count = Math.min(due, Math.max(1, Math.floor(MOST_STEPS / (k + 1))));
     state.slow = count < due;

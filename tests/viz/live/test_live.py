@@ -139,6 +139,14 @@ def test_the_course_to_come_is_the_motion_that_comes(script):
     assert run[200][0] == pytest.approx(script("run.state.time"))
 
 
+def test_a_clock_that_goes_back_makes_no_step(script):
+    """The first frame's time may lie before the moment in which its run was asked for."""
+    before = script("Array.from(machine.run)")
+    assert script("run.advance(-10 * data.dt)") == 0
+    assert (script("run.state.time"), script("Array.from(machine.run)")) == (0, before)
+    assert script("run.advance(1.5 * data.dt)") == 1
+
+
 @pytest.mark.parametrize("dt", [1e-6, 1e-2, 0.1, 10.0])
 def test_the_course_to_come_is_short_and_smooth_whatever_dt_is(dt, script):
     """A picture takes no longer with a shorter dt, and the reference keeps its corners small with a longer one."""
