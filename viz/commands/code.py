@@ -51,7 +51,9 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
         "--python", dest="language", action="store_const", const="python", help="a Python function of a list"
     )
     parser.add_argument(
-        "--what", default="forward_dynamics", choices=tuple(EQUATIONS), help="default: forward_dynamics"
+        "--what",
+        choices=tuple(EQUATIONS),
+        help="default: forward_dynamics; of a first-order system state_equation",
     )
     parser.add_argument(
         "--out", type=Path, help="file to write, in place of standard output: .c (and .h), .wasm or .py"
@@ -70,10 +72,11 @@ def run(options: argparse.Namespace) -> None:
     if out is not None:
         check_writable(out)
     scene = scene_of(options)
-    graph = EQUATIONS[options.what](scene)
+    what = options.what or ("forward_dynamics" if scene.ode is None else "state_equation")
+    graph = EQUATIONS[what](scene)
     name = re.sub("[^A-Za-z0-9_]", "_", scene.name) if out is None else out.stem
     if options.language == "wasm":
-        methods = TABLEAUS if options.what == "state_equation" else None
+        methods = TABLEAUS if what == "state_equation" else None
         files: dict[str, str | bytes] = {suffix: cg.to_wasm(graph, methods)}
     elif options.language == "python":
         files = {suffix: python_text(graph)}

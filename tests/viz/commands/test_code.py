@@ -56,6 +56,14 @@ def test_wasm_has_steps_with_the_state_equation(tmp_path, capsys):
     assert {"euler", "rk4", "dopri5"} <= set(made.exports)
 
 
+def test_of_a_first_order_system_it_is_the_state_equation(tmp_path, capsys):
+    (tmp_path / "decay.py").write_text('import dynamics as dyn\nsystem = dyn.OdeSystem(lambda x, t: [-x[0]], ["x"])\n')
+    assert cli.main(["code", f"{tmp_path}/decay.py:system", "--python"]) == 0
+    names: dict = {}
+    exec(capsys.readouterr().out, names)
+    assert names["function"]([3.0]) == (-3.0,)
+
+
 def test_c_is_one_text_or_two_files(tmp_path, capsys):
     assert cli.main(["code", "spring_mass", "--c"]) == 0
     text = capsys.readouterr().out
