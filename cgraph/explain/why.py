@@ -291,11 +291,11 @@ def _route(names: Names, nodes: Sequence[Node]) -> list[str]:
         if node.name:
             steps.append((names.text(node), []))
         else:
-            tags = f"[{', '.join(sorted(node.tags))}]"
+            tags = f" [{', '.join(sorted(node.tags))}]" if node.tags else ""
             if not steps or steps[-1][0] != tags:
                 steps.append((tags, []))
             steps[-1][1].append(f"{node.op.name} %{names.number[node]}")
-    return [" ".join([*ops, name]) for name, ops in steps]
+    return [" ".join(ops) + name for name, ops in steps]
 
 
 def _told_apart(names: Names, paths: Sequence[Path]) -> list[Path]:

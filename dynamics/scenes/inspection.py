@@ -89,7 +89,8 @@ def inspection(
     if scene.ode is not None:
         return _first_order(scene, end, times)
     system = scene.system
-    say(f"{scene.name}: deriving the equations of {system.n} coordinates, compiling them, and a motion of {end:g} s")
+    count = f"{system.nq} coordinate{'s' * (system.nq != 1)}"
+    say(f"{scene.name}: deriving the equations of {count}, compiling them, and a motion of {end:g} s")
     run = simulate(system, scene.q, scene.qd, end, "dopri5", rtol=1e-6, t_eval=times)
     say(f"{scene.name}: deriving forward dynamics")
     rate = forward_dynamics(system)

@@ -213,7 +213,8 @@ def of_model(model: Model, name: str = "model") -> Scene:
     if as_ode(model) is not None:
         return Scene(name, f"{len(model.coordinates)} states", model, (0.0,) * len(model.coordinates), (), 3.0)
     system = as_system(model)
-    about = f"{len(system.velocities)} coordinate(s): {', '.join(system.velocities[:12])}"
+    count, more = len(system.coordinates), ", .." if len(system.coordinates) > 12 else ""
+    about = f"{count} coordinate{'s' * (count != 1)}: {', '.join(system.coordinates[:12])}{more}"
     return Scene(name, about, model, tuple(system.kinematics.neutral), (0.0,) * system.n, 3.0)
 
 

@@ -55,18 +55,27 @@ def moving_start(scene: Scene) -> Scene:
     """The scene; where it would rest at its start for ever, from a start that shows something.
 
     That is half a radian from there at every joint, of many joints half a turn in all, or half a unit of coordinates
-    without one, or such a velocity.
+    without one, or such a velocity. Where its start has no rates, such as a center that attracts, it moves past it.
     """
     if any(scene.qd):
         return scene
     rate = state_equation(scene)
     starts = [scene, *_nearby(scene)]
     found = [_rates(rate, each) for each in starts]
+    if not np.isfinite(found[0]):
+        starts, found = starts[::-1], found[::-1]  # from rest it would fall into it
     largest = max((rates for rates in found if np.isfinite(rates)), default=0.0)
     for each, rates in zip(starts, found, strict=True):
         if np.isfinite(rates) and (rates > _ROUNDING * largest or any(each.qd)):
             return each
     return scene
+
+
+def rest_text(scene: Scene, moving: Scene) -> str:
+    """Why a motion starts elsewhere than the scene does, and where: a sentence without its capital and its stop."""
+    finite = np.isfinite(_rates(state_equation(scene), scene))
+    reason = "at rest nothing moves" if finite else "at its start the rates are not finite"
+    return f"{reason}, so it starts at {start_text(moving)}"
 
 
 def start_text(scene: Scene) -> str:
@@ -96,7 +105,8 @@ def _nearby(scene: Scene) -> list[Scene]:
     away = [step * (units.get(f"q{i}", "rad") == "rad") for i in range(len(scene.q))]
     q = tuple([value + more for value, more in zip(scene.q, away, strict=True)])
     starts = []
-    for qd in ((0.0,) * len(scene.qd), (step,) * len(scene.qd)):
+    across = tuple([step * (-1.0) ** i for i in range(len(scene.qd))])
+    for qd in ((0.0,) * len(scene.qd), (step,) * len(scene.qd), across):
         try:
             place, velocity = (q, qd) if scene.ode else consistent_state(scene, q, qd)
         except (ValueError, ArithmeticError):
@@ -111,6 +121,6 @@ def _rates(rate: Graph, scene: Scene) -> float:
     values = dict.fromkeys(rate.input_names, 0.0) | dict(scene.parameters) | dict(states)
     try:
         with np.errstate(all="ignore"):
-            return max(abs(float(value)) for value in rate.evaluate(values).values())
+            return float(np.max(np.abs([float(value) for value in rate.evaluate(values).values()])))  # a NaN wins
     except (ValueError, ArithmeticError):
         return np.inf

@@ -382,7 +382,7 @@ def test_the_stages_of_an_inspection_are_told_as_they_begin(tmp_path, capsys):
     assert cli.main(["inspect", "spring_mass", "--t-end", "0.2", "--out", str(tmp_path / "a.html")]) == 0
     said = capsys.readouterr().err.splitlines()
     assert said[0] == "cgraph: reading spring_mass"
-    assert said[1].startswith("cgraph: spring_mass: deriving the equations of 1 coordinates, compiling them, and a")
+    assert said[1].startswith("cgraph: spring_mass: deriving the equations of 1 coordinate, compiling them, and a")
     assert said[-1].startswith("cgraph: spring_mass: writing the page of ")
 
 

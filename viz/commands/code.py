@@ -78,7 +78,10 @@ def run(options: argparse.Namespace) -> None:
     elif options.language == "python":
         files = {suffix: python_text(graph)}
     else:
-        text = cg.to_c(graph, name, names=display_names(scene))
+        try:
+            text = cg.to_c(graph, name, names=display_names(scene))
+        except ValueError as error:
+            raise ValueError(f"{out or scene.name} names the function: {error}") from None
         whole = text.source.replace(f'#include "{name}.h"\n', text.header)  # one text for standard output
         files = {suffix: whole} if out is None else {suffix: text.source, ".h": text.header}
     if out is None:

@@ -11,7 +11,7 @@ from cgraph import Graph
 from cgraph.extend import Names
 from dynamics import display_names
 from dynamics.scenes.scenes import Scene
-from dynamics.scenes.start import Start, moving_start, start_text, with_start
+from dynamics.scenes.start import Start, moving_start, rest_text, with_start
 
 from .arguments import number, say, scene_of
 
@@ -70,18 +70,20 @@ def start(text: str) -> Start:
     return point(text) if "=" in text else [number(each) for each in text.split(",")]
 
 
-def started(options: argparse.Namespace, *, free: bool = True) -> tuple[Scene, bool]:
-    """The scene that the arguments name, from the start that they name or one that shows something; True if so.
+def started(options: argparse.Namespace, *, free: bool = True) -> tuple[Scene, str]:
+    """The scene that the arguments name, from the start that they name or one that shows something, and then why.
 
     free: whether nothing drives it, so that it may rest for ever.
     """
     scene = scene_of(options)
     if options.start is not None:
-        return with_start(scene, options.start), False
+        return with_start(scene, options.start), ""
     moving = moving_start(scene) if free else scene
-    if moving is not scene:
-        say(f"{scene.name}: at rest nothing moves, so it starts at {start_text(moving)}; --start chooses another")
-    return moving, moving is not scene
+    if moving is scene:
+        return scene, ""
+    why = rest_text(scene, moving)
+    say(f"{scene.name}: {why}; --start chooses another")
+    return moving, why
 
 
 def point_text(at: Mapping[str, float]) -> str:

@@ -32,7 +32,7 @@ def run(options: argparse.Namespace) -> None:
             }
         )
     lines = [
-        f"{row['name']:16} {row['about']}\n{'':16} {row['coordinates']} coordinate(s), inverse dynamics "
+        f"{row['name']:16} {row['about']}\n{'':16} coordinates: {row['coordinates']}, inverse dynamics "
         f"{row['inverse_nodes']} nodes, forward dynamics {row['forward_nodes']} nodes"
         for row in rows
     ]

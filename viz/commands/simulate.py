@@ -106,7 +106,7 @@ def _text(run: Trajectory, data: dict[str, Any]) -> str:
     if "energy" in data:
         lines.append(
             f"  energy  {data['energy']:.6g} J at the start, {data['energy_at_end']:.6g} J at the end, "
-            f"{data['energy_drift']:.2g} J off at most"
+            f"changed by {data['energy_drift']:.2g} J at most"
         )
     return "\n".join(lines)
 

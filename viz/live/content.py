@@ -126,7 +126,6 @@ class Live:
             ],
             "energy": ENERGIES - 1,
             "parents": list(self.parents),
-            "phase": [0, len(self.rate.outputs) // 2],  # what is drawn of a system without points
             "methods": list(self.methods),
             "dt": float(self.dt),
         }

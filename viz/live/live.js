@@ -45,8 +45,9 @@ async function startLive() {
     slider.oninput = () => take(slider.value);
     field.oninput = () => take(field.value);
     controls.push(() => {
-      if (document.activeElement !== slider) slider.value = machine.run[i];
-      if (document.activeElement !== field) field.value = +machine.run[i].toPrecision(5);
+      const value = machine.run[i], known = Number.isFinite(value); // a field takes no other, and complains
+      if (document.activeElement !== slider) slider.value = known ? value : 0;
+      if (document.activeElement !== field) field.value = known ? +value.toPrecision(5) : "";
     });
     return liveTag("label", { class: "live-control" }, liveTag("span", {}, called, ...(unit ? [liveTag("small", {}, ` [${unit}]`)] : [])), slider, field);
   }
@@ -89,12 +90,14 @@ async function startLive() {
     if (part === undefined) return;
     $("said").textContent = motion.open(part.slice(5)) ? "" : "The link has no state that could be read.";
     strip.length = 0;
+    anew = true;
     show();
   }
   addEventListener("hashchange", read);
   let waiting = 0;
   function changed() {
     $("said").textContent = "";
+    anew = true;
     show();
     clearTimeout(waiting); // browsers allow the address to change a hundred times in half a minute
     waiting = setTimeout(keep, 400);
@@ -111,37 +114,10 @@ async function startLive() {
   const joints = data.parents.map(() => liveShape("circle", { class: "live-joint" }, svg));
   let reach = 0;
   const past = [];
-  /** Of a system without places: the first coordinate to the right and its velocity up, and thin the reference. */
-  const thin = liveShape("path", { class: "live-reference live-phase" }, svg), beside = [], extent = [0, 0];
-  function drawPhase() {
-    const [q, v] = data.phase;
-    if (!state.time) [past.length, beside.length] = [0, 0];
-    if (playing || !past.length) {
-      past.push([machine.run[q], -machine.run[v]]);
-      beside.push([machine.fine[q], -machine.fine[v]]);
-    }
-    for (const [x, y] of [...past, ...beside]) {
-      if (Number.isFinite(x + y)) [extent[0], extent[1]] = [Math.max(extent[0], Math.abs(x)), Math.max(extent[1], Math.abs(y))];
-    }
-    const at = ([x, y]) => [x / (extent[0] || 1), y / (extent[1] || 1)];
-    svg.setAttribute("viewBox", "-1.1 -1.1 2.2 2.2");
-    [[trace, past, 0.012], [thin, beside, 0.006]].forEach(([path, way, width]) => {
-      const shown = way.slice(-600).map(at).filter((each) => each.every(Number.isFinite));
-      path.setAttribute("d", shown.length > 1 ? `M${shown.map(([x, y]) => `${x.toFixed(4)} ${y.toFixed(4)}`).join("L")}` : "");
-      path.setAttribute("stroke-width", width);
-    });
-    const [x, y] = at([machine.run[q], -machine.run[v]]);
-    joints[0].setAttribute("r", Number.isFinite(x + y) ? 0.03 : 0);
-    if (Number.isFinite(x + y)) { joints[0].setAttribute("cx", x); joints[0].setAttribute("cy", y); }
-    joints[0].setAttribute("stroke-width", 0.01);
-  }
-  if (!points) {
-    joints.push(liveShape("circle", { class: "live-joint" }, svg));
-    const [q, v] = data.phase.map((i) => data.inputs[i].called);
-    $("words").textContent = `${q} to the right, ${v} up. Thick: steps of dt. Thin and green: much shorter steps.`;
-  }
+  const drawCourse = points ? null : liveCourse(svg, $("words"), machine, data, state);
+  let anew = true; // something was set since the picture of a system without places
   function draw({ values, reference: right }) {
-    if (!points) { drawPhase(); return; }
+    if (drawCourse) { drawCourse(anew); anew = false; return; }
     for (let k = 0; k < points; k++) for (const each of place(values, k)) if (Number.isFinite(each)) reach = Math.max(reach, Math.abs(each));
     const half = 1.1 * (reach || 1), r = half / 40;
     svg.setAttribute("viewBox", `${-half} ${-half} ${2 * half} ${2 * half}`);

@@ -2,6 +2,7 @@
 
 const FINER = 4, FINEST = 500; // steps of the reference beside one: a limit, so that any dt is answered within a frame
 const HORIZON = 1500; // steps at most that the error ahead takes
+const COURSE = 300; // first steps that the picture of coordinates over time holds
 
 /** The bytes behind base64. */
 function decoded(text) {
@@ -66,5 +67,25 @@ function liveMachine(data, instances) {
     return { ...apart(ahead, beside), seconds: count * dt };
   }
 
-  return { run, fine, step, finer, look, apart, errorAhead };
+  /** Both runs from here on, rows of a time and a state; the steps are no shorter than a picture needs. */
+  function course(method, dt) {
+    const h = Math.max(dt, data.dt), k = finer(h);
+    const count = Math.max(1, Math.round((COURSE * data.dt) / h));
+    ahead.set(run);
+    beside.set(fine);
+    const row = (time, of) => ({ time, state: of.slice(0, data.states) });
+    const rows = { run: [row(0, ahead)], fine: [row(0, beside)] };
+    for (let done = 0; done < count; done++) {
+      step(ahead, method, h, 1);
+      rows.run.push(row((done + 1) * h, ahead));
+      for (let sub = 0; sub < k; sub += FINER) {
+        const steps = Math.min(FINER, k - sub);
+        step(beside, "dopri5", h / k, steps);
+        rows.fine.push(row((done + (sub + steps) / k) * h, beside));
+      }
+    }
+    return rows;
+  }
+
+  return { run, fine, step, finer, look, apart, errorAhead, course };
 }

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from .. import theme
 from .content import Live
 
-SCRIPTS = ("machine.js", "run.js", "live.js")
+SCRIPTS = ("machine.js", "run.js", "course.js", "live.js")
 EVALUATION = "'wasm-unsafe-eval'"  # in the policy: WebAssembly may be compiled, text may not
 _POLICY = (
     "default-src 'none'; script-src {script} {wasm}; style-src {style}; img-src data:; base-uri 'none'; "

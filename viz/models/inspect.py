@@ -7,7 +7,7 @@ import os
 from cgraph.extend import check_writable, require_flag, require_path, write_files
 from dynamics import display_names, scenes
 from dynamics.scenes.inspection import Inspection, Shares, inspection
-from dynamics.scenes.start import Start, moving_start, start_text, with_start
+from dynamics.scenes.start import Start, moving_start, rest_text, with_start
 from dynamics.systems.model import Model
 
 from ..inspector import Motion, Page, StateTable, Step, Version, page
@@ -78,21 +78,22 @@ def inspect(
     scene = scenes.of_model(model)
     at = moving_start(scene) if start is None else with_start(scene, start)
     content = inspection(at, forward=forward, t_end=t_end)
-    text = inspection_page(at, content, moved=start is None and at is not scene, title=title)
+    moved = rest_text(scene, at) if start is None and at is not scene else ""
+    text = inspection_page(at, content, moved, title)
     if target is not None:
         write_files({target: text})
     return text
 
 
-def inspection_page(scene: scenes.Scene, content: Inspection, moved: bool = False, title: str | None = None) -> Page:
-    """The page of a scene.  moved: whether its start was chosen for it, which the page then says."""
+def inspection_page(scene: scenes.Scene, content: Inspection, moved: str = "", title: str | None = None) -> Page:
+    """The page of a scene.  moved: why its start was chosen for it, if it was."""
     bones, mechanism = content.skeleton, scene.mechanism
     lively = scene.ode is None and scene.system.n <= LIVELY
     inverse = len(content.versions) > 1
     what = "inverse dynamics" if inverse else content.versions[0].name
     notices = [f"Left out of the model: {'; '.join(scene.left_out)}."] if scene.left_out else []
     notices += [tree_alone(scene)] if inverse and tree_alone(scene) else []
-    notices += [f"At rest nothing moves, so it starts at {start_text(scene)}."] if moved else []
+    notices += [f"{moved[0].upper()}{moved[1:]}."] if moved else []
     return page(
         [
             Version(each.name.replace("_", " "), *each[1:4], [Step(*step) for step in each.steps])

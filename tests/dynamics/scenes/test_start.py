@@ -8,7 +8,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from dynamics import scenes
-from dynamics.scenes.start import moving_start, start_text, with_start
+from dynamics.scenes.start import moving_start, rest_text, start_text, with_start
 
 ARM = scenes.of_model(dyn.planar_arm([1.0, 1.0], [1.0, 1.0]))
 FIRST = scenes.of_model(dyn.OdeSystem(lambda x, t: [-x[0]], ["decay"]))
@@ -89,6 +89,10 @@ def test_a_scene_that_would_rest_for_ever_starts_where_it_moves(name):
     assert rates.any()
     assert moving_start(scene) is scene
     assert start_text(scene) != "0"
+    motion = dyn.simulate(scene, scene.q, scene.qd or None, 3.0)  # a center that attracts is passed by
+    assert motion.stats.success
+    why = "at its start the rates are not finite" if "center" in name else "at rest nothing moves"
+    assert rest_text(RESTING[name], scene) == f"{why}, so it starts at {start_text(scene)}"
 
 
 def test_many_joints_are_not_wound_up():

@@ -75,7 +75,7 @@ def test_c_is_one_text_or_two_files(tmp_path, capsys):
         ("--wasm", "--wasm needs --out"),
         ("--wasm --out a.c", "--out must end in .wasm for --wasm, got a.c"),
         ("--c --out 2.c", "must be a letter"),
-        ("--c --out sin.c", "must not be a word of C"),
+        ("--c --out sin.c", "sin.c names the function: the name of a C function must not be a word of C"),
     ],
 )
 def test_a_mistake_is_told_in_one_line_and_writes_nothing(arguments, said, tmp_path, monkeypatch, capsys):

@@ -8,6 +8,10 @@ import pytest
 
 from viz import cli
 
+SPRING = """import dynamics as dyn
+spring = dyn.System(lambda q, qd, t: (qd[0]**2 + 2 * qd[1]**2 - q[0]**2 - q[1]**2) / 2, ["<i>left", "right"])
+"""
+
 
 @pytest.fixture(scope="module")
 def browser():
@@ -27,6 +31,8 @@ def written(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pages")
     for command in ("live", "inspect"):
         assert cli.main([command, "triple_pendulum", "--out", str(folder / f"{command}.html")]) == 0
+    (folder / "spring.py").write_text(SPRING)
+    assert cli.main(["live", f"{folder}/spring.py:spring", "--out", str(folder / "spring.html")]) == 0
     return folder
 
 
@@ -93,6 +99,27 @@ def test_too_long_a_dt_shows_its_error_and_the_two_arms_part(show):
     assert page.locator(".live-stick").nth(3).get_attribute("d") != page.locator(".live-reference").nth(
         3
     ).get_attribute("d")
+
+
+def test_a_system_without_places_shows_its_course_before_anything_runs(show):
+    """Its coordinates over time by name, and where it is now; what it was set to is the course anew."""
+    page = show("spring")
+    lines = page.locator("#live-picture .live-course")
+    assert lines.count() == 2
+    before = [lines.nth(k).get_attribute("d") for k in range(2)]
+    assert all(line.count("L") == 300 for line in before)
+    assert "q.<i>left" in page.locator("#live-words").inner_text()
+    page.get_by_label("q.right", exact=True).fill("2")
+    assert lines.nth(0).get_attribute("d") != before[0]  # on the scale of both
+    dot = page.locator("#live-picture circle").first
+    assert dot.get_attribute("cx") == "0.00"
+    page.click("#live-step")
+    assert float(dot.get_attribute("cx")) > 0.0
+    page.select_option("#live-method", "euler")
+    page.fill("#live-dt-field", "1e9")
+    for _ in range(40):
+        page.click("#live-step")  # until nothing of it is finite: no complaint of a field that takes no NaN
+    assert meter(page, "energy") == "—"
 
 
 def test_a_link_opens_what_was_left_and_reset_forgets_it(show):

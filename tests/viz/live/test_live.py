@@ -126,6 +126,30 @@ def test_the_error_since_the_start_is_the_distance_from_the_solution(script):
     assert found["index"] == off.argmax()
 
 
+def test_the_course_to_come_is_the_motion_that_comes(script):
+    """Of a System without places the picture shows it before anything runs; looking ahead moves nothing."""
+    before = script("Array.from(machine.run)")
+    rows = "(({run, fine}) => [run, fine].map((all) => all.map(({time, state}) => [time, [...state]])))"
+    run, fine = script(f'{rows}(machine.course("rk4", data.dt))')
+    assert script("Array.from(machine.run)") == before
+    assert len(run) == len(fine) == 301
+    script.engine.eval("run.steps(200)")
+    assert run[200][1] == script("Array.from(machine.run.subarray(0, data.states))")
+    assert fine[200][1] == script("Array.from(machine.fine.subarray(0, data.states))")
+    assert run[200][0] == pytest.approx(script("run.state.time"))
+
+
+@pytest.mark.parametrize("dt", [1e-6, 1e-2, 0.1, 10.0])
+def test_the_course_to_come_is_short_and_smooth_whatever_dt_is(dt, script):
+    """A picture takes no longer with a shorter dt, and the reference keeps its corners small with a longer one."""
+    count, fine, end = script(
+        f'(({{run, fine}}) => [run.length, fine.length, run.at(-1).time])(machine.course("rk4", {dt}))'
+    )
+    assert count <= 301
+    assert 100 <= fine <= 301
+    assert end >= 0.9 * 300 * script("data.dt")
+
+
 def test_a_motion_that_leaves_the_numbers_says_so_and_comes_back(script):
     script.engine.eval("run.state.method = 'euler'; run.state.dt = 1e3; run.steps(60)")
     found = script("(({ finite, since }) => ({ finite, most: String(since.most) }))(run.now())")

@@ -1,0 +1,62 @@
+// The picture of a system without places: its coordinates over time, from where it was set, and where it is now.
+
+const COURSES = 6; // coordinates in the picture
+const SQUARE = 300, EDGE = 36; // of the picture, and left free for its numbers
+
+/** Draws the coordinates over the time to come, by the steps and thin by much shorter ones. */
+function liveCourse(svg, words, machine, data, state) {
+  const among = data.inputs.slice(0, data.states);
+  const positions = among.filter(({ group }) => group === "positions").length || data.states;
+  const indices = among.slice(0, Math.min(positions, COURSES)).map((_, i) => i);
+  const shape = (name, attributes) => liveShape(name, attributes, svg);
+  const zero = shape("path", { class: "live-rule" }), now = shape("path", { class: "live-rule live-now" });
+  const thin = indices.map(() => shape("path", { class: "live-reference live-line" }));
+  const thick = indices.map((i) => shape("path", { class: `live-course live-course-${i} live-line` }));
+  const dots = indices.map((i) => shape("circle", { class: `live-joint live-course-${i}`, r: 4 }));
+  const texts = ["start", "start", "start", "end"].map((anchor) => shape("text", { class: "live-number", "text-anchor": anchor }));
+  svg.setAttribute("viewBox", `0 0 ${SQUARE} ${SQUARE}`);
+  svg.setAttribute("aria-label", "coordinates over time, and thin in green the same with much shorter steps");
+  words.classList.add("live-legend");
+  const rest = positions - indices.length;
+  words.replaceChildren(
+    ...indices.map((i) => liveTag("span", { class: `live-course-${i}` }, data.inputs[i].called)),
+    `${rest ? `and ${rest} more ` : ""}over time. Thick: steps of dt. Thin and green: much shorter steps.`,
+  );
+  let end = 0, from = 0, across, up;
+
+  /** What comes from here on, and its scale. */
+  function look() {
+    const rows = machine.course(state.method, state.dt);
+    from = state.time;
+    end = rows.run.at(-1).time;
+    const values = rows.fine.flatMap((row) => indices.map((i) => row.state[i])).filter(Number.isFinite);
+    let low = Math.min(...values), high = Math.max(...values);
+    if (!(high > low)) [low, high] = [(low || 0) - 1, (high || 0) + 1];
+    const inner = SQUARE - 2 * EDGE;
+    across = (time) => (SQUARE * time) / end;
+    up = (value) => SQUARE - EDGE - (inner * (value - low)) / (high - low);
+    const line = (i, of) => rows[of].map(({ time, state: at }) => [across(time), up(at[i])])
+      .filter(([, y]) => Math.abs(y) < 1e4).map(([x, y]) => `${x.toFixed(2)} ${y.toFixed(2)}`);
+    const path = (points) => (points.length > 1 ? `M${points.join("L")}` : "");
+    indices.forEach((i) => { thick[i].setAttribute("d", path(line(i, "run"))); thin[i].setAttribute("d", path(line(i, "fine"))); });
+    zero.setAttribute("d", low < 0 && high > 0 ? `M0 ${up(0).toFixed(2)}H${SQUARE}` : "");
+    const numbers = [[3, EDGE - 8, high], [3, SQUARE - EDGE + 15, low], [3, SQUARE - 4, from], [SQUARE - 3, SQUARE - 4, from + end]];
+    numbers.forEach(([x, y, value], k) => {
+      texts[k].setAttribute("x", x);
+      texts[k].setAttribute("y", y);
+      texts[k].textContent = k < 2 ? liveNumber(value) : `${liveNumber(value)} s`;
+    });
+  }
+  /** The picture now; `anew` after something was set. */
+  function draw(anew) {
+    if (anew || !end || state.time < from || state.time > from + end) look();
+    const x = across(state.time - from).toFixed(2);
+    now.setAttribute("d", `M${x} ${EDGE}V${SQUARE - EDGE}`);
+    dots.forEach((dot, i) => {
+      const y = up(machine.run[i]), seen = Math.abs(y) < 1e4;
+      dot.setAttribute("visibility", seen ? "visible" : "hidden");
+      if (seen) { dot.setAttribute("cx", x); dot.setAttribute("cy", y.toFixed(2)); }
+    });
+  }
+  return draw;
+}
