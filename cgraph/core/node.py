@@ -10,14 +10,11 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from ..util.html_text import picture
 from ..util.interned import Interned
 from .check_name import check_name
 from .label import INPUT, UNLABELLED, Label, SourceLine, label
-from .operation import (
-    BY_UFUNC,
-    OPS as OPS,  # noqa: PLC0414 (beside the nodes that they make)
-    Op as Op,  # noqa: PLC0414
-)
+from .operation import BY_UFUNC, OPS as OPS, Op as Op  # noqa: PLC0414 (beside the nodes that they make)
 from .scope import current
 
 _INPUT = label(roles=frozenset({INPUT}))
@@ -111,6 +108,10 @@ class Node:
             return f"<node {self.value!r}>"
         inner = f" {self.name}" if self.name is not None else ""
         return f"<node {self.op.name}{inner}>"
+
+    def _repr_html_(self) -> str | None:
+        """The formula that a notebook shows, when a drawing package is installed (extra `viz`)."""
+        return picture("node", self)
 
     def __bool__(self) -> NoReturn:
         raise TypeError("a Node has no truth value before it is evaluated; choose between nodes with cg.where")

@@ -143,7 +143,9 @@ def _by_jacobian(system: System) -> tuple[Sequence[Node], Write]:
     """One state after another, by the Jacobian of forward dynamics: of systems whose velocities are rates."""
     graph, n = forward_dynamics(system), system.n
     compiled, wrt = cg.compile(graph), [*system.q, *system.qd, *system.tau]
-    i, j = np.tril_indices(n, -1)  # B is M^-1: of its entries the upper triangle counts
+    entries = np.arange(3 * n * n).reshape(n, 3 * n)
+    inverse = entries[:, 2 * n :]  # B is M^-1: of its entries the upper triangle counts
+    entries[:, 2 * n :] = np.where(np.tri(n, dtype=bool), inverse.T, inverse)
 
     def write(values: Array, matrices: Array, threads: int) -> None:
         def block(start: int) -> None:
@@ -152,11 +154,10 @@ def _by_jacobian(system: System) -> tuple[Sequence[Node], Write]:
             for k in range(start, min(start + BLOCK, len(values))):
                 x[:] = values[k]
                 run()
-                matrices[k, n:] = slopes
+                np.take(slopes, entries, out=matrices[k, n:], mode="clip")  # "raise" would copy first
 
         share(block, range(0, len(values), BLOCK), threads)
         matrices[:, :n] = np.eye(n, 3 * n, n)
-        matrices[:, n + i, 2 * n + j] = matrices[:, n + j, 2 * n + i]
 
     return graph.inputs, write
 

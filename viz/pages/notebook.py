@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from html import escape
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
-from cgraph.extend import Array, require_graph
+from cgraph import Graph, Node
+from cgraph.extend import Array, require_graph, topological
 
 from .. import theme
 from ..graph_drawing.dot import to_dot
 from ..graph_drawing.render import LARGE, render_svg, tags_to_collapse
-
-if TYPE_CHECKING:
-    from cgraph import Graph
+from .mathml import equations
 
 SECONDS = 20.0  # for Graphviz; a cell that takes longer shows text
 COLUMNS = 12  # curves that are told apart in one picture
@@ -64,6 +63,29 @@ def graph_html(graph: Graph) -> str:
     svg = render_svg(to_dot(graph, collapse=tags), timeout=SECONDS)
     note = f"<p>Folded by tags: {said}</p>" if tags else ""
     return f'<div style="max-width:100%;overflow-x:auto;background:{theme.WHITE}">{_fitting(svg)}</div>{note}'
+
+
+def node_html(node: Node) -> str:
+    """The formula of a node, as MathML; of a long one the last lines, and how many are left out.
+
+    Parameters
+    ----------
+    node : Node
+        What is shown.
+
+    Returns
+    -------
+    str
+        HTML.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> "<math" in node_html(cg.sin(cg.variable("x")))
+    True
+    """
+    variables = [each for each in topological([node]) if not each.args and each.value is None]
+    return equations(Graph(variables, {node.name or "node": node}), {"node": ""})
 
 
 def trajectory_html(run: Rows) -> str:

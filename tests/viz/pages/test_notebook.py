@@ -85,6 +85,15 @@ def test_a_large_graph_without_tags_is_told_in_words():
     assert f"{LARGE + 1} nodes" in told
 
 
+def test_a_node_shows_its_formula():
+    x = cg.variable(EVIL)
+    shown = cg.sin(x * x)._repr_html_()
+    assert "<math" in shown
+    assert "<script" not in shown
+    assert "sin" in words(shown)
+    assert "<math" in cg.constant(2.0)._repr_html_()
+
+
 def test_a_motion_is_plotted_and_says_how_it_went():
     run = dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.1], [0.0], 0.1)
     shown = trajectory_html(run)
@@ -103,6 +112,7 @@ def test_states_of_an_ode_are_plotted_and_what_is_left_out_is_said():
 def test_the_package_tells_notebooks_what_draws():
     installed = {entry.name: entry.value for entry in entry_points(group="cgraph.renderers")}
     assert installed["graph"] == "viz.pages.notebook:graph_html"
+    assert installed["node"] == "viz.pages.notebook:node_html"
     assert installed["trajectory"] == "viz.pages.notebook:trajectory_html"
 
 
