@@ -20,9 +20,16 @@ ROUNDING = 1e-13  # of some hundred steps: an error that says nothing about a me
 SMALL = 1e-5  # of the largest coordinate: an error that has not grown beyond its order
 
 
+_BRAKED = (
+    " This system is braked or driven, so its energy changes by right: the dashed line is what a method should follow."
+)
+
+
 def energy_and_step(subject: Subject) -> Screen:
     """The screen of a system."""
     rate, total = state_equation(subject.system), energy(subject.system)
+    forces = (*subject.system.damping, *subject.system.forces)
+    braked = any([getattr(each, "value", each) != 0.0 for each in forces])
     t_end, errors = _measured(subject)
     told = (
         f"Measured here: a factor of {number(errors[1] / errors[2])}."
@@ -47,7 +54,7 @@ def energy_and_step(subject: Subject) -> Screen:
         4,
         "<p>Now the system moves on its own, step by step. Euler's method follows the slope at the start of a step; the "
         "classical Runge-Kutta method, rk4, weighs four slopes. Where nothing brakes, energy must stay what it is, so its "
-        "change is an error that everybody can see.</p>",
+        f"change is an error that everybody can see.{_BRAKED if braked else ''}</p>",
         f"rk4 takes {STEPS} steps to t = {number(t_end)} s. We halve the step. The error of where "
         "everything is then becomes smaller by a factor of about …",
         tuple([str(factor) for factor in FACTORS]),

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+import cgraph as cg
 from cgraph import Graph
-from dynamics import formulation_sizes, inverse_dynamics, momentum_rate, spurious_nodes
+from dynamics import formulation_sizes, inverse_dynamics, kinetic_energy, momentum_rate, spurious_nodes
 
 from .. import theme
 from ..graph_drawing.dark import to_adaptive
@@ -39,13 +40,20 @@ def euler_edge(subject: Subject) -> Screen:
         "We shrink dt from a second to a millionth of a second. The error of the torque by definition …",
         ("vanishes with dt", "tends to something that is not zero", "grows beyond all bounds"),
         1 if stays else 0,
-        _reveal(subject, errors, stays) + _second_try(float(np.abs(kinetic).max()), float(np.abs(torque).max())),
+        _reveal(subject, errors, stays)
+        + _second_try(subject, float(np.abs(kinetic).max()), float(np.abs(torque).max())),
         "Move dt, and the state. Both torques are those of the graphs, computed in this page.",
         _play(subject, right, wrong),
-        f"At dt = 1e-6 s the largest error is {number(last)}. Expect hands for A: a smaller step cures almost every "
-        "other error of a simulation. Listen for “but velocity does move position!” True along a motion, and the chain "
+        f"At dt = 1e-6 s the largest error is {number(last)}. {_expected(stays)} Listen for “but velocity does move position!” True along a motion, and the chain "
         "rule uses it; not in ∂L/∂q̇, where a state is varied that nothing has moved yet.",
     )
+
+
+def _expected(stays: bool) -> str:
+    """What a teacher expects of the class."""
+    if stays:
+        return "Expect hands for A: a smaller step cures almost every other error of a simulation."
+    return "A is right at this state, where ∂L/∂q is zero. Move the state: where it is not, the error stays."
 
 
 def _after_a_step(subject: Subject, wrong: Graph, dt: float) -> np.ndarray:
@@ -78,8 +86,8 @@ def _reveal(subject: Subject, errors: list[tuple[float, np.ndarray]], stays: boo
         "whole torque this meets the −∂L/∂q of Lagrange's equation, which is right, and takes it away. Weight and "
         "springs are in ∂L/∂q: <b>at rest the arm weighs nothing.</b></p>"
         if stays
-        else "<p><b>A.</b> The edge q̇ → q is there and does its damage, but here L hardly depends on q: ∂L/∂q is what "
-        "stays of the error, and it is zero at this state.</p>"
+        else "<p><b>A.</b> The edge q̇ → q is there, and p gains dt · ∂L/∂q by it. What stays of the error at the smallest "
+        "step is ∂L/∂q, and that is zero at this state.</p>"
     )
     joints = subject.joints[:SHOWN]
     rows = [[f"{dt:g}", *[number(error) for error in each[: len(joints)]]] for dt, each in errors]
@@ -88,14 +96,24 @@ def _reveal(subject: Subject, errors: list[tuple[float, np.ndarray]], stays: boo
     return said + _drawing(subject) + steps + table(sizes.caption, sizes.header, sizes.rows) + f"<p>{WHY_FEWER}</p>"
 
 
-def _second_try(error: float, torque: float) -> str:
-    """The kinetic energy alone, which is right by luck."""
-    told = (
-        f"Here the torque is then right, to {number(error)} of {number(torque)} N m: K does not change with the place."
-        if error <= _GONE * torque
-        else f"Here the torque is then still off by {number(error)} of {number(torque)} N m: how hard a joint is to turn "
-        "depends on how the others are bent, so K contains positions, and the edge does its damage there."
-    )
+def _second_try(subject: Subject, error: float, torque: float) -> str:
+    """The kinetic energy alone, which is right where it does not depend on the place."""
+    energy = cg.simplify(kinetic_energy(subject.system))
+    moving = not set(energy.nodes).isdisjoint(set(energy.inputs[: subject.system.nq]))
+    if error > _GONE * torque:
+        told = (
+            f"Here the torque is then still off by {number(error)} of {number(torque)}: how hard a joint is to turn "
+            "depends on where the others are, so K contains positions, and the edge does its damage there."
+        )
+    elif moving:
+        told = (
+            f"At this state the torque is then right, to {number(error)} of {number(torque)}. But K contains positions: "
+            "where its slope by them is not zero, the edge does its damage there."
+        )
+    else:
+        told = (
+            f"Here the torque is then right, to {number(error)} of {number(torque)}: K does not change with the place."
+        )
     return (
         "<p><b>A second try</b> keeps the step and takes the kinetic energy K alone for the momentum, since weight and springs "
         f"have no place in it. {told} The chain rule needs neither trick.</p>"

@@ -24,7 +24,7 @@ from .. import theme
 DT = 1e-3  # s, of the embedded formulations
 LARGEST = 4000  # nodes that the page computes many times a second
 SHOWN = 6  # joints with a slider or a row of their own; of more, the first
-_SPEEDS, _ACCELERATIONS, _BENDS = (1.0, -0.8, 0.6), (0.5, 1.0, -0.7), (0.0, -0.5, 0.8)  # in turn, for the joints
+_SPEEDS, _ACCELERATIONS, _BENDS = (1.0, -0.8, 0.6), (0.5, 1.0, -0.7), (0.0, -0.8, 0.9)  # in turn, for the joints
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,8 @@ def subject_of(model: Model) -> Subject:
     scene = moving_start(scene)
     q, qd, qdd = np.array(scene.q), _in_turn(_SPEEDS, system.n), _in_turn(_ACCELERATIONS, system.n)
     if system.n > 1 and system.kinematics.quasi is None:
-        q = q + _in_turn(_BENDS, system.n)  # a straight arm is a special place
+        q = q + _in_turn(_BENDS, system.n)  # a straight arm is a special place, and so is 0
+        q[q == 0.0] = 0.4
     if len(system.constraints):
         q, qd = consistent_state(scene, q, qd)
     return Subject(scene, q, qd, qdd, _letters(scene))

@@ -43,7 +43,7 @@ def torque_parts(subject: Subject) -> Screen:
         "why-this-torque",
         "Why this torque?",
         3,
-        f"<p>The system moves: {state}. The torque at a joint has three parts. One accelerates mass and vanishes with q̈. "
+        f"<p>The system moves: {state}. The torque at a joint, or the force where it slides, has three parts. One accelerates mass and vanishes with q̈. "
         "One comes from the velocities alone: what turns is carried around a bend. One is there even at rest.</p>",
         f"Which part is the largest at <b>{name}</b> in this state?",
         PARTS,

@@ -23,6 +23,7 @@ from viz import cli
 from viz.inspector.operations import operations
 from viz.lessons import lesson as module
 from viz.lessons.energy_and_step import energy_and_step
+from viz.lessons.euler_edge import euler_edge
 from viz.lessons.subject import lagrangian_graph, subject_of
 from viz.lessons.torque_parts import torque_parts
 
@@ -295,3 +296,28 @@ def test_the_address_holds_the_score(tmp_path):
     assert dom.count('<details class="reveal" open="">') == 2
     assert re.search(r'<a href="#1"[^>]*class="right"', dom)
     assert re.search(r'<a href="#2"[^>]*class="wrong"', dom)
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_what_is_said_of_a_cart_does_not_hang_on_the_order_of_its_coordinates(order: tuple[int, int]) -> None:
+    """Its kinetic energy has a cosine of the pendulum's angle in it, and the weight turns the pendulum."""
+
+    def energies(q: list[cg.Node], qd: list[cg.Node], t: cg.Node) -> cg.Node:
+        cart, swing, angle = qd[order[0]], qd[order[1]], q[order[1]]
+        kinetic = 1.25 * cart * cart + 0.4 * cart * swing * cg.cos(angle) + 0.16 * swing * swing
+        return kinetic + 3.924 * cg.cos(angle)
+
+    names = [("cart", "pendulum")[k] for k in order]
+    screen = euler_edge(subject_of(dyn.System(energies, names, damping=[0.4 * (k == 0) for k in order])))
+    assert screen.answer == 1
+    assert "K contains positions" in screen.reveal
+    assert (
+        "energy changes by right" in energy_and_step(subject_of(dyn.System(energies, names, damping=[0.4, 0.0]))).story
+    )
+
+
+def test_of_what_does_not_depend_on_its_place_the_first_answer_is_right_and_told_so() -> None:
+    screen = euler_edge(subject_of(free_block()))
+    assert screen.answer == 0
+    assert "K does not change with the place" in screen.reveal
+    assert "A is right at this state" in screen.note
