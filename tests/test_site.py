@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import cgraph as cg
-from tests.test_docs import ROOT, chromium
+from tests.test_docs import ROOT
 
 # Boxes that are cut, or wider than the article, and whether the page itself can be moved sideways. What scrolls inside
 # its box has the box's mark; of the elements inside such a box only the box counts.
@@ -52,18 +52,6 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def pages(site: Path) -> list[Path]:
     return sorted(path for path in site.rglob("*.html") if "_static" not in path.parts)
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    api = pytest.importorskip("playwright.sync_api", reason="the browser extra has it")
-    program = chromium()
-    if program is None:
-        pytest.skip("there is no Chromium on PATH")
-    with api.sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        yield opened
-        opened.close()
 
 
 @pytest.fixture

@@ -91,7 +91,7 @@ class Body:
             case ast.Expr(value):
                 self.expression(value)
             case _:
-                raise NotImplementedError(ast.unparse(node))
+                raise NotImplementedError(f"no WebAssembly for this text of an operation: {ast.unparse(node):.60}")
 
     def condition(self, node: ast.expr) -> None:
         """Instructions that leave an integer of 32 bits, not 0 where the condition holds."""
@@ -143,7 +143,7 @@ class Body:
             case ast.Call(ast.Name(name), arguments):
                 self._call(name, arguments)
             case _:
-                raise NotImplementedError(ast.unparse(node))
+                raise NotImplementedError(f"no WebAssembly for this text of an operation: {ast.unparse(node):.60}")
 
     def _call(self, name: str, arguments: list[ast.expr]) -> None:
         if name in ("load", "store", "word"):  # of an address and, at the end, its offset

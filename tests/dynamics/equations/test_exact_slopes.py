@@ -78,7 +78,7 @@ def test_slopes_of_random_trees_are_exact(seed: int, record_property: Any) -> No
     for name, each in found.items():
         off = errors(each, exact)
         print(name, tree.system.n, off)  # noqa: T201
-        record_property(name, off)
+        record_property(name, repr(off))
     require_exact(errors(found["ours"], exact))
 
 

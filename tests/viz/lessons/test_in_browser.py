@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-
 import pytest
 
 import dynamics as dyn
@@ -16,19 +14,6 @@ def lesson(tmp_path_factory):
     path = tmp_path_factory.mktemp("lesson") / "lesson.html"
     viz.lesson(dyn.planar_arm([1.0, 0.8], [1.0, 0.8]), path)
     return path.as_uri()
-
-
-@pytest.fixture(scope="module")
-def browser():
-    """A running Chromium."""
-    api = pytest.importorskip("playwright.sync_api", reason="the browser extra has it")
-    program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if program is None:
-        pytest.skip("no Chromium here")
-    with api.sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        yield opened
-        opened.close()
 
 
 @pytest.fixture

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-
 import pytest
 
 from viz import cli
@@ -11,18 +9,6 @@ from viz import cli
 SPRING = """import dynamics as dyn
 spring = dyn.System(lambda q, qd, t: (qd[0]**2 + 2 * qd[1]**2 - q[0]**2 - q[1]**2) / 2, ["<i>left", "right"])
 """
-
-
-@pytest.fixture(scope="module")
-def browser():
-    api = pytest.importorskip("playwright.sync_api", reason="the browser extra has it")
-    program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if program is None:
-        pytest.skip("there is no Chromium on PATH")
-    with api.sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        yield opened
-        opened.close()
 
 
 @pytest.fixture(scope="module")
