@@ -11,38 +11,57 @@ from .rotation_pairs import Rotation
 Step = Node | list[Rotation]
 
 
-def elimination_steps(arguments: Mapping[Node, Collection[Node]], rotations: Mapping[Node, Rotation]) -> list[Step]:
+def elimination_steps(
+    arguments: Mapping[Node, Collection[Node]], rotations: Mapping[Node, Rotation], *, fewest: bool = False
+) -> list[Step]:
     """Steps from the output down: a node, or rotations by one angle, once all nodes that use them are done.
 
     arguments: {node: those that its row of W t = b passes to}, arguments first. A rotation is there once, by its first
     sum, and wherever either sum is an argument.
 
     Of the nodes that are ready the one last in `arguments` is next; with a rotation, all ready ones by its angle. To
-    take the one that leaves the fewest live saves an eighth of the nodes of a planar chain, but more of them wait for
-    one another, and the machine code takes longer.
+    take the one that leaves the fewest live, `fewest`, saves an eighth of the nodes of a planar chain, but more of them
+    wait for one another, and the machine code takes longer. Between bodies fewer unknowns are left.
     """
     ordered = list(arguments)
     position = {node: i for i, node in enumerate(ordered)}
-    uses = dict.fromkeys(ordered, 0)  # by nodes that are not done
-    for args in arguments.values():
+    users: dict[Node, list[Node]] = {node: [] for node in ordered}
+    for node, args in arguments.items():
         for arg in args:
-            uses[arg] += 1
+            users[arg].append(node)
+    uses = {node: len(by) for node, by in users.items()}  # by nodes that are not done
+    new = {node: len(args) for node, args in arguments.items()}  # arguments that are not live
+    live: set[Node] = set()  # what a node that is done passes to
     by_angle: dict[Node, dict[Node, None]] = {r.cos: {} for r in rotations.values()}  # rotations that are ready
-    heap: list[int] = []
+    heap: list[tuple[int, int]] = []
+
+    def push(node: Node) -> None:
+        heappush(heap, (new[node] - (node in live) if fewest else 0, -position[node]))
 
     def make_ready(node: Node) -> None:
-        heappush(heap, -position[node])
+        push(node)
         if node in rotations:
             by_angle[rotations[node].cos][node] = None
 
-    for node, count in uses.items():
-        if not count:
-            make_ready(node)
+    def pass_to(arg: Node) -> None:
+        if fewest and arg not in live:
+            live.add(arg)
+            for user in users[arg]:
+                new[user] -= 1
+                if not uses[user] and user not in done:
+                    push(user)
+        uses[arg] -= 1
+        if not uses[arg]:
+            make_ready(arg)
+
     done: set[Node] = set()
     result: list[Step] = []
+    for node in ordered:
+        if not uses[node]:
+            make_ready(node)
     while heap:
-        node = ordered[-heappop(heap)]
-        if node in done:  # with another rotation by its angle
+        node = ordered[-heappop(heap)[1]]
+        if node in done:  # with another rotation by its angle, or by a better place
             continue
         batch = [node]
         if node in rotations:
@@ -55,7 +74,5 @@ def elimination_steps(arguments: Mapping[Node, Collection[Node]], rotations: Map
         done.update(batch)
         for finished in batch:
             for arg in arguments[finished]:
-                uses[arg] -= 1
-                if not uses[arg]:
-                    make_ready(arg)
+                pass_to(arg)
     return result

@@ -78,6 +78,10 @@ class EdgePushing(SymmetricElimination):
                 result[leaves_at.get(variable, variable)].append(leaves_at.get(multiplier, multiplier))
         return result
 
+    def unknown(self, node: Node) -> Node:
+        """What is called by a node in the step at hand."""
+        return node
+
     def reduce(self, step: Step) -> None:
         """Take the nodes of a step out of W t = b."""
         if isinstance(step, list):
@@ -94,18 +98,20 @@ class EdgePushing(SymmetricElimination):
         dots = self.dots
         if isinstance(step, list):  # (p, q) = R (x, y), R = [[c, s], [-s, c]]
             for r in step:
-                dots[r.first] = r.sign_x * (r.cos * dots[r.x] + r.sin * dots[r.y])
-                dots[r.second] = r.sign_y * (r.cos * dots[r.y] - r.sin * dots[r.x])
+                x, y = dots[self.unknown(r.x)], dots[self.unknown(r.y)]
+                dots[r.first] = r.sign_x * (r.cos * x + r.sin * y)
+                dots[r.second] = r.sign_y * (r.cos * y - r.sin * x)
         elif step in self.pivot_rows:
             if step not in dots:  # as is one that waited
                 dots[step] = self.solution(step, dots)
             dot = dots[step]
             if step in self.sums:  # z = p w + p' a, so t_w = p (t_z - p' t_a), as p = 1 / p
                 variable, other, p, p_other = self.sums[step]
-                rest = dot if other not in dots else dot - p_other * dots[other]
+                rest = dot if other not in self.depends else dot - p_other * dots[self.unknown(other)]
                 dots[variable] = p * rest
         else:  # t_z = sum_k p_k t_k
-            dots[step] = _total([self.product(step, p, dots[arg]) for arg, p in self.partials[step].items()])
+            terms = [self.product(step, p, dots[self.unknown(arg)]) for arg, p in self.partials[step].items()]
+            dots[step] = _total(terms)
 
     def finish(self) -> None:
         """Take out the unknowns that wait, and give them their tangents."""
@@ -125,6 +131,7 @@ class EdgePushing(SymmetricElimination):
         self.eliminate(node)
         if other in self.depends:
             self.bars[other] = self.bars.get(other, ZERO) + p_other * bar
+            other = self.unknown(other)
             self.rhs[other] = self.rhs.get(other, ZERO) - p_other * at_variable
 
     def push_rotations(self, group: Sequence[Rotation]) -> None:
@@ -143,9 +150,10 @@ class EdgePushing(SymmetricElimination):
                     outer.setdefault(other, {})[node] = sign * value
         for node in signs:
             self.matrix.pop(node)
-        for i, r in enumerate(group):
-            p, q, x, y, c, s = r[:6]
-            for table in (self.bars, self.rhs):  # (x, y) += R^T (p, q)
+        called = [r._replace(x=self.unknown(r.x), y=self.unknown(r.y)) for r in group]
+        for i, r in enumerate(called):
+            p, q, _, _, c, s = r[:6]
+            for table, (x, y) in ((self.bars, group[i][2:4]), (self.rhs, r[2:4])):  # (x, y) += R^T (p, q)
                 a, b = r.sign_x * table.pop(p, ZERO), r.sign_y * table.pop(q, ZERO)
                 table[x] = table.get(x, ZERO) + (c * a - s * b)
                 table[y] = table.get(y, ZERO) + (s * a + c * b)
@@ -153,7 +161,7 @@ class EdgePushing(SymmetricElimination):
                 a, b = row.get(p, ZERO), row.get(q, ZERO)
                 self.matrix.add_both(x, other, c * a - s * b)
                 self.matrix.add_both(y, other, s * a + c * b)
-            for earlier in group[:i]:
+            for earlier in called[:i]:
                 self._push_block(r, earlier, inner)
             self._push_diagonal_block(r, inner)
 
@@ -192,10 +200,11 @@ class EdgePushing(SymmetricElimination):
                     self.reached.pass_on(node.op, node, arg, partial)
         self.partials[node] = partials
         for arg, p in partials.items():
+            a = self.unknown(arg)
             self.bars[arg] = self.bars.get(arg, ZERO) + self.product(node, bar, p)
-            self.rhs[arg] = self.rhs.get(arg, ZERO) + self.product(node, p, rhs)
+            self.rhs[a] = self.rhs.get(a, ZERO) + self.product(node, p, rhs)
             for other, value in row.items():
-                self.matrix.add_both(arg, other, self.product(node, p, value))
+                self.matrix.add_both(a, other, self.product(node, p, value))
         self.push_second_order(node, partials, diagonal)
         if bar.value != 0.0:
             self.add_local_hessian(node, bar)
@@ -211,7 +220,7 @@ class EdgePushing(SymmetricElimination):
             for i, a in enumerate(args):
                 scaled = self.product(node, diagonal, partials[a])
                 for b in args[: i + 1]:
-                    self.matrix.add(a, b, self.product(node, scaled, partials[b]))
+                    self.matrix.add(self.unknown(a), self.unknown(b), self.product(node, scaled, partials[b]))
 
     def add_local_hessian(self, node: Node, bar: Node) -> None:
         """W_kj += zbar d2z/(da_k da_j); an argument in two slots gets both mixed terms."""
@@ -219,7 +228,7 @@ class EdgePushing(SymmetricElimination):
             a, b = node.args[j], node.args[k]
             if a in self.depends and b in self.depends:
                 term = self.product(node, bar, second)
-                self.matrix.add(a, b, 2.0 * term if a is b and j != k else term)
+                self.matrix.add(self.unknown(a), self.unknown(b), 2.0 * term if a is b and j != k else term)
 
 
 def _total(terms: list[Node]) -> Node:

@@ -53,7 +53,7 @@ class SymmetricElimination:
     def __init__(self, rhs: dict[Node, Node], place: Mapping[Node, int]) -> None:
         self.matrix = SymmetricMatrix()
         self.rhs = rhs
-        self.place = place
+        self.place = dict(place)
         self.pivot_rows: dict[Node, PivotRow] = {}  # in the order of elimination
         self._waiting: list[Node] = []
         self._pairs: list[tuple[Node, Node]] = []
@@ -79,13 +79,17 @@ class SymmetricElimination:
         Raises SingularError if a row has nothing but zeros.
         """
         before = len(self.pivot_rows)
-        while self._waiting:
-            waiting, self._waiting = self._waiting, []
-            for i in waiting:
-                self.eliminate(i)
+        while waiting := self.retry():
             if len(self._waiting) == len(waiting):
                 self._eliminate_pair(waiting[0])
         return list(self.pivot_rows)[before:][::-1]
+
+    def retry(self) -> list[Node]:
+        """Take out those of the unknowns that waited whose pivots have been filled; and what waited."""
+        waiting, self._waiting = self._waiting, []
+        for i in waiting:
+            self.eliminate(i)
+        return waiting
 
     def _eliminate_pair(self, i: Node) -> None:
         """Take out i and the first j that it stands with, W_ii = W_jj = 0: t_i = (b_j - sum_k W_jk t_k) / W_ij."""

@@ -1,0 +1,201 @@
+"""Elimination by nested dissection: pieces of W t = b that leave at the same time, each seen from its two ends only.
+
+A node z that other pieces use is there once more for them: a copy c with t_c = t_z, held by a multiplier m,
+
+    [[W_cc, 1], [1, 0]] in the rows of (c, m),   W_zm = -1.
+
+So every piece can be eliminated by itself. Of what lies between its ends there remain, at its copies c and at the
+multipliers m of its nodes: the inertia J that it shows the one, the mobility C that it shows the other, W_mm = -C, and
+what it passes on, W_mc. Two pieces meet in the pairs (c, m) between them: with both gone, so are the pieces, and of
+positive definite parts the pivots [[J, u], [u, -C]] have the determinant -(J C + u^2) < 0. For a chain of bodies that is
+the divide and conquer of Featherstone (1999), in inertias and mobilities.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from heapq import heapify, heappop, heappush
+from typing import NamedTuple
+
+from ..core.node import Node, as_node, variable
+from ..simplify.builder import Builder
+from .dissection import Piece, dissect
+from .elimination_order import Step
+from .schur_elimination import ONE, EdgePushing
+from .symmetric_elimination import PivotRow
+from .symmetric_matrix import ZERO, SymmetricMatrix
+
+
+class Copy(NamedTuple):
+    """What stands for a node in other pieces, and the multiplier that holds it there."""
+
+    copy: Node
+    multiplier: Node
+
+
+class BalancedElimination(EdgePushing):
+    """As EdgePushing, in pieces.
+
+    plan: the steps.  rows: the unknowns that each step leaves entries with, see `written_rows`.
+    """
+
+    def __init__(
+        self,
+        build: Builder,
+        output: Node,
+        rhs: dict[Node, Node],
+        at: Mapping[Node, Node],
+        order: Sequence[Node],
+        plan: Sequence[Step],
+        rows: Sequence[Collection[Node]],
+    ) -> None:
+        super().__init__(build, output, rhs, at, order)
+        place = {node: k for k, step in enumerate(plan) for node in nodes_of(step)}
+        for node, terms in self.sums.items():
+            place[terms.variable] = place[node]
+        later = [{place[node] for node in row if place[node] > k} for k, row in enumerate(rows)]
+        pieces = dissect(later, [self._is_variable(step) for step in plan], [len(nodes_of(step)) for step in plan])
+        self._piece = {node: pieces[k] for node, k in place.items()}
+        self._copies: dict[Node, Copy] = {}
+        self._leaving: dict[int, list[Node]] = {}  # the nodes whose copies leave after the step at a place
+        self._cut(plan, rows, pieces)
+        self._place = place
+        self._here = pieces[0] if pieces else None
+        self._after: dict[int, list[Node]] = {}  # what left after the step at a place
+        self._depths: dict[Node, int] = {}
+
+    def _is_variable(self, step: Step) -> bool:
+        return not isinstance(step, list) and (step in self.sums or step in self.position)
+
+    def _cut(self, plan: Sequence[Step], rows: Sequence[Collection[Node]], pieces: Sequence[Piece]) -> None:
+        """Copies of the nodes that steps of other pieces pass to, and where they leave."""
+        within: dict[Node, Piece | None] = {}  # the piece that holds the node and all that pass to it
+        for step, row, piece in zip(plan, rows, pieces, strict=True):
+            for node in self._passed_to(step):
+                here = self._piece[node]
+                if node in row and piece.common(here) is not here:
+                    wider = within.get(node, here)
+                    within[node] = wider and wider.common(piece)
+        for node, whole in within.items():
+            if whole is not None:
+                i = len(self._copies)
+                self._copies[node] = Copy(variable(f"copy{i}#"), variable(f"multiplier{i}#"))
+                self._leaving.setdefault(whole.last, []).append(node)
+        for nodes in self._leaving.values():
+            nodes.sort(key=lambda node: -(within[node] or pieces[0]).depth)
+
+    def _passed_to(self, step: Step) -> Iterable[Node]:
+        if isinstance(step, list):
+            return [node for r in step for node in (r.x, r.y)]
+        return [arg for arg in step.args if arg in self.depends]
+
+    def unknown(self, node: Node) -> Node:
+        """The node, or its copy where the step at hand is of another piece."""
+        copy = self._copies.get(node)
+        here = self._piece[node]
+        return node if copy is None or self._here is None or self._here.common(here) is here else copy.copy
+
+    def reduce(self, step: Step) -> None:
+        """Take the nodes of a step out, and after it the pairs between pieces that are done."""
+        nodes = nodes_of(step)
+        self._here, k = self._piece[nodes[0]], self._place[nodes[0]]
+        for node in nodes:
+            if node in self._copies:
+                copy, multiplier = self._copies[node]
+                self.matrix.add(node, multiplier, as_node(-1.0))
+                self.matrix.add(copy, multiplier, ONE)
+        super().reduce(step)
+        before = len(self.pivot_rows)
+        for node in self._leaving.get(k, ()):
+            self.eliminate_tied(*self._copies[node])
+            self.retry()
+        self._after[k] = list(self.pivot_rows)[before:]
+
+    def substitute(self, step: Step) -> None:
+        """The tangents of what left with a step."""
+        nodes = nodes_of(step)
+        self._here, k = self._piece[nodes[0]], self._place[nodes[0]]
+        for unknown in reversed(self._after[k]):
+            self.dots[unknown] = self.solution(unknown, self.dots)
+        super().substitute(step)
+
+    def eliminate_tied(self, i: Node, j: Node) -> None:
+        """Take out a copy i and its multiplier j at once, by the pivot [[W_ii, W_ij], [W_ij, W_jj]]."""
+        a, row_i = self.matrix.pop(i)
+        u = row_i.pop(j)
+        e, row_j = self.matrix.pop(j)
+        rhs_i, rhs_j = self.rhs.pop(i, ZERO), self.rhs.pop(j, ZERO)
+        det = a * e - u * u
+        jj, ij, ii = a / det, -(u / det), e / det  # of the inverse
+        others = list(dict.fromkeys([*row_i, *row_j]))
+        gains_i = {k: ii * row_i.get(k, ZERO) + ij * row_j.get(k, ZERO) for k in others}
+        gains_j = {k: ij * row_i.get(k, ZERO) + jj * row_j.get(k, ZERO) for k in others}
+        for n, k in enumerate(others):
+            for m in others[: n + 1]:
+                self.matrix.add(k, m, -(gains_i[k] * row_i.get(m, ZERO) + gains_j[k] * row_j.get(m, ZERO)))
+            self.rhs[k] = self.rhs.get(k, ZERO) - (gains_i[k] * rhs_i + gains_j[k] * rhs_j)
+        last = next((k for k in reversed(self.pivot_rows) if k in self.place), None)
+        self.place[i] = self.place[j] = 0 if last is None else self.place[last]
+        self.pivot_rows[i] = PivotRow(det, ii * rhs_i + ij * rhs_j, gains_i)
+        self.pivot_rows[j] = PivotRow(as_node(-1.0), ij * rhs_i + jj * rhs_j, gains_j)
+
+    def solution(self, i: Node, known: Mapping[Node, Node]) -> Node:
+        """As of the base class, the shallowest terms first."""
+        _, constant, gains = self.pivot_rows[i]
+        terms = [(constant, False), *[(gain * known[other], True) for other, gain in gains.items()]]
+        heap = [(self._depth(node), n, node, negative) for n, (node, negative) in enumerate(terms)]
+        heapify(heap)
+        n = len(heap)
+        while len(heap) > 1:
+            _, _, a, negative = heappop(heap)
+            _, _, b, other_negative = heappop(heap)
+            total = a + b if negative == other_negative else b - a if negative else a - b
+            n += 1
+            heappush(heap, (self._depth(total), n, total, negative and other_negative))
+        _, _, total, negative = heap[0]
+        return -total if negative else total
+
+    def info(self, negative: Collection[Node] = ()) -> Node:
+        """As of the base class; a pair that has not one positive eigenvalue counts as the variable before it."""
+        return super().info({*negative, *[unknown for pair in self._copies.values() for unknown in pair]})
+
+    def _depth(self, node: Node) -> int:
+        """The edges of the longest path to a node."""
+        waiting = [node]
+        while waiting:
+            last = waiting[-1]
+            deeper = [arg for arg in last.args if arg not in self._depths]
+            waiting += deeper
+            if not deeper:
+                self._depths[waiting.pop()] = max([self._depths[arg] + 1 for arg in last.args], default=0)
+        return self._depths[node]
+
+
+class WrittenMatrix(SymmetricMatrix):
+    """A matrix that notes the unknowns whose rows are written to."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.written: set[Node] = set()
+
+    def add(self, a: Node, b: Node, value: Node) -> None:
+        """As of the base class."""
+        if value.value != 0.0:
+            self.written |= {a, b}
+        super().add(a, b, value)
+
+
+def written_rows(equations: EdgePushing, plan: Sequence[Step]) -> list[set[Node]]:
+    """The unknowns that each step leaves entries of W with, when all leave in the order of the plan."""
+    equations.matrix = matrix = WrittenMatrix()
+    rows = []
+    for step in plan:
+        equations.reduce(step)
+        rows.append(matrix.written)
+        matrix.written = set()
+    return rows
+
+
+def nodes_of(step: Step) -> list[Node]:
+    """The nodes of a step."""
+    return [node for r in step for node in (r.first, r.second)] if isinstance(step, list) else [step]
