@@ -61,6 +61,7 @@ from .core.structure_hash import structure_hash
 from .errors import GraphError
 from .explain import Comparison, Lint, Why, WhyNot, compare, lint, why, why_not
 from .program import Loop, loop
+from .simplify.balanced_sums import balanced_sums
 from .simplify.double_double import double_double
 from .simplify.simplify import simplify, specialize
 from .util.version import __version__ as __version__
@@ -83,6 +84,7 @@ __all__ = [
     "asin",
     "atan",
     "atan2",
+    "balanced_sums",
     "cbrt",
     "ceil",
     "clear_cache",

@@ -44,7 +44,7 @@ what a notebook shows of a result; `install` ends an error about a missing packa
 
 from .autodiff.compressed_jacobian import CompressedJacobian, compressed_jacobian
 from .autodiff.forward import tangents
-from .autodiff.hessian_solve import solve_nodes, solve_tangents
+from .autodiff.hessian_solve import Order, solve_nodes, solve_tangents
 from .autodiff.jacobian import hessian_nodes
 from .autodiff.ldl_solve import ldl_elimination, ldl_solve
 from .autodiff.reverse import cotangents
@@ -102,6 +102,7 @@ __all__ = [
     "Names",
     "Notation",
     "Op",
+    "Order",
     "Polynomial",
     "Program",
     "Record",

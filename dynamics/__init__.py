@@ -9,8 +9,8 @@ from .equations.consistent_state import consistent_state
 from .equations.constraint_lint import ConstraintLint, lint_constraints
 from .equations.constraint_rank import ConstraintWarning
 from .equations.coriolis import coriolis, damping_force
-from .equations.energies import kinetic_energy, potential_energy
-from .equations.equations_of_motion import bias, energy, forward_dynamics, gravity_force, mass_matrix, momentum
+from .equations.energies import energy, kinetic_energy, potential_energy
+from .equations.equations_of_motion import bias, forward_dynamics, gravity_force, mass_matrix, momentum
 from .equations.formulation_sizes import formulation_sizes
 from .equations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious_nodes
 from .equations.hamiltonian import hamilton_equations, hamiltonian

@@ -104,7 +104,7 @@ MODEL_ALONE = """as_system bias center_of_mass center_of_mass_jacobian conserved
 
 CALLS = {
     **{f"cg.{op.name}": call(function(op), *[X] * op.arity) for op in OPS.values()},
-    **{f"cg.{name}": call(getattr(cg, name), GRAPH) for name in ("simplify", "structure_hash")},
+    **{f"cg.{name}": call(getattr(cg, name), GRAPH) for name in ("balanced_sums", "simplify", "structure_hash")},
     **{f"cg.{name}": call(getattr(cg, name), GRAPH, wrt=None) for name in ("gradient", "hessian", "jacobian")},
     **{f"cg.{name}": call(getattr(cg, name), GRAPH, wrt=None) for name in ("jvp", "sparsity", "vjp")},
     "cg.compare": call(cg.compare, GRAPH, SQUARES, atoms=(), classify=None, names=None),
@@ -368,6 +368,7 @@ GRAPH_FIRST = [
     (cg.jvp, ()),
     (cg.lint, ()),
     (cg.loop, ({},)),
+    (cg.balanced_sums, ()),
     (cg.simplify, ()),
     (cg.sparsity, ()),
     (cg.specialize, ({},)),

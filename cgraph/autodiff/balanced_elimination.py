@@ -6,9 +6,9 @@ A node z that other pieces use is there once more for them: a copy c with t_c = 
 
 So every piece can be eliminated by itself. Of what lies between its ends there remain, at its copies c and at the
 multipliers m of its nodes: the inertia J that it shows the one, the mobility C that it shows the other, W_mm = -C, and
-what it passes on, W_mc. Two pieces meet in the pairs (c, m) between them: with both gone, so are the pieces, and of
-positive definite parts the pivots [[J, u], [u, -C]] have the determinant -(J C + u^2) < 0. For a chain of bodies that is
-the divide and conquer of Featherstone (1999), in inertias and mobilities.
+what it passes on, W_mc. Two pieces meet in the pairs (c, m) between them: with both gone, so are the pieces. The pivots
+[[J, u], [u, -C]] of positive definite parts have the determinant -(J C + u^2) < 0. For a chain of bodies that is the
+divide and conquer of Featherstone (1999), in inertias and mobilities.
 """
 
 from __future__ import annotations

@@ -50,11 +50,10 @@ def hessian_solve(
         then x is huge.
     order : {"recursive", "balanced"}
         "recursive": from the output down, for a chain or a tree from its tips to its base, one after another: the
-        fewest nodes, a depth in proportion to the length of a chain. "balanced": nested dissection, halves of a chain at
-        the same time, seen from their two ends only: a depth in proportion to the logarithm, at the price of more
-        nodes, about twice as many where two unknowns cross between bodies (planar chains) and three to four times where
-        five do (hinges in space). Pieces are eliminated with the inertia that they have by themselves, so that a body of
-        next to none costs digits; with `check`, their pivots have to be positive as well.
+        fewest nodes, and a depth in proportion to the length of a chain. "balanced": by nested dissection, halves of a
+        chain at the same time, seen from their two ends only, and long sums in blocks (`cg.balanced_sums`): a depth in
+        proportion to the logarithm, for up to twice the nodes. Pieces are eliminated with the inertia that they have by
+        themselves: a body of next to none costs digits, and with `check` their pivots have to be positive as well.
 
     Returns
     -------

@@ -32,9 +32,9 @@ class Block(NamedTuple):
 def balanced_sums(graph: Graph) -> Graph:
     """The same function with long running sums in blocks of 2, 4, 8 .. terms: their depth is the logarithm of n.
 
-    A partial sum of k terms is made of the blocks that the binary digits of k stand for (Fenwick's tree). So n terms,
-    with all partial sums, take at most 2 n additions, 2 log2 n deep, where one after another they take n. Sums of less
-    than 16 terms stay. Values can differ by rounding, which grows with log n in place of n.
+    A partial sum of k terms is made of the blocks that the binary digits of k stand for (as in Fenwick's tree). One sum
+    of n terms takes n - 1 additions as before, and is log2 n + 1 deep at most; all of its partial sums take about
+    n log2(n) / 2. Sums of less than 16 terms stay. Values can differ by rounding, which grows with log n in place of n.
 
     Parameters
     ----------

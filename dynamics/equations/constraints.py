@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, building, cotangents, hessian_nodes, ldl_solve, solve_nodes, topological
+from cgraph.extend import Builder, Order, building, cotangents, hessian_nodes, ldl_solve, solve_nodes, topological
 
 from ..systems.system import System
 from .bias_terms import BiasTerms
@@ -62,13 +62,27 @@ def unknown_names(system: System) -> list[str]:
     return [*[f"coordinate {name!r}" for name in system.velocities], *names]
 
 
+def require_no_constraints(system: System) -> None:
+    """Raises ValueError for a system with constraints: their multipliers have no place in the balanced order."""
+    if len(system.constraints):
+        name = system.constraints.names[0]
+        raise ValueError(f'method "balanced" needs a system without constraints, got constraint {name!r}')
+
+
 def solved_by_elimination(
-    system: System, terms: BiasTerms, rows: Rows, rhs: Sequence[Node], at: dict[Node, Node], build: Builder, check: bool
+    system: System,
+    terms: BiasTerms,
+    rows: Rows,
+    rhs: Sequence[Node],
+    at: dict[Node, Node],
+    build: Builder,
+    check: bool,
+    order: Order,
 ) -> list[Node]:
     """(udot, s) and with `check` the info, without forming a matrix."""
     s = rows.multipliers
     function = rows.function(terms.lagrangian, build)
-    return solve_nodes(function, [*system.qd, *s], rhs, build, at=at, multipliers=s, check=check)
+    return solve_nodes(function, [*system.qd, *s], rhs, build, at=at, multipliers=s, check=check, order=order)
 
 
 class DenseSolver:

@@ -1,4 +1,4 @@
-"""Kinetic and potential energy as graphs."""
+"""Total, kinetic and potential energy as graphs."""
 
 from __future__ import annotations
 
@@ -12,6 +12,45 @@ from ..systems.system import System
 from .formulations import ONE, ZERO
 from .shorter_form import shorter_form
 from .substitute import substitute
+
+
+def energy(model: Model) -> Graph:
+    """Total energy E = qd . dL/dqd - L, which is K + P for a kinetic energy quadratic in qd.
+
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene.
+
+    Returns
+    -------
+    Graph
+        Inputs q0.., qd0.., t if needed, parameters; output E [J].
+
+    Raises
+    ------
+    TypeError
+        For what is no model, or has no Lagrangian.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> spring = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 2.0 * q[0] ** 2, ["x"])
+    >>> dyn.energy(spring).evaluate({"q0": 1.0, "qd0": 2.0})
+    {'E': 4.0}
+    """
+
+    def derive(system: System) -> Graph:
+        build = Builder()
+        bars = cotangents({system.lagrangian: ONE}, system.qd, build)
+        with building(build):
+            total: Node = ZERO
+            for p, qd in zip(bars, system.qd, strict=True):
+                total = total + p * qd
+            total = total - system.lagrangian
+        return cg.simplify(system.graph({"E": total}, system.q, system.qd))
+
+    return shorter_form(as_system(model), derive)
 
 
 def kinetic_energy(model: Model) -> Graph:

@@ -1,17 +1,33 @@
-"""Equations of motion as graphs: mass matrix, bias, momentum, energy, and forward dynamics."""
+"""Equations of motion as graphs: mass matrix, bias, momentum, and forward dynamics."""
 
 from __future__ import annotations
 
 import cgraph as cg
-from cgraph import Graph, Node
-from cgraph.extend import Builder, SingularError, building, cotangents, hessian_nodes, require_choice, require_flag
+from cgraph import Graph
+from cgraph.extend import (
+    Builder,
+    Order,
+    SingularError,
+    building,
+    cotangents,
+    hessian_nodes,
+    require_choice,
+    require_flag,
+)
 
 from ..systems.body_system import BodySystem
 from ..systems.constraints import ConstraintError
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .bias_terms import BiasTerms, bias_terms, bias_terms_of_lagrangian
-from .constraints import DenseSolver, constraint_rows, multiplier_outputs, solved_by_elimination, unknown_names
+from .constraints import (
+    DenseSolver,
+    constraint_rows,
+    multiplier_outputs,
+    require_no_constraints,
+    solved_by_elimination,
+    unknown_names,
+)
 from .formulations import ONE, ZERO
 from .inertia_rank import without_inertia
 from .shorter_form import shorter_form
@@ -159,46 +175,7 @@ def momentum(model: Model) -> Graph:
     return shorter_form(as_system(model), derive)
 
 
-def energy(model: Model) -> Graph:
-    """Total energy E = qd . dL/dqd - L, which is K + P for a kinetic energy quadratic in qd.
-
-    Parameters
-    ----------
-    model : Model
-        A system, a mechanism or a scene.
-
-    Returns
-    -------
-    Graph
-        Inputs q0.., qd0.., t if needed, parameters; output E [J].
-
-    Raises
-    ------
-    TypeError
-        For what is no model, or has no Lagrangian.
-
-    Examples
-    --------
-    >>> import dynamics as dyn
-    >>> spring = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 2.0 * q[0] ** 2, ["x"])
-    >>> dyn.energy(spring).evaluate({"q0": 1.0, "qd0": 2.0})
-    {'E': 4.0}
-    """
-
-    def derive(system: System) -> Graph:
-        build = Builder()
-        bars = cotangents({system.lagrangian: ONE}, system.qd, build)
-        with building(build):
-            total: Node = ZERO
-            for p, qd in zip(bars, system.qd, strict=True):
-                total = total + p * qd
-            total = total - system.lagrangian
-        return cg.simplify(system.graph({"E": total}, system.q, system.qd))
-
-    return shorter_form(as_system(model), derive)
-
-
-SOLUTIONS = ("auto", "recursive", "dense")
+SOLUTIONS = ("auto", "recursive", "dense", "balanced")
 DENSE_UP_TO = 6  # coordinates; beyond, the dense graph is larger on a tree of bodies, and takes long to build
 WORTH = 0.9  # of the recursive graph's nodes, at most, for the dense one: elimination keeps more digits
 
@@ -212,11 +189,13 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
     ----------
     model : Model
         A system, a mechanism or a scene with n coordinates.
-    method : {"auto", "recursive", "dense"}
+    method : {"auto", "recursive", "dense", "balanced"}
         "recursive": elimination on the graph of L without forming M (`cg.hessian_solve`); for a tree of bodies the
         number of nodes is linear in n. "dense": M factored as LDL^T; smaller for some short arms, and less accurate
         where masses or lengths differ by decades. "auto": recursive, but up to 6 coordinates dense where that saves
-        more than a tenth of the nodes.
+        more than a tenth of the nodes. "balanced": elimination of halves of a chain at the same time, and long sums in
+        blocks, so that of a planar chain the depth is O(log n), for about twice the nodes (`cg.hessian_solve`); not
+        with constraints.
     check : bool
         One more output, `info`: 0 where M is positive definite, else 1 + the index of the coordinate whose inertia
         is zero or negative after elimination; the accelerations mean nothing there. `raise_if_singular` raises on it.
@@ -239,7 +218,7 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
         M is singular at every state, or with `check` not positive definite at any; the message names the coordinates.
         An indefinite M that is regular is solved with.
     ValueError
-        For an unknown method.
+        For an unknown method, or one that takes no constraints.
     TypeError
         For what is no model, or has no Lagrangian.
 
@@ -263,6 +242,8 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
     require_flag("check", check)
     if check and method == "dense" and len(as_system(model).constraints):
         raise ValueError('check needs method="recursive" or "auto" where there are constraints, got "dense"')
+    if method == "balanced":
+        require_no_constraints(as_system(model))
     return shorter_form(as_system(model), lambda system: accelerations(system, method, check))
 
 
@@ -324,7 +305,7 @@ def _solved(system: System, terms: BiasTerms, method: str, check: bool) -> Graph
     with building(build):
         # What stands at the coordinates already. Elimination takes the inertial terms where they are, at their
         # velocity nodes, and carries them to the coordinates on its way; a dense solve needs the whole bias here.
-        at_rest = terms.gradient if method == "recursive" else [-force for force in terms.bias(system, build)]
+        at_rest = terms.gradient if method != "dense" else [-force for force in terms.bias(system, build)]
         with cg.tag("damping"):
             braking = [damping * qd for damping, qd in zip(system.damping, system.qd, strict=True)]
         rhs = [
@@ -333,12 +314,14 @@ def _solved(system: System, terms: BiasTerms, method: str, check: bool) -> Graph
         ]
         inertial = {velocity: -force for velocity, force in terms.inertial.items()}
         rhs += [-change for change in system.constraints.rate_changes(rows.rates, build)]
-    if method == "recursive":
-        solved = solved_by_elimination(system, terms, rows, rhs, inertial, build, check)
+    if method != "dense":
+        order: Order = "balanced" if method == "balanced" else "recursive"
+        solved = solved_by_elimination(system, terms, rows, rhs, inertial, build, check, order)
     else:
         solved = DenseSolver(system, terms.lagrangian, rows, build).solve(rhs, check)
     end = system.n + len(rows.kept)
     outputs = {f"qdd{i}": node for i, node in enumerate(solved[: system.n])}
     outputs |= multiplier_outputs(system, rows, solved[system.n : end], build)
     outputs |= dict(zip(("info",), solved[end:], strict=False))
-    return cg.simplify(system.graph(outputs, system.q, system.qd, system.tau))
+    graph = cg.simplify(system.graph(outputs, system.q, system.qd, system.tau))
+    return cg.balanced_sums(graph) if method == "balanced" else graph

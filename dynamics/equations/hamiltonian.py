@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, building, cotangents, require_flag, require_whole
+from cgraph.extend import Builder, Order, building, cotangents, require_choice, require_flag, require_whole
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
@@ -74,7 +76,9 @@ def hamiltonian(model: Model, *, iterations: int = ITERATIONS) -> Graph:
     return shorter_form(as_system(model), derive)
 
 
-def hamilton_equations(model: Model, *, iterations: int = ITERATIONS, check: bool = False) -> Graph:
+def hamilton_equations(
+    model: Model, method: str = "recursive", *, iterations: int = ITERATIONS, check: bool = False
+) -> Graph:
     """Hamilton's equations: qd of the momenta, and their rates p_dot = dL/dq + tau + forces - damping * qd.
 
     dL/dq is taken at fixed velocities, and is -dH/dq. Of quasi-velocities u, whose momenta are p = dL/du, the rates
@@ -85,6 +89,9 @@ def hamilton_equations(model: Model, *, iterations: int = ITERATIONS, check: boo
     ----------
     model : Model
         A system, a mechanism or a scene with n velocities, without constraints.
+    method : {"recursive", "balanced"}
+        How the velocities are solved for: "recursive", the fewest nodes, or "balanced", with long sums in blocks, which
+        is O(log n) deep for a planar chain and takes more nodes, see `cg.hessian_solve`.
     iterations : int
         Newton's steps to the velocities where L is not quadratic in them. The error of what comes out is about the
         square of the last step.
@@ -104,7 +111,7 @@ def hamilton_equations(model: Model, *, iterations: int = ITERATIONS, check: boo
     ConstraintError
         For a model with constraints.
     ValueError
-        For a parameter that is called like a momentum.
+        For a parameter that is called like a momentum, or an unknown method.
     TypeError
         For what is no model, or has no Lagrangian.
 
@@ -117,7 +124,8 @@ def hamilton_equations(model: Model, *, iterations: int = ITERATIONS, check: boo
     """
     count = require_whole("iterations", iterations, 1)
     require_flag("check", check)
-    return shorter_form(as_system(model), lambda system: _equations(system, count, check))
+    order: Order = "balanced" if require_choice("method", method, get_args(Order)) == "balanced" else "recursive"
+    return shorter_form(as_system(model), lambda system: _equations(system, count, check, order))
 
 
 def velocities(system: System) -> Graph:
@@ -127,9 +135,9 @@ def velocities(system: System) -> Graph:
     return cg.simplify(system.graph(outputs, system.q, transform.p))
 
 
-def _equations(system: System, iterations: int, check: bool) -> Graph:
+def _equations(system: System, iterations: int, check: bool, order: Order) -> Graph:
     build = Builder()
-    transform = Legendre(system, build, iterations)
+    transform = Legendre(system, build, iterations, order)
     stated = system.momentum_rates(transform.p)
     if stated is None:
         gradient = cotangents({transform.lagrangian: ONE}, system.q, build)
@@ -151,7 +159,8 @@ def _equations(system: System, iterations: int, check: bool) -> Graph:
             with building(build):
                 left = [p - momentum for p, momentum in zip(transform.p, here, strict=True)]
         outputs |= {f"missing{i}": node for i, node in enumerate(left)}
-    return cg.simplify(system.graph(outputs, system.q, transform.p, system.tau))
+    graph = cg.simplify(system.graph(outputs, system.q, transform.p, system.tau))
+    return cg.balanced_sums(graph) if order == "balanced" else graph
 
 
 def _dot(a: list[Node], b: list[Node]) -> Node:

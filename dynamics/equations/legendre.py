@@ -7,7 +7,7 @@ from functools import cached_property
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, SingularError, building, cotangents, folded, solve_tangents, topological
+from cgraph.extend import Builder, Order, SingularError, building, cotangents, folded, solve_tangents, topological
 
 from ..systems.body_system import BodySystem
 from ..systems.constraints import ConstraintError
@@ -26,14 +26,14 @@ class Legendre:
     p: variables p0, p1, ...  lagrangian: L, folded.  quadratic: whether the solution does not depend on u.
     """
 
-    def __init__(self, system: System, build: Builder, iterations: int) -> None:
+    def __init__(self, system: System, build: Builder, iterations: int, order: Order = "recursive") -> None:
         _require_canonical(system)
         self.system, self.build, self.iterations = system, build, iterations
         self.p = cg.variables([f"p{i}" for i in range(system.n)])
         (self.lagrangian,) = folded([system.lagrangian], build)
         self._at_rest: dict[Node, Node] = dict.fromkeys(system.qd, ZERO)
         try:
-            solved = solve_tangents(self.lagrangian, system.qd, system.tau, build)
+            solved = solve_tangents(self.lagrangian, system.qd, system.tau, build, order=order)
         except SingularError as error:
             raise SingularMassMatrixError(no_inertia(system, error)) from None
         solution = [solved[u] for u in system.qd]

@@ -11,7 +11,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import topological
 
-from ..equations.equations_of_motion import energy
+from ..equations.energies import energy
 from ..equations.projection import projection
 from ..equations.state_equation import normalization, state_inputs, with_multipliers
 from ..systems.arguments import TIME, Parameters, call_user_function

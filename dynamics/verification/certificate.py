@@ -15,7 +15,8 @@ from cgraph import Graph
 from cgraph.extend import Builder, cotangents, real_number, require_whole, tangents
 
 from ..equations.coriolis import coriolis, require_quadratic
-from ..equations.equations_of_motion import bias, energy, forward_dynamics, gravity_force, mass_matrix
+from ..equations.energies import energy
+from ..equations.equations_of_motion import bias, forward_dynamics, gravity_force, mass_matrix
 from ..equations.evaluate_at import Array, evaluate_at
 from ..equations.formulations import ONE, ZERO, inverse_dynamics
 from ..equations.inertia_rank import balanced

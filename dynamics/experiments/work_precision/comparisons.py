@@ -16,7 +16,7 @@ import numpy as np
 import cgraph as cg
 from cgraph.extend import Array
 
-from ...equations.equations_of_motion import energy as energy_graph
+from ...equations.energies import energy as energy_graph
 from ...integrators import METHODS, Problem
 from ...multibody.planar_arm import planar_arm
 from ...peers import UnavailableError

@@ -15,7 +15,7 @@ import numpy as np
 from cgraph import Graph
 from cgraph.extend import Array
 
-from ...equations.equations_of_motion import energy
+from ...equations.energies import energy
 from ...integrators import Problem
 from ...reference import Reference
 from ...systems.model import as_system

@@ -9,7 +9,7 @@ from typing import Any
 import cgraph as cg
 from cgraph import Graph, Node
 
-from ....equations.equations_of_motion import energy
+from ....equations.energies import energy
 from ....systems.model import Model, as_ode, as_system
 from ...setting import Setting
 

@@ -1,0 +1,121 @@
+"""The balanced order of elimination on bodies: how deep, how many nodes, how exact; equal to the recursive one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cgraph as cg
+import dynamics as dyn
+from cgraph.autodiff import dissection
+from cgraph.extend import solve_nodes
+from dynamics.experiments.speed.bench_scenes import chain
+from dynamics.systems.model import as_ode, as_system
+from tests import high_precision
+from tests.tolerances import SOLVED
+
+from .test_hamiltonian import CASES, EQUAL, near, point, random_tree, values
+
+DIGITS = 60
+
+
+def solves(model: dyn.Mechanism) -> dict[str, cg.Graph]:
+    """M^-1 tau by both orders."""
+    system = as_system(model)
+    return {
+        order: cg.simplify(
+            system.graph(
+                {f"x{i}": x for i, x in enumerate(solve_nodes(system.lagrangian, system.qd, system.tau, order=order))},
+                system.q,
+                system.tau,
+            )
+        )
+        for order in ("recursive", "balanced")
+    }
+
+
+def test_a_planar_chain_is_as_deep_as_the_logarithm_of_its_length() -> None:
+    counts = {n: {order: g.counts() for order, g in solves(chain(0.1, 0.1, n)).items()} for n in (25, 50)}
+    sizes = {order: (each.nodes, each.depth) for order, each in counts[50].items()}
+    assert sizes == {"recursive": (3440, 566), "balanced": (6006, 139)}
+    assert sizes["balanced"][1] - counts[25]["balanced"].depth <= 26
+
+
+@pytest.mark.slow
+def test_a_planar_chain_of_a_thousand_links() -> None:
+    """Depth 253 in place of 11 491, for less than twice the nodes."""
+    counts = {order: graph.counts() for order, graph in solves(chain(0.1, 0.1, 1000)).items()}
+    assert counts["recursive"].depth > 11_000
+    assert counts["balanced"].depth <= 320
+    assert counts["balanced"].nodes <= 2 * counts["recursive"].nodes
+
+
+def test_both_forms_of_the_equations_of_motion_become_shallow() -> None:
+    arm = chain(0.1, 0.1, 50)
+    depths = [
+        derive(arm, method).counts().depth
+        for derive in (dyn.forward_dynamics, dyn.hamilton_equations)
+        for method in ("recursive", "balanced")
+    ]
+    assert depths == [566, 140, 619, 150]
+
+
+def test_it_loses_no_digits() -> None:
+    """Beside 60 digits, bent and nearly straight."""
+    graphs = solves(chain(0.1, 0.1, 50))
+    for spread in (1.0, 1e-3):
+        rng = np.random.default_rng(0)
+        at = {
+            name: rng.uniform(-1.0, 1.0) * (spread if name[0] == "q" else 1.0)
+            for name in graphs["balanced"].input_names
+        }
+        exact = np.array([float(x) for x in high_precision.evaluate(graphs["recursive"], at, DIGITS).values()])
+        for graph in graphs.values():
+            found = np.array(list(graph.evaluate(at).values()))
+            assert np.abs(found - exact).max() < EQUAL * np.abs(exact).max()
+
+
+def equal_by_both_orders(model: Any, seed: int = 1) -> None:
+    for derive in (dyn.forward_dynamics, dyn.hamilton_equations):
+        graphs = [derive(model, method) for method in ("recursive", "balanced")]
+        at = point(model, graphs, seed)
+        first, second = (values(graph, at, "qdd" if derive is dyn.forward_dynamics else "") for graph in graphs)
+        near(second, first, SOLVED / EQUAL * np.abs(first).max())
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_models_move_alike(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    """In pieces of one variable."""
+    monkeypatch.setattr(dissection, "LEAF", 0.2)
+    model = CASES[name]()
+    if as_ode(model) is None and not len(as_system(model).constraints):
+        equal_by_both_orders(model)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_random_trees_move_alike_in_pieces_of_one_body(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
+    monkeypatch.setattr(dissection, "LEAF", 0.2)
+    equal_by_both_orders(random_tree(seed))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(200))
+def test_many_random_trees_move_alike(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
+    monkeypatch.setattr(dissection, "LEAF", (0.2, 0.5, 1.8)[seed % 3])
+    equal_by_both_orders(random_tree(seed, 12))
+
+
+def test_constraints_have_no_balanced_order() -> None:
+    rod = dyn.System(
+        lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2),
+        "x y",
+        constraints=lambda q, t: {"rod": 0.5 * (q[0] ** 2 + q[1] ** 2 - 1.0)},
+    )
+    with pytest.raises(
+        ValueError, match="method \"balanced\" needs a system without constraints, got constraint 'rod'"
+    ):
+        dyn.forward_dynamics(rod, "balanced")
+    with pytest.raises(ValueError, match="method must be one of recursive, balanced, got 'dense'"):
+        dyn.hamilton_equations(dyn.planar_arm([1.0], [1.0]), "dense")
