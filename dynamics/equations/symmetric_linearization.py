@@ -1,0 +1,158 @@
+"""The linearization of Hamilton's equations in displacements and momenta: A = J H'' from one half of the entries.
+
+With p = dL/du, M = dp/du, W = dp/dxi and S = d(dL/dxi)/dxi, of displacements xi, dq = G xi, at fixed u:
+
+    du = M^-1 (dp - W xi),   X = M^-1 W,   K = W^T M^-1 W,   R = P - F_u
+    A = [ C - X,                 M^-1                ]    B = [ 0 ]
+        [ S - K + R X + F_q,     X^T - C^T - R M^-1  ]        [ 1 ]
+
+F_q and F_u are the slopes of forces - damping u. C and P are of quasi-velocities alone, by their brackets c: C v =
+c(u, v), P_kj = p . c(e_j, e_k). Where velocities are rates of coordinates, S is symmetric, and without forces and
+damping A is J H'', H'' = [[K - S, -X^T], [-X, M^-1]], to the last bit: mirrored entries are one node.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph.extend import Array, Builder, building, cotangents, folded, hessian_nodes, topological, with_reciprocals
+
+from ..systems.system import System
+from .formulations import ONE, ZERO
+from .hamiltonian import ITERATIONS
+from .inverse_dynamics_derivatives import state_slopes
+from .legendre import Legendre
+from .linearization_parts import ColumnGraphs, column_graphs, mirrored
+from .mass_matrix_solve import MassSolve, inverse, mass_solve, shorter
+
+Rows = Sequence[Sequence[Node]]
+
+
+class SymmetricParts(NamedTuple):
+    """What A is made of, as nodes over (q, u): see the head of the file.  gain: R."""
+
+    transform: Legendre
+    solve: MassSolve
+    mixed: Rows
+    second: Rows
+    gain: Rows
+    by_q: Rows
+    brackets: Rows
+
+    @property
+    def inputs(self) -> list[Node]:
+        """(q, u), and what all graphs of the system have besides."""
+        system = self.transform.system
+        return [*system.q, *system.qd, *system.extra_inputs]
+
+    @property
+    def size(self) -> int:
+        """How many nodes `written_out` has, about."""
+        return len(topological([entry for row in self.rows() for entry in row]))
+
+    def rows(self) -> list[list[Node]]:
+        """Rows of (A B), (2n, 3n)."""
+        n, build = len(self.mixed), self.transform.build
+        units = [[ONE if i == j else ZERO for j in range(n)] for i in range(n)]
+        minv = inverse(self.solve, build)
+        xt, wt = self.solve.solutions(_transposed(self.mixed), build), _transposed(self.mixed)
+        x = _transposed(xt)
+        with building(build):
+            k = [[_dot(wt[i], xt[j]) for j in range(i + 1)] for i in range(n)]
+            top = [
+                [*[c - entry for c, entry in zip(*rows, strict=True)]] for rows in zip(self.brackets, x, strict=True)
+            ]
+            low = [[self.second[i][j] - k[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
+            low = [[low[i][j] + _dot(self.gain[i], xt[j]) + self.by_q[i][j] for j in range(n)] for i in range(n)]
+            last = [[x[j][i] - self.brackets[j][i] - _dot(self.gain[i], minv[j]) for j in range(n)] for i in range(n)]
+        upper = [[*a, *b, *[ZERO] * n] for a, b in zip(top, minv, strict=True)]
+        return [*upper, *[[*a, *b, *unit] for a, b, unit in zip(low, last, units, strict=True)]]
+
+    def written_out(self) -> Graph:
+        """All entries of A and B over (q, u)."""
+        return self._graph(self.inputs, self.rows())
+
+    def of_momenta(self) -> Graph:
+        """All entries of A and B over (q, p)."""
+        transform = self.transform
+        rows = self.rows()
+        flat = transform.at([entry for row in rows for entry in row])
+        width = len(rows[0])
+        inputs = [*transform.system.q, *transform.p, *transform.system.extra_inputs]
+        return self._graph(inputs, [flat[k : k + width] for k in range(0, len(flat), width)])
+
+    def in_columns(self) -> ColumnGraphs:
+        """The parts, with the columns of X and M^-1 left to a graph of one."""
+        n = len(self.mixed)
+        rest = {"S": self.second, "R": self.gain, "F": self.by_q, "C": self.brackets}
+        return column_graphs(self.inputs, self.solve, _transposed(self.mixed), n, rest)
+
+    def assembled(self, sides: Array, rest: Array, solutions: Array) -> tuple[Array, Array]:
+        """A, (.., 2n, 2n), and B, (.., 2n, n), of columns of W and 1 and M^-1 of them, (.., n 2n), and S, R, F_q, C."""
+        n, shape = len(self.mixed), rest.shape[:-1]
+        second, gain, by_q, brackets = np.moveaxis(rest.reshape(*shape, 4, n, n), -3, 0)
+        wt = np.swapaxes(sides.reshape(*shape, n, 2 * n)[..., :n], -1, -2)
+        x, minv = np.split(solutions.reshape(*shape, n, 2 * n), 2, axis=-1)
+        minv = mirrored(minv)
+        a, b = np.empty((*shape, 2 * n, 2 * n)), np.zeros((*shape, 2 * n, n))
+        with np.errstate(all="ignore"):  # of an M that is singular, which is said by who asks for a state
+            a[..., :n, :n], a[..., :n, n:] = brackets - x, minv
+            a[..., n:, :n] = (second - mirrored(wt @ x)) + gain @ x + by_q
+            a[..., n:, n:] = np.swapaxes(x - brackets, -1, -2) - gain @ minv
+        b[..., n:, :] = np.eye(n)
+        return a, b
+
+    def _graph(self, inputs: Sequence[Node], rows: Rows) -> Graph:
+        split = 2 * len(self.mixed)
+        outputs = {f"A_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[:split])}
+        outputs |= {f"B_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[split:])}
+        return with_reciprocals(cg.simplify(Graph(inputs, outputs)))
+
+
+def symmetric_parts(system: System, *, momenta: bool) -> SymmetricParts:
+    """momenta: whether they are variables p, as of a graph over (q, p); else they are those of (q, u).
+
+    Raises SingularMassMatrixError, ConstraintError and ValueError as `hamilton_equations`.
+    """
+    transform = Legendre(system, Builder(), ITERATIONS)
+    build, n, kinematics = transform.build, system.n, system.kinematics
+    if kinematics.quasi is None:
+        lower = hessian_nodes(transform.lagrangian, [*system.q, *system.qd], build)
+        mixed = [list(row[:n]) for row in lower[n:]]
+        second = [[lower[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
+    else:
+        gradient = cotangents({transform.lagrangian: ONE}, system.q, build)
+        slopes = state_slopes(system, kinematics.pulled_back(gradient, build), build)
+        mixed, second = _transposed([row[n:] for row in slopes]), [row[:n] for row in slopes]
+    forces = state_slopes(system, folded(system.forces, build), build)
+    twist = [cotangents({term: ONE}, system.qd, build) for term in kinematics.structure(transform.p, build)]
+    if not momenta:
+        of_state = dict(zip(transform.p, transform.momenta, strict=True))
+        twist = [folded(row, build, of_state) for row in twist]
+    with building(build):
+        gain = [[a - b for a, b in zip(twist[i], forces[i][n:], strict=True)] for i in range(n)]
+        for i, damping in enumerate(system.damping):
+            gain[i][i] = gain[i][i] + damping
+    by_q, brackets = [row[:n] for row in forces], kinematics.brackets(build)
+
+    def parts(method: str) -> SymmetricParts:
+        return SymmetricParts(transform, mass_solve(system, build, method), mixed, second, gain, by_q, brackets)
+
+    return shorter(system, parts)
+
+
+def _dot(row: Sequence[Node], column: Sequence[Node]) -> Node:
+    total = ZERO
+    for a, b in zip(row, column, strict=True):
+        if a.value != 0.0:
+            total = total + a * b
+    return total
+
+
+def _transposed(rows: Rows) -> list[list[Node]]:
+    return [list(column) for column in zip(*rows, strict=True)]
