@@ -19,7 +19,7 @@ from .initial_value import normalized
 from .linearization_parts import LinearizationParts, linearization_parts
 from .shorter_form import shorter_form
 from .singular_mass_matrix import raise_if_singular
-from .symmetric_linearization import SymmetricParts, symmetric_parts
+from .symmetric_linearization import SymmetricParts
 
 
 def state_space(model: Model, *, form: str = "velocity") -> Graph:
@@ -88,7 +88,7 @@ def state_space(model: Model, *, form: str = "velocity") -> Graph:
     if require_choice("form", form, FORMS) == "velocity":
         return shorter_form(as_system(model), lambda system: linearization_parts(system).written_out())
     return shorter_form(
-        as_system(model), lambda system: symmetric_parts(system, momenta=True).of_momenta(), mirrored=True
+        as_system(model), lambda system: SymmetricParts(system, momenta=True).of_momenta(), mirrored=True
     )
 
 
@@ -96,7 +96,7 @@ def parts_of(system: System, form: str) -> LinearizationParts | SymmetricParts:
     """The parts of the linearization of a form, over (q, qd)."""
     if form == "velocity":
         return linearization_parts(system)
-    return symmetric_parts(system, momenta=False)
+    return SymmetricParts(system)
 
 
 def linearize(

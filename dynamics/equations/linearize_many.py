@@ -19,7 +19,7 @@ from .evaluate_at import Array, InputRows
 from .formulations import ONE, ZERO
 from .hamiltonian import FORMS
 from .linearization_parts import ColumnGraphs, LinearizationParts, linearization_parts
-from .symmetric_linearization import SymmetricParts, symmetric_parts
+from .symmetric_linearization import SymmetricParts
 
 # Nodes; beyond, the columns share one piece of code: of 18 000 nodes, machine code is made in half the time and takes a
 # third longer, of 200 000 in a fifth of the time, and takes no longer.
@@ -131,7 +131,7 @@ def _way(system: System) -> tuple[Sequence[Node], Write]:
 
 
 def _symmetric_way(system: System) -> tuple[Sequence[Node], Write]:
-    parts = symmetric_parts(system, momenta=False)
+    parts = SymmetricParts(system)
     return parts.inputs, _written_out(parts) if parts.size < WRITTEN_OUT else _assembled(parts)
 
 

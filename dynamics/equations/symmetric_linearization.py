@@ -14,6 +14,7 @@ damping A is J H'', H'' = [[K - S, -X^T], [-X, M^-1]], to the last bit: mirrored
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Array, Builder, building, cotangents, folded, hessian_nodes, topological, with_reciprocals
 
+from ..systems.momentum_derivatives import MomentumDerivatives
 from ..systems.system import System
 from .formulations import ONE, ZERO
 from .hamiltonian import ITERATIONS
@@ -33,68 +35,114 @@ from .mass_matrix_solve import MassSolve, inverse, mass_solve, shorter
 Rows = Sequence[Sequence[Node]]
 
 
-class SymmetricParts(NamedTuple):
-    """What A is made of, as nodes over (q, u): see the head of the file.  gain: R."""
+class Blocks(NamedTuple):
+    """M, factored, W and S."""
 
-    transform: Legendre
     solve: MassSolve
     mixed: Rows
     second: Rows
-    gain: Rows
-    by_q: Rows
-    brackets: Rows
 
     @property
-    def inputs(self) -> list[Node]:
-        """(q, u), and what all graphs of the system have besides."""
-        system = self.transform.system
-        return [*system.q, *system.qd, *system.extra_inputs]
+    def size(self) -> int:
+        """How many nodes the factorization and its columns have, about."""
+        return self.solve.size + len(self.mixed) * len(self.solve.column)
+
+
+class SymmetricParts:
+    """What A is made of, as nodes over (q, u): see the head of the file.
+
+    momenta: whether P has the momenta as variables p, as of a graph over (q, p); else they are those of (q, u).
+    gain: R.
+
+    Raises SingularMassMatrixError, ConstraintError and ValueError as `hamilton_equations`.
+    """
+
+    def __init__(self, system: System, *, momenta: bool = False) -> None:
+        self.system, self.transform = system, Legendre(system, Builder(), ITERATIONS)
+        n, build, kinematics = system.n, self.transform.build, system.kinematics
+        self.inputs = [*system.q, *system.qd, *system.extra_inputs]
+        self.brackets = kinematics.brackets(build)
+        terms = kinematics.structure(self.transform.p, build)
+        twist = [cotangents({term: ONE}, system.qd, build) for term in terms]
+        if not momenta:
+            of_state = dict(zip(self.transform.p, self.transform.momenta, strict=True))
+            twist = [folded(row, build, of_state) for row in twist]
+        forces = state_slopes(system, folded(system.forces, build), build)
+        self.by_q = [row[:n] for row in forces]
+        with building(build):
+            self.gain = [[a - b for a, b in zip(twist[i], forces[i][n:], strict=True)] for i in range(n)]
+            for i, damping in enumerate(system.damping):
+                self.gain[i][i] = self.gain[i][i] + damping
+
+    @cached_property
+    def blocks(self) -> Blocks:
+        """By differentiation of L."""
+        system, build, n = self.system, self.transform.build, self.system.n
+        lagrangian = self.transform.lagrangian
+        if system.kinematics.quasi is None:
+            lower = hessian_nodes(lagrangian, [*system.q, *system.qd], build)
+            mixed = [list(row[:n]) for row in lower[n:]]
+            second = [[lower[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
+        else:
+            gradient = system.kinematics.pulled_back(cotangents({lagrangian: ONE}, system.q, build), build)
+            slopes = state_slopes(system, gradient, build)
+            mixed, second = _transposed([row[n:] for row in slopes]), [row[:n] for row in slopes]
+        return shorter(system, lambda method: Blocks(mass_solve(system, build, method), mixed, second))
+
+    @cached_property
+    def derivatives(self) -> MomentumDerivatives:
+        """-X, M^-1 and S - K: as bodies state them, or by the blocks."""
+        build, n = self.transform.build, self.system.n
+        stated = self.system.momentum_derivatives(build)
+        if stated is not None:
+            return stated
+        solve, mixed, second = self.blocks
+        wt = _transposed(mixed)
+        xt = solve.solutions(wt, build)
+        with building(build):
+            k = [[_dot(wt[i], xt[j]) for j in range(i + 1)] for i in range(n)]
+            by_q = [[-xt[j][i] for j in range(n)] for i in range(n)]
+            left = [[second[i][j] - k[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
+        return MomentumDerivatives(by_q, inverse(solve, build), left)
+
+    @cached_property
+    def rows(self) -> list[list[Node]]:
+        """Rows of (A B), (2n, 3n)."""
+        n, c, r = self.system.n, self.brackets, self.gain
+        by_q, minv, second = self.derivatives
+        columns = _transposed(by_q)
+        with building(self.transform.build):
+            top = [[c[i][j] + by_q[i][j] for j in range(n)] for i in range(n)]
+            low = [[second[i][j] - _dot(r[i], columns[j]) + self.by_q[i][j] for j in range(n)] for i in range(n)]
+            last = [[-top[j][i] - _dot(r[i], minv[j]) for j in range(n)] for i in range(n)]
+        units = [[ONE if i == j else ZERO for j in range(n)] for i in range(n)]
+        upper = [[*a, *b, *[ZERO] * n] for a, b in zip(top, minv, strict=True)]
+        return [*upper, *[[*a, *b, *unit] for a, b, unit in zip(low, last, units, strict=True)]]
 
     @property
     def size(self) -> int:
         """How many nodes `written_out` has, about."""
-        return len(topological([entry for row in self.rows() for entry in row]))
-
-    def rows(self) -> list[list[Node]]:
-        """Rows of (A B), (2n, 3n)."""
-        n, build = len(self.mixed), self.transform.build
-        units = [[ONE if i == j else ZERO for j in range(n)] for i in range(n)]
-        minv = inverse(self.solve, build)
-        xt, wt = self.solve.solutions(_transposed(self.mixed), build), _transposed(self.mixed)
-        x = _transposed(xt)
-        with building(build):
-            k = [[_dot(wt[i], xt[j]) for j in range(i + 1)] for i in range(n)]
-            top = [
-                [*[c - entry for c, entry in zip(*rows, strict=True)]] for rows in zip(self.brackets, x, strict=True)
-            ]
-            low = [[self.second[i][j] - k[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
-            low = [[low[i][j] + _dot(self.gain[i], xt[j]) + self.by_q[i][j] for j in range(n)] for i in range(n)]
-            last = [[x[j][i] - self.brackets[j][i] - _dot(self.gain[i], minv[j]) for j in range(n)] for i in range(n)]
-        upper = [[*a, *b, *[ZERO] * n] for a, b in zip(top, minv, strict=True)]
-        return [*upper, *[[*a, *b, *unit] for a, b, unit in zip(low, last, units, strict=True)]]
+        return len(topological([entry for row in self.rows for entry in row]))
 
     def written_out(self) -> Graph:
         """All entries of A and B over (q, u)."""
-        return self._graph(self.inputs, self.rows())
+        return _graph(self.inputs, self.rows)
 
     def of_momenta(self) -> Graph:
         """All entries of A and B over (q, p)."""
-        transform = self.transform
-        rows = self.rows()
-        flat = transform.at([entry for row in rows for entry in row])
-        width = len(rows[0])
-        inputs = [*transform.system.q, *transform.p, *transform.system.extra_inputs]
-        return self._graph(inputs, [flat[k : k + width] for k in range(0, len(flat), width)])
+        transform, width = self.transform, 3 * self.system.n
+        flat = transform.at([entry for row in self.rows for entry in row])
+        inputs = [*self.system.q, *transform.p, *self.system.extra_inputs]
+        return _graph(inputs, [flat[k : k + width] for k in range(0, len(flat), width)])
 
     def in_columns(self) -> ColumnGraphs:
-        """The parts, with the columns of X and M^-1 left to a graph of one."""
-        n = len(self.mixed)
-        rest = {"S": self.second, "R": self.gain, "F": self.by_q, "C": self.brackets}
-        return column_graphs(self.inputs, self.solve, _transposed(self.mixed), n, rest)
+        """The blocks and the rest, with the columns of X and M^-1 left to a graph of one."""
+        rest = {"S": self.blocks.second, "R": self.gain, "F": self.by_q, "C": self.brackets}
+        return column_graphs(self.inputs, self.blocks.solve, _transposed(self.blocks.mixed), self.system.n, rest)
 
     def assembled(self, sides: Array, rest: Array, solutions: Array) -> tuple[Array, Array]:
         """A, (.., 2n, 2n), and B, (.., 2n, n), of columns of W and 1 and M^-1 of them, (.., n 2n), and S, R, F_q, C."""
-        n, shape = len(self.mixed), rest.shape[:-1]
+        n, shape = self.system.n, rest.shape[:-1]
         second, gain, by_q, brackets = np.moveaxis(rest.reshape(*shape, 4, n, n), -3, 0)
         wt = np.swapaxes(sides.reshape(*shape, n, 2 * n)[..., :n], -1, -2)
         x, minv = np.split(solutions.reshape(*shape, n, 2 * n), 2, axis=-1)
@@ -107,43 +155,12 @@ class SymmetricParts(NamedTuple):
         b[..., n:, :] = np.eye(n)
         return a, b
 
-    def _graph(self, inputs: Sequence[Node], rows: Rows) -> Graph:
-        split = 2 * len(self.mixed)
-        outputs = {f"A_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[:split])}
-        outputs |= {f"B_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[split:])}
-        return with_reciprocals(cg.simplify(Graph(inputs, outputs)))
 
-
-def symmetric_parts(system: System, *, momenta: bool) -> SymmetricParts:
-    """momenta: whether they are variables p, as of a graph over (q, p); else they are those of (q, u).
-
-    Raises SingularMassMatrixError, ConstraintError and ValueError as `hamilton_equations`.
-    """
-    transform = Legendre(system, Builder(), ITERATIONS)
-    build, n, kinematics = transform.build, system.n, system.kinematics
-    if kinematics.quasi is None:
-        lower = hessian_nodes(transform.lagrangian, [*system.q, *system.qd], build)
-        mixed = [list(row[:n]) for row in lower[n:]]
-        second = [[lower[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
-    else:
-        gradient = cotangents({transform.lagrangian: ONE}, system.q, build)
-        slopes = state_slopes(system, kinematics.pulled_back(gradient, build), build)
-        mixed, second = _transposed([row[n:] for row in slopes]), [row[:n] for row in slopes]
-    forces = state_slopes(system, folded(system.forces, build), build)
-    twist = [cotangents({term: ONE}, system.qd, build) for term in kinematics.structure(transform.p, build)]
-    if not momenta:
-        of_state = dict(zip(transform.p, transform.momenta, strict=True))
-        twist = [folded(row, build, of_state) for row in twist]
-    with building(build):
-        gain = [[a - b for a, b in zip(twist[i], forces[i][n:], strict=True)] for i in range(n)]
-        for i, damping in enumerate(system.damping):
-            gain[i][i] = gain[i][i] + damping
-    by_q, brackets = [row[:n] for row in forces], kinematics.brackets(build)
-
-    def parts(method: str) -> SymmetricParts:
-        return SymmetricParts(transform, mass_solve(system, build, method), mixed, second, gain, by_q, brackets)
-
-    return shorter(system, parts)
+def _graph(inputs: Sequence[Node], rows: Rows) -> Graph:
+    split = len(rows)
+    outputs = {f"A_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[:split])}
+    outputs |= {f"B_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[split:])}
+    return with_reciprocals(cg.simplify(Graph(inputs, outputs)))
 
 
 def _dot(row: Sequence[Node], column: Sequence[Node]) -> Node:
