@@ -93,7 +93,7 @@ class SymmetricParts:
     def derivatives(self) -> MomentumDerivatives:
         """-X, M^-1 and S - K: as bodies state them, or by the blocks."""
         build, n = self.transform.build, self.system.n
-        stated = self.system.momentum_derivatives(build)
+        stated = self.system.momentum_derivatives(self.transform.p, build)
         if stated is not None:
             return stated
         solve, mixed, second = self.blocks
@@ -103,13 +103,13 @@ class SymmetricParts:
             k = [[_dot(wt[i], xt[j]) for j in range(i + 1)] for i in range(n)]
             by_q = [[-xt[j][i] for j in range(n)] for i in range(n)]
             left = [[second[i][j] - k[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
-        return MomentumDerivatives(by_q, inverse(solve, build), left)
+        return MomentumDerivatives(by_q, inverse(solve, build), left, [])
 
     @cached_property
     def rows(self) -> list[list[Node]]:
         """Rows of (A B), (2n, 3n)."""
         n, c, r = self.system.n, self.brackets, self.gain
-        by_q, minv, second = self.derivatives
+        by_q, minv, second, _ = self.derivatives
         columns = _transposed(by_q)
         with building(self.transform.build):
             top = [[c[i][j] + by_q[i][j] for j in range(n)] for i in range(n)]
@@ -131,7 +131,9 @@ class SymmetricParts:
     def of_momenta(self) -> Graph:
         """All entries of A and B over (q, p)."""
         transform, width = self.transform, 3 * self.system.n
-        flat = transform.at([entry for row in self.rows for entry in row])
+        velocities = self.derivatives.velocities or transform.velocities
+        of_momenta = dict(zip(self.system.qd, velocities, strict=True))
+        flat = folded([entry for row in self.rows for entry in row], transform.build, of_momenta)
         inputs = [*self.system.q, *transform.p, *self.system.extra_inputs]
         return _graph(inputs, [flat[k : k + width] for k in range(0, len(flat), width)])
 

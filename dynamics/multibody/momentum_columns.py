@@ -137,14 +137,15 @@ def momentum_derivatives(
     parents: Sequence[int],
     up: Triple,
     state: tuple[Sequence[Node], Sequence[Node]],
+    p: Sequence[Node],
     build: Builder,
 ) -> MomentumDerivatives:
-    """Of bodies, parents first, with springs, without dampers and forces, at (q, u).
+    """Of bodies, parents first, with springs, without dampers and forces, at (q, u), and the velocities of momenta p.
 
     up: the acceleration of the world against free fall.
     """
     n, still = len(state[1]), [ZERO] * len(state[1])
-    result = MomentumDerivatives(*[[[ZERO] * n for _ in range(n)] for _ in range(3)])
+    result = MomentumDerivatives(_zeros(n), _zeros(n), _zeros(n), [])
     with building(build):
         links, frames = tree_frames(bodies, links, parents, (up, ()), (*state, still))
         at_rest = tree_frames(bodies, links, parents, (up, ()), (state[0], still, still))[1]
@@ -154,12 +155,17 @@ def momentum_derivatives(
                 for freedom in stage:
                     _displace(result, tree, (i, s), freedom)
                     _push(result, tree, (i, s), freedom)
-        springs = [[ZERO] * n for _ in range(n)]
+        result.velocities[:] = _velocities(tree, p)
+        springs = _zeros(n)
         for body, link, place in zip(bodies, links, places(bodies), strict=True):
             add_spring_slopes(springs, link, moving_type(body.joint.type), place, state, build)
         for row, stiff in zip(result.second, springs, strict=True):
             row[:] = [entry - slope for entry, slope in zip(row, stiff, strict=True)]
     return result
+
+
+def _zeros(n: int) -> list[list[Node]]:
+    return [[ZERO] * n for _ in range(n)]
 
 
 def _stages(
@@ -203,10 +209,11 @@ def _stage(
     return stage, inertia
 
 
-def _given_way(stage: Stage, wrench: Wrench, pulls: dict[int, Node]) -> Wrench:
-    """Z after the freedoms of a stage."""
+def _given_way(stage: Stage, wrench: Wrench, pulls: dict[int, Node], p: Sequence[Node] = ()) -> Wrench:
+    """Z after the freedoms of a stage, whose momenta change by p."""
     for freedom in reversed(stage):
         pull = -freedom.column.motion.power(wrench)
+        pull = p[freedom.velocity] + pull if p else pull
         pulls[freedom.velocity] = pull * freedom.share
         wrench = wrench.plus(freedom.lever.scaled(pull))
     return wrench
@@ -240,3 +247,15 @@ def _push(result: MomentumDerivatives, tree: Tree, place: tuple[int, int], freed
         for other, change in zip(others, changes, strict=True):
             if other.velocity <= j:
                 result.inverse[other.velocity][j] = result.inverse[j][other.velocity] = change
+
+
+def _velocities(tree: Tree, p: Sequence[Node]) -> list[Node]:
+    """u of momenta p: all pushed at once."""
+    wrenches, pulls = [Wrench(STILL, STILL)] * len(tree.frames), dict[int, Node]()
+    for i in reversed(range(len(tree.frames))):
+        wrench = wrenches[i]
+        for stage in reversed(tree.stages[i]):
+            wrench = _given_way(stage, wrench, pulls, p)
+        if (parent := tree.parents[i]) >= 0:
+            wrenches[parent] = wrenches[parent].plus(wrench.about(tree.frames[i].offset))
+    return [change for *_, changes in tree.from_world(pulls) for change in changes]

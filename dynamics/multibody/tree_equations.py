@@ -124,11 +124,13 @@ class TreeEquations:
             up = newton_euler.base_acceleration(self.ground).linear
             return torque_derivatives(self.bodies, self.links, self.parents, up, state, build)
 
-    def momentum_derivatives(self, q: Sequence[Node], qd: Sequence[Node], build: Builder) -> MomentumDerivatives:
+    def momentum_derivatives(
+        self, q: Sequence[Node], qd: Sequence[Node], p: Sequence[Node], build: Builder
+    ) -> MomentumDerivatives:
         """Of all bodies, with their springs."""
         with building(build):
             up = newton_euler.base_acceleration(self.ground).linear
-            return momentum_derivatives(self.bodies, self.links, self.parents, up, (q, qd), build)
+            return momentum_derivatives(self.bodies, self.links, self.parents, up, (q, qd), p, build)
 
     def _moved(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Moved]:
         motions = {WORLD: self.ground}

@@ -27,7 +27,9 @@ class BodyEquations(Protocol):
     def torque_derivatives(self, state: MotionState, build: Builder) -> TorqueDerivatives:
         """Derivatives of the torques of a motion."""
 
-    def momentum_derivatives(self, q: Sequence[Node], qd: Sequence[Node], build: Builder) -> MomentumDerivatives:
+    def momentum_derivatives(
+        self, q: Sequence[Node], qd: Sequence[Node], p: Sequence[Node], build: Builder
+    ) -> MomentumDerivatives:
         """How velocities and rates of momenta depend on coordinates and momenta."""
 
 
@@ -69,6 +71,6 @@ class BodySystem(System):
         """In closed form; see `System.torque_derivatives`."""
         return self._equations.torque_derivatives((self.q, self.qd, qdd), build)
 
-    def momentum_derivatives(self, build: Builder) -> MomentumDerivatives:
+    def momentum_derivatives(self, p: Sequence[Node], build: Builder) -> MomentumDerivatives:
         """By articulated inertias; see `System.momentum_derivatives`."""
-        return self._equations.momentum_derivatives(self.q, self.qd, build)
+        return self._equations.momentum_derivatives(self.q, self.qd, p, build)

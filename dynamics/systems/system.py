@@ -279,7 +279,7 @@ class System:
         """Torques of a motion and their derivatives, without damping and applied forces; None as for `bias_forces`."""
         return None
 
-    def momentum_derivatives(self, build: Builder) -> MomentumDerivatives | None:
+    def momentum_derivatives(self, p: Sequence[Node], build: Builder) -> MomentumDerivatives | None:
         """How velocities and rates of momenta depend on coordinates and momenta, without damping and applied forces."""
         return None
 
