@@ -13,6 +13,7 @@ import dynamics as dyn
 from cgraph.extend import Array, Builder, cotangents
 from dynamics.equations import linearize_many as many
 from dynamics.equations.hamiltonian import velocities
+from dynamics.equations.symmetric_linearization import SymmetricParts
 from dynamics.systems.model import as_system
 
 from ..linkages import four_bar
@@ -193,6 +194,20 @@ def test_units_and_the_order_of_coordinates_are_no_part_of_it() -> None:
     found = dyn.linearize(other(plain, order), q[order], qd[order], form="momentum")[0]
     places = [*order, *[3 + k for k in order]]
     assert np.abs(found - expected[np.ix_(places, places)]).max() <= EQUAL * np.abs(expected).max()
+
+
+def test_of_a_chain_it_keeps_the_digits_whatever_the_condition_of_its_mass_matrix() -> None:
+    chain, n = dyn.planar_arm([1.0] * 5, [1.0, 1e-3, 1.0, 1e-3, 1.0], gravity=0.0), 5
+    graph = SymmetricParts(chain.system).written_out()
+    q = [0.3, -0.4, 0.9, 1.3, -0.2]
+    at = {f"{kind}{i}": x for kind in ("q", "qd") for i, x in enumerate(q)}
+    exact = cg.double_double(graph)
+    expected = square(exact, {name: at.get(name, 0.0) for name in exact.input_names})
+    assert np.linalg.cond(dyn.arrays_at(chain, dyn.mass_matrix(chain), q)["M"]) > 1e6
+    wrong = np.abs(square(graph, at) - expected)
+    for rows in (slice(n), slice(n, None)):
+        for columns in (slice(n), slice(n, None)):
+            assert wrong[rows, columns].max() < 1e-13 * np.abs(expected[rows, columns]).max()
 
 
 @pytest.mark.parametrize(("name", "columns"), [("arm", False), ("planar", True), ("ball", True)])
