@@ -114,7 +114,7 @@ class SymmetricParts:
         with building(self.transform.build):
             top = [[c[i][j] + by_q[i][j] for j in range(n)] for i in range(n)]
             low = [[second[i][j] - _dot(r[i], columns[j]) + self.by_q[i][j] for j in range(n)] for i in range(n)]
-            last = [[-top[j][i] - _dot(r[i], minv[j]) for j in range(n)] for i in range(n)]
+            last = [[ZERO - top[j][i] - _dot(r[i], minv[j]) for j in range(n)] for i in range(n)]
         units = [[ONE if i == j else ZERO for j in range(n)] for i in range(n)]
         upper = [[*a, *b, *[ZERO] * n] for a, b in zip(top, minv, strict=True)]
         return [*upper, *[[*a, *b, *unit] for a, b, unit in zip(low, last, units, strict=True)]]
