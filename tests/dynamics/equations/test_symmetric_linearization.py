@@ -15,6 +15,7 @@ from dynamics.equations import linearize_many as many
 from dynamics.equations.hamiltonian import velocities
 from dynamics.equations.symmetric_linearization import SymmetricParts
 from dynamics.systems.model import as_system
+from tests.slow import slow
 
 from ..linkages import four_bar
 from ..mechanisms import random_joint, random_mechanism, turned_arm
@@ -23,6 +24,7 @@ from .test_hamiltonian import point, random_tree, rotor, values
 from .test_inverse_dynamics_derivatives import KINDS
 
 EQUAL = 1e-12  # of the largest entry
+RARE = ("along one axis", "pulled")
 SMALL = {
     "planar": lambda: random_arm(3),
     "undamped": lambda: random_arm(2, damped=False),
@@ -36,7 +38,7 @@ SMALL = {
     "rotor": rotor,
     "ball": lambda: random_mechanism(2, ["ball", "prismatic"], 1),
     "free": lambda: free_base(),
-    **{name: KINDS[name] for name in ("screws", "with base parameters", "along one axis", "pulled")},
+    **{name: KINDS[name] for name in ("screws", "with base parameters", *RARE)},
     "with parameters": lambda: with_mass("m"),
 }
 
@@ -131,7 +133,7 @@ def assert_linear(model: Any, seed: int) -> None:
     assert np.abs(matrix - matrix.T).max() <= EQUAL * np.abs(matrix).max()
 
 
-@pytest.mark.parametrize("name", SMALL)
+@pytest.mark.parametrize("name", [*[name for name in SMALL if name not in RARE], *slow(*RARE)])
 def test_it_is_the_slope_of_hamilton_s_equations(name: str) -> None:
     assert_linear(SMALL[name](), 2)
 
@@ -210,7 +212,7 @@ def test_of_a_chain_it_keeps_the_digits_whatever_the_condition_of_its_mass_matri
             assert wrong[rows, columns].max() < 1e-13 * np.abs(expected[rows, columns]).max()
 
 
-@pytest.mark.parametrize(("name", "columns"), [("arm", False), ("planar", True), ("ball", True)])
+@pytest.mark.parametrize(("name", "columns"), [("arm", False), ("planar", True), ("rotor", True)])
 def test_many_states_are_linearized_as_one(name: str, columns: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Written out, and column by column; and where nothing brakes, J A symmetric to the last bit in machine code."""
     monkeypatch.setattr(many, "WRITTEN_OUT", 0 if columns else many.WRITTEN_OUT)
