@@ -24,6 +24,9 @@ from .symmetric_linearization import SymmetricParts
 # Nodes; beyond, the columns share one piece of code: of 18 000 nodes, machine code is made in half the time and takes a
 # third longer, of 200 000 in a fifth of the time, and takes no longer.
 WRITTEN_OUT = 20_000
+LONGER = (
+    5  # times as many where products of matrices would be left: of 83 000 nodes made in 11 s for 8, run in 19 us for 91
+)
 SHARE = 3  # of the nodes of all entries, at most one in so many is forward dynamics
 MATRICES = 1024  # states whose parts are in memory at a time, before they are matrices
 BLOCK = 64  # states that are run between looks at the keyboard, and that a thread takes at a time
@@ -50,7 +53,8 @@ def linearize_many(
     piece, and a column of A and B another. The matrices of a state whose mass matrix is singular, or with a quaternion
     of length 0, have entries that are infinite or NaN.
 
-    Of the momentum form all entries are written out, or the products of X = M^-1 dp/dq are left to NumPy.
+    Of the momentum form all entries are written out, or of very large systems the products of M^-1 dp/dq are left to
+    NumPy.
 
     Parameters
     ----------
@@ -132,7 +136,7 @@ def _way(system: System) -> tuple[Sequence[Node], Write]:
 
 def _symmetric_way(system: System) -> tuple[Sequence[Node], Write]:
     parts = SymmetricParts(system)
-    return parts.inputs, _written_out(parts) if parts.size < WRITTEN_OUT else _assembled(parts)
+    return parts.inputs, _written_out(parts) if parts.size < LONGER * WRITTEN_OUT else _assembled(parts)
 
 
 def _assembled(parts: SymmetricParts) -> Write:
