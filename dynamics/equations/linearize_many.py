@@ -24,8 +24,8 @@ from .symmetric_linearization import SymmetricParts
 # Nodes; beyond, the columns share one piece of code: of 18 000 nodes, machine code is made in half the time and takes a
 # third longer, of 200 000 in a fifth of the time, and takes no longer.
 WRITTEN_OUT = 20_000
-# Times as many, where else products of matrices would be left to NumPy: 83 000 nodes are made in 11 s, not 8, and take 19
-# us a state, not 91.
+# Times as many, where else products of matrices would be left to NumPy: 83 000 nodes are made in 11 s, not 8, and take
+# 19 us a state, not 91.
 LONGER = 5
 SHARE = 3  # of the nodes of all entries, at most one in so many is forward dynamics
 MATRICES = 1024  # states whose parts are in memory at a time, before they are matrices
