@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Builder, building
 
@@ -96,6 +97,7 @@ class Seen(NamedTuple):
 class Tree(NamedTuple):
     """Bodies, parents first, with the freedoms of their joints by stages."""
 
+    names: Sequence[str]
     parents: Sequence[int]
     frames: Sequence[Frame]
     stages: Sequence[Sequence[Stage]]
@@ -105,8 +107,8 @@ class Tree(NamedTuple):
         after: dict[tuple[int, int], Wrench] = {}
         while True:
             for k in reversed(range(s)):
-                wrench = _given_way(self.stages[i][k], wrench, pulls)
-                after[i, k] = wrench
+                with cg.tag(self.names[i]):
+                    after[i, k] = wrench = _given_way(self.stages[i][k], wrench, pulls)
             if self.parents[i] < 0:
                 return after
             wrench, i = wrench.about(self.frames[i].offset), self.parents[i]
@@ -120,12 +122,13 @@ class Tree(NamedTuple):
         for i, frame in enumerate(self.frames):
             before = Seen(motions[self.parents[i]], frame.offset) if self.parents[i] >= 0 else Seen(REST, STILL)
             for k, stage in enumerate(self.stages[i]):
-                before = Seen(before.here.plus(more), STILL) if (i, k) == place else before
-                motion, changes = before, []
-                for freedom in stage:
-                    change = pulls.get(freedom.velocity, ZERO) - motion.power(freedom.lever)
-                    motion = Seen(motion.here.plus(freedom.column.motion.scaled(change)), STILL)
-                    changes.append(change)
+                with cg.tag(self.names[i]):
+                    before = Seen(before.here.plus(more), STILL) if (i, k) == place else before
+                    motion, changes = before, []
+                    for freedom in stage:
+                        change = pulls.get(freedom.velocity, ZERO) - motion.power(freedom.lever)
+                        motion = Seen(motion.here.plus(freedom.column.motion.scaled(change)), STILL)
+                        changes.append(change)
                 yield (i, k), stage, before, changes
                 before = motion
             motions.append(before.here)
@@ -149,7 +152,12 @@ def momentum_derivatives(
     with building(build):
         links, frames = tree_frames(bodies, links, parents, (up, ()), (*state, still))
         at_rest = tree_frames(bodies, links, parents, (up, ()), (state[0], still, still))[1]
-        tree = Tree(parents, frames, _stages(links, parents, frames, [each.acceleration.linear for each in at_rest]))
+        tree = Tree(
+            [body.name for body in bodies],
+            parents,
+            frames,
+            _stages(bodies, links, parents, frames, [each.acceleration.linear for each in at_rest]),
+        )
         for i, stages in enumerate(tree.stages):
             for s, stage in enumerate(stages):
                 for freedom in stage:
@@ -169,21 +177,22 @@ def _zeros(n: int) -> list[list[Node]]:
 
 
 def _stages(
-    links: Sequence[Link], parents: Sequence[int], frames: Sequence[Frame], up: Sequence[Triple]
+    bodies: Sequence[Body], links: Sequence[Link], parents: Sequence[int], frames: Sequence[Frame], up: Sequence[Triple]
 ) -> list[list[Stage]]:
     """The freedoms of all bodies, from the tips to the base.  up: in the axes of each frame."""
     carried: list[Carried | None] = [None] * len(frames)
     result: list[list[Stage]] = [[] for _ in frames]
     for i in reversed(range(len(frames))):
-        alone = body_motion(links[i], frames[i].axes, frames[i].velocity, REST)
-        whole = Carried(rigid(alone), alone.mass, alone.moment, alone.inertial(frames[i].velocity))
-        if (others := carried[i]) is not None:
-            whole = whole.plus(others)
-        for first in sorted({column.stage for column in frames[i].columns}, reverse=True):
-            columns = [column for column in frames[i].columns if column.stage == first]
-            stage, left = _stage(columns, whole, links[i].armature, up[i])
-            result[i].insert(0, stage)
-            whole = whole._replace(inertia=left)
+        with cg.tag(bodies[i].name):
+            alone = body_motion(links[i], frames[i].axes, frames[i].velocity, REST)
+            whole = Carried(rigid(alone), alone.mass, alone.moment, alone.inertial(frames[i].velocity))
+            if (others := carried[i]) is not None:
+                whole = whole.plus(others)
+            for first in sorted({column.stage for column in frames[i].columns}, reverse=True):
+                columns = [column for column in frames[i].columns if column.stage == first]
+                stage, left = _stage(columns, whole, links[i].armature, up[i])
+                result[i].insert(0, stage)
+                whole = whole._replace(inertia=left)
         if (parent := parents[i]) >= 0:
             moved, others = whole.about(frames[i].offset), carried[parent]
             carried[parent] = moved if others is None else moved.plus(others)
