@@ -100,7 +100,7 @@ RUNS = {"dt": 0.01, "max_steps": 100, "backend": "python", "estimate_error": Fal
 MODEL_ALONE = """as_system bias center_of_mass center_of_mass_jacobian conserved_momenta coriolis damping_force
     display_names energy gravity_force inertial_parameters integrable_rows inverse_dynamics_derivatives
     inverse_mass_matrix kinetic_energy lint_constraints mass_matrix momentum potential_energy regressor state_equation
-    state_space to_urdf torque_by_joint_motion torque_by_link RecursiveInverseDynamics"""
+    to_urdf torque_by_joint_motion torque_by_link RecursiveInverseDynamics"""
 
 CALLS = {
     **{f"cg.{op.name}": call(function(op), *[X] * op.arity) for op in OPS.values()},
@@ -157,8 +157,11 @@ CALLS = {
     "dyn.formulation_sizes": call(dyn.formulation_sizes, ARM),
     "dyn.momentum_rate": call(dyn.momentum_rate, ARM, "chain_rule", simplify=True, keep_momentum=False),
     "dyn.reduced_linearization": call(dyn.reduced_linearization, SYSTEM, [0.0], [0.0], None, t=0.0, parameters=None),
-    "dyn.linearize": call(dyn.linearize, SYSTEM, [0.0], [0.0], None, t=0.0, parameters=None),
-    "dyn.linearize_many": call(dyn.linearize_many, SYSTEM, [[0.0]], [[0.0]], None, t=0.0, parameters=None, threads=1),
+    "dyn.state_space": call(dyn.state_space, ARM, form="velocity"),
+    "dyn.linearize": call(dyn.linearize, SYSTEM, [0.0], [0.0], None, form="momentum", t=0.0, parameters=None),
+    "dyn.linearize_many": call(
+        dyn.linearize_many, SYSTEM, [[0.0]], [[0.0]], None, form="velocity", t=0.0, parameters=None, threads=1
+    ),
     "dyn.raise_if_singular": call(dyn.raise_if_singular, ARM, 0.0),
     "dyn.spurious_nodes": call(dyn.spurious_nodes, GRAPH),
     "dyn.prune": call(

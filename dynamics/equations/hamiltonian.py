@@ -14,6 +14,7 @@ from .formulations import ONE, ZERO
 from .legendre import Legendre
 from .shorter_form import shorter_form
 
+FORMS = ("velocity", "momentum")  # of a motion: states (q, qd) or (q, p)
 ITERATIONS = 10  # Newton's, for a Lagrangian that is not quadratic in the velocities
 
 

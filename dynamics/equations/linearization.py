@@ -1,4 +1,4 @@
-"""Linearization: the exact derivative of the state equation, as a graph and at a state."""
+"""Linearization: the exact derivative of the state equation or of Hamilton's, as a graph and at a state."""
 
 from __future__ import annotations
 
@@ -8,19 +8,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
+from cgraph.extend import require_choice
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .equations_of_motion import forward_dynamics
 from .evaluate_at import Array, evaluate_at
+from .hamiltonian import FORMS
 from .initial_value import normalized
-from .linearization_parts import assembled, linearization_parts
+from .linearization_parts import LinearizationParts, linearization_parts
 from .shorter_form import shorter_form
 from .singular_mass_matrix import raise_if_singular
+from .symmetric_linearization import SymmetricParts
 
 
-def state_space(model: Model) -> Graph:
-    """A and B of d(xdot) = A dx + B dtau, x = (q, qd), at any state.
+def state_space(model: Model, *, form: str = "velocity") -> Graph:
+    """A and B of d(xdot) = A dx + B dtau, x = (q, qd), or x = (q, p) of the momentum form, at any state.
 
     Of quasi-velocities, qdot = G(q) qd, dx = (xi, dqd) has small displacements xi with dq = G xi, such as a rotation
     vector in the body's axes, so that A and B have no row or column more than there are freedoms.
@@ -34,37 +37,66 @@ def state_space(model: Model) -> Graph:
     M dqdd - J^T dlambda = dtau - d(tau - J^T lambda)/dx dx,  J dqdd = -d(dz/dt)/dx dx. At a state that meets them A
     holds for displacements that they admit, see `reduced_linearization`.
 
+    In coordinates and momenta p = dL/dqd, of Hamilton's equations, one half of the entries is enough: without damping
+    and forces A = J H'', with J = [[0, 1], [-1, 0]] and the symmetric second slopes of H(q, p), so that J A is
+    symmetric to the last bit, and B = [0, 1]. Damping D and forces f(q, qd, t) add df - D dqd to the rates of momenta,
+    dqd = H_pq dq + H_pp dp, which is not symmetric. A does not depend on tau. With W = dp/dq at fixed velocities,
+    H'' is
+
+        H_pp = M^-1,   H_pq = -M^-1 W,   H_qq = W^T M^-1 W - d2L/dq2
+
+    Of quasi-velocities dp is the change of the numbers p, and A is that of (xi, dp). In (xi, dp + P xi / 2), with
+    P_kj = p . c(e_j, e_k) of the brackets c, it is J times a symmetric matrix again.
+
     Parameters
     ----------
     model : Model
         A system, a mechanism or a scene with n coordinates.
+    form : {"velocity", "momentum"}
+        Of x, as of `simulate`.
 
     Returns
     -------
     Graph
-        Inputs q0.., qd0.., tau0.., t if needed, parameters; outputs A_0_0, .., (2n, 2n), and B_0_0, .., (2n, n), row
-        by row.
+        Inputs q0.., qd0.., tau0.., or q0.., p0.., t if needed, parameters; outputs A_0_0, .., (2n, 2n), and B_0_0, ..,
+        (2n, n), row by row. The velocities of p are those of `hamilton_equations`, with its error where L is not
+        quadratic in them.
 
     Raises
     ------
     SingularMassMatrixError
         For a coordinate without inertia.
+    ConstraintError
+        For the momentum form of a model with constraints.
+    ValueError
+        For the momentum form of a model with a parameter that is called like a momentum.
     TypeError
         For what is no model, or has no Lagrangian.
 
     Examples
     --------
+    >>> import cgraph as cg
     >>> import dynamics as dyn
     >>> spring = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 0.5 * 9.0 * q[0] ** 2, ["x"], damping=0.5)
     >>> state = {"q0": 0.0, "qd0": 0.0, "tau0": 0.0}
     >>> {name: value for name, value in dyn.state_space(spring).evaluate(state).items() if name[2] == "1"}
     {'A_1_0': -9.0, 'A_1_1': -0.5, 'B_1_0': 1.0}
+    >>> pendulum = dyn.System(lambda q, qd, t: 0.5 * 4.0 * qd[0] ** 2 + 20.0 * cg.cos(q[0]), ["angle"])
+    >>> dyn.state_space(pendulum, form="momentum").evaluate({"q0": 0.0, "p0": 0.0})
+    {'A_0_0': 0.0, 'A_0_1': 0.25, 'A_1_0': -20.0, 'A_1_1': 0.0, 'B_0_0': 0.0, 'B_1_0': 1.0}
     """
-    return shorter_form(as_system(model), _state_space)
+    if require_choice("form", form, FORMS) == "velocity":
+        return shorter_form(as_system(model), lambda system: linearization_parts(system).written_out())
+    return shorter_form(
+        as_system(model), lambda system: SymmetricParts(system, momenta=True).of_momenta(), mirrored=True
+    )
 
 
-def _state_space(system: System) -> Graph:
-    return linearization_parts(system).written_out()
+def parts_of(system: System, form: str) -> LinearizationParts | SymmetricParts:
+    """The parts of the linearization of a form, over (q, qd)."""
+    if form == "velocity":
+        return linearization_parts(system)
+    return SymmetricParts(system)
 
 
 def linearize(
@@ -73,13 +105,15 @@ def linearize(
     qd: ArrayLike,
     tau: ArrayLike | None = None,
     *,
+    form: str = "velocity",
     t: float = 0.0,
     parameters: Mapping[str, float] | None = None,
 ) -> tuple[Array, Array]:
     """A, (2n, 2n), and B, (2n, n), of d(xdot) = A dx + B dtau, x = (q, qd), at a state and applied forces (default 0).
 
-    Of quasi-velocities dx is of displacements, see `state_space`. With constraints the state has to meet them (see
-    `consistent_state`), and `reduced_linearization` has the matrices of independent displacements.
+    Of the momentum form x = (q, p), see `state_space`; the state is q and qd all the same. Of quasi-velocities dx is of
+    displacements, see there, too. With constraints the state has to meet them (see `consistent_state`), and
+    `reduced_linearization` has the matrices of independent displacements.
 
     For many states, and for all digits of long chains, there is `linearize_many`.
 
@@ -89,6 +123,8 @@ def linearize(
         A system, a mechanism or a scene with n coordinates.
     q, qd, tau : array_like, (nq,) and (n,)
         Coordinates [rad or m], velocities, and applied forces [N m or N].
+    form : {"velocity", "momentum"}
+        Of x, as of `simulate`. The state is given by velocities in both, so that nothing is iterated.
     t : float
         Time [s], for a model that depends on it.
     parameters : mapping of str to float
@@ -106,6 +142,8 @@ def linearize(
         entries that are not finite.
     SingularMassMatrixError
         For a coordinate without inertia, or a mass matrix that is singular at this state.
+    ConstraintError
+        For the momentum form of a model with constraints.
 
     Examples
     --------
@@ -114,16 +152,23 @@ def linearize(
     >>> A, B = dyn.linearize(spring, [0.0], [0.0])
     >>> A.tolist(), B.tolist()
     ([[0.0, 1.0], [-9.0, -0.5]], [[0.0], [1.0]])
+
+    In the momentum form A is J H'', and its modes are those of the motion:
+
+    >>> pendulum = dyn.planar_arm(masses=[1.0, 1.0], lengths=[1.0, 1.0])
+    >>> A, B = dyn.linearize(pendulum, [0.0, 0.0], [0.0, 0.0], form="momentum")
+    >>> A.round(3).tolist()
+    [[0.0, 0.0, 1.714, -4.286], [0.0, 0.0, -4.286, 13.714], [-19.62, -4.905, 0.0, 0.0], [-4.905, -4.905, 0.0, 0.0]]
     """
-    system = as_system(model)
-    graphs = linearization_parts(system).in_columns()
+    system, parts = as_system(model), parts_of(as_system(model), require_choice("form", form, FORMS))
+    graphs = parts.in_columns()
     flat = evaluate_at(system, graphs.shared, {"q": q, "qd": qd, "tau": tau}, t, parameters)
     if flat.ndim != 1:
         raise ValueError("linearize takes one state, got rows of several; see linearize_many")
-    factors, sides, brackets = np.split(flat, [graphs.factors, len(flat) - system.n**2])
-    rows = [*factors, *sides.reshape(-1, 3 * system.n)]
+    factors, sides, rest = np.split(flat, [graphs.factors, graphs.factors + graphs.sides])
+    rows = [*factors, *sides.reshape(-1, graphs.columns)]
     solved = graphs.column.evaluate(dict(zip(graphs.column.input_names, rows, strict=True))).values()
-    a, b = assembled(brackets, np.concatenate([np.broadcast_to(x, 3 * system.n) for x in solved]), system.n)
+    a, b = parts.assembled(sides, rest, np.concatenate([np.broadcast_to(x, graphs.columns) for x in solved]))
     if not (np.isfinite(a).all() and np.isfinite(b).all()):
         _raise_what_is_not_finite(system, {"q": q, "qd": qd, "tau": tau}, t, parameters)
     return a, b

@@ -6,7 +6,7 @@ tau. M is factored once; a column is then a graph of its own, small, and alike f
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,17 +22,41 @@ from .held_linearization import held_sides
 from .inverse_dynamics_derivatives import torque_derivatives
 from .mass_matrix_solve import MassSolve, inverse, mass_solve, shorter
 
+Rows = Sequence[Sequence[Node]]
+
 
 class ColumnGraphs(NamedTuple):
     """A linearization as two graphs.
 
-    shared: the state to p0.., what columns read, then b_i_0, .., b_i_{k-1} for each row i, the right-hand sides of k =
-    3n columns, then rows of C(qd), xi_dot = dqd + C xi.  column: p0.. and a right-hand side b0.. to x0.., (n,).
+    shared: the state to p0.., what columns read, then b_i_0, .., b_i_{k-1} for each row i, the right-hand sides of k
+    columns, then the rest, such as rows of C(qd), xi_dot = dqd + C xi.  column: p0.. and a right-hand side b0.. to
+    x0.., (n,).
     """
 
     shared: Graph
     column: Graph
     factors: int
+    columns: int
+
+    @property
+    def sides(self) -> int:
+        """How many entries the right-hand sides have."""
+        return self.columns * (len(self.column.inputs) - self.factors)
+
+
+def column_graphs(
+    inputs: Sequence[Node], solve: MassSolve, sides: Rows, n: int, rest: Mapping[str, Rows]
+) -> ColumnGraphs:
+    """Of right-hand sides, (n + m,) with m multipliers, those of M^-1 after them, and matrices by name."""
+    factors, column = solve.split()
+    outputs = {f"p{k}": node for k, node in enumerate(factors)}
+    for i in range(len(solve.b)):
+        row = [*[side[i] for side in sides], *_unit(i, n)]
+        outputs |= {f"b_{i}_{j}": entry for j, entry in enumerate(row)}
+    for name, rows in rest.items():
+        outputs |= {f"{name}_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row)}
+    shared = with_reciprocals(cg.simplify(Graph(inputs, outputs)))
+    return ColumnGraphs(shared, cg.simplify(column), len(factors), len(sides) + n)
 
 
 class LinearizationParts(NamedTuple):
@@ -62,15 +86,17 @@ class LinearizationParts(NamedTuple):
 
     def in_columns(self) -> ColumnGraphs:
         """The same with the columns left to a graph of one."""
+        return column_graphs(self.inputs, self.solve, self.sides, len(self.brackets), {"C": self.brackets})
+
+    def assembled(self, _sides: Array, brackets: Array, solutions: Array) -> tuple[Array, Array]:
+        """A, (.., 2n, 2n), and B, (.., 2n, n), of C(qd), (.., n n), and the solutions of all columns, (.., n 3n)."""
         n = len(self.brackets)
-        factors, column = self.solve.split()
-        outputs = {f"p{k}": node for k, node in enumerate(factors)}
-        for i in range(len(self.solve.b)):
-            row = [*[side[i] for side in self.sides], *_unit(i, n)]
-            outputs |= {f"b_{i}_{j}": entry for j, entry in enumerate(row)}
-        outputs |= {f"C_{i}_{j}": entry for i, row in enumerate(self.brackets) for j, entry in enumerate(row)}
-        shared = with_reciprocals(cg.simplify(Graph(self.inputs, outputs)))
-        return ColumnGraphs(shared, cg.simplify(column), len(factors))
+        solved = solutions.reshape(*solutions.shape[:-1], n, 3 * n).copy()
+        solved[..., 2 * n :] = mirrored(solved[..., 2 * n :])  # symmetric, by the half that is written out, too
+        top = np.zeros_like(solved)
+        top[..., :n], top[..., n : 2 * n] = brackets.reshape(*brackets.shape[:-1], n, n), np.eye(n)
+        rows = np.concatenate([top, solved], axis=-2)
+        return rows[..., : 2 * n], rows[..., 2 * n :]
 
 
 def linearization_parts(system: System) -> LinearizationParts:
@@ -92,15 +118,9 @@ def _parts(system: System, method: str) -> LinearizationParts:
     return LinearizationParts(qdd.inputs, sides, solve, system.kinematics.brackets(build), build)
 
 
-def assembled(brackets: Array, solutions: Array, n: int) -> tuple[Array, Array]:
-    """A, (.., 2n, 2n), and B, (.., 2n, n), of C(qd), (.., n n), and the solutions of all columns, (.., n 3n)."""
-    solved = solutions.reshape(*solutions.shape[:-1], n, 3 * n).copy()
-    by_tau = solved[..., 2 * n :]  # symmetric, to the last bit by the half that is written out, too
-    by_tau[...] = np.triu(by_tau) + np.swapaxes(np.triu(by_tau, 1), -1, -2)
-    top = np.zeros_like(solved)
-    top[..., :n], top[..., n : 2 * n] = brackets.reshape(*brackets.shape[:-1], n, n), np.eye(n)
-    rows = np.concatenate([top, solved], axis=-2)
-    return rows[..., : 2 * n], rows[..., 2 * n :]
+def mirrored(matrix: Array) -> Array:
+    """Symmetric to the last bit, by the upper triangle."""
+    return np.triu(matrix) + np.swapaxes(np.triu(matrix, 1), -1, -2)
 
 
 def _unit(i: int, n: int) -> list[Node]:

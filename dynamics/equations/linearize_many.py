@@ -10,21 +10,27 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Call, Map, Program, Statement, runner, share, thread_count
+from cgraph.extend import Call, Map, Program, Statement, require_choice, runner, share, thread_count
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .equations_of_motion import forward_dynamics
 from .evaluate_at import Array, InputRows
 from .formulations import ONE, ZERO
+from .hamiltonian import FORMS
 from .linearization_parts import ColumnGraphs, LinearizationParts, linearization_parts
+from .symmetric_linearization import SymmetricParts
 
 # Nodes; beyond, the columns share one piece of code: of 18 000 nodes, machine code is made in half the time and takes a
 # third longer, of 200 000 in a fifth of the time, and takes no longer.
 WRITTEN_OUT = 20_000
+# Times as many, where else products of matrices would be left to NumPy: 83 000 nodes are made in 11 s, not 8, and take
+# 19 us a state, not 91.
+LONGER = 5
 SHARE = 3  # of the nodes of all entries, at most one in so many is forward dynamics
+MATRICES = 1024  # states whose parts are in memory at a time, before they are matrices
 BLOCK = 64  # states that are run between looks at the keyboard, and that a thread takes at a time
-_functions: WeakKeyDictionary[System, _Function] = WeakKeyDictionary()
+_functions: WeakKeyDictionary[System, dict[str, _Function]] = WeakKeyDictionary()
 
 
 def linearize_many(
@@ -33,6 +39,7 @@ def linearize_many(
     qd: ArrayLike,
     tau: ArrayLike | None = None,
     *,
+    form: str = "velocity",
     t: float = 0.0,
     parameters: Mapping[str, float] | None = None,
     threads: int | None = 1,
@@ -46,12 +53,17 @@ def linearize_many(
     piece, and a column of A and B another. The matrices of a state whose mass matrix is singular, or with a quaternion
     of length 0, have entries that are infinite or NaN.
 
+    Of the momentum form all entries are written out, or of very large systems the products of M^-1 dp/dq are left to
+    NumPy.
+
     Parameters
     ----------
     model : Model
         A system, a mechanism or a scene with n velocities.
     q, qd, tau : array_like, (N, nq) and (N, n)
         Coordinates [rad or m], their velocities, and applied forces [N m or N]; one row is the same for all.
+    form : {"velocity", "momentum"}
+        Of x, as of `linearize`; the states are q and qd in both.
     t : float
         Time [s], for a model that depends on it.
     parameters : mapping of str to float
@@ -78,7 +90,7 @@ def linearize_many(
     ([-15.0, 15.0], (2, 2, 1))
     """
     system = as_system(model)
-    function, count = _function(system), thread_count(threads)
+    function, count = _function(system, require_choice("form", form, FORMS)), thread_count(threads)
     values = function.inputs({"q": q, "qd": qd, "tau": tau}, t, parameters)
     if values.ndim != 2:
         raise ValueError("linearize_many takes rows of states, got one state; see linearize")
@@ -91,8 +103,8 @@ class _Function:
     write: rows (N, n_in) of the inputs and a number of threads to (A B), (N, 2n, 3n).
     """
 
-    def __init__(self, system: System) -> None:
-        inputs, self._write = _way(system)
+    def __init__(self, system: System, form: str) -> None:
+        inputs, self._write = _way(system) if form == "velocity" else _symmetric_way(system)
         self._n, self.inputs = system.n, InputRows(system, [str(each.name) for each in inputs])
 
     def __call__(self, values: Array, threads: int) -> tuple[Array, Array]:
@@ -101,10 +113,11 @@ class _Function:
         return matrices[:, :, : 2 * self._n], matrices[:, :, 2 * self._n :]
 
 
-def _function(system: System) -> _Function:
-    if system not in _functions:
-        _functions[system] = _Function(system)
-    return _functions[system]
+def _function(system: System, form: str) -> _Function:
+    functions = _functions.setdefault(system, {})
+    if form not in functions:
+        functions[form] = _Function(system, form)
+    return functions[form]
 
 
 Write = Callable[[Array, Array, int], None]
@@ -121,7 +134,36 @@ def _way(system: System) -> tuple[Sequence[Node], Write]:
     return _by_jacobian(system) if rates else (parts.inputs, _in_columns(parts))
 
 
-def _written_out(parts: LinearizationParts) -> Write:
+def _symmetric_way(system: System) -> tuple[Sequence[Node], Write]:
+    parts = SymmetricParts(system)
+    return parts.inputs, _written_out(parts) if parts.size < LONGER * WRITTEN_OUT else _assembled(parts)
+
+
+def _assembled(parts: SymmetricParts) -> Write:
+    """X, M^-1 and the rest in machine code, and their products by NumPy."""
+    graphs, n = parts.in_columns(), len(parts.brackets)
+    outputs = len(graphs.shared.outputs)
+    registers = {"state": len(graphs.shared.inputs), "factors": graphs.factors}
+    registers |= {f"{name}{i}": graphs.columns for name in ("b", "x") for i in range(n)}
+    registers["rest"] = outputs - graphs.factors - graphs.sides
+    sides, solutions = ([f"{name}{i}" for i in range(n)] for name in ("b", "x"))
+    body: list[Statement] = [
+        Call(graphs.shared, ("state",), ("factors", *sides, "rest")),
+        Map(graphs.column, tuple(sides), tuple(solutions), shared=("factors",)),
+    ]
+    run = runner(Program(registers, body, record=[*sides, "rest", *solutions]))
+    splits = [graphs.sides, outputs - graphs.factors]
+
+    def write(values: Array, matrices: Array, threads: int) -> None:
+        for k in range(0, len(values), MATRICES):
+            rows = run.batch("state", values[k : k + MATRICES], threads)
+            a, b = parts.assembled(*np.split(rows, splits, axis=-1))
+            matrices[k : k + MATRICES, :, : 2 * n], matrices[k : k + MATRICES, :, 2 * n :] = a, b
+
+    return write
+
+
+def _written_out(parts: LinearizationParts | SymmetricParts) -> Write:
     """Rows that are the same at every state are no business of the machine code's."""
     graph, n = parts.written_out(), len(parts.brackets)
     rows = [

@@ -69,10 +69,8 @@ def torque_derivatives(
     n = len(state[1])
     result = TorqueDerivatives([ZERO] * n, *[[[ZERO] * n for _ in range(n)] for _ in range(3)])
     tags = (KINETIC, POTENTIAL) if any([x.value != 0.0 for x in up]) else (KINETIC,)  # of accelerations
-    in_plane = _trees_in_a_plane(bodies, links, parents)
-    links = [_about_z(link) if flat else link for link, flat in zip(links, in_plane, strict=True)]
     with building(build):
-        frames = _frames(bodies, links, parents, in_plane, (up, tags), state)
+        links, frames = tree_frames(bodies, links, parents, (up, tags), state)
         composites: list[Composite | None] = [None] * len(bodies)
         for i in reversed(range(len(bodies))):
             with cg.tag(bodies[i].name):
@@ -102,7 +100,21 @@ def torque_derivatives(
 def _add_spring(
     result: TorqueDerivatives, link: Link, joint: MovingJoint, place: Places, state: MotionState, build: Builder
 ) -> None:
-    """A spring's forces, and their slopes by displacements: of its energy G^T d/dq."""
+    q, u = state[0][place.q], state[1][place.u]
+    for i, (_, force) in zip(range(place.u.start, place.u.stop), spring_forces(link, joint, q, u), strict=False):
+        result.torques[i] = result.torques[i] + force
+    add_spring_slopes(result.by_q, link, joint, place, state[:2], build)
+
+
+def add_spring_slopes(
+    to: list[list[Node]],
+    link: Link,
+    joint: MovingJoint,
+    place: Places,
+    state: tuple[Sequence[Node], Sequence[Node]],
+    build: Builder,
+) -> None:
+    """The slopes of a spring's forces by displacements: of its energy G^T d/dq."""
     q, u = state[0][place.q], state[1][place.u]
     rate = joint.rate(q, u)
     for i, (_, force) in zip(range(place.u.start, place.u.stop), spring_forces(link, joint, q, u), strict=False):
@@ -110,9 +122,24 @@ def _add_spring(
         seeds: dict[Node, Node] = {}
         for node, slope in zip(rate, slopes, strict=True):
             seeds[node] = seeds.get(node, ZERO) + slope
-        result.torques[i] = result.torques[i] + force
         for j, slope in zip(range(place.u.start, place.u.stop), cotangents(seeds, u, build), strict=True):
-            result.by_q[i][j] = result.by_q[i][j] + slope
+            to[i][j] = to[i][j] + slope
+
+
+def tree_frames(
+    bodies: Sequence[Body],
+    links: Sequence[Link],
+    parents: Sequence[int],
+    gravity: tuple[Triple, Tags],
+    state: MotionState,
+) -> tuple[list[Link], list[Frame]]:
+    """How all bodies are placed and move; and the links, of trees in a plane without inertia that has no part in it.
+
+    gravity: the acceleration against free fall, and the tags of accelerations.
+    """
+    in_plane = _trees_in_a_plane(bodies, links, parents)
+    links = [_about_z(link) if flat else link for link, flat in zip(links, in_plane, strict=True)]
+    return links, _frames(bodies, links, parents, in_plane, gravity, state)
 
 
 def _frames(

@@ -8,10 +8,10 @@ import numpy as np
 
 from cgraph.extend import Array, require_choice
 
+from ..equations.hamiltonian import FORMS
 from ..integrators import Problem, momentum_form
 from .row_values import row_values
 
-FORMS = ("velocity", "momentum")
 NEEDS = ("events", "dense_output=True", "a SampledController")  # in the order of `needs`
 
 

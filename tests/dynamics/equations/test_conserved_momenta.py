@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -70,7 +71,24 @@ def pulled() -> dyn.System:
     )
 
 
+def rooted(kind: str, axis: Any, gravity: float) -> dyn.Mechanism:
+    """A body with a limb on a joint without springs and dampers."""
+    limb = random_mechanism(1, ["revolute"], 1).bodies[0]
+    base = dyn.Body(
+        "base", dyn.Joint(kind, axis, pitch=0.2 * (kind == "screw")), "world", 1.0, (0.1, 0.0, 0.2), (0.2, 0.3, 0.4)
+    )
+    return dyn.Mechanism([base, replace(limb, name="limb", parent="base")], (0.0, 0.0, -gravity))
+
+
+X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 CASES = {
+    "an upright hinge": (lambda: rooted("revolute", Z, 9.81), ("base",)),
+    "a slide": (lambda: rooted("prismatic", X, 9.81), ("base",)),
+    "an upright screw": (lambda: rooted("screw", Z, 9.81), ()),
+    "a screw in space": (lambda: rooted("screw", X, 0.0), ("base",)),
+    "an upright cylinder": (lambda: rooted("cylindrical", Z, 9.81), ("base.angle",)),
+    "a plane in space": (lambda: rooted("planar", Z, 0.0), ("base.x", "base.y")),
+    "a ball in space": (lambda: rooted("ball", Z, 0.0), ()),  # about axes in the world, which no velocity is of
     "Kepler": (kepler, ("phi",)),
     "top of bodies": (top, ("turn", "spin")),
     "lopsided top": (lambda: top(0.1), ("turn",)),

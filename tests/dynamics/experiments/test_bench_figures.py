@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
-from dynamics.experiments.speed import both_forms, closed_chains, compile_time, ensembles, long_chains, reconfiguration
+from dynamics.experiments.speed import (
+    both_forms,
+    both_linearizations,
+    closed_chains,
+    compile_time,
+    ensembles,
+    long_chains,
+    reconfiguration,
+)
 from dynamics.experiments.speed.agreement import QUANTITIES, differences, random_arm
 from dynamics.experiments.speed.bench_figures import FIGURES
 from dynamics.experiments.speed.bench_scenes import turned_arm
@@ -158,3 +166,13 @@ def test_both_forms_are_counted_and_timed(monkeypatch: pytest.MonkeyPatch) -> No
         assert row[1:5] == tuple(map(str, (counts.nodes, counts.edges, counts.depth, counts.width)))
     assert float(ratios[1]) == pytest.approx(int(canonical[1]) / int(plain[1]), abs=1e-3)
     assert all(float(each) > 0.0 for each in ratios[1:])
+
+
+def test_both_linearizations_are_counted_and_timed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(both_linearizations, "SECONDS", 1e-4)
+    nodes, times = both_linearizations.rows("planar 3", 1)
+    arm = both_forms.MODELS["planar 3"]()
+    found = [len(dyn.state_space(arm, form=form).nodes) for form in ("velocity", "momentum")]
+    assert [int(nodes[1]), int(nodes[3])] == found
+    assert float(nodes[4]) == pytest.approx(found[1] / found[0], abs=1e-3)
+    assert all(float(each) > 0.0 for each in times[1:])
