@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from typing import Any
 
 import numpy as np
@@ -9,12 +10,14 @@ import pytest
 
 import dynamics as dyn
 from dynamics.experiments.speed import (
+    balanced_order,
     both_forms,
     both_linearizations,
     closed_chains,
     compile_time,
     ensembles,
     long_chains,
+    parallel_c,
     reconfiguration,
 )
 from dynamics.experiments.speed.agreement import QUANTITIES, differences, random_arm
@@ -176,3 +179,28 @@ def test_both_linearizations_are_counted_and_timed(monkeypatch: pytest.MonkeyPat
     assert [int(nodes[1]), int(nodes[3])] == found
     assert float(nodes[4]) == pytest.approx(found[1] / found[0], abs=1e-3)
     assert all(float(each) > 0.0 for each in times[1:])
+
+
+def test_a_schedule_is_bounded_by_work_and_by_depth() -> None:
+    x = cg.variables([f"x{i}" for i in range(8)])
+    total = x[0] + x[1]
+    for node in x[2:]:
+        total = total * node
+    chain = cg.Graph(x, {"y": total})
+    assert [balanced_order.schedule(chain, units) for units in (1, 4)] == [7, 7]
+    pairs = [x[2 * i] * x[2 * i + 1] for i in range(4)]
+    tree = cg.Graph(x, {"y": (pairs[0] + pairs[1]) * (pairs[2] + pairs[3])})
+    assert [balanced_order.schedule(tree, units) for units in (1, 2, 4, 8)] == [7, 4, 3, 3]
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+def test_lanes_and_threads_give_the_same_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parallel_c, "ROUNDS", 1)
+    graph = balanced_order.trigonometry_given(balanced_order.solved(both_forms.MODELS["planar 3"](), "balanced"))
+    found = parallel_c.times(graph, graph.inputs[:3], ["x0"])
+    sums = [total for _, total in found.values()]
+    x = [0.2 + 0.8 * ((i * 7919) % 1000) / 1000.0 for i in range(len(graph.inputs))]
+    exact = sum(graph.evaluate(dict(zip(graph.input_names, x, strict=True))).values())
+    assert sums == pytest.approx([exact] * 5, rel=1e-12)
+    with pytest.raises(ValueError, match="the graph has sin, where sums, products and quotients were needed"):
+        parallel_c.times(cg.Graph(graph.inputs, {"y": cg.sin(graph.inputs[0])}), [], [])
