@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import cgraph as cg
 import dynamics as dyn
 from dynamics.experiments.speed import (
     balanced_order,
