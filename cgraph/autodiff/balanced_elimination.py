@@ -64,6 +64,11 @@ class BalancedElimination(EdgePushing):
         self._after: dict[int, list[Node]] = {}  # what left after the step at a place
         self._depths: dict[Node, int] = {}
 
+    @property
+    def is_cut(self) -> bool:
+        """Whether there is more than one piece."""
+        return bool(self._copies)
+
     def _is_variable(self, step: Step) -> bool:
         return not isinstance(step, list) and (step in self.sums or step in self.position)
 

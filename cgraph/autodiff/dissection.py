@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 
-LEAF = 1.8  # variables of a last piece for each unknown that crosses: a longer one is deeper, a shorter one more nodes
+LEAF = 1.8  # variables of a last piece for each unknown that crosses, at least 2: longer are deeper, shorter more nodes
 NEAR = 0.2  # of the variables of a piece: how far from its middle a cut may be
 
 
@@ -99,7 +99,7 @@ def _halves(
         return min(near, key=lambda i: (crossing[path[i - 1]], abs(count[i] - middle)), default=None)
 
     cut = best(whole / 2)
-    leaves = 1 if cut is None else round(whole / (LEAF * max(1, crossing[path[cut - 1]])))
+    leaves = 1 if cut is None else round(whole / (LEAF * max(2, crossing[path[cut - 1]])))
     cut = best(whole * (leaves // 2) / leaves) if leaves > 1 else None
     if cut is None:
         yield piece, path

@@ -52,8 +52,9 @@ def hessian_solve(
         "recursive": from the output down, for a chain or a tree from its tips to its base, one after another: the
         fewest nodes, and a depth in proportion to the length of a chain. "balanced": by nested dissection, halves of a
         chain at the same time, seen from their two ends only, and long sums in blocks (`cg.balanced_sums`): a depth in
-        proportion to the logarithm, for up to twice the nodes. Pieces are eliminated with the inertia that they have by
-        themselves: a body of next to none costs digits, and with `check` their pivots have to be positive as well.
+        proportion to the logarithm, for up to twice the nodes; what is too short to be cut is as before. Pieces are
+        eliminated with the inertia that they have by themselves: a body of next to none costs digits, and with `check`
+        their pivots have to be positive as well.
 
     Returns
     -------
@@ -221,13 +222,16 @@ def _solved(
     with building(build) as set_label:
         equations = EdgePushing(build, output, entries, at, nodes)
         passed = equations.arguments(_rows(output, multipliers, wrt))
-        plan = elimination_steps(passed, equations.rotations, fewest=order == "balanced")
+        plan = elimination_steps(passed, equations.rotations)
         if order == "balanced":
             if multipliers:
                 raise ValueError('order "balanced" needs a function without multipliers')
+            fewest = elimination_steps(passed, equations.rotations, fewest=True)
             with building(Builder()):
-                rows = written_rows(equations, plan)
-            equations = BalancedElimination(build, output, entries, at, nodes, plan, rows)
+                rows = written_rows(EdgePushing(build, output, entries, at, nodes), fewest)
+            pieces = BalancedElimination(build, output, entries, at, nodes, fewest, rows)
+            if pieces.is_cut:
+                equations, plan = pieces, fewest
         for step in plan:
             set_label(nodes_of(step)[0].label.derived(ADJOINT))
             equations.reduce(step)
