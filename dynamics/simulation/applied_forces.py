@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
+import cgraph as cg
 from cgraph import Graph, Node
 
 from ..equations.state_equation import state_inputs
@@ -37,8 +38,11 @@ class Applied:
         varied = () if self.controller is None else state_inputs(self.model).applied
         return {name: value for name, value in numbers.items() if name not in varied}
 
-    def hold(self, options: RunOptions) -> Hold | None:
-        """The forces that a sampled controller is to hold. Raises ValueError for a run that it cannot control."""
+    def hold(self, options: RunOptions, problem: Problem) -> Hold | None:
+        """The forces that a sampled controller is to hold along steps of a problem.
+
+        Raises ValueError for a run that it cannot control.
+        """
         if self.controller is None:
             return None
         if options.scipy_solver is not None:
@@ -46,7 +50,8 @@ class Applied:
         if options.direction < 0.0:
             raise ValueError("a SampledController holds what it has seen, so that t_end has to be later than t0")
         system = as_system(self.model)
-        return Hold(self.controller, system.velocities, system.nq, options.t0)
+        observed = None if problem.velocities is None else cg.compile(problem.velocities, options.backend)
+        return Hold(self.controller, system.velocities, system.nq, options.t0, observed)
 
     def graph(self, problem: Problem) -> Graph:
         """tau as a graph over the states, t and parameters of a problem of the model."""
