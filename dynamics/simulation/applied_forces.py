@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, TypeAlias
 
 import cgraph as cg
@@ -15,6 +16,8 @@ from ..systems.controller import with_closed_form
 from ..systems.model import Model, as_ode, as_system
 from .run_options import RunOptions
 from .sampled_controller import Hold, SampledController
+
+KEPT = 16  # compiled velocities that stay for another run
 
 Constant: TypeAlias = float | Sequence[float]
 Tau: TypeAlias = Constant | Callable[..., Sequence[Node | float]] | SampledController
@@ -50,7 +53,7 @@ class Applied:
         if options.direction < 0.0:
             raise ValueError("a SampledController holds what it has seen, so that t_end has to be later than t0")
         system = as_system(self.model)
-        observed = None if problem.velocities is None else cg.compile(problem.velocities, options.backend)
+        observed = None if problem.velocities is None else _compiled(problem.velocities, options.backend)
         return Hold(self.controller, system.velocities, system.nq, options.t0, observed)
 
     def graph(self, problem: Problem) -> Graph:
@@ -58,6 +61,12 @@ class Applied:
         assert self.nodes is not None
         outputs = {f"tau{k}": node for k, node in enumerate(self.nodes)}
         return problem.bind(problem.states, Graph(quantity_inputs(problem), outputs))
+
+
+@lru_cache(KEPT)
+def _compiled(velocities: Graph, backend: str) -> cg.Compiled:
+    """The velocities of momenta, for a controller; of the last few, those compiled before."""
+    return cg.compile(velocities, backend)
 
 
 def with_applied(model: Model, tau: Tau, parameters: Mapping[str, Any] | None) -> tuple[Model, Applied]:
