@@ -223,17 +223,15 @@ def test_what_the_momentum_form_has_not_is_said() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(900)
 @pytest.mark.parametrize("method", ["verlet", "gauss4"])
 def test_a_million_steps_leave_the_energy_in_its_band(method: str) -> None:
     """No drift: of the band over the first tenth of the run, the last tenth keeps within a hundredth."""
     arm, dt = random_arm(2, damped=False), 2.0**-7
-    times = dt * np.arange(0, 1_000_001, 10)
-    how = {"dt": dt, "t_eval": times, "form": "momentum", "estimate_error": False}
-    run = dyn.simulate(arm, [1.0, -0.5], [0.0, 0.0], times[-1], method, **how)
+    how = {"dt": dt, "form": "momentum", "estimate_error": False}
+    run = dyn.simulate(arm, [1.0, -0.5], [0.0, 0.0], 1_000_000 * dt, method, **how)
     assert run.stats.steps == 1_000_000
     error = run.energy - run.energy[0]
-    first, last = error[:10_000], error[-10_000:]
+    first, last = error[:100_000], error[-100_000:]
     band = np.ptp(first)
     assert abs(last.mean() - first.mean()) <= 0.01 * band
-    assert np.ptp(last) <= 1.1 * band
+    assert np.ptp(last) <= 1.01 * band
