@@ -30,7 +30,8 @@ def evaluate(
     names = [str(node.name) for node in inputs]
     if missing := [name for name in names if name not in read]:
         raise GraphError(f"no value for input {', '.join(missing)}")
-    if unknown := [name for name in read if name not in set(names)]:
+    known = set(names)
+    if unknown := [name for name in read if name not in known]:
         raise GraphError(f"the graph has no input {', '.join(map(str, unknown))} (it has {', '.join(names) or 'none'})")
     shape = _common_shape(read)
 

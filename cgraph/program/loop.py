@@ -55,6 +55,7 @@ class Loop:
         moving, held = ([graph.inputs[k] for k in chosen] for chosen in (self._moving, self._held))
         wanted = [graph.outputs[carry[name]] for name in carry]
         self.invariants, stand_ins = _loop_invariants(wanted, held)
+        self._fixed = [graph.input_names.index(name) for name in self.invariants.input_names] if self.invariants else []
         new = rebuild(wanted, stand_ins, lambda n, args: Node(n.op, args, n.label, name=n.name))
         one_pass = Graph(
             [*moving, *held, *stand_ins.values()], dict(zip(carry, [new[node] for node in wanted], strict=True))
@@ -99,7 +100,8 @@ class Loop:
             raise GraphError(f"x must have shape {wanted}, one row for each input, got {values.shape}")
         registers = {"carry": values[self._moving], "held": values[self._held]}
         if self.invariants is not None:
-            held = dict(zip(self.invariants.input_names, values[self._held], strict=True))
+            fixed = values[self._fixed]
+            held = dict(zip(self.invariants.input_names, fixed.tolist() if dimensions == 1 else fixed, strict=True))
             registers["invariant"] = np.array(list(self.invariants.evaluate(held).values()))
         return self._runner.memory(registers, None if dimensions == 1 else values.shape[1])
 
@@ -118,7 +120,8 @@ def _loop_invariants(outputs: Sequence[Node], held: Sequence[Node]) -> tuple[Gra
     invariants = [node for node in dict.fromkeys(used) if node in fixed and node.args]
     if not invariants:
         return None, {}
-    graph = Graph(held, {f"{k}": node for k, node in enumerate(invariants)})
+    reached = set(topological(invariants))
+    graph = Graph([node for node in held if node in reached], {f"{k}": node for k, node in enumerate(invariants)})
     return graph, {node: variable(next(names)) for node in invariants}
 
 

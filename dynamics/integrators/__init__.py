@@ -7,7 +7,7 @@ from .dop853 import DOP853
 from .explicit import explicit, explicit_step
 from .jacobian_statements import jacobian_statements
 from .method import Method
-from .momentum_form import MomentumForm, momentum_form
+from .momentum_form import in_form, momentum_form
 from .momentum_graphs import Mechanics, mechanics
 from .partitioned_tableau import PARTITIONED, Partitioned, gauss
 from .problem import (
@@ -102,12 +102,12 @@ __all__ = [
     "TABLEAUS",
     "Mechanics",
     "Method",
-    "MomentumForm",
     "Problem",
     "Step",
     "Tableau",
     "derive",
     "force",
+    "in_form",
     "jacobian_statements",
     "mechanics",
     "momentum_form",

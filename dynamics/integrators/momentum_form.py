@@ -1,30 +1,30 @@
-"""MomentumForm: a problem in coordinates and momenta, by Hamilton's equations, and the way there and back."""
+"""Forms: what the states of a problem are, coordinates and velocities or, by Hamilton's equations, momenta."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
-from typing import NamedTuple
 
-from cgraph import Graph
+from cgraph.extend import require_choice
 
 from ..equations.equations_of_motion import momentum
-from ..equations.hamiltonian import hamilton_equations, velocities
+from ..equations.hamiltonian import FORMS, hamilton_equations, velocities
 from ..systems.model import as_system
 from .problem import KEPT, Problem
 
 
-class MomentumForm(NamedTuple):
-    """A mechanical problem in q and p = dL/dqd. Inputs of the graphs: states, t, parameters."""
-
-    problem: Problem
-    momenta: Graph  # of states (q, qd)
-    velocities: Graph  # of states (q, p)
+def in_form(problem: Problem, form: str) -> Problem:
+    """The problem that the steps of a run are of. Raises ValueError for a form that it has not."""
+    if require_choice("form", form, FORMS) == "velocity":
+        return problem
+    if problem.system is None:
+        raise ValueError('form="momentum" needs a Lagrangian, which a system of first order does not have')
+    return momentum_form(problem)
 
 
 @lru_cache(KEPT)
-def momentum_form(problem: Problem) -> MomentumForm:
-    """The same motion in q and p.
+def momentum_form(problem: Problem) -> Problem:
+    """The same motion in q and p = dL/dqd.
 
     Raises TypeError for a first-order system; ConstraintError, SingularMassMatrixError and ValueError as
     `hamilton_equations`.
@@ -32,13 +32,11 @@ def momentum_form(problem: Problem) -> MomentumForm:
     system = as_system(problem.model)
     states = (*problem.states[: problem.nq], *[f"p{i}" for i in range(system.n)])
     names = [f"momentum of {name!r}" for name in system.velocities]
-    canonical = replace(
+    return replace(
         problem,
         states=states,
         components=(*problem.components[: problem.nq], *names),
         rate=problem.bind(states, hamilton_equations(system)),
-        momenta=True,
-    )
-    return MomentumForm(
-        canonical, problem.bind(problem.states, momentum(system)), problem.bind(states, velocities(system))
+        velocities=problem.bind(states, velocities(system)),
+        momentum=problem.bind(problem.states, momentum(system)),
     )

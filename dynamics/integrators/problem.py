@@ -14,6 +14,7 @@ from cgraph.extend import topological
 from ..equations.energies import energy
 from ..equations.projection import projection
 from ..equations.state_equation import normalization, state_inputs, with_multipliers
+from ..equations.substitute import substitute
 from ..systems.arguments import TIME, Parameters, call_user_function
 from ..systems.model import Model, as_ode, as_system
 from ..systems.system import System
@@ -34,7 +35,9 @@ class Problem:
     constraints.
     multipliers: of the constraints, by name; inputs the states, t, parameters. None without constraints.
     system: the Lagrangian system; None for a first-order one.
-    momenta: whether the states are q and p = dL/dqd in place of q and qd.
+    velocities: qd of the states, where these are q and p = dL/dqd; inputs the states, t, parameters. None where they
+    are q and qd, as in `Problem`s that are derived.
+    momentum: p of q and qd, which are its inputs in place of the states; None where velocities is.
     """
 
     model: Model
@@ -47,7 +50,8 @@ class Problem:
     projection: Graph | None
     multipliers: Graph | None
     system: System | None
-    momenta: bool = False
+    velocities: Graph | None = None
+    momentum: Graph | None = None
 
     @property
     def size(self) -> int:
@@ -58,6 +62,11 @@ class Problem:
     def nq(self) -> int:
         """Numbers in a state that are coordinates, which come first; all of a first-order system."""
         return self.size if self.system is None else self.system.nq
+
+    @property
+    def momenta(self) -> bool:
+        """Whether the states are q and p in place of q and qd."""
+        return self.velocities is not None
 
     @property
     def canonical(self) -> bool:
@@ -81,6 +90,14 @@ class Problem:
     def bind(self, first: Sequence[str], graph: Graph) -> Graph:
         """The graph over `first`, t and `parameters`, in this order, with the bound inputs built in."""
         return _bind(graph, first, self.parameters, self.bound)
+
+    def observed(self, quantities: Mapping[str, Node]) -> Graph:
+        """Quantities, see `quantity`, over the states, t and `parameters`: at the velocities of momenta."""
+        nodes = list(quantities.values())
+        if self.velocities is not None and self.system is not None:
+            nodes = substitute(nodes, dict(zip(self.system.qd, self.velocities.outputs.values(), strict=True)))
+        inputs = dict.fromkeys([*cg.variables([*self.states, TIME, *self.parameters]), *quantity_inputs(self)])
+        return self.bind(self.states, Graph(list(inputs), dict(zip(quantities, nodes, strict=True))))
 
 
 def derive(model: Model, bound: Mapping[str, float]) -> Problem:
@@ -210,9 +227,9 @@ def _known(problem: Problem) -> frozenset[Node]:
 
 
 def quantity_inputs(problem: Problem) -> list[Node]:
-    """What a `quantity` may depend on: the states, t, applied forces and the model's parameters."""
+    """What a `quantity` may depend on: the states of the model, t, applied forces and the model's parameters."""
     inputs = state_inputs(problem.model)
-    return cg.variables([*problem.states, TIME, *inputs.applied, *inputs.parameters])
+    return cg.variables([*inputs.states, TIME, *inputs.applied, *inputs.parameters])
 
 
 def reaches(nodes: Iterable[Node], variables: Iterable[Node]) -> bool:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, TypeAlias
 
+import cgraph as cg
 from cgraph import Graph, Node
 
 from ..equations.state_equation import state_inputs
@@ -14,6 +16,8 @@ from ..systems.controller import with_closed_form
 from ..systems.model import Model, as_ode, as_system
 from .run_options import RunOptions
 from .sampled_controller import Hold, SampledController
+
+KEPT = 16  # compiled velocities that stay for another run
 
 Constant: TypeAlias = float | Sequence[float]
 Tau: TypeAlias = Constant | Callable[..., Sequence[Node | float]] | SampledController
@@ -37,8 +41,11 @@ class Applied:
         varied = () if self.controller is None else state_inputs(self.model).applied
         return {name: value for name, value in numbers.items() if name not in varied}
 
-    def hold(self, options: RunOptions) -> Hold | None:
-        """The forces that a sampled controller is to hold. Raises ValueError for a run that it cannot control."""
+    def hold(self, options: RunOptions, problem: Problem) -> Hold | None:
+        """The forces that a sampled controller is to hold along steps of a problem.
+
+        Raises ValueError for a run that it cannot control.
+        """
         if self.controller is None:
             return None
         if options.scipy_solver is not None:
@@ -46,13 +53,20 @@ class Applied:
         if options.direction < 0.0:
             raise ValueError("a SampledController holds what it has seen, so that t_end has to be later than t0")
         system = as_system(self.model)
-        return Hold(self.controller, system.velocities, system.nq, options.t0)
+        observed = None if problem.velocities is None else _compiled(problem.velocities, options.backend)
+        return Hold(self.controller, system.velocities, system.nq, options.t0, observed)
 
     def graph(self, problem: Problem) -> Graph:
         """tau as a graph over the states, t and parameters of a problem of the model."""
         assert self.nodes is not None
         outputs = {f"tau{k}": node for k, node in enumerate(self.nodes)}
         return problem.bind(problem.states, Graph(quantity_inputs(problem), outputs))
+
+
+@lru_cache(KEPT)
+def _compiled(velocities: Graph, backend: str) -> cg.Compiled:
+    """The velocities of momenta, for a controller; of the last few, those compiled before."""
+    return cg.compile(velocities, backend)
 
 
 def with_applied(model: Model, tau: Tau, parameters: Mapping[str, Any] | None) -> tuple[Model, Applied]:

@@ -14,6 +14,7 @@ from .dense_output import StepBlock, with_hermite
 from .event_cells import MOST, WatchedSteps
 from .event_location import Side, crossings, start_side
 from .event_program import EventProgram
+from .row_values import converted
 from .trajectory import Crossings
 
 STEPS = 512  # looked at together
@@ -142,11 +143,15 @@ class EventLog:
         return split_crossings(self.program, self.happened, nq)
 
 
-def split_crossings(program: EventProgram, happened: Sequence[Happening], nq: int) -> dict[str, Crossings]:
+def split_crossings(
+    program: EventProgram, happened: Sequence[Happening], nq: int, parameters: Array | None = None
+) -> dict[str, Crossings]:
     """Of each event by name, (number, t, x) as times and states, split after nq numbers into q and qd."""
     result = {}
     for number, event in enumerate(program.events):
         matching = [(t, x) for k, t, x in happened if k == number]
+        times = np.array([t for t, _ in matching])
         states = np.array([x for _, x in matching]).reshape(len(matching), len(program.components))
-        result[event.name] = Crossings(np.array([t for t, _ in matching]), states[:, :nq], states[:, nq:])
+        states = converted(program.velocities, times, states, parameters)
+        result[event.name] = Crossings(times, states[:, :nq], states[:, nq:])
     return result

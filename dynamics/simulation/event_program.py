@@ -12,6 +12,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Array, Builder, building, topological
 
+from ..equations.substitute import substitute
 from ..integrators import Problem, quantity, quantity_inputs, state_arguments
 from ..systems.arguments import call_user_function, node_or_number, sequence
 from .event import Event
@@ -57,11 +58,12 @@ class WatchedEvent:
 
 @dataclass(frozen=True, eq=False)
 class EventProgram:
-    """The events of a run, the names of the components of its state, and the rate of the state as a graph."""
+    """The events of a run, and of its states the names of the components, the rate, and the velocities, see Problem."""
 
     events: tuple[WatchedEvent, ...]
     components: tuple[str, ...]
     rate: Graph
+    velocities: Graph | None
 
     def motion(self, number: int, t: float, x: Array, p: Sequence[float]) -> float:
         """The derivative of the quantity of an event by the time along the motion."""
@@ -76,12 +78,13 @@ class EventProgram:
 
 def event_program(problem: Problem, events: Sequence[Event]) -> EventProgram:
     """The graphs of these events of a problem. Raises TypeError or ValueError for what is no node of the state."""
-    return EventProgram(tuple([_watched(problem, event) for event in events]), problem.components, problem.rate)
+    watched = tuple([_watched(problem, event) for event in events])
+    return EventProgram(watched, problem.components, problem.rate, problem.velocities)
 
 
 def _watched(problem: Problem, event: Event) -> WatchedEvent:
     node = quantity(problem, f"event {event.name!r}", event.value)
-    values = problem.bind(problem.states, Graph(quantity_inputs(problem), {"g": node}))
+    values = problem.observed({"g": node})
     moving = values.inputs[: problem.size + 1]
     slopes = cg.simplify(cg.jvp(values, list(moving)))
     reset = None if event.reset is None else _reset(problem, event.name, event.reset)
@@ -106,7 +109,10 @@ def _reset(problem: Problem, name: str, function: Callable[..., Any]) -> Graph:
             raise ValueError(f"{what} must depend on the state, t and the parameters alone, got {node.name!r}")
     if problem.system is not None:
         nodes[:nq] = problem.system.kinematics.normalized(nodes[:nq])
-    return problem.bind(problem.states, Graph(inputs, {f"x{k}": node for k, node in enumerate(nodes)}))
+        if problem.momentum is not None:
+            after = dict(zip([*problem.system.q, *problem.system.qd], nodes, strict=True))
+            nodes[nq:] = substitute(list(problem.momentum.outputs.values()), after)
+    return problem.observed({f"x{k}": node for k, node in enumerate(nodes)})
 
 
 def _errors(graph: Graph, inputs: Sequence[Node]) -> Graph:

@@ -5,11 +5,25 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cgraph import Graph
 from cgraph.extend import Array
 
 BLOCK = 4096  # rows that are taken at once
+
+
+def converted(graph: Graph | None, times: Array, states: Array, parameters: ArrayLike | None = None) -> Array:
+    """States (T, m) with what a graph gives of them in place of their last numbers, as qd of p; without one the same.
+
+    parameters: its further inputs, (T, k), or (k,) for all rows; without them 0, of forces that it does not depend on.
+    """
+    if graph is None:
+        return states
+    count = len(graph.inputs) - states.shape[1] - 1
+    held = np.broadcast_to(0.0 if parameters is None else np.asarray(parameters), (len(times), count))
+    last = row_values(graph, times, states, held)
+    return np.concatenate([states[:, : -last.shape[1]], last], axis=1)
 
 
 def row_values(graph: Graph, times: Array, states: Array, held: Array | None = None) -> Array:

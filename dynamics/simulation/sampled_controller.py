@@ -87,18 +87,26 @@ class HeldForces(NamedTuple):
 class Hold:
     """The forces of a controller along a run that starts at t0: those so far, and the times of the next.
 
-    velocities: their names.  nq: of the numbers of a state, the coordinates.  times, forces: one for each period.
+    velocities: their names.  nq: of the numbers of a state, the coordinates.  observed: qd of a state (q, p), t and
+    forces; None where states have qd.  times, forces: one for each period.
     """
 
-    def __init__(self, controller: SampledController, velocities: Sequence[str], nq: int, t0: float) -> None:
-        self.controller, self.velocities, self.nq, self.t0 = controller, velocities, nq, t0
+    def __init__(
+        self,
+        controller: SampledController,
+        velocities: Sequence[str],
+        nq: int,
+        t0: float,
+        observed: Callable[[Array], Array] | None = None,
+    ) -> None:
+        self.controller, self.velocities, self.nq, self.t0, self.observed = controller, velocities, nq, t0, observed
         self.times: list[float] = []
         self.forces: list[list[float]] = []
         self._replayed: HeldForces | None = None
 
     def replay(self) -> Hold:
         """The same forces at the same times, for another run."""
-        other = Hold(self.controller, self.velocities, self.nq, self.t0)
+        other = Hold(self.controller, self.velocities, self.nq, self.t0)  # which no controller sees
         other._replayed = self.held
         return other
 
@@ -138,8 +146,11 @@ class Hold:
 
     def _called(self, t: float, x: Array) -> list[float]:
         try:
+            qd = x[self.nq :]
+            if self.observed is not None:
+                qd = self.observed(np.concatenate([x, [t], np.zeros(len(qd))]))  # they do not depend on the forces
             with np.errstate(all="warn"):
-                given = self.controller.function(x[: self.nq].copy(), x[self.nq :].copy(), t)
+                given = self.controller.function(x[: self.nq].copy(), qd.copy(), t)
             forces = real_array("the controller's forces", given)
             if forces.shape != (len(self.velocities),):
                 needed = f"({len(self.velocities)},), one for each of {', '.join(self.velocities)}"

@@ -15,7 +15,7 @@ from cgraph import Graph
 from cgraph.extend import Array, require_flag
 
 from ..equations.initial_value import initial_value
-from ..integrators import METHODS, Problem, derive, force, total_energy
+from ..integrators import METHODS, Problem, derive, force, in_form, total_energy
 from ..systems.model import Model
 from .applied_forces import Applied, Tau, with_applied
 from .dense_output import StepBlock, with_hermite
@@ -27,12 +27,11 @@ from .free_memory import room
 from .integration import integration
 from .progress_bar import Progress
 from .recorder import Recorder
-from .row_values import row_values
+from .row_values import converted, row_values
 from .run_options import METHOD, TABLES, RunOptions, time_span
 from .sampled_controller import HeldForces, Hold
 from .scipy_solvers import ScipyIntegration, scipy_solver
 from .solution import Solution
-from .state_form import StateForm
 from .step_program import compile_steps, step_program
 from .stepping import FixedStepIntegration, Integration
 from .trajectory import SimulationWarning, Stats, Trajectory
@@ -132,8 +131,8 @@ def simulate(
         A progress line on standard error; None shows it on a terminal, for runs over a second.
     form : {"velocity", "momentum"}
         What the steps are of: q and qd, or q and the momenta p = dL/dqd by Hamilton's equations, on which symplectic
-        methods then act as they are written. The rows have qd all the same, and p besides; `atol` of (m,) is for q and
-        then p. Not with constraints, events, dense output and sampled controllers.
+        methods then act as they are written. Events, controllers, rows and dense output are in q and qd all the same,
+        and the rows have p besides; `atol` of (m,) is for q and then p. Not with constraints.
 
     Returns
     -------
@@ -167,31 +166,30 @@ def simulate(
     options.check(start.states)
     options.check_room(len(start.x))
 
-    # Derive the equations, xdot = f(x, t), the energy and the events as graphs
+    # Derive the equations, xdot = f(x, t), the energy and the events as graphs; x is (q, qd), or in `stepped` (q, p)
     problem = derive(model, applied.bound(start.bound))
-    energy, log = total_energy(problem), EventLog(event_program(problem, watched)) if watched else None
-    hold = applied.hold(options)
-    state = StateForm(problem, form, needs=[bool(watched), dense_output, hold is not None])
+    stepped = in_form(problem, form)
+    energy, log = total_energy(problem), EventLog(event_program(stepped, watched)) if watched else None
+    hold = applied.hold(options, stepped)
 
-    # Write the steps of the method over these graphs, or those of Hamilton's equations, and compile them
-    leg, x = _compiled(state.problem, options, hold, between=bool(watched) or dense_output), state.start(start.x, t0)
+    # Write the steps of the method over these graphs, and compile them
+    leg = _compiled(stepped, options, hold, between=bool(watched) or dense_output)
+    x = converted(stepped.momentum, np.array([t0]), start.x[np.newaxis])[0]
 
     # Integrate, noting rows and events
     run = WatchedIntegration(leg, options, log) if log else leg(options)
     recorder = Recorder(x, options.times, options.t0, options.direction, ENDS[bool(watched)])
     steps: list[StepBlock] | None = [] if dense_output else None
-    outcome = _integrate(run, x, recorder, options, state.problem.rate, steps)
+    outcome = _integrate(run, x, recorder, options, stepped.rate, steps)
 
     # Put the result together
-    times, states, momenta = state.rows(*recorder.table())
-    nq, held = problem.nq, None if hold is None else hold.held
-    stats = _stats(run, options.method, outcome)
+    held, stats = None if hold is None else hold.held, _stats(run, options.method, outcome)
+    table, momenta = _table(stepped, energy, *recorder.table(), held)
     for text in stats.warnings:
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    dense = None if steps is None else Solution(options.t0, start.x, steps, nq)
-    rows = (times, states[:, :nq], states[:, nq:], _energies(energy, times, states, held))
-    kept = (log.crossings(nq) if log else {}, _graphs(problem, applied), dense, held)
-    return Trajectory(*rows, stats, *kept, model.coordinates, model.velocities, momenta)
+    dense = None if steps is None else Solution(options.t0, x, steps, problem.nq, stepped.velocities)
+    kept = (log.crossings(problem.nq) if log else {}, _graphs(problem, applied), dense, held)
+    return Trajectory(*table, stats, *kept, model.coordinates, model.velocities, momenta)
 
 
 def _compiled(
@@ -279,10 +277,15 @@ def _run(
         recorder.add_last()
 
 
-def _energies(energy: Graph | None, times: Array, states: Array, held: HeldForces | None) -> Array:
-    if energy is None:
-        return np.full(len(times), math.nan)
-    return row_values(energy, times, states, None if held is None else held.at(times))[:, 0]
+def _table(
+    stepped: Problem, energy: Graph | None, times: Array, rows: Array, held: HeldForces | None
+) -> tuple[tuple[Array, Array, Array, Array], Array | None]:
+    """t, q, qd and the energy of the rows that steps gave; and their momenta, if they are of these."""
+    states, nq = converted(stepped.velocities, times, rows), stepped.nq
+    energies = np.full(len(times), math.nan)
+    if energy is not None:
+        energies = row_values(energy, times, states, None if held is None else held.at(times))[:, 0]
+    return (times, states[:, :nq], states[:, nq:], energies), rows[:, nq:] if stepped.momenta else None
 
 
 def _stats(run: Integration, method: str, outcome: _Outcome) -> Stats:

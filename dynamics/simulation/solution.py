@@ -8,19 +8,25 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cgraph import Graph
 from cgraph.extend import Array, real_array
 
 from .dense_output import StepBlock
+from .row_values import converted
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The state at any time of a run that began with x at t0 and made these steps; the first nq numbers of it are q."""
+    """The state at any time of a run that began with x at t0 and made these steps; the first nq numbers of it are q.
+
+    velocities: qd of states (q, p), see Problem.
+    """
 
     t0: float
     x: Array
     steps: Sequence[StepBlock]
     nq: int
+    velocities: Graph | None = None
 
     def __call__(self, t: ArrayLike) -> tuple[Array, Array]:
         """q and qd at a time, or at times (k,). Raises ValueError for a time that the run did not come to."""
@@ -33,7 +39,7 @@ class Solution:
         if not inside.all():
             first = float(wanted[~inside][0])
             raise ValueError(f"t must be between {self.t0:g} and {end:g} s, where the run was, got {first!r} s")
-        states = self._states(wanted).reshape(*times.shape, len(self.x))
+        states = converted(self.velocities, wanted, self._states(wanted)).reshape(*times.shape, len(self.x))
         return states[..., : self.nq], states[..., self.nq :]
 
     def _states(self, times: Array) -> Array:

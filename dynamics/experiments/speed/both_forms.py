@@ -1,5 +1,7 @@
 """Both forms of the equations of motion in one run: the graph of accelerations and that of Hamilton's equations.
 
+And the velocities of the momenta alone, an elimination that the second cannot do without and that the first has too.
+
 python -m dynamics.experiments.speed.both_forms
 """
 
@@ -15,7 +17,7 @@ import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Array
 
-from ...equations.hamiltonian import hamilton_equations
+from ...equations.hamiltonian import hamilton_equations, velocities
 from ...equations.state_equation import state_equation
 from ...multibody.mechanism import Mechanism
 from ...multibody.planar_arm import planar_arm
@@ -32,11 +34,15 @@ MODELS: dict[str, Callable[[], Mechanism]] = {
     "tree 15": lambda: binary_tree(15),
     "free 35": lambda: free_tree(35),
 }
-FORMS: dict[str, Callable[[Mechanism], Graph]] = {"qdd": state_equation, "p": hamilton_equations}
-ROUNDS = 15  # of both forms in turn; the fastest counts
+FORMS: dict[str, Callable[[Mechanism], Graph]] = {
+    "qdd": state_equation,
+    "p": hamilton_equations,
+    "qd": lambda model: velocities(model.system),
+}
+ROUNDS = 15  # of all forms in turn; the fastest counts
 SECONDS = 0.02  # of a round
 POINTS = 4096  # of a batch
-STEP = 1e-6  # s, of the steps of a loop
+STEP, PASSES = 1e-6, 5000  # s, of the steps of a loop, and how many: what is done before the first is not measured
 
 
 def both_forms(names: tuple[str, ...] = tuple(MODELS), rounds: int = ROUNDS) -> Iterator[str]:
@@ -48,7 +54,7 @@ def both_forms(names: tuple[str, ...] = tuple(MODELS), rounds: int = ROUNDS) -> 
 
 
 def rows(name: str, rounds: int = ROUNDS) -> list[tuple[str, ...]]:
-    """A row for each form, and one of what the second is of the first."""
+    """A row for each form, and those of what the others are of the first."""
     graphs = {form: derive(MODELS[name]()) for form, derive in FORMS.items()}
     counts = [graph.counts() for graph in graphs.values()]
     sizes = [(each.nodes, each.edges, each.depth, each.width) for each in counts]
@@ -57,8 +63,10 @@ def rows(name: str, rounds: int = ROUNDS) -> list[tuple[str, ...]]:
         (f"{name}, {form}", *map(str, size), *[digits(1e6 * each, 3) for each in measured])
         for form, size, measured in zip(graphs, sizes, times, strict=True)
     ]
-    ratios = [b / a for a, b in zip((*sizes[0], *times[0]), (*sizes[1], *times[1]), strict=True)]
-    return [*lines, ("  p / qdd", *[f"{ratio:.3f}" for ratio in ratios])]
+    first, *others = [(*size, *measured) for size, measured in zip(sizes, times, strict=True)]
+    for form, row in zip(list(FORMS)[1:], others, strict=True):
+        lines.append((f"  {form} / qdd", *[f"{b / a:.3f}" for a, b in zip(first, row, strict=True)]))
+    return lines
 
 
 def ways(graph: Graph) -> list[tuple[Callable[[], object], int]]:
@@ -70,16 +78,15 @@ def ways(graph: Graph) -> list[tuple[Callable[[], object], int]]:
     state = graph.inputs[: compiled.n_out]
     moved = {f"{node.name}_next": node + STEP * rate for node, rate in zip(state, graph.outputs.values(), strict=True)}
     loop = cg.loop(Graph(graph.inputs, moved), {str(node.name): f"{node.name}_next" for node in state})
-    passes = 200
     return [
         (compiled.bind(x, np.empty(compiled.n_out)), 1),
-        (lambda: loop(x, passes, passes), passes),
+        (lambda: loop(x, PASSES, PASSES), PASSES),
         (lambda: compiled.batch(points, out=out), POINTS),
     ]
 
 
 def _times(forms: list[list[tuple[Callable[[], object], int]]], rounds: int) -> list[list[float]]:
-    """Seconds of processor time an evaluation takes, the least of some rounds, both forms in turn."""
+    """Seconds of processor time an evaluation takes, the least of some rounds, all forms in turn."""
     best = [[np.inf] * len(ways) for ways in forms]
     for _ in range(rounds):
         for k in range(len(best[0])):

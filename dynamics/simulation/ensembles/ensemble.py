@@ -81,6 +81,8 @@ class Ensemble:
         How the runs went.
     events : mapping
         {name of an event: (Crossings, ..)}, N of them, one for each trajectory.
+    p : ndarray, optional
+        Momenta dL/dqd, (N, T, n), of runs with `form="momentum"`.
 
     Examples
     --------
@@ -95,6 +97,7 @@ class Ensemble:
     qd: Array
     stats: EnsembleStats
     events: Mapping[str, tuple[Crossings, ...]] = field(default_factory=dict)
+    p: Array | None = None
 
     def __repr__(self) -> str:
         many, rows, n = self.q.shape

@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 
+from cgraph.extend import Array
+
 from ..event_log import Happening, split_crossings
 from ..event_program import EventProgram
 from ..trajectory import Crossings
@@ -59,7 +61,10 @@ class EnsembleRows:
         said, (largest, last) = tuple(self.status), self.errors
         return EnsembleStats(method, *counts, self.dt, seconds, success, said, status, largest, last, texts)
 
-    def events(self, program: EventProgram, nq: int) -> dict[str, tuple[Crossings, ...]]:
-        """Of each event by name, where it happened in the trajectories; the first nq numbers of a state are q."""
-        crossings = [split_crossings(program, happened, nq) for happened in self.happened]
+    def events(self, program: EventProgram, nq: int, p: Array) -> dict[str, tuple[Crossings, ...]]:
+        """Of each event by name, where it happened in the trajectories; the first nq numbers of a state are q.
+
+        p: the parameters of the trajectories, (N, k).
+        """
+        crossings = [split_crossings(program, each, nq, one) for each, one in zip(self.happened, p, strict=True)]
         return {event.name: tuple([named[event.name] for named in crossings]) for event in program.events}

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from cgraph import Node
 from cgraph.extend import Array, require_whole
 
-from ...integrators import METHODS, derive
+from ...integrators import METHODS, Problem, derive, in_form
 from ...systems.controller import with_closed_form
 from ...systems.model import Model
 from ..equal_steps import step_count
@@ -25,6 +25,7 @@ from ..event import Event, as_events
 from ..event_program import event_program
 from ..free_memory import room
 from ..progress_bar import Progress
+from ..row_values import converted
 from ..run_options import METHOD, RunOptions, time_span
 from ..sampled_controller import SampledController
 from ..step_program import StepProgram, pickled_steps, step_program
@@ -68,6 +69,7 @@ def simulate_many(
     estimate_error: bool | None = None,
     backend: str = "auto",
     progress: bool | None = None,
+    form: str = "velocity",
 ) -> Ensemble:
     """The motions of a system from N starts at t0 to t_end, by one program that is compiled once.
 
@@ -83,7 +85,7 @@ def simulate_many(
     q, qd : array_like
         The starts, (N, nq) and (N, n) [rad or m, per second], or (nq,) and (n,) for all, as in `simulate`; of an
         OdeSystem q is the state, and qd None.
-    t_end, method, t0, t_span, dt, max_step, rtol, atol, first_step, max_steps, estimate_error, backend, progress
+    t_end, method, t0, t_span, dt, max_step, rtol, atol, first_step, max_steps, estimate_error, backend, progress, form
         As in `simulate`, without SciPy's methods.
     t_eval : array_like, optional
         Times from t0 to t_end to record, in this order, (T,) [s]; by default every step. Methods that choose their
@@ -127,13 +129,11 @@ def simulate_many(
     [-0.077, -0.155, -0.2348]
     """
     # Check
-    if isinstance(method, str) and method not in METHODS:
-        raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
+    _check(method, chunk)
     t0, t_end = time_span(t_end, t0, t_span)
     arguments = (dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
     options = RunOptions(t_end, method, *arguments, t0, estimate_error)
     watched, team = as_events(events), checked(workers)
-    _check_chunk(chunk)
     model, tau = _closed(model, tau, parameters)
     start = starts(model, q, qd, tau, parameters, t0)
     options.check(start.states)
@@ -142,25 +142,26 @@ def simulate_many(
 
     # Derive the equations as graphs, and write the steps of the method over them
     begin = time.perf_counter()
-    problem = derive(model, start.same)
+    problem = in_form(derive(model, start.same), form)
     program, watch = step_program(problem, METHODS[method], dense=True), event_program(problem, watched)
 
     # Share out the work: what a worker is sent, and the starts of chunks of trajectories
     grids = [] if watched else _grids(program, options)
     sent = replace(options, t_eval=options.row_times) if watched else options
     task = Task(pickled_steps(program), sent, count, tuple(grids), pickle.dumps(watch) if watched else b"")
-    chunks = _chunks(start, problem.parameters, _width(len(start.x), chunk, team, whole=bool(grids)))
+    x, p = _steps_from(start, problem, t0)
+    chunks = _chunks(x, p, _width(len(x), chunk, team, whole=bool(grids)))
 
     # Integrate, by whoever takes the chunks and compiles the steps
     result = EnsembleRows(len(start.x), count, problem.size)
     _run(task, chunks, team, result)
 
     # Put the result together
-    nq = problem.nq
-    stats, rows = result.stats(method, time.perf_counter() - begin), result.rows
+    stats = result.stats(method, time.perf_counter() - begin)
     if text := _warning(stats):
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    return Ensemble(options.row_times, rows[:, :, :nq], rows[:, :, nq:], stats, result.events(watch, nq))
+    table, momenta = _table(problem, options.row_times, result.rows, p)
+    return Ensemble(options.row_times, *table, stats, result.events(watch, problem.nq, p), momenta)
 
 
 def _closed(model: Model, tau: Any, parameters: object) -> tuple[Model, ArrayLike]:
@@ -193,7 +194,9 @@ def _warning(stats: EnsembleStats) -> str:
     return f"{len(doubtful)} of {len(stats.warnings)} trajectories: of {doubtful[0]}, {stats.warnings[doubtful[0]][0]}"
 
 
-def _check_chunk(chunk: int | None) -> None:
+def _check(method: str, chunk: int | None) -> None:
+    if isinstance(method, str) and method not in METHODS:
+        raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
     if chunk is not None:
         require_whole("chunk", chunk, 1)
 
@@ -216,9 +219,24 @@ def _grids(program: StepProgram, options: RunOptions) -> list[StepGrid]:
     return grids if sum(grid.steps * grid.rows for grid in grids) <= options.max_steps else []
 
 
-def _chunks(start: Starts, parameters: Sequence[str], width: int) -> list[Chunk]:
-    x = start.x
-    p = np.stack([start.varied[name] for name in parameters], axis=1) if parameters else x[:, :0]
+def _steps_from(start: Starts, problem: Problem, t: float) -> tuple[Array, Array]:
+    """What the steps start from, states (N, m) and the parameters of the problem, (N, k)."""
+    names = problem.parameters
+    p = np.stack([start.varied[name] for name in names], axis=1) if names else start.x[:, :0]
+    return converted(problem.momentum, np.full(len(start.x), t), start.x, p), p
+
+
+def _table(problem: Problem, times: Array, rows: Array, p: Array) -> tuple[tuple[Array, Array], Array | None]:
+    """q and qd of the rows (N, T, m) that steps gave; and their momenta, if they are of these."""
+    count, many, m = rows.shape
+    states, nq = rows, problem.nq
+    if problem.momenta:
+        flat = (np.tile(times, count), rows.reshape(-1, m), np.repeat(p, many, axis=0))
+        states = converted(problem.velocities, *flat).reshape(rows.shape)
+    return (states[:, :, :nq], states[:, :, nq:]), rows[:, :, nq:] if problem.momenta else None
+
+
+def _chunks(x: Array, p: Array, width: int) -> list[Chunk]:
     return [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)]
 
 

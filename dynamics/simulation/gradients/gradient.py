@@ -90,6 +90,7 @@ def gradient(
     parameters: Mapping[str, float] | None = None,
     events: Event | Iterable[Event] = (),
     backend: str = "auto",
+    form: str = "velocity",
 ) -> MotionGradient:
     """A loss of a motion and its gradient, by reverse mode through every step, in a few times the motion itself.
 
@@ -105,7 +106,7 @@ def gradient(
     loss : callable, optional
         (q, qd, t) or (q, qd, t, p) of the state and time where the motion ends, to a node; of an OdeSystem (x, t) or
         (x, t, p). None for a running loss alone.
-    q, qd, t_end, t0, t_span, dt, max_step, rtol, atol, first_step, backend
+    q, qd, t_end, t0, t_span, dt, max_step, rtol, atol, first_step, backend, form
         As for `simulate`.
     method : str
         A name of `dyn.METHODS`, of equal or chosen steps, but "taylor". Equations that are iterated are solved to
@@ -151,10 +152,11 @@ def gradient(
     """
     options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
     watched = as_events(events)
-    motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, watched)
+    motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, watched, form)
     value, gradients, legs = differentiated(motion, loss, running, watched)
     nq, checkpoints = motion.problem.nq, max([run.checkpoints for run in legs.runs])
-    return MotionGradient(float(value), gradients, legs.t, legs.x[:nq], legs.x[nq:], checkpoints)
+    x = legs.end
+    return MotionGradient(float(value), gradients, legs.t, x[:nq], x[nq:], checkpoints)
 
 
 def differentiated(

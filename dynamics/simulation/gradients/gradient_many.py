@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from cgraph import Node
 from cgraph.extend import Array, real_array
 
-from ...integrators import METHODS, derive
+from ...integrators import METHODS, derive, in_form
 from ...systems.model import Model
 from ..applied_forces import with_applied
 from ..ensembles.initial_states import starts
@@ -76,6 +76,7 @@ def gradient_many(
     tau: ArrayLike | Callable[..., Sequence[Node | float]] = 0.0,
     parameters: Mapping[str, ArrayLike] | None = None,
     backend: str = "auto",
+    form: str = "velocity",
 ) -> MotionGradients:
     """Losses of N motions and their gradients, each by its own start, forces and parameters: `gradient`, N times.
 
@@ -88,7 +89,7 @@ def gradient_many(
         What moves.
     q, qd : array_like
         The starts, (N, nq) and (N, n), or (nq,) and (n,) for all; of an OdeSystem q is the state, and qd None.
-    loss, t_end, running, wrt, t0, t_span, dt, backend
+    loss, t_end, running, wrt, t0, t_span, dt, backend, form
         As for `gradient`.
     method : str
         As for `gradient`, of equal steps.
@@ -116,7 +117,7 @@ def gradient_many(
     [[-0.8804], [-1.1123], [-0.595]]
     """
     options = {"dt": dt, "backend": backend}
-    motions = _motions(model, q, qd, time_span(t_end, t0, t_span), method, tau, parameters, wrt, options)
+    motions = _motions(model, q, qd, time_span(t_end, t0, t_span), method, tau, parameters, wrt, options, form)
     step = motions.method.step
     assert step is not None
     if step(motions.problem).branches:
@@ -128,7 +129,7 @@ def gradient_many(
         value, by_name, legs = differentiated(_some(motions, part), loss, running)
         values.append(np.atleast_1d(value))
         gradients.append({name: _by_motion(array, part) for name, array in by_name.items()})
-        ends.append(_by_motion(legs.x, part))
+        ends.append(_by_motion(legs.end, part))
     rows, nq = np.concatenate(ends), motions.problem.nq
     joined = {name: np.concatenate([each[name] for each in gradients]) for name in motions.wrt}
     return MotionGradients(np.concatenate(values), joined, legs.t, rows[:, :nq], rows[:, nq:])
@@ -154,6 +155,7 @@ def _motions(
     parameters: Mapping[str, ArrayLike] | None,
     wrt: str | Iterable[str] | None,
     options: Mapping[str, Any],
+    form: str,
 ) -> MotionOf:
     """The motions of checked arguments, side by side."""
     t0, t_end = span
@@ -173,7 +175,7 @@ def _motions(
     forced = rows is not None or TORQUE in chosen or np.ndim(constant) == 2
     inputs = changing_forces(moving, start.same, forced=forced)
     free = {*inputs, *chosen, *start.varied, *(parameters or ())}
-    problem = derive(moving, {name: value for name, value in start.same.items() if name not in free})
+    problem = in_form(derive(moving, {name: value for name, value in start.same.items() if name not in free}), form)
     columns, equations = start.same | start.varied, motion_equations(problem, len(inputs))
     forces, values = (
         np.array([np.broadcast_to(columns[name], count) for name in names], dtype=np.float64).reshape(len(names), count)

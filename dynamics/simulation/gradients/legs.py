@@ -39,7 +39,7 @@ class Bars(NamedTuple):
 class Legs:
     """The legs of a motion, run from its start to its end.
 
-    events: by name.  x, t: the end of the motion.  loss: the running loss of all legs.
+    events: by name.  x, t: the end of the motion, in states of its steps.  loss: the running loss of all legs.
     """
 
     motion: MotionOf
@@ -49,7 +49,8 @@ class Legs:
     def __post_init__(self) -> None:
         motion = self.motion
         self.runs: list[MotionRun] = []
-        x, begin = motion.x, float(motion.legs[0].t[0])
+        begin = float(motion.legs[0].t[0])
+        x = converted(motion.equations.start, motion, motion.x, begin)
         for leg in motion.legs:
             t, h = _steps(leg, begin)
             run = MotionRun(replace(motion, x=x, t=t, h=h), self.programs, arrives=bool(leg.event))
@@ -62,6 +63,11 @@ class Legs:
         times = [run.motion.t[:-1] for run in self.runs]
         self.x, self.t = x, np.append(times[0] if len(times) == 1 else np.concatenate(times), begin)
         self.loss = sum([run.loss for run in self.runs[1:]], self.runs[0].loss)
+
+    @property
+    def end(self) -> Array:
+        """The end of the motion in q and qd."""
+        return converted(self.motion.equations.end, self.motion, self.x, float(self.t[-1]))
 
     def _arrive(self, run: MotionRun, event: WatchedEvent) -> None:
         """The last step of a leg, as long as it takes to where the event happens."""
@@ -98,7 +104,7 @@ class Legs:
             more = [bars.get(name, np.zeros((n, *inputs.shape[1:]))) for name, n in lengths.items()]
             inputs += np.concatenate(more)
             if k == 0:
-                return bars["x"], inputs, rows
+                return self._started(bars["x"], inputs), inputs, rows
             t, h = (rows[:, names.index(name)].copy() for name in ("t", "h"))
             t[-1] += later
             if leg.event:
@@ -107,6 +113,15 @@ class Legs:
             begin = float(t @ by_t + h @ by_h) + (float(bars["t"][0]) if "t" in bars else 0.0)
             end = self._before(k, Bars(bars["x"], begin, np.zeros(0)), inputs)
         raise AssertionError("a motion has at least one leg")
+
+    def _started(self, bar: Array, inputs: Array) -> Array:
+        """The cotangent of the start, from that of the first state; adds to the cotangents of the inputs."""
+        graph, motion = self.motion.equations.start, self.motion
+        if graph is None:
+            return bar
+        bars = pulled_at(graph, motion, motion.x, float(motion.legs[0].t[0]), list(bar))
+        inputs += bars.inputs
+        return bars.x
 
     def _before(self, k: int, after: Bars, inputs: Array) -> Bars:
         """Through the reset with which leg k begins; adds to the cotangents of the inputs."""
@@ -165,6 +180,11 @@ def pulled_at(graph: Graph, motion: MotionOf, x: Array, t: float, seeds: Sequenc
 def values_at(graph: Graph, motion: MotionOf, x: Array, t: float) -> Array:
     """The outputs of a graph over the states, t and parameters, at a state and an instant."""
     return _arrays(graph.evaluate(point(graph, motion, x, t)), motion)
+
+
+def converted(graph: Graph | None, motion: MotionOf, x: Array, t: float) -> Array:
+    """The same where there is a graph, else the state itself."""
+    return x if graph is None else values_at(graph, motion, x, t)
 
 
 def _arrays(values: Mapping[str, Any], motion: MotionOf) -> Array:

@@ -38,8 +38,7 @@ def loss_graph(problem: Problem, node: Node) -> Graph:
 
 @lru_cache(KEPT)
 def _bound(quantity: _Quantity) -> Graph:
-    inputs = [each for each in topological([quantity.node]) if each.op.name == "variable"]
-    return quantity.problem.bind(quantity.problem.states, Graph(inputs, {"loss": quantity.node}))
+    return quantity.problem.observed({"loss": quantity.node})
 
 
 @lru_cache(KEPT)

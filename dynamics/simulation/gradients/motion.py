@@ -15,7 +15,7 @@ from cgraph.extend import Array, real_array, require_sequence
 
 from ...equations.initial_value import initial_value
 from ...equations.state_equation import state_inputs
-from ...integrators import METHODS, Method, Problem, derive
+from ...integrators import METHODS, Method, Problem, derive, in_form
 from ...systems.model import Model, as_ode, as_system
 from ..applied_forces import with_applied
 from ..equal_steps import step_count
@@ -60,7 +60,7 @@ class MotionError(ValueError):
 class MotionOf:
     """A motion, whose steps are chosen.
 
-    x: (m,), where it starts.
+    x: (m,), where it starts, in q and qd.
     legs: its parts.  t, h: (steps + 1,), where the steps begin and the last one ends, and (steps,), their lengths.
     tau: the applied forces that are inputs, (forces,), or where they change with the steps, (steps, forces).
     values: of the parameters p that stay inputs, and of the numbers c.  wrt: names.
@@ -132,6 +132,7 @@ def motion_of(
     wrt: str | Iterable[str] | None,
     options: Mapping[str, Any],
     events: Sequence[Event] = (),
+    form: str = "velocity",
 ) -> MotionOf:
     """The motion of checked arguments.  span: t_end, t0, t_span.  options: those of `simulate` besides.
 
@@ -152,12 +153,12 @@ def motion_of(
     forced = rows is not None or TORQUE in chosen
     inputs = changing_forces(moving, start.bound, forced=forced)
     free = {*inputs, *chosen, *(parameters or ())}  # what a caller changes from call to call stays an input
-    problem = derive(moving, {name: value for name, value in start.bound.items() if name not in free})
+    problem = in_form(derive(moving, {name: value for name, value in start.bound.items() if name not in free}), form)
     if run.adaptive or events:
         if rows is not None:
             needed = "equal steps without events" if events else f"equal steps: method {method!r} chooses its steps"
             raise ValueError(f"tau of shape {rows.shape} is one row a step, which needs {needed}")
-        given = {"t0": t0, "tau": tau, "parameters": parameters, "events": events, **options}
+        given = {"t0": t0, "tau": tau, "parameters": parameters, "events": events, "form": form, **options}
         given |= {} if run.adaptive else {"estimate_error": False}
         legs = _legs(simulate(model, q, qd, t_end, method, **given), run, events)
     else:

@@ -32,6 +32,7 @@ class MotionEquations:
     forces: how many of the parameters are applied forces.  names: of p.  numbers: c, a graph over p, if there are any.
     pullback: of the rate, where there is one.
     sharing_rate, sharing_pullback: the same two, where the one records for the other what both need.
+    start, end: (q, qd) to a state of the steps and back, over states, t, parameters; None where they are the same.
     """
 
     problem: Problem
@@ -41,6 +42,8 @@ class MotionEquations:
     pullback: RatePullback | None
     sharing_rate: Graph
     sharing_pullback: RatePullback | None
+    start: Graph | None
+    end: Graph | None
 
     @property
     def lengths(self) -> dict[str, int]:
@@ -89,7 +92,16 @@ def motion_equations(problem: Problem, forces: int) -> MotionEquations:
     parameters, projected = (*problem.parameters, *outputs), projection[0] if projection else None
     made = replace(problem, parameters=parameters, rate=rate, projection=projected, multipliers=None)
     over_p = Graph(cg.variables(list(names)), outputs) if outputs else None
-    return MotionEquations(made, forces, names, over_p, pullback, *_sharing(rate, pullback))
+    ways = _whole(made, made.momentum), _whole(made, made.velocities)
+    return MotionEquations(made, forces, names, over_p, pullback, *_sharing(rate, pullback), *ways)
+
+
+def _whole(problem: Problem, last: Graph | None) -> Graph | None:
+    """States to states, whose coordinates stay and whose last numbers a graph gives."""
+    if last is None:
+        return None
+    q = {str(node.name): node for node in last.inputs[: problem.nq]}
+    return problem.bind(last.input_names[: problem.size], Graph(last.inputs, q | last.outputs))
 
 
 def _sharing(rate: Graph, pullback: RatePullback | None) -> tuple[Graph, RatePullback | None]:

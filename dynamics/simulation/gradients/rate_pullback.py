@@ -57,9 +57,9 @@ class RatePullback:
 
 
 def rate_pullback(problem: Problem) -> RatePullback | None:
-    """None for a system of first order, and where constraints or a singular mass matrix need more."""
+    """None for first-order systems and momenta, and where constraints or a singular mass matrix need more."""
     system, m = problem.system, problem.size
-    if system is None or len(system.constraints):
+    if system is None or problem.momenta or len(system.constraints):
         return None
     taken = problem.rate.input_names
     values, bars, mu = (new_variables(what, n, taken) for what, n in (("value", m), ("bar", m), ("mu", system.n)))

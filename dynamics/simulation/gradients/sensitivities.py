@@ -79,6 +79,7 @@ def sensitivities(
     parameters: Mapping[str, float] | None = None,
     events: Event | Iterable[Event] = (),
     backend: str = "auto",
+    form: str = "velocity",
 ) -> Sensitivities:
     """A motion and the derivatives of all its states, by forward mode through every step.
 
@@ -89,7 +90,7 @@ def sensitivities(
     ----------
     model : System, OdeSystem, Mechanism or Scene
         What moves.
-    q, qd, t_end, t0, t_span, dt, max_step, rtol, atol, first_step, parameters, backend
+    q, qd, t_end, t0, t_span, dt, max_step, rtol, atol, first_step, parameters, backend, form
         As for `simulate`.
     method : str
         As for `gradient`.
@@ -122,7 +123,7 @@ def sensitivities(
     """
     options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
     watched = as_events(events)
-    motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, watched)
+    motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, watched, form)
     if motion.each_step:
         raise ValueError(f"tau must be constant, (n,), got shape {motion.tau.shape}: gradient takes a row a step")
     by = [TORQUE] if TORQUE in motion.wrt else []

@@ -87,15 +87,15 @@ def test_a_carry_that_trades_places(backend: str) -> None:
 
 
 def test_what_does_not_change_is_computed_before_the_first_pass(backend: str) -> None:
-    x, k, taken = cg.variables("x k invariant0")
-    graph = cg.Graph([k, x, taken], {"next": x * cg.exp(-k) + cg.sin(k) * taken, "same": cg.sqrt(k)})
+    x, k, taken, last = cg.variables("x k invariant0 last")
+    graph = cg.Graph([last, k, x, taken], {"next": x * cg.exp(-k) + cg.sin(k) * taken + last, "same": cg.sqrt(k)})
     run = cg.loop(graph, {"x": "next"}, backend, fma=False)
     assert run.invariants is not None
     assert [len(run.invariants.outputs), run.invariants.input_names] == [2, ("k", "invariant0")]
-    values = [0.7, 1.0, 2.0]
+    values = [0.25, 0.7, 1.0, 2.0]  # of `last` alone nothing can be computed before
     expected = 1.0
     for _ in range(3):
-        expected = graph.evaluate({"k": 0.7, "x": expected, "invariant0": 2.0})["next"]
+        expected = graph.evaluate({"last": 0.25, "k": 0.7, "x": expected, "invariant0": 2.0})["next"]
     assert run(values, 3)[-1, 0] == expected
     assert run.batch(np.array([values] * 5).T, 3)[-1, 0].tolist() == [expected] * 5
     assert cg.loop(spring(), {"x": "x_next", "v": "v_next"}, backend).invariants is None

@@ -164,12 +164,13 @@ def test_csv_has_empty_cells_for_what_is_not_known() -> None:
 
 def test_both_forms_are_counted_and_timed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(both_forms, "SECONDS", 1e-4)
-    plain, canonical, ratios = both_forms.rows("planar 3", 1)
-    for row, derive in ((plain, dyn.state_equation), (canonical, dyn.hamilton_equations)):
+    plain, canonical, alone, of_momenta, of_velocities = both_forms.rows("planar 3", 1)
+    for row, derive in zip((plain, canonical, alone), both_forms.FORMS.values(), strict=True):
         counts = derive(both_forms.MODELS["planar 3"]()).counts()
         assert row[1:5] == tuple(map(str, (counts.nodes, counts.edges, counts.depth, counts.width)))
-    assert float(ratios[1]) == pytest.approx(int(canonical[1]) / int(plain[1]), abs=1e-3)
-    assert all(float(each) > 0.0 for each in ratios[1:])
+    for ratios, row in ((of_momenta, canonical), (of_velocities, alone)):
+        assert float(ratios[1]) == pytest.approx(int(row[1]) / int(plain[1]), abs=1e-3)
+        assert all(float(each) > 0.0 for each in ratios[1:])
 
 
 def test_both_linearizations_are_counted_and_timed(monkeypatch: pytest.MonkeyPatch) -> None:
