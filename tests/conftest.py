@@ -6,7 +6,9 @@ import os
 import shutil
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Generator, Iterator
+from functools import lru_cache
+from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -29,6 +31,28 @@ settings.register_profile("explore", max_examples=2000, print_blob=True, **_slow
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "reproducible"))
 
 
+# Importing 200 test files takes as long as running a tenth of them, mostly to rewrite their asserts and compile them.
+# The result is kept in files: of two workers one goes from the first test file to the last and the other from the last
+# to the first, and each reads what the other has made.
+BACKWARDS = os.environ.get("PYTEST_XDIST_WORKER", "gw0")[-1] in "13579"
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(collector: pytest.Collector) -> Generator[None, Any, Any]:
+    """What is in a folder, in the order of this worker."""
+    report = yield
+    if BACKWARDS and isinstance(collector, pytest.Dir):
+        report.result.reverse()
+    return report
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Workers have to agree on the order of the tests."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        items.sort(key=lambda item: item.path.parts)
+
+
 def pytest_collection_finish() -> None:
     """Modules and tests stay to the end: the garbage collector need not walk through them, nor come as often."""
     gc.collect()
@@ -36,17 +60,22 @@ def pytest_collection_finish() -> None:
     gc.set_threshold(50_000, 20, 20)
 
 
+_translated = lru_cache(256)(llvm_engine.Host._translated)
+
+
 @pytest.fixture(autouse=True)
 def quick_machine_code(request: pytest.FixtureRequest) -> Iterator[None]:
     """LLVM's code generator does not optimize, in a quarter of the time, but where its code is what a test is about.
 
-    Products and sums are then not fused, so that last bits are those of a processor without such an instruction. With
-    HYPOTHESIS_PROFILE all code is optimized, as users have it.
+    Products and sums are then not fused, so that last bits are those of a processor without such an instruction. What
+    it has lately made of the same text is taken again: a third of all. With HYPOTHESIS_PROFILE all code is optimized,
+    as users have it.
     """
     users = "optimized" in request.keywords or "HYPOTHESIS_PROFILE" in os.environ
     with pytest.MonkeyPatch.context() as patch:
         if not (users or {"codegen", "program"} & set(request.path.parts)):
             patch.setattr(llvm_engine, "LEVEL", 0)
+            patch.setattr(llvm_engine.Host, "_translated", _translated)
         yield
 
 
@@ -69,3 +98,25 @@ def browser() -> Iterator[Any]:
         opened = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
         yield opened
         opened.close()
+
+
+@pytest.fixture
+def visit(browser: Any) -> Iterator[Callable[..., Any]]:
+    """Opens the page of a file, which must neither ask for anything nor complain; closed after the test."""
+    pages, said, asked = [], [], []
+
+    def opened(path: Path, fragment: str = "", width: int = 1280, height: int = 720, **options: Any) -> Any:
+        page = browser.new_page(viewport={"width": width, "height": height}, **options)
+        page.on("console", lambda message: said.append(message.text))
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.on("dialog", lambda dialog: (said.append(dialog.message), dialog.dismiss()))
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto(path.as_uri() + fragment)
+        pages.append(page)
+        return page
+
+    yield opened
+    for page in pages:
+        page.close()
+    assert said == []
+    assert [url for url in asked if not url.startswith(("file:", "data:"))] == []

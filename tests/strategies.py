@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any, NamedTuple
 
 from hypothesis import settings, strategies as st
@@ -30,8 +31,18 @@ def numbers(low: float = -2.0, high: float = 2.0) -> st.SearchStrategy[float]:
     return quarters | st.floats(low, high).map(lambda x: x if abs(x) > 1e-6 else 0.0)
 
 
+NUMBERS = numbers()  # once: hypothesis looks through every strategy that is made
 CONSTANTS = st.sampled_from((0.0, -0.0, 1.0, -1.0, 2.0, 0.5, -2.0, 3.0)) | numbers(-3.0, 3.0)
 TAGS = st.sampled_from(("", "", "link 1", "link 2", "kinetic"))
+INDEX = st.integers(0, 3) | st.integers(0, 99)  # counted from the newest, so that most of the graph is reached
+CONSTANT_LISTS = st.lists(CONSTANTS, max_size=3)
+STEP = st.tuples(st.sampled_from(tuple(OPS)), INDEX, INDEX, INDEX, TAGS)
+
+
+@cache
+def steps(size: int) -> st.SearchStrategy[list[Any]]:
+    """That many steps, each an operation, three arguments and a tag."""
+    return st.lists(STEP, min_size=size, max_size=size)
 
 
 @st.composite
@@ -41,13 +52,10 @@ def cases(draw: st.DrawFn, max_operations: int = 20, max_outputs: int = 3) -> Ca
     An argument outside the operation's domain is first squeezed into it: middle + half width * sin(argument).
     """
     names = "xyz"[: draw(st.integers(1, 3))]
-    values = {name: draw(numbers()) for name in names}
+    values = {name: draw(NUMBERS) for name in names}
     pool = [(cg.variable(name), value) for name, value in values.items()]
-    pool += [(cg.constant(c), c) for c in draw(st.lists(CONSTANTS, max_size=3))]
-    index = st.integers(0, 3) | st.integers(0, 99)  # counted from the newest, so that most of the graph is reached
-    steps = st.tuples(st.sampled_from(tuple(OPS)), index, index, index, TAGS)
-    size = draw(st.integers(1, max_operations))
-    for name, i, j, k, tag in draw(st.lists(steps, min_size=size, max_size=size)):
+    pool += [(cg.constant(c), c) for c in draw(CONSTANT_LISTS)]
+    for name, i, j, k, tag in draw(steps(draw(st.integers(1, max_operations)))):
         chosen = [pool[-1 - each % len(pool)] for each in (i, j, k)]
         with cg.tag(*([tag] if tag else [])):
             if name == "where":

@@ -184,17 +184,17 @@ CALLS = {
         t_eval=None, events=(), dense_output=False, tau=0.0, parameters=None, first_step=None, form="velocity", **RUNS
     ),
     "dyn.gradient": call(
-        dyn.gradient, ARM, lambda q, qd, t: q[0], [0.1], [0.0], 1.0, "rk4", running=lambda q, qd, tau, t: q[0],
-        wrt=["q"], t0=0.0, t_span=None, dt=0.5, max_step=None, rtol=None, atol=None, first_step=None, tau=[0.0],
+        dyn.gradient, ARM, lambda q, qd, t: q[0], [0.1], [0.0], 1.0, "euler", running=lambda q, qd, tau, t: q[0],
+        wrt=["q"], t0=0.0, t_span=None, dt=1.0, max_step=None, rtol=None, atol=None, first_step=None, tau=[0.0],
         parameters=None, events=(), backend="python"
     ),
     "dyn.gradient_many": call(
-        dyn.gradient_many, ARM, lambda q, qd, t: q[0], [[0.1]], [[0.0]], 1.0, "rk4",
-        running=lambda q, qd, tau, t: q[0], wrt=["q"], t0=0.0, t_span=None, dt=0.5, tau=[[0.0]], parameters={},
+        dyn.gradient_many, ARM, lambda q, qd, t: q[0], [[0.1]], [[0.0]], 1.0, "euler",
+        running=lambda q, qd, tau, t: q[0], wrt=["q"], t0=0.0, t_span=None, dt=1.0, tau=[[0.0]], parameters={},
         backend="python"
     ),
     "dyn.sensitivities": call(
-        dyn.sensitivities, ARM, [0.1], [0.0], 1.0, "rk4", wrt=["q"], t0=0.0, t_span=None, dt=0.5, max_step=None,
+        dyn.sensitivities, ARM, [0.1], [0.0], 1.0, "euler", wrt=["q"], t0=0.0, t_span=None, dt=1.0, max_step=None,
         rtol=None, atol=None, first_step=None, tau=[0.0], parameters=None, backend="python"
     ),
     "dyn.simulate_many": call(
@@ -323,10 +323,10 @@ def fault_of(junk, error):
         return "is taken" if junk in NEVER else None
     if not isinstance(error, SENTENCES):
         return f"raises {type(error).__name__}: {error}"
-    last = traceback.extract_tb(error.__traceback__)[-1]
-    line = linecache.getline(last.filename, last.lineno).strip()
-    if not line.startswith("raise "):  # Python or NumPy stumbled over it
-        return f"is not looked at: {error} ({last.filename}:{last.lineno})"
+    *_, (frame, number) = traceback.walk_tb(error.__traceback__)
+    file = frame.f_code.co_filename
+    if not linecache.getline(file, number).strip().startswith("raise "):  # Python or NumPy stumbled over it
+        return f"is not looked at: {error} ({file}:{number})"
     return None if len(str(error).split()) > 3 else f"gets no sentence: {error}"
 
 

@@ -11,13 +11,14 @@ from html import escape
 from importlib.resources import files
 
 from cgraph import Graph
-from cgraph.extend import check_writable, require_path, write_files
+from cgraph.extend import write_files
 from dynamics import inverse_dynamics
 from dynamics.systems.model import Model
 
 from ..graph_drawing.render import check_can_draw
 from ..inspector import Page
 from ..inspector.operations import operations
+from ..pages.html_target import html_target
 from .closed_loop import closed_loop
 from .elimination import elimination
 from .energy_and_step import energy_and_step
@@ -66,11 +67,7 @@ def lesson(model: Model, path: str | os.PathLike[str] | None = None) -> Page:
     >>> page.count('class="screen"')
     6
     """
-    target = None if path is None else require_path("the lesson's file", path)
-    if target is not None:
-        if target.suffix != ".html":
-            raise ValueError(f"the lesson's file must end in .html, got {os.fspath(target)!r:.80}")
-        check_writable(target)
+    target = html_target("the lesson's file", path)
     check_can_draw(png=False)
     subject = subject_of(model)
     text = page(subject, [screen(subject) for screen in SCREENS])

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 
-from cgraph.extend import check_writable, require_flag, require_path, write_files
+from cgraph.extend import require_flag, write_files
 from dynamics import display_names, scenes
 from dynamics.scenes.inspection import Inspection, Shares, inspection
 from dynamics.scenes.start import Start, moving_start, rest_text, with_start
 from dynamics.systems.model import Model
 
 from ..inspector import Motion, Page, StateTable, Step, Version, page
+from ..pages.html_target import html_target
 from ..typed import box
 from .live import live_panel
 from .open_loops import tree_alone
@@ -69,11 +70,7 @@ def inspect(
     >>> "joint 1" in page
     True
     """
-    target = None if path is None else require_path("the page's file", path)
-    if target is not None:
-        if target.suffix != ".html":
-            raise ValueError(f"the page's file must end in .html, got {os.fspath(target)!r:.80}")
-        check_writable(target)
+    target = html_target("the page's file", path)
     require_flag("forward", forward)
     scene = scenes.of_model(model)
     at = moving_start(scene) if start is None else with_start(scene, start)

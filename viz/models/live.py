@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from cgraph.extend import check_writable, require_path, write_files
+from cgraph.extend import write_files
 from dynamics import scenes
 from dynamics.integrators import TABLEAUS
 from dynamics.scenes.live_graphs import live_graphs
@@ -13,6 +13,7 @@ from dynamics.systems.model import Model
 
 from ..inspector import Panel
 from ..live import EVALUATION, Live, LivePage, page_text, panel
+from ..pages.html_target import html_target
 
 
 def live_page(model: Model, path: str | os.PathLike[str] | None = None, *, start: Start | None = None) -> LivePage:
@@ -53,11 +54,7 @@ def live_page(model: Model, path: str | os.PathLike[str] | None = None, *, start
     >>> "wasm-unsafe-eval" in page, len(page.encode()) < 50_000
     (True, True)
     """
-    target = None if path is None else require_path("the page's file", path)
-    if target is not None:
-        if target.suffix != ".html":
-            raise ValueError(f"the page's file must end in .html, got {os.fspath(target)!r:.80}")
-        check_writable(target)
+    target = html_target("the page's file", path)
     scene = scenes.of_model(model)
     scene = scene if start is None else with_start(scene, start)
     text = page_text(live_of(scene), title=f"{scene.name}, live", about=scene.about)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ...core.edge import Edge
 from ...core.graph import Graph
-from ...core.node import Node
-from ..edge_partials import Point, edge_slopes, node_values
+from ...core.node import Node, as_node
+from ..edge_partials import Point, node_values
 from ..names import Names
 from .finding import Finding
 
@@ -37,12 +36,12 @@ def rounded(names: Names, at: Point) -> Rounded:
     An error passes on through the local partials, in absolute value, and each operation adds its own.
     """
     graph = names.graph
-    values = dict(zip(graph.nodes, node_values(names, graph.nodes, at), strict=True))
-    edges = [Edge(arg, node, slot) for node in graph.nodes for slot, arg in enumerate(node.args)]
-    slopes = iter(edge_slopes(names, edges, at))
+    partials = [as_node(each) for node in graph.nodes if node.args for each in node.op.partials(node, *node.args)]
+    numbers = iter(node_values(names, [*graph.nodes, *partials], at))
+    values = {node: next(numbers) for node in graph.nodes}
     errors: dict[Node, float] = {}
     for node in graph.nodes:
-        inherited = [_times(next(slopes), errors[arg]) for arg in node.args]
+        inherited = [_times(next(numbers), errors[arg]) for arg in node.args]
         own = UNIT * node.op.rounding if node.args else UNIT if node.value is None else 0.0
         errors[node] = sum(inherited) + own * abs(values[node])
     return Rounded(values, errors)

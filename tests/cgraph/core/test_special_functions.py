@@ -37,14 +37,24 @@ FAR = {
 }
 
 
+def far_out(name: str, at: float) -> list[float]:
+    """Value and slope, by mpmath; of error functions by the series of FLINT, which take no second."""
+    if name in ("erf", "erfc"):
+        flint = pytest.importorskip("flint")
+        with flint.ctx.workdps(DIGITS):
+            series = getattr(flint.arb_series([at, 1.0], prec=2), name)()
+            return [float(series[0]), float(series[1])]
+    exact = high_precision.OPERATIONS[name]
+    with mpmath.workdps(DIGITS):
+        return [float(exact(mpf(at))), float(mpmath.diff(exact, mpf(at)))]
+
+
 @pytest.mark.parametrize("name", FAR)
 def test_values_and_slopes_are_right_far_out(name):
     """Relative to themselves, to what rounds the argument of an exponential: up to 700 units."""
-    node, exact = getattr(cg, name)(x), high_precision.OPERATIONS[name]
+    node = getattr(cg, name)(x)
     for at in FAR[name]:
-        with mpmath.workdps(DIGITS):
-            expected = [float(exact(mpf(at))), float(mpmath.diff(exact, mpf(at)))]
-        for found, right in zip((value(node, at), slope(node, at)), expected, strict=True):
+        for found, right in zip((value(node, at), slope(node, at)), far_out(name, at), strict=True):
             assert found == pytest.approx(right, rel=LONG_SUM, abs=5e-324), (name, at)
 
 

@@ -208,7 +208,7 @@ def boxes(draw: st.DrawFn, domains: tuple[tuple[float, float], ...]) -> list[tup
 
 
 @pytest.mark.parametrize("name", sorted(OPS))
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(data=st.data())
 def test_a_value_lies_within_its_bounds(name, data):
     """In floats, and at 50 digits, which is where the outward rounding is needed."""
