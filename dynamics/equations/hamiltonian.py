@@ -121,9 +121,14 @@ def hamilton_equations(model: Model, *, iterations: int = ITERATIONS, check: boo
 
 
 def velocities(system: System) -> Graph:
-    """The velocities qd0.. of momenta: inputs q0.., p0.., t if needed, parameters."""
+    """The velocities qd0.. of momenta: inputs q0.., p0.., t if needed, parameters.
+
+    Where they are iterated, further outputs are missing0.., as of `hamilton_equations`.
+    """
     transform = Legendre(system, Builder(), ITERATIONS)
     outputs = {f"qd{i}": node for i, node in enumerate(transform.velocities)}
+    if not transform.quadratic:
+        outputs |= _missing(transform)
     return cg.simplify(system.graph(outputs, system.q, transform.p))
 
 
@@ -145,13 +150,18 @@ def _equations(system: System, iterations: int, check: bool) -> Graph:
     outputs = {f"q{i}_dot": node for i, node in enumerate(moved[: system.nq])}
     outputs |= {f"p{i}_dot": node for i, node in enumerate(moved[system.nq :])}
     if check:
-        left = [ZERO] * system.n
-        if not transform.quadratic:
-            here = transform.at(transform.momenta)
-            with building(build):
-                left = [p - momentum for p, momentum in zip(transform.p, here, strict=True)]
-        outputs |= {f"missing{i}": node for i, node in enumerate(left)}
+        outputs |= _missing(transform)
     return cg.simplify(system.graph(outputs, system.q, transform.p, system.tau))
+
+
+def _missing(transform: Legendre) -> dict[str, Node]:
+    """What the iteration for the velocities leaves of the momenta, p - dL/dqd; 0 where there is none."""
+    left = [ZERO] * transform.system.n
+    if not transform.quadratic:
+        here = transform.at(transform.momenta)
+        with building(transform.build):
+            left = [p - momentum for p, momentum in zip(transform.p, here, strict=True)]
+    return {f"missing{i}": node for i, node in enumerate(left)}
 
 
 def _dot(a: list[Node], b: list[Node]) -> Node:

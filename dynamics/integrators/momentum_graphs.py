@@ -73,7 +73,7 @@ def mechanics(problem: Problem) -> Mechanics:
     mass_matrix = [node for row in hessian_nodes(system.lagrangian, system.qd) for node in row]
     quadratic = not reaches(mass_matrix, system.qd)
     free = not reaches(rate.outputs.values(), system.qd)
-    constant = not reaches([*mass_matrix, *momentum.outputs.values()], system.q)
+    constant = not reaches([*mass_matrix, *momentum.outputs.values()], [*system.q, system.t])
     solved = graph([*state, *p], [*velocity, singular], before)
     return Mechanics(momentum, rate, solved, quadratic, free and constant and quadratic)
 

@@ -184,6 +184,7 @@ def simulate(
 
     # Put the result together
     times, states, momenta = state.rows(*recorder.table())
+    run.warnings += state.warnings
     nq, held = problem.nq, None if hold is None else hold.held
     stats = _stats(run, options.method, outcome)
     for text in stats.warnings:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -69,6 +70,23 @@ def test_what_the_momentum_form_has_not_is_said() -> None:
     q, qd = dyn.consistent_state(four_bar(), [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
     with pytest.raises(dyn.ConstraintError, match="holds the momenta"):
         dyn.simulate(four_bar(), q, qd, 1.0, form="momentum")
+
+
+@pytest.mark.parametrize(("light", "speed", "solved"), [(1.0, 0.3, True), (1e-3, 2.0, False)])
+def test_velocities_that_the_iteration_does_not_reach_are_no_silent_result(
+    light: float, speed: float, solved: bool
+) -> None:
+    """L = c v^2/2 + v^4/4: from rest Newton's steps leap far where c is small beside v^2."""
+    system = dyn.System(lambda q, qd, t: 0.5 * light * qd[0] ** 2 + 0.25 * qd[0] ** 4, ["x"])
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        run = dyn.simulate(system, [0.0], [speed], 0.1, form="momentum")
+    assert run.stats.warnings == tuple([str(each.message) for each in said])
+    if solved:
+        assert not run.stats.warnings
+        assert run.qd[-1] == pytest.approx([speed], rel=1e-9)
+    else:
+        assert "velocities do not have the momenta" in run.stats.warnings[0]
 
 
 @pytest.mark.slow
