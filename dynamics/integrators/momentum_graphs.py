@@ -10,6 +10,7 @@ from cgraph import Graph, Node
 from cgraph.extend import Builder, SingularError, building, cotangents, hessian_nodes, solve_nodes
 
 from ..equations.singular_mass_matrix import SingularMassMatrixError
+from ..systems.arguments import new_variables
 from ..systems.system import System
 from .problem import KEPT, Problem, reaches
 
@@ -39,7 +40,7 @@ def mechanics(problem: Problem) -> Mechanics:
     if system is None or not problem.canonical:
         raise ValueError("this method steps momenta dL/dqd of coordinates, which the model does not have")
     build = Builder()
-    p = cg.variables([f"p{i}" for i in range(system.n)])
+    p = new_variables("p", system.n, system.parameters)
     bars = cotangents({system.lagrangian: ONE}, [*system.q, *system.qd], build)
     slopes, momenta = bars[: system.n], bars[system.n :]
     with building(build):
@@ -50,7 +51,7 @@ def mechanics(problem: Problem) -> Mechanics:
             )
         ]
         missing = [wanted - here for wanted, here in zip(p, momenta, strict=True)]
-    before = cg.variable("singular")
+    (before,) = new_variables("singular", 1, system.parameters)
     try:
         *steps, info = _solved(system, missing, build)
     except SingularError as error:

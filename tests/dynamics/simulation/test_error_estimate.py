@@ -173,7 +173,9 @@ def test_the_estimate_does_not_compare_momenta_with_coordinates() -> None:
     """However heavy what moves is: all momenta are larger, and not the errors of the coordinates."""
     errors = []
     for mass in (1.0, 1e150):
-        heavy = dyn.System(lambda q, qd, t, mass=mass: mass * (0.5 * qd[0] ** 2 - 0.5 * q[0] ** 2), ["x"])
+        heavy = dyn.System(
+            lambda q, qd, t, p: p["m"] * (0.5 * qd[0] ** 2 - 0.5 * q[0] ** 2), ["x"], parameters={"m": mass}
+        )
         how: dict[str, Any] = {"dt": 0.01, "form": "momentum", "rtol": LOOSE, "backend": "python"}
         run = dyn.simulate(heavy, [1.0], [0.0], math.pi, "symplectic_euler", **how)
         errors.append(run.stats.error)
