@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -184,9 +184,8 @@ def simulate(
 
     # Put the result together
     times, states, momenta = state.rows(*recorder.table())
-    run.warnings += state.warnings
     nq, held = problem.nq, None if hold is None else hold.held
-    stats = _stats(run, options.method, outcome)
+    stats = _stats(run, options.method, outcome, state.warnings)
     for text in stats.warnings:
         warnings.warn(text, SimulationWarning, stacklevel=2)
     dense = None if steps is None else Solution(options.t0, start.x, steps, nq)
@@ -286,11 +285,11 @@ def _energies(energy: Graph | None, times: Array, states: Array, held: HeldForce
     return row_values(energy, times, states, None if held is None else held.at(times))[:, 0]
 
 
-def _stats(run: Integration, method: str, outcome: _Outcome) -> Stats:
+def _stats(run: Integration, method: str, outcome: _Outcome, said: Sequence[str]) -> Stats:
     seconds, status, message, error = outcome
     if error and math.isnan(error.largest):
         error = None  # nothing could be compared
-    texts = [*run.warnings, *([error.warning] if error and error.warning else [])]
+    texts = [*run.warnings, *said, *([error.warning] if error and error.warning else [])]
     return Stats(
         method,
         run.steps,
