@@ -14,6 +14,7 @@ from py_mini_racer import MiniRacer
 
 import cgraph as cg
 import dynamics as dyn
+import viz
 from dynamics.integrators import TABLEAUS
 from dynamics.scenes.live_graphs import live_graphs
 from viz.live import Live, page_text
@@ -346,3 +347,10 @@ def test_a_mistake_is_told_in_one_sentence(changed, kind, said):
         made(**changed)
     assert "\n" not in str(caught.value)
     assert made().to_dict()["states"] == 2
+
+
+def test_a_center_that_attracts_has_a_page():
+    """Its state at 0 has no rates, and no weight that sliders could be as long as."""
+    planet = dyn.System(lambda q, qd, t: qd[0] ** 2 + qd[1] ** 2 + 1.0 / cg.hypot(q[0], q[1]), "x y")
+    assert "wasm-unsafe-eval" in viz.live_page(planet)
+    assert "wasm-unsafe-eval" in viz.live_page(planet, start=[0.0, 0.0, 0.0, 0.0])
