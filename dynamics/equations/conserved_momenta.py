@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Builder, building, cotangents, folded, shortened
 
+from ..systems.arguments import new_variables
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .formulations import ONE
@@ -57,7 +57,7 @@ def conserved_momenta(model: Model) -> tuple[str, ...]:
 def _rates(system: System) -> list[Node]:
     """Rates of the momenta at tau = 0, as short as they get."""
     build = Builder()
-    p = cg.variables([f"p{i}" for i in range(system.n)])
+    p = new_variables("p", system.n, system.parameters)
     stated: Sequence[Node] | None = system.momentum_rates(p)
     if stated is None:
         (lagrangian,) = folded([system.lagrangian], build)

@@ -136,6 +136,12 @@ def velocities(system: System) -> Graph:
     return cg.simplify(system.graph(outputs, system.q, transform.p))
 
 
+def missing_momenta(system: System) -> Graph | None:
+    """What `velocities` leave of the momenta, missing0.. as of `hamilton_equations`; None where nothing is iterated."""
+    transform = Legendre(system, Builder(), ITERATIONS)
+    return None if transform.quadratic else cg.simplify(system.graph(_missing(transform), system.q, transform.p))
+
+
 def _equations(system: System, iterations: int, check: bool, order: Order) -> Graph:
     build = Builder()
     transform = Legendre(system, build, iterations, order)
@@ -154,14 +160,19 @@ def _equations(system: System, iterations: int, check: bool, order: Order) -> Gr
     outputs = {f"q{i}_dot": node for i, node in enumerate(moved[: system.nq])}
     outputs |= {f"p{i}_dot": node for i, node in enumerate(moved[system.nq :])}
     if check:
-        left = [ZERO] * system.n
-        if not transform.quadratic:
-            here = transform.at(transform.momenta)
-            with building(build):
-                left = [p - momentum for p, momentum in zip(transform.p, here, strict=True)]
-        outputs |= {f"missing{i}": node for i, node in enumerate(left)}
+        outputs |= _missing(transform)
     graph = cg.simplify(system.graph(outputs, system.q, transform.p, system.tau))
     return cg.balanced_sums(graph) if order == "balanced" else graph
+
+
+def _missing(transform: Legendre) -> dict[str, Node]:
+    """What the iteration for the velocities leaves of the momenta, p - dL/dqd; 0 where there is none."""
+    left = [ZERO] * transform.system.n
+    if not transform.quadratic:
+        here = transform.at(transform.momenta)
+        with building(transform.build):
+            left = [p - momentum for p, momentum in zip(transform.p, here, strict=True)]
+    return {f"missing{i}": node for i, node in enumerate(left)}
 
 
 def _dot(a: list[Node], b: list[Node]) -> Node:

@@ -68,12 +68,6 @@ def given_start(
     return InitialValue(_state(model, inputs, q, qd), inputs.states, values)
 
 
-def split_state(model: Model, x: Sequence[float]) -> tuple[Sequence[float], Sequence[float] | None]:
-    """A state (m,) as the arguments q and qd; of an OdeSystem the state and None."""
-    nq = len(model.coordinates)
-    return (x, None) if as_ode(model) is not None else (x[:nq], x[nq:])
-
-
 def normalized(model: Model, x: Array) -> Array:
     """States (.., m) with the constraint of the coordinates met, such as quaternions of length 1.
 

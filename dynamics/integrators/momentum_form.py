@@ -8,7 +8,7 @@ from functools import lru_cache
 from cgraph.extend import require_choice
 
 from ..equations.equations_of_motion import momentum
-from ..equations.hamiltonian import FORMS, hamilton_equations, velocities
+from ..equations.hamiltonian import FORMS, hamilton_equations, missing_momenta, velocities
 from ..systems.model import as_system
 from .problem import KEPT, Problem
 
@@ -32,6 +32,7 @@ def momentum_form(problem: Problem) -> Problem:
     system = as_system(problem.model)
     states = (*problem.states[: problem.nq], *[f"p{i}" for i in range(system.n)])
     names = [f"momentum of {name!r}" for name in system.velocities]
+    missing = missing_momenta(system)
     return replace(
         problem,
         states=states,
@@ -39,4 +40,5 @@ def momentum_form(problem: Problem) -> Problem:
         rate=problem.bind(states, hamilton_equations(system)),
         velocities=problem.bind(states, velocities(system)),
         momentum=problem.bind(problem.states, momentum(system)),
+        missing=missing and problem.bind(states, missing),
     )

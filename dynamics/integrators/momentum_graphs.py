@@ -10,6 +10,7 @@ from cgraph import Graph, Node
 from cgraph.extend import Builder, SingularError, building, cotangents, hessian_nodes, solve_nodes
 
 from ..equations.singular_mass_matrix import SingularMassMatrixError
+from ..systems.arguments import new_variables
 from ..systems.system import System
 from .problem import KEPT, Problem, reaches
 
@@ -39,7 +40,7 @@ def mechanics(problem: Problem) -> Mechanics:
     if system is None or not problem.canonical:
         raise ValueError("this method steps momenta dL/dqd of coordinates, which the model does not have")
     build = Builder()
-    p = cg.variables([f"p{i}" for i in range(system.n)])
+    p = new_variables("p", system.n, system.parameters)
     bars = cotangents({system.lagrangian: ONE}, [*system.q, *system.qd], build)
     slopes, momenta = bars[: system.n], bars[system.n :]
     with building(build):
@@ -50,7 +51,7 @@ def mechanics(problem: Problem) -> Mechanics:
             )
         ]
         missing = [wanted - here for wanted, here in zip(p, momenta, strict=True)]
-    before = cg.variable("singular")
+    (before,) = new_variables("singular", 1, system.parameters)
     try:
         *steps, info = _solved(system, missing, build)
     except SingularError as error:
@@ -73,7 +74,7 @@ def mechanics(problem: Problem) -> Mechanics:
     mass_matrix = [node for row in hessian_nodes(system.lagrangian, system.qd) for node in row]
     quadratic = not reaches(mass_matrix, system.qd)
     free = not reaches(rate.outputs.values(), system.qd)
-    constant = not reaches([*mass_matrix, *momentum.outputs.values()], system.q)
+    constant = not reaches([*mass_matrix, *momentum.outputs.values()], [*system.q, system.t])
     solved = graph([*state, *p], [*velocity, singular], before)
     return Mechanics(momentum, rate, solved, quadratic, free and constant and quadratic)
 

@@ -38,6 +38,7 @@ class Problem:
     velocities: qd of the states, where these are q and p = dL/dqd; inputs the states, t, parameters. None where they
     are q and qd, as in `Problem`s that are derived.
     momentum: p of q and qd, which are its inputs in place of the states; None where velocities is.
+    missing: what the velocities leave of the momenta; inputs as of these. None where they are not iterated.
     """
 
     model: Model
@@ -52,6 +53,7 @@ class Problem:
     system: System | None
     velocities: Graph | None = None
     momentum: Graph | None = None
+    missing: Graph | None = None
 
     @property
     def size(self) -> int:

@@ -24,6 +24,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Call, Map, Program, Statement, Sum, While
 
+from ..systems.arguments import TIME
 from .composition import Composition
 from .elementwise import SAME, compensated, function, weighted
 from .explicit import advance, registers, stage_time
@@ -64,12 +65,12 @@ def partitioned_step(method: Partitioned, problem: Problem, composition: Composi
 
 
 def _separable(problem: Problem) -> bool:
-    """Whether the rates of the coordinates depend on momenta alone, and the rates of these on coordinates."""
+    """Whether the rates of the coordinates depend on momenta alone, and the rates of these on coordinates and time."""
     if not problem.momenta:
         return mechanics(problem).separable
     states, rates = cg.variables(list(problem.states)), list(problem.rate.outputs.values())
     nq = problem.nq
-    return not (reaches(rates[:nq], states[:nq]) or reaches(rates[nq:], states[nq:]))
+    return not (reaches(rates[:nq], [*states[:nq], cg.variable(TIME)]) or reaches(rates[nq:], states[nq:]))
 
 
 def _of_momenta(method: Partitioned, problem: Problem, composition: Composition) -> Step:

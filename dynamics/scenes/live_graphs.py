@@ -74,7 +74,7 @@ def live_graphs(scene: Scene) -> LiveGraphs:
     units = {} if scene.mechanism is None else display_units(scene.mechanism.moving)
     units |= {name: "kg" for name in start if name.startswith("mass.")} | {"g": "m/s²", "t": "s"}
     torques = [abs(float(value)) for name, value in shown.evaluate({**start}).items() if name.startswith("gravity")]
-    weight = max(torques, default=0.0)
+    weight = max(filter(math.isfinite, torques), default=0.0)  # none at a center that attracts
     scales = {name: _scale(name, value, units.get(name, ""), weight) for name, value in start.items()}
     return LiveGraphs(rate, start, shown, meters, parents, scales, _step(scene), display_names(scene), units)
 

@@ -17,12 +17,13 @@ from cgraph.extend import Array
 from .dense_output import Indices
 from .equal_steps import SAME, EqualSteps
 from .run_options import RunOptions
-from .step_program import CompiledSteps
+from .state_sizes import StateSizes
+from .step_program import CompiledSteps, StepProgram
 from .stepping import FixedStepIntegration
 
 ENOUGH = 1.5  # times the longest of the steps that make up one of the second run
 APART = 1.5  # the ratio of errors from which a difference of two runs tells them
-ROUNDING = 1e-10  # of the largest component: where another is that small, rounding is no error of it
+ROUNDING = 1e-10  # of the largest component of its kind: where one is that small, rounding is no error of it
 LAWLESS = 0.1  # of the size of a component: a difference above it follows no power of the step
 
 
@@ -96,8 +97,10 @@ def matches(times: Array, others: Array) -> tuple[Indices, Indices]:
 class Differences:
     """Between the rows of k runs and their second runs, by component, as the second runs go on."""
 
-    def __init__(self, rows: Array) -> None:
+    def __init__(self, rows: Array, program: StepProgram) -> None:
         """rows: (k, T, m) of the first runs."""
+        kinds = [0] * program.size if program.ordinary else program.kinds
+        self._kinds = StateSizes(0.0, kinds, program.groups, 0.0, program.lengths)
         self.size = np.abs(rows).max(axis=1, initial=0.0)  # (k, m) of each component over the run
         self.largest, self.last = np.zeros_like(self.size), np.zeros_like(self.size)
         self.compared = 0  # instants
@@ -120,7 +123,7 @@ class Differences:
     @property
     def scale(self) -> Array:
         """What an error of each component is measured by, (k, m)."""
-        scale: Array = self.size + ROUNDING * self.size.max(axis=1, keepdims=True)
+        scale: Array = self.size + ROUNDING * self._kinds.largest_of_kind(self.size)
         return scale
 
     def errors(self, ratio: float) -> tuple[Array, Array]:
@@ -198,7 +201,7 @@ def estimate(
     second, ratio = second_run(run.stretches, program.order, shorter=control is not None)
     compiled = CompiledSteps(program, run.runner)
     other = FixedStepIntegration(compiled, options, run.parameters, stopped, control, every_step=True, stretches=second)
-    differences = Differences(states[None])
+    differences = Differences(states[None], program)
     for block in other.blocks(x):
         beyond = options.direction * (block.t - times[-1]) > 0.0
         rows, same = matches(times, block.t)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +25,7 @@ from .event_log import EventLog
 from .event_program import event_program
 from .free_memory import room
 from .integration import integration
+from .missed_momenta import missed_momenta
 from .progress_bar import Progress
 from .recorder import Recorder
 from .row_values import converted, row_values
@@ -183,8 +184,9 @@ def simulate(
     outcome = _integrate(run, x, recorder, options, stepped.rate, steps)
 
     # Put the result together
-    held, stats = None if hold is None else hold.held, _stats(run, options.method, outcome)
-    table, momenta = _table(stepped, energy, *recorder.table(), held)
+    rows, held = recorder.table(), None if hold is None else hold.held
+    stats = _stats(run, options.method, outcome, missed_momenta(stepped, *rows))
+    table, momenta = _table(stepped, energy, *rows, held)
     for text in stats.warnings:
         warnings.warn(text, SimulationWarning, stacklevel=2)
     dense = None if steps is None else Solution(options.t0, x, steps, problem.nq, stepped.velocities)
@@ -288,11 +290,11 @@ def _table(
     return (times, states[:, :nq], states[:, nq:], energies), rows[:, nq:] if stepped.momenta else None
 
 
-def _stats(run: Integration, method: str, outcome: _Outcome) -> Stats:
+def _stats(run: Integration, method: str, outcome: _Outcome, said: Sequence[str]) -> Stats:
     seconds, status, message, error = outcome
     if error and math.isnan(error.largest):
         error = None  # nothing could be compared
-    texts = [*run.warnings, *([error.warning] if error and error.warning else [])]
+    texts = [*run.warnings, *said, *([error.warning] if error and error.warning else [])]
     return Stats(
         method,
         run.steps,

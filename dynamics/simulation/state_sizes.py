@@ -45,7 +45,7 @@ class StateSizes:
         return result
 
     def largest_of_kind(self, values: Array) -> Array:
-        """For each component the largest size of those of its kind, as one of its own, (m,)."""
+        """For each component the largest size of those of its kind, as one of its own, (.., m)."""
         result: Array = _largest(self._lengths * values, self._alike) / self._lengths
         return result
 
@@ -59,5 +59,5 @@ def _same(numbers: Sequence[int]) -> Flags:
 
 def _largest(values: Array, alike: Flags) -> Array:
     """For each the largest size of those alike."""
-    largest: Array = np.where(alike, np.abs(values), 0.0).max(axis=1)
+    largest: Array = np.where(alike, np.abs(values)[..., None, :], 0.0).max(axis=-1)
     return largest

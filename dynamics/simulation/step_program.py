@@ -30,6 +30,7 @@ class StepProgram:
     kinds: tuple[int, ...]  # of the components: the same for those that can be compared, see `System.lengths`
     lengths: tuple[float, ...]  # of the components: what 1 stands for beside 1 of others of its kind
     groups: tuple[int, ...]  # of the components: the same for those of one quantity, as a quaternion's
+    ordinary: bool  # of a first-order system, whose states may all round each other
     normalization: Graph | None  # of states, see Problem; with constraints their projection, over states and t
 
     @property
@@ -72,6 +73,7 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
         kinds,
         tuple([size or 1.0 for size in problem.lengths]),
         groups,
+        problem.system is None,
         between(problem),
     )
 

@@ -6,7 +6,7 @@ import inspect
 import math
 import numbers
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from types import FunctionType
 from typing import Any, NoReturn
 
@@ -82,6 +82,13 @@ def parameter_value(name: str, value: float) -> float:
     if isinstance(value, bool) or not is_finite(value):
         raise ValueError(f"parameter {name!r} must be a finite number, got {value!r}")
     return float(value)
+
+
+def new_variables(stem: str, count: int, taken: Collection[str]) -> list[Node]:
+    """Variables of this stem and a number, with more underscores where a name is taken."""
+    while any(f"{stem}{k}" in taken for k in range(count)):
+        stem += "_"
+    return cg.variables([f"{stem}{k}" for k in range(count)])
 
 
 def call_user_function(what: str, function: Callable[..., Any], *arguments: Any, state: str = "x") -> Any:

@@ -1,8 +1,5 @@
 // The picture: shapes for bodies, clusters, nodes and outputs, and arrows between what is shown.
 
-/** What a person calls an input, output or node of that name. */
-const calledIn = (record, name) => new Map(record.called).get(name) ?? name;
-
 /** What the operation of a node shows: its symbol, with the constants among its arguments. */
 function caption(record, version, node) {
   const name = version.names[node];

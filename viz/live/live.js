@@ -168,11 +168,10 @@ async function startLive() {
     $("meters").append(liveTag("details", open, liveTag("summary", {}, group), liveTag("table", {}, liveTag("tbody", {}, ...rows))));
   }
   const unitOf = (i) => data.inputs[i].unit;
-  function error(id, { index, most }) {
-    const share = most > 0 ? Math.min(1, Math.max(0, (Math.log10(most) + 12) / 12)) : most === 0 ? 0 : 1;
-    $(`${id}-bar`).value = share;
+  function error(id, { index, most, share }) {
+    $(`${id}-bar`).value = share > 0 ? Math.min(1, Math.max(0, (Math.log10(share) + 12) / 12)) : share === 0 ? 0 : 1;
     $(id).textContent = most === most ? `${liveNumber(most)} ${unitOf(index)} in ${data.inputs[index].called}` : "no number any more";
-    $(id).dataset.large = String(!(most < 0.01));
+    $(id).dataset.large = String(!(share < 0.01));
   }
   function show() {
     const now = motion.now();

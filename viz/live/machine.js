@@ -3,6 +3,7 @@
 const FINER = 4, FINEST = 500; // steps of the reference beside one: a limit, so that any dt is answered within a frame
 const HORIZON = 1500; // steps at most that the error ahead takes
 const COURSE = 300; // first steps that the picture of coordinates over time holds
+const OTHERS = 1e-6; // of the largest state of its group, below which one counts as no smaller: it may be rounding
 
 /** The bytes behind base64. */
 function decoded(text) {
@@ -36,6 +37,7 @@ function liveMachine(data, instances) {
   const seen = new Float64Array(shown.memory.buffer, 0, n);
   const results = new Float64Array(shown.memory.buffer, size, data.shownCount);
   const step = (inputs, method, h, count) => rate[method](places.get(inputs), h, count);
+  const sizes = new Float64Array(data.states);
   const finer = (dt) => Math.min(FINEST, Math.max(FINER, Math.ceil((2 * dt) / data.dt)));
 
   /** What is shown at a state: a copy. */
@@ -45,16 +47,24 @@ function liveMachine(data, instances) {
     return results.slice();
   }
 
-  /** The state in which two runs differ most, and by how much; NaN where one is none. */
+  /** The state in which a run differs most from its reference, by how much, and as a share of its size so far, in any unit. */
   function apart(a, b) {
-    let index = 0, most = 0;
+    const largest = new Map();
+    const states = data.inputs.slice(0, data.states);
+    states.forEach(({ group }, i) => {
+      if (Number.isFinite(b[i])) sizes[i] = Math.max(sizes[i], Math.abs(b[i]));
+      largest.set(group, Math.max(largest.get(group) ?? 0, sizes[i]));
+    });
+    let found = { index: 0, most: 0, share: 0 };
     for (let i = 0; i < data.states; i++) {
-      const off = Math.abs(a[i] - b[i]);
-      if (off > most || off !== off) [index, most] = [i, off];
-      if (off !== off) break;
+      const most = Math.abs(a[i] - b[i]);
+      const share = most ? most / Math.max(sizes[i], OTHERS * largest.get(states[i].group)) : 0;
+      if (share > found.share || most !== most) found = { index: i, most, share };
+      if (most !== most) break;
     }
-    return { index, most };
+    return found;
   }
+  const forget = () => { sizes.fill(0); };
 
   /** How far a run by these steps is off after `seconds` from here on. */
   function errorAhead(method, dt, seconds) {
@@ -87,5 +97,5 @@ function liveMachine(data, instances) {
     return rows;
   }
 
-  return { run, fine, step, finer, look, apart, errorAhead, course };
+  return { run, fine, step, finer, look, apart, forget, errorAhead, course };
 }

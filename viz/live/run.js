@@ -16,6 +16,7 @@ function liveRun(machine, data) {
   /** The reference starts here. */
   function together() {
     machine.fine.set(machine.run);
+    machine.forget();
   }
   /** An input gets a value: of a state the reference starts anew, of a parameter both have it. */
   function set(i, value) {
@@ -53,7 +54,7 @@ function liveRun(machine, data) {
   /** All that is set, as a text for the fragment of a link. */
   function link() {
     const values = Object.fromEntries(data.inputs.map(({ name }, i) => [name, machine.run[i]]));
-    return encodeURIComponent(JSON.stringify({ dt: state.dt, method: state.method, time: state.time, ...values }));
+    return encodeURIComponent(JSON.stringify({ dt: state.dt, method: state.method, time: state.time, values }));
   }
   /** Sets what a link says; what it says wrongly stays as it is. Returns whether it could be read. */
   function open(text) {
@@ -67,7 +68,7 @@ function liveRun(machine, data) {
     if (Number.isFinite(found.dt) && found.dt > 0) state.dt = found.dt;
     if (data.methods.includes(found.method)) state.method = found.method;
     if (Number.isFinite(found.time)) state.time = found.time;
-    for (const [name, i] of index) if (Number.isFinite(found[name])) machine.run[i] = found[name];
+    for (const [name, i] of index) if (Number.isFinite(found.values?.[name])) machine.run[i] = found.values[name];
     state.owed = 0;
     together();
     return true;

@@ -8,7 +8,7 @@ from cgraph.extend import write_files
 from dynamics import scenes
 from dynamics.integrators import TABLEAUS
 from dynamics.scenes.live_graphs import live_graphs
-from dynamics.scenes.start import Start, with_start
+from dynamics.scenes.start import Start, moving_start, with_start
 from dynamics.systems.model import Model
 
 from ..inspector import Panel
@@ -30,7 +30,8 @@ def live_page(model: Model, path: str | os.PathLike[str] | None = None, *, start
     path : str or path, optional
         The file to write the page to, .html.
     start : mapping of str to float, or sequence of float, optional
-        As `viz.inspect` takes it: {name: value} of what differs from the model's start [rad or m, per second].
+        As `viz.inspect` takes it: {name: value} of what differs from the model's start [rad or m, per second]; where
+        that would rest, or has no rates, by default one that shows something.
 
     Returns
     -------
@@ -56,7 +57,7 @@ def live_page(model: Model, path: str | os.PathLike[str] | None = None, *, start
     """
     target = html_target("the page's file", path)
     scene = scenes.of_model(model)
-    scene = scene if start is None else with_start(scene, start)
+    scene = moving_start(scene) if start is None else with_start(scene, start)
     text = page_text(live_of(scene), title=f"{scene.name}, live", about=scene.about)
     if target is not None:
         write_files({target: text})

@@ -6,6 +6,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Sequence
+from unicodedata import normalize
 
 import numpy as np
 
@@ -16,8 +17,10 @@ from dynamics.systems.system import System
 
 MOST = 4  # coordinates that the page takes
 _NAME = re.compile(r"[^\W\d_][A-Za-z0-9_]*")
-_RESERVED = re.compile(r"(q|qd|qdd|tau|lambda)\d+(_old)?|t|dt|pi|.+dot\d*|time|damping|force|coordinates?|[qLTV]")
+_RESERVED = re.compile(r"(q|qd|qdd|tau|lambda)\d+(_old)?|t|dt|pi|π|.+dot\d*|time|damping|tau|force|coordinates?|[qLTV]")
+_ALIASES = ("ln", "arcsin", "arccos", "arctan", "arctan2", "min", "max")  # functions of the page beside the operations
 _NO_FUNCTION = ("where", "less", "less_equal", "equal", "not_equal", "zero_safe_mul")
+_DOTS = "\N{COMBINING DOT ABOVE}\N{COMBINING DIAERESIS}"
 _SUM, _POWER, _WHOLE = 1, 8, 9  # how strongly a sign binds, a power, and a name or a function
 
 
@@ -124,12 +127,11 @@ class _Writer:
     def _free(self, wanted: str, otherwise: str) -> str:
         """The name, if a text may have it and no other has it, or a free one with a number."""
         wanted = re.sub(r"[^\w]", "", wanted)
-        if not _NAME.fullmatch(wanted) or _RESERVED.fullmatch(wanted) or wanted in OPS:
-            wanted = otherwise
+        wanted = wanted if _usable(wanted) else otherwise
         stem, number = wanted.rstrip("0123456789"), 1
-        while wanted in self.taken:
+        while wanted in self.taken or not _usable(wanted):
             number += 1
-            wanted = f"{stem}{number}"
+            wanted = f"{stem}_{number}" if _RESERVED.fullmatch(f"{stem}{number}") else f"{stem}{number}"
         self.taken.add(wanted)
         return wanted
 
@@ -158,6 +160,12 @@ class _Writer:
         """A text in parentheses, unless it binds as strongly as its place asks for and has no sign in front."""
         text, binds = part
         return text if binds >= least and not text.startswith("-") else f"({text})"
+
+
+def _usable(name: str) -> bool:
+    """Whether a text may have a name of its own that is spelled so."""
+    rate = {*normalize("NFD", name)} & {*_DOTS}  # ẋ is a rate, and ö an acceleration
+    return bool(_NAME.fullmatch(name)) and not (rate or _RESERVED.fullmatch(name) or name in {*OPS, *_ALIASES})
 
 
 def _number(value: float) -> str:

@@ -168,7 +168,7 @@ class Meaning {
   /** A formula for each coordinate, from a line for all, a list, or a line for one; else 0. */
   perCoordinate(kind) {
     const label = PRIMAL | (kind === "tau" ? FORCE : 0), found = this.coordinates.map(() => 0), { length } = found;
-    for (const each of this.statements.filter(({ name }) => name === kind)) {
+    for (const each of this.statements.filter((one) => one.name === kind && one.kind !== "start")) { // tau(0) is a coordinate's
       const { at, end, items } = each, of = each.of && this.coordinates.indexOf(each.of.text);
       if (of === -1) throw this.unknown({ ...each.of, name: each.of.text }, each.of.text, 1);
       if (each.kind === "list" && items.length !== length) throw new TextError(`${quoted(kind)} needs a value for each of ${this.coordinates.join(", ")}, not ${items.length}.`, at, end);

@@ -24,6 +24,7 @@ from ..equal_steps import step_count
 from ..event import Event, as_events
 from ..event_program import event_program
 from ..free_memory import room
+from ..missed_momenta import missed_momenta
 from ..progress_bar import Progress
 from ..row_values import converted
 from ..run_options import METHOD, RunOptions, time_span
@@ -157,7 +158,7 @@ def simulate_many(
     _run(task, chunks, team, result)
 
     # Put the result together
-    stats = result.stats(method, time.perf_counter() - begin)
+    stats = _judged(result.stats(method, time.perf_counter() - begin), problem, options.row_times, result.rows, p)
     if text := _warning(stats):
         warnings.warn(text, SimulationWarning, stacklevel=2)
     table, momenta = _table(problem, options.row_times, result.rows, p)
@@ -184,6 +185,14 @@ def _row_count(options: RunOptions) -> int:
             "or method='rk4' make equal steps"
         )
     return step_count(options.t_end - options.t0, options.step) + 1
+
+
+def _judged(stats: EnsembleStats, problem: Problem, times: Array, rows: Array, p: Array) -> EnsembleStats:
+    """The same, with what speaks against the velocities of momenta."""
+    if problem.missing is None:
+        return stats
+    missed = [missed_momenta(problem, times, *each) for each in zip(rows, p, strict=True)]
+    return replace(stats, warnings=tuple([(*a, *b) for a, b in zip(stats.warnings, missed, strict=True)]))
 
 
 def _warning(stats: EnsembleStats) -> str:

@@ -34,7 +34,7 @@ def estimate_side_by_side(
     if times[-1] != options.t_end:
         times, states = np.append(times, options.t_end), np.concatenate([states, ends[:, None]], axis=1)
     second, ratio = second_run(equal_steps(options.instants, options.step), code.program.order)
-    memories, differences = start_memories(code, chunk), Differences(states)
+    memories, differences = start_memories(code, chunk), Differences(states, code.program)
     for stretch in second:
         _compare(code, memories, stretch, differences, _Course(times, states), stopped)
     for k, error in enumerate(estimates(differences, ratio, code.program.components, options)):

@@ -17,8 +17,9 @@ from cgraph import Graph, Node
 from cgraph.extend import Array, Builder, folded, topological
 
 from ...integrators import Problem
+from ...systems.arguments import new_variables
 from .point_functions import at, compiled, pulled_back
-from .rate_pullback import RatePullback, new_variables, rate_pullback, rebuilt
+from .rate_pullback import RatePullback, rate_pullback, rebuilt
 
 ARITHMETIC = ("add", "sub", "mul", "neg")
 PARAMETERS = ("tau", "p", "c")  # registers: what the parameters of the problem are, end to end

@@ -11,11 +11,10 @@ from cgraph.extend import Call, Statement
 
 from ...integrators import Method, Problem
 from ...integrators.explicit import registers
-from ...systems.arguments import TIME
+from ...systems.arguments import TIME, new_variables
 from .linearization import Linearization
 from .motion_equations import PARAMETERS, MotionEquations
 from .products import Products
-from .rate_pullback import new_variables
 
 LOSS = "loss"  # register: the running loss so far
 

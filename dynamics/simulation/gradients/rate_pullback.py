@@ -7,7 +7,7 @@ reverse sweep over the virtual power of inverse dynamics, in place of one over i
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import cgraph as cg
@@ -16,6 +16,7 @@ from cgraph.extend import Builder, SingularError, building, cotangents, folded, 
 
 from ...equations.bias_terms import bias_terms
 from ...integrators import Problem
+from ...systems.arguments import new_variables
 from ...systems.system import System
 
 ONE, ZERO = cg.constant(1.0), cg.constant(0.0)
@@ -61,7 +62,7 @@ def rate_pullback(problem: Problem) -> RatePullback | None:
     system, m = problem.system, problem.size
     if system is None or problem.momenta or len(system.constraints):
         return None
-    taken = problem.rate.input_names
+    taken = [*problem.rate.input_names, *system.parameters]
     values, bars, mu = (new_variables(what, n, taken) for what, n in (("value", m), ("bar", m), ("mu", system.n)))
     build = Builder()
     accelerations = slice(m - system.n, m)
@@ -86,13 +87,6 @@ def rebuilt(nodes: Sequence[Node], replacement: Mapping[Node, Node], build: Buil
         if node not in new:
             new[node] = build(node.op, tuple([new[arg] for arg in node.args]), node.label) if node.args else node
     return [new[node] for node in nodes]
-
-
-def new_variables(stem: str, count: int, taken: Collection[str]) -> list[Node]:
-    """Variables of this stem and a number, with more underscores where a name is taken."""
-    while any(f"{stem}{k}" in taken for k in range(count)):
-        stem += "_"
-    return cg.variables([f"{stem}{k}" for k in range(count)])
 
 
 def _power(system: System, mu: Sequence[Node], qdd: Sequence[Node]) -> Node:

@@ -9,7 +9,6 @@ import numpy as np
 from mpmath import mp
 from pytest import approx, mark, param, raises
 
-from dynamics.equations.initial_value import split_state
 from dynamics.equations.state_equation import state_equation, state_inputs
 from dynamics.experiments.stability import cases
 from dynamics.experiments.stability.cases import chains, rotation, stiff
@@ -18,6 +17,7 @@ from dynamics.reference import reference
 from tests import high_precision
 from tests.dynamics.experiments import sensitivity
 from tests.dynamics.models import Array
+from tests.dynamics.split_state import split_state
 from tests.slow import slow
 
 Rate = Callable[[Array, float], Any]  # of the state and t, written without the library

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from pytest import approx, mark, raises
 
+import cgraph as cg
 import dynamics as dyn
 from dynamics.integrators import METHODS
 from dynamics.integrators.composition import COMPOSITIONS, Composition
@@ -127,3 +128,14 @@ def test_a_coordinate_that_has_no_inertia_by_structure_is_named() -> None:
         dyn.simulate(model, [0.0, 0.0], [0.0, 0.0], 1.0, "verlet")
     negative = dyn.System(lambda q, qd, t: -0.5 * qd[0] ** 2 + 0.5 * q[0] ** 2, ["x"])
     assert dyn.simulate(negative, [1.0], [0.0], 1.0, "verlet").q[-1] == approx(math.cos(1.0), abs=1e-6)
+
+
+@mark.parametrize("form", ["velocity", "momentum"])
+@mark.parametrize("name", ["verlet", "yoshida4", "kahan_li8"])
+def test_time_can_be_turned_where_the_mass_changes_with_it(name: str, form: str) -> None:
+    """A step is symmetric for kinetic energies of any time: what is not is of first order, whatever its name."""
+    growing = dyn.System(lambda q, qd, t: 0.5 * cg.exp(0.3 * t) * (qd[0] ** 2 - 4.0 * q[0] ** 2), ["x"])
+    how = {"dt": 0.05, "form": form, "backend": "python", "estimate_error": False}
+    there = dyn.simulate(growing, [1.0], [0.5], 1.0, name, **how)
+    back = dyn.simulate(growing, there.q[-1], there.qd[-1], 0.0, name, t0=1.0, **how)
+    assert [back.q[-1, 0], back.qd[-1, 0]] == approx([1.0, 0.5], rel=THERE_AND_BACK)

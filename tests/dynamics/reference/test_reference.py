@@ -14,12 +14,12 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.initial_value import split_state
 from dynamics.equations.state_equation import state_equation, state_inputs
 from dynamics.experiments.stability import cases
 from dynamics.reference import REFERENCE_METHODS, Reference, ReferenceFailedError, closed_forms, reference
 from dynamics.reference.flint_numbers import working
 from dynamics.systems.ode_system import OdeSystem
+from tests.dynamics.split_state import split_state
 from tests.slow import slow
 
 pytest.importorskip("flint", reason="reference solutions need python-flint")

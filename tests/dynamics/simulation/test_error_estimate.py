@@ -169,6 +169,19 @@ def test_a_second_run_has_other_steps_to_the_same_end(
     assert (ratio >= 1.5 and work[1] <= 0.67 * work[0] + 1) or (ratio <= 0.5 and work[1] == 2 * work[0])
 
 
+def test_the_estimate_does_not_compare_momenta_with_coordinates() -> None:
+    """However heavy what moves is: all momenta are larger, and not the errors of the coordinates."""
+    errors = []
+    for mass in (1.0, 1e150):
+        heavy = dyn.System(
+            lambda q, qd, t, p: p["m"] * (0.5 * qd[0] ** 2 - 0.5 * q[0] ** 2), ["x"], parameters={"m": mass}
+        )
+        how: dict[str, Any] = {"dt": 0.01, "form": "momentum", "rtol": LOOSE, "backend": "python"}
+        run = dyn.simulate(heavy, [1.0], [0.0], math.pi, "symplectic_euler", **how)
+        errors.append(run.stats.error)
+    assert errors[1] == approx(errors[0], rel=1e-6)
+
+
 def test_ctrl_c_in_an_estimate_is_no_success(monkeypatch: pytest.MonkeyPatch) -> None:
     real, calls = NativeIntegration._advance, []
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
 import pytest
 
+import cgraph as cg
 import dynamics as dyn
 from dynamics.systems.model import as_system
 
@@ -223,6 +225,23 @@ def test_what_the_momentum_form_has_not_is_said() -> None:
         dyn.simulate(four_bar(), q, qd, 1.0, form="momentum")
 
 
+@pytest.mark.parametrize(("light", "speed", "solved"), [(1.0, 0.3, True), (1e-3, 2.0, False)])
+def test_velocities_that_the_iteration_does_not_reach_are_no_silent_result(
+    light: float, speed: float, solved: bool
+) -> None:
+    """L = c v^2/2 + v^4/4: from rest Newton's steps leap far where c is small beside v^2."""
+    system = dyn.System(lambda q, qd, t: 0.5 * light * qd[0] ** 2 + 0.25 * qd[0] ** 4, ["x"])
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        run = dyn.simulate(system, [0.0], [speed], 0.1, form="momentum")
+    assert run.stats.warnings == tuple([str(each.message) for each in said])
+    if solved:
+        assert not run.stats.warnings
+        assert run.qd[-1] == pytest.approx([speed], rel=1e-9)
+    else:
+        assert "velocities do not have the momenta" in run.stats.warnings[0]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["verlet", "gauss4"])
 def test_a_million_steps_leave_the_energy_in_its_band(method: str) -> None:
@@ -236,3 +255,11 @@ def test_a_million_steps_leave_the_energy_in_its_band(method: str) -> None:
     band = np.ptp(first)
     assert abs(last.mean() - first.mean()) <= 0.01 * band
     assert np.ptp(last) <= 1.01 * band
+
+
+def test_an_ensemble_says_which_velocities_are_missed() -> None:
+    """Of a relativistic particle, the one whose momentum the iteration does not reach."""
+    particle = dyn.System(lambda q, qd, t: -cg.sqrt(1.0 - qd[0] ** 2) - 0.5 * q[0] ** 2, "x")
+    with pytest.warns(dyn.SimulationWarning, match="1 of 2 trajectories: of 1, at t = 0 s the velocities do not have"):
+        fan = dyn.simulate_many(particle, [0.0], [[0.1], [0.99]], 1.0, method="rk4", dt=0.1, form="momentum")
+    assert [len(texts) for texts in fan.stats.warnings] == [0, 1]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -47,6 +49,27 @@ def test_a_system_written_as_text_means_the_same(name):
     assert len(found["names"]) == len(system.parameters)
     at = {name: [0.3, -0.7, 0.45][i % 3] for i, name in enumerate(graph.input_names)}
     assert found["values"] == pytest.approx(graph.evaluate(at), rel=1e-12)
+
+
+ALIASES = re.search(
+    r"ALIASES = {(.*?)}", (Path(sys.modules[viz.typed_page.__module__].__file__).parent / "expressions.js").read_text()
+)[1]
+NAMES = [*re.findall(r"(\w+):", ALIASES), "sin", "π", "ẋ", "öl", "tau", "damping", "time", "lambda", "T", "xdot", "m₁"]
+
+
+def test_names_that_mean_something_in_a_text_are_renamed():
+    """Functions, rates, and lines of the page: as a coordinate, a parameter and the name of a formula."""
+
+    def lagrangian(q, qd, t, p):
+        (k,) = p.values()
+        inner = cg.with_name(cg.sin(q[0]) * k, name)
+        return 0.5 * k * qd[0] ** 2 - inner * inner
+
+    read = "(text) => { const { parameters, start, damping, forces } = parsed(text);"
+    read += " return [[...parameters.values()], start.q, start.qd, damping, forces[0].value]; }"
+    for name in NAMES:
+        system = dyn.System(lagrangian, [name], parameters={name: 2.0})
+        assert run_typed(read, viz.typed_text(system, [0.3], [0.4])) == [[2.0], [0.3], [0.4], [0], 0], name
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,33 @@
+"""Missed momenta: where the velocities of a run in momenta, if they are iterated, do not belong to its momenta."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cgraph.extend import Array
+
+from ..integrators import Problem
+from .row_values import row_values
+from .state_sizes import OTHERS
+
+LOOSE = 1e-6  # of a momentum, or so much of the largest: what an iteration may leave of it
+
+
+def missed_momenta(problem: Problem, times: Array, rows: Array, parameters: Array | None = None) -> list[str]:
+    """What speaks against rows (T, m) of a problem in momenta, a sentence each.
+
+    parameters: further inputs of the graph, (k,); without them 0, of forces that velocities do not depend on.
+    """
+    if problem.missing is None or not len(rows):
+        return []
+    count = len(problem.missing.inputs) - rows.shape[1] - 1
+    held = np.broadcast_to(0.0 if parameters is None else np.asarray(parameters), (len(times), count))
+    momenta, missing = rows[:, problem.nq :], row_values(problem.missing, times, rows, held)
+    sizes = np.abs(momenta).max(axis=0, initial=0.0)
+    bad = np.argwhere(~(np.abs(missing) <= LOOSE * np.maximum(sizes, OTHERS * sizes.max(initial=0.0))))
+    if not len(bad):
+        return []
+    row, k = bad[0].tolist()
+    name, left = problem.components[problem.nq + k], f"{missing[row, k]:.2g} of {momenta[row, k]:.2g}"
+    text = f"at t = {times[row]:.6g} s the velocities do not have the momenta: the iteration leaves {left}, {name}"
+    return [f"{text}; take form='velocity'"]
