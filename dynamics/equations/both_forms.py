@@ -13,7 +13,7 @@ from .equations_of_motion import momentum
 from .hamiltonian import hamilton_equations
 from .state_equation import state_equation
 
-LAGRANGE, HAMILTON, VELOCITIES = "state equation", "Hamilton's equations", "velocities alone"
+LAGRANGE, HAMILTON, VELOCITIES_ALONE = "state equation", "Hamilton's equations", "velocities alone"
 
 
 class Agreement(NamedTuple):
@@ -33,7 +33,7 @@ def form_sizes(forms: Mapping[str, Graph]) -> dict[str, Counts]:
     """The sizes of both forms, and of the velocities within Hamilton's equations, on which the rest of them stands."""
     hamilton = forms[HAMILTON]
     velocities = Graph(hamilton.inputs, {name: node for name, node in hamilton.outputs.items() if name[0] == "q"})
-    return {name: graph.counts() for name, graph in {**forms, VELOCITIES: velocities}.items()}
+    return {name: graph.counts() for name, graph in {**forms, VELOCITIES_ALONE: velocities}.items()}
 
 
 def form_agreement(model: Model, forms: Mapping[str, Graph], at: Mapping[str, float]) -> Agreement:

@@ -111,6 +111,11 @@ class Legendre:
         return velocities
 
 
+def is_quadratic(system: System) -> bool:
+    """Whether L is quadratic in the velocities, so that they need no iteration."""
+    return isinstance(system, BodySystem) or Legendre(system, Builder(), 1).quadratic
+
+
 def linear_nodes(output: Node, variables: Sequence[Node]) -> list[Node]:
     """The nodes of an output that are linear in variables, 0 where they are, by what they are made of."""
     linear, moving = set(variables), set(variables)

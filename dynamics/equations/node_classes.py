@@ -9,6 +9,11 @@ from cgraph.extend import ADJOINT, topological
 
 from .formulations import EULER, spurious_nodes
 
+LEAVES, DAMPING = "inputs and numbers", "damping"
+POSITIONS = "of positions alone: kinematics, inertia, and its elimination"
+BIAS, ACCELERATIONS = "bias: of velocities, without torques", "accelerations, with the torques"
+VELOCITIES, RATES = "velocities of the momenta", "rates of the momenta"
+
 
 def formulation_classes(graph: Graph) -> Callable[[Node], str]:
     """The class of each node of a graph of `inverse_dynamics`, as `cg.compare` asks for it.
@@ -39,14 +44,14 @@ def form_classes(graph: Graph) -> Callable[[Node], str]:
 
     def name(node: Node) -> str:
         if not node.args:
-            return "inputs and numbers"
+            return LEAVES
         if node not in moving and node not in driven:
-            return "of positions alone: kinematics, inertia, and its elimination"
-        if "damping" in node.tags and node not in velocities and all([arg not in driven for arg in node.args]):
-            return "damping"
+            return POSITIONS
+        if DAMPING in node.tags and node not in velocities and all([arg not in driven for arg in node.args]):
+            return DAMPING
         if momenta:
-            return "velocities of the momenta" if node in velocities else "rates of the momenta"
-        return "accelerations, with the torques" if node in driven else "bias: of velocities, without torques"
+            return VELOCITIES if node in velocities else RATES
+        return ACCELERATIONS if node in driven else BIAS
 
     return name
 

@@ -29,7 +29,7 @@ from .spatial import STILL, ZERO, Triple, cross, plus, scaled
 from .spatial_vectors import Twist, Wrench
 
 ONE = as_node(1.0)
-COMPOSITE = "composite momentum"  # tag of what is made of it
+COMPOSITE = "momentum"  # tag of what composite momenta are made of, and of the rates made of them
 
 
 class CompositeMomentum(NamedTuple):

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from cgraph import Graph
-from dynamics.equations.both_forms import HAMILTON, LAGRANGE, VELOCITIES, form_sizes
+from dynamics.equations.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, form_sizes
 from dynamics.experiments.text_table import table
 
 SIZES = ("nodes", "edges", "depth", "width")
 WORDS = {
     LAGRANGE: f"{LAGRANGE}, of (q, qd)",
     HAMILTON: f"{HAMILTON}, of (q, p), p = dL/dqd",
-    VELOCITIES: f"  the {VELOCITIES}",
+    VELOCITIES_ALONE: f"  the {VELOCITIES_ALONE}",
 }
 
 

@@ -1,7 +1,7 @@
 // The one state of the page: values of inputs by name, from which every version, derived input and table is computed.
 
 const GROWN = 2 ** 12; // how many times larger rounding becomes along a motion
-const KINDS = /^(qdd|qd|q|tau|lambda|p)\d+(_old)?$/; // of inputs and outputs: letters with a number
+const KINDS = /^(qdd|qd|q|tau|lambda|p)\d+(_old|_dot)?$/; // of inputs and outputs: letters with a number
 
 /** The state of a record, and its graphs made ready.  told: called whenever a value has changed. */
 function makeState(record, told = () => {}) {

@@ -46,10 +46,10 @@ def test_a_node_of_the_momentum_graph_has_a_role_and_tags_as_of_the_other_form(n
 def test_composite_momentum_and_damping_are_named_and_serve_the_rates_alone(name: str) -> None:
     graph = dyn.hamilton_equations(MODELS[name]())
     tags = graph.counts().by_tag
-    assert tags["composite momentum"] > 0
+    assert tags["momentum"] > 0
     assert ("damping" in tags) == (name == "triple_pendulum")
     velocities = Graph(graph.inputs, {name: node for name, node in graph.outputs.items() if name[0] == "q"})
-    here = [node for node in velocities.nodes if "composite momentum" in node.tags]
+    here = [node for node in velocities.nodes if "momentum" in node.tags]
     class_of = form_classes(graph)
     assert all(["positions alone" in class_of(node) for node in here])  # of both: turns and first moments
 
