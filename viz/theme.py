@@ -68,6 +68,11 @@ ROLES = {
     "tangent": _paint("tangent: forward mode", GREEN, 0.35),
     "several": _paint("several of these roles", PURPLE, 0.45),
 }
+MOTION_WORDS = {  # what roles are in equations of motion that are solved, of accelerations or momenta
+    "primal": "as written; bias, composite momentum",
+    "adjoint": "reverse mode, elimination inwards",
+    "tangent": "forward mode, solved back out",
+}
 OUTPUT = Paint("output", WHITE, BLACK)
 COLLAPSED = Paint("collapsed part", tint(GRAY, 0.25), LINE)
 MARKED = _paint("spurious", SPURIOUS, 0.60)

@@ -12,6 +12,7 @@ from ..graph_drawing.render import check_can_draw
 from ..pages import html
 from ..pages.document_files import check_folder
 from ..plots import plot
+from .by_depth import figure7
 from .embedding import embedding
 from .free_fall import figures4_and_5
 from .one_joint import equations, figure1, figure2, figure3, sizes
@@ -51,6 +52,7 @@ def paper(folder: Path, say: Callable[[str], None], *, quick: bool = False) -> P
         "Scaling: nodes, edges and time over the number of links": (
             partial(scaling_of_counts, QUICK_LINKS) if quick else scaling_of_counts
         ),
+        "Figure 7: both forms of the equations of motion, by depth": partial(figure7, {}) if quick else figure7,
     }
     parts, files = [], dict[Path, str | bytes]()
     for number, (what, make) in enumerate(makers.items(), start=1):
