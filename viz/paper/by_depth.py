@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 from cgraph import Counts, Graph
 from dynamics import scenes
@@ -68,9 +67,8 @@ def figure7(larger: Mapping[str, str] = LARGER) -> Part:
 def _kinds(graphs: Sequence[Graph]) -> list[Paint]:
     """The kinds of nodes of all, in the words of equations of motion."""
     found = {kind for graph in graphs for kind in kinds_in(graph)}
-    words = {theme.ROLES[role].words: text for role, text in theme.MOTION_WORDS.items()}
-    order = [*theme.ROLES.values(), theme.OUTPUT]
-    return [replace(kind, words=words.get(kind.words, kind.words)) for kind in order if kind in found]
+    order = [kind for kind in (*theme.ROLES.values(), theme.OUTPUT) if kind in found]
+    return theme.in_words(order, theme.MOTION_WORDS)
 
 
 def _size(counts: Counts) -> dict[str, int]:

@@ -9,7 +9,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from viz import cli
+from viz import cli, theme
 
 ROUNDING = 1e-12  # relative, for sums of a few hundred products
 OWN = """import cgraph as cg
@@ -112,6 +112,9 @@ def test_the_momentum_graph_is_drawn(own, capsys):
         listing = Path("a.txt").read_text(encoding="utf-8")
         assert dyn.hamilton_equations(dyn.scenes.load(scene)).listing() in listing
         assert "# p0 is p." in listing
+    said(capsys, "draw", "triple_pendulum", "--momentum", "--out", "a.dot")
+    drawn = Path("a.dot").read_text(encoding="utf-8")
+    assert all(theme.MOTION_WORDS[role] in drawn for role in ("primal", "adjoint", "tangent"))
 
 
 COMMANDS = ["draw {} --out a.dot", "lint {}", "why {} p0_dot q0", "compare {}", "inspect {} --out a.html"]
