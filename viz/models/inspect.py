@@ -6,6 +6,7 @@ import os
 
 from cgraph.extend import check_writable, require_flag, require_path, write_files
 from dynamics import FORMULATIONS, display_names, scenes
+from dynamics.equations.both_forms import HAMILTON
 from dynamics.scenes.inspection import Inspection, Shares, inspection
 from dynamics.scenes.start import Start, moving_start, rest_text, with_start
 from dynamics.systems.model import Model
@@ -115,7 +116,10 @@ def inspection_page(scene: scenes.Scene, content: Inspection, moved: str = "", t
         units=content.units,
         columns={body.name: body.parent for body in mechanism.moving} if mechanism else None,
         notices=[*notices, *([cut_short(content)] if content.stopped else [])],
-        panels=[box(text_or_none(scene, scene.q, scene.qd)), *([live_panel(scene)] if lively else [])],
+        panels=[
+            box(text_or_none(scene, scene.q, scene.qd)),
+            *([live_panel(scene, momentum=content.versions[0].name == HAMILTON)] if lively else []),
+        ],
     )
 
 
