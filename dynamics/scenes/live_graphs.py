@@ -85,7 +85,8 @@ def live_graphs(scene: Scene, *, momentum: bool = False) -> LiveGraphs:
     scales = {name: _scale(name, value, units.get(name, ""), weight) for name, value in start.items()}
     if momentum:
         usual = {f"qd{i}": USUAL.get(units.get(f"qd{i}", ""), 1.0) for i in range(scene.system.n)}
-        scales |= {name: _round(abs(p)) for name, p in _momenta(scene, values | usual).items() if p}
+        reach = {name: abs(p) for name, p in _momenta(scene, values | usual).items()}
+        scales |= {name: _round(p) for name, p in reach.items() if 0.0 < p < math.inf}  # of speeds that are none, NaN
     return LiveGraphs(rate, start, shown, meters, parents, scales, _step(scene), display_names(scene), units)
 
 

@@ -254,6 +254,13 @@ def test_in_momentum_form_the_state_is_of_momenta_and_moves_alike(name):
     assert "velocities" not in groups
 
 
+def test_a_usual_speed_may_be_none_that_a_system_can_have():
+    for top in (1.0, 0.5):  # a momentum without bound, and none
+        fast = dyn.System(lambda q, qd, t, p: -cg.sqrt(p["c"] - qd[0] ** 2) - q[0] ** 2, "x", {"c": top})
+        found = live_graphs(dyn.Scene("fast", "", fast, (0.2,), (0.1,), 0.1), momentum=True)
+        assert 0.0 < found.scales["p0"] < 10.0
+
+
 def test_masses_and_gravity_of_a_small_mechanism_are_parameters(live):
     assert {"g", "mass.link_1", "mass.link_2", "mass.link_3"} <= set(live.start)
     large = live_graphs(dyn.scenes.load("chain", n=5))
