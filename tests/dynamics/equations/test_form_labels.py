@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import pytest
 
 import cgraph as cg
@@ -68,3 +70,19 @@ def test_classes_are_what_a_node_depends_on_and_what_needs_it(name: str) -> None
             found = class_of(node)
             assert ("positions alone" in found) == (bool(node.args) and not moving and not driven)
             assert not found.startswith("bias") or (moving and not driven and kind == "qd")
+
+
+def test_labels_do_not_depend_on_what_was_derived_before() -> None:
+    """A system keeps what it has made; no tag of the one who asked first may stay on it."""
+
+    def box() -> dyn.Mechanism:
+        free = dyn.Body("box", dyn.Joint("free"), mass=1.0, inertia=(0.1, 0.2, 0.3), center=(0.1, 0.0, 0.0))
+        return dyn.Mechanism([free])
+
+    derivations = [partial(dyn.inverse_dynamics, formulation=name) for name in sorted(dyn.FORMULATIONS)]
+    derivations += [dyn.state_equation, dyn.hamilton_equations, dyn.momentum_rate, dyn.energy]
+    fresh = [derive(box()).listing() for derive in derivations]
+    for order in (1, -1):
+        kept = box()
+        found = [derive(kept).listing() for derive in derivations[::order]]
+        assert found[::order] == fresh
