@@ -19,11 +19,10 @@ planet = dyn.System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + (q[0] * qd[1]) ** 2) + 
 ring = dyn.System(lambda q, qd, t: qd[0] ** 2 + qd[1] ** 2, "x y", constraints=lambda q, t: {"ring": q[0] * q[1] - 1.0})
 slow = dyn.OdeSystem(lambda x, t: [-x[0]], ["decay"])
 named = dyn.System(lambda q, qd, t, p: p["p0"] * qd[0] ** 2, ["x"], {"p0": 1.0})
-fast = dyn.System(lambda q, qd, t: -cg.sqrt(1.0 - qd[0] ** 2) - q[0] ** 2, "x", damping=0.1)
 body = dyn.Body("box", dyn.Joint("free"), mass=1.0, inertia=(0.1, 0.2, 0.3), center=(0.1, 0.0, 0.0))
 free = dyn.Mechanism([body])
 """
-SCENES = ("spring_mass", "triple_pendulum", "own.py:planet", "own.py:fast", "own.py:free")
+SCENES = ("spring_mass", "own.py:planet", "own.py:free")
 
 
 @pytest.fixture(scope="module")
@@ -77,13 +76,12 @@ def test_the_momenta_and_positions_are_proven_apart(own, capsys):
     assert text.splitlines()[-2].split()[-4:] == [str(counts.nodes), "238", str(counts.depth), "28"]
 
 
-@pytest.mark.parametrize("scene", SCENES[1:])
+@pytest.mark.parametrize("scene", ["triple_pendulum", "own.py:planet", "own.py:free"])
 def test_why_adds_up_to_the_derivative(own, capsys, scene):
-    source = "p0" if scene == "own.py:fast" else "q0"
-    found = figures(capsys, "why", scene, "p0_dot", source, "--momentum", "--k", "1")
+    found = figures(capsys, "why", scene, "p0_dot", "q0", "--momentum", "--k", "1")
     if found["depends"]:
         graph, at = dyn.hamilton_equations(dyn.scenes.load(scene)), found["at"]
-        slope = cg.gradient(cg.Graph(graph.inputs, {"rate": graph.outputs["p0_dot"]}), [source])
+        slope = cg.gradient(cg.Graph(graph.inputs, {"rate": graph.outputs["p0_dot"]}), ["q0"])
         ((exact,),) = [tuple(slope.evaluate(at).values())]
         assert abs(found["derivative"] - exact) <= ROUNDING * found["weight"]
     else:
