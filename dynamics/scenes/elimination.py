@@ -52,7 +52,7 @@ def elimination(graph: Graph, names: Mapping[str, str]) -> list[EliminationStep]
         add(f"Back out: the {kind} of {joints[i]}; {how}.", node, i)
         how = "what moves it from below is known now"
     for i, (_, node) in sorted(rates.items(), reverse=True):
-        add(f"All velocities are known: the rate of the momentum of {joints[i]}, with all that it carries.", node, i)
+        add(f"All velocities are known: the rate of the momentum of {joints[i]}.", node, i)
     return steps
 
 
