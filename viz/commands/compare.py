@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -94,4 +95,5 @@ def _forms(scene: scenes.Scene, graphs: Mapping[str, Graph]) -> tuple[dict[str, 
         f"At a state, velocities differ by {apart.velocities:.1g}, and p_dot from dp/dt along the accelerations by "
         f"{apart.momentum_rates:.1g}, relative to the largest."
     )
-    return {"sizes": sizes, "agreement": apart._asdict()}, f"{size_table(sizes)}\n{agreement}"
+    told = {name: each if math.isfinite(each) else None for name, each in apart._asdict().items()}
+    return {"sizes": sizes, "agreement": told}, f"{size_table(sizes)}\n{agreement}"

@@ -21,6 +21,7 @@ slow = dyn.OdeSystem(lambda x, t: [-x[0]], ["decay"])
 named = dyn.System(lambda q, qd, t, p: p["p0"] * qd[0] ** 2, ["x"], {"p0": 1.0})
 body = dyn.Body("box", dyn.Joint("free"), mass=1.0, inertia=(0.1, 0.2, 0.3), center=(0.1, 0.0, 0.0))
 free = dyn.Mechanism([body])
+away = dyn.System(lambda q, qd, t: qd[0] ** 2 + cg.log(q[0]) * qd[0] ** 2, "x")
 """
 SCENES = ("spring_mass", "own.py:planet", "own.py:free")
 
@@ -67,6 +68,10 @@ def test_lint_and_compare_have_the_sizes_of_both_forms(own, capsys, scene):
         assert sum(found[f"{side}_classes"].values()) == len(only)
     assert max(found["agreement"].values()) < ROUNDING
     assert not any("bias" in name for name in found["right_classes"])
+
+
+def test_a_state_at_which_there_is_nothing_to_compare_is_no_number(own, capsys):
+    assert set(figures(capsys, "compare", "own.py:away", "--momentum", status=1)["agreement"].values()) == {None}
 
 
 def test_the_momenta_and_positions_are_proven_apart(own, capsys):
