@@ -9,6 +9,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from cgraph import Graph, Node
+from dynamics.equations.legendre import is_quadratic
 from dynamics.equations.node_classes import form_classes
 
 from ..mechanisms import turned_arm
@@ -86,3 +87,10 @@ def test_labels_do_not_depend_on_what_was_derived_before() -> None:
         kept = box()
         found = [derive(kept).listing() for derive in derivations[::order]]
         assert found[::order] == fresh
+
+
+def test_velocities_that_need_an_iteration_are_told_from_those_of_one_elimination() -> None:
+    fast = dyn.System(lambda q, qd, t: -cg.sqrt(1.0 - qd[0] ** 2) - q[0] ** 2, "x")
+    assert not is_quadratic(fast)
+    assert is_quadratic(tagged_cart())
+    assert is_quadratic(turned_arm(2).system)

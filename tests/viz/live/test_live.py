@@ -255,10 +255,9 @@ def test_in_momentum_form_the_state_is_of_momenta_and_moves_alike(name):
 
 
 def test_a_usual_speed_may_be_none_that_a_system_can_have():
-    for top in (1.0, 0.5):  # a momentum without bound, and none
-        fast = dyn.System(lambda q, qd, t, p: -cg.sqrt(p["c"] - qd[0] ** 2) - q[0] ** 2, "x", {"c": top})
-        found = live_graphs(dyn.Scene("fast", "", fast, (0.2,), (0.1,), 0.1), momentum=True)
-        assert 0.0 < found.scales["p0"] < 10.0
+    fast = dyn.System(lambda q, qd, t: -cg.sqrt(1.0 - qd[0] ** 2) - q[0] ** 2, "x")  # at 1 its momentum has no bound
+    found = live_graphs(dyn.Scene("fast", "", fast, (0.2,), (0.1,), 0.1), momentum=True)
+    assert 0.0 < found.scales["p0"] < 10.0
 
 
 def test_masses_and_gravity_of_a_small_mechanism_are_parameters(live):

@@ -46,11 +46,6 @@ def test_the_page_of_momenta_has_both_forms_their_rows_and_a_machine_of_momenta(
     assert [version["steps"] == [] for version in data["versions"]] == [False, True]
 
 
-def test_a_velocity_that_is_iterated_for_has_no_steps_of_an_elimination():
-    fast = dyn.System(lambda q, qd, t: -cg.sqrt(1.0 - qd[0] ** 2) - q[0] ** 2, "x")
-    assert '"steps":[{' not in viz.inspect(fast, momentum=True, start={"x": 0.2}, t_end=0.05)
-
-
 @pytest.mark.parametrize("start", [{"swing": 1.0}, {"qd0": 1.0}, [0.0, 0.0]])
 def test_a_start_that_is_chosen_is_kept(start):
     assert NOTICE not in viz.inspect(PENDULUM, start=start, t_end=0.1, forward=True)
