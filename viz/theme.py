@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -68,10 +68,21 @@ ROLES = {
     "tangent": _paint("tangent: forward mode", GREEN, 0.35),
     "several": _paint("several of these roles", PURPLE, 0.45),
 }
+MOTION_WORDS = {  # what roles are in equations of motion that are solved, of accelerations or momenta
+    "primal": "primal: as written, or stated by bodies",
+    "adjoint": "adjoint: slopes of L, elimination inwards",
+    "tangent": "tangent: solved, back out",
+}
 OUTPUT = Paint("output", WHITE, BLACK)
 COLLAPSED = Paint("collapsed part", tint(GRAY, 0.25), LINE)
 MARKED = _paint("spurious", SPURIOUS, 0.60)
 MARKS = (MARKED, _paint("marked", BLUE, 0.60))  # of several groups of marked nodes, the first and the second
+
+
+def in_words(kinds: Iterable[Paint], words: Mapping[str, str]) -> list[Paint]:
+    """The kinds of nodes, those of some roles with other words.  words: {role: what a legend says of it}."""
+    chosen = {ROLES[role].words: text for role, text in words.items() if role in ROLES}
+    return [replace(kind, words=chosen.get(kind.words, kind.words)) for kind in kinds]
 
 
 def role_of(node: Node) -> str:

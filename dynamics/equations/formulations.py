@@ -256,12 +256,13 @@ class _Embedding:
         q_old = cg.variables([f"q{i}_old" for i in range(system.nq)])
         qd_old = cg.variables([f"qd{i}_old" for i in range(system.n)])
         self.inputs = [*q_old, *qd_old, *system.qdd, self.dt]
+        q_dot = system.q_dot  # kept by the system once they are made: not in here, where they would be tagged
         with cg.tag(EULER):
             self.qd = [
                 cg.with_name(a * self.dt + old, f"qd{i}")
                 for i, (a, old) in enumerate(zip(system.qdd, qd_old, strict=True))
             ]
-            rates = substitute(system.q_dot, dict(zip([*system.q, *system.qd], [*q_old, *self.qd], strict=True)))
+            rates = substitute(q_dot, dict(zip([*system.q, *system.qd], [*q_old, *self.qd], strict=True)))
             with cg.tag(COUPLING):
                 moved = [rate * self.dt for rate in rates]
             self.q = [cg.with_name(m + old, f"q{i}") for i, (m, old) in enumerate(zip(moved, q_old, strict=True))]

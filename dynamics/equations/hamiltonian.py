@@ -150,13 +150,13 @@ def _equations(system: System, iterations: int, check: bool, order: Order) -> Gr
         gradient = cotangents({transform.lagrangian: ONE}, system.q, build)
         stated = system.kinematics.slopes(gradient, transform.p, build)
     with building(build):
+        with cg.tag("damping"):
+            braking = [damping * qd for damping, qd in zip(system.damping, system.qd, strict=True)]
         rates = [
-            slope + tau + force - damping * qd
-            for slope, tau, force, damping, qd in zip(
-                stated, system.tau, system.forces, system.damping, system.qd, strict=True
-            )
+            slope + tau + force - brake
+            for slope, tau, force, brake in zip(stated, system.tau, system.forces, braking, strict=True)
         ]
-    moved = transform.at([*system.q_dot, *rates])
+    moved = transform.tagged(transform.at([*system.q_dot, *rates]))
     outputs = {f"q{i}_dot": node for i, node in enumerate(moved[: system.nq])}
     outputs |= {f"p{i}_dot": node for i, node in enumerate(moved[system.nq :])}
     if check:

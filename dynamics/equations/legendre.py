@@ -64,6 +64,22 @@ class Legendre:
         """Nodes over (q, u), and any p, as nodes over (q, p)."""
         return folded(folded(nodes, self.build), self.build, self._replace)
 
+    def tagged(self, nodes: Sequence[Node]) -> list[Node]:
+        """The nodes of `at`; what of the velocities has no tags has those that all of their momentum has."""
+        if isinstance(self.system, BodySystem):  # their names are in every part
+            return list(nodes)
+        tags: dict[Node, frozenset[str]] = {}
+        for velocity, momentum in zip(self.velocities, self.momenta, strict=True):
+            common = [node.tags for node in topological([momentum]) if node.args]
+            untagged = [node for node in topological([velocity]) if node.args and not node.tags]
+            tags |= dict.fromkeys(untagged, frozenset.intersection(*common) if common else frozenset())
+        copies: dict[Node, Node] = {}
+        for node in topological(nodes):
+            args, label = tuple([copies[arg] for arg in node.args]), node.label.tagged(tags.get(node, frozenset()))
+            same = args == node.args and label is node.label
+            copies[node] = node if same else Node(node.op, args, label, name=node.name)
+        return [copies[node] for node in nodes]
+
     def at_rest(self, nodes: Sequence[Node]) -> list[Node]:
         """Nodes over (q, u) at u = 0."""
         return folded(nodes, self.build, self._at_rest)
@@ -93,6 +109,11 @@ class Legendre:
             replace = zip((*system.qd, *system.tau), (*velocities, *missing), strict=True)
             velocities = folded(step, build, dict(replace))
         return velocities
+
+
+def is_quadratic(system: System) -> bool:
+    """Whether L is quadratic in the velocities, so that they need no iteration."""
+    return isinstance(system, BodySystem) or Legendre(system, Builder(), 1).quadratic
 
 
 def linear_nodes(output: Node, variables: Sequence[Node]) -> list[Node]:

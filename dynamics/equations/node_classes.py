@@ -1,13 +1,18 @@
-"""Classes of the nodes of a formulation: needed, Euler edge or spurious."""
+"""Classes of the nodes of equations of motion: of a formulation, needed or not; of both forms, what they serve."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 from cgraph import Graph, Node
-from cgraph.extend import ADJOINT
+from cgraph.extend import ADJOINT, topological
 
 from .formulations import EULER, spurious_nodes
+
+LEAVES, DAMPING = "inputs and numbers", "damping"
+POSITIONS = "of positions alone: kinematics, inertia, and its elimination"
+BIAS, ACCELERATIONS = "bias: of velocities, without torques", "accelerations, with the torques"
+VELOCITIES, RATES = "velocities of the momenta", "rates of the momenta"
 
 
 def formulation_classes(graph: Graph) -> Callable[[Node], str]:
@@ -24,3 +29,38 @@ def formulation_classes(graph: Graph) -> Callable[[Node], str]:
         return "Euler edge" if EULER in node.tags and ADJOINT not in node.roles else "needed"
 
     return name
+
+
+def form_classes(graph: Graph) -> Callable[[Node], str]:
+    """The class of each node of `state_equation` or `hamilton_equations`, by what it depends on and what needs it.
+
+    Of positions alone: inertia and its elimination. Then of accelerations the bias, which the torques have no part in,
+    and what the torques reach; of momenta what the velocities need, and what only the rates of the momenta need.
+    """
+    momenta = "p0_dot" in graph.outputs
+    moving = _reached(graph, "p" if momenta else "qd")
+    driven = _reached(graph, "tau")
+    velocities = set(topological([node for name, node in graph.outputs.items() if momenta and name[0] == "q"]))
+
+    def name(node: Node) -> str:
+        if not node.args:
+            return LEAVES
+        if node not in moving and node not in driven:
+            return POSITIONS
+        if DAMPING in node.tags and node not in velocities and all([arg not in driven for arg in node.args]):
+            return DAMPING
+        if momenta:
+            return VELOCITIES if node in velocities else RATES
+        return ACCELERATIONS if node in driven else BIAS
+
+    return name
+
+
+def _reached(graph: Graph, kind: str) -> set[Node]:
+    """The nodes that the inputs of a kind reach, such as p0, p1 .."""
+    names = zip(graph.input_names, graph.inputs, strict=True)
+    reached = {node for name, node in names if name.startswith(kind) and name.removeprefix(kind).isdecimal()}
+    for node in graph.nodes:  # arguments come before their use
+        if not reached.isdisjoint(node.args):
+            reached.add(node)
+    return reached

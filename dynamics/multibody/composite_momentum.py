@@ -29,6 +29,7 @@ from .spatial import STILL, ZERO, Triple, cross, plus, scaled
 from .spatial_vectors import Twist, Wrench
 
 ONE = as_node(1.0)
+COMPOSITE = "momentum"  # tag of what composite momenta are made of, and of the rates made of them
 
 
 class CompositeMomentum(NamedTuple):
@@ -105,8 +106,7 @@ def momentum_rates(
     with cg.tag(POTENTIAL):
         up = scaled(motion.strength, motion.vertical)  # gravity is -up
         loss = carried.plus(Wrench(cross(composite.moment, up), scaled(composite.mass, up)))
-    rates += [-twist.power(loss) for twist in _along(joint, q)[len(rates) :]]
-    with cg.tag(POTENTIAL):
+        rates += [-twist.power(loss) for twist in _along(joint, q)[len(rates) :]]
         springs = [force for _, force in spring_forces(link, joint, q, u)] or [ZERO] * len(rates)
         return [rate - spring for rate, spring in zip(rates, springs, strict=True)]
 

@@ -18,7 +18,7 @@ from . import newton_euler, spatial
 from .base_parameters import base_parameter_links
 from .body import WORLD, Body, quantities
 from .body_motion import Motion, ground
-from .composite_momentum import CompositeMomentum, about_parent, body_momentum, momentum_rates, stated
+from .composite_momentum import COMPOSITE, CompositeMomentum, about_parent, body_momentum, momentum_rates, stated
 from .inertial_numbers import Link
 from .inverse_dynamics_columns import torque_derivatives
 from .joint_coordinates import parts, places
@@ -103,13 +103,13 @@ class TreeEquations:
             rows = list(zip(self.bodies, self._fewest, self._moved(q, qd), parts(self.bodies, q, qd), strict=True))
             composites: list[CompositeMomentum] = []
             for body, link, moved, _ in rows:
-                with cg.tag(body.name):
+                with cg.tag(body.name, COMPOSITE):
                     composites.append(body_momentum(moved.motion, link))
             rates, at = list[Node](), places(self.bodies)
             for i in reversed(range(len(rows))):
                 body, link, moved, (x, u) = rows[i]
                 joint = moving_type(body.joint.type)
-                with cg.tag(body.name):
+                with cg.tag(body.name, COMPOSITE):
                     composites[i] = stated(composites[i], link, joint, x, u, p[at[i].u])
                     motions = (moved.parent, moved.motion)
                     rates[:0] = momentum_rates(composites[i], *motions, link, joint, x, u, p[at[i].u])

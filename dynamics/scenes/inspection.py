@@ -2,23 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import real_number
+from cgraph.extend import PRIMAL, TANGENT, real_number
 
+from ..equations.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
 from ..equations.equations_of_motion import forward_dynamics
 from ..equations.formulations import inverse_dynamics, spurious_nodes
+from ..equations.hamiltonian import velocities
+from ..equations.legendre import is_quadratic
+from ..equations.node_classes import (
+    ACCELERATIONS,
+    BIAS,
+    DAMPING,
+    LEAVES,
+    POSITIONS,
+    RATES,
+    VELOCITIES,
+    form_classes,
+)
 from ..equations.state_equation import state_equation
 from ..equations.torque_decomposition import torque_by_link
 from ..multibody.display_units import display_units
 from ..multibody.joint_positions import Skeleton, skeleton
 from ..simulation.simulate import simulate
+from ..simulation.trajectory import Trajectory
 from ..systems.display_names import display_names
 from ..systems.system import System
 from .elimination import EliminationStep, elimination
@@ -27,17 +42,27 @@ from .scenes import Scene
 Array = np.ndarray[Any, np.dtype[np.float64]]
 FORMULATIONS = ("euler_embedded", "kinetic_only", "chain_rule")  # those of the paper, the flawed ones first
 FRAMES, RATE = 150, 30.0  # most instants shown, and how many a second
+# Rows of the picture by classes of both forms. Of what is solved for, the way back out is a row above the way in.
+INWARD, OUTWARD, TOP = "eliminated", "back out", "rates"
+ROWS = {
+    "of positions": (LEAVES, POSITIONS), "bias": (BIAS, DAMPING), INWARD: (ACCELERATIONS, VELOCITIES), OUTWARD: (),
+    TOP: (RATES,),
+}  # fmt: skip
 DT = 1e-3  # s, the step that the embedded formulations take
 
 
 class Equations(NamedTuple):
-    """A graph of the equations.  about: what to see.  marked: spurious nodes.  steps: of an elimination."""
+    """A graph of the equations.  about: what to see.  marked: spurious nodes.  steps: of an elimination.
+
+    rows: {title: nodes} of the rows of the picture from the bottom; those of the sweeps where there are none.
+    """
 
     name: str
     graph: Graph
     about: str
     marked: frozenset[Node]
     steps: tuple[EliminationStep, ...] = ()
+    rows: Mapping[str, Collection[Node]] = MappingProxyType({})
 
 
 class Shares(NamedTuple):
@@ -73,19 +98,29 @@ class Inspection:
 
 
 def inspection(
-    scene: Scene, *, forward: bool = False, t_end: float | None = None, say: Callable[[str], None] = lambda line: None
+    scene: Scene,
+    *,
+    forward: bool = False,
+    momentum: bool = False,
+    t_end: float | None = None,
+    say: Callable[[str], None] = lambda line: None,
 ) -> Inspection:
-    """The scene's inverse dynamics by the three formulations, or its forward dynamics, along its free motion.
+    """The scene's inverse dynamics by the three formulations, along its free motion.
 
+    forward: its forward dynamics in place of them.  momentum: Hamilton's equations and the state equation.
     Of an OdeSystem it is the state equation.  say: told of each stage before it begins.
 
-    Raises ValueError for t_end out of range, and as `simulate` does.
+    Raises ValueError for t_end out of range or both, and as `simulate` and `hamilton_equations` do.
     """
+    if forward and momentum:
+        raise ValueError("forward and momentum exclude one another: a page shows one of them")
     end = scene.t_end if t_end is None else real_number("t_end", t_end)
     if not 0.0 < end < np.inf:
         raise ValueError(f"t_end must be positive and finite, got {end!r} s")
     frames = int(min(FRAMES, max(2.0, RATE * end))) if np.isfinite(end) else 2
     times = np.linspace(0.0, end, frames) if end > 0.0 else None
+    if momentum:
+        return _hamilton(scene, end, times, say)
     if scene.ode is not None:
         return _first_order(scene, end, times)
     system = scene.system
@@ -107,14 +142,28 @@ def inspection(
         qdd = np.stack([np.broadcast_to(found[f"qdd{i}"], len(run.t)) for i in range(system.n)], axis=1)
         if not np.isfinite(qdd).all():
             raise ValueError(f"{scene.name} has accelerations that are not finite: the motion {run.stats.message}")
-        state |= _named(qdd=qdd) | {"dt": DT}
+        state |= _named(qdd=qdd)
         versions = []
         for name in FORMULATIONS:
             say(f"{scene.name}: deriving inverse dynamics, {name.replace('_', ' ')}")
             versions.append(_version(system, name))
         derived, shares = _derived(system), _shares(scene)
-    places = None if scene.mechanism is None else skeleton(scene.mechanism.bind(), run.q)
     stopped = "" if run.stats.success else run.stats.message
+    return _along(scene, run, versions, state | {"dt": DT}, derived, shares, stopped=stopped)
+
+
+def _along(
+    scene: Scene,
+    run: Trajectory,
+    versions: Sequence[Equations],
+    state: Mapping[str, Any],
+    derived: Graph | None,
+    shares: Shares | None = None,
+    *,
+    stopped: str,
+) -> Inspection:
+    """The versions along a motion.  state: values of all inputs that a graph may have.  stopped: why it ends early."""
+    places = None if scene.mechanism is None else skeleton(scene.mechanism.bind(), run.q)
     units = {} if scene.mechanism is None else display_units(scene.mechanism.moving)
     graphs = [each.graph for each in versions] + [each for each in (derived,) if each]
     graphs += [places.graph] if places is not None else []
@@ -122,6 +171,51 @@ def inspection(
     at = {name: value for name, value in state.items() if name in inputs}
     units = units | {"t": "s", "dt": "s"}
     return Inspection(tuple(versions), run.t, places, at, derived, shares, stopped, units)
+
+
+def _hamilton(scene: Scene, end: float, times: Array | None, say: Callable[[str], None]) -> Inspection:
+    """Both forms of the equations in the state (q, p), along a motion that is stepped in it; velocities follow."""
+    say(f"{scene.name}: deriving Hamilton's equations, and the state equation beside them")
+    forms = both_forms(scene)
+    hamilton, system, sizes = forms[HAMILTON], scene.system, form_sizes(forms)
+    say(f"{scene.name}: a motion of {end:g} s, stepped in coordinates and momenta")
+    run = simulate(system, scene.q, scene.qd, end, "dopri5", rtol=1e-6, t_eval=times, form="momentum")
+    assert run.p is not None
+    state = _named(q=run.q, p=run.p, tau=np.zeros_like(run.qd)) | system.parameters | {"t": run.t}
+    depth = {name: counts.depth for name, counts in sizes.items()}
+    about = (
+        "Rates of coordinates and momenta. The velocities are solved from the momenta, "
+        f"{_operations(depth[VELOCITIES_ALONE])} deep; the rates of the momenta stand on them, {depth[HAMILTON]} deep "
+        f"in all, in {len(hamilton.nodes)} nodes. There is no acceleration and no bias."
+    )
+    beside = (
+        "The same motion by accelerations: at the velocities of these momenta, torque less bias, solved. "
+        f"{_operations(depth[LAGRANGE])} deep, {len(forms[LAGRANGE].nodes)} nodes."
+    )
+    steps = tuple(elimination(hamilton, display_names(scene))) if is_quadratic(system) else ()
+    versions = [
+        Equations(HAMILTON, hamilton, about, frozenset(), steps, _rows(hamilton)),
+        Equations(LAGRANGE, forms[LAGRANGE], beside, frozenset(), (), _rows(forms[LAGRANGE])),
+    ]
+    stopped = "" if run.stats.success else run.stats.message
+    return _along(scene, run, versions, state, velocities(system), stopped=stopped)
+
+
+def _operations(count: int) -> str:
+    return f"{count} operation{'s' * (count != 1)}"
+
+
+def _rows(graph: Graph) -> dict[str, list[Node]]:
+    """{title: nodes} of `ROWS`."""
+    class_of, rows = form_classes(graph), {title: list[Node]() for title in ROWS}
+    title_of = {kind: title for title, kinds in ROWS.items() for kind in kinds}
+    if "p0_dot" in graph.outputs:
+        title_of[DAMPING] = TOP  # there it is of velocities that have been solved for
+    for node in graph.nodes:
+        title = title_of[class_of(node)]
+        back = title in (INWARD, TOP) and TANGENT in node.roles and PRIMAL not in node.roles
+        rows[OUTWARD if back else title].append(node)
+    return rows
 
 
 def _first_order(scene: Scene, end: float, times: Array | None) -> Inspection:

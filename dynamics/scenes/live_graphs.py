@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ from cgraph import Graph, Node
 from ..equations.energies import kinetic_energy, potential_energy
 from ..equations.equations_of_motion import gravity_force, momentum
 from ..equations.formulations import momentum_rate
+from ..equations.hamiltonian import hamilton_equations, velocities
 from ..equations.state_equation import state_equation, state_inputs
 from ..multibody.display_units import display_units
 from ..multibody.joint_positions import drawn_points, view
@@ -27,11 +29,12 @@ from .scenes import Scene
 MOST_BODIES = 4  # of a mechanism whose masses become parameters by themselves
 SAMPLES = 16  # states at which the extent of a mechanism is looked at
 MOST_STEPS = 1000  # of the motion by which dt is chosen
+USUAL = {"rad": math.pi, "rad/s": 10.0}  # how far sliders reach at least; 1 of all else
 SHARE = 0.25  # of the steps that a method of order 5 chooses
 
 
 class Meter(NamedTuple):
-    """An output that is shown.  group: "energy", "momentum" or "torque"."""
+    """An output that is shown.  group: "energy", "momentum", "velocity" or "torque"."""
 
     name: str
     unit: str
@@ -41,9 +44,10 @@ class Meter(NamedTuple):
 class LiveGraphs(NamedTuple):
     """The graphs of a scene that moves live.
 
-    rate: the state equation; its first inputs are the state.  shown: over the same inputs, the meters in their order
-    and then x and y of the points [m].  parents: of each point the earlier one it hangs on, or -1.  start: a value of
-    every input.  scales: {input: how far a slider of it reaches}.  dt: a step that is short enough [s].
+    rate: the state equation, or Hamilton's equations; its first inputs are the state.  shown: over the same inputs, the
+    meters in their order and then x and y of the points [m].  parents: of each point the earlier one it hangs on, or
+    -1.  start: a value of every input.  scales: {input: how far a slider of it reaches}.  dt: a step that is short
+    enough [s].
     """
 
     rate: Graph
@@ -57,16 +61,19 @@ class LiveGraphs(NamedTuple):
     units: dict[str, str]
 
 
-def live_graphs(scene: Scene) -> LiveGraphs:
+def live_graphs(scene: Scene, *, momentum: bool = False) -> LiveGraphs:
     """The graphs of a scene. Of a small mechanism without parameters, the masses and gravity become parameters.
 
-    Raises as `state_equation` and `simulate` do.
+    momentum: the state is coordinates and momenta.
+
+    Raises as `state_equation`, `hamilton_equations` and `simulate` do.
     """
     model = _adjustable(scene.mechanism) if scene.mechanism is not None else scene.model
     scene = replace(scene, model=model)
-    rate = state_equation(scene.model)
+    rate = hamilton_equations(scene.model) if momentum else state_equation(scene.model)
     known = state_inputs(scene.model)
     values = dict(zip(known.states, (*scene.q, *scene.qd), strict=True)) | known.parameters
+    values |= _momenta(scene, values) if momentum else {}
     start = {name: values.get(name, 0.0) for name in rate.input_names}  # torques and the time are 0
     outputs, meters = _meters(scene, rate)
     places_, parents = _places(scene, rate, start)
@@ -76,6 +83,10 @@ def live_graphs(scene: Scene) -> LiveGraphs:
     torques = [abs(float(value)) for name, value in shown.evaluate({**start}).items() if name.startswith("gravity")]
     weight = max(filter(math.isfinite, torques), default=0.0)  # none at a center that attracts
     scales = {name: _scale(name, value, units.get(name, ""), weight) for name, value in start.items()}
+    if momentum:
+        usual = {f"qd{i}": USUAL.get(units.get(f"qd{i}", ""), 1.0) for i in range(scene.system.n)}
+        reach = {name: abs(p) for name, p in _momenta(scene, values | usual).items()}
+        scales |= {name: _round(p) for name, p in reach.items() if 0.0 < p < math.inf}  # of speeds that are none, NaN
     return LiveGraphs(rate, start, shown, meters, parents, scales, _step(scene), display_names(scene), units)
 
 
@@ -104,10 +115,15 @@ def _is_number(value: object) -> bool:
 
 
 def _meters(scene: Scene, rate: Graph) -> tuple[dict[str, Node], tuple[Meter, ...]]:
-    """Energies, momenta and torques over the inputs of the state equation."""
+    """Energies, momenta and torques over the inputs of the rate."""
     system = scene.system
     inputs = dict(zip(rate.input_names, rate.inputs, strict=True))
-    inputs |= {f"qdd{i}": rate.outputs[f"qd{i}_dot"] for i in range(system.n)}
+    momenta = "p0_dot" in rate.outputs
+    if momenta:
+        moved = velocities(system)
+        inputs |= moved(**{name: inputs[name] for name in moved.input_names})
+    else:
+        inputs |= {f"qdd{i}": rate.outputs[f"qd{i}_dot"] for i in range(system.n)}
     called, units = display_names(scene), {} if scene.mechanism is None else display_units(scene.mechanism.moving)
 
     def over(graph: Graph) -> dict[str, Node]:
@@ -117,13 +133,25 @@ def _meters(scene: Scene, rate: Graph) -> tuple[dict[str, Node], tuple[Meter, ..
     (potential,) = over(potential_energy(system)).values()
     outputs = {"kinetic": kinetic, "potential": potential, "energy": kinetic + potential}
     meters = [Meter(name, "J", "energy") for name in outputs]
-    groups = {"momentum": momentum(system), "torque": gravity_force(system), "rate": momentum_rate(system)}
-    for group, graph in groups.items():
-        for name, node in over(graph).items():
+    rates = {kind: {name: node for name, node in rate.outputs.items() if name[0] == kind} for kind in "qp"}
+    groups = {
+        "velocity" if momenta else "momentum": rates["q"] if momenta else over(momentum(system)),
+        "torque": over(gravity_force(system)),
+        "rate": rates["p"] if momenta else over(momentum_rate(system)),
+    }
+    for group, nodes in groups.items():
+        for name, node in nodes.items():
             outputs[name] = node
             shown = called.get(name, name).replace("p_dot", "dp/dt").replace("gravity", "holding")
             meters.append(Meter(shown, units.get(name, ""), "torque" if group == "rate" else group))
     return outputs, tuple(meters)
+
+
+def _momenta(scene: Scene, values: Mapping[str, float]) -> dict[str, float]:
+    """p0.. at a state (q, qd)."""
+    graph = momentum(scene.system)
+    found = graph.evaluate({name: values.get(name, 0.0) for name in graph.input_names})
+    return {name: float(value) for name, value in found.items()}
 
 
 def _places(scene: Scene, rate: Graph, start: dict[str, float]) -> tuple[dict[str, Node], tuple[int, ...]]:
@@ -153,7 +181,7 @@ def _scale(name: str, value: float, unit: str, weight: float) -> float:
     """How far a slider reaches to both sides of 0."""
     if name.startswith("tau"):
         return _round(2.0 * weight) if weight else 10.0
-    usual = {"rad": math.pi, "rad/s": 10.0, "t": 10.0, "1": 1.0}.get(unit, 1.0)
+    usual = USUAL.get(unit, 1.0)
     return max(usual, 3.0 * abs(value)) if name[:1] == "q" else 3.0 * abs(value) or 1.0
 
 

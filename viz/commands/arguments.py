@@ -14,13 +14,14 @@ from typing import Any
 
 from cgraph import Graph
 from cgraph.extend import check_writable, write_files
-from dynamics import FORMULATIONS, forward_dynamics, inverse_dynamics, scenes, state_equation
+from dynamics import FORMULATIONS, forward_dynamics, hamilton_equations, inverse_dynamics, scenes, state_equation
 
 from ..graph_drawing.dot import to_dot
 from ..graph_drawing.render import check_can_draw, render_svg, tags_to_collapse
 from .signals import settled
 
 Commands = argparse._SubParsersAction  # what `add_subparsers` returns has no public name
+MOMENTUM_FORM = "Hamilton's equations, q_dot and p_dot of q and the momenta p"
 READING = ("ignore", "floating")  # options of `scenes.of_file`
 IN_PYTHON = "file.py:name, a model of a Python file, which is executed"
 
@@ -107,13 +108,16 @@ def takes_equations(command: argparse.ArgumentParser) -> None:
         "--formulation", default="chain_rule", choices=sorted(FORMULATIONS), help="of inverse dynamics (chain_rule)"
     )
     which.add_argument("--forward", action="store_true", help="forward dynamics, with outputs such as qdd0")
+    which.add_argument("--momentum", action="store_true", help=f"{MOMENTUM_FORM}, with outputs such as p0_dot")
 
 
 def equations_of(options: argparse.Namespace, scene: scenes.Scene) -> tuple[Graph, str]:
     """The graph that the arguments choose, and what it is: "inverse dynamics, chain rule".
 
-    Of an OdeSystem it is the state equation.
+    Of an OdeSystem it is the state equation. Raises for momenta of what has none.
     """
+    if options.momentum:
+        return hamilton_equations(scene), "Hamilton's equations"
     if scene.ode is not None:
         return state_equation(scene), "state equation"
     if options.forward:
@@ -185,13 +189,14 @@ def collapsed(graph: Graph) -> list[str]:
     return tags
 
 
-def state_names(graph: Graph, scene: scenes.Scene) -> tuple[list[str], list[str]]:
-    """Names of the coordinates and of the velocities that the graph has, as inputs or as inner nodes."""
+def state_names(graph: Graph, scene: scenes.Scene, *, momentum: bool = False) -> tuple[list[str], list[str]]:
+    """Names of the coordinates and of the velocities, or momenta, that the graph has, as inputs or as inner nodes."""
     if scene.ode is not None:
         return [], []
     known = {node.name for node in (*graph.inputs, *graph.nodes)}
-    q, qd = ([str(node.name) for node in nodes if node.name in known] for nodes in (scene.system.q, scene.system.qd))
-    return q, qd
+    names = [node.name for node in scene.system.q], [f"{'p' if momentum else 'qd'}{i}" for i in range(scene.system.n)]
+    q, rest = ([str(name) for name in each if name in known] for each in names)
+    return q, rest
 
 
 def _svg_file(text: str) -> Path:

@@ -1,15 +1,21 @@
-"""`cgraph compare`: what two formulations of a scene's equations have in common, and what only one of them has."""
+"""`cgraph compare`: what two formulations or both forms of a scene's equations share, and what only one of them has."""
 
 from __future__ import annotations
 
 import argparse
+import math
+from collections.abc import Mapping
+from typing import Any
 
 import cgraph as cg
-from dynamics import FORMULATIONS, display_names, inverse_dynamics
-from dynamics.equations.node_classes import formulation_classes
+from cgraph import Graph
+from dynamics import FORMULATIONS, display_names, inverse_dynamics, scenes
+from dynamics.equations.both_forms import LAGRANGE, both_forms, form_agreement
+from dynamics.equations.node_classes import form_classes, formulation_classes
 
 from .. import theme
 from .arguments import (
+    MOMENTUM_FORM,
     Commands,
     answer_and_draw,
     check_picture,
@@ -19,6 +25,8 @@ from .arguments import (
     takes_a_scene,
     unless_json,
 )
+from .point_arguments import filled
+from .sizes import size_data, size_table
 
 
 def add(commands: Commands[argparse.ArgumentParser]) -> None:
@@ -27,7 +35,8 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
         "compare", help="compare two formulations of a scene's equations, node by node; status 1 where they differ"
     )
     takes_a_scene(parser)
-    parser.add_argument(
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument(
         "--formulations",
         nargs=2,
         default=("euler_embedded", "chain_rule"),
@@ -35,6 +44,7 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
         metavar=("LEFT", "RIGHT"),
         help=f"two of {', '.join(sorted(FORMULATIONS))} (default: euler_embedded chain_rule)",
     )
+    which.add_argument("--momentum", action="store_true", help=f"the state equation and {MOMENTUM_FORM}")
     may_draw_and_print(parser)
     parser.set_defaults(run=run)
 
@@ -43,11 +53,17 @@ def run(options: argparse.Namespace) -> int:
     """Print the totals of both sides and the classes of what only one of them has; 1 where one has anything."""
     check_picture(options)
     scene = scene_of(options)
-    left, right = (inverse_dynamics(scene, name) for name in options.formulations)
-    state = [name for graph in (left, right) for names in state_names(graph, scene) for name in names]
+    graphs = (
+        both_forms(scene)
+        if options.momentum
+        else {name: inverse_dynamics(scene, name) for name in dict.fromkeys(options.formulations)}
+    )
+    named = dict(zip(("left", "right"), graphs if options.momentum else options.formulations, strict=True))
+    left, right = (graphs[name] for name in named.values())
+    state = [] if options.momentum else [n for each in (left, right) for part in state_names(each, scene) for n in part]
     called = display_names(scene)
-    comparison = cg.compare(left, right, atoms=dict.fromkeys(state), classify=formulation_classes, names=called)
-    named = dict(zip(("left", "right"), options.formulations, strict=True))
+    classes = form_classes if options.momentum else formulation_classes
+    comparison = cg.compare(left, right, atoms=dict.fromkeys(state), classify=classes, names=called)
     both = len(comparison.common)
     sizes = {"left_nodes": len(left.nodes), "right_nodes": len(right.nodes), "in_both": both}
     only = comparison.only_left, comparison.only_right
@@ -56,14 +72,28 @@ def run(options: argparse.Namespace) -> int:
         for side, graph, rest in zip(named, (left, right), only, strict=True)
     ]
     data = {"scene": scene.name} | named | sizes | comparison.to_dict()
+    if options.momentum:
+        told, text = _forms(scene, graphs)
+        data, lines = data | told, [text, *lines]
     together = comparison.overlay()
-    groups = [f"only {name}" for name in options.formulations], (together.only_left, together.only_right)
+    groups = [f"only {name}" for name in named.values()], (together.only_left, together.only_right)
     answer_and_draw(
         options,
         unless_json(options, data, "\n".join([*lines, str(comparison)])),
         together.graph,
         marked=dict(zip(*groups, strict=True)),
         names=theme.called(called),
-        caption=f"{scene.name}: {' and '.join(options.formulations)} in one".replace("_", " "),
+        caption=f"{scene.name}: {' and '.join(named.values())} in one".replace("_", " "),
     )
     return 1 if any(only) else 0
+
+
+def _forms(scene: scenes.Scene, graphs: Mapping[str, Graph]) -> tuple[dict[str, Any], str]:
+    """Sizes of both forms, and how far they agree at a state, as data and as text."""
+    sizes, apart = size_data(graphs), form_agreement(scene, graphs, filled(graphs[LAGRANGE], scene, {}))
+    agreement = (
+        f"At a state, velocities differ by {apart.velocities:.1g}, and p_dot from dp/dt along the accelerations by "
+        f"{apart.momentum_rates:.1g}, relative to the largest."
+    )
+    told = {name: each if math.isfinite(each) else None for name, each in apart._asdict().items()}
+    return {"sizes": sizes, "agreement": told}, f"{size_table(sizes)}\n{agreement}"

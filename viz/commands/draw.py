@@ -48,7 +48,8 @@ def run(options: argparse.Namespace) -> None:
     graph, what = equations_of(options, scene)
     caption = f"{scene.name}: {what}"
     names = theme.called(display_names(scene))
-    content = _listed(graph, scene) if kind == ".txt" else _drawn(graph, kind, options.collapse, caption, names)
+    words = theme.MOTION_WORDS if options.momentum else {}
+    content = _listed(graph, scene) if kind == ".txt" else _drawn(graph, kind, options.collapse, caption, names, words)
     counts = graph.counts()
     answer(f"{options.out}: {counts.nodes} nodes, {counts.edges} edges", {options.out: content})
 
@@ -61,13 +62,19 @@ def _listed(graph: Graph, scene: scenes.Scene) -> str:
 
 
 def _drawn(
-    graph: Graph, kind: str, collapse: Sequence[str] | None, caption: str, names: Mapping[str, str]
+    graph: Graph,
+    kind: str,
+    collapse: Sequence[str] | None,
+    caption: str,
+    names: Mapping[str, str],
+    words: Mapping[str, str],
 ) -> str | bytes:
     if collapse is None:
         tags = collapsed(graph) if kind in PICTURES else []
     else:
         tags = [tag for each in collapse for tag in tags_of(each, graph)]
-    drawing = to_dot(graph, marked=spurious_nodes(graph), names=names, collapse=tags, caption=caption)
+    legend = words or True
+    drawing = to_dot(graph, marked=spurious_nodes(graph), names=names, collapse=tags, caption=caption, legend=legend)
     if kind == ".dot":
         return str(drawing.source)
     svg = render_svg(drawing)

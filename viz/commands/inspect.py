@@ -9,7 +9,7 @@ from cgraph.extend import check_writable
 from dynamics.scenes.inspection import FRAMES, inspection
 
 from ..models.inspect import cut_short, inspection_page
-from .arguments import Commands, answer, positive, say, takes_a_scene, unless_json
+from .arguments import MOMENTUM_FORM, Commands, answer, positive, say, takes_a_scene, unless_json
 from .point_arguments import started, takes_a_start
 
 LONGEST = 1000.0  # s: seconds of work for an arm of ten links
@@ -22,7 +22,9 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
     )
     takes_a_scene(parser)
     parser.add_argument("--out", type=Path, required=True, help="file to write: .html")
-    parser.add_argument("--forward", action="store_true", help="forward dynamics, in place of the three formulations")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--forward", action="store_true", help="forward dynamics, in place of the three formulations")
+    which.add_argument("--momentum", action="store_true", help=f"{MOMENTUM_FORM}, in place of them")
     takes_a_start(parser)
     parser.add_argument("--t-end", type=positive, metavar="S", help="how long it moves, in place of the scene's time")
     parser.add_argument("--json", action="store_true", help="print the sizes as JSON")
@@ -38,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
     check_writable(options.out)
     say(f"reading {options.scene}")
     scene, moved = started(options)
-    content = inspection(scene, forward=options.forward, t_end=options.t_end, say=say)
+    content = inspection(scene, forward=options.forward, momentum=options.momentum, t_end=options.t_end, say=say)
     say(f"{scene.name}: writing the page of {sum(len(each.graph.nodes) for each in content.versions)} nodes")
     text = inspection_page(scene, content, moved)
     sizes = {

@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 
 import cgraph as cg
-from dynamics import ConstraintLint, conserved_momenta, display_names, lint_constraints
+from dynamics import ConstraintLint, conserved_momenta, display_names, lint_constraints, state_equation
+from dynamics.equations.both_forms import HAMILTON, LAGRANGE
 
 from .. import theme
+from ..models.constant_momenta import constant_momentum
 from ..models.open_loops import tree_alone
 from .arguments import (
     Commands,
@@ -22,6 +24,7 @@ from .arguments import (
     unless_json,
 )
 from .point_arguments import REST, box, filled, point
+from .sizes import size_data, size_table
 
 
 def add(commands: Commands[argparse.ArgumentParser]) -> None:
@@ -50,7 +53,7 @@ def run(options: argparse.Namespace) -> int:
     check_picture(options)
     scene = scene_of(options)
     graph, what = equations_of(options, scene)
-    q, qd = state_names(graph, scene)
+    q, qd = state_names(graph, scene, momentum=options.momentum)
     report = cg.lint(
         graph,
         independent=[(q, qd)] if q and qd else [],
@@ -59,19 +62,20 @@ def run(options: argparse.Namespace) -> int:
         function="L",
         names=display_names(scene),
     )
-    none = "coordinates" if qd else "velocities"
+    none = "coordinates" if qd else "momenta" if options.momentum else "velocities"
     proof = str(report) if q and qd else f"Holds: the equations have no {none}.\n{report}"
     held = lint_constraints(scene) if scene.ode is None else ConstraintLint({}, {})
     if str(held):
         proof = f"{proof}\n{held}"
     conserved = conserved_momenta(scene) if scene.ode is None else ()
-    proof += "".join(
-        [f"\nThe momentum of {name!r} is constant: neither L nor a force depends on it." for name in conserved]
-    )
+    proof += "".join([f"\n{constant_momentum(name)}" for name in conserved])
+    sizes = size_data({LAGRANGE: state_equation(scene), HAMILTON: graph}) if options.momentum else {}
+    proof += f"\n{size_table(sizes)}" if sizes else ""
     alone = "" if options.forward else tree_alone(scene)
     proof = f"{proof}\n{alone}" if alone else proof
     data = {"scene": scene.name, "equations": what, "of_the_tree": bool(alone)} | report.to_dict()
     data |= {"constraints": held.to_dict(), "conserved": list(conserved), "ok": report.ok and held.ok}
+    data |= {"sizes": sizes} if sizes else {}
     answer_and_draw(
         options,
         unless_json(options, data, proof),

@@ -7,9 +7,10 @@ import argparse
 import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Names, cotangents
-from dynamics import display_names, scenes
+from dynamics import conserved_momenta, display_names, scenes
 
 from .. import theme
+from ..models.constant_momenta import constant_momentum
 from ..models.open_loops import tree_alone
 from .arguments import (
     Commands,
@@ -48,7 +49,7 @@ def run(options: argparse.Namespace) -> None:
     at = filled(graph, scene, options.at)
     found = cg.why(graph, options.output, options.input, at=at, k=options.k, names=display_names(scene))
     if not found.count:
-        _not_connected(options, scene, graph)
+        _not_connected(options, scene, names)
         return
     assert found.derivative is not None
     all_listed = len(found.paths) == found.count
@@ -71,14 +72,20 @@ def run(options: argparse.Namespace) -> None:
     )
 
 
-def _not_connected(options: argparse.Namespace, scene: scenes.Scene, graph: Graph) -> None:
+def _not_connected(options: argparse.Namespace, scene: scenes.Scene, names: Names) -> None:
+    graph = names.graph
     stops = cg.why_not(graph, options.output, options.input, names=display_names(scene))
     alone = "" if options.forward else tree_alone(scene)
+    constant = _constant(scene, names, options) if options.momentum else ""
     here = set(graph.nodes)  # an input that nothing uses is none of the graph's nodes
     answer_and_draw(
         options,
         unless_json(
-            options, {"depends": False, "of_the_tree": bool(alone)} | stops.to_dict(), f"{stops}\n{alone}".strip()
+            options,
+            {"depends": False, "of_the_tree": bool(alone)}
+            | stops.to_dict()
+            | ({"constant": constant} if constant else {}),
+            "\n".join(filter(None, [str(stops), alone, constant])),
         ),
         graph,
         marked={
@@ -88,6 +95,18 @@ def _not_connected(options: argparse.Namespace, scene: scenes.Scene, graph: Grap
         names=theme.called(display_names(scene)),
         caption=f"{stops.output} does not depend on {stops.input}",
     )
+
+
+def _constant(scene: scenes.Scene, names: Names, options: argparse.Namespace) -> str:
+    """That the momentum is constant whose rate was asked for, or the coordinate that its rate was asked by; or ""."""
+    output, source = names.meant(options.output), names.meant(options.input)
+    told = [
+        constant_momentum(name)
+        for i, name in enumerate(scene.velocities)
+        if output == f"p{i}_dot" or (source == f"q{i}" and scene.coordinates[i] == name)
+        if name in conserved_momenta(scene)
+    ]
+    return "\n".join(told)
 
 
 def _by_reverse_sweep(names: Names, output: str, source: str, at: dict[str, float]) -> float:

@@ -31,7 +31,7 @@ def to_dot(
     clusters: bool | Sequence[str] | ClusterRule = True,
     collapse: Sequence[str] = (),
     caption: str | None = None,
-    legend: bool = True,
+    legend: bool | Mapping[str, str] = True,
     rankdir: Literal["BT", "TB", "LR", "RL"] = "BT",
 ) -> Digraph:
     """The drawing of a graph; `viz.render_svg` makes a picture of it, `.source` is its text.
@@ -68,8 +68,8 @@ def to_dot(
         several of these tags belongs to the first.
     caption : str, optional
         A line below the drawing; a second line then counts the graph's nodes and edges.
-    legend : bool
-        Whether to explain the colors in use.
+    legend : bool or mapping of str to str
+        Whether to explain the colors in use; or {role: words} where other words say what a role is in this graph.
     rankdir : {"BT", "TB", "LR", "RL"}
         "BT" grows from the inputs at the bottom to the outputs at the top, "LR" from left to right.
 
@@ -95,7 +95,9 @@ def to_dot(
     """
     require_graph("to_dot", graph)
     require_choice("rankdir", rankdir, DIRECTIONS)
-    require_flag("legend", legend)
+    words = require_texts("legend", legend) if isinstance(legend, Mapping) else {}
+    if not isinstance(legend, Mapping):
+        require_flag("legend", legend)
     for what, text in (("caption", "" if caption is None else caption), ("marked_label", marked_label)):
         if not isinstance(text, str):
             raise TypeError(f"{what} must be text, got {type(text).__name__}: {text!r:.60}")
@@ -113,8 +115,8 @@ def to_dot(
         counts = f"{len(graph.nodes)} nodes, {len(graph.edges)} edges"
         drawing.attr(label=literal(f"{caption}\n{counts}" if caption else counts), labelloc="b", fontsize="16")
     draw_boxes(drawing, plan.boxes)
-    if legend:
-        draw_legend(drawing, plan.kinds, vertical=rankdir in ("BT", "TB"))
+    if legend is not False:
+        draw_legend(drawing, theme.in_words(plan.kinds, words), vertical=rankdir in ("BT", "TB"))
     draw_arrows(drawing, plan.arrows)
     return drawing
 

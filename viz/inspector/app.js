@@ -23,7 +23,7 @@ function start(first = JSON.parse(byId("data").textContent)) {
   const app = { svg: byId("picture"), callbacks, playing: false, noises: new WeakMap() };
   app.output = () => (app.version.outputs.find(([name]) => name === app.from) ?? app.version.outputs[0])[2];
   app.partials = () => (app.slopes ??= slopesAt(app.version, app.record.slopes, app.values));
-  app.noise = () => (app.bounds ??= errorBounds(app.version, app.partials(), app.values, app.state.errorsOf(app.version)));
+  app.noise = () => (app.bounds ??= boundsIn(app, app.version, app.partials(), app.values));
   app.refresh = () => refresh(app);
   listen(app);
   showRecord(app, first);
@@ -80,13 +80,18 @@ function compute(app) {
   if (!app.playing) app.bounds = null; // while it plays, noise is that of where it began
 }
 
+function boundsIn(app, graph, slopes, values) {
+  const errors = app.state.errorsOf(graph), bounds = errorBounds(graph, slopes, values, errors);
+  return app.state.solved ? bounds : sharpened(graph, slopes, values, bounds, errors);
+}
+
 /** Noise of a graph's values: computed only where an output may be noise. */
 function noiseIn(app, graph, values) {
   if (values === app.values) return app.noise();
   if (app.playing && app.noises.has(graph)) return app.noises.get(graph);
   const small = 1e-6 * largestOf(values);
   const faint = graph.outputs.some(([, , node]) => Math.abs(values[node]) < small);
-  const found = faint ? errorBounds(graph, slopesAt(graph, app.record.slopes, values), values, app.state.errorsOf(graph))
+  const found = faint ? boundsIn(app, graph, slopesAt(graph, app.record.slopes, values), values)
     : new Float64Array(values.length);
   app.noises.set(graph, found);
   return found;

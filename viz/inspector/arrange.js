@@ -116,8 +116,8 @@ function columnsIn(plan, folded, closed, aspect) {
   const flowed = new Map([...cells].map(([key, own]) => [key, flow(own, sizes)]));
   const cell = (column, stage) => flowed.get(`${column} ${stage}`) ?? { w: 0, h: 0, at: [] };
   const widths = plan.columns.map((name, i) => (closed.has(i) ? BODY.width
-    : Math.max(70, Math.min(160, 8 * name.length), ...STAGES.map((stage) => cell(i, stage).w))));
-  const bands = bandsFor(widths, STAGES.map((stage) => Math.max(...widths.map((_, i) => cell(i, stage).h))), aspect);
+    : Math.max(70, Math.min(160, 8 * name.length), ...plan.stages.map((stage) => cell(i, stage).w))));
+  const bands = bandsFor(widths, plan.stages.map((stage) => Math.max(...widths.map((_, i) => cell(i, stage).h))), aspect);
   const perBand = Math.ceil(plan.columns.length / bands);
   const boxes = [], bodies = [], titles = [];
   const reach = (own) => own.reduce((sum, i) => sum + widths[i] + CELL.beside, -CELL.beside);
@@ -129,7 +129,7 @@ function columnsIn(plan, folded, closed, aspect) {
     const left = own.map((i) => { const at = x; x += widths[i] + CELL.beside; return at; });
     const start = y;
     y += CELL.title + CELL.gap / 2;
-    for (const stage of [...STAGES].reverse()) {
+    for (const stage of [...plan.stages].reverse()) {
       const height = Math.max(0, ...own.map((i) => cell(i, stage).h));
       if (!height) continue;
       own.forEach((i, k) => {

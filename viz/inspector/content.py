@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,6 +32,8 @@ class Version:
     """One of the graphs that the page switches among, and what to see in it.
 
     about: a sentence or two.  marked: nodes in the one color of what is wrong.  steps: to be gone through one by one.
+    rows: {title: nodes} of the rows of the picture from the bottom, alike in all versions; a node that is in none
+    stands in the first. Without any, rows are the sweeps.
     """
 
     name: str
@@ -39,6 +41,7 @@ class Version:
     about: str = ""
     marked: Collection[Node] = frozenset()
     steps: Sequence[Step] = ()
+    rows: Mapping[str, Collection[Node]] = field(default_factory=dict)
 
     def check(self) -> None:
         """Raises ValueError for a marked node, or one of a step, that is not in the graph."""

@@ -6,7 +6,7 @@ const MANY = 60; // clusters; above, they are not split by energy
 const STAGES = ["as written", "reverse sweep", "forward sweep", "both sweeps"];
 const natural = new Intl.Collator("en", { numeric: true }).compare; // link 2 before link 10
 
-/** { clusters, columns, parents, place, cluster }: of each version the place of every node, of each place its cluster.
+/** { clusters, columns, parents, stages, place, cluster }: of each version the place of every node, of each place its cluster.
  *
  * A cluster is { column, stage, title, marked }. LEAF and RESULT stand for one: inputs, and sums that are outputs. */
 const LEAF_PLACE = -1, RESULT_PLACE = -2;
@@ -33,13 +33,14 @@ function placesOf(record, versions) {
       return found.get(key);
     });
   });
+  const stages = record.stages?.length ? record.stages : STAGES;
   const columns = columnsOf(bodies, [...keys.values()], versions, groups);
-  const order = (a, b) => columns.indexOf(a.column) - columns.indexOf(b.column) || STAGES.indexOf(a.stage) - STAGES.indexOf(b.stage)
+  const order = (a, b) => columns.indexOf(a.column) - columns.indexOf(b.column) || stages.indexOf(a.stage) - stages.indexOf(b.stage)
     || a.marked - b.marked || natural(a.title, b.title);
   const clusters = [...keys.values()].sort(order), number = new Map(clusters.map((each, c) => [JSON.stringify(each), c]));
   const parents = new Map(record.columns);
   return {
-    clusters, columns, place, first,
+    clusters, columns, place, first, stages,
     parents: columns.map((name) => columns.indexOf(parents.get(name))),
     tree: columns.map((name) => parents.has(name)),
     cluster: clusterKeys.map((key) => number.get(key) ?? Number(key)),
@@ -62,8 +63,8 @@ function groupOf(version, node, bodies) {
   const [tags, , stage] = version.labels[version.label[node]];
   const own = bodies.filter((body) => tags.includes(body));
   const rest = tags.filter((each) => !own.includes(each));
-  const column = own[0] ?? rest.shift() ?? "";
-  return { column, stage, title: rest.join(", ") || (own.length ? OTHER : ""), marked: version.marked.has(node) };
+  const column = own[0] ?? rest.shift() ?? "", said = rest.filter((each) => !ENERGIES.includes(each));
+  return { column, stage, title: (said.length ? said : rest).join(", ") || (own.length ? OTHER : ""), marked: version.marked.has(node) };
 }
 
 /** Of every node a number that nodes have in common that compute the same; a named node stands for the input of that name. */

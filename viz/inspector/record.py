@@ -6,6 +6,7 @@
     called, units         [[name in a graph: what a person calls it, or its unit]]
     inputs, rows          names of the state's values, and these at every instant of the motion (one without a motion)
     derived               null, or a graph that computes other inputs of versions from the state
+    stages                titles of the rows of the picture, from the bottom; [] leaves them to the page, by sweep
     columns               [[tag, tag of its parent or null]] in the order of the picture; [] leaves it to the page
     versions              [{name, about, labels, label, marked, steps, drawing} and a graph], see below
     tables                [{caption, header, rows: [[name, [numbers of nodes]]]} and a graph]: they follow the state
@@ -13,7 +14,7 @@
 
 A graph is {ops, args, names, inputs, outputs}: for every node, arguments before uses, the name of its operation and the
 numbers of its arguments, or the value of a constant; {node: [name, letters]} of named ones; [[name, node or -1 where
-nothing uses it]]; [[name, letters, node]]. labels are the [tags, role, sweep] that occur, label which of them a node
+nothing uses it]]; [[name, letters, node]]. labels are the [tags, role, row] that occur, label which of them a node
 has, marked the nodes in the color of what is wrong, steps [{words, nodes, value, joint}]. Where nodes stand is the
 page's business, but for a `drawing`.
 """
@@ -74,6 +75,7 @@ def record(
         "inputs": inputs,
         "rows": state.rows(inputs, len(motion.t) if motion else 1).tolist(),
         "derived": None if state.derived is None else _graph(state.derived, letters),
+        "stages": _stages(versions),
         "columns": [[tag, parent] for tag, parent in (columns or {}).items()],
         "versions": [
             _version(version, letters) | {"drawing": drawing}
@@ -82,6 +84,14 @@ def record(
         "tables": [_table(table, letters) for table in tables],
         "motion": None if motion is None else _motion(motion, letters),
     }
+
+
+def _stages(versions: Sequence[Version]) -> list[str]:
+    """Titles of the rows of the versions."""
+    titles = {tuple(version.rows) for version in versions}
+    if len(titles) > 1:
+        raise ValueError(f"all versions need the same rows, got {sorted(map(list, titles))}")
+    return list(*titles)
 
 
 def _motion(motion: Motion, letters: Letters) -> dict[str, Any]:
@@ -137,8 +147,11 @@ def _graph(graph: Graph, letters: Letters) -> dict[str, Any]:
 def _version(version: Version, letters: Letters) -> dict[str, Any]:
     labels: dict[tuple[tuple[str, ...], str, str], int] = {}
     label = []
+    row = {node: title for title, nodes in version.rows.items() for node in nodes}
+    first = next(iter(version.rows), None)
     for node in version.graph.nodes:
-        kind = (tuple(sorted(node.tags, key=theme.natural_order)), theme.role_of(node), _stage(node))
+        stage = _stage(node) if first is None else row.get(node, first)
+        kind = (tuple(sorted(node.tags, key=theme.natural_order)), theme.role_of(node), stage)
         label.append(labels.setdefault(kind, len(labels)))
     marked, number = set(version.marked), {node: i for i, node in enumerate(version.graph.nodes)}
     return {

@@ -1,13 +1,14 @@
 // The one state of the page: values of inputs by name, from which every version, derived input and table is computed.
 
 const GROWN = 2 ** 12; // how many times larger rounding becomes along a motion
-const KINDS = /^(qdd|qd|q|tau|lambda|p)\d+(_old)?$/; // of inputs and outputs: letters with a number
+const KINDS = /^(qdd|qd|q|tau|lambda|p)\d+(_old|_dot)?$/; // of inputs and outputs: letters with a number
 
 /** The state of a record, and its graphs made ready.  told: called whenever a value has changed. */
 function makeState(record, told = () => {}) {
   const versions = record.versions.map((each, index) => ({ ...prepare(each), index })), tables = (record.tables ?? []).map(prepare);
   const derived = record.derived ? prepare(record.derived) : null;
   const called = new Map(record.called), meant = new Map(record.called.map(([name, text]) => [text, name]));
+  const solved = record.inputs.some((name) => KINDS.exec(name)?.[1] === "qdd");
   let frame = 0, edited = false, values = null;
 
   /** All values by name, derived ones too. */
@@ -17,9 +18,10 @@ function makeState(record, told = () => {}) {
     const found = evaluate(derived, rowOf(derived));
     for (const [name, , node] of derived.outputs) values.set(name, found[node]);
   }
-  /** Errors of a graph's inputs. Coordinates of one kind are solved for together: their errors are those of the largest,
-   * times their number, as of a linear system that is solved with rounding. */
+  /** Errors of a graph's inputs. A state with accelerations was solved for: errors of one kind are those of the largest,
+   * times their number, as of a linear system that is solved with rounding. Any other state is as it stands. */
   function errorsOf(graph) {
+    if (!solved) return graph.inputs.map(([name]) => ROUNDING * Math.abs(values.get(name)));
     const grown = edited || !frame ? 1 : GROWN, most = new Map(), kind = (name) => KINDS.exec(name)?.[1] ?? name;
     for (const [name, value] of values) {
       const [largest, many] = most.get(kind(name)) ?? [0, 0];
@@ -53,7 +55,7 @@ function makeState(record, told = () => {}) {
   }
   settle(atFrame());
   return {
-    versions, tables, derived, called, errorsOf, set, show, names: record.inputs,
+    versions, tables, derived, called, solved, errorsOf, set, show, names: record.inputs,
     get frame() { return frame; },
     get edited() { return edited; },
     get: (name) => values.get(name),

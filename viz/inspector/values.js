@@ -74,3 +74,17 @@ function errorBounds(version, slopes, values, errors = []) {
   });
   return bounds;
 }
+
+/** Bounds, with those of faint outputs from their adjoints: ways from a node count with their signs, not their sizes.
+ *
+ * Along a long elimination the sizes of all ways grow without end, and what they add up to does not. */
+function sharpened(version, slopes, values, bounds, errors = []) {
+  const given = new Map(version.inputs.map(([, node], i) => [node, errors[i]])), sharp = bounds.slice();
+  const own = values.map((value, node) => (version.constants.has(node) ? 0 : given.get(node) ?? ROUNDING * Math.abs(value)));
+  for (const [, , output] of version.outputs) {
+    if (!(Math.abs(values[output]) <= bounds[output])) continue;
+    const sum = adjoints(version, slopes, output).reduce((all, bar, node) => (bar === 0 ? all : all + Math.abs(bar) * own[node]), 0);
+    if (sum < bounds[output]) sharp[output] = sum;
+  }
+  return sharp;
+}

@@ -15,7 +15,12 @@ from cgraph.extend import is_finite, real_number, require_graph, require_mapping
 from .. import theme
 
 TIME = "t"  # the input that is the time, if there is one
-GROUPS = (("q", "positions"), ("qd", "velocities"), ("tau", "torques"))  # of inputs, by the start of their names
+GROUPS = (
+    ("q", "positions"),
+    ("qd", "velocities"),
+    ("p", "momenta"),
+    ("tau", "torques"),
+)  # of inputs, by the start of their names
 ENERGIES = 3  # the meters that the strip shows
 NEEDED = ("rk4", "dopri5")  # the method at first, and that of the reference
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 
 from cgraph.extend import require_flag, write_files
-from dynamics import display_names, scenes
+from dynamics import FORMULATIONS, display_names, scenes
+from dynamics.equations.both_forms import HAMILTON
 from dynamics.scenes.inspection import Inspection, Shares, inspection
 from dynamics.scenes.start import Start, moving_start, rest_text, with_start
 from dynamics.systems.model import Model
@@ -27,6 +28,7 @@ def inspect(
     start: Start | None = None,
     t_end: float | None = None,
     forward: bool = False,
+    momentum: bool = False,
     title: str | None = None,
 ) -> Page:
     """The page on which a model's equations unfold, move and answer: one HTML file that loads nothing.
@@ -45,6 +47,8 @@ def inspect(
         How long it moves [s]; 3 s of what is no scene.
     forward : bool
         Forward dynamics, in place of inverse dynamics by the paper's three formulations.
+    momentum : bool
+        Hamilton's equations in place of them, and the state equation beside: the state is coordinates and momenta.
     title : str, optional
         Heading of the page, by default what it shows.
 
@@ -58,7 +62,10 @@ def inspect(
     TypeError
         For what is no model.
     ValueError
-        For a path that does not end in .html, a start that does not fit, or a time that is not positive and finite.
+        For a path that does not end in .html, a start that does not fit, a time that is not positive and finite, or
+        both forward and momentum.
+    ConstraintError
+        With momentum, for a model with constraints.
     OSError
         For a path that cannot be written.
 
@@ -72,9 +79,10 @@ def inspect(
     """
     target = html_target("the page's file", path)
     require_flag("forward", forward)
+    require_flag("momentum", momentum)
     scene = scenes.of_model(model)
     at = moving_start(scene) if start is None else with_start(scene, start)
-    content = inspection(at, forward=forward, t_end=t_end)
+    content = inspection(at, forward=forward, momentum=momentum, t_end=t_end)
     moved = rest_text(scene, at) if start is None and at is not scene else ""
     text = inspection_page(at, content, moved, title)
     if target is not None:
@@ -86,14 +94,14 @@ def inspection_page(scene: scenes.Scene, content: Inspection, moved: str = "", t
     """The page of a scene.  moved: why its start was chosen for it, if it was."""
     bones, mechanism = content.skeleton, scene.mechanism
     lively = scene.ode is None and scene.system.n <= LIVELY
-    inverse = len(content.versions) > 1
+    inverse = content.versions[0].name in FORMULATIONS
     what = "inverse dynamics" if inverse else content.versions[0].name
     notices = [f"Left out of the model: {'; '.join(scene.left_out)}."] if scene.left_out else []
     notices += [tree_alone(scene)] if inverse and tree_alone(scene) else []
     notices += [f"{moved[0].upper()}{moved[1:]}."] if moved else []
     return page(
         [
-            Version(each.name.replace("_", " "), *each[1:4], [Step(*step) for step in each.steps])
+            Version(each.name.replace("_", " "), *each[1:4], [Step(*step) for step in each.steps], each.rows)
             for each in content.versions
         ],
         title=f"{scene.name}: {what}" if title is None else title,
@@ -105,7 +113,10 @@ def inspection_page(scene: scenes.Scene, content: Inspection, moved: str = "", t
         units=content.units,
         columns={body.name: body.parent for body in mechanism.moving} if mechanism else None,
         notices=[*notices, *([cut_short(content)] if content.stopped else [])],
-        panels=[box(text_or_none(scene, scene.q, scene.qd)), *([live_panel(scene)] if lively else [])],
+        panels=[
+            box(text_or_none(scene, scene.q, scene.qd)),
+            *([live_panel(scene, momentum=content.versions[0].name == HAMILTON)] if lively else []),
+        ],
     )
 
 

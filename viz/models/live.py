@@ -64,13 +64,13 @@ def live_page(model: Model, path: str | os.PathLike[str] | None = None, *, start
     return text
 
 
-def live_of(scene: scenes.Scene) -> Live:
+def live_of(scene: scenes.Scene, *, momentum: bool = False) -> Live:
     """What the panel of a scene computes."""
-    graphs = live_graphs(scene)
+    graphs = live_graphs(scene, momentum=momentum)
     return Live(*graphs[:7], TABLEAUS, *graphs[7:])
 
 
-def live_panel(scene: scenes.Scene) -> Panel:
+def live_panel(scene: scenes.Scene, *, momentum: bool = False) -> Panel:
     """The motion of a scene as a panel at the end of another page, closed at first."""
-    live = panel(live_of(scene))
+    live = panel(live_of(scene, momentum=momentum))
     return Panel(style=live.style, run=live.script, end=live.folded(), allowed=EVALUATION)

@@ -12,6 +12,7 @@ from ..graph_drawing.render import check_can_draw
 from ..pages import html
 from ..pages.document_files import check_folder
 from ..plots import plot
+from .by_depth import figure7
 from .embedding import embedding
 from .free_fall import figures4_and_5
 from .one_joint import equations, figure1, figure2, figure3, sizes
@@ -20,8 +21,8 @@ from .scaling import scaling_of_counts
 from .timing import figure6
 
 QUICK_EVALUATIONS = 100  # of each formulation, for Figure 6
-QUICK_ARMS = (1, 2, 3)  # links, for the law of the embedding
-QUICK_LINKS = (1, 2, 3, 6, 10, 20)  # of the chains of the last part
+QUICK_ARMS = (1, 3)  # links, for the law of the embedding
+QUICK_LINKS = (1, 3, 6, 10, 20)  # of the chains of the scaling
 
 
 class Paper(NamedTuple):
@@ -51,6 +52,7 @@ def paper(folder: Path, say: Callable[[str], None], *, quick: bool = False) -> P
         "Scaling: nodes, edges and time over the number of links": (
             partial(scaling_of_counts, QUICK_LINKS) if quick else scaling_of_counts
         ),
+        "Figure 7: both forms of the equations of motion, by depth": partial(figure7, {}) if quick else figure7,
     }
     parts, files = [], dict[Path, str | bytes]()
     for number, (what, make) in enumerate(makers.items(), start=1):

@@ -44,6 +44,21 @@ def test_a_pivot_is_the_inertia_that_is_left_when_all_joints_further_out_follow(
     assert {node for node in graph.nodes if node.args} == set(lit)
 
 
+@pytest.mark.parametrize("name", MODELS)
+def test_the_velocities_of_momenta_have_the_same_pivots_and_the_rates_come_after_them(name):
+    model = MODELS[name]
+    names, graphs = dyn.display_names(model), (dyn.forward_dynamics(model), dyn.hamilton_equations(model))
+    n = model.system.n
+    forward, momenta = (elimination(graph, names) for graph in graphs)
+    assert [step.words for step in forward[:n]] == [step.words for step in momenta[:n]]
+    for step in momenta[n : 2 * n]:
+        assert step.value is graphs[1].outputs[f"q{step.coordinate}_dot"]
+    assert [step.value for step in momenta[2 * n :]] == [graphs[1].outputs[f"p{i}_dot"] for i in reversed(range(n))]
+    lit = [node for step in momenta for node in step.nodes]
+    assert len(set(lit)) == len(lit)
+    assert {node for node in graphs[1].nodes if node.args} == set(lit)
+
+
 def test_what_divides_by_no_pivots_has_no_steps():
     assert elimination(dyn.inverse_dynamics(MODELS["three"]), {}) == []
     x = dyn.planar_arm([1.0], [1.0])

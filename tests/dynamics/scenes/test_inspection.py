@@ -70,6 +70,32 @@ def test_forward_dynamics_and_a_system_without_places():
     assert np.allclose(qdd, -np.cos(found.t), atol=1e-5)  # I = k = 1, let go at 1
 
 
+@pytest.mark.parametrize("name", ["spring_mass", "triple_pendulum"])
+def test_both_forms_are_in_one_state_of_coordinates_and_momenta(name):
+    scene = dyn.scenes.load(name)
+    found = inspection(scene, momentum=True, t_end=0.3)
+    hamilton, lagrange = found.versions
+    n = scene.system.n
+    assert {f"{kind}{i}" for kind in "qp" for i in range(n)} <= found.at.keys()
+    assert [*found.derived.outputs] == [f"qd{i}" for i in range(n)]
+    rates, expected = (each.graph.evaluate(values_of(found, each.graph)) for each in (hamilton, lagrange))
+    for i in range(n):
+        moved = np.gradient(found.at[f"q{i}"], found.t, edge_order=2)
+        assert np.allclose(rates[f"q{i}_dot"], expected[f"q{i}_dot"], rtol=EQUATIONS, atol=EQUATIONS)
+        assert np.allclose(rates[f"q{i}_dot"], moved, atol=0.05 * np.abs(moved).max())
+    rows = [*hamilton.rows]
+    assert rows == [*lagrange.rows] == ["of positions", "bias", "eliminated", "back out", "rates"]
+    for each in (hamilton, lagrange):  # every node stands in one row, on what it is made of
+        at = {node: k for k, nodes in enumerate(each.rows.values()) for node in nodes}
+        assert sum(map(len, each.rows.values())) == len(at) == len(each.graph.nodes)
+        assert all(at[edge.source] <= at[edge.target] for edge in each.graph.edges)
+    assert not hamilton.rows["bias"]
+    assert not lagrange.rows["rates"]
+    assert sorted(step.coordinate for step in hamilton.steps) == sorted(3 * [*range(n)])
+    with pytest.raises(ValueError, match="exclude one another"):
+        inspection(scene, momentum=True, forward=True)
+
+
 def test_joints_of_a_planar_arm_are_a_link_apart():
     q = np.random.default_rng(0).uniform(-3, 3, (5, 3))
     points, parents, graph, joints, turns = skeleton(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7]), q)

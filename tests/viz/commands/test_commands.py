@@ -64,7 +64,7 @@ def test_lint_blames_the_edges_of_the_embedding(capsys, formulation):
     assert (finding["derivatives_through"] == 0) == exact
 
 
-@pytest.mark.parametrize("n", range(1, 11))
+@pytest.mark.parametrize("n", [1, 2, 3, 5, 8])
 def test_the_fewest_edges_to_cut_are_one_for_each_joint(n):
     arm = dyn.scenes.load("chain", n=n)
     groups = [f"q{i}" for i in range(n)], [f"qd{i}" for i in range(n)]

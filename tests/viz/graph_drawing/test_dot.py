@@ -154,6 +154,16 @@ def test_a_role_has_its_color_and_its_line_in_the_legend() -> None:
     assert entries == expected
 
 
+def test_the_legend_has_other_words_where_a_role_is_something_else() -> None:
+    source = to_dot(spring(), legend={"primal": "stated", "adjoint": "elimination"}).source
+    assert "stated" in source
+    assert "elimination" not in source  # there is none
+    assert theme.ROLES["primal"].words not in source
+    assert theme.ROLES["input"].words in source
+    with pytest.raises(TypeError, match="legend"):
+        to_dot(spring(), legend=None)  # type: ignore[arg-type]
+
+
 def test_the_legend_can_be_left_out() -> None:
     assert "legend" not in to_dot(spring(), legend=False).source
 

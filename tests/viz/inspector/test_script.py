@@ -19,7 +19,7 @@ from cgraph.extend import Names
 from dynamics.scenes.inspection import Inspection, inspection
 from tests.page_script import run_script
 from tests.tolerances import SUMS
-from viz.inspector.content import State, StateTable, Version
+from viz.inspector.content import Motion, State, StateTable, Version
 from viz.inspector.record import record, slopes
 
 pytestmark = pytest.mark.usefixtures("without_graphviz")
@@ -262,6 +262,30 @@ def test_what_rounding_leaves_is_told_from_what_is_small():
         assert abs(found[0][1]) <= found[0][2] < 1e-14 * unit
 
 
+def test_a_velocity_of_a_long_arm_is_no_noise_and_what_cancels_is():
+    """Along an elimination the sizes of all ways add up to more than any value; with their signs they do not."""
+    arm, x = dyn.scenes.load("chain", n=12), cg.variable("q0")
+    graph, momenta = dyn.hamilton_equations(arm), dyn.momentum(arm)
+    zero = cg.Graph(graph.inputs, graph.outputs | {"zero": (x + 0.1) - 0.1 - x})
+    at = {name: 1e-7 if name[1] == "d" else float(np.sin(3.0 * i)) for i, name in enumerate(momenta.input_names)}
+    at["qd0"] = 1.0  # it turns as one
+    at |= momenta.evaluate(at)
+    program = """(record) => {
+      const state = makeState(record), [version] = state.versions;
+      const values = state.evaluate(version), slopes = slopesAt(version, record.slopes, values);
+      const errors = state.errorsOf(version), bounds = errorBounds(version, slopes, values, errors);
+      const sharp = sharpened(version, slopes, values, bounds, errors);
+      return [state.solved, ...version.outputs.map(([, , node]) => [values[node], bounds[node], sharp[node]])];
+    }"""
+    state = State({name: at.get(name, 0.0) for name in graph.input_names})
+    data = record([Version("momenta", zero)], None, state=state)
+    solved, *outputs = run_script(program, data)
+    assert not solved
+    assert any(abs(value) <= bound for value, bound, _ in outputs[:-1])
+    assert all(abs(value) > sharp for value, _, sharp in outputs[:-1])
+    assert abs(outputs[-1][0]) <= outputs[-1][2]
+
+
 def test_the_free_motion_takes_torques_of_zero_and_the_page_says_0():
     found = inspection(dyn.scenes.load("triple_pendulum"))
     program = """(record) => record.rows.map((_, frame) => {
@@ -272,8 +296,6 @@ def test_the_free_motion_takes_torques_of_zero_and_the_page_says_0():
       return version.outputs.map(([, , node]) => brief(values[node], noise[node]));
     })"""
     at = {name: value[::10] if np.ndim(value) else value for name, value in found.at.items()}
-    from viz.inspector import Motion
-
     data = record(
         [Version(*found.versions[2])],
         Motion(found.t[::10]),

@@ -260,6 +260,31 @@ def test_the_graphs_of_a_scene_say_what_the_library_says(name):
     assert shown["energy"] == pytest.approx(shown["kinetic"] + shown["potential"])
 
 
+@pytest.mark.parametrize("name", ["spring_mass", "triple_pendulum"])
+def test_in_momentum_form_the_state_is_of_momenta_and_moves_alike(name):
+    scene = dyn.scenes.load(name)
+    found, usual = live_graphs(scene, momentum=True), live_graphs(scene)
+    n = scene.system.n
+    assert found.rate.input_names[: 2 * n] == (*[f"q{i}" for i in range(n)], *[f"p{i}" for i in range(n)])
+    assert set(found.start) == set(found.rate.input_names) == set(found.scales)
+    moving = {f"p{i}": 0.3 * found.scales[f"p{i}"] for i in range(n)}
+    shown, rates = found.shown.evaluate(found.start | moving), found.rate.evaluate(found.start | moving)
+    assert {each: shown[each] for each in rates} == pytest.approx(rates)
+    beside = usual.shown.evaluate(usual.start | {f"qd{i}": rates[f"q{i}_dot"] for i in range(n)})
+    for each in ("kinetic", "energy", "p0_dot"):
+        assert shown[each] == pytest.approx(beside[each])
+    assert {each: beside[each] for each in moving} == pytest.approx(moving)
+    groups = {each["group"] for each in live_of(scene, momentum=True).to_dict()["inputs"]}
+    assert {"positions", "momenta", "torques"} <= groups
+    assert "velocities" not in groups
+
+
+def test_a_usual_speed_may_be_none_that_a_system_can_have():
+    fast = dyn.System(lambda q, qd, t: -cg.sqrt(1.0 - qd[0] ** 2) - q[0] ** 2, "x")  # at 1 its momentum has no bound
+    found = live_graphs(dyn.Scene("fast", "", fast, (0.2,), (0.1,), 0.1), momentum=True)
+    assert 0.0 < found.scales["p0"] < 10.0
+
+
 def test_masses_and_gravity_of_a_small_mechanism_are_parameters(live):
     assert {"g", "mass.link_1", "mass.link_2", "mass.link_3"} <= set(live.start)
     large = live_graphs(dyn.scenes.load("chain", n=5))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import re
+
 import pytest
 
 import cgraph as cg
@@ -27,6 +30,22 @@ def test_a_model_has_its_page_from_a_start_that_shows_something(tmp_path):
     assert "<title>A &lt;b&gt;pendulum&lt;/b&gt;</title>" in page
 
 
+def test_the_page_of_momenta_has_both_forms_their_rows_and_a_machine_of_momenta():
+    page = viz.inspect(dyn.planar_arm([1.0, 0.8], [1.0, 0.7]), momentum=True, t_end=0.1)
+    data, live = (
+        json.loads(re.search(rf'id="{name}" type="application/json">(.*?)</script>', page)[1])
+        for name in ("data", "live-data")
+    )
+    assert [version["name"] for version in data["versions"]] == ["Hamilton's equations", "state equation"]
+    assert data["stages"] == ["of positions", "bias", "eliminated", "back out", "rates"]
+    for version in data["versions"]:
+        assert {stage for _, _, stage in version["labels"]} <= {*data["stages"]}
+    assert [name for name in data["inputs"] if name[0] != "t"] == ["q0", "q1", "p0", "p1"]
+    assert [name for name, *_ in data["derived"]["outputs"]] == ["qd0", "qd1"]
+    assert [row["name"] for row in live["inputs"][:4]] == ["q0", "q1", "p0", "p1"]
+    assert [version["steps"] == [] for version in data["versions"]] == [False, True]
+
+
 @pytest.mark.parametrize("start", [{"swing": 1.0}, {"qd0": 1.0}, [0.0, 0.0]])
 def test_a_start_that_is_chosen_is_kept(start):
     assert NOTICE not in viz.inspect(PENDULUM, start=start, t_end=0.1, forward=True)
@@ -39,6 +58,7 @@ def test_a_start_that_is_chosen_is_kept(start):
         ((PENDULUM, "nowhere/page.html"), {}, "does not exist"),
         ((PENDULUM,), {"start": {"knee": 1.0}}, "there is no knee; it has q.swing, qd.swing"),
         ((PENDULUM,), {"t_end": -1.0}, "t_end must be positive"),
+        ((PENDULUM,), {"forward": True, "momentum": True}, "forward and momentum exclude one another"),
     ],
 )
 def test_what_cannot_be_is_told_and_nothing_is_written(arguments, named, message, tmp_path, monkeypatch):

@@ -1,0 +1,154 @@
+"""The commands on the momentum graph: draw, lint, why, compare and inspect with --momentum."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import cgraph as cg
+import dynamics as dyn
+from viz import cli, theme
+
+ROUNDING = 1e-12  # relative, for sums of a few hundred products
+OWN = """import cgraph as cg
+import dynamics as dyn
+
+planet = dyn.System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + (q[0] * qd[1]) ** 2) + 1.0 / q[0], "r phi")
+ring = dyn.System(lambda q, qd, t: qd[0] ** 2 + qd[1] ** 2, "x y", constraints=lambda q, t: {"ring": q[0] * q[1] - 1.0})
+slow = dyn.OdeSystem(lambda x, t: [-x[0]], ["decay"])
+named = dyn.System(lambda q, qd, t, p: p["p0"] * qd[0] ** 2, ["x"], {"p0": 1.0})
+body = dyn.Body("box", dyn.Joint("free"), mass=1.0, inertia=(0.1, 0.2, 0.3), center=(0.1, 0.0, 0.0))
+free = dyn.Mechanism([body])
+away = dyn.System(lambda q, qd, t: qd[0] ** 2 + cg.log(q[0]) * qd[0] ** 2, "x")
+"""
+SCENES = ("spring_mass", "own.py:planet", "own.py:free")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    made = tmp_path_factory.mktemp("momentum")
+    (made / "own.py").write_text(OWN)
+    return made
+
+
+@pytest.fixture
+def own(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    return folder
+
+
+def said(capsys, *arguments, status=0):
+    assert cli.main(arguments) == status
+    return capsys.readouterr().out
+
+
+def figures(capsys, *arguments, status=0):
+    return json.loads(said(capsys, *arguments, "--json", status=status))
+
+
+def sizes(graph):
+    counts = graph.counts()
+    return {"nodes": counts.nodes, "edges": counts.edges, "depth": counts.depth, "width": counts.width}
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_lint_and_compare_have_the_sizes_of_both_forms(own, capsys, scene):
+    model = dyn.scenes.load(scene)
+    forms = dyn.state_equation(model), dyn.hamilton_equations(model)
+    linted = figures(capsys, "lint", scene, "--momentum")
+    assert [*linted["sizes"].values()][:2] == [sizes(graph) for graph in forms]
+    found = figures(capsys, "compare", scene, "--momentum", status=1)
+    assert found["sizes"] == linted["sizes"]
+    assert found["sizes"]["velocities alone"]["depth"] <= found["sizes"]["Hamilton's equations"]["depth"]
+    for side, graph in zip(("left", "right"), forms, strict=True):
+        only = found[f"only_{side}"]
+        assert found["in_both"] + len(only) == found[f"{side}_nodes"] == len(graph.nodes)
+        assert sum(found[f"{side}_classes"].values()) == len(only)
+    assert max(found["agreement"].values()) < ROUNDING
+    assert not any("bias" in name for name in found["right_classes"])
+
+
+def test_a_state_at_which_there_is_nothing_to_compare_is_no_number(own, capsys):
+    assert set(figures(capsys, "compare", "own.py:away", "--momentum", status=1)["agreement"].values()) == {None}
+
+
+def test_the_momenta_and_positions_are_proven_apart(own, capsys):
+    text = said(capsys, "lint", "triple_pendulum", "--momentum")
+    assert "no path leads from p.joint 1, p.joint 2 and p.joint 3 to q.joint 1" in text
+    counts = dyn.hamilton_equations(dyn.scenes.load("triple_pendulum")).counts()
+    assert text.splitlines()[-2].split()[-4:] == [str(counts.nodes), "238", str(counts.depth), "28"]
+
+
+@pytest.mark.parametrize("scene", ["triple_pendulum", "own.py:planet", "own.py:free"])
+def test_why_adds_up_to_the_derivative(own, capsys, scene):
+    found = figures(capsys, "why", scene, "p0_dot", "q0", "--momentum", "--k", "1")
+    if found["depends"]:
+        graph, at = dyn.hamilton_equations(dyn.scenes.load(scene)), found["at"]
+        slope = cg.gradient(cg.Graph(graph.inputs, {"rate": graph.outputs["p0_dot"]}), ["q0"])
+        ((exact,),) = [tuple(slope.evaluate(at).values())]
+        assert abs(found["derivative"] - exact) <= ROUNDING * found["weight"]
+    else:
+        assert scene == "own.py:free"
+
+
+@pytest.mark.parametrize(
+    ("scene", "asked", "told"),
+    [
+        ("own.py:planet", "p_dot.phi q.r", True),
+        ("own.py:planet", "p_dot.r q.phi", True),  # it is the coordinate that nothing depends on
+        ("own.py:planet", "p_dot.r tau.phi", False),
+        ("spring_mass", "p0_dot p0", False),
+    ],
+)
+def test_a_rate_that_is_0_is_told_why(own, capsys, scene, asked, told):
+    text = said(capsys, "why", scene, *asked.split(), "--momentum")
+    assert "does not depend on" in text
+    assert ("The momentum of 'phi' is constant" in text) is told
+    assert ("constant" in figures(capsys, "why", scene, *asked.split(), "--momentum")) is told
+
+
+def test_the_momentum_graph_is_drawn(own, capsys):
+    for scene in ("own.py:planet", "triple_pendulum"):
+        assert "nodes" in said(capsys, "draw", scene, "--momentum", "--out", "a.txt")
+        listing = Path("a.txt").read_text(encoding="utf-8")
+        assert dyn.hamilton_equations(dyn.scenes.load(scene)).listing() in listing
+        assert "# p0 is p." in listing
+    said(capsys, "draw", "triple_pendulum", "--momentum", "--out", "a.dot")
+    drawn = Path("a.dot").read_text(encoding="utf-8")
+    assert all(theme.MOTION_WORDS[role] in drawn for role in ("primal", "adjoint", "tangent"))
+
+
+COMMANDS = ["draw {} --out a.dot", "lint {}", "why {} p0_dot q0", "compare {}", "inspect {} --out a.html"]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(
+    ("scene", "message"),
+    [
+        ("own.py:ring", "constraint 'ring' holds the momenta"),
+        ("own.py:slow", "a first-order system, which has no Lagrangian"),
+        ("own.py:named", "parameter 'p0' has the name of a momentum"),
+    ],
+)
+def test_what_has_no_momentum_graph_is_refused_in_one_sentence(own, capsys, command, scene, message):
+    assert cli.main([*command.format(scene).split(), "--momentum"]) == 2
+    *_, error = capsys.readouterr().err.splitlines()
+    assert error.startswith("cgraph: error: ")
+    assert message in error
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        "lint spring_mass --momentum --forward",
+        "inspect spring_mass --momentum --forward --out a.html",
+        "compare spring_mass --momentum --formulations chain_rule kinetic_only",
+    ],
+)
+def test_one_graph_at_a_time(capsys, arguments):
+    with pytest.raises(SystemExit) as stop:
+        cli.main(arguments.split())
+    assert stop.value.code == 2
+    assert "not allowed with argument" in capsys.readouterr().err

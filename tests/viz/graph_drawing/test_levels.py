@@ -1,0 +1,57 @@
+"""Drawings by depth: rows are depths, the same for all panels, and nothing overlaps."""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+
+import pytest
+
+import cgraph as cg
+import dynamics as dyn
+from viz.graph_drawing.levels import LevelPanel, Scale, levels_of, levels_svg, longest_way
+
+SCALE = Scale(row=15.0, gap=13.0, width=8.0, height=8.0, ticks=5)
+GRAPHS = {
+    "arm": dyn.hamilton_equations(dyn.scenes.load("triple_pendulum")),
+    "spring": dyn.state_equation(dyn.scenes.load("spring_mass")),
+    "leaf": cg.Graph([cg.variable("x")], {"y": cg.variable("x")}),
+}
+
+
+def rectangles(svg: str) -> list[tuple[float, float]]:
+    """Left and top of the nodes."""
+    return [(float(x), float(y)) for x, y in re.findall(r'<rect x="([-0-9.]+)" y="([-0-9.]+)"', svg)]
+
+
+@pytest.mark.parametrize("name", GRAPHS)
+def test_the_longest_way_has_an_operation_at_every_depth(name: str) -> None:
+    graph = GRAPHS[name]
+    level, way = levels_of(graph), longest_way(graph)
+    assert [level[node] for node in way] == [*range(graph.counts().depth + 1)]
+    assert all(a in b.args for a, b in pairwise(way))
+    assert all(level[edge.source] < level[edge.target] for edge in graph.edges)
+
+
+def test_rows_are_depths_alike_in_all_panels_and_no_two_nodes_touch() -> None:
+    panels = [LevelPanel(name, graph) for name, graph in GRAPHS.items()]
+    places = rectangles(levels_svg(panels, SCALE))
+    assert len(places) == sum(len(graph.nodes) for graph in GRAPHS.values())
+    deepest = max(graph.counts().depth for graph in GRAPHS.values())
+    expected = [SCALE.y(level, deepest) - 4.0 for graph in GRAPHS.values() for level in levels_of(graph).values()]
+    assert sorted(y for _, y in places) == pytest.approx(sorted(expected))
+    rows: dict[float, list[float]] = {}
+    for x, y in places:
+        rows.setdefault(y, []).append(x)
+    for row in rows.values():
+        row.sort()
+        assert all(right - left > SCALE.gap - 0.2 for left, right in pairwise(row))
+
+
+def test_texts_are_escaped_and_words_stand_at_their_row() -> None:
+    x = cg.variable("x<y")
+    scale = Scale(row=60.0, gap=60.0, width=40.0, height=30.0, names={"f": "f & g"})
+    svg = levels_svg([LevelPanel("a < b", cg.Graph([x], {"f": 2.5 * x}), {"here": 1})], scale)
+    for text in ("a &lt; b", "x&lt;y", "f &amp; g", "2.5", "×", "3 nodes, 2 edges, 1 deep, 2 wide"):
+        assert f">{text}</text>" in svg
+    assert f'y="{scale.y(1, 1) - 5:.1f}" text-anchor="start" >here</text>' in svg

@@ -1,0 +1,191 @@
+"""Graphs by depth: a row for each length of the longest way from the leaves, the same rows for all panels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from html import escape
+from itertools import pairwise
+
+from cgraph import Graph, Node
+
+from .. import theme
+
+SWEEPS = 8  # over all rows, to bring nodes near their neighbors
+HEAD, FOOT, SIDE, FONT = 46.0, 12.0, 40.0, 13  # pixels above and below the rows and between panels, and of letters
+Place = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class LevelPanel:
+    """A graph, its title, and {words: level} of the lines across it that say what is there."""
+
+    title: str
+    graph: Graph
+    marks: Mapping[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Pixels from row to row and from node to node, and a node's width and height.  ticks: rows between numbers.
+
+    names: {name of an input or output: text shown}; without any, nodes have no texts.
+    """
+
+    row: float
+    gap: float
+    width: float
+    height: float
+    ticks: int = 1
+    names: Mapping[str, str] = field(default_factory=dict)
+
+    def y(self, level: float, depth: int) -> float:
+        """The height of a row in a picture of so many rows, downward."""
+        return HEAD + (depth - level + 0.5) * self.row
+
+
+def levels_of(graph: Graph) -> dict[Node, int]:
+    """{node: operations on the longest way to it}, as `Graph.counts` measures depth."""
+    level: dict[Node, int] = {}
+    for node in graph.nodes:  # arguments come before their use
+        level[node] = 1 + max([level[arg] for arg in node.args]) if node.args else 0
+    return level
+
+
+def longest_way(graph: Graph) -> list[Node]:
+    """One of the longest ways, from a leaf up."""
+    level = levels_of(graph)
+    way = [max(graph.outputs.values(), key=level.__getitem__)]
+    while way[-1].args:
+        way.append(max(way[-1].args, key=level.__getitem__))
+    return way[::-1]
+
+
+def levels_svg(panels: Sequence[LevelPanel], scale: Scale) -> str:
+    """The panels side by side, leaves at the bottom, one of the longest ways thick.  Dark as `to_adaptive` makes it.
+
+    Lines from constants are left out, those from inputs are faint.
+    """
+    depth = max([panel.graph.counts().depth for panel in panels])
+    drawn, x = list[str](), SIDE
+    for panel in panels:
+        offsets, width = _across(panel.graph, scale)
+        width = max(width, *[0.62 * FONT * len(text) for text in (panel.title, _sizes(panel.graph))])
+        at = {node: (x + left, scale.y(level, depth)) for node, (left, level) in offsets.items()}
+        marks = {words: scale.y(level, depth) for words, level in panel.marks.items()}
+        drawn += [*_words(panel, x, width, marks), *_lines(panel.graph, at), *_nodes(panel.graph, at, scale)]
+        x += width + SIDE
+    rows = []
+    for level in range(0, depth + 1, scale.ticks):
+        y = scale.y(level, depth)
+        rows += [_rule(SIDE - 10, x - SIDE, y, 'stroke-opacity="0.2"'), _text(SIDE - 14, y + 4, str(level), "end")]
+    return _svg(x - SIDE + 8, scale.y(0, depth) + scale.row / 2 + FOOT, [*rows, *drawn])
+
+
+def _across(graph: Graph, scale: Scale) -> tuple[dict[Node, tuple[float, int]], float]:
+    """{node: (pixels from the left, level)}, near its neighbors, and the width."""
+    level = levels_of(graph)
+    near: dict[Node, list[Node]] = {node: [] for node in level}
+    for edge in graph.edges:
+        if edge.source.value is None:
+            near[edge.source].append(edge.target)
+            near[edge.target].append(edge.source)
+    rows: list[list[Node]] = [[] for _ in range(max(level.values()) + 1)]
+    for node, k in level.items():
+        rows[k].append(node)
+    at: dict[Node, float] = {}
+    for row in rows:
+        _spread(at, row, [0.0] * len(row), scale.gap)
+    for sweep in range(SWEEPS):
+        for row in rows if sweep % 2 else rows[::-1]:
+            wish = {node: sum([at[each] for each in near[node]]) / len(near[node]) if near[node] else at[node]
+                    for node in row}  # fmt: skip
+            row.sort(key=wish.__getitem__)
+            _spread(at, row, [wish[node] for node in row], scale.gap)
+    left = min(at.values()) - scale.width / 2
+    return {node: (x - left, level[node]) for node, x in at.items()}, max(at.values()) + scale.width / 2 - left
+
+
+def _spread(at: dict[Node, float], row: Sequence[Node], wish: Sequence[float], gap: float) -> None:
+    """Put the nodes of a row, in order, where they wish to be, as far as they stay a gap apart: by pooling."""
+    pools: list[tuple[float, int]] = []  # the mean wish for the left end of nodes that touch, and how many they are
+    for i, place in enumerate(wish):
+        mean, size = place - i * gap, 1
+        while pools and pools[-1][0] >= mean:
+            other, others = pools.pop()
+            mean, size = (mean * size + other * others) / (size + others), size + others
+        pools.append((mean, size))
+    starts = [mean for mean, size in pools for _ in range(size)]
+    at |= {node: start + i * gap for i, (node, start) in enumerate(zip(row, starts, strict=True))}
+
+
+def _sizes(graph: Graph) -> str:
+    counts = graph.counts()
+    return f"{counts.nodes} nodes, {counts.edges} edges, {counts.depth} deep, {counts.width} wide"
+
+
+def _words(panel: LevelPanel, x: float, width: float, marks: Mapping[str, float]) -> list[str]:
+    """Title, sizes, and the lines across."""
+    parts = [_text(x, 14, panel.title, "start", 'font-weight="bold"'), _text(x, 31, _sizes(panel.graph), "start")]
+    for words, y in marks.items():
+        parts += [_rule(x, x + width, y, 'stroke-dasharray="5 4"'), _text(x, y - 5, words, "start")]
+    return parts
+
+
+def _lines(graph: Graph, at: Mapping[Node, Place]) -> list[str]:
+    way = longest_way(graph)
+    thick = [*pairwise(way)]
+    thin = [(edge.source, edge.target) for edge in graph.edges if edge.source.value is None]
+    faint = [_curve(at[a], at[b], 1.0, 0.55 if a.args else 0.25) for a, b in thin if (a, b) not in thick]
+    return [*faint, *[_curve(at[a], at[b], 3.0, 1.0) for a, b in thick]]
+
+
+def _nodes(graph: Graph, at: Mapping[Node, Place], scale: Scale) -> list[str]:
+    outputs: dict[Node, list[str]] = {}
+    for name, node in graph.outputs.items():
+        outputs.setdefault(node, []).append(scale.names.get(name, theme.pretty(name)))
+    parts = []
+    for node, (x, y) in at.items():
+        paint, w, h = theme.ROLES[theme.role_of(node)], scale.width, scale.height
+        ring = 2.5 if node in outputs else 1.2
+        parts.append(
+            f'<rect x="{x - w / 2:.1f}" y="{y - h / 2:.1f}" width="{w:.1f}" height="{h:.1f}" '
+            f'rx="{h / 2 if node.args else 2:.1f}" fill="{paint.fill}" '
+            f'stroke="{theme.LINE.lower() if node in outputs else paint.line}" stroke-width="{ring}"/>'
+        )
+        if scale.names:
+            parts.append(f'<g class="node">{_text(x, y + 4, _shown(node, scale), "middle")}</g>')
+            parts += [_text(x, y - h / 2 - 6, " = ".join(outputs[node]), "middle")] if node in outputs else []
+    return parts
+
+
+def _shown(node: Node, scale: Scale) -> str:
+    if node.args:
+        return node.op.symbol
+    return f"{node.value:.3g}" if node.value is not None else scale.names.get(str(node.name), str(node.name))
+
+
+def _curve(start: Place, end: Place, thickness: float, strength: float) -> str:
+    (x, y), (to_x, to_y) = start, end
+    bend = (y - to_y) / 2
+    return (
+        f'<path d="M{x:.1f} {y:.1f}C{x:.1f} {y - bend:.1f} {to_x:.1f} {to_y + bend:.1f} {to_x:.1f} {to_y:.1f}" '
+        f'fill="none" stroke="{theme.LINE.lower()}" stroke-width="{thickness}" stroke-opacity="{strength}"/>'
+    )
+
+
+def _rule(left: float, right: float, y: float, look: str) -> str:
+    return f'<path d="M{left:.1f} {y:.1f}H{right:.1f}" stroke="{theme.LINE.lower()}" {look}/>'
+
+
+def _text(x: float, y: float, text: str, anchor: str, look: str = "") -> str:
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" {look}>{escape(text)}</text>'
+
+
+def _svg(width: float, height: float, parts: Sequence[str]) -> str:
+    return (
+        f'<svg width="{width:.0f}" height="{height:.0f}" viewBox="0 0 {width:.0f} {height:.0f}" '
+        f'xmlns="http://www.w3.org/2000/svg"><g class="graph" font-family="{theme.FONT_FAMILIES}" font-size="{FONT}" '
+        f'fill="{theme.TEXT}"><polygon fill="white" stroke="none" points="0,0 0,{height:.0f} {width:.0f},{height:.0f} '
+        f'{width:.0f},0"/>{"".join(parts)}</g></svg>\n'
+    )

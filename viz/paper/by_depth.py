@@ -1,0 +1,118 @@
+"""Figure 7, of our own: both forms of the equations of motion by depth, and what the paper expects of the second."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from cgraph import Counts, Graph
+from dynamics import scenes
+from dynamics.equations.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
+from dynamics.experiments.speed.both_forms import MODELS
+from dynamics.experiments.text_table import csv_text
+
+from .. import theme
+from ..graph_drawing.dark import to_adaptive
+from ..graph_drawing.legend import kinds_in, legend_svg
+from ..graph_drawing.levels import LevelPanel, Scale, levels_svg
+from ..graph_drawing.render import render_png
+from ..pages import html
+from ..theme import Paint
+from .part import Part
+
+TITLES = {LAGRANGE: "Lagrange: accelerations of (q, q̇)", HAMILTON: "Hamilton: rates of (q, p)"}
+SPRING, ARM = "a rotor on a spring", "the three-link arm"
+LARGER = {"a planar chain of 20": "planar 20", "an arm of 7 in space": "arm 7", "a tree of 15": "tree 15"}
+LARGE = Scale(
+    row=68.0,
+    gap=62.0,
+    width=48.0,
+    height=30.0,
+    names={**theme.ONE_JOINT, "p0": "p", "q0_dot": "dθ/dt", "qd0_dot": "dω/dt"},
+)
+SMALL = Scale(row=15.0, gap=13.0, width=8.0, height=8.0, ticks=5)
+SIZES = ("nodes", "edges", "depth", "width")
+
+
+def figure7(larger: Mapping[str, str] = LARGER) -> Part:
+    """Figure 7: a rotor on a spring and the three-link arm in both forms, a row for each operation of depth.
+
+    larger: {what it is called: one of `MODELS`} whose sizes are counted as well.
+    """
+    drawn = {SPRING: both_forms(scenes.load("spring_mass")), ARM: both_forms(scenes.load("triple_pendulum"))}
+    sizes = {name: form_sizes(forms) for name, forms in drawn.items()}
+    sizes |= {name: form_sizes(both_forms(MODELS[model]())) for name, model in larger.items()}
+    spring = levels_svg([LevelPanel(TITLES[name], graph) for name, graph in drawn[SPRING].items()], LARGE)
+    level = sizes[ARM][VELOCITIES_ALONE].depth
+    marks: dict[str, Mapping[str, int]] = {HAMILTON: {"q̇ is solved": level}}
+    arm = levels_svg(
+        [LevelPanel(TITLES[name], graph, marks.get(name, {})) for name, graph in drawn[ARM].items()], SMALL
+    )
+    legend = legend_svg(_kinds([*drawn[SPRING].values(), *drawn[ARM].values()]))
+    table = ("", *[f"{size}, {form}" for size in SIZES for form in ("Lagrange", "Hamilton")]), _rows(sizes)
+    section = (
+        html.point(_answer(sizes[ARM]))
+        + html.figure(to_adaptive(spring), _caption("7a", SPRING, sizes[SPRING]), width="auto", adapts=True)
+        + html.figure(to_adaptive(legend), "The colors of Figure 7.", width="auto", adapts=True)
+        + html.figure(to_adaptive(arm), _caption("7b", ARM, sizes[ARM]), adapts=True)
+        + html.paragraph(_cause(sizes[ARM]))
+        + html.table("Sizes of both forms", *table)
+    )
+    files: dict[str, str | bytes] = {"fig7.csv": csv_text(*table)}
+    for name, svg in (("fig7a", spring), ("fig7b", arm)):
+        files |= {f"{name}.svg": to_adaptive(svg), f"{name}.png": render_png(svg)}
+    data = {name: {form: _size(counts) for form, counts in each.items()} for name, each in sizes.items()}
+    return Part("forms", "Figure 7: both forms by depth", files, data, section)
+
+
+def _kinds(graphs: Sequence[Graph]) -> list[Paint]:
+    """The kinds of nodes of all, in the words of equations of motion."""
+    found = {kind for graph in graphs for kind in kinds_in(graph)}
+    order = [kind for kind in (*theme.ROLES.values(), theme.OUTPUT) if kind in found]
+    return theme.in_words(order, theme.MOTION_WORDS)
+
+
+def _size(counts: Counts) -> dict[str, int]:
+    return {size: getattr(counts, size) for size in SIZES}
+
+
+def _rows(sizes: Mapping[str, Mapping[str, Counts]]) -> list[tuple[str, ...]]:
+    return [
+        (name, *[str(getattr(forms[form], size)) for size in SIZES for form in (LAGRANGE, HAMILTON)])
+        for name, forms in sizes.items()
+    ]
+
+
+def _caption(number: str, what: str, forms: Mapping[str, Counts]) -> str:
+    lagrange, hamilton = forms[LAGRANGE], forms[HAMILTON]
+    thick = "One of the longest ways is thick; outputs have a thick rim, and lines from constants are left out."
+    return (
+        f"Figure {number}. Both forms of {what}, a row for each operation on the longest way to a node, the same rows for "
+        f"both: {lagrange.depth} operations deep by accelerations, {hamilton.depth} by momenta. {thick}"
+    )
+
+
+def _answer(forms: Mapping[str, Counts]) -> str:
+    lagrange, hamilton = forms[LAGRANGE], forms[HAMILTON]
+    return (
+        "Section 5 of the paper leaves the Hamiltonian graph to future work, and expects of it parallelism in place of "
+        "depth, and a more compact graph. "
+        f"More compact: {_yes(hamilton.nodes < lagrange.nodes)}, {hamilton.nodes} nodes in place of {lagrange.nodes}. "
+        f"More parallel: {_yes(hamilton.depth < lagrange.depth)}, {hamilton.depth} operations deep in place of "
+        f"{lagrange.depth}."
+    )
+
+
+def _cause(forms: Mapping[str, Counts]) -> str:
+    level = forms[VELOCITIES_ALONE].depth
+    return (
+        "The cause can be seen. ∂L/∂q is taken at q̇, so q̇ has to be solved from p first, by the elimination that "
+        f"otherwise gives the accelerations, {level} operations deep; the momenta of the links then go from the tip to the "
+        f"base once more, {forms[HAMILTON].depth - level} further. By accelerations the bias stands beside the factors of "
+        "the elimination, not on top of them. The order of the equation has no part in it: both are deep because links "
+        "are eliminated one after another. A rotor alone has nothing to eliminate, and is less deep by momenta. Times, "
+        "longer chains, and what would make the graph parallel are in docs/hamiltonian.md, “The momentum graph”."
+    )
+
+
+def _yes(holds: bool) -> str:
+    return "yes" if holds else "no"
