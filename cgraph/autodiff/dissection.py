@@ -10,7 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 
-LEAF = 1.85  # variables of a last piece for each unknown that crosses, at least 2: longer are deeper, shorter more nodes
+LEAF = (
+    1.85  # variables of a last piece for each unknown that crosses, at least 2: longer are deeper, shorter more nodes
+)
 NEAR = 0.2  # of the variables of a piece: how far from its middle a cut may be
 
 

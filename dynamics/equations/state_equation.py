@@ -5,21 +5,24 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from cgraph import Graph
+from cgraph.extend import require_choice
 
 from ..systems.arguments import TIME
 from ..systems.model import Model, as_ode, as_system
 from .constraints import held_still
-from .equations_of_motion import forward_dynamics
+from .equations_of_motion import SOLUTIONS, forward_dynamics
 from .formulations import ZERO
 
 
-def state_equation(model: Model) -> Graph:
+def state_equation(model: Model, method: str = "auto") -> Graph:
     """The time derivative of a model's state, xdot = f(x, tau, t).
 
     Parameters
     ----------
     model : Model
         A system, a mechanism, a scene, or a first-order system.
+    method : {"auto", "recursive", "dense", "balanced"}
+        How accelerations are solved for, as of `forward_dynamics`; a first-order system has none.
 
     Returns
     -------
@@ -33,6 +36,8 @@ def state_equation(model: Model) -> Graph:
     ------
     SingularMassMatrixError
         For a coordinate without inertia.
+    ValueError
+        For an unknown method, or one that takes no constraints.
     TypeError
         For what is no model.
 
@@ -43,16 +48,17 @@ def state_equation(model: Model) -> Graph:
     >>> dyn.state_equation(block).evaluate({"q0": 0.0, "qd0": 2.0, "tau0": 8.0})
     {'q0_dot': 2.0, 'qd0_dot': 2.0}
     """
-    return with_multipliers(model)[0]
+    require_choice("method", method, SOLUTIONS)
+    return with_multipliers(model, method)[0]
 
 
-def with_multipliers(model: Model) -> tuple[Graph, Graph | None]:
+def with_multipliers(model: Model, method: str = "auto") -> tuple[Graph, Graph | None]:
     """The state equation, and over the same inputs the multipliers of its constraints by name; None without any."""
     ode = as_ode(model)
     if ode is not None:
         return ode.graph, None
     system = as_system(model)
-    solved = forward_dynamics(system)
+    solved = forward_dynamics(system, method)
     outputs = {f"q{i}_dot": rate for i, rate in enumerate(system.q_dot)}
     still = held_still(system)  # the rounding of accelerations that are 0 is all that steps could be chosen by
     outputs |= {f"qd{i}_dot": ZERO if still else solved.outputs[f"qdd{i}"] for i in range(system.n)}

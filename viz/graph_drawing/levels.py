@@ -78,8 +78,8 @@ def levels_svg(panels: Sequence[LevelPanel], scale: Scale) -> str:
     rows = []
     for level in range(0, depth + 1, scale.ticks):
         y = scale.y(level, depth)
-        rows += [_rule(SIDE - 10, x - SIDE, y, 'stroke-opacity="0.2"'), _text(SIDE - 14, y + 4, str(level), "end")]
-    return _svg(x - SIDE + 8, scale.y(0, depth) + scale.row / 2 + FOOT, [*rows, *drawn])
+        rows += [rule(SIDE - 10, x - SIDE, y, 'stroke-opacity="0.2"'), label(SIDE - 14, y + 4, str(level), "end")]
+    return picture(x - SIDE + 8, scale.y(0, depth) + scale.row / 2 + FOOT, [*rows, *drawn])
 
 
 def _across(graph: Graph, scale: Scale) -> tuple[dict[Node, tuple[float, int]], float]:
@@ -126,9 +126,9 @@ def _sizes(graph: Graph) -> str:
 
 def _words(panel: LevelPanel, x: float, width: float, marks: Mapping[str, float]) -> list[str]:
     """Title, sizes, and the lines across."""
-    parts = [_text(x, 14, panel.title, "start", 'font-weight="bold"'), _text(x, 31, _sizes(panel.graph), "start")]
+    parts = [label(x, 14, panel.title, "start", 'font-weight="bold"'), label(x, 31, _sizes(panel.graph), "start")]
     for words, y in marks.items():
-        parts += [_rule(x, x + width, y, 'stroke-dasharray="5 4"'), _text(x, y - 5, words, "start")]
+        parts += [rule(x, x + width, y, 'stroke-dasharray="5 4"'), label(x, y - 5, words, "start")]
     return parts
 
 
@@ -154,8 +154,8 @@ def _nodes(graph: Graph, at: Mapping[Node, Place], scale: Scale) -> list[str]:
             f'stroke="{theme.LINE.lower() if node in outputs else paint.line}" stroke-width="{ring}"/>'
         )
         if scale.names:
-            parts.append(f'<g class="node">{_text(x, y + 4, _shown(node, scale), "middle")}</g>')
-            parts += [_text(x, y - h / 2 - 6, " = ".join(outputs[node]), "middle")] if node in outputs else []
+            parts.append(f'<g class="node">{label(x, y + 4, _shown(node, scale), "middle")}</g>')
+            parts += [label(x, y - h / 2 - 6, " = ".join(outputs[node]), "middle")] if node in outputs else []
     return parts
 
 
@@ -174,15 +174,18 @@ def _curve(start: Place, end: Place, thickness: float, strength: float) -> str:
     )
 
 
-def _rule(left: float, right: float, y: float, look: str) -> str:
+def rule(left: float, right: float, y: float, look: str) -> str:
+    """A line across."""
     return f'<path d="M{left:.1f} {y:.1f}H{right:.1f}" stroke="{theme.LINE.lower()}" {look}/>'
 
 
-def _text(x: float, y: float, text: str, anchor: str, look: str = "") -> str:
+def label(x: float, y: float, text: str, anchor: str, look: str = "") -> str:
+    """A text; anchor: which end of it is at x."""
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" {look}>{escape(text)}</text>'
 
 
-def _svg(width: float, height: float, parts: Sequence[str]) -> str:
+def picture(width: float, height: float, parts: Sequence[str]) -> str:
+    """A picture of parts, on white, as `to_adaptive` takes it."""
     return (
         f'<svg width="{width:.0f}" height="{height:.0f}" viewBox="0 0 {width:.0f} {height:.0f}" '
         f'xmlns="http://www.w3.org/2000/svg"><g class="graph" font-family="{theme.FONT_FAMILIES}" font-size="{FONT}" '

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from cgraph import Counts, Graph
-from dynamics import scenes
+from dynamics import hamilton_equations, scenes, state_equation
 from dynamics.equations.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
+from dynamics.experiments.speed.bench_scenes import chain
 from dynamics.experiments.speed.both_forms import MODELS
 from dynamics.experiments.text_table import csv_text
 
@@ -15,6 +16,7 @@ from ..graph_drawing.dark import to_adaptive
 from ..graph_drawing.legend import kinds_in, legend_svg
 from ..graph_drawing.levels import LevelPanel, Scale, levels_svg
 from ..graph_drawing.render import render_png
+from ..graph_drawing.silhouettes import silhouettes_svg
 from ..pages import html
 from ..theme import Paint
 from .part import Part
@@ -30,13 +32,16 @@ LARGE = Scale(
     names={**theme.ONE_JOINT, "p0": "p", "q0_dot": "dθ/dt", "qd0_dot": "dω/dt"},
 )
 SMALL = Scale(row=15.0, gap=13.0, width=8.0, height=8.0, ticks=5)
+LINKS = 50  # of the chain that is drawn as a silhouette
+METHODS = ("recursive", "balanced")
 SIZES = ("nodes", "edges", "depth", "width")
 
 
 def figure7(larger: Mapping[str, str] = LARGER) -> Part:
     """Figure 7: a rotor on a spring and the three-link arm in both forms, a row for each operation of depth.
 
-    larger: {what it is called: one of `MODELS`} whose sizes are counted as well.
+    And the silhouettes of a long chain in both orders of elimination.  larger: {what it is called: one of `MODELS`}
+    whose sizes are counted as well.
     """
     drawn = {SPRING: both_forms(scenes.load("spring_mass")), ARM: both_forms(scenes.load("triple_pendulum"))}
     sizes = {name: form_sizes(forms) for name, forms in drawn.items()}
@@ -48,6 +53,8 @@ def figure7(larger: Mapping[str, str] = LARGER) -> Part:
         [LevelPanel(TITLES[name], graph, marks.get(name, {})) for name, graph in drawn[ARM].items()], SMALL
     )
     legend = legend_svg(_kinds([*drawn[SPRING].values(), *drawn[ARM].values()]))
+    orders = {f"{form}, {method}": graph for method in METHODS for form, graph in _chain(LINKS, method).items()}
+    silhouettes = silhouettes_svg([LevelPanel(title, graph) for title, graph in orders.items()])
     table = ("", *[f"{size}, {form}" for size in SIZES for form in ("Lagrange", "Hamilton")]), _rows(sizes)
     section = (
         html.point(_answer(sizes[ARM]))
@@ -56,11 +63,14 @@ def figure7(larger: Mapping[str, str] = LARGER) -> Part:
         + html.figure(to_adaptive(arm), _caption("7b", ARM, sizes[ARM]), adapts=True)
         + html.paragraph(_cause(sizes[ARM]))
         + html.table("Sizes of both forms", *table)
+        + html.paragraph(_remedy(orders))
+        + html.figure(to_adaptive(silhouettes), _silhouettes_caption(LINKS), adapts=True)
     )
     files: dict[str, str | bytes] = {"fig7.csv": csv_text(*table)}
-    for name, svg in (("fig7a", spring), ("fig7b", arm)):
+    for name, svg in (("fig7a", spring), ("fig7b", arm), ("fig7c", silhouettes)):
         files |= {f"{name}.svg": to_adaptive(svg), f"{name}.png": render_png(svg)}
     data = {name: {form: _size(counts) for form, counts in each.items()} for name, each in sizes.items()}
+    data[f"a planar chain of {LINKS}"] = {title: _size(graph.counts()) for title, graph in orders.items()}
     return Part("forms", "Figure 7: both forms by depth", files, data, section)
 
 
@@ -109,8 +119,35 @@ def _cause(forms: Mapping[str, Counts]) -> str:
         f"otherwise gives the accelerations, {level} operations deep; the momenta of the links then go from the tip to the "
         f"base once more, {forms[HAMILTON].depth - level} further. By accelerations the bias stands beside the factors of "
         "the elimination, not on top of them. The order of the equation has no part in it: both are deep because links "
-        "are eliminated one after another. A rotor alone has nothing to eliminate, and is less deep by momenta. Times, "
-        "longer chains, and what would make the graph parallel are in docs/hamiltonian.md, “The momentum graph”."
+        "are eliminated one after another. A rotor alone has nothing to eliminate, and is less deep by momenta. Times "
+        "and longer chains are in docs/hamiltonian.md, “The momentum graph”."
+    )
+
+
+def _chain(links: int, method: str) -> dict[str, Graph]:
+    """Both forms of a planar chain, by one order of elimination."""
+    arm = chain(0.1, 0.1, links)
+    return {"Lagrange": state_equation(arm, method), "Hamilton": hamilton_equations(arm, method)}
+
+
+def _remedy(orders: Mapping[str, Graph]) -> str:
+    depths = {title: graph.counts().depth for title, graph in orders.items()}
+    nodes = {title: len(graph.nodes) for title, graph in orders.items()}
+    return (
+        "What makes the graph parallel is another order of elimination, of pieces of the chain at the same time, each seen "
+        "from its two ends, and of pairs of pieces. Either form is then as deep as the logarithm of the number of links: "
+        f"{depths['Lagrange, balanced']} and {depths['Hamilton, balanced']} operations in place of "
+        f"{depths['Lagrange, recursive']} and {depths['Hamilton, recursive']}, for "
+        f"{nodes['Lagrange, balanced'] / nodes['Lagrange, recursive']:.1f} and "
+        f"{nodes['Hamilton, balanced'] / nodes['Hamilton, recursive']:.1f} times the nodes."
+    )
+
+
+def _silhouettes_caption(links: int) -> str:
+    return (
+        f"Figure 7c. A planar chain of {links} links in both forms and both orders of elimination. A row for each "
+        "operation on the longest way to a node, as wide as there are nodes on it: areas are numbers of nodes, in the "
+        "colors of Figure 7. Towers that are high and narrow leave a machine little to do at the same time."
     )
 
 

@@ -10,6 +10,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from viz.graph_drawing.levels import LevelPanel, Scale, levels_of, levels_svg, longest_way
+from viz.graph_drawing.silhouettes import silhouettes_svg
 
 SCALE = Scale(row=15.0, gap=13.0, width=8.0, height=8.0, ticks=5)
 GRAPHS = {
@@ -55,3 +56,18 @@ def test_texts_are_escaped_and_words_stand_at_their_row() -> None:
     for text in ("a &lt; b", "x&lt;y", "f &amp; g", "2.5", "×", "3 nodes, 2 edges, 1 deep, 2 wide"):
         assert f">{text}</text>" in svg
     assert f'y="{scale.y(1, 1) - 5:.1f}" text-anchor="start" >here</text>' in svg
+
+
+def test_a_silhouette_has_the_area_of_its_nodes_and_the_height_of_its_depth() -> None:
+    svg = silhouettes_svg([LevelPanel(name, graph) for name, graph in GRAPHS.items()], 3.0, 2.0)
+    bars = re.findall(r"M([0-9.]+) ([0-9.]+)h([0-9.]+)v3.0h-([0-9.]+)z", svg)
+    assert sum(float(wide) for _, _, wide, _ in bars) == 2.0 * sum(len(graph.nodes) for graph in GRAPHS.values())
+    heights = {float(y) for _, y, _, _ in bars}
+    assert len(heights) == 1 + max(graph.counts().depth for graph in GRAPHS.values())
+    assert max(heights) - min(heights) == pytest.approx(3.0 * (len(heights) - 1))
+    rows: dict[str, list[tuple[float, float]]] = {}
+    for x, y, wide, _ in bars:
+        rows.setdefault(y, []).append((float(x), float(x) + float(wide)))
+    for row in rows.values():
+        row.sort()
+        assert all(a[1] <= b[0] + 1e-6 for a, b in pairwise(row))
