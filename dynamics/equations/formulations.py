@@ -200,7 +200,8 @@ def spurious_nodes(graph: Graph) -> frozenset[Node]:
     """Nodes that are there only because a derivative was taken through the embedded Euler relation.
 
     They are the adjoints that the product qd dt of q = qd dt + q_old passes on, the "unnecessary terms" of eq. (3), and
-    all that only these need.
+    all that only these need, whether the author of the Lagrangian tagged anything or not. Where a slope dL/dq does not
+    change along the step, such as a weight m g, the derivative of m g dt is the node m g itself, which is not marked.
 
     Parameters
     ----------
