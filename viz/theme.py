@@ -132,16 +132,17 @@ ONE_JOINT = {
     "tau0": "τ",
 }
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+_RATE = re.compile(r"(?<![A-Za-z0-9_])((?:q|qd|p)[0-9]*)_dot(?![A-Za-z0-9_])")  # a rate of the state, by its name
 _WORD = re.compile(r"(?<![A-Za-z0-9])([A-Za-z]+)([0-9]*)(?![A-Za-z0-9])")
 
 
 def pretty(name: str) -> str:
-    """A name in mathematical letters: q0 is q₀, qdd1 is q̈₁, tau2 is τ₂, and dL/dqd0 is dL/dq̇₀."""
-    return _WORD.sub(_pretty_word, name)
+    """A name in mathematical letters: q0 is q₀, qdd1 is q̈₁, tau2 is τ₂, dL/dqd0 is dL/dq̇₀, and p0_dot is dp₀/dt."""
+    return _WORD.sub(_pretty_word, _RATE.sub(r"d\1/dt", name))
 
 
 def called(names: Mapping[str, str]) -> dict[str, str]:
-    """Names of coordinates, such as `dynamics.display_names`, as they are drawn: q̇.knee for qd.knee."""
+    """Names such as those of `dynamics.display_names` as drawn: q̇.knee of qd.knee, dp/dt.knee of p_dot.knee."""
     return {name: ".".join([pretty(kind), *rest]) for name, text in names.items() for kind, *rest in [text.split(".")]}
 
 

@@ -19,6 +19,7 @@ from .substitute import substitute
 
 EULER = "euler"  # tag of the embedded relations q = qd dt + q_old and qd = qdd dt + qd_old
 COUPLING = "q of qd"  # tag of the product qd dt in the first of them, through which dL/dqd reaches dL/dq
+LAGRANGIAN = "lagrangian"  # tag of what the author left untagged: derivatives of it would take a relation's tag instead
 ONE, ZERO = cg.constant(1.0), cg.constant(0.0)
 
 
@@ -199,7 +200,8 @@ def spurious_nodes(graph: Graph) -> frozenset[Node]:
     """Nodes that are there only because a derivative was taken through the embedded Euler relation.
 
     They are the adjoints that the product qd dt of q = qd dt + q_old passes on, the "unnecessary terms" of eq. (3), and
-    all that only these need.
+    all that only these need, whether the author of the Lagrangian tagged anything or not. Where a slope dL/dq does not
+    change along the step, such as a weight m g, the derivative of m g dt is the node m g itself, which is not marked.
 
     Parameters
     ----------
@@ -268,8 +270,9 @@ class _Embedding:
             self.q = [cg.with_name(m + old, f"q{i}") for i, (m, old) in enumerate(zip(moved, q_old, strict=True))]
 
     def embed(self, *nodes: Node) -> list[Node]:
-        """Nodes over (q, qd) as nodes over the embedded state."""
-        return substitute(nodes, dict(zip([*self.system.q, *self.system.qd], [*self.q, *self.qd], strict=True)))
+        """Nodes over (q, qd) as nodes over the embedded state, all of them with tags."""
+        state = dict(zip([*self.system.q, *self.system.qd], [*self.q, *self.qd], strict=True))
+        return substitute(nodes, state, LAGRANGIAN)
 
     def terms(
         self, momentum: Sequence[Node], gradient: list[Node], x_dot: Mapping[Node, Node] | None = None

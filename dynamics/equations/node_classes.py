@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from cgraph import Graph, Node
 from cgraph.extend import ADJOINT, topological
@@ -19,14 +19,15 @@ def formulation_classes(graph: Graph) -> Callable[[Node], str]:
     """The class of each node of a graph of `inverse_dynamics`, as `cg.compare` asks for it.
 
     "spurious adjoint": it serves only derivatives through q = qd dt + q_old.  "Euler edge": the embedded relations
-    q = qd dt + q_old and qd = qdd dt + qd_old, and their rates.  "needed": all else.
+    q = qd dt + q_old and qd = qdd dt + qd_old, and their rates.  "needed": all else, sums of the two among it.
     """
     wrong = spurious_nodes(graph)
+    adjoint = _users(graph, [node for node in graph.nodes if ADJOINT in node.roles])
 
     def name(node: Node) -> str:
         if node in wrong:
             return "spurious adjoint"
-        return "Euler edge" if EULER in node.tags and ADJOINT not in node.roles else "needed"
+        return "Euler edge" if EULER in node.tags and node not in adjoint else "needed"
 
     return name
 
@@ -59,7 +60,14 @@ def form_classes(graph: Graph) -> Callable[[Node], str]:
 def _reached(graph: Graph, kind: str) -> set[Node]:
     """The nodes that the inputs of a kind reach, such as p0, p1 .."""
     names = zip(graph.input_names, graph.inputs, strict=True)
-    reached = {node for name, node in names if name.startswith(kind) and name.removeprefix(kind).isdecimal()}
+    return _users(
+        graph, [node for name, node in names if name.startswith(kind) and name.removeprefix(kind).isdecimal()]
+    )
+
+
+def _users(graph: Graph, nodes: Iterable[Node]) -> set[Node]:
+    """Nodes, and all that depends on them."""
+    reached = set(nodes)
     for node in graph.nodes:  # arguments come before their use
         if not reached.isdisjoint(node.args):
             reached.add(node)

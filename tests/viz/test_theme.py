@@ -14,7 +14,11 @@ from viz import theme
         ("tau2", "τ₂"),
         ("theta", "θ"),
         ("dL/dqd0", "dL/dq̇₀"),
-        ("q0_dot", "q₀_dot"),
+        ("q0_dot", "dq₀/dt"),
+        ("qd1_dot", "dq̇₁/dt"),
+        ("left p0_dot", "left dp₀/dt"),
+        ("x_dot", "x_dot"),  # a tangent in general
+        ("q_dot_max", "q_dot_max"),
         ("dt", "dt"),
         ("x", "x"),
         ("2q", "2q"),
@@ -22,6 +26,11 @@ from viz import theme
 )
 def test_names_are_shown_in_mathematical_letters(name: str, shown: str) -> None:
     assert theme.pretty(name) == shown
+
+
+def test_rates_of_named_coordinates_are_shown_as_derivatives() -> None:
+    names = {"q0_dot": "q_dot.left knee", "qd0": "qd.left knee", "p0_dot": "p_dot.left knee"}
+    assert list(theme.called(names).values()) == ["dq/dt.left knee", "q̇.left knee", "dp/dt.left knee"]
 
 
 def test_different_names_of_the_dynamics_stay_different() -> None:

@@ -2,6 +2,7 @@
 
 const ENERGIES = ["kinetic", "potential"]; // a tag beside one of these is a body
 const OTHER = "other"; // of a body, what carries no energy's tag
+const LAGRANGIAN = "lagrangian"; // what formulations with a step inside tag as that, the others leave without a tag
 const MANY = 60; // clusters; above, they are not split by energy
 const STAGES = ["as written", "reverse sweep", "forward sweep", "both sweeps"];
 const natural = new Intl.Collator("en", { numeric: true }).compare; // link 2 before link 10
@@ -12,7 +13,8 @@ const natural = new Intl.Collator("en", { numeric: true }).compare; // link 2 be
 const LEAF_PLACE = -1, RESULT_PLACE = -2;
 function placesOf(record, versions) {
   const bodies = bodiesOf(record, versions);
-  let groups = versions.map((version) => version.ops.map((_, node) => groupOf(version, node, bodies)));
+  const untagged = versions.some(({ labels }) => labels.some(([tags]) => tags.includes(LAGRANGIAN))) ? LAGRANGIAN : "";
+  let groups = versions.map((version) => version.ops.map((_, node) => groupOf(version, node, bodies, untagged)));
   if (new Set(groups.flat().map((each) => JSON.stringify(each))).size > MANY) {
     groups = groups.map((own) => own.map((each) => (typeof each === "number" ? each : { ...each, title: "" })));
   }
@@ -57,13 +59,13 @@ function bodiesOf(record, versions) {
   return [...(beside.size ? beside : [...used].filter((each) => /\d$/.test(each)))].sort(natural);
 }
 
-function groupOf(version, node, bodies) {
+function groupOf(version, node, bodies, untagged) {
   if (!version.args[node].length) return LEAF_PLACE;
   if (!version.users[node].length) return RESULT_PLACE; // nothing but an output needs it
   const [tags, , stage] = version.labels[version.label[node]];
   const own = bodies.filter((body) => tags.includes(body));
   const rest = tags.filter((each) => !own.includes(each));
-  const column = own[0] ?? rest.shift() ?? "", said = rest.filter((each) => !ENERGIES.includes(each));
+  const column = own[0] ?? rest.shift() ?? untagged, said = rest.filter((each) => !ENERGIES.includes(each));
   return { column, stage, title: (said.length ? said : rest).join(", ") || (own.length ? OTHER : ""), marked: version.marked.has(node) };
 }
 

@@ -25,7 +25,8 @@ function embedded(system, energyOf) {
   const qdNew = step(PRIMAL | EULER, qdd, qdOld, "qd");
   const qNew = step(PRIMAL | EULER | COUPLING, qdNew, qOld, "q");
   const replace = pairs([...q, ...qd], [...qNew, ...qdNew]);
-  const [lagrangian, energy] = substitute([system.lagrangian, energyOf(system)], replace);
+  // All with tags: derivatives of nodes without would take those of the relation from their arguments.
+  const [lagrangian, energy] = substitute([system.lagrangian, energyOf(system)], replace, LAGRANGIAN);
   const momentum = cotangents(new Map([[energy, ONE()]]), qdNew); // through q as well: the unwanted coupling
   const gradient = cotangents(new Map([[lagrangian, ONE()]]), qNew);
   const rate = tangents(pairs([dt, ...timeOf(system)], [ONE(), ONE()]), momentum);

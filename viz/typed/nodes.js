@@ -2,8 +2,8 @@
 
 // A label is a number: its low bits are roles, the others tags, by their place in `tagNames`.
 const INPUT = 1, PRIMAL = 2, ADJOINT = 4, TANGENT = 8, ROLES = 15;
-const tagNames = ["euler", "q of qd", "damping", "force", "kinetic", "potential", "definition"];
-const [EULER, COUPLING, DAMPING, FORCE, KINETIC, POTENTIAL, DEFINITION] = tagNames.map((_, i) => 16 << i);
+const tagNames = ["euler", "q of qd", "damping", "force", "kinetic", "potential", "definition", "lagrangian"];
+const [EULER, COUPLING, DAMPING, FORCE, KINETIC, POTENTIAL, DEFINITION, LAGRANGIAN] = tagNames.map((_, i) => 16 << i);
 const derived = (label, role) => (label & ~(INPUT | PRIMAL)) | role;
 const withTagsOf = (label, other) => label | (other & ~ROLES);
 
@@ -115,9 +115,10 @@ function rebuild(outputs, replace, make) {
   return copies;
 }
 
-/** Copies with other nodes in place of variables, operations kept as written. */
-function substitute(nodes, replace) {
-  const copies = rebuild(nodes, replace, (node, args) => new Node(node.op, args, node.label, null, node.name));
+/** Copies with other nodes in place of variables, operations kept as written. tag: of copies of nodes that have none. */
+function substitute(nodes, replace, tag = 0) {
+  const labelOf = ({ label }) => (label & ~ROLES ? label : label | tag);
+  const copies = rebuild(nodes, replace, (node, args) => new Node(node.op, args, labelOf(node), null, node.name));
   return nodes.map((node) => copies.get(node));
 }
 

@@ -59,6 +59,18 @@ def test_marked_nodes_have_clusters_of_their_own_and_bodies_their_order(pendulum
     assert run_script(PLACES, record(pendulum, None))["columns"][:3] == ["link 1", "link 2", "link 3"]
 
 
+def test_without_tags_nodes_stand_with_the_step_or_with_the_lagrangian_in_all_versions():
+    def lagrangian(q, qd, t):
+        return 0.5 * (1.0 + cg.cos(q[1]) ** 2) * qd[0] ** 2 + 0.5 * qd[1] ** 2 - cg.sin(q[0] * q[1])
+
+    system = dyn.System(lagrangian, ["x", "y"])
+    graphs = [dyn.inverse_dynamics(system, name) for name in ("euler_embedded", "chain_rule")]
+    plan = run_script(PLACES, record([Version(f"{i}", graph) for i, graph in enumerate(graphs)], None))
+    assert sorted(plan["columns"]) == ["euler", "lagrangian"]
+    euler, chain = map(set, plan["place"])
+    assert euler & {place for place in chain if plan["cluster"][place] >= 0}  # dL/dq
+
+
 def test_a_sum_that_is_a_result_stands_under_it(pendulum):
     """And in no cluster of what it adds last, such as damping."""
     data = record(pendulum, None)
