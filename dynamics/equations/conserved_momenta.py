@@ -5,20 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cgraph import Node
-from cgraph.extend import Builder, building, cotangents, folded, shortened
+from cgraph.extend import Builder, as_node, building, cotangents, folded, shortened, topological
 
 from ..systems.arguments import new_variables
 from ..systems.model import Model, as_system
 from ..systems.system import System
-from .formulations import ONE
+from .formulations import ONE, ZERO
 
 
 def conserved_momenta(model: Model) -> tuple[str, ...]:
     """The velocities whose momenta p = dL/dqd are constant while no tau acts on them: cyclic coordinates (Noether).
 
     Proven by structure: the rate dL/dq + forces - damping * qd, of quasi-velocities G^T dL/dq - ad(u; p) in place of
-    dL/dq, folds to the constant 0, and no constraint pulls there. What is not named may be conserved all the same, by
-    an identity that no fold knows; what is named is at every state and for all values of the parameters.
+    dL/dq, folds to the constant 0, L does not jump along it, and no constraint pulls there. What is not named may be
+    conserved all the same, by an identity that no fold knows; what is named is at every state and for all values of
+    the parameters.
 
     Parameters
     ----------
@@ -49,7 +50,7 @@ def conserved_momenta(model: Model) -> tuple[str, ...]:
     constant: set[int] = set()
     for form in (system, system.shortened):
         if form is not None:
-            constant |= {i for i, rate in enumerate(_rates(form)) if rate.value == 0.0}
+            constant |= {i for i, rate in enumerate(_rates(form)) if rate.value == 0.0} - _jumping(form)
     held = _held(system)
     return tuple([name for i, name in enumerate(system.velocities) if i in constant - held])
 
@@ -67,6 +68,21 @@ def _rates(system: System) -> list[Node]:
     with building(build):
         rates = [rate + force - damping * qd for rate, force, damping, qd in parts]
     return shortened(folded(rates, build))
+
+
+def _jumping(system: System) -> set[int]:
+    """The velocities along which L jumps, as `floor` and the condition of `where` do: beside a jump its slope is 0."""
+    build = Builder()
+    (lagrangian,) = folded([system.lagrangian], build)
+    moving: set[int] = set()
+    for node in topological([lagrangian]):
+        with building(build):
+            partials = map(as_node, node.op.partials(node, *node.args)) if node.args else ()
+        for arg, partial in zip(node.args, partials, strict=True):
+            if node.op.jumps or partial.value == 0.0:
+                slopes = system.kinematics.slopes(cotangents({arg: ONE}, system.q, build), [ZERO] * system.n, build)
+                moving |= {i for i, slope in enumerate(slopes) if slope.value != 0.0}
+    return moving
 
 
 def _held(system: System) -> set[int]:

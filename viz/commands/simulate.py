@@ -11,7 +11,7 @@ import numpy as np
 from cgraph.extend import check_writable
 from dynamics import METHODS, Trajectory, simulate
 
-from .arguments import Commands, answer, positive, say, takes_a_scene, unless_json
+from .arguments import MOMENTUM_FORM, Commands, answer, positive, say, takes_a_scene, unless_json
 from .point_arguments import started, takes_a_start
 
 METHOD = "dop853"
@@ -33,6 +33,7 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
         metavar="NAME",
         help=f"{', '.join(METHODS)}, or a solver of SciPy, as scipy:Radau (default: {METHOD})",
     )
+    parser.add_argument("--momentum", action="store_true", help=f"step {MOMENTUM_FORM}")
     parser.add_argument("--dt", type=positive, metavar="S", help="the largest of equal steps (default: 0.001)")
     parser.add_argument("--rtol", type=positive, metavar="R", help="relative error of a chosen step (default: 1e-9)")
     parser.add_argument("--every", type=positive, metavar="S", help="a row so often (default: every step is one)")
@@ -47,6 +48,7 @@ def run(options: argparse.Namespace) -> int:
         check_writable(options.csv)
     scene, _ = started(options)
     end = scene.t_end if options.t_end is None else options.t_end
+    form = "momentum" if options.momentum else "velocity"
     at = None if options.every is None else _every(options.every, end)
     run = simulate(
         scene,
@@ -57,8 +59,9 @@ def run(options: argparse.Namespace) -> int:
         rtol=options.rtol,
         dt=options.dt,
         t_eval=at,
+        form=form,
     )
-    data = {"scene": scene.name, "rows": len(run.t)} | _summary(run)
+    data = {"scene": scene.name, "rows": len(run.t), "form": form} | _summary(run)
     files: dict[Path, str | bytes] = {} if options.csv is None else {options.csv: run.to_csv()}
     answer(unless_json(options, data, f"{scene.name}: {_text(run, data)}"), files)
     if not run.stats.success:
@@ -97,7 +100,8 @@ def _text(run: Trajectory, data: dict[str, Any]) -> str:
     """The summary in words."""
     at_end = ", ".join([f"{name} = {value:.6g}" for name, value in [*data["end"].items()][:SHOWN]])
     more = len(data["end"]) - SHOWN
-    work = f"{data['steps']} steps, {data['rejected']} rejected, {data['evaluations']} evaluations"
+    of = ", of coordinates and momenta" if data["form"] == "momentum" else ""
+    work = f"{data['steps']} steps{of}, {data['rejected']} rejected, {data['evaluations']} evaluations"
     lines = [
         f"{data['message']}, {data['t_end']:g} s" if run.success else f"{data['message']}",
         f"  method  {data['method']}: {work}, {data['seconds']:.3g} s",

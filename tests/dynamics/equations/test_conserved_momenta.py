@@ -80,6 +80,29 @@ def rooted(kind: str, axis: Any, gravity: float) -> dyn.Mechanism:
     return dyn.Mechanism([base, replace(limb, name="limb", parent="base")], (0.0, 0.0, -gravity))
 
 
+STEPS = {
+    "floor": cg.floor,
+    "fmod": lambda x: x - cg.fmod(x, 1.0),
+    "sign": lambda x: cg.sign(x - 1.0),
+    "less": lambda x: cg.less(x, 2.0),
+    "where": lambda x: cg.where(cg.less(x, 2.0), 3.0, 4.0),
+    "within": lambda x: cg.where(cg.floor(x), 3.0, cg.ceil(x)),
+}
+
+
+@pytest.mark.parametrize("name", STEPS)
+@pytest.mark.parametrize("of", ["potential", "inertia"])
+def test_a_step_along_a_coordinate_is_not_conserved(name: str, of: str) -> None:
+    """Its slope is 0 beside the step; of the coordinate along the step, the momentum is constant."""
+
+    def lagrangian(q: Any, qd: Any, t: Any) -> cg.Node:
+        step = STEPS[name](q[0])
+        inertia, potential = (2.0 + step, 0.0) if of == "inertia" else (1.0, step)
+        return 0.5 * inertia * qd[0] ** 2 + 0.5 * qd[1] ** 2 * cg.floor(3.0 + cg.sin(t)) - potential
+
+    assert dyn.conserved_momenta(dyn.System(lagrangian, "across along")) == ("along",)
+
+
 X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 CASES = {
     "an upright hinge": (lambda: rooted("revolute", Z, 9.81), ("base",)),

@@ -291,6 +291,16 @@ def test_a_motion_is_written_as_csv_and_summed_up(own, capsys):
     assert found["steps"] == run.stats.steps
 
 
+def test_a_motion_is_stepped_in_momenta(own, capsys):
+    command = ["simulate", "triple_pendulum", "--t-end", "0.05", "--method", "rk4"]
+    found, scene = figures(capsys, *command, "--momentum"), dyn.scenes.load("triple_pendulum")
+    run = dyn.simulate(scene, scene.q, scene.qd, 0.05, "rk4", form="momentum")
+    assert [*found["end"].values()] == [*run.q[-1].tolist(), *run.qd[-1].tolist()]
+    assert found["end"] != figures(capsys, *command)["end"]
+    assert "steps, of coordinates and momenta" in said(capsys, *command, "--momentum")
+    assert cli.main(["simulate", "own.py:slow", "--momentum"]) == 2
+
+
 def test_a_motion_cut_short_is_a_finding(own, capsys):
     assert cli.main(["simulate", "own.py:late", "--csv", "a.csv"]) == 1
     printed = capsys.readouterr()
