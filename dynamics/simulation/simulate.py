@@ -185,7 +185,7 @@ def simulate(
 
     # Put the result together
     rows, held = recorder.table(), None if hold is None else hold.held
-    stats = _stats(run, options.method, outcome, missed_momenta(stepped, *rows))
+    stats = _stats(run, options.method, outcome, missed_momenta(stepped, *rows, start=(t0, start.x, x)))
     table, momenta = _table(stepped, energy, *rows, held)
     for text in stats.warnings:
         warnings.warn(text, SimulationWarning, stacklevel=2)
