@@ -11,6 +11,8 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 
+from ...slow import slow
+
 SIZES = 10.0 ** np.linspace(-6.0, 6.0, 61)  # of momenta, beside those at which L is no longer quadratic
 
 # Strictly convex terms of L, and velocities up to where their slopes are these sizes.
@@ -55,7 +57,9 @@ def there_and_back(system: dyn.System, qd: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 @pytest.mark.parametrize(
-    "names", [*[[name] for name in TERMS], ["relativistic", "cosh"], ["quartic", "relativistic", "soft"]], ids="+".join
+    "names",
+    [*[[name] for name in TERMS], *slow(["relativistic", "cosh"]), ["quartic", "relativistic", "soft"]],
+    ids="+".join,
 )
 def test_the_velocities_of_momenta_are_those_that_they_are_of(names: list[str]) -> None:
     system, qd = mixed(names, len(names))
@@ -68,7 +72,7 @@ def test_the_velocities_of_momenta_are_those_that_they_are_of(names: list[str]) 
 
 
 def test_they_are_the_same_to_the_last_bit_in_other_units() -> None:
-    names, unit, action = ["relativistic", "quartic"], 2.0**-40, 2.0**31
+    names, unit, action = ["relativistic"], 2.0**-40, 2.0**31
     plain, scaled = (there_and_back(*mixed(names, 3, *units)) for units in ((2.0, 4.0), (2.0 * unit, 4.0 * action)))
     assert (scaled[1] == unit * plain[1]).all()
     assert (scaled[2] == action / unit * plain[2]).all()
@@ -77,7 +81,7 @@ def test_they_are_the_same_to_the_last_bit_in_other_units() -> None:
 def test_their_slopes_are_the_inverse_of_the_mass_matrix() -> None:
     """Also where a momentum is the one at rest, and the iteration has nothing to do."""
     charged = dyn.System(lambda q, qd, t: -cg.sqrt(1.0 - qd[0] ** 2 - qd[1] ** 2) + q[0] * qd[1] - q[1] * qd[0], "x y")
-    rates = cg.jacobian(dyn.hamilton_equations(charged), ["p0", "p1"])
+    rates = cg.jacobian(dyn.hamilton_equations(charged, iterations=24), ["p0", "p1"])
     for qd in ([0.0, 0.0], [0.6, -0.3], [0.7, 0.714]):
         q = {"q0": 0.4, "q1": 0.1}
         at = q | {"qd0": qd[0], "qd1": qd[1]}
@@ -109,7 +113,7 @@ def test_two_charged_particles_at_almost_the_speed_of_light_move_the_same_in_bot
         ),
         "x y",
     )  # fmt: skip
-    how = {"t_end": 3.0, "method": "dop853", "rtol": 1e-12, "t_eval": [1.0, 3.0]}
+    how = {"t_end": 1.0, "method": "dop853", "rtol": 1e-12, "t_eval": [0.5, 1.0]}
     plain, canonical = (
         dyn.simulate(pair, [0.0, 0.0], [0.999, -0.5], form=form, **how) for form in ("velocity", "momentum")
     )
