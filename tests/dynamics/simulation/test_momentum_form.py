@@ -93,7 +93,7 @@ def watched(n: int) -> list[dyn.Event]:
     ]
 
 
-@pytest.mark.parametrize("name", [*KINDS, *slow("relativistic")])
+@pytest.mark.parametrize("name", ["rotor", *slow("driven", "magnetic", "relativistic")])
 def test_events_resets_and_dense_output_are_of_the_same_velocities(name: str) -> None:
     """Also where L depends on t, momenta have an offset, L is not quadratic, and coordinates are a quaternion."""
     model = (KINDS | MODELS)[name]()
