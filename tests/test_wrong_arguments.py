@@ -151,7 +151,7 @@ CALLS = {
     "dyn.spatial_momentum": call(dyn.spatial_momentum, ARM, "origin"),
     "dyn.Mechanism.chain": call(ARM.chain, FIRST),
     "dyn.forward_dynamics": call(dyn.forward_dynamics, ARM, "auto", check=False),
-    "dyn.hamiltonian": call(dyn.hamiltonian, ARM, iterations=4),
+    "dyn.hamiltonian": call(dyn.hamiltonian, ARM, iterations=4, check=False),
     "dyn.hamilton_equations": call(dyn.hamilton_equations, ARM, iterations=4, check=False),
     "dyn.inverse_dynamics": call(dyn.inverse_dynamics, ARM, "chain_rule", simplify=True),
     "dyn.formulation_sizes": call(dyn.formulation_sizes, ARM),

@@ -11,27 +11,27 @@ from cgraph.extend import Builder, Order, building, cotangents, require_choice, 
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .formulations import ONE, ZERO
-from .legendre import Legendre
+from .legendre import Legendre, dot
 from .shorter_form import shorter_form
 
 FORMS = ("velocity", "momentum")  # of a motion: states (q, qd) or (q, p)
-ITERATIONS = 10  # Newton's, for a Lagrangian that is not quadratic in the velocities
+ITERATIONS = 40  # Newton's, for a Lagrangian that is not quadratic in the velocities
 
 
-def hamiltonian(model: Model, *, iterations: int = ITERATIONS) -> Graph:
+def hamiltonian(model: Model, *, iterations: int = ITERATIONS, check: bool = False) -> Graph:
     """The Hamiltonian H(q, p) = p . qd - L at the velocities of the momenta p = dL/dqd: the energy.
 
     Parameters
     ----------
     model : Model
         A system, a mechanism or a scene with n velocities, without constraints.
-    iterations : int
+    iterations, check
         As of `hamilton_equations`.
 
     Returns
     -------
     Graph
-        Inputs q0.., p0.., t if needed, parameters; output H [J].
+        Inputs q0.., p0.., t if needed, parameters; output H [J], and missing0.. where asked for.
 
     Raises
     ------
@@ -58,6 +58,7 @@ def hamiltonian(model: Model, *, iterations: int = ITERATIONS) -> Graph:
     output H = %5
     """
     count = require_whole("iterations", iterations, 1)
+    require_flag("check", check)
 
     def derive(system: System) -> Graph:
         build = Builder()
@@ -66,13 +67,14 @@ def hamiltonian(model: Model, *, iterations: int = ITERATIONS) -> Graph:
         if transform.quadratic:  # of L = u M u / 2 + b u + L0 it is (p - b) u / 2 - L0
             (rest,) = transform.at_rest([transform.lagrangian])
             with building(build):
-                total = _dot([momentum - b for momentum, b in zip(p, transform.offset, strict=True)], u)
+                total = dot([momentum - b for momentum, b in zip(p, transform.offset, strict=True)], u)
                 total = 0.5 * total - rest
         else:
             (rest,) = transform.at([transform.lagrangian])
             with building(build):
-                total = _dot(p, u) - rest
-        return cg.simplify(system.graph({"H": total}, system.q, p))
+                total = dot(p, u) - rest
+        outputs = {"H": total} | (_missing(transform) if check else {})
+        return cg.simplify(system.graph(outputs, system.q, p))
 
     return shorter_form(as_system(model), derive)
 
@@ -94,8 +96,9 @@ def hamilton_equations(
         How the velocities are solved for: "recursive", the fewest nodes, or "balanced", with long sums in blocks, which
         is O(log n) deep for a planar chain and takes more nodes, see `cg.hessian_solve`.
     iterations : int
-        Newton's steps to the velocities where L is not quadratic in them. The error of what comes out is about the
-        square of the last step.
+        Newton's steps to the velocities where L is not quadratic in them; a good part of the nodes for every one. They
+        go downhill on L - p qd, from rest, and reach the velocities of an L that is strictly convex in them: the usual
+        number for momenta of up to 1e6 times those at which L is no longer quadratic.
     check : bool
         Further outputs missing0.., (n,): p - dL/dqd at the velocities, what the iteration leaves of the momenta; 0
         where L is quadratic.
@@ -173,10 +176,3 @@ def _missing(transform: Legendre) -> dict[str, Node]:
         with building(transform.build):
             left = [p - momentum for p, momentum in zip(transform.p, here, strict=True)]
     return {f"missing{i}": node for i, node in enumerate(left)}
-
-
-def _dot(a: list[Node], b: list[Node]) -> Node:
-    total = ZERO
-    for x, y in zip(a, b, strict=True):
-        total = total + x * y
-    return total

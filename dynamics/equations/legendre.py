@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import cached_property
+from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Node
@@ -16,12 +18,22 @@ from .equations_of_motion import require_inertia
 from .formulations import ONE, ZERO
 from .singular_mass_matrix import SingularMassMatrixError, no_inertia
 
+SHORTER, LONGER = (
+    1.0 / 16.0,
+    2.0,
+)  # the share of Newton's step to take, after one that went too far, and after a good one
+OVERSHOOT = 0.5  # of a slope at the start of a step, the other way at its end, and the step went too far
+SETTLED = 1e-16  # step M step over u (p - b) where the step is 1e-8 of the velocities: the next one is rounding
+
 
 class Legendre:
     """The velocities u of momenta p = dL/du at (q, p), solved for by elimination on the graph of L.
 
-    Where L is quadratic in u, p = M u + b, they are M^-1 (p - b). Else they are iterated: Newton's steps from u = 0,
-    the first half of them towards momenta between that of u = 0 and p, one after another, so that none goes far.
+    Where L is quadratic in u, p = M u + b, they are M^-1 (p - b). Else they are iterated, from u = 0: they are where
+    L(q, u) - p u is least, of an L that is strictly convex in u, and Newton's steps go downhill. A share of the step is
+    taken, 1 at first. Where the slope along it has turned to the other sign and is more than half as steep, or L or its
+    slopes are not finite, as past the speed of light, the step is not taken, and a sixteenth tried; else twice the
+    share is next, up to 1. The share has no units, nor is there a threshold that has.
 
     p: variables p0, p1, ...  lagrangian: L, folded.  quadratic: whether the solution does not depend on u.
     """
@@ -96,24 +108,67 @@ class Legendre:
         return dict(zip(linear, folded([self._solved[z] for z in linear], self.build, replace), strict=True))
 
     def _iterated(self) -> list[Node]:
-        system, build = self.system, self.build
-        with building(build):
-            step = [u + self._solved[u] for u in system.qd]
-        velocities: list[Node] = [ZERO] * system.n
+        """The velocities at which L - p u is least, by Newton's steps from rest, shortened where they go too far."""
+        rest = [ZERO] * self.system.n
+        with building(self.build):
+            wanted = [p - b for p, b in zip(self.p, self.offset, strict=True)]
+        here, share = _Iterate(rest, wanted, self._step(rest, wanted)), ONE
         for k in range(1, self.iterations + 1):
-            share = min(1.0, 2.0 * k / self.iterations)
-            momenta = folded(self.momenta, build, dict(zip(system.qd, velocities, strict=True)))
-            with building(build):
-                aims = [b + share * (p - b) for p, b in zip(self.p, self.offset, strict=True)]
-                missing = [aim - here for aim, here in zip(aims, momenta, strict=True)]
-            replace = zip((*system.qd, *system.tau), (*velocities, *missing), strict=True)
-            velocities = folded(step, build, dict(replace))
-        return velocities
+            with building(self.build):
+                work = dot(here.step, here.missing)  # step M step
+                settled = cg.less_equal(cg.abs(work), SETTLED * cg.abs(dot(here.velocities, wanted)))
+                share = cg.where(settled, 1.0, share)
+                velocities = [u + share * step for u, step in zip(here.velocities, here.step, strict=True)]
+            lagrangian, *momenta = self._at_velocities([self.lagrangian, *self.momenta], velocities)
+            with building(self.build):
+                missing = [p - momentum for p, momentum in zip(self.p, momenta, strict=True)]
+                good = cg.less_equal(-OVERSHOOT, dot(here.step, missing) / work)
+            step = here.step
+            if k < self.iterations:
+                step = self._step(velocities, missing)
+                with building(self.build):
+                    good = good * cg.less_equal(-OVERSHOOT, dot(step, missing) / work)
+            with building(self.build):
+                good = cg.where(settled, 1.0, good) * cg.less(cg.abs(lagrangian), math.inf)
+                there = _Iterate(velocities, missing, step)
+                here = _Iterate(*[_chosen(good, new, old) for new, old in zip(there, here, strict=True)])
+                share = cg.where(good, cg.minimum(LONGER * share, 1.0), SHORTER * share)
+        return here.velocities
+
+    def _step(self, velocities: list[Node], missing: list[Node]) -> list[Node]:
+        """M^-1 missing, at velocities."""
+        return self._at_velocities([self._solved[u] for u in self.system.qd], velocities, missing)
+
+    def _at_velocities(
+        self, nodes: Sequence[Node], velocities: Sequence[Node], forces: Sequence[Node] = ()
+    ) -> list[Node]:
+        replace = dict(zip(self.system.qd, velocities, strict=True))
+        return folded(nodes, self.build, replace | dict(zip(self.system.tau, forces, strict=False)))
+
+
+class _Iterate(NamedTuple):
+    """Velocities, what they leave of the momenta, and Newton's step from there."""
+
+    velocities: list[Node]
+    missing: list[Node]
+    step: list[Node]
+
+
+def _chosen(condition: Node, new: list[Node], old: list[Node]) -> list[Node]:
+    return [cg.where(condition, a, b) for a, b in zip(new, old, strict=True)]
 
 
 def is_quadratic(system: System) -> bool:
     """Whether L is quadratic in the velocities, so that they need no iteration."""
     return isinstance(system, BodySystem) or Legendre(system, Builder(), 1).quadratic
+
+
+def dot(a: Sequence[Node], b: Sequence[Node]) -> Node:
+    """The sum of products, 0 of none."""
+    total = ZERO
+    for x, y in zip(a, b, strict=True):
+        total = total + x * y
+    return total
 
 
 def linear_nodes(output: Node, variables: Sequence[Node]) -> list[Node]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,13 +19,15 @@ from ..integrators import Problem
 from ..integrators.step_control import RESOLUTION
 from .dense_output import StepBlock, normalized
 from .run_options import SCIPY, RunOptions
-from .step_program import between
+from .state_sizes import StateSizes
+from .step_program import between, state_kinds
 from .stepping import BLOCK_TIME, Clock, Integration
 
 IMPLICIT = ("Radau", "BDF", "LSODA")
 DEGREES = {"RK45": 4, "DOP853": 7, "Radau": 3, "BDF": 5, "LSODA": 12}  # at most, of the dense output
 FINEST = 100.0 * 2.0**-52  # the smallest rtol that SciPy takes
 LEAP = 1e-6  # of the run: the first step where SciPy finds none
+COARSE = 1e-4  # of the largest component of a kind, which the default atol may be
 IDLE = 1000  # steps below the resolution of the time, after which a run ends
 
 
@@ -38,6 +41,7 @@ class ScipySolver:
     rate: Any  # f(t, x) -> (m,)
     jacobian: dict[str, Any]  # {"jac": f(t, x) -> (m, m)} where the solver takes it
     normalization: Graph | None  # of the states that it gives, see Problem
+    sizes: Callable[[], StateSizes]  # of none yet
 
 
 def scipy_solver(problem: Problem, name: str, backend: str) -> ScipySolver:
@@ -47,8 +51,9 @@ def scipy_solver(problem: Problem, name: str, backend: str) -> ScipySolver:
     jacobian: dict[str, Any] = {}
     if name in IMPLICIT:
         jacobian["jac"] = lambda t, x: rate.jacobian([*x, t])[:, : problem.size]
-    make = getattr(integrate, name)
-    return ScipySolver(name, problem.components, make, lambda t, x: rate([*x, t]), jacobian, between(problem))
+    make, (kinds, groups) = getattr(integrate, name), state_kinds(problem)
+    sizes = partial(StateSizes, 0.0, kinds, groups, 0.0, tuple([size or 1.0 for size in problem.lengths]))
+    return ScipySolver(name, problem.components, make, lambda t, x: rate([*x, t]), jacobian, between(problem), sizes)
 
 
 class _Step(NamedTuple):
@@ -69,6 +74,7 @@ class ScipyIntegration(Integration):
         self.solver, self.options, self.between = solver, options, between
         self._jacobians = self._factorizations = 0
         self._idle = 0  # steps in a row that hardly moved the time
+        self._largest = np.zeros(len(solver.components))  # sizes of the components so far
 
     @property
     def jacobians(self) -> int:
@@ -82,7 +88,14 @@ class ScipyIntegration(Integration):
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
+        try:
+            yield from self._blocks(x)
+        finally:
+            self._judge_atol()
+
+    def _blocks(self, x: Array) -> Iterator[StepBlock]:
         solver = self._started(x)
+        self._largest = np.abs(x)
         rows: list[_Step] = []
         clock = Clock()
         while solver is not None and solver.status == "running" and not self.status:
@@ -95,6 +108,17 @@ class ScipyIntegration(Integration):
                 x, rows = rows[-1].x, []
         if rows:
             yield self._block(rows)
+
+    def _judge_atol(self) -> None:
+        """Note where the atol that nobody gave, a number in whatever unit, is no small part of a kind of component."""
+        kind = self.solver.sizes().largest_of_kind(self._largest)
+        shares = np.divide(self.options.absolute, kind, out=np.zeros_like(kind), where=kind > 0.0)
+        k = int(np.argmax(shares))
+        if self.options.atol is None and shares[k] > COARSE:
+            self.warnings.append(
+                f"atol = {self.options.absolute:g}, the default of SciPy's solvers, is {shares[k]:.2g} of "
+                f"{kind[k]:.3g}, the largest that {self.components[k]} or another of its kind has been: give atol"
+            )
 
     def _started(self, x: Array) -> Any:
         """SciPy's solver at the start; None where it would not come back from there, and then `status` says why."""
@@ -156,6 +180,7 @@ class ScipyIntegration(Integration):
         self.steps += 1
         t_old, t, x = float(solver.t_old), float(solver.t), np.array(solver.y)
         self.largest = max(self.largest, abs(t - t_old))
+        self._largest = np.maximum(self._largest, np.abs(x))
         degree, times = DEGREES[self.solver.name], self.options.times
         if not self.between and (times is None or not _inside(times, t_old, t)):
             return _Step(t_old, t, x_old, x, np.full((degree, len(x)), np.nan))

@@ -59,7 +59,7 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
     dense: whether a method that chooses its steps records its dense output.
     Raises SingularMassMatrixError for a coordinate without inertia, ValueError for a method that the model has not.
     """
-    kinds, groups = _kinds(problem)
+    kinds, groups = state_kinds(problem)
     return StepProgram(
         problem.components,
         problem.parameters,
@@ -78,7 +78,7 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
     )
 
 
-def _kinds(problem: Problem) -> tuple[tuple[int, ...], tuple[int, ...]]:
+def state_kinds(problem: Problem) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Kinds and groups of the components.
 
     Coordinates are a kind, and velocities; those of no known length are others, and so is a group of several

@@ -158,7 +158,7 @@ def simulate_many(
     _run(task, chunks, team, result)
 
     # Put the result together
-    stats = _judged(result.stats(method, time.perf_counter() - begin), problem, options.row_times, result.rows, p)
+    stats = _judged(result.stats(method, time.perf_counter() - begin), problem, options, result.rows, start)
     if text := _warning(stats):
         warnings.warn(text, SimulationWarning, stacklevel=2)
     table, momenta = _table(problem, options.row_times, result.rows, p)
@@ -187,11 +187,13 @@ def _row_count(options: RunOptions) -> int:
     return step_count(options.t_end - options.t0, options.step) + 1
 
 
-def _judged(stats: EnsembleStats, problem: Problem, times: Array, rows: Array, p: Array) -> EnsembleStats:
+def _judged(stats: EnsembleStats, problem: Problem, options: RunOptions, rows: Array, start: Starts) -> EnsembleStats:
     """The same, with what speaks against the velocities of momenta."""
     if problem.missing is None:
         return stats
-    missed = [missed_momenta(problem, times, *each) for each in zip(rows, p, strict=True)]
+    t0, times = options.t0, options.row_times
+    x, p = _steps_from(start, problem, t0)
+    missed = [missed_momenta(problem, times, rows[k], p[k], start=(t0, start.x[k], x[k])) for k in range(len(x))]
     return replace(stats, warnings=tuple([(*a, *b) for a, b in zip(stats.warnings, missed, strict=True)]))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -20,8 +21,10 @@ from ...systems.system import System
 from ..applied_forces import Constant
 from ..event import Event, as_events
 from ..event_program import event_program
+from ..trajectory import SimulationWarning
 from .legs import Bars, Legs
 from .loss_function import loss_graph, with_slopes
+from .missed_legs import missed_legs
 from .motion import START, TORQUE, VELOCITY, MotionOf, motion_of
 from .motion_programs import KEPT, Request, motion_programs
 from .point_functions import at
@@ -154,6 +157,8 @@ def gradient(
     watched = as_events(events)
     motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, watched, form)
     value, gradients, legs = differentiated(motion, loss, running, watched)
+    if text := missed_legs(legs):
+        warnings.warn(text, SimulationWarning, stacklevel=2)
     nq, checkpoints = motion.problem.nq, max([run.checkpoints for run in legs.runs])
     x = legs.end
     return MotionGradient(float(value), gradients, legs.t, x[:nq], x[nq:], checkpoints)
@@ -195,7 +200,7 @@ def _final(graph: Graph | None, motion: MotionOf, legs: Legs) -> tuple[Any, Bars
         inputs = np.zeros((motion.forces + len(motion.values), *legs.x.shape[1:]))
         return 0.0, Bars(np.zeros_like(legs.x), 0.0, inputs)
     value, *bars = at(with_slopes(graph, motion.backend), motion.at_end(legs.x, float(legs.t[-1])))
-    return value, Bars(np.array(bars[:m]), bars[m], np.array(bars[m + 1 :]))
+    return value, Bars(np.array(bars[:m]), bars[m], np.array(bars[m + 1 :]).reshape(-1, *legs.x.shape[1:]))
 
 
 def _gradients(motion: MotionOf, start: Array, inputs: Array, rows: Array, end: Bars) -> dict[str, Any]:

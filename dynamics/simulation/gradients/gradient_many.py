@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -18,7 +19,9 @@ from ..applied_forces import with_applied
 from ..ensembles.initial_states import starts
 from ..run_options import time_span
 from ..sampled_controller import SampledController
+from ..trajectory import SimulationWarning
 from .gradient import Loss, differentiated
+from .missed_legs import missed_legs
 from .motion import TORQUE, MotionOf, changing_forces, equal_leg, names_of, options_of
 from .motion_equations import motion_equations
 
@@ -124,12 +127,15 @@ def gradient_many(
         parts: list[int | slice] = list(range(motions.many))
     else:
         parts = [slice(k, k + WIDE) for k in range(0, motions.many, WIDE)]
-    values, gradients, ends = [], [], []
+    values, gradients, ends, said = [], [], [], ""
     for part in parts:
         value, by_name, legs = differentiated(_some(motions, part), loss, running)
+        said = said or missed_legs(legs, first=part if isinstance(part, int) else part.start)
         values.append(np.atleast_1d(value))
         gradients.append({name: _by_motion(array, part) for name, array in by_name.items()})
         ends.append(_by_motion(legs.end, part))
+    if said:
+        warnings.warn(said, SimulationWarning, stacklevel=2)
     rows, nq = np.concatenate(ends), motions.problem.nq
     joined = {name: np.concatenate([each[name] for each in gradients]) for name in motions.wrt}
     return MotionGradients(np.concatenate(values), joined, legs.t, rows[:, :nq], rows[:, nq:])

@@ -108,6 +108,16 @@ class MotionRun:
             else:
                 yield first, last, kept
 
+    def states(self) -> tuple[Array, Array]:
+        """Times (T,) and states (T, m) from the start to the end: after every step, or where checkpoints are."""
+        if not self.checkpoints:
+            return self.motion.t, np.concatenate(
+                [self.begin[None], *[kept[:, -len(self.x) :] for *_, kept in self._blocks]]
+            )
+        kept = [self.step.forward.read(memory, self.step.passes.handed["x"]) for *_, memory in self._blocks]
+        times = [self.motion.t[first] for first, *_ in self._blocks]
+        return np.array([*times, self.motion.t[-1]]), np.array([*kept, self.x])
+
     def pulled(self, seeds: Mapping[str, Array | float]) -> tuple[dict[str, Array], Array]:
         """Cotangents of the start and of the inputs, from those after the last step; and rows, those of each step."""
         memory = self._linear_memory(self.step, self._constants, seeds)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -16,7 +17,9 @@ from ...systems.model import Model
 from ..applied_forces import Constant
 from ..event import Event, as_events
 from ..event_program import event_program
+from ..trajectory import SimulationWarning
 from .legs import Legs
+from .missed_legs import missed_legs
 from .motion import START, TORQUE, VELOCITY, MotionOf, motion_of
 from .motion_programs import Request, motion_programs
 from .pushed_legs import pushed_legs
@@ -133,6 +136,8 @@ def sensitivities(
     directions, columns = _directions(motion)
     program = event_program(motion.problem, watched)
     legs = Legs(motion, motion_programs(request), {event.name: event for event in program.events})
+    if text := missed_legs(legs):
+        warnings.warn(text, SimulationWarning, stacklevel=2)
     t, x, t_dot, x_dot = pushed_legs(legs, directions)
     derivatives = {name: x_dot[:, :, place] for name, place in columns.items()}
     times = {name: t_dot[:, place] for name, place in columns.items()}

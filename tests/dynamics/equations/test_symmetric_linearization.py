@@ -111,7 +111,7 @@ def assert_linear(model: Any, seed: int) -> None:
     """A is the derivative of the rates; without damping and forces it has the structure of a Hamiltonian."""
     system, n = as_system(model), as_system(model).n
     graph = dyn.state_space(model, form="momentum")
-    equations, moving = dyn.hamilton_equations(model), velocities(system)
+    equations, moving = dyn.hamilton_equations(model, iterations=12), velocities(system)
     at = state(model, equations, moving, seed)
     found = square(graph, at)
     c, p, p_rate = brackets(system, at)

@@ -5,7 +5,7 @@ import warnings
 from typing import Any
 
 import numpy as np
-from pytest import mark
+from pytest import approx, mark
 
 import cgraph as cg
 import dynamics as dyn
@@ -66,3 +66,23 @@ def test_the_sentence_names_the_component() -> None:
     assert message(ROOT, [0.0, 1.0], "Radau") == (
         "stopped at t = 0 s: the Jacobian of the rate of state 'x' is not finite"
     )
+
+
+def test_an_atol_that_nobody_gave_is_said_where_it_is_much_of_a_component() -> None:
+    """An arm in other units moves the same, or is said not to: of femtograms and micrometers 1e-10 is large."""
+    start, states = ([1.0, -0.5], [0.0, 0.0]), []
+    for mass, length, coarse in ((1.0, 1.0, False), (1e-15, 1e-6, True)):
+        arm = dyn.planar_arm([mass, mass], [length, length], gravity=9.81 * length)
+        how: dict[str, Any] = {"form": "momentum", "t_eval": [0.0, 1.0]}
+        with warnings.catch_warnings(record=True, action="always") as said:
+            run = dyn.simulate(arm, *start, 1.0, "scipy:LSODA", **how)
+        assert run.stats.warnings == tuple([str(each.message) for each in said])
+        assert len(said) == coarse
+        if coarse:
+            assert "atol = 1e-10, the default of SciPy's solvers, is " in run.stats.warnings[0]
+            assert "largest that momentum of " in run.stats.warnings[0]
+            run = dyn.simulate(
+                arm, *start, 1.0, "scipy:LSODA", atol=[1e-10] * 2 + [1e-10 * mass * length**2] * 2, **how
+            )
+        states.append(run.q[-1])
+    assert states[1] == approx(states[0], abs=1e-7)
