@@ -164,6 +164,10 @@ class BalancedElimination(EdgePushing):
         """As of the base class; a pair that has not one positive eigenvalue counts as the variable before it."""
         return super().info({*negative, *[unknown for pair in self._copies.values() for unknown in pair]})
 
+    def depth_of(self, solved: EdgePushing, wrt: Sequence[Node]) -> int:
+        """How deep the solution of some equations is."""
+        return max([self._depth(solved.dots[node]) for node in wrt], default=0)
+
     def _depth(self, node: Node) -> int:
         """The edges of the longest path to a node."""
         waiting = [node]

@@ -14,7 +14,7 @@ from ..simplify.balanced_sums import balanced
 from ..simplify.builder import Builder
 from ..util.require import require_choice, require_flag, require_sequence
 from .balanced_elimination import BalancedElimination, nodes_of, written_rows
-from .elimination_order import elimination_steps
+from .elimination_order import Step, elimination_steps
 from .reverse import cotangents
 from .schur_elimination import EdgePushing
 
@@ -52,8 +52,8 @@ def hessian_solve(
         "recursive": from the output down, for a chain or a tree from its tips to its base, one after another: the
         fewest nodes, and a depth in proportion to the length of a chain. "balanced": by nested dissection, halves of a
         chain at the same time, seen from their two ends only, and long sums in blocks (`cg.balanced_sums`): a depth in
-        proportion to the logarithm, for about twice the nodes, three times where a link has few; what is too short to
-        be cut is as before. Pieces are eliminated with the inertia that they have by themselves: a body of next to none
+        proportion to the logarithm, for about twice the nodes, three times where a link has few; where it is not
+        shallower, the recursive order stays. Pieces are eliminated with the inertia that they have by themselves: a body of next to none
         beside its neighbors costs digits, and with `check` their pivots have to be positive as well.
 
     Returns
@@ -219,19 +219,31 @@ def _solved(
 ) -> EdgePushing:
     """W t = b, solved: all tangents."""
     nodes, entries = _dependent([output, *at], wrt), dict(zip(wrt, rhs, strict=True))
-    with building(build) as set_label:
+    with building(build):
         equations = EdgePushing(build, output, entries, at, nodes)
         passed = equations.arguments(_rows(output, multipliers, wrt))
         plan = elimination_steps(passed, equations.rotations)
-        if order == "balanced":
-            if multipliers:
-                raise ValueError('order "balanced" needs a function without multipliers')
-            fewest = elimination_steps(passed, equations.rotations, fewest=True)
-            with building(Builder()):
-                rows = written_rows(EdgePushing(build, output, entries, at, nodes), fewest)
+    if order == "balanced":
+        if multipliers:
+            raise ValueError('order "balanced" needs a function without multipliers')
+        fewest = elimination_steps(passed, equations.rotations, fewest=True)
+        with building(Builder()):
+            rows = written_rows(EdgePushing(build, output, entries, at, nodes), fewest)
+            alone = EdgePushing(build, output, entries, at, nodes)
+        with building(build):
             pieces = BalancedElimination(build, output, entries, at, nodes, fewest, rows)
-            if pieces.is_cut:
-                equations, plan = pieces, fewest
+        if pieces.is_cut:
+            _run(pieces, fewest, build)
+            _run(alone, plan, Builder())
+            if pieces.depth_of(pieces, wrt) < pieces.depth_of(alone, wrt):
+                return pieces
+    _run(equations, plan, build)
+    return equations
+
+
+def _run(equations: EdgePushing, plan: Sequence[Step], build: Builder) -> None:
+    """Take the steps out, and give their nodes the tangents."""
+    with building(build) as set_label:
         for step in plan:
             set_label(nodes_of(step)[0].label.derived(ADJOINT))
             equations.reduce(step)
@@ -239,7 +251,6 @@ def _solved(
         for step in reversed(plan):
             set_label(nodes_of(step)[0].label.derived(TANGENT))
             equations.substitute(step)
-    return equations
 
 
 def _rows(output: Node, multipliers: Collection[Node], wrt: Sequence[Node]) -> dict[Node, list[Node]]:

@@ -163,3 +163,19 @@ def test_the_order_of_what_is_no_chain_costs_nothing():
             for order in ("recursive", "balanced")
         ]
         assert sizes[0] == sizes[1]
+
+
+def test_what_pieces_would_make_deeper_stays_as_it_was():
+    """A bushy tree: each of its 63 states goes on from that of its parent."""
+    x, states, total = cg.variables([f"x{i}" for i in range(63)]), [], cg.constant(0.0)
+    for i, node in enumerate(x):
+        a, b = states[(i - 1) // 2] if i else (cg.constant(0.0), cg.constant(1.0))
+        a, b = a + cg.cos(cg.variable("angle") + i) * node, b + cg.sin(cg.variable("angle") + i) * node
+        states.append((a, b))
+        total = total + a * a + b * b
+    depths = {}
+    for order in ("recursive", "balanced"):
+        solved = solve_nodes(total, x, [cg.constant(1.0)] * 63, order=order)
+        graph = cg.Graph([cg.variable("angle")], {f"{i}": node for i, node in enumerate(solved)})
+        depths[order] = graph.counts().depth
+    assert depths["balanced"] <= depths["recursive"]
