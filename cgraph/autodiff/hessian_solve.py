@@ -53,8 +53,8 @@ def hessian_solve(
         fewest nodes, and a depth in proportion to the length of a chain. "balanced": by nested dissection, halves of a
         chain at the same time, seen from their two ends only, and long sums in blocks (`cg.balanced_sums`): a depth in
         proportion to the logarithm, for about twice the nodes, three times where a link has few; where it is not
-        shallower, the recursive order stays. Pieces are eliminated with the inertia that they have by themselves: a body of next to none
-        beside its neighbors costs digits, and with `check` their pivots have to be positive as well.
+        shallower, the recursive order stays. Pieces are eliminated with the inertia that they have by themselves: a
+        body of next to none beside its neighbors costs digits, and with `check` their pivots have to be positive too.
 
     Returns
     -------
