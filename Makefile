@@ -51,11 +51,9 @@ clean:  ## remove .venv, paper and all else that the targets above make where no
 
 # One stamp for each set of extras, so that a second run installs nothing. The environment is kept when
 # pyproject.toml changes; pip then brings it up to date.
-# Tests import few of the files that pip would compile; Python compiles those at their first import.
-$(INSTALLED)test: NO_COMPILE = --no-compile
 $(INSTALLED)%: pyproject.toml | $(VENV)/.created
 	@echo "Installing cgraph[$*] into $(VENV)"
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check $(NO_COMPILE) --editable ".[$*]"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[$*]"
 	@touch "$@"
 
 $(VENV)/.created:

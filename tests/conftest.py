@@ -25,7 +25,7 @@ if sys.dont_write_bytecode:  # else every process that a test starts would compi
     sys.dont_write_bytecode = False
 
 _slow_is_fine = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow, HealthCheck.data_too_large]}
-settings.register_profile("reproducible", max_examples=25, derandomize=True, database=None, **_slow_is_fine)
+settings.register_profile("reproducible", max_examples=18, derandomize=True, database=None, **_slow_is_fine)
 settings.register_profile("full", max_examples=100, derandomize=True, database=None, **_slow_is_fine)
 settings.register_profile("explore", max_examples=2000, print_blob=True, **_slow_is_fine)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "reproducible"))

@@ -20,6 +20,7 @@ import dynamics as dyn
 import viz
 from dynamics import scenes
 from dynamics.scenes import scenes as registry
+from tests.slow import slow
 from viz import cli
 from viz.commands.arguments import IN_PYTHON
 from viz.commands.parser import COMMANDS, parse, parser
@@ -260,7 +261,7 @@ def test_tags_to_collapse_are_given_one_by_one_or_in_a_list(tmp_path, capsys):
     assert "box3d" not in texts[2]
 
 
-@pytest.mark.parametrize("command", [["draw", "chain", "--out"], ["lint", "chain", "--svg"]])
+@pytest.mark.parametrize("command", [["draw", "chain", "--out"], *slow(["lint", "chain", "--svg"])])
 def test_a_picture_of_too_many_nodes_has_a_box_for_a_link(tmp_path, monkeypatch, capsys, command):
     sources = []
     for module in ("viz.commands.draw", "viz.commands.arguments"):

@@ -74,9 +74,9 @@ def test_functions_of_all_kinds_are_solved_in_pieces(name):
 def test_chains_and_trees_are_solved_in_pieces(monkeypatch, leaf, branches, still):
     """Some of them with variables that have no inertia before others have left."""
     monkeypatch.setattr(dissection, "LEAF", leaf)
-    for seed in range(2):
+    for seed in range(1 + (leaf == SMALL)):
         rng = np.random.default_rng(seed)
-        n = int(rng.integers(8, 14))
+        n = int(rng.integers(8, 12))
         x = cg.variables([f"x{i}" for i in range(n)])
         total = running(x, rng, branches, still) + 0.01 * sum([v * v for v in x], cg.constant(0.0)) * (still > 0)
         values = {f"x{i}": float(v) for i, v in enumerate(rng.uniform(-0.3, 0.3, n))} | {"angle": 0.4}
@@ -118,9 +118,9 @@ def info(total, inputs, x, values):
 
 @pytest.mark.usefixtures("small_pieces")
 def test_a_matrix_that_is_not_positive_definite_is_told():
-    """Of 30 random ones, by their eigenvalues; that of positive pieces is told apart from every other."""
+    """Of 16 random ones, by their eigenvalues; that of positive pieces is told apart from every other."""
     told = {True: 0, False: 0}
-    for seed in range(30):
+    for seed in range(16):
         rng = np.random.default_rng(seed)
         x, m = cg.variables([f"x{i}" for i in range(8)]), cg.variable("m")
         total, at = cg.constant(0.0), cg.constant(0.0)
@@ -139,7 +139,7 @@ def test_a_matrix_that_is_not_positive_definite_is_told():
             assert found > 0
         elif mass > 0:
             assert found == 0
-    assert min(told.values()) > 3
+    assert min(told.values()) > 2
 
 
 def test_what_cannot_be_is_said():

@@ -50,6 +50,7 @@ def outcomes(*arguments: str) -> dict[str, list[str]]:
     return found
 
 
+@pytest.mark.slow
 def test_every_part_of_the_library_takes_the_operation_and_the_tests_of_the_table_accept_it() -> None:
     """Without a word about it in any of them."""
     pytest.importorskip("llvmlite")  # without which these files have nothing to run

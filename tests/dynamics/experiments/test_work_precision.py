@@ -381,6 +381,7 @@ def test_mistakes(arguments: dict[str, Any], said: str) -> None:
         work_precision(**arguments)
 
 
+@pytest.mark.slow
 def test_cold_starts_run_in_processes_of_their_own(tmp_path: Path) -> None:
     pytest.importorskip("llvmlite")
     (found,) = cold_starts("spring_mass", {}, ["ours"], turns=2, budget=1e3)

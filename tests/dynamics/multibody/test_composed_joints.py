@@ -15,6 +15,7 @@ import dynamics as dyn
 from dynamics.multibody.spatial import rotation, unit
 from tests.dynamics.mechanisms import random_body, random_mechanism
 from tests.dynamics.models import Array, error, run, states
+from tests.slow import slow
 from tests.tolerances import LONG_SUM, TORQUES
 
 KINDS = {"cylindrical": ("shift", "angle"), "universal": ("angle1", "angle2"), "planar": ("x", "y", "angle")}
@@ -53,7 +54,7 @@ def by_hand(kind: str) -> dyn.Mechanism:
     return dyn.Mechanism([first, *bodies, replace(middle, joint=joints[-1], parent=names[-2]), last])
 
 
-@mark.parametrize("kind", KINDS)
+@mark.parametrize("kind", ["universal", *slow("cylindrical", "planar")])
 def test_a_composed_joint_is_its_parts_node_by_node(kind: str) -> None:
     composed, chain = on_joint(kind), by_hand(kind)
     assert composed.coordinates == chain.coordinates == ("b0", *[f"b1.{name}" for name in KINDS[kind]], "b2")

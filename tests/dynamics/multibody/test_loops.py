@@ -14,6 +14,7 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.constraint_rank import independent_rows
 from dynamics.multibody.spatial import rotation
+from tests.slow import slow
 
 from ..linkages import ACROSS, bar, four_bar, peaucellier, scaled_four_bar, squeezer, stewart_platform
 from ..mechanisms import random_body, random_joint, random_rotation
@@ -125,7 +126,7 @@ def held_still(model: dyn.Mechanism, rate: cg.Graph, at: dict[str, float]) -> di
     return at | {f"qd{i}": x for i, x in enumerate((u - np.linalg.lstsq(rows, rows @ u)[0]).tolist())}
 
 
-@pytest.mark.parametrize("kind", ["point", "hinge", "weld", "distance"])
+@pytest.mark.parametrize("kind", ["hinge", "distance", *slow("point", "weld")])
 def test_accelerations_and_loop_forces_solve_the_defining_equations(kind: str) -> None:
     model, loop, at = closed_tree(kind)
     tree = open_tree(0)
