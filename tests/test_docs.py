@@ -15,6 +15,7 @@ import cgraph as cg
 import dynamics as dyn
 import viz
 from docs.sphinx_extensions.command_reference import markdown
+from tests.slow import slow
 from viz.commands.parser import parse, parser
 
 ROOT = Path(__file__).parents[1]
@@ -100,7 +101,10 @@ def test_an_example_has_the_output_that_follows_it() -> None:
     assert program(page).splitlines()[5] == "print(x)"
 
 
-@pytest.mark.parametrize("name", RUN)
+LONG = "docs/derivatives.md"  # its figures take most of the time
+
+
+@pytest.mark.parametrize("name", [*[name for name in RUN if name != LONG], *slow(LONG)])
 def test_examples_print_what_is_shown(name: str, tmp_path: Path) -> None:
     """From top to bottom, in one namespace, in an empty folder, and write the pictures that the page shows."""
     run = run_examples(name, tmp_path, quickly="HYPOTHESIS_PROFILE" not in os.environ)
