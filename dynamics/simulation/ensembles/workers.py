@@ -71,9 +71,10 @@ def _by_map(task: Task, chunks: Sequence[Chunk], workers: Map) -> Generator[Part
 
 def _by_threads(task: Task, chunks: Sequence[Chunk], threads: int, table: Array) -> Generator[Part, None, None]:
     stop, ended = threading.Event(), SimpleQueue[Future[Part]]()
+    futures: list[Future[Part]] = []
     with ThreadPoolExecutor(threads) as pool:
-        futures = [pool.submit(task.run, chunk, _rows(table, chunk), stop.is_set) for chunk in chunks]
-        try:
+        try:  # threads run from the first submission on, and the pool waits for them at any exit
+            futures.extend(pool.submit(task.run, chunk, _rows(table, chunk), stop.is_set) for chunk in chunks)
             for future in futures:
                 future.add_done_callback(ended.put)
             for _ in futures:

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ import pytest
 from pytest import mark, raises
 
 from cgraph.codegen import llvm_engine
-from dynamics.simulation.ensembles import task
+from dynamics.simulation.ensembles import task, workers as workers_module
 from dynamics.simulation.ensembles.simulate_many import simulate_many
 from tests.dynamics.ensembles import arms, same
 from tests.dynamics.models import random_arm
@@ -160,3 +161,22 @@ def test_an_error_in_a_thread_is_raised_and_leaves_no_thread(monkeypatch: pytest
 def test_workers_that_give_no_results_are_refused() -> None:
     with raises(TypeError, match=r"workers must give the results of the function, as map does, got int: 1"):
         simulate_many(*arms(9), 0.1, "rk4", workers=lambda f, each: [1])  # type: ignore[list-item]
+
+
+def test_an_interrupt_while_chunks_are_handed_out_ends_the_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the instant: the pool waits for its threads, and these have to be told."""
+    submit = workers_module.ThreadPoolExecutor.submit
+
+    class Interrupted(workers_module.ThreadPoolExecutor):
+        def submit(self, *arguments: Any) -> Any:
+            future = submit(self, *arguments)
+            if len(self._threads) > 1:
+                raise KeyboardInterrupt
+            return future
+
+    monkeypatch.setattr(workers_module, "ThreadPoolExecutor", Interrupted)
+    before = set(threading.enumerate())
+    model, q, qd = arms(64)
+    with suppress(KeyboardInterrupt):
+        simulate_many(model, q, qd, 1e9, "rk4", t_eval=[0.0, 1e9], workers=3, chunk=8)
+    assert set(threading.enumerate()) <= before
