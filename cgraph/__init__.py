@@ -1,70 +1,78 @@
 """cgraph: computational graphs of equations, with forward and reverse automatic differentiation."""
 
-from typing import TYPE_CHECKING
+from .util.doors import doors
 
-from .autodiff.forward import jvp
-from .autodiff.hessian_solve import hessian_solve
-from .autodiff.jacobian import hessian, jacobian
-from .autodiff.reverse import gradient, vjp
-from .autodiff.sparsity import sparsity
-from .codegen import Compiled, clear_cache, compile
-from .codegen.c import CSource, to_c
-from .codegen.wasm import to_wasm
-from .core.counts import Counts
-from .core.edge import Edge
-from .core.graph import Graph
-from .core.latex import latex
-from .core.naming import variables, with_name
-from .core.node import Node, constant, variable
-from .core.ops import (
-    abs_ as abs,
-    acos,
-    asin,
-    atan,
-    atan2,
-    cbrt,
-    ceil,
-    cos,
-    cosh,
-    equal,
-    erf,
-    erfc,
-    exp,
-    exp2,
-    expm1,
-    floor,
-    fmod,
-    hypot,
-    less,
-    less_equal,
-    log,
-    log1p,
-    log2,
-    log10,
-    logistic,
-    maximum,
-    minimum,
-    not_equal,
-    pow,
-    round_ as round,
-    sign,
-    sin,
-    sinh,
-    sqrt,
-    tan,
-    tanh,
-    where,
-)
-from .core.scope import tag
-from .core.source_lines import recording_lines
-from .core.structure_hash import structure_hash
-from .errors import GraphError
-from .explain import Comparison, Lint, Why, WhyNot, compare, lint, why, why_not
-from .program import Loop, loop
-from .simplify.balanced_sums import balanced_sums
-from .simplify.double_double import double_double
-from .simplify.simplify import simplify, specialize
-from .util.version import __version__ as __version__
+TYPE_CHECKING = False  # as a checker knows it; typing takes a while to load
+
+if TYPE_CHECKING:
+    from .autodiff.forward import jvp
+    from .autodiff.hessian_solve import hessian_solve
+    from .autodiff.jacobian import hessian, jacobian
+    from .autodiff.reverse import gradient, vjp
+    from .autodiff.sparsity import sparsity
+    from .codegen.c.c_source import CSource, to_c
+    from .codegen.compile import compile
+    from .codegen.compiled import Compiled
+    from .codegen.disk_cache import clear_cache
+    from .codegen.wasm.to_wasm import to_wasm
+    from .core.counts import Counts
+    from .core.edge import Edge
+    from .core.graph import Graph
+    from .core.latex import latex
+    from .core.naming import variables, with_name
+    from .core.node import Node, constant, variable
+    from .core.ops import (
+        abs_ as abs,
+        acos,
+        asin,
+        atan,
+        atan2,
+        cbrt,
+        ceil,
+        cos,
+        cosh,
+        equal,
+        erf,
+        erfc,
+        exp,
+        exp2,
+        expm1,
+        floor,
+        fmod,
+        hypot,
+        less,
+        less_equal,
+        log,
+        log1p,
+        log2,
+        log10,
+        logistic,
+        maximum,
+        minimum,
+        not_equal,
+        pow,
+        round_ as round,
+        sign,
+        sin,
+        sinh,
+        sqrt,
+        tan,
+        tanh,
+        where,
+    )
+    from .core.scope import tag
+    from .core.source_lines import recording_lines
+    from .core.structure_hash import structure_hash
+    from .errors import GraphError
+    from .explain.compare import Comparison, compare
+    from .explain.lint.lint import Lint, lint
+    from .explain.why import Why, why
+    from .explain.why_not import WhyNot, why_not
+    from .program.loop import Loop, loop
+    from .simplification.balanced_sums import balanced_sums
+    from .simplification.double_double import double_double
+    from .simplification.simplify import simplify, specialize
+    from .util.version import __version__ as __version__
 
 __all__ = [
     "CSource",
@@ -146,5 +154,11 @@ __all__ = [
     "with_name",
 ]
 
-if not TYPE_CHECKING:  # `cg.name` of a row that was added; a checker shall see a misspelt name
-    from .core.function_factory import of_name as __getattr__  # noqa: F401
+if not TYPE_CHECKING:  # a checker shall see a misspelt name
+
+    def _of_row(name):
+        from .core.function_factory import of_name
+
+        return of_name(name)  # `cg.name` of a row that was added to the table
+
+    __getattr__, __dir__ = doors(__name__, __file__, _of_row)

@@ -1,72 +1,79 @@
 """dynamics: equations of motion on computational graphs, from Lagrangians and bodies."""
 
-from cgraph import __version__ as __version__
+from cgraph.extend import doors
 
-from . import scenes
-from .equations.arrays_at import arrays_at
-from .equations.conserved_momenta import conserved_momenta
-from .equations.consistent_state import consistent_state
-from .equations.constraint_lint import ConstraintLint, lint_constraints
-from .equations.constraint_rank import ConstraintWarning
-from .equations.coriolis import coriolis, damping_force
-from .equations.energies import energy, kinetic_energy, potential_energy
-from .equations.equations_of_motion import bias, forward_dynamics, gravity_force, mass_matrix, momentum
-from .equations.formulation_sizes import formulation_sizes
-from .equations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious_nodes
-from .equations.hamiltonian import hamilton_equations, hamiltonian
-from .equations.integrability import integrable_rows
-from .equations.inverse_dynamics_derivatives import inverse_dynamics_derivatives
-from .equations.inverse_mass_matrix import inverse_mass_matrix
-from .equations.linearization import linearize, state_space
-from .equations.linearize_many import linearize_many
-from .equations.reduced_linearization import ReducedLinearization, reduced_linearization
-from .equations.singular_mass_matrix import SingularMassMatrixError, raise_if_singular
-from .equations.state_equation import state_equation
-from .equations.torque_decomposition import torque_by_joint_motion, torque_by_link
-from .equations.torque_table import TorqueTable
-from .experiments.stability import cases
-from .integrators import METHODS
-from .io.load import load_mjcf, load_urdf
-from .io.write_mjcf import to_mjcf
-from .io.write_urdf import to_urdf
-from .multibody.build_tree import serial_arm, tree
-from .multibody.frames import (
-    frame_acceleration,
-    frame_bias_acceleration,
-    frame_jacobian,
-    frame_jacobian_rate,
-    frame_placement,
-    frame_velocity,
-)
-from .multibody.impact import Attached, FreeBody, Released, attach_with_impact, release
-from .multibody.joint_force import Actuator, JointForce, JointFriction, JointLimit
-from .multibody.mechanism import Body, Force, Joint, Loop, Mechanism, MechanismError, MechanismWarning
-from .multibody.planar_arm import planar_arm
-from .multibody.pruning import EFFECTS, OmittedTerm, PruneResult, prune
-from .multibody.recursive_inverse_dynamics import RecursiveInverseDynamics
-from .multibody.regressor import inertial_parameters, regressor
-from .multibody.subtree import Subtree
-from .multibody.whole_body import center_of_mass, center_of_mass_jacobian, spatial_momentum
-from .reference import Reference, reference
-from .scenes.scenes import Scene
-from .simulation.ensembles import Ensemble, EnsembleStats, simulate_many
-from .simulation.event import Event
-from .simulation.gradients.gradient import MotionGradient, gradient
-from .simulation.gradients.gradient_many import MotionGradients, gradient_many
-from .simulation.gradients.motion import MotionError
-from .simulation.gradients.sensitivities import Sensitivities, sensitivities
-from .simulation.sampled_controller import HeldForces, SampledController
-from .simulation.simulate import simulate
-from .simulation.trajectory import Crossings, SimulationWarning, Stats, Trajectory
-from .systems.constraints import ConstraintError
-from .systems.controller import with_controller
-from .systems.display_names import display_names
-from .systems.model import as_system
-from .systems.ode_system import OdeSystem
-from .systems.quasi_velocities import QuasiVelocities
-from .systems.system import System
-from .verification.certificate import certify
-from .verification.residual import Certificate
+TYPE_CHECKING = False  # as a checker knows it; typing takes a while to load
+
+if TYPE_CHECKING:
+    from cgraph import __version__ as __version__
+
+    from . import scenes
+    from .equations.arrays_at import arrays_at
+    from .equations.conserved_momenta import conserved_momenta
+    from .equations.consistent_state import consistent_state
+    from .equations.constraint_lint import ConstraintLint, lint_constraints
+    from .equations.constraint_rank import ConstraintWarning
+    from .equations.coriolis import coriolis, damping_force
+    from .equations.energies import energy, kinetic_energy, potential_energy
+    from .equations.equations_of_motion import bias, forward_dynamics, gravity_force, mass_matrix, momentum
+    from .equations.formulation_sizes import formulation_sizes
+    from .equations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious_nodes
+    from .equations.hamiltonian import hamilton_equations, hamiltonian
+    from .equations.integrability import integrable_rows
+    from .equations.inverse_dynamics_derivatives import inverse_dynamics_derivatives
+    from .equations.inverse_mass_matrix import inverse_mass_matrix
+    from .equations.linearization import linearize, state_space
+    from .equations.linearize_many import linearize_many
+    from .equations.reduced_linearization import ReducedLinearization, reduced_linearization
+    from .equations.singular_mass_matrix import SingularMassMatrixError, raise_if_singular
+    from .equations.state_equation import state_equation
+    from .equations.torque_decomposition import torque_by_joint_motion, torque_by_link
+    from .equations.torque_table import TorqueTable
+    from .experiments.stability import cases
+    from .integrators import METHODS
+    from .io.load import load_mjcf, load_urdf
+    from .io.write_mjcf import to_mjcf
+    from .io.write_urdf import to_urdf
+    from .multibody.build_tree import serial_arm, tree
+    from .multibody.frames import (
+        frame_acceleration,
+        frame_bias_acceleration,
+        frame_jacobian,
+        frame_jacobian_rate,
+        frame_placement,
+        frame_velocity,
+    )
+    from .multibody.impact import Attached, FreeBody, Released, attach_with_impact, release
+    from .multibody.joint_force import Actuator, JointForce, JointFriction, JointLimit
+    from .multibody.mechanism import Body, Force, Joint, Loop, Mechanism, MechanismError, MechanismWarning
+    from .multibody.planar_arm import planar_arm
+    from .multibody.pruning import EFFECTS, OmittedTerm, PruneResult, prune
+    from .multibody.recursive_inverse_dynamics import RecursiveInverseDynamics
+    from .multibody.regressor import inertial_parameters, regressor
+    from .multibody.subtree import Subtree
+    from .multibody.whole_body import center_of_mass, center_of_mass_jacobian, spatial_momentum
+    from .multiprecision.reference import reference
+    from .multiprecision.solution import Reference
+    from .scenes.scenes import Scene
+    from .simulation.ensembles.ensemble import Ensemble, EnsembleStats
+    from .simulation.ensembles.simulate_many import simulate_many
+    from .simulation.event import Event
+    from .simulation.gradients.gradient import MotionGradient, gradient
+    from .simulation.gradients.gradient_many import MotionGradients, gradient_many
+    from .simulation.gradients.motion import MotionError
+    from .simulation.gradients.sensitivities import Sensitivities, sensitivities
+    from .simulation.sampled_controller import HeldForces, SampledController
+    from .simulation.simulate import simulate
+    from .simulation.trajectory import Crossings, SimulationWarning, Stats, Trajectory
+    from .systems.constraints import ConstraintError
+    from .systems.controller import with_controller
+    from .systems.display_names import display_names
+    from .systems.model import as_system
+    from .systems.ode_system import OdeSystem
+    from .systems.quasi_velocities import QuasiVelocities
+    from .systems.system import System
+    from .verification.certificate import certify
+    from .verification.residual import Certificate
 
 __all__ = [
     "EFFECTS",
@@ -180,3 +187,6 @@ __all__ = [
     "tree",
     "with_controller",
 ]
+
+if not TYPE_CHECKING:  # a checker shall see a misspelt name
+    __getattr__, __dir__ = doors(__name__, __file__)

@@ -1,5 +1,7 @@
 """viz: pictures and pages of computational graphs."""
 
+from cgraph.extend import doors
+
 TYPE_CHECKING = False  # as a checker knows it; typing takes longer to load than all that awaits Ctrl-C
 
 if TYPE_CHECKING:
@@ -7,13 +9,13 @@ if TYPE_CHECKING:
 
     from .graph_drawing.dot import to_dot
     from .graph_drawing.render import graph_svg, render_png, render_svg
-    from .inspector import page  # type: ignore[no-redef]  # the name of a module there, too
+    from .inspector.page import page
     from .lessons.lesson import lesson
     from .models.animate import animate
     from .models.inspect import inspect
     from .models.live import live_page
     from .models.typed_text import typed_text
-    from .typed import typed_page
+    from .typed.page import typed_page
 
 __all__ = [
     "animate",
@@ -29,18 +31,5 @@ __all__ = [
     "typed_text",
 ]
 
-if not TYPE_CHECKING:  # loaded when asked for: the command line has to await Ctrl-C before it loads anything
-
-    def __getattr__(name):
-        from importlib import import_module
-
-        homes = {"__version__": "cgraph", "to_dot": ".graph_drawing.dot", "page": ".inspector"}
-        homes |= {name: f".models.{name}" for name in ("animate", "inspect", "typed_text")}
-        homes |= {"lesson": ".lessons.lesson", "live_page": ".models.live", "typed_page": ".typed"}
-        homes |= dict.fromkeys(["graph_svg", "render_png", "render_svg"], ".graph_drawing.render")
-        if name not in homes:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        return getattr(import_module(homes[name], __name__), name)
-
-    def __dir__():
-        return sorted({*globals(), *__all__})
+if not TYPE_CHECKING:  # the command line has to await Ctrl-C before it loads anything
+    __getattr__, __dir__ = doors(__name__, __file__)

@@ -18,7 +18,7 @@ from heapq import heapify, heappop, heappush
 from typing import NamedTuple
 
 from ..core.node import Node, as_node, variable
-from ..simplify.builder import Builder
+from ..simplification.builder import Builder
 from .dissection import Piece, dissect
 from .elimination_order import Step
 from .schur_elimination import ONE, EdgePushing

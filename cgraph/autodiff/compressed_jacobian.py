@@ -8,7 +8,7 @@ from typing import NamedTuple
 from ..core.graph import Graph, require_graph
 from ..core.node import Node, as_node, variable
 from ..core.ops import equal
-from ..simplify.simplify import simplify
+from ..simplification.simplify import simplify
 from .coloring import NONE, Coloring, column_coloring
 from .direction_split import direction_split
 from .forward import jvp

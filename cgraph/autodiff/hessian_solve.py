@@ -10,8 +10,8 @@ from ..core.label import ADJOINT, TANGENT
 from ..core.node import Node, Scalar, as_node
 from ..core.scope import building
 from ..core.traversal import topological
-from ..simplify.balanced_sums import balanced
-from ..simplify.builder import Builder
+from ..simplification.balanced_sums import balanced
+from ..simplification.builder import Builder
 from ..util.require import require_choice, require_flag, require_sequence
 from .balanced_elimination import BalancedElimination, nodes_of, written_rows
 from .elimination_order import Step, elimination_steps

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..core.graph import Graph
 from ..core.node import Node, as_node
-from ..simplify.builder import Builder
+from ..simplification.builder import Builder
 from .forward import tangents
 from .reverse import cotangents
 from .sparsity import Pattern, dependence, slopes

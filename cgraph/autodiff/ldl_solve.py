@@ -7,7 +7,7 @@ from typing import Any
 
 from ..core.node import Node, variable
 from ..core.scope import building
-from ..simplify.builder import Builder
+from ..simplification.builder import Builder
 from .symmetric_elimination import SymmetricElimination
 
 

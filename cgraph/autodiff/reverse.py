@@ -10,7 +10,7 @@ from ..core.naming import free_suffix
 from ..core.node import Node, as_node, variable
 from ..core.scope import building
 from ..core.traversal import topological
-from ..simplify.builder import Builder
+from ..simplification.builder import Builder
 from .reached_nodes import ReachedNodes
 
 

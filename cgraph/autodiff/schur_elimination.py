@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ..core.node import Node, as_node
-from ..simplify.builder import Builder
+from ..simplification.builder import Builder
 from .elimination_order import Step
 from .reached_nodes import ReachedNodes
 from .rotation_pairs import Rotation, rotations

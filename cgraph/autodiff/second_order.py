@@ -8,7 +8,7 @@ from typing import NamedTuple
 from ..core.node import Node, Op, as_node, variable
 from ..core.scope import building
 from ..core.traversal import topological
-from ..simplify.builder import Builder
+from ..simplification.builder import Builder
 from .forward import tangents
 
 

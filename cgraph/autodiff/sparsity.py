@@ -14,7 +14,7 @@ from ..core.graph import Graph, require_graph
 from ..core.node import Node, Op, as_node, variable
 from ..core.scipy_modules import scipy_sparse
 from ..core.scope import building
-from ..simplify.builder import Builder
+from ..simplification.builder import Builder
 
 Indices = np.ndarray[Any, np.dtype[np.int64]]
 Indices32 = np.ndarray[Any, np.dtype[np.int32]]

@@ -1,1 +1,3 @@
-"""The graph: nodes, the table of operations, labels, and what can be asked of a graph."""
+"""The core: nodes, graphs, and the table of operations, which is filled before any node is made."""
+
+from . import ops as ops

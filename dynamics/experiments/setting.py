@@ -11,8 +11,8 @@ import numpy as np
 from cgraph.extend import Array, real_array
 
 from ..equations.state_equation import state_inputs
-from ..reference import Reference, reference
-from ..reference.solution import scale
+from ..multiprecision import Reference, reference
+from ..multiprecision.solution import scale
 from ..scenes import Scene
 from ..systems.model import as_ode, as_system
 

@@ -13,7 +13,7 @@ import numpy as np
 
 import dynamics as dyn
 from dynamics.multibody.joint_coordinates import places
-from dynamics.reference.flint_numbers import flint, working
+from dynamics.multiprecision.flint_numbers import flint, working
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 DIGITS = 60

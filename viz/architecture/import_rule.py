@@ -10,15 +10,15 @@ PACKAGES = ("cgraph", "dynamics", "viz")
 # those of the last group are whole packages, or folders of one.
 TABLE = {
     "cgraph": (
-        "util, errors <- core <- simplify <- autodiff <- explain",
+        "util, errors <- core <- simplification <- autodiff <- explain",
         "autodiff <- codegen <- program",
     ),
     "dynamics": (
         "systems <- equations <- multibody <- io",
         "equations <- integrators <- simulation",
-        "equations, multibody <- reference",
+        "equations, multibody <- multiprecision",
         "simulation, io <- scenes",
-        "scenes, reference <- peers <- verification, experiments",
+        "scenes, multiprecision <- peers <- verification, experiments",
     ),
     "viz": (
         "theme <- graph_drawing, plots <- pages <- inspector, paper <- models <- commands <- cli <- __main__",

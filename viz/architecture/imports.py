@@ -52,10 +52,16 @@ class Module:
         return all(
             isinstance(line, ast.Import | ast.ImportFrom)
             or (isinstance(line, ast.Expr) and isinstance(line.value, ast.Constant))
-            or (isinstance(line, ast.FunctionDef) and line.name in ("__getattr__", "__dir__"))
-            or (isinstance(line, ast.Assign) and ast.unparse(line.targets[0]) in ("__all__", "TYPE_CHECKING"))
+            or (isinstance(line, ast.FunctionDef) and line.name in ("_of_row", "__getattr__", "__dir__"))
+            or (
+                isinstance(line, ast.Assign)
+                and ast.unparse(line.targets[0]) in ("__all__", "TYPE_CHECKING", "(__getattr__, __dir__)")
+            )
             for line in body
         )
+
+
+_OF_A_FACE = ("__all__", "TYPE_CHECKING", "__getattr__, __dir__", "(__getattr__, __dir__)")
 
 
 def imports_of(tree: ast.AST, package: str = "") -> Iterator[Import]:

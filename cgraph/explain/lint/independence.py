@@ -13,7 +13,7 @@ from ...core.networkx_queries import minimum_cut
 from ...core.node import Node, constant
 from ...core.source_lines import lines_text
 from ...errors import GraphError
-from ...simplify.builder import Builder
+from ...simplification.builder import Builder
 from ..names import Name, Names, joined, many
 from ..reachability import ancestors, between, descendants, has_more_ancestors
 from .finding import Finding

@@ -15,8 +15,8 @@ from cgraph.extend import ldl_elimination
 from ...equations.equations_of_motion import bias, forward_dynamics, mass_matrix
 from ...multibody.mechanism import Mechanism
 from ...multibody.planar_arm import planar_arm
-from ...reference.planar_arm_equations import accelerations
-from ...reference.spatial_chain_equations import chain_accelerations
+from ...multiprecision.planar_arm_equations import accelerations
+from ...multiprecision.spatial_chain_equations import chain_accelerations
 from ...systems.model import as_system
 from ..fresh_process import run_fresh
 from ..text_table import table

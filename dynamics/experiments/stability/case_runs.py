@@ -10,7 +10,7 @@ import numpy as np
 
 from ...equations.state_equation import state_inputs
 from ...integrators import METHODS
-from ...reference import Reference
+from ...multiprecision import Reference
 from ...simulation.run_options import SCIPY
 from ...simulation.simulate import simulate
 from ...simulation.trajectory import Trajectory

@@ -27,7 +27,7 @@ from ...equations.equations_of_motion import forward_dynamics
 from ...equations.formulations import inverse_dynamics
 from ...multibody.mechanism import Mechanism
 from ...multibody.planar_arm import planar_arm, planar_links
-from ...reference.planar_arm_equations import Pair, accelerations, torques
+from ...multiprecision.planar_arm_equations import Pair, accelerations, torques
 from ...systems.system import System
 from ..planar_by_centers import by_centers
 from .case_result import CaseResult, Measurement

@@ -8,8 +8,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ...reference import Reference
-from ...reference.solution import from_text
+from ...multiprecision import Reference
+from ...multiprecision.solution import from_text
 from . import cases
 from .cases import StabilityCase
 

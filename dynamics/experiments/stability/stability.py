@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from ...reference.flint_numbers import flint
+from ...multiprecision.flint_numbers import flint
 from ..machine import load, machine
 from ..text_table import csv_text
 from . import case_runs, energy_drift, huge_angles, single_evaluations

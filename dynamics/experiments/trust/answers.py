@@ -15,8 +15,8 @@ import numpy as np
 import cgraph as cg
 from cgraph.extend import Array
 
-from ...reference import Reference, ReferenceFailedError
-from ...reference.solution import from_text
+from ...multiprecision import Reference, ReferenceFailedError
+from ...multiprecision.solution import from_text
 from ...simulation.scipy_solvers import solve_ivp
 from ..setting import Setting
 from ..work_precision.trajectory_runs import problem_of

@@ -17,7 +17,7 @@ from cgraph.extend import Array
 
 from ...equations.energies import energy
 from ...integrators import Problem
-from ...reference import Reference
+from ...multiprecision import Reference
 from ...systems.model import as_system
 from ..paper_numbers.fit import exponent
 from ..setting import INTERVALS, Setting

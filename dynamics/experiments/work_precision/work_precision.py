@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ...integrators import METHODS, Problem
+from ...multiprecision import Reference
 from ...peers import UnavailableError
-from ...reference import Reference
 from ..machine import load as load_of_machine, machine
 from ..setting import Setting
 from .cold_start import STARTS, cold_starts

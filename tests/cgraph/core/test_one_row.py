@@ -28,7 +28,7 @@ TABLE = (
     "tests/cgraph/explain/lint/test_lint.py",
     "tests/viz/graph_drawing/test_dot.py",
     "tests/viz/inspector/test_script.py",
-    "tests/dynamics/reference/test_taylor_series.py",
+    "tests/dynamics/multiprecision/test_taylor_series.py",
 )
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from dynamics.experiments.stability.cases import StabilityCase
-from dynamics.reference import Reference, reference
+from dynamics.multiprecision import Reference, reference
 from tests.dynamics.split_state import split_state
 
 STEP = 2.0**-36  # of the start; a growth up to 10^6 is still a matter of first order

@@ -13,7 +13,7 @@ from dynamics.equations.state_equation import state_equation, state_inputs
 from dynamics.experiments.stability import cases
 from dynamics.experiments.stability.cases import chains, rotation, stiff
 from dynamics.experiments.stability.cases.case import StabilityCase
-from dynamics.reference import reference
+from dynamics.multiprecision import reference
 from tests import high_precision
 from tests.dynamics.experiments import sensitivity
 from tests.dynamics.models import Array

@@ -33,7 +33,7 @@ from dynamics.experiments.work_precision.trajectory_runs import (
 )
 from dynamics.experiments.work_precision.work_precision import work_precision
 from dynamics.integrators import METHODS
-from dynamics.reference import Reference
+from dynamics.multiprecision import Reference
 
 T_END = 10.0  # s, of the scene spring_mass: q = cos t
 ROUNDING = 1e-9  # a thousand times that of a power of R(i h) in float64

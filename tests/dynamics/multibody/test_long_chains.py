@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
-from dynamics.reference.planar_arm_equations import accelerations
-from dynamics.reference.spatial_chain_equations import Array, chain_accelerations
+from dynamics.multiprecision.planar_arm_equations import accelerations
+from dynamics.multiprecision.spatial_chain_equations import Array, chain_accelerations
 from tests.dynamics.mechanisms import turned_arm
 
 pytest.importorskip("flint")

@@ -7,7 +7,7 @@ from pytest import mark
 
 import dynamics as dyn
 from dynamics.multibody.spatial import Array, from_quaternion, rotation
-from dynamics.reference import closed_forms
+from dynamics.multiprecision import closed_forms
 
 MOMENTS = [1.0, 2.0, 3.0]  # kg m^2, of the rotor
 ROUNDING = 2e-15  # of some hundred steps, compensated

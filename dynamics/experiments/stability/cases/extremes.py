@@ -6,7 +6,7 @@ import math
 
 import cgraph as cg
 
-from ....reference import closed_forms
+from ....multiprecision import closed_forms
 from ....systems.system import System
 from .case import RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion, error_criterion
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import cgraph as cg
 
-from ....reference import closed_forms
+from ....multiprecision import closed_forms
 from ....systems.ode_system import OdeSystem
 from ....systems.system import System
 from .case import RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion, error_criterion

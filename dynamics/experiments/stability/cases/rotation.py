@@ -8,7 +8,7 @@ from typing import Any
 
 import cgraph as cg
 
-from ....reference import closed_forms
+from ....multiprecision import closed_forms
 from ....systems.ode_system import OdeSystem
 from ....systems.system import System
 from .case import (

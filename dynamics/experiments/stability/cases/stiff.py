@@ -8,8 +8,8 @@ from typing import Any
 
 import cgraph as cg
 
-from ....reference import Reference, closed_forms
-from ....reference.solution import from_text
+from ....multiprecision import Reference, closed_forms
+from ....multiprecision.solution import from_text
 from ....systems.ode_system import OdeSystem
 from ....systems.system import System
 from .case import ATOL, Criterion, StabilityCase, conserved, conserved_states, energy_criterion, error_criterion

@@ -13,8 +13,8 @@ from dynamics.systems.ode_system import OdeSystem
 from tests.high_precision import OPERATIONS
 
 pytest.importorskip("flint", reason="reference solutions need python-flint")
-from dynamics.reference.flint_numbers import value, working
-from dynamics.reference.taylor_series import Series
+from dynamics.multiprecision.flint_numbers import value, working
+from dynamics.multiprecision.taylor_series import Series
 
 ORDER = 12
 TWELVE_ORDERS = 1e-25  # relative, of numbers with 60 digits that mpmath differentiates numerically

@@ -10,7 +10,7 @@ from pytest import raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.reference import REFERENCE_METHODS, Reference, ReferenceFailedError, reference
+from dynamics.multiprecision import REFERENCE_METHODS, Reference, ReferenceFailedError, reference
 from dynamics.systems.ode_system import OdeSystem
 
 pytest.importorskip("flint", reason="reference solutions need python-flint")

@@ -16,8 +16,8 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.state_equation import state_equation, state_inputs
 from dynamics.experiments.stability import cases
-from dynamics.reference import REFERENCE_METHODS, Reference, ReferenceFailedError, closed_forms, reference
-from dynamics.reference.flint_numbers import working
+from dynamics.multiprecision import REFERENCE_METHODS, Reference, ReferenceFailedError, closed_forms, reference
+from dynamics.multiprecision.flint_numbers import working
 from dynamics.systems.ode_system import OdeSystem
 from tests.dynamics.split_state import split_state
 from tests.slow import slow
@@ -261,7 +261,7 @@ def test_a_motion_that_would_take_a_million_steps_is_refused_after_a_few() -> No
 
 def test_the_state_that_does_not_settle_is_named() -> None:
     """As one that is zero but for rounding."""
-    module = importlib.import_module("dynamics.reference.reference")
+    module = importlib.import_module("dynamics.multiprecision.reference")
     with working(50) as number:
 
         def run(wanted: int) -> tuple[list[list[Any]], str]:

@@ -1,0 +1,74 @@
+"""The names of a package that are loaded when they are first asked for (PEP 562)."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from functools import cache
+from importlib import import_module
+
+Homes = dict[str, tuple[str, str | None]]  # {name: (module that has it, its name there; None for the module itself)}
+
+
+def doors(
+    package: str, file: str, otherwise: Callable[[str], object] | None = None
+) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
+    """The `__getattr__` and `__dir__` of a module whose names are written elsewhere.
+
+    The imports of the file under `if TYPE_CHECKING:`, which type checkers read, say where each name is written. A
+    module is imported when one of its names is first asked for, and the name then stays in the package.
+
+    Parameters
+    ----------
+    package : str
+        The module's `__name__`.
+    file : str
+        Its `__file__`.
+    otherwise : callable, optional
+        What gives a name that no import brings, or raises AttributeError.
+
+    Returns
+    -------
+    tuple of callable
+        `__getattr__` and `__dir__`.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> "jvp" in dir(cg)
+    True
+    """
+    homes = cache(lambda: _homes(file))
+
+    def load(name: str) -> object:
+        if name not in homes():
+            if otherwise is not None and not name.startswith("_"):
+                return otherwise(name)
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        module, inner = homes()[name]
+        home = import_module(module, getattr(sys.modules[package], "__package__", package))
+        if inner is not None and not hasattr(home, inner):  # a module of that package
+            import_module(f"{home.__name__}.{inner}")
+        value = home if inner is None else getattr(home, inner)
+        setattr(sys.modules[package], name, value)
+        return value
+
+    return load, lambda: sorted({*vars(sys.modules[package]), *homes()})
+
+
+def _homes(file: str) -> Homes:
+    import ast
+
+    with open(file, encoding="utf-8") as source:  # noqa: PTH123 (pathlib takes longer to load than this file)
+        tree = ast.parse(source.read())
+    homes: Homes = {}
+    for block in tree.body:
+        if isinstance(block, ast.If) and isinstance(block.test, ast.Name) and block.test.id == "TYPE_CHECKING":
+            for line in block.body:
+                assert isinstance(line, ast.ImportFrom)
+                above = "." * line.level
+                for name in line.names:
+                    whole = line.module is None
+                    home = (above + name.name, None) if whole else (f"{above}{line.module}", name.name)
+                    homes[name.asname or name.name] = home
+    return homes
