@@ -146,6 +146,16 @@ def test_shown_commands_are_commands(name: str) -> None:
         parse(shlex.split(command))
 
 
+def test_the_reading_edition_of_the_core_is_short_and_names_files_that_exist() -> None:
+    page = PAGES["docs/core.md"]
+    lines = [line for _, code, _ in examples(page) for line in code.splitlines() if line.strip()]
+    library = lines[: lines.index("def torques(lagrangian, q, qd, qdd):")]
+    assert len(library) <= 150
+    files = re.findall(r"`(cgraph/[\w/]+\.py)`", page)
+    assert len(files) > 10
+    assert [file for file in files if not (ROOT / file).is_file()] == []
+
+
 def test_the_command_reference_has_all_that_the_parsers_have() -> None:
     """Every argument of every command is there, with what it is; what a help says in words of its own stays text."""
     page = markdown(parser())

@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from cgraph.codegen import clear_cache, disk_cache as cache, llvm_engine as llvm
+from cgraph import clear_cache
+from cgraph.codegen import disk_cache as cache, llvm_engine as llvm
 
 llvmlite = pytest.importorskip("llvmlite")
 binding = pytest.importorskip("llvmlite.binding")

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.explain import compare
+from cgraph import compare
 from dynamics.equations.node_classes import formulation_classes
 from tests.strategies import Case, cases, examples
 
@@ -99,7 +99,7 @@ def test_the_chain_rule_and_by_definition_differ_by_the_embedding():
 
 def test_two_runs_are_byte_for_byte_the_same():
     program = (
-        "import json, dynamics as dyn; from cgraph.explain import compare; arm = dyn.planar_arm([1.0] * 2, [1.0] * 2);"
+        "import json, dynamics as dyn; from cgraph import compare; arm = dyn.planar_arm([1.0] * 2, [1.0] * 2);"
         "d = compare(dyn.inverse_dynamics(arm), dyn.inverse_dynamics(arm, 'kinetic_only'), atoms='q0 q1 qd0 qd1');"
         "print(d, json.dumps(d.to_dict()), d.overlay().graph.listing())"
     )

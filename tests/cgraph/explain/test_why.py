@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.explain import why, why_not
+from cgraph import why, why_not
 from tests import high_precision
 from tests.strategies import Case, cases, examples
 from tests.tolerances import EQUATIONS, SOLVED, SUMS

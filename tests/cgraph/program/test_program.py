@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
-from cgraph.program import Call, Factor, If, Map, Program, Solve, Sum, While, runner
+from cgraph.extend import Call, Factor, If, Map, Program, Solve, Sum, While, runner
 from tests.strategies import examples
 from tests.tolerances import LONG_SUM
 

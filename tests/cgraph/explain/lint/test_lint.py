@@ -10,9 +10,9 @@ from hypothesis import assume, given, settings, strategies as st
 
 import cgraph as cg
 import dynamics as dyn
+from cgraph import lint
 from cgraph.core.node import OPS, apply
 from cgraph.core.op_intervals import LINE
-from cgraph.explain import lint
 from cgraph.explain.lint.cancellation import rounded
 from cgraph.explain.lint.singular import intervals, value_of
 from cgraph.explain.names import Names
