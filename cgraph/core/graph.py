@@ -12,11 +12,8 @@ from .check_name import check_name
 from .counts import Counts, count
 from .edge import Edge
 from .evaluate import Value, evaluate
-from .formulas import LINES
 from .label import label
-from .latex import graph_latex
 from .listing import listing
-from .networkx_queries import to_networkx
 from .node import CONSTANT, VARIABLE, Node, Op, Scalar, as_node, variable
 from .ops import OPS
 from .traversal import rebuild, topological
@@ -181,12 +178,15 @@ class Graph:
         """The graph as text, a node a line, the same in every run."""
         return listing(self.input_names, self.nodes, self.outputs)
 
-    def latex(self, *, names: Mapping[str, str] | None = None, lines: int = LINES) -> str:
+    def latex(self, *, names: Mapping[str, str] | None = None, lines: int | None = None) -> str:
         """The equations as LaTeX, an aligned block; a node that several need, or that has a name, has a line.
 
-        names: {name in the graph: what a person calls it}.  lines: at most; a last one says how many are left out.
+        names: {name in the graph: what a person calls it}.  lines: at most, by default 40; a last one says how many are
+        left out.
         """
-        return graph_latex(self.nodes, self.outputs, names, lines)
+        from .latex import LINES, graph_latex
+
+        return graph_latex(self.nodes, self.outputs, names, LINES if lines is None else lines)
 
     def check(self) -> None:
         """Raise GraphError unless every node is well formed and the order is topological."""
@@ -206,6 +206,8 @@ class Graph:
         Nodes are numbered as in `nodes` (unused inputs follow), with op, name, value, tags, roles and outputs (names)
         as attributes; the key of an edge is the argument's slot.
         """
+        from .networkx_queries import to_networkx
+
         return to_networkx(self.nodes, self.inputs, self.outputs)
 
     def __repr__(self) -> str:
