@@ -184,7 +184,8 @@ class Graph:
         names: {name in the graph: what a person calls it}.  lines: at most, by default 40; a last one says how many are
         left out.
         """
-        from .latex import LINES, graph_latex
+        from .formulas import LINES
+        from .latex import graph_latex
 
         return graph_latex(self.nodes, self.outputs, names, LINES if lines is None else lines)
 
