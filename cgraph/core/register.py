@@ -41,7 +41,7 @@ def register(op: Op) -> None:
         raise ValueError(f"operation {op.name!r} is in the table already")
     if not op.name.isidentifier() or iskeyword(op.name):
         raise ValueError(f"an operation's name must be an identifier of Python, got {op.name!r}")
-    if op.name in _GENERATED or op.name in vars(_LIBRARY):
+    if op.name in _GENERATED or op.name in dir(_LIBRARY):
         raise ValueError(f"an operation cannot be called {op.name!r}, which means something else in cgraph")
     for column in ("scalar", "array", "partials"):
         if not callable(getattr(op, column)):
