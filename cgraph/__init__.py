@@ -1,27 +1,29 @@
 """cgraph: computational graphs of equations, with forward and reverse automatic differentiation."""
 
 from .util.doors import doors
+from .util.version import __version__ as __version__
 
 TYPE_CHECKING = False  # as a checker knows it; typing takes a while to load
 
 if TYPE_CHECKING:
-    from .autodiff.forward import jvp
     from .autodiff.hessian_solve import hessian_solve
     from .autodiff.jacobian import hessian, jacobian
-    from .autodiff.reverse import gradient, vjp
+    from .autodiff.products import gradient, jvp, vjp
     from .autodiff.sparsity import sparsity
     from .codegen.c.c_source import CSource, to_c
     from .codegen.compile import compile
     from .codegen.compiled import Compiled
     from .codegen.disk_cache import clear_cache
     from .codegen.wasm.to_wasm import to_wasm
-    from .core.counts import Counts
-    from .core.edge import Edge
-    from .core.graph import Graph
-    from .core.latex import latex
-    from .core.naming import variables, with_name
+    from .core.checks import GraphError
+    from .core.graph import Edge, Graph
     from .core.node import Node, constant, variable
-    from .core.ops import (
+    from .core.scope import tag
+    from .explain.compare import Comparison, compare
+    from .explain.lint.lint import Lint, lint
+    from .explain.why import Why, why
+    from .explain.why_not import WhyNot, why_not
+    from .operations.table import (
         abs_ as abs,
         acos,
         asin,
@@ -60,19 +62,15 @@ if TYPE_CHECKING:
         tanh,
         where,
     )
-    from .core.scope import tag
-    from .core.source_lines import recording_lines
-    from .core.structure_hash import structure_hash
-    from .errors import GraphError
-    from .explain.compare import Comparison, compare
-    from .explain.lint.lint import Lint, lint
-    from .explain.why import Why, why
-    from .explain.why_not import WhyNot, why_not
     from .program.loop import Loop, loop
     from .simplification.balanced_sums import balanced_sums
     from .simplification.double_double import double_double
     from .simplification.simplify import simplify, specialize
-    from .util.version import __version__ as __version__
+    from .writing.counts import Counts
+    from .writing.latex import latex
+    from .writing.naming import variables, with_name
+    from .writing.source_lines import recording_lines
+    from .writing.structure_hash import structure_hash
 
 __all__ = [
     "CSource",
@@ -157,8 +155,8 @@ __all__ = [
 if not TYPE_CHECKING:  # a checker shall see a misspelt name
 
     def _of_row(name):
-        from .core.function_factory import of_name
+        from .operations.functions import of_name
 
         return of_name(name)  # `cg.name` of a row that was added to the table
 
-    __getattr__, __dir__ = doors(__name__, __file__, _of_row)
+    __getattr__, __dir__ = doors(__name__, __file__, _of_row, first="cgraph.operations")

@@ -48,36 +48,34 @@ TYPE_CHECKING = False  # as a checker knows it; typing takes a while to load
 
 if TYPE_CHECKING:
     from .autodiff.compressed_jacobian import CompressedJacobian, compressed_jacobian
-    from .autodiff.forward import tangents
     from .autodiff.hessian_solve import Order, solve_nodes, solve_tangents
     from .autodiff.jacobian import hessian_nodes
     from .autodiff.ldl_solve import ldl_elimination, ldl_solve
-    from .autodiff.reverse import cotangents
     from .autodiff.symmetric_elimination import SingularError
-    from .core.check_name import check_name
-    from .core.evaluate import Array
-    from .core.formulas import Formulas, Notation
+    from .core.builder import Builder, folded
+    from .core.checks import check_name
+    from .core.evaluation import Array
+    from .core.forward import tangents
     from .core.graph import require_graph
     from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED
     from .core.node import as_node
-    from .core.operation import MathML, Op
-    from .core.ops import OPS
-    from .core.register import register
-    from .core.scipy_modules import scipy_integrate
+    from .core.reverse import cotangents
     from .core.scope import building
     from .core.traversal import topological
-    from .errors import install
     from .explain.lint.cancellation import certain_digits
     from .explain.names import Names
+    from .operations.operation import MathML, Op, columns
+    from .operations.register import register
+    from .operations.table import OPS
     from .program.choose_runner import runner
     from .program.program import Call, Factor, If, Map, Program, Solve, Statement, Sum, While
     from .program.runner import Record, Runner
-    from .simplification.builder import Builder, folded
     from .simplification.identities import rewritten, shortened
     from .simplification.polynomial import Polynomial, expand, format_polynomial
     from .simplification.reciprocals import with_reciprocals
     from .util.atomic_write import atomic_write, check_writable, write_files
     from .util.doors import doors
+    from .util.extras import install
     from .util.html_text import html_lines, html_table, html_text, picture
     from .util.nearest import nearest, or_nearest
     from .util.real_arrays import is_finite, real_array, real_number
@@ -90,7 +88,9 @@ if TYPE_CHECKING:
         require_texts,
         require_whole,
     )
+    from .util.scipy_modules import scipy_integrate
     from .util.threads import share, thread_count
+    from .writing.formulas import Formulas, Notation
 
 __all__ = [
     "ADJOINT",
@@ -126,6 +126,7 @@ __all__ = [
     "certain_digits",
     "check_name",
     "check_writable",
+    "columns",
     "compressed_jacobian",
     "cotangents",
     "doors",
@@ -169,4 +170,4 @@ __all__ = [
 ]
 
 if not TYPE_CHECKING:  # a checker shall see a misspelt name
-    __getattr__, __dir__ = doors(__name__, __file__)
+    __getattr__, __dir__ = doors(__name__, __file__, first="cgraph.operations")

@@ -8,7 +8,7 @@ import mpmath
 from mpmath import mp, mpf
 
 import cgraph as cg
-from cgraph.extend import OPS
+from cgraph.extend import OPS, columns
 
 DIGITS = 50
 Number = float | mpf
@@ -66,15 +66,15 @@ def kink_distance(graph: cg.Graph, values: Mapping[str, Number]) -> float:
     """
     env = node_values(graph, values)
     jumps = [
-        node.op.jumps(*[env[arg] for arg in node.args])
+        columns(node.op).jumps(*[env[arg] for arg in node.args])
         for node in graph.nodes
-        if node.op.jumps is not None and any(arg.op.name != "constant" for arg in node.args)
+        if columns(node.op).jumps is not None and any(arg.op.name != "constant" for arg in node.args)
     ]
     distances = [abs(each - mpmath.nint(each)) for each in jumps]
     distances += [
         abs(env[node.args[0]] - (env[node.args[1]] if node.op.arity == 2 else 0))
         for node in graph.nodes
-        if node.op.piece is not None
+        if columns(node.op).piece is not None
         and node.op.arity < 3  # the condition of `where` is a comparison, which counts itself
         and len(set(node.args)) == node.op.arity
         and any(arg.op.name != "constant" for arg in node.args)

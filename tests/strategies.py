@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 from hypothesis import settings, strategies as st
 
 import cgraph as cg
-from cgraph.core.node import OPS, apply
+from cgraph.core.node import apply
+from cgraph.operations.operation import OPS
 from tests import high_precision
 
 

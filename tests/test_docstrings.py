@@ -14,8 +14,8 @@ import cgraph as cg
 import cgraph.extend
 import dynamics as dyn
 import viz
-from cgraph.core.ops import OPS
-from cgraph.errors import install
+from cgraph.extend import install
+from cgraph.operations.table import OPS
 
 ROOT = Path(__file__).parents[1]
 PUBLIC = (cg, cgraph.extend, dyn, viz)

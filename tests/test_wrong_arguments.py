@@ -13,8 +13,8 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 import viz
-from cgraph.core.function_factory import function
 from cgraph.extend import OPS
+from cgraph.operations.functions import function
 from viz.graph_drawing.render import RenderError
 
 ARM, TWO = dyn.planar_arm([1.0], [1.0]), dyn.planar_arm([1.0, 0.5], [1.0, 1.0])

@@ -17,8 +17,8 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from heapq import heapify, heappop, heappush
 from typing import NamedTuple
 
+from ..core.builder import Builder
 from ..core.node import Node, as_node, variable
-from ..simplification.builder import Builder
 from .dissection import Piece, dissect
 from .elimination_order import Step
 from .schur_elimination import ONE, EdgePushing

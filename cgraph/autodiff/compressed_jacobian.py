@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 from ..core.graph import Graph, require_graph
 from ..core.node import Node, as_node, variable
-from ..core.ops import equal
+from ..operations.table import equal
 from ..simplification.simplify import simplify
 from .coloring import NONE, Coloring, column_coloring
 from .direction_split import direction_split
-from .forward import jvp
 from .jacobian_entries import written_sizes
+from .products import jvp
 from .sparsity import pattern
 
 LANES = 8  # colors that cost one sweep

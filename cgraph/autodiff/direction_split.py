@@ -6,8 +6,9 @@ import math
 from typing import NamedTuple
 
 from ..core.graph import Graph
-from ..core.node import OPS, Node, as_node, variable
+from ..core.node import Node, as_node, variable
 from ..core.traversal import rebuild
+from ..operations.operation import OPS
 
 
 class DirectionSplit(NamedTuple):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..core.builder import Builder
+from ..core.forward import tangents
 from ..core.graph import Graph, require_graph
 from ..core.node import Node, as_node
-from ..simplification.builder import Builder
-from .forward import tangents
-from .reverse import cotangents
+from ..core.reverse import cotangents
 
 
 def jacobian(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Graph:

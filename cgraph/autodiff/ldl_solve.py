@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from ..core.builder import Builder
 from ..core.node import Node, variable
 from ..core.scope import building
-from ..simplification.builder import Builder
 from .symmetric_elimination import SymmetricElimination
 
 

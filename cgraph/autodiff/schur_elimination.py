@@ -16,10 +16,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from ..core.builder import Builder
+from ..core.forward import ReachedNodes
 from ..core.node import Node, as_node
-from ..simplification.builder import Builder
 from .elimination_order import Step
-from .reached_nodes import ReachedNodes
 from .rotation_pairs import Rotation, rotations
 from .second_order import second_partials
 from .symmetric_elimination import SymmetricElimination

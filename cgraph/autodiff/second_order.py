@@ -5,11 +5,12 @@ from __future__ import annotations
 from functools import cache
 from typing import NamedTuple
 
-from ..core.node import Node, Op, as_node, variable
+from ..core.builder import Builder
+from ..core.forward import tangents
+from ..core.node import Node, as_node, variable
 from ..core.scope import building
 from ..core.traversal import topological
-from ..simplification.builder import Builder
-from .forward import tangents
+from ..operations.operation import Op
 
 
 class _Second(NamedTuple):

@@ -10,11 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..core.builder import Builder
 from ..core.graph import Graph, require_graph
-from ..core.node import Node, Op, as_node, variable
-from ..core.scipy_modules import scipy_sparse
+from ..core.node import Node, as_node, variable
 from ..core.scope import building
-from ..simplification.builder import Builder
+from ..operations.operation import Op
+from ..util.scipy_modules import scipy_sparse
 
 Indices = np.ndarray[Any, np.dtype[np.int64]]
 Indices32 = np.ndarray[Any, np.dtype[np.int32]]

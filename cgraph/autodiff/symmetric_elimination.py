@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
+from ..core.checks import GraphError
 from ..core.node import Node, as_node
-from ..core.ops import equal, less, where
-from ..errors import GraphError
+from ..operations.table import equal, less, where
 from .symmetric_matrix import ZERO, SymmetricMatrix
 
 

@@ -6,7 +6,7 @@ import ctypes
 
 import numpy as np
 
-from ..core.evaluate import Array
+from ..core.evaluation import Array
 from .compiled import lies_in_rows
 from .llvm_engine import Code
 from .sweep import aligned

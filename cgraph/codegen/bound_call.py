@@ -13,7 +13,7 @@ from functools import cache, partial
 from types import BuiltinFunctionType
 from typing import Any
 
-from ..core.evaluate import Array
+from ..core.evaluation import Array
 from . import llvm_engine as llvm
 
 _STAYS = "a bound call holds addresses of this process: pickle the compiled graph and bind it again"

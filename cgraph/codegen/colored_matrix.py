@@ -10,7 +10,7 @@ import numpy as np
 
 from ..autodiff.coloring import NONE, Coloring, star_coloring
 from ..autodiff.sparsity import Indices, Indices32, Pattern
-from ..core.evaluate import Array
+from ..core.evaluation import Array
 from .sweep import Sweep, aligned
 
 LARGE = 2**16  # numbers in a matrix, of which no copy is kept for another call

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.evaluate import Array
+from ..core.checks import GraphError
+from ..core.evaluation import Array
 from ..core.graph import Graph
-from ..errors import GraphError
 from ..util.html_text import html_table, html_text
 from ..util.real_arrays import real_array
 from ..util.threads import share, thread_count

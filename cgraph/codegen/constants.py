@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..core.graph import Graph
 from ..core.node import CONSTANT, Node
-from ..core.ops import OPS
+from ..operations.table import OPS
 from .arithmetic import Arithmetic, bits
 
 

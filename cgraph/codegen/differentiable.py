@@ -13,17 +13,16 @@ from numpy.typing import ArrayLike
 
 from ..autodiff.coloring import jacobian_coloring
 from ..autodiff.direction_split import DirectionSplit, direction_split
-from ..autodiff.forward import forward_products
 from ..autodiff.jacobian_entries import entry_graph, written_sizes
-from ..autodiff.reverse import reverse_products
+from ..autodiff.products import forward_products, reverse_products
 from ..autodiff.sparsity import Pattern, pattern, symmetric
-from ..core.evaluate import Array
+from ..core.checks import GraphError
+from ..core.evaluation import Array
 from ..core.graph import Graph
 from ..core.node import Node, variable
-from ..core.scipy_modules import scipy_sparse
-from ..errors import GraphError
 from ..util.real_arrays import real_array
 from ..util.require import require_flag
+from ..util.scipy_modules import scipy_sparse
 from .bound_call import bound
 from .colored_matrix import ColoredMatrix, WrittenPart, colored_hessian, colored_jacobian
 from .sweep import Sweep

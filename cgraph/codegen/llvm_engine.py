@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from functools import cache as cached
 from typing import Any
 
-from ..errors import install
+from ..util.extras import install
 from .disk_cache import Cache
 
 LEVEL = 2  # of the code generator's optimization; the text has no redundancy for passes over it to find

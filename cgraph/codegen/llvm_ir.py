@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from ..core.graph import Graph
-from ..core.node import CONSTANT, OPS, Node
+from ..core.node import CONSTANT, Node
+from ..operations.operation import OPS, columns
 from .arithmetic import REGISTERS, Arithmetic, words_of
 from .constants import Constants
 from .parts import Parts, Step
@@ -21,7 +22,9 @@ Address = Callable[[str, str, int], list[str]]
 
 def libm_functions(graph: Graph) -> dict[str, int]:
     """The functions of the C library that the graph calls, and how many arguments each takes."""
-    calls = {node.op.library: node.op.arity for node in graph.nodes if node.args and node.op.calls_library}
+    calls = {
+        columns(node.op).library: node.op.arity for node in graph.nodes if node.args and columns(node.op).calls_library
+    }
     return dict(sorted(calls.items()))
 
 
@@ -52,7 +55,7 @@ def preamble(graphs: Iterable[Graph], arithmetic: Arithmetic) -> list[str]:
         calls = _joined_calls(graph, arithmetic)
         called |= {"".join(call.names): 1 for call in calls.values()}
         if arithmetic.lanes > 1:
-            alone = {node.op.library for node in graph.nodes if node not in calls}
+            alone = {columns(node.op).library for node in graph.nodes if node not in calls}
             called |= {name: arity for name, arity in libm_functions(graph).items() if name in alone}
     vector = _vector(arithmetic)
     return [*declarations(libm), *helpers(called, vector.lanes, vector.flags, polynomials=vector.polynomials)]
@@ -153,7 +156,7 @@ def instructions(graph: Graph, arithmetic: Arithmetic, address: Address, name: s
             written[-1] += parts.forget()
             written.append([])
         args, lines = parts.read(reads)
-        if isinstance(step, Joined) or (step not in merged.calls and step.op.calls_library):
+        if isinstance(step, Joined) or (step not in merged.calls and columns(step.op).calls_library):
             lines += parts.forget()
         r, more = _step(step, f"%v{number}", args, merged, arithmetic)
         written[-1] += [*lines, *more, *parts.write(step, r), *store(step, r)]
@@ -172,10 +175,13 @@ def _step(step: Step, r: str, args: list[str], merged: Merged, arithmetic: Arith
         return _result(step, merged.calls[step], r, args[0], arithmetic)
     if step in merged.products:
         return r, _product_and_sum(step, merged.products[step], r, args, arithmetic)
-    t, call = arithmetic.type, f"@{f'lanes{arithmetic.lanes}.' if arithmetic.lanes > 1 else ''}{step.op.library}"
-    if step.op.llvm:
+    t, call = (
+        arithmetic.type,
+        f"@{f'lanes{arithmetic.lanes}.' if arithmetic.lanes > 1 else ''}{columns(step.op).library}",
+    )
+    if columns(step.op).llvm:
         words = words_of(arithmetic)
-        return r, [f"  {line.format(*args, r=r, call=call, **words)}" for line in step.op.llvm]
+        return r, [f"  {line.format(*args, r=r, call=call, **words)}" for line in columns(step.op).llvm]
     return r, [f"  {r} = call {t} {call}({', '.join(f'{t} {arg}' for arg in args)})"]
 
 
@@ -228,7 +234,7 @@ def _result(node: Node, call: Joined, r: str, called: str, arithmetic: Arithmeti
     """One node out of the results of its call: the value's name, and the lines that make it."""
     t, lines = _vector(arithmetic).type, []
     if len(call.names) > 1:
-        lines.append(f"  {r}.all = extractvalue {{{t}, {t}}} {called}, {call.names.index(node.op.library)}")
+        lines.append(f"  {r}.all = extractvalue {{{t}, {t}}} {called}, {call.names.index(columns(node.op).library)}")
         called = f"{r}.all"
     if arithmetic.lanes == 1:
         lines.append(f"  {r} = extractelement {t} {called}, i32 {call.arguments.index(node.args[0])}")

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..autodiff.direction_split import DirectionSplit
-from ..core.evaluate import Array
+from ..core.evaluation import Array
 from ..core.graph import Graph
-from ..util.garbage import without_collection
+from ..core.scope import without_collection
 from . import llvm_engine as llvm
 from .batch_code import BatchCode
 from .batch_ir import Batch, batch_ir

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from ..autodiff.direction_split import DirectionSplit
 from ..autodiff.sparsity import Indices
-from ..core.evaluate import Array
+from ..core.evaluation import Array
 from .derivative_ir import FIELDS, sweep_ir, whole
 from .disk_cache import Cache
 from .llvm_engine import Host

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..autodiff.direction_split import DirectionSplit
 from ..autodiff.sparsity import Indices
-from ..core.evaluate import Array
+from ..core.evaluation import Array
 from ..core.graph import Graph
 from .sweep import Sweep
 

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..autodiff.direction_split import DirectionSplit
-from ..core.evaluate import Array
+from ..core.evaluation import Array
 from ..core.graph import Graph
-from ..core.op_values import by_element
-from ..core.operation import LIBRARY, Op
-from ..core.ops import OPS
+from ..operations.operation import LIBRARY, Op
+from ..operations.table import OPS
+from ..operations.values import by_element
 from .compiled import Compiled
 from .numpy_sweep import NumpySweep
 from .python_source import source

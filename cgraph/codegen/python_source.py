@@ -6,7 +6,8 @@ import re
 from collections.abc import Callable, Iterable
 
 from ..core.graph import Graph
-from ..core.node import CONSTANT, VARIABLE, Node, Op
+from ..core.node import CONSTANT, VARIABLE, Node
+from ..operations.operation import Op, columns
 
 
 def source(graph: Graph, text_of: Callable[[Op], str], helpers: Iterable[str]) -> str:
@@ -25,7 +26,7 @@ def source(graph: Graph, text_of: Callable[[Op], str], helpers: Iterable[str]) -
         lines.append(f"    {unpacked}{',' if len(graph.inputs) == 1 else ''} = x  # {', '.join(graph.input_names)}")
     for node in graph.nodes:
         if node.op is not CONSTANT and node.op is not VARIABLE:
-            text = text_of(node.op).format(*[names[arg] for arg in node.args])
+            text = text_of(columns(node.op)).format(*[names[arg] for arg in node.args])
             lines.append(f"    {names[node]} = {text}" + (f"  # {node.name}" if node.name else ""))
     results = ", ".join(names[node] for node in graph.outputs.values())
     lines.append(f"    return ({results},)  # {', '.join(graph.outputs)}")

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from ..core.graph import Graph
 from ..core.node import Node
+from ..operations.operation import columns
 from .vector_math import POLYNOMIAL
 
 
@@ -38,7 +39,7 @@ def schedule(graph: Graph, merged: Merged) -> dict[Node | Joined, tuple[Node | J
     read from memory a tenth more often, in a 7-joint arm's forward dynamics two fifths.)
     """
     depth = _depth(graph)
-    early = [merged.calls.get(node, node) for node in graph.nodes if node.args and node.op.calls_library]
+    early = [merged.calls.get(node, node) for node in graph.nodes if node.args and columns(node.op).calls_library]
     order: dict[Node | Joined, tuple[Node | Joined, ...]] = {}
     waiting: dict[Node | Joined, tuple[Node | Joined, ...]] = {}
     results = [node for node in graph.outputs.values() if node.args]
@@ -109,9 +110,9 @@ def joined_calls(graph: Graph, together: int) -> dict[Node, Joined]:
     groups: dict[tuple[int, str], dict[Node, list[Node]]] = {}  # (level, kind) -> argument -> its calls
     for node in graph.nodes:
         level[node] = max([level[arg] for arg in node.args], default=0)
-        if node.op.vector:
+        if columns(node.op).vector:
             level[node] += 1
-            groups.setdefault((level[node], node.op.vector), {}).setdefault(node.args[0], []).append(node)
+            groups.setdefault((level[node], columns(node.op).vector), {}).setdefault(node.args[0], []).append(node)
     calls: dict[Node, Joined] = {}
     for group in groups.values():
         arguments = tuple(group)
@@ -119,7 +120,7 @@ def joined_calls(graph: Graph, together: int) -> dict[Node, Joined]:
             chosen = arguments[start : start + together]
             nodes = [node for argument in chosen for node in group[argument]]
             if len(nodes) > 1:
-                names = {node.op.library for node in nodes}
+                names = {columns(node.op).library for node in nodes}
                 call = Joined(tuple([name for name in POLYNOMIAL if name in names]), chosen)
                 calls.update(dict.fromkeys(nodes, call))
     return calls

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..autodiff.direction_split import DirectionSplit
 from ..autodiff.sparsity import Indices
-from ..core.evaluate import Array
+from ..core.evaluation import Array
 
 NO_ENTRIES = np.zeros(0, dtype=np.int64)
 

@@ -1,3 +1,1 @@
-"""The core: nodes, graphs, and the table of operations, which is filled before any node is made."""
-
-from . import ops as ops
+"""The core: nodes, graphs, and both modes of differentiation, of operations that stand elsewhere."""

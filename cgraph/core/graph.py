@@ -2,24 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..errors import GraphError
-from ..util.html_text import picture
-from .check_name import check_name
-from .counts import Counts, count
-from .edge import Edge
-from .evaluate import Value, evaluate
-from .label import label
-from .listing import listing
-from .node import CONSTANT, VARIABLE, Node, Op, Scalar, as_node, variable
-from .ops import OPS
+from .checks import GraphError, check_name
+from .evaluation import Value, evaluate
+from .node import CONSTANT, VARIABLE, Node, Scalar, as_node, variable
+from .row import ROWS, Row
 from .traversal import rebuild, topological
 
 if TYPE_CHECKING:
     import networkx
+
+    from ..writing.counts import Counts
+
+
+class Edge(NamedTuple):
+    """One use of a node by another.
+
+    Attributes
+    ----------
+    source, target : Node
+        The argument, and the operation that uses it.
+    slot : int
+        Which argument of the target it is, from 0.
+    partial : Node
+        d target / d source through this slot alone.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x, y = cg.variables("x y")
+    >>> cg.Edge(x, x * y, 0).partial
+    <node variable y>
+    """
+
+    source: Node
+    target: Node
+    slot: int
+
+    @property
+    def partial(self) -> Node:
+        """d target / d source through this slot alone, as a node."""
+        return as_node(self.target.op.partials(self.target, *self.target.args)[self.slot])
 
 
 class Graph:
@@ -172,10 +198,14 @@ class Graph:
 
     def counts(self) -> Counts:
         """Nodes, edges, depth, width, and nodes by operation, tag and role."""
+        from ..writing.counts import count
+
         return count(self.nodes)
 
     def listing(self) -> str:
         """The graph as text, a node a line, the same in every run."""
+        from ..writing.listing import listing
+
         return listing(self.input_names, self.nodes, self.outputs)
 
     def latex(self, *, names: Mapping[str, str] | None = None, lines: int | None = None) -> str:
@@ -184,8 +214,8 @@ class Graph:
         names: {name in the graph: what a person calls it}.  lines: at most, by default 40; a last one says how many are
         left out.
         """
-        from .formulas import LINES
-        from .latex import graph_latex
+        from ..writing.formulas import LINES
+        from ..writing.latex import graph_latex
 
         return graph_latex(self.nodes, self.outputs, names, LINES if lines is None else lines)
 
@@ -207,7 +237,7 @@ class Graph:
         Nodes are numbered as in `nodes` (unused inputs follow), with op, name, value, tags, roles and outputs (names)
         as attributes; the key of an edge is the argument's slot.
         """
-        from .networkx_queries import to_networkx
+        from ..writing.networkx_queries import to_networkx
 
         return to_networkx(self.nodes, self.inputs, self.outputs)
 
@@ -219,14 +249,14 @@ class Graph:
 
     def _repr_html_(self) -> str | None:
         """The drawing that a notebook shows, when a drawing package is installed (extra `viz`)."""
+        from ..util.html_text import picture
+
         return picture("graph", self)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _restore, (self.input_names, tuple(_records(self.nodes)), self._output_numbers())
+        from ..writing.records import reduced
 
-    def _output_numbers(self) -> dict[str, int]:
-        number = {node: i for i, node in enumerate(self.nodes)}
-        return {name: number[node] for name, node in self.outputs.items()}
+        return reduced(self)
 
 
 def require_graph(what: str, graph: object) -> None:
@@ -297,7 +327,7 @@ def _short(names: Sequence[str]) -> str:
 
 
 def _check_node(node: Node) -> None:
-    if not isinstance(node, Node) or not isinstance(node.op, Op):
+    if not isinstance(node, Node) or not isinstance(node.op, Row):
         raise GraphError(f"a {type(node).__name__} is not a node of an operation in the table")
     if node.op is CONSTANT:
         if type(node.value) is not float or node.value != node.value:
@@ -305,34 +335,10 @@ def _check_node(node: Node) -> None:
     elif node.op is VARIABLE:
         if not node.name:
             raise GraphError("a variable has no name")
-    elif OPS.get(node.op.name) is not node.op:
+    elif ROWS.get(node.op.name) is not node.op:
         raise GraphError(f"operation {node.op.name!r} is not in the table")
     if len(node.args) != node.op.arity:
         raise GraphError(f"{node.op.name} takes {node.op.arity} argument(s), a node has {len(node.args)}")
     for arg in node.args:
         if not isinstance(arg, Node):
             raise GraphError(f"an argument of {node!r} is not a node: {arg!r:.60}")
-
-
-def _records(nodes: Sequence[Node]) -> Iterator[tuple[Any, ...]]:
-    """One flat record a node, so that pickling a deep graph needs no recursion."""
-    number = {node: i for i, node in enumerate(nodes)}
-    for node in nodes:
-        sets = tuple([tuple(sorted(members)) for members in (node.tags, node.roles, node.lines)])
-        yield node.op.name, tuple([number[arg] for arg in node.args]), node.value, node.name, sets
-
-
-def _restore(inputs: tuple[str, ...], records: tuple[tuple[Any, ...], ...], outputs: dict[str, int]) -> Graph:
-    from_record: list[Node] = []
-    for op, args, value, name, sets in records:
-        if op == CONSTANT.name:
-            node = as_node(value)
-        elif op == VARIABLE.name:
-            node = variable(name)
-        else:
-            if op not in OPS:
-                raise GraphError(f"operation {op!r} is not in the table: register its row before its graph is read")
-            kept = label(*map(frozenset, sets))
-            node = Node(OPS[op], tuple([from_record[i] for i in args]), kept, name=name)
-        from_record.append(node)
-    return Graph([variable(name) for name in inputs], {name: from_record[i] for name, i in outputs.items()})

@@ -2,12 +2,87 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-from ..util.interned import Interned
-from ..util.shared_set import SharedSet
+import threading
+from collections.abc import Callable, Hashable, Iterator
+from typing import Any, Generic, NamedTuple, TypeVar
+from weakref import WeakValueDictionary
 
 INPUT, PRIMAL, ADJOINT, TANGENT = "input", "primal", "adjoint", "tangent"
+Key = TypeVar("Key", bound=Hashable)
+Value = TypeVar("Value")
+
+
+class Interned(Generic[Key, Value]):
+    """A table from keys to the one object of each; it keeps none of them alive."""
+
+    def __init__(self) -> None:
+        self._table: WeakValueDictionary[Key, Value] = WeakValueDictionary()
+        self._lock = threading.RLock()  # the garbage collector may run, and ask for an object, inside
+        self.get = self._table.get  # the object of a key, or None: the fast way to what is there
+
+    def get_or_make(self, key: Key, make: Callable[[], Value]) -> Value:
+        """The object of a key, made if there is none; two threads that ask at once get the same."""
+        with self._lock:
+            value = self._table.get(key)
+            if value is None:
+                value = self._table[key] = make()
+            return value
+
+    def __len__(self) -> int:
+        return len(self._table)
+
+
+PART = 16  # members that a set of its own may have; a larger one is a chain of parts of at least this size
+
+
+class SharedSet:
+    """An immutable set: its members in `part`, and those of `base`, none in both.
+
+    A union of a large and a small set refers to the large one and copies the small one, so that n sets that grow one
+    from the other take memory in proportion to n.
+    """
+
+    __slots__ = ("base", "part", "size")
+
+    def __init__(self, part: frozenset[Any], base: SharedSet | None = None) -> None:
+        self.part, self.base = part, base
+        self.size: int = len(part) + (0 if base is None else base.size)
+
+    def __len__(self) -> int:
+        return self.size
+
+    @property
+    def members(self) -> frozenset[Any]:
+        """All members."""
+        return self.part if self.base is None else frozenset().union(*self._parts())
+
+    @property
+    def key(self) -> frozenset[Any] | SharedSet:
+        """What a dictionary may know the set by: its members, or itself where they are many."""
+        return self.part if self.base is None else self
+
+    def __or__(self, other: SharedSet) -> SharedSet:
+        if self is other or not other.size:
+            return self
+        if not self.size:
+            return other
+        large, small = (self, other) if self.size >= other.size else (other, self)
+        return large.add(small.members)
+
+    def add(self, members: frozenset[Any]) -> SharedSet:
+        """The union with some members."""
+        left = members.difference(*self._parts())
+        if not left:
+            return self
+        if len(self.part) >= PART:
+            return SharedSet(frozenset(list(left)), self)  # anew: a difference keeps the memory of all it came from
+        return SharedSet(self.part | left, self.base)
+
+    def _parts(self) -> Iterator[frozenset[Any]]:
+        rest: SharedSet | None = self
+        while rest is not None:
+            yield rest.part
+            rest = rest.base
 
 
 class SourceLine(NamedTuple):

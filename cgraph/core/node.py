@@ -10,22 +10,15 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from ..util.html_text import picture
-from ..util.interned import Interned
-from .check_name import check_name
-from .label import INPUT, UNLABELLED, Label, SourceLine, label
-from .operation import BY_UFUNC, OPS as OPS, Op as Op  # noqa: PLC0414 (beside the nodes that they make)
+from .checks import check_name
+from .label import INPUT, UNLABELLED, Interned, Label, SourceLine, label
+from .row import BY_UFUNC, ROWS, Row
 from .scope import current
 
 _INPUT = label(roles=frozenset({INPUT}))
 
 
-def _leaf(name: str) -> Op:
-    return Op(name, 0, float, float, lambda *_: ())
-
-
-VARIABLE = _leaf("variable")
-CONSTANT = _leaf("constant")
+VARIABLE, CONSTANT = [Row(name, 0, float, float, lambda *_: ()) for name in ("variable", "constant")]
 
 
 class Node:
@@ -36,7 +29,7 @@ class Node:
 
     Attributes
     ----------
-    op : Op
+    op : Row
         Its row of the operation table; `VARIABLE` or `CONSTANT` for a leaf.
     args : tuple of Node
         Its arguments.
@@ -61,7 +54,7 @@ class Node:
     """
 
     __slots__ = ("__weakref__", "args", "label", "name", "op", "value")
-    op: Op
+    op: Row
     args: tuple[Node, ...]
     value: float | None
     name: str | None
@@ -69,7 +62,7 @@ class Node:
 
     def __init__(
         self,
-        op: Op,
+        op: Row,
         args: tuple[Node, ...] = (),
         label: Label = UNLABELLED,
         *,
@@ -111,6 +104,8 @@ class Node:
 
     def _repr_html_(self) -> str | None:
         """The formula that a notebook shows, when a drawing package is installed (extra `viz`)."""
+        from ..util.html_text import picture
+
         return picture("node", self)
 
     def __bool__(self) -> NoReturn:
@@ -183,22 +178,22 @@ class Node:
         return _binary("less_equal", other, self)
 
     def __neg__(self) -> Node:
-        return apply(OPS["neg"], self)
+        return apply(ROWS["neg"], self)
 
     def __pos__(self) -> Node:
         return self
 
     def __abs__(self) -> Node:
-        return apply(OPS["abs"], self)
+        return apply(ROWS["abs"], self)
 
     def __floor__(self) -> Node:
-        return apply(OPS["floor"], self)
+        return apply(ROWS["floor"], self)
 
     def __ceil__(self) -> Node:
-        return apply(OPS["ceil"], self)
+        return apply(ROWS["ceil"], self)
 
     def __round__(self) -> Node:
-        return apply(OPS["round"], self)
+        return apply(ROWS["round"], self)
 
     def __getattr__(self, name: str) -> Callable[..., Node]:
         """The method that NumPy asks of the elements of an array of objects, as in `np.sqrt(array)`."""
@@ -313,14 +308,14 @@ def as_node(value: Scalar) -> Node:
     return value if isinstance(value, Node) else constant(value)
 
 
-def apply(op: Op, *args: Scalar) -> Node:
+def apply(op: Row, *args: Scalar) -> Node:
     """A new node of this operation, built as the current scope says."""
     if len(args) != op.arity:
         raise TypeError(f"{op.name} takes {op.arity} argument(s), got {len(args)}")
     return _built(op, tuple([each if isinstance(each, Node) else constant(each) for each in args]))
 
 
-def _built(op: Op, args: tuple[Node, ...]) -> Node:
+def _built(op: Row, args: tuple[Node, ...]) -> Node:
     scope = current.get()
     if scope.build is None:
         return Node(op, args, scope.label)
@@ -334,15 +329,15 @@ def _binary(name: str, a: Scalar, b: Scalar) -> Node:
     elif type(a) is float:
         a = constant(a)
     if isinstance(a, Node) and isinstance(b, Node):
-        return _built(OPS[name], (a, b))
+        return _built(ROWS[name], (a, b))
     for each in (a, b):
         if not isinstance(each, (Node, numbers.Real, np.ndarray)):
             return NotImplemented  # type: ignore[no-any-return]  # Python then asks the other operand, or raises
-    node: Node = _elementwise(OPS[name], a, b)
+    node: Node = _elementwise(ROWS[name], a, b)
     return node
 
 
-def _elementwise(op: Op, *args: Any) -> Any:
+def _elementwise(op: Row, *args: Any) -> Any:
     """A node; or an array of nodes, when an argument is an array with dimensions."""
     if any([isinstance(each, np.ndarray) and each.ndim for each in args]):
         return np.frompyfunc(partial(apply, op), op.arity, 1)(*[np.asarray(each, dtype=object) for each in args])

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
 
-from ..util.garbage import without_collection
-from .check_name import check_name
+from .checks import check_name
 from .label import WRITTEN, Label
 
 # (operation, arguments, label) -> node. Nodes are built by what this module holds, so it cannot name their types.
@@ -101,3 +101,15 @@ def building(build: Build) -> Iterator[Callable[[Label], None]]:
             yield scope.set_label
     finally:
         current.reset(token)
+
+
+@contextmanager
+def without_collection() -> Iterator[None]:
+    """Within, many small objects that stay are made without walks over all of them, which free nothing."""
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collecting:
+            gc.enable()

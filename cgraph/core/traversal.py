@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from ..errors import GraphError
+from .checks import GraphError
 from .node import Node
 
 

@@ -7,12 +7,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
+from ..core.checks import GraphError
 from ..core.graph import Graph, require_graph
 from ..core.node import VARIABLE, Node, variable
-from ..core.structure_hash import node_hashes
-from ..errors import GraphError
 from ..util.html_text import html_lines
 from ..util.require import require_choice, require_sequence, require_texts
+from ..writing.structure_hash import node_hashes
 from .names import Names, joined, many
 
 Classify = Callable[[Graph], Callable[[Node], str]]

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ..core.edge import Edge
-from ..core.graph import Graph
+from ..core.checks import GraphError
+from ..core.graph import Edge, Graph
 from ..core.node import Node
-from ..errors import GraphError
 from ..util.real_arrays import is_finite
 from ..util.require import require_mapping
 from .names import Names

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TypeVar
 
+from ..core.checks import GraphError
 from ..core.graph import Graph
 from ..core.node import CONSTANT, Node
-from ..core.operation import SUM
-from ..core.source_lines import lines_text
-from ..errors import GraphError
+from ..operations.operation import SUM, columns
 from ..util.nearest import nearest
 from ..util.require import require_texts
+from ..writing.source_lines import lines_text
 
 Name = str | Node
 Value = TypeVar("Value")
@@ -184,13 +184,13 @@ class Names:
             self._written(arg, depth - 1) if depth > 1 and arg.args and not arg.name else (self.short(arg), _WHOLE)
             for arg in node.args
         ]
-        if node.op.infix is not None:
-            symbol, strength = node.op.infix
+        if (infix := columns(node.op).infix) is not None:
+            symbol, strength = infix
             (a, left), (b, right) = parts
             a = f"({a})" if left < strength else a
             b = f"({b})" if right <= strength or b.startswith("-") else b
             return f"{a} {symbol} {b}", strength
-        if node.op.signs == (-1,):
+        if columns(node.op).signs == (-1,):
             text, strength = parts[0]
             return (f"-({text})" if strength <= _NEGATION or text.startswith("-") else f"-{text}"), _NEGATION
         return f"{node.op.name}({', '.join([text for text, _ in parts])})", _WHOLE

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from operator import itemgetter
 
-from ..core.edge import Edge
+from ..core.graph import Edge
 from ..core.node import Node
 
 

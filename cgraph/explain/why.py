@@ -8,12 +8,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..core.edge import Edge
-from ..core.graph import Graph, require_graph
+from ..core.checks import GraphError
+from ..core.graph import Edge, Graph, require_graph
 from ..core.node import Node
-from ..core.source_lines import lines_text
-from ..errors import GraphError
+from ..operations.operation import columns
 from ..util.html_text import html_table, html_text
+from ..writing.source_lines import lines_text
 from .edge_partials import Point, edge_slopes
 from .names import Name, Names, many
 from .paths import best_paths, by_target, path_count
@@ -272,7 +272,9 @@ def _name_of(names: Names, who: Name) -> str:
 def _path(names: Names, output: str, edges: tuple[Edge, ...], value: float | None) -> Path:
     if not edges:
         return Path(edges, value, output)
-    inner = [edge.target for edge in edges if edge.target.name or not edge.target.op.signs]  # sums hand the value on
+    inner = [
+        edge.target for edge in edges if edge.target.name or not columns(edge.target.op).signs
+    ]  # sums hand the value on
     start, end = names.text(edges[0].source), [] if inner and names.text(inner[-1]) == output else [output]
     text = " -> ".join([start, *[names.text(node) for node in inner], *end])
     tags = sorted({tag for node in inner for tag in node.tags})

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..core.checks import GraphError
 from ..core.graph import Graph, require_graph
 from ..core.node import Node
-from ..errors import GraphError
 from ..util.html_text import html_lines
 from .names import Name, Names, joined, many
 from .reachability import ancestors, descendants

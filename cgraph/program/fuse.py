@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..core.graph import Graph
-from ..core.node import OPS, Node, variable
+from ..core.node import Node, variable
 from ..core.traversal import rebuild
+from ..operations.operation import OPS
 from .program import Call, If, Map, Program, Statement, While
 
 MOST = 1000  # operations of what is fused: it compiles in some tens of milliseconds, and a short run gains no more

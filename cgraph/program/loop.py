@@ -8,11 +8,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.evaluate import Array
+from ..core.checks import GraphError
+from ..core.evaluation import Array
 from ..core.graph import Graph, require_graph
 from ..core.node import CONSTANT, Node, variable
 from ..core.traversal import rebuild, topological
-from ..errors import GraphError
 from ..util.real_arrays import real_array
 from ..util.require import require_mapping
 from .choose_runner import runner

@@ -12,8 +12,8 @@ import numpy as np
 
 from ..codegen import llvm_engine as llvm
 from ..codegen.batch_code import BatchCode
-from ..core.evaluate import Array
-from ..util.garbage import without_collection
+from ..core.evaluation import Array
+from ..core.scope import without_collection
 from .fuse import fused
 from .llvm_ir import program_functions, program_ir
 from .program import Program

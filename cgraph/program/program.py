@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..core.checks import GraphError
 from ..core.graph import Graph
-from ..errors import GraphError
 
 
 @dataclass(frozen=True)

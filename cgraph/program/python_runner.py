@@ -11,7 +11,7 @@ import numpy as np
 
 from ..codegen.compile import compile
 from ..codegen.compiled import Compiled
-from ..core.evaluate import Array
+from ..core.evaluation import Array
 from ..core.graph import Graph
 from . import lu_solve
 from .program import Call, Factor, If, Map, Program, Solve, Statement, Sum, While

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from ..codegen.compiled import require_out
 from ..codegen.differentiable import require_memory
-from ..core.evaluate import Array
-from ..errors import GraphError
+from ..core.checks import GraphError
+from ..core.evaluation import Array
 from ..util.real_arrays import real_array
 from ..util.require import require_whole
 from ..util.threads import share, thread_count

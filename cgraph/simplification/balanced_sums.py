@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
+from ..core.builder import Builder
 from ..core.graph import Graph, require_graph
 from ..core.node import Node
 from ..core.scope import building
 from ..core.traversal import topological
-from .builder import Builder
 
 LEAST = 16  # terms of a sum that is taken in blocks
 

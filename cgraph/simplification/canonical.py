@@ -14,8 +14,10 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from ..core.label import UNLABELLED, Label
-from ..core.node import CONSTANT, OPS, Node, Op
+from ..core.node import CONSTANT, Node
+from ..core.row import Row
 from ..core.traversal import topological
+from ..operations.operation import OPS
 
 Powers = tuple[tuple[int, int], ...]  # (atom, power), in order of atoms
 Angle = tuple[Powers, float]  # a product, and what it is multiplied by
@@ -49,7 +51,7 @@ class Canonical:
 
     def __init__(self, outputs: Sequence[Node]) -> None:
         self.order = topological(outputs)
-        self.made: dict[int, tuple[Op | None, tuple[Node, ...]]] = {}
+        self.made: dict[int, tuple[Row | None, tuple[Node, ...]]] = {}
         self.angles: dict[int, tuple[Angle, bool]] = {}
         self.squares: dict[int, Sum] = {}
         self.written: set[frozenset[Angle]] = set()
@@ -176,7 +178,7 @@ class Canonical:
         self.made[atom] = (None, (node,))
         return {((atom, 1),): Term(1.0, 1.0, node.label)}
 
-    def _function(self, op: Op, args: tuple[Node, ...], label: Label) -> Sum:
+    def _function(self, op: Row, args: tuple[Node, ...], label: Label) -> Sum:
         atom = self._atom((op.name, *[key(self._sums[arg]) for arg in args]))
         self.made.setdefault(atom, (op, args))
         return {((atom, 1),): Term(1.0, 1.0, label)}

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from ..core.graph import Graph, require_graph
 from ..core.label import Label
-from ..core.naming import free_suffix
-from ..core.node import CONSTANT, Node, Op, apply, as_node, constant
-from ..core.op_double_double import ZERO, Pair, normal
-from ..core.ops import zero_safe_mul
+from ..core.node import CONSTANT, Node, apply, as_node, constant
+from ..core.row import Row
 from ..core.scope import building
 from ..core.traversal import topological
+from ..operations.double_double import ZERO, Pair, normal
+from ..operations.operation import columns
+from ..operations.table import zero_safe_mul
 from ..util.require import require_flag
+from ..writing.naming import free_suffix
 
 
 def double_double(graph: Graph, *, low: bool = False) -> Graph:
@@ -70,7 +72,7 @@ def double_double(graph: Graph, *, low: bool = False) -> Graph:
     return Graph(graph.inputs, outputs)
 
 
-def _made(op: Op, args: tuple[Node, ...], label: Label, name: str | None = None) -> Node:
+def _made(op: Row, args: tuple[Node, ...], label: Label, name: str | None = None) -> Node:
     """A node as it is written, but of constants the constant."""
     if all([arg.op is CONSTANT for arg in args]):
         value = op.scalar(*[arg.value for arg in args])
@@ -80,11 +82,12 @@ def _made(op: Op, args: tuple[Node, ...], label: Label, name: str | None = None)
 
 
 def _pair(node: Node, args: list[Pair]) -> Pair:
-    pair: Pair | None = node.op.double_double(*args) if node.op.double_double is not None else None
+    rule = columns(node.op).double_double
+    pair: Pair | None = rule(*args) if rule is not None else None
     return pair if pair is not None else _to_first_order(node.op, args)
 
 
-def _to_first_order(op: Op, args: list[Pair]) -> Pair:
+def _to_first_order(op: Row, args: list[Pair]) -> Pair:
     hi = apply(op, *[arg.hi for arg in args])
     if all([arg.lo is ZERO for arg in args]):
         return Pair(hi, ZERO)

@@ -7,11 +7,12 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
+from ..core.builder import Builder
 from ..core.label import UNLABELLED, WRITTEN, Label
-from ..core.node import CONSTANT, OPS, Node, apply, constant
+from ..core.node import CONSTANT, Node, apply, constant
 from ..core.scope import building
 from ..core.traversal import topological
-from .builder import Builder
+from ..operations.operation import OPS
 from .canonical import ROUNDING, Angle, Canonical, Powers, Sum, Term, accumulate, without_zeros
 from .rounding_growth import as_accurate
 

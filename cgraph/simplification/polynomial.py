@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from ..core.checks import GraphError
 from ..core.node import CONSTANT, Node
 from ..core.traversal import topological
-from ..errors import GraphError
 
 Monomial = tuple[tuple[str, int], ...]  # (name, power), sorted by name
 Polynomial = dict[Monomial, float]  # coefficients; terms that cancel are gone

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import Counter
 
 from ..core.graph import Graph, require_graph
-from ..core.node import OPS, Node, as_node
+from ..core.node import Node, as_node
 from ..core.traversal import rebuild
+from ..operations.operation import OPS
 
 
 def with_reciprocals(graph: Graph) -> Graph:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core.node import CONSTANT, Node
 from ..core.traversal import topological
+from ..operations.operation import columns
 from ..util.real_arrays import Array
 
 UNIT = 2.0**-30  # in place of 2^-53: errors that double precision can show
@@ -48,7 +49,7 @@ def _errors(node: Node, points: dict[str, Array]) -> tuple[Array, Array]:
             continue
         values = [known[arg][0] for arg in inner.args]
         value = inner.op.array(*values)
-        error = inner.op.rounding * UNIT * np.abs(value)
+        error = columns(inner.op).rounding * UNIT * np.abs(value)
         for k, arg in enumerate(inner.args):
             moved = [*values[:k], values[k] + known[arg][1], *values[k + 1 :]]
             error = error + np.abs(inner.op.array(*moved) - value)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from ..core.builder import Builder, folded
+from ..core.checks import GraphError
 from ..core.graph import Graph, require_graph
 from ..core.node import Node, Scalar, constant
 from ..core.traversal import rebuild
-from ..errors import GraphError
 from ..util.require import require_mapping, require_sequence
-from .builder import Builder, folded
 
 
 def simplify(graph: Graph) -> Graph:

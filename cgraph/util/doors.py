@@ -11,7 +11,7 @@ Homes = dict[str, tuple[str, str | None]]  # {name: (module that has it, its nam
 
 
 def doors(
-    package: str, file: str, otherwise: Callable[[str], object] | None = None
+    package: str, file: str, otherwise: Callable[[str], object] | None = None, *, first: str = ""
 ) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
     """The `__getattr__` and `__dir__` of a module whose names are written elsewhere.
 
@@ -26,6 +26,8 @@ def doors(
         Its `__file__`.
     otherwise : callable, optional
         What gives a name that no import brings, or raises AttributeError.
+    first : str
+        A module that is imported before any of those that have the names.
 
     Returns
     -------
@@ -46,6 +48,8 @@ def doors(
                 return otherwise(name)
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         module, inner = homes()[name]
+        if first:
+            import_module(first)
         home = import_module(module, getattr(sys.modules[package], "__package__", package))
         if inner is not None and not hasattr(home, inner):  # a module of that package
             import_module(f"{home.__name__}.{inner}")

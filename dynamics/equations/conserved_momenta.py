@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cgraph import Node
-from cgraph.extend import Builder, as_node, building, cotangents, folded, shortened, topological
+from cgraph.extend import Builder, as_node, building, columns, cotangents, folded, shortened, topological
 
 from ..systems.arguments import new_variables
 from ..systems.model import Model, as_system
@@ -79,7 +79,7 @@ def _jumping(system: System) -> set[int]:
         with building(build):
             partials = map(as_node, node.op.partials(node, *node.args)) if node.args else ()
         for arg, partial in zip(node.args, partials, strict=True):
-            if node.op.jumps or partial.value == 0.0:
+            if columns(node.op).jumps or partial.value == 0.0:
                 slopes = system.kinematics.slopes(cotangents({arg: ONE}, system.q, build), [ZERO] * system.n, build)
                 moving |= {i for i, slope in enumerate(slopes) if slope.value != 0.0}
     return moving

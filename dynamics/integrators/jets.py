@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, as_node, building, topological
+from cgraph.extend import Builder, as_node, building, columns, topological
 
 from ..systems.arguments import TIME
 
@@ -96,7 +96,7 @@ class _Jets:
 
     def _coefficient(self, node: Node, waiting: list[Node]) -> Node | None:
         """Coefficient k of a node, those of its arguments being there; their partials are left to wait."""
-        op, args = node.op, node.args
+        op, args = columns(node.op), node.args
         at = [self.of[arg] for arg in args]
         if all(each is None for each in at):
             return None
@@ -137,7 +137,7 @@ class _Jets:
 
     def _refuse(self, node: Node) -> None:
         partials = [as_node(each).value for each in node.op.partials(node, *node.args)]
-        if node.op.piece is not None or node.op.name in JUMPS or all(value == 0.0 for value in partials):
+        if columns(node.op).piece is not None or node.op.name in JUMPS or all(value == 0.0 for value in partials):
             where = f", in {node.label}" if node.label.tags else ""
             raise NoSeriesError(
                 f"method 'taylor' needs equations that are smooth, and {node.op.name} has no Taylor series"

@@ -15,7 +15,7 @@ from operator import mul
 from typing import Any
 
 from cgraph import Graph, Node
-from cgraph.extend import OPS, Op, as_node, topological
+from cgraph.extend import OPS, Op, as_node, columns, topological
 
 from ..systems.arguments import TIME
 from .flint_numbers import Number, sign, value
@@ -143,14 +143,14 @@ class Series:
         if name == "constant":
             made = self._number_of.get(("constant", node.value))
             return self._append(("constant", node.value), self.number(node.value)) if made is None else made
-        if node.op.series or node.op.piece or not any(self._moving[i] for i in args):
-            return self.shared(node.op, *args)
-        if node.op.jumps is not None:
+        if columns(node.op).series or columns(node.op).piece or not any(self._moving[i] for i in args):
+            return self.shared(columns(node.op), *args)
+        if columns(node.op).jumps is not None:
             raise NotImplementedError(f"a reference solution needs Taylor series, and {name} of what moves jumps")
         key = (name, *args)
         if key not in self._number_of:
-            if node.op.rewrite is not None:
-                self._number_of[key] = self._intern(node.op.rewrite(*node.args))
+            if (rewrite := columns(node.op).rewrite) is not None:
+                self._number_of[key] = self._intern(rewrite(*node.args))
             else:
                 self._integral(self._append(key, None), node, args, waiting)
         return self._number_of[key]
@@ -164,7 +164,7 @@ class Series:
     def _integral(self, i: int, node: Node, args: Sequence[int], waiting: list[Node]) -> None:
         """The recurrence by the table's partials. They may depend on the node itself, so they are made after it."""
         self._of_node[node] = i
-        own, at_point = self.coefficients[i], value(node.op)
+        own, at_point = self.coefficients[i], value(columns(node.op))
         at = [self.coefficients[arg] for arg in args]
         terms = []
         for arg, partial in zip(args, map(as_node, node.op.partials(node, *node.args)), strict=True):

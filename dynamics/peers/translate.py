@@ -7,7 +7,7 @@ from typing import Any
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, topological
+from cgraph.extend import Builder, columns, topological
 
 from .case import Case
 from .contender import UnavailableError
@@ -33,7 +33,7 @@ def translated(
             result[node] = number(node.value)
             continue
         name = node.op.name
-        function: Any = node.op.operator
+        function: Any = columns(node.op).operator
         function = function or getattr(functions, (names or {}).get(name, name), None)
         if function is None:
             raise UnavailableError(f"has no operation {name!r}")

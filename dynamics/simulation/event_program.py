@@ -10,7 +10,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, Builder, building, topological
+from cgraph.extend import Array, Builder, building, columns, topological
 
 from ..equations.substitute import substitute
 from ..integrators import Problem, quantity, quantity_inputs, state_arguments
@@ -130,7 +130,7 @@ def _errors(graph: Graph, inputs: Sequence[Node]) -> Graph:
         for node in graph.nodes:
             if node in errors:
                 continue
-            total = abs(node) * (UNIT * node.op.rounding) if node.args else zero
+            total = abs(node) * (UNIT * columns(node.op).rounding) if node.args else zero
             for arg, partial in zip(node.args, node.op.partials(node, *node.args), strict=True):
                 if (error := errors[arg]).value != 0.0:
                     total = total + abs(partial) * error

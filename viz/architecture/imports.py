@@ -9,6 +9,8 @@ from functools import cached_property
 from importlib.util import find_spec
 from pathlib import Path
 
+from .import_rule import DOORS
+
 
 @dataclass(frozen=True)
 class Import:
@@ -111,7 +113,13 @@ def uses(known: Mapping[str, Module]) -> dict[str, set[str]]:
     is imported as a whole, as by `import cgraph as cg`, leads to all that it shows.
     """
     return {
-        name: {target for line in module.imports for target in _targets(known, line.module, line.name)} - {name}
+        name: {
+            target
+            for line in module.imports
+            if not line.module.startswith(DOORS.get(name, "-"))
+            for target in _targets(known, line.module, line.name)
+        }
+        - {name}
         for name, module in known.items()
         if not module.is_face
     }

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import check_writable
+from cgraph.extend import check_writable, columns
 from dynamics import (
     display_names,
     energy,
@@ -98,7 +98,7 @@ def run(options: argparse.Namespace) -> None:
 
 def python_text(graph: Graph) -> str:
     """The generated function, and before it the functions that it calls."""
-    ops = sorted({node.op for node in graph.nodes if node.args}, key=lambda op: op.name)
+    ops = sorted({columns(node.op) for node in graph.nodes if node.args}, key=lambda op: op.name)
     called = [op for op in ops if re.match(rf"{op.name}\(", op.python)]
     known = [op.name for op in called if op.raising is getattr(math, op.name, None)]
     others = [op.name for op in called if op.name not in known and op.name not in ("abs", "float")]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from cgraph import Edge, Graph, Node
-from cgraph.extend import Names
+from cgraph.extend import Names, columns
 
 from .. import theme
 from ..theme import Paint
@@ -140,7 +140,7 @@ def _node_box(subject: _Subject, node: Node, box_id: str, cluster: str | None) -
     elif not node.args:
         look, label = BOX, name
     else:
-        look, label = _OPERATION, f"{name}\n{node.op.symbol}" if name else node.op.symbol
+        look, label = _OPERATION, f"{name}\n{columns(node.op).symbol}" if name else columns(node.op).symbol
     attributes = {**look, **_weight(node in subject.marks), "label": label, "tooltip": _about(subject, node)}
     return Box(box_id, kind, attributes, cluster)
 

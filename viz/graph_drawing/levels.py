@@ -8,6 +8,7 @@ from html import escape
 from itertools import pairwise
 
 from cgraph import Graph, Node
+from cgraph.extend import columns
 
 from .. import theme
 
@@ -161,7 +162,7 @@ def _nodes(graph: Graph, at: Mapping[Node, Place], scale: Scale) -> list[str]:
 
 def _shown(node: Node, scale: Scale) -> str:
     if node.args:
-        return node.op.symbol
+        return columns(node.op).symbol
     return f"{node.value:.3g}" if node.value is not None else scale.names.get(str(node.name), str(node.name))
 
 

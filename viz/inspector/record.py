@@ -27,7 +27,7 @@ from typing import Any
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import ADJOINT, OPS, PRIMAL, TANGENT, Op
+from cgraph.extend import ADJOINT, OPS, PRIMAL, TANGENT, Op, columns
 
 from .. import theme
 from ..graph_drawing.positions import Positions, positions
@@ -227,7 +227,13 @@ def _width(shown: Node | str, letters: Letters) -> float:
     else:
         text = letters(shown.name) if shown.name else ""
         text += "".join([f" {arg.value:.3g}" for arg in shown.args if arg.value is not None])
-        text += f": {shown.op.symbol}" if shown.args and shown.name else shown.op.symbol if shown.args else ""
+        text += (
+            f": {columns(shown.op).symbol}"
+            if shown.args and shown.name
+            else columns(shown.op).symbol
+            if shown.args
+            else ""
+        )
     letters_wide = len(text.replace("\u0307", "").replace("\u0308", ""))
     return max(58.0, 7.4 * letters_wide + 14.0)
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Names, cotangents
+from cgraph.extend import Names, columns, cotangents
 from dynamics import inverse_dynamics
 
 from ..graph_drawing.dot import to_dot
@@ -84,9 +84,9 @@ def _rows(subject: Subject, graph: Graph) -> list[dict[str, object]]:
 def _text(node: Node, called: Mapping[Node, str]) -> str:
     """The operation on its arguments, these by name or number."""
     parts = [f"{arg.value:.4g}" if arg.value is not None else called.get(arg, "…") for arg in node.args]
-    if node.op.infix:
-        return f" {node.op.symbol} ".join(parts)
-    return f"{node.op.symbol}{parts[0]}" if node.op.signs else f"{node.op.name}({', '.join(parts)})"
+    if columns(node.op).infix:
+        return f" {columns(node.op).symbol} ".join(parts)
+    return f"{columns(node.op).symbol}{parts[0]}" if columns(node.op).signs else f"{node.op.name}({', '.join(parts)})"
 
 
 def _what(node: Node) -> str:

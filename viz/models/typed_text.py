@@ -11,7 +11,7 @@ from unicodedata import normalize
 import numpy as np
 
 from cgraph import Node
-from cgraph.extend import OPS, real_array, topological
+from cgraph.extend import OPS, columns, real_array, topological
 from dynamics.systems.model import Model, as_system
 from dynamics.systems.system import System
 
@@ -148,10 +148,10 @@ class _Writer:
         parts = [self.written[arg] for arg in node.args]
         if node.op.name == "pow":
             return "^".join([self._part(part, _WHOLE) for part in parts]), _POWER
-        if node.op.infix is not None:
-            symbol, strength = node.op.infix
+        if (infix := columns(node.op).infix) is not None:
+            symbol, strength = infix
             return f"{self._part(parts[0], strength)} {symbol} {self._part(parts[1], strength + 1)}", strength
-        if node.op.signs == (-1,):
+        if columns(node.op).signs == (-1,):
             return f"-{self._part(parts[0], _SUM + 1)}", _SUM
         return f"{node.op.name}({', '.join([text for text, _ in parts])})", _WHOLE
 

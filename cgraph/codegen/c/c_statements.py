@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from ...core.node import CONSTANT, VARIABLE, Node
+from ...operations.operation import columns
 
 PART = 2000  # operations in a function: compilers take more than proportionally to its length
 
@@ -27,7 +28,7 @@ def functions(
         stored.setdefault(node, []).append(place)
 
     parts, w_size = _parts(name, nodes, steps, text, stored)
-    helpers = [text.format(name=name) for text in dict.fromkeys([node.op.c_helper for node in steps]) if text]
+    helpers = [text.format(name=name) for text in dict.fromkeys([columns(node.op).c_helper for node in steps]) if text]
     computed = set(steps)
     body = [f"y[{place}] = {text[node]};" for place, node in results if node not in computed]
     if len(parts) > 1:
@@ -66,7 +67,7 @@ def _parts(
     for i, node in enumerate(steps):
         if i % PART == 0:
             parts.append([])
-        expression = node.op.c.format(*[text[arg] for arg in node.args], name=name)
+        expression = columns(node.op).c.format(*[text[arg] for arg in node.args], name=name)
         free += read_last.pop(i, ())
         last = last_use.get(node, i)
         if last // PART == i // PART:

@@ -8,7 +8,8 @@ from collections.abc import Mapping
 from math import copysign
 
 from ...core.graph import Graph
-from ...core.node import CONSTANT, Node, Op
+from ...core.node import CONSTANT, Node
+from ...core.row import Row
 from . import instructions as ins
 from .translate import Body, Signature
 
@@ -16,7 +17,7 @@ X, Y, FIRST = 0, 1, 2  # locals: the addresses of inputs and outputs, and the fi
 Key = Node | float  # of a value that is kept; a constant and its negative are one
 
 
-def evaluation(graph: Graph, texts: Mapping[Op, ast.expr], signatures: Mapping[str, Signature]) -> bytes:
+def evaluation(graph: Graph, texts: Mapping[Row, ast.expr], signatures: Mapping[str, Signature]) -> bytes:
     """The code of evaluate(x, y).  texts: of the operations, on _0, _1, ..
 
     Arguments are computed right before their operation, by a stack of what is still to be written; a value with

@@ -9,7 +9,7 @@ import ast
 from collections.abc import Collection, Iterable
 from functools import cache
 
-from ...core.node import Op
+from ...operations.operation import Op
 from .elementary_functions import DIGITS, TEXT
 from .instructions import INTRINSICS
 from .other_functions import TEXT as OTHERS

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 
+from ...core.checks import GraphError
 from ...core.graph import Graph, require_graph
-from ...errors import GraphError
+from ...operations.operation import columns
 from ...util.require import require_mapping, require_sequence
 from . import instructions as ins
 from .elementary_functions import ROOM
@@ -85,7 +86,7 @@ def to_wasm(
     inputs, states = len(graph.inputs), len(graph.outputs)
     _check(chosen, inputs, states, time, host)
     place = 8 * (inputs + states)
-    texts = {op: text_of(op, host) for op in dict.fromkeys([node.op for node in graph.nodes if node.args])}
+    texts = {op: text_of(columns(op), host) for op in dict.fromkeys([node.op for node in graph.nodes if node.args])}
     needed = called(texts.values(), place)
     imported = [name for name in needed if name.startswith(HOST)]
     own = [text for name, text in library(place).items() if name in needed]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from ...core.graph import Graph
 from ...core.node import Node, as_node
+from ...operations.operation import columns
 from ..edge_partials import Point, node_values
 from ..names import Names
 from .finding import Finding
@@ -42,7 +43,7 @@ def rounded(names: Names, at: Point) -> Rounded:
     errors: dict[Node, float] = {}
     for node in graph.nodes:
         inherited = [_times(next(numbers), errors[arg]) for arg in node.args]
-        own = UNIT * node.op.rounding if node.args else UNIT if node.value is None else 0.0
+        own = UNIT * columns(node.op).rounding if node.args else UNIT if node.value is None else 0.0
         errors[node] = sum(inherited) + own * abs(values[node])
     return Rounded(values, errors)
 
@@ -86,7 +87,7 @@ def cancellations(names: Names, at: Point, threshold: float) -> list[Finding]:
     found = rounded(names, at)
     findings = []
     for node in names.graph.nodes:
-        if len(node.op.signs) != 2 or not math.isfinite(found.errors[node]):
+        if len(columns(node.op).signs) != 2 or not math.isfinite(found.errors[node]):
             continue
         before = min([found.digits(arg) for arg in node.args])
         inherited = sum([found.errors[arg] for arg in node.args])
@@ -101,7 +102,7 @@ def cancellations(names: Names, at: Point, threshold: float) -> list[Finding]:
 def _finding(names: Names, node: Node, found: Rounded, lost: float, left: float) -> Finding:
     a, b = (found.values[arg] for arg in node.args)
     first, second = (f"{value:.{min(17, math.ceil(lost) + 2)}g}" for value in (a, b))
-    sign = "+" if node.op.signs[1] > 0 else "-"
+    sign = "+" if columns(node.op).signs[1] > 0 else "-"
     text = (
         f"{names.line(node)}: {first} {sign} {f'({second})' if b < 0 else second} leaves {found.values[node]:.3g}; "
         f"{lost:.0f} digits are lost here, {left:.0f} remain."

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ...core.edge import Edge
+from ...core.graph import Edge
 from ...core.node import Node
 
 

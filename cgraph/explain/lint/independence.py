@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from ...autodiff.forward import tangents
-from ...core.edge import Edge
-from ...core.graph import Graph
+from ...core.builder import Builder
+from ...core.checks import GraphError
+from ...core.forward import tangents
+from ...core.graph import Edge, Graph
 from ...core.label import ADJOINT
-from ...core.networkx_queries import minimum_cut
 from ...core.node import Node, constant
-from ...core.source_lines import lines_text
-from ...errors import GraphError
-from ...simplification.builder import Builder
+from ...writing.networkx_queries import minimum_cut
+from ...writing.source_lines import lines_text
 from ..names import Name, Names, joined, many
 from ..reachability import ancestors, between, descendants, has_more_ancestors
 from .finding import Finding

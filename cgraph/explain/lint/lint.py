@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...core.edge import Edge
-from ...core.graph import Graph, require_graph
+from ...core.graph import Edge, Graph, require_graph
 from ...core.node import Node
 from ...util.html_text import html_table, html_text
 from ...util.require import require_mapping, require_sequence

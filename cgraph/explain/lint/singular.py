@@ -7,9 +7,9 @@ import numbers
 from collections.abc import Mapping
 
 from ...core.graph import Graph
-from ...core.node import CONSTANT, VARIABLE, Node, Op
-from ...core.op_intervals import LINE
-from ...core.operation import Interval
+from ...core.node import CONSTANT, VARIABLE, Node
+from ...operations.bounds import LINE
+from ...operations.operation import Interval, Op, columns
 from ...util.real_arrays import real_number
 from ...util.require import require_mapping
 from ..names import Names
@@ -34,7 +34,7 @@ def intervals(graph: Graph, box: Box) -> dict[Node, Interval]:
             found[node] = (node.value, node.value)
         else:
             same = len(node.args) == 2 and node.args[0] is node.args[1]
-            found[node] = value_of(node.op, [found[arg] for arg in node.args], same=same)
+            found[node] = value_of(columns(node.op), [found[arg] for arg in node.args], same=same)
     return found
 
 
@@ -59,7 +59,7 @@ def singular_nodes(names: Names, box: Box) -> list[Finding]:
     bounds = intervals(names.graph, _given(names, box))
     findings = []
     for node in names.graph.nodes:
-        reason = singular_at(node.op, [bounds[arg] for arg in node.args]) if node.args else None
+        reason = singular_at(columns(node.op), [bounds[arg] for arg in node.args]) if node.args else None
         if reason is not None:
             arguments = {names.text(arg): bounds[arg] for arg in node.args if arg.value is None}
             within = " and ".join([f"{name} is within {_shown(bound)}" for name, bound in arguments.items()])

@@ -8,7 +8,8 @@ from hypothesis import assume, given, settings, strategies as st
 from mpmath import mpf
 
 import cgraph as cg
-from cgraph.core.node import OPS, apply
+from cgraph.core.node import apply
+from cgraph.operations.operation import OPS
 from tests import high_precision
 from tests.strategies import Case, cases, examples, numbers
 

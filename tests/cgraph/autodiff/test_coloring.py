@@ -7,7 +7,7 @@ from hypothesis import given, strategies as st
 from cgraph.autodiff import coloring
 from cgraph.autodiff.coloring import NONE, jacobian_coloring, star_coloring
 from cgraph.autodiff.sparsity import Pattern, symmetric
-from cgraph.core.naming import free_suffix
+from cgraph.writing.naming import free_suffix
 
 LANES = 8
 

@@ -14,12 +14,12 @@ import pytest
 import cgraph as cg
 from cgraph import GraphError
 from cgraph.autodiff.elimination_order import elimination_steps
-from cgraph.autodiff.forward import tangents
 from cgraph.autodiff.hessian_solve import solve_nodes, solve_tangents
 from cgraph.autodiff.jacobian import hessian_nodes
 from cgraph.autodiff.ldl_solve import ldl_elimination, ldl_solve
 from cgraph.autodiff.rotation_pairs import rotations
 from cgraph.autodiff.symmetric_elimination import SingularError
+from cgraph.core.forward import tangents
 from cgraph.core.traversal import topological
 from tests.tolerances import LONG_SUM
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 import cgraph as cg
-from cgraph.errors import GraphError
+from cgraph import GraphError
 from tests.tolerances import LAST_BITS
 
 x, y, z = cg.variables("x y z")

@@ -16,7 +16,8 @@ from hypothesis import Phase, given, settings, strategies as st
 import cgraph as cg
 import dynamics as dyn
 from cgraph.codegen.c import c_statements as body
-from cgraph.core.node import OPS, apply
+from cgraph.core.node import apply
+from cgraph.operations.operation import OPS
 from cgraph.util.atomic_write import atomic_write
 from tests.slow import slow
 from tests.strategies import cases

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
+from cgraph import GraphError
 from cgraph.codegen import colored_matrix, differentiable, parts, sweep
-from cgraph.errors import GraphError
 from tests import high_precision
 from tests.strategies import cases, examples
 from tests.tolerances import LAST_BITS, LONG_SUM, SHORT_SUM

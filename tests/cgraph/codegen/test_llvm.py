@@ -15,7 +15,8 @@ from hypothesis import given, settings
 import cgraph as cg
 from cgraph.codegen import batch_ir, llvm_engine, parts
 from cgraph.codegen.llvm_ir import scalar_ir
-from cgraph.core.node import OPS, apply
+from cgraph.core.node import apply
+from cgraph.operations.operation import OPS
 from tests.strategies import cases, examples
 from tests.ulps import same, ulps_apart
 

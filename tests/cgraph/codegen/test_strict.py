@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
-from cgraph.core.node import OPS, apply
+from cgraph.core.node import apply
 from cgraph.extend import Call, Program, runner
+from cgraph.operations.operation import OPS
 from tests.strategies import cases
 from tests.ulps import same
 

@@ -13,7 +13,8 @@ from cgraph.codegen import llvm_engine as llvm
 from cgraph.codegen.batch_ir import batch_ir
 from cgraph.codegen.llvm_ir import TOGETHER, libm_functions
 from cgraph.codegen.schedule import Joined, Merged, joined_calls, products_of, schedule
-from cgraph.core.node import OPS, apply
+from cgraph.core.node import apply
+from cgraph.operations.operation import OPS
 from tests.strategies import cases, examples
 from tests.tolerances import SHORT_SUM
 from tests.ulps import exact, same, ulps_apart

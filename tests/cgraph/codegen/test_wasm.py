@@ -12,7 +12,8 @@ from hypothesis import given, settings
 import cgraph as cg
 import dynamics as dyn
 from cgraph.codegen.wasm.functions import library, text_of
-from cgraph.core.node import OPS, apply
+from cgraph.core.node import apply
+from cgraph.operations.operation import OPS
 from dynamics.experiments.speed.bench_scenes import turned_arm
 from dynamics.integrators import TABLEAUS
 from tests.strategies import cases, examples

@@ -7,7 +7,8 @@ import mpmath
 import pytest
 
 import cgraph as cg
-from cgraph.core.node import OPS, apply
+from cgraph.core.node import apply
+from cgraph.operations.operation import OPS
 from tests import high_precision
 from tests.strategies import examples
 from tests.wasm import instance

@@ -8,7 +8,8 @@ import pytest
 from mpmath import mp, mpf
 
 import cgraph as cg
-from cgraph.core.node import OPS, apply
+from cgraph.core.node import apply
+from cgraph.operations.operation import OPS
 from tests import high_precision
 
 ULPS = 16 * 2.0**-53  # a dozen roundings

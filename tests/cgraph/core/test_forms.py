@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 
 import cgraph as cg
-from cgraph.core.node import OPS
+from cgraph.operations.operation import OPS
 from tests.strategies import cases, examples
 
 x, y = cg.variables("x y")

@@ -66,7 +66,7 @@ def test_a_wrong_number_of_arguments_is_told() -> None:
         ({"name": "lambda"}, "must be an identifier of Python, got 'lambda'"),
         ({"name": "sine", "partials": None}, "operation 'sine': partials must be a function, got None"),
         ({"name": "compile"}, "cannot be called 'compile', which means something else in cgraph"),
-        ({"name": "errors"}, "cannot be called 'errors'"),
+        ({"name": "util"}, "cannot be called 'util'"),
         ({"name": "np"}, "cannot be called 'np'"),
         ({"name": "sine", "partials": lambda y, x: ()}, "'sine' takes 1 argument.s., its partials are 0"),
         ({"name": "sine", "partials": lambda y, x: (x, x)}, "'sine' takes 1 argument.s., its partials are 2"),

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from cgraph.core.node import CONSTANT, OPS, VARIABLE, Node
-from cgraph.errors import GraphError
+from cgraph import GraphError
+from cgraph.core.node import CONSTANT, VARIABLE, Node
+from cgraph.operations.operation import OPS
 
 x, y, z = cg.variables("x y z")
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 import cgraph as cg
-from cgraph.core.latex_texts import name_texts
 from cgraph.extend import OPS
+from cgraph.writing.latex_texts import name_texts
 
 mathtext = pytest.importorskip("matplotlib.mathtext")
 A, B, C = cg.variables("a b c")

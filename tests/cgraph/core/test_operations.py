@@ -11,7 +11,8 @@ import pytest
 from mpmath import mpf
 
 import cgraph as cg
-from cgraph.core.node import OPS, Op, apply
+from cgraph.core.node import apply
+from cgraph.operations.operation import OPS, Op
 from tests import high_precision
 
 RELATIVE_ERROR = 1e-13  # of a derivative, relative to the larger of 1 and the size; a few dozen roundings

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 
 import cgraph as cg
-from cgraph.errors import GraphError
+from cgraph import GraphError
 from tests.strategies import cases, examples
 
 x, y = cg.variables("x y")

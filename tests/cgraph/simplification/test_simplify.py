@@ -7,7 +7,7 @@ from hypothesis import assume, given, settings
 from mpmath import mpf
 
 import cgraph as cg
-from cgraph.errors import GraphError
+from cgraph import GraphError
 from tests import high_precision
 from tests.strategies import Case, cases, examples
 from tests.tolerances import LAST_BITS

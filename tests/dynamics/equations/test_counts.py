@@ -6,7 +6,7 @@ import numpy as np
 from pytest import approx, fixture, mark
 
 import dynamics as dyn
-from cgraph.core.structure_hash import structure_hash
+from cgraph.writing.structure_hash import structure_hash
 from tests.dynamics.mechanisms import FAMILIES, turned_arm
 
 FROM_6_TO_40 = (6, 10, 17, 28, 40)

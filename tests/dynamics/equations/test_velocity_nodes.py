@@ -7,8 +7,8 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from cgraph.core.builder import Builder, folded
 from cgraph.core.traversal import topological
-from cgraph.simplification.builder import Builder, folded
 from dynamics.equations.equations_of_motion import bias
 from dynamics.equations.velocity_nodes import velocity_nodes
 from tests import high_precision

@@ -9,7 +9,7 @@ from pytest import approx, importorskip, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.core.structure_hash import structure_hash
+from cgraph.writing.structure_hash import structure_hash
 from dynamics.equations.equations_of_motion import accelerations
 from dynamics.equations.formulations import torques
 from tests.dynamics.mechanisms import FAMILIES, random_inertia, random_rotation, turned_arm

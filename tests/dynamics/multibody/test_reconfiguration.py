@@ -6,7 +6,7 @@ import numpy as np
 from pytest import approx, mark, raises
 
 import dynamics as dyn
-from cgraph.core.structure_hash import structure_hash
+from cgraph.writing.structure_hash import structure_hash
 from dynamics.multibody.body import WORLD
 from tests.dynamics.mechanisms import random_mechanism
 from tests.slow import slow

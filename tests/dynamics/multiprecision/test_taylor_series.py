@@ -8,7 +8,8 @@ import pytest
 from pytest import mark, raises
 
 import cgraph as cg
-from cgraph.core.node import OPS, apply
+from cgraph.core.node import apply
+from cgraph.operations.operation import OPS
 from dynamics.systems.ode_system import OdeSystem
 from tests.high_precision import OPERATIONS
 

@@ -11,7 +11,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.core.node import OPS
+from cgraph.operations.operation import OPS
 from dynamics.equations import equations_of_motion
 from dynamics.equations.constraints import multiplier_outputs
 from dynamics.io.write_mjcf import to_mjcf

@@ -11,7 +11,8 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.core.node import OPS, apply
+from cgraph.core.node import apply
+from cgraph.operations.operation import OPS
 from tests.tolerances import SUMS
 from tests.wasm import Instance
 from viz import cli

@@ -11,7 +11,8 @@ from xml.etree import ElementTree
 import pytest
 
 import cgraph as cg
-from cgraph.core.node import OPS, Op, apply
+from cgraph.core.node import apply
+from cgraph.operations.operation import OPS, Op
 from viz import render_svg, theme, to_dot
 from viz.graph_drawing.dot import main_tag
 

@@ -14,8 +14,8 @@ import cgraph as cg
 import dynamics as dyn
 import viz
 from cgraph.codegen.python_source import source
-from cgraph.core.ops import OPS
 from cgraph.extend import Names
+from cgraph.operations.table import OPS
 from dynamics.scenes.inspection import Inspection, inspection
 from tests.page_script import run_script
 from tests.tolerances import SUMS

@@ -11,11 +11,12 @@ from hypothesis import assume, given, settings, strategies as st
 import cgraph as cg
 import dynamics as dyn
 from cgraph import lint
-from cgraph.core.node import OPS, apply
-from cgraph.core.op_intervals import LINE
+from cgraph.core.node import apply
 from cgraph.explain.lint.cancellation import rounded
 from cgraph.explain.lint.singular import intervals, value_of
 from cgraph.explain.names import Names
+from cgraph.operations.bounds import LINE
+from cgraph.operations.operation import OPS
 from tests import high_precision
 from tests.strategies import Case, cases, examples
 from tests.tolerances import EQUATIONS

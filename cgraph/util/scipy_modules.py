@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..errors import install
+from .extras import install
 
 
 def scipy_sparse(what: str) -> Any:

@@ -6,9 +6,9 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
+from ..core.node import Node
+from ..operations.operation import LEAF, Op, columns
 from ..util.require import require_texts, require_whole
-from .node import Node
-from .operation import LEAF, Op
 
 Text = tuple[str, int]  # a formula, and how strongly it binds, as in the table of operations
 INLINE = 12  # operations in a line, at most; more are told in lines of their own
@@ -151,7 +151,7 @@ class Formulas:
             elif each in self.lined and each is not node:
                 texts[each] = self.symbol[each], LEAF
             else:
-                texts[each] = self.notation.operation(each.op, [texts[arg] for arg in each.args])
+                texts[each] = self.notation.operation(columns(each.op), [texts[arg] for arg in each.args])
         return texts[node][0]
 
 

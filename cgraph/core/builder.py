@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-from ..core.label import Label
-from ..core.node import CONSTANT, Node, Op, constant
-from ..core.scope import building
-from ..core.traversal import rebuild
+from .label import Label
+from .node import CONSTANT, Node, constant
+from .row import Row
+from .scope import building
+from .traversal import rebuild
 
 
 class Builder:
@@ -29,7 +30,7 @@ class Builder:
     def __init__(self) -> None:
         self._made: dict[tuple[str | int, ...], Node] = {}
 
-    def __call__(self, op: Op, args: tuple[Node, ...], label: Label, name: str | None = None) -> Node:
+    def __call__(self, op: Row, args: tuple[Node, ...], label: Label, name: str | None = None) -> Node:
         """The node of this operation on these arguments; a name is kept by a node made here for the first time."""
         for arg in args:
             if arg.op is not CONSTANT:

@@ -1,16 +1,4 @@
-"""The error that a graph raises about itself, and what the errors about missing packages say."""
-
-
-class GraphError(ValueError):
-    """A graph is not well formed, or is asked about inputs, outputs or nodes that it does not have.
-
-    Examples
-    --------
-    >>> import cgraph as cg
-    >>> cg.Graph([], {"y": cg.variable("x")})
-    Traceback (most recent call last):
-    cgraph.errors.GraphError: the outputs need 'x', not among the inputs (none)
-    """
+"""The extras of the distribution: what the errors about missing packages say."""
 
 
 def install(extra: str) -> str:

@@ -8,8 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from .node import OPS
-from .operation import Interval
+from .operation import OPS, Interval
 
 LINE: Interval = (-math.inf, math.inf)
 FLAG: Interval = (0.0, 1.0)

@@ -1,6 +1,19 @@
-"""What may be a name: one rule for variables, outputs, operations, tags, and for what models call by a name."""
+"""Checks: what may be a name of variables, outputs, operations, tags; and the error that a graph raises about itself."""
 
 from __future__ import annotations
+
+
+class GraphError(ValueError):
+    """A graph is not well formed, or is asked about inputs, outputs or nodes that it does not have.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> cg.Graph([], {"y": cg.variable("x")})
+    Traceback (most recent call last):
+    cgraph.core.checks.GraphError: the outputs need 'x', not among the inputs (none)
+    """
+
 
 LONGEST = 1000  # characters; a derived name, such as that of a second derivative, still fits
 

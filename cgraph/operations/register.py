@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from keyword import iskeyword
 
-from .node import Node, variable
+from ..core.node import Node, variable
 from .operation import OPS, Op, enter
 
 _GENERATED = ("float", "function", "inf", "np", "x")  # which mean something in generated Python

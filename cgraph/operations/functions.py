@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable
 from functools import cache
 
-from .node import Node, Scalar, apply
+from ..core.node import Node, Scalar, apply
 from .operation import OPS, Op
 
 Function = Callable[..., Node]

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from operator import mul as product
 from typing import Any
 
-from .node import OPS, Node, apply, as_node
+from ..core.node import Node, apply, as_node
+from .operation import OPS
 
 Coefficients = Sequence[Any]
 POWERS = 64  # whole exponents up to this size become products

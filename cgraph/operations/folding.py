@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from .node import OPS, Node, apply, constant
+from ..core.node import Node, apply, constant
+from .operation import OPS
 
 _SUMS = ("add", "sub")
 

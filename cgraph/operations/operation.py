@@ -10,7 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .op_values import ieee
+from ..core.node import CONSTANT, VARIABLE
+from ..core.row import BY_UFUNC, ROWS, Row
+from .values import ieee
 
 Interval = tuple[float, float]
 
@@ -44,12 +46,12 @@ class MathML(NamedTuple):
     binding: int
 
 
-@dataclass(frozen=True, eq=False)
-class Op:
+@dataclass(frozen=True, eq=False, repr=False)
+class Op(Row):
     """One row of the operation table: all that any part of the library knows of an operation.
 
     Six columns are needed; every other has a default that works, stated here. In the library the rows are in
-    `cgraph/core/ops.py`; `register` adds one in a program of your own.
+    `cgraph/operations/table.py`; `register` adds one in a program of your own.
 
     Parameters
     ----------
@@ -141,12 +143,6 @@ class Op:
     ('np.arcsinh({0})', 'asinh({0})', 2.0)
     """
 
-    name: str
-    arity: int
-    scalar: Callable[..., float]
-    array: Callable[..., Any]
-    partials: Callable[..., tuple[Any, ...]]
-    samples: tuple[tuple[float, ...], ...] = ()
     # its function and texts
     arguments: str = ""
     about: str = ""
@@ -155,16 +151,12 @@ class Op:
     infix: tuple[str, int] | None = None
     mathml: MathML | None = None
     # algebra
-    commutative: bool = False
-    selects: bool = False
     signs: tuple[int, ...] = ()
-    fold: Callable[..., Any] | None = None
     double_double: Callable[..., Any] | None = None
     # bounds and errors
     domain: tuple[Interval, ...] = ()
     interval: Callable[..., Interval] | None = None
     interval_of_same: Callable[[Interval], Interval] | None = None
-    singular: Callable[..., str | None] | None = None
     rounding: float = LIBRARY
     # code
     python: str = ""
@@ -228,16 +220,36 @@ class Op:
         function: Callable[..., float] = getattr(self.scalar, "__wrapped__", self.scalar)
         return function
 
-    def __repr__(self) -> str:
-        return f"<op {self.name}>"
+
+OPS: dict[str, Op] = {}  # the table; filled by table.py
+_LEAVES = {row.name: Op(row.name, 0, row.scalar, row.array, row.partials) for row in (VARIABLE, CONSTANT)}
 
 
-OPS: dict[str, Op] = {}  # the table; filled by ops.py
-BY_UFUNC: dict[Any, Op] = {}  # {ufunc, or the name of one: the operation that it makes of nodes}
+def columns(row: Row) -> Op:
+    """All columns of a node's operation; those of a leaf are empty.
+
+    Parameters
+    ----------
+    row : Row
+        The `op` of a node.
+
+    Returns
+    -------
+    Op
+        Its row of the table.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import columns
+    >>> columns(cg.sin(cg.variable("x")).op).c
+    'sin({0})'
+    """
+    return OPS.get(row.name) or _LEAVES[row.name]
 
 
 def enter(op: Op) -> None:
     """Put a row into the table as it is."""
-    OPS[op.name] = op
+    OPS[op.name] = ROWS[op.name] = op
     if op.ufunc is not None:
         BY_UFUNC[op.ufunc] = op

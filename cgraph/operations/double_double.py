@@ -11,7 +11,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
-from .node import OPS, Node, Scalar, apply, constant
+from ..core.node import Node, Scalar, apply, constant
+from .operation import OPS
 
 ZERO = constant(0.0)
 SPLIT = 2.0**27  # halves of at most 26 bits, whose products are exact

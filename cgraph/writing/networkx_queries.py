@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from .edge import Edge
-from .node import Node
+from ..core.graph import Edge
+from ..core.node import Node
 
 if TYPE_CHECKING:
     import networkx

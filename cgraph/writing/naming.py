@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 
-from .check_name import check_name
-from .node import Node, as_node, variable
+from ..core.checks import check_name
+from ..core.node import Node, as_node, variable
 
 
 def variables(names: str | Sequence[str]) -> list[Node]:

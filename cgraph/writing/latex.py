@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from ..core.node import Node
+from ..core.traversal import topological
 from .formulas import LINES, Formulas, Lines, Notation
 from .latex_texts import literal, name_texts, number_text, operation_text
-from .node import Node
-from .traversal import topological
 
 LATEX = Notation(name_texts, number_text, operation_text, "v_{{{}}}".format)
 

@@ -7,21 +7,11 @@ import operator
 
 import numpy as np
 
-from . import (
-    op_double_double as dd,
-    op_folding as folding,
-    op_intervals as bounds,
-    op_series as series,
-    op_texts as texts,
-    op_values as values,
-)
-from .function_factory import Function, function
-from .node import (
-    OPS as OPS,  # noqa: PLC0414 (who needs the table imports it from here, filled)
-    Node,
-)
-from .op_values import ieee
-from .operation import FUNCTION, LEAF, PRODUCT, RELATION, SUM, MathML, Op, enter
+from ..core.node import Node
+from . import bounds, double_double as dd, folding, series, texts, values
+from .functions import Function, function
+from .operation import FUNCTION, LEAF, OPS as OPS, PRODUCT, RELATION, SUM, MathML, Op, enter  # noqa: PLC0414
+from .values import ieee
 
 
 # Conventions where there is no derivative: abs'(0) = 0; a tie of minimum or maximum gives one half to each argument;

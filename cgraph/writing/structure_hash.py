@@ -6,8 +6,8 @@ import struct
 from collections.abc import Iterable, Mapping
 from hashlib import blake2b
 
-from .graph import Graph, require_graph
-from .node import CONSTANT, VARIABLE, Node
+from ..core.graph import Graph, require_graph
+from ..core.node import CONSTANT, VARIABLE, Node
 
 _SIZE = 16  # bytes of a digest: equal ones by chance need some 2^64 nodes
 

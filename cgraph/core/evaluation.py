@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import GraphError
 from ..util.real_arrays import real_array
+from .checks import GraphError
 from .node import CONSTANT, VARIABLE, Node
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

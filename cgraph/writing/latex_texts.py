@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from xml.etree import ElementTree
 
+from ..operations.operation import FUNCTION, LEAF, PRODUCT, SUM, Op
 from .formulas import Text
-from .operation import FUNCTION, LEAF, PRODUCT, SUM, Op
 
 _GREEK = frozenset(
     "alpha beta gamma delta epsilon zeta eta theta kappa lambda mu nu xi pi rho sigma tau phi chi psi omega".split()

@@ -7,9 +7,10 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from .label import Label, SourceLine
-from .node import Node, Op
-from .scope import Scope, current
+from ..core.label import Label, SourceLine
+from ..core.node import Node
+from ..core.scope import Scope, current
+from ..operations.operation import Op
 
 # Packages whose lines say nothing to the person who calls: this library, and what calls back from between.
 _SKIPPED = frozenset({"cgraph", "dynamics", "functools", "numpy"})

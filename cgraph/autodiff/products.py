@@ -1,0 +1,138 @@
+"""Products: graphs of J x_dot and J^T y_bar of a graph, one sweep each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..core.forward import tangents
+from ..core.graph import Graph, require_graph
+from ..core.node import Node, as_node, variable
+from ..core.reverse import cotangents
+from ..writing.naming import free_suffix
+
+
+def jvp(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Graph:
+    """x -> y becomes (x, x_dot) -> y_dot with y_dot = J(x) x_dot: one forward sweep.
+
+    An entry of x_dot that is zero counts for nothing, also where y has no slope in it.
+
+    Parameters
+    ----------
+    graph : Graph
+        x -> y.
+    wrt : str, Node or sequence of these, optional
+        The inputs x to differentiate by; by default all.
+
+    Returns
+    -------
+    Graph
+        Its inputs are those of `graph`, then a tangent `x_dot` for each of `wrt`; its outputs are `y_dot`. Where such a
+        name is taken, as in `jvp(jvp(graph))`, the suffix is `_dot2`, `_dot3`, ...
+
+    Raises
+    ------
+    GraphError
+        If the graph has no such input.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x, y = cg.variables("x y")
+    >>> graph = cg.jvp(cg.Graph([x, y], {"f": x * y}))
+    >>> graph.evaluate({"x": 2.0, "y": 3.0, "x_dot": 1.0, "y_dot": 0.0})
+    {'f_dot': 3.0}
+    """
+    require_graph("jvp", graph)
+    return forward_products(graph, graph.select_inputs(wrt), zero_wins=True)
+
+
+def forward_products(graph: Graph, chosen: Sequence[Node], *, zero_wins: bool) -> Graph:
+    """`jvp` by these inputs; zero_wins: as for `tangents`."""
+    suffix = free_suffix("_dot", graph.input_names, [str(node.name) for node in chosen])
+    seeds = {node: variable(f"{node.name}{suffix}") for node in chosen}
+    dots = tangents(seeds, graph.outputs.values(), zero_wins=zero_wins and len(seeds) > 1)
+    zero = as_node(0.0)
+    outputs = {f"{name}{suffix}": dots.get(node, zero) for name, node in graph.outputs.items()}
+    return Graph((*graph.inputs, *seeds.values()), outputs)
+
+
+def vjp(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Graph:
+    """x -> y becomes (x, y_bar) -> x_bar with x_bar = J(x)^T y_bar: one reverse sweep.
+
+    An entry of y_bar that is zero counts for nothing, also where that output has no slope.
+
+    Parameters
+    ----------
+    graph : Graph
+        x -> y.
+    wrt : str, Node or sequence of these, optional
+        The inputs x to differentiate by; by default all.
+
+    Returns
+    -------
+    Graph
+        Its inputs are those of `graph`, then a cotangent `y_bar` for each output; its outputs are `x_bar` for each of
+        `wrt`. Where such a name is taken the suffix is `_bar2`, `_bar3`, ...
+
+    Raises
+    ------
+    GraphError
+        If the graph has no such input.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x, y = cg.variables("x y")
+    >>> graph = cg.vjp(cg.Graph([x, y], {"f": x * y}))
+    >>> graph.evaluate({"x": 2.0, "y": 3.0, "f_bar": 1.0})
+    {'x_bar': 3.0, 'y_bar': 2.0}
+    """
+    require_graph("vjp", graph)
+    return reverse_products(graph, graph.select_inputs(wrt), zero_wins=True)
+
+
+def reverse_products(graph: Graph, chosen: Sequence[Node], *, zero_wins: bool) -> Graph:
+    """`vjp` by these inputs; zero_wins: as for `cotangents`."""
+    suffix = free_suffix("_bar", graph.input_names, list(graph.outputs))
+    bars = {name: variable(f"{name}{suffix}") for name in graph.outputs}
+    seeds: dict[Node, Node] = {}
+    for name, node in graph.outputs.items():  # two names may share a node
+        seeds[node] = seeds[node] + bars[name] if node in seeds else bars[name]
+    results = cotangents(seeds, chosen, zero_wins=zero_wins and len(seeds) > 1)
+    outputs = {f"{node.name}{suffix}": bar for node, bar in zip(chosen, results, strict=True)}
+    return Graph((*graph.inputs, *bars.values()), outputs)
+
+
+def gradient(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Graph:
+    """x -> y, one output, becomes x -> (dy/dx_i): one reverse sweep.
+
+    Parameters
+    ----------
+    graph : Graph
+        A function with one output y.
+    wrt : str, Node or sequence of these, optional
+        The inputs to differentiate by; by default all.
+
+    Returns
+    -------
+    Graph
+        With the inputs of `graph` and outputs named `dy/dx_i`.
+
+    Raises
+    ------
+    GraphError
+        If there are several outputs (then see `jacobian`), or the graph has no such input.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x, y = cg.variables("x y")
+    >>> cg.gradient(cg.Graph([x, y], {"f": x * y})).evaluate({"x": 2.0, "y": 3.0})
+    {'df/dx': 3.0, 'df/dy': 2.0}
+    """
+    require_graph("gradient", graph)
+    output = graph.only_output()
+    (name,) = graph.outputs
+    chosen = graph.select_inputs(wrt)
+    results = cotangents({output: as_node(1.0)}, chosen)
+    return Graph(graph.inputs, {f"d{name}/d{node.name}": bar for node, bar in zip(chosen, results, strict=True)})

@@ -1,0 +1,110 @@
+"""Forward mode: tangents pushed from the inputs to the outputs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+from .builder import Builder
+from .label import TANGENT
+from .node import Node, apply, as_node
+from .row import ROWS, Row
+from .scope import building
+from .traversal import topological
+
+
+def tangents(
+    seeds: Mapping[Node, Node],
+    outputs: Iterable[Node],
+    build: Builder | None = None,
+    *,
+    zero_wins: bool = False,
+) -> dict[Node, Node]:
+    """Tangents of nodes by forward mode: y_dot = sum over seeds x of (dy/dx) x_dot.
+
+    Parameters
+    ----------
+    seeds : mapping of Node to Node
+        {x: x_dot}; leaves or inner nodes, which count as independent.
+    outputs : iterable of Node
+        Where to end.
+    build : Builder, optional
+        What the nodes are built by; by default a new one.
+    zero_wins : bool
+        Whether a seed that is zero counts for nothing where a slope is infinite or NaN. Default False: NaN.
+
+    Returns
+    -------
+    dict of Node to Node
+        {y: y_dot} for every node that `outputs` reach; absent where y_dot is zero.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import tangents
+    >>> x, x_dot = cg.variables("x x_dot")
+    >>> y = cg.exp(x)
+    >>> tangents({x: x_dot}, [y])[y].args  # y_dot = y * x_dot
+    (<node exp>, <node variable x_dot>)
+    """
+    dots = dict(seeds)
+    reached = ReachedNodes(seeds if zero_wins else dict.fromkeys(seeds))
+    with building(build or Builder()) as labelled:
+        for node in topological(outputs):
+            if node in dots or not any([arg in dots for arg in node.args]):
+                continue
+            labelled(node.label.derived(TANGENT))
+            total: Node | None = None
+            for arg, partial in zip(node.args, map(as_node, node.op.partials(node, *node.args)), strict=True):
+                if arg in dots:
+                    term = reached.product(node.op, arg, partial, dots[arg])
+                    total = term if total is None else total + term
+                    if term.value != 0.0:
+                        reached.pass_on(node.op, arg, node, partial)
+            assert total is not None
+            if total.value != 0.0:
+                dots[node] = total
+    return dots
+
+
+class ReachedNodes:
+    """The flags of nodes that one sweep, forward or reverse, reaches through operations that select.
+
+    A selecting operation such as `where` has the partial 0 in an argument that it leaves out. Beyond it, whichever way
+    the sweep goes, the tangent or cotangent is 0 and must stay so, though partials there may be infinite or NaN. A zero
+    of any other origin is no such zero: times infinity it is NaN, as it should be.
+
+    seeds: {seed: its value}, if a zero of it means the same, which matters where an operation has a singular slope;
+    else {seed: None}.
+    """
+
+    def __init__(self, seeds: Mapping[Node, Node | None]) -> None:
+        # {node: what is not 0 where the sweep reaches it; None: it always does}
+        self._flags: dict[Node, Node | None] = dict(seeds)
+        self._behind_selection: set[Node] = set()
+
+    def product(self, op: Row, source: Node, a: Node, b: Node) -> Node:
+        """a * b for a partial of `op` and the tangent or cotangent of `source`; 0 where the sweep misses `source`."""
+        if op.selects or 0.0 in (a.value, b.value):
+            return apply(ROWS["zero_safe_mul"], a, b)
+        flag = self._flags.get(source)
+        may_be_infinite = op.singular is not None or source in self._behind_selection
+        if flag is None or not may_be_infinite or _is_finite(a) or _is_finite(b):
+            return a * b
+        return apply(ROWS["where"], flag, a * b, 0.0)
+
+    def pass_on(self, op: Row, source: Node, target: Node, partial: Node) -> None:
+        """Say that the sweep reaches `target` from `source`, through an operation with this partial."""
+        flag = self._flags.get(source)
+        if op.selects:
+            flag = partial if flag is None else apply(ROWS["where"], flag, partial, 0.0)
+        if op.selects or source in self._behind_selection:
+            self._behind_selection.add(target)
+        other = self._flags.setdefault(target, flag)
+        if other is not flag:
+            self._flags[target] = None if flag is None or other is None else apply(ROWS["where"], other, 1.0, flag)
+
+
+def _is_finite(a: Node) -> bool:
+    """Whether a factor is a finite constant: a slope that takes 0 to 0, or a cotangent that is nowhere 0."""
+    return a.value is not None and math.isfinite(a.value)

@@ -1,0 +1,90 @@
+"""Reverse mode: cotangents pulled from the outputs to the inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+
+from .builder import Builder
+from .forward import ReachedNodes
+from .label import ADJOINT, UNLABELLED, Label
+from .node import Node, as_node
+from .scope import building
+from .traversal import topological
+
+
+def cotangents(
+    seeds: Mapping[Node, Node],
+    wrt: Sequence[Node],
+    build: Builder | None = None,
+    *,
+    fixed: Collection[Node] = (),
+    zero_wins: bool = False,
+) -> list[Node]:
+    """Cotangents of nodes by reverse mode: x_bar = sum over seeds y of y_bar dy/dx.
+
+    Parameters
+    ----------
+    seeds : mapping of Node to Node
+        {y: y_bar}.
+    wrt : sequence of Node
+        The nodes x, leaves or inner nodes; one may depend on another. An inner node's cotangent counts every use of it,
+        and goes on to its arguments.
+    build : Builder, optional
+        What the nodes are built by; by default a new one.
+    fixed : collection of Node
+        Inner nodes that count as independent: nothing goes on to their arguments.
+    zero_wins : bool
+        Whether a seed that is zero counts for nothing where a slope is infinite or NaN. Default False: NaN.
+
+    Returns
+    -------
+    list of Node
+        x_bar for each of `wrt`; the constant 0 where no seed depends on it.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import cotangents
+    >>> x, y = cg.variables("x y")
+    >>> cotangents({x * y: cg.constant(1.0)}, [x, y])
+    [<node variable y>, <node variable x>]
+    """
+    order = topological(seeds)
+    active = set(wrt)
+    for node in order:
+        if any([arg in active for arg in node.args]):
+            active.add(node)
+    bars = dict(seeds)
+    reached = ReachedNodes(seeds if zero_wins else dict.fromkeys(seeds))
+    # A cotangent that is a constant carries no tags: what is made of it at an argument takes them from the use itself.
+    bare: dict[Node, Label] = {}
+    with building(build or Builder()) as labelled:
+        for node in reversed(order):
+            bar = bars.get(node)
+            if bar is None or node not in active or not node.args or node in fixed:
+                continue
+            labelled(_label(node, bare))
+            terms: dict[Node, Node] = {}  # by argument first, so that x * x gives 2 * (bar * x)
+            for arg, partial in zip(node.args, map(as_node, node.op.partials(node, *node.args)), strict=True):
+                if arg in active:
+                    term = reached.product(node.op, node, bar, partial)
+                    terms[arg] = terms[arg] + term if arg in terms else term
+                    if term.value != 0.0:
+                        reached.pass_on(node.op, node, arg, partial)
+            for arg, term in terms.items():
+                if term.value == 0.0:
+                    continue
+                if term.value is not None:
+                    bare[arg] = bare.get(arg, UNLABELLED).with_tags_of(node.label)
+                if arg in bars:  # the sum over all uses of arg is about arg, not about this use
+                    labelled(_label(arg, bare))
+                    bars[arg] = bars[arg] + term
+                else:
+                    bars[arg] = term
+    zero = as_node(0.0)
+    return [bars.get(node, zero) for node in wrt]
+
+
+def _label(node: Node, bare: Mapping[Node, Label]) -> Label:
+    label = node.label.derived(ADJOINT)
+    return label.with_tags_of(bare[node]) if node in bare else label
