@@ -56,7 +56,6 @@ if TYPE_CHECKING:
     from .core.checks import check_name
     from .core.evaluation import Array
     from .core.forward import tangents
-    from .core.graph import require_graph
     from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED
     from .core.node import as_node
     from .core.reverse import cotangents
@@ -82,6 +81,7 @@ if TYPE_CHECKING:
     from .util.require import (
         require_choice,
         require_flag,
+        require_graph,
         require_mapping,
         require_path,
         require_sequence,

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ..core.graph import Graph, require_graph
+from ..core.graph import Graph
 from ..core.node import Node, as_node, variable
 from ..operations.table import equal
 from ..simplification.simplify import simplify
+from ..util.require import require_graph
 from .coloring import NONE, Coloring, column_coloring
 from .direction_split import direction_split
 from .jacobian_entries import written_sizes

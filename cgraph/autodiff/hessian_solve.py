@@ -6,14 +6,14 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Literal, get_args
 
 from ..core.builder import Builder
-from ..core.graph import Graph, require_graph
+from ..core.graph import Graph
 from ..core.label import ADJOINT, TANGENT
 from ..core.node import Node, Scalar, as_node
 from ..core.reverse import cotangents
 from ..core.scope import building
 from ..core.traversal import topological
 from ..simplification.balanced_sums import balanced
-from ..util.require import require_choice, require_flag, require_sequence
+from ..util.require import require_choice, require_flag, require_graph, require_sequence
 from .balanced_elimination import BalancedElimination, nodes_of, written_rows
 from .elimination_order import Step, elimination_steps
 from .schur_elimination import EdgePushing

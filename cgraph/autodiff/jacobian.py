@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 from ..core.builder import Builder
 from ..core.forward import tangents
-from ..core.graph import Graph, require_graph
+from ..core.graph import Graph
 from ..core.node import Node, as_node
 from ..core.reverse import cotangents
+from ..util.require import require_graph
 
 
 def jacobian(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Graph:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..core.forward import tangents
-from ..core.graph import Graph, require_graph
+from ..core.graph import Graph
 from ..core.node import Node, as_node, variable
 from ..core.reverse import cotangents
+from ..util.require import require_graph
 from ..writing.naming import free_suffix
 
 

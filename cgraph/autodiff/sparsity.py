@@ -11,10 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.builder import Builder
-from ..core.graph import Graph, require_graph
+from ..core.graph import Graph
 from ..core.node import Node, as_node, variable
 from ..core.scope import building
 from ..operations.operation import Op
+from ..util.require import require_graph
 from ..util.scipy_modules import scipy_sparse
 
 Indices = np.ndarray[Any, np.dtype[np.int64]]

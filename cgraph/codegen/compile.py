@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core.graph import Graph, require_graph
-from ..util.require import require_choice, require_flag
+from ..core.graph import Graph
+from ..util.require import require_choice, require_flag, require_graph
 from .compiled import Compiled
 from .llvm_engine import MissingFunctionError
 from .native_function import Native

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .checks import GraphError, check_name
 from .evaluation import Value, evaluate
-from .node import CONSTANT, VARIABLE, Node, Scalar, as_node, variable
-from .row import ROWS, Row
+from .node import VARIABLE, Node, Scalar, as_node, variable
 from .traversal import rebuild, topological
 
 if TYPE_CHECKING:
@@ -194,7 +193,9 @@ class Graph:
         TypeError
             If a value is not real.
         """
-        return evaluate(self.inputs, self.nodes, self.outputs, values)
+        from ..util.input_values import input_values
+
+        return evaluate(self.nodes, self.outputs, input_values(self.input_names, values))
 
     def counts(self) -> Counts:
         """Nodes, edges, depth, width, and nodes by operation, tag and role."""
@@ -221,15 +222,9 @@ class Graph:
 
     def check(self) -> None:
         """Raise GraphError unless every node is well formed and the order is topological."""
-        for node in self.nodes:
-            _check_node(node)
-        if set(topological(self.outputs.values())) != set(self.nodes):
-            raise GraphError("the nodes are not those that the outputs reach")
-        visited: set[Node] = set()
-        for node in self.nodes:
-            if not visited.issuperset(node.args):
-                raise GraphError(f"{node!r} comes before one of its arguments")
-            visited.add(node)
+        from ..writing.check import check
+
+        check(self)
 
     def to_networkx(self) -> networkx.MultiDiGraph:
         """A networkx.MultiDiGraph from arguments to uses.
@@ -257,38 +252,6 @@ class Graph:
         from ..writing.records import reduced
 
         return reduced(self)
-
-
-def require_graph(what: str, graph: object) -> None:
-    """Raise TypeError, saying that the function `what` needs a graph, for anything else.
-
-    Parameters
-    ----------
-    what : str
-        The function that was called.
-    graph : object
-        What it was given.
-
-    Raises
-    ------
-    TypeError
-        For what is no `Graph`.
-
-    Examples
-    --------
-    >>> from cgraph.extend import require_graph
-    >>> require_graph("gradient", 3)
-    Traceback (most recent call last):
-    TypeError: gradient needs a cg.Graph, got int: 3
-    """
-    if isinstance(graph, Graph):
-        return
-    hint = ""
-    if hasattr(type(graph), "coordinates"):  # a model has graphs; see `dynamics.Model`
-        hint = "; forward_dynamics(model) of the package dynamics is one"
-    elif isinstance(graph, Node):
-        hint = "; write cg.Graph(inputs, {name: node})"
-    raise TypeError(f"{what} needs a cg.Graph, got {type(graph).__name__}: {graph!r:.60}{hint}")
 
 
 def _checked_inputs(inputs: Sequence[Node]) -> tuple[Node, ...]:
@@ -324,21 +287,3 @@ def _checked_outputs(outputs: Mapping[str, Scalar]) -> dict[str, Node]:
 
 def _short(names: Sequence[str]) -> str:
     return ", ".join(names if len(names) <= 6 else [*names[:3], "...", names[-1]])
-
-
-def _check_node(node: Node) -> None:
-    if not isinstance(node, Node) or not isinstance(node.op, Row):
-        raise GraphError(f"a {type(node).__name__} is not a node of an operation in the table")
-    if node.op is CONSTANT:
-        if type(node.value) is not float or node.value != node.value:
-            raise GraphError(f"constant {node.value!r} is not a number")
-    elif node.op is VARIABLE:
-        if not node.name:
-            raise GraphError("a variable has no name")
-    elif ROWS.get(node.op.name) is not node.op:
-        raise GraphError(f"operation {node.op.name!r} is not in the table")
-    if len(node.args) != node.op.arity:
-        raise GraphError(f"{node.op.name} takes {node.op.arity} argument(s), a node has {len(node.args)}")
-    for arg in node.args:
-        if not isinstance(arg, Node):
-            raise GraphError(f"an argument of {node!r} is not a node: {arg!r:.60}")

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Callable
-from functools import partial
 from typing import Any, NoReturn
 
 import numpy as np
 
 from .checks import check_name
 from .label import INPUT, UNLABELLED, Interned, Label, SourceLine, label
-from .row import BY_UFUNC, ROWS, Row
+from .row import ROWS, Row
 from .scope import current
 
 _INPUT = label(roles=frozenset({INPUT}))
@@ -127,12 +126,9 @@ class Node:
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **kwargs: Any) -> Any:
         """`np.sin(node)`, `np.float64(2) * node`, and element by element for arrays of nodes."""
-        if ufunc in _TURNED:
-            ufunc, inputs = _TURNED[ufunc], inputs[::-1]
-        op = BY_UFUNC.get(ufunc) or BY_UFUNC.get(ufunc.__name__)
-        if op is None or method != "__call__" or kwargs:
-            return NotImplemented
-        return _elementwise(op, *inputs)
+        from ..operations.arrays import of_ufunc
+
+        return of_ufunc(ufunc, method, inputs, kwargs)
 
     # Operators look the row up by name, so that the table stays the one place that knows operations.
     def __add__(self, other: Scalar) -> Node:
@@ -197,16 +193,14 @@ class Node:
 
     def __getattr__(self, name: str) -> Callable[..., Node]:
         """The method that NumPy asks of the elements of an array of objects, as in `np.sqrt(array)`."""
-        ufunc = getattr(np, name, None)
-        if isinstance(ufunc, np.ufunc) and ufunc in BY_UFUNC:
-            return partial(apply, BY_UFUNC[ufunc], self)
-        raise AttributeError(f"a Node has no attribute {name!r}")
+        from ..operations.arrays import method_of
+
+        return method_of(self, name)
 
 
 # Past Node.__setattr__, in half the time of object.__setattr__.
 _set_args, _set_label, _set_name, _set_op, _set_value = [vars(Node)[field].__set__ for field in Node.__slots__[1:]]
 Scalar = Node | float
-_TURNED = {np.greater: np.less, np.greater_equal: np.less_equal}  # a > b is b < a
 _constants: Interned[tuple[float, float], Node] = Interned()
 _variables: Interned[str, Node] = Interned()
 
@@ -333,12 +327,7 @@ def _binary(name: str, a: Scalar, b: Scalar) -> Node:
     for each in (a, b):
         if not isinstance(each, (Node, numbers.Real, np.ndarray)):
             return NotImplemented  # type: ignore[no-any-return]  # Python then asks the other operand, or raises
-    node: Node = _elementwise(ROWS[name], a, b)
+    from ..operations.arrays import elementwise
+
+    node: Node = elementwise(ROWS[name], a, b)
     return node
-
-
-def _elementwise(op: Row, *args: Any) -> Any:
-    """A node; or an array of nodes, when an argument is an array with dimensions."""
-    if any([isinstance(each, np.ndarray) and each.ndim for each in args]):
-        return np.frompyfunc(partial(apply, op), op.arity, 1)(*[np.asarray(each, dtype=object) for each in args])
-    return apply(op, *[each.item() if isinstance(each, np.ndarray) else each for each in args])

@@ -37,4 +37,3 @@ class Row:
 
 
 ROWS: dict[str, Row] = {}  # {name: row}, filled by `cgraph.operations`
-BY_UFUNC: dict[Any, Row] = {}  # {ufunc of NumPy, or the name of one: the operation that it makes of nodes}

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 from ..core.checks import GraphError
-from ..core.graph import Graph, require_graph
+from ..core.graph import Graph
 from ..core.node import VARIABLE, Node, variable
 from ..util.html_text import html_lines
-from ..util.require import require_choice, require_sequence, require_texts
+from ..util.require import require_choice, require_graph, require_sequence, require_texts
 from ..writing.structure_hash import node_hashes
 from .names import Names, joined, many
 

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..core.checks import GraphError
-from ..core.graph import Graph, require_graph
+from ..core.graph import Graph
 from ..core.node import Node
 from ..util.html_text import html_lines
+from ..util.require import require_graph
 from .names import Name, Names, joined, many
 from .reachability import ancestors, descendants
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.node import CONSTANT, VARIABLE
-from ..core.row import BY_UFUNC, ROWS, Row
+from ..core.row import ROWS, Row
 from .values import ieee
 
 Interval = tuple[float, float]
@@ -222,6 +222,7 @@ class Op(Row):
 
 
 OPS: dict[str, Op] = {}  # the table; filled by table.py
+BY_UFUNC: dict[Any, Op] = {}  # {ufunc of NumPy, or the name of one: the operation that it makes of nodes}
 _LEAVES = {row.name: Op(row.name, 0, row.scalar, row.array, row.partials) for row in (VARIABLE, CONSTANT)}
 
 

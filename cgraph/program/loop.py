@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 
 from ..core.checks import GraphError
 from ..core.evaluation import Array
-from ..core.graph import Graph, require_graph
+from ..core.graph import Graph
 from ..core.node import CONSTANT, Node, variable
 from ..core.traversal import rebuild, topological
 from ..util.real_arrays import real_array
-from ..util.require import require_mapping
+from ..util.require import require_graph, require_mapping
 from .choose_runner import runner
 from .program import Call, Program
 

@@ -6,7 +6,7 @@ own, in `core.op_double_double`; an operation without one takes the low parts of
 
 from __future__ import annotations
 
-from ..core.graph import Graph, require_graph
+from ..core.graph import Graph
 from ..core.label import Label
 from ..core.node import CONSTANT, Node, apply, as_node, constant
 from ..core.row import Row
@@ -15,7 +15,7 @@ from ..core.traversal import topological
 from ..operations.double_double import ZERO, Pair, normal
 from ..operations.operation import columns
 from ..operations.table import zero_safe_mul
-from ..util.require import require_flag
+from ..util.require import require_flag, require_graph
 from ..writing.naming import free_suffix
 
 

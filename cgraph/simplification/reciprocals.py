@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 
-from ..core.graph import Graph, require_graph
+from ..core.graph import Graph
 from ..core.node import Node, as_node
 from ..core.traversal import rebuild
 from ..operations.operation import OPS
+from ..util.require import require_graph
 
 
 def with_reciprocals(graph: Graph) -> Graph:

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 
 from ..core.builder import Builder, folded
 from ..core.checks import GraphError
-from ..core.graph import Graph, require_graph
+from ..core.graph import Graph
 from ..core.node import Node, Scalar, constant
 from ..core.traversal import rebuild
-from ..util.require import require_mapping, require_sequence
+from ..util.require import require_graph, require_mapping, require_sequence
 
 
 def simplify(graph: Graph) -> Graph:

@@ -10,6 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from ..core.graph import Graph
+from ..core.node import Node
+
 
 def require_flag(what: str, value: Any) -> bool:
     """The value as a bool.
@@ -244,3 +247,35 @@ def require_path(what: str, value: Any) -> Path:
     if not isinstance(value, (str, os.PathLike)):
         raise TypeError(f"{what} must be a path, got {type(value).__name__}: {value!r:.60}")
     return Path(value).expanduser()
+
+
+def require_graph(what: str, graph: object) -> None:
+    """Raise TypeError, saying that the function `what` needs a graph, for anything else.
+
+    Parameters
+    ----------
+    what : str
+        The function that was called.
+    graph : object
+        What it was given.
+
+    Raises
+    ------
+    TypeError
+        For what is no `Graph`.
+
+    Examples
+    --------
+    >>> from cgraph.extend import require_graph
+    >>> require_graph("gradient", 3)
+    Traceback (most recent call last):
+    TypeError: gradient needs a cg.Graph, got int: 3
+    """
+    if isinstance(graph, Graph):
+        return
+    hint = ""
+    if hasattr(type(graph), "coordinates"):  # a model has graphs; see `dynamics.Model`
+        hint = "; forward_dynamics(model) of the package dynamics is one"
+    elif isinstance(graph, Node):
+        hint = "; write cg.Graph(inputs, {name: node})"
+    raise TypeError(f"{what} needs a cg.Graph, got {type(graph).__name__}: {graph!r:.60}{hint}")

@@ -6,8 +6,9 @@ import struct
 from collections.abc import Iterable, Mapping
 from hashlib import blake2b
 
-from ..core.graph import Graph, require_graph
+from ..core.graph import Graph
 from ..core.node import CONSTANT, VARIABLE, Node
+from ..util.require import require_graph
 
 _SIZE = 16  # bytes of a digest: equal ones by chance need some 2^64 nodes
 

@@ -116,7 +116,7 @@ def uses(known: Mapping[str, Module]) -> dict[str, set[str]]:
         name: {
             target
             for line in module.imports
-            if not line.module.startswith(DOORS.get(name, "-"))
+            if not line.module.startswith(DOORS.get(name, ("-",)))
             for target in _targets(known, line.module, line.name)
         }
         - {name}

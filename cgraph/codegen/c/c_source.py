@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from ...core.graph import Graph, require_graph
+from ...core.graph import Graph
 from ...util.atomic_write import atomic_write
-from ...util.require import require_flag, require_path, require_texts
+from ...util.require import require_flag, require_graph, require_path, require_texts
 from .c_identifiers import check_function_name, distinct
 from .c_statements import comment, functions
 

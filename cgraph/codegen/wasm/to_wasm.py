@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from ...core.checks import GraphError
-from ...core.graph import Graph, require_graph
+from ...core.graph import Graph
 from ...operations.operation import columns
-from ...util.require import require_mapping, require_sequence
+from ...util.require import require_graph, require_mapping, require_sequence
 from . import instructions as ins
 from .elementary_functions import ROOM
 from .evaluation import evaluation

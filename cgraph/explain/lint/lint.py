@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...core.graph import Edge, Graph, require_graph
+from ...core.graph import Edge, Graph
 from ...core.node import Node
 from ...util.html_text import html_table, html_text
-from ...util.require import require_mapping, require_sequence
+from ...util.require import require_graph, require_mapping, require_sequence
 from ..edge_partials import Point
 from ..names import Name, Names, many
 from .cancellation import cancellations, rounded

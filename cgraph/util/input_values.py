@@ -1,0 +1,42 @@
+"""Values of inputs by name, as a caller passes them: checked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..core.checks import GraphError
+from ..core.evaluation import Value
+from .real_arrays import real_array
+
+
+def input_values(names: Sequence[str], values: object) -> dict[str, Value]:
+    """{name: a float, or an array of float64} of all inputs, in shapes that broadcast.
+
+    Raises GraphError for a missing or unknown name or shapes that do not broadcast, TypeError for a value that is
+    not real.
+    """
+    if not isinstance(values, Mapping):
+        raise TypeError(f"evaluate takes a mapping {{input: value}}, got {type(values).__name__}: {values!r:.60}")
+    read = {name: _as_value(name, value) for name, value in values.items()}
+    if missing := [name for name in names if name not in read]:
+        raise GraphError(f"no value for input {', '.join(missing)}")
+    known = set(names)
+    if unknown := [name for name in read if name not in known]:
+        raise GraphError(f"the graph has no input {', '.join(map(str, unknown))} (it has {', '.join(names) or 'none'})")
+    shapes = {name: value.shape for name, value in read.items() if isinstance(value, np.ndarray)}
+    try:
+        np.broadcast_shapes(*shapes.values())
+    except ValueError:
+        listed = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
+        raise GraphError(f"the inputs' shapes do not broadcast: {listed}") from None
+    return read
+
+
+def _as_value(name: str, value: Any) -> Value:
+    if type(value) is float:
+        return value
+    array = real_array(f"input {name!r}", value)
+    return array if array.ndim else float(array)
