@@ -129,6 +129,40 @@ def test_the_core_is_imported_through_its_two_faces(sources: dict[str, Module]) 
     assert deeper == []
 
 
+def test_the_core_is_small_and_imports_numpy_and_the_standard_library_alone(sources: dict[str, Module]) -> None:
+    core = {file: module for file, module in sources.items() if file.startswith("cgraph/core/")}
+    texts = {file: module.path.read_text(encoding="utf-8").splitlines() for file, module in core.items()}
+    code = 0
+    for file, lines in texts.items():
+        told = {
+            line for _, start, count in docstrings(ast.walk(core[file].tree)) for line in range(start, start + count)
+        }
+        code += sum(
+            [
+                number not in told and bool(line.strip()) and not line.strip().startswith("#")
+                for number, line in enumerate(lines, 1)
+            ]
+        )
+    assert len(core) <= 12
+    assert sum(map(len, texts.values())) <= 1300
+    assert code <= 700
+
+
+def test_the_core_loads_nothing_else_of_ours(tmp_path: Path) -> None:
+    modules = [f"cgraph.core.{path.stem}" for path in (ROOT / "cgraph" / "core").glob("[!_]*.py")]
+    program = f"import {', '.join(modules)}; print(*[m for m in sys.modules if m.startswith('cgraph.')])"
+    run = subprocess.run(
+        [sys.executable, "-c", f"import sys; {program}"], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True, text=True, check=True
+    )  # fmt: skip
+    assert set(run.stdout.split()) - set(modules) == {
+        "cgraph.core",
+        "cgraph.util",
+        "cgraph.util.doors",
+        "cgraph.util.version",
+    }
+
+
 def test_no_public_function_takes_a_model_of_any_type(sources: dict[str, Module]) -> None:
     found = [
         f"{file}:{node.lineno} {node.name}"

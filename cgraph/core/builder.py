@@ -17,8 +17,6 @@ class Builder:
     Merging unites labels, and keeps the first name. Only nodes that this builder made are merged, so that no other
     node changes. A node without tags, such as a sum at a variable, takes those of its arguments.
 
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, building
     >>> x = cg.variable("x")
@@ -65,26 +63,10 @@ class Builder:
 
 
 def folded(nodes: Collection[Node], build: Builder, replace: Mapping[Node, Node] | None = None) -> list[Node]:
-    """Copies of nodes, and of all that they reach, made by a builder.
+    """Copies of nodes, and of all that they reach, made by a builder; replace: {node: what stands in its place}.
 
     Once is enough: a rule sees the very arguments that the copy keeps, so a copy of the copy would come out alike.
 
-    Parameters
-    ----------
-    nodes : collection of Node
-        What to copy.
-    build : Builder
-        What the copies are made by, and shared with.
-    replace : mapping of Node to Node, optional
-        Nodes to put in the place of others, variables or inner nodes, as they are.
-
-    Returns
-    -------
-    list of Node
-        The copies, in the order of `nodes`.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, folded
     >>> x = cg.variable("x")

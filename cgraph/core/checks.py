@@ -1,56 +1,23 @@
-"""Checks: what may be a name of variables, outputs, operations, tags; and the error that a graph raises about itself."""
+"""Checks: what may be a name, and the error that a graph raises about itself."""
 
 from __future__ import annotations
 
 
 class GraphError(ValueError):
-    """A graph is not well formed, or is asked about inputs, outputs or nodes that it does not have.
-
-    Examples
-    --------
-    >>> import cgraph as cg
-    >>> cg.Graph([], {"y": cg.variable("x")})
-    Traceback (most recent call last):
-    cgraph.core.checks.GraphError: the outputs need 'x', not among the inputs (none)
-    """
+    """A graph is not well formed, or is asked about inputs, outputs or nodes that it does not have."""
 
 
 LONGEST = 1000  # characters; a derived name, such as that of a second derivative, still fits
 
 
 def check_name(what: str, name: str, *, spaces: bool = True) -> str:
-    r"""The name, if it is one: printable text that a listing, a drawing, a page and a pickle show as it is.
+    r"""The name, if it is one: 1 to 1000 printable characters; spaces: whether it may have any.
 
     Names are labels: generated code numbers its identifiers, so a name may be a keyword, a formula or a word of any
-    language. What would change a text around it is refused: line breaks and other control characters, characters
-    without a glyph (which make two names look alike), and halves of surrogate pairs, which no file can hold.
+    language. What would change a text around it is refused: control characters, characters without a glyph (which make
+    two names look alike), and halves of surrogate pairs, which no file can hold. Raises TypeError, ValueError.
 
-    Parameters
-    ----------
-    what : str
-        Whose name it is, as the error begins: "a joint".
-    name : str
-        From 1 to 1000 printable characters.
-    spaces : bool
-        Whether it may contain spaces.
-
-    Returns
-    -------
-    str
-        The name.
-
-    Raises
-    ------
-    TypeError
-        If it is not a string.
-    ValueError
-        If it is empty, too long, or has a character that is refused.
-
-    Examples
-    --------
     >>> from cgraph.extend import check_name
-    >>> check_name("a joint", "left elbow")
-    'left elbow'
     >>> check_name("a joint", "left\nelbow")
     Traceback (most recent call last):
     ValueError: the name of a joint must be printable, got '\n' in 'left\nelbow'

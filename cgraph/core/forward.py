@@ -20,26 +20,11 @@ def tangents(
     *,
     zero_wins: bool = False,
 ) -> dict[Node, Node]:
-    """Tangents of nodes by forward mode: y_dot = sum over seeds x of (dy/dx) x_dot.
+    """Tangents y_dot = sum over seeds x of (dy/dx) x_dot, {y: y_dot}, of all that `outputs` reach; absent where zero.
 
-    Parameters
-    ----------
-    seeds : mapping of Node to Node
-        {x: x_dot}; leaves or inner nodes, which count as independent.
-    outputs : iterable of Node
-        Where to end.
-    build : Builder, optional
-        What the nodes are built by; by default a new one.
-    zero_wins : bool
-        Whether a seed that is zero counts for nothing where a slope is infinite or NaN. Default False: NaN.
+    seeds: {x: x_dot}, leaves or inner nodes, which count as independent.  build: what makes the nodes.
+    zero_wins: a seed that is zero counts for nothing, also where a slope is infinite or NaN; else the result is NaN.
 
-    Returns
-    -------
-    dict of Node to Node
-        {y: y_dot} for every node that `outputs` reach; absent where y_dot is zero.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import tangents
     >>> x, x_dot = cg.variables("x x_dot")

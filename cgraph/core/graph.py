@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .checks import GraphError, check_name
 from .evaluation import Value, evaluate
-from .node import VARIABLE, Node, Scalar, as_node, variable
+from .node import VARIABLE, Node, Scalar, as_node
 from .traversal import rebuild, topological
 
 if TYPE_CHECKING:
@@ -112,44 +112,13 @@ class Graph:
         return tuple([Edge(arg, node, slot) for node in self.nodes for slot, arg in enumerate(node.args)])
 
     def select_inputs(self, wrt: str | Node | Sequence[str | Node] | None) -> tuple[Node, ...]:
-        """The inputs that `wrt` names.
+        """The inputs that `wrt` names, by a name or a variable or several; None for all.
 
-        Parameters
-        ----------
-        wrt : str, Node, sequence of these, or None
-            A name or variable, or several; None for all inputs.
-
-        Returns
-        -------
-        tuple of Node
-            The variables.
-
-        Raises
-        ------
-        GraphError
-            If the graph has no such input, or one is named twice.
-        TypeError
-            If `wrt` holds anything but strings and nodes.
+        Raises GraphError if the graph has no such input or one is named twice, TypeError for anything else.
         """
-        if wrt is None:
-            return self.inputs
-        if not isinstance(wrt, (str, Node, Iterable)):
-            raise TypeError(f"wrt must name inputs by strings or variables, got {type(wrt).__name__}: {wrt!r:.60}")
-        inputs, chosen = set(self.inputs), dict[Node, None]()
-        for name in (wrt,) if isinstance(wrt, (str, Node)) else wrt:
-            node = variable(name) if isinstance(name, str) else name
-            if not isinstance(node, Node):
-                raise TypeError(f"wrt must name inputs by strings or variables, got {node!r:.60}")
-            if node not in inputs:
-                raise GraphError(f"the graph has no input {node.name or node!r} (it has {', '.join(self.input_names)})")
-            if node in chosen:
-                raise GraphError(f"wrt names the input {node.name} twice")
-            chosen[node] = None
-        if not chosen:
-            raise GraphError(
-                f"wrt must name at least one input (the graph has {', '.join(self.input_names) or 'none'})"
-            )
-        return tuple(chosen)
+        from ..util.inputs import chosen_inputs
+
+        return self.inputs if wrt is None else chosen_inputs(self, wrt)
 
     def only_output(self) -> Node:
         """The one output. Raises GraphError if there are several."""
@@ -193,7 +162,7 @@ class Graph:
         TypeError
             If a value is not real.
         """
-        from ..util.input_values import input_values
+        from ..util.inputs import input_values
 
         return evaluate(self.nodes, self.outputs, input_values(self.input_names, values))
 
@@ -255,10 +224,8 @@ class Graph:
 
 
 def _checked_inputs(inputs: Sequence[Node]) -> tuple[Node, ...]:
-    if isinstance(inputs, Node):
-        raise TypeError("inputs must be a sequence of variables, got a single Node; write [x]")
-    if not isinstance(inputs, Iterable):
-        raise TypeError(f"inputs must be a sequence of variables, got {type(inputs).__name__}: {inputs!r:.60}")
+    if isinstance(inputs, Node) or not isinstance(inputs, Iterable):
+        raise TypeError(f"inputs must be a sequence of variables, such as [x]; got {inputs!r:.60}")
     nodes = tuple(inputs)
     for node in nodes:
         if not isinstance(node, Node) or node.op is not VARIABLE:

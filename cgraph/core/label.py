@@ -28,9 +28,6 @@ class Interned(Generic[Key, Value]):
                 value = self._table[key] = make()
             return value
 
-    def __len__(self) -> int:
-        return len(self._table)
-
 
 PART = 16  # members that a set of its own may have; a larger one is a chain of parts of at least this size
 
@@ -47,9 +44,6 @@ class SharedSet:
     def __init__(self, part: frozenset[Any], base: SharedSet | None = None) -> None:
         self.part, self.base = part, base
         self.size: int = len(part) + (0 if base is None else base.size)
-
-    def __len__(self) -> int:
-        return self.size
 
     @property
     def members(self) -> frozenset[Any]:
@@ -100,13 +94,7 @@ class Label:
 
     A label lives as long as a node has it. Labels of the same sets are one object, so that most comparisons are a
     comparison of pointers; of labels with many tags there may be two of the same meaning.
-
-    Attributes
-    ----------
-    roles : frozenset of str
-        Among "input", "primal", "adjoint", "tangent".
-    has_tags : bool
-        Whether there is any tag.
+    roles: among "input", "primal", "adjoint", "tangent".
     """
 
     __slots__ = ("__weakref__", "_derived", "_lines", "_tags", "has_tags", "roles")

@@ -283,18 +283,6 @@ def variable(name: str) -> Node:
 def as_node(value: Scalar) -> Node:
     """The node itself, or the constant of a number.
 
-    Parameters
-    ----------
-    value : Node or float
-        Either.
-
-    Returns
-    -------
-    Node
-        A node.
-
-    Examples
-    --------
     >>> from cgraph.extend import as_node
     >>> as_node(1.0)
     <node 1.0>

@@ -20,29 +20,13 @@ def cotangents(
     fixed: Collection[Node] = (),
     zero_wins: bool = False,
 ) -> list[Node]:
-    """Cotangents of nodes by reverse mode: x_bar = sum over seeds y of y_bar dy/dx.
+    """Cotangents x_bar = sum over seeds y of y_bar dy/dx of the nodes `wrt`; the constant 0 where no seed depends on x.
 
-    Parameters
-    ----------
-    seeds : mapping of Node to Node
-        {y: y_bar}.
-    wrt : sequence of Node
-        The nodes x, leaves or inner nodes; one may depend on another. An inner node's cotangent counts every use of it,
-        and goes on to its arguments.
-    build : Builder, optional
-        What the nodes are built by; by default a new one.
-    fixed : collection of Node
-        Inner nodes that count as independent: nothing goes on to their arguments.
-    zero_wins : bool
-        Whether a seed that is zero counts for nothing where a slope is infinite or NaN. Default False: NaN.
+    seeds: {y: y_bar}.  wrt: leaves or inner nodes; one may depend on another: the cotangent of an inner node counts
+    every use of it, and goes on to its arguments.  build: what makes the nodes.
+    fixed: inner nodes that count as independent: nothing goes on to their arguments.
+    zero_wins: a seed that is zero counts for nothing, also where a slope is infinite or NaN; else the result is NaN.
 
-    Returns
-    -------
-    list of Node
-        x_bar for each of `wrt`; the constant 0 where no seed depends on it.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import cotangents
     >>> x, y = cg.variables("x y")

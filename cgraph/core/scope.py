@@ -69,24 +69,12 @@ def tag(*tags: str) -> Iterator[None]:
 
 @contextmanager
 def building(build: Build) -> Iterator[Callable[[Label], None]]:
-    """Send every node made inside the `with` block through `build`, so that plain formulas are folded and shared.
+    """Send every node made inside the `with` block through `build`, in general a `Builder`.
 
-    The garbage collector is off inside the block. What is built is kept, so its searches through a growing graph
-    would free nothing, and take as long as all the rest.
+    It gives a function that sets the label of the nodes to come: setting a field of this block's scope costs a tenth of
+    setting a context variable. The garbage collector is off inside the block: what is built is kept, so its searches
+    through a growing graph would free nothing, and take as long as all the rest.
 
-    Parameters
-    ----------
-    build : callable
-        `(operation, arguments, label) -> node`; in general a `Builder`.
-
-    Yields
-    ------
-    callable
-        Sets the label of the nodes to come. It changes the scope of this block, no other: setting a field costs a
-        tenth of setting a context variable.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, building
     >>> x = cg.variable("x")

@@ -9,25 +9,10 @@ from .node import Node
 
 
 def topological(outputs: Iterable[Node]) -> list[Node]:
-    """The nodes that `outputs` reach, arguments first, in an order that depends on structure alone.
+    """The nodes that `outputs` reach, arguments first, each once, in an order that depends on structure alone.
 
-    Parameters
-    ----------
-    outputs : iterable of Node
-        Where to start.
+    Raises GraphError if the nodes form a cycle, which the public interface cannot make.
 
-    Returns
-    -------
-    list of Node
-        The outputs and all that they are made from, every node once.
-
-    Raises
-    ------
-    GraphError
-        If the nodes form a cycle (impossible through the public interface).
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import topological
     >>> x = cg.variable("x")

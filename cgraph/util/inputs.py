@@ -1,14 +1,16 @@
-"""Values of inputs by name, as a caller passes them: checked."""
+"""Inputs of a graph as a caller names them, and the values that they get: checked."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ..core.checks import GraphError
 from ..core.evaluation import Value
+from ..core.graph import Graph
+from ..core.node import Node, variable
 from .real_arrays import real_array
 
 
@@ -40,3 +42,22 @@ def _as_value(name: str, value: Any) -> Value:
         return value
     array = real_array(f"input {name!r}", value)
     return array if array.ndim else float(array)
+
+
+def chosen_inputs(graph: Graph, wrt: str | Node | Sequence[str | Node]) -> tuple[Node, ...]:
+    """The inputs that `wrt` names. Raises as `Graph.select_inputs`."""
+    if not isinstance(wrt, (str, Node, Iterable)):
+        raise TypeError(f"wrt must name inputs by strings or variables, got {type(wrt).__name__}: {wrt!r:.60}")
+    inputs, chosen = set(graph.inputs), dict[Node, None]()
+    for name in (wrt,) if isinstance(wrt, (str, Node)) else wrt:
+        node = variable(name) if isinstance(name, str) else name
+        if not isinstance(node, Node):
+            raise TypeError(f"wrt must name inputs by strings or variables, got {node!r:.60}")
+        if node not in inputs:
+            raise GraphError(f"the graph has no input {node.name or node!r} (it has {', '.join(graph.input_names)})")
+        if node in chosen:
+            raise GraphError(f"wrt names the input {node.name} twice")
+        chosen[node] = None
+    if not chosen:
+        raise GraphError(f"wrt must name at least one input (the graph has {', '.join(graph.input_names) or 'none'})")
+    return tuple(chosen)
