@@ -225,7 +225,7 @@ class Graph:
 
 def _checked_inputs(inputs: Sequence[Node]) -> tuple[Node, ...]:
     if isinstance(inputs, Node) or not isinstance(inputs, Iterable):
-        raise TypeError(f"inputs must be a sequence of variables, such as [x]; got {inputs!r:.60}")
+        raise TypeError(f"inputs must be a sequence of variables, got {inputs!r:.60}; write [x]")
     nodes = tuple(inputs)
     for node in nodes:
         if not isinstance(node, Node) or node.op is not VARIABLE:
