@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from ..core.graph import Graph, require_graph
 from ..core.node import Node, as_node
 from ..simplify.builder import Builder
+from ..util.explain_failure import explain_failure
 from .forward import tangents
 from .reverse import cotangents
 
@@ -104,6 +105,7 @@ def _distinct(by_name: list[str], by_place: list[str]) -> list[str]:
     return by_name if len(set(by_name)) == len(by_name) else by_place
 
 
+@explain_failure
 def hessian_nodes(output: Node, wrt: Sequence[Node], build: Builder | None = None) -> list[list[Node]]:
     """The lower triangle of the Hessian d2y/dx2, as nodes: forward mode over reverse mode.
 

@@ -8,9 +8,11 @@ from typing import Any
 from ..core.node import Node, variable
 from ..core.scope import building
 from ..simplify.builder import Builder
+from ..util.explain_failure import explain_failure
 from .symmetric_elimination import SymmetricElimination
 
 
+@explain_failure
 def ldl_solve(
     lower: Sequence[Sequence[Node]], rhs: Sequence[Node], build: Builder | None = None, *, check: bool = False
 ) -> list[Node]:
@@ -49,6 +51,7 @@ def ldl_solve(
     >>> ldl_solve([[as_node(4.0)], [as_node(2.0), as_node(2.0)]], [as_node(10.0), as_node(6.0)])
     [<node 2.0>, <node 1.0>]
     """
+    _require_triangle(lower, rhs)
     unknowns = [variable(f"unknown{i}#") for i in range(len(rhs))]
     with building(build or Builder()):
         equations = SymmetricElimination(dict(zip(unknowns, rhs, strict=True)), {x: i for i, x in enumerate(unknowns)})
@@ -64,6 +67,16 @@ def ldl_solve(
         return [solution[unknown] for unknown in unknowns] + ([equations.info()] if check else [])
 
 
+def _require_triangle(lower: Sequence[Sequence[Any]], rhs: Sequence[Any]) -> None:
+    lengths = [len(row) for row in lower]
+    if len(lengths) != len(rhs) or any([length <= i for i, length in enumerate(lengths)]):
+        raise ValueError(f"lower needs at least 1 to {len(rhs)} entries in {len(rhs)} rows as rhs has, got {lengths}")
+    for entry in (*rhs, *[entry for row in lower for entry in row]):
+        if not hasattr(entry, "__truediv__"):
+            raise TypeError(f"lower and rhs must be numbers, got {type(entry).__name__}: {entry!r:.60}")
+
+
+@explain_failure
 def ldl_elimination(lower: Sequence[Sequence[Any]], rhs: Sequence[Any]) -> tuple[list[Any], list[Any]]:
     """The solution x of A x = rhs and the pivots of A, over any numbers with + - * /.
 
@@ -91,6 +104,7 @@ def ldl_elimination(lower: Sequence[Sequence[Any]], rhs: Sequence[Any]) -> tuple
     >>> ldl_elimination([[4.0], [2.0, 2.0]], [10.0, 6.0])
     ([2.0, 1.0], [2.0, 2.0])
     """
+    _require_triangle(lower, rhs)
     n = len(rhs)
     a = [list(row) for row in lower]
     b = list(rhs)

@@ -11,9 +11,11 @@ from ..core.node import Node, as_node, variable
 from ..core.scope import building
 from ..core.traversal import topological
 from ..simplify.builder import Builder
+from ..util.explain_failure import explain_failure
 from .reached_nodes import ReachedNodes
 
 
+@explain_failure
 def cotangents(
     seeds: Mapping[Node, Node],
     wrt: Sequence[Node],

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from ..util.require import require_texts, require_whole
+from ..util.require import require_mapping, require_sequence, require_texts, require_whole
 from .node import Node
 from .operation import LEAF, Op
 
@@ -94,6 +94,10 @@ class Formulas:
         called: Mapping[str, str] | None = None,
     ) -> None:
         called = require_texts("names", called)
+        nodes = require_sequence("nodes", nodes, "nodes", Node)
+        require_sequence("outputs", require_mapping("outputs", outputs, "name: node").values(), "nodes", Node)
+        if not isinstance(notation, Notation):
+            raise TypeError(f"notation must be a Notation, got {type(notation).__name__}: {notation!r:.60}")
         self.outputs, self.notation = outputs, notation
         self.places = {node: k for k, node in enumerate(nodes)}
         taken = Counter([node.name for node in nodes if node.name])

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from ..errors import GraphError
+from ..util.explain_failure import explain_failure
 from .node import Node
 
 
+@explain_failure
 def topological(outputs: Iterable[Node]) -> list[Node]:
     """The nodes that `outputs` reach, arguments first, in an order that depends on structure alone.
 

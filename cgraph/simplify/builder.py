@@ -8,6 +8,7 @@ from ..core.label import Label
 from ..core.node import CONSTANT, Node, Op, constant
 from ..core.scope import building
 from ..core.traversal import rebuild
+from ..util.explain_failure import explain_failure
 
 
 class Builder:
@@ -63,6 +64,7 @@ class Builder:
         return node
 
 
+@explain_failure
 def folded(nodes: Collection[Node], build: Builder, replace: Mapping[Node, Node] | None = None) -> list[Node]:
     """Copies of nodes, and of all that they reach, made by a builder.
 

@@ -11,6 +11,7 @@ from ..core.label import UNLABELLED, WRITTEN, Label
 from ..core.node import CONSTANT, OPS, Node, apply, constant
 from ..core.scope import building
 from ..core.traversal import topological
+from ..util.explain_failure import explain_failure
 from .builder import Builder
 from .canonical import ROUNDING, Angle, Canonical, Powers, Sum, Term, accumulate, without_zeros
 from .rounding_growth import as_accurate
@@ -29,6 +30,7 @@ class Product(NamedTuple):
     label: Label
 
 
+@explain_failure
 def rewritten(nodes: Sequence[Node], build: Builder | None = None) -> list[Node]:
     """Nodes of the same values, written out as sums of products by identities, with common factors taken out.
 
@@ -254,6 +256,7 @@ class _Writer:
         return new if leaves([new]) < leaves([node]) else node
 
 
+@explain_failure
 def shortened(nodes: Sequence[Node]) -> list[Node]:
     """Nodes of the same values: written anew by identities where that is shorter and as accurate, else as they are.
 

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from .explain_failure import explain_failure
+
 
 def require_flag(what: str, value: Any) -> bool:
     """The value as a bool.
@@ -42,6 +44,7 @@ def require_flag(what: str, value: Any) -> bool:
     raise TypeError(f"{what} must be True or False, got {value!r:.60}")
 
 
+@explain_failure
 def require_whole(what: str, value: Any, least: int = 0) -> int:
     """The value as an int.
 
@@ -82,6 +85,7 @@ def require_whole(what: str, value: Any, least: int = 0) -> int:
     return number
 
 
+@explain_failure
 def require_choice(what: str, value: Any, choices: Collection[str]) -> str:
     """The value, if it is one of the choices.
 
@@ -115,7 +119,7 @@ def require_choice(what: str, value: Any, choices: Collection[str]) -> str:
     raise ValueError(f"{what} must be one of {', '.join(choices)}, got {value!r:.60}")
 
 
-def require_sequence(what: str, value: Any, of: str) -> tuple[Any, ...]:
+def require_sequence(what: str, value: Any, of: str, kind: type | tuple[type, ...] = object) -> tuple[Any, ...]:
     """The members of a sequence; an iterator is read once.
 
     Parameters
@@ -126,6 +130,8 @@ def require_sequence(what: str, value: Any, of: str) -> tuple[Any, ...]:
         The members. A string is its characters.
     of : str
         What the members are, in the plural.
+    kind : type or tuple of types
+        What every member must be an instance of.
 
     Returns
     -------
@@ -134,7 +140,7 @@ def require_sequence(what: str, value: Any, of: str) -> tuple[Any, ...]:
     Raises
     ------
     TypeError
-        If it cannot be iterated.
+        If it cannot be iterated, or a member is of another kind.
 
     Examples
     --------
@@ -145,7 +151,11 @@ def require_sequence(what: str, value: Any, of: str) -> tuple[Any, ...]:
     """
     if not isinstance(value, Iterable) or isinstance(value, type):
         raise TypeError(f"{what} must be a sequence of {of}, got {type(value).__name__}: {value!r:.60}")
-    return tuple(value)
+    members = tuple(value)
+    for member in members:
+        if not isinstance(member, kind):
+            raise TypeError(f"{what} must be a sequence of {of}, got {type(member).__name__} within: {member!r:.60}")
+    return members
 
 
 def require_mapping(what: str, value: Any, of: str) -> Mapping[Any, Any]:

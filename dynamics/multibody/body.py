@@ -279,7 +279,7 @@ def unit_axis(what: str, value: Any) -> Array:
 def _checked_joint(where: str, joint: Joint) -> Joint:
     if not isinstance(joint, Joint):
         raise MechanismError(f"{where}: joint must be of the type Joint, got {type(joint).__name__}: {joint!r:.60}")
-    if joint.name != "":
+    if not isinstance(joint.name, str) or joint.name:
         _check_name(f"the joint of {where}", joint.name)
     axis = unit_axis(f"{where}: axis", joint.axis)
     if joint.second_axis is not None:

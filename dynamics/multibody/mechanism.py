@@ -101,7 +101,7 @@ class Mechanism(Structure):
     def __post_init__(self) -> None:
         quantities("gravity", self.gravity)
         require_flag("base_parameters", self.base_parameters)
-        kinds = {"bodies": (Body,), "forces": (Force, JointForce), "loops": (Loop,)}
+        kinds = {"bodies": (Body,), "forces": (Force, JointForce), "loops": (Loop,), "left_out": (str,)}
         for what, allowed in kinds.items():  # kept, so that an iterator is read once
             object.__setattr__(self, what, listed(what, allowed, getattr(self, what)))
         self._check_parameters([part for body in self.bodies for part in self.shared.parts(body)])

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from ...core.graph import Graph
 from ...core.node import Node, as_node
+from ...util.explain_failure import explain_failure
 from ..edge_partials import Point, node_values
 from ..names import Names
 from .finding import Finding
@@ -47,6 +48,7 @@ def rounded(names: Names, at: Point) -> Rounded:
     return Rounded(values, errors)
 
 
+@explain_failure
 def certain_digits(graph: Graph, at: Point) -> dict[str, float]:
     """Decimal digits of the outputs that rounding leaves certain at a point, by a running bound to first order.
 

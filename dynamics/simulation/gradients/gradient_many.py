@@ -207,9 +207,8 @@ def _motions(
 
 def _rows(tau: Any) -> Array | None:
     """tau where it is one row a step, (N, steps, n)."""
-    if callable(tau) or np.ndim(tau) != 3:
+    if callable(tau) or (rows := real_array("tau", tau)).ndim != 3:
         return None
-    rows = real_array("tau", tau)
     if not rows.size or not np.isfinite(rows).all():
         raise ValueError(f"tau must be finite numbers of the shape (N, steps, n), got shape {rows.shape}")
     return rows

@@ -207,9 +207,9 @@ def _checked_options(t_end: float, method: str, t0: float, *options: tuple[str, 
 
 def _rows(model: Model, tau: Any) -> Array | None:
     """tau where it is one row a step, (steps, n)."""
-    if np.ndim(tau) != 2:
-        return None
     rows = real_array("tau", tau)
+    if rows.ndim != 2:
+        return None
     n = 0 if as_ode(model) is not None else as_system(model).n
     if not n or rows.shape[1] != n or not len(rows):
         raise ValueError(f"tau must have shape (n,) or (steps, n) with n = {n} velocities, got {rows.shape}")
