@@ -70,7 +70,6 @@ from .simplify.identities import rewritten, shortened
 from .simplify.polynomial import Polynomial, expand, format_polynomial
 from .simplify.reciprocals import with_reciprocals
 from .util.atomic_write import atomic_write, check_writable, write_files
-from .util.explain_failure import explain_failure
 from .util.html_text import html_lines, html_table, html_text, picture
 from .util.nearest import nearest, or_nearest
 from .util.real_arrays import is_finite, real_array, real_number
@@ -122,7 +121,6 @@ __all__ = [
     "compressed_jacobian",
     "cotangents",
     "expand",
-    "explain_failure",
     "folded",
     "format_polynomial",
     "hessian_nodes",

@@ -22,24 +22,6 @@ def explain_failure(called: T) -> T:
     Nothing is looked at before a call has failed, so a right call takes no longer. Then the arguments are held against
     their annotations, and the first that does not fit is told. Where all fit, the error goes on as it is.
 
-    Parameters
-    ----------
-    called : callable
-        Its annotations say what it needs.
-
-    Returns
-    -------
-    callable
-        A function in its place, or the class itself.
-
-    Raises
-    ------
-    TypeError
-        For anything else; then by what is returned, for an argument that does not fit.
-
-    Examples
-    --------
-    >>> from cgraph.extend import explain_failure
     >>> @explain_failure
     ... def total(numbers: list[float]) -> float:
     ...     return sum(numbers)
@@ -47,8 +29,6 @@ def explain_failure(called: T) -> T:
     Traceback (most recent call last):
     TypeError: numbers of total must be list[float], got str within: 'a'
     """
-    if not callable(called):
-        raise TypeError(f"explain_failure needs a function or a class, got {type(called).__name__}: {called!r:.60}")
     if not isinstance(called, type):
         return _explained(called, called.__name__)  # type: ignore[return-value]  # of the same signature
     setattr(called, "__init__", _explained(vars(called)["__init__"], called.__name__))  # noqa: B010 (for mypy)
