@@ -17,6 +17,7 @@ from .sampled_controller import Hold
 from .step_program import CompiledSteps
 
 BLOCK_TIME = 0.1  # s of run time after which a run comes back to Python: for Ctrl-C, progress and events
+TINY = np.finfo(float).tiny
 FIRST_PASSES = 32  # of the first block, before it is known how long one takes
 
 
@@ -45,6 +46,7 @@ class Integration(ABC):
     status: empty while all is well, else why it stopped before the end.  largest: step [s].
     warnings: what speaks against the result, a sentence each.  event: the one that has ended it, in words.
     parameters: values of the rate's inputs that are not built in, as of the block that has come last.
+    stiff: that one of `warnings` by which the steps are held at a stability limit.
     """
 
     def __init__(self, components: Sequence[str]) -> None:
@@ -53,7 +55,7 @@ class Integration(ABC):
         self.largest = 0.0
         self.status = ""
         self.warnings: list[str] = []
-        self.event = ""
+        self.event = self.stiff = ""
         self.parameters: list[float] = []
 
     @property
@@ -203,16 +205,20 @@ class FixedStepIntegration(NativeIntegration):
                 block = _block(rows[:, 0], rows[:, 1 : 1 + m], t_old, x_old)
                 yield block._replace(normalization=self.program.normalization)
             if failed:
-                self.status = self._failure(memory)
+                self.status = self._failure(memory, rows[-1, 1 : 1 + m] if len(rows) else x_old)
                 return
 
-    def _failure(self, memory: Array) -> str:
+    def _failure(self, memory: Array, before: Array) -> str:
+        """Why the step from a state (m,) failed."""
         t = self._number(memory, "t")
         if "singular" in self.runner.program.registers and (index := int(self._number(memory, "singular"))):
             return f"stopped at t = {t:.6g} s: {self.components[index - 1]} has an inertia that is not positive"
         if reason := self.nonfinite(self.runner.read(memory, "x")):
             return f"stopped at t = {t:.6g} s: {reason}"
-        return f"stopped at t = {t:.6g} s: the equations of the step did not converge; the step is too long"
+        x = self.runner.read(memory, "x")
+        fastest = self.components[int(np.argmax(np.abs(x - before) / np.maximum(np.abs(x), np.abs(before)).clip(TINY)))]
+        why = "the equations of the step did not converge; the step is too long"
+        return f"stopped at t = {t:.6g} s: {why}, first of all for {fastest}"
 
 
 def _block(t: Array, states: Array, t_old: float, x_old: Array) -> StepBlock:

@@ -23,7 +23,9 @@ _ROWS = 10_000  # of a text, written at once
 
 
 class SimulationWarning(UserWarning):
-    """A run that has ended, but whose result should not be trusted as it is; `Stats.warnings` has the same text.
+    """A run that stopped early, or whose result should not be trusted as it is.
+
+    `Stats.message` has the same text, or `Stats.warnings`. A terminal event and Ctrl-C end a run without one.
 
     Examples
     --------
@@ -54,7 +56,7 @@ class Stats:
     success : bool
         Whether the run reached t_end or ended at a terminal event.
     message : str
-        "reached t_end", or where and why it stopped.
+        "reached t_end", or where and why it stopped, which is issued as a `SimulationWarning`, too.
     status : int
         0: the end was reached; 1: a terminal event; -1: the run failed or was interrupted.
     njev, nlu : int

@@ -10,6 +10,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from dynamics.systems.model import as_system
+from tests.early_end import stops
 
 from ...slow import slow
 from ..equations.test_hamiltonian import random_tree, rotor
@@ -203,6 +204,7 @@ def test_what_is_wrong_is_said_in_the_same_words(name: str) -> None:
     assert said[0] == said[1]
 
 
+@stops
 def test_what_ends_a_run_is_said_in_the_same_words() -> None:
     lost = dyn.Event("lost", lambda q, qd, t: q[0] - 0.25, reset=lambda q, qd, t: (q, [qd[0] / (q[0] - q[0])]))
     for how in ({"max_steps": 3, "rtol": 1e-12}, {"events": lost}):
