@@ -16,26 +16,23 @@ from cgraph import Graph
 from cgraph.extend import Array, require_flag
 
 from ..equations.initial_value import initial_value
-from ..integrators import METHODS, Problem, derive, force, in_form, total_energy
+from ..integrators import Problem, derive, force, in_form, total_energy
 from ..systems.model import Model
 from .advice import advise
 from .applied_forces import Applied, Tau, with_applied
 from .dense_output import StepBlock, with_hermite
 from .error_estimate import ErrorEstimate, estimate
 from .event import Event, as_events
-from .event_log import EventLog
-from .event_program import EventProgram, event_program
+from .event_program import event_program
 from .free_memory import room
-from .integration import integration
+from .integration import integration_of
 from .missed_momenta import missed_momenta
 from .progress_bar import Progress
 from .recorder import Recorder
 from .row_values import converted, row_values
 from .run_options import METHOD, TABLES, RunOptions, time_span
-from .sampled_controller import HeldForces, Hold
-from .scipy_solvers import ScipyIntegration, scipy_solver
+from .sampled_controller import HeldForces
 from .solution import Solution
-from .step_program import compile_steps, step_program
 from .stepping import FixedStepIntegration, Integration
 from .trajectory import SimulationWarning, Stats, Trajectory
 from .watched import WatchedIntegration
@@ -177,15 +174,15 @@ def simulate(
     hold = applied.hold(options, stepped)
 
     # Write the steps of the method over these graphs, and compile them
-    made = partial(_compiled, stepped, events=program, between=bool(watched) or dense_output)
-    run = made(options, hold)
+    made = partial(integration_of, stepped, events=program, between=bool(watched) or dense_output)
+    run = made(options, hold=hold)
     x = converted(stepped.momentum, np.array([t0]), start.x[np.newaxis])[0]
 
     # Integrate, noting rows and events
     recorder = Recorder(x, options.times, options.t0, options.direction, ENDS[bool(watched)])
     steps: list[StepBlock] | None = [] if dense_output else None
     outcome = _integrate(run, x, recorder, options, stepped.rate, steps)
-    advise(run, recorder.last, options, x, lambda other: made(other, None if hold is None else hold.replay()))
+    advise(run, recorder.last, options, x, lambda other: made(other, hold=None if hold is None else hold.replay()))
 
     # Put the result together
     rows, held = recorder.table(), None if hold is None else hold.held
@@ -197,20 +194,6 @@ def simulate(
     found = run.log.crossings(problem.nq) if isinstance(run, WatchedIntegration) else {}
     kept = found, _graphs(problem, applied), dense, held
     return Trajectory(*table, stats, *kept, model.coordinates, model.velocities, momenta)
-
-
-def _compiled(
-    problem: Problem, options: RunOptions, hold: Hold | None, *, events: EventProgram | None, between: bool
-) -> Integration:
-    """A run before its first step. between: with all steps, and the dense output of chosen ones."""
-    leg: Callable[[RunOptions], Integration]
-    if (name := options.scipy_solver) is not None:
-        leg = partial(ScipyIntegration, scipy_solver(problem, name, options.backend), between=between)
-    else:
-        method = METHODS[options.method]
-        program = step_program(problem, method, dense=method.adaptive and (between or options.times is not None))
-        leg = partial(integration, compile_steps(program, options.backend), control=hold, every_step=between)
-    return leg(options) if events is None else WatchedIntegration(leg, options, EventLog(events))
 
 
 class _Outcome(NamedTuple):

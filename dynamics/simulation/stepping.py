@@ -215,10 +215,14 @@ class FixedStepIntegration(NativeIntegration):
             return f"stopped at t = {t:.6g} s: {self.components[index - 1]} has an inertia that is not positive"
         if reason := self.nonfinite(self.runner.read(memory, "x")):
             return f"stopped at t = {t:.6g} s: {reason}"
-        x = self.runner.read(memory, "x")
-        fastest = self.components[int(np.argmax(np.abs(x - before) / np.maximum(np.abs(x), np.abs(before)).clip(TINY)))]
-        why = "the equations of the step did not converge; the step is too long"
-        return f"stopped at t = {t:.6g} s: {why}, first of all for {fastest}"
+        return f"stopped at t = {t:.6g} s: {unsolved(self.components, before, self.runner.read(memory, 'x'))}"
+
+
+def unsolved(components: Sequence[str], before: Array, x: Array) -> str:
+    """Why a step from one state to another, (m,), which is no solution, failed: with the component that moved most."""
+    moved = np.abs(x - before) / np.maximum(np.abs(x), np.abs(before)).clip(TINY)
+    first = components[int(np.argmax(moved))]
+    return f"the equations of the step did not converge; the step is too long, first of all for {first}"
 
 
 def _block(t: Array, states: Array, t_old: float, x_old: Array) -> StepBlock:
