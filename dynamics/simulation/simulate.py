@@ -35,7 +35,6 @@ from .sampled_controller import HeldForces
 from .solution import Solution
 from .stepping import FixedStepIntegration, Integration
 from .trajectory import SimulationWarning, Stats, Trajectory
-from .watched import WatchedIntegration
 
 ENDS = (1, 3)  # rows that are kept at the end: an event cuts the last step, and of the others one in two is compared
 
@@ -175,8 +174,7 @@ def simulate(
 
     # Write the steps of the method over these graphs, and compile them
     made = partial(integration_of, stepped, events=program, between=bool(watched) or dense_output)
-    run = made(options, hold=hold)
-    x = converted(stepped.momentum, np.array([t0]), start.x[np.newaxis])[0]
+    run, x = made(options, hold=hold), converted(stepped.momentum, np.array([t0]), start.x[np.newaxis])[0]
 
     # Integrate, noting rows and events
     recorder = Recorder(x, options.times, options.t0, options.direction, ENDS[bool(watched)])
@@ -191,8 +189,7 @@ def simulate(
     for text in [*outcome.early, *stats.warnings]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
     dense = None if steps is None else Solution(options.t0, x, steps, problem.nq, stepped.velocities)
-    found = run.log.crossings(problem.nq) if isinstance(run, WatchedIntegration) else {}
-    kept = found, _graphs(problem, applied), dense, held
+    kept = run.crossings(problem.nq), _graphs(problem, applied), dense, held
     return Trajectory(*table, stats, *kept, model.coordinates, model.velocities, momenta)
 
 

@@ -15,6 +15,7 @@ from .equal_steps import EqualSteps, equal_steps
 from .run_options import RunOptions
 from .sampled_controller import Hold
 from .step_program import CompiledSteps
+from .trajectory import Crossings
 
 BLOCK_TIME = 0.1  # s of run time after which a run comes back to Python: for Ctrl-C, progress and events
 TINY = np.finfo(float).tiny
@@ -76,6 +77,10 @@ class Integration(ABC):
     @abstractmethod
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
+
+    def crossings(self, nq: int, parameters: Array | None = None) -> dict[str, Crossings]:
+        """Of each event by name, where it happened, with states split after nq numbers; parameters: of the problem."""
+        return {}
 
     def nonfinite(self, state: Array) -> str:
         """The first component that is not finite, in words; empty if all are."""

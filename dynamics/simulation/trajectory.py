@@ -23,9 +23,7 @@ _ROWS = 10_000  # of a text, written at once
 
 
 class SimulationWarning(UserWarning):
-    """A run that stopped early, or whose result should not be trusted as it is.
-
-    `Stats.message` has the same text, or `Stats.warnings`. A terminal event and Ctrl-C end a run without one.
+    """A run that stopped early, as `Stats.message` says, or whose result has something against it, `Stats.warnings`.
 
     Examples
     --------

@@ -13,14 +13,12 @@ from cgraph.extend import Array
 from ...integrators import Problem
 from ..advice import advise
 from ..event import Event
-from ..event_log import split_crossings
 from ..event_program import event_program
 from ..integration import integration_of
 from ..missed_momenta import missed_momenta
 from ..recorder import Recorder
 from ..row_values import converted
 from ..run_options import RunOptions
-from ..watched import WatchedIntegration
 
 
 class AcceptedSteps(NamedTuple):
@@ -51,9 +49,6 @@ def accepted_steps(
             recorder.add(block)
     advise(run, recorder.last, options, x, made)
     t, rows = recorder.table()
-    found: dict[str, Array] = {}
-    if program is not None and isinstance(run, WatchedIntegration):
-        crossings = split_crossings(program, run.log.happened, problem.nq, parameters)
-        found = {name: each.t for name, each in crossings.items()}
+    found = {name: each.t for name, each in run.crossings(problem.nq, parameters).items()}
     missed = missed_momenta(problem, t, rows, parameters, start=(options.t0, start, x))
     return AcceptedSteps(t, found, bool(run.event), run.status, (*run.warnings, *missed))
