@@ -60,9 +60,8 @@ def test_runs_of_random_systems_are_whole_or_heard(seed: int, method: str) -> No
         sum([linear[i, j] * x[j] + square[i, j] * x[j] ** 2 for j in range(2)]) for i in range(2)
     ]
     model, starts = dyn.OdeSystem(rate, ["x", "y"]), rng.normal(size=(3, 2))
-    given: dict[str, Any] = {"method": method, "rtol": 1e-2, "max_steps": 5000} | (
-        {"dt": 0.01} if method == "rk4" else {}
-    )
+    given: dict[str, Any] = {"method": method, "rtol": 1e-2, "max_steps": 5000}
+    given |= {"dt": 0.01} if method == "rk4" else {}
     runs = [early(partial(dyn.simulate, model, x, None, 10.0, **given)) for x in starts]
     assert [said for _, said in runs] == [[] if run.success else [f"the run {run.message}"] for run, _ in runs]
     many, said = early(lambda: dyn.simulate_many(model, starts, None, 10.0, t_eval=[10.0], **given))
