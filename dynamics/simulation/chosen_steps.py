@@ -39,7 +39,7 @@ class AdaptiveIntegration(NativeIntegration):
         self.relative = max(options.relative, self.program.finest)
         self.absolute = np.broadcast_to(np.maximum(options.absolute, SMALLEST_ATOL), self.program.size)
         self.sizes = self._fresh_sizes() if options.atol is None else None
-        self._stiff = self._below_rounding = False
+        self._below_rounding = False
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
@@ -116,13 +116,13 @@ class AdaptiveIntegration(NativeIntegration):
     def _look(self, memory: Array, rows: Array) -> None:
         """Note once what a user should know of these steps: stiffness, and tolerances below rounding."""
         options, held = self.options, int(self._number(memory, "held"))
-        if held >= HELD and held >= SHARE * self.steps and not self._stiff:
-            self._stiff = True
+        if held >= HELD and held >= SHARE * self.steps and not self.stiff:
             t, h = rows[-1, :2]
-            self.warnings.append(
+            self.stiff = (
                 f"the system is stiff: at t = {t:.6g} s the step, {abs(h):.3g} s, is held at the stability limit of "
-                f"method {options.method!r}, not by its tolerance; try method='radau'"
+                f"method {options.method!r}, not by its tolerance"
             )
+            self.warnings.append(self.stiff)
         if options.relative < self.relative and not self._below_rounding:
             size = np.abs(rows[:, 2 : 2 + self.program.size])
             short = (self.absolute + options.relative * size < self.relative * size).any(axis=0)

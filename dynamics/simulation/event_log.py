@@ -138,10 +138,6 @@ class EventLog:
             f"{MOST} looks in a step; shorter steps (max_step or dt) find all"
         )
 
-    def crossings(self, nq: int) -> dict[str, Crossings]:
-        """Of each event by name, with states split after nq numbers into q and qd."""
-        return split_crossings(self.program, self.happened, nq)
-
 
 def split_crossings(
     program: EventProgram, happened: Sequence[Happening], nq: int, parameters: Array | None = None

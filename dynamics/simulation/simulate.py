@@ -6,6 +6,7 @@ import math
 import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,28 +16,25 @@ from cgraph import Graph
 from cgraph.extend import Array, require_flag
 
 from ..equations.initial_value import initial_value
-from ..integrators import METHODS, Problem, derive, force, in_form, total_energy
+from ..integrators import Problem, derive, force, in_form, total_energy
 from ..systems.model import Model
+from .advice import advise
 from .applied_forces import Applied, Tau, with_applied
 from .dense_output import StepBlock, with_hermite
 from .error_estimate import ErrorEstimate, estimate
 from .event import Event, as_events
-from .event_log import EventLog
 from .event_program import event_program
 from .free_memory import room
-from .integration import integration
+from .integration import integration_of
 from .missed_momenta import missed_momenta
 from .progress_bar import Progress
 from .recorder import Recorder
 from .row_values import converted, row_values
 from .run_options import METHOD, TABLES, RunOptions, time_span
-from .sampled_controller import HeldForces, Hold
-from .scipy_solvers import ScipyIntegration, scipy_solver
+from .sampled_controller import HeldForces
 from .solution import Solution
-from .step_program import compile_steps, step_program
 from .stepping import FixedStepIntegration, Integration
 from .trajectory import SimulationWarning, Stats, Trajectory
-from .watched import WatchedIntegration
 
 ENDS = (1, 3)  # rows that are kept at the end: an event cuts the last step, and of the others one in two is compared
 
@@ -69,8 +67,8 @@ def simulate(
     """The motion of a system from (q, qd) at t0 to t_end.
 
     A step whose state is not finite, or that has to be smaller than the resolution of t, ends the run: the trajectory
-    keeps what was computed before it, the state where it stopped is its last row, and `stats.message` names the time
-    and the coordinate. Ctrl-C does the same.
+    keeps what was computed before it, the state where it stopped is its last row, and `stats.message` and a
+    `SimulationWarning` name the time and the coordinate. Ctrl-C does the same, without a warning.
 
     Parameters
     ----------
@@ -171,51 +169,41 @@ def simulate(
     # Derive the equations, xdot = f(x, t), the energy and the events as graphs; x is (q, qd), or in `stepped` (q, p)
     problem = derive(model, applied.bound(start.bound))
     stepped = in_form(problem, form)
-    energy, log = total_energy(problem), EventLog(event_program(stepped, watched)) if watched else None
+    energy, program = total_energy(problem), event_program(stepped, watched) if watched else None
     hold = applied.hold(options, stepped)
 
     # Write the steps of the method over these graphs, and compile them
-    leg = _compiled(stepped, options, hold, between=bool(watched) or dense_output)
-    x = converted(stepped.momentum, np.array([t0]), start.x[np.newaxis])[0]
+    made = partial(integration_of, stepped, events=program, between=bool(watched) or dense_output)
+    run, x = made(options, hold=hold), converted(stepped.momentum, np.array([t0]), start.x[np.newaxis])[0]
 
     # Integrate, noting rows and events
-    run = WatchedIntegration(leg, options, log) if log else leg(options)
     recorder = Recorder(x, options.times, options.t0, options.direction, ENDS[bool(watched)])
     steps: list[StepBlock] | None = [] if dense_output else None
     outcome = _integrate(run, x, recorder, options, stepped.rate, steps)
+    advise(run, recorder.last, options, x, lambda other: made(other, hold=None if hold is None else hold.replay()))
 
     # Put the result together
     rows, held = recorder.table(), None if hold is None else hold.held
     stats = _stats(run, options.method, outcome, missed_momenta(stepped, *rows, start=(t0, start.x, x)))
     table, momenta = _table(stepped, energy, *rows, held)
-    for text in stats.warnings:
+    for text in [*outcome.early, *stats.warnings]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
     dense = None if steps is None else Solution(options.t0, x, steps, problem.nq, stepped.velocities)
-    kept = (log.crossings(problem.nq) if log else {}, _graphs(problem, applied), dense, held)
+    kept = run.crossings(problem.nq), _graphs(problem, applied), dense, held
     return Trajectory(*table, stats, *kept, model.coordinates, model.velocities, momenta)
 
 
-def _compiled(
-    problem: Problem, options: RunOptions, hold: Hold | None, *, between: bool
-) -> Callable[[RunOptions], Integration]:
-    """What makes a run, compiled, of options. between: with all steps, and the dense output of chosen ones."""
-    name = options.scipy_solver
-    if name is not None:
-        solver = scipy_solver(problem, name, options.backend)
-        return lambda options: ScipyIntegration(solver, options, between=between)
-    method = METHODS[options.method]
-    program = step_program(problem, method, dense=method.adaptive and (between or options.times is not None))
-    compiled = compile_steps(program, options.backend)
-    return lambda options: integration(compiled, options, control=hold, every_step=between)
-
-
 class _Outcome(NamedTuple):
-    """How a run ended: in the end, at an event, or otherwise; and how large its error is."""
+    """How a run ended: in the end, at an event, or otherwise; and how large its error is.
+
+    early: that it stopped, unless Ctrl-C did it.
+    """
 
     seconds: float
     status: int
     message: str
     error: ErrorEstimate | None
+    early: tuple[str, ...] = ()
 
 
 def _integrate(
@@ -232,7 +220,7 @@ def _integrate(
     """
     begin, seconds, error = time.perf_counter(), math.nan, None
     second = 0.5 * options.estimated  # of the length of the run
-    doing = ""
+    doing, early = "", tuple[str, ...]()
     try:
         total = (1.0 + second) * options.length
         with np.errstate(all="ignore"), Progress("simulate", total, options.progress) as report:
@@ -244,6 +232,7 @@ def _integrate(
                 done = abs(recorder.last - options.t0)
                 at, states = recorder.checkpoints()
                 error = estimate(plain, x, at, states, lambda t: report(done + second * abs(t - options.t0)))
+        early = (f"the run {run.status}",) if run.status else ()
     except KeyboardInterrupt:
         run.status = f"interrupted after t = {recorder.last:.6g} s{doing}"
     if run.status:
@@ -251,7 +240,7 @@ def _integrate(
     seconds = time.perf_counter() - begin if math.isnan(seconds) else seconds
     if run.event and not run.status:
         return _Outcome(seconds, 1, run.event, error)
-    return _Outcome(seconds, -1 if run.status else 0, run.status or "reached t_end", error)
+    return _Outcome(seconds, -1 if run.status else 0, run.status or "reached t_end", error, early)
 
 
 def _run(
@@ -292,7 +281,7 @@ def _table(
 
 
 def _stats(run: Integration, method: str, outcome: _Outcome, said: Sequence[str]) -> Stats:
-    seconds, status, message, error = outcome
+    seconds, status, message, error, _ = outcome
     if error and math.isnan(error.largest):
         error = None  # nothing could be compared
     texts = [*run.warnings, *said, *([error.warning] if error and error.warning else [])]

@@ -15,8 +15,10 @@ from .equal_steps import EqualSteps, equal_steps
 from .run_options import RunOptions
 from .sampled_controller import Hold
 from .step_program import CompiledSteps
+from .trajectory import Crossings
 
 BLOCK_TIME = 0.1  # s of run time after which a run comes back to Python: for Ctrl-C, progress and events
+TINY = np.finfo(float).tiny
 FIRST_PASSES = 32  # of the first block, before it is known how long one takes
 
 
@@ -45,6 +47,7 @@ class Integration(ABC):
     status: empty while all is well, else why it stopped before the end.  largest: step [s].
     warnings: what speaks against the result, a sentence each.  event: the one that has ended it, in words.
     parameters: values of the rate's inputs that are not built in, as of the block that has come last.
+    stiff: that one of `warnings` by which the steps are held at a stability limit.
     """
 
     def __init__(self, components: Sequence[str]) -> None:
@@ -53,7 +56,7 @@ class Integration(ABC):
         self.largest = 0.0
         self.status = ""
         self.warnings: list[str] = []
-        self.event = ""
+        self.event = self.stiff = ""
         self.parameters: list[float] = []
 
     @property
@@ -74,6 +77,10 @@ class Integration(ABC):
     @abstractmethod
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
+
+    def crossings(self, nq: int, parameters: Array | None = None) -> dict[str, Crossings]:
+        """Of each event by name, where it happened, with states split after nq numbers; parameters: of the problem."""
+        return {}
 
     def nonfinite(self, state: Array) -> str:
         """The first component that is not finite, in words; empty if all are."""
@@ -203,16 +210,24 @@ class FixedStepIntegration(NativeIntegration):
                 block = _block(rows[:, 0], rows[:, 1 : 1 + m], t_old, x_old)
                 yield block._replace(normalization=self.program.normalization)
             if failed:
-                self.status = self._failure(memory)
+                self.status = self._failure(memory, rows[-1, 1 : 1 + m] if len(rows) else x_old)
                 return
 
-    def _failure(self, memory: Array) -> str:
+    def _failure(self, memory: Array, before: Array) -> str:
+        """Why the step from a state (m,) failed."""
         t = self._number(memory, "t")
         if "singular" in self.runner.program.registers and (index := int(self._number(memory, "singular"))):
             return f"stopped at t = {t:.6g} s: {self.components[index - 1]} has an inertia that is not positive"
         if reason := self.nonfinite(self.runner.read(memory, "x")):
             return f"stopped at t = {t:.6g} s: {reason}"
-        return f"stopped at t = {t:.6g} s: the equations of the step did not converge; the step is too long"
+        return f"stopped at t = {t:.6g} s: {unsolved(self.components, before, self.runner.read(memory, 'x'))}"
+
+
+def unsolved(components: Sequence[str], before: Array, x: Array) -> str:
+    """Why a step from one state to another, (m,), which is no solution, failed: with the component that moved most."""
+    moved = np.abs(x - before) / np.maximum(np.abs(x), np.abs(before)).clip(TINY)
+    first = components[int(np.argmax(moved))]
+    return f"the equations of the step did not converge; the step is too long, first of all for {first}"
 
 
 def _block(t: Array, states: Array, t_old: float, x_old: Array) -> StepBlock:

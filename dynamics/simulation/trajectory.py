@@ -23,7 +23,7 @@ _ROWS = 10_000  # of a text, written at once
 
 
 class SimulationWarning(UserWarning):
-    """A run that has ended, but whose result should not be trusted as it is; `Stats.warnings` has the same text.
+    """A run that stopped early, as `Stats.message` says, or whose result has something against it, `Stats.warnings`.
 
     Examples
     --------
@@ -54,7 +54,7 @@ class Stats:
     success : bool
         Whether the run reached t_end or ended at a terminal event.
     message : str
-        "reached t_end", or where and why it stopped.
+        "reached t_end", or where and why it stopped, which is issued as a `SimulationWarning`, too.
     status : int
         0: the end was reached; 1: a terminal event; -1: the run failed or was interrupted.
     njev, nlu : int

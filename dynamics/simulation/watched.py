@@ -10,9 +10,10 @@ import numpy as np
 from cgraph.extend import Array
 
 from .dense_output import StepBlock
-from .event_log import EventLog
+from .event_log import EventLog, split_crossings
 from .run_options import RunOptions
 from .stepping import Integration
+from .trajectory import Crossings
 
 
 class WatchedIntegration(Integration):
@@ -40,6 +41,10 @@ class WatchedIntegration(Integration):
     def factorizations(self) -> int:
         """LU factorizations of matrices."""
         return sum(run.factorizations for run in self._legs)
+
+    def crossings(self, nq: int, parameters: Array | None = None) -> dict[str, Crossings]:
+        """Of each event by name, where it happened, with states split after nq numbers; parameters: of the problem."""
+        return split_crossings(self.log.program, self.log.happened, nq, parameters)
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time. A reset is a step of no length."""
@@ -82,7 +87,7 @@ class WatchedIntegration(Integration):
 
     def _count(self, run: Integration, rejected: int, evaluations: int) -> None:
         self.rejected, self.evaluations = rejected + run.rejected, evaluations + run.evaluations
-        self.largest = max(self.largest, run.largest)
+        self.largest, self.stiff = max(self.largest, run.largest), self.stiff or run.stiff
         self.warnings = list(dict.fromkeys([*self.warnings, *run.warnings, *self.log.warnings]))
 
     def _rest(self, t: float) -> RunOptions:

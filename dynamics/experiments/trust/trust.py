@@ -50,7 +50,7 @@ def judge(number: int, method: str | None = None) -> Verdict:
         warnings.simplefilter("always")
         arguments: dict[str, Any] = {} if method is None else {"method": method}
         run = simulate(setting.model, setting.q, setting.qd, setting.t_end, progress=False, **arguments)
-    words = "; ".join([*([] if run.stats.success else [run.stats.message]), *[str(each.message) for each in caught]])
+    words = "; ".join([str(each.message) for each in caught])
     excess = _excess(setting, truth, run)
     right = excess <= SLACK or (truth.end is None and not run.stats.success)
     verdict = RIGHT if right else SAID if words else SILENT

@@ -15,6 +15,7 @@ from dynamics.integrators.tableau import DOPRI5, EULER, real_stability
 from dynamics.simulation.integration import integration
 from dynamics.simulation.run_options import RunOptions
 from dynamics.simulation.step_program import compile_steps, step_program
+from tests.early_end import stops
 from tests.slow import slow
 
 ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
@@ -39,6 +40,7 @@ SINGULAR: dict[str, tuple[dyn.OdeSystem, list[float]]] = {
 }
 
 
+@stops
 @mark.parametrize("method", ADAPTIVE)
 def test_no_run_passes_a_singularity_and_every_row_is_a_state_at_a_time_of_its_own(method: str) -> None:
     for name, (system, start) in SINGULAR.items():
@@ -51,6 +53,7 @@ def test_no_run_passes_a_singularity_and_every_row_is_a_state_at_a_time_of_its_o
         assert run.t[-1] == approx(1.0, rel=NEAR), name
 
 
+@stops
 @mark.parametrize("method", ADAPTIVE)
 def test_a_collision_ends_a_run(method: str) -> None:
     """From rest at 1 under the attraction 1 / q a body meets the center after pi / (2 sqrt 2)."""
@@ -149,6 +152,7 @@ def test_a_tolerance_below_rounding_is_raised_and_said(method: str) -> None:
     assert run.stats.success
 
 
+@stops
 @mark.parametrize("method", ADAPTIVE)
 def test_the_shortest_spans_end(method: str) -> None:
     system = first_order(lambda x, t: -x[0])

@@ -17,6 +17,7 @@ from dynamics.systems.system import System
 from tests.dynamics.ensembles import arms, same
 from tests.dynamics.models import oscillator, random_arm
 from tests.dynamics.step_options import LIKE_OTHERS, step
+from tests.early_end import stops
 from tests.slow import slow
 
 RK4_ERROR = 1e-11  # of a period at dt = 1 ms: (w dt)^4 w t / 120
@@ -126,6 +127,7 @@ def test_many_steps_come_in_many_blocks(monkeypatch: pytest.MonkeyPatch) -> None
 # What can go wrong on the way
 
 
+@stops
 @mark.parametrize("method", ["rk4", "euler", "midpoint", "dopri5"])
 def test_one_that_leaves_the_numbers_is_nan_from_there_and_says_where(method: str) -> None:
     qd = np.zeros((17, 2))
@@ -150,6 +152,7 @@ def test_one_that_leaves_the_numbers_is_nan_from_there_and_says_where(method: st
         assert len(result.t) - finite.all(axis=1).sum() == np.isnan(result.q[k, :, 0]).sum()
 
 
+@stops
 def test_a_neighbor_that_fails_is_not_felt_in_an_arm() -> None:
     model, q, qd = arms(16)
     calm = simulate_many(model, q, qd, 0.5, "rk4")
@@ -162,6 +165,7 @@ def test_a_neighbor_that_fails_is_not_felt_in_an_arm() -> None:
     assert result.q[3, 0].tolist() == q[3].tolist()
 
 
+@stops
 def test_all_may_fail() -> None:
     result = simulate_many(runaway(), np.zeros((3, 2)), [0.0, 1.0], 9.0, "rk4", dt=0.1)
     assert not result.stats.success.any()
@@ -169,6 +173,7 @@ def test_all_may_fail() -> None:
     assert np.isnan(result.q[:, -1]).all()
 
 
+@stops
 def test_max_steps() -> None:
     for method in ("rk4", "dop853"):
         result = simulate_many(*arms(3), 5.0, method, t_eval=[0.0, 5.0], max_steps=4)

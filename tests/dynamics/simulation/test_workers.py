@@ -20,6 +20,7 @@ from dynamics.simulation.ensembles.simulate_many import simulate_many
 from tests.dynamics.ensembles import arms, same
 from tests.dynamics.models import random_arm
 from tests.dynamics.step_options import step
+from tests.early_end import stops
 from tests.slow import slow
 
 
@@ -30,6 +31,7 @@ def case(method: str) -> tuple[tuple[Any, ...], dict[str, Any]]:
     return (model, q, qd, 0.2, method), {"t_eval": [0.1, 0.2], "tau": np.tanh(q)}
 
 
+@stops
 @mark.parametrize(
     ("backend", "method"),
     [("llvm", "rk4"), ("llvm", "midpoint"), ("llvm", "dop853"), ("python", "rk4")]
@@ -46,6 +48,7 @@ def test_threads_and_chunks_change_nothing(backend: str, method: str) -> None:
     assert same(alone, simulate_many(*arguments, **options, workers=map, chunk=1))
 
 
+@stops
 def test_parts_may_come_in_any_order() -> None:
     arguments, options = case("rk4")
     alone = simulate_many(*arguments, **options)
@@ -56,6 +59,7 @@ def optimize(level: int) -> None:
     llvm_engine.LEVEL = level
 
 
+@stops
 @mark.parametrize("method", ["dopri5", *slow("rk4")])
 def test_processes_change_nothing_and_make_the_code_once(method: str) -> None:
     arguments, options = case(method)
