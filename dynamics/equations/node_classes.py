@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 
 from cgraph import Graph, Node
 from cgraph.extend import ADJOINT, topological
 
 from .formulations import EULER
-from .verdict import Blame
+from .verdict import Verdict
 
 LEAVES, DAMPING = "inputs and numbers", "damping"
 POSITIONS = "of positions alone: kinematics, inertia, and its elimination"
@@ -16,21 +16,22 @@ BIAS, ACCELERATIONS = "bias: of velocities, without torques", "accelerations, wi
 VELOCITIES, RATES = "velocities of the momenta", "rates of the momenta"
 
 
-def formulation_classes(wrong: Mapping[Graph, Blame]) -> Callable[[Graph], Callable[[Node], str]]:
-    """The class of each node of graphs of `inverse_dynamics`, as `cg.compare` asks for it.
+def formulation_classes(verdicts: Iterable[Verdict]) -> Callable[[Graph], Callable[[Node], str]]:
+    """The class of each node of the verdicts' graphs, as `cg.compare` asks for it.
 
-    wrong: what is to blame in them.  "spurious adjoint": it serves only derivatives through q = qd dt + q_old.
+    "spurious adjoint": it serves only derivatives through q = qd dt + q_old.
     "takes in what is spurious": a sum that has a part of it.  "Euler edge": the embedded relations q = qd dt + q_old
     and qd = qdd dt + qd_old, and their rates.  "needed": all else.
     """
+    known = {each.graph: each for each in verdicts}
 
     def classes(graph: Graph) -> Callable[[Node], str]:
-        nodes, edges, _ = wrong[graph]
+        wrong = known[graph]
         adjoint = _users(graph, [node for node in graph.nodes if ADJOINT in node.roles])
-        spoilt = _users(graph, [edge.target for edge in edges])
+        spoilt = _users(graph, [edge.target for edge in wrong.edges])
 
         def name(node: Node) -> str:
-            if node in nodes:
+            if node in wrong.nodes:
                 return "spurious adjoint"
             if node in spoilt:
                 return "takes in what is spurious"

@@ -17,7 +17,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Edge, Graph, Node
-from cgraph.extend import Builder, Names, building, certain_digits, cotangents, folded, shortened
+from cgraph.extend import Builder, Names, building, certain_digits, cotangents, folded, require_mapping, shortened
 
 from ..systems.arguments import new_variables
 from ..systems.display_names import display_names
@@ -114,15 +114,39 @@ class Verdict:
     terms: Graph | None = None
 
     def excess_at(self, at: Mapping[str, float]) -> dict[str, float]:
-        """{"tau1": what it has too much} at a state, of the outputs where that is not 0; other names are left alone.
+        """{"tau1": what it has too much} at a state, of the outputs where that is not 0, as dt tends to 0.
 
         Not 0 is what has a digit that rounding cannot have made, whatever its unit.
+
+        Parameters
+        ----------
+        at : mapping of str to float
+            {name: number} of all inputs of `terms`, finite; other names are left alone.
+
+        Returns
+        -------
+        dict of str to float
+            Empty where nothing is too much.
+
+        Raises
+        ------
+        TypeError
+            For what is no mapping.
+        GraphError
+            For an input that is missing.
+
+        Examples
+        --------
+        >>> import dynamics as dyn
+        >>> verdict = dyn.formulation_verdict(dyn.scenes.load("spring_mass"))
+        >>> verdict.excess_at({"q0": 0.5, "qd0": 0.0, "I": 1.0, "k": 4.0})
+        {'tau0': -2.0}
         """
+        given = require_mapping("at", at, "name: number")
         if self.terms is None:
             return {}
-        at = {name: at[name] for name in self.terms.input_names}
-        digits = certain_digits(self.terms, at)
-        values = self.terms.evaluate(at)
+        known = {name: given[name] for name in self.terms.input_names if name in given}
+        digits, values = certain_digits(self.terms, known), self.terms.evaluate(known)
         return {name: float(value) for name, value in values.items() if value and digits[name] >= 1.0}
 
     def __str__(self) -> str:

@@ -12,7 +12,6 @@ from cgraph import Graph
 from dynamics import FORMULATIONS, display_names, formulation_verdict, scenes
 from dynamics.equations.both_forms import LAGRANGE, both_forms, form_agreement
 from dynamics.equations.node_classes import form_classes, formulation_classes
-from dynamics.equations.verdict import Blame
 
 from .. import theme
 from .arguments import (
@@ -61,8 +60,7 @@ def run(options: argparse.Namespace) -> int:
     left, right = (graphs[name] for name in named.values())
     state = [] if options.momentum else [n for each in (left, right) for part in state_names(each, scene) for n in part]
     called = display_names(scene)
-    wrong = {each.graph: Blame(each.nodes, each.edges) for each in verdicts.values()}
-    classes = form_classes if options.momentum else formulation_classes(wrong)
+    classes = form_classes if options.momentum else formulation_classes(verdicts.values())
     comparison = cg.compare(left, right, atoms=dict.fromkeys(state), classify=classes, names=called)
     both = len(comparison.common)
     sizes = {"left_nodes": len(left.nodes), "right_nodes": len(right.nodes), "in_both": both}
@@ -73,15 +71,15 @@ def run(options: argparse.Namespace) -> int:
     ]
     data = {"scene": scene.name} | named | sizes | comparison.to_dict()
     data |= {"verdicts": {name: each.to_dict() for name, each in verdicts.items()}} if verdicts else {}
-    lines = [f"{name}: {each}" for name, each in verdicts.items()] + lines
+    told = [f"{name}: {each}" for name, each in verdicts.items()]
     if options.momentum:
-        told, text = _forms(scene, graphs)
-        data, lines = data | told, [text, *lines]
+        agreement, text = _forms(scene, graphs)
+        data, lines = data | agreement, [text, *lines]
     together = comparison.overlay()
     groups = [f"only {name}" for name in named.values()], (together.only_left, together.only_right)
     answer_and_draw(
         options,
-        unless_json(options, data, "\n".join([*lines, str(comparison)])),
+        unless_json(options, data, "\n".join([*lines, str(comparison), *told])),
         together.graph,
         marked=dict(zip(*groups, strict=True)),
         names=theme.called(called),

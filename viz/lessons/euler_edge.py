@@ -52,7 +52,7 @@ def _expected(stays: bool, verdict: Verdict) -> str:
     if stays:
         return "Expect hands for A: a smaller step cures almost every other error of a simulation."
     if not verdict.differs:
-        return "A is right of this system at every state: nothing is in ∂L/∂q. A weight or a spring makes it B."
+        return "A is right of this system: ∂L/∂q is zero at every state. With a weight or a spring it is B."
     return "A is right at this state, where ∂L/∂q is zero. Move the state: where it is not, the error stays."
 
 

@@ -50,17 +50,20 @@ def by_complex_step(graph: cg.Graph, output: str, name: str, at: dict[str, float
 @pytest.mark.parametrize("formulation", RIGHT)
 def test_lint_proves_that_the_chain_rule_keeps_q_and_qd_apart(capsys, formulation):
     text = said(capsys, "lint", "triple_pendulum", "--formulation", formulation)
-    assert text.count("Holds: ") == 2
+    assert text.count("Holds: ") == 3
+    assert text.startswith("Holds: this is the torque of the chain rule: no derivative in it is taken through a step")
     assert "q.joint 1, q.joint 2 and q.joint 3 are inputs" in text
 
 
 @pytest.mark.parametrize("formulation", FLAWED)
 def test_lint_blames_the_edges_of_the_embedding(capsys, formulation):
-    found = figures(capsys, "lint", "triple_pendulum", "--formulation", formulation, status=1)
-    (finding,) = found["findings"]
-    assert [cut["text"] for cut in finding["cut"]] == [f"qd.joint {i} * dt -> q.joint {i}" for i in (1, 2, 3)]
-    assert [each["gains"] for each in finding["corrupted"]] == [f"dt * dL/dq.joint {i}" for i in (1, 2, 3)]
     exact = formulation == "kinetic_only_exact"  # embedded, but no derivative is taken through it
+    found = figures(capsys, "lint", "triple_pendulum", "--formulation", formulation, status=int(not exact))
+    (finding,) = found["findings"]
+    energy = "L" if formulation == "euler_embedded" else "K"
+    assert [cut["text"] for cut in finding["cut"]] == [f"qd.joint {i} * dt -> q.joint {i}" for i in (1, 2, 3)]
+    assert [each["gains"] for each in finding["corrupted"]] == [f"dt * d{energy}/dq.joint {i}" for i in (1, 2, 3)]
+    assert found["verdict"]["differs"] == (len(found["verdict"]["edges"]) == 3) == (not found["ok"]) == (not exact)
     assert (finding["derivatives_through"] == 0) == exact
 
 
@@ -197,13 +200,15 @@ def test_compare_has_totals_that_add_up_and_a_class_for_every_node(capsys):
         only = found[f"only_{side}"]
         assert found["in_both"] + len(only) == found[f"{side}_nodes"]
         assert sum(found[f"{side}_classes"].values()) == len(only)
-    assert set(found["left_classes"]) == {"needed", "spurious adjoint", "Euler edge"}
+    assert set(found["left_classes"]) == {"needed", "spurious adjoint", "takes in what is spurious", "Euler edge"}
+    assert {name: each["differs"] for name, each in found["verdicts"].items()} == {
+        "euler_embedded": True,
+        "chain_rule": False,
+    }
     assert set(found["right_classes"]) == {"needed"}
     arm = dyn.scenes.load("triple_pendulum")
     assert found["left_nodes"] == len(dyn.inverse_dynamics(arm, "euler_embedded").nodes)
-    assert found["left_classes"]["spurious adjoint"] == len(
-        dyn.spurious_nodes(dyn.inverse_dynamics(arm, "euler_embedded"))
-    )
+    assert found["left_classes"]["spurious adjoint"] == len(dyn.formulation_verdict(arm, "euler_embedded").nodes)
     text = said(capsys, "compare", "triple_pendulum", "--formulations", "chain_rule", "chain_rule_literal", status=1)
     assert text.startswith("left: chain_rule, 171 nodes = ")
     assert "spurious" not in text
