@@ -10,8 +10,9 @@ from cgraph import Graph, Node
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
+from .blame import Blame, blame
 from .formulations import inverse_dynamics, momenta, momentum_rate, torques
-from .verdict import Blame, blame, formulation_verdict
+from .verdict import formulation_verdict
 
 PAPER = ("euler_embedded", "kinetic_only", "chain_rule")  # of Figures 1 to 3, in this order
 INERTIAL_TERM, TORQUE = "p and dp/dt", "tau"

@@ -7,40 +7,25 @@ is 0 at every state.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import reduce
-from operator import or_
 from typing import Any, NamedTuple
 
 import numpy as np
 
-import cgraph as cg
 from cgraph import Edge, Graph, Node
 from cgraph.extend import Builder, Names, building, certain_digits, cotangents, folded, require_mapping, shortened
 
-from ..systems.arguments import new_variables
 from ..systems.display_names import display_names
 from ..systems.model import Model, as_system
 from ..systems.system import System
-from .formulations import ONE, THROUGH_STEP, ZERO, inverse_dynamics, torques
+from .blame import blame
+from .formulations import ONE, THROUGH_STEP, inverse_dynamics, torques
 
 STATES = 24  # tried where c does not fold to 0: a third of size 1, the rest of sizes from 1e-6 to 1e6
 WRITTEN = 200  # nodes of c that identities are tried on
 SHOWN, FORMULA = 6, 60  # coordinates that the text lists, and characters of a formula in it
 _DIFFERS = "This is not the torque of the chain rule, however small dt is"
-
-
-class Blame(NamedTuple):
-    """What a graph has from the derivative through the step.
-
-    nodes: they serve nothing else.  edges: by these it enters what is sound, or another use of a sound node is wrong.
-    cancelled: outputs that have no such edge left, since simplification took it away together with a right one.
-    """
-
-    nodes: frozenset[Node] = frozenset()
-    edges: frozenset[Edge] = frozenset()
-    cancelled: tuple[str, ...] = ()
 
 
 class Excess(NamedTuple):
@@ -97,7 +82,7 @@ class Verdict:
     >>> print(dyn.formulation_verdict(ball, "euler_embedded"))
     This is not the torque of the chain rule, however small dt is. Too much in it:
       tau.y  dL/dq.y = -9.81
-    In tau.y it took away a right term, and nothing is left to be marked. Missing: -dL/dq.y = 9.81.
+    In tau.y this cancels a right term, and no edge is left to be marked. Missing: -dL/dq.y = 9.81.
     """
 
     formulation: str
@@ -182,7 +167,7 @@ class Verdict:
             return ""
         called = Names(self.graph, self.names)
         outputs, terms = (_listed(each) for each in (map(called.shown, self.missing), map(str, self.missing.values())))
-        return f"In {outputs} it took away a right term, and nothing is left to be marked. Missing: {terms}."
+        return f"In {outputs} this cancels a right term, and no edge is left to be marked. Missing: {terms}."
 
     def _blamed(self, called: Names) -> str:
         edges = [edge for edge in self.graph.edges if edge in self.edges]
@@ -279,56 +264,6 @@ def formulation_verdict(model: Model, formulation: str = "euler_embedded") -> Ve
     )
 
 
-def blame(system: System, formulation: str, derive: Callable[[System, str, Node], Graph], graph: Graph) -> Blame:
-    """What of the graph is there by the derivative through the step, whether its value is 0 or not.
-
-    derive: `torques` or `momenta`, of which `graph` is the simplified graph by this formulation.
-
-    All that comes through the step is multiplied by a variable. What folds to 0 when that is 0 is wrong, and the edges
-    that lead out of it are to blame; at 1 the graph is the formulation's, node by node.
-    """
-    if formulation not in THROUGH_STEP:
-        return Blame()
-    (through,) = new_variables("through", 1, system.parameters)
-    marked = cg.simplify(derive(system, formulation, through))
-    without, whole = (
-        dict(zip(marked.nodes, folded(marked.nodes, Builder(), {through: factor}), strict=True))
-        for factor in (ZERO, ONE)
-    )
-    wrong = {node for node in marked.nodes if without[node].value == 0.0 and node.value != 0.0}
-    image = Graph(graph.inputs, {name: whole[node] for name, node in marked.outputs.items()})
-    same = dict(cg.compare(image, graph).common)
-    leaving = {edge for edge in marked.edges if edge.source in wrong and edge.target not in wrong}
-    drawn: dict[Edge, Edge] = {}
-    for edge in leaving:
-        source, target = same.get(whole[edge.source]), same.get(whole[edge.target])
-        if source is not None and target is not None and source in target.args:
-            drawn[edge] = Edge(source, target, target.args.index(source))
-    edges, reach = frozenset(drawn.values()), dict.fromkeys(marked.nodes, 0)
-    for k, node in enumerate(marked.outputs.values()):
-        reach[node] |= 1 << k
-    for node in reversed(marked.nodes):  # which outputs need it, a bit each
-        for arg in node.args:
-            reach[arg] |= reach[node]
-    touched, left = (reduce(or_, [reach[edge.target] for edge in each], 0) for each in (leaving, drawn))
-    cancelled = tuple([name for k, name in enumerate(marked.outputs) if touched & ~left & 1 << k])
-    outputs = [graph.outputs[name] for name, node in marked.outputs.items() if node not in wrong]
-    return Blame(frozenset(graph.nodes) - _needed(outputs, edges), edges, cancelled)
-
-
-def _needed(outputs: list[Node], cut: frozenset[Edge]) -> set[Node]:
-    """The nodes that outputs need when these edges are cut."""
-    closed = {(edge.target, edge.slot) for edge in cut}
-    needed: set[Node] = set()
-    stack = list(outputs)
-    while stack:
-        node = stack.pop()
-        if node not in needed:
-            needed.add(node)
-            stack.extend([arg for slot, arg in enumerate(node.args) if (node, slot) not in closed])
-    return needed
-
-
 def _terms(system: System, formulation: str) -> Graph:
     """c = G^T dE/dq at independent q and qd, as short as it gets, named as the torques that it is in."""
     build = Builder()
@@ -355,7 +290,7 @@ def _state(system: System, verdict: Verdict) -> tuple[dict[str, float], int]:
         drawn = np.abs(drawn) if k % 2 else drawn  # where a root or a logarithm is
         numbers = {name: neutral.get(name, 0.0) + x for name, x in zip(names, drawn, strict=True)}
         at = {name: float(f"{x:.3g}") for name, x in numbers.items()} | system.parameters
-        if np.isfinite(list(verdict.terms.evaluate(at).values())).all():
+        if np.isfinite([float(value) for value in verdict.terms.evaluate(at).values()]).all():
             finite += 1
             if verdict.excess_at(at):
                 break

@@ -249,7 +249,7 @@ def _version(scene: Scene, name: str) -> Equations:
         about += f" The velocity derivative {through}was taken through q = qd dt + q_old, so it reached q as well."
         entries = f"the {len(edges)} edges" if len(edges) > 1 else "the edge"
         nodes = f"{len(wrong)} of {len(verdict.graph.nodes)} nodes, and " if wrong else ""
-        about += f" Look at what is vermillion: {nodes}{entries} by which it enters." if edges else ""
+        about += f" Look at what is vermillion: {nodes}{entries} by which the surplus enters." if edges else ""
         about += f" {verdict.lacking}" if verdict.missing else ""
     elif scene.system.constraints:
         about += " Nothing drives the joints here: these torques are those of the constraints alone."

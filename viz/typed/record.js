@@ -92,7 +92,7 @@ function aboutOf(name, { nodes }, found) {
   if (!differs) return `${summary} Nothing else drives it, so the torques should be 0.`;
   const entries = edges.length > 1 ? `the ${edges.length} edges` : "the edge", of = wrong.size ? `${wrong.size} of ${nodes.length} nodes, and ` : "";
   return [sentence, `The velocity derivative ${ABOUT[name]}was taken through q = qd dt + q_old, so it reached q as well.`,
-    ...(edges.length ? [`Look at what is vermillion: ${of}${entries} by which it enters.`] : []), lacking].join(" ").trim();
+    ...(edges.length ? [`Look at what is vermillion: ${of}${entries} by which the surplus enters.`] : []), lacking].join(" ").trim();
 }
 function noticesOf(system, motion) {
   if (motion.error) return [motion.error];

@@ -24,7 +24,7 @@ function verdict(system, formulation) {
   const where = shown.map(({ name }) => `${names.get(name) ?? name}=${at.get(name)}`).join(", ");
   const term = (i, value, sign) => `${sign < 0 ? "-" : ""}${slope}.${system.coordinates[i]} = ${+(sign * value).toPrecision(6)}`;
   const missing = excess.filter(([i]) => cancelled.has(`tau${i}`)), output = ([i]) => names.get(`tau${i}`);
-  const lacking = missing.length ? `In ${missing.map(output).join(", ")} it took away a right term, and nothing is left to be marked. `
+  const lacking = missing.length ? `In ${missing.map(output).join(", ")} this cancels a right term, and no edge is left to be marked. `
     + `Missing: ${missing.map(([i, value]) => term(i, value, -1)).join(", ")}.` : "";
   const blamed = edges.length ? [`To blame: ${edges.length === 1 ? "an edge" : `${edges.length} edges`}, ${nodes.size
     ? `with ${nodes.size} of ${graph.nodes.length} nodes, which serve${nodes.size === 1 ? "s" : ""} nothing else` : "and no node by itself"}.`] : [];

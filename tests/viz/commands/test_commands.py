@@ -214,6 +214,30 @@ def test_compare_has_totals_that_add_up_and_a_class_for_every_node(capsys):
     assert "spurious" not in text
 
 
+ATWOOD = """import dynamics as dyn
+atwood = dyn.System(lambda q, qd, t, p: p["m"] * qd[0] ** 2 + p["w"] * q[0], ["x"], {"m": 1.5, "w": 9.81})
+ball = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 9.81 * q[0], ["y"])
+"""
+
+
+def test_an_edge_that_is_wrong_by_itself_is_seen_by_every_command(tmp_path, capsys):
+    (tmp_path / "own.py").write_text(ATWOOD)
+    model, page = f"{tmp_path / 'own.py'}:atwood", str(tmp_path / "page.html")
+    found = figures(capsys, "compare", model, status=1)
+    assert found["left_classes"] == {"takes in what is spurious": 2}
+    assert [found["verdicts"][name]["differs"] for name in ("euler_embedded", "chain_rule")] == [True, False]
+    assert "This is not the torque of the chain rule" in said(capsys, "compare", model, status=1)
+    versions = figures(capsys, "inspect", model, "--t-end", "0.1", "--out", page)["versions"]
+    shown = [(each["spurious"], each["spurious_edges"], each["differs"]) for each in versions.values()]
+    assert shown == [(0, 1, True), (0, 0, False), (0, 0, False)]
+    assert "Holds: this is the torque of the chain rule: dK/dq is 0" in Path(page).read_text(encoding="utf-8")
+    ball = f"{tmp_path / 'own.py'}:ball"
+    assert "Missing: -dL/dq.y = 9.81." in said(capsys, "lint", ball, "--formulation", "euler_embedded", status=1)
+    versions = figures(capsys, "inspect", ball, "--t-end", "0.1", "--out", page)["versions"]
+    assert [each["differs"] for each in versions.values()] == [True, False, False]
+    assert "Missing: -dL/dq.y = 9.81." in Path(page).read_text(encoding="utf-8")
+
+
 OWN = """import cgraph as cg
 import dynamics as dyn
 

@@ -202,3 +202,31 @@ def test_typed_accelerations_are_those_of_the_library(case):
         assert found["at"][f"qdd{i}"] == pytest.approx(expected[f"qdd{i}"], rel=0.0, abs=bound)
     energy = dyn.energy(system).evaluate({name: at[name] for name in dyn.energy(system).input_names})["E"]
     assert found["at"]["E"] == pytest.approx(energy, rel=0.0, abs=ROUNDING * max(1.0, found["largest"]))
+
+
+# What dL/dq is of each: a number, a parameter's, of a velocity; 0, also by an identity that only numbers show.
+NAMED = {
+    "L = 1/2*(a + b)*x'^2 + (a - b)*9.81*x\na = 2, b = 1": (True, 1, False),
+    "L = 1/2*(x'^2 + y'^2) - 9.81*y": (True, 0, True),
+    "L = 1/2*(x'^2 + y'^2) + x*y'": (True, 1, False),
+    "L = 1/2*(x'^2 + 3*y'^2)": (False, 0, False),
+    "L = 1/2*(sin(x)^2 + cos(x)^2)*x'^2": (False, 0, False),
+}
+
+
+@pytest.mark.parametrize("text", NAMED)
+def test_where_an_edge_alone_is_wrong_or_gone_the_page_says_so(text: str) -> None:
+    differs, edges, lacking = NAMED[text]
+    found, shown = run_typed(
+        """(text) => {
+          const system = parsed(text), { graph, ...found } = formulation(system, "euler_embedded");
+          return [found, TYPED.recordOf(system, TYPED.motionOf(system), false).versions];
+        }""",
+        text,
+    )
+    assert (found["differs"], found["blamed"], found["lacking"]) == (differs, edges, lacking)
+    assert [each["flawed"] for each in shown] == [differs, differs and "x*y'" in text, False]
+    assert len(shown[0]["blamed"]) == edges
+    begin = "This is not the torque of the chain rule" if differs else "Holds: this is the torque of the chain rule"
+    assert shown[0]["about"].startswith(begin)
+    assert ("Missing: -dL/dq.y = 9.81." in shown[0]["about"]) == lacking
