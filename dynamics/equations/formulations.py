@@ -212,7 +212,8 @@ def spurious_nodes(graph: Graph) -> frozenset[Node]:
 
     They are the adjoints that the product qd dt of q = qd dt + q_old passes on, the "unnecessary terms" of eq. (3), and
     all that only these need, whether the author of the Lagrangian tagged anything or not. Where a slope dL/dq does not
-    change along the step, such as a weight m g, the derivative of m g dt is the node m g itself, which is not marked.
+    change along the step, such as a weight m g, the derivative of m g dt is the node m g itself, which is not marked:
+    there an edge is wrong. Whether the torque is wrong, and by which edges, `formulation_verdict` says.
 
     Parameters
     ----------

@@ -175,7 +175,7 @@ class Verdict:
         count = len(self.nodes)
         alone = f"with {count} of {len(self.graph.nodes)} nodes, which serve{'s' * (count == 1)} nothing else"
         what = "this edge" if len(edges) == 1 else f"these {len(edges)} edges"
-        return f"To blame: {what}, {alone if count else 'and no node by itself'}: {texts}."
+        return f"There by mistake: {what}, {alone if count else 'and no node by itself'}: {texts}."
 
     def to_dict(self) -> dict[str, Any]:
         """The same for JSON; nodes are numbered as in `graph.nodes`, an edge is [source, target, argument slot]."""

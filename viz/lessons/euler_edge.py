@@ -93,7 +93,8 @@ def _reveal(subject: Subject, errors: list[tuple[float, np.ndarray]], stays: boo
     rows = [[f"{dt:g}", *[number(error) for error in each[: len(joints)]]] for dt, each in errors]
     steps = table("Error of the torque by definition", ["dt [s]", *joints], rows)
     sizes = size_table(formulation_sizes(subject.system))
-    return said + _drawing(subject) + steps + table(sizes.caption, sizes.header, sizes.rows) + f"<p>{WHY_FEWER}</p>"
+    why = f"<p>{verdict.lacking or WHY_FEWER}</p>" * verdict.differs
+    return said + _drawing(subject) + steps + table(sizes.caption, sizes.header, sizes.rows) + why
 
 
 def _second_try(subject: Subject, right: np.ndarray) -> str:

@@ -108,7 +108,7 @@ function showDerived({ system, motion, record }) {
     return tag("tr", {}, rowHead(name), ...[ops.length, edges, spuriousIn(version)].map((count, k) => tag("td", { class: k === 2 && flawed ? "off" : "" }, String(count))));
   });
   const lint = TYPED.FORMULATIONS.map((name) => {
-    const found = TYPED.verdict(system, name), words = found.differs ? "not the chain rule's torque" : "holds";
+    const found = TYPED.verdict(system, name), words = found.differs ? "differs" : "holds";
     return tag("details", {}, tag("summary", {}, `lint, ${name.replace("_", " ")}: ${words}`), tag("pre", {}, TYPED.lint(system, found).join("\n")));
   });
   byId("derived").replaceChildren(table(["nodes", "edges", "spurious"], rows), ...lint, ...(motion.error ? [] : motionWords(system, motion)));

@@ -26,7 +26,7 @@ function verdict(system, formulation) {
   const missing = excess.filter(([i]) => cancelled.has(`tau${i}`)), output = ([i]) => names.get(`tau${i}`);
   const lacking = missing.length ? `In ${missing.map(output).join(", ")} this cancels a right term, and no edge is left to be marked. `
     + `Missing: ${missing.map(([i, value]) => term(i, value, -1)).join(", ")}.` : "";
-  const blamed = edges.length ? [`To blame: ${edges.length === 1 ? "an edge" : `${edges.length} edges`}, ${nodes.size
+  const blamed = edges.length ? [`There by mistake: ${edges.length === 1 ? "an edge" : `${edges.length} edges`}, ${nodes.size
     ? `with ${nodes.size} of ${graph.nodes.length} nodes, which serve${nodes.size === 1 ? "s" : ""} nothing else` : "and no node by itself"}.`] : [];
   const lines = [...excess.map((each) => `  ${output(each)}  ${term(...each, 1)}`), ...blamed, ...(lacking ? [lacking] : [])];
   const summary = `${DIFFERS}. Too much in it${where && ` at ${where}`}:`;
