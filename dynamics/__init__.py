@@ -24,6 +24,7 @@ from .equations.singular_mass_matrix import SingularMassMatrixError, raise_if_si
 from .equations.state_equation import state_equation
 from .equations.torque_decomposition import torque_by_joint_motion, torque_by_link
 from .equations.torque_table import TorqueTable
+from .equations.verdict import Verdict, formulation_verdict
 from .experiments.stability import cases
 from .integrators import METHODS
 from .io.load import load_mjcf, load_urdf
@@ -115,6 +116,7 @@ __all__ = [
     "System",
     "TorqueTable",
     "Trajectory",
+    "Verdict",
     "arrays_at",
     "as_system",
     "attach_with_impact",
@@ -130,6 +132,7 @@ __all__ = [
     "display_names",
     "energy",
     "formulation_sizes",
+    "formulation_verdict",
     "forward_dynamics",
     "frame_acceleration",
     "frame_bias_acceleration",

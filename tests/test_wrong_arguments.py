@@ -176,6 +176,7 @@ CALLS = {
     "dyn.hamilton_equations": call(dyn.hamilton_equations, ARM, "recursive", iterations=4, check=False),
     "dyn.inverse_dynamics": call(dyn.inverse_dynamics, ARM, "chain_rule", simplify=True),
     "dyn.formulation_sizes": call(dyn.formulation_sizes, ARM),
+    "dyn.formulation_verdict": call(dyn.formulation_verdict, ARM, formulation="chain_rule"),
     "dyn.momentum_rate": call(dyn.momentum_rate, ARM, "chain_rule", simplify=True, keep_momentum=False),
     "dyn.reduced_linearization": call(dyn.reduced_linearization, SYSTEM, [0.0], [0.0], None, t=0.0, parameters=None),
     "dyn.state_space": call(dyn.state_space, ARM, form="velocity"),
@@ -267,6 +268,7 @@ CALLS = {
     "dyn.Reference.relative_error": call(EXACT.relative_error, [[0.0, 1.0], [0.0, 1.0]]),
     "dyn.Subtree.with_parent": call(SUBTREE.with_parent, "world"),
     "dyn.System.graph": call(SYSTEM.graph, {"o": SYSTEM.q[0]}, SYSTEM.q),
+    "dyn.Verdict.excess_at": call(dyn.formulation_verdict(SYSTEM).excess_at, {}),
     "dyn.TorqueTable.at": call(TABLE.at, [0.0], [0.0], [0.0], t=0.0, parameters=None),
     **{f"dyn.TorqueTable.{name}": call(getattr(TABLE, name), 4) for name in ("to_latex", "to_markdown", "to_text")},
     "dyn.Trajectory.solution": call(RUN.solution, [0.005]),
@@ -438,7 +440,7 @@ RECORDS = """
     dyn.Attached dyn.Certificate dyn.Crossings dyn.Ensemble dyn.EnsembleStats dyn.Force dyn.FreeBody
     dyn.ConstraintLint dyn.HeldForces dyn.JointForce dyn.MotionGradient dyn.MotionGradients dyn.OmittedTerm
     dyn.PruneResult dyn.QuasiVelocities dyn.ReducedLinearization dyn.Reference dyn.Released dyn.Sensitivities dyn.Stats
-    dyn.Subtree dyn.TorqueTable dyn.Trajectory
+    dyn.Subtree dyn.TorqueTable dyn.Trajectory dyn.Verdict
     extend.CompressedJacobian extend.MathML extend.Notation extend.Op extend.Record
 """
 # Nothing to give; types; what a mechanism calls; what empties the user's cache; the fast way into compiled code, which

@@ -22,6 +22,7 @@ def cotangents(
     build: Builder | None = None,
     *,
     fixed: Collection[Node] = (),
+    through: Mapping[Node, Node] | None = None,
     zero_wins: bool = False,
 ) -> list[Node]:
     """Cotangents of nodes by reverse mode: x_bar = sum over seeds y of y_bar dy/dx.
@@ -37,6 +38,8 @@ def cotangents(
         What the nodes are built by; by default a new one.
     fixed : collection of Node
         Inner nodes that count as independent: nothing goes on to their arguments.
+    through : mapping of Node to Node, optional
+        {inner node: factor} of its cotangent before that goes on to its arguments, which marks all that comes of it.
     zero_wins : bool
         Whether a seed that is zero counts for nothing where a slope is infinite or NaN. Default False: NaN.
 
@@ -68,6 +71,8 @@ def cotangents(
             if bar is None or node not in active or not node.args or node in fixed:
                 continue
             labelled(_label(node, bare))
+            if through and node in through:
+                bar = bar * through[node]
             terms: dict[Node, Node] = {}  # by argument first, so that x * x gives 2 * (bar * x)
             for arg, partial in zip(node.args, map(as_node, node.op.partials(node, *node.args)), strict=True):
                 if arg in active:

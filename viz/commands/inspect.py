@@ -48,6 +48,8 @@ def run(options: argparse.Namespace) -> int:
             "nodes": len(version.graph.nodes),
             "edges": len(version.graph.edges),
             "spurious": len(version.marked),
+            "spurious_edges": len(version.blamed),
+            "differs": version.flawed,
         }
         for version in content.versions
     }
