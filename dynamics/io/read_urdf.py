@@ -149,7 +149,7 @@ def _joint(joint: Element, name: str, child: str) -> Joint:
     where, word = f"joint {name!r}", joint.get("type")
     kinds = {each.urdf: kind for kind, each in TYPES.items() if each.urdf} | _OTHERS
     if word not in kinds:
-        given = f"is {word}" if word else "has no type"
+        given = f"is {listed([word])}" if word else "has no type"
         raise MechanismError(f"{where} {given}, and a mechanism has {', '.join(sorted(kinds))}")
     fields: dict[str, Any] = dict(zip(("position", "orientation"), origin_of(joint, where), strict=True))
     if kinds[word] != "fixed":

@@ -208,6 +208,17 @@ def test_what_is_no_source_is_said(load: Any) -> None:
         load(3)
 
 
+@mark.parametrize("load", [dyn.load_mjcf, dyn.load_urdf])
+@mark.parametrize("source", ["robot\n" * 5000, "x" * 5000, "<robot name='\ud800'/>", "a\0b", "\ud800", "", "<", "<!--"])
+def test_what_cannot_be_read_is_one_sentence(load: Any, source: str) -> None:
+    with raises(
+        MechanismError, match=r"cannot be read: File name too long|is not XML: |there is no file|is a folder"
+    ) as told:
+        load(source)
+    assert "\n" not in str(told.value)
+    assert len(str(told.value)) < 300
+
+
 @mark.parametrize(
     "text", ["<mujoco><worldbody>", "<mujoco><nonsense/></mujoco>", mjcf('<body><joint axis="1"/></body>')]
 )

@@ -444,6 +444,7 @@ WRONG = [
     ),
     param(robot(BASE, A, HINGE.replace(' type="continuous"', "")), "joint 'j' has no type, and a mechanism", id="type"),
     param(robot(BASE, A, HINGE.replace("continuous", "screw")), "joint 'j' is screw, and a mechanism has", id="screw"),
+    param(robot(BASE, A, HINGE.replace("continuous", "a&#10;b")), r"joint 'j' is 'a\nb', and a mechanism", id="lines"),
     param(robot(BASE, A, HINGE.replace(' xyz="0 0 1"', "")), "joint 'j': <axis> has no xyz", id="axis"),
     param(robot(BASE, A, HINGE.replace("0 0 1", "0 0 0")), "body 'a': axis must not be zero", id="no axis"),
     param(
