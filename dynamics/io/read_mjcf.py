@@ -64,7 +64,7 @@ def compiled_mjcf(source: Any, called: str) -> Any:
     mujoco().set_mju_user_warning(said.append)
     try:
         mj = models.from_xml_string(given) if is_text(source) else models.from_xml_path(given)
-    except ValueError as error:
+    except (ValueError, RuntimeError) as error:
         if not root_of(source):
             raise MechanismError(f"{called} is not XML, as MJCF and URDF are") from None
         raise MechanismError(f"MuJoCo cannot read {called}: {' '.join(str(error).split())}") from None

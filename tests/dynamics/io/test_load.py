@@ -220,7 +220,15 @@ def test_what_cannot_be_read_is_one_sentence(load: Any, source: str) -> None:
 
 
 @mark.parametrize(
-    "text", ["<mujoco><worldbody>", "<mujoco><nonsense/></mujoco>", mjcf('<body><joint axis="1"/></body>')]
+    "text",
+    [
+        "<mujoco><worldbody>",
+        "<mujoco><nonsense/></mujoco>",
+        mjcf('<body><joint axis="1"/></body>'),
+        mjcf(f'<body name="b">{HINGE}{INERTIAL}</body>').replace(
+            "</mujoco>", '<equality><connect body1="b" body2="world" anchor="&#9;"/></equality></mujoco>'
+        ),  # which MuJoCo itself does not explain
+    ],
 )
 def test_bad_mjcf_is_one_sentence(text: str, tmp_path: Path) -> None:
     with raises(MechanismError, match=r"^(MuJoCo cannot read the given text|the given text is not XML): \S.*\S$"):
