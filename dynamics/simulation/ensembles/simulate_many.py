@@ -119,6 +119,8 @@ def simulate_many(
         For arguments of another type, shape or range, each by name, and for `workers` that give no results.
     MemoryError
         For a result that would not fit.
+    RuntimeError
+        Where a process of `workers` is ended from outside.
     SingularMassMatrixError
         For a coordinate without inertia.
 

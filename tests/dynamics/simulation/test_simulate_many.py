@@ -11,7 +11,7 @@ from pytest import approx, mark, raises
 import dynamics as dyn
 from dynamics.integrators import METHODS
 from dynamics.simulation.ensembles.simulate_many import simulate_many
-from dynamics.simulation.ensembles.step_grid import grids_between
+from dynamics.simulation.ensembles.step_grid import StepGrid, grids_between
 from dynamics.systems.model import as_system
 from dynamics.systems.system import System
 from tests.dynamics.ensembles import arms, same
@@ -235,6 +235,14 @@ def test_a_result_that_would_not_fit_is_refused() -> None:
         MemoryError, match=r"100000 trajectories of 100000001 rows of 4 numbers take 2.98e\+05 GiB, and .* free"
     ):
         simulate_many(random_arm(2), np.zeros((100_000, 2)), [0.0, 0.0], 1e5, "rk4")
+
+
+def test_only_the_last_block_of_a_row_ends_at_an_instant() -> None:
+    grid = StepGrid(0.0, 0.1, 7, 2)
+    assert [*grid.blocks(3, 5)] == [(3, 3, False), (3, 3, False), (1, 1, True)] * 2
+    assert [*grid.blocks(7, 5)] == [(7, 7, True)] * 2
+    assert [*grid.blocks(20, 5)] == [(14, 7, True)]
+    assert [*StepGrid(0.0, 0.1, 1, 5).blocks(20, 2)] == [(2, 1, True), (2, 1, True), (1, 1, True)]
 
 
 @given(
