@@ -19,7 +19,7 @@ from ..integrators import METHODS, Problem, derive, force, in_form, total_energy
 from ..systems.model import Model
 from .applied_forces import Applied, Tau, with_applied
 from .dense_output import StepBlock, with_hermite
-from .error_estimate import ErrorEstimate, estimate
+from .error_estimate import ErrorEstimate
 from .event import Event, as_events
 from .event_log import EventLog
 from .event_program import event_program
@@ -29,16 +29,15 @@ from .missed_momenta import missed_momenta
 from .progress_bar import Progress
 from .recorder import Recorder
 from .row_values import converted, row_values
+from .run_estimate import RunEstimate
 from .run_options import METHOD, TABLES, RunOptions, time_span
 from .sampled_controller import HeldForces, Hold
 from .scipy_solvers import ScipyIntegration, scipy_solver
 from .solution import Solution
 from .step_program import compile_steps, step_program
-from .stepping import FixedStepIntegration, Integration
+from .stepping import Integration
 from .trajectory import SimulationWarning, Stats, Trajectory
 from .watched import WatchedIntegration
-
-ENDS = (1, 3)  # rows that are kept at the end: an event cuts the last step, and of the others one in two is compared
 
 
 def simulate(
@@ -180,7 +179,7 @@ def simulate(
 
     # Integrate, noting rows and events
     run = WatchedIntegration(leg, options, log) if log else leg(options)
-    recorder = Recorder(x, options.times, options.t0, options.direction, ENDS[bool(watched)])
+    recorder = Recorder(x, options.times, options.t0, options.direction)
     steps: list[StepBlock] | None = [] if dense_output else None
     outcome = _integrate(run, x, recorder, options, stepped.rate, steps)
 
@@ -226,29 +225,22 @@ def _integrate(
     rate: Graph,
     steps: list[StepBlock] | None,
 ) -> _Outcome:
-    """Run from x to t_end, an event, a failure, the end of the memory, or Ctrl-C; then estimate the error.
+    """Run from x to t_end, an event, a failure, the end of the memory, or Ctrl-C, and estimate the error.
 
     steps: receives the steps with their dense output.
     """
-    begin, seconds, error = time.perf_counter(), math.nan, None
-    second = 0.5 * options.estimated  # of the length of the run
-    doing = ""
+    begin, error = time.perf_counter(), None
+    estimate = RunEstimate(run, x, options) if options.estimated else None
     try:
-        total = (1.0 + second) * options.length
-        with np.errstate(all="ignore"), Progress("simulate", total, options.progress) as report:
-            _run(run, x, recorder, rate, steps, lambda t: report(abs(t - options.t0)))
-            seconds = time.perf_counter() - begin
-            plain = run.plain
-            if isinstance(plain, FixedStepIntegration) and options.estimated and not run.status:
-                doing = ", while its error was estimated"
-                done = abs(recorder.last - options.t0)
-                at, states = recorder.checkpoints()
-                error = estimate(plain, x, at, states, lambda t: report(done + second * abs(t - options.t0)))
+        with np.errstate(all="ignore"), Progress("simulate", options.length, options.progress) as report:
+            _run(run, x, recorder, estimate, rate, steps, lambda t: report(abs(t - options.t0)))
+            if estimate is not None and not run.status:
+                error = estimate.result()
     except KeyboardInterrupt:
-        run.status = f"interrupted after t = {recorder.last:.6g} s{doing}"
+        run.status = f"interrupted after t = {recorder.last:.6g} s"
     if run.status:
         recorder.add_last()
-    seconds = time.perf_counter() - begin if math.isnan(seconds) else seconds
+    seconds = time.perf_counter() - begin - (0.0 if estimate is None else estimate.seconds)
     if run.event and not run.status:
         return _Outcome(seconds, 1, run.event, error)
     return _Outcome(seconds, -1 if run.status else 0, run.status or "reached t_end", error)
@@ -258,6 +250,7 @@ def _run(
     run: Integration,
     x: Array,
     recorder: Recorder,
+    estimate: RunEstimate | None,
     rate: Graph,
     steps: list[StepBlock] | None,
     report: Callable[[float], None],
@@ -268,6 +261,8 @@ def _run(
         if steps is not None and block.dense is None:
             block = with_hermite(block, rate, run.parameters)
         recorder.add(block)
+        if estimate is not None:
+            estimate.add(block)
         if steps is not None:
             steps.append(block)
             kept += block.nbytes
