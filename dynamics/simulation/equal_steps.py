@@ -80,8 +80,11 @@ def _merged(stretches: Iterable[EqualSteps]) -> list[EqualSteps]:
 
 
 def joined(t: float, stretches: Sequence[EqualSteps]) -> list[EqualSteps]:
-    """Steps from t on, of which the first, of half a step to one and a half, ends where one of these does."""
-    if t == stretches[0].begin:
+    """Steps from t on, of which one, of half a step to one and a half, ends where one of these does."""
+    begin, h = stretches[0][:2]
+    if (begin - t) / h > 0.5:
+        return [*equal_steps([t, begin], abs(h)), *stretches]
+    if t == begin:
         return list(stretches)
     for number, part in enumerate(stretches):
         ahead = max(1, math.ceil((t - part.begin) / part.h + 0.5))

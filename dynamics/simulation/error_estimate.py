@@ -40,7 +40,7 @@ BRANCHES: dict[str, Callable[[Node], Node]] = {
 }
 KINK = 16.0  # times an error of second order, as across a kink, that of steps four times as long is
 UNKNOWN = "the error is unknown"
-LATE = 2.0  # steps after the reset of another run, from which on a run without it takes another course
+LATE, SHARE = 2.0, 0.1  # steps, or of the time since the last reset: a run so much later resets takes another course
 
 
 class States(NamedTuple):
@@ -69,14 +69,15 @@ class Course:
         self._doublings = doublings
         self.every = 1 if doublings == 2 else 2  # of how many steps the end is one of those compared
         self.stretches: list[EqualSteps] = []
-        self.longest = 0.0  # s
+        self.longest, self.late = 0.0, 0.0  # s; that its resets may differ from those of the first run [s]
 
-    def follow(self, stretches: Sequence[EqualSteps]) -> None:
-        """The first run is in a leg of these steps."""
+    def follow(self, stretches: Sequence[EqualSteps], lasted: float = 0.0) -> None:
+        """The first run is in a leg of these steps, after one that lasted so long [s]."""
         made = halved(stretches) if self._doublings < 0 else list(stretches)
         for _ in range(self._doublings):
             made = doubled(made)
         self.stretches, self.longest = made, max(abs(part.h) for part in made)
+        self.late = max(LATE * self.longest, SHARE * lasted)
 
     def meets(self, t: Array) -> Flags:
         """Which of the instants t (r,) are ends of its steps, but for rounding."""
@@ -262,6 +263,7 @@ class Estimator:
         self._bent = np.zeros(k, dtype=bool)  # whether a jump or a kink was passed
         self._looked_at = _looked_at(self.program.rate)
         self._end: States | None = None  # of what was compared
+        self._begun = self.options.t0  # the leg [s]
 
     def begin(self, x: Array, stretches: Sequence[EqualSteps], *, shorter: bool = False) -> None:
         """The runs start from x (k, m), on these steps."""
@@ -280,8 +282,9 @@ class Estimator:
 
     def leg(self, stretches: Sequence[EqualSteps]) -> None:
         """After a reset, the runs go on with these steps."""
+        lasted, self._begun = abs(stretches[0].begin - self._begun), stretches[0].begin
         for beside in self._beside:
-            beside.course.follow(stretches)
+            beside.course.follow(stretches, lasted)
 
     def restart(self, x: Array, stretch: EqualSteps, p: Array) -> None:
         """The runs are at x (k, m), at the start of a stretch with parameters p: errors of stretches add up."""
@@ -345,10 +348,10 @@ class Estimator:
 
     def _until(self, beside: _Beside, end: float, resets: int) -> Iterator[States]:
         """What a run beside comes to until it is at `end` after so many resets, unless it takes another course."""
-        direction, rounding, late = self.options.direction, SAME * np.spacing(abs(end)), LATE * beside.course.longest
+        direction, rounding, course = self.options.direction, SAME * np.spacing(abs(end)), beside.course
         while not beside.lost and beside.resets <= resets:
             ahead = direction * (beside.t - end)
-            if ahead >= -rounding if beside.resets == resets else ahead > late:
+            if ahead >= -rounding if beside.resets == resets else ahead > course.late:
                 beside.lost = beside.resets < resets
                 break
             following = next(beside.states, None)
@@ -358,8 +361,9 @@ class Estimator:
             new, beside.t, beside.resets = following.resets > beside.resets, float(following.t[-1]), following.resets
             if not new:
                 yield following
-        if beside.resets > resets and direction * (end - beside.t) > late:
-            beside.lost = True
+        if beside.resets > resets:
+            late = max(LATE * course.longest, SHARE * abs(beside.t - self._begun))
+            beside.lost = beside.lost or direction * (end - beside.t) > late
         if beside.lost:
             for difference in self._differences[self._beside.index(beside) :]:
                 difference.lose(beside.t)

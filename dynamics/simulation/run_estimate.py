@@ -9,7 +9,7 @@ import numpy as np
 from cgraph.extend import Array
 
 from .dense_output import StepBlock
-from .equal_steps import EqualSteps
+from .equal_steps import EqualSteps, equal_steps
 from .error_estimate import Course, ErrorEstimate, Estimator, States
 from .run_options import RunOptions
 from .stepping import FixedStepIntegration, Integration
@@ -68,6 +68,8 @@ class RunEstimate:
         for block in other.blocks(x[0]):
             yield States(block.t, block.x[None], other.resets)
             at, t = course.stretches[0].begin, float(block.t[-1])
-            if block.h[0] == 0.0 and abs(at - t) <= course.longest:  # a reset, which the run had at another time
-                aside = leg.beside([EqualSteps(t, at - t, 1, at)], p[0].tolist()).blocks(block.x[-1])
-                yield from [States(one.t, one.x[None], other.resets) for one in ([block] if at == t else aside)]
+            if block.h[0] == 0.0 and abs(at - t) <= course.late:  # a reset, which the run had at another time
+                aside = leg.beside(equal_steps([t, at], course.longest), p[0].tolist()).blocks(block.x[-1])
+                for one in [block] if at == t else aside:
+                    if one.t[-1] == at:
+                        yield States(one.t[-1:], one.x[None, -1:], other.resets)

@@ -116,7 +116,7 @@ def simulate(
         Applied force [N m or N]: constant, for all velocities or for each, (n,); or a controller. One in closed form is
         a function (q, qd, t) or (q, qd, t, p) to a node or number for each velocity, which is compiled into the steps,
         see `with_controller`. A `SampledController` calls a Python function of numbers once in a period; equal steps
-        then have their error estimated by steps of half the length, with the same forces.
+        then have their error estimated by steps of half the length, period by period.
     parameters : mapping, optional
         {name: value} in place of the model's own, and of those that a controller in closed form has besides.
     first_step : float, optional
@@ -124,8 +124,8 @@ def simulate(
     max_steps : float
         Steps after which the run stops.
     estimate_error : bool, optional
-        Of equal steps, whether a second run of steps twice as long estimates their error (`Stats.error`), which takes
-        half as long again; by default it does. The rows are the same without.
+        Of equal steps, whether runs beside, of steps two and four times as long, estimate their error
+        (`Stats.error`), which takes three quarters as long again; by default they do. The rows are the same without.
     backend : str
         "llvm", "python", or "auto" for machine code where llvmlite is installed; the steps are the same.
     progress : bool, optional

@@ -9,6 +9,7 @@ import numpy as np
 from hypothesis import given, strategies as st
 from pytest import approx, mark, raises, warns
 
+import cgraph as cg
 import dynamics as dyn
 from dynamics.integrators import METHODS
 from dynamics.simulation.equal_steps import doubled, equal_steps, joined
@@ -169,6 +170,9 @@ def test_runs_beside_have_other_steps_to_the_same_end(
     longest, longer = (max(abs(part.h) for part in steps) for steps in (first, second))
     assert longer <= 3.0 * longest * (1.0 + 1e-9)
     assert abs(joined(t, second)[0].h) <= 1.5 * longer * (1.0 + 1e-9)
+    early = joined(-t, second)
+    assert early[0].begin == -t
+    assert max(abs(part.h) for part in early) <= 1.5 * longer * (1.0 + 1e-9)
     work = [sum(part.steps for part in steps) for steps in (first, second)]
     assert work[1] <= 0.67 * work[0] + 1
 
@@ -184,6 +188,98 @@ def test_the_estimate_does_not_compare_momenta_with_coordinates() -> None:
         run = dyn.simulate(heavy, [1.0], [0.0], math.pi, "symplectic_euler", **how)
         errors.append(run.stats.error)
     assert errors[1] == approx(errors[0], rel=1e-6)
+
+
+def of(lagrangian: Any) -> dyn.System:
+    return dyn.System(lagrangian, ["x"])
+
+
+def in_silence(*arguments: Any, **options: Any) -> dyn.Trajectory:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", dyn.SimulationWarning)
+        return dyn.simulate(*arguments, **options)
+
+
+def test_an_error_between_the_rows_counts() -> None:
+    """A spring of 1000 rad/s has lost its swing by the end, with steps of any length."""
+    run = in_silence(of(lambda q, qd, t: 0.5 * qd[0] ** 2 - 5e5 * q[0] ** 2), [1.0], [0.0], 1.0, "rk4", t_eval=[1.0])
+    true = abs(run.q[0, 0] - math.cos(1000.0))
+    assert 0.1 * true <= run.stats.error <= 10.0 * true
+    assert run.stats.warnings
+
+
+@mark.parametrize("method", ["rk4", *slow("gauss4", "gauss8", "gauss12", "verlet")])
+@mark.parametrize("dt", [0.05, 0.013])
+def test_no_order_is_taken_for_granted_across_kinks(method: str, dt: float) -> None:
+    """A spring of 1 N/m to one side and 7 N/m to the other: half turns of two lengths."""
+    left, right = math.sqrt(7.0), 1.0
+    bent = of(lambda q, qd, t: 0.5 * qd[0] ** 2 - 0.5 * cg.where(q[0] > 0.0, right**2, left**2) * q[0] ** 2)
+    run = in_silence(bent, [1.0], [0.0], 20.0, method, dt=dt)
+    t = np.mod(run.t + 0.5 * math.pi / right, math.pi / right + math.pi / left)
+    turn = t - math.pi / right
+    true = np.abs(run.q[:, 0] - np.where(turn < 0.0, np.sin(right * t), -np.sin(left * turn) / left)).max()
+    assert 0.1 * true <= run.stats.error <= 100.0 * true
+    many = dyn.simulate_many(bent, [[1.0]], [0.0], 20.0, method, dt=dt, rtol=LOOSE)
+    assert many.stats.error[0] == approx(run.stats.error, rel=1e-6)
+
+
+@mark.parametrize("scale", [1.0, *slow(1e-6, 1e6)])
+@mark.parametrize("method", ["rk4", *slow("euler", "verlet", "gauss4")])
+def test_the_estimate_goes_on_across_resets(method: str, scale: float) -> None:
+    """A spring that a wall turns back after a third of a turn, again and again; in other units of length."""
+    wall = dyn.Event("wall", lambda q, qd, t: q[0] + 0.5 * scale, -1, reset=lambda q, qd, t: (q, [-qd[0]]))
+    dt, half = {"euler": 1e-3}.get(method, 0.02), 2.0 * math.pi / 3.0
+    run = in_silence(spring(), [scale], [0.0], 12.0, method, dt=dt, events=wall, rtol=1e-9, t_eval=[1.0, 11.5, 12.0])
+    true = np.abs(run.q[:, 0] / scale - np.cos(np.mod(run.t + half, 2.0 * half) - half)).max()
+    assert len(run.events["wall"].t) == 3
+    assert 0.1 * true <= run.stats.error <= 100.0 * true
+    assert run.stats.error_at_end > 0.0
+    assert "the state is off by an estimated" in run.stats.warnings[0]
+
+
+def test_a_run_beside_with_other_resets_says_that_nothing_is_known() -> None:
+    """Longer steps of Euler's method gain so much energy that they reach a wall which the run does not reach."""
+    wall = dyn.Event("wall", lambda q, qd, t: q[0] - 1.1, 1, reset=lambda q, qd, t: (q, [-qd[0]]))
+    with warns(dyn.SimulationWarning, match="the error is unknown: beside it a run .* takes another course, at t = "):
+        run = dyn.simulate(spring(), [1.0], [0.0], 7.0, "euler", dt=0.02, events=wall)
+    assert (len(run.events["wall"].t), run.stats.error) == (0, math.inf)
+
+
+@mark.parametrize("place", [0.0, math.pi])
+def test_errors_of_a_controlled_motion_add_up_period_by_period(place: float) -> None:
+    """Also about a rest that is none without the controller, from which the same forces would drive it away."""
+    hold = dyn.SampledController(lambda q, qd, t: 60.0 * (place + 0.2 * math.sin(t) - q) - 12.0 * qd, 0.01)
+    arm, start = dyn.planar_arm([1.0], [1.0]), ([place - 0.5], [0.0])
+    run = dyn.simulate(arm, *start, 10.0, "rk4", dt=5e-3, tau=hold)
+    exact = dyn.simulate(arm, *start, 10.0, "dop853", rtol=1e-13, tau=hold, t_eval=run.t)
+    true = max(np.max(np.abs(a - b)) / np.max(np.abs(b)) for a, b in ((run.q, exact.q), (run.qd, exact.qd)))
+    assert 0.5 * true <= run.stats.error <= 100.0 * true
+    assert not run.stats.warnings
+
+
+@mark.parametrize("method", ["rk4", *slow("euler", "verlet", "gauss6")])
+@mark.parametrize("turns", [16.0, 16.37])
+def test_a_force_that_steps_cannot_see_is_said(method: str, turns: float) -> None:
+    """sin(w t), of 16 turns in a step, is another force to every run that takes these steps, or none."""
+    rate, dt = 2.0 * math.pi * turns / 1e-3, 1e-3
+    pushed = of(lambda q, qd, t: 0.5 * qd[0] ** 2 + q[0] * cg.cos(rate * t))
+    said = rf"the error is unknown: a sine or cosine of the equations turns at {rate:.3g} rad/s".replace("+", r"\+")
+    with warns(dyn.SimulationWarning, match=said):
+        run = dyn.simulate(pushed, [0.0], [0.0], 0.1, method, dt=dt)
+    with warns(dyn.SimulationWarning, match=said):
+        many = dyn.simulate_many(pushed, [[0.0]], [0.0], 0.1, method, dt=dt)
+    assert run.stats.error == many.stats.error[0] == math.inf
+    slower = of(lambda q, qd, t: 0.5 * qd[0] ** 2 + q[0] * cg.cos(100.0 * t))
+    assert dyn.simulate(slower, [0.0], [0.0], 0.1, method, dt=dt, rtol=LOOSE).stats.error < 1.0
+
+
+@mark.parametrize("method", ["rk4", "gauss6"])
+def test_no_error_is_said_to_be_below_rounding(method: str) -> None:
+    """Both methods are exact on a parabola."""
+    fall = of(lambda q, qd, t: 0.5 * qd[0] ** 2 - 9.81 * q[0])
+    run = dyn.simulate(fall, [1.0], [0.0], 0.4, method, dt=0.01)
+    assert 2.0**-52 * math.sqrt(40.0) <= run.stats.error <= 1e-13
+    assert dyn.simulate_many(fall, [[1.0]], [0.0], 0.4, method, dt=0.01).stats.error[0] >= 2.0**-52
 
 
 @mark.parametrize(
