@@ -15,204 +15,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cgraph import Graph, Node, floor, less
+from cgraph import Graph
 from cgraph.extend import Array
 
-from ..systems.arguments import TIME
-from .dense_output import Indices
-from .equal_steps import SAME, EqualSteps, doubled, halved, joined
+from .courses import LATE, SHARE, Course, Law, courses
+from .equal_steps import SAME, EqualSteps
 from .run_options import RunOptions
-from .state_sizes import Flags, StateSizes
+from .state_difference import Difference, States, even, together
+from .state_sizes import StateSizes
 from .step_program import StepProgram
+from .unresolved import waves_and_branches
 
-APART = 1.5  # the ratio of errors from which a difference of two runs tells them
 LEAST = 2.0  # times a difference that of steps twice as long is, at least, where the error has a law
 ROUNDING = 1e-10  # of the largest component of its kind: where one is that small, rounding is no error of it
 LAWLESS = 0.1  # of the size of a component: a difference above it follows no power of the step
 UNIT = 2.0**-52  # of each component, by which runs beside start aside: what a rounding grows to is part of the error
-TOGETHER = 128
-WAVES = ("sin", "cos", "tan")
-BRANCHES: dict[str, Callable[[Node], Node]] = {
-    **dict.fromkeys(("floor", "ceil", "round", "sign", "less", "less_equal", "equal", "not_equal"), lambda node: node),
-    **dict.fromkeys(("minimum", "maximum"), lambda node: less(*node.args)),
-    "abs": lambda node: less(node.args[0], 0.0),
-    "fmod": lambda node: floor(abs(node.args[0] / node.args[1])),
-}
+TOGETHER = 512  # states that are compared at once
 KINK = 16.0  # times an error of second order, as across a kink, that of steps four times as long is
 UNKNOWN = "the error is unknown"
-LATE, SHARE = 2.0, 0.1  # steps, or of the time since the last reset: a run so much later resets takes another course
-
-
-class States(NamedTuple):
-    """Of k runs side by side: instants (r,) and states (k, r, m), after so many resets."""
-
-    t: Array
-    x: Array
-    resets: int = 0
-
-
-class Law(NamedTuple):
-    """What follows from differences where the error is a power of the step.
-
-    ratio: of the second difference to the first.  share: of the first one, that is error.
-    """
-
-    ratio: float
-    share: float
-
-
-class Course:
-    """The steps of a run beside, in each leg: those of the first run, made others."""
-
-    def __init__(self, doublings: int) -> None:
-        """doublings: of the length of steps, -1 for half of it."""
-        self._doublings = doublings
-        self.every = 1 if doublings == 2 else 2  # of how many steps the end is one of those compared
-        self.stretches: list[EqualSteps] = []
-        self.longest, self.late = 0.0, 0.0  # s; that its resets may differ from those of the first run [s]
-
-    def follow(self, stretches: Sequence[EqualSteps], lasted: float = 0.0) -> None:
-        """The first run is in a leg of these steps, after one that lasted so long [s]."""
-        made = halved(stretches) if self._doublings < 0 else list(stretches)
-        for _ in range(self._doublings):
-            made = doubled(made)
-        self.stretches, self.longest = made, max(abs(part.h) for part in made)
-        self.late = max(LATE * self.longest, SHARE * lasted)
-
-    def meets(self, t: Array) -> Flags:
-        """Which of the instants t (r,) are ends of its steps, but for rounding."""
-        begins, h = (np.array(column) for column in zip(*[part[:2] for part in self.stretches], strict=True))
-        sign = math.copysign(1.0, h[0])
-        part = np.maximum(np.searchsorted(sign * begins, sign * t) - 1, 0)
-        ends = begins[part] + np.rint((t - begins[part]) / h[part]) * h[part]
-        same: Flags = np.abs(ends - t) <= SAME * np.spacing(np.abs(t))
-        return same
-
-    def steps(self, t: float) -> list[EqualSteps]:
-        """From t on."""
-        return joined(t, self.stretches)
-
-
-def courses(stretches: Sequence[EqualSteps], order: int, *, shorter: bool = False) -> tuple[list[Course], Law]:
-    """Those of two runs of longer steps; where there are too few of them, of one of steps half as long.
-
-    shorter: of half, for every stretch has to end where it does.
-    """
-    if not shorter:
-        longest = max(abs(part.h) for part in stretches)
-        longer = doubled(stretches)
-        sums = [
-            sum(part.steps * (abs(part.h) / longest) ** (order + 1) for part in each)
-            for each in (stretches, longer, doubled(longer))
-        ]
-        one, two, four = sums
-        if two >= APART * one and four - two >= APART * (two - one):
-            return [Course(1), Course(2)], Law((four - two) / (two - one), one / (two - one))
-    return [Course(-1)], Law(1.0, 1.0 / (1.0 - 0.5**order))
-
-
-def matches(times: Array, others: Array) -> tuple[Indices, Indices]:
-    """Where two courses of time have the same instants but for rounding: indices into both. Both go the same way."""
-    direction = 1.0 if len(times) < 2 or times[-1] > times[0] else -1.0
-    near = np.searchsorted(direction * times, direction * others)
-    near = np.clip(near, 0, len(times) - 1)
-    before = np.maximum(near - 1, 0)
-    near = np.where(np.abs(times[before] - others) < np.abs(times[near] - others), before, near)
-    same = np.flatnonzero(np.abs(times[near] - others) <= SAME * np.spacing(np.abs(others)))
-    return near[same], same
-
-
-def _even(rows: Indices) -> slice | Indices:
-    """The same rows; as a slice, which copies nothing, where they are evenly spaced."""
-    if not len(rows):
-        return slice(0)
-    apart = int(rows[1] - rows[0]) if len(rows) > 1 else 1
-    even = bool((np.diff(rows) == apart).all())
-    return slice(int(rows[0]), int(rows[-1]) + 1, apart) if even else rows
-
-
-class Difference:
-    """Between two streams of states at the instants of both, (k, m): the largest so far, and the last.
-
-    lost: the time since which it is infinite, for one of the runs is not finite or takes another course, (k,); NaN
-    before.
-    """
-
-    def __init__(self, k: int, m: int, direction: float) -> None:
-        self.largest, self.last, self._before = np.zeros((3, k, m))
-        self.lost = np.full(k, math.nan)
-        self.compared = 0  # instants
-        self._direction = direction
-        self._streams: tuple[list[States], list[States]] = [], []
-
-    def add(self, which: int, states: States) -> None:
-        """More states of one of the streams."""
-        self._streams[which].append(states)
-
-    def restart(self) -> None:
-        """The streams begin anew, at states that do not differ: what comes is added to the last difference."""
-        self._before = self.last
-        for stream in self._streams:
-            stream.clear()
-
-    def lose(self, t: float, runs: Flags | bool = True) -> None:
-        """From t on nothing is known of these runs."""
-        new = np.isnan(self.lost) & runs
-        self.lost[new] = t
-        self.largest[new] = self.last[new] = math.inf
-
-    def compare(self, resets: int) -> None:
-        """The states that both have of the leg after so many resets."""
-        first, other = (_together(stream, resets) for stream in self._streams)
-        if first is None or other is None:
-            return
-        here, there = matches(first.t, other.t)
-        if len(here):
-            self.compared += len(here)
-            change = other.x[:, _even(there)] - first.x[:, _even(here)]
-            np.abs(change, out=change)
-            most = change.max(axis=1)
-            if len(bad := np.flatnonzero(~np.isfinite(most).all(axis=1))):
-                finite = np.isfinite(change[bad]).all(axis=(0, 2))
-                self.lose(float(first.t[here[np.argmin(finite)]]), np.isin(np.arange(len(most)), bad))
-            known = np.isnan(self.lost)
-            self.last[known] = self._before[known] + change[known, -1]
-            self.largest[known] = np.maximum(self.largest, self._before + most)[known]
-        end = min(self._direction * first.t[-1], self._direction * other.t[-1])
-        for stream, states in zip(self._streams, (first, other), strict=True):
-            left = self._direction * states.t > end
-            stream[:1] = [States(states.t[left], states.x[:, left], resets)] if left.any() else []
-
-
-def _together(stream: list[States], resets: int) -> States | None:
-    """The states of a leg as one, which alone stay in the stream with those of later ones; None if there are none."""
-    here = [states for states in stream if states.resets == resets]
-    stream[:] = [states for states in stream if states.resets > resets]
-    if not here:
-        return None
-    whole = here[0]
-    if len(here) > 1:
-        t, x = np.concatenate([each.t for each in here]), np.concatenate([each.x for each in here], axis=1)
-        whole = States(t, x, resets)
-    stream.insert(0, whole)
-    return whole
-
-
-def _looked_at(rate: Graph) -> Graph | None:
-    """What tells, along a run, how well steps can follow a rate; None if there is nothing.
-
-    phase..: what changes with time of all that it takes sines, cosines and tangents of.  branch..: what is another
-    number on the other side of a jump or a kink.
-    """
-    timed = {node for node in rate.inputs if node.name == TIME}
-    for node in rate.nodes:
-        if not timed.isdisjoint(node.args):
-            timed.add(node)
-    waves = [node.args[0] for node in rate.nodes if node.op.name in WAVES and node.args[0] in timed]
-    branches = [BRANCHES[node.op.name](node) for node in rate.nodes if node.op.name in BRANCHES]
-    outputs = {f"phase{k}": node for k, node in enumerate(dict.fromkeys(waves))}
-    outputs |= {f"branch{k}": node for k, node in enumerate(dict.fromkeys(branches))}
-    return Graph(rate.inputs, outputs) if outputs else None
 
 
 class ErrorEstimate(NamedTuple):
@@ -261,7 +81,7 @@ class Estimator:
         self._size, self._steps, self._law = np.zeros((k, m)), 0, Law(1.0, 1.0)
         self._turning, self._longest = np.zeros(k), 0.0  # rad/s, of sines and cosines; s, of steps
         self._bent = np.zeros(k, dtype=bool)  # whether a jump or a kink was passed
-        self._looked_at = _looked_at(self.program.rate)
+        self._looked_at = waves_and_branches(self.program.rate)
         self._end: States | None = None  # of what was compared
         self._begun = self.options.t0  # the leg [s]
 
@@ -308,14 +128,14 @@ class Estimator:
 
     def _compare(self) -> None:
         """Bring the runs beside to where the first are, and note by how much they differ."""
-        states = _together(self._pending, self._pending[0].resets) if self._pending else None
+        states = together(self._pending, self._pending[0].resets) if self._pending else None
         if states is None:
             return
         self._pending.clear()
         end = float(states.t[-1])
         if self.sparse and self.longer:
             met = np.flatnonzero(self._beside[-1].course.meets(states.t))
-            states = States(states.t[met], states.x[:, _even(met)], states.resets)
+            states = States(states.t[met], states.x[:, even(met)], states.resets)
         if len(states.t):
             size = np.maximum(states.x.max(axis=1), -states.x.min(axis=1))
             self._size = np.maximum(self._size, np.where(np.isfinite(size), size, 0.0))

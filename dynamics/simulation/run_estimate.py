@@ -8,10 +8,12 @@ import numpy as np
 
 from cgraph.extend import Array
 
+from .courses import Course
 from .dense_output import StepBlock
 from .equal_steps import EqualSteps, equal_steps
-from .error_estimate import Course, ErrorEstimate, Estimator, States
+from .error_estimate import ErrorEstimate, Estimator
 from .run_options import RunOptions
+from .state_difference import States
 from .stepping import FixedStepIntegration, Integration
 from .watched import WatchedIntegration
 

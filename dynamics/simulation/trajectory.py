@@ -60,17 +60,13 @@ class Stats:
     njev, nlu : int
         Evaluations of the Jacobian and LU factorizations, 0 of methods without.
     error, error_at_end : float, optional
-        Of equal steps, the estimated error of the state, the largest over the run, rows or not, and that at the end:
-        in units of the largest value that a component has over the run, of the component where it is largest. It is
-        the difference from a second run, of steps twice as long, over 2^k - 1, where a third one, of steps four times
-        as long, tells the order k that the run has, at most the method's (their evaluations are not counted in nfev);
-        across a jump or a kink of the equations, and where it is large, the difference itself. Resets are at other
-        instants there, and states between two resets are compared. With a SampledController the errors of its periods,
-        by steps of half the length, are added up: more than the error of a closed loop that is stable, less than that
-        of one that amplifies what it is off by. Infinite where it is unknown, which a warning explains: a run beside
-        stops or has other resets, or a sine of the time turns faster than steps can tell. The phase of a motion is part
-        of its state: of symplectic methods this error grows, while the energy is kept. None of methods that choose
-        their steps, of runs without `estimate_error`, and of those that fail or end in the first steps.
+        Of equal steps, the estimated error of the state, phase included, the largest over the run, and that at the end,
+        in units of the largest value of a component over the run, of the component where it is largest. It is the
+        difference from a run of steps twice as long over 2^k - 1, where one of steps four times as long tells the order
+        k, at most the method's; across jumps and kinks, and where it is large, the difference itself. States between
+        the same resets are compared. The errors of a SampledController's periods are added up, which holds where the
+        closed loop does not amplify them. Infinite where it is unknown, which a warning explains. None of chosen steps,
+        of runs without `estimate_error`, and of those that fail or end in the first steps.
     warnings : tuple of str
         What speaks against the result, a sentence each; every one is issued as a `SimulationWarning`, too.
 

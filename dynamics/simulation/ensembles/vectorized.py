@@ -10,7 +10,9 @@ import numpy as np
 
 from cgraph.extend import Array, Runner
 
-from ..error_estimate import Course, Estimator, States
+from ..courses import Course
+from ..error_estimate import Estimator
+from ..state_difference import States
 from ..step_program import StepProgram
 from .chunk import INTERRUPTED, Chunk, Part
 from .step_grid import StepGrid
