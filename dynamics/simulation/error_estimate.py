@@ -8,7 +8,6 @@ h^(p + 1). This is the error of the state, phase included, not that of the energ
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -71,7 +70,6 @@ class Estimator:
     p: Array
     follow: Follow
     sparse: bool
-    seconds: float = field(default=0.0, init=False)  # spent here
     _beside: list[_Beside] = field(default_factory=list, init=False)
     _differences: list[Difference] = field(default_factory=list, init=False)
     _pending: list[States] = field(default_factory=list, init=False)
@@ -117,14 +115,12 @@ class Estimator:
 
     def add(self, states: States) -> None:
         """The next states of the runs."""
-        begin = time.perf_counter()
         if self._pending and states.resets != self._pending[-1].resets:
             self._compare()
         self._pending.append(states)
         self._steps += len(states.t)
         if sum(len(each.t) for each in self._pending) >= TOGETHER:
             self._compare()
-        self.seconds += time.perf_counter() - begin
 
     def _compare(self) -> None:
         """Bring the runs beside to where the first are, and note by how much they differ."""
@@ -190,9 +186,7 @@ class Estimator:
 
     def estimates(self) -> list[ErrorEstimate]:
         """Of each run, and whether it is as good as it was asked to be; NaN where nothing could be compared."""
-        begin = time.perf_counter()
         self._compare()
-        self.seconds += time.perf_counter() - begin
         first = self._differences[0]
         if not first.compared and np.isnan(first.lost).all():
             return [ErrorEstimate(math.nan, math.nan, "")] * len(self._size)

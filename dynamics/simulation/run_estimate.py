@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -30,14 +31,15 @@ class RunEstimate:
         self._estimator: Estimator | None = None
         self._leg: FixedStepIntegration | None = None
         self._stretch: EqualSteps | None = None
-
-    @property
-    def seconds(self) -> float:
-        """Spent here [s]."""
-        return 0.0 if self._estimator is None else self._estimator.seconds
+        self.seconds = 0.0  # spent here
 
     def add(self, block: StepBlock) -> None:
         """The next steps of the run, or a reset."""
+        begin = time.perf_counter()
+        self._add(block)
+        self.seconds += time.perf_counter() - begin
+
+    def _add(self, block: StepBlock) -> None:
         leg = self._run.leg
         assert isinstance(leg, FixedStepIntegration)
         controlled = leg.control is not None
@@ -57,8 +59,11 @@ class RunEstimate:
         self._estimator.add(States(block.t, block.x[None], 0 if controlled else self._run.resets))
 
     def result(self) -> ErrorEstimate | None:
-        """After the last step; None where nothing could be compared."""
-        return None if self._estimator is None else self._estimator.estimates()[0]
+        """After the last step; None where there was none."""
+        begin = time.perf_counter()
+        error = None if self._estimator is None else self._estimator.estimates()[0]
+        self.seconds += time.perf_counter() - begin
+        return error
 
     def _beside(self, course: Course, x: Array, p: Array) -> Iterator[States]:
         """The states of a run on another course."""
