@@ -50,5 +50,5 @@ def integration(
     """A run, before its first step.  every_step: of equal steps, keep those between times of t_eval too."""
     if compiled.program.adaptive:
         return AdaptiveIntegration(compiled, options, parameters, stopped, control)
-    every_step = every_step or options.times is None
+    every_step = every_step or options.times is None or options.estimated
     return FixedStepIntegration(compiled, options, parameters, stopped, control, every_step=every_step)

@@ -64,7 +64,7 @@ class RunOptions:
     t0 : float
         Where the run starts [s].
     estimate_error : bool, optional
-        Whether a second run of other steps estimates the error of equal steps; by default it does.
+        Whether runs of other steps beside it estimate the error of equal steps; by default they do.
 
     Raises
     ------
@@ -157,7 +157,7 @@ class RunOptions:
 
     @property
     def estimated(self) -> bool:
-        """Whether a second run estimates the error."""
+        """Whether runs beside it estimate the error."""
         return not self.adaptive and self.estimate_error is not False
 
     @property

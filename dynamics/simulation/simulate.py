@@ -21,7 +21,7 @@ from ..systems.model import Model
 from .advice import advise
 from .applied_forces import Applied, Tau, with_applied
 from .dense_output import StepBlock, with_hermite
-from .error_estimate import ErrorEstimate, estimate
+from .error_estimate import ErrorEstimate
 from .event import Event, as_events
 from .event_program import event_program
 from .free_memory import room
@@ -30,13 +30,12 @@ from .missed_momenta import missed_momenta
 from .progress_bar import Progress
 from .recorder import Recorder
 from .row_values import converted, row_values
+from .run_estimate import RunEstimate
 from .run_options import METHOD, TABLES, RunOptions, time_span
 from .sampled_controller import HeldForces
 from .solution import Solution
-from .stepping import FixedStepIntegration, Integration
+from .stepping import Integration
 from .trajectory import SimulationWarning, Stats, Trajectory
-
-ENDS = (1, 3)  # rows that are kept at the end: an event cuts the last step, and of the others one in two is compared
 
 
 def simulate(
@@ -115,7 +114,7 @@ def simulate(
         Applied force [N m or N]: constant, for all velocities or for each, (n,); or a controller. One in closed form is
         a function (q, qd, t) or (q, qd, t, p) to a node or number for each velocity, which is compiled into the steps,
         see `with_controller`. A `SampledController` calls a Python function of numbers once in a period; equal steps
-        then have their error estimated by steps of half the length, with the same forces.
+        then have their error estimated by steps of half the length, period by period.
     parameters : mapping, optional
         {name: value} in place of the model's own, and of those that a controller in closed form has besides.
     first_step : float, optional
@@ -123,8 +122,8 @@ def simulate(
     max_steps : float
         Steps after which the run stops.
     estimate_error : bool, optional
-        Of equal steps, whether a second run of steps twice as long estimates their error (`Stats.error`), which takes
-        half as long again; by default it does. The rows are the same without.
+        Of equal steps, whether runs beside, of steps two and four times as long, estimate their error
+        (`Stats.error`), which takes three quarters as long again; by default they do. The rows are the same without.
     backend : str
         "llvm", "python", or "auto" for machine code where llvmlite is installed; the steps are the same.
     progress : bool, optional
@@ -177,10 +176,11 @@ def simulate(
     run, x = made(options, hold=hold), converted(stepped.momentum, np.array([t0]), start.x[np.newaxis])[0]
 
     # Integrate, noting rows and events
-    recorder = Recorder(x, options.times, options.t0, options.direction, ENDS[bool(watched)])
+    recorder = Recorder(x, options.times, options.t0, options.direction)
     steps: list[StepBlock] | None = [] if dense_output else None
     outcome = _integrate(run, x, recorder, options, stepped.rate, steps)
-    advise(run, recorder.last, options, x, lambda other: made(other, hold=None if hold is None else hold.replay()))
+    if hold is None:  # a controller may remember what it has seen, so that it is not asked again
+        advise(run, recorder.last, options, x, made)
 
     # Put the result together
     rows, held = recorder.table(), None if hold is None else hold.held
@@ -214,30 +214,23 @@ def _integrate(
     rate: Graph,
     steps: list[StepBlock] | None,
 ) -> _Outcome:
-    """Run from x to t_end, an event, a failure, the end of the memory, or Ctrl-C; then estimate the error.
+    """Run from x to t_end, an event, a failure, the end of the memory, or Ctrl-C, and estimate the error.
 
     steps: receives the steps with their dense output.
     """
-    begin, seconds, error = time.perf_counter(), math.nan, None
-    second = 0.5 * options.estimated  # of the length of the run
-    doing, early = "", tuple[str, ...]()
+    begin, error, early = time.perf_counter(), None, tuple[str, ...]()
+    estimate = RunEstimate(run, x, options) if options.estimated else None
     try:
-        total = (1.0 + second) * options.length
-        with np.errstate(all="ignore"), Progress("simulate", total, options.progress) as report:
-            _run(run, x, recorder, rate, steps, lambda t: report(abs(t - options.t0)))
-            seconds = time.perf_counter() - begin
-            plain = run.plain
-            if isinstance(plain, FixedStepIntegration) and options.estimated and not run.status:
-                doing = ", while its error was estimated"
-                done = abs(recorder.last - options.t0)
-                at, states = recorder.checkpoints()
-                error = estimate(plain, x, at, states, lambda t: report(done + second * abs(t - options.t0)))
+        with np.errstate(all="ignore"), Progress("simulate", options.length, options.progress) as report:
+            _run(run, x, recorder, estimate, rate, steps, lambda t: report(abs(t - options.t0)))
+            if estimate is not None and not run.status:
+                error = estimate.result()
         early = (f"the run {run.status}",) if run.status else ()
     except KeyboardInterrupt:
-        run.status = f"interrupted after t = {recorder.last:.6g} s{doing}"
+        run.status = f"interrupted after t = {recorder.last:.6g} s"
     if run.status:
         recorder.add_last()
-    seconds = time.perf_counter() - begin if math.isnan(seconds) else seconds
+    seconds = time.perf_counter() - begin - (0.0 if estimate is None else estimate.seconds)
     if run.event and not run.status:
         return _Outcome(seconds, 1, run.event, error)
     return _Outcome(seconds, -1 if run.status else 0, run.status or "reached t_end", error, early)
@@ -247,6 +240,7 @@ def _run(
     run: Integration,
     x: Array,
     recorder: Recorder,
+    estimate: RunEstimate | None,
     rate: Graph,
     steps: list[StepBlock] | None,
     report: Callable[[float], None],
@@ -257,6 +251,8 @@ def _run(
         if steps is not None and block.dense is None:
             block = with_hermite(block, rate, run.parameters)
         recorder.add(block)
+        if estimate is not None:
+            estimate.add(block)
         if steps is not None:
             steps.append(block)
             kept += block.nbytes

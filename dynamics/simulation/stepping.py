@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -48,11 +50,12 @@ class Integration(ABC):
     warnings: what speaks against the result, a sentence each.  event: the one that has ended it, in words.
     parameters: values of the rate's inputs that are not built in, as of the block that has come last.
     stiff: that one of `warnings` by which the steps are held at a stability limit.
+    resets: of the state, by events, so far.
     """
 
     def __init__(self, components: Sequence[str]) -> None:
         self.components = components
-        self.steps = self.rejected = self.evaluations = 0
+        self.steps = self.rejected = self.evaluations = self.resets = 0
         self.largest = 0.0
         self.status = ""
         self.warnings: list[str] = []
@@ -60,8 +63,8 @@ class Integration(ABC):
         self.parameters: list[float] = []
 
     @property
-    def plain(self) -> Integration | None:
-        """The run without its events; None where they have changed its course."""
+    def leg(self) -> Integration:
+        """The part of the run that it is in: what makes its steps since the last reset."""
         return self
 
     @property
@@ -148,7 +151,7 @@ class NativeIntegration(Integration):
 class FixedStepIntegration(NativeIntegration):
     """Equal steps between the instants, at most dt. Every step is in a block, or of a block the last alone.
 
-    stretches: other steps than those of the options.
+    stretches: its steps, those of the options unless others are given.  stretch: the one that it is in.
     """
 
     def __init__(
@@ -167,7 +170,12 @@ class FixedStepIntegration(NativeIntegration):
         if stretches is None:
             instants = options.instants if control is None else control.instants(options.instants)
             stretches = equal_steps(instants, options.step)
-        self.stretches = stretches
+        self.stretches, self.stretch = stretches, stretches[0]
+
+    def beside(self, stretches: Sequence[EqualSteps], parameters: Sequence[float]) -> FixedStepIntegration:
+        """The same by other steps, with parameters in place of a controller."""
+        compiled, options = CompiledSteps(self.program, self.runner), replace(self.options, max_steps=math.inf)
+        return FixedStepIntegration(compiled, options, parameters, self._stopped, every_step=True, stretches=stretches)
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
@@ -178,6 +186,7 @@ class FixedStepIntegration(NativeIntegration):
             start["fresh"] = 1.0
         memory = self.runner.memory(start)
         for stretch in self.stretches:
+            self.stretch = stretch
             for name, value in (("start", stretch.begin), ("t", stretch.begin), ("count", 0.0), ("h", stretch.h)):
                 self.runner.write(memory, name, value)
             if self.control is not None:

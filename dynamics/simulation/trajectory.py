@@ -60,13 +60,13 @@ class Stats:
     njev, nlu : int
         Evaluations of the Jacobian and LU factorizations, 0 of methods without.
     error, error_at_end : float, optional
-        Of equal steps, the estimated error of the state, the largest over the rows and the end, and that at the end:
-        in units of the largest value that a component has over the run, of the component where it is largest. It is
-        the difference from a second run, of steps twice as long (whose evaluations are not counted in nfev), divided by
-        2^order - 1, as of a run whose error goes with this power of the step; infinite where the second run fails. The
-        phase of a motion is part of its state: of symplectic methods this error grows, while the energy is kept. None
-        of methods that choose their steps, of runs without `estimate_error`, and of those that fail or end in the first
-        steps.
+        Of equal steps, the estimated error of the state, phase included, the largest over the run, and that at the end,
+        in units of the largest value of a component over the run, of the component where it is largest. It is the
+        difference from a run of steps twice as long over 2^k - 1, where one of steps four times as long tells the order
+        k, at most the method's; across jumps and kinks, and where it is large, the difference itself. States between
+        the same resets are compared. The errors of a SampledController's periods are added up, which holds where the
+        closed loop does not amplify them. Infinite where it is unknown, which a warning explains. None of chosen steps,
+        of runs without `estimate_error`, and of those that fail or end in the first steps.
     warnings : tuple of str
         What speaks against the result, a sentence each; every one is issued as a `SimulationWarning`, too.
 
