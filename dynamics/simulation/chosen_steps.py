@@ -147,7 +147,6 @@ class AdaptiveIntegration(NativeIntegration):
 
     def _rate(self, t: float, x: Array) -> Array:
         rate = self.program.rate
-        assert rate is not None
         values = dict(zip(rate.input_names, [*x.tolist(), t, *self.parameters], strict=True))
         return np.array(list(rate.evaluate(values).values()), dtype=np.float64)
 

@@ -3,25 +3,45 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from cgraph.extend import Array
 
 from ..integrators.step_control import RESOLUTION
-from .dense_output import StepBlock, with_hermite
-from .event_cells import MOST, WatchedSteps
-from .event_location import Side, crossings, start_side
+from .dense_output import StepBlock
+from .event_cells import MOST, Flags, WatchedSteps
+from .event_location import Side, crossings
 from .event_program import EventProgram
 from .row_values import converted
 from .trajectory import Crossings
 
 STEPS = 512  # looked at together
-AT_ONCE = 32  # resets at one instant: more than the impacts of a few bodies that touch
-
+AT_ONCE = 32  # restarts of the run at one instant
+RESETS = 10_000  # one after another before a restart: more than bodies that touch need to come apart
+MISSED = (
+    "may have been missed, first after t = {:.6g} s: its quantity turns too often for "
+    f"{MOST} looks in a step; shorter steps (max_step or dt) find all"
+)
+UNSIDED = (
+    "starts at zero and leaves it at t = {:.6g} s, where nothing is reset: it has no direction, which would tell on "
+    "which side it starts"
+)
 
 Happening = tuple[int, float, Array]  # number of the event, time, state
+Found = tuple[int, float, int, float, bool]  # step, share of it, number of the event, see Crossing for the rest
+
+
+class _Zeros(NamedTuple):
+    """At an instant: which quantities are at zero, their values, what these may be off by, and their motions, (k,)."""
+
+    at: Flags
+    values: Array
+    noise: Array
+    motions: Array
 
 
 class EventLog:
@@ -29,7 +49,7 @@ class EventLog:
 
     ended: the event that has ended the run, in words.  status: why a reset has stopped it.
     parameters: of the rate, those of the block that is to come.
-    restart: (t, x) to go on from after a reset, else None.
+    restart: (t, x, x_new), the state that was reset and the one to go on from, else None.
     warnings: a sentence for each event of which some may have been missed.
     """
 
@@ -37,106 +57,169 @@ class EventLog:
         self.program = program
         self.parameters: Sequence[float] = ()
         self.ended = self.status = ""
-        self.restart: tuple[float, Array] | None = None
+        self.restart: tuple[float, Array, Array] | None = None
         self.warnings: list[str] = []
         self.happened: list[Happening] = []
-        self._sides: list[Side] = []  # none before the first step, or the first after a reset
-        self._reached: dict[int, float] = {}  # events that have just reset the state, and the side they came from
+        self._sides: list[Side] = []  # none before the first step
+        self._from = np.array(
+            [-float(event.direction) for event in program.events]
+        )  # sides that they come to zero from
+        self._noise = np.zeros(len(program.events))  # of quantities at rest, as of the start of these steps
+        self._done: set[int] = set()  # events that happen again only after they have not been due
+        self._reached: set[int] = set()  # events of the last restart
         self._missed: set[int] = set()
-        self._reset_at, self._resets = np.nan, 0  # the instant, to rounding, and how many there in a row
-        self._end: tuple[float, Array] | None = None
+        self._reset_at, self._restarts = math.nan, 0  # the instant, to rounding, and how many there in a row
+        self._last: StepBlock | None = None
 
     def __call__(self, block: StepBlock) -> StepBlock:
         """Note the events of these steps. The steps up to the event after which the run ends or restarts, or all."""
-        dense = with_hermite(block, self.program.rate, self.parameters) if block.dense is None else block
         for first in range(0, len(block.t), STEPS):
-            part = dense.part(slice(first, first + STEPS))
+            part = block.part(slice(first, first + STEPS))
             if stop := self._note(part, self._found(part)):
-                t, x = self.happened[-1][1:]
-                return dense.part(slice(first + stop[0] + (stop[1] > 0.0))).ending(t, x)
-            self._end = float(part.t[-1]), part.x[-1]
-        return dense
+                row, s, t, x = stop
+                return block.part(slice(first + row + (s > 0.0))).ending(t, x)
+            self._last = part.part(slice(-1, None))
+        return block
 
     def finish(self) -> None:
         """The run is at its end: what is zero there to the last bit has arrived."""
-        if self._end is None:
-            return
-        waiting = [(number, side.sign < 0.0) for number, side in enumerate(self._sides) if side.waiting]
-        counting = [(number, rising) for number, rising in waiting if self.program.events[number].counts(rising)]
-        self._happen(*self._end, counting)
+        if self._last is not None:
+            waiting = {number: (side.sign, False) for number, side in enumerate(self._sides) if side.waiting}
+            self._happen(self._last, float(self._last.t[0]), self._last.x[0], waiting)
 
-    def _found(self, part: StepBlock) -> list[tuple[int, float, int, bool]]:
-        """(step, share of it, number of the event, whether it comes from below), in order."""
-        found = []
-        watched = [WatchedSteps(event, self.parameters, part) for event in self.program.events]
-        if not self._sides:
-            self._sides = [self._start(number, steps) for number, steps in enumerate(watched)]
-        for number, (steps, side) in enumerate(zip(watched, self._sides, strict=True)):
+    def _found(self, part: StepBlock) -> list[Found]:
+        """What reaches zero in these steps, in order."""
+        found: list[Found] = []
+        self._sides = self._sides or [self._start(number, part) for number in range(len(self.program.events))]
+        self._noise = np.array([side.noise for side in self._sides])
+        for number, side in enumerate(self._sides):
+            steps = WatchedSteps(self.program.events[number], self.parameters, part, side.noise)
             some, beyond = crossings(steps, side)
-            found += [(one.row, one.s, number, one.rising) for one in some]
+            found += [(one.row, one.s, number, one.side, one.touching) for one in some]
+            if side.resting:  # rounding moves it on from step to step
+                rounding = float(steps.rounding(np.array([-1]), np.ones(1))[0])
+                side.noise = math.hypot(side.noise, math.sqrt(len(part.t)) * rounding)
             if beyond.any() and number not in self._missed:
                 self._missed.add(number)
-                self._warn(number, float(part.t_old[np.argmax(beyond)]))
+                self._warn(number, MISSED.format(part.t_old[np.argmax(beyond)]))
         return sorted(found)
 
-    def _start(self, number: int, steps: WatchedSteps) -> Side:
-        """On which side an event starts: after a reset by it, on the one to which its quantity moves."""
-        if not self._reached:
-            return start_side(steps)
-        if number not in self._reached:
+    def _start(self, number: int, part: StepBlock) -> Side:
+        """At the start of the run. What is zero there, to rounding, rests; with a reset, on the side to come from."""
+        event, row, s = self.program.events[number], np.zeros(1, dtype=np.intp), np.zeros(1)
+        steps = WatchedSteps(event, self.parameters, part)
+        noise = float(steps.rounding(row, s)[0])
+        if not abs(steps.values(row, s)[0]) <= noise:
             return Side()
-        block = steps.block
-        slope = self.program.motion(number, float(block.t_old[0]), block.x_old[0], self.parameters) * block.h[0]
-        return Side(left=float(np.sign(slope)) or self._reached[number])
+        return Side(0.0 if event.reset is None else float(self._from[number]), left=0.0, noise=noise)
 
-    def _note(self, part: StepBlock, found: Sequence[tuple[int, float, int, bool]]) -> tuple[int, float] | None:
-        """Add these events. (step, share) of the one after which the run does not go on, with those of its instant."""
+    def _note(self, part: StepBlock, found: Sequence[Found]) -> tuple[int, float, float, Array] | None:
+        """Add these events. (step, share, t, x) of those after which the run does not go on."""
         if not found:
             return None
         rows, s = np.array([one[0] for one in found]), np.array([one[1] for one in found])
         times, states = part.times_at(rows, s).tolist(), part.states_at(rows, s)
-        for _, group in itertools.groupby(range(len(found)), lambda k: found[k][:2]):
+        for (row, share), group in itertools.groupby(range(len(found)), lambda k: found[k][:2]):
             together = list(group)
-            first = together[0]
-            if self._happen(times[first], states[first], [found[k][2:] for k in together]):
-                return found[first][0], found[first][1]
+            t, x = times[together[0]], states[together[0]]
+            if self._happen(part.part(slice(row, row + 1)), t, x, {found[k][2]: found[k][3:] for k in together}):
+                return row, share, t, x
         return None
 
-    def _happen(self, t: float, x: Array, events: Sequence[tuple[int, bool]]) -> bool:
-        """Note events, (number, whether it comes from below), of one instant; whether one ends or resets the run."""
-        self.happened += [(number, t, x) for number, _ in events]
-        for number, _ in events:
-            if self.program.events[number].terminal:
-                self.ended = f"event {self.program.events[number].name!r} at t = {t:.6g} s"
-                return True
-        before = self._reached
-        reached = {number: -1.0 if rising else 1.0 for number, rising in events if self.program.events[number].reset}
-        if not reached:
-            return False
-        motions = {number: self.program.motion(number, t, x, self.parameters) for number in reached}
-        lost = any(number in before and motions[number] * side > 0.0 for number, side in reached.items())  # in rounding
-        self._reached = reached
-        for number in reached:
-            x = self.program.reset(number, t, x, self.parameters)
-        name = self.program.events[max(reached)].name
+    def _happen(self, step: StepBlock, t: float, x: Array, arrived: Mapping[int, tuple[float, bool]]) -> bool:
+        """Note what reaches zero at an instant of a step; whether that ends or resets the run.
+
+        arrived: {number: (the sign with which it comes, whether it turns back)}.
+        """
+        events = self.program.events
+        sided = {number: side for number, (side, _) in arrived.items() if side}
+        new = [number for number, side in sided.items() if events[number].counts(side, touching=arrived[number][1])]
+        ends = [number for number in new if events[number].terminal]
+        restarts = not ends and any(events[number].reset for number in new)
+        if restarts:  # another reset may move what only the next step would find at zero
+            before = self._zeros(step, float(step.t_old[0]), step.x_old[0])
+            self._from = np.where(before.at, self._from, np.sign(before.values))
+        for number, (side, _) in arrived.items():
+            if side:
+                self._from[number] = side
+            elif events[number].reset is not None:
+                self._warn(number, UNSIDED.format(t))
+        if restarts:
+            self._restart(step, t, x, {*new}, {number for number in new if arrived[number][1]})
+            return True
+        self.happened += [(number, t, x) for number in new]
+        self._done |= {*new}
+        self.ended = self._ended(ends[0], t) if ends else ""
+        return bool(ends)
+
+    def _restart(self, step: StepBlock, t: float, x: Array, due: set[int], touching: set[int]) -> None:
+        """Reset the state by these events, one at a time, and by those that are due after a reset.
+
+        Due is what is zero and moves to the other side than it has come from; what touches, once. Events without a
+        reset, which see the state as it comes, are first.
+        """
+        events, arrived, resets, zeros = self.program.events, x, list[int](), self._zeros(step, t, x)
+        back = zeros.motions * self._from
+        lost = any(number in self._reached and back[number] > 0.0 for number in due - touching)  # in rounding
+        while len(resets) <= RESETS and np.isfinite(x).all():
+            moves = zeros.motions * np.where(self._from == 0.0, -np.sign(zeros.motions), self._from) < 0.0
+            leaving = {n for n in np.flatnonzero(zeros.at & moves).tolist() if events[n].counts(self._from[n])}
+            self._done &= leaving
+            if resets:
+                due = (due & touching) | (leaving - self._done)
+            if not due:
+                break
+            number = min(due, key=lambda number: (events[number].reset is not None, number))
+            due = due - {number}
+            self._done.add(number)
+            self._from[number] = self._from[number] or -np.sign(zeros.motions[number])
+            self.happened.append((number, t, x))
+            if events[number].terminal:
+                self.ended = self._ended(number, t)
+                break
+            if events[number].reset is not None:
+                resets.append(number)
+                x = self.program.reset(number, t, x, self.parameters)
+                zeros = self._zeros(step, t, x)
+        self._restarts = self._restarts + 1 if abs(t - self._reset_at) <= RESOLUTION * abs(t) else 0
+        self._reset_at, self._reached, self.restart = t, {*resets}, (t, arrived, x)
+        names = [f"{events[number].name!r}" for number in sorted({*resets[-AT_ONCE:]})]
+        which = f"event {names[0]} resets" if len(names) == 1 else f"events {', '.join(names)} reset"
         if len(bad := np.flatnonzero(~np.isfinite(x))):
-            component = self.program.components[bad[0]]
-            self.status = f"stopped at t = {t:.6g} s: {component} is {x[bad[0]]} after the reset of event {name!r}"
-        self._resets = self._resets + 1 if abs(t - self._reset_at) <= RESOLUTION * abs(t) else 0
-        if self._resets > AT_ONCE or lost:
+            what = (
+                f"{self.program.components[bad[0]]} is {x[bad[0]]} after the reset of event {events[resets[-1]].name!r}"
+            )
+            self.status = f"stopped at t = {t:.6g} s: {what}"
+        elif len(resets) > RESETS or self._restarts > AT_ONCE or lost:
             self.status = (
-                f"stopped at t = {t:.6g} s: event {name!r} resets the state again and again at this instant; "
+                f"stopped at t = {t:.6g} s: {which} the state again and again at this instant; "
                 "a contact that stays needs other equations from here on"
             )
-        self._sides, self._reset_at, self.restart = [], t, (t, x)
-        return True
+        self._from = np.where(zeros.at & (zeros.motions != 0.0), np.sign(zeros.motions), self._from)
+        self._sides = [self._side(number, zeros) for number in range(len(events))]
 
-    def _warn(self, number: int, t: float) -> None:
-        name = self.program.events[number].name
-        self.warnings.append(
-            f"event {name!r} may have been missed, first after t = {t:.6g} s: its quantity turns too often for "
-            f"{MOST} looks in a step; shorter steps (max_step or dt) find all"
-        )
+    def _side(self, number: int, zeros: _Zeros) -> Side:
+        """After a reset: a quantity at zero is on the side that it moves to, or rests there."""
+        if not zeros.at[number]:
+            return Side()
+        motion, noise = float(np.sign(zeros.motions[number])), float(zeros.noise[number])
+        return Side(left=motion) if motion else Side(float(self._from[number]), left=0.0, noise=noise)
+
+    def _zeros(self, step: StepBlock, t: float, x: Array) -> _Zeros:
+        """The quantities at an instant of a step, also after resets there."""
+        p, at, states = self.parameters, np.array([t]), x[None]
+        errors = step.rounding(np.zeros(1, dtype=np.intp), at, states)
+        events = self.program.events
+        values = np.array([event.value(at, states, p)[0] for event in events])
+        noise = self._noise + np.array([event.error(at, states, p, *errors)[0] for event in events])
+        motions = self.program.motions(at, states, p) * np.sign(step.h[0])
+        return _Zeros(np.abs(values) <= noise, values, noise, motions)
+
+    def _ended(self, number: int, t: float) -> str:
+        return f"event {self.program.events[number].name!r} at t = {t:.6g} s"
+
+    def _warn(self, number: int, what: str) -> None:
+        self.warnings.append(f"event {self.program.events[number].name!r} {what}")
 
     def crossings(self, nq: int) -> dict[str, Crossings]:
         """Of each event by name, with states split after nq numbers into q and qd."""

@@ -18,7 +18,7 @@ from ..equations.initial_value import initial_value
 from ..integrators import METHODS, Problem, derive, force, in_form, total_energy
 from ..systems.model import Model
 from .applied_forces import Applied, Tau, with_applied
-from .dense_output import StepBlock, with_hermite
+from .dense_output import StepBlock
 from .error_estimate import ErrorEstimate, estimate
 from .event import Event, as_events
 from .event_log import EventLog
@@ -182,7 +182,7 @@ def simulate(
     run = WatchedIntegration(leg, options, log) if log else leg(options)
     recorder = Recorder(x, options.times, options.t0, options.direction, ENDS[bool(watched)])
     steps: list[StepBlock] | None = [] if dense_output else None
-    outcome = _integrate(run, x, recorder, options, stepped.rate, steps)
+    outcome = _integrate(run, x, recorder, options, steps)
 
     # Put the result together
     rows, held = recorder.table(), None if hold is None else hold.held
@@ -223,7 +223,6 @@ def _integrate(
     x: Array,
     recorder: Recorder,
     options: RunOptions,
-    rate: Graph,
     steps: list[StepBlock] | None,
 ) -> _Outcome:
     """Run from x to t_end, an event, a failure, the end of the memory, or Ctrl-C; then estimate the error.
@@ -236,7 +235,7 @@ def _integrate(
     try:
         total = (1.0 + second) * options.length
         with np.errstate(all="ignore"), Progress("simulate", total, options.progress) as report:
-            _run(run, x, recorder, rate, steps, lambda t: report(abs(t - options.t0)))
+            _run(run, x, recorder, steps, lambda t: report(abs(t - options.t0)))
             seconds = time.perf_counter() - begin
             plain = run.plain
             if isinstance(plain, FixedStepIntegration) and options.estimated and not run.status:
@@ -258,7 +257,6 @@ def _run(
     run: Integration,
     x: Array,
     recorder: Recorder,
-    rate: Graph,
     steps: list[StepBlock] | None,
     report: Callable[[float], None],
 ) -> None:
@@ -266,7 +264,7 @@ def _run(
     most, kept = room() / TABLES, 0
     for block in run.blocks(x):
         if steps is not None and block.dense is None:
-            block = with_hermite(block, rate, run.parameters)
+            block = run.with_dense(block)
         recorder.add(block)
         if steps is not None:
             steps.append(block)

@@ -21,7 +21,7 @@ class StepProgram:
     components: tuple[str, ...]  # of the state, in words
     parameters: tuple[str, ...]  # inputs that are not built in
     steps: Program
-    rate: Graph | None  # for a method that chooses its steps
+    rate: Graph
     order: int
     adaptive: bool
     dense: bool  # whether its record has dense output
@@ -64,7 +64,7 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
         problem.components,
         problem.parameters,
         _normalized(method.program(problem, dense), problem, method),
-        problem.rate if method.adaptive else None,
+        problem.rate,
         method.order,
         method.adaptive,
         dense and method.adaptive,

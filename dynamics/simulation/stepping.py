@@ -10,7 +10,7 @@ import numpy as np
 
 from cgraph.extend import Array
 
-from .dense_output import StepBlock
+from .dense_output import StepBlock, inside_nodes, with_hermite
 from .equal_steps import EqualSteps, equal_steps
 from .run_options import RunOptions
 from .sampled_controller import Hold
@@ -74,6 +74,10 @@ class Integration(ABC):
     @abstractmethod
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
+
+    def with_dense(self, block: StepBlock) -> StepBlock:
+        """The block that has come last, with dense output."""
+        return block
 
     def nonfinite(self, state: Array) -> str:
         """The first component that is not finite, in words; empty if all are."""
@@ -205,6 +209,28 @@ class FixedStepIntegration(NativeIntegration):
             if failed:
                 self.status = self._failure(memory)
                 return
+
+    def with_dense(self, block: StepBlock) -> StepBlock:
+        """The block that has come last, with dense output of the method's order: by shorter steps of the method."""
+        runner, shares = self.runner, inside_nodes(self.program.order)
+        states = np.empty((len(shares), len(block.t), self.program.size))
+        if len(shares):
+            memory = runner.memory({"p": self.parameters})
+            if "fresh" in runner.program.registers:
+                runner.write(memory, "fresh", 1.0)
+            start, call = memory.copy(), runner.bind(memory, np.empty((1, runner.program.width)))
+            x, t, begin, h = (runner.read(memory, name) for name in ("x", "t", "start", "h"))
+            for k, row in np.ndindex(states.shape[:2]):
+                memory[:] = start
+                x[:], t[:], begin[:], h[:] = (
+                    block.x_old[row],
+                    block.t_old[row],
+                    block.t_old[row],
+                    shares[k] * block.h[row],
+                )
+                call()
+                states[k, row] = x
+        return with_hermite(block, self.program.rate, self.parameters, states)
 
     def _failure(self, memory: Array) -> str:
         t = self._number(memory, "t")
