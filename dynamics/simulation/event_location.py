@@ -86,9 +86,7 @@ class _Chain:
         g = np.concatenate([cells.g_a[:1], cells.g_b])
         self.exact = g == 0.0
         signs = np.nan_to_num(np.sign(g))
-        self.zero = self._zeros(g, np.concatenate([[-signs[0] if side.resting else side.sign], signs]))
-        if not math.isnan(side.left):
-            self.zero[0] = True
+        self.zero = self._zeros(g, np.concatenate([[side.sign], signs]), start=not math.isnan(side.left))
         looks = np.flatnonzero(self.zero)
         before, after = signs.copy(), signs.copy()
         before[looks], after[looks] = self._beside(looks, -1), self._beside(looks, 1)
@@ -99,14 +97,15 @@ class _Chain:
         self.signs[0] = side.sign
         self.signs[1::2], self.signs[2::2] = after[:-1], before[1:]
 
-    def _zeros(self, g: Array, signs: Array) -> Flags:
+    def _zeros(self, g: Array, signs: Array, *, start: bool) -> Flags:
         """Which looks are at zero: exactly, or, beside a change of sign or such a look, to rounding.
 
-        signs: from the side before the first look on.
+        signs: from the side before the first look on.  start: whether the first look is.
         """
         zero: Flags = g == 0.0
-        tested = np.zeros(len(g), dtype=bool)
-        beside = np.flatnonzero(signs[:-1] * signs[1:] < 0.0)
+        zero[0] |= start
+        tested, seeds = np.zeros(len(g), dtype=bool), np.flatnonzero(zero)
+        beside = np.concatenate([np.flatnonzero(signs[:-1] * signs[1:] < 0.0), seeds, seeds + 1])
         while True:
             looks = np.unique(np.concatenate([beside - 1, beside]))
             looks = looks[(looks >= 0) & (looks < len(g))]

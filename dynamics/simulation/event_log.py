@@ -109,8 +109,8 @@ class EventLog:
         event, row, s = self.program.events[number], np.zeros(1, dtype=np.intp), np.zeros(1)
         steps = WatchedSteps(event, self.parameters, part)
         noise = float(steps.rounding(row, s)[0])
-        if not abs(steps.values(row, s)[0]) <= noise:
-            return Side()
+        if not abs(value := steps.values(row, s)[0]) <= noise:
+            return Side(float(np.sign(value)))
         return Side(0.0 if event.reset is None else float(self._from[number]), left=0.0, noise=noise)
 
     def _note(self, part: StepBlock, found: Sequence[Found]) -> tuple[int, float, float, Array] | None:
@@ -201,7 +201,7 @@ class EventLog:
     def _side(self, number: int, zeros: _Zeros) -> Side:
         """After a reset: a quantity at zero is on the side that it moves to, or rests there."""
         if not zeros.at[number]:
-            return Side()
+            return Side(float(np.sign(zeros.values[number])))
         motion, noise = float(np.sign(zeros.motions[number])), float(zeros.noise[number])
         return Side(left=motion) if motion else Side(float(self._from[number]), left=0.0, noise=noise)
 
