@@ -35,14 +35,13 @@ class Side:
 
     sign: its last, 0 before it has one; of one at rest on zero, that of the side that it belongs to, if there is one.
     slope: at the end of the last step; NaN at a start.  left: of a run that starts on zero, the sign with which the
-    quantity leaves, 0 as long as it rests there; NaN elsewhere.  noise: of a quantity at rest, what is still zero.
+    quantity leaves, 0 as long as it rests there; NaN elsewhere.
     waiting: whether it is zero at the last instant, and what it does there is for the next step to tell.
     """
 
     sign: float = 0.0
     slope: float = math.nan
     left: float = math.nan
-    noise: float = 0.0
     waiting: bool = False
 
     @property
@@ -146,7 +145,7 @@ class _Chain:
         """Where a quantity at rest on zero leaves to a side that is not its own, and what it does then."""
         if not len(known):
             return []
-        side.left, side.noise, last = math.nan, 0.0, (int(known[0]) - 1) // 2  # look at which it is zero
+        side.left, last = math.nan, (int(known[0]) - 1) // 2  # look at which it is zero
         leaves = Crossing(int(self.rows[last]), float(self.shares[last]), side.sign, touching=False)
         own = side.sign == self.signs[known[0]]
         return [*([] if own else [leaves]), *self._turns(side, known)]

@@ -12,7 +12,7 @@ import numpy as np
 from cgraph.extend import Array
 
 from ..integrators.step_control import RESOLUTION
-from .dense_output import StepBlock
+from .dense_output import UNIT, StepBlock
 from .event_cells import MOST, Flags, WatchedSteps
 from .event_location import Side, crossings
 from .event_program import EventProgram
@@ -20,7 +20,8 @@ from .row_values import converted
 from .trajectory import Crossings
 
 STEPS = 512  # looked at together
-AT_ONCE = 32  # restarts of the run at one instant
+ROUNDED = 3.0  # times a state, until it is read: at both ends of a step and between
+AT_ONCE = 32  # restarts of the run in a row, at one instant or of contacts that rest
 RESETS = 10_000  # one after another before a restart: more than bodies that touch need to come apart
 MISSED = (
     "may have been missed, first after t = {:.6g} s: its quantity turns too often for "
@@ -36,11 +37,10 @@ Found = tuple[int, float, int, float, bool]  # step, share of it, number of the 
 
 
 class _Zeros(NamedTuple):
-    """At an instant: which quantities are at zero, their values, what these may be off by, and their motions, (k,)."""
+    """At an instant: which quantities are at zero, their values and their motions, (k,)."""
 
     at: Flags
     values: Array
-    noise: Array
     motions: Array
 
 
@@ -64,11 +64,12 @@ class EventLog:
         self._from = np.array(
             [-float(event.direction) for event in program.events]
         )  # sides that they come to zero from
-        self._noise = np.zeros(len(program.events))  # of quantities at rest, as of the start of these steps
+        self._steps = 0
+        self._largest, self._fastest = np.zeros((2, 1, len(program.components)))  # states so far, and rates at resets
         self._done: set[int] = set()  # events that happen again only after they have not been due
-        self._reached: set[int] = set()  # events of the last restart
+        self._resting: set[int] = set()  # quantities that were at rest when the run went on from a reset
         self._missed: set[int] = set()
-        self._reset_at, self._restarts = math.nan, 0  # the instant, to rounding, and how many there in a row
+        self._reset_at, self._restarts = math.nan, 0  # the instant, and how many in a row from which nothing got away
         self._last: StepBlock | None = None
 
     def __call__(self, block: StepBlock) -> StepBlock:
@@ -90,15 +91,14 @@ class EventLog:
     def _found(self, part: StepBlock) -> list[Found]:
         """What reaches zero in these steps, in order."""
         found: list[Found] = []
+        np.fmax(self._largest, np.abs(np.concatenate([part.x_old, part.x])).max(axis=0), out=self._largest)
         self._sides = self._sides or [self._start(number, part) for number in range(len(self.program.events))]
-        self._noise = np.array([side.noise for side in self._sides])
+        self._steps += len(part.t)
         for number, side in enumerate(self._sides):
-            steps = WatchedSteps(self.program.events[number], self.parameters, part, side.noise)
+            noise = self._noise(number, float(part.t[-1]), part.x[-1]) if side.resting else 0.0
+            steps = WatchedSteps(self.program.events[number], self.parameters, part, noise)
             some, beyond = crossings(steps, side)
             found += [(one.row, one.s, number, one.side, one.touching) for one in some]
-            if side.resting:  # rounding moves it on from step to step
-                rounding = float(steps.rounding(np.array([-1]), np.ones(1))[0])
-                side.noise = math.hypot(side.noise, math.sqrt(len(part.t)) * rounding)
             if beyond.any() and number not in self._missed:
                 self._missed.add(number)
                 self._warn(number, MISSED.format(part.t_old[np.argmax(beyond)]))
@@ -106,12 +106,11 @@ class EventLog:
 
     def _start(self, number: int, part: StepBlock) -> Side:
         """At the start of the run. What is zero there, to rounding, rests; with a reset, on the side to come from."""
-        event, row, s = self.program.events[number], np.zeros(1, dtype=np.intp), np.zeros(1)
-        steps = WatchedSteps(event, self.parameters, part)
-        noise = float(steps.rounding(row, s)[0])
-        if not abs(value := steps.values(row, s)[0]) <= noise:
+        event, t, x = self.program.events[number], part.t_old[:1], part.x_old[:1]
+        value = float(event.value(t, x, self.parameters)[0])
+        if not abs(value) <= self._noise(number, float(t[0]), x[0]):
             return Side(float(np.sign(value)))
-        return Side(0.0 if event.reset is None else float(self._from[number]), left=0.0, noise=noise)
+        return Side(0.0 if event.reset is None else float(self._from[number]), left=0.0)
 
     def _note(self, part: StepBlock, found: Sequence[Found]) -> tuple[int, float, float, Array] | None:
         """Add these events. (step, share, t, x) of those after which the run does not go on."""
@@ -145,22 +144,22 @@ class EventLog:
             elif events[number].reset is not None:
                 self._warn(number, UNSIDED.format(t))
         if restarts:
-            self._restart(step, t, x, {*new}, {number for number in new if arrived[number][1]})
+            self._restart(step, t, x, {*new}, {number for number in new if arrived[number][1]}, before.at)
             return True
         self.happened += [(number, t, x) for number in new]
         self._done |= {*new}
         self.ended = self._ended(ends[0], t) if ends else ""
         return bool(ends)
 
-    def _restart(self, step: StepBlock, t: float, x: Array, due: set[int], touching: set[int]) -> None:
+    def _restart(self, step: StepBlock, t: float, x: Array, due: set[int], touching: set[int], rested: Flags) -> None:
         """Reset the state by these events, one at a time, and by those that are due after a reset.
 
         Due is what is zero and moves to the other side than it has come from; what touches, once. Events without a
         reset, which see the state as it comes, are first.
         """
         events, arrived, resets, zeros = self.program.events, x, list[int](), self._zeros(step, t, x)
-        back = zeros.motions * self._from
-        lost = any(number in self._reached and back[number] > 0.0 for number in due - touching)  # in rounding
+        back = rested & zeros.at & (zeros.motions * self._from > 0.0)  # has not really left
+        blamed, due = due, {number for number in due if number in touching or not back[number]}
         while len(resets) <= RESETS and np.isfinite(x).all():
             moves = zeros.motions * np.where(self._from == 0.0, -np.sign(zeros.motions), self._from) < 0.0
             leaving = {n for n in np.flatnonzero(zeros.at & moves).tolist() if events[n].counts(self._from[n])}
@@ -181,39 +180,49 @@ class EventLog:
                 resets.append(number)
                 x = self.program.reset(number, t, x, self.parameters)
                 zeros = self._zeros(step, t, x)
-        self._restarts = self._restarts + 1 if abs(t - self._reset_at) <= RESOLUTION * abs(t) else 0
-        self._reset_at, self._reached, self.restart = t, {*resets}, (t, arrived, x)
-        names = [f"{events[number].name!r}" for number in sorted({*resets[-AT_ONCE:]})]
+        again = blamed <= self._resting or abs(t - self._reset_at) <= RESOLUTION * abs(t)
+        self._restarts = self._restarts + 1 if again else 0
+        self._reset_at, self.restart = t, (t, arrived, x)
+        names = [f"{events[number].name!r}" for number in sorted({*resets[-AT_ONCE:]} or blamed)]
         which = f"event {names[0]} resets" if len(names) == 1 else f"events {', '.join(names)} reset"
         if len(bad := np.flatnonzero(~np.isfinite(x))):
             what = (
                 f"{self.program.components[bad[0]]} is {x[bad[0]]} after the reset of event {events[resets[-1]].name!r}"
             )
             self.status = f"stopped at t = {t:.6g} s: {what}"
-        elif len(resets) > RESETS or self._restarts > AT_ONCE or lost:
+        elif len(resets) > RESETS or self._restarts > AT_ONCE:
             self.status = (
                 f"stopped at t = {t:.6g} s: {which} the state again and again at this instant; "
                 "a contact that stays needs other equations from here on"
             )
         self._from = np.where(zeros.at & (zeros.motions != 0.0), np.sign(zeros.motions), self._from)
         self._sides = [self._side(number, zeros) for number in range(len(events))]
+        self._resting = {number for number, side in enumerate(self._sides) if side.resting}
 
     def _side(self, number: int, zeros: _Zeros) -> Side:
         """After a reset: a quantity at zero is on the side that it moves to, or rests there."""
         if not zeros.at[number]:
             return Side(float(np.sign(zeros.values[number])))
-        motion, noise = float(np.sign(zeros.motions[number])), float(zeros.noise[number])
-        return Side(left=motion) if motion else Side(float(self._from[number]), left=0.0, noise=noise)
+        motion = float(np.sign(zeros.motions[number]))
+        return Side(left=motion) if motion else Side(float(self._from[number]), left=0.0)
 
     def _zeros(self, step: StepBlock, t: float, x: Array) -> _Zeros:
         """The quantities at an instant of a step, also after resets there."""
-        p, at, states = self.parameters, np.array([t]), x[None]
-        errors = step.rounding(np.zeros(1, dtype=np.intp), at, states)
-        events = self.program.events
-        values = np.array([event.value(at, states, p)[0] for event in events])
-        noise = self._noise + np.array([event.error(at, states, p, *errors)[0] for event in events])
-        motions = self.program.motions(at, states, p) * np.sign(step.h[0])
-        return _Zeros(np.abs(values) <= noise, values, noise, motions)
+        at, states, p = np.array([t]), x[None], self.parameters
+        values = np.array([event.value(at, states, p)[0] for event in self.program.events])
+        noise = np.array([self._noise(number, t, x) for number in range(len(values))])
+        motions = self.program.motions(at, states, p, self._fastest, self._roundings) * np.sign(step.h[0])
+        return _Zeros(np.abs(values) <= noise, values, motions)
+
+    @property
+    def _roundings(self) -> float:
+        """By how much states may be off by now, relative to the largest so far: roundings of steps add up at random."""
+        return UNIT * ROUNDED * math.sqrt(1.0 + self._steps)
+
+    def _noise(self, number: int, t: float, x: Array) -> float:
+        """By how much a quantity may be off for that."""
+        errors = self._roundings * self._largest, np.array([self._roundings * abs(t)])
+        return float(self.program.events[number].error(np.array([t]), x[None], self.parameters, *errors)[0])
 
     def _ended(self, number: int, t: float) -> str:
         return f"event {self.program.events[number].name!r} at t = {t:.6g} s"

@@ -70,8 +70,11 @@ class Balls:
         """Contacts and walls."""
         n, size = len(self.x), self.size
         contacts = [] if self.alone else [_contact(i, size, self.direction) for i in range(n - 1)]
-        sides = [(i, wall) for i in range(n) for wall in self.walls] if self.alone else [*zip((0, n - 1), self.walls)]
-        walls = [_wall(i, wall, 1.0 if wall == self.walls[0] else -1.0) for i, wall in sides]
+        walls = [
+            _wall(i, wall, side)
+            for wall, side, outer in zip(self.walls, (1.0, -1.0), (0, n - 1), strict=False)
+            for i in (range(n) if self.alone else [outer])
+        ]
         every = [*contacts, *walls]
         return [every[k] for k in self.order]
 
@@ -185,7 +188,7 @@ def judge_balls(number: int, method: str | None = None, *, many: bool = False) -
 def _error(balls: Balls, q: Array, qd: Array) -> float:
     """The largest at t_end, of places relative to how far the balls came, of velocities to the fastest."""
     x, v = balls.end()
-    fastest = max(max(abs(float(one)) for one in v), *[abs(one) for one in balls.v])
+    fastest = max(abs(float(one)) for one in (*v, *balls.v))
     far = max(*[abs(one) for one in balls.x], fastest * balls.t_end)
     pairs = zip((x, v), (q, qd), (far, fastest), strict=True)
     return max(
