@@ -37,7 +37,7 @@ Found = tuple[int, float, int, float, bool]  # step, share of it, number of the 
 
 
 class _Zeros(NamedTuple):
-    """At an instant: which quantities are at zero, their values and their motions, (k,)."""
+    """At an instant: which quantities are at zero, the values of all, and the motions of these, (k,)."""
 
     at: Flags
     values: Array
@@ -210,9 +210,9 @@ class EventLog:
         """The quantities at an instant of a step, also after resets there."""
         at, states, p = np.array([t]), x[None], self.parameters
         values = np.array([event.value(at, states, p)[0] for event in self.program.events])
-        noise = np.array([self._noise(number, t, x) for number in range(len(values))])
-        motions = self.program.motions(at, states, p, self._fastest, self._roundings) * np.sign(step.h[0])
-        return _Zeros(np.abs(values) <= noise, values, motions)
+        zero = np.abs(values) <= np.array([self._noise(number, t, x) for number in range(len(values))])
+        motions = self.program.motions(zero, at, states, p, self._fastest, self._roundings)
+        return _Zeros(zero, values, motions * np.sign(step.h[0]))
 
     @property
     def _roundings(self) -> float:

@@ -66,15 +66,24 @@ class EventProgram:
     rate: Graph
     velocities: Graph | None
 
-    def motions(self, t: Array, x: Array, p: Sequence[float], fastest: Array, off: float) -> Array:
-        """The derivatives of all quantities by the time (1,) at one state (1, m); 0 where they are rounding.
+    def motions(
+        self,
+        which: np.ndarray[Any, np.dtype[np.bool_]],
+        t: Array,
+        x: Array,
+        p: Sequence[float],
+        fastest: Array,
+        off: float,
+    ) -> Array:
+        """The derivatives of quantities by the time (1,) at one state (1, m); 0 of others, and where they are rounding.
 
         fastest: the largest rates of the states so far, (1, m), which are moved on.  off: what of these is rounding.
         """
         x_dot = _table(self.rate, [*x.T, t, *p], 1).T
         np.fmax(fastest, np.abs(x_dot), out=fastest)
         motions, none = np.zeros(len(self.events)), np.zeros_like(x)
-        for number, event in enumerate(self.events):
+        for number in np.flatnonzero(which):
+            event = self.events[number]
             motion = event.slope(t, x, p, x_dot, np.ones(1))
             most = event.error(t, x, p, fastest, np.ones(1)) - event.error(t, x, p, none, np.zeros(1))
             motions[number] = np.where(np.abs(motion) <= off * most, 0.0, motion)[0]

@@ -11,7 +11,7 @@ import math
 import warnings
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -164,6 +164,8 @@ def random_balls(number: int) -> Balls:
 def judge_balls(number: int, method: str | None = None, *, many: bool = False) -> Verdict:
     """The verdict on one cascade by a method, in `simulate` or `simulate_many`, with default arguments but for dt."""
     balls = random_balls(number)
+    if method in METHODS and METHODS[method].order == 1:  # which is not exact under a pull
+        balls = replace(balls, pull=0.0)
     arguments: dict[str, Any] = {"events": balls.events, "progress": False}
     if method is not None:
         arguments["method"] = method
