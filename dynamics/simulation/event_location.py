@@ -27,6 +27,7 @@ class Crossing(NamedTuple):
     s: float  # share of the step
     side: float  # the sign with which it comes; 0 of one that has none, and leaves zero
     touching: bool  # whether it turns back
+    resting: bool = False  # whether it was at rest there, and leaves
 
 
 @dataclass
@@ -146,7 +147,7 @@ class _Chain:
         if not len(known):
             return []
         side.left, last = math.nan, (int(known[0]) - 1) // 2  # look at which it is zero
-        leaves = Crossing(int(self.rows[last]), float(self.shares[last]), side.sign, touching=False)
+        leaves = Crossing(int(self.rows[last]), float(self.shares[last]), side.sign, touching=False, resting=True)
         own = side.sign == self.signs[known[0]]
         return [*([] if own else [leaves]), *self._turns(side, known)]
 

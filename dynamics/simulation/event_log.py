@@ -14,7 +14,7 @@ from cgraph.extend import Array
 from ..integrators.step_control import RESOLUTION
 from .dense_output import UNIT, StepBlock
 from .event_cells import MOST, Flags, WatchedSteps
-from .event_location import Side, crossings
+from .event_location import Crossing, Side, crossings
 from .event_program import EventProgram
 from .row_values import converted
 from .trajectory import Crossings
@@ -33,7 +33,7 @@ UNSIDED = (
 )
 
 Happening = tuple[int, float, Array]  # number of the event, time, state
-Found = tuple[int, float, int, float, bool]  # step, share of it, number of the event, see Crossing for the rest
+Found = tuple[int, float, int, Crossing]  # step, share of it, number of the event, what its quantity does
 
 
 class _Zeros(NamedTuple):
@@ -61,13 +61,10 @@ class EventLog:
         self.warnings: list[str] = []
         self.happened: list[Happening] = []
         self._sides: list[Side] = []  # none before the first step
-        self._from = np.array(
-            [-float(event.direction) for event in program.events]
-        )  # sides that they come to zero from
+        self._from = np.array([-float(event.direction) for event in program.events])  # sides, see `Crossing`
         self._steps = 0
         self._largest, self._fastest = np.zeros((2, 1, len(program.components)))  # states so far, and rates at resets
         self._done: set[int] = set()  # events that happen again only after they have not been due
-        self._resting: set[int] = set()  # quantities that were at rest when the run went on from a reset
         self._missed: set[int] = set()
         self._reset_at, self._restarts = math.nan, 0  # the instant, and how many in a row from which nothing got away
         self._last: StepBlock | None = None
@@ -79,26 +76,27 @@ class EventLog:
             if stop := self._note(part, self._found(part)):
                 row, s, t, x = stop
                 return block.part(slice(first + row + (s > 0.0))).ending(t, x)
+            self._see(part, len(part.t), part.x[-1])
             self._last = part.part(slice(-1, None))
         return block
 
     def finish(self) -> None:
         """The run is at its end: what is zero there to the last bit has arrived."""
         if self._last is not None:
-            waiting = {number: (side.sign, False) for number, side in enumerate(self._sides) if side.waiting}
+            sides = enumerate(self._sides)
+            waiting = {number: Crossing(0, 1.0, side.sign, touching=False) for number, side in sides if side.waiting}
             self._happen(self._last, float(self._last.t[0]), self._last.x[0], waiting)
 
     def _found(self, part: StepBlock) -> list[Found]:
         """What reaches zero in these steps, in order."""
         found: list[Found] = []
-        np.fmax(self._largest, np.abs(np.concatenate([part.x_old, part.x])).max(axis=0), out=self._largest)
+        self._see(part, 0, part.x_old[0])
         self._sides = self._sides or [self._start(number, part) for number in range(len(self.program.events))]
-        self._steps += len(part.t)
         for number, side in enumerate(self._sides):
             noise = self._noise(number, float(part.t[-1]), part.x[-1]) if side.resting else 0.0
             steps = WatchedSteps(self.program.events[number], self.parameters, part, noise)
             some, beyond = crossings(steps, side)
-            found += [(one.row, one.s, number, one.side, one.touching) for one in some]
+            found += [(one.row, one.s, number, one) for one in some]
             if beyond.any() and number not in self._missed:
                 self._missed.add(number)
                 self._warn(number, MISSED.format(part.t_old[np.argmax(beyond)]))
@@ -121,45 +119,49 @@ class EventLog:
         for (row, share), group in itertools.groupby(range(len(found)), lambda k: found[k][:2]):
             together = list(group)
             t, x = times[together[0]], states[together[0]]
-            if self._happen(part.part(slice(row, row + 1)), t, x, {found[k][2]: found[k][3:] for k in together}):
+            if self._happen(part.part(slice(row + 1)), t, x, {found[k][2]: found[k][3] for k in together}):
                 return row, share, t, x
         return None
 
-    def _happen(self, step: StepBlock, t: float, x: Array, arrived: Mapping[int, tuple[float, bool]]) -> bool:
-        """Note what reaches zero at an instant of a step; whether that ends or resets the run.
+    def _see(self, part: StepBlock, steps: int, x: Array) -> None:
+        """The run came to x by the first steps of a part: how large its states are, and how many roundings old."""
+        self._steps += steps
+        np.fmax(self._largest, np.abs(np.vstack([part.x_old[:steps], x])).max(axis=0), out=self._largest)
 
-        arrived: {number: (the sign with which it comes, whether it turns back)}.
-        """
+    def _happen(self, part: StepBlock, t: float, x: Array, arrived: Mapping[int, Crossing]) -> bool:
+        """Note what reaches zero at an instant of the last of these steps; whether that ends or resets the run."""
         events = self.program.events
-        sided = {number: side for number, (side, _) in arrived.items() if side}
-        new = [number for number, side in sided.items() if events[number].counts(side, touching=arrived[number][1])]
+        new = [n for n, one in arrived.items() if one.side and events[n].counts(one.side, touching=one.touching)]
         ends = [number for number in new if events[number].terminal]
         restarts = not ends and any(events[number].reset for number in new)
+        step = part.part(slice(-1, None))
         if restarts:  # another reset may move what only the next step would find at zero
+            self._see(part, len(part.t), x)
             before = self._zeros(step, float(step.t_old[0]), step.x_old[0])
             self._from = np.where(before.at, self._from, np.sign(before.values))
-        for number, (side, _) in arrived.items():
-            if side:
-                self._from[number] = side
+        for number, one in arrived.items():
+            if one.side:
+                self._from[number] = one.side
             elif events[number].reset is not None:
                 self._warn(number, UNSIDED.format(t))
         if restarts:
-            self._restart(step, t, x, {*new}, {number for number in new if arrived[number][1]}, before.at)
+            self._restart(step, t, x, {number: arrived[number] for number in new}, before.at)
             return True
         self.happened += [(number, t, x) for number in new]
         self._done |= {*new}
         self.ended = self._ended(ends[0], t) if ends else ""
         return bool(ends)
 
-    def _restart(self, step: StepBlock, t: float, x: Array, due: set[int], touching: set[int], rested: Flags) -> None:
+    def _restart(self, step: StepBlock, t: float, x: Array, new: Mapping[int, Crossing], rested: Flags) -> None:
         """Reset the state by these events, one at a time, and by those that are due after a reset.
 
         Due is what is zero and moves to the other side than it has come from; what touches, once. Events without a
-        reset, which see the state as it comes, are first.
+        reset, which see the state as it comes, are first.  rested: what was at zero at the start of the step.
         """
         events, arrived, resets, zeros = self.program.events, x, list[int](), self._zeros(step, t, x)
         back = rested & zeros.at & (zeros.motions * self._from > 0.0)  # has not really left
-        blamed, due = due, {number for number in due if number in touching or not back[number]}
+        touching = {number for number, one in new.items() if one.touching}
+        due = touching | {number for number in new if not back[number]}
         while len(resets) <= RESETS and np.isfinite(x).all():
             moves = zeros.motions * np.where(self._from == 0.0, -np.sign(zeros.motions), self._from) < 0.0
             leaving = {n for n in np.flatnonzero(zeros.at & moves).tolist() if events[n].counts(self._from[n])}
@@ -180,10 +182,10 @@ class EventLog:
                 resets.append(number)
                 x = self.program.reset(number, t, x, self.parameters)
                 zeros = self._zeros(step, t, x)
-        again = blamed <= self._resting or abs(t - self._reset_at) <= RESOLUTION * abs(t)
+        again = all(one.resting for one in new.values()) or abs(t - self._reset_at) <= RESOLUTION * abs(t)
         self._restarts = self._restarts + 1 if again else 0
         self._reset_at, self.restart = t, (t, arrived, x)
-        names = [f"{events[number].name!r}" for number in sorted({*resets[-AT_ONCE:]} or blamed)]
+        names = [f"{events[number].name!r}" for number in sorted({*(resets[-AT_ONCE:] or new)})]
         which = f"event {names[0]} resets" if len(names) == 1 else f"events {', '.join(names)} reset"
         if len(bad := np.flatnonzero(~np.isfinite(x))):
             what = (
@@ -197,7 +199,6 @@ class EventLog:
             )
         self._from = np.where(zeros.at & (zeros.motions != 0.0), np.sign(zeros.motions), self._from)
         self._sides = [self._side(number, zeros) for number in range(len(events))]
-        self._resting = {number for number, side in enumerate(self._sides) if side.resting}
 
     def _side(self, number: int, zeros: _Zeros) -> Side:
         """After a reset: a quantity at zero is on the side that it moves to, or rests there."""
@@ -210,7 +211,7 @@ class EventLog:
         """The quantities at an instant of a step, also after resets there."""
         at, states, p = np.array([t]), x[None], self.parameters
         values = np.array([event.value(at, states, p)[0] for event in self.program.events])
-        zero = np.abs(values) <= np.array([self._noise(number, t, x) for number in range(len(values))])
+        zero = np.abs(values) <= np.array([self._noise(number, t, x, step.x) for number in range(len(values))])
         motions = self.program.motions(zero, at, states, p, self._fastest, self._roundings)
         return _Zeros(zero, values, motions * np.sign(step.h[0]))
 
@@ -219,9 +220,9 @@ class EventLog:
         """By how much states may be off by now, relative to the largest so far: roundings of steps add up at random."""
         return UNIT * ROUNDED * math.sqrt(1.0 + self._steps)
 
-    def _noise(self, number: int, t: float, x: Array) -> float:
-        """By how much a quantity may be off for that."""
-        errors = self._roundings * self._largest, np.array([self._roundings * abs(t)])
+    def _noise(self, number: int, t: float, x: Array, end: Array | float = 0.0) -> float:
+        """By how much a quantity may be off for that, also inside a step to an end (1, m)."""
+        errors = self._roundings * self._largest + UNIT * np.abs(end), np.array([self._roundings * abs(t)])
         return float(self.program.events[number].error(np.array([t]), x[None], self.parameters, *errors)[0])
 
     def _ended(self, number: int, t: float) -> str:

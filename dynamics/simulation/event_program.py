@@ -80,7 +80,7 @@ class EventProgram:
         fastest: the largest rates of the states so far, (1, m), which are moved on.  off: what of these is rounding.
         """
         x_dot = _table(self.rate, [*x.T, t, *p], 1).T
-        np.fmax(fastest, np.abs(x_dot), out=fastest)
+        np.fmax(fastest, np.abs(x_dot), out=fastest, where=np.isfinite(x_dot))
         motions, none = np.zeros(len(self.events)), np.zeros_like(x)
         for number in np.flatnonzero(which):
             event = self.events[number]

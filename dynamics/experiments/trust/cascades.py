@@ -190,7 +190,7 @@ def judge_balls(number: int, method: str | None = None, *, many: bool = False) -
 def _error(balls: Balls, q: Array, qd: Array) -> float:
     """The largest at t_end, of places relative to how far the balls came, of velocities to the fastest."""
     x, v = balls.end()
-    fastest = max(abs(float(one)) for one in (*v, *balls.v))
+    fastest = max(*[abs(float(one)) for one in v], *[abs(one) for one in balls.v])
     far = max(*[abs(one) for one in balls.x], fastest * balls.t_end)
     pairs = zip((x, v), (q, qd), (far, fastest), strict=True)
     return max(

@@ -9,8 +9,8 @@ from pytest import approx, mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.experiments.trust.cascades import CASCADES, KINDS, SILENT, judge_balls, random_balls
-from dynamics.experiments.trust.trust import RIGHT
+from dynamics.experiments.trust.cascades import CASCADES, KINDS, judge_balls, random_balls
+from dynamics.experiments.trust.trust import RIGHT, SILENT
 from dynamics.integrators import METHODS
 from tests.slow import slow
 
