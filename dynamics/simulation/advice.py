@@ -18,13 +18,14 @@ LONGER = 4.0  # times as long as those of the run are steps that are worth a wor
 
 
 def advise(
-    run: Integration, reached: float, options: RunOptions, x: Array, again: Callable[[RunOptions], Integration]
+    run: Integration, reached: float, options: RunOptions, x: Array, again: Callable[[RunOptions], Integration] | None
 ) -> None:
     """Name the method in the warning of a run that is stiff; none where all of them stop, or take steps as short.
 
-    reached: how far the run has come [s].  x: where it started, (m,).  again: the same run by other options.
+    reached: how far the run has come [s].  x: where it started, (m,).  again: the same run by other options;
+    None where a controller decides, which may remember what it has seen.
     """
-    if not run.stiff:
+    if not run.stiff or again is None:
         return
     length = LONGER * abs(reached - options.t0) / run.steps
     for name in IMPLICIT:

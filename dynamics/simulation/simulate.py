@@ -20,7 +20,7 @@ from ..integrators import Problem, derive, force, in_form, total_energy
 from ..systems.model import Model
 from .advice import advise
 from .applied_forces import Applied, Tau, with_applied
-from .dense_output import StepBlock, with_hermite
+from .dense_output import StepBlock
 from .error_estimate import ErrorEstimate
 from .event import Event, as_events
 from .event_program import event_program
@@ -178,9 +178,8 @@ def simulate(
     # Integrate, noting rows and events
     recorder = Recorder(x, options.times, options.t0, options.direction)
     steps: list[StepBlock] | None = [] if dense_output else None
-    outcome = _integrate(run, x, recorder, options, stepped.rate, steps)
-    if hold is None:  # a controller may remember what it has seen, so that it is not asked again
-        advise(run, recorder.last, options, x, made)
+    outcome = _integrate(run, x, recorder, options, steps)
+    advise(run, recorder.last, options, x, made if hold is None else None)
 
     # Put the result together
     rows, held = recorder.table(), None if hold is None else hold.held
@@ -211,7 +210,6 @@ def _integrate(
     x: Array,
     recorder: Recorder,
     options: RunOptions,
-    rate: Graph,
     steps: list[StepBlock] | None,
 ) -> _Outcome:
     """Run from x to t_end, an event, a failure, the end of the memory, or Ctrl-C, and estimate the error.
@@ -222,7 +220,7 @@ def _integrate(
     estimate = RunEstimate(run, x, options) if options.estimated else None
     try:
         with np.errstate(all="ignore"), Progress("simulate", options.length, options.progress) as report:
-            _run(run, x, recorder, estimate, rate, steps, lambda t: report(abs(t - options.t0)))
+            _run(run, x, recorder, estimate, steps, lambda t: report(abs(t - options.t0)))
             if estimate is not None and not run.status:
                 error = estimate.result()
         early = (f"the run {run.status}",) if run.status else ()
@@ -241,7 +239,6 @@ def _run(
     x: Array,
     recorder: Recorder,
     estimate: RunEstimate | None,
-    rate: Graph,
     steps: list[StepBlock] | None,
     report: Callable[[float], None],
 ) -> None:
@@ -249,7 +246,7 @@ def _run(
     most, kept = room() / TABLES, 0
     for block in run.blocks(x):
         if steps is not None and block.dense is None:
-            block = with_hermite(block, rate, run.parameters)
+            block = run.with_dense(block)
         recorder.add(block)
         if estimate is not None:
             estimate.add(block)

@@ -12,7 +12,7 @@ import numpy as np
 
 from cgraph.extend import Array
 
-from .dense_output import StepBlock
+from .dense_output import StepBlock, inside_nodes, with_hermite
 from .equal_steps import EqualSteps, equal_steps
 from .run_options import RunOptions
 from .sampled_controller import Hold
@@ -84,6 +84,10 @@ class Integration(ABC):
     def crossings(self, nq: int, parameters: Array | None = None) -> dict[str, Crossings]:
         """Of each event by name, where it happened, with states split after nq numbers; parameters: of the problem."""
         return {}
+
+    def with_dense(self, block: StepBlock) -> StepBlock:
+        """The block that has come last, with dense output."""
+        return block
 
     def nonfinite(self, state: Array) -> str:
         """The first component that is not finite, in words; empty if all are."""
@@ -221,6 +225,28 @@ class FixedStepIntegration(NativeIntegration):
             if failed:
                 self.status = self._failure(memory, rows[-1, 1 : 1 + m] if len(rows) else x_old)
                 return
+
+    def with_dense(self, block: StepBlock) -> StepBlock:
+        """The block that has come last, with dense output of the method's order: by shorter steps of the method."""
+        runner, shares = self.runner, inside_nodes(self.program.order)
+        states = np.empty((len(shares), len(block.t), self.program.size))
+        if len(shares):
+            memory = runner.memory({"p": self.parameters})
+            if "fresh" in runner.program.registers:
+                runner.write(memory, "fresh", 1.0)
+            start, call = memory.copy(), runner.bind(memory, np.empty((1, runner.program.width)))
+            x, t, begin, h = (runner.read(memory, name) for name in ("x", "t", "start", "h"))
+            for k, row in np.ndindex(states.shape[:2]):
+                memory[:] = start
+                x[:], t[:], begin[:], h[:] = (
+                    block.x_old[row],
+                    block.t_old[row],
+                    block.t_old[row],
+                    shares[k] * block.h[row],
+                )
+                call()
+                states[k, row] = x
+        return with_hermite(block, self.program.rate, self.parameters, states)
 
     def _failure(self, memory: Array, before: Array) -> str:
         """Why the step from a state (m,) failed."""

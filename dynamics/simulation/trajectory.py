@@ -201,7 +201,7 @@ class Trajectory:
         """The motion at any time of the run, by the dense output of its steps.
 
         At the end of a step it is that step's state exactly; between, it has the order of the method's own dense
-        output, or of a cubic where the method has none (all equal steps).
+        output; of equal steps that of the method, or of a cubic.
 
         Parameters
         ----------

@@ -66,14 +66,13 @@ class WatchedIntegration(Integration):
         options, log = self.options, self.log
         while True:
             yield from self._leg(options, x)
-            if self.status or self.event or log.restart is None:
+            if self.status or log.restart is None:
                 return
-            (t, x_new), log.restart = log.restart, None
+            (t, before, x_new), log.restart = log.restart, None
             self.resets = sum(log.program.events[number].reset is not None for number, _, _ in log.happened)
-            before = np.array(log.happened[-1][2])
             instant = np.array([t])
             yield StepBlock(instant, x_new[None], instant, np.zeros(1), before[None], np.zeros((1, 1, len(x))))
-            if t == options.t_end:
+            if self.event or t == options.t_end:
                 return
             options, x = self._rest(t), x_new
 
@@ -84,7 +83,7 @@ class WatchedIntegration(Integration):
         rejected, evaluations = self.rejected, self.evaluations
         for block in run.blocks(x):
             log.parameters = run.parameters
-            kept = log(block)
+            kept = log(run.with_dense(block))
             self.steps += len(kept.t)
             self._count(run, rejected, evaluations)
             if len(kept.t):
