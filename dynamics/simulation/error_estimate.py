@@ -28,7 +28,8 @@ from .unresolved import waves_and_branches
 LEAST = 2.0  # times a difference that of steps twice as long is, at least, where the error has a law
 ROUNDING = 1e-10  # of the largest component of its kind: where one is that small, rounding is no error of it
 LAWLESS = 0.1  # of the size of a component: a difference above it follows no power of the step
-UNIT = 2.0**-52  # of each component, by which runs beside start aside: what a rounding grows to is part of the error
+UNIT = 2.0**-52  # the last bit of a number near 1
+NUDGE = 8.0 * UNIT  # of each component, by which runs beside start aside: what roundings grow to is part of the error
 TOGETHER = 512  # states that are compared at once
 KINK = 16.0  # times an error of second order, as across a kink, that of steps four times as long is
 UNKNOWN = "the error is unknown"
@@ -91,7 +92,7 @@ class Estimator:
         self._differences = [Difference(len(x), self.program.size, self.options.direction) for _ in made]
         for course in made:
             course.follow(stretches)
-            self._beside.append(_Beside(course, self.follow(course, x * (1.0 + UNIT), self.p), self.options.t0))
+            self._beside.append(_Beside(course, self.follow(course, x * (1.0 + NUDGE), self.p), self.options.t0))
 
     @property
     def longer(self) -> bool:

@@ -224,6 +224,15 @@ def test_no_order_is_taken_for_granted_across_kinks(method: str, dt: float) -> N
     assert many.stats.error[0] == approx(run.stats.error, rel=1e-6)
 
 
+@mark.parametrize(("dt", "aside"), [(0.1, 1e-10), *slow((0.05, 1e-8), (0.05, 1e-10), (0.1, 1e-8), (0.1, 1e-11))])
+def test_what_roundings_grow_to_near_a_separatrix_is_part_of_the_error(dt: float, aside: float) -> None:
+    """A pendulum let go so near upright that roundings tell when it falls again: it is off by a turn."""
+    pendulum = of(lambda q, qd, t: 0.5 * qd[0] ** 2 + cg.cos(q[0]))
+    run = in_silence(pendulum, [math.pi - aside], [0.0], 80.0, "gauss6", dt=dt)
+    assert run.stats.error > 0.1
+    assert run.stats.warnings
+
+
 @mark.parametrize("scale", [1.0, *slow(1e-6, 1e6)])
 @mark.parametrize("method", ["rk4", *slow("euler", "verlet", "gauss4")])
 def test_the_estimate_goes_on_across_resets(method: str, scale: float) -> None:
