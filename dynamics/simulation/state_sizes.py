@@ -11,7 +11,7 @@ from cgraph.extend import Array
 
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
-OTHERS = 1e-6  # of the largest component of its kind, below which one counts as no smaller: it may be rounding
+OTHERS = 1e-4  # of the largest component of its kind, below which one counts as no smaller: it may be rounding
 
 
 class StateSizes:
