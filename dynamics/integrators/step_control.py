@@ -10,7 +10,8 @@ stability limit of an explicit method; and of the last accepted step t_old, x_ol
 Where a force jumps, steps can only shrink. `jump` is the share of the `longest` of the last steps in which it may be
 missed, 0 where the caller has given atol: what its mean rate would make in that time counts into the `scale` of a
 component by `leap`, rtol times that time over h. A step far shorter than those before passes a jump so, and a pole, at
-which the steps before get short as well, stays one.
+which the steps before get short as well, stays one. A step in which nothing moved says nothing of forces to come: the
+next is at most `still`.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ SMALLEST_ATOL = 2.0**-1022  # in place of 0: a state that is 0 and stays 0 has n
 def registers(problem: Problem) -> dict[str, int]:
     """What every program has."""
     names = "t h tried next max_step min_step end fresh rtol accepted status rejected error error_old"
-    names += " evaluations held t_old t_new jump longest leap"
+    names += " evaluations held t_old t_new jump longest leap still moved"
     m = problem.size
     states = dict.fromkeys(("x", "x_new", "x_old", "atol"), m)
     return {**states, "p": len(problem.parameters), **dict.fromkeys(names.split(), 1)}
@@ -103,8 +104,12 @@ def accept_step(*after: Statement) -> If:
     kept = (Map(SAME, ("x",), ("x_old",)), Call(SAME, ("t",), ("t_old",)))
     h, longest = cg.variables("h longest")
     after_h = Graph([h, longest], {"longest": cg.maximum(abs(h), FORGOTTEN * longest)})
-    moved = (Map(SAME, ("x_new",), ("x",)), Call(SAME, ("t_new",), ("t",)), Call(after_h, ("h", "longest"), ("longest",)))
-    return If("accepted", (*kept, *after, *moved))
+    x, x_new, moved, wanted, still = cg.variables("x x_new moved next still")
+    way = Sum(Graph([x, x_new], {"way": abs(x_new - x)}), ("x", "x_new"), "moved")
+    short = Graph([moved, wanted, still], {"next": cg.where(moved, wanted, cg.minimum(wanted, still))})
+    steps = (way, Call(short, ("moved", "next", "still"), ("next",)), Call(after_h, ("h", "longest"), ("longest",)))
+    arrived = (Map(SAME, ("x_new",), ("x",)), Call(SAME, ("t_new",), ("t",)))
+    return If("accepted", (*kept, *after, *steps, *arrived))
 
 
 def count(evaluations: int) -> Call:

@@ -57,6 +57,7 @@ class AdaptiveIntegration(NativeIntegration):
             "longest": longest,
             "jump": JUMP if self.sizes else 0.0,
             "max_step": options.longest_step,
+            "still": LEAP * options.length if self.program.timed else math.inf,
             "min_step": COLLAPSE * abs(options.t_end - options.t0),
             "fresh": 1.0,
             "error_old": 1e-4,
@@ -197,7 +198,8 @@ class AdaptiveIntegration(NativeIntegration):
     def _euler(self, x: Array, rate: Array, h: float) -> Array | None:
         """x and two of Euler's steps, (.., m), or as many as move all that moves; None where they cannot be trusted.
 
-        At rest each step may move one component more, the next of a chain; the first moves none where forces begin at 0.
+        At rest each step may move one component more, the next of a chain; the first moves none where a force begins
+        at 0.
         """
         assert self.sizes is not None
         largest, states, moved = self.sizes.largest_of_kind, [x], [0, 0]

@@ -33,7 +33,8 @@ def first_step(
     derivatives can be far off; halving cannot be fooled by either. Of an initial layer that a method damps, both the
     whole and the half steps keep nothing: there the first rate points much farther than the step goes.
 
-    start: registers x and p.  rate: (m,), of the state at the start.  scale: what errors from x to x_new are measured by.
+    start: registers x and p.  rate: (m,), of the state at the start.  scale: what errors from x to x_new are measured
+    by, (m,).
     """
     span, x = options.t_end - options.t0, np.asarray(start["x"])
     anything = {"rtol": HUGE, "atol": HUGE, "max_step": math.inf, "fresh": 1.0, "accepted": 1.0}

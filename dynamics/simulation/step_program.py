@@ -22,6 +22,7 @@ class StepProgram:
     parameters: tuple[str, ...]  # inputs that are not built in
     steps: Program
     rate: Graph | None  # for a method that chooses its steps
+    timed: bool  # whether the rate depends on t
     order: int
     adaptive: bool
     dense: bool  # whether its record has dense output
@@ -65,6 +66,7 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
         problem.parameters,
         _normalized(method.program(problem, dense), problem, method),
         problem.rate if method.adaptive else None,
+        problem.timed,
         method.order,
         method.adaptive,
         dense and method.adaptive,

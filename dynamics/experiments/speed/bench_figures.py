@@ -32,10 +32,8 @@ FIGURES = {
     "agreement": BenchFigure("largest differences from MuJoCo and Pinocchio", agreement, ("links", "count")),
     "ensembles": BenchFigure("many pendulums beside MuJoCo's rollout and JAX's vmap", ensembles, ("count", "repeats")),
     "reconfiguration": BenchFigure("first torque after a change of structure", reconfiguration, ("links", "repeats")),
-    "trust": BenchFigure(
-        "random Lagrangians with exact answers: runs right, said to be wrong, silent", trust, ("count",)
-    ),
-    "tightest": BenchFigure("the same as exactly as float64 has them, beside heyoka", tightest, ("count",)),
+    "trust": BenchFigure("random motions with exact answers: runs right, said to be wrong, silent", trust, ("count",)),
+    "tightest": BenchFigure("random Lagrangians as exactly as float64 has them, beside heyoka", tightest, ("count",)),
     "closed-chains": BenchFigure("chains pinned at the tip beside Pinocchio and MuJoCo", closed_chains, ("repeats",)),
     "long-chains": BenchFigure("cost of a thousand links, and accuracy of long chains", long_chains, ("links",)),
 }

@@ -1,4 +1,4 @@
-"""Random starts: motions that begin with states at 0, driven from rest, as chains, and with forces that jump in time."""
+"""Random starts: motions that begin with states at 0, from rest or as chains, and with forces that jump in time."""
 
 from __future__ import annotations
 
@@ -31,12 +31,13 @@ def random_motion(number: int) -> Setting:
 
 def from_rest(rng: np.random.Generator, name: str) -> Setting:
     """At rest at 0, under forces that begin at 0 and grow."""
+    power = float(rng.integers(1, 5))
     pushes: list[Push] = [
         lambda t: cg.sin(3.0 * t),
-        lambda t: t ** float(rng.integers(1, 5)),
+        lambda t: t**power,
         lambda t: 1.0 - cg.cos(2.0 * t),
         lambda t: t * cg.exp(-t),
-        lambda t: cg.exp(0.5 * t) - 1.0,
+        lambda t: t / (1.0 + t),
         lambda t: 40.0 * t,
     ]
     return _driven(rng, name, pushes[rng.integers(len(pushes))], moving=False)
@@ -56,7 +57,7 @@ def jump(rng: np.random.Generator, name: str) -> Setting:
 
 
 def chain(rng: np.random.Generator, name: str) -> Setting:
-    """Substances that turn into one another, the first alone at the start; of some, two that meet turn into the next."""
+    """Substances that turn into one another, the first alone at the start; some need two that meet."""
     n, second, amount = int(rng.integers(3, 13)), _unit(rng), _unit(rng)
     rates = rng.uniform(0.3, 3.0, (2, n)) / second
     meets = rng.random(n) < 0.3
@@ -82,7 +83,7 @@ def _driven(rng: np.random.Generator, name: str, push: Push, *, moving: bool) ->
     mass = np.eye(n) + 0.3 * np.ones((n, n))
     stiffness, turning = rng.uniform(-1.0, 5.0, n), rng.uniform(0.0, 0.4)
     strength = rng.uniform(0.3, 2.0, n) * (np.arange(n) == rng.integers(n)).astype(float)
-    gain = rng.choice([0.0, 20.0])
+    gain, energy = rng.choice([0.0, 20.0]), (length / second) ** 2.0
 
     def lagrangian(q: Sequence[Node], qd: Sequence[Node], t: Node) -> Node:
         x, v = [each / length for each in q], [each * (second / length) for each in qd]
@@ -90,12 +91,13 @@ def _driven(rng: np.random.Generator, name: str, push: Push, *, moving: bool) ->
         kinetic = sum([0.5 * mass[i, j] * v[i] * v[j] for i, j in pairs], cg.constant(0.0))
         kinetic = kinetic * (1.0 + turning * cg.sin(x[-1]))
         springs = [0.5 * stiffness[i] * x[i] ** 2.0 + 0.5 * (x[i] - x[i - 1]) ** 2.0 for i in range(n)]
-        return kinetic - sum(springs, cg.constant(0.0))
+        total: Node = energy * (kinetic - sum(springs, cg.constant(0.0)))
+        return total
 
     def forces(q: Sequence[Node], qd: Sequence[Node], t: Node) -> list[Node | float]:
-        return [float(s) * push(t / second) / length for s in strength]
+        return [float(s) * energy / length * push(t / second) for s in strength]
 
-    damping = float(gain * 0.2 * second / length**2)
+    damping = float(gain * 0.2 * energy * second / length**2)
     model = System(lagrangian, [f"x{i}" for i in range(n)], forces=forces, damping=damping)
     q, qd = (rng.normal(size=(2, n)) if moving else np.zeros((2, n))).tolist()
     start = tuple([length * x for x in q]), tuple([length / second * x for x in qd])
