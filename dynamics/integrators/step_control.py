@@ -166,6 +166,15 @@ def measured(error: str, m: int) -> list[Statement]:
     return [total, Call(function("sum", y=cg.sqrt(cg.variable("sum") / m)), ("sum",), ("error",))]
 
 
+def moved(m: int) -> list[Statement]:
+    """x = register `onto`; `farthest`, the largest of such moves so far, a root mean square of move over tolerance."""
+    x, rtol, atol, onto, way, far = cg.variables("x rtol atol onto way farthest")
+    part = (onto - x) / scale(x, onto, rtol, atol, cg.constant(0.0))
+    total = Sum(Graph([x, rtol, atol, onto], {"y": part * part}), ("x", "rtol", "atol", "onto"), "way")
+    longer = Graph([way, far], {"far": cg.maximum(cg.sqrt(way / m), far)})
+    return [total, Call(longer, ("way", "farthest"), ("farthest",)), Map(SAME, ("onto",), ("x",))]
+
+
 def lost(register: str, target: str) -> Sum:
     """target = 0 where all numbers of a register are finite, else NaN.
 

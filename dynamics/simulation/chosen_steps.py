@@ -21,6 +21,7 @@ from .stepping import FIRST_PASSES, NativeIntegration
 
 ROUNDS = 4  # of a first step, by which the sizes of the states are known
 HALVINGS = 100  # of a look ahead
+FAR = 1e3  # tolerances of a step, by which constraints may move what it arrives at
 JUMP = 1e-2  # of the longest of the last steps: how much of it a jump may take, where atol is chosen by sizes
 HELD, SHARE = 100, 0.25  # steps at the stability limit, of all, from which on a run is called stiff
 
@@ -40,7 +41,7 @@ class AdaptiveIntegration(NativeIntegration):
         self.relative = max(options.relative, self.program.finest)
         self.absolute = np.broadcast_to(np.maximum(options.absolute, SMALLEST_ATOL), self.program.size)
         self.sizes = self._fresh_sizes() if options.atol is None else None
-        self._stiff = self._below_rounding = False
+        self._stiff = self._below_rounding = self._far = False
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
@@ -127,6 +128,13 @@ class AdaptiveIntegration(NativeIntegration):
                 f"the system is stiff: at t = {t:.6g} s the step, {abs(h):.3g} s, is held at the stability limit of "
                 f"method {options.method!r}, not by its tolerance; try method='radau'"
             )
+        if not self._far and "farthest" in self.program.steps.registers:
+            way, self._far = self._number(memory, "farthest"), self._number(memory, "farthest") > FAR
+            if self._far:
+                self.warnings.append(
+                    f"by t = {rows[-1, 0]:.6g} s the constraints moved the state by {way:.3g} times the tolerance of a "
+                    "step: near a position where it can go on in two ways the motion is not certain"
+                )
         if options.relative < self.relative and not self._below_rounding:
             size = np.abs(rows[:, 2 : 2 + self.program.size])
             short = (self.absolute + options.relative * size < self.relative * size).any(axis=0)
