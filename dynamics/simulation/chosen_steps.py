@@ -214,7 +214,7 @@ class AdaptiveIntegration(NativeIntegration):
         size = largest(x)
         while len(states) < 3 or (moved[-1] < len(x) and moved[-1] > moved[-3]):
             states.append(states[-1] + h * rate)
-            moved.append(np.count_nonzero(states[-1]))
+            moved.append(int(np.count_nonzero(states[-1])))
             before, rate = rate, self._rate(self.options.t0 + (len(states) - 1) * h, states[-1])
             fast = np.maximum(largest(before), largest(rate))
             if not (((largest(states[-1] - x) <= size) | (size == 0.0)) & (largest(rate - before) <= fast)).all():

@@ -84,7 +84,8 @@ def pole(rng: np.random.Generator) -> tuple[Any, list[float], list[float] | None
 
     def lagrangian(q: list[cg.Node], qd: list[cg.Node], t: cg.Node) -> cg.Node:
         fall = 0.5 * (qd[0] * (second / length)) ** 2.0 + strength * (q[0] / length) ** -power
-        return fall + 0.5 * (qd[1] * second) ** 2.0 - 0.5 * q[1] ** 2.0
+        total: cg.Node = fall + 0.5 * (qd[1] * second) ** 2.0 - 0.5 * q[1] ** 2.0
+        return total
 
     start = [length, 1.0], [float(rng.choice([0.0, 0.3])) * length / second, 0.0]
     return dyn.System(lagrangian, ["r", "y"]), *start, 10.0 * second / math.sqrt(strength)
