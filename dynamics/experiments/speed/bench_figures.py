@@ -35,7 +35,7 @@ FIGURES = {
     "trust": BenchFigure(
         "random motions with exact answers: runs right, said to be wrong, silent", with_cascades, ("count",)
     ),
-    "tightest": BenchFigure("the same as exactly as float64 has them, beside heyoka", tightest, ("count",)),
+    "tightest": BenchFigure("random Lagrangians as exactly as float64 has them, beside heyoka", tightest, ("count",)),
     "closed-chains": BenchFigure("chains pinned at the tip beside Pinocchio and MuJoCo", closed_chains, ("repeats",)),
     "long-chains": BenchFigure("cost of a thousand links, and accuracy of long chains", long_chains, ("links",)),
 }
