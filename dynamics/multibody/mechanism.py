@@ -25,7 +25,7 @@ from .inertial_numbers import Link
 from .joint_coordinates import coordinate_names, lengths, per_velocity, quasi_velocities, velocity_names
 from .joint_force import JointForce, add_joint_forces, check_any_force
 from .joint_positions import skeleton
-from .kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia
+from .kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia, resists
 from .loop_equations import check_loops, position_rows, velocity_rows
 from .loops import Loop
 from .mechanism_fields import Structure, changed, listed
@@ -206,6 +206,7 @@ class Mechanism(Structure):
             velocity_constraints=lambda q, qd, t: velocity_rows(self, lambda body: self._chain(body, q, qd)),
             lengths=lengths(self._bound.moving),
             require_values=self._require_values,
+            surely_regular=all([bool(body.joint.armature) or resists(body) for body in self._bound.moving]),
         )
 
     def _require_values(self, values: Mapping[str, ArrayLike], bodies: Sequence[Body] | None = None) -> None:
