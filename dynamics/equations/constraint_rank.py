@@ -134,11 +134,11 @@ class RowNumbers:
         """
         shown = {"t": t} | dict(self.constraints.parameters if parameters is None else parameters)
         with np.errstate(all="ignore"):
-            point = before = self._point(q, shown)
+            point = before = self.point(q, shown)
             step = np.zeros(self.n)  # from the point before
             size, looked = np.inf, 0.0  # at the rounding of phi, which takes longer than a step, once a gap is so small
             for k in range(ITERATIONS):
-                phi = self._phi(point)
+                phi = self.gaps(point)
                 if (not k or size <= looked) and not len(self._open_rows(before, step)):
                     return Closing(point, 0.0, None)
                 matrix = self.matrix(point)[: len(phi)]
@@ -150,13 +150,13 @@ class RowNumbers:
                 looked = looked or SMALL * size
                 for halved in range(HALVINGS):
                     shorter = whole * 0.5**halved
-                    trial = self._point(self._moved(point, shorter), shown)
-                    if np.abs(rows * self._phi(trial)).max() < size:
+                    trial = self.point(self.moved_by(point, shorter), shown)
+                    if np.abs(rows * self.gaps(trial)).max() < size:
                         before, point, step = point, trial, shorter
                         break
                 else:
                     break
-            phi, open_rows = self._phi(point), self._open_rows(before, step)
+            phi, open_rows = self.gaps(point), self._open_rows(before, step)
         if not len(open_rows):
             return Closing(point, 0.0, None)
         return Closing(point, size, int(open_rows[np.abs(phi[open_rows]).argmax()]))
@@ -177,7 +177,8 @@ class RowNumbers:
             matrix[k] = np.where(np.array(list(digits.values())) >= 1.0, matrix[k], 0.0)
         return matrix
 
-    def _phi(self, point: Mapping[str, float]) -> Array:
+    def gaps(self, point: Mapping[str, float]) -> Array:
+        """phi."""
         return np.zeros(0) if self.phi is None else np.array(list(self.phi.evaluate(dict(point)).values()))
 
     def _open_rows(self, before: Mapping[str, float], step: Array) -> Indices:
@@ -189,10 +190,12 @@ class RowNumbers:
         wrong = [x != 0.0 and not (digits[name] < OPEN and np.isfinite(x)) for name, x in values.items()]
         return np.flatnonzero(wrong)
 
-    def _point(self, q: Array, shown: Mapping[str, float]) -> dict[str, float]:
-        return {f"q{i}": float(x) for i, x in enumerate(q)} | dict(shown)
+    def point(self, q: Array, shown: Mapping[str, float]) -> dict[str, float]:
+        """Values of q0.., of t and parameters, from these and others."""
+        return dict(shown) | {f"q{i}": float(x) for i, x in enumerate(q)}
 
-    def _moved(self, point: Mapping[str, float], step: Any) -> Array:
+    def moved_by(self, point: Mapping[str, float], step: Any) -> Array:
+        """q after a step along the velocities, (nq,)."""
         at = {name: point[name] for name in self.moved.input_names if name in point}
         at |= dict(zip(self.steps, step.tolist(), strict=True))
         return np.array(list(self.moved.evaluate(at).values()), dtype=np.float64)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from cgraph import Node
 
+from ..systems.constraints import LoopRow
 from .body import Body, MechanismError
 from .forward_kinematics import KinematicChain
 from .inertial_numbers import Link
@@ -44,6 +45,16 @@ def position_rows(
             phi = loop_rows(loop, *relative_placements(ends, moving, links, q))
         rows |= dict(zip(loop.rows, phi, strict=True))
     return rows
+
+
+def rows_of_loops(structure: Structure) -> dict[str, LoopRow]:
+    """What is known of the rows of all loops that hold frames; a coupling is exact, and has none."""
+    return {
+        name: LoopRow(loop.label, " about " in name.removeprefix(loop.label), loop.tolerance)
+        for loop in structure.loops
+        if loop.kind != "coupling"
+        for name in (*loop.rows, *loop.velocity_rows)
+    }
 
 
 def velocity_rows(structure: Structure, chain: Callable[[str], KinematicChain]) -> dict[str, Node]:

@@ -13,6 +13,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Builder, building, require_flag, require_mapping
 
+from ..equations.nearly_redundant_rows import without_nearly_redundant
 from ..systems.arguments import parameter_value
 from ..systems.body_system import BodySystem
 from ..systems.model import Model
@@ -26,7 +27,7 @@ from .joint_coordinates import coordinate_names, lengths, per_velocity, quasi_ve
 from .joint_force import JointForce, add_joint_forces, check_any_force
 from .joint_positions import skeleton
 from .kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia, resists
-from .loop_equations import check_loops, position_rows, velocity_rows
+from .loop_equations import check_loops, position_rows, rows_of_loops, velocity_rows
 from .loops import Loop
 from .mechanism_fields import Structure, changed, listed
 from .mechanism_summary import summary
@@ -194,7 +195,7 @@ class Mechanism(Structure):
         """
         if not self.moving:
             raise MechanismError("the mechanism has no joint that moves")
-        return BodySystem(
+        system = BodySystem(
             self._equations,
             lambda q, qd, t: self._equations.partial_lagrangians(q, qd),
             self.coordinates,
@@ -208,6 +209,12 @@ class Mechanism(Structure):
             require_values=self._require_values,
             surely_regular=all([bool(body.joint.armature) or resists(body) for body in self._bound.moving]),
         )
+        system.constraints.loop_rows = rows_of_loops(self)
+        system.constraints.turning = [
+            unit == "rad/s" for body in self.moving for unit in body.joint.type.velocity_units
+        ]
+        system.constraints = without_nearly_redundant(system.constraints)
+        return system
 
     def _require_values(self, values: Mapping[str, ArrayLike], bodies: Sequence[Body] | None = None) -> None:
         with outer_names(self.bodies):
