@@ -8,7 +8,7 @@ loop it is seen to be no more than the rounding of numbers in a file.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,16 +16,23 @@ import numpy as np
 from cgraph.extend import Array
 
 from ..systems.constraints import Constraints
-from .constraint_rank import DEPENDENT, ConstraintWarning, RowNumbers, equilibrated
+from .constraint_rank import (
+    DEPENDENT,
+    ConstraintWarning,
+    RowNumbers,
+    equilibrated,
+    factors,
+    independent_rows,
+    row_numbers,
+)
 
 NAMED = 1e-2  # of the largest row of its loop: a row of which no more is left is named, though it is kept
 STATES = 3
-SPREADS = (1.0, 0.3, 3.0, 0.1, 0.03) * 3  # of random starts about the neutral coordinates
-TRUNCATED = 2e-2  # of the largest singular value: what Newton's method does not close
-OPEN = 1e-1  # of a loop, at most, once it has arrived
+SPREADS = (1.0, 0.3, 3.0, 0.1, 2.0, 0.5, 1.5, 0.03)  # of random starts about the neutral coordinates
+TRUNCATED = 4e-3  # of the largest singular value: what Newton's method does not close
+OPEN, WORSE = 1e-1, 30.0  # of a loop, at most, once it has arrived; and of the state that closes best
 ALIKE = 0.5  # of the largest row: one that is as good
 ITERATIONS, ARRIVED, LONGEST = 60, 1e-9, 0.5  # of Newton's method: steps, the last, and the longest, of displacements
-ROUNDS = 4  # of scaling
 
 
 class Left(NamedTuple):
@@ -34,31 +41,6 @@ class Left(NamedTuple):
     kept: list[int]
     shares: Array  # (m,), of the largest row of its loop
     sizes: Array  # (m,), of the whole row, likewise
-
-
-def factors(constraints: Constraints, matrix: Array) -> tuple[Array, Array]:
-    """Factors of rows, one for each loop, and of columns, which make J free of units and its largest entries 1.
-
-    Rows of angles stand beside those of lengths by the longest lever that a joint of the loop has.
-    """
-    rows, columns = np.ones(len(matrix)), np.ones(matrix.shape[1])
-    groups: dict[str, list[int]] = {}
-    for k, name in enumerate(constraints.names):
-        looped = constraints.loop_rows.get(name)
-        groups.setdefault(name if looped is None else f"loop {looped.loop}", []).append(k)
-        if looped and not looped.angle:
-            rows[k] = -1.0  # a length
-    for members in groups.values():
-        lengths = [k for k in members if rows[k] < 0.0]
-        lever = np.abs(matrix[lengths][:, constraints.turning]).max(initial=0.0)
-        rows[lengths] = 1.0 / (lever or 1.0)
-    for _ in range(ROUNDS):
-        sizes = np.abs(rows[:, None] * matrix * columns).max(axis=0, initial=0.0)
-        columns /= np.where(sizes > 0.0, sizes, 1.0)
-        for members in groups.values():
-            largest = np.linalg.norm(rows[members, None] * matrix[members] * columns, axis=1).max()
-            rows[members] /= largest or 1.0
-    return rows, columns
 
 
 def left_without(constraints: Constraints, matrices: Sequence[Array], tolerance: float | None = None) -> Left:
@@ -71,8 +53,8 @@ def left_without(constraints: Constraints, matrices: Sequence[Array], tolerance:
     rest = np.stack(
         [rows[:, None] * matrix * columns for (rows, columns), matrix in zip(scales, matrices, strict=True)]
     )
-    least = np.array([looped[name].tolerance if name in looped else 0.0 for name in names])
-    least = np.maximum(least if tolerance is None else tolerance, DEPENDENT)
+    of_loops = [looped[name].tolerance if name in looped else 0.0 for name in names]
+    least = np.maximum(of_loops if tolerance is None else [tolerance] * len(names), DEPENDENT)
     kept: list[int] = []
     shares = np.zeros(len(names))
     waiting = list(range(len(names)))
@@ -93,12 +75,34 @@ def left_without(constraints: Constraints, matrices: Sequence[Array], tolerance:
             rest[:, waiting] -= (rest[:, waiting] @ units[:, :, None]) * units[:, None, :]
 
 
+def left_at(constraints: Constraints, q: Array, t: float, parameters: Mapping[str, float], tolerance: float) -> Left:
+    """`left_without` at one state."""
+    if not len(constraints):
+        return Left([], np.zeros(0), np.zeros(0))
+    numbers = row_numbers(constraints)
+    return left_without(constraints, [numbers.matrix(numbers.point(q, {"t": t, **parameters}))], tolerance)
+
+
+def lost_rank(constraints: Constraints, q: Array, t: float, parameters: Mapping[str, float]) -> str:
+    """What to say of a state where rows that are independent elsewhere are not; "" where they are."""
+    if not len(constraints) or not np.isfinite(q).all():
+        return ""
+    elsewhere, here = independent_rows(constraints), left_at(constraints, q, t, parameters, DEPENDENT).kept
+    if len(here) >= len(elsewhere):
+        return ""
+    names = " and ".join([repr(constraints.names[k]) for k in elsewhere if k not in here])
+    return (
+        f"at this state the constraints are of rank {len(here)}, elsewhere of {len(elsewhere)}: {names} says nothing "
+        "that the others do not say, and accelerations are not determined"
+    )
+
+
 def without_nearly_redundant(constraints: Constraints) -> Constraints:
     """The constraints with 0 for the rows of loops that nearly follow from others, with a warning that names them."""
     if not constraints.loop_rows:
         return constraints
-    numbers = RowNumbers(constraints)
-    found = list(_nearly_closed(constraints, numbers))
+    numbers = row_numbers(constraints)
+    found = _nearly_closed(constraints, numbers)
     if not found:
         return constraints
     matrices = [numbers.certain_matrix(point) for point in found]
@@ -108,44 +112,58 @@ def without_nearly_redundant(constraints: Constraints) -> Constraints:
     names, exact = constraints.names, _following(matrices, kept)
     exact -= {k for k in exact if 0.0 < sizes[k] < NAMED}  # which others that are as small must not take in their place
     dropped = [k for k in range(len(constraints)) if k not in kept and k not in exact]
-    for what, rows in (
-        ("left out; a smaller tolerance of the Loop keeps {}", dropped),
-        ("kept: {} may hold the motion", [k for k in kept if names[k] in constraints.loop_rows and shares[k] < NAMED]),
+    close = [k for k in kept if names[k] in constraints.loop_rows and shares[k] < NAMED]
+    for rows, what in (
+        (dropped, "left out; a smaller tolerance of the Loop keeps {}"),
+        (close, "kept: {} may hold the motion"),
     ):
         if rows:
             one = len(rows) == 1
-            listed = " and ".join([f"{names[k]!r} ({shares[k]:.1e} of it is new, open by {gaps[k]:.1e}{_unit(constraints, k)})" for k in rows])
+            listed = " and ".join(
+                [
+                    f"{names[k]!r} ({shares[k]:.1e} of it is new, open by {gaps[k]:.1e}{_unit(constraints, k)})"
+                    for k in rows
+                ]
+            )
             verbs = "nearly follows from the others and is" if one else "nearly follow from the others and are"
             text = f"constraint{'' if one else 's'} {listed} {verbs} {what.format('it' if one else 'them')}"
             warnings.warn(text, ConstraintWarning, stacklevel=2)
     return constraints.without(dropped) if dropped else constraints
 
 
-def _nearly_closed(constraints: Constraints, numbers: RowNumbers) -> Iterator[dict[str, float]]:
-    """Random states where all rows are 0 but for what nearly follows from others: Newton's method without it."""
-    rng, found = np.random.default_rng(0), 0
+def _nearly_closed(constraints: Constraints, numbers: RowNumbers) -> list[dict[str, float]]:
+    """Random states where all rows are 0 but for what nearly follows from others, those that close best.
+
+    Near a place where a linkage is singular Newton's method may end with a gap that is not of its axes.
+    """
+    rng, found = np.random.default_rng(0), list[tuple[float, dict[str, float]]]()
     neutral = np.array(constraints.kinematics.neutral)
     for spread in SPREADS:
         q = neutral + spread * rng.uniform(-1.0, 1.0, numbers.nq)
         point = numbers.point(q, {"t": float(rng.uniform(0.3, 1.2)), **constraints.parameters})
-        with np.errstate(all="ignore"):
-            for _ in range(ITERATIONS):
-                phi, matrix = numbers.gaps(point), numbers.matrix(point)
-                if not (np.isfinite(phi).all() and np.isfinite(matrix).all()):
-                    break
-                rows, columns = factors(constraints, matrix)
-                left = rows[: len(phi)] * phi
-                step = -np.linalg.lstsq((rows[:, None] * matrix * columns)[: len(phi)], left, rcond=TRUNCATED)[0]
-                size = float(np.linalg.norm(step))
-                if size < ARRIVED:
-                    if np.abs(left).max(initial=0.0) < OPEN:
-                        yield point
-                        found += 1
-                    break
-                shorter = min(1.0, LONGEST / size)
-                point = numbers.point(numbers.moved_by(point, shorter * columns * step), point)
-        if found == STATES:
-            return
+        gap, point = _closed(constraints, numbers, point)
+        if gap < OPEN:
+            found.append((gap, point))
+    found.sort(key=lambda pair: pair[0])
+    return [point for gap, point in found[:STATES] if gap <= WORSE * found[0][0] + DEPENDENT]
+
+
+def _closed(constraints: Constraints, numbers: RowNumbers, point: dict[str, float]) -> tuple[float, dict[str, float]]:
+    """Newton's method without small singular values: what it leaves of a loop, inf if it does not arrive, and where."""
+    with np.errstate(all="ignore"):
+        for _ in range(ITERATIONS):
+            phi, matrix = numbers.gaps(point), numbers.matrix(point)
+            if not (np.isfinite(phi).all() and np.isfinite(matrix).all()):
+                break
+            rows, columns = factors(constraints, matrix)
+            left = rows[: len(phi)] * phi
+            step = -np.linalg.lstsq((rows[:, None] * matrix * columns)[: len(phi)], left, rcond=TRUNCATED)[0]
+            size = float(np.linalg.norm(step))
+            if size < ARRIVED:
+                return float(np.abs(left).max(initial=0.0)), point
+            shorter = min(1.0, LONGEST / size)
+            point = numbers.point(numbers.moved_by(point, shorter * columns * step), point)
+    return np.inf, point
 
 
 def _unit(constraints: Constraints, k: int) -> str:

@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 from cgraph import Node
 
-from ..systems.constraints import LoopRow
+from ..equations.nearly_redundant_rows import without_nearly_redundant
+from ..systems.constraints import Constraints, LoopRow
 from .body import Body, MechanismError
 from .forward_kinematics import KinematicChain
 from .inertial_numbers import Link
@@ -47,14 +48,19 @@ def position_rows(
     return rows
 
 
-def rows_of_loops(structure: Structure) -> dict[str, LoopRow]:
-    """What is known of the rows of all loops that hold frames; a coupling is exact, and has none."""
-    return {
+def of_loops(constraints: Constraints, structure: Structure, moving: Sequence[Body]) -> Constraints:
+    """The constraints with what is known of the rows of loops, less those that nearly follow from others.
+
+    A coupling is exact: its row counts as it is.
+    """
+    constraints.turning = [unit == "rad/s" for body in moving for unit in body.joint.type.velocity_units]
+    constraints.loop_rows = {
         name: LoopRow(loop.label, " about " in name.removeprefix(loop.label), loop.tolerance)
         for loop in structure.loops
         if loop.kind != "coupling"
         for name in (*loop.rows, *loop.velocity_rows)
     }
+    return without_nearly_redundant(constraints)
 
 
 def velocity_rows(structure: Structure, chain: Callable[[str], KinematicChain]) -> dict[str, Node]:

@@ -13,7 +13,6 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Builder, building, require_flag, require_mapping
 
-from ..equations.nearly_redundant_rows import without_nearly_redundant
 from ..systems.arguments import parameter_value
 from ..systems.body_system import BodySystem
 from ..systems.model import Model
@@ -27,7 +26,7 @@ from .joint_coordinates import coordinate_names, lengths, per_velocity, quasi_ve
 from .joint_force import JointForce, add_joint_forces, check_any_force
 from .joint_positions import skeleton
 from .kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia, resists
-from .loop_equations import check_loops, position_rows, rows_of_loops, velocity_rows
+from .loop_equations import check_loops, of_loops, position_rows, velocity_rows
 from .loops import Loop
 from .mechanism_fields import Structure, changed, listed
 from .mechanism_summary import summary
@@ -209,11 +208,7 @@ class Mechanism(Structure):
             require_values=self._require_values,
             surely_regular=all([bool(body.joint.armature) or resists(body) for body in self._bound.moving]),
         )
-        system.constraints.loop_rows = rows_of_loops(self)
-        system.constraints.turning = [
-            unit == "rad/s" for body in self.moving for unit in body.joint.type.velocity_units
-        ]
-        system.constraints = without_nearly_redundant(system.constraints)
+        system.constraints = of_loops(system.constraints, self, self.moving)
         return system
 
     def _require_values(self, values: Mapping[str, ArrayLike], bodies: Sequence[Body] | None = None) -> None:
