@@ -30,7 +30,9 @@ NAMED = 1e-2  # of the largest row of its loop: a row of which no more is left i
 STATES = 3
 SPREADS = (1.0, 0.3, 3.0, 0.1, 2.0, 0.5, 1.5, 0.03)  # of random starts about the neutral coordinates
 TRUNCATED = 4e-3  # of the largest singular value: what Newton's method does not close
+FAR = 1e3  # of the gap that a row was left out with
 OPEN, WORSE = 1e-1, 30.0  # of a loop, at most, once it has arrived; and of the state that closes best
+EXACT = 1e-12  # of a row that is a sum of others but for the rounding of axes and lengths
 ALIKE = 0.5  # of the largest row: one that is as good
 ITERATIONS, ARRIVED, LONGEST = 60, 1e-9, 0.5  # of Newton's method: steps, the last, and the longest, of displacements
 
@@ -97,6 +99,20 @@ def lost_rank(constraints: Constraints, q: Array, t: float, parameters: Mapping[
     )
 
 
+def opened(constraints: Constraints, q: Array, t: float, parameters: Mapping[str, float]) -> str:
+    """What to say of rows that were left out and are far more open than where they were; "" where none is."""
+    if constraints.whole is None:
+        return ""
+    numbers = row_numbers(constraints.whole)
+    gaps, names = np.abs(numbers.gaps(numbers.point(q, {"t": t, **parameters}))), constraints.names
+    most = FAR * max(constraints.left_out.values())
+    open_rows = [k for k in constraints.left_out if k < len(gaps) and gaps[k] > most]
+    rows = [f"{names[k]!r} by {gaps[k]:.1e}" for k in open_rows]
+    return (
+        f"constraints that nearly follow from the others and were left out are open: {', '.join(rows)}" if rows else ""
+    )
+
+
 def without_nearly_redundant(constraints: Constraints) -> Constraints:
     """The constraints with 0 for the rows of loops that nearly follow from others, with a warning that names them."""
     if not constraints.loop_rows:
@@ -128,7 +144,7 @@ def without_nearly_redundant(constraints: Constraints) -> Constraints:
             verbs = "nearly follows from the others and is" if one else "nearly follow from the others and are"
             text = f"constraint{'' if one else 's'} {listed} {verbs} {what.format('it' if one else 'them')}"
             warnings.warn(text, ConstraintWarning, stacklevel=2)
-    return constraints.without(dropped) if dropped else constraints
+    return constraints.without({k: float(gaps[k]) for k in dropped}) if dropped else constraints
 
 
 def _nearly_closed(constraints: Constraints, numbers: RowNumbers) -> list[dict[str, float]]:
@@ -159,10 +175,10 @@ def _closed(constraints: Constraints, numbers: RowNumbers, point: dict[str, floa
             left = rows[: len(phi)] * phi
             step = -np.linalg.lstsq((rows[:, None] * matrix * columns)[: len(phi)], left, rcond=TRUNCATED)[0]
             size = float(np.linalg.norm(step))
-            if size < ARRIVED:
-                return float(np.abs(left).max(initial=0.0)), point
-            shorter = min(1.0, LONGEST / size)
+            shorter = min(1.0, LONGEST / size) if size else 1.0
             point = numbers.point(numbers.moved_by(point, shorter * columns * step), point)
+            if size < ARRIVED:
+                return float(np.abs(rows[: len(phi)] * numbers.gaps(point)).max(initial=0.0)), point
     return np.inf, point
 
 
@@ -172,11 +188,11 @@ def _unit(constraints: Constraints, k: int) -> str:
 
 
 def _following(matrices: Sequence[Array], kept: Sequence[int]) -> set[int]:
-    """The rows that are sums of those kept, each beside its own size: rows of 0 among them."""
+    """The rows that are sums of those kept to rounding, each beside its own size: rows of 0 among them."""
     following = set(range(len(matrices[0]))) - {*kept}
     for matrix in matrices:
         alike = equilibrated(matrix)
         basis = np.linalg.qr(alike[list(kept)].T)[0] if kept else np.zeros((alike.shape[1], 0))
         rest = np.linalg.norm(alike - (alike @ basis) @ basis.T, axis=1)
-        following &= set(np.flatnonzero(rest <= DEPENDENT * np.linalg.norm(alike, axis=1)).tolist())
+        following &= set(np.flatnonzero(rest <= EXACT * np.linalg.norm(alike, axis=1)).tolist())
     return following

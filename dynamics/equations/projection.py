@@ -23,7 +23,7 @@ from ..systems.system import System
 from .constraint_rank import FOLLOWS, ConstraintWarning, RowNumbers, independent_rows, step_names
 from .constraints import Rows
 from .formulations import ZERO
-from .nearly_redundant_rows import lost_rank
+from .nearly_redundant_rows import lost_rank, opened
 from .substitute import substitute
 
 ITERATIONS = 20  # of Newton's method
@@ -94,6 +94,8 @@ def projected(system: System, x: Array, t: float, parameters: Mapping[str, float
             values = graph.evaluate(dict(zip(names, x.tolist(), strict=True)) | fixed)
         x = np.array(list(values.values()), dtype=np.float64)
         if np.isfinite(x).all() and not (left := _open_rows(system, x, before, t, parameters)):
+            if said := opened(system.constraints, x[: system.nq], t, parameters):
+                warnings.warn(said, ConstraintWarning, stacklevel=2)
             return x
     lost = lost_rank(system.constraints, start[: system.nq], t, parameters)
     raise ConstraintError(

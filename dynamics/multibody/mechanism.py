@@ -188,7 +188,7 @@ class Mechanism(Structure):
 
     @cached_property
     def system(self) -> System:
-        """The Lagrangian system: a partial Lagrangian for each body, tagged with its name and energy; forces likewise."""
+        """The Lagrangian system: a partial Lagrangian for each body, tagged with name and energy; forces likewise."""
         if not self.moving:
             raise MechanismError("the mechanism has no joint that moves")
         system = BodySystem(

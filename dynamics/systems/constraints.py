@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from functools import cached_property
 from types import MappingProxyType
@@ -50,12 +50,13 @@ class Constraints:
     names: of all rows, m: those of positions, then those of velocities alone.
     positions: phi.  velocities: A u + a, linear in the velocities.  parameters: values by name.
     loop_rows: of the rows that loops have, by name.  turning: whether each velocity is of an angle.
-    whole: the constraints with all rows, where some are 0 as they nearly follow from others.
+    whole: the constraints with all rows, where some are 0 as they nearly follow from others; left_out: these, and gaps.
     """
 
     loop_rows: Mapping[str, LoopRow] = MappingProxyType({})
     turning: Sequence[bool] = ()
     whole: Constraints | None = None
+    left_out: Mapping[int, float] = MappingProxyType({})
 
     def __init__(
         self,
@@ -99,12 +100,13 @@ class Constraints:
         dots = tangents(dict(zip(k.q, k.q_dot, strict=True)) | {self.t: ONE}, rates, build)
         return [dots.get(z, ZERO) for z in rates]
 
-    def without(self, dropped: Collection[int]) -> Constraints:
-        """With 0 for some rows."""
+    def without(self, dropped: Mapping[int, float]) -> Constraints:
+        """With 0 for some rows, which are open by so much."""
         other, count = copy(self), len(self.positions)
         other.__dict__.pop("rates", None)
         rows = [ZERO if k in dropped else row for k, row in enumerate((*self.positions, *self.velocities))]
         other.positions, other.velocities, other.whole = tuple(rows[:count]), tuple(rows[count:]), self
+        other.left_out = dropped
         return other
 
     def _check(self) -> None:

@@ -28,7 +28,7 @@ def moving_state(model: dyn.Mechanism, length: float, rng: np.random.Generator) 
             )
         except dyn.ConstraintError:
             continue
-        if dyn.freedom(model, q, tolerance=0.05).freedoms == 1:
+        if dyn.freedom(model, q, tolerance=0.05).freedoms == 1 and np.abs(qd).max() > 0.0:
             return q, qd / np.abs(qd / size).max()
     raise AssertionError("no state")
 
