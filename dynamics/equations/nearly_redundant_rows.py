@@ -27,7 +27,7 @@ from .constraint_rank import (
 )
 
 NAMED = 1e-2  # of the largest row of its loop: a row of which no more is left is named, though it is kept
-STATES = 3
+STATES = 6
 SPREADS = (1.0, 0.3, 3.0, 0.1, 2.0, 0.5, 1.5, 0.03)  # of random starts about the neutral coordinates
 TRUNCATED = 4e-3  # of the largest singular value: what Newton's method does not close
 FAR = 1e3  # of the gap that a row was left out with
