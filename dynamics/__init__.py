@@ -13,6 +13,7 @@ from .equations.energies import energy, kinetic_energy, potential_energy
 from .equations.equations_of_motion import bias, forward_dynamics, gravity_force, mass_matrix, momentum
 from .equations.formulation_sizes import formulation_sizes
 from .equations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious_nodes
+from .equations.freedom import Freedom, freedom
 from .equations.hamiltonian import hamilton_equations, hamiltonian
 from .equations.integrability import integrable_rows
 from .equations.inverse_dynamics_derivatives import inverse_dynamics_derivatives
@@ -86,6 +87,7 @@ __all__ = [
     "Event",
     "Force",
     "FreeBody",
+    "Freedom",
     "HeldForces",
     "Joint",
     "JointForce",
@@ -140,6 +142,7 @@ __all__ = [
     "frame_jacobian_rate",
     "frame_placement",
     "frame_velocity",
+    "freedom",
     "gradient",
     "gradient_many",
     "gravity_force",

@@ -164,6 +164,7 @@ CALLS = {
     "cg.CSource.write": call(cg.to_c(GRAPH).write, "."),
     **{f"dyn.{name}": call(getattr(dyn, name), ARM) for name in MODEL_ALONE.split()},
     "dyn.state_equation": call(dyn.state_equation, ARM, "auto"),
+    "dyn.freedom": call(dyn.freedom, ARM, [0.0], tolerance=1e-4, t=0.0, parameters=None),
     "dyn.consistent_state": call(dyn.consistent_state, ARM, [0.0], [0.0], 0.0, parameters=None),
     "dyn.frame_placement": call(dyn.frame_placement, ARM, FIRST, (0.0, 0.0, 0.0)),
     **{f"dyn.frame_{name}": call(getattr(dyn, f"frame_{name}"), ARM, FIRST, (0.0, 0.0, 0.0), "world")
@@ -438,7 +439,7 @@ OWN_ERRORS = {("extend.ldl_elimination", label) for label in ("objects", "huge")
 RECORDS = """
     cg.CSource cg.Comparison cg.Compiled cg.Counts cg.Edge cg.Lint cg.Loop cg.Node cg.Why cg.WhyNot
     dyn.Attached dyn.Certificate dyn.Crossings dyn.Ensemble dyn.EnsembleStats dyn.Force dyn.FreeBody
-    dyn.ConstraintLint dyn.HeldForces dyn.JointForce dyn.MotionGradient dyn.MotionGradients dyn.OmittedTerm
+    dyn.ConstraintLint dyn.Freedom dyn.HeldForces dyn.JointForce dyn.MotionGradient dyn.MotionGradients dyn.OmittedTerm
     dyn.PruneResult dyn.QuasiVelocities dyn.ReducedLinearization dyn.Reference dyn.Released dyn.Sensitivities dyn.Stats
     dyn.Subtree dyn.TorqueTable dyn.Trajectory dyn.Verdict
     extend.CompressedJacobian extend.MathML extend.Notation extend.Op extend.Record
