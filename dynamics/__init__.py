@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .equations.equations_of_motion import bias, forward_dynamics, gravity_force, mass_matrix, momentum
     from .equations.formulation_sizes import formulation_sizes
     from .equations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious_nodes
+    from .equations.freedom import Freedom, freedom
     from .equations.hamiltonian import hamilton_equations, hamiltonian
     from .equations.integrability import integrable_rows
     from .equations.inverse_dynamics_derivatives import inverse_dynamics_derivatives
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from .equations.state_equation import state_equation
     from .equations.torque_decomposition import torque_by_joint_motion, torque_by_link
     from .equations.torque_table import TorqueTable
+    from .equations.verdict import Verdict, formulation_verdict
     from .experiments.stability import cases
     from .integrators import METHODS
     from .io.load import load_mjcf, load_urdf
@@ -92,6 +94,7 @@ __all__ = [
     "Event",
     "Force",
     "FreeBody",
+    "Freedom",
     "HeldForces",
     "Joint",
     "JointForce",
@@ -122,6 +125,7 @@ __all__ = [
     "System",
     "TorqueTable",
     "Trajectory",
+    "Verdict",
     "arrays_at",
     "as_system",
     "attach_with_impact",
@@ -137,6 +141,7 @@ __all__ = [
     "display_names",
     "energy",
     "formulation_sizes",
+    "formulation_verdict",
     "forward_dynamics",
     "frame_acceleration",
     "frame_bias_acceleration",
@@ -144,6 +149,7 @@ __all__ = [
     "frame_jacobian_rate",
     "frame_placement",
     "frame_velocity",
+    "freedom",
     "gradient",
     "gradient_many",
     "gravity_force",

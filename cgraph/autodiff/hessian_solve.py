@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from numbers import Real
 from typing import Literal, get_args
 
 from ..core.builder import Builder
@@ -81,9 +82,7 @@ def hessian_solve(
     """
     require_graph("hessian_solve", graph)
     chosen = graph.select_inputs(wrt)
-    rhs = require_sequence("rhs", rhs, "numbers and nodes")
-    if len(rhs) != len(chosen):
-        raise ValueError(f"rhs needs one entry for each of the {len(chosen)} variables, got {len(rhs)}")
+    rhs = require_sequence("rhs", rhs, "numbers and nodes", (Node, Real))
     require_choice("order", order, get_args(Order))
     return solve_nodes(
         graph.only_output(),
@@ -218,6 +217,8 @@ def _solved(
     order: Order,
 ) -> EdgePushing:
     """W t = b, solved: all tangents."""
+    if len(rhs) != len(wrt):
+        raise ValueError(f"rhs needs one entry for each of the {len(wrt)} variables, got {len(rhs)}")
     nodes, entries = _dependent([output, *at], wrt), dict(zip(wrt, rhs, strict=True))
     with building(build):
         equations = EdgePushing(build, output, entries, at, nodes)
@@ -259,6 +260,8 @@ def _rows(output: Node, multipliers: Collection[Node], wrt: Sequence[Node]) -> d
         return {}
     slopes = cotangents({output: as_node(1.0)}, list(multipliers))
     rows = {s: set(topological([slope])) for s, slope in zip(multipliers, slopes, strict=True)}
+    if wrong := [s for s, reached in rows.items() if not reached.isdisjoint(multipliers)]:
+        raise ValueError(f"the output must be linear in the multipliers, got {wrong[0]!r} with a slope that has one")
     return {s: [w for w in wrt if w in reached] for s, reached in rows.items()}
 
 

@@ -49,6 +49,7 @@ def ldl_solve(
     >>> ldl_solve([[as_node(4.0)], [as_node(2.0), as_node(2.0)]], [as_node(10.0), as_node(6.0)])
     [<node 2.0>, <node 1.0>]
     """
+    _require_triangle(lower, rhs)
     unknowns = [variable(f"unknown{i}#") for i in range(len(rhs))]
     with building(build or Builder()):
         equations = SymmetricElimination(dict(zip(unknowns, rhs, strict=True)), {x: i for i, x in enumerate(unknowns)})
@@ -62,6 +63,15 @@ def ldl_solve(
         for unknown in reversed(equations.pivot_rows):
             solution[unknown] = equations.solution(unknown, solution)
         return [solution[unknown] for unknown in unknowns] + ([equations.info()] if check else [])
+
+
+def _require_triangle(lower: Sequence[Sequence[Any]], rhs: Sequence[Any]) -> None:
+    lengths = [len(row) for row in lower]
+    if len(lengths) != len(rhs) or any([length <= i for i, length in enumerate(lengths)]):
+        raise ValueError(f"lower needs at least 1 to {len(rhs)} entries in {len(rhs)} rows as rhs has, got {lengths}")
+    for entry in (*rhs, *[entry for row in lower for entry in row]):
+        if not hasattr(entry, "__truediv__"):
+            raise TypeError(f"lower and rhs must be numbers, got {type(entry).__name__}: {entry!r:.60}")
 
 
 def ldl_elimination(lower: Sequence[Sequence[Any]], rhs: Sequence[Any]) -> tuple[list[Any], list[Any]]:
@@ -91,6 +101,7 @@ def ldl_elimination(lower: Sequence[Sequence[Any]], rhs: Sequence[Any]) -> tuple
     >>> ldl_elimination([[4.0], [2.0, 2.0]], [10.0, 6.0])
     ([2.0, 1.0], [2.0, 2.0])
     """
+    _require_triangle(lower, rhs)
     n = len(rhs)
     a = [list(row) for row in lower]
     b = list(rhs)

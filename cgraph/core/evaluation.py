@@ -50,11 +50,7 @@ def evaluate(nodes: Sequence[Node], outputs: Mapping[str, Node], values: Mapping
     taken = {id(value) for value in values.values()}  # arrays of others: inputs, and outputs of the same node
     filled: dict[str, Value] = {}
     for name, value in results.items():
-        filled[name] = np.array(value) if id(value) in taken else value
-        filled[name] = _filled(filled[name], shape)
+        fits = isinstance(value, np.ndarray) and value.shape == shape and id(value) not in taken
+        filled[name] = value if fits else np.array(np.broadcast_to(value, shape))
         taken.add(id(value))
     return filled
-
-
-def _filled(value: Value, shape: tuple[int, ...]) -> Value:
-    return value if isinstance(value, np.ndarray) and value.shape == shape else np.array(np.broadcast_to(value, shape))

@@ -74,7 +74,8 @@ class ReachedNodes:
             return apply(ROWS["zero_safe_mul"], a, b)
         flag = self._flags.get(source)
         may_be_infinite = op.singular is not None or source in self._behind_selection
-        if flag is None or not may_be_infinite or _is_finite(a) or _is_finite(b):
+        # A finite constant is a slope that takes 0 to 0, or a cotangent that is nowhere 0.
+        if flag is None or not may_be_infinite or any([x.value is not None and math.isfinite(x.value) for x in (a, b)]):
             return a * b
         return apply(ROWS["where"], flag, a * b, 0.0)
 
@@ -88,8 +89,3 @@ class ReachedNodes:
         other = self._flags.setdefault(target, flag)
         if other is not flag:
             self._flags[target] = None if flag is None or other is None else apply(ROWS["where"], other, 1.0, flag)
-
-
-def _is_finite(a: Node) -> bool:
-    """Whether a factor is a finite constant: a slope that takes 0 to 0, or a cotangent that is nowhere 0."""
-    return a.value is not None and math.isfinite(a.value)

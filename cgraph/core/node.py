@@ -14,9 +14,6 @@ from .label import INPUT, UNLABELLED, Interned, Label, SourceLine, label
 from .row import ROWS, Row
 from .scope import current
 
-_INPUT = label(roles=frozenset({INPUT}))
-
-
 VARIABLE, CONSTANT = [Row(name, 0, float, float, lambda *_: ()) for name in ("variable", "constant")]
 
 
@@ -276,7 +273,7 @@ def variable(name: str) -> Node:
     node = _variables.get(name) if type(name) is str else None
     if node is None:
         name = check_name("a variable", name, spaces=False)
-        node = _variables.get_or_make(name, lambda: Node(VARIABLE, (), _INPUT, name=name))
+        node = _variables.get_or_make(name, lambda: Node(VARIABLE, (), label(roles=frozenset({INPUT})), name=name))
     return node
 
 

@@ -18,6 +18,7 @@ def cotangents(
     build: Builder | None = None,
     *,
     fixed: Collection[Node] = (),
+    through: Mapping[Node, Node] | None = None,
     zero_wins: bool = False,
 ) -> list[Node]:
     """Cotangents x_bar = sum over seeds y of y_bar dy/dx of the nodes `wrt`; the constant 0 where no seed depends on x.
@@ -25,6 +26,7 @@ def cotangents(
     seeds: {y: y_bar}.  wrt: leaves or inner nodes; one may depend on another: the cotangent of an inner node counts
     every use of it, and goes on to its arguments.  build: what makes the nodes.
     fixed: inner nodes that count as independent: nothing goes on to their arguments.
+    through: {inner node: factor} of its cotangent before it goes on to its arguments, which marks all that comes of it.
     zero_wins: a seed that is zero counts for nothing, also where a slope is infinite or NaN; else the result is NaN.
 
     >>> import cgraph as cg
@@ -48,6 +50,8 @@ def cotangents(
             if bar is None or node not in active or not node.args or node in fixed:
                 continue
             labelled(_label(node, bare))
+            if through and node in through:
+                bar = bar * through[node]
             terms: dict[Node, Node] = {}  # by argument first, so that x * x gives 2 * (bar * x)
             for arg, partial in zip(node.args, map(as_node, node.op.partials(node, *node.args)), strict=True):
                 if arg in active:

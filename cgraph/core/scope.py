@@ -82,6 +82,8 @@ def building(build: Build) -> Iterator[Callable[[Label], None]]:
     ...     print(1.0 * x + 0.0 is x, cg.sin(x) is cg.sin(x))
     True True
     """
+    if not callable(build):
+        raise TypeError(f"build must be a Builder or a function, got {type(build).__name__}: {build!r:.60}")
     scope = Scope(current.get().label, build)
     token = current.set(scope)
     try:

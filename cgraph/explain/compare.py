@@ -194,9 +194,8 @@ def compare(
     """
     for graph in (left, right):
         require_graph("compare", graph)
-    chosen = set(
-        atoms.replace(",", " ").split() if isinstance(atoms, str) else require_sequence("atoms", atoms, "names")
-    )
+    atoms = atoms.replace(",", " ").split() if isinstance(atoms, str) else atoms
+    chosen = set(require_sequence("atoms", atoms, "names", str))
     if classify is not None and (not callable(classify) or isinstance(classify, type)):
         raise TypeError(f"classify must be a function of a graph, got {type(classify).__name__}: {classify!r:.60}")
     named = {node: node.name for graph in (left, right) for node in graph.nodes if node.name in chosen}

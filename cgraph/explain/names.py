@@ -10,7 +10,7 @@ from ..core.graph import Graph
 from ..core.node import CONSTANT, Node
 from ..operations.operation import SUM, columns
 from ..util.nearest import nearest
-from ..util.require import require_texts
+from ..util.require import require_graph, require_texts
 from ..writing.source_lines import lines_text
 
 Name = str | Node
@@ -52,6 +52,7 @@ class Names:
     """
 
     def __init__(self, graph: Graph, called: Mapping[str, str] | None = None) -> None:
+        require_graph("Names", graph)
         self.graph = graph
         self.number: dict[Node, int] = {}
         self.by_name: dict[str, list[Node]] = {}
@@ -97,14 +98,14 @@ class Names:
 
     # From a name to nodes.
 
-    def all(self, who: Name) -> list[Node]:
+    def all(self, who: Name, what: str = "a node") -> list[Node]:
         """The nodes of a name: input, named nodes, output. Raises GraphError if there is none."""
         if isinstance(who, Node):
             if who not in self.known:
                 raise GraphError(f"{who!r} is not a node of the graph")
             return [who]
         if not isinstance(who, str):
-            raise TypeError(f"a node is given by its name or itself, got {type(who).__name__}: {who!r:.60}")
+            raise TypeError(f"{what} is given by its name or itself, got {type(who).__name__}: {who!r:.60}")
         name = self.meant(who)
         nodes = self.by_name.get(name, []) + ([self.graph.outputs[name]] if name in self.graph.outputs else [])
         if not nodes:
@@ -123,21 +124,21 @@ class Names:
             raise ValueError("a group needs at least one name")
         return list(dict.fromkeys([node for member in members for node in self.all(member)]))
 
-    def one(self, who: Name) -> Node:
+    def one(self, who: Name, what: str = "a node") -> Node:
         """The one node of a name. Raises GraphError if there is none, or more than one."""
-        nodes = self.all(who)
+        nodes = self.all(who, what)
         if len(nodes) > 1:
             raise GraphError(f"{len(nodes)} nodes are called {who!r:.80}; give the node itself")
         return nodes[0]
 
-    def output(self, who: Name) -> Node:
+    def output(self, who: Name, what: str = "a node") -> Node:
         """The output of a name, else the one node of that name."""
         name = self.meant(who) if isinstance(who, str) else who
-        return self.graph.outputs[name] if isinstance(name, str) and name in self.graph.outputs else self.one(who)
+        return self.graph.outputs[name] if isinstance(name, str) and name in self.graph.outputs else self.one(who, what)
 
     def _near(self, who: str, known: Iterable[str]) -> str:
         """Which of the known names may be meant; a part of a sentence, empty where none is near."""
-        near = nearest(who, [each for name in known for each in dict.fromkeys((self.shown(name), name))])
+        near = nearest(str(who), [each for name in known for each in dict.fromkeys((self.shown(name), name))])
         return f": did you mean {' or '.join(near)}?" if near else ""
 
     def _known(self) -> str:
@@ -171,6 +172,8 @@ class Names:
         tags += f"  {lines_text([node])}" if node.lines else ""
         if not node.args:
             return self.short(node) + tags
+        if node not in self.number:
+            raise GraphError(f"{node!r} is not a node of the graph")
         name = f"  ({self.shown(node.name)})" if node.name else ""
         return f"%{self.number[node]} = {self.formula(node)}{name}{tags}"
 

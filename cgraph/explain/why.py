@@ -205,7 +205,7 @@ def why(
     known = Names(graph, names)
     if not isinstance(k, int) or isinstance(k, bool) or k < 0:
         raise ValueError(f"k must be a whole number of paths, at least 0, got {k!r}")
-    source, sink = known.one(input), known.output(output)
+    source, sink = known.one(input, "input"), known.output(output, "output")
     to, origin = _name_of(known, output), _name_of(known, input)
     nodes = between(graph.nodes, [source], [sink])
     inside = set(nodes)

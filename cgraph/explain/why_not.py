@@ -131,7 +131,7 @@ def why_not(
     """
     require_graph("why_not", graph)
     known = Names(graph, names)
-    source, sink = known.one(input), known.output(output)
+    source, sink = known.one(input, "input"), known.output(output, "output")
     reached, made_from = descendants(graph.nodes, [source]), ancestors([sink])
     to, origin = (known.shown(known.meant(who)) if isinstance(who, str) else known.text(who) for who in (output, input))
     if sink in reached:

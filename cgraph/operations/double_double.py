@@ -119,7 +119,7 @@ def pow(a: Pair, b: Pair) -> Pair | None:
         return None
     if exponent == 0.5:
         return sqrt(a)
-    if exponent != int(exponent) or not 0.0 < abs(exponent) <= WHOLE:
+    if not (0.0 < abs(exponent) <= WHOLE and exponent == int(exponent)):
         return None
     result: Pair | None = None
     square, left = a, int(abs(exponent))

@@ -70,16 +70,15 @@ def mul(a: Node, b: Node) -> Node | None:
             return constant(c * inner) * b.args[1]
         if b.op.name == "mul":
             return _cancelled(c, b)
-        return _times_quotient(a, *b.args) if b.op.name == "div" else None
+        return _times_quotient(a, b)
     left, right = a.op.name, b.op.name
     if left == "neg":
         return a.args[0] * b.args[0] if right == "neg" else -(a.args[0] * b)
     if right == "neg":
         return -(a * b.args[0])
-    if right == "div" and (quotient := _times_quotient(a, *b.args)) is not None:
-        return quotient
-    if left == "div" and (quotient := _times_quotient(b, *a.args)) is not None:
-        return quotient
+    for x, y in ((a, b), (b, a)):
+        if (quotient := _times_quotient(x, y)) is not None:
+            return quotient
     if left != "mul" or right != "mul":
         return None
     c, d = a.args[0].value, b.args[0].value
@@ -88,13 +87,36 @@ def mul(a: Node, b: Node) -> Node | None:
     return constant(c * d) * (a.args[1] * b.args[1])
 
 
-def _times_quotient(a: Node, b: Node, c: Node) -> Node | None:
-    """a * (b / c) where it is a quotient: a * (1 / c) = a / c, and x * (b / (x * y)) = b / y."""
-    if b.value == 1.0:
+def _times_quotient(a: Node, b: Node) -> Node | None:
+    """a * b where b is a quotient or has one and a factor goes: x * (1 / c) = x / c, x * (b / (x * y)) = b / y, ..
+
+    It is also exact: b / x of a subnormal x, as in the slope of x * log(x), overflows.
+    """
+    name = b.op.name
+    if name == "where" and b.args[1].op.name in ("div", "mul") and b.args[2].value == 0.0:
+        product = _times_quotient(a, b.args[1])  # derivatives have such branches at singular slopes
+        return None if product is None else apply(OPS["where"], b.args[0], product, 0.0)
+    if name == "mul":
+        for factor, other in (b.args, b.args[::-1]):
+            if factor.op.name == "div" and factor.args[1] is a and _cancels(a):
+                return other * factor.args[0]
+    if name != "div":
+        return None
+    top, c = b.args
+    if top.value == 1.0:
         return a / c
+    if c is a and _cancels(c):
+        return top
     if c.op.name == "mul" and a in c.args:
-        return b / c.args[c.args[0] is a]
+        return top / c.args[c.args[0] is a]
+    if a.op.name == "mul" and c in a.args and _cancels(c):
+        return a.args[a.args[0] is c] * top
     return None
+
+
+def _cancels(x: Node) -> bool:
+    """Whether x / x goes from within a product: not where x has an infinite slope, which times 0 is to stay NaN."""
+    return x.op.singular is None
 
 
 def _cancelled(c: float, b: Node) -> Node | None:
@@ -106,7 +128,7 @@ def _cancelled(c: float, b: Node) -> Node | None:
 
 
 def div(a: Node, b: Node) -> Node | None:
-    """a / b: 1 and signs go; of twice the same it is one."""
+    """a / b: 1, signs and what divides both go; of twice the same it is one."""
     if b.value == 1.0:
         return a
     if b.value == -1.0:
@@ -115,6 +137,8 @@ def div(a: Node, b: Node) -> Node | None:
         return constant(0.0)
     if a is b:
         return constant(1.0)
+    if a.op.name == "mul" and b in a.args and _cancels(b):
+        return a.args[a.args[0] is b]
     if a.op.name == "neg":
         return a.args[0] / b.args[0] if b.op.name == "neg" else -(a.args[0] / b)
     return -(a / b.args[0]) if b.op.name == "neg" else None
@@ -157,10 +181,10 @@ def zero_safe_mul(a: Node, b: Node) -> Node | None:
 
 
 def where(c: Node, a: Node, b: Node) -> Node | None:
-    """The one that a constant condition chooses; what both are."""
+    """The one that a constant condition chooses; what both are; a condition that is itself, or 0 where it is 0."""
     if c.value is not None:
         return a if c.value != 0.0 else b
-    return a if a is b else None
+    return a if a is b or (a is c and b.value == 0.0) else None
 
 
 def same(a: Node, b: Node) -> Node | None:

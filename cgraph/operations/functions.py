@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable
 from functools import cache
 
-from ..core.node import Node, Scalar, apply
+from ..core.node import Node, Scalar, apply, constant
 from .operation import OPS, Op
 
 Function = Callable[..., Node]
@@ -52,12 +52,25 @@ def function(op: Op) -> Function:
                 args = signature.bind(*args, **named).args
             except TypeError as error:
                 raise TypeError(f"{op.name}{signature}: {error}") from None
-        return apply(op, *args)
+        try:
+            return apply(op, *args)
+        except (TypeError, ValueError):
+            for name, value in zip(op.parameters, args, strict=False):
+                if not isinstance(value, Node):
+                    _require_constant(f"{name} of {op.name}", value)
+            raise
 
     make.__name__ = make.__qualname__ = op.name
     make.__doc__ = _help(op)
     make.__signature__ = signature  # type: ignore[attr-defined]
     return make
+
+
+def _require_constant(what: str, value: float) -> None:
+    try:
+        constant(value)
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"{what}: {error}") from None
 
 
 def of_name(name: str) -> Function:

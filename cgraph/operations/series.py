@@ -14,7 +14,7 @@ from ..core.node import Node, apply, as_node
 from .operation import OPS
 
 Coefficients = Sequence[Any]
-POWERS = 64  # whole exponents up to this size become products
+POWERS = 2.0**53  # whole exponents up to this size become products
 
 
 def add(k: int, y: Coefficients, a: Coefficients, b: Coefficients) -> Any:
@@ -66,7 +66,7 @@ def zero_safe_mul(k: int, y: Coefficients, a: Coefficients, b: Coefficients) -> 
 def power(a: Node, b: Node) -> Node:
     """a ** b by operations that have series: products for a whole exponent, else exp(b log a)."""
     exponent = b.value
-    if exponent is None or exponent != int(exponent) or abs(exponent) > POWERS:
+    if exponent is None or not abs(exponent) <= POWERS or exponent != int(exponent):
         return apply(OPS["sqrt"], a) if exponent == 0.5 else apply(OPS["exp"], b * apply(OPS["log"], a))
     result: Node | None = None
     square, rest = a, abs(int(exponent))

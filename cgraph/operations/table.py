@@ -101,7 +101,7 @@ _ROWS = (
        about="The quotient a / b.", symbol="÷", infix=("/", PRODUCT), mathml=MathML("<mfrac>{0}{1}</mfrac>", (0, 0), PRODUCT),
        fold=folding.div, double_double=dd.div, series=series.div, operator=operator.truediv, domain=(_REAL, _POSITIVE),
        interval=bounds.div, singular=bounds.divisor, rounding=1.0,
-       python="{} / {}", numpy="{} / {}", llvm=texts.llvm_arithmetic("fdiv"), c="{0} / {1}", javascript="(a, b) => a / b"),
+       python="{} / {}", numpy="np.divide({}, {})", llvm=texts.llvm_arithmetic("fdiv"), c="{0} / {1}", javascript="(a, b) => a / b"),
     Op("neg", 1, operator.neg, np.negative, lambda y, a: (-1.0,), ((0.3,),), about="-x.",
        symbol="−", mathml=MathML("<mo>−</mo>{0}", (PRODUCT,), SUM), signs=(-1,), fold=folding.neg, double_double=dd.neg,
        series=series.neg, operator=operator.neg, domain=(_REAL,), interval=bounds.neg, rounding=0.0,

@@ -14,7 +14,7 @@ from ..core.graph import Graph
 from ..core.node import CONSTANT, Node, variable
 from ..core.traversal import rebuild, topological
 from ..util.real_arrays import real_array
-from ..util.require import require_graph, require_mapping
+from ..util.require import require_graph, require_mapping, require_sequence
 from .choose_runner import runner
 from .program import Call, Program
 
@@ -41,7 +41,8 @@ class Loop:
     """
 
     def __init__(self, graph: Graph, carry: Mapping[str, str], backend: str, *, fast: bool, fma: bool) -> None:
-        for name in require_mapping("carry", carry, "input: output"):
+        inputs = require_mapping("carry", carry, "input: output")
+        for name in require_sequence("carry", inputs, "inputs", (str, Node)):
             graph.select_inputs(name)
         if missing := [name for name in carry.values() if not isinstance(name, str) or name not in graph.outputs]:
             raise GraphError(

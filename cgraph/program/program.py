@@ -8,6 +8,7 @@ from typing import Any
 
 from ..core.checks import GraphError
 from ..core.graph import Graph
+from ..util.explain_failure import explain_failure
 
 
 @dataclass(frozen=True)
@@ -185,6 +186,7 @@ class Solve:
 Statement = Call | Map | Sum | While | If | Factor | Solve
 
 
+@explain_failure
 @dataclass(frozen=True)
 class Program:
     """A loop body over named registers of numbers, which `runner` makes ready to run.

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..codegen.compiled import require_out
-from ..codegen.differentiable import require_memory
+from ..codegen.differentiable import describe, require_memory
 from ..core.checks import GraphError
 from ..core.evaluation import Array
 from ..util.real_arrays import real_array
-from ..util.require import require_whole
+from ..util.require import require_mapping, require_whole
 from ..util.threads import share, thread_count
 from .llvm_ir import offsets
 from .program import Call, Map, Program, Sum
@@ -121,20 +121,24 @@ class Runner(ABC):
         GraphError
             If a register is unknown or a value has another length.
         """
-        memory = np.zeros(self.size if count is None else (self.size, count))
-        for name, value in values.items():
+        memory = np.zeros(self.size if count is None else (self.size, require_whole("count", count)))
+        for name, value in require_mapping("values", values, "register: numbers").items():
             self.write(memory, name, value)
         return memory
 
     def read(self, memory: Array, name: str) -> Array:
         """The register in a memory, a view (length,). Raises GraphError for an unknown one."""
-        if name not in self._slices:
+        if not isinstance(name, str) or name not in self._slices:
             raise GraphError(f"the program has no register {name!r} (it has {', '.join(self._slices) or 'none'})")
         return memory[self._slices[name]]
 
     def write(self, memory: Array, name: str, value: ArrayLike) -> None:
         """Set a register. Raises GraphError for an unknown one, or a value of another length."""
-        register, numbers = self.read(memory, name), np.asarray(value, dtype=np.float64)
+        register = self.read(memory, name)
+        try:
+            numbers = np.asarray(value, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):
+            numbers = real_array(f"register {name!r}", value)
         if numbers.ndim and numbers.shape != register.shape:
             raise GraphError(f"register {name!r} needs shape {register.shape}, got {numbers.shape}")
         register[...] = numbers
@@ -189,8 +193,9 @@ class Runner(ABC):
         """
         if self.program.feed:
             raise GraphError("a bound run takes no feed: give its registers a place in the memory")
-        require_memory("rows", rows, (len(rows), self.program.width))
-        self._check(memory, (self.size,), len(rows), 1)
+        passes = len(rows) if isinstance(rows, np.ndarray) and rows.ndim else 0
+        require_memory("rows", rows, (passes, self.program.width))
+        self._check(memory, (self.size,), passes, 1)
         return self._bound(memory, rows)
 
     def _bound(self, memory: Array, rows: Array) -> Callable[[], None]:
@@ -222,8 +227,8 @@ class Runner(ABC):
         GraphError
             If the program has branches (`While`, `If`, `Factor`, `Solve`, `record_if`, `stop`), and as for `run`.
         """
-        if not memories.ndim == 2:
-            raise GraphError(f"memories must have shape ({self.size}, N), got {memories.shape}")
+        if not isinstance(memories, np.ndarray) or memories.ndim != 2:
+            raise GraphError(f"memories must have shape ({self.size}, N), got {describe(memories)}")
         self._check(memories, (self.size, memories.shape[1]), passes, every)
         self._require_branch_free()
         count = memories.shape[1]
@@ -297,14 +302,15 @@ class Runner(ABC):
         """The rows of a feed, of that shape; the last dimension may be one for all."""
         if feed is None and not self.program.feed:
             return np.empty(shape)
-        rows = np.asarray(feed, dtype=np.float64)
+        rows = real_array("feed", () if feed is None else feed)
         if rows.shape not in (shape, (*shape[:2], 1)[: len(shape)]):
             raise GraphError(f"the program needs a feed of shape {shape}, got {rows.shape}")
         return rows
 
     def _check(self, memory: Array, shape: tuple[int, ...], passes: int, every: int) -> None:
-        if memory.dtype != np.float64 or memory.shape != shape or not memory.flags.c_contiguous:
-            raise GraphError(f"a memory must be contiguous float64 of shape {shape}, got {memory.dtype} {memory.shape}")
+        fits = isinstance(memory, np.ndarray) and memory.dtype == np.float64 and memory.shape == shape
+        if not fits or not memory.flags.c_contiguous:
+            raise GraphError(f"a memory must be contiguous float64 of shape {shape}, got {describe(memory)}")
         require_whole("passes", passes)
         require_whole("every", every, 1)
 

@@ -79,7 +79,8 @@ def specialize(graph: Graph, values: Mapping[str, Scalar], outputs: Sequence[str
     """
     require_graph("specialize", graph)
     replace = {}
-    for name, value in require_mapping("values", values, "input: number or node").items():
+    require_sequence("values", require_mapping("values", values, "input: number or node"), "inputs", (str, Node))
+    for name, value in values.items():
         (node,) = graph.select_inputs(name)
         try:
             replace[node] = value if isinstance(value, Node) else constant(value)

@@ -70,6 +70,8 @@ def write_files(files: Mapping[Path, str | bytes], *, mode: int = 0o666) -> None
     ...     sorted(path.name for path in Path(folder).iterdir())
     ['a.txt', 'b.txt']
     """
+    if not 0 <= mode <= 0o7777:
+        raise ValueError(f"mode must be permissions from 0 to 0o7777, got {mode!r:.20}")
     with ExitStack() as temporaries:
         written = []
         for path, data in files.items():

@@ -118,7 +118,7 @@ def require_choice(what: str, value: Any, choices: Collection[str]) -> str:
     raise ValueError(f"{what} must be one of {', '.join(choices)}, got {value!r:.60}")
 
 
-def require_sequence(what: str, value: Any, of: str) -> tuple[Any, ...]:
+def require_sequence(what: str, value: Any, of: str, kind: type | tuple[type, ...] = object) -> tuple[Any, ...]:
     """The members of a sequence; an iterator is read once.
 
     Parameters
@@ -129,6 +129,8 @@ def require_sequence(what: str, value: Any, of: str) -> tuple[Any, ...]:
         The members. A string is its characters.
     of : str
         What the members are, in the plural.
+    kind : type or tuple of types
+        What every member must be an instance of.
 
     Returns
     -------
@@ -137,7 +139,7 @@ def require_sequence(what: str, value: Any, of: str) -> tuple[Any, ...]:
     Raises
     ------
     TypeError
-        If it cannot be iterated.
+        If it cannot be iterated, or a member is of another kind.
 
     Examples
     --------
@@ -148,7 +150,11 @@ def require_sequence(what: str, value: Any, of: str) -> tuple[Any, ...]:
     """
     if not isinstance(value, Iterable) or isinstance(value, type):
         raise TypeError(f"{what} must be a sequence of {of}, got {type(value).__name__}: {value!r:.60}")
-    return tuple(value)
+    members = tuple(value)
+    for member in members:
+        if not isinstance(member, kind):
+            raise TypeError(f"{what} must be a sequence of {of}, got {type(member).__name__} within: {member!r:.60}")
+    return members
 
 
 def require_mapping(what: str, value: Any, of: str) -> Mapping[Any, Any]:

@@ -77,6 +77,7 @@ def share(work: Callable[[int], None], items: Iterable[int], threads: int) -> No
             waiting.clear()
             raise
 
+    threads = min(threads, len(waiting))
     if threads <= 1:
         run()
         return

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from ..core.node import Node
 from ..operations.operation import LEAF, Op, columns
-from ..util.require import require_texts, require_whole
+from ..util.require import require_mapping, require_sequence, require_texts, require_whole
 
 Text = tuple[str, int]  # a formula, and how strongly it binds, as in the table of operations
 INLINE = 12  # operations in a line, at most; more are told in lines of their own
@@ -94,6 +94,10 @@ class Formulas:
         called: Mapping[str, str] | None = None,
     ) -> None:
         called = require_texts("names", called)
+        nodes = require_sequence("nodes", nodes, "nodes", Node)
+        require_sequence("outputs", require_mapping("outputs", outputs, "name: node").values(), "nodes", Node)
+        if not isinstance(notation, Notation):
+            raise TypeError(f"notation must be a Notation, got {type(notation).__name__}: {notation!r:.60}")
         self.outputs, self.notation = outputs, notation
         self.places = {node: k for k, node in enumerate(nodes)}
         taken = Counter([node.name for node in nodes if node.name])

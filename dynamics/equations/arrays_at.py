@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
 from collections.abc import Mapping
 from functools import lru_cache
 from itertools import groupby
@@ -14,7 +15,10 @@ from numpy.typing import ArrayLike
 from cgraph import Compiled, Graph
 
 from ..systems.model import Model, as_system
+from ..systems.system import System
+from .constraint_rank import ConstraintWarning
 from .evaluate_at import Array, InputRows, evaluate_at
+from .nearly_redundant_rows import lost_rank
 
 _ENTRY = re.compile(r"(.*?[^\d_])((?:_\d+)+|\d+)")  # M_0_1, h_2, tau0
 
@@ -81,6 +85,7 @@ def arrays_at(
     else:
         x = InputRows(system, graph.input_names)(state, t, parameters)
         flat = function.batch(x.T).T if x.ndim == 2 else function(x)
+    _warn_of_lost_rank(system, flat, state, t, parameters)
     arrays: dict[str, Array] = {}
     start = 0
     for name, shape in _shapes(tuple(graph.outputs)):
@@ -88,6 +93,20 @@ def arrays_at(
         arrays[name] = flat[..., start:end].reshape((*flat.shape[:-1], *shape))
         start = end
     return arrays
+
+
+def _warn_of_lost_rank(
+    system: System, flat: Array, state: Mapping[str, ArrayLike | None], t: float, parameters: Mapping[str, float] | None
+) -> None:
+    """A ConstraintWarning where values are not finite, since rows of constraints follow from others at a state."""
+    finite = np.isfinite(flat).all(axis=-1)
+    if not len(system.constraints) or finite.all():
+        return
+    given = system.kinematics.neutral if state["q"] is None else state["q"]
+    rows = np.broadcast_to(np.asarray(given, dtype=np.float64), (*finite.shape, system.nq))
+    if lost := lost_rank(system.constraints, rows[~finite][0], t, {**system.parameters, **(parameters or {})}):
+        where = f" of row {int(np.argmin(finite))}" if finite.ndim else ""
+        warnings.warn(f"values{where} are not finite: {lost}", ConstraintWarning, stacklevel=3)
 
 
 @lru_cache(maxsize=64)

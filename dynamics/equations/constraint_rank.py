@@ -23,7 +23,9 @@ ITERATIONS, HALVINGS = 50, 12  # of Newton's method for such a state
 DEPENDENT = 1e-9  # a row of length 1 is one of the others if this much of it is left without them
 SMALL = 1e-6  # of the first gap: what Newton's method closes to rounding in a step or two
 OPEN = 0.5  # certain digits of a row that is not 0
+FOLLOWS = 4.0  # more digits of one that follows from others: the rounding of axes and lengths that it has in common
 KEPT = 16  # constraints whose rank stays known
+ROUNDS = 4  # of scaling
 
 
 Indices = np.ndarray[Any, np.dtype[np.intp]]
@@ -56,7 +58,7 @@ def independent_rows(constraints: Constraints) -> tuple[int, ...]:
 
     Raises ConstraintError where no state is seen that meets all.
     """
-    numbers = RowNumbers(constraints)
+    numbers = row_numbers(constraints)
     kept: list[int] = []
     acting = np.zeros(len(constraints), dtype=bool)
     for point in numbers.states():
@@ -134,29 +136,29 @@ class RowNumbers:
         """
         shown = {"t": t} | dict(self.constraints.parameters if parameters is None else parameters)
         with np.errstate(all="ignore"):
-            point = before = self._point(q, shown)
+            point = before = self.point(q, shown)
             step = np.zeros(self.n)  # from the point before
             size, looked = np.inf, 0.0  # at the rounding of phi, which takes longer than a step, once a gap is so small
             for k in range(ITERATIONS):
-                phi = self._phi(point)
+                phi = self.gaps(point)
                 if (not k or size <= looked) and not len(self._open_rows(before, step)):
                     return Closing(point, 0.0, None)
                 matrix = self.matrix(point)[: len(phi)]
                 if not (np.isfinite(phi).all() and np.isfinite(matrix).all()):
                     return Closing(point, np.inf, int(np.argmin(np.isfinite(phi))))
-                rows, columns = balance(matrix)
+                rows, columns = factors(self.constraints, matrix)
                 whole = -columns * np.linalg.lstsq(rows[:, None] * matrix * columns, rows * phi, rcond=1e-10)[0]
                 size = float(np.abs(rows * phi).max())
                 looked = looked or SMALL * size
                 for halved in range(HALVINGS):
                     shorter = whole * 0.5**halved
-                    trial = self._point(self._moved(point, shorter), shown)
-                    if np.abs(rows * self._phi(trial)).max() < size:
+                    trial = self.point(self.moved_by(point, shorter), shown)
+                    if np.abs(rows * self.gaps(trial)).max() < size:
                         before, point, step = point, trial, shorter
                         break
                 else:
                     break
-            phi, open_rows = self._phi(point), self._open_rows(before, step)
+            phi, open_rows = self.gaps(point), self._open_rows(before, step, OPEN + FOLLOWS)
         if not len(open_rows):
             return Closing(point, 0.0, None)
         return Closing(point, size, int(open_rows[np.abs(phi[open_rows]).argmax()]))
@@ -177,25 +179,31 @@ class RowNumbers:
             matrix[k] = np.where(np.array(list(digits.values())) >= 1.0, matrix[k], 0.0)
         return matrix
 
-    def _phi(self, point: Mapping[str, float]) -> Array:
+    def gaps(self, point: Mapping[str, float]) -> Array:
+        """phi."""
         return np.zeros(0) if self.phi is None else np.array(list(self.phi.evaluate(dict(point)).values()))
 
-    def _open_rows(self, before: Mapping[str, float], step: Array) -> Indices:
+    def _open_rows(self, before: Mapping[str, float], step: Array, most: float = OPEN) -> Indices:
         """The rows of phi that are not 0 to their rounding, that of the step included, after a step."""
         if self.landed is None:
             return np.zeros(0, dtype=np.intp)
         point = {**before, **dict(zip(self.steps, step.tolist(), strict=True))}
         values, digits = self.landed.evaluate(point), certain_digits(self.landed, point)
-        wrong = [x != 0.0 and not (digits[name] < OPEN and np.isfinite(x)) for name, x in values.items()]
+        wrong = [x != 0.0 and not (digits[name] < most and np.isfinite(x)) for name, x in values.items()]
         return np.flatnonzero(wrong)
 
-    def _point(self, q: Array, shown: Mapping[str, float]) -> dict[str, float]:
-        return {f"q{i}": float(x) for i, x in enumerate(q)} | dict(shown)
+    def point(self, q: Array, shown: Mapping[str, float]) -> dict[str, float]:
+        """Values of q0.., of t and parameters, from these and others."""
+        return dict(shown) | {f"q{i}": float(x) for i, x in enumerate(q)}
 
-    def _moved(self, point: Mapping[str, float], step: Any) -> Array:
+    def moved_by(self, point: Mapping[str, float], step: Any) -> Array:
+        """q after a step along the velocities, (nq,)."""
         at = {name: point[name] for name in self.moved.input_names if name in point}
         at |= dict(zip(self.steps, step.tolist(), strict=True))
         return np.array(list(self.moved.evaluate(at).values()), dtype=np.float64)
+
+
+row_numbers = lru_cache(KEPT)(RowNumbers)
 
 
 class Closing(NamedTuple):
@@ -221,6 +229,31 @@ def balance(matrix: Array) -> tuple[Array, Array]:
         for axis, factors in ((0, columns), (1, rows)):
             size = np.abs(rows[:, None] * matrix * columns).max(axis=axis, initial=0.0)
             factors /= np.sqrt(np.where(size > 0.0, size, 1.0))
+    return rows, columns
+
+
+def factors(constraints: Constraints, matrix: Array) -> tuple[Array, Array]:
+    """Factors of rows, one for each loop, and of columns, which make J free of units and its largest entries 1.
+
+    Rows of angles stand beside those of lengths by the longest lever that a joint of the loop has.
+    """
+    rows, columns = np.ones(len(matrix)), np.ones(matrix.shape[1])
+    groups: dict[str, list[int]] = {}
+    for k, name in enumerate(constraints.names[: len(matrix)]):
+        looped = constraints.loop_rows.get(name)
+        groups.setdefault(name if looped is None else f"loop {looped.loop}", []).append(k)
+        if looped and not looped.angle:
+            rows[k] = -1.0  # a length
+    for members in groups.values():
+        lengths = [k for k in members if rows[k] < 0.0]
+        lever = np.abs(matrix[lengths][:, constraints.turning]).max(initial=0.0)
+        rows[lengths] = 1.0 / (lever or 1.0)
+    for _ in range(ROUNDS):
+        sizes = np.abs(rows[:, None] * matrix * columns).max(axis=0, initial=0.0)
+        columns /= np.where(sizes > 0.0, sizes, 1.0)
+        for members in groups.values():
+            largest = np.linalg.norm(rows[members, None] * matrix[members] * columns, axis=1).max()
+            rows[members] /= largest or 1.0
     return rows, columns
 
 

@@ -15,7 +15,6 @@ from cgraph.extend import (
     require_flag,
 )
 
-from ..systems.body_system import BodySystem
 from ..systems.constraints import ConstraintError
 from ..systems.model import Model, as_system
 from ..systems.system import System
@@ -290,7 +289,7 @@ def accelerations(system: System, method: str = "auto", check: bool = False) -> 
     if not graphs:
         raise SingularMassMatrixError(no_inertia(system, failure)) from None
     chosen = graphs[-1] if len(graphs[-1].nodes) < WORTH * len(graphs[0].nodes) else graphs[0]
-    if not isinstance(system, BodySystem):  # bodies have masses; of another Lagrangian nobody knows
+    if not system.surely_regular:
         if held:
             _require_inertia_without_constraints(system)
         else:

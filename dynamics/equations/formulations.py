@@ -95,6 +95,10 @@ FORMULATIONS: dict[str, Callable[[System], LagrangeTerms]] = {
     for formulation in (chain_rule, chain_rule_literal, euler_embedded, kinetic_only, kinetic_only_exact)
 }
 """Formulations of Lagrange's equation by name, right and wrong ones: what `inverse_dynamics` takes."""
+THROUGH_STEP: dict[str, Callable[[System], Node]] = {
+    "euler_embedded": lambda system: system.lagrangian,
+    "kinetic_only": lambda system: system.kinetic,
+}  # the formulations that differentiate by qd through q = qd dt + q_old, and what they differentiate
 
 
 def inverse_dynamics(model: Model, formulation: str = "chain_rule", *, simplify: bool = True) -> Graph:
@@ -142,9 +146,12 @@ def inverse_dynamics(model: Model, formulation: str = "chain_rule", *, simplify:
     return cg.simplify(graph) if simplify else graph
 
 
-def torques(system: System, formulation: str = "chain_rule") -> Graph:
-    """Inverse dynamics from the Lagrangian as it is written, not simplified. Raises as `inverse_dynamics`."""
-    terms = _lagrange_terms(system, formulation)
+def torques(system: System, formulation: str = "chain_rule", through: Node = ONE) -> Graph:
+    """Inverse dynamics from the Lagrangian as it is written, not simplified. Raises as `inverse_dynamics`.
+
+    through: a factor of what `THROUGH_STEP` lets through q = qd dt + q_old; an input of the graph if it is a variable.
+    """
+    terms = _lagrange_terms(system, formulation, through)
     applied = _forces(system, terms)
     build = Builder()
     outputs = {}
@@ -154,7 +161,7 @@ def torques(system: System, formulation: str = "chain_rule") -> Graph:
             with cg.tag("damping"):
                 tau = tau + system.damping[i] * terms.qd[i]
             outputs[f"tau{i}"] = tau - applied[i]
-    return system.graph(outputs, terms.inputs)
+    return system.graph(outputs, terms.inputs, [through] if through is not ONE else [])
 
 
 def momentum_rate(
@@ -188,12 +195,16 @@ def momentum_rate(
     >>> dyn.momentum_rate(spring).evaluate({"q0": 1.0, "qd0": 2.0, "qdd0": 3.0})  # the spring has no part in it
     {'p0_dot': 12.0}
     """
-    system = as_system(model)
-    terms = _lagrange_terms(system, formulation)
-    outputs = {f"p{i}": p for i, p in enumerate(terms.momentum)} if require_flag("keep_momentum", keep_momentum) else {}
-    outputs |= {f"p{i}_dot": rate for i, rate in enumerate(terms.momentum_rate)}
-    graph = system.graph(outputs, terms.inputs)
+    graph = momenta(as_system(model), formulation, keep_momentum=require_flag("keep_momentum", keep_momentum))
     return cg.simplify(graph) if require_flag("simplify", simplify) else graph
+
+
+def momenta(system: System, formulation: str, through: Node = ONE, *, keep_momentum: bool = True) -> Graph:
+    """The inertial term, with or without the momenta, as derived.  through: as of `torques`."""
+    terms = _lagrange_terms(system, formulation, through)
+    outputs = {f"p{i}": p for i, p in enumerate(terms.momentum)} if keep_momentum else {}
+    outputs |= {f"p{i}_dot": rate for i, rate in enumerate(terms.momentum_rate)}
+    return system.graph(outputs, terms.inputs, [through] if through is not ONE else [])
 
 
 def spurious_nodes(graph: Graph) -> frozenset[Node]:
@@ -201,7 +212,8 @@ def spurious_nodes(graph: Graph) -> frozenset[Node]:
 
     They are the adjoints that the product qd dt of q = qd dt + q_old passes on, the "unnecessary terms" of eq. (3), and
     all that only these need, whether the author of the Lagrangian tagged anything or not. Where a slope dL/dq does not
-    change along the step, such as a weight m g, the derivative of m g dt is the node m g itself, which is not marked.
+    change along the step, such as a weight m g, the derivative of m g dt is the node m g itself, which is not marked:
+    there an edge is wrong. Whether the torque is wrong, and by which edges, `formulation_verdict` says.
 
     Parameters
     ----------
@@ -232,7 +244,9 @@ def spurious_nodes(graph: Graph) -> frozenset[Node]:
     return frozenset(node for node in graph.nodes if node not in needed)
 
 
-def _lagrange_terms(system: System, formulation: str) -> LagrangeTerms:
+def _lagrange_terms(system: System, formulation: str, through: Node = ONE) -> LagrangeTerms:
+    if through is not ONE:
+        return _embedded(system, THROUGH_STEP[formulation](system), through)
     return FORMULATIONS[require_choice("formulation", formulation, FORMULATIONS)](system)
 
 
@@ -287,10 +301,14 @@ class _Embedding:
         return LagrangeTerms(self.inputs, self.q, self.qd, list(momentum), rate, slopes)
 
 
-def _embedded(system: System, energy: Node) -> LagrangeTerms:
-    """d/dt of d(energy)/dqd with the Euler relation in the graph, the middle of eq. (3), and dL/dq."""
+def _embedded(system: System, energy: Node, through: Node = ONE) -> LagrangeTerms:
+    """d/dt of d(energy)/dqd with the Euler relation in the graph, the middle of eq. (3), and dL/dq.
+
+    through: a factor of all that comes through q: 1 in the formulation, and at 0 the momentum is the right one.
+    """
     embedding = _Embedding(system)
     lagrangian, energy = embedding.embed(system.lagrangian, energy)
-    momentum = cotangents({energy: ONE}, embedding.qd)  # through q as well: the unwanted coupling
+    factors = dict.fromkeys(embedding.q, through)
+    momentum = cotangents({energy: ONE}, embedding.qd, through=factors)  # through q as well: the unwanted coupling
     gradient = cotangents({lagrangian: ONE}, embedding.q)
     return embedding.terms(momentum, gradient)

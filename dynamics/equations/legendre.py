@@ -49,7 +49,7 @@ class Legendre:
         except SingularError as error:
             raise SingularMassMatrixError(no_inertia(system, error)) from None
         solution = [solved[u] for u in system.qd]
-        if not isinstance(system, BodySystem):
+        if not system.surely_regular:
             outputs = {f"qdd{i}": node for i, node in enumerate(solution)}
             require_inertia(system, system.graph(outputs, system.q, system.qd, system.tau))
         self.quadratic = not {*system.qd} & {*topological(solution)}

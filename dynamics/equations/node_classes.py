@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable
 from cgraph import Graph, Node
 from cgraph.extend import ADJOINT, topological
 
-from .formulations import EULER, spurious_nodes
+from .formulations import EULER
+from .verdict import Verdict
 
 LEAVES, DAMPING = "inputs and numbers", "damping"
 POSITIONS = "of positions alone: kinematics, inertia, and its elimination"
@@ -15,21 +16,30 @@ BIAS, ACCELERATIONS = "bias: of velocities, without torques", "accelerations, wi
 VELOCITIES, RATES = "velocities of the momenta", "rates of the momenta"
 
 
-def formulation_classes(graph: Graph) -> Callable[[Node], str]:
-    """The class of each node of a graph of `inverse_dynamics`, as `cg.compare` asks for it.
+def formulation_classes(verdicts: Iterable[Verdict]) -> Callable[[Graph], Callable[[Node], str]]:
+    """The class of each node of the verdicts' graphs, as `cg.compare` asks for it.
 
-    "spurious adjoint": it serves only derivatives through q = qd dt + q_old.  "Euler edge": the embedded relations
-    q = qd dt + q_old and qd = qdd dt + qd_old, and their rates.  "needed": all else, sums of the two among it.
+    "spurious adjoint": it serves only derivatives through q = qd dt + q_old.
+    "takes in what is spurious": a sum that has a part of it.  "Euler edge": the embedded relations q = qd dt + q_old
+    and qd = qdd dt + qd_old, and their rates.  "needed": all else.
     """
-    wrong = spurious_nodes(graph)
-    adjoint = _users(graph, [node for node in graph.nodes if ADJOINT in node.roles])
+    known = {each.graph: each for each in verdicts}
 
-    def name(node: Node) -> str:
-        if node in wrong:
-            return "spurious adjoint"
-        return "Euler edge" if EULER in node.tags and node not in adjoint else "needed"
+    def classes(graph: Graph) -> Callable[[Node], str]:
+        wrong = known[graph]
+        adjoint = _users(graph, [node for node in graph.nodes if ADJOINT in node.roles])
+        spoilt = _users(graph, [edge.target for edge in wrong.edges])
 
-    return name
+        def name(node: Node) -> str:
+            if node in wrong.nodes:
+                return "spurious adjoint"
+            if node in spoilt:
+                return "takes in what is spurious"
+            return "Euler edge" if EULER in node.tags and node not in adjoint else "needed"
+
+        return name
+
+    return classes
 
 
 def form_classes(graph: Graph) -> Callable[[Node], str]:

@@ -20,9 +20,10 @@ from cgraph.extend import Array, Builder, building, certain_digits, folded, solv
 
 from ..systems.constraints import ConstraintError
 from ..systems.system import System
-from .constraint_rank import ConstraintWarning, RowNumbers, independent_rows, step_names
+from .constraint_rank import FOLLOWS, ConstraintWarning, RowNumbers, independent_rows, step_names
 from .constraints import Rows
 from .formulations import ZERO
+from .nearly_redundant_rows import lost_rank, opened
 from .substitute import substitute
 
 ITERATIONS = 20  # of Newton's method
@@ -93,16 +94,21 @@ def projected(system: System, x: Array, t: float, parameters: Mapping[str, float
             values = graph.evaluate(dict(zip(names, x.tolist(), strict=True)) | fixed)
         x = np.array(list(values.values()), dtype=np.float64)
         if np.isfinite(x).all() and not (left := _open_rows(system, x, before, t, parameters)):
+            if said := opened(system.constraints, x[: system.nq], t, parameters):
+                warnings.warn(said, ConstraintWarning, stacklevel=2)
             return x
+    lost = lost_rank(system.constraints, start[: system.nq], t, parameters)
     raise ConstraintError(
         f"the start cannot be moved onto the constraints: {system.constraints.names[left[0]]!r} stays open from "
-        f"q = {start[: system.nq].tolist()!s:.200}"
+        f"q = {start[: system.nq].tolist()!s:.200}{lost and f'; {lost}'}"
     )
 
 
 def projected_start(system: System, x: Array, t: float, parameters: Mapping[str, float]) -> Array:
-    """`projected`, with a ConstraintWarning that says how far a start was moved."""
+    """`projected`, with a ConstraintWarning that says how far a start was moved, and one of a rank that is lost."""
     moved = projected(system, x, t, parameters)
+    if lost := lost_rank(system.constraints, moved[: system.nq], t, parameters):
+        warnings.warn(f"the start: {lost}", ConstraintWarning, stacklevel=2)
     if moved is not x:
         parts = []
         for what, names, part in (
@@ -141,7 +147,10 @@ def _open_rows(system: System, x: Array, before: Array, t: float, parameters: Ma
     point = {name: others[name] for name in names if name in others}
     point |= dict(zip([*names[:n], *names[-n:]], [*before.tolist(), *(x - before).tolist()], strict=True))
     values, digits = graph.evaluate(point), certain_digits(graph, point)
-    left = [
-        name for name, value in values.items() if value != 0.0 and not (digits[name] < SPARE and np.isfinite(value))
-    ]
-    return sorted({int(name.removeprefix("phi").removeprefix("rate")) for name in left})
+    kept, left = independent_rows(system.constraints), set[int]()
+    for name, value in values.items():
+        k = int(name.removeprefix("phi").removeprefix("rate"))
+        most = SPARE if k in kept else SPARE + FOLLOWS
+        if value != 0.0 and not (digits[name] < most and np.isfinite(value)):
+            left.add(k)
+    return sorted(left)

@@ -3,8 +3,9 @@
 Coefficient k of a node is linear in coefficients k of its arguments, with coefficients 0 as factors, and in sums over
 0 < j < k of products of earlier ones. So one graph computes all values at order 0, and one, the same for all k > 0, the
 rest, from those sums, which run over many nodes at once. Of a product y = a b, y_k = a_0 b_k + b_0 a_k + sum a_j b_k-j;
-of a quotient y b = a; of any other operation ydot = sum over arguments of (dy/da) adot, by the table's partials g:
-y_k = sum of g_0 a_k + 1/k sum j a_j g_k-j. The last only need g_0 .. g_k-1, so g may depend on y itself.
+of a quotient y b = a; a whole power is products; of any other operation ydot = sum over arguments of (dy/da) adot, by
+the table's partials g: y_k = sum of g_0 a_k + 1/k sum j a_j g_k-j. The last only need g_0 .. g_k-1, so g may depend on
+y itself.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, as_node, building, columns, topological
+from cgraph.extend import Builder, as_node, building, columns
 
 from ..systems.arguments import TIME
 
@@ -56,11 +57,9 @@ class _Jets:
                 self.of[node] = moving
         self.states = states
         waiting = list(rate.outputs.values())
-        while waiting:
-            for node in topological([waiting.pop()]):
-                if node not in self.of:
-                    with building(self.build):
-                        self.of[node] = self._coefficient(node, waiting)
+        with building(self.build):
+            while waiting:
+                self._reach(waiting.pop(), waiting)
 
     def graphs(self) -> Jets:
         """Both graphs."""
@@ -94,6 +93,16 @@ class _Jets:
             a, b = b, a
         return self.sums.setdefault((a, b, weighted), cg.variable(f"sum{len(self.sums)}"))
 
+    def _reach(self, node: Node, waiting: list[Node]) -> Node | None:
+        """Coefficient k of a node, after those of all that it is made from."""
+        path = [node]
+        while path:
+            if missing := [arg for arg in path[-1].args if arg not in self.of]:
+                path += missing
+            elif (last := path.pop()) not in self.of:
+                self.of[last] = self._coefficient(last, waiting)
+        return self.of[node]
+
     def _coefficient(self, node: Node, waiting: list[Node]) -> Node | None:
         """Coefficient k of a node, those of its arguments being there; their partials are left to wait."""
         op, args = columns(node.op), node.args
@@ -120,6 +129,8 @@ class _Jets:
                 total = total + 0.5 * self.sum(arg, arg) + self.zero(arg) * each
             return total * self.zero(1.0 / node)
         if op.name == "pow" and op.rewrite is not None and at[1] is None:
+            if args[1].value is not None and args[1].value.is_integer():
+                return self._reach(op.rewrite(*args), waiting)  # products, whose coefficients a base of 0 has, too
             return self._power(node, at[0])
         self._refuse(node)
         return self._by_partials(node, at, waiting)

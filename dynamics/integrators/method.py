@@ -64,6 +64,7 @@ class Method:
                             sets h and tried, `control()` sets next
     max_step, min_step, end the longest step, the shortest, and where to stop [s]
     rtol, atol (m)          the tolerance, rtol |x| + atol
+    jump, longest, still    how steps pass jumps in time, and go on from rest: see `step_control`
     x_new (m), error        where the trial arrived, and its estimated error, 1 at the tolerance (`measured`)
     accepted, rejected      1 or 0 after a trial, and how many were 0
     held                    accepted steps at the stability limit, where the method counts them

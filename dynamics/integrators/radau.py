@@ -22,6 +22,7 @@ from .jacobian_statements import jacobian_statements
 from .problem import Problem
 from .step import Step
 from .step_control import (
+    SCALE,
     accept_step,
     control,
     count,
@@ -256,12 +257,11 @@ def _turn(problem: Problem, z: tuple[str, ...], w: tuple[str, ...], f: tuple[str
 
 def _compared(m: int) -> list[Statement]:
     """The change of a turn beside the tolerance of the step, and what follows from it."""
-    names = ("x", "x_new", "rtol", "atol")
-    x, x_new, rtol, atol, *changes = cg.variables([*names, "d0", "d1", "d2"])
-    size = scale(x, x_new, rtol, atol)
+    sizes, changes = cg.variables(SCALE), cg.variables("d0 d1 d2")
+    size = scale(*sizes)
     squares = [(change / size) * (change / size) for change in changes]
-    graph = Graph([x, x_new, rtol, atol, *changes], {"y": squares[0] + squares[1] + squares[2]})
-    return [Sum(graph, (*names, *CHANGES), "change"), _judged(3 * m)]
+    graph = Graph([*sizes, *changes], {"y": squares[0] + squares[1] + squares[2]})
+    return [Sum(graph, (*SCALE, *CHANGES), "change"), _judged(3 * m)]
 
 
 def _judged(numbers: int) -> Call:

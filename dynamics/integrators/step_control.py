@@ -6,6 +6,12 @@ rounded, `next` the size to try next, `max_step` and `min_step` their limits; `e
 each component of the state; accepted (1 or 0), status; rejected, a count; `error`, the estimate of the last trial, 1
 at the tolerance; x_new what the trial arrived at; `fresh`, 1 before the first pass; `held`, accepted steps at the
 stability limit of an explicit method; and of the last accepted step t_old, x_old and, for its dense output, dense1, ..
+
+Where a force jumps, steps can only shrink. `jump` is the share of the `longest` of the last steps in which it may be
+missed, 0 where the caller has given atol: what its mean rate would make in that time counts into the `scale` of a
+component by `leap`, rtol times that time over h. A step far shorter than those before passes a jump so, and a pole, at
+which the steps before get short as well, stays one. A step in which nothing moved says nothing of forces to come: the
+next is at most `still`.
 """
 
 from __future__ import annotations
@@ -25,6 +31,8 @@ RUNNING, DONE, TOO_SMALL = 0.0, 1.0, 2.0  # register `status`
 SAFETY, SMALLEST, LARGEST = 0.9, 0.2, 5.0  # factors from one step to the next
 MEMORY = 0.04  # weight of the estimate before in the choice of the next step (Gustafsson's PI control)
 RESOLUTION = 4.0 * 2.0**-52  # steps below this share of t hardly move t
+SCALE = ("x", "x_new", "rtol", "atol", "leap")
+FORGOTTEN = 0.9  # of the longest step, in every step that is shorter
 COLLAPSE = 2.0**-200  # steps below this share of a run never end it
 SMALLEST_ATOL = 2.0**-1022  # in place of 0: a state that is 0 and stays 0 has no error
 
@@ -32,7 +40,7 @@ SMALLEST_ATOL = 2.0**-1022  # in place of 0: a state that is 0 and stays 0 has n
 def registers(problem: Problem) -> dict[str, int]:
     """What every program has."""
     names = "t h tried next max_step min_step end fresh rtol accepted status rejected error error_old"
-    names += " evaluations held t_old t_new"
+    names += " evaluations held t_old t_new jump longest leap still moved"
     m = problem.size
     states = dict.fromkeys(("x", "x_new", "x_old", "atol"), m)
     return {**states, "p": len(problem.parameters), **dict.fromkeys(names.split(), 1)}
@@ -48,17 +56,19 @@ def trial() -> Call:
 
     h = t_new - t, so that the clock and the state make the same step.
     """
-    t, wanted, max_step, end = inputs = cg.variables("t next max_step end")
+    names = ("t", "next", "max_step", "end", "rtol", "jump", "longest")
+    t, wanted, max_step, end, rtol, jump, longest = inputs = cg.variables(names)
     left, most = abs(end - t), cg.minimum(wanted, max_step)
     tried = cg.where(most >= left, left, cg.where(2.0 * most > left, 0.5 * left, most))
     t_new = cg.where(most >= left, end, t + cg.where(end > t, tried, -tried))
-    outputs = {"tried": tried, "t_new": t_new, "h": t_new - t}
-    return Call(Graph(inputs, outputs), ("t", "next", "max_step", "end"), tuple(outputs))
+    h = t_new - t
+    outputs = {"tried": tried, "t_new": t_new, "h": h, "leap": rtol * jump * longest / abs(h)}
+    return Call(Graph(inputs, outputs), names, tuple(outputs))
 
 
-def scale(x: Node, x_new: Node, rtol: Node, atol: Node) -> Node:
-    """What an error is measured by."""
-    return atol + rtol * cg.maximum(abs(x), abs(x_new))
+def scale(x: Node, x_new: Node, rtol: Node, atol: Node, leap: Node) -> Node:
+    """What an error is measured by, of the registers `SCALE`."""
+    return atol + rtol * cg.maximum(abs(x), abs(x_new)) + leap * abs(x_new - x)
 
 
 def control(order: int, evaluations: int) -> Call:
@@ -92,8 +102,14 @@ def control(order: int, evaluations: int) -> Call:
 def accept_step(*after: Statement) -> If:
     """An accepted step becomes the state; `after` is what the method does besides, with x still the old state."""
     kept = (Map(SAME, ("x",), ("x_old",)), Call(SAME, ("t",), ("t_old",)))
-    moved = (Map(SAME, ("x_new",), ("x",)), Call(SAME, ("t_new",), ("t",)))
-    return If("accepted", (*kept, *after, *moved))
+    h, longest = cg.variables("h longest")
+    after_h = Graph([h, longest], {"longest": cg.maximum(abs(h), FORGOTTEN * longest)})
+    x, x_new, moved, wanted, still = cg.variables("x x_new moved next still")
+    way = Sum(Graph([x, x_new], {"way": abs(x_new - x)}), ("x", "x_new"), "moved")
+    short = Graph([moved, wanted, still], {"next": cg.where(moved, wanted, cg.minimum(wanted, still))})
+    steps = (way, Call(short, ("moved", "next", "still"), ("next",)), Call(after_h, ("h", "longest"), ("longest",)))
+    arrived = (Map(SAME, ("x_new",), ("x",)), Call(SAME, ("t_new",), ("t",)))
+    return If("accepted", (*kept, *after, *steps, *arrived))
 
 
 def count(evaluations: int) -> Call:
@@ -144,10 +160,19 @@ def measured(error: str, m: int) -> list[Statement]:
 
     NaN where x_new is not finite: its scale would hide any error.
     """
-    x, x_new, rtol, atol, e = inputs = cg.variables("x x_new rtol atol e")
-    part = e / scale(x, x_new, rtol, atol)
-    total = Sum(Graph(inputs, {"y": part * part + (x_new - x_new)}), ("x", "x_new", "rtol", "atol", error), "sum")
+    *sizes, e = inputs = cg.variables((*SCALE, "e"))
+    part, x_new = e / scale(*sizes), sizes[1]
+    total = Sum(Graph(inputs, {"y": part * part + (x_new - x_new)}), (*SCALE, error), "sum")
     return [total, Call(function("sum", y=cg.sqrt(cg.variable("sum") / m)), ("sum",), ("error",))]
+
+
+def moved(m: int) -> list[Statement]:
+    """x = register `onto`; `farthest`, the largest of such moves so far, a root mean square of move over tolerance."""
+    x, rtol, atol, onto, way, far = cg.variables("x rtol atol onto way farthest")
+    part = (onto - x) / scale(x, onto, rtol, atol, cg.constant(0.0))
+    total = Sum(Graph([x, rtol, atol, onto], {"y": part * part}), ("x", "rtol", "atol", "onto"), "way")
+    longer = Graph([way, far], {"far": cg.maximum(cg.sqrt(way / m), far)})
+    return [total, Call(longer, ("way", "farthest"), ("farthest",)), Map(SAME, ("onto",), ("x",))]
 
 
 def lost(register: str, target: str) -> Sum:
@@ -173,11 +198,11 @@ def _held(tableau: Tableau) -> list[Statement]:
     if tableau.c[-1] != 1.0:
         return []
     stages, limit = len(tableau.b), real_stability(tableau)
-    x, x_new, rtol, atol, a, b = inputs = cg.variables("x x_new rtol atol a b")
-    part = (a - b) / scale(x, x_new, rtol, atol)
-    graph, common = Graph(inputs, {"y": part * part}), ("x", "x_new", "rtol", "atol")
-    rise = Sum(graph, (*common, f"slope{stages}", f"slope{stages - 1}"), "rise")
-    reach = Sum(graph, (*common, "x_new", "at"), "reach")
+    *sizes, a, b = inputs = cg.variables((*SCALE, "a", "b"))
+    part = (a - b) / scale(*sizes)
+    graph = Graph(inputs, {"y": part * part})
+    rise = Sum(graph, (*SCALE, f"slope{stages}", f"slope{stages - 1}"), "rise")
+    reach = Sum(graph, (*SCALE, "x_new", "at"), "reach")
     h, up, along, held = inputs = cg.variables("h rise reach held")
     beyond = h * h * up > (SAFETY * limit) ** 2 * along
     return [rise, reach, Call(Graph(inputs, {"sum": held + beyond}), ("h", "rise", "reach", "held"), ("held",))]
@@ -186,11 +211,10 @@ def _held(tableau: Tableau) -> list[Statement]:
 def _squared(weights: tuple[float, ...], slopes: tuple[str, ...], target: str) -> Sum:
     """Sum over the state of (h * (sum of weight * slope) / scale)^2."""
     used = [k for k, weight in enumerate(weights) if weight]
-    x, x_new, rtol, atol, h = cg.variables("x x_new rtol atol h")
+    *sizes, h = inputs = cg.variables((*SCALE, "h"))
     nodes = cg.variables([f"s{k}" for k in used])
-    part = h * weighted(nodes, [weights[k] for k in used]) / scale(x, x_new, rtol, atol)
-    graph = Graph([x, x_new, rtol, atol, h, *nodes], {"y": part * part})
-    return Sum(graph, ("x", "x_new", "rtol", "atol", "h", *[slopes[k] for k in used]), target)
+    part = h * weighted(nodes, [weights[k] for k in used]) / scale(*sizes)
+    return Sum(Graph([*inputs, *nodes], {"y": part * part}), (*SCALE, "h", *[slopes[k] for k in used]), target)
 
 
 def _estimate(count: int, m: int) -> Call:

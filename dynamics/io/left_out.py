@@ -19,8 +19,9 @@ def present(what: Mapping[str, Any]) -> list[str]:
 
 
 def listed(names: Sequence[str]) -> str:
-    """All of the names, or the first few of many."""
-    return ", ".join([*names[:5], *([f"{len(names) - 5} more"] if len(names) > 5 else [])])
+    """All of the names, or the first few of many, each on one line."""
+    shown = [name if name.isprintable() else repr(name) for name in names[:5]]
+    return ", ".join([*shown, *([f"{len(names) - 5} more"] if len(names) > 5 else [])])
 
 
 def refused_or_left_out(essential: Sequence[str], outside: Sequence[str], ignore: bool) -> tuple[str, ...]:

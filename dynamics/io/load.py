@@ -38,7 +38,7 @@ def load_mjcf(
     Parameters
     ----------
     source : str, path or MjModel
-        A path, the XML text (it starts with "<"), or MuJoCo's own model.
+        A path, the XML text (it starts with "<") of a model that names no other files, or MuJoCo's own model.
     ignore : bool
         Leave out what a mechanism cannot have: springs of free joints, tendons, fluid, ...
         Contacts, joint limits, friction loss and actuators, which act on a mechanism and do not belong to it, are
@@ -60,8 +60,9 @@ def load_mjcf(
     Raises
     ------
     MechanismError
-        For a file that is missing or wrong, for what a mechanism cannot have, unless `ignore`, for loops that cannot be
-        closed together, and as `Mechanism`. Rows of loops that follow from others are a `ConstraintWarning`.
+        For a file that is missing or wrong, a text that names other files, more than 10 000 copies by `count`, for what
+        a mechanism cannot have, unless `ignore`, for loops that cannot be closed together, and as `Mechanism`. Rows of
+        loops that follow from others are a `ConstraintWarning`.
     ImportError
         Without MuJoCo.
 
@@ -90,7 +91,8 @@ def load_urdf(
     Every link is a body of its name, those without mass and those on fixed joints too, so that `position("tool0")` is
     where that frame is. Coordinates have the names of the joints, in the order of the file, those that carry
     others first. A joint that mimics another is coupled to it by a loop, see `Loop`. Shapes are not read, so their
-    meshes need not be there. A link whose moments no rigid body can have is taken as it is, with a warning.
+    meshes need not be there. A link whose moments no rigid body can have is taken as it is, with a warning; of negative
+    moments 0 is taken, without `ignore` only of those that rounding to the digits of the file can make of 0.
 
     Parameters
     ----------
@@ -98,11 +100,11 @@ def load_urdf(
         A path or the XML text (it starts with "<").
     ignore : bool
         Leave out what a mechanism cannot have: joints that mimic one that is not there, or themselves by way of others,
-        or that have not one coordinate. Contacts, joint limits, friction loss and extensions of URDF, such as
-        transmissions, are left out, the second and third unless asked for.
+        or that have not one coordinate, and negative moments of inertia. Contacts, joint limits, friction loss and
+        extensions of URDF, such as transmissions, are left out, the second and third unless asked for.
     floating : bool
         Whether the root link moves freely, by a joint that is called as the link is. Joints that are floating in the
-        file are free in any case.
+        file are free in any case. A root link called "world" is then "world'", as "world" is what it moves in.
     limits : pair of floats, optional
         (stiffness, damping) of springs that stand for the limits of hinges and slides, see `JointLimit`.
     friction : float, optional
@@ -117,7 +119,7 @@ def load_urdf(
     ------
     MechanismError
         For a file that is missing or wrong, for joints of other types, for what a mechanism cannot have, unless
-        `ignore`, for `floating` where the root link is the world, and as `Mechanism`.
+        `ignore`, and as `Mechanism`.
 
     Examples
     --------

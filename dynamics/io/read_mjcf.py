@@ -14,6 +14,7 @@ from ..multibody.joints import TYPES
 from ..multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError, MechanismWarning
 from ..multibody.spatial import Array
 from .left_out import listed, present, refused_or_left_out
+from .mjcf_limits import require_modest
 from .mujoco_twin import mujoco
 from .read_equality import left_of_equalities, other_equalities, read_loops
 from .smooth_forces import NONE, Smooth, actuators, disabled, first_output, inputs, mjcf_forces, modelled, single
@@ -56,13 +57,14 @@ def compiled_mjcf(source: Any, called: str) -> Any:
     MuJoCo by itself prints its warnings and adds them to a file in the current folder; a handler takes them instead.
     """
     models = mujoco().MjModel
+    require_modest(source, called)
     given = text_of(source).decode() if is_text(source) else str(path_of(source))
     said: list[str] = []
     before = mujoco().get_mju_user_warning()
     mujoco().set_mju_user_warning(said.append)
     try:
         mj = models.from_xml_string(given) if is_text(source) else models.from_xml_path(given)
-    except ValueError as error:
+    except (ValueError, RuntimeError) as error:
         if not root_of(source):
             raise MechanismError(f"{called} is not XML, as MJCF and URDF are") from None
         raise MechanismError(f"MuJoCo cannot read {called}: {' '.join(str(error).split())}") from None

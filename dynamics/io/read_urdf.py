@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any
+from decimal import Decimal
+from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from cgraph.extend import require_flag
 
 from ..multibody import spatial
+from ..multibody.body import moment_rounding
 from ..multibody.joint_force import JointForce, JointFriction
 from ..multibody.joints import TYPES, SpatialJoint
 from ..multibody.loops import Loop
@@ -24,11 +26,24 @@ from .smooth_forces import NONE, Smooth
 GRAVITY = (0.0, 0.0, -9.81)  # m/s^2, where the file says nothing
 FAR = 1e9  # m: a limit of a slide that `to_urdf` writes because URDF asks for one; it stands for none
 _OTHERS = {"revolute": "revolute", "planar": "planar"}  # beside the words of joint types: a hinge with limits, three
+_ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _KNOWN = {
     "robot": {"link", "joint", "material"},
     "link": {"inertial", "visual", "collision"},
     "joint": {"parent", "child", "origin", "axis", "limit", "dynamics", "mimic", "calibration"},
 }
+
+
+class _Inertial(NamedTuple):
+    """Fields of a body: mass, center and inertia in the link's frame, without negative principal moments.
+
+    least: the least principal moment in the file, where it is negative [kg m^2], else 0.
+    digits: the most by which moments differ from those that the file's numbers are rounded from [kg m^2].
+    """
+
+    fields: dict[str, Any]
+    least: float = 0.0
+    digits: float = 0.0
 
 
 def read_urdf(robot: Element, called: str, ignore: bool, floating: bool = False, smooth: Smooth = NONE) -> Mechanism:
@@ -39,13 +54,14 @@ def read_urdf(robot: Element, called: str, ignore: bool, floating: bool = False,
         links, joints = _by_name(robot, "link"), _by_name(robot, "joint")
         root = _root(links, joints)
         mimics = read_mimics(joints)
-        outside = [*_outside(robot, joints, smooth), *mimics.of_no_effect]
-        left_out = refused_or_left_out(mimics.refused, outside, ignore)
         with np.errstate(all="ignore"):  # of numbers that are not finite Mechanism says where they stand
-            bodies = [] if root == WORLD else [Body(root, Joint("fixed"), **_inertial(links[root], root))]
+            inertials = {name: _inertial(link, name) for name, link in links.items()}
+            bodies = [] if root == WORLD else [Body(root, Joint("fixed"), **inertials[root].fields)]
             for name, element in joints.items():
                 parent, child = _end(element, name, "parent"), _end(element, name, "child")
-                bodies.append(Body(child, _joint(element, name, child), parent, **_inertial(links[child], child)))
+                bodies.append(Body(child, _joint(element, name, child), parent, **inertials[child].fields))
+        outside = [*_outside(robot, joints, smooth), *mimics.of_no_effect, *_negative(inertials, by_digits=True)]
+        left_out = refused_or_left_out([*mimics.refused, *_negative(inertials, by_digits=False)], outside, ignore)
         return Mechanism(
             bodies,
             _gravity(robot),
@@ -58,11 +74,19 @@ def read_urdf(robot: Element, called: str, ignore: bool, floating: bool = False,
 
 
 def add_floating_base(robot: Element) -> None:
-    """Hang the root link of a robot on the world by a floating joint, called as the link or as no joint is."""
-    joints = _by_name(robot, "joint")
-    root = name = _root(_by_name(robot, "link"), joints)
+    """Hang the root link of a robot on the world by a floating joint, called as the link or as no joint is.
+
+    A root link that is called as the world itself gets a name that no link has.
+    """
+    joints, links = _by_name(robot, "joint"), _by_name(robot, "link")
+    root = name = _root(links, joints)
+    while name in links and root == WORLD:
+        name += "'"
     if root == WORLD:
-        raise MechanismError(f"the root link is {WORLD!r}, which does not float")
+        ends = [end for joint in joints.values() for end in joint.findall("parent") if end.get("link") == WORLD]
+        for element, attribute in ((links[root], "name"), *[(end, "link") for end in ends]):
+            element.set(attribute, name)
+        root = name
     while name in joints:
         name += "'"
     SubElement(robot, "link", name=WORLD)
@@ -125,7 +149,7 @@ def _joint(joint: Element, name: str, child: str) -> Joint:
     where, word = f"joint {name!r}", joint.get("type")
     kinds = {each.urdf: kind for kind, each in TYPES.items() if each.urdf} | _OTHERS
     if word not in kinds:
-        given = f"is {word}" if word else "has no type"
+        given = f"is {listed([word])}" if word else "has no type"
         raise MechanismError(f"{where} {given}, and a mechanism has {', '.join(sorted(kinds))}")
     fields: dict[str, Any] = dict(zip(("position", "orientation"), origin_of(joint, where), strict=True))
     if kinds[word] != "fixed":
@@ -136,25 +160,35 @@ def _joint(joint: Element, name: str, child: str) -> Joint:
     return Joint(kinds[word], name="" if name == child else name, **fields)
 
 
-def _inertial(link: Element, name: str) -> dict[str, Any]:
-    """Mass, center and inertia of a link, in its frame; nothing for one without."""
+def _inertial(link: Element, name: str) -> _Inertial:
+    """What a link has; nothing for one without."""
     where = f"link {name!r}"
     inertial = _one(link, where, "inertial")
     if inertial is None:
-        return {}
+        return _Inertial({})
     mass, moments = (_one(inertial, where, tag) for tag in ("mass", "inertia"))
     if mass is None or moments is None:
         raise MechanismError(f"{where} has an <inertial> without <{'mass' if mass is None else 'inertia'}>")
     center, turn = origin_of(inertial, where)
-    xx, xy, xz, yy, yz, zz = (
-        _numbers(moments, where, name, 1)[0] for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    )
-    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return {
-        "mass": _numbers(mass, where, "value", 1)[0],
-        "center": center,
-        "inertia": turn @ inertia @ turn.T,
-    }
+    xx, xy, xz, yy, yz, zz = (_numbers(moments, where, entry, 1)[0] for entry in _ENTRIES)
+    inertia = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
+    fields = {"mass": _numbers(mass, where, "value", 1)[0], "center": center, "inertia": inertia}
+    if not np.isfinite(inertia).all():
+        return _Inertial(fields)
+    values, axes = np.linalg.eigh(inertia)
+    if values[0] >= -moment_rounding(float(np.abs(values).max()), fields["mass"] * float(center @ center)):
+        return _Inertial(fields)
+    fields["inertia"] = axes @ np.diag(np.maximum(values, 0.0)) @ axes.T
+    texts = [moments.get(entry, "") for entry in (*_ENTRIES, "ixy", "ixz", "iyz")]
+    places = [Decimal(text.strip()).as_tuple().exponent for text in texts if float(text)]  # a 0 is taken as exact
+    return _Inertial(fields, float(values[0]), 0.5 * math.hypot(*[10.0 ** int(place) for place in places]))
+
+
+def _negative(inertials: Mapping[str, _Inertial], *, by_digits: bool) -> list[str]:
+    """A sentence on links with negative moments: those that rounding to the file's digits makes of 0, or the others."""
+    least = {name: each for name, each in inertials.items() if each.least < 0.0}
+    chosen = [f"{name}: {each.least:.3g}" for name, each in least.items() if (-each.least <= each.digits) == by_digits]
+    return present({f"moments of inertia below 0 ({listed(chosen)} kg m^2)": chosen})
 
 
 def origin_of(element: Element, where: str) -> tuple[Array, Array]:
@@ -185,12 +219,12 @@ def _one(element: Element, where: str, tag: str) -> Element | None:
 
 
 def _numbers(element: Element, where: str, attribute: str, count: int, default: str | None = None) -> list[float]:
-    """The finite numbers of an attribute."""
+    """The finite numbers of an attribute, in ASCII; float() would also take 1_000 and digits of other scripts."""
     text = element.get(attribute, default)
     if text is None:
         raise MechanismError(f"{where}: <{element.tag}> has no {attribute}")
     try:
-        values = [float(each) for each in text.replace("_", "?").split()]  # float() would take 1_000
+        values = [float(each) for each in text.split()] if text.isascii() and "_" not in text else []
     except ValueError:
         values = []
     if len(values) != count or not all(map(math.isfinite, values)):

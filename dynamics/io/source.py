@@ -29,18 +29,27 @@ def path_of(source: Any) -> Path:
     if not isinstance(source, str | os.PathLike):
         raise MechanismError(f"a model is a path or XML text, and of MJCF an MjModel, too, got {type(source).__name__}")
     path = Path(source)
-    if path.is_dir():
+    try:
+        is_folder, is_file = path.is_dir(), path.is_file()
+    except OSError as error:  # such as a name that is too long, of a text that begins with no "<"
+        raise MechanismError(f"{os.fspath(source)!r:.200} cannot be read: {error.strerror}") from None
+    if is_folder:
         raise MechanismError(f"{os.fspath(source)!r:.200} is a folder, and a model is a file")
-    if not path.is_file():
+    if not is_file:
         raise MechanismError(f"there is no file {os.fspath(source)!r:.200}")
     return path
 
 
 def text_of(source: Any) -> bytes:
-    """The XML of a source, in the encoding that it declares."""
-    if is_text(source):
-        return str(source).lstrip(_BEFORE_XML).encode()
-    return path_of(source).read_bytes().removeprefix(b"\xef\xbb\xbf").lstrip()
+    """The XML of a source, in the encoding that it declares. Raises MechanismError."""
+    try:
+        if is_text(source):
+            return str(source).lstrip(_BEFORE_XML).encode()
+        return path_of(source).read_bytes().removeprefix(b"\xef\xbb\xbf").lstrip()
+    except UnicodeEncodeError as error:
+        raise MechanismError(f"{called(source)} is not XML: {error}") from None
+    except OSError as error:
+        raise MechanismError(f"{called(source)} cannot be read: {error.strerror}") from None
 
 
 def root_of(source: Any) -> str:

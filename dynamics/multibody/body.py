@@ -15,28 +15,16 @@ from cgraph import Node
 from cgraph.extend import check_name, is_finite
 
 from . import spatial
+from .errors import (
+    MechanismError as MechanismError,  # noqa: PLC0414 (who needs a body imports them from here)
+    MechanismWarning as MechanismWarning,  # noqa: PLC0414
+)
 from .joints import COMPOSITIONS, TYPES, JointType
 from .parameters import Quantities, Quantity, entries, evaluated, names_in, symbol, vanishes
 from .spatial import Array
 
 WORLD = "world"
 ROUNDING = 1e-9  # of the largest entry: what is left of an inertia or a rotation that came through text
-
-
-class MechanismError(ValueError):
-    """A mechanism that cannot be: which body, what was given, and what was needed."""
-
-
-class MechanismWarning(UserWarning):
-    """What a mechanism has not of the file that it was read from, or a body that cannot be, but can be calculated with.
-
-    Examples
-    --------
-    >>> import warnings
-    >>> import dynamics as dyn
-    >>> with warnings.catch_warnings():
-    ...     warnings.simplefilter("error", dyn.MechanismWarning)  # a model that lacks something is no model
-    """
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,7 +251,8 @@ def checked(body: Body) -> Body:
     if not isinstance(body.parent, str):
         raise MechanismError(f"{where}: parent must be the name of a body or {WORLD!r}, got {body.parent!r:.80}")
     mass, center = _mass(f"{where}: mass", body.mass), quantities(f"{where}: center", body.center)
-    beside = 0.0 if isinstance(mass, Node) or center.dtype == object else mass * float(center @ center)
+    with np.errstate(over="ignore"):
+        beside = 0.0 if isinstance(mass, Node) or center.dtype == object else mass * float(center @ center)
     inertia = _inertia(f"{where}: inertia", body.inertia, beside)
     return replace(body, mass=mass, center=center, inertia=inertia, joint=_checked_joint(where, joint))
 
@@ -279,7 +268,7 @@ def unit_axis(what: str, value: Any) -> Array:
 def _checked_joint(where: str, joint: Joint) -> Joint:
     if not isinstance(joint, Joint):
         raise MechanismError(f"{where}: joint must be of the type Joint, got {type(joint).__name__}: {joint!r:.60}")
-    if joint.name != "":
+    if not isinstance(joint.name, str) or joint.name:
         _check_name(f"the joint of {where}", joint.name)
     axis = unit_axis(f"{where}: axis", joint.axis)
     if joint.second_axis is not None:
@@ -323,17 +312,25 @@ def _inertia(what: str, given: Any, beside: float = 0.0) -> Array:
     inertia = np.where(np.eye(3, dtype=bool), inertia, 0.0) if diagonal else inertia
     if inertia.dtype == object:
         return inertia
-    scale = np.abs(inertia).max()
+    scale = float(np.abs(inertia).max())
+    if not math.isfinite(3.0 * scale + beside):
+        given = f"{scale:g} kg m^2 about its center and {beside:g} kg m^2 by that of its mass"
+        raise MechanismError(f"{what} about the joint is beyond float64, with {given}")
     if np.abs(inertia - inertia.T).max() > ROUNDING * scale:
         raise MechanismError(f"{what} must be symmetric")
     moments = np.linalg.eigvalsh(inertia)
-    rounding = ROUNDING * scale + spatial.SNAP * beside
+    rounding = moment_rounding(scale, beside)
     if moments[0] < -rounding:
         raise MechanismError(f"{what} must not be negative, its principal moments are {moments.tolist()}")
     if moments[2] > moments[0] + moments[1] + rounding:
         text = f"no body has principal moments {moments.tolist()}: the largest exceeds the sum of the others"
         warnings.warn(f"{what.removesuffix(': inertia')}: {text}", MechanismWarning, stacklevel=2)
     return 0.5 * (inertia + inertia.T)
+
+
+def moment_rounding(scale: float, beside: float) -> float:
+    """What counts as 0 of a principal moment, beside the largest entry and the inertia of the mass about the joint."""
+    return ROUNDING * scale + spatial.SNAP * beside
 
 
 BODY_QUANTITIES: dict[str, Callable[[str, Any], Any]] = {

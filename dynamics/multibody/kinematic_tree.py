@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -98,7 +99,7 @@ def _weld_at(joint: Joint, at: Array) -> Joint:
 
 def merge_fixed_bodies(bodies: Sequence[Body]) -> tuple[list[Body], dict[str, Carrier]]:
     """The bodies that move and what carries each body of all: a welded body's mass and children are its carrier's."""
-    with building(Builder()):
+    with building(Builder()), np.errstate(all="ignore"):  # `require_inertia` says what is beyond float64
         carriers = {WORLD: Carrier(WORLD, *_OWN)}
         merged: dict[str, Body] = {}
         for body in bodies:
@@ -146,11 +147,11 @@ def _has_parameters(body: Body) -> bool:
 def require_inertia(bodies: Sequence[Body]) -> tuple[Body, ...]:
     """The bodies, once each is seen to have inertia along its coordinate: its own, its armature's, or further out.
 
-    Masses further out are taken to move; where they lie on an axis in some state, M is singular there.
+    Masses further out are taken to move: whether they do, the equations of motion look at.
     """
     carries: set[str] = set()
     for body in reversed(bodies):
-        if not (body.name in carries or body.joint.armature or _resists(body)):
+        if not (body.name in carries or body.joint.armature or resists(body)):
             lacks = "no mass" if not body.mass else "no inertia about its axis"
             raise MechanismError(f"body {body.name!r} has {lacks}, carries no mass, and its joint has no armature")
         if body.name in carries or not (vanishes(body.mass) and vanishes(body.inertia)):
@@ -158,7 +159,15 @@ def require_inertia(bodies: Sequence[Body]) -> tuple[Body, ...]:
     return tuple(bodies)
 
 
-def _resists(body: Body) -> bool:
-    """Whether the body alone has inertia along its coordinate."""
-    mass, _, inertia = inertia_in(axes_of(body), body)
+def resists(body: Body) -> bool:
+    """Whether the body alone has inertia along all velocities of its joint.
+
+    Raises MechanismError for more than float64 has.
+    """
+    with np.errstate(all="ignore"):
+        mass, _, inertia = inertia_in(axes_of(body), body)
+    if not (math.isfinite(float(mass)) and np.isfinite(inertia).all()):
+        raise MechanismError(
+            f"body {body.name!r}: its inertia about the joint is beyond float64, with all welded to it"
+        )
     return body.joint.type.resists(float(mass), inertia)

@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 from cgraph import Node
 
+from ..equations.nearly_redundant_rows import without_nearly_redundant
+from ..systems.constraints import Constraints, LoopRow
 from .body import Body, MechanismError
 from .forward_kinematics import KinematicChain
 from .inertial_numbers import Link
@@ -44,6 +46,21 @@ def position_rows(
             phi = loop_rows(loop, *relative_placements(ends, moving, links, q))
         rows |= dict(zip(loop.rows, phi, strict=True))
     return rows
+
+
+def of_loops(constraints: Constraints, structure: Structure, moving: Sequence[Body]) -> Constraints:
+    """The constraints with what is known of the rows of loops, less those that nearly follow from others.
+
+    A coupling is exact: its row counts as it is.
+    """
+    constraints.turning = [unit == "rad/s" for body in moving for unit in body.joint.type.velocity_units]
+    constraints.loop_rows = {
+        name: LoopRow(loop.label, " about " in name.removeprefix(loop.label), loop.tolerance)
+        for loop in structure.loops
+        if loop.kind != "coupling"
+        for name in (*loop.rows, *loop.velocity_rows)
+    }
+    return without_nearly_redundant(constraints)
 
 
 def velocity_rows(structure: Structure, chain: Callable[[str], KinematicChain]) -> dict[str, Node]:

@@ -59,6 +59,10 @@ class Loop:
         Of a "coupling": c0, c1, .. of q = c0 + c1 q_to + c2 q_to^2 + ... [rad or m].
     name : str
         What its rows are called, by default "<body> to <to>".
+    tolerance : float
+        A row that nearly follows from the others, as those across the plane of a linkage whose axes are parallel but
+        for the rounding of a file, is left out with a warning, if no more of it is new than this, of the largest row
+        of the loop. 0 leaves out none.
 
     Raises
     ------
@@ -96,6 +100,7 @@ class Loop:
     length: float = 0.0
     coefficients: Sequence[float] = (0.0, 1.0)
     name: str = ""
+    tolerance: float = 2e-4
 
     def __post_init__(self) -> None:
         if not isinstance(self.kind, str) or self.kind not in ROWS:
@@ -135,6 +140,8 @@ def check_loop(loop: Loop, bodies: Mapping[str, Body]) -> None:
         for what in ("axis", "to_axis"):
             if not np.any(vector(f"{where}: {what}", getattr(loop, what))):
                 raise MechanismError(f"{where}: {what} must not be zero")
+    if not (is_finite(loop.tolerance) and 0.0 <= loop.tolerance < 1.0):
+        raise MechanismError(f"{where}: tolerance must be at least 0 and less than 1, got {loop.tolerance!r:.60}")
     if loop.kind == "weld":
         checked_rotation(f"{where}: orientation", loop.orientation)
     if loop.kind in ("distance", "rolling") and not (is_finite(loop.length) and loop.length > 0.0):

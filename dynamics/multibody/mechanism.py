@@ -25,8 +25,8 @@ from .inertial_numbers import Link
 from .joint_coordinates import coordinate_names, lengths, per_velocity, quasi_velocities, velocity_names
 from .joint_force import JointForce, add_joint_forces, check_any_force
 from .joint_positions import skeleton
-from .kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia
-from .loop_equations import check_loops, position_rows, velocity_rows
+from .kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia, resists
+from .loop_equations import check_loops, of_loops, position_rows, velocity_rows
 from .loops import Loop
 from .mechanism_fields import Structure, changed, listed
 from .mechanism_summary import summary
@@ -101,7 +101,7 @@ class Mechanism(Structure):
     def __post_init__(self) -> None:
         quantities("gravity", self.gravity)
         require_flag("base_parameters", self.base_parameters)
-        kinds = {"bodies": (Body,), "forces": (Force, JointForce), "loops": (Loop,)}
+        kinds = {"bodies": (Body,), "forces": (Force, JointForce), "loops": (Loop,), "left_out": (str,)}
         for what, allowed in kinds.items():  # kept, so that an iterator is read once
             object.__setattr__(self, what, listed(what, allowed, getattr(self, what)))
         self._check_parameters([part for body in self.bodies for part in self.shared.parts(body)])
@@ -188,13 +188,10 @@ class Mechanism(Structure):
 
     @cached_property
     def system(self) -> System:
-        """The Lagrangian system: one partial Lagrangian for each body, tagged with its name and energy.
-
-        Of forces it has the generalized forces, tagged with "force" and the body.
-        """
+        """The Lagrangian system: a partial Lagrangian for each body, tagged with name and energy; forces likewise."""
         if not self.moving:
             raise MechanismError("the mechanism has no joint that moves")
-        return BodySystem(
+        system = BodySystem(
             self._equations,
             lambda q, qd, t: self._equations.partial_lagrangians(q, qd),
             self.coordinates,
@@ -206,7 +203,10 @@ class Mechanism(Structure):
             velocity_constraints=lambda q, qd, t: velocity_rows(self, lambda body: self._chain(body, q, qd)),
             lengths=lengths(self._bound.moving),
             require_values=self._require_values,
+            surely_regular=all([bool(body.joint.armature) or resists(body) for body in self._bound.moving]),
         )
+        system.constraints = of_loops(system.constraints, self, self.moving)
+        return system
 
     def _require_values(self, values: Mapping[str, ArrayLike], bodies: Sequence[Body] | None = None) -> None:
         with outer_names(self.bodies):

@@ -91,7 +91,7 @@ def _in_space(
     linear: Triple,
     angular: Triple,
 ) -> tuple[Triple, Triple]:
-    """R^T a + 2 omega_parent x v_joint + a_joint, and R^T alpha + omega_parent x omega_joint, in the body's axes.
+    """R^T a + 2 omega_parent x v_joint + a_joint, R^T alpha + omega_parent x omega_joint + alpha_joint, in body axes.
 
     omega, linear, angular: of the parent, in the joint's axes.
     """
@@ -101,8 +101,8 @@ def _in_space(
         linear = spatial.plus(spatial.rotate_transpose(turn, linear), joint.linear_acceleration(q, u))
         linear = spatial.plus(linear, spatial.scaled(2.0, spatial.cross(omega, velocity)))
     with cg.tag(KINETIC):
-        turned = spatial.rotate_transpose(turn, angular)
-        return linear, spatial.plus(turned, spatial.cross(omega, joint.angular_velocity(q, u)))
+        angular = spatial.plus(spatial.rotate_transpose(turn, angular), joint.angular_acceleration(q, u))
+        return linear, spatial.plus(angular, spatial.cross(omega, joint.angular_velocity(q, u)))
 
 
 def _about_axis(

@@ -9,7 +9,7 @@ from typing import Any
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import real_number, require_flag, require_graph, require_mapping, require_sequence
+from cgraph.extend import check_name, real_number, require_flag, require_graph, require_mapping, require_sequence
 
 from ..equations.formulations import inverse_dynamics
 from ..systems.model import Model, as_system
@@ -198,7 +198,7 @@ def prune(
     (82, 12)
     """
     model = as_mechanism(model) or as_system(model)
-    kept = require_sequence("effects", effects, "names")
+    kept = require_sequence("effects", effects, "names", str)
     if not callable(equations) or isinstance(equations, type):
         raise TypeError(f"equations must be a function of a model, got {type(equations).__name__}: {equations!r:.60}")
     if unknown := [each for each in kept if each not in EFFECTS]:
@@ -219,7 +219,7 @@ def prune(
 def _mapping(what: str, given: Mapping[str, float] | None) -> dict[str, float]:
     """The numbers of a mapping by name; none for None."""
     chosen = {} if given is None else require_mapping(what, given, "name: number")
-    return {name: real_number(f"{what}: {name!r}", value) for name, value in chosen.items()}
+    return {check_name(what, name): real_number(f"{what}: {name!r}", value) for name, value in chosen.items()}
 
 
 def _regrouped(step: _Step) -> _Step | None:
@@ -254,7 +254,7 @@ def _steps(
     for name, value in values.items():
         take(f"input {name}", f"is {value:g}", values={**steps[-1].values, name: value})
     if outputs is not None:
-        outputs = [str(name) for name in require_sequence("outputs", outputs, "names")]
+        outputs = list(require_sequence("outputs", outputs, "names", str))
         take("other outputs", f"only {', '.join(outputs)} asked for", outputs=tuple(outputs))
     return steps
 

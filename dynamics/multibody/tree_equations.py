@@ -57,6 +57,12 @@ class TreeEquations:
         return self.shared.ground(ground(self.gravity, in_plane=in_plane))
 
     @cached_property
+    def _turning(self) -> bool:
+        """Whether the directions of all joints turn with their bodies, which closed forms take for granted."""
+        joints = {moving_type(body.joint.type) for body in self.bodies}
+        return all([isinstance(joint, AxialJoint) or joint.turns_with_body for joint in joints])
+
+    @cached_property
     def _links(self) -> tuple[list[Link], Array]:
         """The links, and the first moment of what of their inertia is the world's."""
         carriers = [self.bodies[i] if i >= 0 else None for i in self.parents]
@@ -97,8 +103,13 @@ class TreeEquations:
                     forces += newton_euler.bias_wrench(acceleration, moved.motion, link, joint, x, u)
         return forces
 
-    def momentum_rates(self, q: Sequence[Node], qd: Sequence[Node], p: Sequence[Node]) -> list[Node]:
-        """dp/dt without applied forces at velocities qd that belong to p, by composite momentum."""
+    def momentum_rates(self, q: Sequence[Node], qd: Sequence[Node], p: Sequence[Node]) -> list[Node] | None:
+        """dp/dt without applied forces at velocities qd that belong to p, by composite momentum.
+
+        None, as of the derivatives, where directions of a joint depend on its coordinates: they follow from L.
+        """
+        if not self._turning:
+            return None
         with building(Builder()):
             rows = list(zip(self.bodies, self._fewest, self._moved(q, qd), parts(self.bodies, q, qd), strict=True))
             composites: list[CompositeMomentum] = []
@@ -118,16 +129,20 @@ class TreeEquations:
                         composites[k] = composites[k].plus(carried)
         return rates
 
-    def torque_derivatives(self, state: MotionState, build: Builder) -> TorqueDerivatives:
+    def torque_derivatives(self, state: MotionState, build: Builder) -> TorqueDerivatives | None:
         """Of all bodies, with their springs."""
+        if not self._turning:
+            return None
         with building(build):
             up = newton_euler.base_acceleration(self.ground).linear
             return torque_derivatives(self.bodies, self.links, self.parents, up, state, build)
 
     def momentum_derivatives(
         self, q: Sequence[Node], qd: Sequence[Node], p: Sequence[Node], build: Builder
-    ) -> MomentumDerivatives:
+    ) -> MomentumDerivatives | None:
         """Of all bodies, with their springs."""
+        if not self._turning:
+            return None
         with building(build):
             up = newton_euler.base_acceleration(self.ground).linear
             return momentum_derivatives(self.bodies, self.links, self.parents, up, (q, qd), p, build)

@@ -152,7 +152,7 @@ class Ours(Peer):
         q, qd, tau = np.split(case.point(task), [n, 2 * n])
         rows, end, wrt = tau.reshape(PASSES, n), PASSES * DT, ["q", "qd", "tau", *numbers]
         return Contender(
-            lambda: gradient(model, _square, q, qd, t_end=end, tau=rows, wrt=wrt),
+            lambda: gradient(model, _square, q, qd, end, "rk4", tau=rows, wrt=wrt, estimate_error=False),
             lambda found: np.concatenate([np.ravel(found[name]) for name in wrt]),
         )
 

@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import cgraph as cg
-from cgraph import Graph, Node
+from cgraph import Edge, Graph, Node
 from cgraph.extend import PRIMAL, TANGENT, real_number
 
 from ..equations.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
 from ..equations.equations_of_motion import forward_dynamics
-from ..equations.formulations import inverse_dynamics, spurious_nodes
+from ..equations.formulations import inverse_dynamics
 from ..equations.hamiltonian import velocities
 from ..equations.legendre import is_quadratic
 from ..equations.node_classes import (
@@ -30,6 +30,7 @@ from ..equations.node_classes import (
 )
 from ..equations.state_equation import state_equation
 from ..equations.torque_decomposition import torque_by_link
+from ..equations.verdict import formulation_verdict
 from ..multibody.display_units import display_units
 from ..multibody.joint_positions import Skeleton, skeleton
 from ..simulation.simulate import simulate
@@ -55,6 +56,7 @@ class Equations(NamedTuple):
     """A graph of the equations.  about: what to see.  marked: spurious nodes.  steps: of an elimination.
 
     rows: {title: nodes} of the rows of the picture from the bottom; those of the sweeps where there are none.
+    blamed: edges by which what is spurious enters.  flawed: whether these are not the equations of the chain rule.
     """
 
     name: str
@@ -63,6 +65,8 @@ class Equations(NamedTuple):
     marked: frozenset[Node]
     steps: tuple[EliminationStep, ...] = ()
     rows: Mapping[str, Collection[Node]] = MappingProxyType({})
+    blamed: frozenset[Edge] = frozenset()
+    flawed: bool = False
 
 
 class Shares(NamedTuple):
@@ -146,7 +150,7 @@ def inspection(
         versions = []
         for name in FORMULATIONS:
             say(f"{scene.name}: deriving inverse dynamics, {name.replace('_', ' ')}")
-            versions.append(_version(system, name))
+            versions.append(_version(scene, name))
         derived, shares = _derived(system), _shares(scene)
     stopped = "" if run.stats.success else run.stats.message
     return _along(scene, run, versions, state | {"dt": DT}, derived, shares, stopped=stopped)
@@ -237,23 +241,21 @@ def _derived(system: System) -> Graph:
     return Graph([*system.q, *system.qd, *qdd, dt], old)
 
 
-def _version(system: System, name: str) -> Equations:
-    graph = inverse_dynamics(system, name)
-    wrong = spurious_nodes(graph)
-    if wrong:
+def _version(scene: Scene, name: str) -> Equations:
+    verdict = formulation_verdict(scene, name)
+    wrong, edges, about = verdict.nodes, verdict.edges, verdict.summary
+    if verdict.differs:
         through = "of the kinetic energy " if name == "kinetic_only" else ""
-        about = (
-            f"Look at what is vermillion: {len(wrong)} of {len(graph.nodes)} nodes. The velocity derivative {through}"
-            "was taken through q = qd dt + q_old, so it reached q as well, and a branch that does not belong there "
-            "runs into the torques. No smaller dt takes it away."
-        )
-    else:
-        about = f"No spurious branch: {len(graph.nodes)} nodes, and the torques that the motion takes."
-    if not wrong and system.constraints:
+        about += f" The velocity derivative {through}was taken through q = qd dt + q_old, so it reached q as well."
+        entries = f"the {len(edges)} edges" if len(edges) > 1 else "the edge"
+        nodes = f"{len(wrong)} of {len(verdict.graph.nodes)} nodes, and " if wrong else ""
+        about += f" Look at what is vermillion: {nodes}{entries} by which the surplus enters." if edges else ""
+        about += f" {verdict.lacking}" if verdict.missing else ""
+    elif scene.system.constraints:
         about += " Nothing drives the joints here: these torques are those of the constraints alone."
-    elif not wrong:
+    else:
         about += " Nothing drives the joints here, so the torques should be 0."
-    return Equations(name, graph, about, wrong)
+    return Equations(name, verdict.graph, about, wrong, blamed=edges, flawed=verdict.differs)
 
 
 def _named(**tables: Array) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import numpy as np
 from cgraph import Graph
 from cgraph.extend import or_nearest, real_array, real_number
 
-from ..equations.consistent_state import consistent_state
+from ..equations.consistent_state import nearest_state
 from ..equations.state_equation import state_equation
 from ..multibody.display_units import display_units
 from .scenes import Scene
@@ -108,7 +108,7 @@ def _nearby(scene: Scene) -> list[Scene]:
     across = tuple([step * (-1.0) ** i for i in range(len(scene.qd))])
     for qd in ((0.0,) * len(scene.qd), (step,) * len(scene.qd), across):
         try:
-            place, velocity = (q, qd) if scene.ode else consistent_state(scene, q, qd)
+            place, velocity = (q, qd) if scene.ode else nearest_state(scene, q, qd)
         except (ValueError, ArithmeticError):
             continue
         starts.append(replace(scene, q=tuple(map(float, place)), qd=tuple(map(float, velocity))))

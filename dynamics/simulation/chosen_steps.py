@@ -21,6 +21,8 @@ from .stepping import FIRST_PASSES, NativeIntegration
 
 ROUNDS = 4  # of a first step, by which the sizes of the states are known
 HALVINGS = 100  # of a look ahead
+FAR = 1e3  # tolerances of a step, by which constraints may move what it arrives at
+JUMP = 1e-2  # of the longest of the last steps: how much of it a jump may take, where atol is chosen by sizes
 HELD, SHARE = 100, 0.25  # steps at the stability limit, of all, from which on a run is called stiff
 
 
@@ -39,12 +41,12 @@ class AdaptiveIntegration(NativeIntegration):
         self.relative = max(options.relative, self.program.finest)
         self.absolute = np.broadcast_to(np.maximum(options.absolute, SMALLEST_ATOL), self.program.size)
         self.sizes = self._fresh_sizes() if options.atol is None else None
-        self._stiff = self._below_rounding = False
+        self._below_rounding = self._far = False
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
         options, end = self.options, self._hold(self.options.t0, x)
-        wanted = self._first_step(x)
+        wanted, longest = self._first_step(x)
         start: Mapping[str, float | Array | list[float]] = {
             "x": x,
             "p": self.parameters,
@@ -53,7 +55,10 @@ class AdaptiveIntegration(NativeIntegration):
             "rtol": self.relative,
             "atol": self.absolute,
             "next": wanted,
+            "longest": longest,
+            "jump": JUMP if self.sizes else 0.0,
             "max_step": options.longest_step,
+            "still": LEAP * options.length if self.program.timed else math.inf,
             "min_step": COLLAPSE * abs(options.t_end - options.t0),
             "fresh": 1.0,
             "error_old": 1e-4,
@@ -116,13 +121,20 @@ class AdaptiveIntegration(NativeIntegration):
     def _look(self, memory: Array, rows: Array) -> None:
         """Note once what a user should know of these steps: stiffness, and tolerances below rounding."""
         options, held = self.options, int(self._number(memory, "held"))
-        if held >= HELD and held >= SHARE * self.steps and not self._stiff:
-            self._stiff = True
+        if held >= HELD and held >= SHARE * self.steps and not self.stiff:
             t, h = rows[-1, :2]
-            self.warnings.append(
+            self.stiff = (
                 f"the system is stiff: at t = {t:.6g} s the step, {abs(h):.3g} s, is held at the stability limit of "
-                f"method {options.method!r}, not by its tolerance; try method='radau'"
+                f"method {options.method!r}, not by its tolerance"
             )
+            self.warnings.append(self.stiff)
+        if not self._far and "farthest" in self.program.steps.registers:
+            way, self._far = self._number(memory, "farthest"), self._number(memory, "farthest") > FAR
+            if self._far:
+                self.warnings.append(
+                    f"by t = {rows[-1, 0]:.6g} s the constraints moved the state by {way:.3g} times the tolerance of a "
+                    "step: near a position where it can go on in two ways the motion is not certain"
+                )
         if options.relative < self.relative and not self._below_rounding:
             size = np.abs(rows[:, 2 : 2 + self.program.size])
             short = (self.absolute + options.relative * size < self.relative * size).any(axis=0)
@@ -141,63 +153,74 @@ class AdaptiveIntegration(NativeIntegration):
             return f"{where}the rate of {first} is not finite{' at the start' if t == self.options.t0 else ''}"
         if reason := self.nonfinite(self.runner.read(memory, "x_new")):
             return f"{where}{reason}, however small"
-        fastest = self.components[int(np.argmax(np.abs(rate) / self._scale(x)))]
+        fastest = self.components[int(np.argmax(np.abs(rate) / self._scale(x, x)))]
         h = self._number(memory, "tried")
         return f"{where}the step, {h:.3g} s, is below the resolution of the time; fastest is {fastest}"
 
     def _rate(self, t: float, x: Array) -> Array:
         rate = self.program.rate
-        assert rate is not None
         values = dict(zip(rate.input_names, [*x.tolist(), t, *self.parameters], strict=True))
         return np.array(list(rate.evaluate(values).values()), dtype=np.float64)
 
     def _fresh_sizes(self) -> StateSizes:
         return StateSizes(self.relative, self.program.kinds, self.program.groups, SMALLEST_ATOL, self.program.lengths)
 
-    def _first_step(self, x: Array) -> float:
-        """The first step; where atol is chosen by the sizes of the states, those that it leads to."""
+    def _first_step(self, x: Array) -> tuple[float, float]:
+        """The first step, and how far ahead the sizes of the states were seen, where they choose atol."""
         options = self.options
-        if self.sizes is None and options.first_step is not None:
-            return options.first_step
-        if self.sizes is None and self.program.starts:
-            return options.length
+        if self.sizes is None and (options.first_step is not None or self.program.starts):
+            return options.first_step or options.length, 0.0
         start: dict[str, ArrayLike] = {"x": x, "p": self.parameters}
         rate = self._rate(options.t0, x)
         if self.sizes is None:
-            return first_step(self.runner, self.program.order, options, start, rate, self._scale(x))
+            return first_step(self.runner, self.program.order, options, start, rate, self._scale), 0.0
         given = options.first_step
         h = min(options.length, options.longest_step) * LEAP if given is None else given
         for _ in range(ROUNDS):
             self.sizes = self._fresh_sizes()
-            self.sizes.see(self._ahead(x, rate, h))
+            states, far = self._ahead(x, rate, h)
+            self.sizes.see(states)
             self.absolute = self.sizes.tolerance()
             if given is not None:
-                return given
-            before, h = h, first_step(self.runner, self.program.order, options, start, rate, self._scale(x))
+                return given, max(given, far)
+            before, h = h, first_step(self.runner, self.program.order, options, start, rate, self._scale)
             if h >= 0.5 * before:
                 break
-        return h
+        return h, max(h, far)
 
-    def _ahead(self, x: Array, rate: Array, h: float) -> Array:
-        """x, and where two of Euler's steps lead to, of h or of so much less that they can be trusted, (3, m).
+    def _ahead(self, x: Array, rate: Array, h: float) -> tuple[Array, float]:
+        """x and where Euler's steps lead to, (.., m), of h or of so much less that they can be trusted, and their size.
 
-        They move no kind of component by more than its size, and change no kind of rate by more than its size.
+        They move no kind of component by more than its size, and turn no kind of rate: it changes by no more than the
+        larger of before and after.
         """
-        assert self.sizes is not None
-        t0, sign = self.options.t0, math.copysign(1.0, self.options.t_end - self.options.t0)
-        largest = self.sizes.largest_of_kind
+        sign = math.copysign(1.0, self.options.t_end - self.options.t0)
         with np.errstate(all="ignore"):
             for _ in range(HALVINGS):
-                first = x + sign * h * rate
-                second = first + sign * h * self._rate(t0 + sign * h, first)
-                moves, turns = largest(second - x), largest(self._rate(t0 + 2.0 * sign * h, second) - rate)
-                at, fast = largest(x), largest(rate)
-                if ((moves <= at) | (at == 0.0)).all() and ((turns <= fast) | (fast == 0.0)).all():
-                    return np.stack([x, first, second])
+                if (states := self._euler(x, rate, sign * h)) is not None:
+                    return states, h
                 h *= 0.25
-        return x[None]
+        return x[None], h
 
-    def _scale(self, x: Array) -> Array:
-        """What an error is measured by."""
-        size: Array = self.absolute + self.relative * np.abs(x)
+    def _euler(self, x: Array, rate: Array, h: float) -> Array | None:
+        """x and two of Euler's steps, (.., m), or as many as move all that moves; None where they cannot be trusted.
+
+        At rest each step may move one component more, the next of a chain; the first moves none where a force begins
+        at 0.
+        """
+        assert self.sizes is not None
+        largest, states, moved = self.sizes.largest_of_kind, [x], [0, 0]
+        size = largest(x)
+        while len(states) < 3 or (moved[-1] < len(x) and moved[-1] > moved[-3]):
+            states.append(states[-1] + h * rate)
+            moved.append(int(np.count_nonzero(states[-1])))
+            before, rate = rate, self._rate(self.options.t0 + (len(states) - 1) * h, states[-1])
+            fast = np.maximum(largest(before), largest(rate))
+            if not (((largest(states[-1] - x) <= size) | (size == 0.0)) & (largest(rate - before) <= fast)).all():
+                return None
+        return np.stack(states)
+
+    def _scale(self, x: Array, x_new: Array) -> Array:
+        """What the error of a step is measured by."""
+        size: Array = self.absolute + self.relative * np.maximum(np.abs(x), np.abs(x_new))
         return size

@@ -12,6 +12,7 @@ import cgraph as cg
 from cgraph import Compiled, Graph
 from cgraph.extend import Array
 
+UNIT = 2.0**-53  # relative error of one rounding
 KEPT = 16  # compiled rates that stay for another block
 
 Indices = np.ndarray[Any, np.dtype[np.intp]]
@@ -63,6 +64,11 @@ class StepBlock(NamedTuple):
         columns = _with_times(self.normalization, between, self.times_at(rows, s))
         return _table(_tangent(self.normalization, self.x.shape[1]), np.concatenate([columns, total], axis=1))
 
+    def rounding(self, rows: Indices, t: Array, x: Array) -> tuple[Array, Array]:
+        """By how much states x (k, m) in these steps may be off, (k, m), and the times t (k,), for being rounded."""
+        x_error = np.abs(self.x_old[rows]) + np.abs(self.x[rows]) + np.abs(x)
+        return UNIT * x_error, UNIT * (np.abs(self.t_old[rows]) + np.abs(t))
+
     def part(self, which: slice) -> StepBlock:
         """Some of the steps."""
         dense = None if self.dense is None else self.dense[which]
@@ -106,11 +112,26 @@ def _compiled(rate: Graph) -> Compiled:
     return cg.compile(rate)
 
 
-def with_hermite(block: StepBlock, rate: Graph, parameters: Sequence[float] = ()) -> StepBlock:
-    """The steps with dense output where the method has none: the cubic through states and rates at both ends."""
-    f, p = _compiled(rate), np.tile(np.reshape(parameters, (-1, 1)), len(block.t))
-    first = f.batch(np.concatenate([block.x_old.T, block.t_old[None], p])).T
-    last = f.batch(np.concatenate([block.x.T, block.t[None], p])).T
-    h, change = block.h[:, None], block.x - block.x_old
-    dense = np.stack([h * first, 3 * change - h * (2 * first + last), h * (first + last) - 2 * change], axis=1)
-    return block._replace(dense=dense)
+def inside_nodes(order: int) -> Array:
+    """The shares of a step between its ends, (k,), whose states `with_hermite` needs for an error of h^(order + 1)."""
+    parts = max(1, order // 2)
+    return 0.5 - 0.5 * np.cos(np.pi * np.arange(1, parts) / parts)
+
+
+def with_hermite(block: StepBlock, rate: Graph, parameters: Sequence[float], inside: Array) -> StepBlock:
+    """The steps with dense output where the method has none: the polynomial through states and rates.
+
+    They are those at both ends, and inside, (k, T, m), at `inside_nodes`.
+    """
+    f, shares = _compiled(rate), np.concatenate([[0.0], inside_nodes(2 * len(inside) + 2), [1.0]])
+    states = np.stack([block.x_old, *inside, block.x])
+    times = block.t_old + shares[:, None] * block.h
+    times[-1] = block.t
+    p = np.tile(np.reshape(parameters, (-1, 1)), times.size)
+    rates = f.batch(np.concatenate([states.reshape(-1, states.shape[2]).T, times.reshape(1, -1), p])).T
+    slopes = block.h[:, None] * rates.reshape(states.shape)
+    powers = np.arange(1, 2 * len(shares))
+    matrix = np.concatenate([shares[1:, None] ** powers, powers * shares[:, None] ** (powers - 1)])
+    known = np.concatenate([states[1:] - states[0], slopes])
+    dense = np.linalg.solve(matrix, known.reshape(len(powers), -1)).reshape(len(powers), *block.x.shape)
+    return block._replace(dense=dense.swapaxes(0, 1))

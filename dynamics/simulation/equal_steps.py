@@ -1,13 +1,16 @@
-"""Equal steps: the stretches between instants that a run has to meet."""
+"""Equal steps: the stretches between instants that a run has to meet; and the longer or shorter ones of runs beside."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 SAME = 8.0  # units of the last bit of the time, by which instants that are meant to be the same may differ
+ENOUGH = 1.5  # times the longest of the steps that make up one twice as long
 
 
 class EqualSteps(NamedTuple):
@@ -31,3 +34,64 @@ def equal_steps(instants: Sequence[float], dt: float) -> list[EqualSteps]:
         count = step_count(end - begin, dt)
         result.append(EqualSteps(begin, (end - begin) / count, count, end))
     return result
+
+
+def halved(stretches: Iterable[EqualSteps]) -> list[EqualSteps]:
+    """Each step as two."""
+    return [part._replace(h=0.5 * part.h, steps=2 * part.steps) for part in stretches]
+
+
+def doubled(stretches: Sequence[EqualSteps]) -> list[EqualSteps]:
+    """Two steps as one; of shorter ones between close instants, as many as it takes."""
+    return _merged(_doubled(stretches))
+
+
+def _doubled(stretches: Sequence[EqualSteps]) -> Iterable[EqualSteps]:
+    at = begin = stretches[0].begin
+    longest = 0.0  # of the steps since `begin`, which are not one yet
+    for part in stretches:
+        done = 0
+        while done < part.steps:
+            pairs = (part.steps - done) // 2 if at == begin else 0
+            done += 2 * pairs or 1
+            at = part.end if done == part.steps else part.begin + done * part.h
+            longest = max(longest, abs(part.h))
+            if pairs:
+                yield EqualSteps(begin, 2.0 * part.h, pairs, at)
+            elif abs(at - begin) >= ENOUGH * longest:
+                yield EqualSteps(begin, at - begin, 1, at)
+            else:
+                continue
+            begin, longest = at, 0.0
+    if at != begin:
+        yield EqualSteps(begin, at - begin, 1, at)
+
+
+def _merged(stretches: Iterable[EqualSteps]) -> list[EqualSteps]:
+    """Stretches of the same step, but for rounding of the times, as one."""
+    result: list[EqualSteps] = []
+    for part in stretches:
+        if result and abs(part.h - result[-1].h) <= SAME * np.spacing(max(abs(part.begin), abs(part.end))):
+            before = result.pop()
+            steps = before.steps + part.steps
+            part = EqualSteps(before.begin, (part.end - before.begin) / steps, steps, part.end)
+        result.append(part)
+    return result
+
+
+def joined(t: float, stretches: Sequence[EqualSteps]) -> list[EqualSteps]:
+    """Steps from t on, of which one, of half a step to one and a half, ends where one of these does."""
+    begin, h = stretches[0][:2]
+    if (begin - t) / h > 0.5:
+        return [*equal_steps([t, begin], abs(h)), *stretches]
+    if t == begin:
+        return list(stretches)
+    for number, part in enumerate(stretches):
+        ahead = max(1, math.ceil((t - part.begin) / part.h + 0.5))
+        if ahead > part.steps and number < len(stretches) - 1:
+            continue
+        left = part.steps - ahead
+        at = part.end if left <= 0 else part.begin + ahead * part.h
+        rest = [EqualSteps(at, part.h, left, part.end)] if left > 0 else []
+        return [EqualSteps(t, at - t, 1, at), *rest, *stretches[number + 1 :]]
+    return []

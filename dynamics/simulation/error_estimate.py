@@ -1,146 +1,38 @@
-"""Error estimate of a run of equal steps: its difference from a second run, of steps twice as long (Richardson).
+"""Error estimate of runs of equal steps: their differences from runs beside them, of longer steps (Richardson).
 
-With an error that is e = C h^p along the run, x(2h) - x(h) = (2^p - 1) e; of steps that are not all equal, 2^p is the
-ratio of the sums of h^(p + 1). This is the error of the state, phase included, not that of the energy.
+With an error that is e = C h^p along the run, x(2h) - x(h) = (2^p - 1) e, and x(4h) - x(2h) is 2^p times as large; how
+much larger it is tells the order that the run has. Of steps that are not all equal, 2^p is the ratio of the sums of
+h^(p + 1). This is the error of the state, phase included, not that of the energy.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
+from cgraph import Graph
 from cgraph.extend import Array
 
-from .dense_output import Indices
+from .courses import LATE, SHARE, Course, Law, courses
 from .equal_steps import SAME, EqualSteps
 from .run_options import RunOptions
+from .state_difference import Difference, States, even, together
 from .state_sizes import StateSizes
-from .step_program import CompiledSteps, StepProgram
-from .stepping import FixedStepIntegration
+from .step_program import StepProgram
+from .unresolved import waves_and_branches
 
-ENOUGH = 1.5  # times the longest of the steps that make up one of the second run
-APART = 1.5  # the ratio of errors from which a difference of two runs tells them
+LEAST = 2.0  # times a difference that of steps twice as long is, at least, where the error has a law
 ROUNDING = 1e-10  # of the largest component of its kind: where one is that small, rounding is no error of it
 LAWLESS = 0.1  # of the size of a component: a difference above it follows no power of the step
-
-
-class SecondRun(NamedTuple):
-    """The steps of a second run, and by how much its error is larger than that of the first, or smaller."""
-
-    stretches: list[EqualSteps]
-    ratio: float
-
-
-def second_run(stretches: Sequence[EqualSteps], order: int, *, shorter: bool = False) -> SecondRun:
-    """Steps of about twice the length; where there are too few for that, of half.
-
-    shorter: of half, for every stretch has to end where it does.
-    """
-    if not shorter:
-        first = sum(part.steps * abs(part.h) ** (order + 1) for part in stretches)
-        longer = _merged(_doubled(stretches))
-        ratio = sum(part.steps * abs(part.h) ** (order + 1) for part in longer) / first
-        if ratio >= APART:
-            return SecondRun(longer, ratio)
-    halves = [part._replace(h=0.5 * part.h, steps=2 * part.steps) for part in stretches]
-    return SecondRun(halves, 0.5**order)
-
-
-def _doubled(stretches: Sequence[EqualSteps]) -> Iterable[EqualSteps]:
-    """Two steps become one; of shorter ones between close instants, as many as it takes."""
-    at = begin = stretches[0].begin
-    longest = 0.0  # of the steps since `begin`, which are not one yet
-    for part in stretches:
-        done = 0
-        while done < part.steps:
-            pairs = (part.steps - done) // 2 if at == begin else 0
-            done += 2 * pairs or 1
-            at = part.end if done == part.steps else part.begin + done * part.h
-            longest = max(longest, abs(part.h))
-            if pairs:
-                yield EqualSteps(begin, 2.0 * part.h, pairs, at)
-            elif abs(at - begin) >= ENOUGH * longest:
-                yield EqualSteps(begin, at - begin, 1, at)
-            else:
-                continue
-            begin, longest = at, 0.0
-    if at != begin:
-        yield EqualSteps(begin, at - begin, 1, at)
-
-
-def _merged(stretches: Iterable[EqualSteps]) -> list[EqualSteps]:
-    """Stretches of the same step, but for rounding of the times, as one."""
-    result: list[EqualSteps] = []
-    for part in stretches:
-        if result and abs(part.h - result[-1].h) <= SAME * np.spacing(max(abs(part.begin), abs(part.end))):
-            before = result.pop()
-            steps = before.steps + part.steps
-            part = EqualSteps(before.begin, (part.end - before.begin) / steps, steps, part.end)
-        result.append(part)
-    return result
-
-
-def matches(times: Array, others: Array) -> tuple[Indices, Indices]:
-    """Where two courses of time have the same instants but for rounding: indices into both. Both go the same way."""
-    direction = 1.0 if len(times) < 2 or times[-1] > times[0] else -1.0
-    near = np.searchsorted(direction * times, direction * others)
-    near = np.clip(near, 0, len(times) - 1)
-    before = np.maximum(near - 1, 0)
-    near = np.where(np.abs(times[before] - others) < np.abs(times[near] - others), before, near)
-    same = np.flatnonzero(np.abs(times[near] - others) <= SAME * np.spacing(np.abs(others)))
-    return near[same], same
-
-
-class Differences:
-    """Between the rows of k runs and their second runs, by component, as the second runs go on."""
-
-    def __init__(self, rows: Array, program: StepProgram) -> None:
-        """rows: (k, T, m) of the first runs."""
-        kinds = [0] * program.size if program.ordinary else program.kinds
-        self._kinds = StateSizes(0.0, kinds, program.groups, 0.0, program.lengths)
-        self.size = np.abs(rows).max(axis=1, initial=0.0)  # (k, m) of each component over the run
-        self.largest, self.last = np.zeros_like(self.size), np.zeros_like(self.size)
-        self.compared = 0  # instants
-
-    def seen(self, states: Array) -> None:
-        """States (k, r, m) that the second runs passed through between the rows: they tell the size."""
-        if states.shape[1]:
-            size = np.abs(states).max(axis=1)
-            self.size = np.where(np.isfinite(size), np.maximum(self.size, size), self.size)
-
-    def add(self, rows: Array, others: Array) -> None:
-        """The same instants of both, (k, r, m)."""
-        if rows.shape[1]:
-            self.compared += rows.shape[1]
-            change = others - rows
-            np.abs(change, out=change)
-            self.last = _or_infinite(change[:, -1])
-            self.largest = np.maximum(self.largest, _or_infinite(change.max(axis=1)))
-
-    @property
-    def scale(self) -> Array:
-        """What an error of each component is measured by, (k, m)."""
-        scale: Array = self.size + ROUNDING * self._kinds.largest_of_kind(self.size)
-        return scale
-
-    def errors(self, ratio: float) -> tuple[Array, Array]:
-        """Of each component, relative to its size: the largest and the last, (k, m) both."""
-        scale = self.scale
-        largest, last = (np.where(change > 0.0, change / scale, 0.0) for change in (self.largest, self.last))
-        return _by_law(largest, ratio), _by_law(last, ratio)
-
-
-def _or_infinite(change: Array) -> Array:
-    """The same, infinite in place of NaN."""
-    return np.where(np.isnan(change), math.inf, change)
-
-
-def _by_law(change: Array, ratio: float) -> Array:
-    errors: Array = np.where(change > LAWLESS, change, change / abs(ratio - 1.0))
-    return errors
+UNIT = 2.0**-52  # the last bit of a number near 1
+NUDGE = 8.0 * UNIT  # of each component, by which runs beside start aside: what roundings grow to is part of the error
+TOGETHER = 512  # states that are compared at once
+KINK = 16.0  # times an error of second order, as across a kink, that of steps four times as long is
+UNKNOWN = "the error is unknown"
 
 
 class ErrorEstimate(NamedTuple):
@@ -151,66 +43,204 @@ class ErrorEstimate(NamedTuple):
     warning: str  # where more was asked for
 
 
-def estimates(
-    differences: Differences, ratio: float, components: Sequence[str], options: RunOptions
-) -> list[ErrorEstimate]:
-    """Of each run, whether it is as good as it was asked to be; NaN where nothing could be compared."""
-    if not differences.compared:
-        return [ErrorEstimate(math.nan, math.nan, "")] * len(differences.size)
-    largest, last = differences.errors(ratio)
-    scale = differences.scale
-    beyond = ~(largest * scale <= options.absolute + options.relative * scale)
-    result = []
-    for k in range(len(scale)):
-        warning = ""
-        if beyond[k].any():
-            worst = int(np.argmax(np.where(beyond[k], largest[k], -1.0)))
-            off = f"{largest[k, worst]:.2g} of the size of {components[worst]}"
-            warning = _sentence(f"the state is off by an estimated {off}", options)
-        result.append(ErrorEstimate(float(largest[k].max()), float(last[k].max()), warning))
-    return result
+@dataclass
+class _Beside:
+    """A run beside: its course, its states as they come, and how far they have."""
+
+    course: Course
+    states: Iterator[States]
+    t: float
+    resets: int = 0
+    lost: bool = False
 
 
-def unknown(status: str, options: RunOptions) -> ErrorEstimate:
-    """Of a run whose second run did not get through."""
-    what = f"with steps of another length the run {status}: its error is unknown"
-    return ErrorEstimate(math.inf, math.inf, _sentence(what, options))
+Follow = Callable[[Course, Array, Array], Iterator[States]]
 
 
-def _sentence(what: str, options: RunOptions) -> str:
-    return (
-        f"{what}; rtol = {options.relative:g} allows less: take a dt shorter than {options.step:g} s, or "
-        "method='dop853', which chooses its steps"
-    )
+@dataclass
+class Estimator:
+    """The errors of k runs side by side, which are told their states as they come to them.
 
-
-def estimate(
-    run: FixedStepIntegration,
-    x: Array,
-    times: Array,
-    states: Array,
-    report: Callable[[float], None] = lambda t: None,
-    stopped: Callable[[], bool] = lambda: False,
-) -> ErrorEstimate:
-    """Of a run from x that came to these states.
-
-    report: is told the time [s] that the second run has come to.  stopped: see NativeIntegration.
+    p: values of the parameters, (k, ..).  follow: runs of a course from states x (k, m) with parameters p; they stop
+    after a reset, which is not compared, until the first run has had its own.
+    sparse: whether to look only where the longest steps end, which is where all do.
     """
-    options, program = run.options, run.program
-    control = None if run.control is None else run.control.replay()
-    second, ratio = second_run(run.stretches, program.order, shorter=control is not None)
-    compiled = CompiledSteps(program, run.runner)
-    other = FixedStepIntegration(compiled, options, run.parameters, stopped, control, every_step=True, stretches=second)
-    differences = Differences(states[None], program)
-    for block in other.blocks(x):
-        beyond = options.direction * (block.t - times[-1]) > 0.0
-        rows, same = matches(times, block.t)
-        if len(same) < len(block.t):
-            differences.seen(block.x[None, ~beyond])
-        differences.add(states[None, rows], block.x[None, same])
-        report(float(block.t[-1]))
-        if beyond.any():
-            break
-    if other.status:
-        return unknown(other.status, options)
-    return estimates(differences, ratio, run.components, options)[0]
+
+    program: StepProgram
+    options: RunOptions
+    p: Array
+    follow: Follow
+    sparse: bool
+    _beside: list[_Beside] = field(default_factory=list, init=False)
+    _differences: list[Difference] = field(default_factory=list, init=False)
+    _pending: list[States] = field(default_factory=list, init=False)
+
+    def __post_init__(self) -> None:
+        k, m = len(self.p), self.program.size
+        self._size, self._steps, self._law = np.zeros((k, m)), 0, Law(1.0, 1.0)
+        self._turning, self._longest = np.zeros(k), 0.0  # rad/s, of sines and cosines; s, of steps
+        self._bent = np.zeros(k, dtype=bool)  # whether a jump or a kink was passed
+        self._looked_at = waves_and_branches(self.program.rate)
+        self._end: States | None = None  # of what was compared
+        self._begun = self.options.t0  # the leg [s]
+
+    def begin(self, x: Array, stretches: Sequence[EqualSteps], *, shorter: bool = False) -> None:
+        """The runs start from x (k, m), on these steps."""
+        made, self._law = courses(stretches, self.program.order, shorter=shorter)
+        self._size, self._end = np.abs(x), States(np.array([self.options.t0]), x[:, None])
+        self._longest = max(abs(part.h) for part in stretches)
+        self._differences = [Difference(len(x), self.program.size, self.options.direction) for _ in made]
+        for course in made:
+            course.follow(stretches)
+            self._beside.append(_Beside(course, self.follow(course, x * (1.0 + NUDGE), self.p), self.options.t0))
+
+    @property
+    def longer(self) -> bool:
+        """Whether the runs beside have longer steps."""
+        return len(self._beside) > 1
+
+    def leg(self, stretches: Sequence[EqualSteps]) -> None:
+        """After a reset, the runs go on with these steps."""
+        lasted, self._begun = abs(stretches[0].begin - self._begun), stretches[0].begin
+        for beside in self._beside:
+            beside.course.follow(stretches, lasted)
+
+    def restart(self, x: Array, stretch: EqualSteps, p: Array) -> None:
+        """The runs are at x (k, m), at the start of a stretch with parameters p: errors of stretches add up."""
+        self._compare()
+        self.p = p
+        for beside, difference in zip(self._beside, self._differences, strict=True):
+            difference.restart()
+            beside.course.follow([stretch])
+            beside.states, beside.t = self.follow(beside.course, x, p), stretch.begin
+
+    def add(self, states: States) -> None:
+        """The next states of the runs."""
+        if self._pending and states.resets != self._pending[-1].resets:
+            self._compare()
+        self._pending.append(states)
+        self._steps += len(states.t)
+        if sum(len(each.t) for each in self._pending) >= TOGETHER:
+            self._compare()
+
+    def _compare(self) -> None:
+        """Bring the runs beside to where the first are, and note by how much they differ."""
+        states = together(self._pending, self._pending[0].resets) if self._pending else None
+        if states is None:
+            return
+        self._pending.clear()
+        end = float(states.t[-1])
+        if self.sparse and self.longer:
+            met = np.flatnonzero(self._beside[-1].course.meets(states.t))
+            states = States(states.t[met], states.x[:, even(met)], states.resets)
+        if len(states.t):
+            size = np.maximum(states.x.max(axis=1), -states.x.min(axis=1))
+            self._size = np.maximum(self._size, np.where(np.isfinite(size), size, 0.0))
+        if self._looked_at is not None:
+            self._look(self._looked_at, states)
+        self._differences[0].add(0, states)
+        for number, beside in enumerate(self._beside):
+            for each in self._until(beside, end, states.resets):
+                self._differences[number].add(1, each)
+                if number + 1 < len(self._differences):
+                    self._differences[number + 1].add(0, each)
+        for difference in self._differences:
+            difference.compare(states.resets)
+
+    def _look(self, graph: Graph, states: States) -> None:
+        """Note how fast sines and cosines turn, and where a jump or a kink is passed."""
+        t, x = states.t, states.x
+        if self._end is not None and self._end.resets == states.resets:
+            t, x = np.append(self._end.t, t), np.concatenate([self._end.x, x], axis=1)
+        if len(t) > 1:
+            columns = [*np.moveaxis(x, 2, 0), t, *self.p.T[:, :, None]]
+            values = graph.evaluate(dict(zip(graph.input_names, columns, strict=True)))
+            for name, value in values.items():
+                change = np.abs(np.diff(np.broadcast_to(value, x.shape[:2])))
+                if name.startswith("phase"):
+                    self._turning = np.maximum(self._turning, (change / np.abs(np.diff(t))).max(axis=1))
+                else:
+                    self._bent |= (change != 0.0).any(axis=1)
+        self._end = States(t[-1:], x[:, -1:], states.resets)
+
+    def _until(self, beside: _Beside, end: float, resets: int) -> Iterator[States]:
+        """What a run beside comes to until it is at `end` after so many resets, unless it takes another course."""
+        direction, rounding, course = self.options.direction, SAME * np.spacing(abs(end)), beside.course
+        while not beside.lost and beside.resets <= resets:
+            ahead = direction * (beside.t - end)
+            if ahead >= -rounding if beside.resets == resets else ahead > course.late:
+                beside.lost = beside.resets < resets
+                break
+            following = next(beside.states, None)
+            if following is None:
+                beside.lost = True
+                break
+            new, beside.t, beside.resets = following.resets > beside.resets, float(following.t[-1]), following.resets
+            if not new:
+                yield following
+        if beside.resets > resets:
+            late = max(LATE * course.longest, SHARE * abs(beside.t - self._begun))
+            beside.lost = beside.lost or direction * (end - beside.t) > late
+        if beside.lost:
+            for difference in self._differences[self._beside.index(beside) :]:
+                difference.lose(beside.t)
+
+    def estimates(self) -> list[ErrorEstimate]:
+        """Of each run, and whether it is as good as it was asked to be; NaN where nothing could be compared."""
+        self._compare()
+        first = self._differences[0]
+        if not first.compared and np.isnan(first.lost).all():
+            return [ErrorEstimate(math.nan, math.nan, "")] * len(self._size)
+        kinds = [0] * self.program.size if self.program.ordinary else self.program.kinds
+        sizes = StateSizes(0.0, kinds, self.program.groups, 0.0, self.program.lengths)
+        scale = self._size + ROUNDING * sizes.largest_of_kind(self._size)
+        least = UNIT * math.sqrt(self._steps)
+        largest, last = (
+            np.maximum(least, self._errors([np.where(change > 0.0, change / scale, 0.0) for change in changes]))
+            for changes in zip(*[(each.largest, each.last) for each in self._differences], strict=True)
+        )
+        resolved = math.pi * max(1.0, 0.5 * self.program.order) / self._longest  # rad/s: two evaluations in a turn
+        largest[self._turning > resolved] = last[self._turning > resolved] = math.inf
+        options = self.options
+        beyond = ~(largest * scale <= options.absolute + options.relative * scale)
+        result = []
+        for k in range(len(scale)):
+            said = ""
+            if self._turning[k] > resolved:
+                said = (
+                    f"{UNKNOWN}: a sine or cosine of the equations turns at {self._turning[k]:.3g} rad/s, and steps of "
+                    f"{self._longest:.3g} s by method {options.method!r} resolve {resolved:.3g} rad/s"
+                )
+            elif not math.isnan(first.lost[k]):
+                at = f"t = {first.lost[k]:.6g} s"
+                said = f"{UNKNOWN}: beside it a run of other steps stops, or takes another course, at {at}"
+            elif beyond[k].any():
+                worst = int(np.argmax(np.where(beyond[k], largest[k], -1.0)))
+                name = self.program.components[worst]
+                said = f"the state is off by an estimated {largest[k, worst]:.2g} of the size of {name}"
+            result.append(ErrorEstimate(float(largest[k].max()), float(last[k].max()), said and self._sentence(said)))
+        return result
+
+    def _errors(self, changes: Sequence[Array]) -> Array:
+        """Of each component, (k, m), from differences between the first run and the second, and that and the third.
+
+        The law of the method holds where these, in the largest, have the ratio that goes with it, and where they have a
+        lower one as of another order. Across a kink it depends on where in a step that is: no ratio tells.
+        """
+        first = changes[0]
+        if len(changes) == 1:
+            return first * self._law.share
+        (ratio, share), least = self._law, min(LEAST, self._law.ratio)
+        with np.errstate(all="ignore"):
+            measured = self._differences[1].largest / self._differences[0].largest
+        measured = np.where(np.isfinite(measured), np.clip(measured, least, ratio), least)
+        errors = np.where(first <= LAWLESS, first * share * (ratio - 1.0) / (measured - 1.0), first)
+        bent = np.maximum(first, np.where(changes[1] <= LAWLESS, changes[1] / KINK, 0.0))
+        return np.where(self._bent[:, None], bent, errors)
+
+    def _sentence(self, what: str) -> str:
+        options = self.options
+        return (
+            f"{what}; rtol = {options.relative:g} allows less: take a dt shorter than {options.step:g} s, or "
+            "method='dop853', which chooses its steps"
+        )

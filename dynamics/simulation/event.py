@@ -19,7 +19,10 @@ class Event:
 
     A quantity that touches zero and turns back counts too, with direction 0, where its extremum is zero to the rounding
     of its evaluation. One that stays zero for a while has one event, where it arrives; one that starts there has none
-    before it comes back. A jump by a reset is no crossing.
+    before it comes back, but for one with a reset and a direction, a contact: it happens there if it closes. Of events
+    at one instant those without a reset are first; then one reset follows another, the first in the list that is due
+    after the last: what is zero and moves in its direction. What another reset has turned back is not; contacts that
+    rest are, once another reset closes them. A jump by a reset is no crossing.
 
     Value and slope of the quantity are looked at sixteen times in each step, and as often more as it takes until the
     cubics between looks agree with them, at most 1024 times. Where that is too few, `Stats.warnings` says so: limit the
@@ -39,9 +42,10 @@ class Event:
     reset : callable, optional
         The state from which the run goes on, reset(q, qd, t) or reset(q, qd, t, p) -> (q, qd) as nodes or numbers; of
         an OdeSystem reset(x, t) or reset(x, t, p) -> x. Quaternions in q are brought to length 1. Both states are rows
-        of the trajectory, at the same instant; at a time of `t_eval`, the one before is. Of resets at one instant the
-        next takes what the one before left. Where they follow one another in no time, as the bounces of a ball that
-        comes to rest do, the run stops and says so.
+        of the trajectory, at the same instant, the first and the last of several resets there; at a time of `t_eval`,
+        the one before is. Where they follow one another in no time, as the bounces of a ball that comes to rest do, the
+        run stops and says so. Without a direction, a reset that starts at zero does not know its side: how it leaves
+        from there by itself resets nothing, and a warning says so.
 
     Raises
     ------

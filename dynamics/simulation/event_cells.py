@@ -10,7 +10,7 @@ import numpy as np
 from cgraph.extend import Array
 
 from .dense_output import Indices, StepBlock
-from .event_program import UNIT, WatchedEvent
+from .event_program import WatchedEvent
 
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
@@ -21,15 +21,18 @@ COARSER = 8.0  # than a neighbor a cell may not be: it would agree by chance
 SHORTEST = 2.0**-48  # of a step, a cell
 DECAY = 16.0  # of what a cubic misses, from a cell to its halves
 MARGIN = 12.0  # by which a cubic has to tell more than it misses
-ROUNDINGS = 8.0  # that the interpolation of a state may take
 
 
 class WatchedSteps(NamedTuple):
-    """Consecutive steps with dense output, and the quantity of an event along them: at rows (k,) and shares s (k,)."""
+    """Consecutive steps with dense output, and the quantity of an event along them: at rows (k,) and shares s (k,).
+
+    noise: what the rounding of the quantity is at least.
+    """
 
     event: WatchedEvent
     parameters: Sequence[float]
     block: StepBlock
+    noise: float = 0.0
 
     def values(self, rows: Indices, s: Array) -> Array:
         """(k,)."""
@@ -43,11 +46,8 @@ class WatchedSteps(NamedTuple):
 
     def rounding(self, rows: Indices, s: Array) -> Array:
         """What a value may be off by because numbers are rounded, (k,)."""
-        block = self.block
-        t, x = block.times_at(rows, s), block.states_at(rows, s)
-        x_error = UNIT * (np.abs(block.x_old[rows]) + np.abs(block.x[rows]) + np.abs(x))
-        t_error = UNIT * (np.abs(block.t_old[rows]) + np.abs(t))
-        return ROUNDINGS * self.event.error(t, x, self.parameters, x_error, t_error)
+        t, x = self.block.times_at(rows, s), self.block.states_at(rows, s)
+        return np.maximum(self.noise, self.event.error(t, x, self.parameters, *self.block.rounding(rows, t, x)))
 
 
 class Cells(NamedTuple):

@@ -21,21 +21,23 @@ PROBES = 0.5 ** np.arange(50, 0, -5)  # of a cell: how far from a zero the sign 
 
 
 class Crossing(NamedTuple):
-    """Where an event happens."""
+    """Where a quantity reaches zero."""
 
     row: int  # of the step
     s: float  # share of the step
-    rising: bool  # whether the quantity comes from below
+    side: float  # the sign with which it comes; 0 of one that has none, and leaves zero
     touching: bool  # whether it turns back
+    resting: bool = False  # whether it was at rest there, and leaves
 
 
 @dataclass
 class Side:
     """On which side of zero a quantity is, between one part of a run and the next.
 
-    sign: its last, 0 before it has one.  slope: at the end of the last step; NaN at a start.  left: of a run that
-    starts on zero, the sign with which the quantity leaves, 0 if unknown; NaN elsewhere.  waiting: whether it is zero
-    at the last instant, and what it does there is for the next step to tell.
+    sign: its last, 0 before it has one; of one at rest on zero, that of the side that it belongs to, if there is one.
+    slope: at the end of the last step; NaN at a start.  left: of a run that starts on zero, the sign with which the
+    quantity leaves, 0 as long as it rests there; NaN elsewhere.
+    waiting: whether it is zero at the last instant, and what it does there is for the next step to tell.
     """
 
     sign: float = 0.0
@@ -43,24 +45,23 @@ class Side:
     left: float = math.nan
     waiting: bool = False
 
-
-def start_side(steps: WatchedSteps) -> Side:
-    """At the start of these steps. A quantity that starts at zero, to rounding, has not passed through it."""
-    row, s = np.zeros(1, dtype=np.intp), np.zeros(1)
-    return Side(left=0.0 if np.abs(steps.values(row, s)) <= steps.rounding(row, s) else math.nan)
+    @property
+    def resting(self) -> bool:
+        """Whether the quantity has been zero, to rounding, since the start of the run or the last reset."""
+        return self.left == 0.0
 
 
 def crossings(steps: WatchedSteps, side: Side) -> tuple[list[Crossing], Flags]:
     """What happens in these steps, and in which (steps,) more may have happened; moves `side` on.
 
     A quantity crosses zero where its sign turns, and touches it where an extremum is zero to the rounding of its
-    evaluation. One that stays zero does so from where it arrives.
+    evaluation. One that stays zero does so from where it arrives; one that rests there, and leaves to the other side
+    than its own, crosses zero where it leaves.
     """
     cells, beyond = event_cells(steps)
     _join(cells, side)
-    chain, event = _Chain(steps, cells, side), steps.event
-    found = [*chain.at_signs(side), *chain.at_extrema()]
-    return [one for one in found if (event.direction == 0 if one.touching else event.counts(one.rising))], beyond
+    chain = _Chain(steps, cells, side)
+    return [*chain.at_signs(side), *chain.at_extrema()], beyond
 
 
 def _join(cells: Cells, side: Side) -> None:
@@ -85,28 +86,26 @@ class _Chain:
         g = np.concatenate([cells.g_a[:1], cells.g_b])
         self.exact = g == 0.0
         signs = np.nan_to_num(np.sign(g))
-        self.zero = self._zeros(g, np.concatenate([[side.sign], signs]))
-        if not math.isnan(side.left):
-            self.zero[0] = True
+        self.zero = self._zeros(g, np.concatenate([[side.sign], signs]), start=not math.isnan(side.left))
         looks = np.flatnonzero(self.zero)
         before, after = signs.copy(), signs.copy()
         before[looks], after[looks] = self._beside(looks, -1), self._beside(looks, 1)
         if side.left and not math.isnan(side.left):
-            after[0] = side.left
-        side.left = math.nan
+            after[0], side.left = side.left, math.nan
         # [sign before look 0, start of cell 0, its end, start of cell 1, ..]: even entries stand before their look
         self.signs = np.empty(2 * len(cells.a) + 1)
         self.signs[0] = side.sign
         self.signs[1::2], self.signs[2::2] = after[:-1], before[1:]
 
-    def _zeros(self, g: Array, signs: Array) -> Flags:
+    def _zeros(self, g: Array, signs: Array, *, start: bool) -> Flags:
         """Which looks are at zero: exactly, or, beside a change of sign or such a look, to rounding.
 
-        signs: from the side before the first look on.
+        signs: from the side before the first look on.  start: whether the first look is.
         """
         zero: Flags = g == 0.0
-        tested = np.zeros(len(g), dtype=bool)
-        beside = np.flatnonzero(signs[:-1] * signs[1:] < 0.0)
+        zero[0] |= start
+        tested, seeds = np.zeros(len(g), dtype=bool), np.flatnonzero(zero)
+        beside = np.concatenate([np.flatnonzero(signs[:-1] * signs[1:] < 0.0), seeds, seeds + 1])
         while True:
             looks = np.unique(np.concatenate([beside - 1, beside]))
             looks = looks[(looks >= 0) & (looks < len(g))]
@@ -139,8 +138,22 @@ class _Chain:
         """Where signs turn, and where a quantity that was zero at a look goes back to where it came from."""
         signs = self.signs
         known = np.flatnonzero(signs)
+        if side.resting:
+            return self._after_rest(side, known[known > 0])
+        return self._turns(side, known) if len(known) else []
+
+    def _after_rest(self, side: Side, known: Indices) -> list[Crossing]:
+        """Where a quantity at rest on zero leaves to a side that is not its own, and what it does then."""
         if not len(known):
             return []
+        side.left, last = math.nan, (int(known[0]) - 1) // 2  # look at which it is zero
+        leaves = Crossing(int(self.rows[last]), float(self.shares[last]), side.sign, touching=False, resting=True)
+        own = side.sign == self.signs[known[0]]
+        return [*([] if own else [leaves]), *self._turns(side, known)]
+
+    def _turns(self, side: Side, known: Indices) -> list[Crossing]:
+        """The same from entries with signs alone."""
+        signs = self.signs
         i, j, last = known[:-1], known[1:], int(known[-1])
         at_zero = (i % 2 == 0) & self.zero[i // 2]
         pairs = np.flatnonzero((signs[i] != signs[j]) | (j > i + 1) | at_zero)
@@ -179,7 +192,7 @@ class _Chain:
 
             if toward(low[:, None])[0, 0] and not toward(high[:, None])[0, 0]:
                 s = _turn(toward, low, high)[0]
-        return Crossing(int(row[0]), float(s[0]), sign < 0.0, touching=True)
+        return Crossing(int(row[0]), float(s[0]), sign, touching=True)
 
     def _arrivals(self, entries: Indices) -> list[Crossing]:
         """Where the quantity first is not of the sign that it has at these entries."""
@@ -189,7 +202,7 @@ class _Chain:
         cells, rows[inside] = self.cells.take(looks[inside]), self.cells.rows[looks[inside]]
         s[inside] = self._turn(cells.rows, cells.a, cells.b, signs[inside])
         places = zip(rows.tolist(), s.tolist(), signs.tolist(), strict=True)
-        return [Crossing(row, share, sign < 0.0, touching=False) for row, share, sign in places]
+        return [Crossing(row, share, sign, touching=False) for row, share, sign in places]
 
     def _turn(self, rows: Indices, low: Array, high: Array, signs: Array) -> Array:
         """The first shares, to the last bit, at which the quantity has not these signs, which it has at `low`."""
@@ -217,12 +230,12 @@ class _Chain:
         through = (value * signs < 0.0) & ~touching
         out, back = self._turn(rows, few.a, s, signs), self._turn(rows, s, few.b, -signs)
         for k in np.flatnonzero(touching | through).tolist():
-            below, row = bool(signs[k] < 0.0), int(rows[k])
+            row, side = int(rows[k]), float(signs[k])
             if touching[k]:
-                yield Crossing(row, float(s[k]), below, touching=True)
+                yield Crossing(row, float(s[k]), side, touching=True)
             else:
-                yield Crossing(row, float(out[k]), below, touching=False)
-                yield Crossing(row, float(back[k]), not below, touching=False)
+                yield Crossing(row, float(out[k]), side, touching=False)
+                yield Crossing(row, float(back[k]), -side, touching=False)
 
 
 def _turn(same: Callable[[Array], Flags], low: Array, high: Array) -> tuple[Array, Array]:

@@ -15,9 +15,10 @@ from cgraph.extend import Array, Builder, building, columns, topological
 from ..equations.substitute import substitute
 from ..integrators import Problem, quantity, quantity_inputs, state_arguments
 from ..systems.arguments import call_user_function, node_or_number, sequence
+from .dense_output import UNIT
 from .event import Event
 
-UNIT = 2.0**-53  # relative error of one rounding
+ROUNDINGS = 8.0  # that the interpolation of a state, and the sum of a motion, may take
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,9 +37,9 @@ class WatchedEvent:
     errors: Graph
     reset: Graph | None
 
-    def counts(self, rising: bool) -> bool:
-        """Whether a crossing in this direction is one of the event."""
-        return self.direction in (0, 1 if rising else -1)
+    def counts(self, side: float, *, touching: bool = False) -> bool:
+        """Whether a crossing from a side, a sign, or a touch, is one of the event."""
+        return self.direction == 0 or (self.direction * side < 0.0 and not touching)
 
     def value(self, t: Array, x: Array, p: Sequence[float]) -> Array:
         """g, (k,), at times (k,) and states (k, m)."""
@@ -51,9 +52,9 @@ class WatchedEvent:
         return g
 
     def error(self, t: Array, x: Array, p: Sequence[float], x_error: Array, t_error: Array) -> Array:
-        """A bound of the rounding error of g, (k,), where x and t are off by x_error (k, m) and t_error (k,)."""
+        """What g is off by, (k,), from some roundings, where x and t are off by x_error (k, m) and t_error (k,)."""
         g: Array = _table(self.errors, [*x.T, t, *p, *x_error.T, t_error], len(t))[0]
-        return g
+        return ROUNDINGS * g
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,10 +66,28 @@ class EventProgram:
     rate: Graph
     velocities: Graph | None
 
-    def motion(self, number: int, t: float, x: Array, p: Sequence[float]) -> float:
-        """The derivative of the quantity of an event by the time along the motion."""
-        x_dot = _table(self.rate, [*x, t, *p], 1).T
-        return float(self.events[number].slope(np.array([t]), x[None], p, x_dot, np.ones(1))[0])
+    def motions(
+        self,
+        which: np.ndarray[Any, np.dtype[np.bool_]],
+        t: Array,
+        x: Array,
+        p: Sequence[float],
+        fastest: Array,
+        off: float,
+    ) -> Array:
+        """The derivatives of quantities by the time (1,) at one state (1, m); 0 of others, and where they are rounding.
+
+        fastest: the largest rates of the states so far, (1, m), which are moved on.  off: what of these is rounding.
+        """
+        x_dot = _table(self.rate, [*x.T, t, *p], 1).T
+        np.fmax(fastest, np.abs(x_dot), out=fastest, where=np.isfinite(x_dot))
+        motions, none = np.zeros(len(self.events)), np.zeros_like(x)
+        for number in np.flatnonzero(which):
+            event = self.events[number]
+            motion = event.slope(t, x, p, x_dot, np.ones(1))
+            most = event.error(t, x, p, fastest, np.ones(1)) - event.error(t, x, p, none, np.zeros(1))
+            motions[number] = np.where(np.abs(motion) <= off * most, 0.0, motion)[0]
+        return motions
 
     def reset(self, number: int, t: float, x: Array, p: Sequence[float]) -> Array:
         """The state (m,) after an event; the same where it resets nothing."""

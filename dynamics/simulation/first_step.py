@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +20,12 @@ HUGE = 1e300  # a tolerance that anything meets
 
 
 def first_step(
-    runner: Runner, order: int, options: RunOptions, start: Mapping[str, ArrayLike], rate: Array, scale: Array
+    runner: Runner,
+    order: int,
+    options: RunOptions,
+    start: Mapping[str, ArrayLike],
+    rate: Array,
+    scale: Callable[[Array, Array], Array],
 ) -> float:
     """A step that two half steps confirm, their difference is within the tolerance, and the first rate, too.
 
@@ -28,7 +33,8 @@ def first_step(
     derivatives can be far off; halving cannot be fooled by either. Of an initial layer that a method damps, both the
     whole and the half steps keep nothing: there the first rate points much farther than the step goes.
 
-    start: registers x and p.  rate, scale: (m,), of the state at the start.
+    start: registers x and p.  rate: (m,), of the state at the start.  scale: what errors from x to x_new are measured
+    by, (m,).
     """
     span, x = options.t_end - options.t0, np.asarray(start["x"])
     anything = {"rtol": HUGE, "atol": HUGE, "max_step": math.inf, "fresh": 1.0, "accepted": 1.0}
@@ -39,9 +45,10 @@ def first_step(
     for _ in range(TRIALS):
         with np.errstate(all="ignore"):
             whole = _forced(runner, memory, [h])
-            change = (whole - _forced(runner, memory, [0.5 * h, 0.5 * h])) / scale
+            size = scale(x, whole)
+            change = (whole - _forced(runner, memory, [0.5 * h, 0.5 * h])) / size
             difference = float(np.sqrt(np.mean(change * change)))
-            ahead = float(np.max(h * np.abs(rate) / np.maximum(np.abs(whole - x), scale)))
+            ahead = float(np.max(h * np.abs(rate) / np.maximum(np.abs(whole - x), size)))
         if (difference <= 1.0 and ahead <= AHEAD) or h <= least:
             break
         # of tolerances; below a rounding, as of a state that moves evenly, it does not limit the step

@@ -1,14 +1,41 @@
-"""The integration of a compiled program of steps, equal or chosen ones."""
+"""The integration of a problem by a method, and of a compiled program of steps, equal or chosen ones."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
+from ..integrators import METHODS, Problem
 from .chosen_steps import AdaptiveIntegration
+from .event_log import EventLog
+from .event_program import EventProgram
 from .run_options import RunOptions
 from .sampled_controller import Hold
-from .step_program import CompiledSteps
-from .stepping import FixedStepIntegration, NativeIntegration
+from .scipy_solvers import ScipyIntegration, scipy_solver
+from .step_program import CompiledSteps, compile_steps, step_program
+from .stepping import FixedStepIntegration, Integration, NativeIntegration
+from .watched import WatchedIntegration
+
+
+def integration_of(
+    problem: Problem,
+    options: RunOptions,
+    parameters: Sequence[float] = (),
+    hold: Hold | None = None,
+    *,
+    events: EventProgram | None,
+    between: bool,
+) -> Integration:
+    """A run of a problem, before its first step. between: with all steps, and the dense output of chosen ones."""
+    leg: Callable[[RunOptions], Integration]
+    if (name := options.scipy_solver) is not None:
+        leg = partial(ScipyIntegration, scipy_solver(problem, name, options.backend), between=between)
+    else:
+        method = METHODS[options.method]
+        program = step_program(problem, method, dense=method.adaptive and (between or options.times is not None))
+        compiled = compile_steps(program, options.backend)
+        leg = partial(integration, compiled, parameters=parameters, control=hold, every_step=between)
+    return leg(options) if events is None else WatchedIntegration(leg, options, EventLog(events))
 
 
 def integration(
@@ -23,5 +50,5 @@ def integration(
     """A run, before its first step.  every_step: of equal steps, keep those between times of t_eval too."""
     if compiled.program.adaptive:
         return AdaptiveIntegration(compiled, options, parameters, stopped, control)
-    every_step = every_step or options.times is None
+    every_step = every_step or options.times is None or options.estimated
     return FixedStepIntegration(compiled, options, parameters, stopped, control, every_step=every_step)

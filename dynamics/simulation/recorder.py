@@ -12,16 +12,14 @@ from .dense_output import StepBlock
 class Recorder:
     """The rows of a trajectory that starts with x at t0: every step, or the states at `times`.
 
-    direction: 1.0, or -1.0 for a run back in time, whose times decrease.  ends: of how many last steps the end is kept
-    besides.
+    direction: 1.0, or -1.0 for a run back in time, whose times decrease.
     """
 
-    def __init__(self, x: Array, times: Array | None, t0: float = 0.0, direction: float = 1.0, ends: int = 1) -> None:
+    def __init__(self, x: Array, times: Array | None, t0: float = 0.0, direction: float = 1.0) -> None:
         self.times, self.direction = times, direction
         self.last, self._last_state = t0, x  # how far the run has come [s]
         at_start = int(times is None or times[0] == t0)
         self._parts = [(np.full(at_start, t0), np.tile(x, (at_start, 1)))]  # times and states
-        self._ends = [(np.empty(0), np.empty((0, len(x))))] * ends  # of the last steps
         self._next = at_start  # of `times`
         self.size = 0  # bytes
 
@@ -42,9 +40,6 @@ class Recorder:
                 inside = rows[~exact]
                 states[~exact] = block.states_at(inside, (times[~exact] - block.t_old[inside]) / block.h[inside])
             self._append(times, states)
-        kept = len(self._ends)
-        ends = [(t[None].copy(), x[None].copy()) for t, x in zip(block.t[-kept:], block.x[-kept:], strict=True)]
-        self._ends = [*self._ends, *ends][-kept:]
         self._next, self.last, self._last_state = following, last, block.x[-1].copy()
 
     def add_last(self) -> None:
@@ -56,12 +51,6 @@ class Recorder:
     def _append(self, times: Array, states: Array) -> None:
         self._parts.append((times, states))
         self.size += times.nbytes + states.nbytes
-
-    def checkpoints(self) -> tuple[Array, Array]:
-        """The rows, and the ends of the last steps: times (k,) and states (k, m)."""
-        times, states = (np.concatenate(part) for part in zip(*self._parts, *self._ends, strict=True))
-        order = np.unique(self.direction * times, return_index=True)[1]
-        return times[order], states[order]
 
     def table(self) -> tuple[Array, Array]:
         """Times (T,) and states (T, m)."""

@@ -45,8 +45,9 @@ class RunOptions:
     rtol, atol : float, float or array_like, optional
         The error of a chosen step, relative to each component of the state, and absolute: one number for all, or (m,),
         one for each of q and then qd. By default 1e-9, and for atol rtol times the largest value that the
-        component has had so far, or a millionth of the largest coordinate or velocity, in whatever unit: of a mechanism
-        an angle counts as the way that it moves its bodies by. All entries of a quaternion are as large as 1. For
+        component has had so far, or a ten-thousandth of the largest coordinate or velocity, in whatever unit: of a
+        mechanism an angle counts as the way that it moves its bodies by. All entries of a quaternion are as large as 1.
+        A jump of a force in time is passed then, as well as a hundredth of the longest of the last steps allows. For
         SciPy's solvers 1e-10, and a warning where that is more than 1e-4 of the largest component of a kind. Of equal
         steps the estimated error that is no cause of a warning, relative to the largest of a component over
         the run; 1e-3 and 0 by default.
@@ -64,7 +65,7 @@ class RunOptions:
     t0 : float
         Where the run starts [s].
     estimate_error : bool, optional
-        Whether a second run of other steps estimates the error of equal steps; by default it does.
+        Whether runs of other steps beside it estimate the error of equal steps; by default they do.
 
     Raises
     ------
@@ -157,7 +158,7 @@ class RunOptions:
 
     @property
     def estimated(self) -> bool:
-        """Whether a second run estimates the error."""
+        """Whether runs beside it estimate the error."""
         return not self.adaptive and self.estimate_error is not False
 
     @property

@@ -102,18 +102,9 @@ class Hold:
         self.controller, self.velocities, self.nq, self.t0, self.observed = controller, velocities, nq, t0, observed
         self.times: list[float] = []
         self.forces: list[list[float]] = []
-        self._replayed: HeldForces | None = None
-
-    def replay(self) -> Hold:
-        """The same forces at the same times, for another run."""
-        other = Hold(self.controller, self.velocities, self.nq, self.t0)  # which no controller sees
-        other._replayed = self.held
-        return other
 
     def at(self, t: float, x: Array) -> list[float]:
         """The forces from t on, (n,); x: the state, (m,)."""
-        if self._replayed is not None:
-            return list(self._replayed.at(np.array([t]))[0].tolist())
         if t >= self._start(len(self.times)) - _rounding(t):
             self.forces.append(self._called(t, x))
             self.times.append(t)

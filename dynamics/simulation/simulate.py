@@ -6,6 +6,7 @@ import math
 import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,30 +16,26 @@ from cgraph import Graph
 from cgraph.extend import Array, require_flag
 
 from ..equations.initial_value import initial_value
-from ..integrators import METHODS, Problem, derive, force, in_form, total_energy
+from ..integrators import Problem, derive, force, in_form, total_energy
 from ..systems.model import Model
+from .advice import advise
 from .applied_forces import Applied, Tau, with_applied
-from .dense_output import StepBlock, with_hermite
-from .error_estimate import ErrorEstimate, estimate
+from .dense_output import StepBlock
+from .error_estimate import ErrorEstimate
 from .event import Event, as_events
-from .event_log import EventLog
 from .event_program import event_program
 from .free_memory import room
-from .integration import integration
+from .integration import integration_of
 from .missed_momenta import missed_momenta
 from .progress_bar import Progress
 from .recorder import Recorder
 from .row_values import converted, row_values
+from .run_estimate import RunEstimate
 from .run_options import METHOD, TABLES, RunOptions, time_span
-from .sampled_controller import HeldForces, Hold
-from .scipy_solvers import ScipyIntegration, scipy_solver
+from .sampled_controller import HeldForces
 from .solution import Solution
-from .step_program import compile_steps, step_program
-from .stepping import FixedStepIntegration, Integration
+from .stepping import Integration
 from .trajectory import SimulationWarning, Stats, Trajectory
-from .watched import WatchedIntegration
-
-ENDS = (1, 3)  # rows that are kept at the end: an event cuts the last step, and of the others one in two is compared
 
 
 def simulate(
@@ -69,8 +66,8 @@ def simulate(
     """The motion of a system from (q, qd) at t0 to t_end.
 
     A step whose state is not finite, or that has to be smaller than the resolution of t, ends the run: the trajectory
-    keeps what was computed before it, the state where it stopped is its last row, and `stats.message` names the time
-    and the coordinate. Ctrl-C does the same.
+    keeps what was computed before it, the state where it stopped is its last row, and `stats.message` and a
+    `SimulationWarning` name the time and the coordinate. Ctrl-C does the same, without a warning.
 
     Parameters
     ----------
@@ -100,8 +97,9 @@ def simulate(
     rtol, atol : float, float or array_like, optional
         The error of a chosen step, relative to each component of the state, and absolute: one number for all, or (m,),
         one for each of q and then qd. By default 1e-9, and for atol rtol times the largest value that the
-        component has had so far, or a millionth of the largest coordinate or velocity, in whatever unit: of a mechanism
-        an angle counts as the way that it moves its bodies by. All entries of a quaternion are as large as 1. For
+        component has had so far, or a ten-thousandth of the largest coordinate or velocity, in whatever unit: of a
+        mechanism an angle counts as the way that it moves its bodies by. All entries of a quaternion are as large as 1.
+        A jump of a force in time is passed then, as well as a hundredth of the longest of the last steps allows. For
         SciPy's solvers 1e-10, and a warning where that is more than 1e-4 of the largest component of a kind. Of equal
         steps the estimated error that is no cause of a warning, relative to the largest of a component over
         the run; 1e-3 and 0 by default.
@@ -117,7 +115,7 @@ def simulate(
         Applied force [N m or N]: constant, for all velocities or for each, (n,); or a controller. One in closed form is
         a function (q, qd, t) or (q, qd, t, p) to a node or number for each velocity, which is compiled into the steps,
         see `with_controller`. A `SampledController` calls a Python function of numbers once in a period; equal steps
-        then have their error estimated by steps of half the length, with the same forces.
+        then have their error estimated by steps of half the length, period by period.
     parameters : mapping, optional
         {name: value} in place of the model's own, and of those that a controller in closed form has besides.
     first_step : float, optional
@@ -125,8 +123,8 @@ def simulate(
     max_steps : float
         Steps after which the run stops.
     estimate_error : bool, optional
-        Of equal steps, whether a second run of steps twice as long estimates their error (`Stats.error`), which takes
-        half as long again; by default it does. The rows are the same without.
+        Of equal steps, whether runs beside, of steps two and four times as long, estimate their error
+        (`Stats.error`), which takes three quarters as long again; by default they do. The rows are the same without.
     backend : str
         "llvm", "python", or "auto" for machine code where llvmlite is installed; the steps are the same.
     progress : bool, optional
@@ -171,51 +169,41 @@ def simulate(
     # Derive the equations, xdot = f(x, t), the energy and the events as graphs; x is (q, qd), or in `stepped` (q, p)
     problem = derive(model, applied.bound(start.bound))
     stepped = in_form(problem, form)
-    energy, log = total_energy(problem), EventLog(event_program(stepped, watched)) if watched else None
+    energy, program = total_energy(problem), event_program(stepped, watched) if watched else None
     hold = applied.hold(options, stepped)
 
     # Write the steps of the method over these graphs, and compile them
-    leg = _compiled(stepped, options, hold, between=bool(watched) or dense_output)
-    x = converted(stepped.momentum, np.array([t0]), start.x[np.newaxis])[0]
+    made = partial(integration_of, stepped, events=program, between=bool(watched) or dense_output)
+    run, x = made(options, hold=hold), converted(stepped.momentum, np.array([t0]), start.x[np.newaxis])[0]
 
     # Integrate, noting rows and events
-    run = WatchedIntegration(leg, options, log) if log else leg(options)
-    recorder = Recorder(x, options.times, options.t0, options.direction, ENDS[bool(watched)])
+    recorder = Recorder(x, options.times, options.t0, options.direction)
     steps: list[StepBlock] | None = [] if dense_output else None
-    outcome = _integrate(run, x, recorder, options, stepped.rate, steps)
+    outcome = _integrate(run, x, recorder, options, steps)
+    advise(run, recorder.last, options, x, made if hold is None else None)
 
     # Put the result together
     rows, held = recorder.table(), None if hold is None else hold.held
     stats = _stats(run, options.method, outcome, missed_momenta(stepped, *rows, start=(t0, start.x, x)))
     table, momenta = _table(stepped, energy, *rows, held)
-    for text in stats.warnings:
+    for text in [*outcome.early, *stats.warnings]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
     dense = None if steps is None else Solution(options.t0, x, steps, problem.nq, stepped.velocities)
-    kept = (log.crossings(problem.nq) if log else {}, _graphs(problem, applied), dense, held)
+    kept = run.crossings(problem.nq), _graphs(problem, applied), dense, held
     return Trajectory(*table, stats, *kept, model.coordinates, model.velocities, momenta)
 
 
-def _compiled(
-    problem: Problem, options: RunOptions, hold: Hold | None, *, between: bool
-) -> Callable[[RunOptions], Integration]:
-    """What makes a run, compiled, of options. between: with all steps, and the dense output of chosen ones."""
-    name = options.scipy_solver
-    if name is not None:
-        solver = scipy_solver(problem, name, options.backend)
-        return lambda options: ScipyIntegration(solver, options, between=between)
-    method = METHODS[options.method]
-    program = step_program(problem, method, dense=method.adaptive and (between or options.times is not None))
-    compiled = compile_steps(program, options.backend)
-    return lambda options: integration(compiled, options, control=hold, every_step=between)
-
-
 class _Outcome(NamedTuple):
-    """How a run ended: in the end, at an event, or otherwise; and how large its error is."""
+    """How a run ended: in the end, at an event, or otherwise; and how large its error is.
+
+    early: that it stopped, unless Ctrl-C did it.
+    """
 
     seconds: float
     status: int
     message: str
     error: ErrorEstimate | None
+    early: tuple[str, ...] = ()
 
 
 def _integrate(
@@ -223,42 +211,35 @@ def _integrate(
     x: Array,
     recorder: Recorder,
     options: RunOptions,
-    rate: Graph,
     steps: list[StepBlock] | None,
 ) -> _Outcome:
-    """Run from x to t_end, an event, a failure, the end of the memory, or Ctrl-C; then estimate the error.
+    """Run from x to t_end, an event, a failure, the end of the memory, or Ctrl-C, and estimate the error.
 
     steps: receives the steps with their dense output.
     """
-    begin, seconds, error = time.perf_counter(), math.nan, None
-    second = 0.5 * options.estimated  # of the length of the run
-    doing = ""
+    begin, error, early = time.perf_counter(), None, tuple[str, ...]()
+    estimate = RunEstimate(run, x, options) if options.estimated else None
     try:
-        total = (1.0 + second) * options.length
-        with np.errstate(all="ignore"), Progress("simulate", total, options.progress) as report:
-            _run(run, x, recorder, rate, steps, lambda t: report(abs(t - options.t0)))
-            seconds = time.perf_counter() - begin
-            plain = run.plain
-            if isinstance(plain, FixedStepIntegration) and options.estimated and not run.status:
-                doing = ", while its error was estimated"
-                done = abs(recorder.last - options.t0)
-                at, states = recorder.checkpoints()
-                error = estimate(plain, x, at, states, lambda t: report(done + second * abs(t - options.t0)))
+        with np.errstate(all="ignore"), Progress("simulate", options.length, options.progress) as report:
+            _run(run, x, recorder, estimate, steps, lambda t: report(abs(t - options.t0)))
+            if estimate is not None and not run.status:
+                error = estimate.result()
+        early = (f"the run {run.status}",) if run.status else ()
     except KeyboardInterrupt:
-        run.status = f"interrupted after t = {recorder.last:.6g} s{doing}"
+        run.status = f"interrupted after t = {recorder.last:.6g} s"
     if run.status:
         recorder.add_last()
-    seconds = time.perf_counter() - begin if math.isnan(seconds) else seconds
+    seconds = time.perf_counter() - begin - (0.0 if estimate is None else estimate.seconds)
     if run.event and not run.status:
         return _Outcome(seconds, 1, run.event, error)
-    return _Outcome(seconds, -1 if run.status else 0, run.status or "reached t_end", error)
+    return _Outcome(seconds, -1 if run.status else 0, run.status or "reached t_end", error, early)
 
 
 def _run(
     run: Integration,
     x: Array,
     recorder: Recorder,
-    rate: Graph,
+    estimate: RunEstimate | None,
     steps: list[StepBlock] | None,
     report: Callable[[float], None],
 ) -> None:
@@ -266,8 +247,10 @@ def _run(
     most, kept = room() / TABLES, 0
     for block in run.blocks(x):
         if steps is not None and block.dense is None:
-            block = with_hermite(block, rate, run.parameters)
+            block = run.with_dense(block)
         recorder.add(block)
+        if estimate is not None:
+            estimate.add(block)
         if steps is not None:
             steps.append(block)
             kept += block.nbytes
@@ -292,7 +275,7 @@ def _table(
 
 
 def _stats(run: Integration, method: str, outcome: _Outcome, said: Sequence[str]) -> Stats:
-    seconds, status, message, error = outcome
+    seconds, status, message, error, _ = outcome
     if error and math.isnan(error.largest):
         error = None  # nothing could be compared
     texts = [*run.warnings, *said, *([error.warning] if error and error.warning else [])]

@@ -11,13 +11,13 @@ from cgraph.extend import Array
 
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
-OTHERS = 1e-6  # of the largest component of its kind, below which one counts as no smaller: it may be rounding
+OTHERS = 1e-4  # of the largest component of its kind, below which one counts as no smaller: it may be rounding
 
 
 class StateSizes:
     """The absolute tolerance of a run that was given none, in the units of its states.
 
-    rtol times the largest value that the component, or another of its group, has had so far, or a millionth of the
+    rtol times the largest value that the component, or another of its group, has had so far, or a ten-thousandth of the
     largest of its kind, coordinates or velocities, angles and lengths compared by `lengths`. It grows with the motion.
 
     kinds, groups: for each component a number, the same for those of one kind, or of one quantity, (m,).

@@ -10,6 +10,7 @@ from cgraph import Graph
 from cgraph.extend import Call, Factor, If, Program, Runner, runner
 
 from ..integrators import Method, Problem
+from ..integrators.step_control import moved
 
 KEPT = 16  # programs that stay ready for another run
 
@@ -21,7 +22,8 @@ class StepProgram:
     components: tuple[str, ...]  # of the state, in words
     parameters: tuple[str, ...]  # inputs that are not built in
     steps: Program
-    rate: Graph | None  # for a method that chooses its steps
+    rate: Graph
+    timed: bool  # whether it depends on t
     order: int
     adaptive: bool
     dense: bool  # whether its record has dense output
@@ -64,7 +66,8 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
         problem.components,
         problem.parameters,
         _normalized(method.program(problem, dense), problem, method),
-        problem.rate if method.adaptive else None,
+        problem.rate,
+        problem.timed,
         method.order,
         method.adaptive,
         dense and method.adaptive,
@@ -98,8 +101,13 @@ def state_kinds(problem: Problem) -> tuple[tuple[int, ...], tuple[int, ...]]:
 def _normalized(steps: Program, problem: Problem, method: Method) -> Program:
     """The steps with every state that a step arrives at normalized, so that errors do not add up along it.
 
-    Where there are constraints it is projected onto them, which normalizes it.
+    Where there are constraints it is projected onto them, which normalizes it; of steps by error register `farthest`
+    tells how far, in tolerances.
     """
+    if problem.projection is not None and method.adaptive:
+        lengths = {**steps.registers, "onto": problem.size, "way": 1, "farthest": 1}
+        onto = Call(problem.projection, ("x", "t", "p"), ("onto",))
+        return replace(steps, registers=lengths, body=[*steps.body, If("accepted", (onto, *moved(problem.size)))])
     if problem.projection is not None:
         arrived = Call(problem.projection, ("x", "t", "p"), ("x",))
     elif problem.normalization is not None:

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from cgraph.extend import Array
 
-from .dense_output import StepBlock
+from .dense_output import StepBlock, inside_nodes, with_hermite
 from .equal_steps import EqualSteps, equal_steps
 from .run_options import RunOptions
 from .sampled_controller import Hold
 from .step_program import CompiledSteps
+from .trajectory import Crossings
 
 BLOCK_TIME = 0.1  # s of run time after which a run comes back to Python: for Ctrl-C, progress and events
+TINY = np.finfo(float).tiny
 FIRST_PASSES = 32  # of the first block, before it is known how long one takes
 
 
@@ -45,20 +49,22 @@ class Integration(ABC):
     status: empty while all is well, else why it stopped before the end.  largest: step [s].
     warnings: what speaks against the result, a sentence each.  event: the one that has ended it, in words.
     parameters: values of the rate's inputs that are not built in, as of the block that has come last.
+    stiff: that one of `warnings` by which the steps are held at a stability limit.
+    resets: of the state, by events, so far.
     """
 
     def __init__(self, components: Sequence[str]) -> None:
         self.components = components
-        self.steps = self.rejected = self.evaluations = 0
+        self.steps = self.rejected = self.evaluations = self.resets = 0
         self.largest = 0.0
         self.status = ""
         self.warnings: list[str] = []
-        self.event = ""
+        self.event = self.stiff = ""
         self.parameters: list[float] = []
 
     @property
-    def plain(self) -> Integration | None:
-        """The run without its events; None where they have changed its course."""
+    def leg(self) -> Integration:
+        """The part of the run that it is in: what makes its steps since the last reset."""
         return self
 
     @property
@@ -74,6 +80,14 @@ class Integration(ABC):
     @abstractmethod
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
+
+    def crossings(self, nq: int, parameters: Array | None = None) -> dict[str, Crossings]:
+        """Of each event by name, where it happened, with states split after nq numbers; parameters: of the problem."""
+        return {}
+
+    def with_dense(self, block: StepBlock) -> StepBlock:
+        """The block that has come last, with dense output."""
+        return block
 
     def nonfinite(self, state: Array) -> str:
         """The first component that is not finite, in words; empty if all are."""
@@ -141,7 +155,7 @@ class NativeIntegration(Integration):
 class FixedStepIntegration(NativeIntegration):
     """Equal steps between the instants, at most dt. Every step is in a block, or of a block the last alone.
 
-    stretches: other steps than those of the options.
+    stretches: its steps, those of the options unless others are given.  stretch: the one that it is in.
     """
 
     def __init__(
@@ -160,7 +174,12 @@ class FixedStepIntegration(NativeIntegration):
         if stretches is None:
             instants = options.instants if control is None else control.instants(options.instants)
             stretches = equal_steps(instants, options.step)
-        self.stretches = stretches
+        self.stretches, self.stretch = stretches, stretches[0]
+
+    def beside(self, stretches: Sequence[EqualSteps], parameters: Sequence[float]) -> FixedStepIntegration:
+        """The same by other steps, with parameters in place of a controller."""
+        compiled, options = CompiledSteps(self.program, self.runner), replace(self.options, max_steps=math.inf)
+        return FixedStepIntegration(compiled, options, parameters, self._stopped, every_step=True, stretches=stretches)
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
@@ -171,6 +190,7 @@ class FixedStepIntegration(NativeIntegration):
             start["fresh"] = 1.0
         memory = self.runner.memory(start)
         for stretch in self.stretches:
+            self.stretch = stretch
             for name, value in (("start", stretch.begin), ("t", stretch.begin), ("count", 0.0), ("h", stretch.h)):
                 self.runner.write(memory, name, value)
             if self.control is not None:
@@ -203,16 +223,46 @@ class FixedStepIntegration(NativeIntegration):
                 block = _block(rows[:, 0], rows[:, 1 : 1 + m], t_old, x_old)
                 yield block._replace(normalization=self.program.normalization)
             if failed:
-                self.status = self._failure(memory)
+                self.status = self._failure(memory, rows[-1, 1 : 1 + m] if len(rows) else x_old)
                 return
 
-    def _failure(self, memory: Array) -> str:
+    def with_dense(self, block: StepBlock) -> StepBlock:
+        """The block that has come last, with dense output of the method's order: by shorter steps of the method."""
+        runner, shares = self.runner, inside_nodes(self.program.order)
+        states = np.empty((len(shares), len(block.t), self.program.size))
+        if len(shares):
+            memory = runner.memory({"p": self.parameters})
+            if "fresh" in runner.program.registers:
+                runner.write(memory, "fresh", 1.0)
+            start, call = memory.copy(), runner.bind(memory, np.empty((1, runner.program.width)))
+            x, t, begin, h = (runner.read(memory, name) for name in ("x", "t", "start", "h"))
+            for k, row in np.ndindex(states.shape[:2]):
+                memory[:] = start
+                x[:], t[:], begin[:], h[:] = (
+                    block.x_old[row],
+                    block.t_old[row],
+                    block.t_old[row],
+                    shares[k] * block.h[row],
+                )
+                call()
+                states[k, row] = x
+        return with_hermite(block, self.program.rate, self.parameters, states)
+
+    def _failure(self, memory: Array, before: Array) -> str:
+        """Why the step from a state (m,) failed."""
         t = self._number(memory, "t")
         if "singular" in self.runner.program.registers and (index := int(self._number(memory, "singular"))):
             return f"stopped at t = {t:.6g} s: {self.components[index - 1]} has an inertia that is not positive"
         if reason := self.nonfinite(self.runner.read(memory, "x")):
             return f"stopped at t = {t:.6g} s: {reason}"
-        return f"stopped at t = {t:.6g} s: the equations of the step did not converge; the step is too long"
+        return f"stopped at t = {t:.6g} s: {unsolved(self.components, before, self.runner.read(memory, 'x'))}"
+
+
+def unsolved(components: Sequence[str], before: Array, x: Array) -> str:
+    """Why a step from one state to another, (m,), which is no solution, failed: with the component that moved most."""
+    moved = np.abs(x - before) / np.maximum(np.abs(x), np.abs(before)).clip(TINY)
+    first = components[int(np.argmax(moved))]
+    return f"the equations of the step did not converge; the step is too long, first of all for {first}"
 
 
 def _block(t: Array, states: Array, t_old: float, x_old: Array) -> StepBlock:

@@ -23,7 +23,7 @@ _ROWS = 10_000  # of a text, written at once
 
 
 class SimulationWarning(UserWarning):
-    """A run that has ended, but whose result should not be trusted as it is; `Stats.warnings` has the same text.
+    """A run that stopped early, as `Stats.message` says, or whose result has something against it, `Stats.warnings`.
 
     Examples
     --------
@@ -54,19 +54,19 @@ class Stats:
     success : bool
         Whether the run reached t_end or ended at a terminal event.
     message : str
-        "reached t_end", or where and why it stopped.
+        "reached t_end", or where and why it stopped, which is issued as a `SimulationWarning`, too.
     status : int
         0: the end was reached; 1: a terminal event; -1: the run failed or was interrupted.
     njev, nlu : int
         Evaluations of the Jacobian and LU factorizations, 0 of methods without.
     error, error_at_end : float, optional
-        Of equal steps, the estimated error of the state, the largest over the rows and the end, and that at the end:
-        in units of the largest value that a component has over the run, of the component where it is largest. It is
-        the difference from a second run, of steps twice as long (whose evaluations are not counted in nfev), divided by
-        2^order - 1, as of a run whose error goes with this power of the step; infinite where the second run fails. The
-        phase of a motion is part of its state: of symplectic methods this error grows, while the energy is kept. None
-        of methods that choose their steps, of runs without `estimate_error`, and of those that fail or end in the first
-        steps.
+        Of equal steps, the estimated error of the state, phase included, the largest over the run, and that at the end,
+        in units of the largest value of a component over the run, of the component where it is largest. It is the
+        difference from a run of steps twice as long over 2^k - 1, where one of steps four times as long tells the order
+        k, at most the method's; across jumps and kinks, and where it is large, the difference itself. States between
+        the same resets are compared. The errors of a SampledController's periods are added up, which holds where the
+        closed loop does not amplify them. Infinite where it is unknown, which a warning explains. None of chosen steps,
+        of runs without `estimate_error`, and of those that fail or end in the first steps.
     warnings : tuple of str
         What speaks against the result, a sentence each; every one is issued as a `SimulationWarning`, too.
 
@@ -201,7 +201,7 @@ class Trajectory:
         """The motion at any time of the run, by the dense output of its steps.
 
         At the end of a step it is that step's state exactly; between, it has the order of the method's own dense
-        output, or of a cubic where the method has none (all equal steps).
+        output; of equal steps that of the method, or of a cubic.
 
         Parameters
         ----------

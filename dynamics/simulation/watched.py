@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +11,11 @@ import numpy as np
 from cgraph.extend import Array
 
 from .dense_output import StepBlock
-from .event_log import EventLog
+from .equal_steps import EqualSteps
+from .event_log import EventLog, split_crossings
 from .run_options import RunOptions
-from .stepping import Integration
+from .stepping import FixedStepIntegration, Integration
+from .trajectory import Crossings
 
 
 class WatchedIntegration(Integration):
@@ -23,13 +26,26 @@ class WatchedIntegration(Integration):
 
     def __init__(self, leg: Callable[[RunOptions], Integration], options: RunOptions, log: EventLog) -> None:
         super().__init__(log.program.components)
-        self.leg, self.options, self.log = leg, options, log
+        self._make, self.options, self.log = leg, options, log
         self._legs: list[Integration] = []
 
     @property
-    def plain(self) -> Integration | None:
-        """The run without its events; None where a reset has changed its course."""
-        return self._legs[0] if len(self._legs) == 1 else None
+    def leg(self) -> Integration:
+        """The part of the run that it is in: what makes its steps since the last reset."""
+        return self._legs[-1]
+
+    @property
+    def resetting(self) -> bool:
+        """Whether there are events that reset the state."""
+        return any(event.reset is not None for event in self.log.program.events)
+
+    def beside(self, steps: Callable[[float], Sequence[EqualSteps]]) -> WatchedIntegration:
+        """The same run with other equal steps: those of a leg from the time on at which it begins."""
+        first, options = self._legs[0], replace(self.options, max_steps=math.inf)
+        assert isinstance(first, FixedStepIntegration)
+        return WatchedIntegration(
+            lambda leg: first.beside(steps(leg.t0), first.parameters), options, EventLog(self.log.program)
+        )
 
     @property
     def jacobians(self) -> int:
@@ -41,29 +57,33 @@ class WatchedIntegration(Integration):
         """LU factorizations of matrices."""
         return sum(run.factorizations for run in self._legs)
 
+    def crossings(self, nq: int, parameters: Array | None = None) -> dict[str, Crossings]:
+        """Of each event by name, where it happened, with states split after nq numbers; parameters: of the problem."""
+        return split_crossings(self.log.program, self.log.happened, nq, parameters)
+
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time. A reset is a step of no length."""
         options, log = self.options, self.log
         while True:
             yield from self._leg(options, x)
-            if self.status or self.event or log.restart is None:
+            if self.status or log.restart is None:
                 return
-            (t, x_new), log.restart = log.restart, None
-            before = np.array(log.happened[-1][2])
+            (t, before, x_new), log.restart = log.restart, None
+            self.resets = sum(log.program.events[number].reset is not None for number, _, _ in log.happened)
             instant = np.array([t])
             yield StepBlock(instant, x_new[None], instant, np.zeros(1), before[None], np.zeros((1, 1, len(x))))
-            if t == options.t_end:
+            if self.event or t == options.t_end:
                 return
             options, x = self._rest(t), x_new
 
     def _leg(self, options: RunOptions, x: Array) -> Iterator[StepBlock]:
         """The steps up to an event after which the run does not go on as it did, or to the end."""
-        run, log, last = self.leg(options), self.log, options.t0
+        run, log, last = self._make(options), self.log, options.t0
         self._legs.append(run)
         rejected, evaluations = self.rejected, self.evaluations
         for block in run.blocks(x):
             log.parameters = run.parameters
-            kept = log(block)
+            kept = log(run.with_dense(block))
             self.steps += len(kept.t)
             self._count(run, rejected, evaluations)
             if len(kept.t):
@@ -82,7 +102,7 @@ class WatchedIntegration(Integration):
 
     def _count(self, run: Integration, rejected: int, evaluations: int) -> None:
         self.rejected, self.evaluations = rejected + run.rejected, evaluations + run.evaluations
-        self.largest = max(self.largest, run.largest)
+        self.largest, self.stiff = max(self.largest, run.largest), self.stiff or run.stiff
         self.warnings = list(dict.fromkeys([*self.warnings, *run.warnings, *self.log.warnings]))
 
     def _rest(self, t: float) -> RunOptions:

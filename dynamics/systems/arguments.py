@@ -94,14 +94,15 @@ def new_variables(stem: str, count: int, taken: Collection[str]) -> list[Node]:
 def call_user_function(what: str, function: Callable[..., Any], *arguments: Any, state: str = "x") -> Any:
     """function(*arguments), or without the last of them, the parameters, where it does not take them.
 
+    An argument with a default, as in `lambda q, qd, t, i=i: ..`, is the caller's own unless it is called t or p.
     state: what the first of three is called.
     Raises TypeError, naming `what`, for what is no such function.
     """
     names = "(q, qd, t) or (q, qd, t, p)" if len(arguments) == 4 else f"({state}, t) or ({state}, t, p)"
     if not callable(function):
         raise TypeError(f"{what} must be a function of {names}, got {function!r:.60}")
-    for chosen in (arguments, arguments[:-1]):
-        if _takes(function, len(chosen)):
+    for chosen, last in ((arguments, "p"), (arguments[:-1], "t")):
+        if _takes(function, len(chosen)) and not _keeps(function, len(chosen) - 1, last):
             return function(*chosen)
     raise TypeError(f"{what} must take {names}, got {inspect.signature(function)}")
 
@@ -117,6 +118,12 @@ def _takes(function: Callable[..., Any], count: int) -> bool:
     except TypeError:
         return False
     return True
+
+
+def _keeps(function: Callable[..., Any], place: int, name: str) -> bool:
+    """Whether its argument at this place has a default and another name: a value that it keeps."""
+    taken = [*inspect.signature(function).parameters.values()][place : place + 1]
+    return any([each.default is not each.empty and each.name != name for each in taken])
 
 
 def sequence(what: str, value: Any) -> list[Any]:

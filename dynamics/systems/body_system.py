@@ -16,20 +16,20 @@ from .torque_derivatives import MotionState, TorqueDerivatives
 
 
 class BodyEquations(Protocol):
-    """What bodies know of their equations; see the methods of `System` of the same names."""
+    """What bodies know of their equations; see the methods of `System` of the same names, also for None."""
 
     def bias_forces(self, q: Sequence[Node], qd: Sequence[Node]) -> Sequence[BiasForce]:
         """The pairs (velocity, force) of the bias."""
 
-    def momentum_rates(self, q: Sequence[Node], qd: Sequence[Node], p: Sequence[Node]) -> list[Node]:
+    def momentum_rates(self, q: Sequence[Node], qd: Sequence[Node], p: Sequence[Node]) -> list[Node] | None:
         """Rates of the momenta p of velocities qd."""
 
-    def torque_derivatives(self, state: MotionState, build: Builder) -> TorqueDerivatives:
+    def torque_derivatives(self, state: MotionState, build: Builder) -> TorqueDerivatives | None:
         """Derivatives of the torques of a motion."""
 
     def momentum_derivatives(
         self, q: Sequence[Node], qd: Sequence[Node], p: Sequence[Node], build: Builder
-    ) -> MomentumDerivatives:
+    ) -> MomentumDerivatives | None:
         """How velocities and rates of momenta depend on coordinates and momenta."""
 
 
@@ -42,10 +42,17 @@ class BodySystem(System):
         *of_system: Any,
         require_values: Callable[[Mapping[str, ArrayLike]], None],
         lengths: tuple[float, ...],
+        surely_regular: bool,
         **more: Any,
     ) -> None:
         super().__init__(*of_system, **more)
         self._equations, self._require_values, self._lengths = equations, require_values, lengths
+        self._surely_regular = surely_regular
+
+    @property
+    def surely_regular(self) -> bool:
+        """Where each body alone has inertia along the velocities of its joint: then no motion is without."""
+        return self._surely_regular
 
     @property
     def lengths(self) -> tuple[float, ...]:
@@ -63,14 +70,14 @@ class BodySystem(System):
         """The pairs (velocity, force) that the bodies state; see `System.bias_forces`."""
         return self._equations.bias_forces(self.q, self.qd)
 
-    def momentum_rates(self, p: Sequence[Node]) -> list[Node]:
+    def momentum_rates(self, p: Sequence[Node]) -> list[Node] | None:
         """By composite momentum; see `System.momentum_rates`."""
         return self._equations.momentum_rates(self.q, self.qd, p)
 
-    def torque_derivatives(self, qdd: Sequence[Node], build: Builder) -> TorqueDerivatives:
+    def torque_derivatives(self, qdd: Sequence[Node], build: Builder) -> TorqueDerivatives | None:
         """In closed form; see `System.torque_derivatives`."""
         return self._equations.torque_derivatives((self.q, self.qd, qdd), build)
 
-    def momentum_derivatives(self, p: Sequence[Node], build: Builder) -> MomentumDerivatives:
+    def momentum_derivatives(self, p: Sequence[Node], build: Builder) -> MomentumDerivatives | None:
         """By articulated inertias; see `System.momentum_derivatives`."""
         return self._equations.momentum_derivatives(self.q, self.qd, p, build)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from functools import cached_property
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 from cgraph import Node
 from cgraph.extend import Builder, check_name, cotangents, tangents, topological
@@ -31,12 +33,30 @@ class ConstraintError(ValueError):
     """
 
 
+class LoopRow(NamedTuple):
+    """A row of a loop that holds frames of bodies: which loop, and whether it is of an angle or of a length.
+
+    tolerance: how much of it has to be new beside the others, of the largest row of the loop.
+    """
+
+    loop: str
+    angle: bool
+    tolerance: float
+
+
 class Constraints:
     """The rows that hold a system, as nodes.
 
     names: of all rows, m: those of positions, then those of velocities alone.
     positions: phi.  velocities: A u + a, linear in the velocities.  parameters: values by name.
+    loop_rows: of the rows that loops have, by name.  turning: whether each velocity is of an angle.
+    whole: the constraints with all rows, where some are 0 as they nearly follow from others; left_out: these, and gaps.
     """
+
+    loop_rows: Mapping[str, LoopRow] = MappingProxyType({})
+    turning: Sequence[bool] = ()
+    whole: Constraints | None = None
+    left_out: Mapping[int, float] = MappingProxyType({})
 
     def __init__(
         self,
@@ -79,6 +99,15 @@ class Constraints:
         k = self.kinematics
         dots = tangents(dict(zip(k.q, k.q_dot, strict=True)) | {self.t: ONE}, rates, build)
         return [dots.get(z, ZERO) for z in rates]
+
+    def without(self, dropped: Mapping[int, float]) -> Constraints:
+        """With 0 for some rows, which are open by so much."""
+        other, count = copy(self), len(self.positions)
+        other.__dict__.pop("rates", None)
+        rows = [ZERO if k in dropped else row for k, row in enumerate((*self.positions, *self.velocities))]
+        other.positions, other.velocities, other.whole = tuple(rows[:count]), tuple(rows[count:]), self
+        other.left_out = dropped
+        return other
 
     def _check(self) -> None:
         u = set(self.kinematics.u)

@@ -264,6 +264,11 @@ class System:
         other.constraints = Constraints(self.kinematics, self.t, self.parameters, None, None)
         return other
 
+    @property
+    def surely_regular(self) -> bool:
+        """Whether M is known to be positive definite; where it is not, `forward_dynamics` looks at its rank."""
+        return False
+
     def bias_forces(self) -> Sequence[BiasForce] | None:
         """The bias as forces f at velocities z, nodes of L: sum of f dz/dqd = d/dt dL/dqd - dL/dq at qdd = 0.
 

@@ -25,6 +25,7 @@ from ..equations.torque_table import TorqueTable
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from . import peer_agreement as agreement
+from .derivatives import derivative_residuals
 from .held_states import Held, random_states
 from .residual import DIFFERENCES, POSITIVE, ROUNDING, Certificate, Residual, worst
 
@@ -153,6 +154,12 @@ class _Checks:
         return self.value(gravity_force(self.system))
 
     @cached_property
+    def pushed(self) -> Array:
+        """Applied forces less damping."""
+        rows = zip(self.system.forces, self.system.damping, self.system.qd, strict=True)
+        return self.value(self.graph({f"f{i}": f - damping * u for i, (f, damping, u) in enumerate(rows)}))
+
+    @cached_property
     def accelerations(self) -> Array:
         return self._solved[:, : self.system.n]
 
@@ -169,11 +176,13 @@ class _Checks:
     def always(self) -> Iterator[Residual]:
         """What holds for every Lagrangian."""
         yield from self._mass_matrix()
+        yield self._bias()
         yield self._forward()
         yield self._power()
         yield self._energy()
         yield self._sum("links: partial torques add up to tau", torque_by_link(self.system))
         yield self._adjoint()
+        yield from derivative_residuals(self.system, self.value, self.inverse, self.inertia, self.rng)
         graphs = {"L": self.graph({"L": self.system.lagrangian}), "tau": self.inverse}
         if self.held.any:
             yield self.held.closed(self.accelerations)
@@ -222,6 +231,12 @@ class _Checks:
         equation = "M: positive definite" + " on motions that the constraints admit" * self.held.any
         yield Residual(equation, max(0.0, rounding - smallest), POSITIVE, note)
 
+    def _bias(self) -> Residual:
+        """Bodies state their bias by Newton and Euler; inverse dynamics is of the Lagrangian."""
+        still, pushed = self.value(self.inverse, qdd=None), self.pushed
+        equation = "bias = inverse dynamics at qdd = 0, without damping and forces"
+        return Residual(equation, worst(self.bias - still - pushed, np.abs(still) + np.abs(pushed)), ROUNDING)
+
     def _forward(self) -> Residual:
         tau, qdd = self.at["tau"], self.accelerations
         terms = (np.abs(self.inertia) @ np.abs(qdd)[..., None])[..., 0] + np.abs(self.bias) + np.abs(tau)
@@ -232,9 +247,7 @@ class _Checks:
     def _power(self) -> Residual:
         system, qd, tau, qdd = self.system, self.at["qd"], self.at["tau"], self.accelerations
         gained = self.value(self.rate(energy(system)), qdd=qdd)[..., 0]
-        rows = zip(system.forces, system.damping, system.qd, strict=True)
-        forces = self.value(self.graph({f"f{i}": f - damping * u for i, (f, damping, u) in enumerate(rows)}))
-        held = self.held_by.sum(axis=-1)
+        forces, held = self.pushed, self.held_by.sum(axis=-1)
         power = np.concatenate([qd * (tau + forces), qd * held], axis=-1)
         equation = "energy: dE/dt = qd . (tau + forces - damping" + " + J^T lambda" * self.held.any + ")"
         if self.timed:

@@ -11,7 +11,7 @@ import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Builder, cotangents, tangents
 
-from ..equations.consistent_state import consistent_state
+from ..equations.consistent_state import nearest_state
 from ..equations.evaluate_at import Array
 from ..equations.formulations import ONE, ZERO
 from ..systems.constraints import ConstraintError
@@ -40,7 +40,7 @@ def _moved(system: System, q: Array, qd: Array, t: float, rng: np.random.Generat
     """The state on the constraints; another one where this cannot be moved there."""
     for k in range(TRIALS):
         try:
-            return consistent_state(system, q, qd, t)
+            return nearest_state(system, q, qd, t)
         except ConstraintError:
             if k == TRIALS - 1:
                 raise

@@ -109,3 +109,16 @@ def squeezer() -> dyn.Mechanism:
         dyn.Loop("point", "K2", "K6", at=(-0.028, 0, 0), to_at=(0.02, 0.0, 0), name="with K6"),
     ]
     return dyn.Mechanism(links, (0.0, 0.0, 0.0), [spring], loops=[meeting, *others])
+
+
+def windows(n: int) -> tuple[dyn.Mechanism, list[float], list[float]]:
+    """n four-bars in a row, all links of 1 m and 1 kg, with a start: upright, at 1 rad/s."""
+    bodies, q, qd = [bar("crank 0", "world", 1.0, (0.0, 0.0, 0.0))], [-0.5 * np.pi], [1.0]
+    for k in range(n):
+        bodies.append(bar(f"coupler {k}", f"crank {k}", 1.0, (1.0, 0.0, 0.0)))
+        bodies.append(bar(f"crank {k + 1}", "world", 1.0, (k + 1.0, 0.0, 0.0)))
+        q += [0.5 * np.pi, -0.5 * np.pi]
+        qd += [-1.0, 1.0]
+    at = {"at": (1.0, 0.0, 0.0), "to_at": (1.0, 0.0, 0.0)}
+    loops = [dyn.Loop("point", f"coupler {k}", f"crank {k + 1}", **at) for k in range(n)]
+    return dyn.Mechanism(bodies, (0.0, 0.0, -9.81), loops=loops), q, qd

@@ -14,7 +14,16 @@ from typing import Any
 
 from cgraph import Graph
 from cgraph.extend import check_writable, write_files
-from dynamics import FORMULATIONS, forward_dynamics, hamilton_equations, inverse_dynamics, scenes, state_equation
+from dynamics import (
+    FORMULATIONS,
+    Verdict,
+    formulation_verdict,
+    forward_dynamics,
+    hamilton_equations,
+    inverse_dynamics,
+    scenes,
+    state_equation,
+)
 
 from ..graph_drawing.dot import to_dot
 from ..graph_drawing.render import check_can_draw, render_svg, tags_to_collapse
@@ -111,10 +120,17 @@ def takes_equations(command: argparse.ArgumentParser) -> None:
     which.add_argument("--momentum", action="store_true", help=f"{MOMENTUM_FORM}, with outputs such as p0_dot")
 
 
-def equations_of(options: argparse.Namespace, scene: scenes.Scene) -> tuple[Graph, str]:
+def verdict_of(options: argparse.Namespace, scene: scenes.Scene) -> Verdict | None:
+    """The verdict on the formulation that the arguments choose; None of other equations than inverse dynamics."""
+    other = scene.ode is not None or options.forward or options.momentum
+    return None if other else formulation_verdict(scene, options.formulation)
+
+
+def equations_of(options: argparse.Namespace, scene: scenes.Scene, verdict: Verdict | None = None) -> tuple[Graph, str]:
     """The graph that the arguments choose, and what it is: "inverse dynamics, chain rule".
 
-    Of an OdeSystem it is the state equation. Raises for momenta of what has none.
+    verdict: that of `verdict_of`, if it is there, which has the graph.  Of an OdeSystem it is the state equation.
+    Raises for momenta of what has none.
     """
     if options.momentum:
         return hamilton_equations(scene), "Hamilton's equations"
@@ -122,7 +138,7 @@ def equations_of(options: argparse.Namespace, scene: scenes.Scene) -> tuple[Grap
         return state_equation(scene), "state equation"
     if options.forward:
         return forward_dynamics(scene), "forward dynamics"
-    graph = inverse_dynamics(scene, options.formulation)
+    graph = verdict.graph if verdict else inverse_dynamics(scene, options.formulation)
     return graph, f"inverse dynamics, {options.formulation.replace('_', ' ')}"
 
 

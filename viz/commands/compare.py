@@ -9,7 +9,7 @@ from typing import Any
 
 import cgraph as cg
 from cgraph import Graph
-from dynamics import FORMULATIONS, display_names, inverse_dynamics, scenes
+from dynamics import FORMULATIONS, display_names, formulation_verdict, scenes
 from dynamics.equations.both_forms import LAGRANGE, both_forms, form_agreement
 from dynamics.equations.node_classes import form_classes, formulation_classes
 
@@ -53,16 +53,14 @@ def run(options: argparse.Namespace) -> int:
     """Print the totals of both sides and the classes of what only one of them has; 1 where one has anything."""
     check_picture(options)
     scene = scene_of(options)
-    graphs = (
-        both_forms(scene)
-        if options.momentum
-        else {name: inverse_dynamics(scene, name) for name in dict.fromkeys(options.formulations)}
-    )
+    names = [] if options.momentum else dict.fromkeys(options.formulations)
+    verdicts = {name: formulation_verdict(scene, name) for name in names}
+    graphs = both_forms(scene) if options.momentum else {name: each.graph for name, each in verdicts.items()}
     named = dict(zip(("left", "right"), graphs if options.momentum else options.formulations, strict=True))
     left, right = (graphs[name] for name in named.values())
     state = [] if options.momentum else [n for each in (left, right) for part in state_names(each, scene) for n in part]
     called = display_names(scene)
-    classes = form_classes if options.momentum else formulation_classes
+    classes = form_classes if options.momentum else formulation_classes(verdicts.values())
     comparison = cg.compare(left, right, atoms=dict.fromkeys(state), classify=classes, names=called)
     both = len(comparison.common)
     sizes = {"left_nodes": len(left.nodes), "right_nodes": len(right.nodes), "in_both": both}
@@ -72,14 +70,16 @@ def run(options: argparse.Namespace) -> int:
         for side, graph, rest in zip(named, (left, right), only, strict=True)
     ]
     data = {"scene": scene.name} | named | sizes | comparison.to_dict()
+    data |= {"verdicts": {name: each.to_dict() for name, each in verdicts.items()}} if verdicts else {}
+    told = [f"{name}: {each}" for name, each in verdicts.items()]
     if options.momentum:
-        told, text = _forms(scene, graphs)
-        data, lines = data | told, [text, *lines]
+        agreement, text = _forms(scene, graphs)
+        data, lines = data | agreement, [text, *lines]
     together = comparison.overlay()
     groups = [f"only {name}" for name in named.values()], (together.only_left, together.only_right)
     answer_and_draw(
         options,
-        unless_json(options, data, "\n".join([*lines, str(comparison)])),
+        unless_json(options, data, "\n".join([*lines, str(comparison), *told])),
         together.graph,
         marked=dict(zip(*groups, strict=True)),
         names=theme.called(called),

@@ -6,14 +6,14 @@ import argparse
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from cgraph import Graph
+from cgraph import Edge, Graph, Node
 from cgraph.extend import check_writable
-from dynamics import display_names, scenes, spurious_nodes
+from dynamics import Verdict, display_names, scenes
 
 from .. import theme
 from ..graph_drawing.dot import to_dot
 from ..graph_drawing.render import check_can_draw, render_png, render_svg
-from .arguments import Commands, answer, collapsed, equations_of, scene_of, takes_a_scene, takes_equations
+from .arguments import Commands, answer, collapsed, equations_of, scene_of, takes_a_scene, takes_equations, verdict_of
 
 PICTURES = (".svg", ".png")
 KINDS = (*PICTURES, ".dot", ".txt")
@@ -45,11 +45,13 @@ def run(options: argparse.Namespace) -> None:
     if kind in PICTURES:
         check_can_draw(png=kind == ".png")
     scene = scene_of(options)
-    graph, what = equations_of(options, scene)
+    verdict = verdict_of(options, scene)
+    graph, what = equations_of(options, scene, verdict)
     caption = f"{scene.name}: {what}"
     names = theme.called(display_names(scene))
     words = theme.MOTION_WORDS if options.momentum else {}
-    content = _listed(graph, scene) if kind == ".txt" else _drawn(graph, kind, options.collapse, caption, names, words)
+    drawn = (graph, kind, options.collapse, caption, names, words, verdict)
+    content = _listed(graph, scene) if kind == ".txt" else _drawn(*drawn)
     counts = graph.counts()
     answer(f"{options.out}: {counts.nodes} nodes, {counts.edges} edges", {options.out: content})
 
@@ -68,13 +70,17 @@ def _drawn(
     caption: str,
     names: Mapping[str, str],
     words: Mapping[str, str],
+    verdict: Verdict | None,
 ) -> str | bytes:
     if collapse is None:
         tags = collapsed(graph) if kind in PICTURES else []
     else:
         tags = [tag for each in collapse for tag in tags_of(each, graph)]
     legend = words or True
-    drawing = to_dot(graph, marked=spurious_nodes(graph), names=names, collapse=tags, caption=caption, legend=legend)
+    wrong, edges = (verdict.nodes, verdict.edges) if verdict else (frozenset[Node](), frozenset[Edge]())
+    drawing = to_dot(
+        graph, marked=wrong, marked_edges=edges, names=names, collapse=tags, caption=caption, legend=legend
+    )
     if kind == ".dot":
         return str(drawing.source)
     svg = render_svg(drawing)

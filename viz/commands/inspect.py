@@ -8,7 +8,7 @@ from pathlib import Path
 from cgraph.extend import check_writable
 from dynamics.scenes.inspection import FRAMES, inspection
 
-from ..models.inspect import cut_short, inspection_page
+from ..models.inspect import inspection_page
 from .arguments import MOMENTUM_FORM, Commands, answer, positive, say, takes_a_scene, unless_json
 from .point_arguments import started, takes_a_start
 
@@ -48,6 +48,8 @@ def run(options: argparse.Namespace) -> int:
             "nodes": len(version.graph.nodes),
             "edges": len(version.graph.edges),
             "spurious": len(version.marked),
+            "spurious_edges": len(version.blamed),
+            "differs": version.flawed,
         }
         for version in content.versions
     }
@@ -55,6 +57,4 @@ def run(options: argparse.Namespace) -> int:
     counts = ", ".join(f"{name} {version['nodes']} nodes" for name, version in sizes.items())
     data = {"scene": scene.name, "bytes": size, "stopped": content.stopped, "versions": sizes}
     answer(unless_json(options, data, f"{options.out}: {counts}; {size / 1e6:.2f} MB"), {options.out: text})
-    if content.stopped:
-        say(cut_short(content))
     return 1 if content.stopped else 0

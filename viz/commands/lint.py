@@ -1,11 +1,18 @@
-"""`cgraph lint`: are q and qd independent of one another in a scene's equations? A proof, or what is to blame."""
+"""`cgraph lint`: are these the equations of the chain rule, with q and qd independent? A proof, or what is to blame."""
 
 from __future__ import annotations
 
 import argparse
 
 import cgraph as cg
-from dynamics import ConstraintLint, conserved_momenta, display_names, lint_constraints, state_equation
+from dynamics import (
+    ConstraintLint,
+    Verdict,
+    conserved_momenta,
+    display_names,
+    lint_constraints,
+    state_equation,
+)
 from dynamics.equations.both_forms import HAMILTON, LAGRANGE
 
 from .. import theme
@@ -22,6 +29,7 @@ from .arguments import (
     takes_a_scene,
     takes_equations,
     unless_json,
+    verdict_of,
 )
 from .point_arguments import REST, box, filled, point
 from .sizes import size_data, size_table
@@ -31,7 +39,7 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
     """The command's arguments."""
     parser = commands.add_parser(
         "lint",
-        help="check that q and qd are independent in a scene's equations; status 1 and the blame if they are not",
+        help="check that a scene's equations are those of the chain rule; status 1 and the blame if they are not",
     )
     takes_a_scene(parser)
     takes_equations(parser)
@@ -52,18 +60,22 @@ def run(options: argparse.Namespace) -> int:
     """Print the proof or the blame; 1 where anything is not as declared."""
     check_picture(options)
     scene = scene_of(options)
-    graph, what = equations_of(options, scene)
+    verdict = verdict_of(options, scene)
+    graph, what = equations_of(options, scene, verdict)
     q, qd = state_names(graph, scene, momentum=options.momentum)
     report = cg.lint(
         graph,
         independent=[(q, qd)] if q and qd else [],
         box=options.box,
         at=None if options.at is None else filled(graph, scene, options.at),
-        function="L",
+        function="K" if options.formulation.startswith("kinetic") else "L",
         names=display_names(scene),
     )
-    none = "coordinates" if qd else "momenta" if options.momentum else "velocities"
-    proof = str(report) if q and qd else f"Holds: the equations have no {none}.\n{report}"
+    # A path from qd to q is the finding of equations that nothing else is known of; of a formulation the verdict tells.
+    faults = [each for each in report.findings if verdict is None or each.kind != "dependence"]
+    proof = lint_text(report, verdict)
+    proof = proof if scene.ode is None else f"Holds: equations of first order have no velocities.\n{report}"
+    ok = not faults and not (verdict and verdict.differs)
     held = lint_constraints(scene) if scene.ode is None else ConstraintLint({}, {})
     if str(held):
         proof = f"{proof}\n{held}"
@@ -74,16 +86,31 @@ def run(options: argparse.Namespace) -> int:
     alone = "" if options.forward else tree_alone(scene)
     proof = f"{proof}\n{alone}" if alone else proof
     data = {"scene": scene.name, "equations": what, "of_the_tree": bool(alone)} | report.to_dict()
-    data |= {"constraints": held.to_dict(), "conserved": list(conserved), "ok": report.ok and held.ok}
+    data |= {"constraints": held.to_dict(), "conserved": list(conserved), "ok": ok and held.ok}
+    data |= {"verdict": verdict.to_dict()} if verdict else {}
     data |= {"sizes": sizes} if sizes else {}
     answer_and_draw(
         options,
         unless_json(options, data, proof),
         graph,
-        marked=report.nodes,
+        marked=(verdict.nodes if verdict else frozenset())
+        .union(*[each.nodes for each in faults])
+        .intersection(graph.nodes),
         marked_label="to blame",
-        marked_edges=report.edges,
+        marked_edges=(verdict.edges | report.edges if verdict.differs else frozenset()) if verdict else report.edges,
         names=theme.called(display_names(scene)),
         caption=f"{scene.name}: {what}",
     )
-    return 0 if report.ok and held.ok else 1
+    return 0 if ok and held.ok else 1
+
+
+def lint_text(report: cg.Lint, verdict: Verdict | None) -> str:
+    """The report with the verdict before it, which tells better than tags what is gained on a path from qd to q."""
+    if verdict is None:
+        return str(report)
+    lines = [str(verdict)]
+    for each in report.findings:
+        told = str(each)
+        lines.append(told.rpartition("\n")[0] if each.data.get("derivatives_through") else told)
+    lines += [f"Holds: {proof}" for proof in report.proofs] + [f"Note: {note}" for note in report.notes]
+    return "\n".join(lines)

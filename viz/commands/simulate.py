@@ -11,7 +11,7 @@ import numpy as np
 from cgraph.extend import check_writable
 from dynamics import METHODS, Trajectory, simulate
 
-from .arguments import MOMENTUM_FORM, Commands, answer, positive, say, takes_a_scene, unless_json
+from .arguments import MOMENTUM_FORM, Commands, answer, positive, takes_a_scene, unless_json
 from .point_arguments import started, takes_a_start
 
 METHOD = "dop853"
@@ -64,8 +64,6 @@ def run(options: argparse.Namespace) -> int:
     data = {"scene": scene.name, "rows": len(run.t), "form": form} | _summary(run)
     files: dict[Path, str | bytes] = {} if options.csv is None else {options.csv: run.to_csv()}
     answer(unless_json(options, data, f"{scene.name}: {_text(run, data)}"), files)
-    if not run.stats.success:
-        say(f"the motion is not whole: it {run.stats.message}")
     return 0 if run.stats.success else 1
 
 

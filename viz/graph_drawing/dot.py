@@ -108,7 +108,7 @@ def to_dot(
         _marks(marked, marked_label),
         _edges(marked_edges),
         _cluster_rule(clusters),
-        require_sequence("collapse", collapse, "tags"),
+        require_sequence("collapse", collapse, "tags", str),
     )
     drawing = digraph(rankdir)
     if caption is not None:
@@ -122,11 +122,7 @@ def to_dot(
 
 
 def _edges(marked: Collection[Edge]) -> frozenset[Edge]:
-    edges = require_sequence("marked_edges", marked, "edges")
-    for edge in edges:
-        if not isinstance(edge, tuple):
-            raise TypeError(f"marked_edges must be edges of the graph, got {type(edge).__name__}: {edge!r:.60}")
-    return frozenset(edges)
+    return frozenset(require_sequence("marked_edges", marked, "edges", tuple))
 
 
 def _marks(marked: Collection[Node] | Mapping[str, Collection[Node]], words: str) -> dict[Node, Paint]:
@@ -136,7 +132,7 @@ def _marks(marked: Collection[Node] | Mapping[str, Collection[Node]], words: str
         raise ValueError(f"marked nodes come in at most {len(theme.MARKS)} groups, got {len(groups)}")
     marks: dict[Node, Paint] = {}
     for paint, (group, given) in zip(theme.MARKS, groups.items(), strict=False):
-        nodes = require_sequence("marked", given, "nodes")
+        nodes = require_sequence("marked", given, "nodes", Node)
         if both := [node for node in nodes if node in marks]:
             raise ValueError(f"{len(both)} marked nodes are in both groups, such as {both[0]!r}")
         marks |= dict.fromkeys(nodes, replace(paint, words=group))
@@ -158,7 +154,6 @@ def _cluster_rule(clusters: bool | Sequence[str] | ClusterRule) -> ClusterRule:
         return clusters
     if isinstance(clusters, bool):
         return main_tag if clusters else lambda node: None
-    chosen = frozenset([clusters] if isinstance(clusters, str) else require_sequence("clusters", clusters, "tags"))
-    if not all([isinstance(tag, str) for tag in chosen]):
-        raise TypeError(f"clusters must be True, False, tags or a function of a node, got {clusters!r:.60}")
+    given = [clusters] if isinstance(clusters, str) else clusters
+    chosen = frozenset(require_sequence("clusters", given, "tags, or True, False or a function of a node", str))
     return lambda node: _only(node.tags & chosen)

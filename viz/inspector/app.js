@@ -177,7 +177,7 @@ function makeVersions(app) {
   const { versions } = app.state;
   byId("versions").replaceChildren(...versions.map((each, i) => {
     const button = tag("button", { type: "button", role: "radio" }, each.name);
-    if (each.marked.size) button.className = "flawed";
+    if (each.flawed) button.className = "flawed";
     button.onclick = () => choose(app, i);
     return button;
   }));
@@ -200,7 +200,7 @@ function choose(app, i) {
   showLegend(app);
   byId("about").textContent = app.version.about;
   byId("about").hidden = !app.version.about;
-  byId("about").classList.toggle("flawed", app.version.marked.size > 0);
+  byId("about").classList.toggle("flawed", app.version.flawed);
   byId("sweep").max = 2 * app.version.ops.length;
   byId("from").replaceChildren(...app.version.outputs.map(([name, letters]) => tag("option", { value: name }, shownName(app, name, letters))));
   if (app.version.outputs.some(([name]) => name === app.from)) byId("from").value = app.from;

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cgraph import Graph, Node
+from cgraph import Edge, Graph, Node
 from cgraph.extend import real_array
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -33,7 +33,8 @@ class Version:
 
     about: a sentence or two.  marked: nodes in the one color of what is wrong.  steps: to be gone through one by one.
     rows: {title: nodes} of the rows of the picture from the bottom, alike in all versions; a node that is in none
-    stands in the first. Without any, rows are the sweeps.
+    stands in the first. Without any, rows are the sweeps.  blamed: edges in that color.  flawed: whether the version is
+    wrong, which it may be with nothing left in it that could be marked.
     """
 
     name: str
@@ -42,6 +43,8 @@ class Version:
     marked: Collection[Node] = frozenset()
     steps: Sequence[Step] = ()
     rows: Mapping[str, Collection[Node]] = field(default_factory=dict)
+    blamed: Collection[Edge] = frozenset()
+    flawed: bool = False
 
     def check(self) -> None:
         """Raises ValueError for a marked node, or one of a step, that is not in the graph."""

@@ -135,14 +135,13 @@ def page(
     if at is not None:
         require_mapping("at", at, "input: value")
     texts = require_texts("names", names), require_texts("units", units)
-    nodes, tables = frozenset(require_sequence("marked", marked, "nodes")), require_sequence("tables", tables, "Table")
-    if not all([isinstance(table, (Table, StateTable)) for table in tables]):
-        raise TypeError(f"tables must be a sequence of Table or StateTable, got {tables!r:.60}")
-    if not all([isinstance(text, str) for text in require_sequence("notices", notices, "texts")]):
-        raise TypeError(f"notices must be texts, got {notices!r:.60}")
-    panels = require_sequence("panels", panels, "Panel")
-    if not all([isinstance(panel, Panel) for panel in panels]):
-        raise TypeError(f"panels must be a sequence of Panel, got {panels!r:.60}")
+    nodes = frozenset(require_sequence("marked", marked, "nodes", Node))
+    tables = require_sequence("tables", tables, "Table or StateTable", (Table, StateTable))
+    notices = require_sequence("notices", notices, "texts", str)
+    panels = require_sequence("panels", panels, "Panel", Panel)
+    if columns is not None:
+        parents = require_mapping("columns", columns, "tag: parent").values()
+        require_sequence("columns", [*columns, *[tag for tag in parents if tag is not None]], "tags", str)
     if derived is not None:
         require_graph("derived", derived)
     versions = _versions(graph, about, nodes)

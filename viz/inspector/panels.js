@@ -93,10 +93,15 @@ function showInputs(app) {
   byId("reset").hidden = byId("edited").hidden = !app.state.edited;
 }
 
+/** How many nodes are there by mistake; where there are none, what else is wrong. */
+function spuriousIn({ marked, blamed, flawed }) {
+  const nodes = marked.size ?? marked.length;
+  return nodes || (blamed.length ? counted(blamed.length, "edge") : flawed ? "a term gone" : 0);
+}
 function showCounts(app) {
   const { version } = app;
   const rows = app.state.versions.map((each) => tag("tr", {}, rowHead(each.name),
-    ...[each.ops.length, each.edges.length, each.marked.size].map((count) => tag("td", {}, String(count)))));
+    ...[each.ops.length, each.edges.length, spuriousIn(each)].map((count) => tag("td", {}, String(count)))));
   const ops = new Map();
   version.ops.forEach((op) => { ops.set(op, (ops.get(op) ?? 0) + 1); });
   const kinds = [...ops].sort((a, b) => b[1] - a[1]).map(([op, many]) => `${op} ${many}`);
@@ -107,6 +112,6 @@ function showCounts(app) {
 function showLegend(app) {
   const kinds = [["input", "input"], ["primal", "as written"], ["adjoint", "adjoint: reverse"], ["tangent", "tangent: forward"], ["several", "several roles"], ["wrong", "spurious"]];
   const present = new Set(app.version.labels.map(([, role]) => role));
-  if (app.version.marked.size) present.add("wrong");
+  if (app.version.marked.size || app.version.blamed.length) present.add("wrong");
   byId("legend").replaceChildren(...kinds.filter(([kind]) => present.has(kind)).map(([kind, words]) => tag("span", { class: kind }, words)));
 }

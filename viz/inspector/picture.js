@@ -223,9 +223,10 @@ function drawArrows({ version, items, shownBy, lines, layout }, drawing) {
   const bundle = new Map([...layout.bundles].flatMap(([key, names]) => (key[0] === "o" ? names.map((name) => [name, `k${key}`]) : [])));
   for (const [name, , node] of version.outputs) add(shownBy[node], bundle.get(name) ?? `o${name}`, [node, node]);
   return [...merged.values()].map(({ from, to, pairs }) => {
-    const wrong = pairs.filter(([source]) => version.marked.has(source)).length * 2 >= pairs.length;
+    const blamed = pairs.some(([source, target]) => version.crossed.has(`${source} ${target}`));
+    const wrong = blamed || pairs.filter(([source]) => version.marked.has(source)).length * 2 >= pairs.length;
     const [d, near] = drawing?.lines[`${from} ${to}`] ? [drawing.lines[`${from} ${to}`], true] : [from, to].every((id) => id[0] === "b") ? between(items.get(from).at, items.get(to).at) : curve(items.get(from).at, items.get(to).at);
-    const width = Math.min(4, 1.1 + 0.4 * Math.log2(pairs.length)).toFixed(1);
+    const width = blamed ? 3 : Math.min(4, 1.1 + 0.4 * Math.log2(pairs.length)).toFixed(1);
     const path = element("path", {
       class: `line${wrong ? " wrong" : ""}${near ? " near" : ""}`, d, "stroke-width": width, "data-from": from, "data-to": to,
     }, lines);

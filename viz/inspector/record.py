@@ -8,15 +8,15 @@
     derived               null, or a graph that computes other inputs of versions from the state
     stages                titles of the rows of the picture, from the bottom; [] leaves them to the page, by sweep
     columns               [[tag, tag of its parent or null]] in the order of the picture; [] leaves it to the page
-    versions              [{name, about, labels, label, marked, steps, drawing} and a graph], see below
+    versions              [{name, about, labels, label, marked, blamed, flawed, steps, drawing} and a graph], see below
     tables                [{caption, header, rows: [[name, [numbers of nodes]]]} and a graph]: they follow the state
     motion                null, or {t, points: null or [[[x, y]]], parents, joints, turns, places: null or a graph}
 
 A graph is {ops, args, names, inputs, outputs}: for every node, arguments before uses, the name of its operation and the
 numbers of its arguments, or the value of a constant; {node: [name, letters]} of named ones; [[name, node or -1 where
 nothing uses it]]; [[name, letters, node]]. labels are the [tags, role, row] that occur, label which of them a node
-has, marked the nodes in the color of what is wrong, steps [{words, nodes, value, joint}]. Where nodes stand is the
-page's business, but for a `drawing`.
+has, marked the nodes in the color of what is wrong, blamed the edges [source, target] in it, flawed whether the version
+is wrong, steps [{words, nodes, value, joint}]. Where nodes stand is the page's business, but for a `drawing`.
 """
 
 from __future__ import annotations
@@ -161,6 +161,8 @@ def _version(version: Version, letters: Letters) -> dict[str, Any]:
         "label": label,
         "labels": [[list(tags), *rest] for tags, *rest in labels],
         "marked": [number[node] for node in version.graph.nodes if node in marked],
+        "blamed": sorted([[number[edge.source], number[edge.target]] for edge in version.blamed]),
+        "flawed": version.flawed or bool(marked),
         "steps": [
             {
                 "words": step.words,

@@ -19,7 +19,7 @@ function write(cell, text, kind = "") {
 function makeResults(app) {
   const { versions, tables } = app.state;
   app.names = [...new Map(versions.flatMap((each) => each.outputs.map(([name, letters]) => [name, shownName(app, name, letters)])))];
-  app.right = versions.findLastIndex((each) => !each.marked.size && versions.some((other) => other.marked.size));
+  app.right = versions.findLastIndex((each) => !each.flawed && versions.some((other) => other.flawed));
   const [shown, cells] = numbers(app, versions.map((each) => each.name), app.names);
   app.cells = cells;
   byId("results").replaceChildren(shown, ...(app.right < 0 ? []
@@ -32,7 +32,7 @@ function makeResults(app) {
   }));
 }
 
-/** Results of all versions at the one state, and what differs from the version without spurious nodes. */
+/** Results of all versions at the one state, and what differs from the version that is right. */
 function showResults(app) {
   const found = app.state.versions.map((each, i) => {
     const own = i === app.index ? app.values : app.state.evaluate(each), noise = noiseIn(app, each, own);

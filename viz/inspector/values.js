@@ -18,7 +18,8 @@ function prepare(version) {
   const number = args.map((own) => (own.length ? ++operations : 0)); // as in Graph.listing(): %1 is the first operation
   const byNumber = new Map(number.map((each, node) => [each, node]).filter(([each]) => each));
   const functions = version.ops.map((op) => VALUE[op]);
-  return { ...version, args, functions, constants, users, edges, number, byNumber, operations, marked: new Set(version.marked) };
+  return { ...version, args, functions, constants, users, edges, number, byNumber, operations, marked: new Set(version.marked),
+    crossed: new Set((version.blamed ?? []).map(([source, target]) => `${source} ${target}`)) };
 }
 
 /** The value of every node, inputs in the order of the version's. */

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-import cgraph as cg
 from cgraph import Graph
-from dynamics import formulation_sizes, inverse_dynamics, kinetic_energy, momentum_rate, spurious_nodes
+from dynamics import Verdict, formulation_sizes, formulation_verdict, inverse_dynamics
+from dynamics.equations.formulation_sizes import INERTIAL_TERM, blamed
 
 from .. import theme
 from ..graph_drawing.dark import to_adaptive
@@ -21,17 +21,16 @@ from .subject import LARGEST, SHOWN, Subject, lagrangian_graph
 
 STEPS = (1.0, 0.1, 0.01, 1e-3, 1e-6)  # s
 DRAWN = 60  # nodes, at most, of a graph that is drawn
-_GONE = 1e-4  # of the torque: an error below, at the smallest step, has gone
 
 
 def euler_edge(subject: Subject) -> Screen:
     """The screen of a system."""
-    right, wrong = (inverse_dynamics(subject.system, name) for name in ("chain_rule", "euler_embedded"))
+    right, verdict = inverse_dynamics(subject.system), formulation_verdict(subject.scene, "euler_embedded")
+    wrong = verdict.graph
     torque = subject.evaluate(right)
     errors = [(dt, _after_a_step(subject, wrong, dt) - torque) for dt in STEPS]
-    kinetic = _after_a_step(subject, inverse_dynamics(subject.system, "kinetic_only"), STEPS[-1]) - torque
     last = float(np.abs(errors[-1][1]).max())
-    stays = last > _GONE * float(np.abs(torque).max())
+    stays = bool(verdict.excess_at(subject.values))
     return Screen(
         "euler-edge",
         "A time step in the graph",
@@ -40,19 +39,20 @@ def euler_edge(subject: Subject) -> Screen:
         "We shrink dt from a second to a millionth of a second. The error of the torque by definition …",
         ("vanishes with dt", "tends to something that is not zero", "grows beyond all bounds"),
         1 if stays else 0,
-        _reveal(subject, errors, stays)
-        + _second_try(subject, float(np.abs(kinetic).max()), float(np.abs(torque).max())),
+        _reveal(subject, errors, stays, verdict) + _second_try(subject, torque),
         "Move dt, and the state. Both torques are those of the graphs, computed in this page.",
         _play(subject, right, wrong),
-        f"At dt = 1e-6 s the largest error is {number(last)}. {_expected(stays)} Listen for “but velocity does move position!” True along a motion, and the chain "
+        f"At dt = 1e-6 s the largest error is {number(last)}. {_expected(stays, verdict)} Listen for “but velocity does move position!” True along a motion, and the chain "
         "rule uses it; not in ∂L/∂q̇, where a state is varied that nothing has moved yet.",
     )
 
 
-def _expected(stays: bool) -> str:
+def _expected(stays: bool, verdict: Verdict) -> str:
     """What a teacher expects of the class."""
     if stays:
         return "Expect hands for A: a smaller step cures almost every other error of a simulation."
+    if not verdict.differs:
+        return "A is right of this system: ∂L/∂q is zero at every state. With a weight or a spring it is B."
     return "A is right at this state, where ∂L/∂q is zero. Move the state: where it is not, the error stays."
 
 
@@ -78,7 +78,7 @@ def _story(subject: Subject) -> str:
     )
 
 
-def _reveal(subject: Subject, errors: list[tuple[float, np.ndarray]], stays: bool) -> str:
+def _reveal(subject: Subject, errors: list[tuple[float, np.ndarray]], stays: bool, verdict: Verdict) -> str:
     said = (
         "<p><b>B.</b> q = q̇ dt + q<sub>old</sub> is an edge from velocity to position. Turning the knob q̇ now turns q "
         "as well, so p gains dt · ∂L/∂q. A small dt makes that small. But then we differentiate <em>by</em> dt, and the "
@@ -93,27 +93,27 @@ def _reveal(subject: Subject, errors: list[tuple[float, np.ndarray]], stays: boo
     rows = [[f"{dt:g}", *[number(error) for error in each[: len(joints)]]] for dt, each in errors]
     steps = table("Error of the torque by definition", ["dt [s]", *joints], rows)
     sizes = size_table(formulation_sizes(subject.system))
-    return said + _drawing(subject) + steps + table(sizes.caption, sizes.header, sizes.rows) + f"<p>{WHY_FEWER}</p>"
+    why = f"<p>{verdict.lacking or WHY_FEWER}</p>" * verdict.differs
+    return said + _drawing(subject) + steps + table(sizes.caption, sizes.header, sizes.rows) + why
 
 
-def _second_try(subject: Subject, error: float, torque: float) -> str:
+def _second_try(subject: Subject, right: np.ndarray) -> str:
     """The kinetic energy alone, which is right where it does not depend on the place."""
-    energy = cg.simplify(kinetic_energy(subject.system))
-    moving = not set(energy.nodes).isdisjoint(set(energy.inputs[: subject.system.nq]))
-    if error > _GONE * torque:
+    verdict = formulation_verdict(subject.scene, "kinetic_only")
+    off = float(np.abs(_after_a_step(subject, verdict.graph, STEPS[-1]) - right).max())
+    error, torque = number(off), number(float(np.abs(right).max()))
+    if verdict.excess_at(subject.values):
         told = (
-            f"Here the torque is then still off by {number(error)} of {number(torque)}: how hard a joint is to turn "
+            f"Here the torque is then still off by {error} of {torque}: how hard a joint is to turn "
             "depends on where the others are, so K contains positions, and the edge does its damage there."
         )
-    elif moving:
+    elif verdict.differs:
         told = (
-            f"At this state the torque is then right, to {number(error)} of {number(torque)}. But K contains positions: "
+            f"At this state the torque is then right, to {error} of {torque}. But K contains positions: "
             "where its slope by them is not zero, the edge does its damage there."
         )
     else:
-        told = (
-            f"Here the torque is then right, to {number(error)} of {number(torque)}: K does not change with the place."
-        )
+        told = f"Here the torque is then right, to {error} of {torque}: K does not change with the place."
     return (
         "<p><b>A second try</b> keeps the step and takes the kinetic energy K alone for the momentum, since weight and springs "
         f"have no place in it. {told} The chain rule needs neither trick.</p>"
@@ -124,8 +124,7 @@ def _drawing(subject: Subject) -> str:
     """The inertial term by definition and by the chain rule, where they are small enough for a picture."""
     pictures = ""
     for formulation in ("euler_embedded", "chain_rule"):
-        graph = momentum_rate(subject.system, formulation, keep_momentum=True)
-        wrong = spurious_nodes(graph)
+        graph, (wrong, edges, _) = blamed(subject.system, INERTIAL_TERM, formulation)
         if len(graph.nodes) > DRAWN:
             return ""
         if not pictures:
@@ -135,6 +134,7 @@ def _drawing(subject: Subject) -> str:
             names=subject.names,
             formulas=short_formulas(graph, subject.names),
             marked=wrong,
+            marked_edges=edges,
             clusters=False,
             legend=False,
         )

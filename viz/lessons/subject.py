@@ -13,7 +13,8 @@ import numpy as np
 import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Array
-from dynamics import consistent_state, display_names
+from dynamics import display_names
+from dynamics.equations.consistent_state import nearest_state
 from dynamics.scenes.scenes import Scene, of_model
 from dynamics.scenes.start import moving_start
 from dynamics.systems.model import Model
@@ -101,7 +102,7 @@ def subject_of(model: Model) -> Subject:
         q = q + _in_turn(_BENDS, system.n)  # a straight arm is a special place, and so is 0
         q[q == 0.0] = 0.4
     if len(system.constraints):
-        q, qd = consistent_state(scene, q, qd)
+        q, qd = nearest_state(scene, q, qd)
     return Subject(scene, q, qd, qdd, _letters(scene))
 
 

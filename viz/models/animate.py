@@ -120,7 +120,7 @@ def animate(
         raise TypeError(f"title must be text, got {type(title).__name__}: {title!r:.60}")
     model = scenes.of_model(model)
     known = _motions(model, motions)
-    wrong = require_sequence("marked", marked, "words of motions")
+    wrong = require_sequence("marked", marked, "words of motions", str)
     if unknown := [each for each in wrong if each not in known]:
         raise ValueError(f"marked: there is no motion {unknown[0]!r:.80} (there are {', '.join(known)})")
     times = _times(known.values(), speed)

@@ -101,7 +101,7 @@ def inspection_page(scene: scenes.Scene, content: Inspection, moved: str = "", t
     notices += [f"{moved[0].upper()}{moved[1:]}."] if moved else []
     return page(
         [
-            Version(each.name.replace("_", " "), *each[1:4], [Step(*step) for step in each.steps], each.rows)
+            Version(each.name.replace("_", " "), *each[1:4], [Step(*step) for step in each.steps], *each[5:])
             for each in content.versions
         ],
         title=f"{scene.name}: {what}" if title is None else title,

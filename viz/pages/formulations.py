@@ -22,16 +22,19 @@ WHY_FEWER = (
 
 
 def size_table(sizes: Mapping[tuple[str, str], Sequence[int]]) -> Table:
-    """The sizes of each term by each formulation, {(term, formulation): (nodes, edges, depth, spurious ones)}.
+    """The sizes of each term by each formulation, {(term, formulation): (nodes, edges, depth, spurious ones, missing)}.
 
     Sizes are those of `dynamics.formulation_sizes`.
     """
     rows = [
-        [
-            f"{theme.pretty(term)}, {TITLES[formulation]}",
-            *[str(count) for count in counts],
-            f"{nodes} nodes, {edges} edges" if nodes else "none",
-        ]
-        for (term, formulation), (*counts, nodes, edges) in sizes.items()
+        [f"{theme.pretty(term)}, {TITLES[formulation]}", *[str(count) for count in counts], _mistakes(*wrong)]
+        for (term, formulation), (*counts, nodes, edges, missing) in sizes.items()
+        for wrong in [(nodes, edges, missing)]
     ]
     return Table("Sizes of the graphs", ["", "nodes", "edges", "depth", "there by mistake"], rows)
+
+
+def _mistakes(nodes: int, edges: int, missing: int) -> str:
+    """What is there by mistake, and what is not there by mistake."""
+    kinds = ((nodes, "node"), (edges, "edge"), (missing, "missing term"))
+    return ", ".join([f"{count} {kind}{'s' * (count != 1)}" for count, kind in kinds if count]) or "none"

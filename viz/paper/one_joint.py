@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from cgraph import Graph
 from cgraph.extend import format_polynomial
-from dynamics import formulation_sizes, momentum_rate, scenes, spurious_nodes
-from dynamics.equations.formulation_sizes import formulation_size
+from dynamics import formulation_sizes, scenes
+from dynamics.equations.blame import Blame
+from dynamics.equations.formulation_sizes import INERTIAL_TERM, blamed, formulation_size
 from dynamics.experiments.paper_numbers.equation3 import PAPER, equation3, torque_terms
 from dynamics.experiments.text_table import csv_text
 
@@ -53,7 +54,7 @@ def equations() -> Part:
 
 def figure1() -> Part:
     """Figure 1: by definition, with the Euler relation embedded."""
-    size = formulation_size(_one_joint("euler_embedded"))
+    size = formulation_size(*_one_joint("euler_embedded"))
     caption = (
         f"Figure 1. By definition, with the Euler relation embedded. {size.spurious_nodes} of {size.nodes} nodes and "
         f"{size.spurious_edges} of {size.edges} edges (in vermillion) are there by mistake: the spring's energy is "
@@ -96,21 +97,22 @@ def sizes() -> Part:
     return Part("sizes", "Sizes of the graphs", {"sizes.csv": csv_text(table.header, table.rows)}, data, section)
 
 
-def _one_joint(formulation: str) -> Graph:
-    """The inertial term of the rotor on a spring, with its momentum, as Figures 1 to 3 draw it."""
-    return momentum_rate(scenes.load("spring_mass"), formulation, keep_momentum=True)
+def _one_joint(formulation: str) -> tuple[Graph, Blame]:
+    """The inertial term of the rotor on a spring, with its momentum, as Figures 1 to 3 draw it, and what is wrong in it."""
+    return blamed(scenes.load("spring_mass"), INERTIAL_TERM, formulation)
 
 
 def _drawn(name: str, heading: str, formulation: str, caption: str) -> Part:
     """A drawing of a graph as SVG, PNG and DOT, its counts in the caption. The legend of all stands above the first."""
-    graph = _one_joint(formulation)
-    size = formulation_size(graph)
+    graph, wrong = _one_joint(formulation)
+    size = formulation_size(graph, wrong)
     caption = f"{caption} {size.nodes} nodes, {size.edges} edges."
     drawing = to_dot(
         graph,
         names=theme.ONE_JOINT,
         formulas=short_formulas(graph, theme.ONE_JOINT),
-        marked=spurious_nodes(graph),
+        marked=wrong.nodes,
+        marked_edges=wrong.edges,
         clusters=False,
         legend=False,
     )
@@ -122,7 +124,7 @@ def _drawn(name: str, heading: str, formulation: str, caption: str) -> Part:
     }
     section = html.figure(svg, caption, width="auto", adapts=True)
     if name == "fig1":
-        legend = to_adaptive(legend_svg(kinds_in(graph, spurious_nodes(graph))))
+        legend = to_adaptive(legend_svg(kinds_in(graph, wrong.nodes)))
         files["legend.svg"] = legend
         section = html.figure(legend, "The colors of Figures 1 to 3.", width="auto", adapts=True) + section
     return Part(name, heading, files, size._asdict(), section)

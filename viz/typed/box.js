@@ -102,13 +102,14 @@ function showWrong(wrong) {
 }
 /** Counts, lint in words, and how exact the motion is. */
 function showDerived({ system, motion, record }) {
-  const rows = record.versions.map(({ name, ops, args, marked }) => {
+  const rows = record.versions.map((version) => {
+    const { name, ops, args, flawed } = version;
     const edges = args.reduce((sum, each) => sum + (Array.isArray(each) ? each.length : 0), 0);
-    return tag("tr", {}, rowHead(name), ...[ops.length, edges, marked.length].map((count, k) => tag("td", { class: k === 2 && count ? "off" : "" }, String(count))));
+    return tag("tr", {}, rowHead(name), ...[ops.length, edges, spuriousIn(version)].map((count, k) => tag("td", { class: k === 2 && flawed ? "off" : "" }, String(count))));
   });
   const lint = TYPED.FORMULATIONS.map((name) => {
-    const { ok, lines } = TYPED.lint(system, TYPED.inverseDynamics(system, name));
-    return tag("details", {}, tag("summary", {}, `lint, ${name.replace("_", " ")}: ${ok ? "holds" : "q depends on qd"}`), tag("pre", {}, lines.join("\n")));
+    const found = TYPED.verdict(system, name), words = found.differs ? "differs" : "holds";
+    return tag("details", {}, tag("summary", {}, `lint, ${name.replace("_", " ")}: ${words}`), tag("pre", {}, TYPED.lint(system, found).join("\n")));
   });
   byId("derived").replaceChildren(table(["nodes", "edges", "spurious"], rows), ...lint, ...(motion.error ? [] : motionWords(system, motion)));
 }

@@ -35,8 +35,9 @@ class Reached {
   }
 }
 
-/** Reverse mode: the cotangents of `wrt` for seeds Map {y: y_bar}; 0 where no seed depends on one. */
-function cotangents(seeds, wrt, build = new Builder()) {
+/** Reverse mode: the cotangents of `wrt` for seeds Map {y: y_bar}; 0 where no seed depends on one.
+ * through: Map {inner node: factor} of its cotangent before that goes on. */
+function cotangents(seeds, wrt, build = new Builder(), through = new Map()) {
   const order = topological(seeds.keys()), active = new Set(wrt), bars = new Map(seeds);
   for (const node of order) if (node.args.some((arg) => active.has(arg))) active.add(node);
   const reached = new Reached(seeds.keys());
@@ -44,9 +45,10 @@ function cotangents(seeds, wrt, build = new Builder()) {
   const labelOf = (node) => withTagsOf(derived(node.label, ADJOINT), bare.get(node) ?? 0);
   within({ build }, () => {
     for (const node of order.reverse()) {
-      const bar = bars.get(node);
+      let bar = bars.get(node);
       if (!bar || !active.has(node) || !node.args.length) continue;
       scope.label = labelOf(node);
+      if (through.has(node)) bar = mul(bar, through.get(node));
       const terms = new Map(); // by argument first, so that x * x gives 2 * (bar * x)
       partialsOf(node).forEach((partial, slot) => {
         const arg = node.args[slot];

@@ -20,6 +20,7 @@ FILES = (
     "folding.js",
     "derivatives.js",
     "equations.js",
+    "verdict.js",
     "lint.js",
     "motion.js",
     "record.js",
@@ -39,6 +40,7 @@ def engine() -> str:
             "arity": op.arity,
             "commutative": op.commutative,
             "selects": op.selects,
+            "rounding": op.rounding,
             "singular": op.singular is not None,
             "slopes": slopes(op),
         }

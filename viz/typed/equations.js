@@ -14,8 +14,9 @@ function chainRule(system) {
 }
 const timeOf = (system) => system.extra.filter((node) => node === system.t);
 
-/** By definition: dL/dqd is taken through q = qd dt + q_old, which is wrong; or of the kinetic energy alone. */
-function embedded(system, energyOf) {
+/** By definition: dL/dqd is taken through q = qd dt + q_old, which is wrong; or of the kinetic energy alone.
+ * through: a factor of all that comes through q, 1 in the formulation; at 0 the momentum is the right one. */
+function embedded(system, energyOf, through) {
   const { q, qd, qdd } = system, dt = variable("dt");
   const old = (kind) => q.map((_, i) => variable(`${kind}${i}_old`)), qOld = old("q"), qdOld = old("qd");
   const step = (label, rates, from, kind) => rates.map((rate, i) => {
@@ -27,16 +28,15 @@ function embedded(system, energyOf) {
   const replace = pairs([...q, ...qd], [...qNew, ...qdNew]);
   // All with tags: derivatives of nodes without would take those of the relation from their arguments.
   const [lagrangian, energy] = substitute([system.lagrangian, energyOf(system)], replace, LAGRANGIAN);
-  const momentum = cotangents(new Map([[energy, ONE()]]), qdNew); // through q as well: the unwanted coupling
+  const factors = new Map(qNew.map((node) => [node, through]));
+  const momentum = cotangents(new Map([[energy, ONE()]]), qdNew, new Builder(), factors); // through q as well: the unwanted coupling
   const gradient = cotangents(new Map([[lagrangian, ONE()]]), qNew);
   const rate = tangents(pairs([dt, ...timeOf(system)], [ONE(), ONE()]), momentum);
   return { inputs: [...qOld, ...qdOld, ...qdd, dt], q: qNew, qd: qdNew, rate, gradient };
 }
-const FORMULATIONS = {
-  euler_embedded: (system) => embedded(system, ({ lagrangian }) => lagrangian),
-  kinetic_only: (system) => embedded(system, kineticEnergy),
-  chain_rule: chainRule,
-};
+/** What is differentiated by qd through q = qd dt + q_old, by the formulations that do that. */
+const THROUGH_STEP = { euler_embedded: ({ lagrangian }) => lagrangian, kinetic_only: (system) => kineticEnergy(system) };
+const FORMULATIONS = ["euler_embedded", "kinetic_only", "chain_rule"];
 
 /** K: the terms of L that depend on velocities. */
 function kineticEnergy({ lagrangian, qd }) {
@@ -54,8 +54,8 @@ function kineticEnergy({ lagrangian, qd }) {
 }
 
 /** tau = d/dt dL/dqd - dL/dq + damping qd - forces, simplified. */
-function inverseDynamics(system, formulation) {
-  const terms = FORMULATIONS[formulation](system);
+function inverseDynamics(system, formulation, through = ONE()) {
+  const energyOf = THROUGH_STEP[formulation], terms = energyOf ? embedded(system, energyOf, through) : chainRule(system);
   const applied = terms.q === system.q ? system.forces
     : substitute(system.forces, pairs([...system.q, ...system.qd], [...terms.q, ...terms.qd]));
   const outputs = within({ build: new Builder() }, () => terms.rate.map((rate, i) => {
@@ -63,19 +63,6 @@ function inverseDynamics(system, formulation) {
     return sub(within({ label: PRIMAL | DAMPING }, () => add(tau, mul(system.damping[i], terms.qd[i]))), applied[i]);
   }));
   return simplified(graphOf([...terms.inputs, ...system.extra], new Map(outputs.map((node, i) => [`tau${i}`, node]))));
-}
-
-/** Nodes that serve only derivatives taken through q = qd dt + q_old. */
-function spuriousNodes(graph) {
-  const coupling = new Set(graph.nodes.filter(({ label }) => label & COUPLING && label & ADJOINT));
-  const needed = new Set(), stack = [...graph.outputs.values()].filter((node) => !coupling.has(node));
-  while (stack.length) {
-    const node = stack.pop();
-    if (needed.has(node)) continue;
-    needed.add(node);
-    stack.push(...node.args.filter((arg) => !coupling.has(arg)));
-  }
-  return new Set(graph.nodes.filter((node) => !needed.has(node)));
 }
 
 /** Lower triangle of M = d2L/dqd2. */

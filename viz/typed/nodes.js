@@ -122,9 +122,9 @@ function substitute(nodes, replace, tag = 0) {
   return nodes.map((node) => copies.get(node));
 }
 
-/** Copies of nodes made by a builder. */
-function folded(nodes, build = new Builder()) {
-  const copies = rebuild(nodes, new Map(), (node, args) =>
+/** Copies of nodes made by a builder. replace: Map {node: what stands in its place}. */
+function folded(nodes, build = new Builder(), replace = new Map()) {
+  const copies = rebuild(nodes, replace, (node, args) =>
     within({ build, label: node.label }, () => build.make(node.op, args, node.label, node.name)));
   return nodes.map((node) => copies.get(node));
 }

@@ -10,8 +10,8 @@ const pretty = (name) => name.replace(/(?<![A-Za-z0-9])([A-Za-z]+)([0-9]*)(?![A-
 
 /** Inverse dynamics by all formulations, or forward dynamics, along a motion. */
 function recordOf(system, motion, forward) {
-  const graphs = forward ? [["forward dynamics", accelerations(system)]]
-    : Object.keys(FORMULATIONS).map((name) => [name, inverseDynamics(system, name)]);
+  const graphs = forward ? [["forward dynamics", accelerations(system), null]]
+    : FORMULATIONS.map((name) => { const found = verdict(system, name); return [name, found.graph, found]; });
   const derived = forward ? null : earlier(system), computed = new Set(derived?.outputs.keys());
   const places = placesOf(system), shownGraphs = [...graphs.map(([, graph]) => graph), ...(places ? [places] : [])];
   const needed = [...(derived?.inputs ?? []), ...shownGraphs.flatMap((graph) => graph.inputs)].map(({ name }) => name);
@@ -28,7 +28,7 @@ function recordOf(system, motion, forward) {
     units: [["t", "s"], ["dt", "s"]].filter(([name]) => known.has(name)),
     inputs, rows: rowsOf(system, motion, inputs), columns: [], tables: [],
     derived: derived && listed(derived, letters),
-    versions: graphs.map(([name, graph]) => versionOf(name, graph, letters)),
+    versions: graphs.map(([name, graph, found]) => versionOf(name, graph, letters, found)),
     motion: motion.error ? null : { ...shownMotion(motion), joints: [], places: places && listed(places, letters) },
   };
 }
@@ -63,16 +63,18 @@ function listed(graph, letters) {
     outputs: [...graph.outputs].map(([name, node]) => [name, letters(name), number.get(node)]),
   };
 }
-function versionOf(name, graph, letters) {
-  const wrong = spuriousNodes(graph), kinds = new Map();
+function versionOf(name, graph, letters, found) {
+  const { nodes: wrong, edges, differs } = found ?? { nodes: new Set(), edges: [], differs: false }, kinds = new Map();
+  const number = new Map(graph.nodes.map((node, i) => [node, i]));
   const label = graph.nodes.map((node) => {
     const kind = [tagNames.filter((_, i) => node.label & (16 << i)), roleOf(node), stageOf(node)], key = JSON.stringify(kind);
     if (!kinds.has(key)) kinds.set(key, { i: kinds.size, kind });
     return kinds.get(key).i;
   });
   return {
-    name: name.replace("_", " "), about: aboutOf(name, graph, wrong), ...listed(graph, letters), label, labels: [...kinds.values()].map(({ kind }) => kind),
-    marked: graph.nodes.flatMap((node, i) => (wrong.has(node) ? [i] : [])), steps: [],
+    name: name.replace("_", " "), about: aboutOf(name, graph, found), ...listed(graph, letters), label, labels: [...kinds.values()].map(({ kind }) => kind),
+    marked: graph.nodes.flatMap((node, i) => (wrong.has(node) ? [i] : [])), steps: [], flawed: differs,
+    blamed: edges.map((edge) => edge.map((node) => number.get(node))),
   };
 }
 function roleOf({ args, value, label }) {
@@ -84,14 +86,13 @@ function stageOf({ label }) {
   if (label & PRIMAL || !(label & (ADJOINT | TANGENT))) return "as written";
   return label & ADJOINT ? (label & TANGENT ? "both sweeps" : "reverse sweep") : "forward sweep";
 }
-function aboutOf(name, { nodes }, wrong) {
-  if (wrong.size) {
-    return `Look at what is vermillion: ${wrong.size} of ${nodes.length} nodes. The velocity derivative ${ABOUT[name]}was taken through `
-      + "q = qd dt + q_old, so it reached q as well, and a branch that does not belong there runs into the torques. No smaller dt takes it away.";
-  }
-  if (name === "forward dynamics") return `Accelerations from torques: the mass matrix is derived and eliminated, ${nodes.length} nodes.`;
-  const free = name === "kinetic_only" ? " This way out is right here, because the kinetic energy does not depend on q." : "";
-  return `No spurious branch: ${nodes.length} nodes, and the torques that the motion takes.${free} Nothing else drives it, so they should be 0.`;
+function aboutOf(name, { nodes }, found) {
+  if (!found) return `Accelerations from torques: the mass matrix is derived and eliminated, ${nodes.length} nodes.`;
+  const { differs, nodes: wrong, edges, sentence, summary, lacking } = found;
+  if (!differs) return `${summary} Nothing else drives it, so the torques should be 0.`;
+  const entries = edges.length > 1 ? `the ${edges.length} edges` : "the edge", of = wrong.size ? `${wrong.size} of ${nodes.length} nodes, and ` : "";
+  return [sentence, `The velocity derivative ${ABOUT[name]}was taken through q = qd dt + q_old, so it reached q as well.`,
+    ...(edges.length ? [`Look at what is vermillion: ${of}${entries} by which the surplus enters.`] : []), lacking].join(" ").trim();
 }
 function noticesOf(system, motion) {
   if (motion.error) return [motion.error];

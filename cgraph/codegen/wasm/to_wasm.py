@@ -81,7 +81,7 @@ def to_wasm(
     (b'\x00asm', 75)
     """
     require_graph("to_wasm", graph)
-    host = require_sequence("host", host, "names of functions")
+    host = require_sequence("host", host, "names of functions", str)
     chosen = {} if methods is None else require_mapping("methods", methods, "name: Tableau")
     inputs, states = len(graph.inputs), len(graph.outputs)
     _check(chosen, inputs, states, time, host)

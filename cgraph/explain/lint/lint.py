@@ -104,9 +104,9 @@ def lint(
     ----------
     graph : Graph
         What to check.
-    independent : pair of groups, or sequence of such pairs
+    independent : pair of groups, or list of such pairs
         `("q0 q1", "qd0 qd1")`: neither group may depend on the other, whatever else both depend on. A group is a name,
-        several names in one string, or a sequence of names and nodes; inner nodes have names by `cg.with_name`. A
+        several names in one string, or a list of names and nodes; inner nodes have names by `cg.with_name`. A
         violation is blamed on a minimum cut of the paths, the one nearest to what should be independent, and tells what
         a derivative through it counts.
     depends : mapping, optional
@@ -175,10 +175,20 @@ def lint(
 
 
 def _pairs(independent: Pair | Sequence[Pair]) -> list[Pair]:
-    """The pairs; a single pair of strings or nodes counts as one."""
+    """The pairs: a tuple of two is one itself, as are two names in a list; a list holds pairs.
+
+    Raises ValueError for two tuples of two in a tuple, which may be either.
+    """
     if isinstance(independent, (str, Node)):
         raise TypeError(f"independent: expected pairs of groups, got {independent!r:.60}")
     pairs: list[Any] = list(require_sequence("independent", independent, "pairs of groups"))
+    if len(pairs) == 2 and isinstance(independent, tuple):
+        if all([isinstance(each, tuple) and len(each) == 2 for each in pairs]):
+            raise ValueError(
+                f"independent: {independent!r:.60} may be one pair of groups or two pairs; give groups as strings or "
+                "lists, and several pairs in a list"
+            )
+        return [(pairs[0], pairs[1])]
     if len(pairs) == 2 and all([isinstance(group, (str, Node)) for group in pairs]):
         return [(pairs[0], pairs[1])]
     for pair in pairs:

@@ -12,7 +12,7 @@ import numpy as np
 import cgraph as cg
 from cgraph.extend import Array
 
-from ...equations.consistent_state import consistent_state
+from ...equations.consistent_state import nearest_state
 from ...equations.equations_of_motion import forward_dynamics
 from ...io.mujoco_twin import mujoco
 from ...io.write_mjcf import to_mjcf
@@ -83,7 +83,7 @@ def closed_chains(repeats: int = REPEATS) -> Iterator[str]:
     for links in SIZES:
         arm, held = pinned(links)
         rng = np.random.default_rng(links)
-        q, qd = consistent_state(held, 0.6 * rng.normal(size=links), rng.normal(size=links))
+        q, qd = nearest_state(held, 0.6 * rng.normal(size=links), rng.normal(size=links))
         x = np.concatenate([q, qd, rng.normal(size=links)])
         calls = {"ours": ours(held, x)}
         calls |= {"Pinocchio": pinocchio(arm, x)} if find_spec("pinocchio") else {}

@@ -1,4 +1,4 @@
-"""Answers: where the random Lagrangians end, to thirty digits, and how much a small error grows on the way."""
+"""Answers: where the random motions end, to thirty digits, and how much a small error grows on the way."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ from ...multiprecision.solution import from_text
 from ...simulation.scipy_solvers import solve_ivp
 from ..setting import Setting
 from ..work_precision.trajectory_runs import problem_of
-from .random_lagrangians import random_setting
+from .random_lagrangians import LAGRANGIANS
+from .random_starts import EACH, FAMILIES, random_motion
 
 FILE = Path(__file__).with_name("answers.json")
-COUNT = 200
+COUNT = LAGRANGIANS + EACH * len(FAMILIES)
 DIGITS = 30
 PARTS = 8  # of the motion: an error may be made at the start of any
 RTOL, NUDGE = 1e-7, 2.0**-12  # of motions beside the motion: their errors, and how far they start aside, in sizes
@@ -47,8 +48,8 @@ class Answer:
 
 
 def answer(number: int) -> Answer:
-    """The answer to the random Lagrangian of this number, from the file beside this one or computed."""
-    setting = random_setting(number)
+    """The answer to the random motion of this number, from the file beside this one or computed."""
+    setting = random_motion(number)
     kept = _kept().get(str(number))
     if kept is None or kept["start"] != _hex(setting.start) or kept["t"] != setting.t_end.hex():
         return compute(setting)
@@ -96,7 +97,7 @@ def size_and_growth(setting: Setting, times: Sequence[float], size: Array) -> tu
 def renew(numbers: Iterable[int], say: Callable[[str], None] = lambda line: None) -> None:
     """Compute the answers of these numbers and keep them in the file; some take half a minute."""
     for number in numbers:
-        setting = random_setting(number)
+        setting = random_motion(number)
         result = compute(setting)
         entry: dict[str, Any] = {"start": _hex(setting.start), "t": setting.t_end.hex()}
         entry |= {"size": list(result.size), "growth": result.growth, "how": result.how}

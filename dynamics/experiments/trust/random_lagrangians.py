@@ -16,6 +16,7 @@ from ..setting import Setting
 
 Lagrangian = Callable[[list[Node], list[Node], Node], Node]
 FAMILIES: dict[str, Callable[[np.random.Generator, str], Setting]] = {}
+LAGRANGIANS = 200
 FREQUENCY = 3.0  # rad/s, of what turns with time
 
 

@@ -14,8 +14,8 @@ from ..text_table import table
 from ..work_precision.measurement import Tried, in_turns
 from ..work_precision.trajectory_peers import EPSILON, Heyoka
 from ..work_precision.trajectory_runs import Ours, Solver, problem_of
-from .answers import COUNT, Answer, answer
-from .random_lagrangians import random_setting
+from .answers import Answer, answer
+from .random_lagrangians import LAGRANGIANS, random_setting
 
 METHOD, TURNS = "taylor", 5
 FLOOR = EPSILON / 4.0  # of an error in a ratio: less is luck
@@ -59,7 +59,7 @@ def _error(truth: Answer, x: Array) -> float:
     return float(np.max(np.abs(truth.end.deviation(x[None])[0]) / np.where(size > 0.0, size, 1.0)))
 
 
-def tightest(count: int = COUNT) -> Iterator[str]:
+def tightest(count: int = LAGRANGIANS) -> Iterator[str]:
     """Errors and times as ratios to heyoka's, by family and in all."""
     duels = [result for number in range(count) if (result := duel(number)) is not None]
     fought = [each for each in duels if not each.status]

@@ -1,7 +1,8 @@
-"""Trust: runs of the random Lagrangians with default arguments, judged by their answers: right, said, or silent."""
+"""Trust: random motions run with default arguments, judged by their answers: right, said, or silent."""
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
@@ -11,16 +12,18 @@ from typing import Any
 import numpy as np
 
 from ...integrators import METHODS
+from ...integrators.jets import NoSeriesError
 from ...simulation.run_options import RunOptions
 from ...simulation.simulate import simulate
 from ...simulation.trajectory import Trajectory
 from ..setting import Setting
 from ..text_table import table
 from .answers import COUNT, Answer, answer
-from .random_lagrangians import random_setting
+from .random_starts import jump, random_motion
 
 RIGHT, SAID, SILENT = "right", "said", "silent"
 SLACK = 100.0  # times rtol times the growth: an error that is right
+JUMPS = 1000.0  # the same where forces jump, whose size in a step no estimate knows
 DEFAULT = "default"
 ADAPTIVE = tuple([name for name, method in METHODS.items() if method.adaptive])
 
@@ -30,8 +33,8 @@ class Verdict:
     """One run judged.
 
     excess: the error at t_end over rtol times the growth, the largest of all states, each over its size; NaN
-    where there is no end, or the run did not get there.  verdict: "right", excess at most `SLACK`, or the motion has no
-    end and the run says so; "said", the run stopped or warns; "silent".  words: what the run said.
+    where there is no end, or the run did not get there.  verdict: "right", excess at most `SLACK` or `JUMPS`, or the
+    motion has no end and the run says so; "said", the run stopped, is refused or warns; "silent".  words: what it said.
     """
 
     name: str
@@ -44,22 +47,27 @@ class Verdict:
 
 
 def judge(number: int, method: str | None = None) -> Verdict:
-    """The verdict on one random Lagrangian by a method with default arguments."""
-    setting, truth = random_setting(number), answer(number)
+    """The verdict on one random motion by a method with default arguments."""
+    setting, truth = random_motion(number), answer(number)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         arguments: dict[str, Any] = {} if method is None else {"method": method}
-        run = simulate(setting.model, setting.q, setting.qd, setting.t_end, progress=False, **arguments)
-    words = "; ".join([*([] if run.stats.success else [run.stats.message]), *[str(each.message) for each in caught]])
+        start = setting.q, setting.qd or None
+        try:
+            run = simulate(setting.model, *start, setting.t_end, progress=False, **arguments)
+        except NoSeriesError as error:
+            return Verdict(setting.name, method or DEFAULT, SAID, math.nan, str(error), 0, 0.0)
+    words = "; ".join([str(each.message) for each in caught])
     excess = _excess(setting, truth, run)
-    right = excess <= SLACK or (truth.end is None and not run.stats.success)
+    slack = JUMPS if setting.name.startswith(jump.__name__) else SLACK
+    right = excess <= slack or (truth.end is None and not run.stats.success)
     verdict = RIGHT if right else SAID if words else SILENT
     return Verdict(setting.name, method or DEFAULT, verdict, excess, words, run.stats.steps, run.stats.seconds)
 
 
 def _excess(setting: Setting, truth: Answer, run: Trajectory) -> float:
     if truth.end is None or not run.stats.success:
-        return float("nan")
+        return math.nan
     size = np.array(truth.size)
     error = np.abs(truth.end.deviation(np.hstack([run.q[-1:], run.qd[-1:]]))[0])
     relative = np.divide(error, size, out=np.where(error > 0.0, np.inf, 0.0), where=size > 0.0)
@@ -70,7 +78,7 @@ def _excess(setting: Setting, truth: Answer, run: Trajectory) -> float:
 def verdicts(
     numbers: Iterable[int] = range(COUNT), methods: Sequence[str | None] = (None, *ADAPTIVE)
 ) -> Iterator[Verdict]:
-    """The verdicts on these random Lagrangians by these methods; None is the default."""
+    """The verdicts on these random motions by these methods; None is the default."""
     for number in numbers:
         for method in methods:
             yield judge(number, method)
@@ -95,7 +103,8 @@ def trust(count: int = COUNT) -> Iterator[str]:
             ]
         )
     head = ["method", RIGHT, SAID, SILENT, "median excess", "largest", "seconds"]
-    yield f"{count} random Lagrangians, default arguments; excess: error over rtol times growth, right to {SLACK:g}"
+    right = f"right to {SLACK:g}, where forces jump to {JUMPS:g}"
+    yield f"{count} random motions, default arguments; excess: error over rtol times growth, {right}"
     yield "\n".join(table(head, rows))
     for each in judged:
         if each.verdict != RIGHT:

@@ -9,7 +9,7 @@ import numpy as np
 from cgraph import Node
 
 from .. import spatial
-from ..spatial import Array, Triple
+from ..spatial import STILL, Array, Triple
 from . import quaternion
 from .joint_type import NodeMatrix, SpatialJoint
 
@@ -34,6 +34,14 @@ class Ball(SpatialJoint):
         """The velocities themselves."""
         x, y, z = u
         return x, y, z
+
+    def angular_acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
+        """0: the velocities are its components."""
+        return STILL
+
+    def linear_acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
+        """0."""
+        return STILL
 
     def rate(self, q: Sequence[Node], u: Sequence[Node]) -> Sequence[Node]:
         """That of the quaternion."""

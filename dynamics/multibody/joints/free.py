@@ -9,7 +9,7 @@ import numpy as np
 from cgraph import Node
 
 from .. import spatial
-from ..spatial import ZERO, Array, Triple
+from ..spatial import STILL, ZERO, Array, Triple
 from . import quaternion
 from .joint_type import NodeMatrix, SpatialJoint
 
@@ -44,6 +44,14 @@ class Free(SpatialJoint):
     def linear_velocity(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
         """The first three, turned into the body's axes."""
         return spatial.rotate_transpose(self.rotation(q), (u[0], u[1], u[2]))
+
+    def angular_acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
+        """0: three of the velocities are its components."""
+        return STILL
+
+    def linear_acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
+        """0: the others are rates of a place."""
+        return STILL
 
     def rate(self, q: Sequence[Node], u: Sequence[Node]) -> Sequence[Node]:
         """The linear velocities, and the rate of the quaternion."""

@@ -7,11 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+import cgraph as cg
 from cgraph import Node
+from cgraph.extend import tangents, topological
 
-from ..spatial import STILL, ZERO, Array, Triple
+from ..spatial import STILL, ZERO, Array, Triple, cross, plus
 
 NodeMatrix = Sequence[Sequence[Node]]  # (3, 3), rows
+ONE = cg.constant(1.0)
 
 
 class JointType(ABC):
@@ -128,9 +131,31 @@ class SpatialJoint(JointType):
         """Of the body's origin against the joint [m/s]."""
         return STILL
 
+    def angular_acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
+        """Of the body against the joint, at constant velocities u [rad/s^2]: the rate of the angular velocity."""
+        return self._rate_along(q, u, self.angular_velocity(q, u))
+
     def linear_acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
-        """Of the body's origin against the joint, at constant velocities u [m/s^2]. The angular one is 0."""
-        return STILL
+        """Of the body's origin against the joint, at constant velocities u [m/s^2]: v_dot + omega x v."""
+        velocity = self.linear_velocity(q, u)
+        return plus(self._rate_along(q, u, velocity), cross(self.angular_velocity(q, u), velocity))
+
+    def _rate_along(self, q: Sequence[Node], u: Sequence[Node], vector: Triple) -> Triple:
+        """The rate of a vector of nodes over q and u as q moves with u, which is constant."""
+        moving = {x: dot for x, dot in zip(q, self.rate(q, u), strict=True) if x.value is None}
+        dots = tangents(moving, vector)
+        x, y, z = (dots.get(node, ZERO) for node in vector)
+        return x, y, z
+
+    @property
+    def turns_with_body(self) -> bool:
+        """Whether the directions of all velocities but the sliding ones are constant in the body's axes."""
+        q, u = cg.variables([f"q{k}" for k in range(len(self.coordinates))]), [ZERO] * len(self.velocities)
+        for k in range(self.sliding, len(u)):
+            unit = [*u[:k], ONE, *u[k + 1 :]]
+            if {*q} & {*topological([*self.angular_velocity(q, unit), *self.linear_velocity(q, unit)])}:
+                return False
+        return True
 
 
 MovingJoint = AxialJoint | SpatialJoint  # every type but that of a joint without coordinates

@@ -8,6 +8,7 @@ import numpy as np
 
 from cgraph.extend import Array
 
+from ..error_estimate import ErrorEstimate
 from ..event_log import Happening
 from .ensemble import Counts
 
@@ -38,6 +39,11 @@ class Part:
     warnings: list[list[str]]  # what speaks against a trajectory
     ended: list[bool]  # whether an event has ended it; then its status says which
     happened: list[list[Happening]]  # the events of each
+
+    def tell(self, k: int, error: ErrorEstimate) -> None:
+        """The error of trajectory k."""
+        self.errors[:, k] = error.largest, error.last
+        self.warnings[k] += [error.warning] if error.warning else []
 
     def interrupt(self, k: int, t: float, rows: int) -> None:
         """Trajectory k ends at t [s], after so many rows, and those after it did not begin."""

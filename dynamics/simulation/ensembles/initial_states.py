@@ -55,7 +55,7 @@ def starts(
             del same[name]
     if parameters and as_ode(model) is None:
         as_system(model).require_values({**same, **columns})
-    if np.ndim(tau) == 2:
+    if real_array("tau", tau).ndim == 2:
         arrays["tau"] = _array("tau", tau, n)
     else:
         values = np.asarray(tau).tolist()

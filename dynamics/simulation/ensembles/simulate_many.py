@@ -32,7 +32,7 @@ from ..sampled_controller import SampledController
 from ..step_program import StepProgram, pickled_steps, step_program
 from ..trajectory import SimulationWarning
 from .branch_free import branch_free
-from .chunk import Chunk
+from .chunk import INTERRUPTED, Chunk
 from .ensemble import Ensemble, EnsembleStats
 from .ensemble_rows import EnsembleRows
 from .initial_states import Starts, starts
@@ -76,8 +76,8 @@ def simulate_many(
 
     Where the steps do not branch on the state (euler, rk4; verlet and symplectic_euler of a constant mass matrix and
     forces that do not depend on qd), trajectories run side by side, a vector of them at a time; else one by one. One
-    whose state is not finite is NaN from there on, `stats.message` names the time and the coordinate, and the others go
-    on. Ctrl-C keeps the chunks that are done.
+    whose state is not finite is NaN from there on, `stats.message` and a `SimulationWarning` name the time and the
+    coordinate, and the others go on. Ctrl-C keeps the chunks that are done, without a warning.
 
     Parameters
     ----------
@@ -119,6 +119,8 @@ def simulate_many(
         For arguments of another type, shape or range, each by name, and for `workers` that give no results.
     MemoryError
         For a result that would not fit.
+    RuntimeError
+        Where a process of `workers` is ended from outside.
     SingularMassMatrixError
         For a coordinate without inertia.
 
@@ -159,7 +161,7 @@ def simulate_many(
 
     # Put the result together
     stats = _judged(result.stats(method, time.perf_counter() - begin), problem, options, result.rows, start)
-    if text := _warning(stats):
+    for text in _warnings(stats):
         warnings.warn(text, SimulationWarning, stacklevel=2)
     table, momenta = _table(problem, options.row_times, result.rows, p)
     return Ensemble(options.row_times, *table, stats, result.events(watch, problem.nq, p), momenta)
@@ -197,12 +199,16 @@ def _judged(stats: EnsembleStats, problem: Problem, options: RunOptions, rows: A
     return replace(stats, warnings=tuple([(*a, *b) for a, b in zip(stats.warnings, missed, strict=True)]))
 
 
-def _warning(stats: EnsembleStats) -> str:
-    """What speaks against the first trajectory that something speaks against, and how many there are."""
-    doubtful = [k for k, texts in enumerate(stats.warnings) if texts]
-    if not doubtful:
-        return ""
-    return f"{len(doubtful)} of {len(stats.warnings)} trajectories: of {doubtful[0]}, {stats.warnings[doubtful[0]][0]}"
+def _warnings(stats: EnsembleStats) -> list[str]:
+    """Of the first trajectory that stopped early, and of the first that something speaks against, with their number."""
+    early = {
+        k: f"the run {stats.message[k]}"
+        for k in np.flatnonzero(stats.status < 0).tolist()
+        if not stats.message[k].startswith(INTERRUPTED)
+    }
+    doubtful = {k: texts[0] for k, texts in enumerate(stats.warnings) if texts}
+    said = [(len(texts), *min(texts.items())) for texts in (early, doubtful) if texts]
+    return [f"{count} of {len(stats.warnings)} trajectories: of {first}, {text}" for count, first, text in said]
 
 
 def _check(method: str, chunk: int | None) -> None:

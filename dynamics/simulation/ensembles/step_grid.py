@@ -29,10 +29,11 @@ class StepGrid(NamedTuple):
             for done in range(0, self.rows, most):
                 yield min(most, self.rows - done) * self.steps, self.steps, True
             return
+        full, last = divmod(self.steps - 1, most_passes)
         for _ in range(self.rows):
-            for done in range(0, self.steps, most_passes):
-                steps = min(most_passes, self.steps - done)
-                yield steps, steps, done + steps == self.steps
+            for _ in range(full):
+                yield most_passes, most_passes, False
+            yield last + 1, last + 1, True
 
 
 def step_grids(options: RunOptions) -> list[StepGrid]:

@@ -6,26 +6,27 @@ import pickle
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
 from cgraph.extend import Array, runner
 
-from ..error_estimate import estimate
+from ..equal_steps import equal_steps
+from ..error_estimate import ErrorEstimate, Estimator
 from ..event_log import EventLog, Happening
 from ..event_program import EventProgram
 from ..integration import integration
 from ..recorder import Recorder
+from ..run_estimate import RunEstimate
 from ..run_options import RunOptions
 from ..step_program import CompiledSteps, StepProgram, compile_steps
-from ..stepping import FixedStepIntegration, Integration, StoppedError
+from ..stepping import Integration, StoppedError
 from ..watched import WatchedIntegration
 from .branch_free import branch_free
 from .chunk import Chunk, Part, empty
 from .step_grid import StepGrid
-from .vectorized import VectorCode, VectorizedIntegration
-from .vectorized_error import estimate_side_by_side
+from .vectorized import VectorCode, VectorizedIntegration, beside
 
 KEPT = 8  # programs that a process keeps ready
 
@@ -60,7 +61,12 @@ class Task:
         times = self.options.times
         at = int(times is None or times[0] == self.options.t0)
         part.rows[:, :at] = chunk.x[:, None]
-        run = VectorizedIntegration(code, chunk, part, at, self.options.t0)
+        estimator = None
+        if self.options.estimated:
+            estimator = Estimator(code.program, self.options, chunk.p, partial(beside, code), sparse=True)
+            estimator.begin(chunk.x, equal_steps(self.options.instants, self.options.step))
+        even = len(self.grids) == 1
+        run = VectorizedIntegration(code, chunk, part, at, self.options.t0, estimator, even=even)
         try:
             for grid in self.grids:
                 run.begin(grid)
@@ -68,8 +74,9 @@ class Task:
                     if stopped():
                         raise StoppedError
                     run.advance(*block)
-            if self.options.estimated:
-                estimate_side_by_side(code, chunk, part, run.states, self.options, stopped)
+            for k, error in enumerate(estimator.estimates() if estimator else []):
+                if not part.status[k]:
+                    part.tell(k, error)
         except (KeyboardInterrupt, StoppedError):
             run.interrupt()
         run.end()
@@ -79,32 +86,30 @@ class Task:
             compiled = _compiled(self.pickled, self.options.backend)
         for k, x in enumerate(chunk.x):
             run = self._run(compiled, chunk.p[k].tolist(), stopped, part.happened[k])
-            recorder = Recorder(x, self.options.times, self.options.t0, self.options.direction, 3 if self.events else 1)
-            interrupted = not self._finished(run, x, recorder, part.errors[:, k], stopped)
+            recorder = Recorder(x, self.options.times, self.options.t0, self.options.direction)
+            interrupted, error = self._interrupted(run, x, recorder)
             states = recorder.table()[1]
             part.rows[k, : len(states)], part.rows[k, len(states) :] = states, np.nan
             part.steps[k], part.rejected[k], part.evaluations[k] = run.steps, run.rejected, run.evaluations
             part.dt[k], part.status[k], part.warnings[k] = run.largest, run.status or run.event, run.warnings
             part.ended[k] = bool(run.event) and not run.status
+            if error is not None:
+                part.tell(k, error)
             if interrupted:
                 part.interrupt(k, recorder.last, len(states))
                 return
 
-    def _finished(
-        self, run: Integration, x: Array, recorder: Recorder, errors: Array, stopped: Callable[[], bool]
-    ) -> bool:
-        """Run one trajectory and estimate its errors (2,). False where it was interrupted."""
+    def _interrupted(self, run: Integration, x: Array, recorder: Recorder) -> tuple[bool, ErrorEstimate | None]:
+        """Run one trajectory; whether it was interrupted, and its error where that is estimated."""
+        estimate = RunEstimate(run, x, self.options) if self.options.estimated else None
         try:
             for block in run.blocks(x):
                 recorder.add(block)
-            plain = run.plain
-            if isinstance(plain, FixedStepIntegration) and self.options.estimated and not run.status:
-                error = estimate(plain, x, *recorder.checkpoints(), stopped=stopped)
-                errors[:] = error.largest, error.last
-                run.warnings += [error.warning] if error.warning else []
+                if estimate is not None:
+                    estimate.add(block)
+            return False, estimate.result() if estimate is not None and not run.status else None
         except (KeyboardInterrupt, StoppedError):
-            return False
-        return True
+            return True, None
 
     def _run(
         self,

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from cgraph.extend import Array, Runner
 
+from ..courses import Course
+from ..error_estimate import Estimator
+from ..state_difference import States
 from ..step_program import StepProgram
 from .chunk import INTERRUPTED, Chunk, Part
 from .step_grid import StepGrid
 
 WORK = 2**21  # nodes computed in a block: half a millisecond for each vector
 NUMBERS = 2**22  # in the rows of a block
+SEEN = 4  # steps that one of the longest of runs beside stands for
 
 
 class VectorCode(NamedTuple):
@@ -24,42 +30,70 @@ class VectorCode(NamedTuple):
     one_pass: Runner
 
 
-def start_memories(code: VectorCode, chunk: Chunk) -> Array:
-    """Memories before the first step, (size, k)."""
-    memories = code.one_pass.memory({"x": chunk.x.T, "p": chunk.p.T}, len(chunk.x))
+def _start_memories(code: VectorCode, x: Array, p: Array) -> Array:
+    """Memories before the first step from states x (k, m) with parameters p (k, ..), (size, k)."""
+    memories = code.one_pass.memory({"x": x.T, "p": p.T}, len(x))
     if code.start is not None:
         code.start.run_many(memories, 1)
     return memories
 
 
-def block_limits(code: VectorCode, count: int) -> tuple[int, int]:
-    """Steps, and rows, of `count` trajectories in a block."""
+def _block_limits(code: VectorCode, count: int) -> tuple[int, int]:
+    """Steps, and rows, of `count` trajectories in a block; of `SEEN` at least, or a multiple."""
     program = code.one_pass.program
     nodes = sum(len(graph.nodes) for graph in program.graphs())
-    return max(1, WORK // nodes), max(1, NUMBERS // (program.width * count))
+    limits = WORK // nodes, NUMBERS // (program.width * count)
+    return SEEN * max(1, limits[0] // SEEN), SEEN * max(1, limits[1] // SEEN)
+
+
+def _begin(code: VectorCode, memories: Array, begin: float, h: float) -> None:
+    """The steps that follow are of h [s], from `begin` on."""
+    for name, value in (("start", begin), ("t", begin), ("count", 0.0), ("h", h)):
+        code.one_pass.write(memories, name, value)
+
+
+def _advanced(code: VectorCode, memories: Array, steps: int, every: int) -> tuple[Array, States]:
+    """So many steps: the record of each `every`th, and its states."""
+    record = code.one_pass.run_many(memories, steps, every).rows
+    states = record[:, 1 : 1 + code.program.size].transpose(2, 0, 1)
+    return record, States(np.ascontiguousarray(record[:, 0, 0]), states)
+
+
+def beside(code: VectorCode, course: Course, x: Array, p: Array) -> Iterator[States]:
+    """The states of runs from x (k, m) with parameters p (k, ..) on another course."""
+    memories, most = _start_memories(code, x, p), min(_block_limits(code, len(x)))
+    for number, stretch in enumerate(course.stretches):
+        _begin(code, memories, stretch.begin, stretch.h)
+        for done in range(0, stretch.steps, most):
+            steps = min(most, stretch.steps - done)
+            yield _advanced(code, memories, steps, math.gcd(steps, 1 if number else course.every))[1]
 
 
 class VectorizedIntegration:
     """One run of the trajectories of a chunk, into a part, from its row `at` on.
 
+    estimator: is told the states after all steps, or, where the grid is even, after those that it looks at.
     A trajectory whose state is no longer finite is noticed after the block in which it stopped being so. From there its
     lane repeats a neighbor, since NaN is slow to compute with, and its rows become NaN in the end.
     """
 
-    def __init__(self, code: VectorCode, chunk: Chunk, part: Part, at: int, t0: float) -> None:
-        self.program, self.runner, self.part = code.program, code.one_pass, part
+    def __init__(
+        self, code: VectorCode, chunk: Chunk, part: Part, at: int, t0: float, estimator: Estimator | None, *, even: bool
+    ) -> None:
+        self.code, self.program, self.runner, self.part = code, code.program, code.one_pass, part
+        self.estimator, self._seen = estimator, SEEN if even and estimator and estimator.longer else 1
         count, total = part.rows.shape[:2]
-        self._memories = start_memories(code, chunk)
+        self._memories = _start_memories(code, chunk.x, chunk.p)
         self._live = np.ones(count, dtype=bool)
         self._good = np.full(count, total)  # rows that count
         self._at, self._done, self._reached = at, 0, t0  # rows, steps, and the time [s] of the last block
         self._interrupted = False
-        self.limits = block_limits(code, count)
+        passes, rows = _block_limits(code, count)
+        self.limits = passes if estimator is None else min(passes, rows), rows
 
     def begin(self, grid: StepGrid) -> None:
         """The steps that follow are of this grid."""
-        for name, value in (("start", grid.begin), ("t", grid.begin), ("count", 0.0), ("h", grid.h)):
-            self.runner.write(self._memories, name, value)
+        _begin(self.code, self._memories, grid.begin, grid.h)
         self.part.dt[self._live] = np.maximum(self.part.dt[self._live], abs(grid.h))
 
     def advance(self, steps: int, every: int, due: bool) -> None:
@@ -67,7 +101,13 @@ class VectorizedIntegration:
         if not self._live.any():
             return
         before, m = self._memories.copy(), self.program.size
-        record = self.runner.run_many(self._memories, steps, every).rows
+        if self.estimator is None:
+            record = self.runner.run_many(self._memories, steps, every).rows
+        else:
+            seen = math.gcd(every, self._seen)
+            record, states = _advanced(self.code, self._memories, steps, seen)
+            record = record[every // seen - 1 :: every // seen]
+            self.estimator.add(states)
         if due:
             kept = record[: self.part.rows.shape[1] - self._at]  # t_end itself may be no row
             self.part.rows[:, self._at : self._at + len(kept)] = kept[:, 1 : 1 + m].transpose(2, 0, 1)
@@ -81,11 +121,6 @@ class VectorizedIntegration:
                 self._memories[:, ~self._live] = self._memories[:, np.flatnonzero(self._live)[:1]]
         self._done += steps
         self._reached = float(self.runner.read(self._memories, "t")[0, 0])
-
-    @property
-    def states(self) -> Array:
-        """Where the trajectories are, (k, m)."""
-        return self.runner.read(self._memories, "x").T
 
     def interrupt(self) -> None:
         """Those that have not failed end here, with the rows that they have."""

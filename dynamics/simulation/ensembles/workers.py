@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import threading
 from collections.abc import Callable, Generator, Iterable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
 from contextlib import closing, suppress
+from multiprocessing.pool import Pool
+from multiprocessing.process import BaseProcess
 from queue import Empty, SimpleQueue
 
 import numpy as np
@@ -18,8 +21,6 @@ from .task import Task
 Map = Callable[[Callable[[Chunk], Part], Sequence[Chunk]], Iterable[Part]]
 Workers = int | Map | None
 LOOK = 0.1  # s: not every system interrupts a wait without an end for Ctrl-C
-
-
 MOST = 2**31  # threads
 
 
@@ -42,10 +43,19 @@ def finished(task: Task, chunks: Sequence[Chunk], workers: int | Map, table: Arr
 
     table: (N, T, m), in which this process makes the rows. Those of a map's parts lie elsewhere.
 
-    Raises TypeError for a map that gives something else than results.
+    Raises TypeError for a map that gives something else than results, RuntimeError for a process that was ended.
     """
     if callable(workers):
-        yield from _by_map(task, chunks, workers)
+        done = 0
+        try:
+            for part in _by_map(task, chunks, workers):
+                yield part
+                done += 1
+        except BrokenExecutor:
+            raise RuntimeError(
+                "a process of workers was ended from outside, as where memory runs out, when "
+                f"{done} of {len(chunks)} chunks were here"
+            ) from None
     elif workers == 1 or len(chunks) == 1:
         for chunk in chunks:
             part = task.run(chunk, _rows(table, chunk), lambda: False)
@@ -58,7 +68,8 @@ def finished(task: Task, chunks: Sequence[Chunk], workers: int | Map, table: Arr
 
 
 def _by_map(task: Task, chunks: Sequence[Chunk], workers: Map) -> Generator[Part, None, None]:
-    parts = workers(task, chunks)
+    pool = getattr(workers, "__self__", None)
+    parts = _by_pool(pool, task, chunks) if isinstance(pool, Pool) else workers(task, chunks)
     if not isinstance(parts, Iterable):
         raise TypeError(f"workers must give the results of the function, as map does, got {parts!r:.60}")
     for part in parts:
@@ -67,6 +78,19 @@ def _by_map(task: Task, chunks: Sequence[Chunk], workers: Map) -> Generator[Part
                 f"workers must give the results of the function, as map does, got {type(part).__name__}: {part!r:.60}"
             )
         yield part
+
+
+def _by_pool(pool: Pool, task: Task, chunks: Sequence[Chunk]) -> Generator[Part, None, None]:
+    """The parts from a `multiprocessing` pool, whose own map waits for ever for what a killed process had in hand."""
+    parts, watched = pool.imap_unordered(task, chunks), set[BaseProcess]()
+    for _ in chunks:
+        while True:
+            watched |= {each for each in multiprocessing.active_children() if "PoolWorker" in each.name}
+            with suppress(multiprocessing.TimeoutError):
+                yield parts.next(timeout=LOOK)
+                break
+            if any([each.exitcode not in (None, 0) for each in watched]):
+                raise BrokenExecutor
 
 
 def _by_threads(task: Task, chunks: Sequence[Chunk], threads: int, table: Array) -> Generator[Part, None, None]:

@@ -13,16 +13,27 @@ from numpy.typing import ArrayLike
 from cgraph import Node
 from cgraph.extend import Array, real_array
 
-from ...integrators import METHODS, derive, in_form
+from ...integrators import METHODS, Problem, derive, in_form
 from ...systems.model import Model
 from ..applied_forces import with_applied
 from ..ensembles.initial_states import starts
 from ..run_options import time_span
 from ..sampled_controller import SampledController
 from ..trajectory import SimulationWarning
+from .doubts import doubts
 from .gradient import Loss, differentiated
-from .missed_legs import missed_legs
-from .motion import TORQUE, MotionOf, changing_forces, equal_leg, names_of, options_of
+from .motion import (
+    START,
+    TORQUE,
+    VELOCITY,
+    MotionError,
+    MotionOf,
+    changing_forces,
+    equal_leg,
+    legs_of,
+    names_of,
+    options_of,
+)
 from .motion_equations import motion_equations
 
 WIDE = 16  # motions side by side: whole vectors of any processor, of which what is recorded stays in its caches
@@ -35,11 +46,12 @@ class MotionGradients:
     Attributes
     ----------
     value : ndarray, (N,)
-        The losses; NaN of a motion that does not stay finite.
+        The losses; NaN, as all else, of a motion that does not stay finite or does not reach its end.
     gradients : dict of str to ndarray
         As of `MotionGradient`, with an axis of N first.
     t : ndarray, (steps + 1,)
-        Where the steps begin, and the last one ends [s].
+        Where equal steps begin, and the last one ends [s]. Of chosen steps, which each motion has for itself, its start
+        and end alone, (2,).
     q, qd : ndarray, (N, nq) and (N, n)
         Where the motions end.
 
@@ -69,22 +81,28 @@ def gradient_many(
     q: ArrayLike,
     qd: ArrayLike | None,
     t_end: float | None = None,
-    method: str = "rk4",
+    method: str | None = None,
     *,
     running: Loss | None = None,
     wrt: str | Iterable[str] | None = None,
     t0: float = 0.0,
     t_span: ArrayLike | None = None,
     dt: float | None = None,
+    max_step: float | None = None,
+    rtol: float | None = None,
+    atol: ArrayLike | None = None,
+    first_step: float | None = None,
     tau: ArrayLike | Callable[..., Sequence[Node | float]] = 0.0,
     parameters: Mapping[str, ArrayLike] | None = None,
+    estimate_error: bool | None = None,
     backend: str = "auto",
     form: str = "velocity",
 ) -> MotionGradients:
     """Losses of N motions and their gradients, each by its own start, forces and parameters: `gradient`, N times.
 
-    Motions go side by side, a vector of them at a time, where the steps do not branch on the state: by explicit methods
-    and "verlet" of a constant mass matrix; else one by one.
+    Motions go side by side, a vector of them at a time, where the steps do not branch on the state: in equal steps of
+    explicit methods, and "verlet" of a constant mass matrix; else one by one. One that does not stay finite, or does
+    not reach its end, is NaN, and a `SimulationWarning` says how many are, and of the first when and why.
 
     Parameters
     ----------
@@ -92,10 +110,10 @@ def gradient_many(
         What moves.
     q, qd : array_like
         The starts, (N, nq) and (N, n), or (nq,) and (n,) for all; of an OdeSystem q is the state, and qd None.
-    loss, t_end, running, wrt, t0, t_span, dt, backend, form
+    loss, t_end, running, wrt, t0, t_span, dt, max_step, rtol, atol, first_step, estimate_error, backend, form
         As for `gradient`.
-    method : str
-        As for `gradient`, of equal steps.
+    method : str, optional
+        As for `gradient`: "dop853", and "rk4" where `dt` or a row of forces a step asks for equal steps.
     tau : float, array_like or callable
         Applied force [N m or N]: constant, (n,) or (N, n); a row a step, (N, steps, n); or a controller in closed form.
     parameters : mapping, optional
@@ -108,7 +126,7 @@ def gradient_many(
 
     Raises
     ------
-    TypeError, ValueError, MotionError, SingularMassMatrixError
+    TypeError, ValueError, SingularMassMatrixError
         As `gradient` does.
 
     Examples
@@ -119,26 +137,50 @@ def gradient_many(
     >>> fan["q"].round(4).tolist()
     [[-0.8804], [-1.1123], [-0.595]]
     """
-    options = {"dt": dt, "backend": backend}
-    motions = _motions(model, q, qd, time_span(t_end, t0, t_span), method, tau, parameters, wrt, options, form)
+    options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
+    options["estimate_error"] = estimate_error
+    motions, problem = _motions(model, q, qd, time_span(t_end, t0, t_span), method, tau, parameters, wrt, options, form)
+    count, nq, run = motions.many, problem.nq, motions.options
     step = motions.method.step
     assert step is not None
-    if step(motions.problem).branches:
-        parts: list[int | slice] = list(range(motions.many))
-    else:
-        parts = [slice(k, k + WIDE) for k in range(0, motions.many, WIDE)]
-    values, gradients, ends, said = [], [], [], ""
+    one_by_one = run.adaptive or step(motions.problem).branches
+    parts: list[int | slice] = [*range(count)] if one_by_one else [slice(k, k + WIDE) for k in range(0, count, WIDE)]
+    value, end = np.full(count, np.nan), np.full((count, problem.size), np.nan)
+    by_name = {name: np.full((count, *shape), np.nan) for name, shape in _shapes(motions).items()}
+    early: dict[int, str] = {}
+    said: dict[int, str] = {}
     for part in parts:
-        value, by_name, legs = differentiated(_some(motions, part), loss, running)
-        said = said or missed_legs(legs, first=part if isinstance(part, int) else part.start)
-        values.append(np.atleast_1d(value))
-        gradients.append({name: _by_motion(array, part) for name, array in by_name.items()})
-        ends.append(_by_motion(legs.end, part))
-    if said:
-        warnings.warn(said, SimulationWarning, stacklevel=2)
-    rows, nq = np.concatenate(ends), motions.problem.nq
-    joined = {name: np.concatenate([each[name] for each in gradients]) for name in motions.wrt}
-    return MotionGradients(np.concatenate(values), joined, legs.t, rows[:, :nq], rows[:, nq:])
+        first = part if isinstance(part, int) else part.start
+        try:
+            motion = _some(motions, problem, part)
+            losses, slopes, legs = differentiated(motion, loss, running)
+        except MotionError as error:
+            early[first] = str(error)
+            continue
+        arrived, texts = np.atleast_1d(np.isfinite(legs.end).all(axis=0)), doubts(legs, losses, slopes)
+        rows = first + np.flatnonzero(arrived)
+        value[rows], end[rows] = np.atleast_1d(losses)[arrived], _by_motion(legs.end, part)[arrived]
+        for name, array in slopes.items():
+            by_name[name][rows] = _by_motion(array, part)[arrived]
+        for k, whole in enumerate(arrived):
+            if not whole:
+                early[first + k] = f"the motion {legs.runs[0].stopped(k)}"
+            elif texts[k]:
+                said[first + k] = texts[k][0]
+    for sentences in (early, said):
+        if sentences:
+            first, text = min(sentences.items())
+            warnings.warn(f"{len(sentences)} of {count} motions: of {first}, {text}", SimulationWarning, stacklevel=2)
+    t = motions.legs[0].t.copy() if motions.legs else np.array([run.t0, run.t_end])
+    return MotionGradients(value, by_name, t, end[:, :nq], end[:, nq:])
+
+
+def _shapes(motions: MotionOf) -> dict[str, tuple[int, ...]]:
+    """Of the gradients of a motion, by the names of `wrt`."""
+    problem, nq = motions.problem, motions.problem.nq
+    n = problem.size - nq
+    shapes = {START: (nq if problem.system is None else n,), VELOCITY: (n,), TORQUE: motions.tau.shape[:-1]}
+    return {name: shapes.get(name, ()) for name in motions.wrt}
 
 
 def _by_motion(array: Any, part: int | slice) -> Array:
@@ -147,8 +189,14 @@ def _by_motion(array: Any, part: int | slice) -> Array:
     return np.moveaxis(rows, -1, 0) if isinstance(part, slice) else rows[None]
 
 
-def _some(motions: MotionOf, part: int | slice) -> MotionOf:
-    return replace(motions, x=motions.x[:, part], tau=motions.tau[..., part], values=motions.values[:, part])
+def _some(motions: MotionOf, problem: Problem, part: int | slice) -> MotionOf:
+    """One of the motions, or some of them; one by chosen steps with these. problem: without numbers of parameters."""
+    some = replace(motions, x=motions.x[:, part], tau=motions.tau[..., part], values=motions.values[:, part])
+    if motions.legs:
+        return some
+    parameters = np.concatenate([some.tau, some.values])[: len(problem.parameters)]
+    legs, said = legs_of(problem, motions.options, (), some.x, parameters)
+    return replace(some, legs=legs, said=said)
 
 
 def _motions(
@@ -156,21 +204,22 @@ def _motions(
     q: ArrayLike,
     qd: ArrayLike | None,
     span: tuple[float, float],
-    method: str,
+    method: str | None,
     tau: Any,
     parameters: Mapping[str, ArrayLike] | None,
     wrt: str | Iterable[str] | None,
     options: Mapping[str, Any],
     form: str,
-) -> MotionOf:
-    """The motions of checked arguments, side by side."""
+) -> tuple[MotionOf, Problem]:
+    """The motions of checked arguments, side by side, those by chosen steps without legs; and their problem."""
     t0, t_end = span
     if isinstance(tau, SampledController):
         raise TypeError("tau must be numbers or a controller in closed form, got a SampledController")
     rows = _rows(tau)
-    run = options_of(t_end, method, t0, options)
-    if run.adaptive:
-        raise ValueError(f"gradient_many needs equal steps, and method {method!r} chooses its steps: take gradient")
+    run = options_of(t_end, method, t0, options, rows=rows is not None)
+    if run.adaptive and rows is not None:
+        needed = f"equal steps: method {method!r} chooses its steps"
+        raise ValueError(f"tau of shape {rows.shape} is one row a step, which needs {needed}")
     moving, applied = with_applied(model, 0.0 if rows is not None or not callable(tau) else tau, parameters)
     constant = 0.0 if rows is not None or callable(tau) else tau
     if rows is not None:  # a motion for each of their first forces
@@ -189,11 +238,11 @@ def _motions(
     )
     if rows is not None:
         forces = np.broadcast_to(np.moveaxis(rows, 0, -1), (*rows.shape[1:], count))
-    return MotionOf(
+    motions = MotionOf(
         equations,
-        METHODS[method],
+        METHODS[run.method],
         start.x.T.copy(),
-        (equal_leg(run, None if rows is None else rows.shape[1]),),
+        () if run.adaptive else (equal_leg(run, None if rows is None else rows.shape[1]),),
         np.empty(0),
         np.empty(0),
         forces,
@@ -201,15 +250,15 @@ def _motions(
         equations.values(values, run.backend),
         chosen,
         applied.nodes,
-        run.backend,
+        run,
     )
+    return motions, problem
 
 
 def _rows(tau: Any) -> Array | None:
     """tau where it is one row a step, (N, steps, n)."""
-    if callable(tau) or np.ndim(tau) != 3:
+    if callable(tau) or (rows := real_array("tau", tau)).ndim != 3:
         return None
-    rows = real_array("tau", tau)
     if not rows.size or not np.isfinite(rows).all():
         raise ValueError(f"tau must be finite numbers of the shape (N, steps, n), got shape {rows.shape}")
     return rows

@@ -39,21 +39,24 @@ class Bars(NamedTuple):
 class Legs:
     """The legs of a motion, run from its start to its end.
 
-    events: by name.  x, t: the end of the motion, in states of its steps.  loss: the running loss of all legs.
+    events: by name.  every: of each leg, see MotionRun; or nothing.
+    x, t: the end of the motion, in states of its steps.  loss: the running loss of all legs.
     """
 
     motion: MotionOf
     programs: MotionPrograms
     events: Mapping[str, WatchedEvent]
+    every: Sequence[int] = ()
 
     def __post_init__(self) -> None:
         motion = self.motion
         self.runs: list[MotionRun] = []
         begin = float(motion.legs[0].t[0])
         x = converted(motion.equations.start, motion, motion.x, begin)
-        for leg in motion.legs:
+        for number, leg in enumerate(motion.legs):
             t, h = _steps(leg, begin)
-            run = MotionRun(replace(motion, x=x, t=t, h=h), self.programs, arrives=bool(leg.event))
+            every = self.every[number] if self.every else 0
+            run = MotionRun(replace(motion, x=x, t=t, h=h), self.programs, arrives=bool(leg.event), every=every)
             if leg.event:
                 self._arrive(run, self.events[leg.event])
             self.runs.append(run)

@@ -20,14 +20,14 @@ from ...systems.model import Model, as_ode, as_system
 from ..applied_forces import with_applied
 from ..equal_steps import step_count
 from ..event import Event
-from ..run_options import RunOptions, time_span
+from ..run_options import METHOD, RunOptions, time_span
 from ..sampled_controller import SampledController
-from ..simulate import simulate
-from ..trajectory import Trajectory
+from .accepted_steps import AcceptedSteps, accepted_steps
 from .motion_equations import KEPT, PARAMETERS, MotionEquations, motion_equations
 
 START, VELOCITY, TORQUE = "q", "qd", "tau"
-_PLAIN = (float, int, str, type(None))
+EQUAL = "rk4"  # by which equal steps are, unless another method is asked for
+_PLAIN = (float, int, str, bool, type(None))
 
 
 class Leg(NamedTuple):
@@ -52,7 +52,7 @@ class MotionError(ValueError):
     >>> runaway = dyn.OdeSystem(lambda x, t: [x[0] * x[0]], ["x"])
     >>> dyn.gradient(runaway, lambda x, t: x[0], [1.0], None, t_end=2.0)
     Traceback (most recent call last):
-    dynamics.simulation.gradients.motion.MotionError: the motion does not stay finite: shorter steps may help
+    dynamics.simulation.gradients.motion.MotionError: the motion did not reach t_end, stopped at t = 1 s: ...
     """
 
 
@@ -64,7 +64,7 @@ class MotionOf:
     legs: its parts.  t, h: (steps + 1,), where the steps begin and the last one ends, and (steps,), their lengths.
     tau: the applied forces that are inputs, (forces,), or where they change with the steps, (steps, forces).
     values: of the parameters p that stay inputs, and of the numbers c.  wrt: names.
-    applied: the whole applied force as nodes.  backend: of what is compiled.
+    applied: the whole applied force as nodes.  options: of the run.  said: what speaks against it, a sentence each.
     Of N motions side by side x, tau and values have an axis of N besides, the last.
     """
 
@@ -79,7 +79,13 @@ class MotionOf:
     values: Array
     wrt: tuple[str, ...]
     applied: Sequence[Node] | None
-    backend: str
+    options: RunOptions
+    said: tuple[str, ...] = ()
+
+    @property
+    def backend(self) -> str:
+        """Of what is compiled."""
+        return self.options.backend
 
     @property
     def problem(self) -> Problem:
@@ -126,7 +132,7 @@ def motion_of(
     q: ArrayLike,
     qd: ArrayLike | None,
     span: tuple[float | None, float, ArrayLike | None],
-    method: str,
+    method: str | None,
     tau: Any,
     parameters: Mapping[str, float] | None,
     wrt: str | Iterable[str] | None,
@@ -145,7 +151,7 @@ def motion_of(
         )
     t0, t_end = time_span(span[0], span[1], span[2])
     rows = None if callable(tau) else _rows(model, tau)
-    run = options_of(t_end, method, t0, options)
+    run = options_of(t_end, method, t0, options, rows=rows is not None)
     moving, applied = with_applied(model, 0.0 if rows is not None else tau, parameters)
     start = initial_value(moving, q, qd, applied.constant, parameters, t0)
     run.check(start.states)
@@ -154,22 +160,21 @@ def motion_of(
     inputs = changing_forces(moving, start.bound, forced=forced)
     free = {*inputs, *chosen, *(parameters or ())}  # what a caller changes from call to call stays an input
     problem = in_form(derive(moving, {name: value for name, value in start.bound.items() if name not in free}), form)
+    constant = np.array([start.bound[name] for name in inputs])
+    equations = motion_equations(problem, len(inputs))
+    values = np.array([start.bound[name] for name in equations.names])
+    said: tuple[str, ...] = ()
     if run.adaptive or events:
         if rows is not None:
             needed = "equal steps without events" if events else f"equal steps: method {method!r} chooses its steps"
             raise ValueError(f"tau of shape {rows.shape} is one row a step, which needs {needed}")
-        given = {"t0": t0, "tau": tau, "parameters": parameters, "events": events, "form": form, **options}
-        given |= {} if run.adaptive else {"estimate_error": False}
-        legs = _legs(simulate(model, q, qd, t_end, method, **given), run, events)
+        legs, said = legs_of(problem, run, events, start.x, np.concatenate([constant, values]))
     else:
         legs = (equal_leg(run, None if rows is None else len(rows)),)
-    constant = np.array([start.bound[name] for name in inputs])
-    equations = motion_equations(problem, len(inputs))
-    values = np.array([start.bound[name] for name in equations.names])
     forces = constant if rows is None else rows
     return MotionOf(
         equations,
-        METHODS[method],
+        METHODS[run.method],
         start.x,
         legs,
         np.empty(0),  # of steps, before the legs are run
@@ -179,7 +184,8 @@ def motion_of(
         equations.values(values, run.backend),
         chosen,
         applied.nodes,
-        run.backend,
+        run,
+        said,
     )
 
 
@@ -189,8 +195,15 @@ def changing_forces(model: Model, bound: Mapping[str, float], *, forced: bool) -
     return applied if forced or any([bound.get(name, 0.0) != 0.0 for name in applied]) else ()
 
 
-def options_of(t_end: float, method: str, t0: float, options: Mapping[str, Any]) -> RunOptions:
-    """The options of a run, by a method whose motions have derivatives. Raises ValueError for another."""
+def options_of(
+    t_end: float, method: str | None, t0: float, options: Mapping[str, Any], *, rows: bool = False
+) -> RunOptions:
+    """The options of a run, by a method whose motions have derivatives. Raises ValueError for another.
+
+    rows: whether there is a row of forces for each step.  method: None for that of `simulate`, or equal steps.
+    """
+    if method is None:
+        method = EQUAL if rows or options["dt"] is not None else METHOD
     given = (t_end, method, t0, *options.items())
     plain = all([type(each) in _PLAIN for each in (t_end, method, t0, *options.values())])
     return _checked_options(*given) if plain else _checked_options.__wrapped__(*given)
@@ -207,9 +220,9 @@ def _checked_options(t_end: float, method: str, t0: float, *options: tuple[str, 
 
 def _rows(model: Model, tau: Any) -> Array | None:
     """tau where it is one row a step, (steps, n)."""
-    if np.ndim(tau) != 2:
-        return None
     rows = real_array("tau", tau)
+    if rows.ndim != 2:
+        return None
     n = 0 if as_ode(model) is not None else as_system(model).n
     if not n or rows.shape[1] != n or not len(rows):
         raise ValueError(f"tau must have shape (n,) or (steps, n) with n = {n} velocities, got {rows.shape}")
@@ -251,20 +264,31 @@ def _equal_leg(t0: float, t_end: float, count: int) -> Leg:
     return Leg(t, equal=count, end=t_end)
 
 
-def _legs(motion: Trajectory, run: RunOptions, events: Sequence[Event]) -> tuple[Leg, ...]:
+def legs_of(
+    problem: Problem, run: RunOptions, events: Sequence[Event], start: Array, parameters: Array
+) -> tuple[tuple[Leg, ...], tuple[str, ...]]:
+    """The legs of a motion from a start (q, qd), and what speaks against its steps.
+
+    Raises MotionError for one that does not reach its end.
+    """
+    motion = accepted_steps(problem, run, events, start, parameters)
+    if motion.status:
+        raise MotionError(f"the motion did not reach t_end, {motion.status}")
+    return _legs(motion, run, events), motion.said
+
+
+def _legs(motion: AcceptedSteps, run: RunOptions, events: Sequence[Event]) -> tuple[Leg, ...]:
     """The accepted steps of a motion, between the events that reset its state or end it."""
-    if not motion.stats.success:
-        raise MotionError(f"the motion did not reach t_end, {motion.stats.message}")
     starts = np.flatnonzero(np.diff(motion.t) == 0.0) + 1  # rows after a reset
     parts = np.split(motion.t, starts)
     legs = []
     for number, t in enumerate(parts):
         ends = number < len(parts) - 1
-        stopped = motion.stats.status == 1 and not ends
+        stopped = motion.ended and not ends
         at = [
             each.name
             for each in events
-            if (each.reset if ends else each.terminal) and t[-1] in motion.events[each.name].t
+            if (each.reset if ends else each.terminal) and t[-1] in motion.events[each.name]
         ]
         if (ends or stopped) and len(at) != 1:
             raise ValueError(

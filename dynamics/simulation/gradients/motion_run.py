@@ -10,6 +10,8 @@ import numpy as np
 
 from cgraph.extend import Array, Factor, Record, Runner, Solve, While
 
+from ..dense_output import Indices
+from ..stepping import unsolved
 from .iteration import UNSOLVED
 from .motion import MotionError, MotionOf
 from .motion_programs import Along, MotionPrograms
@@ -25,14 +27,16 @@ class MotionRun:
     checkpoints: steps between two of them; 0 where all that is needed of every step is kept.
     x: (m,), the end.  loss: the running loss.
     arrives: whether the last step is still to be fitted, by `tried`, and then made, by `finish`.
-    Raises MotionError for a motion that does not stay finite, or whose equations are not solved.
+    Raises MotionError for a motion that does not stay finite, or whose equations are not solved; of motions side by
+    side, one that does not stay finite has an end that is not.
     """
 
-    def __init__(self, motion: MotionOf, programs: MotionPrograms, *, arrives: bool = False) -> None:
+    def __init__(self, motion: MotionOf, programs: MotionPrograms, *, arrives: bool = False, every: int = 0) -> None:
+        """every: keep the states after every so many steps alone, of which nothing goes along the motion."""
         self.motion, self.start, self.step, self.failed = motion, programs.start, programs.step, programs.failed
         count, width = len(motion.h), self.step.forward.program.width
-        fits = 8 * width * count * max(1, motion.many) <= MOST_RECORDED
-        self.checkpoints = 0 if fits else math.ceil(math.sqrt(count))
+        fits = every > 0 or 8 * width * count * max(1, motion.many) <= MOST_RECORDED
+        self.checkpoints, self._every = 0 if fits else math.ceil(math.sqrt(count)), every or 1
         self._blocks: list[tuple[int, int, Array]] = []  # first and last step, and the rows, or the memory before
         self._memory = self._begin()
         self._run(0, count - arrives)
@@ -79,11 +83,15 @@ class MotionRun:
         self._end()
 
     def _run(self, begin: int, end: int) -> None:
-        forward, memory, size = self.step.forward, self._memory, self.checkpoints or PIECE
+        forward, memory, size = (
+            self.step.forward,
+            self._memory,
+            self.checkpoints or max(1, PIECE // self._every) * self._every,
+        )
         for first in range(begin, end, size):
             last = min(first + size, end)
             before = memory.copy() if self.checkpoints else None
-            every = last - first if self.checkpoints else 1
+            every = last - first if self.checkpoints else self._every
             rows = _run(forward, memory, last - first, every, self._feed(first, last)).rows
             self._blocks.append((first, last, rows if before is None else before))
 
@@ -91,11 +99,38 @@ class MotionRun:
         forward, handed, memory = self.step.forward, self.step.passes.handed, self._memory
         self.x = forward.read(memory, handed["x"]).copy()
         self.loss = forward.read(memory, handed[LOSS])[0].copy() if LOSS in handed else np.zeros(self.x.shape[1:])
-        if self.failed and forward.read(memory, handed[self.failed])[0]:
-            raise MotionError("the equations of a step were not solved: the step is too long")
-        if not (np.isfinite(self.x).all() and np.isfinite(self.loss).all()) and not self.motion.many:
-            raise MotionError("the motion does not stay finite: shorter steps may help")
+        if not self.motion.many and self._bad(memory):
+            raise MotionError(f"the motion {self.stopped()}")
         self._constants = {name: forward.read(memory, name).copy() for name in self.step.passes.constants}
+
+    def _bad(self, memory: Array, k: int | None = None) -> bool:
+        """Whether the steps so far, of motion k of many, left the numbers, or have equations that were not solved."""
+        handed, lane = self.step.passes.handed, slice(None) if k is None else k
+        x = self.step.forward.read(memory, handed["x"])
+        if not np.isfinite(x[..., lane] if self.motion.many else x).all():
+            return True
+        return bool(self.failed) and k is None and self.step.forward.read(memory, handed[self.failed])[0] != 0.0
+
+    def stopped(self, k: int | None = None) -> str:
+        """Where a motion that went wrong, the k-th of many, did so: the first step after which it is, in words."""
+        motion, forward, memory = self.motion, self.step.forward, self._begin()
+        before, first, size = memory, 0, PIECE
+        while first < len(motion.h):
+            before, last = memory.copy(), min(first + size, len(motion.h))
+            _run(forward, memory, last - first, last - first, self._feed(first, last))
+            if not self._bad(memory, k):
+                first = last
+            elif last - first == 1:
+                break
+            else:
+                memory, size = before, max(1, (last - first) // 16)
+        x = forward.read(memory, self.step.passes.handed["x"])
+        x = x if k is None else x[:, k]
+        where, bad = f"stopped at t = {motion.t[first + 1]:.6g} s", np.flatnonzero(~np.isfinite(x))
+        if len(bad):
+            return f"{where}: {motion.problem.components[bad[0]]} is {x[bad[0]]} after the step"
+        old = forward.read(before, self.step.passes.handed["x"])
+        return f"{where}: {unsolved(motion.problem.components, old if k is None else old[:, k], x)}"
 
     def recorded(self, *, backwards: bool) -> Iterator[tuple[int, int, Array]]:
         """(first, last, rows) of what was recorded of the steps first .. last - 1, block by block.
@@ -108,15 +143,17 @@ class MotionRun:
             else:
                 yield first, last, kept
 
-    def states(self) -> tuple[Array, Array]:
-        """Times (T,) and states (T, m) from the start to the end: after every step, or where checkpoints are."""
+    def states(self) -> tuple[Indices, Array]:
+        """After how many steps (T,), and states (T, m), from the start to the end: all that are kept."""
+        count, m = len(self.motion.h), len(self.x)
         if not self.checkpoints:
-            return self.motion.t, np.concatenate(
-                [self.begin[None], *[kept[:, -len(self.x) :] for *_, kept in self._blocks]]
-            )
+            numbers = [np.arange(first + self._every, last + 1, self._every) for first, last, _ in self._blocks]
+            rows = [kept[:, -m:] for *_, kept in self._blocks]
+            if not len(numbers[-1]) or numbers[-1][-1] != count:
+                numbers, rows = [*numbers, np.array([count])], [*rows, self.x[None]]
+            return np.concatenate([[0], *numbers]), np.concatenate([self.begin[None], *rows])
         kept = [self.step.forward.read(memory, self.step.passes.handed["x"]) for *_, memory in self._blocks]
-        times = [self.motion.t[first] for first, *_ in self._blocks]
-        return np.array([*times, self.motion.t[-1]]), np.array([*kept, self.x])
+        return np.array([*[first for first, *_ in self._blocks], count]), np.array([*kept, self.x])
 
     def pulled(self, seeds: Mapping[str, Array | float]) -> tuple[dict[str, Array], Array]:
         """Cotangents of the start and of the inputs, from those after the last step; and rows, those of each step."""

@@ -18,8 +18,8 @@ from ..applied_forces import Constant
 from ..event import Event, as_events
 from ..event_program import event_program
 from ..trajectory import SimulationWarning
+from .doubts import doubts
 from .legs import Legs
-from .missed_legs import missed_legs
 from .motion import START, TORQUE, VELOCITY, MotionOf, motion_of
 from .motion_programs import Request, motion_programs
 from .pushed_legs import pushed_legs
@@ -68,7 +68,7 @@ def sensitivities(
     q: ArrayLike,
     qd: ArrayLike | None,
     t_end: float | None = None,
-    method: str = "rk4",
+    method: str | None = None,
     *,
     wrt: str | Iterable[str] | None = None,
     t0: float = 0.0,
@@ -81,6 +81,7 @@ def sensitivities(
     tau: Constant | Callable[..., Sequence[Node | float]] = 0.0,
     parameters: Mapping[str, float] | None = None,
     events: Event | Iterable[Event] = (),
+    estimate_error: bool | None = None,
     backend: str = "auto",
     form: str = "velocity",
 ) -> Sensitivities:
@@ -95,7 +96,7 @@ def sensitivities(
         What moves.
     q, qd, t_end, t0, t_span, dt, max_step, rtol, atol, first_step, parameters, backend, form
         As for `simulate`.
-    method : str
+    method, estimate_error
         As for `gradient`.
     wrt : str or sequence of str, optional
         What to differentiate by: "q", "qd", "tau" and names of parameters. By default the start and the applied force.
@@ -125,6 +126,7 @@ def sensitivities(
     [[-0.1275, 0.4627], [0.0445, -0.6321]]
     """
     options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
+    options["estimate_error"] = estimate_error
     watched = as_events(events)
     motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, watched, form)
     if motion.each_step:
@@ -136,7 +138,7 @@ def sensitivities(
     directions, columns = _directions(motion)
     program = event_program(motion.problem, watched)
     legs = Legs(motion, motion_programs(request), {event.name: event for event in program.events})
-    if text := missed_legs(legs):
+    for text in doubts(legs, 0.0, {})[0]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
     t, x, t_dot, x_dot = pushed_legs(legs, directions)
     derivatives = {name: x_dot[:, :, place] for name, place in columns.items()}

@@ -60,6 +60,16 @@ def test_every_operation_has_the_same_bits_where_numbers_are_special(backend):
     assert wrong(graph, backend, points) == []
 
 
+def test_every_operation_on_constants_alone_has_the_same_bits(backend):
+    outputs = {
+        f"{name}{args}": apply(op, *map(cg.constant, args))
+        for name, op in OPS.items()
+        for args in itertools.product((0.0, -1.5, 1.0, 1e300, math.inf, -math.inf), repeat=op.arity)
+    }
+    outputs["a sum of them"] = sum(itertools.islice(outputs.values(), 5), cg.variable("x"))
+    assert wrong(cg.Graph([cg.variable("x")], outputs), backend, np.array([[0.5] * 9])) == []
+
+
 def test_angles_and_exponents_of_many_sizes_have_the_same_bits(backend):
     """Where polynomials, NumPy and the C library differ in some hundredths of all values."""
     x = cg.variable("x")

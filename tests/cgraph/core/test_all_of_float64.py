@@ -91,3 +91,35 @@ def test_of_these_nothing_overflows_on_the_way(f, at, first, second):
     graph = cg.Graph([x], {"f": f})
     found = [*cg.gradient(graph).evaluate({"x": at}).values(), *cg.hessian(graph).evaluate({"x": at}).values()]
     assert found == [pytest.approx(first, rel=ULPS, abs=0.0), pytest.approx(second, rel=ULPS, abs=ULPS * abs(first))]
+
+
+ENTROPIES = {
+    "x log x": lambda m, x, y: x * m.log(x),
+    "- x log x": lambda m, x, y: -x * m.log(x),
+    "2 x log x": lambda m, x, y: 2.0 * x * m.log(x),
+    "x^2 log x": lambda m, x, y: x * x * m.log(x),
+    "x log 3x": lambda m, x, y: x * m.log(3.0 * x),
+    "x log xy": lambda m, x, y: x * m.log(x * y),
+    "x log2 x": lambda m, x, y: x * (m.log2(x) if m is cg else m.log(x, 2)),
+    "x log10 x": lambda m, x, y: x * m.log10(x),
+    "x log x / y": lambda m, x, y: x * m.log(x) / y,
+    "a sum": lambda m, x, y: x * m.log(x) + y * m.log(y),
+}
+
+
+@pytest.mark.parametrize("f", ENTROPIES.values(), ids=ENTROPIES)
+def test_the_slope_of_an_entropy_is_the_same_in_both_modes_down_to_the_least_number(f):
+    graph = cg.Graph(inputs := cg.variables("x y"), {"f": f(cg, *inputs)})
+    for at in (5e-324, 1e-310, 5e-309, 1e-300, 0.3):
+        with mp.workdps(DIGITS if at < 0.1 else 50):
+            slope = float(mp.diff(lambda x: f(mp, x, mpf(1.5)), mpf(at), h=mpf(at) * mpf(10) ** -20))
+        for by in (1.0, 0.7, -3.0):
+            assert_both_modes(graph, at, by, by * slope)
+
+
+def assert_both_modes(graph, at, by, exact):
+    point, bound = {"x": at, "y": 1.5}, ULPS * abs(exact) + 4.0 * math.ulp(0.0) / at
+    for wrt, rest in ((["x"], {}), (None, {"y_dot": 0.0})):
+        forward = cg.jvp(graph, wrt).evaluate(point | rest | {"x_dot": by})["f_dot"]
+        assert forward == pytest.approx(exact, abs=bound, rel=0.0), (at, by, wrt)
+    assert cg.vjp(graph).evaluate(point | {"f_bar": by})["x_bar"] == pytest.approx(exact, abs=bound, rel=0.0)

@@ -85,9 +85,10 @@ def test_copies_are_paired_once_each():
 
 def test_the_chain_rule_and_by_definition_differ_by_the_embedding():
     arm = dyn.planar_arm([1.0] * 3, [1.0] * 3)
-    chain, embedded = dyn.inverse_dynamics(arm), dyn.inverse_dynamics(arm, "euler_embedded")
+    verdicts = [dyn.formulation_verdict(arm, name) for name in ("chain_rule", "euler_embedded")]
+    chain, embedded = (each.graph for each in verdicts)
     atoms = "q0 q1 q2 qd0 qd1 qd2"
-    found = compare(chain, embedded, atoms=atoms, classify=formulation_classes)
+    found = compare(chain, embedded, atoms=atoms, classify=formulation_classes(verdicts))
     assert found.classes("right")["spurious adjoint"] == len(dyn.spurious_nodes(embedded))
     assert set(found.classes("left")) == {"needed"}
     assert len(found.common) > 2 * len(compare(chain, embedded).common)  # without atoms, q is never the same

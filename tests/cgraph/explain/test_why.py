@@ -168,7 +168,7 @@ def test_marks_are_nodes_and_edges_of_the_graph():
     [
         (("h", "x"), cg.GraphError, r"nothing in the graph is called 'h' \(inputs x, y, z; outputs f, g\)"),
         (("f", "w"), cg.GraphError, "nothing in the graph is called 'w'"),
-        (("f", 3), TypeError, "a node is given by its name or itself, got int: 3"),
+        (("f", 3), TypeError, "input is given by its name or itself, got int: 3"),
         (("f", cg.variable("strange")), cg.GraphError, "<node variable strange> is not a node of the graph"),
         (("f", "x", {"x": 1.0}), cg.GraphError, "at: no value for input y, z"),
         (("f", "x", {"x": math.nan, "y": 0.0, "z": 0.0}), ValueError, "input 'x' must be a finite number, got nan"),

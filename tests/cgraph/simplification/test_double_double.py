@@ -1,5 +1,6 @@
 """Double-double: beside multiprecision, where sums cancel, in every back end."""
 
+import itertools
 import math
 
 import mpmath
@@ -8,6 +9,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
+from cgraph.core.node import OPS, apply
 from cgraph.core.traversal import topological
 from tests.strategies import examples
 from tests.tolerances import EQUATIONS, LONG_SUM
@@ -171,6 +173,21 @@ def test_constants_are_folded_and_tags_and_inputs_stay():
     assert list(cg.double_double(graph, low=True).outputs) == ["f", "f_low"]
     assert all("spring" in each.tags for each in found.nodes if each.args)
     assert cg.double_double(cg.Graph([], {"c": cg.constant(2.0) * 3.0 + 1.0})).evaluate({})["c"] == 7.0
+
+
+@pytest.mark.parametrize("op", [pytest.param(op, id=op.name) for op in OPS.values()])
+def test_a_special_constant_has_the_value_of_float64_or_none(op):
+    """As any argument of any operation. NaN stands for what pairs lose: infinities, and what overflows on the way."""
+    for slot, special in itertools.product(range(op.arity), (math.inf, -math.inf, 0.0, 0.5, -3.0, 64.5, 1e300)):
+        args = [x, y, z][: op.arity]
+        args[slot] = cg.constant(special)
+        for low in (cg.constant(0.0), 1e-20 * z)[: 1 + (op.jumps is None)]:
+            rest = [arg if arg.value is not None else arg + low for arg in args]
+            graph = cg.Graph([x, y, z], {"f": apply(op, *rest)})
+            for size in (0.7, 1.5):  # not 1, whose infinite power the low part decides
+                values = dict.fromkeys("xyz", size)
+                (found,), (plain,) = (each.evaluate(values).values() for each in (cg.double_double(graph), graph))
+                assert math.isnan(found) or found == pytest.approx(plain, rel=1e-14, nan_ok=True), (slot, special, size)
 
 
 def test_beyond_the_range_is_not_a_number():

@@ -104,6 +104,30 @@ def test_integrable_rows_of_velocities_are_told_from_others() -> None:
     assert dyn.integrable_rows(dyn.System(plane, "x y a")) == {}
 
 
+@pytest.mark.parametrize("scale", [1e-15, 1e-6, 1e6, 1e15])
+def test_integrability_is_free_of_the_rows_units(scale: float) -> None:
+    """Each row by itself: a row of small numbers counts beside one of large ones."""
+
+    def rows(q: Any, qd: Any, t: Any) -> Any:
+        return {"circle": scale * (q[0] * qd[0] + q[1] * qd[1]), "turn": qd[2] - qd[0] * 0.5}
+
+    assert dyn.integrable_rows(dyn.System(plane, "x y a", velocity_constraints=rows)) == {"circle": True, "turn": True}
+
+    def coin(q: Any, qd: Any, t: Any) -> Any:
+        return {"x": scale * (qd[0] - 0.5 * cg.cos(q[2]) * qd[3]), "y": qd[1] - 0.5 * cg.sin(q[2]) * qd[3]}
+
+    upright = dyn.System(lambda q, qd, t: 0.5 * sum(x * x for x in qd), "x y heading roll", velocity_constraints=coin)
+    assert dyn.integrable_rows(upright) == {"x": False, "y": False}
+
+    def only_together(q: Any, qd: Any, t: Any) -> Any:
+        return {"twist": scale * (qd[2] - q[1] * qd[0]), "rail": qd[0]}
+
+    assert dyn.integrable_rows(dyn.System(plane, "x y a", velocity_constraints=only_together)) == {
+        "twist": True,
+        "rail": True,
+    }
+
+
 def test_brackets_of_quasi_velocities_count() -> None:
     """Of a rotor, w_z = 0 alone is not integrable: turns about x and y together turn about z."""
     ball = dyn.Body("ball", dyn.Joint("ball"), inertia=(1.0, 2.0, 2.5))

@@ -214,3 +214,60 @@ def test_an_inertia_that_is_not_positive_is_named_by_its_velocity() -> None:
     flat = dyn.Body("flat", dyn.Joint("free"), mass=1.0, inertia=np.diag([1.0, 1.0, 2.0]))
     with pytest.raises(dyn.SingularMassMatrixError, match=r"'flat.wz' has an inertia that is not positive"):
         dyn.raise_if_singular(dyn.Mechanism([flat]), 6)
+
+
+def random_chain(seed: int) -> dyn.Mechanism:
+    """Of two to four joints of all types, most bodies without mass, in units of any size."""
+    rng = np.random.default_rng(seed)
+    kinds = ["revolute", "prismatic", "ball", "free", "universal", "planar", "cylindrical"]
+    bodies, count = [], int(rng.integers(2, 5))
+    mass, length = 10.0 ** rng.uniform(-6.0, 6.0, 2)
+    for i in range(count):
+        inertia = mass * length**2 * np.diag([0.1, 0.2, 0.25]) if rng.integers(2) else np.zeros((3, 3))
+        numbers = {"mass": mass, "center": length * rng.normal(size=3), "inertia": inertia}
+        place = length * rng.normal(size=3) if rng.integers(2) else np.zeros(3)
+        axis = np.eye(3)[rng.integers(3)] if rng.integers(2) else rng.normal(size=3)
+        heavy = i == count - 1 or rng.random() < 0.3
+        joint = dyn.Joint(str(rng.choice(kinds)), axis, place)
+        bodies.append(dyn.Body(f"b{i}", joint, f"b{i - 1}" if i else "world", **(numbers if heavy else {})))
+    return dyn.Mechanism(bodies)
+
+
+def lacks_inertia(mechanism: dyn.Mechanism) -> bool:
+    """Whether the eigenvalues of M, scaled to 1 on its diagonal, have one that is rounding at a random state."""
+    system, rng = mechanism.system, np.random.default_rng(0)
+    size = [
+        max(np.abs(np.asarray(b.joint.position)).max() + np.abs(np.asarray(b.center)).max() for b in mechanism.bodies)
+    ]
+    q = np.where([unit == "m" for b in mechanism.moving for unit in b.joint.type.units], size, 1.0)
+    matrix = dyn.arrays_at(system, dyn.mass_matrix(system), q=q * rng.uniform(0.5, 1.5, system.nq))["M"]
+    scale = np.sqrt(np.diagonal(matrix))
+    if not scale.all():
+        return True
+    smallest = np.linalg.eigvalsh(matrix / np.outer(scale, scale))[0]
+    assert not 1e-13 < smallest < 1e-9, "neither"
+    return bool(smallest < 1e-13)
+
+
+@pytest.mark.parametrize("seed", [*range(6), *slow(*range(6, 300))])
+def test_of_random_chains_those_without_inertia_are_refused(seed: int) -> None:
+    """Whatever the types of their joints: a massless slide below a free body, a massless ball on a ball."""
+    try:
+        mechanism = random_chain(seed)
+    except dyn.MechanismError:  # of a body that carries nothing
+        return
+    if lacks_inertia(mechanism):
+        for use in (forward_dynamics, dyn.inverse_mass_matrix, dyn.hamilton_equations):
+            with pytest.raises(SingularMassMatrixError):
+                use(mechanism)
+    else:
+        assert len(forward_dynamics(mechanism).outputs) == mechanism.system.n
+
+
+@pytest.mark.parametrize("kinds", [("prismatic", "free"), ("ball", "ball"), ("free", "prismatic"), ("free", "free")])
+def test_a_massless_body_on_a_joint_that_the_next_one_repeats_is_refused(kinds: tuple[str, str]) -> None:
+    first = dyn.Body("first", dyn.Joint(kinds[0]))
+    second = dyn.Joint(kinds[1], position=(0.0, 0.0, 1.0))
+    bodies = [first, dyn.Body("second", second, "first", 1.0, (0.1, 0.2, 0.3), (0.1, 0.2, 0.25))]
+    with pytest.raises(SingularMassMatrixError, match=r"a motion of .*'first.* has no inertia"):
+        forward_dynamics(dyn.Mechanism(bodies))

@@ -26,6 +26,7 @@ from dynamics.experiments.stability.case_result import CaseResult, Measurement
 from dynamics.integrators import METHODS, Method
 from dynamics.integrators.step_control import embedded
 from dynamics.integrators.tableau import DOPRI5
+from tests.early_end import stops
 
 STIFF, SMOOTH = "Robertson, to 1e11", "heavy top"
 RECOMPUTED = 1e-6  # relative, of a change of 1e-9: what rounding of the invariant adds to it
@@ -148,6 +149,7 @@ def test_stiff_methods_meet_the_bounds(method: str) -> None:
     assert [each.quantity for each in found.measurements] == [each.quantity for each in cases.load(STIFF).criteria]
 
 
+@stops
 def test_a_run_that_stops_meets_nothing(monkeypatch: MonkeyPatch) -> None:
     monkeypatch.setattr(case_runs, "MOST_STEPS", 10)
     found = case_runs.result(cases.load(SMOOTH), "dopri5")

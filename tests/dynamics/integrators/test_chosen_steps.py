@@ -1,6 +1,7 @@
 """Chosen steps: they move the time, keep its clock, see what is not finite, stiffness and layers, and always end."""
 
 import math
+import warnings
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from dynamics.integrators.tableau import DOPRI5, EULER, real_stability
 from dynamics.simulation.integration import integration
 from dynamics.simulation.run_options import RunOptions
 from dynamics.simulation.step_program import compile_steps, step_program
+from tests.dynamics.linkages import windows
+from tests.early_end import stops
 from tests.slow import slow
 
 ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
@@ -39,6 +42,7 @@ SINGULAR: dict[str, tuple[dyn.OdeSystem, list[float]]] = {
 }
 
 
+@stops
 @mark.parametrize("method", ADAPTIVE)
 def test_no_run_passes_a_singularity_and_every_row_is_a_state_at_a_time_of_its_own(method: str) -> None:
     for name, (system, start) in SINGULAR.items():
@@ -51,6 +55,7 @@ def test_no_run_passes_a_singularity_and_every_row_is_a_state_at_a_time_of_its_o
         assert run.t[-1] == approx(1.0, rel=NEAR), name
 
 
+@stops
 @mark.parametrize("method", ADAPTIVE)
 def test_a_collision_ends_a_run(method: str) -> None:
     """From rest at 1 under the attraction 1 / q a body meets the center after pi / (2 sqrt 2)."""
@@ -149,6 +154,7 @@ def test_a_tolerance_below_rounding_is_raised_and_said(method: str) -> None:
     assert run.stats.success
 
 
+@stops
 @mark.parametrize("method", ADAPTIVE)
 def test_the_shortest_spans_end(method: str) -> None:
     system = first_order(lambda x, t: -x[0])
@@ -160,3 +166,17 @@ def test_the_shortest_spans_end(method: str) -> None:
             or "however small" in (run.stats.message)
         )
         assert run.q[-1] == approx([1.0], abs=1e-5)
+
+
+@mark.parametrize("method", ["dop853", "radau", *slow("dopri5", "rodas", "taylor")])
+@mark.parametrize("h", [2e-7, *slow(1e-6, 1e-4)])
+def test_where_a_linkage_can_go_on_in_two_ways_it_keeps_its_energy_or_says_why_not(method: str, h: float) -> None:
+    """Steps that end near a flat position have the rounding of its constraints over their distance."""
+    model, _, _ = windows(2)
+    ways, length = np.array([1.0, -1.0, 1.0, -1.0, 1.0]), 1e-4
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        run = dyn.simulate(model, -length * ways, 4.0 * ways, length, method, max_step=h, max_steps=3000)
+    assert np.ptp(run.energy) < 1e-6 * np.abs(run.energy).max() or said or not run.success
+    if (method, h) == ("radau", 2e-7):
+        assert any(["constraints moved the state" in str(each.message) for each in said])

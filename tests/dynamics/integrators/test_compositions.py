@@ -14,6 +14,7 @@ from dynamics.integrators import METHODS
 from dynamics.integrators.composition import COMPOSITIONS, Composition
 from tests.dynamics.planet import PERIHELION, cart, planet, position
 from tests.dynamics.step_options import step
+from tests.early_end import stops
 
 Series = dict[tuple[int, ...], Fraction]  # of words in X_1, X_3, X_5, .., whose weights are their indices
 
@@ -111,6 +112,7 @@ WITHOUT_INERTIA = {  # {name: (L, parameters, start)}; 'slider' has no inertia, 
 }
 
 
+@stops
 @mark.parametrize("method", ["verlet", "gauss4", "yoshida4"])
 @mark.parametrize("case", WITHOUT_INERTIA)
 def test_a_coordinate_without_inertia_is_named(method: str, case: str) -> None:

@@ -18,6 +18,7 @@ from dynamics.simulation.run_options import SCIPY_SOLVERS
 from dynamics.systems.system import System
 from tests.dynamics.planet import PERIHELION, cart, planet, position
 from tests.dynamics.step_options import EVERY_METHOD, step
+from tests.early_end import stops
 
 FIXED = [name for name, method in METHODS.items() if not method.adaptive and name not in COMPOSITIONS]
 ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
@@ -185,6 +186,7 @@ def test_a_start_from_rest_does_not_fool_the_first_step() -> None:
         assert run.q[1] == approx(first.q[-1], abs=FIRST_STEP)
 
 
+@stops
 def test_a_run_that_its_steps_cannot_follow_says_so() -> None:
     pytest.importorskip("llvmlite")
     blow = dyn.OdeSystem(lambda x, t: [x[0] * x[0], 0.0], ["wild", "calm"])
@@ -198,6 +200,7 @@ def test_a_run_that_its_steps_cannot_follow_says_so() -> None:
     assert "did not converge; the step is too long" in turns.stats.message
 
 
+@stops
 def test_a_start_whose_rate_is_no_number() -> None:
     root = dyn.OdeSystem(lambda x, t: [1.0, cg.log(x[1])], ["a", "b"])
     run = dyn.simulate(root, [0.0, -1.0], None, 1.0, "dopri5")
@@ -207,6 +210,7 @@ def test_a_start_whose_rate_is_no_number() -> None:
     )
 
 
+@stops
 @mark.parametrize("method", ["rk4", "dopri5", "rodas", "scipy:RK45"])
 def test_max_steps_ends_a_run(method: str) -> None:
     if method.startswith("scipy"):

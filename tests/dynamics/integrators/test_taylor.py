@@ -1,5 +1,6 @@
 """The Taylor method: its series against those of mpmath, its runs against 30 digits, and what it refuses."""
 
+import itertools
 import math
 from collections.abc import Callable
 from typing import Any
@@ -21,6 +22,10 @@ SERIES: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {
     "root": (lambda x, t: cg.sqrt(1.0 + x * x + t), lambda x, t: mpmath.sqrt(1 + x * x + t)),
     "power": (lambda x, t: (2.0 + x) ** -1.5, lambda x, t: (2 + x) ** mpmath.mpf(-1.5)),
     "whole": (lambda x, t: 0.1 * x**3.0 + (x + 2.0) ** -3.0, lambda x, t: x**3 / 10 + (x + 2) ** -3),
+    "powers at 0": (
+        lambda x, t: 1.0 + (x - 0.3) ** 4.0 - 2.0 * (x - 0.3) ** 65.0 + t**3.0,
+        lambda x, t: 1 + (x - mpmath.mpf(0.3)) ** 4 - 2 * (x - mpmath.mpf(0.3)) ** 65 + t**3,
+    ),
     "length": (lambda x, t: cg.hypot(1.0 + x, t), lambda x, t: mpmath.hypot(1 + x, t)),
     "waves": (lambda x, t: cg.sin(x) * cg.cos(3.0 * t), lambda x, t: mpmath.sin(x) * mpmath.cos(3 * t)),
     "exponential": (lambda x, t: cg.exp(-x) + cg.log(2.0 + t), lambda x, t: mpmath.exp(-x) + mpmath.log(2 + t)),
@@ -58,6 +63,22 @@ def test_what_the_series_at_the_start_does_not_show_is_seen_at_the_end_of_the_st
     pulse = dyn.OdeSystem(lambda x, t: [cg.exp(-100.0 * (t - 2.0) ** 2.0)], ["x"])
     run = dyn.simulate(pulse, [0.0], None, 2.0, "taylor", rtol=1e-12, atol=1e-12)
     assert run.q[-1, 0] == approx(math.sqrt(math.pi / 100.0) / 2.0, rel=1e-9)
+
+
+@mark.parametrize("power", [2.0, 3.0, 4.0, 5.0, 9.0])
+def test_a_chain_of_whole_powers_starts_at_0(power: float) -> None:
+    """As Fermi, Pasta and Ulam's: springs of x^2 + |power| x^power, all at 0 but one velocity, and a force t^power."""
+
+    def lagrangian(q: list[cg.Node], qd: list[cg.Node], t: cg.Node) -> Any:
+        stretches = [b - a for a, b in itertools.pairwise([0.0, *q, 0.0])]
+        return sum(0.5 * v**2.0 for v in qd) - sum(0.5 * d**2.0 + d**power / power for d in stretches)
+
+    chain = dyn.System(lagrangian, ["a", "b", "c"], forces=lambda q, qd, t: [0.0, 0.0, 0.1 * t**power])
+    start = [0.0, 0.0, 0.0], [0.3, 0.0, 0.0]
+    run, other = [dyn.simulate(chain, *start, 1.0, method) for method in ("taylor", "dop853")]
+    assert run.success
+    assert run.stats.steps < 40
+    np.testing.assert_allclose(run.q[-1], other.q[-1], rtol=1e-8)
 
 
 def test_events_and_times_lie_on_its_polynomials() -> None:

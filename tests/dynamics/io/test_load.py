@@ -208,16 +208,76 @@ def test_what_is_no_source_is_said(load: Any) -> None:
         load(3)
 
 
+@mark.parametrize("load", [dyn.load_mjcf, dyn.load_urdf])
+@mark.parametrize("source", ["robot\n" * 5000, "x" * 5000, "<robot name='\ud800'/>", "a\0b", "\ud800", "", "<", "<!--"])
+def test_what_cannot_be_read_is_one_sentence(load: Any, source: str) -> None:
+    with raises(
+        MechanismError, match=r"cannot be read: File name too long|is not XML: |there is no file|is a folder"
+    ) as told:
+        load(source)
+    assert "\n" not in str(told.value)
+    assert len(str(told.value)) < 300
+
+
 @mark.parametrize(
-    "text", ["<mujoco><worldbody>", "<mujoco><nonsense/></mujoco>", mjcf('<body><joint axis="1"/></body>')]
+    "text",
+    [
+        "<mujoco><worldbody>",
+        "<mujoco><nonsense/></mujoco>",
+        mjcf('<body><joint axis="1"/></body>'),
+        mjcf(f'<body name="b">{HINGE}{INERTIAL}</body>').replace(
+            "</mujoco>", '<equality><connect body1="b" body2="world" anchor="&#9;"/></equality></mujoco>'
+        ),  # which MuJoCo itself does not explain
+    ],
 )
 def test_bad_mjcf_is_one_sentence(text: str, tmp_path: Path) -> None:
-    with raises(MechanismError, match=r"^MuJoCo cannot read the given text: \S.*\S$"):
+    with raises(MechanismError, match=r"^(MuJoCo cannot read the given text|the given text is not XML): \S.*\S$"):
         dyn.load_mjcf(text)
     file = tmp_path / "bad.xml"
     file.write_text(text, encoding="utf-8")
     with raises(MechanismError, match=r"^MuJoCo cannot read '.*bad\.xml': \S.*\S$"):
         dyn.load_mjcf(file)
+
+
+NAMED = {
+    "included": '<include file="{0}"/>',
+    "a mesh": '<asset><mesh name="m" file="{0}"/></asset>',
+    "a texture": '<asset><texture name="m" type="cube" fileright="{0}"/></asset>',
+    "a field": '<asset><hfield name="m" file="{0}"/></asset>',
+    "a model": '<asset><model name="m" file="{0}"/></asset>',
+}
+
+
+@mark.parametrize("element", NAMED.values(), ids=NAMED)
+def test_a_text_reads_no_other_files(element: str, tmp_path: Path, monkeypatch: Any) -> None:
+    (tmp_path / "inside").mkdir()
+    monkeypatch.chdir(tmp_path / "inside")
+    other = tmp_path / "other.xml"
+    other.write_text(mjcf(f'<body name="b">{HINGE}{INERTIAL}</body>'), encoding="utf-8")
+    for name in (str(other), "../other.xml", "other.xml"):
+        with raises(MechanismError, match=f"^the given text names the file '{re.escape(name)}', and a text reads no"):
+            dyn.load_mjcf(f"<mujoco>{element.format(name)}</mujoco>")
+
+
+def test_a_file_reads_those_that_it_includes(tmp_path: Path) -> None:
+    body = mjcf(f'<body name="b">{HINGE}{INERTIAL}</body>')
+    (tmp_path / "b.xml").write_text(body, encoding="utf-8")
+    (tmp_path / "a.xml").write_text('<mujoco><!-- a -- b --><include file="b.xml"/></mujoco>', encoding="utf-8")
+    assert dyn.load_mjcf(tmp_path / "a.xml").coordinates == dyn.load_mjcf(body).coordinates
+
+
+@mark.parametrize("count", [("100000000",), ("1000", "11"), ("9000", "1"), ("1e300",)])
+def test_more_copies_than_are_made_in_seconds_are_refused(count: tuple[str, ...], tmp_path: Path) -> None:
+    site = "<site/>"
+    for each in count:
+        site = f'<replicate count="{each}" offset="0 0 1">{site}</replicate>'
+    text = mjcf(f'<body name="b">{HINGE}{INERTIAL}{site}{site if count == ("9000", "1") else ""}</body>')
+    (tmp_path / "b.xml").write_text(text, encoding="utf-8")
+    (tmp_path / "a.xml").write_text('<mujoco><include file="b.xml"/></mujoco>', encoding="utf-8")
+    for source in (text, tmp_path / "a.xml"):
+        with raises(MechanismError, match=r" asks for \S+ copies by `count`, at most 10000 are made$"):
+            dyn.load_mjcf(source)
+    assert dyn.load_mjcf(text.replace(f'"{count[0]}"', '"3"')).coordinates == ("j",)
 
 
 # --- what is not modelled

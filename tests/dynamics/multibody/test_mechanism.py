@@ -306,6 +306,19 @@ BAD = [
         "body 'a': orientation must be (3, 3) finite numbers",
         id="orientation nan",
     ),
+    param(
+        {"mass": 1e308, "center": (1.0, 1.0, 1.0)},
+        "body 'a': inertia about the joint is beyond float64, with 0 kg m^2 about its center and inf kg m^2 by that",
+        id="mass beyond float64",
+    ),
+    param(
+        {"inertia": (1e308, 1e308, 1e308)}, "body 'a': inertia about the joint is beyond float64", id="moments beyond"
+    ),
+    param(
+        [Body("a", hinge()), *[Body(f"b{k}", Joint("fixed"), "a", 9e307, (0.9, 0.9, 0.0)) for k in range(2)]],
+        "body 'a': its inertia about the joint is beyond float64, with all welded to it",
+        id="a sum beyond float64",
+    ),
     param(LEAF, f"body 'leaf' has no mass, {AND_NO_MORE}", id="leaf without mass"),
     param({"center": (0.0, 0.0, 0.5)}, f"body 'a' has no inertia about its axis, {AND_NO_MORE}", id="mass on the axis"),
     param(
@@ -319,6 +332,19 @@ BAD = [
         id="a slide without mass",
     ),
 ]
+
+
+def test_a_mass_of_any_size_has_a_mass_matrix_or_is_beyond_float64() -> None:
+    """Never "carries no mass", where its square distance has a number, whatever the unit."""
+    for mass in [float(f"1e{k}") for k in range(-150, 309, 17)]:
+        for length in [float(f"1e{k}") for k in range(-75, 154, 19)]:
+            body = Body("a", hinge(axis=(0.0, 1.0, 0.0)), mass=mass, center=(length, 0.0, 0.0))
+            if mass * length * length < 1e308:
+                (inertia,) = dyn.mass_matrix(Mechanism([body])).evaluate({"q0": 0.3, "qd0": 0.0}).values()
+                assert inertia == approx(mass * length**2, rel=1e-15, abs=0.0)
+            else:
+                with raises(MechanismError, match="inertia about the joint is beyond float64"):
+                    Mechanism([body])
 
 
 @mark.parametrize(("bodies", "message"), BAD)

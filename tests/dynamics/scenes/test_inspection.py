@@ -13,6 +13,7 @@ from cgraph import Graph
 from dynamics.multibody.joint_positions import skeleton
 from dynamics.scenes.inspection import DT, FORMULATIONS, Inspection, inspection
 from dynamics.scenes.scenes import Scene
+from tests.early_end import stops
 from tests.tolerances import EQUATIONS
 
 ARM = cache(lambda: inspection(dyn.scenes.load("triple_pendulum")))
@@ -141,6 +142,7 @@ def test_a_time_out_of_range_is_refused():
         inspection(Scene("x", "", dyn.planar_arm([1.0], [1.0]), (0.0,), (0.0,), 1.0), t_end=-1.0)
 
 
+@stops
 def test_a_motion_that_does_not_begin_is_told():
     weightless = dyn.System(lambda q, qd, t, p: p["m"] * qd[0] ** 2 - q[0] ** 2, ["x"], {"m": 0.0})
     with pytest.raises(ValueError, match=r"accelerations that are not finite: the motion stopped at t = 0 s: "):

@@ -10,6 +10,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from dynamics.systems.model import as_system
+from tests.early_end import stops
 
 from ...slow import slow
 from ..equations.test_hamiltonian import random_tree, rotor
@@ -203,6 +204,7 @@ def test_what_is_wrong_is_said_in_the_same_words(name: str) -> None:
     assert said[0] == said[1]
 
 
+@stops
 def test_what_ends_a_run_is_said_in_the_same_words() -> None:
     lost = dyn.Event("lost", lambda q, qd, t: q[0] - 0.25, reset=lambda q, qd, t: (q, [qd[0] / (q[0] - q[0])]))
     for how in ({"max_steps": 3, "rtol": 1e-12}, {"events": lost}):
@@ -244,9 +246,10 @@ def test_velocities_that_momenta_do_not_have_are_no_silent_result(model: Any, t_
 @pytest.mark.parametrize("derive", [dyn.gradient_many, *slow(dyn.gradient, dyn.sensitivities)])
 def test_nor_are_their_derivatives(derive: Any) -> None:
     where = [] if derive is dyn.sensitivities else [lambda q, qd, t: q[0]]
-    qd, number = ([[0.0], [0.9]], "motion 1: ") if derive is dyn.gradient_many else ([0.9], "")
+    qd, number = ([[0.0], [0.9]], "1 of 2 motions: of 1, ") if derive is dyn.gradient_many else ([0.9], "")
+    given = {"form": "momentum", "wrt": "q", "backend": "python", "estimate_error": False}
     with pytest.warns(dyn.SimulationWarning, match=f"{number}the momenta of the start .*0.1.* in place of 0.9"):
-        derive(FOLDED, *where, [0.0], qd, 0.1, "euler", dt=0.1, form="momentum", wrt="q", backend="python")
+        derive(FOLDED, *where, [0.0], qd, 0.1, "euler", dt=0.1, **given)
 
 
 @pytest.mark.slow

@@ -58,7 +58,7 @@ def options(method: str) -> dict[str, Any]:
     """Steps of the same length, whatever the method."""
     if METHODS[method].adaptive:
         return {"rtol": 10.0, "atol": 10.0, "max_step": 0.1, "first_step": 0.1}
-    return {"dt": 0.1}
+    return {"dt": 0.1, "estimate_error": False}  # they are off, and right derivatives of that
 
 
 @mark.parametrize("method", [*USUAL, *slow(*OTHERS)])
@@ -369,8 +369,10 @@ def test_many_gradients_with_what_is_the_same_for_all() -> None:
     assert [two[name][1] for name in ("q", "gain", "m")] == [approx(one[name]) for name in ("q", "gain", "m")]
     same = dyn.gradient_many(BEAD, loss, [[0.5], [0.5]], [0.2], tau=[0.3], **given)
     assert same["tau"].shape == (2, 1)
-    with raises(ValueError, match="gradient_many needs equal steps"):
-        dyn.gradient_many(BEAD, loss, [[0.5]], [0.2], 0.2, "dop853")
+    with raises(
+        ValueError, match=r"tau of shape \(1, 4, 1\) is one row a step, which needs equal steps: method 'radau'"
+    ):
+        dyn.gradient_many(BEAD, loss, [[0.5]], [0.2], 0.2, "radau", tau=np.zeros((1, 4, 1)))
 
 
 @mark.parametrize("method", ["rk4", "dopri5", "rodas", "radau", "midpoint"])
@@ -436,7 +438,7 @@ def test_a_new_tableau_has_gradients(monkeypatch: pytest.MonkeyPatch) -> None:
     heun = Tableau(2, c=(0.0, 1.0), a=((), (1.0,)), b=(0.5, 0.5))
     monkeypatch.setitem(METHODS, "heun", runge_kutta(heun))
     decay = dyn.OdeSystem(lambda x, t: [-2.0 * x[0]], ["x"])
-    result = dyn.gradient(decay, lambda x, t: x[0], [3.0], None, 1.0, "heun", dt=0.25, backend="python")
+    result = dyn.gradient(decay, lambda x, t: x[0], [3.0], None, 1.0, "heun", dt=0.25, rtol=0.1, backend="python")
     assert result["q"] == approx([(1.0 - 0.5 + 0.125) ** 4], rel=SHORT_SUM)
 
 
@@ -492,7 +494,7 @@ def test_what_is_not_there_is_said_in_a_sentence() -> None:
         end(events=[one, two])
     with raises(ValueError, match="needs equal steps without events"):
         end(events=one, tau=np.zeros((2, 1)))
-    with raises(dyn.MotionError, match="does not stay finite"):
+    with raises(dyn.MotionError, match=r"the motion stopped at t = 0.05 s: coordinate 's' is .* after the step"):
         end(tau=[1e300])
 
 

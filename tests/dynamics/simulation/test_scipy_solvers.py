@@ -9,6 +9,7 @@ from pytest import approx, mark
 
 import cgraph as cg
 import dynamics as dyn
+from tests.early_end import stops
 
 SOLVERS = ["RK45", "DOP853", "Radau", "BDF", "LSODA"]
 CIRCLE = dyn.OdeSystem(lambda x, t: [x[1], -x[0]], ["x", "v"])
@@ -52,6 +53,7 @@ def test_a_run_ends_with_an_answer_or_a_sentence_and_says_nothing_else(case: str
     assert capfd.readouterr() == ("", "")
 
 
+@stops
 def test_the_sentence_names_the_component() -> None:
     def message(model: dyn.OdeSystem, start: list[float], solver: str, **options: Any) -> str:
         return dyn.simulate(model, start, None, 1.0, f"scipy:{solver}", **options).stats.message

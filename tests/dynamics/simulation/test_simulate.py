@@ -16,6 +16,7 @@ from dynamics.simulation.stepping import NativeIntegration
 from dynamics.systems.system import System
 from tests.dynamics.models import oscillator, random_arm
 from tests.dynamics.step_options import step
+from tests.early_end import stops
 
 ROUNDING = 1e-14  # of a few sums of fractions, or of products of order 1
 SPACING = 1e-12  # relative, of differences of rounded times
@@ -99,6 +100,7 @@ def test_one_step_of_euler_is_euler_s_step() -> None:
     assert (result.q[-1, 0], result.qd[-1, 0]) == approx((1.0 + 0.1 * 0.4, 0.4 - 0.1 * 1.5), rel=ROUNDING)
 
 
+@stops
 def test_a_run_that_leaves_the_numbers_keeps_its_rows_and_says_where() -> None:
     result = dyn.simulate(runaway(), [0.0, 0.0], [0.0, 1.0], 2.0, "rk4", dt=0.01)
     assert not result.stats.success
@@ -112,6 +114,7 @@ def test_a_run_that_leaves_the_numbers_keeps_its_rows_and_says_where() -> None:
     assert result.qd[50, 1] == approx(1.0 / (1.0 - 0.5), rel=10.0 * RK4_ERROR)
 
 
+@stops
 def test_a_run_that_stops_before_the_first_recorded_instant_has_the_row_where_it_stopped() -> None:
     result = dyn.simulate(runaway(), [0.0, 0.0], [0.0, 1.0], 2.0, "rk4", dt=0.01, t_eval=[1.5, 2.0])
     every = dyn.simulate(runaway(), [0.0, 0.0], [0.0, 1.0], 2.0, "rk4", dt=0.01)
@@ -120,6 +123,7 @@ def test_a_run_that_stops_before_the_first_recorded_instant_has_the_row_where_it
     assert "stopped at t = 1.0" in result.stats.message
 
 
+@stops
 @pytest.mark.filterwarnings("error")
 @mark.parametrize("parameters", [{"m": 0.0}, {"m": 1e-300}])
 def test_an_infinite_acceleration_stops_the_run_without_a_warning(parameters: dict[str, float]) -> None:
@@ -128,6 +132,7 @@ def test_an_infinite_acceleration_stops_the_run_without_a_warning(parameters: di
     assert result.stats.message.startswith("stopped at t = 0.1 s: ")
 
 
+@stops
 @pytest.mark.filterwarnings("error")
 def test_leaving_a_function_s_domain_stops_the_run() -> None:
     """A particle on the potential -sqrt(q) that is thrown at q = 0, beyond which the root is no number."""
@@ -308,6 +313,7 @@ def test_a_last_time_past_the_end_by_rounding_is_the_end() -> None:
     assert times[-1] > 0.3  # the caller's array is as it was
 
 
+@stops
 def test_rows_that_fill_the_memory_end_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = dyn.simulate(oscillator(), [1.0], [0.0], 200.0, "dop853", max_step=1e-2)
     hundred = 3.0 * 24.0 * 100.0  # rows of time and state

@@ -11,12 +11,13 @@ from pytest import approx, mark, raises
 import dynamics as dyn
 from dynamics.integrators import METHODS
 from dynamics.simulation.ensembles.simulate_many import simulate_many
-from dynamics.simulation.ensembles.step_grid import grids_between
+from dynamics.simulation.ensembles.step_grid import StepGrid, grids_between
 from dynamics.systems.model import as_system
 from dynamics.systems.system import System
 from tests.dynamics.ensembles import arms, same
 from tests.dynamics.models import oscillator, random_arm
 from tests.dynamics.step_options import LIKE_OTHERS, step
+from tests.early_end import stops
 from tests.slow import slow
 
 RK4_ERROR = 1e-11  # of a period at dt = 1 ms: (w dt)^4 w t / 120
@@ -126,6 +127,7 @@ def test_many_steps_come_in_many_blocks(monkeypatch: pytest.MonkeyPatch) -> None
 # What can go wrong on the way
 
 
+@stops
 @mark.parametrize("method", ["rk4", "euler", "midpoint", "dopri5"])
 def test_one_that_leaves_the_numbers_is_nan_from_there_and_says_where(method: str) -> None:
     qd = np.zeros((17, 2))
@@ -150,6 +152,7 @@ def test_one_that_leaves_the_numbers_is_nan_from_there_and_says_where(method: st
         assert len(result.t) - finite.all(axis=1).sum() == np.isnan(result.q[k, :, 0]).sum()
 
 
+@stops
 def test_a_neighbor_that_fails_is_not_felt_in_an_arm() -> None:
     model, q, qd = arms(16)
     calm = simulate_many(model, q, qd, 0.5, "rk4")
@@ -162,6 +165,7 @@ def test_a_neighbor_that_fails_is_not_felt_in_an_arm() -> None:
     assert result.q[3, 0].tolist() == q[3].tolist()
 
 
+@stops
 def test_all_may_fail() -> None:
     result = simulate_many(runaway(), np.zeros((3, 2)), [0.0, 1.0], 9.0, "rk4", dt=0.1)
     assert not result.stats.success.any()
@@ -169,6 +173,7 @@ def test_all_may_fail() -> None:
     assert np.isnan(result.q[:, -1]).all()
 
 
+@stops
 def test_max_steps() -> None:
     for method in ("rk4", "dop853"):
         result = simulate_many(*arms(3), 5.0, method, t_eval=[0.0, 5.0], max_steps=4)
@@ -230,6 +235,14 @@ def test_a_result_that_would_not_fit_is_refused() -> None:
         MemoryError, match=r"100000 trajectories of 100000001 rows of 4 numbers take 2.98e\+05 GiB, and .* free"
     ):
         simulate_many(random_arm(2), np.zeros((100_000, 2)), [0.0, 0.0], 1e5, "rk4")
+
+
+def test_only_the_last_block_of_a_row_ends_at_an_instant() -> None:
+    grid = StepGrid(0.0, 0.1, 7, 2)
+    assert [*grid.blocks(3, 5)] == [(3, 3, False), (3, 3, False), (1, 1, True)] * 2
+    assert [*grid.blocks(7, 5)] == [(7, 7, True)] * 2
+    assert [*grid.blocks(20, 5)] == [(14, 7, True)]
+    assert [*StepGrid(0.0, 0.1, 1, 5).blocks(20, 2)] == [(2, 1, True), (2, 1, True), (1, 1, True)]
 
 
 @given(

@@ -13,6 +13,7 @@ from dynamics.integrators import METHODS
 from dynamics.simulation.stepping import NativeIntegration
 from tests.dynamics.models import oscillator
 from tests.dynamics.step_options import EVERY_METHOD, LIKE_OTHERS, step
+from tests.early_end import stops
 from tests.slow import slow
 
 EQUAL = [name for name, method in METHODS.items() if not method.adaptive]
@@ -54,6 +55,7 @@ def test_a_run_goes_to_t_end_whatever_is_recorded(method: str) -> None:
         assert many.t.tolist() == [0.0, 0.25]
 
 
+@stops
 @mark.parametrize("method", ["rk4", "gauss4", "scipy:DOP853"])
 def test_what_goes_wrong_after_the_last_recorded_time_is_said(method: str) -> None:
     """v' = v^2 leaves the numbers at t = 1."""

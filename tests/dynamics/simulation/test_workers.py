@@ -1,12 +1,14 @@
 """Workers: whoever runs an ensemble, threads, processes or another map, its numbers are the same."""
 
 import multiprocessing
+import os
 import re
 import signal
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from typing import Any
 
@@ -20,6 +22,7 @@ from dynamics.simulation.ensembles.simulate_many import simulate_many
 from tests.dynamics.ensembles import arms, same
 from tests.dynamics.models import random_arm
 from tests.dynamics.step_options import step
+from tests.early_end import stops
 from tests.slow import slow
 
 
@@ -30,6 +33,7 @@ def case(method: str) -> tuple[tuple[Any, ...], dict[str, Any]]:
     return (model, q, qd, 0.2, method), {"t_eval": [0.1, 0.2], "tau": np.tanh(q)}
 
 
+@stops
 @mark.parametrize(
     ("backend", "method"),
     [("llvm", "rk4"), ("llvm", "midpoint"), ("llvm", "dop853"), ("python", "rk4")]
@@ -46,6 +50,7 @@ def test_threads_and_chunks_change_nothing(backend: str, method: str) -> None:
     assert same(alone, simulate_many(*arguments, **options, workers=map, chunk=1))
 
 
+@stops
 def test_parts_may_come_in_any_order() -> None:
     arguments, options = case("rk4")
     alone = simulate_many(*arguments, **options)
@@ -56,6 +61,7 @@ def optimize(level: int) -> None:
     llvm_engine.LEVEL = level
 
 
+@stops
 @mark.parametrize("method", ["dopri5", *slow("rk4")])
 def test_processes_change_nothing_and_make_the_code_once(method: str) -> None:
     arguments, options = case(method)
@@ -64,6 +70,47 @@ def test_processes_change_nothing_and_make_the_code_once(method: str) -> None:
     with ProcessPoolExecutor(1, spawn, optimize, [llvm_engine.LEVEL]) as pool:
         assert same(alone, simulate_many(*arguments, **options, workers=pool.map, chunk=8))
         assert pool.submit(programs_made).result() == 1
+
+
+def test_an_executor_that_breaks_is_a_sentence() -> None:
+    def breaking(function: Callable[..., Any], items: Iterable[Any]) -> Iterator[Any]:
+        yield function(next(iter(items)))
+        raise BrokenProcessPool
+
+    told = r"^a process of workers was ended from outside, as where memory runs out, when 1 of 4 chunks were here$"
+    with raises(RuntimeError, match=told):
+        simulate_many(*arms(29), 0.1, "rk4", workers=breaking, chunk=8)
+
+
+@mark.slow  # two processes that load the library
+@mark.skipif(not hasattr(signal, "SIGKILL"), reason="no such signal on this system")
+@mark.parametrize("kind", ["executor", "map", "imap", "imap_unordered"])
+def test_a_killed_process_is_a_sentence(kind: str) -> None:
+    """Also in a `multiprocessing` pool, which would wait for ever for what the process had in hand."""
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(2, spawn) if kind == "executor" else spawn.Pool(2) as pool:
+        list(pool.map(abs, range(8)))
+
+        def kill() -> None:
+            pid = next(iter({each.pid for each in multiprocessing.active_children()}))
+            assert pid is not None
+            os.kill(pid, signal.SIGKILL)
+
+        timer = threading.Timer(4.0, kill)
+        timer.start()
+        with raises(
+            RuntimeError, match=r"^a process of workers was ended from outside, .* when \d of 4 chunks were here$"
+        ):
+            simulate_many(
+                *arms(29),
+                1e5,
+                "rk4",
+                dt=1e-3,
+                t_eval=[1e5],
+                workers=getattr(pool, kind.replace("executor", "map")),
+                chunk=8,
+            )
+        timer.join()
 
 
 def programs_made() -> int:

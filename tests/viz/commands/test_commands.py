@@ -50,17 +50,20 @@ def by_complex_step(graph: cg.Graph, output: str, name: str, at: dict[str, float
 @pytest.mark.parametrize("formulation", RIGHT)
 def test_lint_proves_that_the_chain_rule_keeps_q_and_qd_apart(capsys, formulation):
     text = said(capsys, "lint", "triple_pendulum", "--formulation", formulation)
-    assert text.count("Holds: ") == 2
+    assert text.count("Holds: ") == 3
+    assert text.startswith("Holds: this is the torque of the chain rule: no derivative in it is taken through a step")
     assert "q.joint 1, q.joint 2 and q.joint 3 are inputs" in text
 
 
 @pytest.mark.parametrize("formulation", FLAWED)
 def test_lint_blames_the_edges_of_the_embedding(capsys, formulation):
-    found = figures(capsys, "lint", "triple_pendulum", "--formulation", formulation, status=1)
-    (finding,) = found["findings"]
-    assert [cut["text"] for cut in finding["cut"]] == [f"qd.joint {i} * dt -> q.joint {i}" for i in (1, 2, 3)]
-    assert [each["gains"] for each in finding["corrupted"]] == [f"dt * dL/dq.joint {i}" for i in (1, 2, 3)]
     exact = formulation == "kinetic_only_exact"  # embedded, but no derivative is taken through it
+    found = figures(capsys, "lint", "triple_pendulum", "--formulation", formulation, status=int(not exact))
+    (finding,) = found["findings"]
+    energy = "L" if formulation == "euler_embedded" else "K"
+    assert [cut["text"] for cut in finding["cut"]] == [f"qd.joint {i} * dt -> q.joint {i}" for i in (1, 2, 3)]
+    assert [each["gains"] for each in finding["corrupted"]] == [f"dt * d{energy}/dq.joint {i}" for i in (1, 2, 3)]
+    assert found["verdict"]["differs"] == (len(found["verdict"]["edges"]) == 3) == (not found["ok"]) == (not exact)
     assert (finding["derivatives_through"] == 0) == exact
 
 
@@ -197,16 +200,42 @@ def test_compare_has_totals_that_add_up_and_a_class_for_every_node(capsys):
         only = found[f"only_{side}"]
         assert found["in_both"] + len(only) == found[f"{side}_nodes"]
         assert sum(found[f"{side}_classes"].values()) == len(only)
-    assert set(found["left_classes"]) == {"needed", "spurious adjoint", "Euler edge"}
+    assert set(found["left_classes"]) == {"needed", "spurious adjoint", "takes in what is spurious", "Euler edge"}
+    assert {name: each["differs"] for name, each in found["verdicts"].items()} == {
+        "euler_embedded": True,
+        "chain_rule": False,
+    }
     assert set(found["right_classes"]) == {"needed"}
     arm = dyn.scenes.load("triple_pendulum")
     assert found["left_nodes"] == len(dyn.inverse_dynamics(arm, "euler_embedded").nodes)
-    assert found["left_classes"]["spurious adjoint"] == len(
-        dyn.spurious_nodes(dyn.inverse_dynamics(arm, "euler_embedded"))
-    )
+    assert found["left_classes"]["spurious adjoint"] == len(dyn.formulation_verdict(arm, "euler_embedded").nodes)
     text = said(capsys, "compare", "triple_pendulum", "--formulations", "chain_rule", "chain_rule_literal", status=1)
     assert text.startswith("left: chain_rule, 171 nodes = ")
     assert "spurious" not in text
+
+
+ATWOOD = """import dynamics as dyn
+atwood = dyn.System(lambda q, qd, t, p: p["m"] * qd[0] ** 2 + p["w"] * q[0], ["x"], {"m": 1.5, "w": 9.81})
+ball = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 9.81 * q[0], ["y"])
+"""
+
+
+def test_an_edge_that_is_wrong_by_itself_is_seen_by_every_command(tmp_path, capsys):
+    (tmp_path / "own.py").write_text(ATWOOD)
+    model, page = f"{tmp_path / 'own.py'}:atwood", str(tmp_path / "page.html")
+    found = figures(capsys, "compare", model, status=1)
+    assert found["left_classes"] == {"takes in what is spurious": 2}
+    assert [found["verdicts"][name]["differs"] for name in ("euler_embedded", "chain_rule")] == [True, False]
+    assert "This is not the torque of the chain rule" in said(capsys, "compare", model, status=1)
+    versions = figures(capsys, "inspect", model, "--t-end", "0.1", "--out", page)["versions"]
+    shown = [(each["spurious"], each["spurious_edges"], each["differs"]) for each in versions.values()]
+    assert shown == [(0, 1, True), (0, 0, False), (0, 0, False)]
+    assert "Holds: this is the torque of the chain rule: dK/dq is 0" in Path(page).read_text(encoding="utf-8")
+    ball = f"{tmp_path / 'own.py'}:ball"
+    assert "Missing: -dL/dq.y = 9.81." in said(capsys, "lint", ball, "--formulation", "euler_embedded", status=1)
+    versions = figures(capsys, "inspect", ball, "--t-end", "0.1", "--out", page)["versions"]
+    assert [each["differs"] for each in versions.values()] == [True, False, False]
+    assert "Missing: -dL/dq.y = 9.81." in Path(page).read_text(encoding="utf-8")
 
 
 OWN = """import cgraph as cg
@@ -301,10 +330,11 @@ def test_a_motion_is_stepped_in_momenta(own, capsys):
     assert cli.main(["simulate", "own.py:slow", "--momentum"]) == 2
 
 
+@pytest.mark.filterwarnings("always:the run stopped:dynamics.SimulationWarning")
 def test_a_motion_cut_short_is_a_finding(own, capsys):
     assert cli.main(["simulate", "own.py:late", "--csv", "a.csv"]) == 1
     printed = capsys.readouterr()
-    assert "the motion is not whole: it stopped at t = " in printed.err
+    assert [line[:37] for line in printed.err.splitlines()[1:]] == ["cgraph: warning: the run stopped at t"]
     assert Path("a.csv").read_text().startswith("t,q.x,qd.x,energy\n0.0,1.0,0.0,")
     found = figures(capsys, "simulate", "own.py:slow", "--start", "decay=1", "--t-end", "1")
     assert found["end"] == {"decay": pytest.approx(np.exp(-1.0))}

@@ -320,4 +320,4 @@ def test_of_what_does_not_depend_on_its_place_the_first_answer_is_right_and_told
     screen = euler_edge(subject_of(free_block()))
     assert screen.answer == 0
     assert "K does not change with the place" in screen.reveal
-    assert "A is right at this state" in screen.note
+    assert "A is right of this system: ∂L/∂q is zero at every state." in screen.note

@@ -13,6 +13,7 @@ import dynamics as dyn
 from dynamics.equations.formulations import torques
 from tests.strategies import examples
 from tests.viz.typed.typed_script import run_typed
+from viz.commands.lint import lint_text
 
 ROUNDING = 1e-12  # of the largest number in a graph: two orders of sums, and sines of two libraries
 COORDINATES, PARAMETERS = ("u", "v"), {"m": 1.3, "k": 0.7}
@@ -161,20 +162,24 @@ def test_typed_equations_are_those_of_the_library(case):
     for name, graph in expected.items():
         mine = found[name]
         assert mine["inputs"] == list(graph.input_names)
-        wrong = dyn.spurious_nodes(graph)
-        assert [mine["nodes"], mine["edges"], mine["spurious"]] == [len(graph.nodes), len(graph.edges), len(wrong)], (
-            name
-        )
+        verdict = dyn.formulation_verdict(system, name)
+        assert [mine["nodes"], mine["edges"]] == [len(graph.nodes), len(graph.edges)], name
+        assert mine["differs"] == verdict.differs
+        if verdict.differs:
+            wrong = [len(verdict.nodes), len(verdict.edges), bool(verdict.missing)]
+            assert [mine["spurious"], mine["blamed"], mine["lacking"]] == wrong
+            assert len(mine["lines"]) == len(str(verdict).splitlines()) - 1
         q, qd = ([f"{kind}{i}" for i in range(n)] for kind in ("q", "qd"))
         known = {node.name for node in (*graph.inputs, *graph.nodes)}
         if known.issuperset(q):
             lint = cg.lint(
                 graph,
                 independent=[(q, [each for each in qd if each in known])],
-                function="L",
+                function="K" if name == "kinetic_only" else "L",
                 names=dyn.display_names(system),
             )
-            assert "\n".join(mine["lint"]) == str(lint)
+            told = lint_text(lint, verdict).splitlines()[len(str(verdict).splitlines()) :]
+            assert mine["lint"][1 + len(mine["lines"]) :] == told
         if mine["largest"] is None:  # infinite on the way
             continue
         for output, value in graph.evaluate(at[name]).items():
@@ -197,3 +202,31 @@ def test_typed_accelerations_are_those_of_the_library(case):
         assert found["at"][f"qdd{i}"] == pytest.approx(expected[f"qdd{i}"], rel=0.0, abs=bound)
     energy = dyn.energy(system).evaluate({name: at[name] for name in dyn.energy(system).input_names})["E"]
     assert found["at"]["E"] == pytest.approx(energy, rel=0.0, abs=ROUNDING * max(1.0, found["largest"]))
+
+
+# What dL/dq is of each: a number, a parameter's, of a velocity; 0, also by an identity that only numbers show.
+NAMED = {
+    "L = 1/2*(a + b)*x'^2 + (a - b)*9.81*x\na = 2, b = 1": (True, 1, False),
+    "L = 1/2*(x'^2 + y'^2) - 9.81*y": (True, 0, True),
+    "L = 1/2*(x'^2 + y'^2) + x*y'": (True, 1, False),
+    "L = 1/2*(x'^2 + 3*y'^2)": (False, 0, False),
+    "L = 1/2*(sin(x)^2 + cos(x)^2)*x'^2": (False, 0, False),
+}
+
+
+@pytest.mark.parametrize("text", NAMED)
+def test_where_an_edge_alone_is_wrong_or_gone_the_page_says_so(text: str) -> None:
+    differs, edges, lacking = NAMED[text]
+    found, shown = run_typed(
+        """(text) => {
+          const system = parsed(text), { graph, ...found } = formulation(system, "euler_embedded");
+          return [found, TYPED.recordOf(system, TYPED.motionOf(system), false).versions];
+        }""",
+        text,
+    )
+    assert (found["differs"], found["blamed"], found["lacking"]) == (differs, edges, lacking)
+    assert [each["flawed"] for each in shown] == [differs, differs and "x*y'" in text, False]
+    assert len(shown[0]["blamed"]) == edges
+    begin = "This is not the torque of the chain rule" if differs else "Holds: this is the torque of the chain rule"
+    assert shown[0]["about"].startswith(begin)
+    assert ("Missing: -dL/dq.y = 9.81." in shown[0]["about"]) == lacking

@@ -27,9 +27,9 @@ function parsed(text) {
   return system;
 }
 const formulation = (system, name) => {
-  const graph = TYPED.inverseDynamics(system, name), wrong = TYPED.spuriousNodes(graph);
-  const { lines } = TYPED.lint(system, graph);
-  return { nodes: graph.nodes.length, edges: edges(graph), spurious: wrong.size, lint: lines, graph };
+  const found = TYPED.verdict(system, name), { graph, nodes, differs, lines } = found;
+  return { nodes: graph.nodes.length, edges: edges(graph), spurious: nodes.size, blamed: found.edges.length, differs,
+    lacking: found.lacking !== "", summary: found.summary, lines, lint: TYPED.lint(system, found), graph };
 };
 /** Outputs of a graph at {input: number}, and the largest number on the way. */
 function outputsAt(graph, at) {

@@ -150,6 +150,12 @@ def test_groups_may_be_given_in_many_ways():
     graph = cg.Graph([x, y, z], {"f": cg.with_name(x * y, "two words") + z})
     for pairs in (("x y", "z"), [("x, y", "z")], [(["x", "y"], "z")], [((x, "y"), z)], [("x", "z"), ("y", "z")]):
         assert lint(graph, independent=pairs).ok
+    lists = ((["x"], ["y"]), (["x", "y"], ["z", "z"]), (("x", "y"), [z]), ([x], "z"), (["x"], ("y", "z")))
+    for pair in lists:
+        found = lint(graph, independent=pair)
+        assert found.proofs == lint(graph, independent=[pair]).proofs
+        assert found.ok
+    assert not lint(cg.Graph([x, y], {"f": x * y}), independent=(["x", "y"], ["f", "f"])).ok  # not x of y and f of f
     assert not lint(graph, independent=("two words", "x")).ok
     for pairs, error, words in (
         ("x y", TypeError, "expected pairs of groups"),
@@ -157,6 +163,11 @@ def test_groups_may_be_given_in_many_ways():
         ([("x", "y", "z")], ValueError, "each entry must be a pair"),
         ([("x y", "y z")], cg.GraphError, "y is in both groups"),
         ([("x", "w")], cg.GraphError, "nothing in the graph is called 'w'"),
+        (
+            (("x", "y"), ("y", "z")),
+            ValueError,
+            "one pair of groups or two pairs; give groups as strings or lists",
+        ),
         ([("x", "")], ValueError, "a group needs at least one name"),
         ([(3, "x")], TypeError, "a group is a name or several, or nodes; got int: 3"),
     ):

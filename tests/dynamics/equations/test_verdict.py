@@ -1,0 +1,262 @@
+"""The verdict on a formulation: against numbers of 60 digits, for random systems in any units and for named ones."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from mpmath import mp, mpf
+from pytest import mark
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.equations.blame import blame
+from dynamics.equations.formulations import THROUGH_STEP, torques
+from tests import high_precision
+from tests.slow import slow
+from viz import cli
+
+DIGITS, STEP = 90, mpf(10) ** -50  # s: by so little an embedded torque that is right is off
+SEEN = 1e-12  # of the larger torque: graphs fold numbers in 53 bits; a difference is far more, in any units
+STATES = 3
+
+Term = Callable[[Any, Any, Any], Any]
+# Of q, qd, and a number a: what a Lagrangian may have beside its masses. The first have slope 0 by q.
+NOTHING: list[Term] = [
+    lambda q, v, a: a * (cg.sin(q[0]) ** 2 + cg.cos(q[0]) ** 2) * v[0] ** 2,
+    lambda q, v, a: a * v[0] * v[1],
+    lambda q, v, a: a * (q[1] - q[1]) * v[1] ** 2,
+    lambda q, v, a: a * (cg.exp(q[0]) * cg.exp(-q[0])) * v[1] ** 2,
+    lambda q, v, a: a * cg.sqrt(1.0 + v[0] ** 2),
+    lambda q, v, a: a * (cg.exp(cg.log(2.0 + cg.sin(q[1]))) - cg.sin(q[1])) * v[0] ** 2,
+]
+OF_POSITION: list[Term] = [
+    lambda q, v, a: a * q[0],
+    lambda q, v, a: -a * (q[0] - q[1]),
+    lambda q, v, a: a * q[1] ** 2,
+    lambda q, v, a: a * cg.cos(q[0] - q[1]),
+    lambda q, v, a: a * cg.exp(-q[1]),
+]
+OF_BOTH: list[Term] = [
+    lambda q, v, a: a * q[0] * v[1],
+    lambda q, v, a: a * cg.cos(q[1]) * v[0] * v[1],
+    lambda q, v, a: a * q[0] ** 2 * v[1] ** 2,
+]
+
+
+def random_system(seed: int) -> dyn.System:
+    """Two coordinates in units of 1e-6 to 1e6, an energy in others, with or without each kind of term."""
+    rng = random.Random(seed)
+    units, energy = [10.0 ** rng.randint(-6, 6) for _ in range(2)], 10.0 ** rng.randint(-6, 6)
+    kinds = [(NOTHING, 0.7), (OF_POSITION, 0.5), (OF_BOTH, 0.3)]
+    chosen = [
+        (rng.choice(terms), rng.uniform(0.3, 2.0)) for terms, chance in kinds for _ in range(2) if rng.random() < chance
+    ]
+    parameters = {f"a{i}": a * energy for i, (_, a) in enumerate(chosen)} if rng.random() < 0.5 else {}
+    moving, damping, driven = rng.random() < 0.3, rng.choice([0.0, 0.4]), rng.random() < 0.3
+
+    def lagrangian(q: Any, qd: Any, t: Any, p: Any) -> Any:
+        x, v = (
+            [a / unit for a, unit in zip(q, units, strict=True)],
+            [a / unit for a, unit in zip(qd, units, strict=True)],
+        )
+        total = energy * (0.5 * v[0] ** 2 + 0.8 * v[1] ** 2)
+        for i, (term, a) in enumerate(chosen):
+            total = total + term(x, v, p.get(f"a{i}", a * energy))
+        return total + energy * t * v[0] if moving else total
+
+    force = (lambda q, qd, t: [energy / units[0] * cg.sin(t), 0.0]) if driven else None
+    return dyn.System(lagrangian, "x y", parameters, forces=force, damping=[damping * energy, 0.0])
+
+
+NAMED: dict[str, tuple[dyn.System, tuple[bool, bool]]] = {  # and whether by definition and kinetic only are wrong
+    "atwood": (
+        dyn.System(
+            lambda q, qd, t, p: 0.5 * (p["a"] + p["b"]) * qd[0] ** 2 + (p["a"] - p["b"]) * 9.81 * q[0],
+            ["x"],
+            {"a": 2.0, "b": 1.0},
+        ),
+        (True, False),
+    ),
+    "balance": (
+        dyn.System(lambda q, qd, t, p: p["a"] * qd[0] ** 2 + (p["a"] - p["a"]) * 9.81 * q[0], ["x"], {"a": 2.0}),
+        (False, False),
+    ),
+    "ball": (dyn.System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2) - 9.81 * q[1], "x y"), (True, False)),
+    "incline": (
+        dyn.System(
+            lambda q, qd, t, p: 0.5 * p["m"] * qd[0] ** 2 - p["m"] * 9.81 * q[0] * cg.sin(p["slope"]),
+            ["s"],
+            {"m": 2.0, "slope": 0.5},
+        ),
+        (True, False),
+    ),
+    "hoist": (
+        dyn.System(
+            lambda q, qd, t: 0.5 * 3.0 * qd[0] ** 2 + 0.5 * 2.0 * (0.4 * qd[0]) ** 2 - 2.0 * 9.81 * 0.4 * q[0], ["drum"]
+        ),
+        (True, False),
+    ),
+    "charge": (dyn.System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2) + q[0] * qd[1], "x y"), (True, True)),
+    "free": (dyn.System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + 3.0 * qd[1] ** 2), "x y"), (False, False)),
+    "circle": (
+        dyn.System(lambda q, qd, t: 0.5 * (cg.sin(q[0]) ** 2 + cg.cos(q[0]) ** 2) * qd[0] ** 2, ["phi"]),
+        (False, False),
+    ),
+    "spring": (dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 2.0 * q[0] ** 2, ["x"]), (True, False)),
+    "planet": (
+        dyn.System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + (q[0] * qd[1]) ** 2) + 1.0 / q[0], "r phi"),
+        (True, True),
+    ),
+}
+
+
+def differs(system: dyn.System, formulation: str, sizes: list[float]) -> bool:
+    """Whether the torques differ by more than the step can make, at random states of the coordinates' sizes."""
+    flawed, right, rng = dyn.inverse_dynamics(system, formulation), dyn.inverse_dynamics(system), random.Random(7)
+    with mp.workdps(DIGITS):
+        for _ in range(STATES):
+            at: dict[str, Any] = {"t": mpf(rng.uniform(0.2, 1.0)), "dt": STEP} | system.parameters
+            for i, size in enumerate(sizes):
+                q, qd, qdd = (mpf(rng.uniform(0.2, 1.0) * size) for _ in range(3))
+                at |= {
+                    f"q{i}": q,
+                    f"qd{i}": qd,
+                    f"qdd{i}": qdd,
+                    f"qd{i}_old": qd - qdd * STEP,
+                    f"q{i}_old": q - qd * STEP,
+                }
+            a, b = (high_precision.evaluate(graph, at, DIGITS) for graph in (flawed, right))
+            if any([abs(a[name] - b[name]) > SEEN * max(abs(a[name]), abs(b[name])) for name in a]):
+                return True
+    return False
+
+
+def check(system: dyn.System, formulation: str, sizes: list[float]) -> dyn.Verdict:
+    """The verdict, which is that of the numbers, with something to blame if and only if it is guilty."""
+    verdict = dyn.formulation_verdict(system, formulation)
+    assert verdict.differs == differs(system, formulation, sizes)
+    assert verdict.differs == bool(verdict.excess) == bool(verdict.edges or verdict.missing)
+    assert verdict.differs or not verdict.nodes
+    assert verdict.edges <= set(verdict.graph.edges)
+    assert str(verdict).startswith("This is not the torque" if verdict.differs else "Holds: this is the torque")
+    return verdict
+
+
+def sizes_of(seed: int) -> list[float]:
+    rng = random.Random(seed)
+    return [10.0 ** rng.randint(-6, 6) for _ in range(2)]
+
+
+@mark.parametrize("seed", [*range(6), *slow(*range(6, 200))])
+def test_a_verdict_is_that_of_the_numbers_in_any_units(seed: int, tmp_path: Path) -> None:
+    system = random_system(seed)
+    for formulation in dyn.FORMULATIONS:
+        verdict = check(system, formulation, sizes_of(seed))
+        text = f"from {__name__} import random_system\nsystem = random_system({seed})\n"
+        (tmp_path / "own.py").write_text(text)
+        assert cli.main(["lint", f"{tmp_path / 'own.py'}:system", "--formulation", formulation]) == verdict.differs
+
+
+@mark.parametrize("formulation", dyn.FORMULATIONS)
+@mark.parametrize("name", NAMED)
+def test_a_named_system_is_judged_right_by_lint(name: str, formulation: str, tmp_path: Path, capsys: Any) -> None:
+    system, wrong = NAMED[name]
+    expected = dict(zip(THROUGH_STEP, wrong, strict=True)).get(formulation, False)
+    verdict = check(system, formulation, [1.0] * system.n)
+    assert verdict.differs == expected
+    (tmp_path / "own.py").write_text(f"from {__name__} import NAMED\nsystem = NAMED[{name!r}][0]\n")
+    assert cli.main(["lint", f"{tmp_path / 'own.py'}:system", "--formulation", formulation]) == int(expected)
+    assert capsys.readouterr().out.startswith(str(verdict))
+
+
+def test_what_has_cancelled_is_said_to_be_missing() -> None:
+    verdict = dyn.formulation_verdict(NAMED["ball"][0], "euler_embedded")
+    assert (verdict.nodes, verdict.edges, list(verdict.missing)) == (frozenset(), frozenset(), ["tau1"])
+    assert str(verdict.excess["tau1"]) == "dL/dq.y = -9.81"
+    assert str(verdict.missing["tau1"]) == "-dL/dq.y = 9.81"
+
+
+def test_where_an_edge_alone_is_wrong_it_is_blamed_and_by_how_much_is_said() -> None:
+    verdict = dyn.formulation_verdict(NAMED["atwood"][0], "euler_embedded")
+    assert (len(verdict.nodes), len(verdict.edges), verdict.missing) == (0, 1, {})
+    excess = verdict.excess["tau0"]
+    assert (excess.formula, excess.value, verdict.at) == ("9.81 * (a - b)", 9.81, {"a": 2.0, "b": 1.0})
+
+
+def test_that_it_holds_is_proved_or_said_not_to_be() -> None:
+    circle = dyn.formulation_verdict(NAMED["circle"][0], "euler_embedded")
+    assert circle.proved  # by an identity
+    hidden = dyn.System(
+        lambda q, qd, t: 0.5 * qd[0] ** 2 * cg.cos(cg.acos(cg.tanh(q[0])) - cg.acos(cg.tanh(q[0])) * 1.0), "x"
+    )
+    tangled = dyn.System(
+        lambda q, qd, t: 0.5 * (qd[0] * (cg.exp(cg.log(2.0 + cg.sin(q[0]))) - cg.sin(q[0]))) ** 2, ["x"]
+    )
+    assert dyn.formulation_verdict(hidden, "euler_embedded").differs is False
+    verdict = dyn.formulation_verdict(tangled, "kinetic_only")
+    assert (verdict.differs, verdict.proved, verdict.nodes) == (False, False, frozenset())
+    assert "0 to rounding at all 24 states tried" in str(verdict)
+
+
+@mark.parametrize("scale", [1e-30, 1e-12, 1e12, 1e30])
+def test_a_unit_changes_no_verdict(scale: float) -> None:
+    """What is 0 but for rounding may be a large number, and what is not a small one."""
+
+    def constant(q: Any, qd: Any, t: Any) -> Any:
+        return scale * 0.5 * (qd[0] * (cg.exp(cg.log(2.0 + cg.sin(q[0]))) - cg.sin(q[0]))) ** 2
+
+    spring = dyn.System(lambda q, qd, t: scale * 0.5 * qd[0] ** 2 - scale * 2.0 * q[0] ** 2, ["x"])
+    assert not dyn.formulation_verdict(dyn.System(constant, ["x"]), "euler_embedded").differs
+    assert dyn.formulation_verdict(spring, "euler_embedded").differs
+    assert not dyn.formulation_verdict(spring, "kinetic_only").differs
+
+
+def test_where_no_state_is_finite_nothing_is_said_to_hold() -> None:
+    nowhere = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 + cg.sqrt(-1.0 - q[0] ** 2), ["x"])
+    verdict = dyn.formulation_verdict(nowhere, "euler_embedded")
+    assert (verdict.differs, verdict.proved, verdict.excess) == (True, False, {})
+    assert str(verdict).startswith("This is not shown to be the torque of the chain rule: dL/dq is finite at none")
+
+
+@mark.parametrize("joint", ["ball", "free"])
+@mark.parametrize("formulation", THROUGH_STEP)
+def test_of_quasi_velocities_too(joint: str, formulation: str) -> None:
+    """A top that hangs beside its point is heavy; a free body's weight is its only force by definition."""
+    kind = dyn.Joint(joint, name="base")
+    body = dyn.Body("body", kind, mass=1.3, center=(0.2, 0.1, -0.3), inertia=(0.1, 0.2, 0.25))
+    system = dyn.Mechanism([body]).system
+    verdict = dyn.formulation_verdict(system, formulation)
+    right, flawed = dyn.inverse_dynamics(system), verdict.graph
+    rng, step = random.Random(3), 1e-7
+    q = [n + rng.uniform(-0.3, 0.3) for n in system.kinematics.neutral]
+    size = sum([each * each for each in q[-4:]]) ** 0.5
+    q = [*q[:-4], *[each / size for each in q[-4:]]]
+    qd, qdd = ([rng.uniform(-1.0, 1.0) for _ in range(system.n)] for _ in range(2))
+    at = {f"q{i}": x for i, x in enumerate(q)} | {f"qd{i}": x for i, x in enumerate(qd)}
+    at |= {f"qdd{i}": x for i, x in enumerate(qdd)} | {"dt": step}
+    rates = cg.Graph([*system.q, *system.qd], {f"{i}": node for i, node in enumerate(system.q_dot)})
+    q_dot = rates.evaluate({name: at[name] for name in rates.input_names})
+    at |= {f"q{i}_old": x - step * q_dot[f"{i}"] for i, x in enumerate(q)}
+    at |= {f"qd{i}_old": x - step * qdd[i] for i, x in enumerate(qd)}
+    a, b = (graph.evaluate({name: at[name] for name in graph.input_names}) for graph in (flawed, right))
+    off = {name for name in a if abs(a[name] - b[name]) > 1e-4}
+    assert verdict.differs == bool(off)
+    assert set(verdict.excess_at(at)) == off
+    for name, value in verdict.excess_at(at).items():
+        assert abs(a[name] - b[name] - value) < 1e-4
+
+
+@mark.parametrize("seed", [0, 1, 2, *slow(*range(3, 60))])
+@mark.parametrize("formulation", THROUGH_STEP)
+def test_marked_by_a_factor_the_graph_is_the_same_node_by_node(seed: int, formulation: str) -> None:
+    """So every edge to blame is found in it, or has cancelled; with those edges cut, c is gone."""
+    system = random_system(seed)
+    graph, factor = dyn.inverse_dynamics(system, formulation), cg.variable("factor")
+    marked = cg.specialize(torques(system, formulation, factor), {"factor": 1.0})
+    assert not cg.compare(marked, graph).only_left + cg.compare(marked, graph).only_right
+    found = blame(system, formulation, torques, graph)
+    assert found.nodes.issubset(graph.nodes)
+    assert all([edge.source in edge.target.args for edge in found.edges])

@@ -1,0 +1,193 @@
+"""Joints of a user's own whose directions depend on their coordinates: all that the joints of one axis say of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import reduce
+
+import numpy as np
+from pytest import MonkeyPatch, fixture, mark
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.multibody import spatial
+from dynamics.multibody.joints import TYPES, SpatialJoint
+from dynamics.multibody.spatial import Triple
+from dynamics.verification.certificate import certify
+from tests.dynamics.models import Array
+from tests.dynamics.units import Units, in_units
+from tests.slow import slow
+
+ROUNDING = 1e-12  # of the largest of its kind, in some hundred sums
+ZERO, ONE = cg.constant(0.0), cg.constant(1.0)
+X, Y, Z = range(3)
+Nodes = Sequence[cg.Node]
+
+
+def turn(axis: int, angle: cg.Node) -> list[list[cg.Node]]:
+    """About x, y or z."""
+    c, s, matrix = cg.cos(angle), cg.sin(angle), [[ONE if i == j else ZERO for j in range(3)] for i in range(3)]
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    matrix[i][i] = matrix[j][j] = c
+    matrix[i][j], matrix[j][i] = -s, s
+    return matrix
+
+
+def along(axis: int, size: cg.Node) -> Triple:
+    x, y, z = (size if k == axis else ZERO for k in range(3))
+    return x, y, z
+
+
+class Angles(SpatialJoint):
+    """Yaw, pitch and roll, whose rates are the velocities."""
+
+    kind = "angles"
+    coordinates = velocities = ("yaw", "pitch", "roll")
+    units, velocity_units = ("rad",) * 3, ("rad/s",) * 3
+    neutral, groups = (0.0,) * 3, (0, 1, 2)
+    hinges = (("revolute", Z), ("revolute", Y), ("revolute", X))  # the same, one after another
+
+    def rotation(self, q: Nodes) -> list[list[cg.Node]]:
+        turns = [turn(axis, q[k]) for k, (kind, axis) in enumerate(self.hinges) if kind == "revolute"]
+        return reduce(lambda a, b: [[spatial.dot(tuple(r), tuple(c)) for c in zip(*b, strict=True)] for r in a], turns)
+
+    def angular_velocity(self, q: Nodes, u: Nodes) -> Triple:
+        omega = spatial.STILL
+        for k, (kind, axis) in enumerate(self.hinges):
+            if kind == "revolute":
+                omega = spatial.plus(spatial.rotate_transpose(turn(axis, q[k]), omega), along(axis, u[k]))
+        return omega
+
+    def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
+        raise NotImplementedError
+
+    def resists(self, mass: float, inertia: Array) -> bool:
+        return mass > 0.0
+
+
+class Polar(Angles):
+    """Out along an arm that turns, and about that arm."""
+
+    kind = "polar"
+    coordinates = velocities = ("angle", "radius", "roll")
+    units, velocity_units = ("rad", "m", "rad"), ("rad/s", "m/s", "rad/s")
+    hinges = (("revolute", Z), ("prismatic", X), ("revolute", X))
+
+    def translation(self, q: Nodes) -> Triple:
+        return q[1] * cg.cos(q[0]), q[1] * cg.sin(q[0]), ZERO
+
+    def linear_velocity(self, q: Nodes, u: Nodes) -> Triple:
+        return spatial.rotate_transpose(turn(X, q[2]), (u[1], q[1] * u[0], ZERO))
+
+
+class Still(Angles):
+    """With a wrong rate of its angular velocity, as of directions that turn with the body."""
+
+    kind = "still"
+
+    def angular_acceleration(self, q: Nodes, u: Nodes) -> Triple:
+        return spatial.STILL
+
+
+class Constant(Angles):
+    """Said to have directions that turn with the body."""
+
+    kind = "constant"
+    turns_with_body = True
+
+
+@fixture(autouse=True)
+def registered(monkeypatch: MonkeyPatch) -> None:
+    for joint in (Angles(), Polar(), Still(), Constant()):
+        monkeypatch.setitem(TYPES, joint.kind, joint)
+
+
+def twins(kind: str, seed: int) -> tuple[dyn.Mechanism, dyn.Mechanism]:
+    """A random chain with such a joint in it, and the same with a chain of massless bodies in its place."""
+    rng = np.random.default_rng(seed)
+
+    def numbers() -> dict[str, object]:
+        points = rng.normal(size=(6, 3))
+        inertia = 0.1 * sum([(p @ p) * np.eye(3) - np.outer(p, p) for p in points])
+        return {"mass": float(rng.uniform(0.5, 2.0)), "center": 0.3 * rng.normal(size=3), "inertia": inertia}
+
+    def other(name: str, parent: str) -> dyn.Body:
+        joint = dyn.Joint(str(rng.choice(["revolute", "prismatic", "ball"])), rng.normal(size=3), rng.normal(size=3))
+        return dyn.Body(name, joint, parent, **numbers())
+
+    before = [other("base", "world")] if rng.integers(2) else []
+    parent = "base" if before else "world"
+    own, place = numbers(), rng.normal(size=3)
+    orientation = spatial.from_quaternion(rng.normal(size=4))
+    after = [other("end", "b")] if rng.integers(2) else []
+    whole = dyn.Body("b", dyn.Joint(kind, position=place, orientation=orientation), parent, **own)
+    chain = []
+    for k, (part, axis) in enumerate(TYPES[kind].hinges):
+        last = k == 2
+        placed = {} if k else {"position": place, "orientation": orientation}
+        joint = dyn.Joint(part, np.eye(3)[axis], **placed)
+        chain.append(dyn.Body("b" if last else f"b{k}", joint, f"b{k - 1}" if k else parent, **(own if last else {})))
+    return dyn.Mechanism([*before, whole, *after]), dyn.Mechanism([*before, *chain, *after])
+
+
+def compared(make: Callable[[dyn.Mechanism], Sequence[Array]], pair: tuple[dyn.Mechanism, dyn.Mechanism]) -> float:
+    """The largest difference, of the largest number of its kind and row."""
+    worst = 0.0
+    for a, b in zip(*map(make, pair), strict=True):
+        scale = np.abs(b).max(axis=-1, keepdims=True)
+        worst = max(worst, float((np.abs(a - b) / np.where(scale > 0.0, scale, 1.0)).max()))
+    return worst
+
+
+@mark.parametrize("kind", ["angles", "polar"])
+@mark.parametrize("seed", [7, *slow(*[k for k in range(40) if k != 7])])
+def test_every_equation_is_that_of_its_joints_of_one_axis(kind: str, seed: int) -> None:
+    pair = twins(kind, seed)
+    n, nq = pair[0].system.n, pair[0].system.nq
+    rng = np.random.default_rng(seed + 100)
+    q, qd, x = rng.uniform(0.3, 1.0, nq), rng.normal(size=n), rng.normal(size=n)
+
+    def arrays(derive: Callable[..., cg.Graph], **more: Array) -> Callable[[dyn.Mechanism], Sequence[Array]]:
+        return lambda model: [*dyn.arrays_at(model, derive(model), q=q, qd=qd, **more).values()]
+
+    def hamilton(model: dyn.Mechanism) -> Sequence[Array]:
+        named = {f"q{k}": v for k, v in enumerate(q)} | {f"p{k}": v for k, v in enumerate(x)}
+        values = dyn.hamilton_equations(model).evaluate(named | {f"tau{k}": 0.0 for k in range(n)})
+        return [np.array(list(values.values()))]
+
+    for make in (
+        arrays(dyn.bias),
+        arrays(dyn.forward_dynamics, tau=x),
+        arrays(dyn.inverse_dynamics_derivatives, qdd=x),
+        lambda model: dyn.linearize(model, q, qd, x),
+        lambda model: dyn.linearize(model, q, qd, x, form="momentum"),
+        hamilton,
+    ):
+        assert compared(make, pair) < ROUNDING
+
+
+@mark.parametrize("length", [2.0**-20, *slow(2.0**20)])
+@mark.parametrize("kind", ["angles", "polar"])
+def test_nothing_depends_on_the_unit_of_length(kind: str, length: float) -> None:
+    """To the last bit, of a power of two."""
+    first = twins(kind, 11)[0]
+    rng, size = np.random.default_rng(0), np.array([length if u == "m" else 1.0 for u in TYPES[kind].units])
+    q, qd, qdd = rng.uniform(0.3, 1.0, 3), rng.normal(size=3), rng.normal(size=3)
+    here, there = (
+        dyn.arrays_at(model, dyn.inverse_dynamics_derivatives(model), q=q * unit, qd=qd * unit, qdd=qdd * unit)
+        for model, unit in ((first, np.ones(3)), (in_units(first, Units(length=length)), size))
+    )
+    for name, array in here.items():
+        factor = length**2 / (size if array.ndim == 1 else np.outer(size, size))
+        assert np.array_equal(there[name], factor * array)
+
+
+def test_the_certificate_looks_at_bias_and_derivatives() -> None:
+    """Of a type of joint that is wrong about itself, each finds its own."""
+    said = {
+        kind: {each.equation.partition(" ")[0] for each in certify(twins(kind, 11)[0], 2).residuals if not each.passed}
+        for kind in ("angles", "polar", "still", "constant")
+    }
+    assert said["angles"] == said["polar"] == set()
+    assert "bias" in said["still"]
+    assert said["constant"] == {"derivatives:"}

@@ -1,0 +1,107 @@
+"""Early ends: a run that stops before t_end is a warning that names the time, the coordinate and the cause."""
+
+import re
+import warnings
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+from pytest import mark
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.integrators import METHODS
+from tests.slow import slow
+
+USUAL = "dop853 radau rk4 verlet".split()
+FORMS = ("velocity", "momentum")
+EARLY = r"(\d+ of \d+ trajectories: of \d+, )?the run stopped at t = [\d.e-]+ s.* \S"
+
+
+def falling(metre: float) -> dyn.System:
+    """A body that falls into a centre of force within a second, in units of so many metres."""
+    return dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 + metre**-3 * 2.0 / q[0], ["gap"])
+
+
+def early(run: Callable[[], Any]) -> tuple[Any, list[str]]:
+    """What a run gives, and the warnings by which it says that it stopped."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        result = run()
+    assert all(each.category is dyn.SimulationWarning for each in caught)
+    assert all(each.filename == __file__ for each in caught)
+    return result, [text for each in caught if re.match(EARLY, text := str(each.message))]
+
+
+@mark.parametrize("metre", [1.0, *slow(1e-6, 1e6)])
+@mark.parametrize("form", FORMS)
+@mark.parametrize("method", [*USUAL, *slow(*[name for name in METHODS if name not in USUAL])])
+def test_a_run_into_a_centre_of_force_is_heard(method: str, form: str, metre: float) -> None:
+    """Equal steps jump over the centre, or leave the numbers; what does not get to the end says so, once."""
+    given: dict[str, Any] = {"method": method, "form": form, "max_steps": 3000}
+    given |= {} if METHODS[method].adaptive else {"dt": 0.02}
+    model, times = falling(metre), [0.5, 2.0]
+    run, said = early(lambda: dyn.simulate(model, [1.0 / metre], [0.0], 2.0, **given))
+    assert not (METHODS[method].adaptive and run.success)
+    assert said == ([] if run.success else [f"the run {run.message}"])
+    many, said = early(lambda: dyn.simulate_many(model, [[1.0 / metre]], [0.0], 2.0, t_eval=times, **given))
+    assert said == ([] if many.stats.success[0] else [f"1 of 1 trajectories: of 0, the run {many.stats.message[0]}"])
+
+
+@mark.parametrize("method", ["dop853", "rk4"])
+@mark.parametrize("seed", [1, *slow(*range(2, 8))])
+def test_runs_of_random_systems_are_whole_or_heard(seed: int, method: str) -> None:
+    """x' = a polynomial of second degree, which leaves the numbers soon or stays: of many, too."""
+    rng = np.random.default_rng(seed)
+    linear, square = rng.normal(size=(2, 2)), rng.normal(size=(2, 2))
+    rate = lambda x, t: [  # noqa: E731
+        sum([linear[i, j] * x[j] + square[i, j] * x[j] ** 2 for j in range(2)]) for i in range(2)
+    ]
+    model, starts = dyn.OdeSystem(rate, ["x", "y"]), rng.normal(size=(3, 2))
+    given: dict[str, Any] = {"method": method, "rtol": 1e-2, "max_steps": 5000}
+    given |= {"dt": 0.01} if method == "rk4" else {}
+    runs = [early(partial(dyn.simulate, model, x, None, 10.0, **given)) for x in starts]
+    assert [said for _, said in runs] == [[] if run.success else [f"the run {run.message}"] for run, _ in runs]
+    many, said = early(lambda: dyn.simulate_many(model, starts, None, 10.0, t_eval=[10.0], **given))
+    stopped = np.flatnonzero(~many.stats.success)
+    assert said == [f"{len(stopped)} of 3 trajectories: of {k}, the run {many.stats.message[k]}" for k in stopped[:1]]
+    assert many.stats.success.tolist() == [run.success for run, _ in runs]
+
+
+def test_a_terminal_event_and_whoever_interrupts_a_run_end_it_in_silence() -> None:
+    end = dyn.Event("end", lambda q, qd, t: q[0] - 0.5, terminal=True)
+    assert dyn.simulate(falling(1.0), [1.0], [0.0], 2.0, events=end).status == 1
+    assert dyn.simulate_many(falling(1.0), [[1.0]], [0.0], 2.0, t_eval=[2.0], events=end).stats.status.tolist() == [1]
+
+    def interrupted(q: Any, qd: Any, t: float) -> list[float]:
+        if t > 0.25:
+            raise KeyboardInterrupt
+        return [0.0]
+
+    hold = dyn.SampledController(interrupted, period=0.1)
+    assert dyn.simulate(falling(1.0), [1.0], [0.0], 0.5, tau=hold).message.startswith("interrupted after t = ")
+
+
+def relaxing(pole: bool) -> dyn.OdeSystem:
+    """x is held at cos t; a y that comes beside it grows beyond all bounds at 1 s."""
+    rates: list[Any] = [lambda x, t: -1e5 * (x[0] - cg.cos(t)), lambda x, t: x[1] ** 2]
+    return dyn.OdeSystem(lambda x, t: [rate(x, t) for rate in rates[: 1 + pole]], ["x", "y"][: 1 + pole])
+
+
+@mark.parametrize("method", ["dop853", "dopri5"])
+def test_a_method_is_advised_that_gets_through(method: str) -> None:
+    with pytest.warns(dyn.SimulationWarning, match="the system is stiff") as caught:
+        run = dyn.simulate(relaxing(False), [1.0], None, 0.1, method)
+    found = re.search(r"; try method='(\w+)', which comes to t = 0.1 s in (\d+) steps$", str(caught[0].message))
+    assert found is not None
+    other = dyn.simulate(relaxing(False), [1.0], None, 0.1, found[1])
+    assert (other.success, other.stats.steps, other.stats.steps < run.stats.steps) == (True, int(found[2]), True)
+
+
+def test_a_method_that_stops_is_not_advised() -> None:
+    run, said = early(lambda: dyn.simulate(relaxing(True), [1.0, 1.0], None, 2.0, "dopri5", rtol=1e-4))
+    assert (len(said), len(run.stats.warnings)) == (1, 1)
+    assert "the system is stiff" in run.stats.warnings[0]
+    assert "try" not in run.stats.warnings[0]

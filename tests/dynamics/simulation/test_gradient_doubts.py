@@ -1,0 +1,244 @@
+"""Gradients are of the default method of `simulate`, or of equal steps that say how far off they are."""
+
+import warnings
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+from pytest import approx, mark, raises
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.integrators import METHODS
+from dynamics.simulation.gradients import motion_run
+from dynamics.simulation.step_program import compile_steps
+from dynamics.simulation.stepping import NativeIntegration
+from tests.slow import slow
+
+SLOPES = 1e-3  # relative: of what 1e-9 in every step leaves of the slopes of a motion through a pericentre
+RIGHT = 1e-2  # relative: a slope that needs no word
+EQUAL = [name for name, method in METHODS.items() if not method.adaptive]
+USUAL = "euler rk4 verlet midpoint gauss4".split()
+
+
+def said(run: Callable[[], Any]) -> tuple[Any, list[str]]:
+    """A result, and its warnings, each of which is at the caller's line."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        result = run()
+    assert all(each.category is dyn.SimulationWarning for each in caught)
+    assert all(each.filename == __file__ for each in caught)
+    return result, [str(each.message) for each in caught]
+
+
+def all_three(
+    model: dyn.OdeSystem, start: list[float], t_end: float, **given: Any
+) -> tuple[list[Any], list[list[str]]]:
+    """The slopes of the first state at the end, by the start, of `gradient`, `gradient_many` and `sensitivities`."""
+    end = lambda x, t: x[0]  # noqa: E731
+    one, a = said(lambda: dyn.gradient(model, end, start, None, t_end, **given))
+    many, b = said(lambda: dyn.gradient_many(model, end, [start], None, t_end, **given))
+    rows, c = said(lambda: dyn.sensitivities(model, start, None, t_end, wrt="q", **given))
+    return [one["q"], many["q"][0], rows["q"][-1, 0]], [a, b, c]
+
+
+def kepler(strength: float) -> dyn.OdeSystem:
+    def rate(x: Any, t: Any) -> Any:
+        cubed = (x[0] ** 2 + x[1] ** 2) ** 1.5
+        return [x[2], x[3], -strength * x[0] / cubed, -strength * x[1] / cubed]
+
+    return dyn.OdeSystem(rate, ["x", "y", "u", "v"])
+
+
+def kepler_slopes(mpmath: Any, strength: float, start: list[float], t: float) -> list[float]:
+    """Of x by the start, by Kepler's equation in 40 digits and differences of 1e-15: no integration."""
+    mp = mpmath.mp
+
+    def place(x: list[Any]) -> Any:
+        r, speed, rv = mp.hypot(x[0], x[1]), x[2] ** 2 + x[3] ** 2, x[0] * x[2] + x[1] * x[3]
+        a = 1 / (2 / r - speed / strength)
+        n, s = mp.sqrt(strength / a**3), rv / mp.sqrt(strength * a)
+
+        def kepler(d: Any) -> Any:
+            return d + s * (1 - mp.cos(d)) - (1 - r / a) * mp.sin(d) - n * t
+
+        d = mp.findroot(kepler, n * t)
+        f, g = 1 - a / r * (1 - mp.cos(d)), t - (d - mp.sin(d)) / n
+        return f * x[0] + g * x[2]
+
+    with mpmath.workdps(40):
+        numbers = [mp.mpf(each) for each in start]
+        slopes = []
+        for k in range(4):
+            e = abs(numbers[k] or 1) * mp.mpf(10) ** -15
+            up, down = ([x + sign * e * (i == k) for i, x in enumerate(numbers)] for sign in (1, -1))
+            slopes.append(float((place(up) - place(down)) / (2 * e)))
+    return slopes
+
+
+@mark.parametrize("unit", [1.0, *slow(1e-6, 1e6)])
+@mark.parametrize("seed", [0, *slow(*range(1, 10))])
+def test_orbits_through_a_pericentre(seed: int, unit: float) -> None:
+    """By default as good as a run of `simulate`; in equal steps right, or said to be off."""
+    mpmath = pytest.importorskip("mpmath")
+    rng = np.random.default_rng(seed)
+    e, t_end = 0.99 if seed == 0 else rng.uniform(0.9, 0.99), rng.uniform(2.0, 5.0)
+    start = [(1.0 + e) * unit, 0.0, 0.0, np.sqrt((1.0 - e) / (1.0 + e)) * unit]
+    exact = np.array(kepler_slopes(mpmath, unit**3, start, t_end))
+    for one in all_three(kepler(unit**3), start, t_end, backend="python")[0]:
+        assert one == approx(exact, rel=SLOPES, abs=SLOPES * np.abs(exact).max())
+    slopes, texts = all_three(kepler(unit**3), start, t_end, dt=1e-2)
+    for one, words in zip(slopes, texts, strict=True):
+        right = np.abs(one - exact).max() <= RIGHT * np.abs(exact).max()
+        assert right or "the state is off by an estimated" in words[0] or "its error is unknown" in words[0]
+
+
+SPRING = dyn.System(lambda q, qd, t, p: 0.5 * qd[0] ** 2 - 0.5 * p["w"] ** 2 * q[0] ** 2, ["x"], {"w": 2.0})
+
+
+def end(q: Any, qd: Any, t: Any) -> Any:
+    return q[0]
+
+
+@mark.parametrize("form", ["velocity", "momentum"])
+@mark.parametrize("method", [*USUAL, *slow(*[name for name in EQUAL if name not in USUAL])])
+def test_no_equal_steps_have_wrong_slopes_in_silence(method: str, form: str) -> None:
+    """A spring of any stiffness, in any unit, with torques of every step or without, alone and among others."""
+    rng = np.random.default_rng(len(method))
+    for _ in range(2):
+        rate, unit = 10.0 ** rng.uniform(0.0, 4.0), 10.0 ** rng.uniform(-6.0, 6.0)
+        given: dict[str, Any] = {"method": method, "form": form, "wrt": ["q", "tau"]}
+        given["parameters"] = {"w": rate}
+        given["t_end"], q, qd = 0.2, [unit], [0.0]
+        equal: dict[str, Any] = {"dt": 2e-3}
+        runs: list[Any] = [
+            partial(dyn.gradient, SPRING, end, q, qd, **equal, **given),
+            partial(dyn.gradient, SPRING, end, q, qd, tau=np.zeros((100, 1)), **given),
+            partial(dyn.sensitivities, SPRING, q, qd, **equal, **given),
+            partial(dyn.gradient_many, SPRING, end, [q] * 2, qd, **equal, **given),
+        ]
+        for k, run in enumerate(runs):
+            try:
+                result, words = said(run)
+            except dyn.MotionError:  # which is heard
+                continue
+            by_q, by_tau = np.atleast_2d(result["q"][-1]), result["tau"][-1]
+            by_tau = result["tau"].sum() if k == 1 else np.ravel(by_tau)[0]
+            off = [np.ravel(by_q)[0] - np.cos(0.2 * rate), by_tau * rate**2 - (1.0 - np.cos(0.2 * rate))]
+            assert np.abs(off).max() <= RIGHT or words, (k, rate, off)
+
+
+def test_what_chosen_steps_say_is_what_simulate_says() -> None:
+    """The steps and the words of `simulate`, also with parameters and events, and back in time."""
+    stiff = dyn.OdeSystem(lambda x, t, p: [-p["k"] * (x[0] - cg.cos(t))], ["x"], {"k": 1e5})
+    given: dict[str, Any] = {"t_end": 0.1, "method": "dopri5", "parameters": {"k": 2e5}}
+    run, words = said(lambda: dyn.simulate(stiff, [1.0], None, **given))
+    result, others = said(lambda: dyn.gradient(stiff, lambda x, t: x[0], [1.0], None, **given))
+    assert (len(words), words == others, len(result.t)) == (1, True, len(run.t))
+    up = dyn.Event("up", lambda q, qd, t: q[0], direction=-1, reset=lambda q, qd, t: (q, [-0.5 * qd[0]]))
+    ball = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 9.81 * q[0], ["height"])
+    for method in ("dop853", "rk4"):
+        thrown = dyn.gradient(ball, lambda q, qd, t: q[0], [1.0], [0.0], 1.2, method, events=up)
+        moved = dyn.simulate(ball, [1.0], [0.0], 1.2, method, events=up)
+        assert np.unique(moved.t) == approx(np.unique(thrown.t))
+    back = dyn.gradient(ball, lambda q, qd, t: q[0], [1.0], [0.0], t_span=(1.0, 0.0))
+    assert (back["q"], back["qd"]) == (approx([1.0]), approx([-1.0]))
+
+
+def test_the_default_is_that_of_simulate_and_equal_steps_where_they_are_asked_for() -> None:
+    model, start = SPRING, ([1.0], [0.0], 1.0)
+    chosen = dyn.simulate(model, *start).t
+    assert dyn.gradient(model, end, *start).t.tolist() == chosen.tolist()
+    assert dyn.sensitivities(model, *start).t.tolist() == chosen.tolist()
+    assert dyn.gradient_many(model, end, [[1.0], [2.0]], [0.0], 1.0).t.tolist() == [0.0, 1.0]
+    for equal in ({"dt": 0.1}, {"tau": np.zeros((10, 1))}):
+        one, named = (dyn.gradient(model, end, *start, *by, **equal) for by in ([], ["rk4"]))
+        assert (len(one.t), one["q"].tolist()) == (11, named["q"].tolist())
+    assert len(dyn.gradient_many(model, end, [1.0], [0.0], 1.0, tau=np.zeros((2, 10, 1))).t) == 11
+    with raises(ValueError, match="method 'dop853' keeps the error of its steps"):
+        dyn.gradient(model, end, *start, estimate_error=True)
+
+
+def test_other_parameters_make_no_steps_anew() -> None:
+    def slope(k: float) -> float:
+        given: dict[str, Any] = {"parameters": {"w": k}, "tau": [k], "wrt": "w", "backend": "python"}
+        one = dyn.gradient(SPRING, end, [1.0], [0.0], 1.0, **given)["w"]
+        many = dyn.gradient_many(SPRING, end, [[1.0]], [0.0], 1.0, **given)["w"][0]
+        assert many == approx(one, rel=1e-12)
+        return float(one)
+
+    first, made = slope(4.0), compile_steps.cache_info().misses
+    assert slope(5.0) != first
+    assert compile_steps.cache_info().misses == made
+
+
+def test_a_loss_that_is_no_number_is_said() -> None:
+    def none(q: Any, qd: Any, t: Any) -> Any:
+        return cg.sqrt(q[0] - 10.0)
+
+    def running(q: Any, qd: Any, tau: Any, t: Any) -> Any:
+        return cg.log(q[0] - 10.0)
+
+    def root(q: Any, qd: Any, t: Any) -> Any:
+        return cg.sqrt(q[0])
+
+    for method in ("dop853", "rk4"):
+        given: dict[str, Any] = {"t_end": 0.1, "backend": "python", "method": method}
+        result, words = said(partial(dyn.gradient, SPRING, none, [0.5], [0.0], **given))
+        assert (np.isnan(result.value), words) == (True, ["the loss is nan of a motion that is finite"])
+        result, words = said(partial(dyn.gradient, SPRING, None, [0.5], [0.0], running=running, **given))
+        assert (np.isnan(result.value), words) == (True, ["the loss is nan of a motion that is finite"])
+        result, words = said(partial(dyn.gradient, SPRING, root, [0.0], [0.0], wrt="qd", **given))
+        assert (result.value, words) == (0.0, ["the loss is 0, and its gradient by 'qd' is not finite"])
+        many, words = said(partial(dyn.gradient_many, SPRING, root, [[0.5], [-0.5], [-0.6]], [0.0], **given))
+        assert np.isnan(many.value).tolist() == [False, True, True]
+        assert words == ["2 of 3 motions: of 1, the loss is nan of a motion that is finite"]
+
+
+def test_a_motion_that_does_not_arrive_is_told_with_time_and_coordinate(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`gradient` raises, in the words of `simulate`; `gradient_many` gives NaN, and the others are as alone."""
+    monkeypatch.setattr("dynamics.simulation.gradients.motion_run.PIECE", 16)
+
+    def end(x: Any, t: Any) -> Any:
+        return x[0]
+
+    model = dyn.OdeSystem(lambda x, t: [x[0] ** 2, 1.0], ["x", "clock"])
+    steps = {"rk4": 1e-3, "gauss4": 1e-2}
+    for method in ("rk4", "dop853", "radau", "gauss4"):
+        given: dict[str, Any] = {"dt": steps[method], "estimate_error": False} if method in steps else {}
+        for start in ([1.0, 0.0], [2.0, 0.0]):
+            run, _ = said(partial(dyn.simulate, model, start, None, 2.0, method, **given))
+            with raises(dyn.MotionError) as caught:
+                dyn.gradient(model, end, start, None, 2.0, method, **given)
+            assert not run.success
+            if method != "gauss4":  # whose equations are solved more exactly here
+                assert run.message in str(caught.value)
+        starts = [[0.1, 0.0], [1.0, 0.0], [0.2, 0.0], [2.0, 0.0]]
+        many, words = said(partial(dyn.gradient_many, model, end, starts, None, 2.0, method, **given))
+        assert len(words) == 1
+        assert words[0].startswith("2 of 4 motions: of 1, the motion ")
+        assert "stopped at t = " in words[0]
+        for k in (0, 2):
+            alone = dyn.gradient(model, end, starts[k], None, 2.0, method, **given)
+            assert (many.value[k], many["q"][k].tolist()) == (approx(alone.value), approx(alone["q"].tolist()))
+        for array in (many.value, many["q"], many.q):
+            assert np.isnan(array[[1, 3]]).all()
+    assert motion_run.PIECE == 16
+
+
+@mark.parametrize("method", ["dop853", "rk4"])
+@mark.parametrize("derive", [dyn.gradient, dyn.gradient_many, dyn.sensitivities])
+def test_ctrl_c_is_a_keyboard_interrupt(method: str, derive: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def advance(*args: Any, **options: Any) -> Any:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(NativeIntegration, "_advance", advance)
+    ball = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 9.81 * q[0], ["height"])
+    loss = [] if derive is dyn.sensitivities else [lambda q, qd, t: q[0]]
+    events = {} if derive is dyn.gradient_many else {"events": dyn.Event("half", lambda q, qd, t: q[0] - 0.5)}
+    if derive is dyn.gradient_many and method == "rk4":
+        monkeypatch.setattr("dynamics.simulation.gradients.motion_run._run", advance)
+    with raises(KeyboardInterrupt):
+        derive(ball, *loss, [[1.0]] if derive is dyn.gradient_many else [1.0], [0.0], 0.4, method, **events)
