@@ -16,7 +16,7 @@ _FILES = {f"file{side}" for side in ("", "right", "left", "up", "down", "front",
 
 
 def require_modest(source: Any, called: str) -> None:
-    """Raises MechanismError for a text that names another file or is not XML, and for too many copies.
+    """Raises MechanismError for a text that names another file or is not XML, too many copies, and a blank anchor.
 
     called: what errors call the source.
     """
@@ -29,6 +29,8 @@ def require_modest(source: Any, called: str) -> None:
     if is_text(source) and asked.files:
         named = f"{called} names the file {asked.files[0]!r:.200}"
         raise MechanismError(f"{named}, and a text reads no other files: give the path of a model instead")
+    if asked.blank:
+        raise MechanismError(f"MuJoCo cannot read {called}: the anchor of a <connect> needs three numbers, got none")
     if asked.copies > COPIES:
         raise MechanismError(f"{called} asks for {asked.copies:.6g} copies by `count`, at most {COPIES} are made")
 
@@ -44,6 +46,7 @@ class _Asked:
         self.files: list[str] = []
         self.included: set[Path] = set()
         self.copies = 0.0
+        self.blank = False  # an anchor without numbers, after which MuJoCo 4 reads no other model in this process
         self.within = [1.0]  # of each open element, how often it is made
 
     def read(self, text: bytes) -> None:
@@ -54,6 +57,7 @@ class _Asked:
 
     def _opened(self, tag: str, attributes: dict[str, str]) -> None:
         self.files += [attributes[name] for name in sorted(_FILES & attributes.keys())]
+        self.blank |= not attributes.get("anchor", "0").strip()
         times = 1.0
         with suppress(ValueError):  # MuJoCo says what is no number
             times = math.prod([float(each) for each in attributes.get("count", "1").split()])
