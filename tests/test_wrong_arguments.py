@@ -76,10 +76,10 @@ def body(name="b", parent="world"):
 OPEN = dyn.Mechanism([dyn.Body("b", dyn.Joint("revolute"), mass="m", inertia=(1.0, 1.0, 1.0))], parameters={"m": 1.0})
 
 
-def closed(body_name, to, at, to_at, axis, length, coefficients, name):
+def closed(body_name, to, at, to_at, axis, length, coefficients, name, tolerance):
     """One-body mechanisms with a loop of every kind."""
     for kind in ("distance", "hinge", "rolling"):
-        loop = dyn.Loop(kind, body_name, to, at, to_at, axis, axis, length=length, name=name)
+        loop = dyn.Loop(kind, body_name, to, at, to_at, axis, axis, length=length, name=name, tolerance=tolerance)
         dyn.Mechanism([body(), body("c", "b")], loops=[loop])
     coupling = dyn.Loop("coupling", body_name, "c", coefficients=coefficients, name=name)
     return dyn.Mechanism([body(), body("c", "b")], loops=[coupling])
@@ -211,16 +211,17 @@ CALLS = {
     "dyn.gradient": call(
         dyn.gradient, ARM, lambda q, qd, t: q[0], [0.1], [0.0], 1.0, "euler", running=lambda q, qd, tau, t: q[0],
         wrt=["q"], t0=0.0, t_span=None, dt=1.0, max_step=None, rtol=None, atol=None, first_step=None, tau=[0.0],
-        parameters=None, events=(), backend="python", form="velocity"
+        parameters=None, events=(), estimate_error=False, backend="python", form="velocity"
     ),
     "dyn.gradient_many": call(
         dyn.gradient_many, ARM, lambda q, qd, t: q[0], [[0.1]], [[0.0]], 1.0, "euler",
-        running=lambda q, qd, tau, t: q[0], wrt=["q"], t0=0.0, t_span=None, dt=1.0, tau=[[0.0]], parameters={},
-        backend="python", form="velocity"
+        running=lambda q, qd, tau, t: q[0], wrt=["q"], t0=0.0, t_span=None, dt=1.0, max_step=None, rtol=None, atol=None,
+        first_step=None, tau=[[0.0]], parameters={}, estimate_error=False, backend="python", form="velocity"
     ),
     "dyn.sensitivities": call(
         dyn.sensitivities, ARM, [0.1], [0.0], 1.0, "euler", wrt=["q"], t0=0.0, t_span=None, dt=1.0, max_step=None,
-        rtol=None, atol=None, first_step=None, tau=[0.0], parameters=None, backend="python", form="velocity", events=()
+        rtol=None, atol=None, first_step=None, tau=[0.0], parameters=None, estimate_error=False, backend="python",
+        form="velocity", events=()
     ),
     "dyn.simulate_many": call(
         dyn.simulate_many, ARM, [[0.1]], [[0.0]], 0.02, "rk4", t0=0.0, t_span=None, t_eval=None, tau=0.0,
@@ -246,7 +247,9 @@ CALLS = {
     "dyn.HeldForces.at": call(dyn.HeldForces(np.zeros(1), np.zeros((1, 1))).at, [0.1]),
     "dyn.with_controller": call(dyn.with_controller, ARM, lambda q, qd, t, p: [p["k"]], {"k": 1.0}),
     "dyn.Loop": call(lambda kind: dyn.Loop(kind, "b"), "point"),
-    "dyn.Mechanism with a loop": call(closed, "b", "world", (0, 0, 0), (0, 0, 0), (0, 0, 1), 1.0, [0.0, 1.0], "loop"),
+    "dyn.Mechanism with a loop": call(
+        closed, "b", "world", (0, 0, 0), (0, 0, 0), (0, 0, 1), 1.0, [0.0, 1.0], "loop", 2e-4
+    ),
     "dyn.Event": call(dyn.Event, "e", lambda q, qd, t: q[0], 0, False, None),
     "dyn.Mechanism": call(dyn.Mechanism, [body()], (0.0, 0.0, -9.81), (), {}, {}, False, left_out=(), loops=()),
     "dyn.OdeSystem": call(dyn.OdeSystem, lambda x, t: [-x[0]], ["x"], {}),
@@ -269,7 +272,7 @@ CALLS = {
     "dyn.Reference.relative_error": call(EXACT.relative_error, [[0.0, 1.0], [0.0, 1.0]]),
     "dyn.Subtree.with_parent": call(SUBTREE.with_parent, "world"),
     "dyn.System.graph": call(SYSTEM.graph, {"o": SYSTEM.q[0]}, SYSTEM.q),
-    "dyn.Verdict.excess_at": call(dyn.formulation_verdict(SYSTEM).excess_at, {}),
+    "dyn.Verdict.excess_at": call(dyn.formulation_verdict(SYSTEM).excess_at, {"q0": 0.0, "qd0": 0.0}),
     "dyn.TorqueTable.at": call(TABLE.at, [0.0], [0.0], [0.0], t=0.0, parameters=None),
     **{f"dyn.TorqueTable.{name}": call(getattr(TABLE, name), 4) for name in ("to_latex", "to_markdown", "to_text")},
     "dyn.Trajectory.solution": call(RUN.solution, [0.005]),
@@ -352,7 +355,7 @@ CALLS |= {
     "extend.check_name": call(lambda name: extend.check_name("a body", name), "b"),
     "extend.check_writable": call(extend.check_writable, "file"),
     "extend.compressed_jacobian": call(extend.compressed_jacobian, GRAPH, None),
-    "extend.cotangents": call(extend.cotangents, {X * Y: ONE}, [X, Y], None, fixed=(), zero_wins=False),
+    "extend.cotangents": call(extend.cotangents, {X * Y: ONE}, [X, Y], None, fixed=(), through={}, zero_wins=False),
     "extend.expand": call(extend.expand, X * Y, {X: "a"}),
     "extend.folded": call(extend.folded, [X * Y], extend.Builder(), {X: Y}),
     "extend.format_polynomial": call(extend.format_polynomial, {(("a", 1),): 1.0}),
