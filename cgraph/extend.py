@@ -170,4 +170,6 @@ __all__ = [
 ]
 
 if not TYPE_CHECKING:  # a checker shall see a misspelt name
-    __getattr__, __dir__ = doors(__name__, __file__, first="cgraph.operations", explained=True)
+    __getattr__, __dir__ = doors(
+        __name__, __file__, first="cgraph.operations", explained=("cotangents", "folded", "tangents", "topological")
+    )

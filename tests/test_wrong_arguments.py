@@ -449,7 +449,7 @@ RECORDS = """
 """
 # Nothing to give; types; what a mechanism calls; what empties the user's cache; the fast way into compiled code, which
 # looks at nothing, and into the names of nodes.
-LEFT_OUT = """cg.recording_lines cg.clear_cache cg.Compiled.bind cg.Compiled.values cg.Graph.check cg.Graph.counts
+LEFT_OUT = """extend.doors extend.columns cg.recording_lines cg.clear_cache cg.Compiled.bind cg.Compiled.values cg.Graph.check cg.Graph.counts
     cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.bias_forces dyn.System.require_values
     dyn.System.momentum_rates
     dyn.System.momentum_derivatives dyn.System.torque_derivatives

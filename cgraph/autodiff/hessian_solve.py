@@ -14,6 +14,7 @@ from ..core.reverse import cotangents
 from ..core.scope import building
 from ..core.traversal import topological
 from ..simplification.balanced_sums import balanced
+from ..util.explain_failure import explain_failure
 from ..util.require import require_choice, require_flag, require_graph, require_sequence
 from .balanced_elimination import BalancedElimination, nodes_of, written_rows
 from .elimination_order import Step, elimination_steps
@@ -93,6 +94,7 @@ def hessian_solve(
     )
 
 
+@explain_failure
 def solve_nodes(
     output: Node,
     wrt: Sequence[Node],
@@ -169,6 +171,7 @@ def solve_nodes(
     return x
 
 
+@explain_failure
 def solve_tangents(
     output: Node,
     wrt: Sequence[Node],

@@ -9,6 +9,7 @@ from ..core.forward import tangents
 from ..core.graph import Graph
 from ..core.node import Node, as_node
 from ..core.reverse import cotangents
+from ..util.explain_failure import explain_failure
 from ..util.require import require_graph
 
 
@@ -105,6 +106,7 @@ def _distinct(by_name: list[str], by_place: list[str]) -> list[str]:
     return by_name if len(set(by_name)) == len(by_name) else by_place
 
 
+@explain_failure
 def hessian_nodes(output: Node, wrt: Sequence[Node], build: Builder | None = None) -> list[list[Node]]:
     """The lower triangle of the Hessian d2y/dx2, as nodes: forward mode over reverse mode.
 

@@ -8,9 +8,11 @@ from typing import Any
 from ..core.builder import Builder
 from ..core.node import Node, variable
 from ..core.scope import building
+from ..util.explain_failure import explain_failure
 from .symmetric_elimination import SymmetricElimination
 
 
+@explain_failure
 def ldl_solve(
     lower: Sequence[Sequence[Node]], rhs: Sequence[Node], build: Builder | None = None, *, check: bool = False
 ) -> list[Node]:
@@ -74,6 +76,7 @@ def _require_triangle(lower: Sequence[Sequence[Any]], rhs: Sequence[Any]) -> Non
             raise TypeError(f"lower and rhs must be numbers, got {type(entry).__name__}: {entry!r:.60}")
 
 
+@explain_failure
 def ldl_elimination(lower: Sequence[Sequence[Any]], rhs: Sequence[Any]) -> tuple[list[Any], list[Any]]:
     """The solution x of A x = rhs and the pivots of A, over any numbers with + - * /.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..codegen.llvm_engine import MissingFunctionError
 from ..codegen.native_function import flags_of
+from ..util.explain_failure import explain_failure
 from ..util.require import require_choice, require_flag
 from .native_runner import NativeRunner
 from .program import Program
@@ -13,6 +14,7 @@ from .runner import Runner
 BACKENDS = ("auto", "python", "llvm")
 
 
+@explain_failure
 def runner(program: Program, backend: str = "auto", *, fast: bool = False, fma: bool = True) -> Runner:
     """A program made ready to run.
 

@@ -13,6 +13,7 @@ from ..core.node import CONSTANT, Node, apply, constant
 from ..core.scope import building
 from ..core.traversal import topological
 from ..operations.operation import OPS
+from ..util.explain_failure import explain_failure
 from .canonical import ROUNDING, Angle, Canonical, Powers, Sum, Term, accumulate, without_zeros
 from .rounding_growth import as_accurate
 
@@ -30,6 +31,7 @@ class Product(NamedTuple):
     label: Label
 
 
+@explain_failure
 def rewritten(nodes: Sequence[Node], build: Builder | None = None) -> list[Node]:
     """Nodes of the same values, written out as sums of products by identities, with common factors taken out.
 
@@ -255,6 +257,7 @@ class _Writer:
         return new if leaves([new]) < leaves([node]) else node
 
 
+@explain_failure
 def shortened(nodes: Sequence[Node]) -> list[Node]:
     """Nodes of the same values: written anew by identities where that is shorter and as accurate, else as they are.
 

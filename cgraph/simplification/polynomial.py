@@ -7,11 +7,13 @@ from collections.abc import Mapping
 from ..core.checks import GraphError
 from ..core.node import CONSTANT, Node
 from ..core.traversal import topological
+from ..util.explain_failure import explain_failure
 
 Monomial = tuple[tuple[str, int], ...]  # (name, power), sorted by name
 Polynomial = dict[Monomial, float]  # coefficients; terms that cancel are gone
 
 
+@explain_failure
 def expand(node: Node, atoms: Mapping[Node, str] | None = None) -> Polynomial:
     """The terms of a node that is built by +, -, * and whole powers from variables and constants.
 
@@ -55,6 +57,7 @@ def expand(node: Node, atoms: Mapping[Node, str] | None = None) -> Polynomial:
     return value[node]
 
 
+@explain_failure
 def format_polynomial(terms: Polynomial) -> str:
     """A polynomial as text, terms in order of degree and name.
 

@@ -8,7 +8,10 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
+from .explain_failure import explain_failure
 
+
+@explain_failure
 def atomic_write(path: str | Path, data: str | bytes, *, mode: int = 0o666) -> Path:
     """Write a file whole or not at all, by way of a temporary file beside it.
 
@@ -45,6 +48,7 @@ def atomic_write(path: str | Path, data: str | bytes, *, mode: int = 0o666) -> P
     return Path(path)
 
 
+@explain_failure
 def write_files(files: Mapping[Path, str | bytes], *, mode: int = 0o666) -> None:
     """Write several files, all or none: they take their places once all are written beside them.
 
@@ -87,6 +91,7 @@ def write_files(files: Mapping[Path, str | bytes], *, mode: int = 0o666) -> None
                 temporary.replace(target)
 
 
+@explain_failure
 def check_writable(path: str | Path) -> None:
     """Find out whether a file could be written, before the work of making what goes there. Leaves nothing behind.
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import cache
 from importlib import import_module
-from types import FunctionType
 
 Homes = dict[str, tuple[str, str | None]]  # {name: (module that has it, its name there; None for the module itself)}
 
@@ -17,7 +16,7 @@ def doors(
     otherwise: Callable[[str], object] | None = None,
     *,
     first: str = "",
-    explained: bool = False,
+    explained: Collection[str] = (),
 ) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
     """The `__getattr__` and `__dir__` of a module whose names are written elsewhere.
 
@@ -34,8 +33,8 @@ def doors(
         What gives a name that no import brings, or raises AttributeError.
     first : str
         A module that is imported before any of those that have the names.
-    explained : bool
-        Whether a wrong argument of its functions is told in a sentence, see `explain_failure`.
+    explained : collection of str
+        Functions of the core whose wrong arguments are told in a sentence, see `explain_failure`.
 
     Returns
     -------
@@ -62,7 +61,7 @@ def doors(
         if inner is not None and not hasattr(home, inner):  # a module of that package
             import_module(f"{home.__name__}.{inner}")
         value = home if inner is None else getattr(home, inner)
-        if explained and isinstance(value, FunctionType):
+        if name in explained:
             value = import_module("cgraph.util.explain_failure").explain_failure(value)
         setattr(sys.modules[package], name, value)
         return value

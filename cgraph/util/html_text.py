@@ -6,9 +6,12 @@ from collections.abc import Sequence
 from html import escape
 from importlib.metadata import entry_points
 
+from .explain_failure import explain_failure
+
 LEFT, RIGHT = "text-align:left", "text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap"
 
 
+@explain_failure
 def html_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, title: str = "", texts: int = 1) -> str:
     """A table of texts.
 
@@ -46,6 +49,7 @@ def html_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, title: s
     return f'<div style="overflow-x:auto"><table>{above}{head}<tbody>{body}</tbody></table></div>'
 
 
+@explain_failure
 def html_lines(text: str) -> str:
     """Text in its lines, in letters of equal width.
 
@@ -68,6 +72,7 @@ def html_lines(text: str) -> str:
     return f"<pre>{escape(text)}</pre>"
 
 
+@explain_failure
 def html_text(text: str) -> str:
     """A paragraph of text.
 
@@ -90,6 +95,7 @@ def html_text(text: str) -> str:
     return f"<p>{escape(text)}</p>"
 
 
+@explain_failure
 def picture(kind: str, what: object) -> str | None:
     """The HTML that a drawing package makes of something (entry point `kind` of the group `cgraph.renderers`), if any.
 

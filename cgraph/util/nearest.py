@@ -6,11 +6,14 @@ import difflib
 from collections.abc import Iterable, Sequence
 from itertools import islice
 
+from .explain_failure import explain_failure
+
 _MOST, _LENGTH = 5000, 80  # names compared, and characters of each: an error should come at once
 _ALIKE = 0.7  # share of the letters that two names have in common
 _LISTED = 12  # names that are listed where none is near
 
 
+@explain_failure
 def nearest(name: str, known: Iterable[str], most: int = 3) -> list[str]:
     """The known names that are spelled most like a name, whatever their case; the best first.
 
@@ -40,6 +43,7 @@ def nearest(name: str, known: Iterable[str], most: int = 3) -> list[str]:
     return [folded[each] for each in difflib.get_close_matches(name[:_LENGTH].casefold(), folded, most, _ALIKE)]
 
 
+@explain_failure
 def or_nearest(name: str, known: Sequence[str]) -> str:
     """What an error says after "there is no ...": the nearest of the known names, or some of them.
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..core.graph import Graph
 from ..core.node import Node
+from .explain_failure import explain_failure
 
 
 def require_flag(what: str, value: Any) -> bool:
@@ -45,6 +46,7 @@ def require_flag(what: str, value: Any) -> bool:
     raise TypeError(f"{what} must be True or False, got {value!r:.60}")
 
 
+@explain_failure
 def require_whole(what: str, value: Any, least: int = 0) -> int:
     """The value as an int.
 
@@ -85,6 +87,7 @@ def require_whole(what: str, value: Any, least: int = 0) -> int:
     return number
 
 
+@explain_failure
 def require_choice(what: str, value: Any, choices: Collection[str]) -> str:
     """The value, if it is one of the choices.
 

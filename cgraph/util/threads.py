@@ -9,6 +9,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
+from .explain_failure import explain_failure
+
 
 def thread_count(threads: int | None) -> int:
     """The number of threads that an argument `threads` asks for.
@@ -41,6 +43,7 @@ def thread_count(threads: int | None) -> int:
     return int(threads)
 
 
+@explain_failure
 def share(work: Callable[[int], None], items: Iterable[int], threads: int) -> None:
     """Run `work(item)` for every item, in whichever thread is free; the caller's thread is one of them.
 

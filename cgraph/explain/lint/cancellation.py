@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from ...core.graph import Graph
 from ...core.node import Node, as_node
 from ...operations.operation import columns
+from ...util.explain_failure import explain_failure
 from ..edge_partials import Point, node_values
 from ..names import Names
 from .finding import Finding
@@ -48,6 +49,7 @@ def rounded(names: Names, at: Point) -> Rounded:
     return Rounded(values, errors)
 
 
+@explain_failure
 def certain_digits(graph: Graph, at: Point) -> dict[str, float]:
     """Decimal digits of the outputs that rounding leaves certain at a point, by a running bound to first order.
 

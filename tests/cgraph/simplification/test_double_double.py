@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
-from cgraph.core.node import OPS, apply
+from cgraph.core.node import apply
 from cgraph.core.traversal import topological
+from cgraph.extend import OPS
 from tests.strategies import examples
 from tests.tolerances import EQUATIONS, LONG_SUM
 

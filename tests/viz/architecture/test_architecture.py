@@ -121,7 +121,7 @@ def test_the_table_is_an_order_that_names_every_folder(known: dict[str, Module])
     ("importer", "imported", "allowed"),
     [
         ("cgraph.explain", "cgraph.core", True),
-        ("cgraph.simplify", "cgraph.autodiff", False),
+        ("cgraph.simplification", "cgraph.autodiff", False),
         ("dynamics.peers", "cgraph.explain", True),
         ("cgraph.core", "dynamics.systems", False),
         ("viz.paper", "dynamics.experiments", True),
