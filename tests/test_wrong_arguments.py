@@ -455,7 +455,8 @@ LEFT_OUT = """cg.recording_lines cg.clear_cache cg.Compiled.bind cg.Compiled.val
     dyn.System.momentum_derivatives dyn.System.torque_derivatives
     dyn.JointForce.along dyn.JointForce.check dyn.JointLimit.along dyn.JointLimit.check dyn.JointFriction.along
     dyn.JointFriction.check dyn.Actuator.along dyn.Actuator.check
-    extend.Array extend.columns extend.doors extend.Order extend.Polynomial extend.Builder extend.Runner extend.Runner.read extend.Runner.write
+    extend.Array extend.columns extend.doors extend.Order extend.Polynomial extend.Builder extend.Runner
+    extend.Runner.read extend.Runner.write
     extend.Program.elements extend.Formulas.lines extend.Names.formula extend.Names.inputs_of extend.Names.line
     extend.Names.meant extend.Names.short extend.Names.shown extend.Names.text"""
 
