@@ -63,7 +63,7 @@ class EventLog:
         self._sides: list[Side] = []  # none before the first step
         self._from = np.array([-float(event.direction) for event in program.events])  # sides, see `Crossing`
         self._steps = 0
-        self._largest, self._fastest = np.zeros((2, 1, len(program.components)))  # states so far, and rates at resets
+        self._sizes, self._ways = np.zeros((2, 2, len(program.components)))  # of states and rates: largest, and path
         self._done: set[int] = set()  # events that happen again only after they have not been due
         self._missed: set[int] = set()
         self._reset_at, self._restarts = math.nan, 0  # the instant, and how many in a row from which nothing got away
@@ -124,9 +124,14 @@ class EventLog:
         return None
 
     def _see(self, part: StepBlock, steps: int, x: Array) -> None:
-        """The run came to x by the first steps of a part: how large its states are, and how many roundings old."""
+        """The run came to x by the first steps of a part: how far its states have gone, and how many roundings old."""
         self._steps += steps
-        np.fmax(self._largest, np.abs(np.vstack([part.x_old[:steps], x])).max(axis=0), out=self._largest)
+        states = np.vstack([part.x_old[:steps], x])
+        times = np.append(part.t_old[:steps], part.t_old[0] if steps == 0 else part.t[steps - 1])
+        for k, values in enumerate((states, self.program.rates(times, states, self.parameters))):
+            values = np.where(np.isfinite(values), values, 0.0)
+            np.fmax(self._sizes[k], np.abs(values).max(axis=0), out=self._sizes[k])
+            self._ways[k] += np.abs(np.diff(values, axis=0)).sum(axis=0)
 
     def _happen(self, part: StepBlock, t: float, x: Array, arrived: Mapping[int, Crossing]) -> bool:
         """Note what reaches zero at an instant of the last of these steps; whether that ends or resets the run."""
@@ -212,17 +217,25 @@ class EventLog:
         at, states, p = np.array([t]), x[None], self.parameters
         values = np.array([event.value(at, states, p)[0] for event in self.program.events])
         zero = np.abs(values) <= np.array([self._noise(number, t, x, step.x) for number in range(len(values))])
-        motions = self.program.motions(zero, at, states, p, self._fastest, self._roundings)
+        motions = self.program.motions(zero, at, states, p, self._gone[1:], self._roundings)
         return _Zeros(zero, values, motions * np.sign(step.h[0]))
 
     @property
     def _roundings(self) -> float:
-        """By how much states may be off by now, relative to the largest so far: roundings of steps add up at random."""
+        """By how much states may be off by now, relative to how far they have gone.
+
+        Roundings of steps add up at random; a rate that is off takes its state off by that share of the whole way.
+        """
         return UNIT * ROUNDED * math.sqrt(1.0 + self._steps)
+
+    @property
+    def _gone(self) -> Array:
+        """How far states and their rates have gone, (2, m), at least as far as they are large."""
+        return np.fmax(self._sizes, self._ways)
 
     def _noise(self, number: int, t: float, x: Array, end: Array | float = 0.0) -> float:
         """By how much a quantity may be off for that, also inside a step to an end (1, m)."""
-        errors = self._roundings * self._largest + UNIT * np.abs(end), np.array([self._roundings * abs(t)])
+        errors = self._roundings * self._gone[:1] + UNIT * np.abs(end), np.array([self._roundings * abs(t)])
         return float(self.program.events[number].error(np.array([t]), x[None], self.parameters, *errors)[0])
 
     def _ended(self, number: int, t: float) -> str:

@@ -77,10 +77,11 @@ class EventProgram:
     ) -> Array:
         """The derivatives of quantities by the time (1,) at one state (1, m); 0 of others, and where they are rounding.
 
-        fastest: the largest rates of the states so far, (1, m), which are moved on.  off: what of these is rounding.
+        fastest: how far the rates of the states have gone, at least the largest so far, (1, m).  off: what of these is
+        rounding.
         """
-        x_dot = _table(self.rate, [*x.T, t, *p], 1).T
-        np.fmax(fastest, np.abs(x_dot), out=fastest, where=np.isfinite(x_dot))
+        x_dot = self.rates(t, x, p)
+        fastest = np.fmax(fastest, np.where(np.isfinite(x_dot), np.abs(x_dot), 0.0))
         motions, none = np.zeros(len(self.events)), np.zeros_like(x)
         for number in np.flatnonzero(which):
             event = self.events[number]
@@ -88,6 +89,10 @@ class EventProgram:
             most = event.error(t, x, p, fastest, np.ones(1)) - event.error(t, x, p, none, np.zeros(1))
             motions[number] = np.where(np.abs(motion) <= off * most, 0.0, motion)[0]
         return motions
+
+    def rates(self, t: Array, x: Array, p: Sequence[float]) -> Array:
+        """The derivatives of the states by the time, (k, m), at times (k,) and states (k, m)."""
+        return _table(self.rate, [*x.T, t, *p], len(t)).T
 
     def reset(self, number: int, t: float, x: Array, p: Sequence[float]) -> Array:
         """The state (m,) after an event; the same where it resets nothing."""

@@ -74,8 +74,9 @@ def test_no_cascade_is_wrong(method: str | None) -> None:
     assert [each for each in judged if each.verdict != RIGHT] == []
 
 
-@mark.parametrize("balls", [1, *slow(2, 3)])
-@mark.parametrize("method", ["dop853", *slow("rk4", "radau", "verlet")])
+@mark.filterwarnings("ignore:the (state is off|error is unknown):dynamics.SimulationWarning")  # of equal steps
+@mark.parametrize("balls", [1, 2, *slow(3)])
+@mark.parametrize("method", ["dop853", *slow("dopri5", "rk4", "radau", "verlet")])
 def test_pendulums_that_touch_swing_at_the_ends_alone(balls: int, method: str) -> None:
     """Contacts rest, and move together, for ten swings: rounding does not bring them apart or through one another."""
     n = 5
@@ -120,6 +121,7 @@ def test_what_another_reset_turns_back_is_no_event_what_it_lets_through_is_one_a
     assert moved([0.0], [0.0], clock, 1.5).q[-1] == approx([1.0], abs=EXACT)
 
 
+@mark.filterwarnings("ignore:the error is unknown:dynamics.SimulationWarning")  # other steps take another course
 @mark.parametrize("method", ["dop853", "rk4"])
 def test_three_balls_that_are_squeezed_without_restitution_come_to_rest(method: str) -> None:
     run = moved([-1.0, 0.0, 1.0], [1.0, 0.0, -1.0], [contact(0, e=0.0), contact(1, e=0.0)], 1.5, method)
@@ -130,7 +132,8 @@ def test_three_balls_that_are_squeezed_without_restitution_come_to_rest(method: 
 @mark.slow
 def test_a_ball_without_room_between_two_walls_stops_the_run_with_their_names() -> None:
     opposite = dyn.Event("opposite", lambda q, qd, t: -q[0], -1, reset=lambda q, qd, t: (q, [-qd[0]]))
-    message = moved([0.0], [1.0], [wall(0), opposite], 1.0).stats.message
+    with pytest.warns(dyn.SimulationWarning, match="the run stopped at t = 0 s"):
+        message = moved([0.0], [1.0], [wall(0), opposite], 1.0).stats.message
     assert message.startswith("stopped at t = 0 s: events 'wall 0', 'opposite' reset the state again and again")
 
 
