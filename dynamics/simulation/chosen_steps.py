@@ -23,7 +23,7 @@ ROUNDS = 4  # of a first step, by which the sizes of the states are known
 HALVINGS = 100  # of a look ahead
 FAR = 1e3  # tolerances of a step, by which constraints may move what it arrives at
 JUMP = 1e-2  # of the longest of the last steps: how much of it a jump may take, where atol is chosen by sizes
-SUDDEN = 1e-3  # of a kind of rate: a change by more in the first instant is a jump
+SUDDEN = 1e-3  # of a kind of rate: a force that jumps at the start changes it by more
 HELD, SHARE = 100, 0.25  # steps at the stability limit, of all, from which on a run is called stiff
 
 
@@ -193,14 +193,17 @@ class AdaptiveIntegration(NativeIntegration):
         return h, max(h, far)
 
     def _after_start(self, x: Array, rate: Array) -> Array | None:
-        """The rate right after the start, where a force jumps there from something else than 0; else None."""
+        """The rate right after the start, where a force jumps there: it changes in the first instant, and no more."""
         assert self.sizes is not None
-        options, largest = self.options, self.sizes.largest_of_kind(np.abs(rate))
+        options, largest = self.options, self.sizes.largest_of_kind
         if not self.program.timed:
             return None
         instant = max(float(np.spacing(abs(options.t0))), COLLAPSE * options.length)
-        after = self._rate(options.t0 + math.copysign(instant, options.t_end - options.t0), x)
-        jumps = (np.abs(after - rate) > SUDDEN * largest) & (largest > 0.0) & np.isfinite(after)
+        instant = math.copysign(instant, options.t_end - options.t0)
+        after, later = (self._rate(options.t0 + k * instant, x) for k in (1, 2))
+        with np.errstate(all="ignore"):
+            least = SUDDEN * np.maximum(largest(rate), largest(after))
+            jumps = (np.abs(after - rate) > least) & (np.abs(later - after) <= least)
         return after if jumps.any() else None
 
     def _ahead(self, x: Array, rate: Array, h: float) -> tuple[Array, float]:
