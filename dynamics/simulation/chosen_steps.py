@@ -23,6 +23,7 @@ ROUNDS = 4  # of a first step, by which the sizes of the states are known
 HALVINGS = 100  # of a look ahead
 FAR = 1e3  # tolerances of a step, by which constraints may move what it arrives at
 JUMP = 1e-2  # of the longest of the last steps: how much of it a jump may take, where atol is chosen by sizes
+SUDDEN = 1e-3  # of a kind of rate: a force that jumps at the start changes it by more
 HELD, SHARE = 100, 0.25  # steps at the stability limit, of all, from which on a run is called stiff
 
 
@@ -176,17 +177,34 @@ class AdaptiveIntegration(NativeIntegration):
             return first_step(self.runner, self.program.order, options, start, rate, self._scale), 0.0
         given = options.first_step
         h = min(options.length, options.longest_step) * LEAP if given is None else given
+        after = self._after_start(x, rate)
         for _ in range(ROUNDS):
             self.sizes = self._fresh_sizes()
-            states, far = self._ahead(x, rate, h)
+            states, far = self._ahead(x, rate if after is None else after, h)
             self.sizes.see(states)
             self.absolute = self.sizes.tolerance()
             if given is not None:
                 return given, max(given, far)
+            if after is not None:  # halving steps only leads to the jump; step control passes it, as any later one
+                return far, far
             before, h = h, first_step(self.runner, self.program.order, options, start, rate, self._scale)
             if h >= 0.5 * before:
                 break
         return h, max(h, far)
+
+    def _after_start(self, x: Array, rate: Array) -> Array | None:
+        """The rate right after the start, where a force jumps there: it changes in the first instant, and no more."""
+        assert self.sizes is not None
+        options, largest = self.options, self.sizes.largest_of_kind
+        if not self.program.timed:
+            return None
+        instant = max(float(np.spacing(abs(options.t0))), COLLAPSE * options.length)
+        instant = math.copysign(instant, options.t_end - options.t0)
+        after, later = (self._rate(options.t0 + k * instant, x) for k in (1, 2))
+        with np.errstate(all="ignore"):
+            least = SUDDEN * np.maximum(largest(rate), largest(after))
+            jumps = (np.abs(after - rate) > least) & (np.abs(later - after) <= least)
+        return after if jumps.any() else None
 
     def _ahead(self, x: Array, rate: Array, h: float) -> tuple[Array, float]:
         """x and where Euler's steps lead to, (.., m), of h or of so much less that they can be trusted, and their size.

@@ -199,6 +199,7 @@ class Estimator:
             np.maximum(least, self._errors([np.where(change > 0.0, change / scale, 0.0) for change in changes]))
             for changes in zip(*[(each.largest, each.last) for each in self._differences], strict=True)
         )
+        largest = np.maximum(largest, last)  # where the law that holds for one does not for the other
         resolved = math.pi * max(1.0, 0.5 * self.program.order) / self._longest  # rad/s: two evaluations in a turn
         largest[self._turning > resolved] = last[self._turning > resolved] = math.inf
         options = self.options

@@ -96,7 +96,7 @@ class System:
         p = Parameters(self.parameters)
         energy = call_user_function("lagrangian", lagrangian, self.q, self.qd, self.t, p)
         single = isinstance(energy, (Node, numbers.Real))
-        partials = [energy] if single else sequence("the lagrangian must give", energy)
+        partials = [energy] if single else sequence("the lagrangian must give a node or", energy)
         if not partials:
             raise ValueError("the lagrangian gave no partial Lagrangians")
         self.partial_lagrangians = tuple([node_or_number("the lagrangian", partial) for partial in partials])

@@ -72,6 +72,17 @@ def test_times_that_second_steps_step_over_have_an_estimate(method: str, t_eval:
     assert dyn.simulate(spring(), [1.0], [0.0], 2.5, method, events=early, **options).stats.error is None
 
 
+def test_the_error_is_no_less_than_that_at_the_end() -> None:
+    """Where a force jumps, and the longest steps are off by too much to tell of the run, though not of its end."""
+
+    def push(q: list[cg.Node], qd: list[cg.Node], t: cg.Node) -> list[cg.Node]:
+        return [cg.where(t > 1.0, 1.0, 0.0)]
+
+    with warns(dyn.SimulationWarning, match="the state is off by an estimated"):
+        stats = dyn.simulate(spring(), [0.0], [0.0], 3.0, "midpoint", dt=0.07, tau=push).stats
+    assert stats.error >= stats.error_at_end > 0.0
+
+
 @mark.parametrize("method", EQUAL)
 def test_an_estimate_changes_no_row(method: str) -> None:
     for t_eval in (None, [0.1, 0.3]):

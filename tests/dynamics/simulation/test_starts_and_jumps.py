@@ -58,6 +58,22 @@ def test_jumps_and_kinks_in_time_are_passed(method: str, power: int, units: tupl
     np.testing.assert_allclose(run.q[-1] / units[0], end, rtol=JUMPS)
 
 
+@mark.parametrize("before", [-1.0, 0.5, *slow(0.0, 0.9, 3.0)])
+@mark.parametrize("span", [1.0, *slow(-1.0, 1e-2, 1e5)])
+@mark.parametrize("t0", [0.0, 1.0, *slow(-3.0)])
+@mark.parametrize("method", [name for name in ADAPTIVE if name != "taylor"])
+def test_a_force_that_jumps_as_the_run_starts_is_passed(method: str, t0: float, span: float, before: float) -> None:
+    """As a square wave does: one value at t0 itself, another right after."""
+
+    def push(q: list[cg.Node], qd: list[cg.Node], t: cg.Node) -> list[cg.Node]:
+        return [cg.where((t - t0) * span > 0.0, 1.0, before) / span**2.0]
+
+    model = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2.0, ["x"], forces=push)
+    run = dyn.simulate(model, [0.0], [0.0], t0 + span, method, t0=t0, max_steps=3000)
+    assert run.success, run.stats.message
+    np.testing.assert_allclose(run.q[-1], 0.5, rtol=JUMPS)
+
+
 @mark.parametrize("n", [6, *slow(20)])
 @mark.parametrize("method", ADAPTIVE)
 def test_a_chain_of_decays_begins_in_one_component(method: str, n: int) -> None:

@@ -76,7 +76,11 @@ _SYSTEMS: dict[str, tuple[dict[str, Any], type[Exception], str]] = {
         TypeError,
         "the lagrangian must be a node or a number: .*str: 'L'",
     ),
-    "lagrangian nothing": ({"lagrangian": lambda q, qd, t: None}, TypeError, "the lagrangian must give .*None"),
+    "lagrangian nothing": (
+        {"lagrangian": lambda q, qd, t: None},
+        TypeError,
+        "the lagrangian must give a node or a sequence, .*None",
+    ),
     "lagrangian NaN": ({"lagrangian": lambda q, qd, t: math.nan}, ValueError, "the lagrangian must be .*NaN"),
     "lagrangian empty": ({"lagrangian": lambda q, qd, t: []}, ValueError, "gave no partial Lagrangians"),
     "lagrangian of what": ({"lagrangian": lambda q: q[0]}, TypeError, r"lagrangian must take \(q, qd, t\)"),
