@@ -139,7 +139,7 @@ def test_the_command_prints_and_draws(
     assert cli.main(["architecture", "viz", "--out", str(tmp_path / "viz.dot")]) == 0
     assert "loose modules in viz: viz.__main__, viz.cli, viz.theme" in capsys.readouterr().out
     assert '"viz.cli" -> "viz.commands"' in (tmp_path / "viz.dot").read_text(encoding="utf-8")
-    monkeypatch.setattr("viz.commands.architecture.architecture", lambda package: library)
+    monkeypatch.setattr("viz.commands.library.architecture", lambda package: library)
     assert cli.main(["architecture", "--json"]) == (0 if library.sound else 1)
     assert json.loads(capsys.readouterr().out) == library.to_dict()
     assert cli.main(["architecture", "--out", "a.jpg"]) == 2
