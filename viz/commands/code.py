@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import cgraph as cg
@@ -15,7 +16,13 @@ from . import library
 from .arguments import answer, scene_of, takes_a_scene
 from .command import Command
 
-EQUATIONS = ("forward_dynamics", "inverse_dynamics", "state_equation", "mass_matrix", "energy")
+EQUATIONS: dict[str, Callable[[dyn.scenes.Scene], cg.Graph]] = {
+    "forward_dynamics": lambda scene: dyn.forward_dynamics(scene),
+    "inverse_dynamics": lambda scene: dyn.inverse_dynamics(scene),
+    "state_equation": lambda scene: dyn.state_equation(scene),
+    "mass_matrix": lambda scene: dyn.mass_matrix(scene),
+    "energy": lambda scene: dyn.energy(scene),
+}  # each is loaded when it is called
 SUFFIXES = {"c": ".c", "wasm": ".wasm", "python": ".py"}
 
 
@@ -37,7 +44,7 @@ def add(parser: Command) -> None:
     )
     parser.add_argument(
         "--what",
-        choices=EQUATIONS,
+        choices=tuple(EQUATIONS),
         help="default: forward_dynamics; of a first-order system state_equation",
     )
     parser.add_argument(
@@ -58,7 +65,7 @@ def run(options: argparse.Namespace) -> None:
         extend.check_writable(out)
     scene = scene_of(options)
     what = options.what or ("forward_dynamics" if scene.ode is None else "state_equation")
-    graph: cg.Graph = getattr(dyn, what)(scene)
+    graph = EQUATIONS[what](scene)
     name = re.sub("[^A-Za-z0-9_]", "_", scene.name) if out is None else out.stem
     if options.language == "wasm":
         methods = library.TABLEAUS if what == "state_equation" else None

@@ -31,7 +31,7 @@ def test_python_is_the_graph(what, capsys):
     assert cli.main(["code", "triple_pendulum", "--python", "--what", what]) == 0
     names: dict = {}
     exec(capsys.readouterr().out, names)
-    graph = getattr(dyn, what)(SCENE)
+    graph = EQUATIONS[what](SCENE)
     expected = graph.evaluate(dict(zip(graph.input_names, point(graph), strict=True)))
     assert names["function"](point(graph)) == tuple(expected.values())
 
