@@ -16,7 +16,7 @@ import dynamics as dyn
 import viz
 from docs.sphinx_extensions.command_reference import markdown
 from tests.slow import slow
-from viz.commands.parser import parse, parser
+from viz.commands.parser import complete, parse
 
 ROOT = Path(__file__).parents[1]
 PAGES = {
@@ -158,10 +158,10 @@ def test_the_reading_edition_of_the_core_is_short_and_names_files_that_exist() -
 
 def test_the_command_reference_has_all_that_the_parsers_have() -> None:
     """Every argument of every command is there, with what it is; what a help says in words of its own stays text."""
-    page = markdown(parser())
-    (subparsers,) = parser()._subparsers._group_actions
-    assert re.findall(r"^## cgraph (.*)$", page, re.MULTILINE) == list(subparsers.choices)
-    for section, command in zip(page.split("\n## "), subparsers.choices.values(), strict=True):
+    parsers = complete()
+    page = markdown(parsers)
+    assert re.findall(r"^## cgraph (.*)$", page, re.MULTILINE) == list(parsers)
+    for section, command in zip(page.split("\n## "), parsers.values(), strict=True):
         listed = re.findall(r"^`(.*)`\n: (.+)$", section, re.MULTILINE)
         arguments = [action for action in command._actions if action.dest != "help"]
         assert len(listed) == len(arguments)

@@ -7,11 +7,11 @@ from functools import partial
 WIDTH = 88  # columns of the usage
 
 
-def markdown(parser):
-    """Sections in Markdown, one for each command of a parser."""
-    (commands,) = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
-    help_of = {action.dest: action.help for action in commands._choices_actions}
-    return "\n".join(_section(name, help_of[name], command) for name, command in commands.choices.items())
+def markdown(commands):
+    """Sections in Markdown, one for each command, {name: parser}."""
+    from viz.commands.parser import COMMANDS
+
+    return "\n".join(_section(name, COMMANDS[name], command) for name, command in commands.items())
 
 
 def _section(name, summary, command):
@@ -35,10 +35,10 @@ def _sentence(text):
 
 
 def _append(app, name, source):
-    from viz.commands.parser import parser
+    from viz.commands.parser import complete
 
     if name == "command-reference":
-        source[0] += "\n" + markdown(parser())
+        source[0] += "\n" + markdown(complete())
 
 
 def setup(app):

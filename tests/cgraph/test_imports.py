@@ -46,6 +46,26 @@ def test_a_program_loads_what_it_uses(code: str, most: int) -> None:
     assert len(loaded) <= most
 
 
+USAGE = """
+import contextlib, io
+from viz.cli import main
+from viz.commands.parser import COMMANDS
+known = ["draw chain --out a.svg --formulation best", "code chain", "simulate chain --t-end 0", "lint chain --box q0=1"]
+for line in ["", "--help", "--version", "best", "draw", *known, *[f"{name} --best" for name in COMMANDS]]:
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), contextlib.suppress(SystemExit):
+        raise ValueError(f"cgraph {line} runs and ends with {main(line.split())}")
+    assert said.getvalue().startswith("cgraph " if line == "--version" else "usage: "), line
+"""
+
+
+def test_the_help_and_a_wrong_argument_come_before_the_library() -> None:
+    loaded = modules_of(f"exec({USAGE!r})")
+    assert "viz.commands.draw" in loaded
+    ours = [name for name in loaded if name.partition(".")[0] in ("numpy", "dynamics", "viz") and "." in name]
+    assert [name for name in ours if not name.startswith(("viz.cli", "viz.commands", "viz.architecture"))] == []
+
+
 def test_names_are_there_before_they_are_loaded() -> None:
     packages = "(cgraph, dynamics, viz, cgraph.extend)"
     code = f"import cgraph.extend, dynamics, viz; print([set(p.__all__) - set(dir(p)) for p in {packages}])"

@@ -22,8 +22,8 @@ from dynamics import scenes
 from dynamics.scenes import scenes as registry
 from tests.slow import slow
 from viz import cli
-from viz.commands.arguments import IN_PYTHON
-from viz.commands.parser import COMMANDS, parse, parser
+from viz.commands.arguments import FORMULATIONS, IN_PYTHON
+from viz.commands.parser import COMMANDS, complete, parse
 
 
 def run(*arguments: str, cwd=None) -> subprocess.CompletedProcess[str]:
@@ -153,10 +153,9 @@ def test_every_command_is_in_the_help_and_has_help(capsys):
 
 
 def test_every_command_that_takes_a_scene_says_that_a_python_file_will_do():
-    (commands,) = [action for action in parser()._actions if isinstance(action.choices, dict)]
     taking = {
         name: action.help
-        for name, command in commands.choices.items()
+        for name, command in complete().items()
         for action in command._actions
         if "SCENE" in str(action.metavar) and not action.option_strings
     }
@@ -171,11 +170,15 @@ def test_a_command_is_loaded_alone(monkeypatch):
         asked.append(name)
         return import_module(name, package)
 
-    monkeypatch.setattr("viz.commands.parser.import_module", load)
+    monkeypatch.setattr("viz.commands.command.import_module", load)
     parse(["draw", "chain", "--out", "a.dot"])
     assert asked == [".draw"]
-    parse(["completion", "bash"])
+    complete()
     assert asked[1:] == [f".{name}" for name in COMMANDS]
+
+
+def test_a_formulation_is_chosen_of_those_that_there_are():
+    assert list(FORMULATIONS) == sorted(dyn.FORMULATIONS)
 
 
 def test_every_file_of_commands_is_listed_or_helps_one_that_is():
@@ -264,8 +267,7 @@ def test_tags_to_collapse_are_given_one_by_one_or_in_a_list(tmp_path, capsys):
 @pytest.mark.parametrize("command", [["draw", "chain", "--out"], *slow(["lint", "chain", "--svg"])])
 def test_a_picture_of_too_many_nodes_has_a_box_for_a_link(tmp_path, monkeypatch, capsys, command):
     sources = []
-    for module in ("viz.commands.draw", "viz.commands.arguments"):
-        monkeypatch.setattr(f"{module}.render_svg", lambda drawing: sources.append(drawing.source) or "<svg/>")
+    monkeypatch.setattr("viz.commands.library.render_svg", lambda drawing: sources.append(drawing.source) or "<svg/>")
     assert cli.main([*command, str(tmp_path / "a.svg")]) == 0
     assert "nodes are too many for one picture: those of a tag are one box" in capsys.readouterr().err
     (source,) = sources

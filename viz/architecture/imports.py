@@ -48,6 +48,18 @@ class Module:
         return tuple(imports_of(self.tree, self.name if self.is_package else self.name.rpartition(".")[0]))
 
     @cached_property
+    def attributes(self) -> dict[str, set[str]]:
+        """{name: attributes that the file takes of it}, of names that it uses in no other way."""
+        taken: dict[str, set[str]] = {}
+        used, nodes = set(), list(ast.walk(self.tree))
+        for node in nodes:
+            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+                taken.setdefault(node.value.id, set()).add(node.attr)
+                used.add(id(node.value))
+        bare = {node.id for node in nodes if isinstance(node, ast.Name) and id(node) not in used}
+        return {name: names for name, names in taken.items() if name not in bare}
+
+    @cached_property
     def is_face(self) -> bool:
         """It holds a docstring, imports, also on demand, and `__all__` alone: what it shows is written elsewhere."""
         body = [inner for line in self.tree.body for inner in (line.body if isinstance(line, ast.If) else [line])]
@@ -110,19 +122,28 @@ def uses(known: Mapping[str, Module]) -> dict[str, set[str]]:
     """{module: modules that it imports}, faces left out.
 
     A name that comes through a package's `__init__` or a face leads to the module in which it is written; a face that
-    is imported as a whole, as by `import cgraph as cg`, leads to all that it shows.
+    is imported as a whole, as by `import cgraph as cg`, to those of the names that are taken of it, as `cg.Graph`.
     """
     return {
         name: {
             target
             for line in module.imports
             if not line.module.startswith(DOORS.get(name, ("-",)))
-            for target in _targets(known, line.module, line.name)
+            for shown, taken in _taken(known, module, line)
+            for target in _targets(known, shown, taken)
         }
         - {name}
         for name, module in known.items()
         if not module.is_face
     }
+
+
+def _taken(known: Mapping[str, Module], importer: Module, line: Import) -> list[tuple[str, str | None]]:
+    """What an import brings, (module, name): of a face as a whole, each name that the importer takes of it."""
+    whole = line.module if line.name is None else f"{line.module}.{line.name}"
+    if whole in known and known[whole].is_face and line.bound in importer.attributes:
+        return [(whole, name) for name in sorted(importer.attributes[line.bound])]
+    return [(line.module, line.name)]
 
 
 def _targets(

@@ -6,33 +6,31 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
-from cgraph.extend import check_writable
-from dynamics import FORMULATIONS, Trajectory, formulation_verdict, scenes, simulate
+import dynamics as dyn
+from cgraph import extend
 
-from ..animation.canvas import KINDS, check_can_animate
-from ..models.animate import Array, animate, frames
-from .arguments import Commands, answer, positive, say, takes_a_scene
+from . import library
+from .arguments import FORMULATIONS, answer, positive, say, takes_a_scene
+from .command import Command
 from .point_arguments import started, takes_a_start
 
 DRIVEN = ("euler_embedded", "chain_rule")
 WORDS = {"euler_embedded": "by definition", "chain_rule": "by the chain rule"}  # others by their names
 
 
-def add(commands: Commands[argparse.ArgumentParser]) -> None:
+def add(parser: Command) -> None:
     """The command's arguments."""
-    parser = commands.add_parser(
-        "animate", help="a film of a scene in motion (GIF, APNG or MP4); status 1 for a motion cut short"
-    )
     takes_a_scene(parser)
     takes_a_start(parser)
-    parser.add_argument("--out", type=Path, required=True, help=f"file to write: {', '.join(KINDS)}, MP4 by ffmpeg")
+    parser.names["kinds"] = lambda: library.KINDS
+    parser.add_argument("--out", type=Path, required=True, help="file to write: {kinds}, MP4 by ffmpeg")
     parser.add_argument(
         "--driven", action="store_true", help="two side by side: the same motion is wanted, driven by two torques"
     )
     parser.add_argument(
         "--formulations",
         nargs=2,
-        choices=sorted(FORMULATIONS),
+        choices=FORMULATIONS,
         metavar=("LEFT", "RIGHT"),
         help=f"with --driven: whose torques (default: {' '.join(DRIVEN)})",
     )
@@ -46,30 +44,30 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write the film; 1 where a motion ends before its time."""
-    if options.out.suffix not in KINDS:
-        raise ValueError(f"--out must end in {', '.join(KINDS[:-1])} or {KINDS[-1]}, got {options.out}")
+    if options.out.suffix not in library.KINDS:
+        raise ValueError(f"--out must end in {', '.join(library.KINDS[:-1])} or {library.KINDS[-1]}, got {options.out}")
     if options.formulations and not options.driven:
         raise ValueError("--formulations goes with --driven")
-    check_writable(options.out)
-    check_can_animate(options.out.suffix)
+    extend.check_writable(options.out)
+    library.check_can_animate(options.out.suffix)
     scene, _ = started(options, free=not options.driven)
     end = scene.t_end if options.t_end is None else options.t_end
-    frames(end, options.speed)  # before the work
+    library.frames(end, options.speed)  # before the work
     say(f"{scene.name}: a motion of {end:g} s")
-    motions: dict[str, Trajectory] = {}
+    motions: dict[str, dyn.Trajectory] = {}
     marked: list[str] = []
-    wanted: Callable[[Array], Array] | None = None
+    wanted: Callable[[library.Array], library.Array] | None = None
     if options.driven:
         for name in options.formulations or DRIVEN:
             words = f"torque {WORDS.get(name, name.replace('_', ' '))}"
-            motions[words], wanted = scenes.driven(scene, name, end)
-            if formulation_verdict(scene, name).differs:
+            motions[words], wanted = dyn.scenes.driven(scene, name, end)
+            if dyn.formulation_verdict(scene, name).differs:
                 marked.append(words)
     else:
-        motions[scene.name] = simulate(scene, scene.q, None if scene.ode else scene.qd, end)
-    say(f"{scene.name}: drawing {frames(max(each.t[-1] for each in motions.values()), options.speed)} frames")
+        motions[scene.name] = dyn.simulate(scene, scene.q, None if scene.ode else scene.qd, end)
+    say(f"{scene.name}: drawing {library.frames(max(each.t[-1] for each in motions.values()), options.speed)} frames")
     title = f"{scene.name}: the gray motion is wanted" if options.driven else ""
-    film = animate(
+    film = library.animate(
         scene, motions, kind=options.out.suffix, wanted=wanted, marked=marked, speed=options.speed, dark=options.dark,
         title=title,
     )  # fmt: skip

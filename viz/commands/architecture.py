@@ -5,20 +5,16 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cgraph.extend import check_writable
+from cgraph import extend
 
-from ..architecture.architecture import architecture
 from ..architecture.import_rule import PACKAGES
-from ..architecture.picture import to_dot
-from ..graph_drawing.render import check_can_draw, render_png, render_svg
-from .arguments import Commands, answer, say, unless_json
+from . import library
+from .arguments import answer, say, unless_json
+from .command import Command
 
 
-def add(commands: Commands[argparse.ArgumentParser]) -> None:
+def add(parser: Command) -> None:
     """The command's arguments."""
-    parser = commands.add_parser(
-        "architecture", help="which folder of the library imports which; status 1 for a circle or an arrow that climbs"
-    )
     parser.add_argument(
         "package", nargs="?", choices=PACKAGES, help="the folders of this one alone (default: the whole library)"
     )
@@ -33,16 +29,16 @@ def run(options: argparse.Namespace) -> int:
     if kind not in (None, ".svg", ".png", ".dot"):
         raise ValueError(f"--out must end in .svg, .png or .dot, got {options.out}")
     if kind is not None:
-        check_writable(options.out)
+        extend.check_writable(options.out)
     if kind in (".svg", ".png"):
-        check_can_draw(png=kind == ".png")
-    plan = architecture(options.package)
+        library.check_can_draw(png=kind == ".png")
+    plan = library.architecture(options.package)
     text = unless_json(options, plan.to_dict(), plan)
     if kind is None:
         answer(text)
     else:
-        drawing = to_dot(plan)
-        picture = str(drawing.source) if kind == ".dot" else render_svg(drawing)
-        answer(text, {options.out: render_png(picture) if kind == ".png" else picture})
+        drawing = library.architecture_dot(plan)
+        picture = str(drawing.source) if kind == ".dot" else library.render_svg(drawing)
+        answer(text, {options.out: library.render_png(picture) if kind == ".png" else picture})
         say(f"drawn in {options.out}")
     return 0 if plan.sound else 1

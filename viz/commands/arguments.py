@@ -12,37 +12,29 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from cgraph import Graph
-from cgraph.extend import check_writable, write_files
-from dynamics import (
-    FORMULATIONS,
-    Verdict,
-    formulation_verdict,
-    forward_dynamics,
-    hamilton_equations,
-    inverse_dynamics,
-    scenes,
-    state_equation,
-)
+import cgraph as cg
+import dynamics as dyn
+from cgraph import extend
 
-from ..graph_drawing.dot import to_dot
-from ..graph_drawing.render import check_can_draw, render_svg, tags_to_collapse
+from . import library
+from .command import Command
 from .signals import settled
 
-Commands = argparse._SubParsersAction  # what `add_subparsers` returns has no public name
+FORMULATIONS = ("chain_rule", "chain_rule_literal", "euler_embedded", "kinetic_only", "kinetic_only_exact")
 MOMENTUM_FORM = "Hamilton's equations, q_dot and p_dot of q and the momenta p"
 READING = ("ignore", "floating")  # options of `scenes.of_file`
 IN_PYTHON = "file.py:name, a model of a Python file, which is executed"
 
 
-def takes_a_scene(command: argparse.ArgumentParser, default: str | None = None) -> None:
+def takes_a_scene(command: Command, default: str | None = None) -> None:
     """The arguments that `scene_of` reads.  default: the scene where none is named."""
+    command.names["scenes"] = lambda: dyn.scenes.names()
     command.add_argument(
         "scene",
         metavar="SCENE",
         nargs=None if default is None else "?",
         default=default,
-        help=f"{', '.join(scenes.names())}, a model file, MJCF or URDF, or {IN_PYTHON}",
+        help=f"{{scenes}}, a model file, MJCF or URDF, or {IN_PYTHON}",
     )
     reads_files(command)
 
@@ -58,9 +50,9 @@ def reading(options: argparse.Namespace) -> dict[str, bool]:
     return {name: True for name in READING if getattr(options, name)}
 
 
-def scene_of(options: argparse.Namespace) -> scenes.Scene:
+def scene_of(options: argparse.Namespace) -> dyn.scenes.Scene:
     """The scene that the arguments name; what of a file is left out is a warning, a line of standard error."""
-    return scenes.load(options.scene, **reading(options))
+    return dyn.scenes.load(options.scene, **reading(options))
 
 
 def say(line: str) -> None:
@@ -85,7 +77,7 @@ def answer(text: str, files: Mapping[Path, str | bytes] | None = None, *, folder
     try:
         for place in places:
             place.mkdir(parents=True, exist_ok=True)
-        write_files(files or {})
+        extend.write_files(files or {})
     except OSError:
         for place in sorted(missing, reverse=True):  # what is inside first
             with suppress(OSError):
@@ -114,31 +106,33 @@ def takes_equations(command: argparse.ArgumentParser) -> None:
     """The arguments that `equations_of` reads, of which one may be given."""
     which = command.add_mutually_exclusive_group()
     which.add_argument(
-        "--formulation", default="chain_rule", choices=sorted(FORMULATIONS), help="of inverse dynamics (chain_rule)"
+        "--formulation", default="chain_rule", choices=FORMULATIONS, help="of inverse dynamics (chain_rule)"
     )
     which.add_argument("--forward", action="store_true", help="forward dynamics, with outputs such as qdd0")
     which.add_argument("--momentum", action="store_true", help=f"{MOMENTUM_FORM}, with outputs such as p0_dot")
 
 
-def verdict_of(options: argparse.Namespace, scene: scenes.Scene) -> Verdict | None:
+def verdict_of(options: argparse.Namespace, scene: dyn.scenes.Scene) -> dyn.Verdict | None:
     """The verdict on the formulation that the arguments choose; None of other equations than inverse dynamics."""
     other = scene.ode is not None or options.forward or options.momentum
-    return None if other else formulation_verdict(scene, options.formulation)
+    return None if other else dyn.formulation_verdict(scene, options.formulation)
 
 
-def equations_of(options: argparse.Namespace, scene: scenes.Scene, verdict: Verdict | None = None) -> tuple[Graph, str]:
+def equations_of(
+    options: argparse.Namespace, scene: dyn.scenes.Scene, verdict: dyn.Verdict | None = None
+) -> tuple[cg.Graph, str]:
     """The graph that the arguments choose, and what it is: "inverse dynamics, chain rule".
 
     verdict: that of `verdict_of`, if it is there, which has the graph.  Of an OdeSystem it is the state equation.
     Raises for momenta of what has none.
     """
     if options.momentum:
-        return hamilton_equations(scene), "Hamilton's equations"
+        return dyn.hamilton_equations(scene), "Hamilton's equations"
     if scene.ode is not None:
-        return state_equation(scene), "state equation"
+        return dyn.state_equation(scene), "state equation"
     if options.forward:
-        return forward_dynamics(scene), "forward dynamics"
-    graph = verdict.graph if verdict else inverse_dynamics(scene, options.formulation)
+        return dyn.forward_dynamics(scene), "forward dynamics"
+    graph = verdict.graph if verdict else dyn.inverse_dynamics(scene, options.formulation)
     return graph, f"inverse dynamics, {options.formulation.replace('_', ' ')}"
 
 
@@ -184,28 +178,28 @@ def may_draw_and_print(command: argparse.ArgumentParser) -> None:
 def check_picture(options: argparse.Namespace) -> None:
     """Raise what writing the picture would, before the work."""
     if options.svg:
-        check_writable(options.svg)
-        check_can_draw(png=False)
+        extend.check_writable(options.svg)
+        library.check_can_draw(png=False)
 
 
-def answer_and_draw(options: argparse.Namespace, text: str, graph: Graph, **marks: Any) -> None:
+def answer_and_draw(options: argparse.Namespace, text: str, graph: cg.Graph, **marks: Any) -> None:
     """The end of a command, with the drawing that `--svg` asks for.  marks: as `to_dot` takes them."""
     if not options.svg:
         answer(text)
         return
-    answer(text, {options.svg: render_svg(to_dot(graph, collapse=collapsed(graph), **marks))})
+    answer(text, {options.svg: library.render_svg(library.to_dot(graph, collapse=collapsed(graph), **marks))})
     say(f"drawn in {options.svg}")
 
 
-def collapsed(graph: Graph) -> list[str]:
+def collapsed(graph: cg.Graph) -> list[str]:
     """The tags to collapse so that the picture is made in seconds; it is said where there are any."""
-    tags = tags_to_collapse(graph)
+    tags = library.tags_to_collapse(graph)
     if tags:
         say(f"{len(graph.nodes)} nodes are too many for one picture: those of a tag are one box")
     return tags
 
 
-def state_names(graph: Graph, scene: scenes.Scene, *, momentum: bool = False) -> tuple[list[str], list[str]]:
+def state_names(graph: cg.Graph, scene: dyn.scenes.Scene, *, momentum: bool = False) -> tuple[list[str], list[str]]:
     """Names of the coordinates and of the velocities, or momenta, that the graph has, as inputs or as inner nodes."""
     if scene.ode is not None:
         return [], []

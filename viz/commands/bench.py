@@ -6,46 +6,38 @@ import argparse
 import json
 from dataclasses import asdict
 
-from dynamics.experiments.machine import machine
-from dynamics.experiments.speed.bench import MODES, PEERS, QUICK, SCENES, TASKS, Row, bench
-from dynamics.experiments.speed.bench_figures import FIGURES
-from dynamics.experiments.speed.bench_table import tables
-
-from .arguments import IN_PYTHON, READING, Commands, positive, reading, reads_files, say, whole
+from . import library
+from .arguments import IN_PYTHON, READING, positive, reading, reads_files, say, whole
+from .command import Command
 
 SPEED = "speed"
 OF_SPEED = (*READING, "tasks", "modes", "peers", "quick", "budget", "json")  # options of speed alone
 NUMBERS = {"links": "links of the models", "repeats": "turns", "count": "trajectories, or states"}
 
 
-def add(commands: Commands[argparse.ArgumentParser]) -> None:
+def add(parser: Command) -> None:
     """The command's arguments."""
-    parser = commands.add_parser(
-        "bench",
-        help="our speed beside what is installed: CasADi, Pinocchio, MuJoCo, heyoka, JAX, SymPy, PyTorch",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="\n".join(
-            [
-                "figures:",
-                f"  {SPEED:16} run times of tasks beside other software (default)",
-                *[
-                    f"  {name:16} {each.about}; takes {', '.join(f'--{taken}' for taken in each.takes)}"
-                    for name, each in FIGURES.items()
-                ],
-            ]
-        ),
-    )
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = f"figures:\n  {SPEED:16} run times of tasks beside other software (default)\n{{figures}}"
+    parser.names |= {
+        "figures": _figures,
+        "scenes": lambda: library.speed.SCENES,
+        "tasks": lambda: library.speed.TASKS,
+        "modes": lambda: library.speed.MODES,
+        "peers": lambda: library.speed.PEERS,
+        "quick_scenes": lambda: library.speed.QUICK,
+    }
     parser.add_argument(
         "what",
         nargs="*",
         metavar="FIGURE | SCENE",
-        help=f"a figure of those below, {SPEED} if none; its scenes: {', '.join(SCENES)} (default: all of these), a "
-        f"name that `cgraph scenes` lists, a model file, or {IN_PYTHON}",
+        help=f"a figure of those below, {SPEED} if none; its scenes: {{scenes}} (default: all of these), a name "
+        f"that `cgraph scenes` lists, a model file, or {IN_PYTHON}",
     )
     reads_files(parser)
-    for what, known in (("tasks", TASKS), ("modes", MODES), ("peers", PEERS)):
-        parser.add_argument(f"--{what}", metavar="A,B", help=f"only these of {', '.join(known)}")
-    parser.add_argument("--quick", action="store_true", help=f"fewer turns and, unless named, {', '.join(QUICK)} alone")
+    for what in ("tasks", "modes", "peers"):
+        parser.add_argument(f"--{what}", metavar="A,B", help=f"only these of {{{what}}}")
+    parser.add_argument("--quick", action="store_true", help="fewer turns and, unless named, {quick_scenes} alone")
     parser.add_argument(
         "--budget", type=positive, metavar="S", help="seconds a peer may take to make one task (default: 60; quick: 20)"
     )
@@ -55,12 +47,20 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
     parser.set_defaults(run=run, words="what")
 
 
+def _figures() -> list[str]:
+    lines = [
+        f"  {name:16} {each.about}; takes {', '.join(f'--{taken}' for taken in each.takes)}"
+        for name, each in library.FIGURES.items()
+    ]
+    return ["\n".join(lines)]
+
+
 def run(options: argparse.Namespace) -> None:
     """Print one figure."""
     figure, scenes = SPEED, options.what
-    if scenes and scenes[0] in (SPEED, *FIGURES):
+    if scenes and scenes[0] in (SPEED, *library.FIGURES):
         figure, *scenes = scenes
-    takes = FIGURES[figure].takes if figure in FIGURES else (*OF_SPEED, "repeats")
+    takes = library.FIGURES[figure].takes if figure in library.FIGURES else (*OF_SPEED, "repeats")
     for name in (*OF_SPEED, *NUMBERS):
         if name not in takes and getattr(options, name) not in (None, False):
             raise ValueError(f"--{name} does not go with {figure}, which takes {', '.join(f'--{x}' for x in takes)}")
@@ -72,9 +72,9 @@ def run(options: argparse.Namespace) -> None:
         return
     if scenes:
         raise ValueError(f"{figure} has models of its own and takes no scene, got {scenes[0]!r}")
-    print(machine())
-    numbers = {name: getattr(options, name) for name in FIGURES[figure].takes if getattr(options, name) is not None}
-    for text in FIGURES[figure].run(**numbers):
+    print(library.machine())
+    numbers = {name: getattr(options, name) for name in takes if getattr(options, name) is not None}
+    for text in library.FIGURES[figure].run(**numbers):
         print(text, flush=True)
 
 
@@ -82,12 +82,16 @@ def _speed(scenes: list[str], options: argparse.Namespace) -> None:
     """Print the tables; of a run that is interrupted, of what has been measured."""
     chosen = [
         tuple(names.split(",")) if names else tuple(known)
-        for names, known in ((options.tasks, TASKS), (options.modes, MODES), (options.peers, PEERS))
+        for names, known in (
+            (options.tasks, library.speed.TASKS),
+            (options.modes, library.speed.MODES),
+            (options.peers, library.speed.PEERS),
+        )
     ]
-    rows: list[Row] = []
+    rows: list[library.speed.Row] = []
     complete = False
-    measured = bench(
-        scenes or (QUICK if options.quick else tuple(SCENES)),
+    measured = library.speed.bench(
+        scenes or (library.speed.QUICK if options.quick else tuple(library.speed.SCENES)),
         *chosen,
         repeats=options.repeats or (5 if options.quick else 15),
         budget=(20.0 if options.quick else 60.0) if options.budget is None else options.budget,
@@ -101,7 +105,7 @@ def _speed(scenes: list[str], options: argparse.Namespace) -> None:
         if not complete and rows:
             say("the bench did not come to its end; these rows were measured before")
         if options.json and rows:
-            data = {"machine": machine(), "complete": complete, "rows": [asdict(row) for row in rows]}
+            data = {"machine": library.machine(), "complete": complete, "rows": [asdict(row) for row in rows]}
             print(json.dumps(data, indent=1))
         elif rows:
-            print(tables(rows, machine()))
+            print(library.tables(rows, library.machine()))

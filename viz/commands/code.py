@@ -9,35 +9,27 @@ from collections.abc import Callable
 from pathlib import Path
 
 import cgraph as cg
-from cgraph import Graph
-from cgraph.extend import check_writable, columns
-from dynamics import (
-    display_names,
-    energy,
-    forward_dynamics,
-    inverse_dynamics,
-    mass_matrix,
-    state_equation,
-)
-from dynamics.integrators import TABLEAUS
-from dynamics.scenes.scenes import Scene
+import dynamics as dyn
+from cgraph import extend
 
-from .arguments import Commands, answer, scene_of, takes_a_scene
+from . import library
+from .arguments import answer, scene_of, takes_a_scene
+from .command import Command
 
-EQUATIONS: dict[str, Callable[[Scene], Graph]] = {
-    "forward_dynamics": forward_dynamics,
-    "inverse_dynamics": inverse_dynamics,
-    "state_equation": state_equation,
-    "mass_matrix": mass_matrix,
-    "energy": energy,
-}
+EQUATIONS: dict[str, Callable[[dyn.scenes.Scene], cg.Graph]] = {
+    "forward_dynamics": lambda scene: dyn.forward_dynamics(scene),
+    "inverse_dynamics": lambda scene: dyn.inverse_dynamics(scene),
+    "state_equation": lambda scene: dyn.state_equation(scene),
+    "mass_matrix": lambda scene: dyn.mass_matrix(scene),
+    "energy": lambda scene: dyn.energy(scene),
+}  # each is loaded when it is called
 SUFFIXES = {"c": ".c", "wasm": ".wasm", "python": ".py"}
 
 
-def add(commands: Commands[argparse.ArgumentParser]) -> None:
+def add(parser: Command) -> None:
     """The command's arguments."""
-    parser = commands.add_parser("code", help="write a scene's equations as C, WebAssembly or Python")
     takes_a_scene(parser)
+    parser.names["tableaus"] = lambda: library.TABLEAUS
     language = parser.add_mutually_exclusive_group(required=True)
     language.add_argument("--c", dest="language", action="store_const", const="c", help="C99, with its header")
     language.add_argument(
@@ -45,7 +37,7 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
         dest="language",
         action="store_const",
         const="wasm",
-        help=f"a WebAssembly module; of the state equation with steps of {', '.join(TABLEAUS)}",
+        help="a WebAssembly module; of the state equation with steps of {tableaus}",
     )
     language.add_argument(
         "--python", dest="language", action="store_const", const="python", help="a Python function of a list"
@@ -70,19 +62,19 @@ def run(options: argparse.Namespace) -> None:
     if out is not None and out.suffix != suffix:
         raise ValueError(f"--out must end in {suffix} for --{options.language}, got {out}")
     if out is not None:
-        check_writable(out)
+        extend.check_writable(out)
     scene = scene_of(options)
     what = options.what or ("forward_dynamics" if scene.ode is None else "state_equation")
     graph = EQUATIONS[what](scene)
     name = re.sub("[^A-Za-z0-9_]", "_", scene.name) if out is None else out.stem
     if options.language == "wasm":
-        methods = TABLEAUS if what == "state_equation" else None
+        methods = library.TABLEAUS if what == "state_equation" else None
         files: dict[str, str | bytes] = {suffix: cg.to_wasm(graph, methods)}
     elif options.language == "python":
         files = {suffix: python_text(graph)}
     else:
         try:
-            text = cg.to_c(graph, name, names=display_names(scene))
+            text = cg.to_c(graph, name, names=dyn.display_names(scene))
         except ValueError as error:
             raise ValueError(f"{out or scene.name} names the function: {error}") from None
         whole = text.source.replace(f'#include "{name}.h"\n', text.header)  # one text for standard output
@@ -96,9 +88,9 @@ def run(options: argparse.Namespace) -> None:
     answer(f"{sizes}{places if options.language == 'wasm' else ''}", written)
 
 
-def python_text(graph: Graph) -> str:
+def python_text(graph: cg.Graph) -> str:
     """The generated function, and before it the functions that it calls."""
-    ops = sorted({columns(node.op) for node in graph.nodes if node.args}, key=lambda op: op.name)
+    ops = sorted({extend.columns(node.op) for node in graph.nodes if node.args}, key=lambda op: op.name)
     called = [op for op in ops if re.match(rf"{op.name}\(", op.python)]
     known = [op.name for op in called if op.raising is getattr(math, op.name, None)]
     others = [op.name for op in called if op.name not in known and op.name not in ("abs", "float")]

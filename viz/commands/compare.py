@@ -8,15 +8,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import cgraph as cg
-from cgraph import Graph
-from dynamics import FORMULATIONS, display_names, formulation_verdict, scenes
-from dynamics.equations.both_forms import LAGRANGE, both_forms, form_agreement
-from dynamics.equations.node_classes import form_classes, formulation_classes
+import dynamics as dyn
 
-from .. import theme
+from . import library
 from .arguments import (
+    FORMULATIONS,
     MOMENTUM_FORM,
-    Commands,
     answer_and_draw,
     check_picture,
     may_draw_and_print,
@@ -25,24 +22,22 @@ from .arguments import (
     takes_a_scene,
     unless_json,
 )
+from .command import Command
 from .point_arguments import filled
 from .sizes import size_data, size_table
 
 
-def add(commands: Commands[argparse.ArgumentParser]) -> None:
+def add(parser: Command) -> None:
     """The command's arguments."""
-    parser = commands.add_parser(
-        "compare", help="compare two formulations of a scene's equations, node by node; status 1 where they differ"
-    )
     takes_a_scene(parser)
     which = parser.add_mutually_exclusive_group()
     which.add_argument(
         "--formulations",
         nargs=2,
         default=("euler_embedded", "chain_rule"),
-        choices=sorted(FORMULATIONS),
+        choices=FORMULATIONS,
         metavar=("LEFT", "RIGHT"),
-        help=f"two of {', '.join(sorted(FORMULATIONS))} (default: euler_embedded chain_rule)",
+        help=f"two of {', '.join(FORMULATIONS)} (default: euler_embedded chain_rule)",
     )
     which.add_argument("--momentum", action="store_true", help=f"the state equation and {MOMENTUM_FORM}")
     may_draw_and_print(parser)
@@ -54,13 +49,13 @@ def run(options: argparse.Namespace) -> int:
     check_picture(options)
     scene = scene_of(options)
     names = [] if options.momentum else dict.fromkeys(options.formulations)
-    verdicts = {name: formulation_verdict(scene, name) for name in names}
-    graphs = both_forms(scene) if options.momentum else {name: each.graph for name, each in verdicts.items()}
+    verdicts = {name: dyn.formulation_verdict(scene, name) for name in names}
+    graphs = library.both_forms(scene) if options.momentum else {name: each.graph for name, each in verdicts.items()}
     named = dict(zip(("left", "right"), graphs if options.momentum else options.formulations, strict=True))
     left, right = (graphs[name] for name in named.values())
     state = [] if options.momentum else [n for each in (left, right) for part in state_names(each, scene) for n in part]
-    called = display_names(scene)
-    classes = form_classes if options.momentum else formulation_classes(verdicts.values())
+    called = dyn.display_names(scene)
+    classes = library.form_classes if options.momentum else library.formulation_classes(verdicts.values())
     comparison = cg.compare(left, right, atoms=dict.fromkeys(state), classify=classes, names=called)
     both = len(comparison.common)
     sizes = {"left_nodes": len(left.nodes), "right_nodes": len(right.nodes), "in_both": both}
@@ -82,15 +77,15 @@ def run(options: argparse.Namespace) -> int:
         unless_json(options, data, "\n".join([*lines, str(comparison), *told])),
         together.graph,
         marked=dict(zip(*groups, strict=True)),
-        names=theme.called(called),
+        names=library.theme.called(called),
         caption=f"{scene.name}: {' and '.join(named.values())} in one".replace("_", " "),
     )
     return 1 if any(only) else 0
 
 
-def _forms(scene: scenes.Scene, graphs: Mapping[str, Graph]) -> tuple[dict[str, Any], str]:
+def _forms(scene: dyn.scenes.Scene, graphs: Mapping[str, cg.Graph]) -> tuple[dict[str, Any], str]:
     """Sizes of both forms, and how far they agree at a state, as data and as text."""
-    sizes, apart = size_data(graphs), form_agreement(scene, graphs, filled(graphs[LAGRANGE], scene, {}))
+    sizes, apart = size_data(graphs), library.form_agreement(scene, graphs, filled(graphs[library.LAGRANGE], scene, {}))
     agreement = (
         f"At a state, velocities differ by {apart.velocities:.1g}, and p_dot from dp/dt along the accelerations by "
         f"{apart.momentum_rates:.1g}, relative to the largest."

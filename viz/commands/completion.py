@@ -4,25 +4,25 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from functools import partial
 
-from dynamics import scenes
+import dynamics as dyn
 
-from .arguments import Commands, answer
+from .arguments import answer
+from .command import Command
+from .parser import complete
 
 Words = dict[str, list[str]]  # by what stands before the word: a command, or a command and an option with choices
 
 
-def add(commands: Commands[argparse.ArgumentParser]) -> None:
+def add(parser: Command) -> None:
     """The command's arguments."""
-    parser = commands.add_parser("completion", help="a script that lets the Tab key complete commands and options")
     parser.add_argument("shell", choices=SHELLS, help='bash or zsh: eval "$(cgraph completion bash)"; fish: | source')
-    parser.set_defaults(run=partial(run, commands))
+    parser.set_defaults(run=run)
 
 
-def run(commands: Commands[argparse.ArgumentParser], options: argparse.Namespace) -> None:
+def run(options: argparse.Namespace) -> None:
     """Print the script."""
-    names = {name: _words(parser) for name, parser in commands.choices.items()}
+    names = {name: _words(parser) for name, parser in complete().items()}
     answer(SHELLS[options.shell](names))
 
 
@@ -31,7 +31,7 @@ def _words(parser: argparse.ArgumentParser) -> Words:
     words: Words = {"": []}
     for action in parser._actions:
         choices = [str(choice) for choice in action.choices or ()]
-        words[""] += action.option_strings or choices or (scenes.names() if "SCENE" in str(action.metavar) else [])
+        words[""] += action.option_strings or choices or (dyn.scenes.names() if "SCENE" in str(action.metavar) else [])
         if action.option_strings and choices:
             words |= dict.fromkeys(action.option_strings, choices)
     return words

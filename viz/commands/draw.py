@@ -6,24 +6,20 @@ import argparse
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from cgraph import Edge, Graph, Node
-from cgraph.extend import check_writable
-from dynamics import Verdict, display_names, scenes
+import cgraph as cg
+import dynamics as dyn
+from cgraph import extend
 
-from .. import theme
-from ..graph_drawing.dot import to_dot
-from ..graph_drawing.render import check_can_draw, render_png, render_svg
-from .arguments import Commands, answer, collapsed, equations_of, scene_of, takes_a_scene, takes_equations, verdict_of
+from . import library
+from .arguments import answer, collapsed, equations_of, scene_of, takes_a_scene, takes_equations, verdict_of
+from .command import Command
 
 PICTURES = (".svg", ".png")
 KINDS = (*PICTURES, ".dot", ".txt")
 
 
-def add(commands: Commands[argparse.ArgumentParser]) -> None:
+def add(parser: Command) -> None:
     """The command's arguments."""
-    parser = commands.add_parser(
-        "draw", help="draw the graph of a scene's equations (SVG, PNG or DOT) or list it (TXT)"
-    )
     takes_a_scene(parser)
     takes_equations(parser)
     parser.add_argument("--out", type=Path, required=True, help="file to write: .svg, .png, .dot or .txt")
@@ -41,53 +37,53 @@ def run(options: argparse.Namespace) -> None:
     kind = options.out.suffix
     if kind not in KINDS:
         raise ValueError(f"--out must end in {', '.join(KINDS[:-1])} or {KINDS[-1]}, got {options.out}")
-    check_writable(options.out)
+    extend.check_writable(options.out)
     if kind in PICTURES:
-        check_can_draw(png=kind == ".png")
+        library.check_can_draw(png=kind == ".png")
     scene = scene_of(options)
     verdict = verdict_of(options, scene)
     graph, what = equations_of(options, scene, verdict)
     caption = f"{scene.name}: {what}"
-    names = theme.called(display_names(scene))
-    words = theme.MOTION_WORDS if options.momentum else {}
+    names = library.theme.called(dyn.display_names(scene))
+    words = library.theme.MOTION_WORDS if options.momentum else {}
     drawn = (graph, kind, options.collapse, caption, names, words, verdict)
     content = _listed(graph, scene) if kind == ".txt" else _drawn(*drawn)
     counts = graph.counts()
     answer(f"{options.out}: {counts.nodes} nodes, {counts.edges} edges", {options.out: content})
 
 
-def _listed(graph: Graph, scene: scenes.Scene) -> str:
+def _listed(graph: cg.Graph, scene: dyn.scenes.Scene) -> str:
     """The listing, and above it what a person calls inputs and outputs."""
-    called = display_names(scene)
+    called = dyn.display_names(scene)
     names = [name for name in (*graph.input_names, *graph.outputs) if name in called]
     return "".join([f"# {name} is {called[name]}\n" for name in names]) + graph.listing()
 
 
 def _drawn(
-    graph: Graph,
+    graph: cg.Graph,
     kind: str,
     collapse: Sequence[str] | None,
     caption: str,
     names: Mapping[str, str],
     words: Mapping[str, str],
-    verdict: Verdict | None,
+    verdict: dyn.Verdict | None,
 ) -> str | bytes:
     if collapse is None:
         tags = collapsed(graph) if kind in PICTURES else []
     else:
         tags = [tag for each in collapse for tag in tags_of(each, graph)]
     legend = words or True
-    wrong, edges = (verdict.nodes, verdict.edges) if verdict else (frozenset[Node](), frozenset[Edge]())
-    drawing = to_dot(
+    wrong, edges = (verdict.nodes, verdict.edges) if verdict else (frozenset[cg.Node](), frozenset[cg.Edge]())
+    drawing = library.to_dot(
         graph, marked=wrong, marked_edges=edges, names=names, collapse=tags, caption=caption, legend=legend
     )
     if kind == ".dot":
         return str(drawing.source)
-    svg = render_svg(drawing)
-    return render_png(svg) if kind == ".png" else svg
+    svg = library.render_svg(drawing)
+    return library.render_png(svg) if kind == ".png" else svg
 
 
-def tags_of(text: str, graph: Graph) -> list[str]:
+def tags_of(text: str, graph: cg.Graph) -> list[str]:
     """The tags in `a,b`; a tag may have a comma itself."""
     carried = {tag for node in graph.nodes for tag in node.tags}
     return [text] if text in carried else [tag.strip() for tag in text.split(",") if tag.strip()]

@@ -5,21 +5,18 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cgraph.extend import check_writable
-from dynamics.scenes.inspection import FRAMES, inspection
+from cgraph import extend
 
-from ..models.inspect import inspection_page
-from .arguments import MOMENTUM_FORM, Commands, answer, positive, say, takes_a_scene, unless_json
+from . import library
+from .arguments import MOMENTUM_FORM, answer, positive, say, takes_a_scene, unless_json
+from .command import Command
 from .point_arguments import started, takes_a_start
 
 LONGEST = 1000.0  # s: seconds of work for an arm of ten links
 
 
-def add(commands: Commands[argparse.ArgumentParser]) -> None:
+def add(parser: Command) -> None:
     """The command's arguments."""
-    parser = commands.add_parser(
-        "inspect", help="one page on which a scene's equations unfold, move and answer; status 1 for a motion cut short"
-    )
     takes_a_scene(parser)
     parser.add_argument("--out", type=Path, required=True, help="file to write: .html")
     which = parser.add_mutually_exclusive_group()
@@ -36,13 +33,17 @@ def run(options: argparse.Namespace) -> int:
     if options.out.suffix != ".html":
         raise ValueError(f"--out must end in .html, got {options.out}")
     if options.t_end is not None and options.t_end > LONGEST:
-        raise ValueError(f"--t-end must be at most {LONGEST:g} s, got {options.t_end:g} s: a page has {FRAMES} times")
-    check_writable(options.out)
+        raise ValueError(
+            f"--t-end must be at most {LONGEST:g} s, got {options.t_end:g} s: a page has {library.FRAMES} times"
+        )
+    extend.check_writable(options.out)
     say(f"reading {options.scene}")
     scene, moved = started(options)
-    content = inspection(scene, forward=options.forward, momentum=options.momentum, t_end=options.t_end, say=say)
+    content = library.inspection(
+        scene, forward=options.forward, momentum=options.momentum, t_end=options.t_end, say=say
+    )
     say(f"{scene.name}: writing the page of {sum(len(each.graph.nodes) for each in content.versions)} nodes")
-    text = inspection_page(scene, content, moved)
+    text = library.inspection_page(scene, content, moved)
     sizes = {
         version.name: {
             "nodes": len(version.graph.nodes),

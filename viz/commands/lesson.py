@@ -5,17 +5,17 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cgraph.extend import check_writable
+from cgraph import extend
 
-from ..lessons.lesson import SCREENS, lesson
-from .arguments import Commands, answer, say, scene_of, takes_a_scene
+from . import library
+from .arguments import answer, say, scene_of, takes_a_scene
+from .command import Command
 
 DEFAULT = "spring_mass"
 
 
-def add(commands: Commands[argparse.ArgumentParser]) -> None:
+def add(parser: Command) -> None:
     """The command's arguments."""
-    parser = commands.add_parser("lesson", help="a page for a class, on any scene: predict, reveal, play; with answers")
     takes_a_scene(parser, default=DEFAULT)
     parser.add_argument("--out", type=Path, required=True, help="file to write: .html")
     parser.set_defaults(run=run)
@@ -25,10 +25,11 @@ def run(options: argparse.Namespace) -> None:
     """Write the page."""
     if options.out.suffix != ".html":
         raise ValueError(f"--out must end in .html, got {options.out}")
-    check_writable(options.out)
+    extend.check_writable(options.out)
     scene = scene_of(options)
-    say(f"{scene.name}: deriving the equations and answers of {len(SCREENS)} screens")
-    text = lesson(scene)
+    say(f"{scene.name}: deriving the equations and answers of {len(library.SCREENS)} screens")
+    text = library.lesson(scene)
     answer(
-        f"{options.out}: {len(SCREENS)} screens on {scene.name}; {len(text.encode()) / 1e3:.0f} kB", {options.out: text}
+        f"{options.out}: {len(library.SCREENS)} screens on {scene.name}; {len(text.encode()) / 1e3:.0f} kB",
+        {options.out: text},
     )

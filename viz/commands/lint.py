@@ -5,21 +5,10 @@ from __future__ import annotations
 import argparse
 
 import cgraph as cg
-from dynamics import (
-    ConstraintLint,
-    Verdict,
-    conserved_momenta,
-    display_names,
-    lint_constraints,
-    state_equation,
-)
-from dynamics.equations.both_forms import HAMILTON, LAGRANGE
+import dynamics as dyn
 
-from .. import theme
-from ..models.constant_momenta import constant_momentum
-from ..models.open_loops import tree_alone
+from . import library
 from .arguments import (
-    Commands,
     answer_and_draw,
     check_picture,
     equations_of,
@@ -31,16 +20,13 @@ from .arguments import (
     unless_json,
     verdict_of,
 )
+from .command import Command
 from .point_arguments import REST, box, filled, point
 from .sizes import size_data, size_table
 
 
-def add(commands: Commands[argparse.ArgumentParser]) -> None:
+def add(parser: Command) -> None:
     """The command's arguments."""
-    parser = commands.add_parser(
-        "lint",
-        help="check that a scene's equations are those of the chain rule; status 1 and the blame if they are not",
-    )
     takes_a_scene(parser)
     takes_equations(parser)
     parser.add_argument(
@@ -69,21 +55,22 @@ def run(options: argparse.Namespace) -> int:
         box=options.box,
         at=None if options.at is None else filled(graph, scene, options.at),
         function="K" if options.formulation.startswith("kinetic") else "L",
-        names=display_names(scene),
+        names=dyn.display_names(scene),
     )
     # A path from qd to q is the finding of equations that nothing else is known of; of a formulation the verdict tells.
     faults = [each for each in report.findings if verdict is None or each.kind != "dependence"]
     proof = lint_text(report, verdict)
     proof = proof if scene.ode is None else f"Holds: equations of first order have no velocities.\n{report}"
     ok = not faults and not (verdict and verdict.differs)
-    held = lint_constraints(scene) if scene.ode is None else ConstraintLint({}, {})
+    held = dyn.lint_constraints(scene) if scene.ode is None else dyn.ConstraintLint({}, {})
     if str(held):
         proof = f"{proof}\n{held}"
-    conserved = conserved_momenta(scene) if scene.ode is None else ()
-    proof += "".join([f"\n{constant_momentum(name)}" for name in conserved])
-    sizes = size_data({LAGRANGE: state_equation(scene), HAMILTON: graph}) if options.momentum else {}
+    conserved = dyn.conserved_momenta(scene) if scene.ode is None else ()
+    proof += "".join([f"\n{library.constant_momentum(name)}" for name in conserved])
+    forms = {library.LAGRANGE: dyn.state_equation(scene), library.HAMILTON: graph} if options.momentum else {}
+    sizes = size_data(forms) if forms else {}
     proof += f"\n{size_table(sizes)}" if sizes else ""
-    alone = "" if options.forward else tree_alone(scene)
+    alone = "" if options.forward else library.tree_alone(scene)
     proof = f"{proof}\n{alone}" if alone else proof
     data = {"scene": scene.name, "equations": what, "of_the_tree": bool(alone)} | report.to_dict()
     data |= {"constraints": held.to_dict(), "conserved": list(conserved), "ok": ok and held.ok}
@@ -98,13 +85,13 @@ def run(options: argparse.Namespace) -> int:
         .intersection(graph.nodes),
         marked_label="to blame",
         marked_edges=(verdict.edges | report.edges if verdict.differs else frozenset()) if verdict else report.edges,
-        names=theme.called(display_names(scene)),
+        names=library.theme.called(dyn.display_names(scene)),
         caption=f"{scene.name}: {what}",
     )
     return 0 if ok and held.ok else 1
 
 
-def lint_text(report: cg.Lint, verdict: Verdict | None) -> str:
+def lint_text(report: cg.Lint, verdict: dyn.Verdict | None) -> str:
     """The report with the verdict before it, which tells better than tags what is gained on a path from qd to q."""
     if verdict is None:
         return str(report)

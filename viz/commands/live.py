@@ -5,16 +5,16 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cgraph.extend import check_writable
+from cgraph import extend
 
-from ..models.live import live_page
-from .arguments import Commands, answer, say, takes_a_scene
+from . import library
+from .arguments import answer, say, takes_a_scene
+from .command import Command
 from .point_arguments import started, takes_a_start
 
 
-def add(commands: Commands[argparse.ArgumentParser]) -> None:
+def add(parser: Command) -> None:
     """The command's arguments."""
-    parser = commands.add_parser("live", help="one page that computes a scene's motion, with sliders and meters")
     takes_a_scene(parser)
     takes_a_start(parser)
     parser.add_argument("--out", type=Path, required=True, help="file to write: .html")
@@ -25,8 +25,8 @@ def run(options: argparse.Namespace) -> None:
     """Write the page."""
     if options.out.suffix != ".html":
         raise ValueError(f"--out must end in .html, got {options.out}")
-    check_writable(options.out)
+    extend.check_writable(options.out)
     scene, _ = started(options)
     say(f"{scene.name}: deriving what moves and what is shown")
-    text = live_page(scene)
+    text = library.live_page(scene)
     answer(f"{options.out}: {len(text.encode()) / 1e3:.0f} kB", {options.out: text})

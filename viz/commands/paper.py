@@ -6,13 +6,13 @@ import argparse
 import json
 from pathlib import Path
 
-from ..paper.paper import paper
-from .arguments import Commands, answer, say
+from . import library
+from .arguments import answer, say
+from .command import Command
 
 
-def add(commands: Commands[argparse.ArgumentParser]) -> None:
+def add(parser: Command) -> None:
     """The command's arguments."""
-    parser = commands.add_parser("paper", help="the paper's six figures and its table, measured, in one folder")
     parser.add_argument("--out", type=Path, default=Path("paper"), help="folder to fill (default: paper)")
     parser.add_argument("--quick", action="store_true", help="times of fewer evaluations, and shorter chains")
     parser.add_argument("--json", action="store_true", help="print the figures as JSON on standard output")
@@ -21,6 +21,6 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Write the folder."""
-    files, data = paper(options.out, say, quick=options.quick)
+    files, data = library.paper(options.out, say, quick=options.quick)
     page = f"All of it on one page: {options.out / 'index.html'}"
     answer(json.dumps(data, indent=1) if options.json else page, files, folder=options.out)

@@ -5,17 +5,15 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 
-import numpy as np
+import cgraph as cg
+import dynamics as dyn
+from cgraph import extend
 
-from cgraph import Graph
-from cgraph.extend import Names
-from dynamics import display_names
-from dynamics.scenes.scenes import Scene
-from dynamics.scenes.start import Start, moving_start, rest_text, with_start
-
+from . import library
 from .arguments import number, say, scene_of
 
 SEED, DIGITS = 20250814, 3  # of the numbers that nobody gave: always the same, and short enough to be typed again
+
 DT = 1e-3  # s, the step of an embedded relation
 SHOWN = 12  # inputs that a line of text names
 
@@ -43,15 +41,17 @@ def box(text: str) -> dict[str, tuple[float, float]]:
     return intervals
 
 
-def filled(graph: Graph, scene: Scene, given: dict[str, float]) -> dict[str, float]:
+def filled(graph: cg.Graph, scene: dyn.scenes.Scene, given: dict[str, float]) -> dict[str, float]:
     """The given numbers with the rest that the graph's inputs need, by the graph's names. Raises for unknown names."""
+    import numpy as np
+
     chosen = np.random.default_rng(SEED)
     parameters = scene.parameters
     values = {}
     for name in graph.input_names:
         drawn = round(chosen.uniform(-1.0, 1.0), DIGITS)
         values[name] = parameters[name] if name in parameters else {"dt": DT, "t": 0.0}.get(name, drawn)
-    return values | Names(graph, display_names(scene)).inputs_of("--at", given)
+    return values | extend.Names(graph, dyn.display_names(scene)).inputs_of("--at", given)
 
 
 def takes_a_start(command: argparse.ArgumentParser) -> None:
@@ -65,23 +65,23 @@ def takes_a_start(command: argparse.ArgumentParser) -> None:
     )
 
 
-def start(text: str) -> Start:
+def start(text: str) -> library.Start:
     """`q0=0.3,qd.knee=1` as numbers by name, or `0.3,0,0,1` as all of them, for argparse."""
     return point(text) if "=" in text else [number(each) for each in text.split(",")]
 
 
-def started(options: argparse.Namespace, *, free: bool = True) -> tuple[Scene, str]:
+def started(options: argparse.Namespace, *, free: bool = True) -> tuple[dyn.scenes.Scene, str]:
     """The scene that the arguments name, from the start that they name or one that shows something, and then why.
 
     free: whether nothing drives it, so that it may rest for ever.
     """
     scene = scene_of(options)
     if options.start is not None:
-        return with_start(scene, options.start), ""
-    moving = moving_start(scene) if free else scene
+        return library.with_start(scene, options.start), ""
+    moving = library.moving_start(scene) if free else scene
     if moving is scene:
         return scene, ""
-    why = rest_text(scene, moving)
+    why = library.rest_text(scene, moving)
     say(f"{scene.name}: {why}; --start chooses another")
     return moving, why
 

@@ -10,22 +10,15 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
-from dynamics import EFFECTS, scenes
-from dynamics.experiments.machine import machine
-from dynamics.experiments.work_precision import named_settings, work_precision
-from dynamics.experiments.work_precision.cold_start import STARTS
-from dynamics.experiments.work_precision.comparisons import COMPARISONS
-from dynamics.experiments.work_precision.report import PEERS, to_csv
-from dynamics.integrators import METHODS
+import dynamics as dyn
 
-from ..pages import work_precision as page
-from ..pages.document_files import check_folder, document_files
-from ..plots.plot import check_can_plot
-from . import pruning_report, stability_report
-from .arguments import IN_PYTHON, READING, Commands, answer, number, positive, reading, reads_files, say, unless_json
+from . import library, pruning_report, stability_report
+from .arguments import IN_PYTHON, READING, answer, number, positive, reading, reads_files, say, unless_json
+from .command import Command
 from .point_arguments import start
 
 CURVES, STABILITY, PRUNING, COMPARE = "a report of run times", "--stability", "--pruning", "--compare"
+
 GO_WITH = {  # options that not every kind of report has
     **dict.fromkeys(READING, (CURVES, PRUNING)),
     "t_end": (CURVES,),
@@ -42,15 +35,20 @@ BUDGET = 60.0  # s
 FOLDER = Path("report")
 
 
-def add(commands: Commands[argparse.ArgumentParser]) -> None:
+def add(parser: Command) -> None:
     """The command's arguments."""
-    parser = commands.add_parser("report", help="error beside run time of every integrator, ours and others', as pages")
+    parser.names |= {
+        "scenes": lambda: [*dyn.scenes.names(), *library.named_settings.names()],
+        "methods": lambda: dyn.METHODS,
+        "peers": lambda: library.PEERS,
+        "comparisons": lambda: library.COMPARISONS,
+        "effects": lambda: dyn.EFFECTS,
+    }
     parser.add_argument(
         "scenes",
         nargs="*",
         metavar="SCENE",
-        help=f"{', '.join([*scenes.names(), *named_settings.names()])}, a model file, MJCF or URDF, a case, or "
-        f"{IN_PYTHON}",
+        help=f"{{scenes}}, a model file, MJCF or URDF, a case, or {IN_PYTHON}",
     )
     parser.add_argument(
         "--stability", action="store_true", help="the table of stiff and extreme cases; status 1 for an unexplained row"
@@ -61,8 +59,8 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
     parser.add_argument(
         "--start", type=start, metavar="A=1,B=2", help="instead of the scene's own: by names, or all numbers"
     )
-    parser.add_argument("--methods", metavar="A,B", help=f"only these of {', '.join(METHODS)}")
-    parser.add_argument("--peers", metavar="A,B", help=f"only these of {', '.join(PEERS)}; '' for none")
+    parser.add_argument("--methods", metavar="A,B", help="only these of {methods}")
+    parser.add_argument("--peers", metavar="A,B", help="only these of {peers}; '' for none")
     parser.add_argument("--quick", action="store_true", help="fewer turns, shorter runs, and no cold starts")
     parser.add_argument(
         "--budget", type=positive, metavar="S", help=f"seconds that a cold start may take (default: {BUDGET:g})"
@@ -70,11 +68,11 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
     parser.add_argument(
         "--compare",
         metavar="A,B",
-        help=f"instead: print comparisons at equal error, of {', '.join(COMPARISONS)}; minutes, and no scene",
+        help="instead: print comparisons at equal error, of {comparisons}; minutes, and no scene",
     )
     parser.add_argument("--json", action="store_true", help="print as JSON")
     parser.add_argument("--pruning", action="store_true", help="instead: what the scene's graphs hold and leave out")
-    parser.add_argument("--without", metavar="A,B", help=f"with --pruning: leave out {', '.join(EFFECTS)}")
+    parser.add_argument("--without", metavar="A,B", help="with --pruning: leave out {effects}")
     parser.add_argument(
         "--lock", type=_locked, action="append", metavar="BODY=AT", help="with --pruning: lock a joint there [rad or m]"
     )
@@ -102,7 +100,7 @@ def run(options: argparse.Namespace) -> int | None:
         COMPARE: _comparisons,
     }
     if options.out is not None:
-        check_folder(options.out)
+        library.check_folder(options.out)
     return runs[kind](options)
 
 
@@ -144,25 +142,25 @@ def _exact_motions(out: Path | None) -> Iterator[_Exact]:
 def _comparisons(options: argparse.Namespace) -> None:
     """Print comparisons as they are measured; exact motions are kept where reports keep theirs."""
     names = [name for name in options.compare.split(",") if name]
-    if unknown := [name for name in names if name not in COMPARISONS]:
-        raise ValueError(f"comparisons are {', '.join(COMPARISONS)}, got {unknown[0]!r}")
-    print(machine())
+    if unknown := [name for name in names if name not in library.COMPARISONS]:
+        raise ValueError(f"comparisons are {', '.join(library.COMPARISONS)}, got {unknown[0]!r}")
+    print(library.machine())
     with _exact_motions(options.out) as exact:
-        for name in names or COMPARISONS:
-            for text in COMPARISONS[name](str(exact.folder)):
+        for name in names or library.COMPARISONS:
+            for text in library.COMPARISONS[name](str(exact.folder)):
                 print(f"\n{text}", flush=True)
         answer("", exact.files(), folder=options.out)
 
 
 def _curves(options: argparse.Namespace) -> None:
     """A page of run time beside error for each scene."""
-    named = {named_settings.load(name, reading=reading(options)).name for name in options.scenes}
+    named = {library.named_settings.load(name, reading=reading(options)).name for name in options.scenes}
     if len(named) < len(options.scenes):
         raise ValueError(f"each scene needs a name of its own for its files, got {', '.join(options.scenes)}")
     chosen = {"t_end": options.t_end, "start": options.start, "reading": reading(options)}
-    peers = tuple(PEERS) if options.peers is None else tuple(filter(None, options.peers.split(",")))
+    peers = tuple(library.PEERS) if options.peers is None else tuple(filter(None, options.peers.split(",")))
     if options.out is not None:
-        check_can_plot()
+        library.check_can_plot()
     with _exact_motions(options.out) as exact:
         found, lines, files = _measured(options, chosen, peers, exact.folder)
         answer(unless_json(options, found, "\n".join(lines)), files | exact.files(), folder=options.out)
@@ -174,13 +172,13 @@ def _measured(
     """What a report has: its data, what is printed of it, and its files."""
     found, lines, files = [], [], dict[Path, str | bytes]()
     for name in options.scenes:
-        report = work_precision.work_precision(
+        report = library.work_precision.work_precision(
             name,
-            methods=options.methods.split(",") if options.methods else tuple(METHODS),
+            methods=options.methods.split(",") if options.methods else tuple(dyn.METHODS),
             peers=peers,
             turns=3 if options.quick else 9,
-            limit=0.03 if options.quick else work_precision.LIMIT,
-            cold=() if options.quick else tuple(STARTS),
+            limit=0.03 if options.quick else library.work_precision.LIMIT,
+            cold=() if options.quick else tuple(library.STARTS),
             budget=BUDGET if options.budget is None else options.budget,
             folder=exact,
             options=chosen,
@@ -189,8 +187,8 @@ def _measured(
         content = report.to_dict()
         found.append(content)
         if options.out is not None:
-            document, rows = page.work_precision(content), to_csv(report)
-            files |= (written := document_files(options.out, content["name"], document, content, rows))
+            document, rows = library.work_precision_page.work_precision(content), library.to_csv(report)
+            files |= (written := library.document_files(options.out, content["name"], document, content, rows))
             points = sum(len(each.points) for each in report.curves)
             lines.append(f"{[*written][-1]}: {len(report.curves)} integrators, {points} points")
     return found, lines, files

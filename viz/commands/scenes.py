@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import argparse
 
-from dynamics import forward_dynamics, inverse_dynamics, scenes
+import dynamics as dyn
 
-from .arguments import Commands, answer, unless_json
+from .arguments import answer, unless_json
+from .command import Command
 
 
-def add(commands: Commands[argparse.ArgumentParser]) -> None:
+def add(parser: Command) -> None:
     """The command's arguments."""
-    parser = commands.add_parser("scenes", help="the scenes, with the size of their graphs")
     parser.add_argument("--json", action="store_true", help="print as JSON")
     parser.set_defaults(run=run)
 
@@ -19,9 +19,9 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Print two lines a scene."""
     rows = []
-    for name in scenes.names():
-        scene = scenes.load(name)
-        inverse, forward = inverse_dynamics(scene).counts(), forward_dynamics(scene).counts()
+    for name in dyn.scenes.names():
+        scene = dyn.scenes.load(name)
+        inverse, forward = dyn.inverse_dynamics(scene).counts(), dyn.forward_dynamics(scene).counts()
         rows.append(
             {
                 "name": name,

@@ -6,12 +6,11 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+import dynamics as dyn
+from cgraph import extend
 
-from cgraph.extend import check_writable
-from dynamics import METHODS, Trajectory, simulate
-
-from .arguments import MOMENTUM_FORM, Commands, answer, positive, takes_a_scene, unless_json
+from .arguments import MOMENTUM_FORM, answer, positive, takes_a_scene, unless_json
+from .command import Command
 from .point_arguments import started, takes_a_start
 
 METHOD = "dop853"
@@ -19,19 +18,17 @@ SHOWN = 12  # states that the summary names
 MOST_ROWS = 1_000_000
 
 
-def add(commands: Commands[argparse.ArgumentParser]) -> None:
+def add(parser: Command) -> None:
     """The command's arguments."""
-    parser = commands.add_parser(
-        "simulate", help="the motion of a scene: how the run went, its energy, and as CSV; status 1 if it is cut short"
-    )
     takes_a_scene(parser)
     takes_a_start(parser)
+    parser.names["methods"] = lambda: dyn.METHODS
     parser.add_argument("--t-end", type=positive, metavar="S", help="how long, in place of the scene's time")
     parser.add_argument(
         "--method",
         default=METHOD,
         metavar="NAME",
-        help=f"{', '.join(METHODS)}, or a solver of SciPy, as scipy:Radau (default: {METHOD})",
+        help=f"{{methods}}, or a solver of SciPy, as scipy:Radau (default: {METHOD})",
     )
     parser.add_argument("--momentum", action="store_true", help=f"step {MOMENTUM_FORM}")
     parser.add_argument("--dt", type=positive, metavar="S", help="the largest of equal steps (default: 0.001)")
@@ -45,12 +42,12 @@ def add(commands: Commands[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> int:
     """Print how the run went; 1 where it ends before its time."""
     if options.csv is not None:
-        check_writable(options.csv)
+        extend.check_writable(options.csv)
     scene, _ = started(options)
     end = scene.t_end if options.t_end is None else options.t_end
     form = "momentum" if options.momentum else "velocity"
     at = None if options.every is None else _every(options.every, end)
-    run = simulate(
+    run = dyn.simulate(
         scene,
         scene.q,
         None if scene.ode else scene.qd,
@@ -67,8 +64,10 @@ def run(options: argparse.Namespace) -> int:
     return 0 if run.stats.success else 1
 
 
-def _summary(run: Trajectory) -> dict[str, Any]:
+def _summary(run: dyn.Trajectory) -> dict[str, Any]:
     """How a run went, as data."""
+    import numpy as np
+
     stats = run.stats
     names = [f"q.{name}" for name in run.coordinates] if run.velocities else list(run.coordinates)
     names += [f"qd.{name}" for name in run.velocities]
@@ -94,7 +93,7 @@ def _summary(run: Trajectory) -> dict[str, Any]:
     }
 
 
-def _text(run: Trajectory, data: dict[str, Any]) -> str:
+def _text(run: dyn.Trajectory, data: dict[str, Any]) -> str:
     """The summary in words."""
     at_end = ", ".join([f"{name} = {value:.6g}" for name, value in [*data["end"].items()][:SHOWN]])
     more = len(data["end"]) - SHOWN
@@ -113,8 +112,10 @@ def _text(run: Trajectory, data: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _every(step: float, end: float) -> np.ndarray[Any, np.dtype[np.float64]]:
+def _every(step: float, end: float) -> extend.Array:
     """Times so far apart up to the end, which is one of them. Raises ValueError for more than can be kept."""
+    import numpy as np
+
     count = end / step
     if count > MOST_ROWS:
         raise ValueError(f"--every {step:g} makes {count:.3g} rows of {end:g} s, and {MOST_ROWS} are the most")

@@ -6,11 +6,7 @@ import argparse
 import time
 from pathlib import Path
 
-from dynamics.experiments.stability import stability, stability_table
-
-from ..pages import stability as page
-from ..pages.document_files import document_files
-from ..plots.plot import check_can_plot
+from . import library
 from .arguments import answer, say, unless_json
 
 NAME = "stability"  # of the files
@@ -19,14 +15,16 @@ NAME = "stability"  # of the files
 def run(options: argparse.Namespace) -> int:
     """Write the page and print the table; 1 for a row beyond its bound without a known reason."""
     if options.out is not None:
-        check_can_plot()
+        library.check_can_plot()
     begin = time.perf_counter()
-    found = stability.run(options.quick, say)
-    content = stability.to_dict(found, time.perf_counter() - begin, options.quick)
+    found = library.stability.run(options.quick, say)
+    content = library.stability.to_dict(found, time.perf_counter() - begin, options.quick)
     files: dict[Path, str | bytes] = {}
-    text = stability_table.text(found)
+    text = library.stability_table.text(found)
     if options.out is not None:
-        files |= document_files(options.out, NAME, page.document(content), content, stability.to_csv(found))
+        files |= library.document_files(
+            options.out, NAME, library.stability_page.document(content), content, library.stability.to_csv(found)
+        )
         text = f"{text}\n{[*files][-1]}"
     answer(unless_json(options, content, text), files, folder=options.out)
     unexplained = [f"{each.case} by {each.method}" for each in found if not each.explained]

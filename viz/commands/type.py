@@ -5,15 +5,15 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cgraph.extend import check_writable
+from cgraph import extend
 
-from ..typed import typed_page
-from .arguments import Commands, answer
+from . import library
+from .arguments import answer
+from .command import Command
 
 
-def add(commands: Commands[argparse.ArgumentParser]) -> None:
+def add(parser: Command) -> None:
     """The command's arguments."""
-    parser = commands.add_parser("type", help="a page that a Lagrangian is typed into: derived, checked, drawn, moving")
     parser.add_argument("--out", type=Path, required=True, help="file to write: .html")
     parser.add_argument("--text", type=Path, metavar="FILE", help="what the box holds at first, by default an example")
     parser.set_defaults(run=run)
@@ -23,7 +23,7 @@ def run(options: argparse.Namespace) -> None:
     """Write the page."""
     if options.out.suffix != ".html":
         raise ValueError(f"--out must end in .html, got {options.out}")
-    check_writable(options.out)
+    extend.check_writable(options.out)
     text = None if options.text is None else options.text.read_text(encoding="utf-8")
-    page = typed_page(text)
+    page = library.typed_page(text)
     answer(f"{options.out}: a box for a Lagrangian; {len(page.encode()) / 1e6:.2f} MB", {options.out: page})

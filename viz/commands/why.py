@@ -5,15 +5,11 @@ from __future__ import annotations
 import argparse
 
 import cgraph as cg
-from cgraph import Graph
-from cgraph.extend import Names, cotangents
-from dynamics import conserved_momenta, display_names, scenes
+import dynamics as dyn
+from cgraph import extend
 
-from .. import theme
-from ..models.constant_momenta import constant_momentum
-from ..models.open_loops import tree_alone
+from . import library
 from .arguments import (
-    Commands,
     answer_and_draw,
     check_picture,
     equations_of,
@@ -24,12 +20,12 @@ from .arguments import (
     unless_json,
     whole,
 )
+from .command import Command
 from .point_arguments import REST, filled, point, point_text
 
 
-def add(commands: Commands[argparse.ArgumentParser]) -> None:
+def add(parser: Command) -> None:
     """The command's arguments."""
-    parser = commands.add_parser("why", help="the paths by which an output depends on an input, and what they weigh")
     takes_a_scene(parser)
     parser.add_argument("output", metavar="OUTPUT", help="such as tau0, or tau.knee of a joint by its name")
     parser.add_argument("input", metavar="INPUT", help="such as q2, or q.hip")
@@ -45,9 +41,9 @@ def run(options: argparse.Namespace) -> None:
     check_picture(options)
     scene = scene_of(options)
     graph, _ = equations_of(options, scene)
-    names = Names(graph, display_names(scene))
+    names = extend.Names(graph, dyn.display_names(scene))
     at = filled(graph, scene, options.at)
-    found = cg.why(graph, options.output, options.input, at=at, k=options.k, names=display_names(scene))
+    found = cg.why(graph, options.output, options.input, at=at, k=options.k, names=dyn.display_names(scene))
     if not found.count:
         _not_connected(options, scene, names)
         return
@@ -59,7 +55,7 @@ def run(options: argparse.Namespace) -> None:
     gap = abs(total - derivative)
     balance = {"sum_over_all_paths": total, "derivative_by_reverse_sweep": derivative, "difference": gap}
     what = "sum of path products" if all_listed else f"sum over all {found.count} path products"
-    alone = "" if options.forward else tree_alone(scene)
+    alone = "" if options.forward else library.tree_alone(scene)
     text = f"At {point_text(shown)}:\n{found}\n|{what} - derivative by a reverse sweep| = {gap:.2g}"
     text = f"{text}\n{alone}" if alone else text
     answer_and_draw(
@@ -67,15 +63,15 @@ def run(options: argparse.Namespace) -> None:
         unless_json(options, {"depends": True, "of_the_tree": bool(alone), "at": at} | found.to_dict() | balance, text),
         graph,
         marked_edges=found.edges,
-        names=theme.called(display_names(scene)),
+        names=library.theme.called(dyn.display_names(scene)),
         caption=f"{found.output} depends on {found.input}: {len(found.paths)} of {found.count} paths",
     )
 
 
-def _not_connected(options: argparse.Namespace, scene: scenes.Scene, names: Names) -> None:
+def _not_connected(options: argparse.Namespace, scene: dyn.scenes.Scene, names: extend.Names) -> None:
     graph = names.graph
-    stops = cg.why_not(graph, options.output, options.input, names=display_names(scene))
-    alone = "" if options.forward else tree_alone(scene)
+    stops = cg.why_not(graph, options.output, options.input, names=dyn.display_names(scene))
+    alone = "" if options.forward else library.tree_alone(scene)
     constant = _constant(scene, names, options) if options.momentum else ""
     here = set(graph.nodes)  # an input that nothing uses is none of the graph's nodes
     answer_and_draw(
@@ -92,24 +88,24 @@ def _not_connected(options: argparse.Namespace, scene: scenes.Scene, names: Name
             f"made from {stops.input}": stops.reached & here,
             f"{stops.output} is made from it": stops.made_from & here,
         },
-        names=theme.called(display_names(scene)),
+        names=library.theme.called(dyn.display_names(scene)),
         caption=f"{stops.output} does not depend on {stops.input}",
     )
 
 
-def _constant(scene: scenes.Scene, names: Names, options: argparse.Namespace) -> str:
+def _constant(scene: dyn.scenes.Scene, names: extend.Names, options: argparse.Namespace) -> str:
     """That the momentum is constant whose rate was asked for, or the coordinate that its rate was asked by; or ""."""
     output, source = names.meant(options.output), names.meant(options.input)
     told = [
-        constant_momentum(name)
+        library.constant_momentum(name)
         for i, name in enumerate(scene.velocities)
         if output == f"p{i}_dot" or (source == f"q{i}" and scene.coordinates[i] == name)
-        if name in conserved_momenta(scene)
+        if name in dyn.conserved_momenta(scene)
     ]
     return "\n".join(told)
 
 
-def _by_reverse_sweep(names: Names, output: str, source: str, at: dict[str, float]) -> float:
+def _by_reverse_sweep(names: extend.Names, output: str, source: str, at: dict[str, float]) -> float:
     """d output / d source by the library's reverse mode, which knows no paths."""
-    (bar,) = cotangents({names.output(output): cg.constant(1.0)}, [names.one(source)])
-    return float(Graph(names.graph.inputs, {"bar": bar}).evaluate(at)["bar"])
+    (bar,) = extend.cotangents({names.output(output): cg.constant(1.0)}, [names.one(source)])
+    return float(cg.Graph(names.graph.inputs, {"bar": bar}).evaluate(at)["bar"])

@@ -477,6 +477,6 @@ def test_a_run_that_is_interrupted_prints_what_it_has(capsys, monkeypatch):
         yield row("planar 3", ours=cell(0.2, 0.0))
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("viz.commands.bench.bench", rows)
+    monkeypatch.setattr("dynamics.experiments.speed.bench.bench", rows)
     assert cli.main(["bench"]) == 130
     assert "planar 3  0.200" in capsys.readouterr().out

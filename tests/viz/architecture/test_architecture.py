@@ -60,6 +60,7 @@ def test_a_name_leads_to_the_file_in_which_it_is_written(tmp_path: Path) -> None
             "p.more.inner": "inner = 1",
             "p.one": "from p import g\nx = g()",
             "p.two": "import p\nx = p.g()",
+            "p.all": "import p\nx = p.g()\nfor name in names:\n  getattr(p, name)",
             "p.three": "from .more import METHODS, inner\nimport numpy\nx = 1",
         },
     )
@@ -68,7 +69,8 @@ def test_a_name_leads_to_the_file_in_which_it_is_written(tmp_path: Path) -> None
         "p.more": {"p.more.inner"},
         "p.more.inner": set(),
         "p.one": {"p.low"},
-        "p.two": {"p.low", "p.more"},
+        "p.two": {"p.low"},
+        "p.all": {"p.low", "p.more"},
         "p.three": {"p.more", "p.more.inner"},
     }
 
@@ -139,7 +141,7 @@ def test_the_command_prints_and_draws(
     assert cli.main(["architecture", "viz", "--out", str(tmp_path / "viz.dot")]) == 0
     assert "loose modules in viz: viz.__main__, viz.cli, viz.theme" in capsys.readouterr().out
     assert '"viz.cli" -> "viz.commands"' in (tmp_path / "viz.dot").read_text(encoding="utf-8")
-    monkeypatch.setattr("viz.commands.architecture.architecture", lambda package: library)
+    monkeypatch.setattr("viz.commands.library.architecture", lambda package: library)
     assert cli.main(["architecture", "--json"]) == (0 if library.sound else 1)
     assert json.loads(capsys.readouterr().out) == library.to_dict()
     assert cli.main(["architecture", "--out", "a.jpg"]) == 2

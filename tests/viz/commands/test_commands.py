@@ -362,7 +362,7 @@ def test_two_runs_print_the_same_bytes(capsys):
     ],
 )
 def test_the_answer_is_marked(tmp_path, capsys, monkeypatch, arguments, status, colors):
-    monkeypatch.setattr("viz.commands.arguments.render_svg", lambda drawing: drawing.source)  # a picture takes seconds
+    monkeypatch.setattr("viz.commands.library.render_svg", lambda drawing: drawing.source)  # a picture takes seconds
     target = tmp_path / "answer.svg"
     said(capsys, *arguments, "--svg", str(target), status=status)
     heavy = [line for line in target.read_text(encoding="utf-8").splitlines() if "penwidth" in line]

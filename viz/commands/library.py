@@ -1,0 +1,55 @@
+"""What commands use of the library beyond its public names, loaded when a command runs."""
+# ruff: noqa: F401
+# mypy: implicit-reexport
+
+from cgraph.extend import doors
+
+TYPE_CHECKING = False
+
+if TYPE_CHECKING:
+    from dynamics.equations.both_forms import (
+        HAMILTON,
+        LAGRANGE,
+        VELOCITIES_ALONE,
+        both_forms,
+        form_agreement,
+        form_sizes,
+    )
+    from dynamics.equations.node_classes import form_classes, formulation_classes
+    from dynamics.experiments import pruning
+    from dynamics.experiments.machine import machine
+    from dynamics.experiments.speed import bench as speed
+    from dynamics.experiments.speed.bench_figures import FIGURES
+    from dynamics.experiments.speed.bench_table import tables
+    from dynamics.experiments.stability import stability, stability_table
+    from dynamics.experiments.text_table import table
+    from dynamics.experiments.work_precision import named_settings, work_precision
+    from dynamics.experiments.work_precision.cold_start import STARTS
+    from dynamics.experiments.work_precision.comparisons import COMPARISONS
+    from dynamics.experiments.work_precision.report import PEERS, to_csv
+    from dynamics.integrators import TABLEAUS
+    from dynamics.io.load import compiled
+    from dynamics.scenes.inspection import FRAMES, inspection
+    from dynamics.scenes.start import Start, moving_start, rest_text, with_start
+    from dynamics.verification.certificate import certify
+
+    from .. import theme
+    from ..animation.canvas import KINDS, check_can_animate
+    from ..architecture.architecture import architecture
+    from ..architecture.picture import to_dot as architecture_dot
+    from ..graph_drawing.dot import to_dot
+    from ..graph_drawing.render import check_can_draw, render_png, render_svg, tags_to_collapse
+    from ..lessons.lesson import SCREENS, lesson
+    from ..models.animate import Array, animate, frames
+    from ..models.constant_momenta import constant_momentum
+    from ..models.inspect import inspection_page
+    from ..models.live import live_page
+    from ..models.open_loops import tree_alone
+    from ..pages import pruning as pruning_page, stability as stability_page, work_precision as work_precision_page
+    from ..pages.document_files import check_folder, document_files
+    from ..paper.paper import paper
+    from ..plots.plot import check_can_plot
+    from ..typed import typed_page
+
+if not TYPE_CHECKING:
+    __getattr__, __dir__ = doors(__name__, __file__)
