@@ -22,7 +22,7 @@ SPREADS = (0.3, 1.0, 0.1, 3.0, 0.01, 0.001, 10.0, 0.0001) * 2  # of random start
 ITERATIONS, HALVINGS = 50, 12  # of Newton's method for such a state
 TRUNCATED = 4e-3  # of the largest singular value: what it does not close in `nearly_closed`
 LAST, LONGEST = 1e-9, 0.5  # steps there, of displacements
-DEPENDENT = 1e-9  # a row of length 1 is one of the others if this much of it is left without them
+DEPENDENT = 1e-9  # of the largest row of a loop, or of a row of no loop: one of the others if no more of it is left
 CLEAR = 1e-5  # what is left of rows that are independent: less is also seen where a state is singular but for rounding
 SMALL = 1e-6  # of the first gap: what Newton's method closes to rounding in a step or two
 OPEN = 0.5  # certain digits of a row that is not 0
@@ -70,9 +70,7 @@ def independent_rows(constraints: Constraints) -> tuple[int, ...]:
     for point in numbers.states():
         matrix = numbers.certain_matrix(point)
         acting |= matrix.any(axis=1)
-        rows, columns = factors(constraints, matrix)
-        matrix[np.linalg.norm(rows[:, None] * matrix * columns, axis=1) <= DEPENDENT] = 0.0  # of its loop: rounding
-        shares = _independent(matrix)
+        shares = _independent(constraints, matrix)
         if min(shares.values(), default=1.0) < CLEAR:
             doubtful.append(shares)
             continue
@@ -80,11 +78,9 @@ def independent_rows(constraints: Constraints) -> tuple[int, ...]:
         if len(clear) == STATES or len(shares) == len(constraints):
             break
     kept = max(clear or doubtful, key=len)
-    if not clear:
-        rows = " and ".join([f"{constraints.names[k]!r} ({x:.1e})" for k, x in kept.items() if x < CLEAR])
-        text = (
-            f"at every state seen next to nothing is new of {rows}, beside rows of size 1: kept, it may hold the motion"
-        )
+    small = [f"{constraints.names[k]!r} ({x:.1e} of it is new)" for k, x in kept.items() if x < CLEAR]
+    if small and not clear:
+        text = f"at all states seen next to nothing is new of {' and '.join(small)}: kept, and may hold the motion"
         warnings.warn(text, ConstraintWarning, stacklevel=2)
     dropped = [name for k, name in enumerate(constraints.names) if k not in kept and acting[k]]
     if dropped:
@@ -303,19 +299,15 @@ def equilibrated(matrix: Array) -> Array:
     return rows[:, None] * matrix * columns
 
 
-def _independent(matrix: Array) -> dict[int, float]:
-    """Rows that are not sums of earlier ones: Gram and Schmidt, on rows and columns scaled to be alike.
+def _independent(constraints: Constraints, matrix: Array) -> dict[int, float]:
+    """Rows of J that are not sums of earlier ones, and how much of each is new: Gram and Schmidt.
 
-    With what is left of each without those before, of rows of length 1.
+    Rows of one loop share one scale: scaled by itself, a row that is small at a flat position looks as good as any.
     """
-    scaled = equilibrated(matrix)
+    rows, columns = factors(constraints, matrix)
     kept: dict[int, float] = {}
     basis: list[Array] = []
-    for k, row in enumerate(scaled):
-        length = float(np.linalg.norm(row))
-        if not length:
-            continue
-        rest = row / length
+    for k, rest in enumerate(rows[:, None] * matrix * columns):
         for _ in range(2):
             for unit in basis:
                 rest = rest - (unit @ rest) * unit
