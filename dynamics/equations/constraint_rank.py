@@ -17,10 +17,13 @@ from ..systems.constraints import ConstraintError, Constraints
 from ..systems.kinematics import ZERO
 from .substitute import substitute
 
-STATES = 3  # states that meet the constraints, at which rows are compared
+STATES = 3  # states that meet the constraints and whose rank is clear, at which rows are compared
 SPREADS = (0.3, 1.0, 0.1, 3.0, 0.01, 0.001, 10.0, 0.0001) * 2  # of random starts about the neutral coordinates
 ITERATIONS, HALVINGS = 50, 12  # of Newton's method for such a state
-DEPENDENT = 1e-9  # a row of length 1 is one of the others if this much of it is left without them
+TRUNCATED = 4e-3  # of the largest singular value: what it does not close in `nearly_closed`
+LAST, LONGEST = 1e-9, 0.5  # steps there, of displacements
+DEPENDENT = 1e-9  # of the largest row of a loop, or of a row of no loop: one of the others if no more of it is left
+CLEAR = 1e-5  # what is left of rows that are independent: less is also seen where a state is singular but for rounding
 SMALL = 1e-6  # of the first gap: what Newton's method closes to rounding in a step or two
 OPEN = 0.5  # certain digits of a row that is not 0
 FOLLOWS = 4.0  # more digits of one that follows from others: the rounding of axes and lengths that it has in common
@@ -53,20 +56,32 @@ class ConstraintWarning(UserWarning):
 def independent_rows(constraints: Constraints) -> tuple[int, ...]:
     """Indices of the rows that do not follow from those before them, at all states seen.
 
-    The states are random ones that meet the constraints, since rows may depend on one another only there. Warns of
-    rows that are left out, unless they hold nothing, as the third of a point in a plane.
+    The states are random ones that meet the constraints, since rows may depend on one another only there. Where the
+    rank is less than elsewhere, a state that is known to the rounding e of the rows is off by sqrt(e), and so are rows
+    that follow from others: states at which as little of a row is new count only if no others are seen. Warns of that,
+    and of rows that are left out, unless they hold nothing, as the third of a point in a plane.
 
     Raises ConstraintError where no state is seen that meets all.
     """
     numbers = row_numbers(constraints)
-    kept: list[int] = []
+    clear: list[dict[int, float]] = []
+    doubtful: list[dict[int, float]] = []
     acting = np.zeros(len(constraints), dtype=bool)
     for point in numbers.states():
         matrix = numbers.certain_matrix(point)
-        kept = max(kept, _independent(matrix), key=len)
         acting |= matrix.any(axis=1)
-        if len(kept) == len(constraints):
+        shares = _independent(constraints, matrix)
+        if min(shares.values(), default=1.0) < CLEAR:
+            doubtful.append(shares)
+            continue
+        clear.append(shares)
+        if len(clear) == STATES or len(shares) == len(constraints):
             break
+    kept = max(clear or doubtful, key=len)
+    small = [f"{constraints.names[k]!r} ({x:.1e} of it is new)" for k, x in kept.items() if x < CLEAR]
+    if small and not clear:
+        text = f"at all states seen next to nothing is new of {' and '.join(small)}: kept, and may hold the motion"
+        warnings.warn(text, ConstraintWarning, stacklevel=2)
     dropped = [name for k, name in enumerate(constraints.names) if k not in kept and acting[k]]
     if dropped:
         names = " and ".join(map(repr, dropped))
@@ -108,26 +123,47 @@ class RowNumbers:
             self.landed = Graph([*self.inputs, *displaced.values()], outputs)
 
     def states(self) -> Iterator[dict[str, float]]:
-        """Some random states that meet the constraints: values of q0.., t and parameters."""
-        rng, found = np.random.default_rng(0), 0
+        """Random states that meet the constraints: values of q0.., t and parameters.
+
+        Newton's method is drawn to where the rank is less; half of the states are nearly closed first.
+        """
+        rng, found = np.random.default_rng(0), False
         nearest: tuple[float, int] | None = None
         neutral = np.array(self.constraints.kinematics.neutral)
-        for spread in SPREADS:
-            start = neutral + spread * rng.uniform(-1.0, 1.0, self.nq)
-            closing = self.closed(start, float(rng.uniform(0.3, 1.2)))
+        for k, spread in enumerate(SPREADS):
+            q, t = neutral + spread * rng.uniform(-1.0, 1.0, self.nq), float(rng.uniform(0.3, 1.2))
+            if (k + 2 * k // len(SPREADS)) % 2:  # each spread once
+                point = self.nearly_closed(self.point(q, {"t": t, **self.constraints.parameters}))[1]
+                near = np.array([point[f"q{i}"] for i in range(self.nq)])
+                q = near if np.isfinite(near).all() else q
+            closing = self.closed(q, t)
             if closing.worst is None:
                 yield closing.point
-                found += 1
-                if found == STATES:
-                    return
+                found = True
             elif nearest is None or closing.size < nearest[0]:
                 nearest = closing.size, closing.worst
-        if found:
-            return
-        row = 0 if nearest is None else nearest[1]
-        raise ConstraintError(
-            f"the constraints cannot be met: no state was seen where {self.constraints.names[row]!r} is 0"
-        )
+        if not found:
+            row = 0 if nearest is None else nearest[1]
+            raise ConstraintError(
+                f"the constraints cannot be met: no state was seen where {self.constraints.names[row]!r} is 0"
+            )
+
+    def nearly_closed(self, point: dict[str, float]) -> tuple[float, dict[str, float]]:
+        """Newton's method without small singular values: what it leaves of a loop, and where; inf if it never ends."""
+        with np.errstate(all="ignore"):
+            for _ in range(ITERATIONS):
+                phi, matrix = self.gaps(point), self.matrix(point)
+                if not (np.isfinite(phi).all() and np.isfinite(matrix).all()):
+                    break
+                rows, columns = factors(self.constraints, matrix)
+                left = rows[: len(phi)] * phi
+                step = -np.linalg.lstsq((rows[:, None] * matrix * columns)[: len(phi)], left, rcond=TRUNCATED)[0]
+                size = float(np.linalg.norm(step))
+                shorter = min(1.0, LONGEST / size) if size else 1.0
+                point = self.point(self.moved_by(point, shorter * columns * step), point)
+                if size < LAST:
+                    return float(np.abs(rows[: len(phi)] * self.gaps(point)).max(initial=0.0)), point
+        return np.inf, point
 
     def closed(self, q: Array, t: float, parameters: Mapping[str, float] | None = None) -> Closing:
         """A state that meets phi = 0, by Newton's method with halved steps from q.
@@ -263,20 +299,19 @@ def equilibrated(matrix: Array) -> Array:
     return rows[:, None] * matrix * columns
 
 
-def _independent(matrix: Array) -> list[int]:
-    """Rows that are not sums of earlier ones: Gram and Schmidt, on rows and columns scaled to be alike."""
-    scaled = equilibrated(matrix)
-    kept: list[int] = []
+def _independent(constraints: Constraints, matrix: Array) -> dict[int, float]:
+    """Rows of J that are not sums of earlier ones, and how much of each is new: Gram and Schmidt.
+
+    Rows of one loop share one scale: scaled by itself, a row that is small at a flat position looks as good as any.
+    """
+    rows, columns = factors(constraints, matrix)
+    kept: dict[int, float] = {}
     basis: list[Array] = []
-    for k, row in enumerate(scaled):
-        length = float(np.linalg.norm(row))
-        if not length:
-            continue
-        rest = row / length
+    for k, rest in enumerate(rows[:, None] * matrix * columns):
         for _ in range(2):
             for unit in basis:
                 rest = rest - (unit @ rest) * unit
-        if np.linalg.norm(rest) > DEPENDENT:
-            kept.append(k)
-            basis.append(rest / np.linalg.norm(rest))
+        if (left := float(np.linalg.norm(rest))) > DEPENDENT:
+            kept[k] = left
+            basis.append(rest / left)
     return kept

@@ -11,6 +11,8 @@ solved here) differ from those that make the action stationary under them (vakon
 
 from __future__ import annotations
 
+from itertools import islice
+
 import numpy as np
 
 import cgraph as cg
@@ -75,7 +77,7 @@ def integrable_rows(model: Model) -> dict[str, bool]:
     numbers, curvature = RowNumbers(system.constraints), _Curvature(system)
     kept = list(range(len(system.constraints)))
     rng = np.random.default_rng(1)
-    states = list(numbers.states())[:STATES]
+    states = list(islice(numbers.states(), STATES))
     while True:
         bent = {k for point in states for k in curvature.bent(point, numbers.matrix(point), kept, rng)}
         if not bent:

@@ -29,12 +29,10 @@ from .constraint_rank import (
 NAMED = 1e-2  # of the largest row of its loop: a row of which no more is left is named, though it is kept
 STATES = 6
 SPREADS = (1.0, 0.3, 3.0, 0.1, 2.0, 0.5, 1.5, 0.03)  # of random starts about the neutral coordinates
-TRUNCATED = 4e-3  # of the largest singular value: what Newton's method does not close
 FAR = 1e3  # of the gap that a row was left out with
 OPEN, WORSE = 1e-1, 30.0  # of a loop, at most, once it has arrived; and of the state that closes best
 EXACT = 1e-12  # of a row that is a sum of others but for the rounding of axes and lengths
 ALIKE = 0.5  # of the largest row: one that is as good
-ITERATIONS, ARRIVED, LONGEST = 60, 1e-9, 0.5  # of Newton's method: steps, the last, and the longest, of displacements
 
 
 class Left(NamedTuple):
@@ -157,29 +155,11 @@ def _nearly_closed(constraints: Constraints, numbers: RowNumbers) -> list[dict[s
     for spread in SPREADS:
         q = neutral + spread * rng.uniform(-1.0, 1.0, numbers.nq)
         point = numbers.point(q, {"t": float(rng.uniform(0.3, 1.2)), **constraints.parameters})
-        gap, point = _closed(constraints, numbers, point)
+        gap, point = numbers.nearly_closed(point)
         if gap < OPEN:
             found.append((gap, point))
     found.sort(key=lambda pair: pair[0])
     return [point for gap, point in found[:STATES] if gap <= WORSE * found[0][0] + DEPENDENT]
-
-
-def _closed(constraints: Constraints, numbers: RowNumbers, point: dict[str, float]) -> tuple[float, dict[str, float]]:
-    """Newton's method without small singular values: what it leaves of a loop, inf if it does not arrive, and where."""
-    with np.errstate(all="ignore"):
-        for _ in range(ITERATIONS):
-            phi, matrix = numbers.gaps(point), numbers.matrix(point)
-            if not (np.isfinite(phi).all() and np.isfinite(matrix).all()):
-                break
-            rows, columns = factors(constraints, matrix)
-            left = rows[: len(phi)] * phi
-            step = -np.linalg.lstsq((rows[:, None] * matrix * columns)[: len(phi)], left, rcond=TRUNCATED)[0]
-            size = float(np.linalg.norm(step))
-            shorter = min(1.0, LONGEST / size) if size else 1.0
-            point = numbers.point(numbers.moved_by(point, shorter * columns * step), point)
-            if size < ARRIVED:
-                return float(np.abs(rows[: len(phi)] * numbers.gaps(point)).max(initial=0.0)), point
-    return np.inf, point
 
 
 def _unit(constraints: Constraints, k: int) -> str:
