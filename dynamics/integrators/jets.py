@@ -149,7 +149,7 @@ class _Jets:
     def _refuse(self, node: Node) -> None:
         partials = [as_node(each).value for each in node.op.partials(node, *node.args)]
         if columns(node.op).piece is not None or node.op.name in JUMPS or all(value == 0.0 for value in partials):
-            where = f", in {node.label}" if node.label.tags else ""
+            where = f", in what is tagged {', '.join(map(repr, sorted(node.tags)))}" if node.tags else ""
             raise NoSeriesError(
                 f"method 'taylor' needs equations that are smooth, and {node.op.name} has no Taylor series"
                 f"{where}: take another method, such as 'dop853'"
