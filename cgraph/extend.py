@@ -67,8 +67,16 @@ if TYPE_CHECKING:
     from .operations.register import register
     from .operations.table import OPS
     from .program.choose_runner import runner
-    from .program.program import Call, Factor, If, Map, Program, Solve, Statement, Sum, While
+    from .program.derivatives.linearization import Linearization, Linearized
+    from .program.derivatives.tape import Tape, run_passes
+    from .program.derivatives.transforms import ProgramVjp, Pulled, program_jvp, program_vjp
+    from .program.program import Program
     from .program.runner import Record, Runner
+    from .program.statement import STATEMENTS, Statement, StatementRow, register_statement, require_length
+    from .program.statements.call import Call, Map, Sum
+    from .program.statements.control import FixedPoint, If, While
+    from .program.statements.matrix import Factor, Solve
+    from .program.statements.memory import Pop, Push, Take
     from .simplification.identities import rewritten, shortened
     from .simplification.polynomial import Polynomial, expand, format_polynomial
     from .simplification.reciprocals import with_reciprocals
@@ -96,6 +104,7 @@ __all__ = [
     "ADJOINT",
     "OPS",
     "PRIMAL",
+    "STATEMENTS",
     "TANGENT",
     "UNLABELLED",
     "Array",
@@ -103,8 +112,11 @@ __all__ = [
     "Call",
     "CompressedJacobian",
     "Factor",
+    "FixedPoint",
     "Formulas",
     "If",
+    "Linearization",
+    "Linearized",
     "Map",
     "MathML",
     "Names",
@@ -112,13 +124,20 @@ __all__ = [
     "Op",
     "Order",
     "Polynomial",
+    "Pop",
     "Program",
+    "ProgramVjp",
+    "Pulled",
+    "Push",
     "Record",
     "Runner",
     "SingularError",
     "Solve",
     "Statement",
+    "StatementRow",
     "Sum",
+    "Take",
+    "Tape",
     "While",
     "as_node",
     "atomic_write",
@@ -144,18 +163,23 @@ __all__ = [
     "nearest",
     "or_nearest",
     "picture",
+    "program_jvp",
+    "program_vjp",
     "real_array",
     "real_number",
     "register",
+    "register_statement",
     "require_choice",
     "require_flag",
     "require_graph",
+    "require_length",
     "require_mapping",
     "require_path",
     "require_sequence",
     "require_texts",
     "require_whole",
     "rewritten",
+    "run_passes",
     "runner",
     "scipy_integrate",
     "share",

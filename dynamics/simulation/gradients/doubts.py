@@ -73,7 +73,7 @@ def _half_steps(legs: Legs) -> list[str]:
     parts = tuple([_halved(leg, run) for leg, run in zip(motion.legs, legs.runs, strict=True)])
     beside = replace(motion, x=motion.x * ASIDE, legs=parts, tau=tau)
     try:
-        every = [2 * (run.checkpoints or max(1, len(run.motion.h) // LOOKS)) for run in legs.runs]
+        every = [2 * (run.tape.checkpoints or max(1, len(run.motion.h) // LOOKS)) for run in legs.runs]
         other = Legs(beside, legs.programs, legs.events, every)
     except MotionError as stopped:
         return [f"its error is unknown: in steps of half the length {stopped}"]

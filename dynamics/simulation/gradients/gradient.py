@@ -168,7 +168,7 @@ def gradient(
     value, gradients, legs = differentiated(motion, loss, running, watched)
     for text in doubts(legs, value, gradients)[0]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    nq, checkpoints = motion.problem.nq, max([run.checkpoints for run in legs.runs])
+    nq, checkpoints = motion.problem.nq, max([run.tape.checkpoints for run in legs.runs])
     x = legs.end
     return MotionGradient(float(value), gradients, legs.t, x[:nq], x[nq:], checkpoints)
 
