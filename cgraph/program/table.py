@@ -2,9 +2,22 @@
 
 from __future__ import annotations
 
-from .derivatives import call_rules, control_rules, fixed_point_rules, matrix_rules, memory_rules
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
 from .statement import StatementRow, register_statement
 from .statements import call, control, matrix, memory
+
+
+def _later(file: str, name: str) -> Callable[..., Any]:
+    """A rule of `derivatives`, which is loaded when it is first asked for: most runs have no derivatives."""
+
+    def rule(*arguments: Any) -> Any:
+        return getattr(import_module(f"{__package__}.derivatives.{file}"), name)(*arguments)
+
+    return rule
+
 
 ROWS = [
     StatementRow(
@@ -16,8 +29,8 @@ ROWS = [
         graph="graph",
         text=call.call_text,
         beside=call.call_beside,
-        jvp=call_rules.push_call,
-        transpose=call_rules.pull_call,
+        jvp=_later("call_rules", "push_call"),
+        transpose=_later("call_rules", "pull_call"),
     ),
     *[
         StatementRow(
@@ -29,8 +42,8 @@ ROWS = [
             graph="graph",
             text=text,
             beside=call.elements_beside,
-            jvp=call_rules.push_elements,
-            transpose=call_rules.pull_elements,
+            jvp=_later("call_rules", "push_elements"),
+            transpose=_later("call_rules", "pull_elements"),
         )
         for kind, run, text in ((call.Map, call.run_map, call.map_text), (call.Sum, call.run_sum, call.sum_text))
     ],
@@ -41,8 +54,8 @@ ROWS = [
         run=matrix.run_factor,
         check=matrix.check_matrix,
         text=matrix.factor_text,
-        jvp=matrix_rules.push_factor,
-        transpose=matrix_rules.pull_factor,
+        jvp=_later("matrix_rules", "push_factor"),
+        transpose=_later("matrix_rules", "pull_factor"),
     ),
     StatementRow(
         matrix.Solve,
@@ -51,8 +64,8 @@ ROWS = [
         run=matrix.run_solve,
         check=matrix.check_matrix,
         text=matrix.solve_text,
-        jvp=matrix_rules.push_solve,
-        transpose=matrix_rules.pull_solve,
+        jvp=_later("matrix_rules", "push_solve"),
+        transpose=_later("matrix_rules", "pull_solve"),
     ),
     StatementRow(
         control.If,
@@ -62,9 +75,9 @@ ROWS = [
         check=control.check_control,
         bodies=("body", "otherwise"),
         text=control.if_text,
-        assign=control_rules.assign_if,
-        jvp=control_rules.push_if,
-        transpose=control_rules.pull_if,
+        assign=_later("control_rules", "assign_if"),
+        jvp=_later("control_rules", "push_if"),
+        transpose=_later("control_rules", "pull_if"),
     ),
     StatementRow(
         control.While,
@@ -74,9 +87,9 @@ ROWS = [
         check=control.check_control,
         bodies=("body",),
         text=control.while_text,
-        assign=control_rules.assign_while,
-        jvp=control_rules.push_while,
-        transpose=control_rules.pull_while,
+        assign=_later("control_rules", "assign_while"),
+        jvp=_later("control_rules", "push_while"),
+        transpose=_later("control_rules", "pull_while"),
         reruns=True,
     ),
     StatementRow(
@@ -87,9 +100,9 @@ ROWS = [
         check=control.check_control,
         bodies=("body",),
         text=control.while_text,
-        assign=fixed_point_rules.assign_fixed_point,
-        jvp=fixed_point_rules.push_fixed_point,
-        transpose=fixed_point_rules.pull_fixed_point,
+        assign=_later("fixed_point_rules", "assign_fixed_point"),
+        jvp=_later("fixed_point_rules", "push_fixed_point"),
+        transpose=_later("fixed_point_rules", "pull_fixed_point"),
     ),
     StatementRow(
         memory.Take,
@@ -99,8 +112,8 @@ ROWS = [
         check=memory.check_take,
         text=memory.take_text,
         beside=memory.take_beside,
-        jvp=memory_rules.push_take,
-        transpose=memory_rules.pull_take,
+        jvp=_later("memory_rules", "push_take"),
+        transpose=_later("memory_rules", "pull_take"),
     ),
     StatementRow(
         memory.Push,
@@ -109,8 +122,8 @@ ROWS = [
         run=memory.run_push,
         check=memory.check_stack,
         text=memory.push_text,
-        jvp=memory_rules.push_push,
-        transpose=memory_rules.pull_push,
+        jvp=_later("memory_rules", "push_push"),
+        transpose=_later("memory_rules", "pull_push"),
     ),
     StatementRow(
         memory.Pop,
@@ -119,8 +132,8 @@ ROWS = [
         run=memory.run_pop,
         check=memory.check_stack,
         text=memory.pop_text,
-        jvp=memory_rules.push_pop,
-        transpose=memory_rules.pull_pop,
+        jvp=_later("memory_rules", "push_pop"),
+        transpose=_later("memory_rules", "pull_pop"),
     ),
 ]
 for _row in ROWS:
