@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
@@ -36,7 +37,7 @@ class MotionRun:
         count, width = len(motion.h), self.step.forward.program.width
         fits = every > 0 or 8 * width * count * max(1, motion.many) <= MOST_RECORDED
         self._every = every or 1
-        self.tape = Tape(self.step.forward, self._feed, 0 if fits else math.ceil(math.sqrt(count)))
+        self.tape = Tape(self.step.forward, partial(_fed, motion), 0 if fits else math.ceil(math.sqrt(count)))
         self._memory = self._begin()
         self._run(0, count - arrives)
         if not arrives:
@@ -59,20 +60,10 @@ class MotionRun:
         values = {handed.get(name, name): forward.read(memory, after).copy() for name, after in passes.handed.items()}
         return _memory(self.step.forward, {**given, **values}, motion.many)
 
-    def _feed(self, first: int, last: int) -> Array:
-        """What the steps first .. last - 1 are fed."""
-        motion, part = self.motion, slice(first, last)
-        columns = np.stack([motion.t[:-1][part], motion.h[part]], axis=1)
-        if not motion.each_step:
-            return columns
-        tau = motion.tau[part]
-        wide = np.broadcast_to(columns[..., None], (*columns.shape, motion.many)) if motion.many else columns
-        return np.concatenate([wide, tau], axis=1)
-
     def tried(self) -> Array:
         """Where the last step arrives, (m,)."""
         count, memory = len(self.motion.h), self._memory.copy()
-        self.step.forward.run(memory, 1, 1, self._feed(count - 1, count))
+        self.step.forward.run(memory, 1, 1, _fed(self.motion, count - 1, count))
         return self.step.forward.read(memory, self.step.passes.handed["x"])
 
     def finish(self) -> None:
@@ -106,7 +97,7 @@ class MotionRun:
         before, first, size = memory, 0, PIECE
         while first < len(motion.h):
             before, last = memory.copy(), min(first + size, len(motion.h))
-            run_passes(forward, memory, last - first, last - first, self._feed(first, last))
+            run_passes(forward, memory, last - first, last - first, _fed(motion, first, last))
             if not self._bad(memory, k):
                 first = last
             elif last - first == 1:
@@ -216,3 +207,14 @@ def _memory(ready: Runner, values: Mapping[str, Array], many: int) -> Array:
         name: value if value.ndim != 1 else np.repeat(value[:, None], many, axis=1) for name, value in known.items()
     }
     return ready.memory(wide, many)
+
+
+def _fed(motion: MotionOf, first: int, last: int) -> Array:
+    """What the steps first .. last - 1 are fed."""
+    part = slice(first, last)
+    columns = np.stack([motion.t[:-1][part], motion.h[part]], axis=1)
+    if not motion.each_step:
+        return columns
+    tau = motion.tau[part]
+    wide = np.broadcast_to(columns[..., None], (*columns.shape, motion.many)) if motion.many else columns
+    return np.concatenate([wide, tau], axis=1)
