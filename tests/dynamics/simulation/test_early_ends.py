@@ -17,7 +17,7 @@ from tests.slow import slow
 
 USUAL = "dop853 radau rk4 verlet".split()
 FORMS = ("velocity", "momentum")
-EARLY = r"(\d+ of \d+ trajectories: of \d+, )?the run stopped at t = [\d.e-]+ s.* \S"
+EARLY = r"(the run stopped|\d+ of \d+ trajectories stopped early: trajectory \d+) at t = [\d.e-]+ s.* \S"
 
 
 def falling(metre: float) -> dyn.System:
@@ -35,6 +35,12 @@ def early(run: Callable[[], Any]) -> tuple[Any, list[str]]:
     return result, [text for each in caught if re.match(EARLY, text := str(each.message))]
 
 
+def which(many: dyn.Ensemble, k: int) -> str:
+    """A trajectory, and where it stopped."""
+    assert many.stats.message[k].startswith("stopped at t = ")
+    return f"trajectory {k}{many.stats.message[k].removeprefix('stopped')}"
+
+
 @mark.parametrize("metre", [1.0, *slow(1e-6, 1e6)])
 @mark.parametrize("form", FORMS)
 @mark.parametrize("method", [*USUAL, *slow(*[name for name in METHODS if name not in USUAL])])
@@ -47,7 +53,7 @@ def test_a_run_into_a_centre_of_force_is_heard(method: str, form: str, metre: fl
     assert not (METHODS[method].adaptive and run.success)
     assert said == ([] if run.success else [f"the run {run.message}"])
     many, said = early(lambda: dyn.simulate_many(model, [[1.0 / metre]], [0.0], 2.0, t_eval=times, **given))
-    assert said == ([] if many.stats.success[0] else [f"1 of 1 trajectories: of 0, the run {many.stats.message[0]}"])
+    assert said == ([] if many.stats.success[0] else ["1 of 1 trajectories stopped early: " + which(many, 0)])
 
 
 @mark.parametrize("method", ["dop853", "rk4"])
@@ -66,7 +72,7 @@ def test_runs_of_random_systems_are_whole_or_heard(seed: int, method: str) -> No
     assert [said for _, said in runs] == [[] if run.success else [f"the run {run.message}"] for run, _ in runs]
     many, said = early(lambda: dyn.simulate_many(model, starts, None, 10.0, t_eval=[10.0], **given))
     stopped = np.flatnonzero(~many.stats.success)
-    assert said == [f"{len(stopped)} of 3 trajectories: of {k}, the run {many.stats.message[k]}" for k in stopped[:1]]
+    assert said == [f"{len(stopped)} of 3 trajectories stopped early: " + which(many, k) for k in stopped[:1]]
     assert many.stats.success.tolist() == [run.success for run, _ in runs]
 
 

@@ -124,7 +124,9 @@ def test_what_is_warned_of_is_what_was_asked_for() -> None:
     dyn.simulate(spring(), [1.0], [0.0], 1.0, "rk4", dt=0.1, rtol=1e-8, atol=[1e-5, 1e-5])
     with warns(dyn.SimulationWarning, match="coordinate 'x'"):
         dyn.simulate(spring(), [1.0], [0.0], 1.0, "rk4", dt=0.1, rtol=1e-8, atol=[0.0, 1e-5])
-    with warns(dyn.SimulationWarning, match="1 of 2 trajectories: of 1, the state is off by an estimated"):
+    with warns(
+        dyn.SimulationWarning, match="1 of 2 trajectories has a warning: trajectory 1: the state is off by an estimated"
+    ):
         many = dyn.simulate_many(
             spring(), [[1e-3], [1.0]], [0.0], 1.0, "rk4", dt=0.1, rtol=1e-12, atol=1e-7, backend="python"
         )

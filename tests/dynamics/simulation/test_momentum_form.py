@@ -238,7 +238,7 @@ def test_velocities_that_momenta_do_not_have_are_no_silent_result(model: Any, t_
     with pytest.warns(dyn.SimulationWarning, match=said) as record:
         run = dyn.simulate(model, [0.0], [0.9], **how)
     assert run.stats.warnings == tuple([str(each.message) for each in record])
-    with pytest.warns(dyn.SimulationWarning, match=f"1 of 2 trajectories: of 1, .*{said}"):
+    with pytest.warns(dyn.SimulationWarning, match=f"1 of 2 trajectories has a warning: trajectory 1: .*{said}"):
         fan = dyn.simulate_many(model, [0.0], [[-2.0 if model is BOUNDED else 0.0], [0.9]], **how)
     assert [len(texts) for texts in fan.stats.warnings] == [0, len(run.stats.warnings)]
 
