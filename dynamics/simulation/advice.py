@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph.extend import Array, many
 
 from .run_options import RunOptions
 from .stepping import Integration
@@ -39,5 +39,5 @@ def advise(
         whole = trial.steps + trial.rejected < TRIED
         if not (trial.status and whole) and abs(t - options.t0) >= length * trial.steps > 0.0:
             at = run.warnings.index(run.stiff)
-            run.warnings[at] += f"; try method={name!r}, which comes to t = {t:.6g} s in {trial.steps} steps"
+            run.warnings[at] += f"; try method={name!r}, which comes to t = {t:.6g} s in {many(trial.steps, 'step')}"
             return
