@@ -152,11 +152,24 @@ class AdaptiveIntegration(NativeIntegration):
         if not np.isfinite(rate).all():
             first = self.components[int(np.flatnonzero(~np.isfinite(rate))[0])]
             return f"{where}the rate of {first} is not finite{' at the start' if t == self.options.t0 else ''}"
+        if self._slope(memory):
+            return f"{where}{self.slope} is not finite, and method {self.options.method!r} takes it"
         if reason := self.nonfinite(self.runner.read(memory, "x_new")):
             return f"{where}{reason}, however small"
         fastest = self.components[int(np.argmax(np.abs(rate) / self._scale(x, x)))]
         h = self._number(memory, "tried")
         return f"{where}the step, {h:.3g} s, is below the resolution of the time; fastest is {fastest}"
+
+    def _slope(self, memory: Array) -> str:
+        """Note the first derivative of the rate, of those that the method takes, that is not finite; empty if all are."""
+        names, lengths = self.components, self.program.steps.registers
+        for register, by in (("time_slope", ["the time"]), ("jacobian", names)):
+            bad = np.argwhere(~np.isfinite(self.runner.read(memory, register))) if lengths.get(register) else []
+            if len(bad):
+                row, column = divmod(int(bad[0, 0]), len(by))
+                self.slope = f"the derivative of the rate of {names[row]} by {by[column]}"
+                break
+        return self.slope
 
     def _rate(self, t: float, x: Array) -> Array:
         rate = self.program.rate

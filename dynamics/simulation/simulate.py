@@ -181,6 +181,8 @@ def simulate(
     steps: list[StepBlock] | None = [] if dense_output else None
     outcome = _integrate(run, x, recorder, options, steps)
     advise(run, recorder.last, options, x, made if hold is None else None)
+    if outcome.early:
+        outcome = outcome._replace(message=run.status, early=(f"the run {run.status}",))
 
     # Put the result together
     rows, held = recorder.table(), None if hold is None else hold.held

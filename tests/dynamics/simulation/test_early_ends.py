@@ -111,3 +111,23 @@ def test_a_method_that_stops_is_not_advised() -> None:
     assert (len(said), len(run.stats.warnings)) == (1, 1)
     assert "the system is stiff" in run.stats.warnings[0]
     assert "try" not in run.stats.warnings[0]
+
+
+STEEP: dict[str, tuple[dyn.OdeSystem, str]] = {
+    "rodas": (dyn.OdeSystem(lambda x, t: [cg.sqrt(t) - x[0]], ["x"]), "by the time"),
+    "radau": (dyn.OdeSystem(lambda x, t: [1.0 + cg.sqrt(x[0])], ["x"]), "by state 'x'"),
+}
+
+
+@mark.parametrize("watched", [False, True])
+@mark.parametrize("method", STEEP)
+def test_a_derivative_that_a_method_lacks_is_named_with_a_method_that_takes_none(method: str, watched: bool) -> None:
+    model, by = STEEP[method]
+    events = dyn.Event("never", lambda x, t: x[0] + 1.0) if watched else ()
+    run, said = early(lambda: dyn.simulate(model, [0.0], None, 1.0, method, events=events))
+    assert said == [f"the run {run.message}"]
+    assert f"stopped at t = 0 s: the derivative of the rate of state 'x' {by} is not finite" in run.message
+    found = re.search(r"; try method='(\w+)', which comes to t = 1 s in (\d+) steps$", run.message)
+    assert found is not None
+    other = dyn.simulate(model, [0.0], None, 1.0, found[1], events=events)
+    assert (other.success, other.stats.steps) == (True, int(found[2]))
