@@ -153,11 +153,11 @@ def gradient_many(
         first = part if isinstance(part, int) else part.start
         try:
             motion = _some(motions, problem, part)
-            losses, slopes, legs = differentiated(motion, loss, running)
+            losses, slopes, legs, ends = differentiated(motion, loss, running)
         except MotionError as error:
             early[first] = str(error)
             continue
-        arrived, texts = np.atleast_1d(np.isfinite(legs.end).all(axis=0)), doubts(legs, losses, slopes)
+        arrived, texts = np.atleast_1d(np.isfinite(legs.end).all(axis=0)), doubts(legs, losses, slopes, ends)
         rows = first + np.flatnonzero(arrived)
         value[rows], end[rows] = np.atleast_1d(losses)[arrived], _by_motion(legs.end, part)[arrived]
         for name, array in slopes.items():

@@ -9,6 +9,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics.equations.consistent_state import nearest_state
 from dynamics.systems.model import as_system
 from tests.early_end import stops
 
@@ -221,7 +222,7 @@ def test_what_the_momentum_form_has_not_is_said() -> None:
     for run in (dyn.simulate, dyn.simulate_many):
         with pytest.raises(ValueError, match="first order"):
             run(first_order, [[1.0]] if run is dyn.simulate_many else [1.0], None, 1.0, t_eval=[1.0], form="momentum")
-    q, qd = dyn.consistent_state(four_bar(), [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    q, qd = nearest_state(four_bar(), [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
     with pytest.raises(dyn.ConstraintError, match="holds the momenta"):
         dyn.simulate(four_bar(), q, qd, 1.0, form="momentum")
 
