@@ -194,7 +194,7 @@ def test_a_loss_that_is_no_number_is_said() -> None:
         assert (result.value, words) == (0.0, ["the loss is 0, and its gradient by 'qd' is not finite"])
         many, words = said(partial(dyn.gradient_many, SPRING, root, [[0.5], [-0.5], [-0.6]], [0.0], **given))
         assert np.isnan(many.value).tolist() == [False, True, True]
-        assert words == ["2 of 3 motions: of 1, the loss is nan of a motion that is finite"]
+        assert words == ["2 of 3 motions doubtful: motion 1: the loss is nan of a motion that is finite"]
 
 
 def test_a_motion_that_does_not_arrive_is_told_with_time_and_coordinate(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -218,7 +218,7 @@ def test_a_motion_that_does_not_arrive_is_told_with_time_and_coordinate(monkeypa
         starts = [[0.1, 0.0], [1.0, 0.0], [0.2, 0.0], [2.0, 0.0]]
         many, words = said(partial(dyn.gradient_many, model, end, starts, None, 2.0, method, **given))
         assert len(words) == 1
-        assert words[0].startswith("2 of 4 motions: of 1, the motion ")
+        assert words[0].startswith("2 of 4 motions stopped early: motion 1: the motion ")
         assert "stopped at t = " in words[0]
         for k in (0, 2):
             alone = dyn.gradient(model, end, starts[k], None, 2.0, method, **given)

@@ -247,7 +247,7 @@ def test_velocities_that_momenta_do_not_have_are_no_silent_result(model: Any, t_
 @pytest.mark.parametrize("derive", [dyn.gradient_many, *slow(dyn.gradient, dyn.sensitivities)])
 def test_nor_are_their_derivatives(derive: Any) -> None:
     where = [] if derive is dyn.sensitivities else [lambda q, qd, t: q[0]]
-    qd, number = ([[0.0], [0.9]], "1 of 2 motions: of 1, ") if derive is dyn.gradient_many else ([0.9], "")
+    qd, number = ([[0.0], [0.9]], "1 of 2 motions doubtful: motion 1: ") if derive is dyn.gradient_many else ([0.9], "")
     given = {"form": "momentum", "wrt": "q", "backend": "python", "estimate_error": False}
     with pytest.warns(dyn.SimulationWarning, match=f"{number}the momenta of the start .*0.1.* in place of 0.9"):
         derive(FOLDED, *where, [0.0], qd, 0.1, "euler", dt=0.1, **given)
