@@ -27,9 +27,9 @@ label may have. `certain_digits` says what rounding leaves of the outputs.
 **At the edges**: `real_array`, `real_number`, `is_finite`, `check_name`, `require_graph`, `require_flag`,
 `require_whole`, `require_choice`, `require_sequence`, `require_mapping` and `require_path` check what a caller passed,
 `thread_count` reads `threads=`, `share` gives work to threads, `atomic_write` writes a file whole or not at all,
-`write_files` several, and `check_writable` looks beforehand; `html_table`, `html_text`, `html_lines` and `picture` are
-what a notebook shows of a result; `install` ends an error about a missing package,
-`scipy_integrate` gives SciPy's module or raises it. `Array` is the type of an array of float64.
+`write_files` several, and `check_writable` looks beforehand; `many` is a number with its noun; `html_table`,
+`html_text`, `html_lines` and `picture` are what a notebook shows of a result; `install` ends an error about a missing
+package, `scipy_integrate` gives SciPy's module or raises it. `Array` is the type of an array of float64.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, building, cotangents
@@ -84,6 +84,7 @@ if TYPE_CHECKING:
     from .util.doors import doors
     from .util.extras import install
     from .util.html_text import html_lines, html_table, html_text, picture
+    from .util.many import many
     from .util.nearest import nearest, or_nearest
     from .util.real_arrays import is_finite, real_array, real_number
     from .util.require import (
@@ -160,6 +161,7 @@ __all__ = [
     "is_finite",
     "ldl_elimination",
     "ldl_solve",
+    "many",
     "nearest",
     "or_nearest",
     "picture",

@@ -381,6 +381,7 @@ CALLS |= {
     "extend.is_finite": call(extend.is_finite, 1.0),
     "extend.ldl_elimination": call(extend.ldl_elimination, [[4.0], [2.0, 2.0]], [10.0, 6.0]),
     "extend.ldl_solve": call(extend.ldl_solve, [[ONE], [X, Y]], [ONE, Y], None, check=False),
+    "extend.many": call(extend.many, 2, "node"),
     "extend.nearest": call(extend.nearest, "a", ["b"], 3),
     "extend.or_nearest": call(extend.or_nearest, "a", ["b"]),
     "extend.picture": call(extend.picture, "nothing", 3),
