@@ -16,15 +16,8 @@ import numpy as np
 from cgraph.extend import Array
 
 from ..systems.constraints import Constraints
-from .constraint_rank import (
-    DEPENDENT,
-    ConstraintWarning,
-    RowNumbers,
-    equilibrated,
-    factors,
-    independent_rows,
-    row_numbers,
-)
+from .constraint_rank import DEPENDENT, ConstraintWarning, independent_rows
+from .row_numbers import RowNumbers, equilibrated, factors, row_numbers
 
 NAMED = 1e-2  # of the largest row of its loop: a row of which no more is left is named, though it is kept
 STATES = 6
