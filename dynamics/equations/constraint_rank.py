@@ -79,8 +79,8 @@ def independent_rows(constraints: Constraints) -> tuple[int, ...]:
 def _independent(matrix: Array, rows: Array, columns: Array) -> dict[int, float]:
     """Rows of J that are not sums of earlier ones, and how much of each is new: Gram and Schmidt.
 
-    rows, columns: factors by what J is about the state; by what it is there a row that is small at a flat position would
-    look as good as any.
+    rows, columns: factors by what J is about the state; by what it is there a row that is small at a flat position
+    would look as good as any.
     """
     kept: dict[int, float] = {}
     basis: list[Array] = []
