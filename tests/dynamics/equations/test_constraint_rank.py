@@ -16,8 +16,13 @@ from tests.dynamics.models import Array
 from tests.slow import slow
 
 
-def parallelogram(rng: np.random.Generator, cranks: int, units: float) -> tuple[dyn.System, Array, Array]:
-    """A table of 1 m on cranks; the motion it has, in angles, and the unit of each coordinate, in rad."""
+def parallelogram(
+    rng: np.random.Generator, cranks: int, units: float, longer: float = 0.0
+) -> tuple[dyn.System, Array, Array]:
+    """A table of 1 m on cranks; the motion it has, in angles, and the unit of each coordinate, in rad.
+
+    longer: by how much of its length the last crank is longer.
+    """
     length, places = rng.uniform(0.3, 0.6), [0.0, *([rng.uniform(0.4, 0.6)] if cranks == 3 else []), 1.0]
     hung = float(rng.integers(2))  # whether the table's angle is counted from the first crank
     of_q = 10.0 ** rng.uniform(-units, units, cranks + 1)
@@ -40,7 +45,8 @@ def parallelogram(rng: np.random.Generator, cranks: int, units: float) -> tuple[
         table, rows = angles[-1] + hung * angles[0], {}
         for k in range(1, cranks):
             for axis, unit, function, along in zip("xy", of_rows[k], (cg.cos, cg.sin), (places[k], 0.0), strict=True):
-                gap = length * function(angles[0]) + places[k] * function(table) - length * function(angles[k]) - along
+                other = length * (1.0 + longer * (k == cranks - 1))
+                gap = length * function(angles[0]) + places[k] * function(table) - other * function(angles[k]) - along
                 rows[f"{axis} of {k}"] = unit * gap
         return rows
 
@@ -59,6 +65,23 @@ def test_parallelograms_of_rows_in_any_units_have_one_freedom(cranks: int, units
         said = [str(each.message) for each in caught]
         assert len(kept) == cranks, (seed, said)
         assert [("left out" in each) for each in said] == [True] * (cranks - 2)
+
+
+@pytest.mark.parametrize("longer", [1e-13, 1e-6, *slow(1e-16, 1e-10, 1e-4, 1e-2)])
+def test_a_crank_that_is_a_little_longer_does_not_hold_a_parallelogram_in_silence(longer: float) -> None:
+    system, along, _ = parallelogram(np.random.default_rng(0), 3, 0.0, longer)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            _, qd = dyn.consistent_state(system, 0.7 * along, along)
+        except dyn.ConstraintError as error:
+            said = str(error)
+            assert longer > 1e-12
+            assert "says nothing that the others do not say" in said or "no state was seen" in said
+            return
+    texts = [str(each.message) for each in caught]
+    assert np.abs(qd - along).max() < 1e-9 + 10.0 * longer or any("moved onto them" in text for text in texts)
+    assert longer > 1e-12 or any("follows from the others and is left out" in text for text in texts)
 
 
 @pytest.mark.parametrize("seed", [0, *slow(*range(1, 20))])
