@@ -10,7 +10,8 @@ copies nodes through a builder, `topological` gives all nodes that some nodes re
 `with_reciprocals` leaves one division for a divisor.
 
 **Differentiate**: `cotangents` pulls from outputs, `tangents` pushes from inputs, `hessian_nodes` gives the lower
-triangle of second derivatives, all as nodes. `compressed_jacobian` gives the parts of a loop over colors of columns.
+triangle of second derivatives, all as nodes. `compressed_jacobian` gives the parts of a loop over colors of columns,
+`jets` the Taylor coefficients of a solution.
 
 **Solve**: `solve_nodes` is `cg.hessian_solve` on nodes, `solve_tangents` the same with the tangents of all that lies
 between, `ldl_solve` the dense factorization; all raise `SingularError`. `ldl_elimination` does the same over any
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
     from .autodiff.compressed_jacobian import CompressedJacobian, compressed_jacobian
     from .autodiff.hessian_solve import Order, solve_nodes, solve_tangents
     from .autodiff.jacobian import hessian_nodes
+    from .autodiff.jets import Jets, NoSeriesError, jets
     from .autodiff.ldl_solve import ldl_elimination, ldl_solve
     from .autodiff.symmetric_elimination import SingularError
     from .core.builder import Builder, folded
@@ -105,9 +107,11 @@ __all__ = [
     "Factor",
     "Formulas",
     "If",
+    "Jets",
     "Map",
     "MathML",
     "Names",
+    "NoSeriesError",
     "Notation",
     "Op",
     "Order",
@@ -139,6 +143,7 @@ __all__ = [
     "html_text",
     "install",
     "is_finite",
+    "jets",
     "ldl_elimination",
     "ldl_solve",
     "nearest",

@@ -12,11 +12,11 @@ import math
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Call, If, Map, Program, Statement, Sum
+from cgraph.extend import Call, If, Jets, Map, NoSeriesError, Program, Statement, Sum, jets
 
+from ..systems.arguments import TIME
 from .elementwise import SAME, compensated, function
 from .explicit import stage_time
-from .jets import Jets, jets
 from .problem import Problem
 from .step_control import accept_step, control, count, first_pass, recorded, registers, trial
 
@@ -27,7 +27,7 @@ CHECKED = 2.0**-46  # relative: rounding of the rates, below which a defect says
 
 def taylor(order: int, problem: Problem, dense: bool) -> Program:
     """A trial of one step of at most that order."""
-    m, graphs = problem.size, jets(problem.rate, problem.size)
+    m, graphs = problem.size, _jets(problem)
     orders = range(1, order + 1)
     begin = Call(graphs.start, ("x", "t", "p"), ("rate", "zeros"))
     none = Graph([], {f"order{k}": float(k) for k in orders})
@@ -52,6 +52,15 @@ def taylor(order: int, problem: Problem, dense: bool) -> Program:
     lengths |= dict.fromkeys([*single, *[f"{name}{k}" for name in ("order", "takes") for k in orders]], 1)
     record = recorded(dense, order)
     return Program({**registers(problem), **lengths}, body, record, record_if="accepted", stop="status")
+
+
+def _jets(problem: Problem) -> Jets:
+    try:
+        return jets(problem.rate, problem.size, TIME)
+    except NoSeriesError as error:
+        raise NoSeriesError(
+            f"method 'taylor' needs equations that are smooth, and {error}: take another method, such as 'dop853'"
+        ) from None
 
 
 def _orders(order: int) -> Call:
