@@ -355,7 +355,7 @@ CALLS |= {
     "extend.check_name": call(lambda name: extend.check_name("a body", name), "b"),
     "extend.check_writable": call(extend.check_writable, "file"),
     "extend.compressed_jacobian": call(extend.compressed_jacobian, GRAPH, None),
-    "extend.jets": call(extend.jets, GRAPH, 1),
+    "extend.jets": call(extend.jets, GRAPH, "t", exact=False),
     "extend.cotangents": call(extend.cotangents, {X * Y: ONE}, [X, Y], None, fixed=(), through={}, zero_wins=False),
     "extend.expand": call(extend.expand, X * Y, {X: "a"}),
     "extend.folded": call(extend.folded, [X * Y], extend.Builder(), {X: Y}),

@@ -11,6 +11,7 @@ from contextlib import AbstractContextManager
 from typing import Any, NamedTuple
 
 from ..core.builder import Builder
+from ..core.checks import check_name
 from ..core.graph import Graph
 from ..core.label import Label
 from ..core.node import CONSTANT, Node, as_node, constant, variable
@@ -20,7 +21,7 @@ from ..operations.operation import columns
 from ..operations.series import by_partials
 from ..operations.table import equal, where
 from ..simplification.simplify import simplify
-from ..util.require import require_flag, require_graph, require_whole
+from ..util.require import require_flag, require_graph
 from ..writing.naming import variables
 
 
@@ -48,7 +49,7 @@ class Jets(NamedTuple):
     >>> import cgraph as cg
     >>> from cgraph.extend import jets
     >>> x = cg.variable("x")
-    >>> growth = jets(cg.Graph([x], {"rate": x * x}), 1)
+    >>> growth = jets(cg.Graph([x], {"rate": x * x}))
     >>> growth.zeros, growth.sums
     (1, 1)
     """
@@ -65,15 +66,13 @@ class NoSeriesError(ValueError):
     """An operation without a Taylor series in the equations."""
 
 
-def jets(rate: Graph, m: int, time: str = "t", *, exact: bool = False) -> Jets:
+def jets(rate: Graph, time: str = "t", *, exact: bool = False) -> Jets:
     """The Taylor coefficients of a solution of xdot = f(x, t), as graphs.
 
     Parameters
     ----------
     rate : Graph
-        f. Its first m inputs are the states, in the order of its outputs; the others are constant, but for the time.
-    m : int
-        How many states there are.
+        f. Its first inputs are the states, one for each output; the others are constant, but for the time.
     time : str
         The name of the input that is t.
     exact : bool
@@ -91,6 +90,8 @@ def jets(rate: Graph, m: int, time: str = "t", *, exact: bool = False) -> Jets:
         For an operation that jumps; unless `exact`, for a piecewise one, too.
     TypeError
         For what is no graph.
+    ValueError
+        For a graph with more rates than inputs.
 
     Examples
     --------
@@ -99,12 +100,14 @@ def jets(rate: Graph, m: int, time: str = "t", *, exact: bool = False) -> Jets:
     >>> import cgraph as cg
     >>> from cgraph.extend import jets
     >>> x = cg.variable("x")
-    >>> made = jets(cg.Graph([x], {"rate": x}), 1)
+    >>> made = jets(cg.Graph([x], {"rate": x}))
     >>> made.order.evaluate({"rate0": 1.0, "unit": 1.0, "order": 2.0})
     {'0': 0.5, '1': 0.5}
     """
     require_graph("jets", rate)
-    return _Jets(rate, require_whole("m", m), time, require_flag("exact", exact)).graphs()
+    if len(rate.outputs) > len(rate.inputs):
+        raise ValueError(f"jets needs a state for each rate, got {len(rate.outputs)} rates of {len(rate.inputs)} inputs")
+    return _Jets(rate, check_name("the time", time), require_flag("exact", exact)).graphs()
 
 
 class _Shared:
@@ -131,8 +134,8 @@ class _Shared:
 class _Jets:
     """The orders of a series, for the rules of the operations."""
 
-    def __init__(self, rate: Graph, m: int, time: str, exact: bool) -> None:
-        self.rate, self.exact = rate, exact
+    def __init__(self, rate: Graph, time: str, exact: bool) -> None:
+        self.rate, self.exact, m = rate, exact, len(rate.outputs)
         self.build: Any = _Shared(rate) if exact else Builder()
         self.before = variables([f"rate{i}" for i in range(m)])
         self.unit, self.k = variables(["unit", "order"])

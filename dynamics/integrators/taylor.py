@@ -56,7 +56,7 @@ def taylor(order: int, problem: Problem, dense: bool) -> Program:
 
 def _jets(problem: Problem) -> Jets:
     try:
-        return jets(problem.rate, problem.size, TIME)
+        return jets(problem.rate, TIME)
     except NoSeriesError as error:
         raise NoSeriesError(
             f"method 'taylor' needs equations that are smooth, and {error}: take another method, such as 'dop853'"

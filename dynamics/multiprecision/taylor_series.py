@@ -30,7 +30,7 @@ class Series:
     def __init__(self, graph: Graph, states: Sequence[str], constants: Mapping[str, Any], number: Any) -> None:
         self.number, self._m = number, len(states)
         try:
-            self._jets = jets(graph, self._m, TIME, exact=True)
+            self._jets = jets(graph, TIME, exact=True)
         except NoSeriesError as error:
             raise NotImplementedError(f"a reference solution needs Taylor series, and {error}") from None
         self._pieces = {node: k for k, node in enumerate(self._jets.pieces)}
