@@ -106,7 +106,7 @@ def jets(rate: Graph, time: str = "t", *, exact: bool = False) -> Jets:
     """
     require_graph("jets", rate)
     if len(rate.outputs) > len(rate.inputs):
-        raise ValueError(f"jets needs a state for each rate, got {len(rate.outputs)} rates of {len(rate.inputs)} inputs")
+        raise ValueError(f"jets needs a state for each rate, got {len(rate.outputs)} rates, {len(rate.inputs)} inputs")
     return _Jets(rate, check_name("the time", time), require_flag("exact", exact)).graphs()
 
 
