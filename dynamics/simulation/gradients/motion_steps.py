@@ -7,10 +7,11 @@ from functools import partial
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Call, Statement
+from cgraph.extend import Call, Map, Statement
 
 from ...integrators import Method, Problem
-from ...integrators.explicit import registers
+from ...integrators.elementwise import SAME
+from ...integrators.equal import registers
 from ...systems.arguments import TIME, new_variables
 from .linearization import Linearization
 from .motion_equations import PARAMETERS, MotionEquations
@@ -47,10 +48,9 @@ def motion_steps(
     new in every step.  sharing: whether the rate records what its pullback needs of it.
     """
     problem = equations.problem
-    assert method.step is not None
     made = method.step(problem)
-    lengths = {**registers(problem), **made.lengths, **equations.lengths, "arrival": 1}
-    body: list[Statement] = [*made.body, *_arrival(problem)]
+    lengths = {**made.lengths, **registers(problem), **equations.lengths, "arrival": 1}
+    body: list[Statement] = [*made.derived, Map(SAME, ("x_new",), ("x",)), *_arrival(problem)]
     carried = ["x"]
     if running is not None:
         (before,) = new_variables(LOSS, 1, running.input_names)
