@@ -24,6 +24,7 @@ from .problem import (
 from .radau import ORDER as RADAU_ORDER, radau_step
 from .rosenbrock import RODAS5P, rosenbrock_step
 from .step import Step
+from .step_control import measured
 from .symplectic import composed_step, partitioned_step
 from .tableau import TABLEAUS, Tableau
 from .taylor import ORDER as TAYLOR_ORDER, taylor_step
@@ -96,6 +97,7 @@ __all__ = [
     "force",
     "in_form",
     "jacobian_statements",
+    "measured",
     "mechanics",
     "momentum_form",
     "quantity",

@@ -12,7 +12,7 @@ from cgraph.extend import Call, Map, Program, Statement, Sum
 
 from .elementwise import SAME
 from .problem import Problem
-from .step import Step, rate_calls
+from .step import Step, rate_calls, with_registers
 from .step_control import first_pass
 
 
@@ -24,7 +24,7 @@ def registers(problem: Problem) -> dict[str, int]:
 
 def equal(step: Step, problem: Problem) -> Program:
     """One step a pass."""
-    lengths = {**step.lengths, **registers(problem)}
+    lengths = with_registers(step, registers(problem))
     body: list[Statement] = [*step.prepare, *step.body, *step.kept, Map(SAME, ("x_new",), ("x",))]
     body += _advance(rate_calls(problem, step.prepare, step.body))
     if step.failed:

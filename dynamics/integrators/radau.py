@@ -139,7 +139,7 @@ def _matrices(m: int) -> list[Statement]:
         rows.append([*diagonal(-b, row), *same])
     entries: dict[str, Node | float] = {f"{k}": entry for k, entry in enumerate(entry for row in rows for entry in row)}
     both = Graph([*(entry for row in jacobian for entry in row), h], entries)
-    both_factored = [Call(both, ("jacobian", "h"), ("complex",)), Factor("complex", "pivots2")]
+    both_factored: list[Statement] = [Call(both, ("jacobian", "h"), ("complex",)), Factor("complex", "pivots2")]
     return [real, Factor("real", "pivots"), *both_factored]
 
 

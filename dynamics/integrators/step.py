@@ -9,6 +9,9 @@ from cgraph.extend import Call, Factor, Solve, Statement, While
 
 from .problem import Problem
 
+# What a step may read of a run; in equal steps and derivatives those for which it has lengths are 0.
+SHARED = ("x", "x_new", "t", "h", "p", "rtol", "atol", "leap", "next", "evaluations", "error", "held", "accepted")
+
 
 @dataclass(frozen=True, eq=False)
 class Step:
@@ -100,6 +103,14 @@ class Step:
     def branches(self) -> bool:
         """Whether what is done depends on numbers, so that steps from several states cannot go side by side."""
         return any(isinstance(each, While | Factor | Solve) for each in (*self.start, *self.derived))
+
+
+def with_registers(step: Step, own: Mapping[str, int]) -> dict[str, int]:
+    """All registers: a step's, and those of what wraps it. Raises ValueError where one name has two meanings."""
+    twice = [name for name in (*step.lengths, *step.dense_lengths) if name in own and name not in SHARED]
+    if twice:
+        raise ValueError(f"a step cannot have a register {twice[0]!r}: a run has another of that name")
+    return {**step.lengths, **own}
 
 
 def rate_calls(problem: Problem, *statements: Sequence[Statement]) -> int:

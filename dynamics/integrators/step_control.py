@@ -25,7 +25,7 @@ from cgraph.extend import Call, If, Map, Program, Statement, Sum
 
 from .elementwise import SAME, function
 from .problem import Problem
-from .step import Step, rate_calls
+from .step import Step, rate_calls, with_registers
 
 RUNNING, DONE, TOO_SMALL = 0.0, 1.0, 2.0  # register `status`
 SAFETY, SMALLEST, LARGEST = 0.9, 0.2, 5.0  # factors from one step to the next
@@ -126,7 +126,7 @@ def first_pass(*statements: Statement) -> If:
 
 def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bool) -> Program:
     """A trial of one step a pass. starts: whether the next step is at most what the derivatives at its start allow."""
-    lengths = {**step.lengths, **registers(problem)}
+    lengths = with_registers(step, registers(problem))
     prepare = [*step.prepare, *_counted(problem, step.prepare)]
     first = [*step.start, *(prepare if step.prepared else [])]
     body: list[Statement] = [first_pass(*first)] if first else []

@@ -34,12 +34,14 @@ def taylor_step(order: int, problem: Problem) -> Step:
     series: list[Statement] = [Map(SAME, ("rate",), ("rates0",))]
     for k in orders:
         series += [If(f"takes{k}", tuple(_coefficients(k, graphs)))]
+    wanted = cg.variable("next")
     share = Call(function("h unit", s=cg.variable("h") / cg.variable("unit")), ("h", "unit"), ("s",))
     kept = [Map(SAME, (f"{name}_new",), (name,)) for name in ("rounding", "rate", "zeros")]
     names = [f"c{k}" for k in orders]
     lengths = dict.fromkeys([*names, "rates0", "rates1", "rate", "rate_new", "rounding", "rounding_new", "slope"], m)
     lengths |= {f"{side}{k}": graphs.sums for side in ("left", "right") for k in orders}
     lengths |= {"sums": graphs.sums, "none": graphs.sums, "zeros": graphs.zeros, "zeros_new": graphs.zeros}
+    lengths |= {"next": 1, "rtol": 1, "atol": m}
     single = ["unit", "s", "at_t", "last", "before", "highest"]
     lengths |= dict.fromkeys([*single, *[f"{name}{k}" for name in ("order", "takes") for k in orders]], 1)
     return Step(
@@ -51,7 +53,7 @@ def taylor_step(order: int, problem: Problem) -> Step:
             count(1),
             Call(numbers, (), tuple(numbers.outputs)),
             _orders(order),
-            Map(SAME, ("next",), ("unit",)),
+            Call(function("next h", unit=cg.where(wanted, wanted, cg.variable("h"))), ("next", "h"), ("unit",)),
         ],
         kept=[*kept, Map(SAME, ("h",), ("unit",))],
         error=_checked(m),

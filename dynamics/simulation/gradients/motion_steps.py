@@ -12,6 +12,7 @@ from cgraph.extend import Call, Map, Statement
 from ...integrators import Method, Problem
 from ...integrators.elementwise import SAME
 from ...integrators.equal import registers
+from ...integrators.step import with_registers
 from ...systems.arguments import TIME, new_variables
 from .linearization import Linearization
 from .motion_equations import PARAMETERS, MotionEquations
@@ -49,14 +50,13 @@ def motion_steps(
     """
     problem = equations.problem
     made = method.step(problem)
-    lengths = {**made.lengths, **registers(problem), **equations.lengths, "arrival": 1}
+    lengths = with_registers(made, {**registers(problem), **equations.lengths, "arrival": 1, LOSS: 1})
     body: list[Statement] = [*made.derived, Map(SAME, ("x_new",), ("x",)), *_arrival(problem)]
     carried = ["x"]
     if running is not None:
         (before,) = new_variables(LOSS, 1, running.input_names)
         total = Graph([*running.inputs, before], {LOSS: running.only_output() + before})
         body.insert(0, Call(total, ("x", "t", "p", LOSS), (LOSS,)))
-        lengths[LOSS] = 1
         carried.append(LOSS)
     pullbacks = {id(problem.rate): equations.pullback, id(equations.sharing_rate): equations.sharing_pullback}
     if sharing and equations.sharing_pullback is not None:
