@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Call, Map, Program, Statement, Sum
+from cgraph.extend import Call, Program, Statement, Sum
 
-from .elementwise import SAME
 from .problem import Problem
-from .step import Step, rate_calls, with_registers
+from .step import Step, arriving, rate_calls, with_registers
 from .step_control import first_pass
 
 
@@ -25,7 +24,7 @@ def registers(problem: Problem) -> dict[str, int]:
 def equal(step: Step, problem: Problem) -> Program:
     """One step a pass."""
     lengths = with_registers(step, registers(problem))
-    body: list[Statement] = [*step.prepare, *step.body, *step.kept, Map(SAME, ("x_new",), ("x",))]
+    body = arriving([*step.prepare, *step.body, *step.kept])
     body += _advance(rate_calls(problem, step.prepare, step.body))
     if step.failed:
         body.append(_judged(step.failed, "singular" in step.lengths))

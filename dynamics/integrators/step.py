@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from cgraph.extend import Call, Factor, Solve, Statement, While
+from cgraph.extend import Call, Factor, Map, Solve, Statement, While
 
+from .elementwise import SAME
 from .problem import Problem
 
 # What a step may read of a run; in equal steps and derivatives those for which it has lengths are 0.
@@ -96,13 +97,21 @@ class Step:
 
     @property
     def derived(self) -> list[Statement]:
-        """The statements of a step whose derivatives are taken."""
-        return [*(self.prepare if self.smooth is None else self.smooth), *self.body, *self.kept]
+        """The statements of a step whose derivatives are taken, from x to the new x."""
+        return arriving([*(self.prepare if self.smooth is None else self.smooth), *self.body, *self.kept])
 
     @property
     def branches(self) -> bool:
         """Whether what is done depends on numbers, so that steps from several states cannot go side by side."""
         return any(isinstance(each, While | Factor | Solve) for each in (*self.start, *self.derived))
+
+
+def arriving(statements: Sequence[Statement]) -> list[Statement]:
+    """The statements with x_new as the new x: where the last one makes it, written there, else copied."""
+    *before, last = statements
+    if isinstance(last, Map | Call) and last.outputs == ("x_new",):
+        return [*before, replace(last, outputs=("x",))]
+    return [*statements, Map(SAME, ("x_new",), ("x",))]
 
 
 def with_registers(step: Step, own: Mapping[str, int]) -> dict[str, int]:

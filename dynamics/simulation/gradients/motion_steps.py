@@ -7,10 +7,9 @@ from functools import partial
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Call, Map, Statement
+from cgraph.extend import Call, Statement
 
 from ...integrators import Method, Problem
-from ...integrators.elementwise import SAME
 from ...integrators.equal import registers
 from ...integrators.step import with_registers
 from ...systems.arguments import TIME, new_variables
@@ -51,7 +50,7 @@ def motion_steps(
     problem = equations.problem
     made = method.step(problem)
     lengths = with_registers(made, {**registers(problem), **equations.lengths, "arrival": 1, LOSS: 1})
-    body: list[Statement] = [*made.derived, Map(SAME, ("x_new",), ("x",)), *_arrival(problem)]
+    body: list[Statement] = [*made.derived, *_arrival(problem)]
     carried = ["x"]
     if running is not None:
         (before,) = new_variables(LOSS, 1, running.input_names)
