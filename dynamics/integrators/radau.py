@@ -40,7 +40,7 @@ HALVES = (0.9 / 0.5) ** 4  # the error at which a step of estimate h^4 is halved
 TURNS = 8.0  # of Newton's iteration, at most
 MOST_TURNS = 100.0  # where it goes on to rounding
 ROUNDING = 2.0**-52  # relative
-LOOSE = 1e-9  # a change above this, relative, that comes no nearer is no convergence: the step is too long
+STALLS = 3.0  # turns that come no nearer: the rest is rounding
 SMALL = 1e-6  # of the largest coordinate or velocity, below which a component is measured by it
 CHANGES = ("right0", "F1", "F2")  # of W in a turn
 ORDER = 5
@@ -79,7 +79,7 @@ def radau_step(problem: Problem) -> Step:
         While("going", (*_turn(problem, z, w, f), *_compared(m))),
         _unsolved(),
     ]
-    controls = "h_old lost lost2 going turns most change change_old newton loose converged failed again sum".split()
+    controls = "h_old lost lost2 going turns stalled change change_old exact newton converged failed again sum".split()
     lengths = _lengths(m) | on_the_way | dict.fromkeys((*powers, "error_vector", "size", "least"), m)
     lengths |= {"rtol": 1, "atol": m, "leap": 1, "evaluations": 1} | dict.fromkeys(controls, 1)
     zeros = Graph([], {f"{k}": 0.0 for k in range(m)})
@@ -168,14 +168,15 @@ def _begin() -> Call:
     Without a tolerance, where the step cannot be halved: beside rounding, after as many turns as it takes.
     """
     rtol = cg.variable("rtol")
+    newton = cg.maximum(10.0 * ROUNDING / rtol, cg.minimum(0.03, cg.sqrt(rtol)))
     outputs: dict[str, Node | float] = {
         "going": 1.0,
         "turns": 0.0,
+        "stalled": 0.0,
         "change_old": math.inf,
         "converged": 0.0,
-        "newton": cg.where(rtol, cg.maximum(10.0 * ROUNDING / rtol, cg.minimum(0.03, cg.sqrt(rtol))), 10.0),
-        "most": cg.where(rtol, TURNS, MOST_TURNS),
-        "loose": cg.where(rtol, 0.0, LOOSE / ROUNDING),
+        "exact": cg.equal(rtol, 0.0),
+        "newton": cg.where(rtol, newton, 10.0),
     }
     return Call(Graph([rtol], outputs), ("rtol",), tuple(outputs))
 
@@ -218,21 +219,27 @@ def _compared(m: int) -> list[Statement]:
 
 
 def _judged(numbers: int) -> Call:
-    """Whether Newton's iteration goes on, and whether it has converged."""
-    names = ("change", "change_old", "turns", "most", "newton", "loose", "evaluations")
-    total, old, turns, most, newton, loose, done = inputs = cg.variables(names)
+    """Whether Newton's iteration goes on, and whether it has converged.
+
+    One that will not come to the tolerance in time has not; beside rounding, one that comes no nearer has.
+    """
+    names = ("change", "change_old", "turns", "stalled", "exact", "newton", "evaluations")
+    total, old, turns, stalled, exact, newton, done = inputs = cg.variables(names)
     change = cg.sqrt(total / numbers)
     rate = change / old  # 0 in the first turn
     left = rate / (1.0 - rate) * change
-    hopeful = (rate < 1.0) * (rate ** (most - 1.0 - turns) / (1.0 - rate) * change <= newton)
+    hopeful = (rate < 1.0) * (rate ** (TURNS - 1.0 - turns) / (1.0 - rate) * change <= newton)
     first = cg.equal(turns, 0.0)
     settled = cg.maximum(cg.equal(change, 0.0), (1.0 - first) * (rate < 1.0) * (left < newton))
     finite = change < math.inf
-    going = finite * (1.0 - settled) * cg.maximum(first, hopeful) * (turns + 1.0 < most)
+    stalls = stalled + (1.0 - (rate < 1.0))
+    hope = cg.where(exact, stalls < STALLS, cg.maximum(first, hopeful))
+    going = finite * (1.0 - settled) * hope * (turns + 1.0 < cg.where(exact, MOST_TURNS, TURNS))
     outputs = {
         "going": going,
-        "converged": cg.maximum(settled, change <= loose),
+        "converged": cg.maximum(settled, exact * finite * (stalls >= STALLS)),
         "turns": turns + 1.0,
+        "stalled": stalls,
         "change_old": change,
         "evaluations": done + 3.0,
     }
