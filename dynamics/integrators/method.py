@@ -88,13 +88,13 @@ class Method:
     def program(self, problem: Problem, dense: bool) -> Program:
         """The steps of a run, one after another; dense: with dense output where they are chosen.
 
-        Raises ValueError for a method that the model has not.
+        Raises ValueError for a method that the model has not, and for a step that lacks what the run needs.
         """
         step = self.step(problem)
         if not self.adaptive:
             return equal(step, problem)
-        if not step.error:
-            raise ValueError("a method that chooses its steps needs an estimate of their error, `Step.error`")
+        if not step.error or step.estimate < 1:
+            raise ValueError("a method that chooses its steps needs their error, `Step.error`, and `Step.estimate`")
         return chosen(step, problem, dense=dense, degree=self.degree, starts=self.starts)
 
     def __repr__(self) -> str:

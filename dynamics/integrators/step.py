@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from cgraph.extend import Call, Factor, Map, Solve, Statement, While
+from cgraph.extend import Call, Factor, If, Map, Solve, Statement, Sum, While
 
 from .elementwise import SAME
 from .problem import Problem
@@ -115,11 +115,32 @@ def arriving(statements: Sequence[Statement]) -> list[Statement]:
 
 
 def with_registers(step: Step, own: Mapping[str, int]) -> dict[str, int]:
-    """All registers: a step's, and those of what wraps it. Raises ValueError where one name has two meanings."""
+    """All registers: a step's, and those of what wraps it.
+
+    Raises ValueError where one name has two meanings, and for a step that does not make x_new of x.
+    """
+    written = set(_outputs([*step.prepare, *step.body, *step.kept]))
+    if "x_new" not in written or "x" in written:
+        raise ValueError("a step has to write register 'x_new', and to leave 'x' as it is")
     twice = [name for name in (*step.lengths, *step.dense_lengths) if name in own and name not in SHARED]
     if twice:
         raise ValueError(f"a step cannot have a register {twice[0]!r}: a run has another of that name")
     return {**step.lengths, **own}
+
+
+def _outputs(statements: Sequence[Statement]) -> Iterator[str]:
+    for each in statements:
+        match each:
+            case While() | If():
+                yield from _outputs([*each.body, *(each.otherwise if isinstance(each, If) else ())])
+            case Call() | Map():
+                yield from each.outputs
+            case Sum():
+                yield each.output
+            case Factor():
+                yield from (each.matrix, each.pivots)
+            case Solve():
+                yield each.vector
 
 
 def rate_calls(problem: Problem, *statements: Sequence[Statement]) -> int:

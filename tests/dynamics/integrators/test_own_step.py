@@ -106,12 +106,19 @@ def test_without_dense_output_of_its_own_it_is_the_cubic_through_states_and_rate
     assert abs(runs[1].q - runs[0].q)[1:-1].max() < 1e-4
 
 
-def test_a_step_without_an_estimate_cannot_be_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(
-        METHODS, "blind", Method(2, lambda problem: replace(parabola(problem), error=()), adaptive=True)
-    )
-    with raises(ValueError, match="needs an estimate of their error"):
+@mark.parametrize("lacking", [{"error": ()}, {"estimate": 0}])
+def test_a_step_without_an_estimate_cannot_be_chosen(lacking: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(METHODS, "blind", Method(2, lambda problem: replace(parabola(problem), **lacking), True))
+    with raises(ValueError, match="needs their error"):
         dyn.simulate(DRIVEN, START, None, 1.0, "blind")
+
+
+@mark.parametrize("body", [[], [Map(cg.Graph([cg.variable("x")], {"y": cg.variable("x")}), ("x",), ("x",))]])
+def test_a_step_that_does_not_make_x_new_is_refused(body: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(METHODS, EQUAL, Method(2, lambda problem: replace(parabola(problem), body=body)))
+    for run in (dyn.simulate, lambda *given: dyn.gradient(given[0], lambda x, t: x[0], *given[1:])):
+        with raises(ValueError, match="a step has to write register 'x_new'"):
+            run(DRIVEN, START, None, 1.0, EQUAL)
 
 
 @mark.parametrize(("taken", "method"), [("end", OWN), ("count", EQUAL)])
