@@ -10,7 +10,8 @@ copies nodes through a builder, `topological` gives all nodes that some nodes re
 `with_reciprocals` leaves one division for a divisor.
 
 **Differentiate**: `cotangents` pulls from outputs, `tangents` pushes from inputs, `hessian_nodes` gives the lower
-triangle of second derivatives, all as nodes. `compressed_jacobian` gives the parts of a loop over colors of columns.
+triangle of second derivatives, all as nodes. `compressed_jacobian` gives the parts of a loop over colors of columns,
+`jets` the Taylor coefficients of a solution.
 
 **Solve**: `solve_nodes` is `cg.hessian_solve` on nodes, `solve_tangents` the same with the tangents of all that lies
 between, `ldl_solve` the dense factorization; all raise `SingularError`. `ldl_elimination` does the same over any
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
     from .autodiff.compressed_jacobian import CompressedJacobian, compressed_jacobian
     from .autodiff.hessian_solve import Order, solve_nodes, solve_tangents
     from .autodiff.jacobian import hessian_nodes
+    from .autodiff.jets import Jets, NoSeriesError, jets
     from .autodiff.ldl_solve import ldl_elimination, ldl_solve
     from .autodiff.symmetric_elimination import SingularError
     from .core.builder import Builder, folded
@@ -116,11 +118,13 @@ __all__ = [
     "FixedPoint",
     "Formulas",
     "If",
+    "Jets",
     "Linearization",
     "Linearized",
     "Map",
     "MathML",
     "Names",
+    "NoSeriesError",
     "Notation",
     "Op",
     "Order",
@@ -159,6 +163,7 @@ __all__ = [
     "html_text",
     "install",
     "is_finite",
+    "jets",
     "ldl_elimination",
     "ldl_solve",
     "many",

@@ -369,6 +369,7 @@ CALLS |= {
     "extend.check_name": call(lambda name: extend.check_name("a body", name), "b"),
     "extend.check_writable": call(extend.check_writable, "file"),
     "extend.compressed_jacobian": call(extend.compressed_jacobian, GRAPH, None),
+    "extend.jets": call(extend.jets, GRAPH, "t", exact=False),
     "extend.cotangents": call(extend.cotangents, {X * Y: ONE}, [X, Y], None, fixed=(), through={}, zero_wins=False),
     "extend.expand": call(extend.expand, X * Y, {X: "a"}),
     "extend.folded": call(extend.folded, [X * Y], extend.Builder(), {X: Y}),
@@ -460,8 +461,8 @@ RECORDS = """
     dyn.ConstraintLint dyn.Freedom dyn.HeldForces dyn.JointForce dyn.MotionGradient dyn.MotionGradients dyn.OmittedTerm
     dyn.PruneResult dyn.QuasiVelocities dyn.ReducedLinearization dyn.Reference dyn.Released dyn.Sensitivities dyn.Stats
     dyn.Subtree dyn.TorqueTable dyn.Trajectory dyn.Verdict
-    extend.CompressedJacobian extend.Linearized extend.MathML extend.Pulled extend.Statement extend.StatementRow
-    extend.Notation extend.Op extend.Record
+    extend.CompressedJacobian extend.Jets extend.Linearized extend.MathML extend.Pulled extend.Statement
+    extend.StatementRow extend.Notation extend.Op extend.Record
 """
 # Nothing to give; types; what a mechanism calls; what empties the user's cache; the fast way into compiled code, which
 # looks at nothing, and into the names of nodes.

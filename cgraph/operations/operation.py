@@ -129,9 +129,8 @@ class Op(Row):
     jumps : callable
         Of an operation that jumps: of the arguments as numbers, what is whole where it does. Default: it does not.
     series : callable
-        Taylor coefficient k of (k, the result's coefficients, each argument's). Default through the partials.
-    rewrite : callable
-        The same by other operations, for their series. Default none.
+        Of the orders of a series, the output's node and the arguments': Taylor coefficient k, see
+        `cgraph/operations/series.py`. Default by `signs`, by `piece`, else through the partials.
 
     Examples
     --------
@@ -173,7 +172,6 @@ class Op(Row):
     piece: Callable[[int], tuple[int | None, int]] | None = None
     jumps: Callable[..., Any] | None = None
     series: Callable[..., Any] | None = None
-    rewrite: Callable[..., Any] | None = None
 
     def __post_init__(self) -> None:
         if self.arity == 0:  # variable and constant have no texts

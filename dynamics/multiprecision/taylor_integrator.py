@@ -111,9 +111,8 @@ def _until_switch(series: Series, h: Number, digits: int) -> tuple[Number, dict[
     """The step to the first switch of a piecewise operation, and the sides to take after it."""
     forced: dict[int, int] = {}
     first = h
-    for node, switch in series.switches.items():
-        d, side = series.coefficients[switch], series.sides[node]
-        if not side or not series.moving(switch):
+    for piece, (d, side) in enumerate(zip(series.switches, series.sides, strict=True)):
+        if not side:
             continue
         low = first * 0
         for j in range(1, SAMPLES + 1):
@@ -132,5 +131,5 @@ def _until_switch(series: Series, h: Number, digits: int) -> tuple[Number, dict[
         if (first - high) > 0:
             forced = {}
         first = high
-        forced[node] = -side
+        forced[piece] = -side
     return first, forced

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from cgraph.extend import NoSeriesError
+
 from ...integrators import METHODS
-from ...integrators.jets import NoSeriesError
 from ...simulation.run_options import RunOptions
 from ...simulation.simulate import simulate
 from ...simulation.trajectory import Trajectory

@@ -141,9 +141,7 @@ def gradient_many(
     options["estimate_error"] = estimate_error
     motions, problem = _motions(model, q, qd, time_span(t_end, t0, t_span), method, tau, parameters, wrt, options, form)
     count, nq, run = motions.many, problem.nq, motions.options
-    step = motions.method.step
-    assert step is not None
-    one_by_one = run.adaptive or step(motions.problem).branches
+    one_by_one = run.adaptive or motions.method.step(motions.problem).branches
     parts: list[int | slice] = [*range(count)] if one_by_one else [slice(k, k + WIDE) for k in range(0, count, WIDE)]
     value, end = np.full(count, np.nan), np.full((count, problem.size), np.nan)
     by_name = {name: np.full((count, *shape), np.nan) for name, shape in _shapes(motions).items()}
