@@ -28,8 +28,9 @@ label may have. `certain_digits` says what rounding leaves of the outputs.
 `require_whole`, `require_choice`, `require_sequence`, `require_mapping` and `require_path` check what a caller passed,
 `thread_count` reads `threads=`, `share` gives work to threads, `atomic_write` writes a file whole or not at all,
 `write_files` several, and `check_writable` looks beforehand; `html_table`, `html_text`, `html_lines` and `picture` are
-what a notebook shows of a result; `install` ends an error about a missing package,
-`scipy_integrate` gives SciPy's module or raises it. `Array` is the type of an array of float64.
+what a notebook shows of a result; `install` ends an error about a missing package, `scipy_integrate` gives SciPy's
+module or raises it. `memo` and `kept_by_first` make a function keep its results. `Array` is the type of an array of
+float64.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, building, cotangents
@@ -73,6 +74,7 @@ if TYPE_CHECKING:
     from .simplification.polynomial import Polynomial, expand, format_polynomial
     from .simplification.reciprocals import with_reciprocals
     from .util.atomic_write import atomic_write, check_writable, write_files
+    from .util.caches import kept_by_first, memo
     from .util.doors import doors
     from .util.extras import install
     from .util.html_text import html_lines, html_table, html_text, picture
@@ -139,8 +141,10 @@ __all__ = [
     "html_text",
     "install",
     "is_finite",
+    "kept_by_first",
     "ldl_elimination",
     "ldl_solve",
+    "memo",
     "nearest",
     "or_nearest",
     "picture",

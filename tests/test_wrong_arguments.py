@@ -447,16 +447,16 @@ RECORDS = """
     dyn.Subtree dyn.TorqueTable dyn.Trajectory dyn.Verdict
     extend.CompressedJacobian extend.MathML extend.Notation extend.Op extend.Record
 """
-# Nothing to give; types; what a mechanism calls; what empties the user's cache; the fast way into compiled code, which
-# looks at nothing, and into the names of nodes.
-LEFT_OUT = """cg.recording_lines cg.clear_cache cg.Compiled.bind cg.Compiled.values cg.Graph.check cg.Graph.counts
-    cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.bias_forces dyn.System.require_values
-    dyn.System.momentum_rates
+# Nothing to give; types; decorators; what a mechanism calls; what empties the user's caches; the fast way into compiled
+# code, which looks at nothing, and into the names of nodes.
+LEFT_OUT = """cg.recording_lines cg.clear_cache cg.clear_caches cg.Compiled.bind cg.Compiled.values cg.Graph.check
+    cg.Graph.counts cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.bias_forces
+    dyn.System.require_values dyn.System.momentum_rates
     dyn.System.momentum_derivatives dyn.System.torque_derivatives
     dyn.JointForce.along dyn.JointForce.check dyn.JointLimit.along dyn.JointLimit.check dyn.JointFriction.along
     dyn.JointFriction.check dyn.Actuator.along dyn.Actuator.check
     extend.Array extend.columns extend.doors extend.Order extend.Polynomial extend.Builder extend.Runner
-    extend.Runner.read extend.Runner.write
+    extend.kept_by_first extend.memo extend.Runner.read extend.Runner.write
     extend.Program.elements extend.Formulas.lines extend.Names.formula extend.Names.inputs_of extend.Names.line
     extend.Names.meant extend.Names.short extend.Names.shown extend.Names.text"""
 

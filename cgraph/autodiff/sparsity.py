@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,8 +12,9 @@ import numpy as np
 from ..core.builder import Builder
 from ..core.graph import Graph
 from ..core.node import Node, as_node, variable
+from ..core.row import Row
 from ..core.scope import building
-from ..operations.operation import Op
+from ..util.caches import kept_by_first
 from ..util.require import require_graph
 from ..util.scipy_modules import scipy_sparse
 
@@ -157,8 +157,8 @@ def slopes(node: Node) -> Collection[Node]:
     return [arg for arg, partial in zip(node.args, partials, strict=True) if partial.value != 0.0]
 
 
-@cache
-def _sloping_slots(op: Op) -> list[int]:
+@kept_by_first
+def _sloping_slots(op: Row) -> list[int]:
     """The slots in which an operation on variables has a slope."""
     arguments = [variable(f"argument{slot}#") for slot in range(op.arity)]
     with building(Builder()):

@@ -9,11 +9,12 @@ import ctypes
 import struct
 import sys
 from collections.abc import Callable
-from functools import cache, partial
+from functools import partial
 from types import BuiltinFunctionType
 from typing import Any
 
 from ..core.evaluation import Array
+from ..util.caches import memo
 from . import llvm_engine as llvm
 
 _STAYS = "a bound call holds addresses of this process: pickle the compiled graph and bind it again"
@@ -80,7 +81,7 @@ def bound_call(entry: Any, x: Array, y: Array) -> Callable[[], None]:
     return function
 
 
-@cache
+@memo(1)
 def _enter() -> tuple[Any, _Method] | None:
     """CPython's PyCFunction_NewEx, and the method that `_ENTER` is; None for another Python."""
     if sys.implementation.name != "cpython":

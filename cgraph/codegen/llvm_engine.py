@@ -6,9 +6,9 @@ import ctypes.util
 import threading
 import weakref
 from collections.abc import Iterable
-from functools import cache as cached
 from typing import Any
 
+from ..util.caches import memo
 from ..util.extras import install
 from .disk_cache import Cache
 
@@ -118,6 +118,6 @@ def host() -> Host:
     return _host(binding, __version__)
 
 
-@cached
+@memo(1)
 def _host(binding: Any, version: str) -> Host:
     return Host(binding, version)

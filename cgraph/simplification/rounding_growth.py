@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -30,8 +29,7 @@ def as_accurate(old: Node, new: Node) -> bool:
     return not np.any(usable & worse)
 
 
-@cache
-def _points(count: int) -> Any:
+def _points(count: int) -> Array:
     """Samples of so many variables, (count, points)."""
     rng = np.random.default_rng(count)
     noise = rng.normal(size=(4, count, 6))

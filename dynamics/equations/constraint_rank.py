@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Array, Builder, building, certain_digits, cotangents
+from cgraph.extend import Array, Builder, building, certain_digits, cotangents, kept_by_first
 
 from ..systems.constraints import ConstraintError, Constraints
 from ..systems.kinematics import ZERO
@@ -27,7 +26,6 @@ CLEAR = 1e-5  # what is left of rows that are independent: less is also seen whe
 SMALL = 1e-6  # of the first gap: what Newton's method closes to rounding in a step or two
 OPEN = 0.5  # certain digits of a row that is not 0
 FOLLOWS = 4.0  # more digits of one that follows from others: the rounding of axes and lengths that it has in common
-KEPT = 16  # constraints whose rank stays known
 ROUNDS = 4  # of scaling
 
 
@@ -52,7 +50,7 @@ class ConstraintWarning(UserWarning):
     """
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def independent_rows(constraints: Constraints) -> tuple[int, ...]:
     """Indices of the rows that do not follow from those before them, at all states seen.
 
@@ -239,7 +237,7 @@ class RowNumbers:
         return np.array(list(self.moved.evaluate(at).values()), dtype=np.float64)
 
 
-row_numbers = lru_cache(KEPT)(RowNumbers)
+row_numbers = kept_by_first(RowNumbers)
 
 
 class Closing(NamedTuple):

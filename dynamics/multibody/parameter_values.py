@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
+
+from cgraph.extend import kept_by_first
 
 from .body import BODY_QUANTITIES, JOINT_QUANTITIES, Body, MechanismError, quantities
 from .external_force import Force
@@ -25,9 +26,6 @@ class Use(NamedTuple):
     check: Callable[[str, Any], Any]
 
 
-_KNOWN: WeakKeyDictionary[Body, tuple[Use, ...]] = WeakKeyDictionary()  # bodies are not to be altered
-
-
 def uses(bodies: Sequence[Body], gravity: Any) -> Iterator[Use]:
     """The quantities of bodies, their joints and gravity in which there are parameters."""
     yield from _of_parameters([("gravity", gravity, quantities)])
@@ -35,16 +33,15 @@ def uses(bodies: Sequence[Body], gravity: Any) -> Iterator[Use]:
         yield from _uses_of(body)
 
 
+@kept_by_first
 def _uses_of(body: Body) -> tuple[Use, ...]:
-    if body not in _KNOWN:
-        tables = (body, BODY_QUANTITIES), (body.joint, JOINT_QUANTITIES)
-        rows = [
-            (f"body {body.name!r}: {name}", getattr(owner, name), check)
-            for owner, table in tables
-            for name, check in table.items()
-        ]
-        _KNOWN[body] = tuple(_of_parameters(rows))
-    return _KNOWN[body]
+    tables = (body, BODY_QUANTITIES), (body.joint, JOINT_QUANTITIES)
+    rows = [
+        (f"body {body.name!r}: {name}", getattr(owner, name), check)
+        for owner, table in tables
+        for name, check in table.items()
+    ]
+    return tuple(_of_parameters(rows))
 
 
 def _of_parameters(rows: Iterable[tuple[str, Any, Callable[[str, Any], Any]]]) -> Iterator[Use]:

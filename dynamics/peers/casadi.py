@@ -6,13 +6,12 @@ import os
 import shutil
 import subprocess
 import tempfile
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cgraph.extend import install
+from cgraph.extend import install, kept_by_first
 
 from .case import BATCH, DERIVATIVES, MOTIONS, NUDGE, PASSES, Array, Case, rk4_step
 from .contender import Contender, Peer, UnavailableError
@@ -34,7 +33,12 @@ class CasadiPeer(Peer):
         super().__init__(case)
         self.casadi, self.native = casadi(), native
         self.compiler = os.environ.get("CC") or shutil.which("gcc") or shutil.which("cc")
-        self.function = cache(self._lagrange if own_graph else self._ours)
+        self._own_graph = own_graph
+
+    @kept_by_first
+    def function(self, task: str) -> Any:
+        """The task, x -> y."""
+        return self._lagrange(task) if self._own_graph else self._ours(task)
 
     def _lagrange(self, task: str) -> Any:
         """The task from the Lagrangian, x -> y."""

@@ -6,12 +6,11 @@ import io
 import shutil
 import subprocess
 from collections.abc import Callable, Sequence
-from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from cgraph.extend import install
+from cgraph.extend import install, memo
 
 from .. import theme
 
@@ -143,7 +142,7 @@ def _ffmpeg() -> str:
     return found
 
 
-@cache
+@memo(16)
 def _font(size: int) -> Any:
     fonts, folder = _pillow()[2], theme.font_folder()
     if folder is None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +38,6 @@ def renew(names: Iterable[str] | None = None, say: Callable[[str], None] = lambd
     known = [name for name, case in cases.table().items() if name in entries and (case.exact or case.method)]
     ordered = {name: entries[name] for name in known}
     FILE.write_text(json.dumps(ordered, indent=1) + "\n", encoding="utf-8")
-    _kept.cache_clear()
 
 
 def entry(case: StabilityCase, result: Reference) -> dict[str, Any]:
@@ -57,7 +55,6 @@ def _hex(values: Iterable[float]) -> list[str]:
     return [float(each).hex() for each in values]
 
 
-@cache
 def _kept() -> dict[str, Any]:
     entries: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
     return entries

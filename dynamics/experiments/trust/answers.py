@@ -6,7 +6,6 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -114,14 +113,12 @@ def _changed() -> Iterator[dict[str, Any]]:
     yield entries
     ordered = {str(number): entries[str(number)] for number in sorted(map(int, entries))}
     FILE.write_text(json.dumps(ordered, indent=0) + "\n", encoding="utf-8")
-    _kept.cache_clear()
 
 
 def _hex(values: Iterable[float]) -> list[str]:
     return [float(value).hex() for value in values]
 
 
-@cache
 def _kept() -> dict[str, Any]:
     if not FILE.exists():
         return {}

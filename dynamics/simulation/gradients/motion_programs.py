@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 from cgraph import Graph
-from cgraph.extend import Runner, runner
+from cgraph.extend import Runner, memo, runner
 
 from ...integrators import Method
 from .linearization import Linearization, Linearized
@@ -54,7 +53,7 @@ class Request:
     running: Graph | None = None
 
 
-@lru_cache(KEPT)
+@memo(KEPT)
 def motion_programs(request: Request) -> MotionPrograms:
     """The programs; of the last few requests, those made before."""
     steps = motion_steps(
