@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from ..core.evaluation import Array
 from ..core.node import CONSTANT, Node
 from ..core.traversal import topological
 from ..operations.operation import columns
-from ..util.real_arrays import Array
 
 UNIT = 2.0**-30  # in place of 2^-53: errors that double precision can show
 MORE = 8.0  # times the error, that another form may have

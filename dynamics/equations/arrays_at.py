@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Compiled, Graph
-from cgraph.extend import kept_by_first
+from cgraph.extend import Array, kept_by_first
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .constraint_rank import ConstraintWarning
-from .evaluate_at import Array, InputRows, evaluate_at
+from .evaluate_at import InputRows, evaluate_at
 from .nearly_redundant_rows import lost_rank
 
 _ENTRY = re.compile(r"(.*?[^\d_])((?:_\d+)+|\d+)")  # M_0_1, h_2, tau0

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
-from cgraph.extend import real_array, real_number, require_mapping
+from cgraph.extend import Array, real_array, real_number, require_mapping
 
 from ..systems.arguments import TIME
 from ..systems.system import System
 
 STATE = ("q", "qd", "qdd", "tau")  # the prefixes of a graph's inputs, each an array of one number a coordinate
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def evaluate_at(

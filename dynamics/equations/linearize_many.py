@@ -9,12 +9,23 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Call, Map, Program, Statement, kept_by_first, require_choice, runner, share, thread_count
+from cgraph.extend import (
+    Array,
+    Call,
+    Map,
+    Program,
+    Statement,
+    kept_by_first,
+    require_choice,
+    runner,
+    share,
+    thread_count,
+)
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .equations_of_motion import forward_dynamics
-from .evaluate_at import Array, InputRows
+from .evaluate_at import InputRows
 from .formulations import ONE, ZERO
 from .hamiltonian import FORMS
 from .linearization_parts import ColumnGraphs, LinearizationParts, linearization_parts

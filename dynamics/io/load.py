@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -18,6 +18,9 @@ from .read_mjcf import compiled_mjcf, read_mjcf
 from .read_urdf import add_floating_base, origin_of, read_urdf
 from .smooth_forces import smooth
 from .source import called, root_of, urdf_root
+
+if TYPE_CHECKING:
+    from mujoco import MjModel
 
 
 def load_mjcf(
@@ -149,7 +152,7 @@ def load_at_start(source: Any, *, ignore: bool = False, floating: bool = False) 
     return warned(read_mjcf(mj, ignore), called(source)), tuple(mj.qpos0.tolist())
 
 
-def compiled(source: Any, *, floating: bool = False) -> Any:
+def compiled(source: Any, *, floating: bool = False) -> MjModel:
     """MuJoCo's own model, an MjModel, of a model, MJCF or URDF, read as `load_at_start` does.
 
     Raises MechanismError for what MuJoCo cannot read, and for joints with other coordinates there; and ImportError.

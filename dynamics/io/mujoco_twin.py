@@ -5,17 +5,19 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cgraph.extend import install
+from cgraph.extend import Array, install
 
 from ..multibody.mechanism import Mechanism, MechanismError, require_mechanism
 from ..multibody.planar_arm import planar_links
-from ..multibody.spatial import Array
 from ..systems.model import Model
 from .write_mjcf import moving_alone, to_mjcf
+
+if TYPE_CHECKING:
+    from mujoco import MjModel
 
 
 def mujoco() -> Any:
@@ -35,7 +37,7 @@ def _warn(text: str) -> None:
         warnings.warn(f"MuJoCo: {' '.join(text.split())}", stacklevel=2)
 
 
-def joint_order(mj: Any, mechanism: Mechanism) -> tuple[list[int], list[int]]:
+def joint_order(mj: MjModel, mechanism: Mechanism) -> tuple[list[int], list[int]]:
     """Where our coordinates stand in qpos, (nq,), and our velocities in qvel, (n,), by the names of the joints."""
     joints = [(mj.joint(body.coordinate), body.joint.type) for body in mechanism.moving]
     q = [int(joint.qposadr[0]) + k for joint, kind in joints for k in range(len(kind.coordinates))]
@@ -43,7 +45,7 @@ def joint_order(mj: Any, mechanism: Mechanism) -> tuple[list[int], list[int]]:
     return q, u
 
 
-def rollout(mj: Any, starts: Array, states: Array) -> Callable[[], None]:
+def rollout(mj: MjModel, starts: Array, states: Array) -> Callable[[], None]:
     """A run of MuJoCo's own native loop of steps, one thread, from every start.
 
     starts: (N, 1 + 2n), the time, positions and velocities in MuJoCo's order.  states: (N, steps, 1 + 2n), which each

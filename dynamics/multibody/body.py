@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Node
-from cgraph.extend import check_name, is_finite
+from cgraph.extend import Array, check_name, is_finite
 
 from . import spatial
 from .errors import (
@@ -21,7 +21,6 @@ from .errors import (
 )
 from .joints import COMPOSITIONS, TYPES, JointType
 from .parameters import Quantities, Quantity, entries, evaluated, names_in, symbol, vanishes
-from .spatial import Array
 
 WORLD = "world"
 ROUNDING = 1e-9  # of the largest entry: what is left of an inertia or a rotation that came through text

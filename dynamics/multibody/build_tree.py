@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cgraph.extend import Array
+
 from .body import WORLD, Body, Joint, MechanismError, shape_of, vector
 from .mechanism import Mechanism
 from .parameters import Quantities
-from .spatial import Array
 
 _FIELDS = [each.name for each in fields(Body) if each.name not in ("name", "parent")]
 

@@ -8,13 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import real_array
+from cgraph.extend import Array, real_array
 
 from ..equations.equations_of_motion import forward_dynamics, momentum
 from .body import Body, MechanismError, vector
 from .mechanism import Mechanism, require_mechanism
 from .parameter_values import bound_body
-from .spatial import Array
 
 _COMPONENTS = ("x y z", "vx vy vz", "wx wy wz")
 

@@ -16,14 +16,13 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Compiled, Graph, Node
-from cgraph.extend import Builder, building, cotangents, memo, real_array, tangents
+from cgraph.extend import Array, Builder, building, cotangents, memo, real_array, tangents
 
 from .body_motion import Motion, energy, ground, propagate_motion
 from .inertial_numbers import Link
 from .joint_coordinates import places
 from .joints import MovingJoint, moving_type
 from .mechanism import Mechanism, require_mechanism
-from .spatial import Array
 
 ONE = cg.constant(1.0)
 MOTION = 10  # numbers in a Motion

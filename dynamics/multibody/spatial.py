@@ -14,9 +14,8 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import as_node
+from cgraph.extend import Array, as_node
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 Triple = tuple[Node, Node, Node]
 Matrix = Sequence[Sequence[float | Node]]  # (3, 3)
 ZERO = cg.constant(0.0)

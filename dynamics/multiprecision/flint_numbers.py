@@ -25,7 +25,7 @@ def flint() -> Any:
 
 
 @contextmanager
-def working(digits: int) -> Iterator[Callable[[Any], Number]]:
+def working(digits: int) -> Iterator[Callable[[object], Number]]:
     """Arithmetic with so many decimal digits; gives the constructor of numbers."""
     package = flint()
     with package.ctx.workprec(math.ceil(digits * BITS_PER_DIGIT) + 8):

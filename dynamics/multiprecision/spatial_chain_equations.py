@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from cgraph.extend import Array
+
 from ..multibody.mechanism import Mechanism
 from .flint_numbers import Number, flint, working
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 Vector = list[Number]
 DIGITS = 66
 LOST = 1e-30  # a bound on the relative error of the results, or there were too few bits

@@ -7,7 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from .case import Array, Case
+from cgraph.extend import Array
+
+from .case import Case
 
 # How a task is asked for.
 MODES = {

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 import cgraph as cg
-from cgraph import Compiled, Graph
-from cgraph.extend import Call, Program, kept_by_first, runner
+from cgraph import Compiled, Graph, Node
+from cgraph.extend import Array, Call, Program, kept_by_first, runner
 
 from ..equations.equations_of_motion import forward_dynamics
 from ..equations.formulations import inverse_dynamics
@@ -21,7 +22,7 @@ from ..equations.state_equation import state_equation
 from ..multibody.mechanism import as_mechanism
 from ..simulation.gradients.gradient import gradient
 from ..systems.model import Model
-from .case import DT, MOTIONS, NUDGE, PASSES, Array, Case, rk4_step
+from .case import DT, MOTIONS, NUDGE, PASSES, Case, rk4_step
 from .contender import Contender, Peer, UnavailableError
 from .inertial_parameters import with_inertial_parameters
 
@@ -166,8 +167,8 @@ class Ours(Peer):
         )
 
 
-def _square(q: Any, qd: Any, t: Any) -> Any:
-    return sum([x * x for x in q])
+def _square(q: Sequence[Node], qd: Sequence[Node], t: Node) -> Node:
+    return sum([x * x for x in q], start=cg.constant(0.0))
 
 
 def _slopes(a: Array, b: Array) -> Array:

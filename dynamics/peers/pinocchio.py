@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from cgraph.extend import Array
+
 from ..multibody.joint_coordinates import per_velocity, places
-from .case import BATCH, DERIVATIVES, Array, Case, rk4_step
+from .case import BATCH, DERIVATIVES, Case, rk4_step
 from .contender import Contender, Peer, UnavailableError
 from .mujoco import bodies
 from .pinocchio_model import PinocchioModel, pinocchio

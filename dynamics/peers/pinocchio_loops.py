@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from cgraph.extend import Array
+
 from ..multibody.body import WORLD
 from ..multibody.loops import Loop
 from ..multibody.mechanism import Mechanism
-from .case import Array, Case
+from .case import Case
 from .contender import UnavailableError
 from .pinocchio import PinocchioPeer
 

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from types import ModuleType
 from typing import Any, cast
 
 import numpy as np
 
-from cgraph.extend import install
+from cgraph.extend import Array, install
 
 from ..multibody.body import WORLD, Body
 from ..multibody.joint_coordinates import places
 from ..multibody.joints import quaternion
 from ..multibody.mechanism import Mechanism
-from .case import Array
 from .contender import UnavailableError
 
 # Pinocchio's joints for ours; of the first two it has quicker ones where the axis is one of the coordinate axes.
@@ -160,7 +160,7 @@ def _depth_first(bodies: Sequence[Body]) -> Iterator[Body]:
         stack += [each for each in reversed(bodies) if each.parent == body.name]
 
 
-def _joint(module: Any, body: Body) -> Any:
+def _joint(module: ModuleType, body: Body) -> Any:
     """Pinocchio's joint. Raises UnavailableError for a kind that has none."""
     kind = body.joint.kind
     if kind not in _JOINTS:
@@ -174,7 +174,7 @@ def _joint(module: Any, body: Body) -> Any:
     return getattr(module, _JOINTS[kind])(axis)
 
 
-def _inertia(module: Any, body: Body) -> Any:
+def _inertia(module: ModuleType, body: Body) -> Any:
     """Pinocchio's inertia. Raises UnavailableError for one that it does not take, as with a moment of -1e-20."""
     try:
         return module.Inertia(body.mass, np.array(body.center), np.array(body.inertia))

@@ -11,7 +11,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Edge, Graph, Node
-from cgraph.extend import PRIMAL, TANGENT, real_number
+from cgraph.extend import PRIMAL, TANGENT, Array, real_number
 
 from ..equations.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
 from ..equations.equations_of_motion import forward_dynamics
@@ -40,7 +40,6 @@ from ..systems.system import System
 from .elimination import EliminationStep, elimination
 from .scenes import Scene
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 FORMULATIONS = ("euler_embedded", "kinetic_only", "chain_rule")  # those of the paper, the flawed ones first
 FRAMES, RATE = 150, 30.0  # most instants shown, and how many a second
 # Rows of the picture by classes of both forms. Of what is solved for, the way back out is a row above the way in.

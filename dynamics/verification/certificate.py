@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Builder, cotangents, real_number, require_whole, tangents
+from cgraph.extend import Array, Builder, cotangents, real_number, require_whole, tangents
 
 from ..equations.coriolis import coriolis, require_quadratic
 from ..equations.energies import energy
 from ..equations.equations_of_motion import bias, forward_dynamics, gravity_force, mass_matrix
-from ..equations.evaluate_at import Array, evaluate_at
+from ..equations.evaluate_at import evaluate_at
 from ..equations.formulations import ONE, ZERO, inverse_dynamics
 from ..equations.inertia_rank import balanced
 from ..equations.torque_decomposition import torque_by_joint_motion, torque_by_link

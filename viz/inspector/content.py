@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cgraph import Edge, Graph, Node
-from cgraph.extend import real_array
+from cgraph.extend import Array, real_array
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 UNKNOWN = 0.5  # an input's value where none is given: a product with 0 would show nothing
 
 

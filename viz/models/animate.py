@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from cgraph.extend import (
+    Array,
     check_writable,
     real_array,
     real_number,
@@ -29,7 +30,6 @@ from dynamics.systems.model import Model
 from ..animation.canvas import KINDS, RATE, check_can_animate, encode
 from ..animation.panels import FINE, Curves, Motion, Panel, Sticks, film
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 MOST_FRAMES, MOST_MOTIONS = 1000, 4
 FILM = 10.0  # s, a length that is offered
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cgraph.extend import install
+from cgraph.extend import Array, install
 
 from .. import theme
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 STYLE: dict[Any, Any] = {
     "font.family": theme.FONT,
     "font.size": 10,

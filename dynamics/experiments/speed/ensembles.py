@@ -14,9 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from cgraph.extend import Array
+
 from ... import scenes
 from ...io.mujoco_twin import rollout
-from ...peers.case import Array, Case, rk4_step
+from ...peers.case import Case, rk4_step
 from ...peers.jax import JaxPeer
 from ...peers.mujoco import MujocoPeer
 from ...simulation.ensembles.simulate_many import simulate_many

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import cgraph as cg
-from cgraph.extend import ldl_elimination
+from cgraph.extend import Array, ldl_elimination
 
 from ...equations.equations_of_motion import bias, forward_dynamics, mass_matrix
 from ...multibody.mechanism import Mechanism
@@ -21,8 +21,6 @@ from ...systems.model import as_system
 from ..fresh_process import run_fresh
 from ..text_table import table
 from .bench_scenes import turned_arm
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 LINKS = 1000
 STATES = 3  # of each chain
