@@ -253,6 +253,6 @@ def require_memory(name: str, array: Any, *shapes: tuple[int, ...]) -> None:
         raise GraphError(f"{name} must be contiguous and aligned, got strides {array.strides}")
 
 
-def describe(value: Any) -> str:
+def describe(value: object) -> str:
     """What a value is that should have been an array of float64 of some shape."""
     return f"{value.dtype} {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__

@@ -50,7 +50,7 @@ class NativeSweep(Sweep):
     def _like(self, split: DirectionSplit) -> NativeSweep:
         return NativeSweep(split, *self._how)
 
-    def _bound(self, x: Array, s: Array, y: Array, take: Indices, put: Indices, values: Array) -> Callable[[], Any]:
+    def _bound(self, x: Array, s: Array, y: Array, take: Indices, put: Indices, values: Array) -> Callable[[], object]:
         groups, p = len(s), aligned((whole(len(self.split.primal.outputs), self.lanes),))
         p[:] = 0.0
         arrays = {"x": x, "p": p, "s": s, "y": y, "take": take, "put": put, "values": values}

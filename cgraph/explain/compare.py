@@ -244,7 +244,7 @@ def _by_label(graph: Graph) -> Callable[[Node], str]:
 
 def _described(
     graph: Graph, nodes: Iterable[Node], classify: Classify, called: Mapping[str, str]
-) -> list[dict[str, Any]]:
+) -> list[dict[str, object]]:
     names, name_of = Names(graph, called), classify(graph)
     number = {node: i for i, node in enumerate(graph.nodes)}
     return [{"node": number[node], "text": names.line(node), "class": name_of(node)} for node in nodes]

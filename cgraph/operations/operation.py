@@ -168,11 +168,11 @@ class Op(Row):
     c_helper: str = ""
     javascript: str = ""
     # values in other numbers than floats
-    operator: Callable[..., Any] | None = None
-    precise: Callable[..., Any] | None = None
+    operator: Callable[..., object] | None = None
+    precise: Callable[..., object] | None = None
     piece: Callable[[int], tuple[int | None, int]] | None = None
     jumps: Callable[..., Any] | None = None
-    series: Callable[..., Any] | None = None
+    series: Callable[..., object] | None = None
     rewrite: Callable[..., Any] | None = None
 
     def __post_init__(self) -> None:

@@ -24,7 +24,7 @@ def ieee(function: Callable[..., float], ufunc: Any) -> Callable[..., float]:
     return value
 
 
-def flag(ufunc: Any) -> Callable[..., Any]:
+def flag(ufunc: Any) -> Callable[..., object]:
     """A comparison of arrays as 1.0 and 0.0."""
     return lambda a, b: ufunc(a, b) * 1.0
 

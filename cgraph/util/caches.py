@@ -29,7 +29,7 @@ class _Results:
 
     def __init__(self, owner: object = None) -> None:
         self.owner = ref(_Results if owner is None else owner)
-        self.known: dict[Hashable, Any] = {}
+        self.known: dict[Hashable, object] = {}
 
     def __reduce__(self) -> tuple[type[_Results], tuple[()]]:
         return _Results, ()

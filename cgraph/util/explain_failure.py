@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 
 from .real_arrays import is_finite
 
-T = TypeVar("T", bound=Callable[..., Any])
+T = TypeVar("T", bound=Callable[..., object])
 # What Python raises; a subclass, such as GraphError, is a sentence already.
 _STUMBLES = (TypeError, ValueError, AttributeError, KeyError, IndexError, AssertionError, OverflowError)
 
@@ -35,9 +35,9 @@ def explain_failure(called: T) -> T:
     return called
 
 
-def _explained(function: Callable[..., Any], who: str) -> Callable[..., Any]:
+def _explained(function: Callable[..., object], who: str) -> Callable[..., object]:
     @wraps(function)
-    def call(*args: Any, **named: Any) -> Any:
+    def call(*args: object, **named: Any) -> Any:
         try:
             return function(*args, **named)
         except Exception as error:

@@ -72,7 +72,7 @@ def jax(q: Array, qd: Array) -> Run:
     """JAX's own derivatives of the same Lagrangian: jit of vmap of lax.scan, in double precision."""
     peer = JaxPeer(Case(SCENE, scenes.load(SCENE)))
 
-    def step(x: Any, _: None) -> tuple[Any, None]:
+    def step(x: object, _: None) -> tuple[Any, None]:
         return rk4_step(peer.rate, x, DT), None
 
     many = peer.jax.jit(peer.jax.vmap(lambda x: peer.jax.lax.scan(step, x, None, STEPS)[0]))

@@ -60,7 +60,7 @@ def cost(kind: str, n: int) -> None:
 
     rows: list[list[str]] = []
 
-    def stage(what: str, function: Callable[[], Any]) -> Any:
+    def stage(what: str, function: Callable[[], object]) -> Any:
         begin, worked = time.perf_counter(), time.process_time()
         result = function()
         seconds, worked = time.perf_counter() - begin, time.process_time() - worked
