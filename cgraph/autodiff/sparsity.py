@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.builder import Builder
 from ..core.graph import Graph
@@ -18,8 +19,8 @@ from ..util.caches import kept_by_first
 from ..util.require import require_graph
 from ..util.scipy_modules import scipy_sparse
 
-Indices = np.ndarray[Any, np.dtype[np.int64]]
-Indices32 = np.ndarray[Any, np.dtype[np.int32]]
+Indices = NDArray[np.int64]
+Indices32 = NDArray[np.int32]
 
 
 class Pattern(NamedTuple):

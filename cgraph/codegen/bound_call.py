@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable
 from functools import partial
 from types import BuiltinFunctionType
-from typing import Any
+from typing import Any, NoReturn, SupportsIndex
 
 from ..core.evaluation import Array
 from ..util.caches import memo
@@ -52,16 +52,16 @@ class _Method(ctypes.Structure):
 class _Addresses(bytes):
     """What a call needs, `self` of its function: as addresses, and as objects that stay alive with it."""
 
-    kept: tuple[Any, ...]
+    kept: tuple[object, ...]
 
-    def __reduce_ex__(self, protocol: Any) -> Any:
+    def __reduce_ex__(self, protocol: SupportsIndex) -> NoReturn:
         raise TypeError(_STAYS)
 
 
 class _Bound(partial[None]):
     """A call of a function of Python, as little to be copied."""
 
-    def __reduce_ex__(self, protocol: Any) -> Any:
+    def __reduce_ex__(self, protocol: SupportsIndex) -> NoReturn:
         raise TypeError(_STAYS)
 
 

@@ -146,7 +146,7 @@ class Op(Row):
     # its function and texts
     arguments: str = ""
     about: str = ""
-    ufunc: Any = None
+    ufunc: np.ufunc | str | None = None
     symbol: str = ""
     infix: tuple[str, int] | None = None
     mathml: MathML | None = None
@@ -222,7 +222,7 @@ class Op(Row):
 
 
 OPS: dict[str, Op] = {}  # the table; filled by table.py
-BY_UFUNC: dict[Any, Op] = {}  # {ufunc of NumPy, or the name of one: the operation that it makes of nodes}
+BY_UFUNC: dict[np.ufunc | str, Op] = {}  # {ufunc of NumPy, or the name of one: the operation that it makes of nodes}
 _LEAVES = {row.name: Op(row.name, 0, row.scalar, row.array, row.partials) for row in (VARIABLE, CONSTANT)}
 
 

@@ -53,7 +53,7 @@ def _explained(function: Callable[..., object], who: str) -> Callable[..., objec
     return call
 
 
-def misfits(value: Any, kind: Any) -> list[Any]:
+def misfits(value: Any, kind: Any) -> list[object]:
     """The parts of a value that are not what an annotation says; the value itself where it is another kind of thing."""
     origin, parts = get_origin(kind) or kind, get_args(kind)
     if origin in (Union, UnionType):
@@ -67,7 +67,7 @@ def misfits(value: Any, kind: Any) -> list[Any]:
     fits = isinstance(value, origin) or (origin is float and is_finite(value))
     if not fits or isinstance(value, refused):
         return [value]
-    inside: list[tuple[Any, Any]] = []
+    inside: list[tuple[object, object]] = []
     if is_dataclass(value) or hasattr(value, "_fields"):
         inside = [(getattr(value, name), each) for name, each in get_type_hints(type(value)).items()]
     elif issubclass(origin, Mapping) and parts:

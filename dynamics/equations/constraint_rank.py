@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 import cgraph as cg
 from cgraph import Graph
@@ -29,7 +30,7 @@ FOLLOWS = 4.0  # more digits of one that follows from others: the rounding of ax
 ROUNDS = 4  # of scaling
 
 
-Indices = np.ndarray[Any, np.dtype[np.intp]]
+Indices = NDArray[np.intp]
 
 
 class ConstraintWarning(UserWarning):
@@ -230,7 +231,7 @@ class RowNumbers:
         """Values of q0.., of t and parameters, from these and others."""
         return dict(shown) | {f"q{i}": float(x) for i, x in enumerate(q)}
 
-    def moved_by(self, point: Mapping[str, float], step: Any) -> Array:
+    def moved_by(self, point: Mapping[str, float], step: Array) -> Array:
         """q after a step along the velocities, (nq,)."""
         at = {name: point[name] for name in self.moved.input_names if name in point}
         at |= dict(zip(self.steps, step.tolist(), strict=True))

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cgraph.extend import real_array, real_number, require_flag
+from cgraph.extend import Array, real_array, real_number, require_flag
 
 from ..multibody.body import Body, MechanismError
 from ..multibody.joint_force import Actuator, JointForce, JointFriction, JointLimit, Range
@@ -90,7 +90,7 @@ def actuators(mj: MjModel) -> int:
     return len(mj.actuator_trntype)
 
 
-def _called(kind: str, value: Any) -> str:
+def _called(kind: str, value: int) -> str:
     """MuJoCo's word for a type of a transmission, gain, ..."""
     word: str = getattr(mujoco(), f"mjt{kind}")(int(value)).name
     return word.removeprefix(f"mj{kind.upper()}_").lower()
@@ -171,5 +171,5 @@ def _actuator(mj: MjModel, i: int, name: str, moving: Sequence[Body]) -> Actuato
     )
 
 
-def _range(limited: Any, ends: Any) -> Range | None:
+def _range(limited: int, ends: Array) -> Range | None:
     return (float(ends[0]), float(ends[1])) if limited else None

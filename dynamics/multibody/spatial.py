@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import reduce
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -69,7 +68,7 @@ def without_rounding(total: Array, terms: Array) -> Array:
     return np.where(np.abs(total) <= ROUNDING * terms, 0.0, total) + 0.0
 
 
-def plain(value: Any) -> float | Node:
+def plain(value: float | Node) -> float | Node:
     """The number of a constant, else the node."""
     if isinstance(value, Node):
         return value if value.value is None else value.value

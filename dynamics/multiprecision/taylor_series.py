@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from operator import mul
-from typing import Any
 
 from cgraph import Graph, Node
 from cgraph.extend import OPS, Op, as_node, columns, topological
@@ -21,7 +20,7 @@ from ..systems.arguments import TIME
 from .flint_numbers import Number, sign, value
 
 Push = Callable[[int], None]  # appends coefficient k of one series, those of its arguments being there
-Key = tuple[Any, ...]
+Key = tuple[object, ...]
 
 
 class Series:
@@ -35,7 +34,9 @@ class Series:
     the next expansion where the value at the point does not tell, as just after a switch.
     """
 
-    def __init__(self, graph: Graph, states: Sequence[str], constants: Mapping[str, Any], number: Any) -> None:
+    def __init__(
+        self, graph: Graph, states: Sequence[str], constants: Mapping[str, object], number: Callable[[object], Number]
+    ) -> None:
         self.number = number
         self.coefficients: list[list[Number]] = []  # of each series; those of the last expansion
         self.switches: dict[int, int] = {}

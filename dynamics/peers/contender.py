@@ -32,7 +32,7 @@ class Contender:
     evaluations: of the task, in one run.  size: instructions or nodes of one evaluation, where they can be counted.
     """
 
-    run: Callable[[], Any]
+    run: Callable[[], object]
     result: Callable[[Any], Array]
     evaluations: int = 1
     size: int | None = None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -186,6 +185,6 @@ class OurNumpy(Peer):
         return Contender(lambda: function.batch(points), _same, points.shape[1], len(function.graph.nodes))
 
 
-def _same(values: Any) -> Array:
+def _same(values: Array) -> Array:
     array: Array = values
     return array

@@ -149,12 +149,12 @@ class PinocchioPeer(Peer):
 
         return Contender(run, result, len(states))
 
-    def _derivatives(self, task: str) -> Callable[..., Any]:
+    def _derivatives(self, task: str) -> Callable[..., object]:
         """Pinocchio's function. Raises UnavailableError for a model that has more than it knows."""
         stretched = self.stiffness != 0.0
         if any([stretched[place.u].any() for place in self.balls]):
             raise UnavailableError("has no slopes of the springs of ball joints")
-        derivatives: Callable[..., Any] = getattr(
+        derivatives: Callable[..., object] = getattr(
             self.pinocchio, f"compute{'ABA' if task == 'derivatives' else 'RNEA'}Derivatives"
         )
         return derivatives

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from types import ModuleType
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from ..multibody.joint_coordinates import places
 from ..multibody.joints import quaternion
 from ..multibody.mechanism import Mechanism
 from .contender import UnavailableError
+
+if TYPE_CHECKING:
+    from pinocchio import Inertia, JointModel
 
 # Pinocchio's joints for ours; of the first two it has quicker ones where the axis is one of the coordinate axes.
 _JOINTS = {
@@ -160,7 +163,7 @@ def _depth_first(bodies: Sequence[Body]) -> Iterator[Body]:
         stack += [each for each in reversed(bodies) if each.parent == body.name]
 
 
-def _joint(module: ModuleType, body: Body) -> Any:
+def _joint(module: ModuleType, body: Body) -> JointModel:
     """Pinocchio's joint. Raises UnavailableError for a kind that has none."""
     kind = body.joint.kind
     if kind not in _JOINTS:
@@ -174,7 +177,7 @@ def _joint(module: ModuleType, body: Body) -> Any:
     return getattr(module, _JOINTS[kind])(axis)
 
 
-def _inertia(module: ModuleType, body: Body) -> Any:
+def _inertia(module: ModuleType, body: Body) -> Inertia:
     """Pinocchio's inertia. Raises UnavailableError for one that it does not take, as with a moment of -1e-20."""
     try:
         return module.Inertia(body.mass, np.array(body.center), np.array(body.inertia))

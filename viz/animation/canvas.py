@@ -8,6 +8,7 @@ import subprocess
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from cgraph.extend import install, memo
@@ -150,7 +151,7 @@ def _font(size: int) -> Any:
     return fonts.truetype(str(folder / "DejaVuSans.ttf"), size)
 
 
-def _pillow() -> tuple[Any, Any, Any]:
+def _pillow() -> tuple[ModuleType, ModuleType, ModuleType]:
     try:
         from PIL import Image, ImageDraw, ImageFont
     except ImportError as error:

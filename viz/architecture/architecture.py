@@ -133,7 +133,7 @@ def _listed(what: str, lines: Sequence[str]) -> list[str]:
     return [f"{what}: {len(lines) or 'none'}", *[f"  {line}" for line in lines]]
 
 
-Arrows = Mapping[tuple[str, str], Any] | Sequence[tuple[str, str]]
+Arrows = Mapping[tuple[str, str], object] | Sequence[tuple[str, str]]
 
 
 def _heads(arrows: Arrows) -> dict[str, list[str]]:

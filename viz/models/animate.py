@@ -10,6 +10,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cgraph.extend import (
     Array,
@@ -51,7 +52,7 @@ def animate(
     path: str | os.PathLike[str] | None = None,
     *,
     kind: str | None = None,
-    wanted: Callable[[Array], Any] | None = None,
+    wanted: Callable[[Array], ArrayLike] | None = None,
     marked: Collection[str] = (),
     speed: float = 1.0,
     dark: bool = False,
@@ -182,7 +183,7 @@ def _panel(
     model: Model,
     known: Mapping[str, Trajectory],
     times: Array,
-    wanted: Callable[[Array], Any] | None,
+    wanted: Callable[[Array], ArrayLike] | None,
     wrong: Collection[str],
 ) -> Panel:
     rows = [_at(each, times) for each in known.values()]
@@ -198,7 +199,7 @@ def _panel(
     return make(motions, None if wanted is None else shown[-1])
 
 
-def _wanted(wanted: Callable[[Array], Any], times: Array, nq: int) -> Array:
+def _wanted(wanted: Callable[[Array], ArrayLike], times: Array, nq: int) -> Array:
     if not callable(wanted) or isinstance(wanted, type):
         raise TypeError(f"wanted must be a function of times, got {type(wanted).__name__}: {wanted!r:.60}")
     found = real_array("wanted", wanted(times))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,7 +44,7 @@ def check_can_plot() -> None:
     empty_figure(1.0, 1.0)
 
 
-def style() -> Any:
+def style() -> AbstractContextManager[None]:
     """A context in which matplotlib draws as all pictures look."""
     from matplotlib import rc_context
 

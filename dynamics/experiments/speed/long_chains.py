@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -27,6 +27,8 @@ STATES = 3  # of each chain
 SIZES = (("planar", 10), ("planar", 100), ("planar", 300), ("3D", 10), ("3D", 100))
 DENSE = {"planar": 30, "3D": 10}  # links; beyond, the graph of the dense solve, which grows with n^3, takes long
 
+Made = TypeVar("Made")
+
 
 def planar(n: int) -> Mechanism:
     """A planar chain of unlike rods."""
@@ -34,7 +36,7 @@ def planar(n: int) -> Mechanism:
     return planar_arm(masses, lengths, damping=0.1)
 
 
-MODELS: dict[str, Callable[[int], Any]] = {"planar": planar, "3D": turned_arm}
+MODELS: dict[str, Callable[[int], Mechanism]] = {"planar": planar, "3D": turned_arm}
 EXACT: dict[str, Callable[..., Array]] = {
     "planar": lambda *at: accelerations(*at).high,
     "3D": chain_accelerations,
@@ -60,7 +62,7 @@ def cost(kind: str, n: int) -> None:
 
     rows: list[list[str]] = []
 
-    def stage(what: str, function: Callable[[], object]) -> Any:
+    def stage(what: str, function: Callable[[], Made]) -> Made:
         begin, worked = time.perf_counter(), time.process_time()
         result = function()
         seconds, worked = time.perf_counter() - begin, time.process_time() - worked

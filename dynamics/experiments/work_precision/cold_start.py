@@ -51,7 +51,7 @@ class ColdStart:
 class _Start:
     about: str
     packages: tuple[str, ...]
-    run: Callable[[Setting], Any]
+    run: Callable[[Setting], object]
     primed: bool = False  # the first start is there to fill a cache, and does not count
 
 

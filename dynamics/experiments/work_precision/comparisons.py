@@ -207,7 +207,7 @@ def numpy_rate() -> Callable[[float, Array], Array]:
 class SolveIvp(Solver):
     """SciPy's solve_ivp with DOP853 on a rate in Python. Raises ImportError without SciPy."""
 
-    def __init__(self, rate: Callable[[float, Array], Any], setting: Setting, smallest: float, _: Problem) -> None:
+    def __init__(self, rate: Callable[[float, Array], object], setting: Setting, smallest: float, _: Problem) -> None:
         super().__init__("solve_ivp", "SciPy's solve_ivp, DOP853", setting, smallest)
         self.rate, self.solve = rate, solve_ivp()
 
@@ -233,7 +233,7 @@ def loops(folder: str) -> Iterator[str]:
     x = np.array([0.3, -0.5, 0.7, 1.0, -2.0, 0.5])
     apart = np.abs(plain(0.0, x) - compiled([*x, 0.0])).max()
     yield f"rates in NumPy against the graph: largest difference {apart:.1e}"
-    rates: dict[str, Callable[[float, Array], Any]] = {
+    rates: dict[str, Callable[[float, Array], object]] = {
         "solve_ivp, rate in NumPy": plain,
         "solve_ivp, our generated Python": lambda t, x: python.values([*x.tolist(), t]),
         "solve_ivp, our compiled rate": lambda t, x: compiled([*x, t]),
