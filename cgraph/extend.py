@@ -30,7 +30,7 @@ label may have. `certain_digits` says what rounding leaves of the outputs.
 `write_files` several, and `check_writable` looks beforehand; `html_table`, `html_text`, `html_lines` and `picture` are
 what a notebook shows of a result; `install` ends an error about a missing package, `scipy_integrate` gives SciPy's
 module or raises it. `memo` and `kept_by_first` make a function keep its results. `Array` is the type of an array of
-float64.
+float64, `Json` of what JSON can hold.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, building, cotangents
@@ -78,6 +78,7 @@ if TYPE_CHECKING:
     from .util.doors import doors
     from .util.extras import install
     from .util.html_text import html_lines, html_table, html_text, picture
+    from .util.json_type import Json
     from .util.nearest import nearest, or_nearest
     from .util.real_arrays import is_finite, real_array, real_number
     from .util.require import (
@@ -107,6 +108,7 @@ __all__ = [
     "Factor",
     "Formulas",
     "If",
+    "Json",
     "Map",
     "MathML",
     "Names",

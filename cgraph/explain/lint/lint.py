@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ...core.graph import Edge, Graph
 from ...core.node import Node
@@ -18,6 +18,9 @@ from .dependence import missing_dependences, unused_inputs
 from .finding import Finding
 from .independence import Group, check_independence
 from .singular import Box, singular_nodes
+
+if TYPE_CHECKING:
+    from ...util.json_type import Json
 
 Pair = tuple[Group, Group]
 
@@ -77,7 +80,7 @@ class Lint:
         rows += [("Note", str(each)) for each in self.notes]
         return html_table(("", ""), rows, texts=2) if rows else html_text(str(self))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Json]:
         """The same for JSON; nodes are numbered as in `graph.nodes`, an edge is (source, target, argument slot)."""
         return {
             "ok": self.ok,
