@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -37,13 +36,13 @@ def input_values(
     state: Mapping[str, ArrayLike | None],
     t: float = 0.0,
     parameters: Mapping[str, float] | None = None,
-) -> tuple[dict[str, Any], tuple[int, ...]]:
+) -> tuple[dict[str, float | Array], tuple[int, ...]]:
     """Values of those inputs at a state {"q": .., "qd": .., "qdd": .., "tau": ..}, (n,) or (N, n) each; and () or (N,).
 
     What of the state is None or missing is zero, coordinates neutral. Parameters have the system's values unless given.
     Raises ValueError for another shape, what is not finite, or a parameter that the system does not have.
     """
-    values: dict[str, Any] = _numbers(system, t, parameters)
+    values: dict[str, float | Array] = {**_numbers(system, t, parameters)}
     arrays, shape = _arrays(system, state)
     for name, rows in arrays.items():
         values |= {f"{name}{i}": column if rows.ndim == 2 else float(column) for i, column in enumerate(rows.T)}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -55,7 +55,7 @@ def read_mjcf(mj: MjModel, ignore: bool, smooth: Smooth = NONE) -> Mechanism:
     return Mechanism(bodies, gravity, forces, left_out=left_out, loops=loops)
 
 
-def compiled_mjcf(source: Any, called: str) -> MjModel:
+def compiled_mjcf(source: object, called: str) -> MjModel:
     """MuJoCo's model of a path or text.  called: what errors call it.
 
     MuJoCo by itself prints its warnings and adds them to a file in the current folder; a handler takes them instead.

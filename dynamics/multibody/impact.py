@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -239,5 +239,5 @@ def _inertia_alone(mechanism: Mechanism) -> Mechanism:
     return replace(mechanism, bodies=bodies, gravity=(0.0, 0.0, 0.0), forces=(), parameters={})
 
 
-def _named(**groups: Array) -> dict[str, Any]:
+def _named(**groups: Array) -> dict[str, float | Array]:
     return {f"{name}{i}": value for name, values in groups.items() for i, value in enumerate(values)}

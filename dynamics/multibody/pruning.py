@@ -19,7 +19,7 @@ from .switched_effects import EFFECTS as EFFECTS, absent_parts, has_effect, with
 GROUPS = ("q", "qd", "qdd", "tau")
 NEVER = "unobservable inertial numbers"
 
-Equations = Callable[[Any], Graph]
+Equations = Callable[[Model], Graph]
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -206,7 +206,7 @@ def _growth(method: Radau, rates: list[list[Number]], x: list[Number], h: Number
     return math.exp2((-digits * math.log2(10.0) - worst) / len(table))
 
 
-def _jacobian(graph: Graph, states: Sequence[str], values: Mapping[str, Any]) -> Callable[[Array, Array], Array]:
+def _jacobian(graph: Graph, states: Sequence[str], values: Mapping[str, Number]) -> Callable[[Array, Array], Array]:
     """df/dx in float64 at points x, (s, m), and times t, (s,): (s, m, m)."""
     bound = cg.specialize(graph, {name: float(value) for name, value in values.items()})
     compiled = cg.compile(cg.jacobian(bound, list(states)), "numpy")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -93,7 +93,7 @@ class Inspection:
     versions: tuple[Equations, ...]
     t: Array
     skeleton: Skeleton | None
-    at: Mapping[str, Any]
+    at: Mapping[str, float | Array]
     derived: Graph | None = None
     shares: Shares | None = None
     stopped: str = ""
@@ -159,7 +159,7 @@ def _along(
     scene: Scene,
     run: Trajectory,
     versions: Sequence[Equations],
-    state: Mapping[str, Any],
+    state: Mapping[str, float | Array],
     derived: Graph | None,
     shares: Shares | None = None,
     *,
@@ -257,7 +257,7 @@ def _version(scene: Scene, name: str) -> Equations:
     return Equations(name, verdict.graph, about, wrong, blamed=edges, flawed=verdict.differs)
 
 
-def _named(**tables: Array) -> dict[str, Any]:
+def _named(**tables: Array) -> dict[str, float | Array]:
     return {f"{name}{i}": table[:, i] for name, table in tables.items() for i in range(table.shape[1])}
 
 

@@ -14,7 +14,7 @@ from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import CodeType, ModuleType
-from typing import Any, TypeGuard
+from typing import TypeGuard, TypeVar
 
 from cgraph.extend import or_nearest
 
@@ -24,6 +24,8 @@ SUFFIX = ".py"
 NEEDED = "a System, an OdeSystem, a Mechanism, a Scene, or a function without arguments that returns one"
 _FILE = re.compile(r"(?P<source>.+\.py)(?::(?P<name>.*))?", re.DOTALL)
 _MODULE = re.compile(r"(?P<source>[^\W\d]\w*(?:\.[^\W\d]\w*)*):(?P<name>[^\W\d]\w*)")
+
+Made = TypeVar("Made")
 
 
 def is_python(name: str) -> bool:
@@ -111,7 +113,7 @@ def _executed(path: Path) -> ModuleType:
     return module
 
 
-def _told(source: str, function: Callable[[], Any]) -> Any:
+def _told(source: str, function: Callable[[], Made]) -> Made:
     """What a function of the user's gives. Raises ValueError, with the line in the source, for what it raises."""
     try:
         return function()

@@ -122,7 +122,7 @@ def _numbered(forces: Sequence[Node]) -> dict[str, Node]:
 
 def _with_forces(system: System, forces: Sequence[Node], parameters: Mapping[str, float]) -> System:
     """The system with these forces besides its own, and these parameters."""
-    changes: dict[str, Any] = {"parameters": system.parameters | dict(parameters)}
+    changes: dict[str, object] = {"parameters": system.parameters | dict(parameters)}
     pairs = zip(system.forces, forces, strict=True)
     changes["forces"] = tuple([more if own.value == 0.0 else own + more for own, more in pairs])
     other = copy(system)

@@ -12,7 +12,7 @@ from cgraph import Edge, Graph, Node
 from cgraph.extend import Array, real_array
 
 if TYPE_CHECKING:
-    from cgraph.extend import Json
+    pass
 
 UNKNOWN = 0.5  # an input's value where none is given: a product with 0 would show nothing
 
@@ -65,7 +65,7 @@ class State:
     derived: a graph from inputs of the state to inputs of versions, such as q0_old = q0 - dt qd0; these have no value.
     """
 
-    at: Mapping[str, Json]
+    at: Mapping[str, float | Array]
     derived: Graph | None = None
 
     def inputs(self, graphs: Sequence[Graph]) -> list[str]:

@@ -12,7 +12,7 @@ from string import Template
 from typing import TYPE_CHECKING, NamedTuple
 
 from cgraph import Graph, Node, __version__
-from cgraph.extend import require_graph, require_mapping, require_sequence, require_texts
+from cgraph.extend import Array, require_graph, require_mapping, require_sequence, require_texts
 
 from .. import theme
 from ..pages import html
@@ -68,7 +68,7 @@ def page(
     *,
     title: str = "Computational graph",
     about: str = "",
-    at: Mapping[str, Json] | None = None,
+    at: Mapping[str, float | Array] | None = None,
     marked: Collection[Node] = frozenset(),
     motion: Motion | None = None,
     tables: Sequence[Table | StateTable] = (),

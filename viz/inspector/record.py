@@ -119,7 +119,7 @@ def slopes(op: Op) -> dict[str, Json]:
     partials = [cg.constant(each) if not isinstance(each, Node) else each for each in op.partials(y, *args)]
     graph = Graph([y, *args], {str(i): node for i, node in enumerate(partials)})
     number = {node: i for i, node in enumerate([y, *args])}
-    code: list[Any] = []
+    code: list[Json] = []
     for node in graph.nodes:
         if node not in number:
             number[node] = op.arity + 1 + len(code)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -53,7 +53,7 @@ def cost(kind: str, n: int) -> None:
     graph = stage(lambda: forward_dynamics(model))
     x = np.random.default_rng(n).normal(size=len(graph.inputs))
 
-    def called() -> Any:
+    def called() -> cg.Compiled:
         function = cg.compile(graph)
         function(x)
         return function

@@ -110,6 +110,6 @@ def accuracy(kind: str, n: int, spread: float) -> dict[str, float]:
     return worst
 
 
-def values(graph: cg.Graph, state: dict[str, Any]) -> Array:
+def values(graph: cg.Graph, state: dict[str, float]) -> Array:
     """The outputs, from what of the state the graph needs."""
     return np.array(list(graph.evaluate({name: state[name] for name in graph.input_names}).values()))

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from cgraph.extend import Array
+
 from ...equations.state_equation import state_inputs
 from ...integrators import METHODS
 from ...multiprecision import Reference
@@ -93,7 +95,7 @@ def changes(case: StabilityCase, run: Trajectory, wanted: set[str]) -> dict[str,
     first: dict[str, float] = {}
     for start in range(0, len(run.t), BLOCK):
         part = slice(start, start + BLOCK)
-        values: dict[str, Any] = dict(zip(inputs.states, states[part].T, strict=True)) | inputs.parameters
+        values: dict[str, float | Array] = dict(zip(inputs.states, states[part].T, strict=True)) | inputs.parameters
         values[TIME] = run.t[part]
         rows = graph.evaluate({name: values[name] for name in graph.input_names})
         for name in wanted:
