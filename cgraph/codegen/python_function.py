@@ -24,7 +24,7 @@ from .python_source import source
 
 BLOCK = 4096  # states a NumPy sweep takes at once: its temporaries stay in the cache
 
-_Function = Callable[[Any], tuple[Any, ...]]
+_Function = Callable[[Any], tuple[float, ...]]
 _PLAIN = ("float", "inf", "np")
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from ..core.evaluation import Array
+from ..core.evaluation import Array, Value
 from ..core.node import CONSTANT, Node
 from ..core.traversal import topological
 from ..operations.operation import columns
@@ -39,10 +37,10 @@ def _points(count: int) -> Array:
 
 def _errors(node: Node, points: dict[str, Array]) -> tuple[Array, Array]:
     """The value, and a bound of its error with operations that round to a part of `UNIT`, to first order."""
-    known: dict[Node, tuple[Any, Any]] = {}
+    known: dict[Node, tuple[Value, Value]] = {}
     for inner in topological([node]):
         if not inner.args:
-            value = inner.value if inner.op is CONSTANT else points[inner.name or ""]
+            value = points[inner.name or ""] if inner.value is None else inner.value
             known[inner] = (value, 0.0)
             continue
         values = [known[arg][0] for arg in inner.args]

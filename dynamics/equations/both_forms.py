@@ -51,6 +51,6 @@ def form_agreement(model: Model, forms: Mapping[str, Graph], at: Mapping[str, fl
     return Agreement(_apart(found, moved, q), _apart(found, rates, p))
 
 
-def _apart(found: Mapping[str, object], expected: Mapping[str, Any], names: Sequence[str]) -> float:
+def _apart(found: Mapping[str, Any], expected: Mapping[str, Any], names: Sequence[str]) -> float:
     largest = max([abs(expected[name]) for name in names])
     return float(max([abs(found[name] - expected[name]) for name in names]) / (largest or 1.0))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from mujoco import MjModel
 
 
-def mujoco() -> Any:
+def mujoco() -> ModuleType:
     """The mujoco module. Raises ImportError naming the extra when it is not installed."""
     try:
         import mujoco as module
@@ -28,7 +29,8 @@ def mujoco() -> Any:
         raise ImportError(f"MuJoCo is not installed: {install('mujoco')}") from error
     if module.get_mju_user_warning() is None:  # by itself it adds a warning to a file in the current folder
         module.set_mju_user_warning(_warn)
-    return module
+    found: ModuleType = module  # it has no types
+    return found
 
 
 def _warn(text: str) -> None:

@@ -7,7 +7,8 @@ import shutil
 import subprocess
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -170,10 +171,11 @@ class CasadiPeer(Peer):
             return self.casadi.external(function.name(), str(library))
 
 
-def casadi() -> Any:
+def casadi() -> ModuleType:
     """The module. Raises ImportError naming the extra when it is not installed."""
     try:
         import casadi as module
     except ImportError as error:
         raise ImportError(f"CasADi is not installed: {install('bench')}") from error
-    return module
+    found: ModuleType = module  # it has no types
+    return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -41,13 +41,14 @@ class HeyokaPeer(Peer):
         return Contender(lambda: function(x, outputs=y), lambda _: y.copy(), BATCH if many else 1)
 
 
-def heyoka() -> Any:
+def heyoka() -> ModuleType:
     """The module. Raises ImportError naming the extra when it is not installed."""
     try:
         import heyoka as module
     except ImportError as error:
         raise ImportError(f"heyoka is not installed: {install('bench')}") from error
-    return module
+    found: ModuleType = module  # it has no types
+    return found
 
 
 def leave_cache(hy: ModuleType) -> None:

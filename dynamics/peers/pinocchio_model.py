@@ -31,13 +31,14 @@ _ALIGNED = {"revolute": "JointModelR", "prismatic": "JointModelP"}
 _WORLD_AXES = "free"  # whose linear velocity is in the axes of the joint, and Pinocchio's in the body's
 
 
-def pinocchio() -> Any:
+def pinocchio() -> ModuleType:
     """The pinocchio module. Raises ImportError naming the extra when it is not installed."""
     try:
         import pinocchio as module
     except ImportError as error:
         raise ImportError(f"Pinocchio is not installed: {install('bench')}") from error
-    return module
+    found: ModuleType = module  # it has no types
+    return found
 
 
 class PinocchioModel:

@@ -13,6 +13,7 @@ from .case import Case
 from .contender import UnavailableError
 
 Expression = TypeVar("Expression")
+Constant = Callable[[float], Any]  # of an expression
 
 
 def translated(
@@ -20,7 +21,7 @@ def translated(
     env: Mapping[Node, Expression],
     functions: object,
     names: Mapping[str, str] | None = None,
-    number: Callable[[float], Any] = float,
+    number: Constant = float,
 ) -> dict[Node, Expression]:
     """Every node of a topological order as an expression, from those of the variables in `env`.
 
@@ -49,7 +50,7 @@ def lagrangian(
     qd: Sequence[Expression],
     functions: object,
     names: Mapping[str, str] | None = None,
-    number: Callable[[float], Any] = float,
+    number: Constant = float,
 ) -> tuple[Expression, list[Expression]]:
     """L and the applied forces at q and qd, without damping, in the other software's expressions."""
     system = case.system
@@ -66,7 +67,7 @@ def quasi_velocities(
     momenta: Sequence[Expression],
     functions: object,
     names: Mapping[str, str] | None = None,
-    number: Callable[[float], Any] = float,
+    number: Constant = float,
 ) -> tuple[list[Expression], list[Expression]]:
     """The rates of the coordinates, G(q) qd, and what brackets of velocities take of the force, ad(qd; p)."""
     kinematics = case.system.kinematics

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,13 +29,18 @@ from .derivatives import derivative_residuals
 from .held_states import Held, random_states
 from .residual import DIFFERENCES, POSITIVE, ROUNDING, Certificate, Residual, worst
 
+if TYPE_CHECKING:
+    from ..io.load import Source
+
 STEP = 1e-3  # of differences, in units of the coordinates
 
 
 MOST_STATES = 1_000_000  # of a certificate, some of whose matrices are kept for all states
 
 
-def certify(model: Model, states: int = 20, seed: int = 0, *, speed: float = 1.0, twin: Any = None) -> Certificate:
+def certify(
+    model: Model, states: int = 20, seed: int = 0, *, speed: float = 1.0, twin: Source | None = None
+) -> Certificate:
     """Check the model's graphs against each other, against differences of L, and against MuJoCo and Pinocchio.
 
     With constraints the states meet them; the equations are those of the whole, J^T lambda in them, and of the rows.

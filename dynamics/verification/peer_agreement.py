@@ -31,6 +31,8 @@ from .residual import PEERS, PROXIMAL, Residual
 if TYPE_CHECKING:
     from mujoco import MjModel
 
+    from ..io.load import Source
+
 ASKED = 4  # states at which a disagreement is explained
 TAKEN = 2  # terms at most that are taken out together
 TINY = 2.0**-40  # of the heaviest body: a mass that weighs nothing beside what is left
@@ -294,7 +296,7 @@ def _translated(make: Callable[[Case], Peer], model: Model) -> Translation:
         raise NotComparableError(str(error)) from None
 
 
-def original(twin: Any, model: Model) -> Original:
+def original(twin: Source, model: Model) -> Original:
     """MuJoCo on a model, MJCF or URDF, with the coordinates of the model.
 
     Raises ValueError for a twin that cannot be read or has another number of coordinates, and for a model that is not

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -97,13 +97,13 @@ def accuracy(kind: str, n: int, spread: float) -> dict[str, float]:
         q, qd, tau = rng.uniform(-spread, spread, n), rng.normal(size=n), rng.normal(size=n)
         exact = EXACT[kind](model, q, qd, tau)
         state = dict(zip(graphs["elimination"].input_names, [*q, *qd, *tau], strict=True))
-        solved: dict[str, Any] = {name: values(graph, state) for name, graph in graphs.items()}
+        solved: dict[str, Array] = {name: values(graph, state) for name, graph in graphs.items()}
         if matrix is not None:
             m = values(matrix, state).reshape(n, n)
             rhs = tau - values(biases, state) - np.array(as_system(model).damping) * qd
             solved |= {
-                "numpy.linalg.solve": np.linalg.solve(m, rhs),
-                "LDL of the same, floats": ldl_elimination(m.tolist(), rhs.tolist())[0],
+                "numpy.linalg.solve": np.asarray(np.linalg.solve(m, rhs), dtype=np.float64),
+                "LDL of the same, floats": np.array(ldl_elimination(m.tolist(), rhs.tolist())[0]),
             }
         for name, x in solved.items():
             worst[name] = max(worst.get(name, 0.0), float(np.abs(x - exact).max() / np.abs(exact).max()))

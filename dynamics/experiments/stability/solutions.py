@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ...multiprecision import Reference
 from ...multiprecision.solution import from_text
 from . import cases
 from .cases import StabilityCase
+
+if TYPE_CHECKING:
+    from cgraph.extend import Json
 
 FILE = Path(__file__).with_name("solutions.json")
 
@@ -40,7 +43,7 @@ def renew(names: Iterable[str] | None = None, say: Callable[[str], None] = lambd
     FILE.write_text(json.dumps(ordered, indent=1) + "\n", encoding="utf-8")
 
 
-def entry(case: StabilityCase, result: Reference) -> dict[str, Any]:
+def entry(case: StabilityCase, result: Reference) -> dict[str, Json]:
     """What the file says of a case."""
     return {
         "start": _hex(case.start),
@@ -56,5 +59,4 @@ def _hex(values: Iterable[float]) -> list[str]:
 
 
 def _kept() -> dict[str, Any]:
-    entries: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
-    return entries
+    return dict(json.loads(FILE.read_text(encoding="utf-8"))) if FILE.exists() else {}
