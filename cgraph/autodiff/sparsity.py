@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,9 @@ from ..core.scope import building
 from ..util.caches import kept_by_first
 from ..util.require import require_graph
 from ..util.scipy_modules import scipy_sparse
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Indices = NDArray[np.int64]
 Indices32 = NDArray[np.int32]
@@ -55,7 +58,7 @@ def _grouped(values: Indices, keys: Indices, count: int) -> list[list[int]]:
     return [flat[begin:end] for begin, end in itertools.pairwise(ends)]
 
 
-def sparsity(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Any:
+def sparsity(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> csr_array:
     """Where the Jacobian of a graph can be other than zero, whatever the values of the inputs.
 
     An entry that is left out is zero everywhere: no path leads from the input to the output, or each one passes an
@@ -93,7 +96,10 @@ def sparsity(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None)
     require_graph("sparsity", graph)
     sparse = scipy_sparse("sparsity")
     entries = pattern(graph, graph.select_inputs(wrt))
-    return sparse.csr_array((np.ones(len(entries.rows), dtype=bool), *entries.compressed()), shape=entries.shape)
+    found: csr_array = sparse.csr_array(
+        (np.ones(len(entries.rows), dtype=bool), *entries.compressed()), shape=entries.shape
+    )
+    return found
 
 
 def pattern(graph: Graph, wrt: Sequence[Node]) -> Pattern:

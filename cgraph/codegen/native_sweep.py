@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from functools import partial
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from ..autodiff.direction_split import DirectionSplit
 from ..autodiff.sparsity import Indices
@@ -23,7 +23,7 @@ class _Fields(ctypes.Structure):
     """What the one argument of the machine code points to."""
 
     _fields_: ClassVar = [(name, ctypes.c_int64) for name in FIELDS]
-    arrays: dict[str, Any]
+    arrays: object  # which it keeps alive
 
 
 class NativeSweep(Sweep):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from functools import lru_cache, wraps
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Protocol, TypeVar, cast
+from typing import TYPE_CHECKING, Concatenate, ParamSpec, Protocol, TypeVar, cast
 from weakref import WeakSet, ref
 
 if TYPE_CHECKING:
-    from functools import _lru_cache_wrapper
+    from functools import _CacheInfo
 
 Arguments = ParamSpec("Arguments")
 First = TypeVar("First")
@@ -23,6 +23,12 @@ class Memo(Protocol[Arguments, Result]):
     def __call__(self, *args: Arguments.args, **named: Arguments.kwargs) -> Result:
         """The result, kept or made."""
 
+    def cache_info(self) -> _CacheInfo:
+        """How many results were made, and how many are kept."""
+
+    def cache_clear(self) -> None:
+        """Keep none."""
+
 
 class _Results:
     """Results of calls whose first argument is one object. A copy of the object has none of them, here or pickled."""
@@ -35,7 +41,7 @@ class _Results:
         return _Results, ()
 
 
-_memos: list[_lru_cache_wrapper[Any]] = []
+_memos: list[Memo[..., object]] = []
 _kept: WeakSet[_Results] = WeakSet()
 
 
@@ -68,9 +74,9 @@ def memo(size: int) -> Callable[[Callable[Arguments, Result]], Memo[Arguments, R
     """
 
     def decorate(function: Callable[Arguments, Result]) -> Memo[Arguments, Result]:
-        keeping = lru_cache(size)(function)
-        _memos.append(keeping)
-        return cast("Memo[Arguments, Result]", keeping)
+        keeping = cast("Memo[Arguments, Result]", lru_cache(size)(function))
+        _memos.append(cast("Memo[..., object]", keeping))
+        return keeping
 
     return decorate
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -96,7 +95,7 @@ class PinocchioPeer(Peer):
         x = self.case.point(task) if mode == "call" else self.case.points(task)
         arguments = self.arguments(x, task)
 
-        def result(y: Any) -> Array:
+        def result(y: Array) -> Array:
             return self._result(x, *arguments[:2], y, task)
 
         if mode == "call":
@@ -105,7 +104,7 @@ class PinocchioPeer(Peer):
             return Contender(lambda: algorithm(twin, data, *arguments), result)
         return self._many("abaInParallel" if task == "forward" else "rneaInParallel", arguments, result)
 
-    def _many(self, name: str, arguments: tuple[Array, ...], result: Callable[[Any], Array]) -> Contender:
+    def _many(self, name: str, arguments: tuple[Array, ...], result: Callable[[Array], Array]) -> Contender:
         """Its loop over the columns of a batch, on one thread. Builds without OpenMP lack it."""
         algorithm = getattr(self.pinocchio, name, None)
         if algorithm is None:

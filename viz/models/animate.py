@@ -7,7 +7,6 @@ import math
 import os
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -137,7 +136,7 @@ def animate(
 def _motions(model: Model, motions: object) -> dict[str, Trajectory]:
     """The motions by their words, checked."""
     if isinstance(motions, Trajectory):
-        known: dict[Any, Any] = {"": motions}
+        known: dict[str, Trajectory] = {"": motions}
     elif isinstance(motions, Mapping):
         known = dict(motions)
     else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ...core.graph import Edge, Graph
 from ...core.node import Node
@@ -184,7 +184,7 @@ def _pairs(independent: Pair | Sequence[Pair]) -> list[Pair]:
     """
     if isinstance(independent, (str, Node)):
         raise TypeError(f"independent: expected pairs of groups, got {independent!r:.60}")
-    pairs: list[Any] = list(require_sequence("independent", independent, "pairs of groups"))
+    pairs = list(require_sequence("independent", independent, "pairs of groups"))
     if len(pairs) == 2 and isinstance(independent, tuple):
         if all([isinstance(each, tuple) and len(each) == 2 for each in pairs]):
             raise ValueError(
