@@ -63,7 +63,7 @@ class Applied:
 
 @kept_by_first
 def _compiled(velocities: Graph, backend: str) -> cg.Compiled:
-    """The velocities of momenta, for a controller; of the last few, those compiled before."""
+    """The velocities of momenta, for a controller."""
     return cg.compile(velocities, backend)
 
 

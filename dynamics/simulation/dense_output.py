@@ -106,7 +106,7 @@ def _table(graph: Graph, columns: Array) -> Array:
 
 @kept_by_first
 def _compiled(rate: Graph) -> Compiled:
-    """The rate, for states at many times; of the last few, the one compiled before."""
+    """The rate, for states at many times."""
     return cg.compile(rate)
 
 

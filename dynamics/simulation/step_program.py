@@ -53,7 +53,7 @@ class CompiledSteps:
 
 @kept_by_first
 def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgram:
-    """The steps of a method on a problem, all graphs that they need derived; of the last few, those written before.
+    """The steps of a method on a problem, all graphs that they need derived; the problem keeps them.
 
     dense: whether a method that chooses its steps records its dense output.
     Raises SingularMassMatrixError for a coordinate without inertia, ValueError for a method that the model has not.
@@ -123,11 +123,11 @@ def between(problem: Problem) -> Graph | None:
 
 @kept_by_first
 def pickled_steps(program: StepProgram) -> bytes:
-    """The steps as other processes are sent them; of the last few, those pickled before."""
+    """The steps as other processes are sent them."""
     return pickle.dumps(program)
 
 
 @kept_by_first
 def compile_steps(program: StepProgram, backend: str) -> CompiledSteps:
-    """The steps, ready to run; of the last few, those compiled before."""
+    """The steps, ready to run."""
     return CompiledSteps(program, runner(program.steps, backend).prepared())
