@@ -10,7 +10,7 @@ from ..core.node import Node, as_node, variable
 from ..core.row import Row
 from ..core.scope import building
 from ..core.traversal import topological
-from ..util.caches import kept_by_first
+from ..util.caches import OPERATIONS, memo
 
 
 class _Second(NamedTuple):
@@ -40,7 +40,7 @@ def second_partials(node: Node, build: Builder) -> list[tuple[int, int, Node]]:
     return result
 
 
-@kept_by_first
+@memo(OPERATIONS)
 def _seconds_of(op: Row) -> tuple[Node, list[Node], list[_Second]]:
     """Placeholders for the output y and the arguments a of an operation, and its second partials over them."""
     output = variable("output#")

@@ -15,7 +15,7 @@ from ..core.graph import Graph
 from ..core.node import Node, as_node, variable
 from ..core.row import Row
 from ..core.scope import building
-from ..util.caches import kept_by_first
+from ..util.caches import OPERATIONS, memo
 from ..util.require import require_graph
 from ..util.scipy_modules import scipy_sparse
 
@@ -164,7 +164,7 @@ def slopes(node: Node) -> Collection[Node]:
     return [arg for arg, partial in zip(node.args, partials, strict=True) if partial.value != 0.0]
 
 
-@kept_by_first
+@memo(OPERATIONS)
 def _sloping_slots(op: Row) -> list[int]:
     """The slots in which an operation on variables has a slope."""
     arguments = [variable(f"argument{slot}#") for slot in range(op.arity)]

@@ -41,6 +41,7 @@ class _Results:
         return _Results, ()
 
 
+OPERATIONS = 128  # of which results are kept: thrice the table of operations
 _memos: list[Memo[..., object]] = []
 _kept: WeakSet[_Results] = WeakSet()
 
@@ -113,11 +114,11 @@ def kept_by_first(
 
     @wraps(function)
     def call(first: First, /, *others: Arguments.args, **named: Arguments.kwargs) -> Result:
-        results: _Results | None = vars(first).get("_results")
+        results: _Results | None = first.__dict__.get("_results")
         if results is None or results.owner() is not first:
-            results = vars(first)["_results"] = _Results(first)
+            results = first.__dict__["_results"] = _Results(first)
             _kept.add(results)
-        key = (function, others, *named.items())
+        key = (function, others, *named.items()) if named else (function, others)
         found = results.known.get(key, results)
         if found is results:
             found = results.known[key] = function(first, *others, **named)

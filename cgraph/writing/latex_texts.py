@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from xml.etree import ElementTree
 
 from ..operations.operation import FUNCTION, LEAF, PRODUCT, SUM, Op
-from ..util.caches import kept_by_first
+from ..util.caches import OPERATIONS, memo
 from .formulas import Text
 
 _GREEK = frozenset(
@@ -83,7 +83,7 @@ def _fenced(text: str) -> str:
     return rf"\left({text}\right)"
 
 
-@kept_by_first
+@memo(OPERATIONS)
 def _template(op: Op) -> Callable[[Sequence[str]], str]:
     """The function that puts arguments into an operation's formula."""
     mathml = "" if op.mathml is None else op.mathml.text

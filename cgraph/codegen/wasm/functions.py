@@ -20,7 +20,7 @@ PRIMITIVES = {*INTRINSICS, "load", "store", "word", "address"}
 HOST = "math."  # before the name of a function that the host supplies
 
 
-def table() -> bytes:
+def _table() -> bytes:
     """What `wave` reads at TABLE: the digits of 2/pi, the last ones first."""
     one = 1 << 1300
     pi = 4 * (4 * _arctan_of_inverse(5, one) - _arctan_of_inverse(239, one))
@@ -36,7 +36,10 @@ def _arctan_of_inverse(n: int, one: int) -> int:
     return total
 
 
-@memo(2)
+WAVE_TABLE = _table()
+
+
+@memo(8)
 def library(at: int) -> dict[str, ast.FunctionDef]:
     """{name: function}, for a table at this place in memory."""
     found = ast.parse((TEXT + OTHERS).replace("TABLE", str(at))).body
