@@ -27,10 +27,10 @@ label may have. `certain_digits` says what rounding leaves of the outputs.
 **At the edges**: `real_array`, `real_number`, `is_finite`, `check_name`, `require_graph`, `require_flag`,
 `require_whole`, `require_choice`, `require_sequence`, `require_mapping` and `require_path` check what a caller passed,
 `thread_count` reads `threads=`, `share` gives work to threads, `atomic_write` writes a file whole or not at all,
-`write_files` several, and `check_writable` looks beforehand; `html_table`, `html_text`, `html_lines` and `picture` are
-what a notebook shows of a result; `install` ends an error about a missing package, `scipy_integrate` gives SciPy's
-module or raises it. `memo` and `kept_by_first` make a function keep its results. `Array` is the type of an array of
-float64, `Json` of what JSON can hold.
+`write_files` several, and `check_writable` looks beforehand; `many` is a number with its noun; `html_table`,
+`html_text`, `html_lines` and `picture` are what a notebook shows of a result; `install` ends an error about a missing
+package, `scipy_integrate` gives SciPy's module or raises it. `memo` and `kept_by_first` make a
+function keep its results. `Array` is the type of an array of float64, `Json` of what JSON can hold.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, building, cotangents
@@ -68,8 +68,16 @@ if TYPE_CHECKING:
     from .operations.register import register
     from .operations.table import OPS
     from .program.choose_runner import runner
-    from .program.program import Call, Factor, If, Map, Program, Solve, Statement, Sum, While
+    from .program.derivatives.linearization import Linearization, Linearized
+    from .program.derivatives.tape import Tape, run_passes
+    from .program.derivatives.transforms import ProgramVjp, Pulled, program_jvp, program_vjp
+    from .program.program import Program
     from .program.runner import Record, Runner
+    from .program.statement import STATEMENTS, Statement, StatementRow, register_statement, require_length
+    from .program.statements.call import Call, Map, Sum
+    from .program.statements.control import FixedPoint, If, While
+    from .program.statements.matrix import Factor, Solve
+    from .program.statements.memory import Pop, Push, Take
     from .simplification.identities import rewritten, shortened
     from .simplification.polynomial import Polynomial, expand, format_polynomial
     from .simplification.reciprocals import with_reciprocals
@@ -79,6 +87,7 @@ if TYPE_CHECKING:
     from .util.extras import install
     from .util.html_text import html_lines, html_table, html_text, picture
     from .util.json_type import Json
+    from .util.many import many
     from .util.nearest import nearest, or_nearest
     from .util.real_arrays import is_finite, real_array, real_number
     from .util.require import (
@@ -99,6 +108,7 @@ __all__ = [
     "ADJOINT",
     "OPS",
     "PRIMAL",
+    "STATEMENTS",
     "TANGENT",
     "UNLABELLED",
     "Array",
@@ -106,9 +116,12 @@ __all__ = [
     "Call",
     "CompressedJacobian",
     "Factor",
+    "FixedPoint",
     "Formulas",
     "If",
     "Json",
+    "Linearization",
+    "Linearized",
     "Map",
     "MathML",
     "Names",
@@ -116,13 +129,20 @@ __all__ = [
     "Op",
     "Order",
     "Polynomial",
+    "Pop",
     "Program",
+    "ProgramVjp",
+    "Pulled",
+    "Push",
     "Record",
     "Runner",
     "SingularError",
     "Solve",
     "Statement",
+    "StatementRow",
     "Sum",
+    "Take",
+    "Tape",
     "While",
     "as_node",
     "atomic_write",
@@ -146,22 +166,28 @@ __all__ = [
     "kept_by_first",
     "ldl_elimination",
     "ldl_solve",
+    "many",
     "memo",
     "nearest",
     "or_nearest",
     "picture",
+    "program_jvp",
+    "program_vjp",
     "real_array",
     "real_number",
     "register",
+    "register_statement",
     "require_choice",
     "require_flag",
     "require_graph",
+    "require_length",
     "require_mapping",
     "require_path",
     "require_sequence",
     "require_texts",
     "require_whole",
     "rewritten",
+    "run_passes",
     "runner",
     "scipy_integrate",
     "share",

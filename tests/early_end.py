@@ -2,4 +2,6 @@
 
 import pytest
 
-stops = pytest.mark.filterwarnings("ignore:.*the run stopped at t = :dynamics.SimulationWarning")
+stops = pytest.mark.filterwarnings(
+    r"ignore:(the run|.* trajectories) stopped (early. trajectory \d+ )?at t = :dynamics.SimulationWarning"
+)

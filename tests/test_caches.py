@@ -25,6 +25,7 @@ TABLES = {
     "cgraph.core.row.ROWS",
     "cgraph.operations.operation.OPS",
     "cgraph.operations.operation.BY_UFUNC",
+    "cgraph.program.statement.STATEMENTS",
     "dynamics.experiments.trust.random_lagrangians.FAMILIES",
     f"{HOME}._memos",
 }

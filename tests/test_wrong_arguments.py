@@ -330,8 +330,22 @@ def registered(op):
     return op is OPS["sin"] or extend.register(op)
 
 
+def registered_statement(row):
+    return row is extend.STATEMENTS[extend.Call] or extend.register_statement(row)
+
+
 CALLS |= {
     "extend.Call": call(a_program_of(extend.Call), HALVE, ("x",), ("y",)),
+    "extend.FixedPoint": call(a_program_of(extend.FixedPoint), "x", (HALF,)),
+    "extend.Linearization": call(extend.Linearization, PROGRAM, ["x"], [], constant=[], rules=None, turns=4),
+    "extend.Pop": call(a_program_of(extend.Pop), "x", "y", ("z",)),
+    "extend.Push": call(a_program_of(extend.Push), "x", "y", ("z",)),
+    "extend.Take": call(a_program_of(extend.Take), "x", "y", (0,)),
+    "extend.program_jvp": call(extend.program_jvp, PROGRAM, [], constant=[]),
+    "extend.program_vjp": call(
+        extend.program_vjp, PROGRAM, ["x"], [], constant=[], turns=4, checkpoints=0, backend="python"
+    ),
+    "extend.register_statement": call(registered_statement, extend.STATEMENTS[extend.Call]),
     "extend.Factor": call(a_program_of(extend.Factor), "x", "y"),
     "extend.Formulas": call(extend.Formulas, GRAPH.nodes, GRAPH.outputs, PLAIN, called=None),
     "extend.If": call(a_program_of(extend.If), "x", (HALF,), (HALF,)),
@@ -367,6 +381,7 @@ CALLS |= {
     "extend.is_finite": call(extend.is_finite, 1.0),
     "extend.ldl_elimination": call(extend.ldl_elimination, [[4.0], [2.0, 2.0]], [10.0, 6.0]),
     "extend.ldl_solve": call(extend.ldl_solve, [[ONE], [X, Y]], [ONE, Y], None, check=False),
+    "extend.many": call(extend.many, 2, "node"),
     "extend.nearest": call(extend.nearest, "a", ["b"], 3),
     "extend.or_nearest": call(extend.or_nearest, "a", ["b"]),
     "extend.picture": call(extend.picture, "nothing", 3),
@@ -445,7 +460,8 @@ RECORDS = """
     dyn.ConstraintLint dyn.Freedom dyn.HeldForces dyn.JointForce dyn.MotionGradient dyn.MotionGradients dyn.OmittedTerm
     dyn.PruneResult dyn.QuasiVelocities dyn.ReducedLinearization dyn.Reference dyn.Released dyn.Sensitivities dyn.Stats
     dyn.Subtree dyn.TorqueTable dyn.Trajectory dyn.Verdict
-    extend.CompressedJacobian extend.MathML extend.Notation extend.Op extend.Record
+    extend.CompressedJacobian extend.Linearized extend.MathML extend.Pulled extend.Statement extend.StatementRow
+    extend.Notation extend.Op extend.Record
 """
 # Nothing to give; types; decorators; what a mechanism calls; what empties the user's caches; the fast way into compiled
 # code, which looks at nothing, and into the names of nodes.
@@ -456,8 +472,11 @@ LEFT_OUT = """cg.recording_lines cg.clear_cache cg.clear_caches cg.Compiled.bind
     dyn.JointForce.along dyn.JointForce.check dyn.JointLimit.along dyn.JointLimit.check dyn.JointFriction.along
     dyn.JointFriction.check dyn.Actuator.along dyn.Actuator.check
     extend.Array extend.columns extend.doors extend.Order extend.Polynomial extend.Builder extend.Runner
-    extend.kept_by_first extend.memo extend.Runner.read extend.Runner.write
-    extend.Program.elements extend.Formulas.lines extend.Names.formula extend.Names.inputs_of extend.Names.line
+    extend.kept_by_first extend.memo
+    extend.ProgramVjp extend.Tape extend.Tape.run extend.Tape.recorded extend.run_passes extend.Linearization.adjoint
+    extend.Linearization.beside extend.Linearization.forward extend.Linearization.tangent extend.require_length
+    extend.Runner.read extend.Runner.write
+    extend.Formulas.lines extend.Names.formula extend.Names.inputs_of extend.Names.line
     extend.Names.meant extend.Names.short extend.Names.shown extend.Names.text"""
 
 

@@ -11,9 +11,10 @@ from ..core.checks import GraphError
 from ..core.graph import Graph
 from ..core.node import VARIABLE, Node, variable
 from ..util.html_text import html_lines
+from ..util.many import many
 from ..util.require import require_choice, require_graph, require_sequence, require_texts
 from ..writing.structure_hash import node_hashes
-from .names import Names, joined, many
+from .names import Names, joined
 
 if TYPE_CHECKING:
     from ..util.json_type import Json

@@ -208,8 +208,3 @@ def joined(words: Sequence[str], most: int = 6) -> str:
     if len(words) > most:
         words = [*words[: most - 1], f"{len(words) - most + 1} more"]
     return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)
-
-
-def many(number: int, noun: str) -> str:
-    """`1 path`, `3 paths`."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"

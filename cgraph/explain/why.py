@@ -13,10 +13,11 @@ from ..core.graph import Edge, Graph
 from ..core.node import Node
 from ..operations.operation import columns
 from ..util.html_text import html_table, html_text
+from ..util.many import many
 from ..util.require import require_graph
 from ..writing.source_lines import lines_text
 from .edge_partials import Point, edge_slopes
-from .names import Name, Names, many
+from .names import Name, Names
 from .paths import best_paths, by_target, path_count
 from .reachability import between
 

@@ -10,8 +10,9 @@ from ..core.checks import GraphError
 from ..core.graph import Graph
 from ..core.node import Node
 from ..util.html_text import html_lines
+from ..util.many import many
 from ..util.require import require_graph
-from .names import Name, Names, joined, many
+from .names import Name, Names, joined
 from .reachability import ancestors, descendants
 
 if TYPE_CHECKING:

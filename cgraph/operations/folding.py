@@ -109,6 +109,8 @@ def _times_quotient(a: Node, b: Node) -> Node | None:
         return top
     if c.op.name == "mul" and a in c.args:
         return top / c.args[c.args[0] is a]
+    if c.op.name == "div" and c.args[0] is a and _cancels(a):
+        return top * c.args[1]
     if a.op.name == "mul" and c in a.args and _cancels(c):
         return a.args[a.args[0] is c] * top
     return None

@@ -9,7 +9,9 @@ from ..core.graph import Graph
 from ..core.node import Node, variable
 from ..core.traversal import rebuild
 from ..operations.operation import OPS
-from .program import Call, If, Map, Program, Statement, While
+from .program import Program
+from .statement import Statement, row_of
+from .statements.call import Call, Map, elements
 
 MOST = 1000  # operations of what is fused: it compiles in some tens of milliseconds, and a short run gains no more
 
@@ -33,18 +35,16 @@ def _fused(program: Program, statements: Sequence[Statement]) -> tuple[Statement
             continue
         done += _one_call(program, run)
         run = []
-        if isinstance(statement, While):
-            statement = replace(statement, body=_fused(program, statement.body))
-        elif isinstance(statement, If):
-            body, otherwise = (_fused(program, each) for each in (statement.body, statement.otherwise))
-            statement = replace(statement, body=body, otherwise=otherwise)
+        bodies = {name: _fused(program, getattr(statement, name)) for name in row_of(statement).bodies}
+        if bodies:
+            statement = replace(statement, **bodies)  # type: ignore[type-var]
         done.append(statement)
     return (*done, *_one_call(program, run))
 
 
 def _one_call(program: Program, run: list[Call | Map]) -> list[Call | Map]:
     """The statements as one, if they are short and no product that is overwritten would go into a sum."""
-    repeated = [1 if isinstance(each, Call) else program.elements(each) for each in run]
+    repeated = [1 if isinstance(each, Call) else elements(each, program.registers) for each in run]
     size = sum([len(each.graph.nodes) * count for each, count in zip(run, repeated, strict=True)])
     if len(run) < 2 or size > MOST:
         return run

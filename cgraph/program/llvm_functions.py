@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Sequence
 from ..codegen.arithmetic import Arithmetic
 from ..codegen.llvm_ir import Address, Body, body, libm_functions
 from ..core.graph import Graph
-from .lu_solve import factor_text, solve_text
 
 _ARGUMENT = {"x": "in", "y": "out"}  # by the names that `body` gives to the two sides of a graph
 Lengths = tuple[int, ...]  # of the registers that are a function's arguments
@@ -98,38 +97,57 @@ class Functions:
         scope += [f"ptr %same{k}" for k in scalars]
         return lines
 
-    def sum(self, graph: Graph, inputs: Lengths, count: int) -> str:
-        """y = sum over i = 0 .. count - 1 of graph(x[i]), added up in this order from 0."""
-        t = self.arithmetic.type
+    def sum(self, graph: Graph, inputs: Lengths, count: int, shared: Lengths = (), outputs: Lengths = (1,)) -> str:
+        """y = sum over i = 0 .. count - 1 of graph(shared, x[i]), added up in this order from 0."""
+        t, known, first = self.arithmetic.type, _numbers(shared), len(shared)
+        inputs, places = (*shared, *inputs), _numbers(outputs)
+        terms = [f"%one{k}" if k else "%one" for k in range(len(places))]
 
         def address(base: str, name: str, row: int) -> list[str]:
             if base == "y":
-                return [f"  {name} = getelementptr {t}, ptr %one, i64 0"]
+                return [f"  {name} = getelementptr {t}, ptr {terms[row]}, i64 0"]
+            if row < len(known):
+                return [f"  {name} = getelementptr {t}, ptr %in{known[row][0]}, i64 {known[row][1]}"]
+            row += first - len(known)
             return [f"  {name} = getelementptr {t}, ptr %in{row}, i64 {'%i' if inputs[row] == count else 0}"]
 
         def lines() -> list[str]:
-            add = [  # y += graph(x[i])
-                f"  %so.far = load {t}, ptr %out0, align 8",
-                f"  %here = load {t}, ptr %one, align 8",
-                f"  %total = fadd {t} %so.far, %here",
-                f"  store {t} %total, ptr %out0, align 8",
+            start, add = [], []
+            for k, ((register, at), term) in enumerate(zip(places, terms, strict=True)):
+                start += [f"  {term} = alloca {t}, align 64"]
+                start += [f"  %sum{k} = getelementptr {t}, ptr %out{register}, i64 {at}"]
+                start += [f"  store {t} {self.arithmetic.number(0.0)}, ptr %sum{k}, align 8"]
+                add += [  # y += graph(shared, x[i])
+                    f"  %so.far{k} = load {t}, ptr %sum{k}, align 8",
+                    f"  %here{k} = load {t}, ptr {term}, align 8",
+                    f"  %total{k} = fadd {t} %so.far{k}, %here{k}",
+                    f"  store {t} %total{k}, ptr %sum{k}, align 8",
+                ]
+            return [*start, *(_loop(self._body(graph, self.arithmetic, address, scope), add, count) if count else [])]
+
+        scope = [*_pointers("in", inputs), *[f"ptr {term}" for term in terms], "i64 %i"]
+        key = ("sum", id(graph), inputs, count, first, outputs)
+        return self._define(key, "sum", lines, len(inputs), len(outputs))
+
+    def take(self, table: Sequence[int]) -> str:
+        """y[i] = x[table[i]]."""
+        t, size = self.arithmetic.type, len(table)
+
+        def lines() -> list[str]:
+            numbers = ", ".join(f"i64 {place}" for place in table)
+            name = f"@table{len(self._names)}"
+            self.definitions.append(f"{name} = internal unnamed_addr constant [{size} x i64] [{numbers}]")
+            body = [
+                f"  %place.at = getelementptr i64, ptr {name}, i64 %i",
+                "  %place = load i64, ptr %place.at, align 8",
+                f"  %from = getelementptr {t}, ptr %in0, i64 %place",
+                f"  %to = getelementptr {t}, ptr %out0, i64 %i",
+                f"  %taken = load {t}, ptr %from, align 8",
+                f"  store {t} %taken, ptr %to, align 8",
             ]
-            return [
-                f"  %one = alloca {t}, align 64",
-                f"  store {t} {self.arithmetic.number(0.0)}, ptr %out0, align 8",
-                *(_loop(self._body(graph, self.arithmetic, address, scope), add, count) if count else []),
-            ]
+            return _loop(Body([], body, []), [], size) if size else []
 
-        scope = [*_pointers("in", inputs), "ptr %one", "i64 %i"]
-        return self._define(("sum", id(graph), inputs, count), "sum", lines, len(inputs), 1)
-
-    def factor(self) -> str:
-        """LU = PA in place, see `lu_solve.factor_text`."""
-        return self._define_text("lu.factor", factor_text)
-
-    def solve(self) -> str:
-        """The solution of A x = b in place of b, see `lu_solve.solve_text`."""
-        return self._define_text("lu.solve", solve_text)
+        return self._define(("take", tuple(table)), "take", lines, 1, 1)
 
     def _body(
         self, graph: Graph, arithmetic: Arithmetic, address: Address, scope: Sequence[str], uniform: int = 0
@@ -152,7 +170,8 @@ class Functions:
             self.definitions += [head, "start:", *inner, "  ret void", "}"]
         return self._names[key]
 
-    def _define_text(self, name: str, text: Callable[[str], Sequence[str]]) -> str:
+    def text(self, name: str, text: Callable[[str], Sequence[str]]) -> str:
+        """A function of that name, whose lines `text` writes with the flags of the module's arithmetic."""
         if (name,) not in self._names:
             self._names[name,] = name
             self.definitions += text(self.arithmetic.flags)

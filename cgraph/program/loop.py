@@ -16,7 +16,8 @@ from ..core.traversal import rebuild, topological
 from ..util.real_arrays import real_array
 from ..util.require import require_graph, require_mapping, require_sequence
 from .choose_runner import runner
-from .program import Call, Program
+from .program import Program
+from .statements.call import Call
 
 
 class Loop:

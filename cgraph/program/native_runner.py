@@ -15,7 +15,7 @@ from ..codegen.batch_code import BatchCode
 from ..core.evaluation import Array
 from ..core.scope import without_collection
 from .fuse import fused
-from .llvm_ir import program_functions, program_ir
+from .llvm_ir import program_functions, program_ir, require_texts
 from .program import Program
 from .rows_ir import program_rows_ir
 from .runner import Record, Runner
@@ -31,6 +31,7 @@ class NativeRunner(Runner):
     def __init__(self, program: Program, flags: str) -> None:
         host = llvm.host()
         super().__init__(program, host.lanes)
+        require_texts(program)
         self._flags, self._host = flags, host
         self._fused = fused(program)
         self._functions = program_functions(self._fused)

@@ -18,7 +18,8 @@ from ..util.real_arrays import real_array
 from ..util.require import require_mapping, require_whole
 from ..util.threads import share, thread_count
 from .llvm_ir import offsets
-from .program import Call, Map, Program, Sum
+from .program import Program
+from .statement import reads_and_writes
 
 BLOCK = 64  # states of a batch that are run between looks at the keyboard, and that a thread takes at a time
 
@@ -292,11 +293,8 @@ class Runner(ABC):
         return write
 
     def _require_branch_free(self) -> None:
-        program = self.program
-        kinds = {type(statement).__name__ for statement in program.statements()} & {"While", "If", "Factor", "Solve"}
-        kinds |= {name for name in ("record_if", "stop") if getattr(program, name) is not None}
-        if kinds:
-            raise GraphError(f"runs side by side need a branch-free program: no {', '.join(sorted(kinds))}")
+        if branches := self.program.branches:
+            raise GraphError(f"runs side by side need a branch-free program: no {', '.join(branches)}")
 
     def _fed(self, feed: ArrayLike | None, shape: tuple[int, ...]) -> Array:
         """The rows of a feed, of that shape; the last dimension may be one for all."""
@@ -325,10 +323,9 @@ def _first_unset(program: Program, known: str) -> str | None:
     """A register that a pass without branches reads or records before it sets it, if there is one besides `known`."""
     is_set = {known}
     for statement in program.body:
-        assert isinstance(statement, Call | Map | Sum)
-        shared = statement.shared if isinstance(statement, Map) else ()
-        for name in (*shared, *statement.inputs):
+        reads, writes = reads_and_writes(statement)
+        for name in reads:
             if name not in is_set:
                 return name
-        is_set |= {statement.output} if isinstance(statement, Sum) else {*statement.outputs}
+        is_set |= {*writes}
     return next((name for name in program.record if name not in is_set), None)

@@ -17,7 +17,7 @@ from .initial_value import given_start
 from .projection import projected
 
 MOVED = "the velocities do not meet the constraints and were moved onto them"
-ROUNDING = 1e-9  # of the largest velocity
+ROUNDING = 1e-9  # of the largest velocity, those of angles and lengths by what they move
 
 
 def consistent_state(
@@ -66,9 +66,10 @@ def consistent_state(
     given = given_start(model, q, qd, 0.0, parameters)
     place, velocity = nearest_state(model, q, qd, t, parameters)
     system = as_system(model)
-    before = given.x[system.nq :]
-    change = np.abs(velocity - before)
-    if change.max(initial=0.0) > ROUNDING * np.abs(before).max(initial=0.0):
+    before, lengths = given.x[system.nq :], np.array(system.lengths[system.nq :])
+    lengths[lengths == 0.0] = 1.0  # of no known length
+    change = lengths * np.abs(velocity - before)
+    if change.max(initial=0.0) > ROUNDING * (lengths * np.maximum(np.abs(before), np.abs(velocity))).max(initial=0.0):
         k = int(change.argmax())
         text = f"velocity {system.velocities[k]!r} from {before[k]:.3g} to {velocity[k]:.3g}"
         warnings.warn(f"{MOVED}, the most {text}", ConstraintWarning, stacklevel=2)

@@ -42,9 +42,13 @@ def without_inertia(accelerations: Graph, mass_matrix: Callable[[], Graph], n: i
         if not finite.all():
             graph = mass_matrix()
             entries = graph.evaluate({name: point[name] for name in graph.input_names})
-            if all([np.isfinite(entry) for entry in entries.values()]):
-                found |= set(np.flatnonzero(~finite).tolist())  # a pivot is zero
-            continue  # else there is no M at this state
+            inertia = np.array([*entries.values()], dtype=np.float64).reshape(n, n)
+            if not np.isfinite(inertia).all():
+                continue  # there is no M at this state
+            if np.linalg.eigvalsh(balanced(inertia))[0] * SPARE > np.finfo(float).eps * n:
+                return []  # it is a force that overflows
+            found |= set(np.flatnonzero(~finite).tolist())  # a pivot is zero
+            continue
         if np.linalg.cond(balanced(inverse), 1) * np.finfo(float).eps * n < SPARE:
             return []
         digits = certain_digits(accelerations, point)

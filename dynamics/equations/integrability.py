@@ -22,7 +22,7 @@ from cgraph.extend import Array, Builder, building, tangents, topological
 from ..systems.kinematics import ZERO
 from ..systems.model import Model, as_system
 from ..systems.system import System
-from .constraint_rank import RowNumbers
+from .row_numbers import RowNumbers
 from .substitute import substitute
 
 STATES = 3

@@ -9,22 +9,16 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
 
 from cgraph.extend import Array
 
-from ..systems.constraints import Constraints
-from .constraint_rank import (
-    DEPENDENT,
-    ConstraintWarning,
-    RowNumbers,
-    equilibrated,
-    factors,
-    independent_rows,
-    row_numbers,
-)
+from ..systems.constraints import ConstraintError, Constraints
+from .constraint_rank import DEPENDENT, ConstraintWarning, independent_rows
+from .row_numbers import RowNumbers, equilibrated, factors, row_numbers
 
 NAMED = 1e-2  # of the largest row of its loop: a row of which no more is left is named, though it is kept
 STATES = 6
@@ -121,12 +115,11 @@ def without_nearly_redundant(constraints: Constraints) -> Constraints:
         return constraints
     matrices = [numbers.certain_matrix(point) for point in found]
     kept, shares, sizes = left_without(constraints, matrices)
-    gaps = np.max([np.abs(numbers.gaps(point)) for point in found], axis=0)
-    gaps = np.concatenate([gaps, np.zeros(len(constraints) - len(gaps))])
     names, exact = constraints.names, _following(matrices, kept)
     exact -= {k for k in exact if 0.0 < sizes[k] < NAMED}  # which others that are as small must not take in their place
     dropped = [k for k in range(len(constraints)) if k not in kept and k not in exact]
     close = [k for k in kept if names[k] in constraints.loop_rows and shares[k] < NAMED]
+    gaps = _gaps(constraints, numbers, found, {*kept} - {*close}) if dropped or close else np.zeros(0)
     for rows, what in (
         (dropped, "left out; a smaller tolerance of the Loop keeps {}"),
         (close, "kept: {} may hold the motion"),
@@ -135,7 +128,7 @@ def without_nearly_redundant(constraints: Constraints) -> Constraints:
             one = len(rows) == 1
             listed = " and ".join(
                 [
-                    f"{names[k]!r} ({shares[k]:.1e} of it is new, open by {gaps[k]:.1e}{_unit(constraints, k)})"
+                    f"{names[k]!r} ({shares[k]:.1e} of it is new, open by up to {gaps[k]:.1e}{_unit(constraints, k)})"
                     for k in rows
                 ]
             )
@@ -143,6 +136,15 @@ def without_nearly_redundant(constraints: Constraints) -> Constraints:
             text = f"constraint{'' if one else 's'} {listed} {verbs} {what.format('it' if one else 'them')}"
             warnings.warn(text, ConstraintWarning, stacklevel=2)
     return constraints.without({k: float(gaps[k]) for k in dropped}) if dropped else constraints
+
+
+def _gaps(constraints: Constraints, numbers: RowNumbers, found: list[dict[str, float]], closed: set[int]) -> Array:
+    """How far each row is open, (m,), at the most, at random states where these are closed."""
+    points, others = list(found), [k for k in range(len(constraints)) if k not in closed]
+    with suppress(ConstraintError):
+        points += RowNumbers(constraints.without(dict.fromkeys(others, 0.0))).states()
+    gaps = np.max([np.abs(numbers.gaps(point)) for point in points], axis=0)
+    return np.concatenate([gaps, np.zeros(len(constraints) - len(gaps))])
 
 
 def _nearly_closed(constraints: Constraints, numbers: RowNumbers) -> list[dict[str, float]]:

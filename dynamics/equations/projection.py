@@ -19,10 +19,11 @@ from cgraph.extend import Array, Builder, building, certain_digits, folded, kept
 
 from ..systems.constraints import ConstraintError
 from ..systems.system import System
-from .constraint_rank import FOLLOWS, ConstraintWarning, RowNumbers, independent_rows, step_names
+from .constraint_rank import ConstraintWarning, independent_rows
 from .constraints import Rows
 from .formulations import ZERO
 from .nearly_redundant_rows import lost_rank, opened
+from .row_numbers import FOLLOWS, RowNumbers, step_names
 from .substitute import substitute
 
 ITERATIONS = 20  # of Newton's method

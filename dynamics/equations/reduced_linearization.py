@@ -13,11 +13,12 @@ from cgraph.extend import Array, Builder
 from ..systems.constraints import ConstraintError
 from ..systems.model import Model, as_system
 from ..systems.system import System
-from .constraint_rank import DEPENDENT, equilibrated, independent_rows
+from .constraint_rank import DEPENDENT, independent_rows
 from .evaluate_at import evaluate_at
 from .initial_value import initial_value
 from .inverse_dynamics_derivatives import state_slopes
 from .linearization import linearize
+from .row_numbers import equilibrated
 
 
 class ReducedLinearization(NamedTuple):

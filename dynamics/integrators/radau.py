@@ -14,7 +14,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Call, Factor, If, Map, Program, Solve, Statement, Sum, While
+from cgraph.extend import Call, Factor, FixedPoint, If, Map, Program, Solve, Statement, Sum
 
 from .elementwise import SAME, identity, weighted
 from .explicit import stage_time
@@ -89,7 +89,7 @@ def radau(problem: Problem, dense: bool) -> Program:
         *_guess(z, powers),
         *_combined(_T_INVERSE, z, w),
         _begin(),
-        While("going", (*_turn(problem, z, w, f), *_compared(m))),
+        FixedPoint("going", (*_turn(problem, z, w, f), *_compared(m))),
         *_estimate(problem, z),
         control(4, 0),
         accept_step(*_dense(z, powers), Call(SAME, ("h",), ("h_old",))),
@@ -121,7 +121,7 @@ def radau_step(problem: Problem) -> Step:
         *[Call(zeros, (), (name,)) for name in (*z, *w)],
         _sizes(problem),
         Call(begin, (), tuple(begin.outputs)),
-        While("going", (*_turn(problem, z, w, f), *_to_rounding())),
+        FixedPoint("going", (*_turn(problem, z, w, f), *_to_rounding())),
         Map(SAME, ("x_new",), ("x",)),
     ]
     lengths = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from cgraph.extend import Factor, Solve, Statement, While
+from cgraph.extend import STATEMENTS, Statement
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,7 +16,6 @@ class Step:
 
     lengths: of the registers besides.  start: what is done before the first step, with x at the start in `x`.
     body: the step itself, with no `If`; what it hands on to the next one is in registers that it both reads and writes.
-    Every `While` iterates to a fixed point of what it carries.
     fixed: registers whose values have no derivatives: guesses, roundings, matrices of an iteration.
     failed: a register that is not 0 after a step whose equations were not solved; empty where nothing is iterated.
     """
@@ -30,4 +29,4 @@ class Step:
     @property
     def branches(self) -> bool:
         """Whether what is done depends on numbers, so that steps from several states cannot go side by side."""
-        return any(isinstance(each, While | Factor | Solve) for each in (*self.start, *self.body))
+        return any(STATEMENTS[type(each)].beside is None for each in (*self.start, *self.body))

@@ -22,7 +22,7 @@ from fractions import Fraction
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Call, Map, Program, Statement, Sum, While
+from cgraph.extend import Call, FixedPoint, Map, Program, Statement, Sum
 
 from ..systems.arguments import TIME
 from .composition import Composition
@@ -236,7 +236,7 @@ def _iterated(method: Partitioned, turn: list[Statement]) -> list[Statement]:
     for i in stages:
         measured += [Sum(difference, (f"W{i}", f"V{i}"), f"change{i}"), Sum(square, (f"W{i}",), f"speed{i}")]
         measured.append(Map(SAME, (f"W{i}",), (f"V{i}",)))
-    body.append(While("going", (*turn, *measured, _judged(len(method.w)))))
+    body.append(FixedPoint("going", (*turn, *measured, _judged(len(method.w)))))
     return body
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import check_name, real_number, require_flag, require_graph, require_mapping, require_sequence
+from cgraph.extend import check_name, many, real_number, require_flag, require_graph, require_mapping, require_sequence
 
 from ..equations.formulations import inverse_dynamics
 from ..systems.model import Model, as_system
@@ -47,7 +47,7 @@ class OmittedTerm:
     edges: int
 
     def __str__(self) -> str:
-        return f"{self.what}: {self.why} ({self.nodes} nodes, {self.edges} edges)"
+        return f"{self.what}: {self.why} ({many(self.nodes, 'node')}, {many(self.edges, 'edge')})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,4 +273,4 @@ def _saved(before: Graph, after: Graph) -> tuple[int, int]:
 
 
 def _size(graph: Graph) -> str:
-    return f"{len(graph.nodes)} nodes and {len(graph.edges)} edges"
+    return f"{many(len(graph.nodes), 'node')} and {many(len(graph.edges), 'edge')}"

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array
+from cgraph.extend import Array, Runner
 
 from ..integrators.step_control import COLLAPSE, DONE, SMALLEST_ATOL, TOO_SMALL
 from .dense_output import StepBlock
@@ -152,6 +152,9 @@ class AdaptiveIntegration(NativeIntegration):
         if not np.isfinite(rate).all():
             first = self.components[int(np.flatnonzero(~np.isfinite(rate))[0])]
             return f"{where}the rate of {first} is not finite{' at the start' if t == self.options.t0 else ''}"
+        self.slope = _lacking(self.runner, memory, self.components)
+        if self.slope:
+            return f"{where}{self.slope} is not finite, and method {self.options.method!r} takes it"
         if reason := self.nonfinite(self.runner.read(memory, "x_new")):
             return f"{where}{reason}, however small"
         fastest = self.components[int(np.argmax(np.abs(rate) / self._scale(x, x)))]
@@ -242,3 +245,13 @@ class AdaptiveIntegration(NativeIntegration):
         """What the error of a step is measured by."""
         size: Array = self.absolute + self.relative * np.maximum(np.abs(x), np.abs(x_new))
         return size
+
+
+def _lacking(runner: Runner, memory: Array, components: Sequence[str]) -> str:
+    """The first derivative of the rate that a method takes and that is not finite; empty if all are."""
+    lengths = runner.program.registers
+    for register, by in (("time_slope", ["the time"]), ("jacobian", components)):
+        if lengths.get(register) and len(bad := np.flatnonzero(~np.isfinite(runner.read(memory, register)))):
+            row, column = divmod(int(bad[0]), len(by))
+            return f"the derivative of the rate of {components[row]} by {by[column]}"
+    return ""

@@ -1,7 +1,8 @@
 """Error estimate of runs of equal steps: their differences from runs beside them, of longer steps (Richardson).
 
 With an error that is e = C h^p along the run, x(2h) - x(h) = (2^p - 1) e, and x(4h) - x(2h) is 2^p times as large; how
-much larger it is tells the order that the run has. Of steps that are not all equal, 2^p is the ratio of the sums of
+much larger it is tells the order that the run has. Across a jump or a kink of the rate these runs may be off alike, and
+what a step can miss there is the least that is said. Of steps that are not all equal, 2^p is the ratio of the sums of
 h^(p + 1). This is the error of the state, phase included, not that of the energy.
 """
 
@@ -14,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cgraph import Graph
 from cgraph.extend import Array
 
 from .courses import LATE, SHARE, Course, Law, courses
@@ -23,7 +23,7 @@ from .run_options import RunOptions
 from .state_difference import Difference, States, even, together
 from .state_sizes import StateSizes
 from .step_program import StepProgram
-from .unresolved import waves_and_branches
+from .unresolved import missed, turning, unresolved
 
 LEAST = 2.0  # times a difference that of steps twice as long is, at least, where the error has a law
 ROUNDING = 1e-10  # of the largest component of its kind: where one is that small, rounding is no error of it
@@ -31,7 +31,6 @@ LAWLESS = 0.1  # of the size of a component: a difference above it follows no po
 UNIT = 2.0**-52  # the last bit of a number near 1
 NUDGE = 8.0 * UNIT  # of each component, by which runs beside start aside: what roundings grow to is part of the error
 TOGETHER = 512  # states that are compared at once
-KINK = 16.0  # times an error of second order, as across a kink, that of steps four times as long is
 UNKNOWN = "the error is unknown"
 
 
@@ -80,7 +79,8 @@ class Estimator:
         self._size, self._steps, self._law = np.zeros((k, m)), 0, Law(1.0, 1.0)
         self._turning, self._longest = np.zeros(k), 0.0  # rad/s, of sines and cosines; s, of steps
         self._bent = np.zeros(k, dtype=bool)  # whether a jump or a kink was passed
-        self._looked_at = waves_and_branches(self.program.rate)
+        self._missed = np.zeros((k, m))  # by how much steps across jumps and kinks are off
+        self._unresolved = unresolved(self.program.rate)
         self._end: States | None = None  # of what was compared
         self._begun = self.options.t0  # the leg [s]
 
@@ -98,6 +98,11 @@ class Estimator:
     def longer(self) -> bool:
         """Whether the runs beside have longer steps."""
         return len(self._beside) > 1
+
+    @property
+    def every(self) -> bool:
+        """Whether it looks at all steps, for one may pass a jump or a kink."""
+        return not self.longer or self._unresolved.branches is not None
 
     def leg(self, stretches: Sequence[EqualSteps]) -> None:
         """After a reset, the runs go on with these steps."""
@@ -130,14 +135,13 @@ class Estimator:
             return
         self._pending.clear()
         end = float(states.t[-1])
+        self._look(states)
         if self.sparse and self.longer:
             met = np.flatnonzero(self._beside[-1].course.meets(states.t))
             states = States(states.t[met], states.x[:, even(met)], states.resets)
         if len(states.t):
             size = np.maximum(states.x.max(axis=1), -states.x.min(axis=1))
             self._size = np.maximum(self._size, np.where(np.isfinite(size), size, 0.0))
-        if self._looked_at is not None:
-            self._look(self._looked_at, states)
         self._differences[0].add(0, states)
         for number, beside in enumerate(self._beside):
             for each in self._until(beside, end, states.resets):
@@ -147,20 +151,17 @@ class Estimator:
         for difference in self._differences:
             difference.compare(states.resets)
 
-    def _look(self, graph: Graph, states: States) -> None:
-        """Note how fast sines and cosines turn, and where a jump or a kink is passed."""
-        t, x = states.t, states.x
+    def _look(self, states: States) -> None:
+        """Note how fast sines and cosines turn, and what steps across jumps and kinks miss."""
+        t, x, what = states.t, states.x, self._unresolved
         if self._end is not None and self._end.resets == states.resets:
             t, x = np.append(self._end.t, t), np.concatenate([self._end.x, x], axis=1)
-        if len(t) > 1:
-            columns = [*np.moveaxis(x, 2, 0), t, *self.p.T[:, :, None]]
-            values = graph.evaluate(dict(zip(graph.input_names, columns, strict=True)))
-            for name, value in values.items():
-                change = np.abs(np.diff(np.broadcast_to(value, x.shape[:2])))
-                if name.startswith("phase"):
-                    self._turning = np.maximum(self._turning, (change / np.abs(np.diff(t))).max(axis=1))
-                else:
-                    self._bent |= (change != 0.0).any(axis=1)
+        if len(t) > 1 and what.waves is not None:
+            self._turning = np.maximum(self._turning, turning(what.waves, t, x, self.p))
+        if len(t) > 1 and what.branches is not None:
+            bent, error = missed(what, self.program.order, t, x, self.p)
+            self._bent |= bent
+            self._missed += error
         self._end = States(t[-1:], x[:, -1:], states.resets)
 
     def _until(self, beside: _Beside, end: float, resets: int) -> Iterator[States]:
@@ -199,6 +200,8 @@ class Estimator:
             np.maximum(least, self._errors([np.where(change > 0.0, change / scale, 0.0) for change in changes]))
             for changes in zip(*[(each.largest, each.last) for each in self._differences], strict=True)
         )
+        across = np.where(self._missed > 0.0, self._missed / scale, 0.0)
+        largest, last = np.maximum(largest, across), np.maximum(last, across)
         largest = np.maximum(largest, last)  # where the law that holds for one does not for the other
         resolved = math.pi * max(1.0, 0.5 * self.program.order) / self._longest  # rad/s: two evaluations in a turn
         largest[self._turning > resolved] = last[self._turning > resolved] = math.inf
@@ -236,8 +239,7 @@ class Estimator:
             measured = self._differences[1].largest / self._differences[0].largest
         measured = np.where(np.isfinite(measured), np.clip(measured, least, ratio), least)
         errors = np.where(first <= LAWLESS, first * share * (ratio - 1.0) / (measured - 1.0), first)
-        bent = np.maximum(first, np.where(changes[1] <= LAWLESS, changes[1] / KINK, 0.0))
-        return np.where(self._bent[:, None], bent, errors)
+        return np.where(self._bent[:, None], first, errors)
 
     def _sentence(self, what: str) -> str:
         options = self.options

@@ -180,7 +180,7 @@ def simulate(
     recorder = Recorder(x, options.times, options.t0, options.direction)
     steps: list[StepBlock] | None = [] if dense_output else None
     outcome = _integrate(run, x, recorder, options, steps)
-    advise(run, recorder.last, options, x, made if hold is None else None)
+    outcome = _advised(outcome, run, recorder.last, options, x, made if hold is None else None)
 
     # Put the result together
     rows, held = recorder.table(), None if hold is None else hold.held
@@ -233,6 +233,19 @@ def _integrate(
     if run.event and not run.status:
         return _Outcome(seconds, 1, run.event, error)
     return _Outcome(seconds, -1 if run.status else 0, run.status or "reached t_end", error, early)
+
+
+def _advised(
+    outcome: _Outcome,
+    run: Integration,
+    reached: float,
+    options: RunOptions,
+    x: Array,
+    again: Callable[[RunOptions], Integration] | None,
+) -> _Outcome:
+    """The same, with the method that a run should have had; see `advise`."""
+    advise(run, reached, options, x, again)
+    return outcome._replace(message=run.status, early=(f"the run {run.status}",)) if outcome.early else outcome
 
 
 def _run(

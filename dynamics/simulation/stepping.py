@@ -51,6 +51,7 @@ class Integration(ABC):
     parameters: values of the rate's inputs that are not built in, as of the block that has come last.
     stiff: that one of `warnings` by which the steps are held at a stability limit.
     resets: of the state, by events, so far.
+    slope: that of the rate, in words, which is not finite where the run stopped, and which the method needs.
     """
 
     def __init__(self, components: Sequence[str]) -> None:
@@ -59,7 +60,7 @@ class Integration(ABC):
         self.largest = 0.0
         self.status = ""
         self.warnings: list[str] = []
-        self.event = self.stiff = ""
+        self.event = self.stiff = self.slope = ""
         self.parameters: list[float] = []
 
     @property

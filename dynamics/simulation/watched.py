@@ -103,6 +103,7 @@ class WatchedIntegration(Integration):
     def _count(self, run: Integration, rejected: int, evaluations: int) -> None:
         self.rejected, self.evaluations = rejected + run.rejected, evaluations + run.evaluations
         self.largest, self.stiff = max(self.largest, run.largest), self.stiff or run.stiff
+        self.slope = run.slope
         self.warnings = list(dict.fromkeys([*self.warnings, *run.warnings, *self.log.warnings]))
 
     def _rest(self, t: float) -> RunOptions:

@@ -49,7 +49,10 @@ def run(options: argparse.Namespace) -> None:
     drawn = (graph, kind, options.collapse, caption, names, words, verdict)
     content = _listed(graph, scene) if kind == ".txt" else _drawn(*drawn)
     counts = graph.counts()
-    answer(f"{options.out}: {counts.nodes} nodes, {counts.edges} edges", {options.out: content})
+    answer(
+        f"{options.out}: {extend.many(counts.nodes, 'node')}, {extend.many(counts.edges, 'edge')}",
+        {options.out: content},
+    )
 
 
 def _listed(graph: cg.Graph, scene: dyn.scenes.Scene) -> str:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
 import dynamics as dyn
+from cgraph.extend import many
 
 from .arguments import answer, unless_json
 from .command import Command
@@ -18,7 +20,7 @@ def add(parser: Command) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Print two lines a scene."""
-    rows = []
+    rows = list[dict[str, Any]]()
     for name in dyn.scenes.names():
         scene = dyn.scenes.load(name)
         inverse, forward = dyn.inverse_dynamics(scene).counts(), dyn.forward_dynamics(scene).counts()
@@ -33,7 +35,7 @@ def run(options: argparse.Namespace) -> None:
         )
     lines = [
         f"{row['name']:16} {row['about']}\n{'':16} coordinates: {row['coordinates']}, inverse dynamics "
-        f"{row['inverse_nodes']} nodes, forward dynamics {row['forward_nodes']} nodes"
+        f"{many(row['inverse_nodes'], 'node')}, forward dynamics {many(row['forward_nodes'], 'node')}"
         for row in rows
     ]
     answer(unless_json(options, rows, "\n".join(lines)))

@@ -98,7 +98,8 @@ def _text(run: dyn.Trajectory, data: dict[str, Any]) -> str:
     at_end = ", ".join([f"{name} = {value:.6g}" for name, value in [*data["end"].items()][:SHOWN]])
     more = len(data["end"]) - SHOWN
     of = ", of coordinates and momenta" if data["form"] == "momentum" else ""
-    work = f"{data['steps']} steps{of}, {data['rejected']} rejected, {data['evaluations']} evaluations"
+    steps, evaluations = extend.many(data["steps"], "step"), extend.many(data["evaluations"], "evaluation")
+    work = f"{steps}{of}, {data['rejected']} rejected, {evaluations}"
     lines = [
         f"{data['message']}, {data['t_end']:g} s" if run.success else f"{data['message']}",
         f"  method  {data['method']}: {work}, {data['seconds']:.3g} s",

@@ -7,7 +7,15 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 from cgraph import Edge, Graph, Node
-from cgraph.extend import require_choice, require_flag, require_graph, require_mapping, require_sequence, require_texts
+from cgraph.extend import (
+    many,
+    require_choice,
+    require_flag,
+    require_graph,
+    require_mapping,
+    require_sequence,
+    require_texts,
+)
 
 from .. import theme
 from ..theme import Paint
@@ -112,7 +120,7 @@ def to_dot(
     )
     drawing = digraph(rankdir)
     if caption is not None:
-        counts = f"{len(graph.nodes)} nodes, {len(graph.edges)} edges"
+        counts = f"{many(len(graph.nodes), 'node')}, {many(len(graph.edges), 'edge')}"
         drawing.attr(label=literal(f"{caption}\n{counts}" if caption else counts), labelloc="b", fontsize="16")
     draw_boxes(drawing, plan.boxes)
     if legend is not False:

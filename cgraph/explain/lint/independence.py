@@ -11,9 +11,10 @@ from ...core.forward import tangents
 from ...core.graph import Edge, Graph
 from ...core.label import ADJOINT
 from ...core.node import Node, constant
+from ...util.many import many
 from ...writing.networkx_queries import minimum_cut
 from ...writing.source_lines import lines_text
-from ..names import Name, Names, joined, many
+from ..names import Name, Names, joined
 from ..reachability import ancestors, between, descendants, has_more_ancestors
 from .finding import Finding
 

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 from ...core.graph import Edge, Graph
 from ...core.node import Node
 from ...util.html_text import html_table, html_text
+from ...util.many import many
 from ...util.require import require_graph, require_mapping, require_sequence
 from ..edge_partials import Point
-from ..names import Name, Names, many
+from ..names import Name, Names
 from .cancellation import cancellations, rounded
 from .dependence import missing_dependences, unused_inputs
 from .finding import Finding

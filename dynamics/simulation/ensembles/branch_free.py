@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import NamedTuple
 
-from cgraph.extend import Factor, If, Program, Solve, While
+from cgraph.extend import If, Program
 
 from ..step_program import StepProgram
 
@@ -27,7 +27,6 @@ def branch_free(program: StepProgram) -> BranchFreeProgram | None:
     if isinstance(first, If) and first.register == "fresh" and not first.otherwise:
         start, body = replace(steps, body=first.body, stop=None), body[1:]
     one_pass = replace(steps, body=body, stop=None)
-    statements = [*one_pass.statements(), *(start.statements() if start else ())]
-    if steps.record_if is not None or any(isinstance(one, While | If | Factor | Solve) for one in statements):
+    if one_pass.branches or (start is not None and start.branches):
         return None
     return BranchFreeProgram(start, one_pass)

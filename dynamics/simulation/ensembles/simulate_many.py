@@ -202,13 +202,21 @@ def _judged(stats: EnsembleStats, problem: Problem, options: RunOptions, rows: A
 def _warnings(stats: EnsembleStats) -> list[str]:
     """Of the first trajectory that stopped early, and of the first that something speaks against, with their number."""
     early = {
-        k: f"the run {stats.message[k]}"
+        k: str(stats.message[k]).removeprefix("stopped ")
         for k in np.flatnonzero(stats.status < 0).tolist()
         if not stats.message[k].startswith(INTERRUPTED)
     }
     doubtful = {k: texts[0] for k, texts in enumerate(stats.warnings) if texts}
-    said = [(len(texts), *min(texts.items())) for texts in (early, doubtful) if texts]
-    return [f"{count} of {len(stats.warnings)} trajectories: of {first}, {text}" for count, first, text in said]
+    many = f"of {len(stats.warnings)} trajectories"
+    said = []
+    if early:
+        first = min(early)
+        said.append(f"{len(early)} {many} stopped early: trajectory {first} {early[first]}")
+    if doubtful:
+        first = min(doubtful)
+        have = "has" if len(doubtful) == 1 else "have"
+        said.append(f"{len(doubtful)} {many} {have} a warning: trajectory {first}: {doubtful[first]}")
+    return said
 
 
 def _check(method: str, chunk: int | None) -> None:

@@ -81,7 +81,7 @@ class VectorizedIntegration:
         self, code: VectorCode, chunk: Chunk, part: Part, at: int, t0: float, estimator: Estimator | None, *, even: bool
     ) -> None:
         self.code, self.program, self.runner, self.part = code, code.program, code.one_pass, part
-        self.estimator, self._seen = estimator, SEEN if even and estimator and estimator.longer else 1
+        self.estimator, self._seen = estimator, SEEN if even and estimator and not estimator.every else 1
         count, total = part.rows.shape[:2]
         self._memories = _start_memories(code, chunk.x, chunk.p)
         self._live = np.ones(count, dtype=bool)

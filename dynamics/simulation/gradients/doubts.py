@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from cgraph.extend import Array
+
 from ..missed_momenta import missed_momenta
 from ..state_sizes import StateSizes
 from ..step_program import state_kinds
@@ -21,8 +23,13 @@ LOOKS = 64  # at least, if there are so many steps, at which two motions are com
 ASIDE = 1.0 + 2.0**-52  # by which the other motion starts aside: what a rounding grows to is part of the error
 
 
-def doubts(legs: Legs, value: Any, gradients: Mapping[str, Any]) -> list[list[str]]:
-    """A sentence each, of every motion, which has an end.  value, gradients: of the loss."""
+def doubts(
+    legs: Legs, value: Any, gradients: Mapping[str, Any], slopes: tuple[Array, Array] | None = None
+) -> list[list[str]]:
+    """A sentence each, of every motion, which has an end.  value, gradients: of the loss.
+
+    slopes: of the loss by the start of the motion and by its end.
+    """
     many = legs.motion.many
     count = max(many, 1)
     said = [[*legs.motion.said] for _ in range(count)]
@@ -30,6 +37,9 @@ def doubts(legs: Legs, value: Any, gradients: Mapping[str, Any]) -> list[list[st
         texts += more
     for texts, text in zip(said, _half_steps(legs), strict=True):
         texts += [text] if text else []
+    if slopes is not None:
+        for texts, text in zip(said, _grown(legs, *slopes), strict=True):
+            texts += [text] if text else []
     values = np.broadcast_to(np.asarray(value, dtype=np.float64), (count,))
     for k, texts in enumerate(said):
         if not np.isfinite(values[k]):
@@ -60,6 +70,30 @@ def _missed(legs: Legs) -> list[list[str]]:
     return result
 
 
+def _grown(legs: Legs, start: Array, end: Array) -> list[str]:
+    """Of every motion: whether what steps leave at its start may change the loss by more than the motion's size does.
+
+    start, end: slopes of the loss by the state there. Of a loss along the way alone, its value is compared.
+    """
+    motion, options = legs.motion, legs.motion.options
+    count = max(motion.many, 1)
+    left = options.relative if motion.method.adaptive else ASIDE - 1.0
+    at_start = np.maximum(np.abs(motion.x), np.abs(legs.end)).reshape(-1, count)
+    at_end = np.max([np.abs(run.states()[1]).max(axis=0).reshape(-1, count) for run in legs.runs], axis=0)
+    with np.errstate(all="ignore"):
+        change = left * (np.abs(start).reshape(-1, count) * at_start).sum(axis=0)
+        whole = (np.abs(end).reshape(-1, count) * at_end).sum(axis=0) + np.abs(np.asarray(legs.loss)).reshape(-1)
+        ratios = np.divide(change, whole, out=np.zeros(count), where=whole > 0.0)
+    what = f"rtol = {left:g}" if motion.method.adaptive else "rounding"
+    return [
+        f"the motion is chaotic, or nearly so: by its end {what} at its start has grown to {ratio:.2g} times its size, "
+        "and the gradient is that of the numbers computed, not of the motion"
+        if ratio > 1.0
+        else ""
+        for ratio in ratios.tolist()
+    ]
+
+
 def _half_steps(legs: Legs) -> list[str]:
     """Of equal steps, of every motion: by how much it is off, if by too much, beside one in steps of half the length.
 
@@ -73,7 +107,7 @@ def _half_steps(legs: Legs) -> list[str]:
     parts = tuple([_halved(leg, run) for leg, run in zip(motion.legs, legs.runs, strict=True)])
     beside = replace(motion, x=motion.x * ASIDE, legs=parts, tau=tau)
     try:
-        every = [2 * (run.checkpoints or max(1, len(run.motion.h) // LOOKS)) for run in legs.runs]
+        every = [2 * (run.tape.checkpoints or max(1, len(run.motion.h) // LOOKS)) for run in legs.runs]
         other = Legs(beside, legs.programs, legs.events, every)
     except MotionError as stopped:
         return [f"its error is unknown: in steps of half the length {stopped}"]

@@ -164,18 +164,21 @@ def gradient(
     options["estimate_error"] = estimate_error
     watched = as_events(events)
     motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, watched, form)
-    value, gradients, legs = differentiated(motion, loss, running, watched)
-    for text in doubts(legs, value, gradients)[0]:
+    value, gradients, legs, slopes = differentiated(motion, loss, running, watched)
+    for text in doubts(legs, value, gradients, slopes)[0]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    nq, checkpoints = motion.problem.nq, max([run.checkpoints for run in legs.runs])
+    nq, checkpoints = motion.problem.nq, max([run.tape.checkpoints for run in legs.runs])
     x = legs.end
     return MotionGradient(float(value), gradients, legs.t, x[:nq], x[nq:], checkpoints)
 
 
 def differentiated(
     motion: MotionOf, loss: Loss | None, running: Loss | None, watched: Sequence[Event] = ()
-) -> tuple[Any, dict[str, Any], Legs]:
-    """The loss of a motion, its gradient by names, and the motion; of N motions side by side an axis more, the last."""
+) -> tuple[Any, dict[str, Any], Legs, tuple[Array, Array]]:
+    """The loss of a motion, its gradient by names, the motion, and the slopes of the loss by its start and by its end.
+
+    Of N motions side by side all have an axis more, the last.
+    """
     problem = motion.problem
     if loss is None and running is None:
         raise ValueError("a loss is needed: of the end of the motion, `loss`, of how it goes, `running`, or both")
@@ -198,7 +201,7 @@ def differentiated(
     legs = Legs(motion, motion_programs(request), {event.name: event for event in program.events})
     value, end = _final(final, motion, legs)
     start, inputs, rows = legs.pulled(end)
-    return value + legs.loss, _gradients(motion, start, inputs, rows, end), legs
+    return value + legs.loss, _gradients(motion, start, inputs, rows, end), legs, (start, end.x)
 
 
 def _final(graph: Graph | None, motion: MotionOf, legs: Legs) -> tuple[Any, Bars]:

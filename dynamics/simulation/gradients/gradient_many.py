@@ -153,11 +153,11 @@ def gradient_many(
         first = part if isinstance(part, int) else part.start
         try:
             motion = _some(motions, problem, part)
-            losses, slopes, legs = differentiated(motion, loss, running)
+            losses, slopes, legs, ends = differentiated(motion, loss, running)
         except MotionError as error:
             early[first] = str(error)
             continue
-        arrived, texts = np.atleast_1d(np.isfinite(legs.end).all(axis=0)), doubts(legs, losses, slopes)
+        arrived, texts = np.atleast_1d(np.isfinite(legs.end).all(axis=0)), doubts(legs, losses, slopes, ends)
         rows = first + np.flatnonzero(arrived)
         value[rows], end[rows] = np.atleast_1d(losses)[arrived], _by_motion(legs.end, part)[arrived]
         for name, array in slopes.items():
@@ -167,10 +167,11 @@ def gradient_many(
                 early[first + k] = f"the motion {legs.runs[0].stopped(k)}"
             elif texts[k]:
                 said[first + k] = texts[k][0]
-    for sentences in (early, said):
+    for sentences, what in ((early, "stopped early"), (said, "doubtful")):
         if sentences:
             first, text = min(sentences.items())
-            warnings.warn(f"{len(sentences)} of {count} motions: of {first}, {text}", SimulationWarning, stacklevel=2)
+            text = f"{len(sentences)} of {count} motions {what}: motion {first}: {text}"
+            warnings.warn(text, SimulationWarning, stacklevel=2)
     t = motions.legs[0].t.copy() if motions.legs else np.array([run.t0, run.t_end])
     return MotionGradients(value, by_name, t, end[:, :nq], end[:, nq:])
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Runner, memo, runner
+from cgraph.extend import Linearization, Linearized, Map, Runner, memo, runner
 
 from ...integrators import Method
-from .linearization import Linearization, Linearized
 from .motion_equations import MotionEquations
 from .motion_steps import LOSS, motion_steps
 
+_T, _H = cg.variables("t h")
+_ADDED = Graph([_T, _H], {"t": _T + _H})
 KEPT = 16  # motions whose programs stay ready for another run
 
 
@@ -66,12 +68,13 @@ def motion_programs(request: Request) -> MotionPrograms:
     )
     step, start, first = steps.step, steps.start, None
     if request.forwards:
-        linear = step.tangent([*step.inputs, *step.varied])
+        then = [Map(_ADDED, ("t:dot", "h:dot"), ("t:dot",))] if {"t", "h"} <= set(step.wrt) else []
+        linear = step.tangent(step.wrt, ["x"], then)
     else:
         linear = step.adjoint(["x", LOSS] if LOSS in step.handed else ["x"])
     if start is not None:
         seeds = [name for name in linear.vectors if name in start.handed]
-        pass_on = start.tangent(start.inputs) if request.forwards else start.adjoint(seeds)
+        pass_on = start.tangent(start.wrt, ["x"]) if request.forwards else start.adjoint(seeds)
         first = _along(start, pass_on, list(start.handed), request.backend)
     results = [name for name in ("x", LOSS, steps.failed) if name in step.handed]
     return MotionPrograms(first, _along(step, linear, results, request.backend), steps.failed)

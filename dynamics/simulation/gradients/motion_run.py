@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
-from cgraph.extend import Array, Factor, Record, Runner, Solve, While
+from cgraph.extend import Array, Runner, Tape, run_passes
 
 from ..dense_output import Indices
 from ..stepping import unsolved
-from .iteration import UNSOLVED
 from .motion import MotionError, MotionOf
 from .motion_programs import Along, MotionPrograms
 from .motion_steps import LOSS
@@ -24,7 +24,7 @@ PIECE = 4096  # passes between two looks at Python
 class MotionRun:
     """A motion from its start to its end, once; then along it.
 
-    checkpoints: steps between two of them; 0 where all that is needed of every step is kept.
+    tape: what is recorded of the steps.
     x: (m,), the end.  loss: the running loss.
     arrives: whether the last step is still to be fitted, by `tried`, and then made, by `finish`.
     Raises MotionError for a motion that does not stay finite, or whose equations are not solved; of motions side by
@@ -36,8 +36,8 @@ class MotionRun:
         self.motion, self.start, self.step, self.failed = motion, programs.start, programs.step, programs.failed
         count, width = len(motion.h), self.step.forward.program.width
         fits = every > 0 or 8 * width * count * max(1, motion.many) <= MOST_RECORDED
-        self.checkpoints, self._every = 0 if fits else math.ceil(math.sqrt(count)), every or 1
-        self._blocks: list[tuple[int, int, Array]] = []  # first and last step, and the rows, or the memory before
+        self._every = every or 1
+        self.tape = Tape(self.step.forward, partial(_fed, motion), 0 if fits else math.ceil(math.sqrt(count)))
         self._memory = self._begin()
         self._run(0, count - arrives)
         if not arrives:
@@ -52,7 +52,7 @@ class MotionRun:
             return _memory(self.step.forward, {**given, self.step.passes.handed["x"]: motion.x}, motion.many)
         passes, forward = start.passes, start.forward
         memory = _memory(forward, {**given, passes.handed["x"]: motion.x}, motion.many)
-        rows = _run(forward, memory, 1, 1, np.empty((1, 0))).rows
+        rows = run_passes(forward, memory, 1, 1, np.empty((1, 0))).rows
         self._start_tape = rows[:, : start.linear.program.feed_width]
         self.begin = forward.read(memory, passes.handed["x"]).copy()
         self._start_constants = {name: forward.read(memory, name).copy() for name in passes.constants}
@@ -60,20 +60,10 @@ class MotionRun:
         values = {handed.get(name, name): forward.read(memory, after).copy() for name, after in passes.handed.items()}
         return _memory(self.step.forward, {**given, **values}, motion.many)
 
-    def _feed(self, first: int, last: int) -> Array:
-        """What the steps first .. last - 1 are fed."""
-        motion, part = self.motion, slice(first, last)
-        columns = np.stack([motion.t[:-1][part], motion.h[part]], axis=1)
-        if not motion.each_step:
-            return columns
-        tau = motion.tau[part]
-        wide = np.broadcast_to(columns[..., None], (*columns.shape, motion.many)) if motion.many else columns
-        return np.concatenate([wide, tau], axis=1)
-
     def tried(self) -> Array:
         """Where the last step arrives, (m,)."""
         count, memory = len(self.motion.h), self._memory.copy()
-        self.step.forward.run(memory, 1, 1, self._feed(count - 1, count))
+        self.step.forward.run(memory, 1, 1, _fed(self.motion, count - 1, count))
         return self.step.forward.read(memory, self.step.passes.handed["x"])
 
     def finish(self) -> None:
@@ -83,17 +73,7 @@ class MotionRun:
         self._end()
 
     def _run(self, begin: int, end: int) -> None:
-        forward, memory, size = (
-            self.step.forward,
-            self._memory,
-            self.checkpoints or max(1, PIECE // self._every) * self._every,
-        )
-        for first in range(begin, end, size):
-            last = min(first + size, end)
-            before = memory.copy() if self.checkpoints else None
-            every = last - first if self.checkpoints else self._every
-            rows = _run(forward, memory, last - first, every, self._feed(first, last)).rows
-            self._blocks.append((first, last, rows if before is None else before))
+        self.tape.run(self._memory, begin, end, PIECE, self._every)
 
     def _end(self) -> None:
         forward, handed, memory = self.step.forward, self.step.passes.handed, self._memory
@@ -117,7 +97,7 @@ class MotionRun:
         before, first, size = memory, 0, PIECE
         while first < len(motion.h):
             before, last = memory.copy(), min(first + size, len(motion.h))
-            _run(forward, memory, last - first, last - first, self._feed(first, last))
+            run_passes(forward, memory, last - first, last - first, _fed(motion, first, last))
             if not self._bad(memory, k):
                 first = last
             elif last - first == 1:
@@ -132,49 +112,40 @@ class MotionRun:
         old = forward.read(before, self.step.passes.handed["x"])
         return f"{where}: {unsolved(motion.problem.components, old if k is None else old[:, k], x)}"
 
-    def recorded(self, *, backwards: bool) -> Iterator[tuple[int, int, Array]]:
-        """(first, last, rows) of what was recorded of the steps first .. last - 1, block by block.
-
-        A row is what goes along the step, and then the state after it.
-        """
-        for first, last, kept in reversed(self._blocks) if backwards else self._blocks:
-            if self.checkpoints:
-                yield first, last, _run(self.step.forward, kept.copy(), last - first, 1, self._feed(first, last)).rows
-            else:
-                yield first, last, kept
-
     def states(self) -> tuple[Indices, Array]:
         """After how many steps (T,), and states (T, m), from the start to the end: all that are kept."""
         count, m = len(self.motion.h), len(self.x)
-        if not self.checkpoints:
-            numbers = [np.arange(first + self._every, last + 1, self._every) for first, last, _ in self._blocks]
-            rows = [kept[:, -m:] for *_, kept in self._blocks]
+        blocks = self.tape.blocks
+        if not self.tape.checkpoints:
+            numbers = [np.arange(first + self._every, last + 1, self._every) for first, last, _ in blocks]
+            # a row ends with the state after the step
+            rows = [kept[:, -m:] for *_, kept in blocks]
             if not len(numbers[-1]) or numbers[-1][-1] != count:
                 numbers, rows = [*numbers, np.array([count])], [*rows, self.x[None]]
             return np.concatenate([[0], *numbers]), np.concatenate([self.begin[None], *rows])
-        kept = [self.step.forward.read(memory, self.step.passes.handed["x"]) for *_, memory in self._blocks]
-        return np.array([*[first for first, *_ in self._blocks], count]), np.array([*kept, self.x])
+        kept = [self.step.forward.read(memory, self.step.passes.handed["x"]) for *_, memory in blocks]
+        return np.array([*[first for first, *_ in blocks], count]), np.array([*kept, self.x])
 
     def pulled(self, seeds: Mapping[str, Array | float]) -> tuple[dict[str, Array], Array]:
         """Cotangents of the start and of the inputs, from those after the last step; and rows, those of each step."""
         memory = self._linear_memory(self.step, self._constants, seeds)
         back = self.step.back
         width, parts = back.program.feed_width, []
-        for first, last, tape in self.recorded(backwards=True):
-            parts.append(_run(back, memory, last - first, 1, tape[::-1, :width]).rows)
+        for first, last, tape in self.tape.recorded(backwards=True):
+            parts.append(run_passes(back, memory, last - first, 1, tape[::-1, :width]).rows)
         none = np.empty((len(self.motion.h), 0))
         rows = np.concatenate([part[::-1] for part in reversed(parts)]) if back.program.record else none
         bars = self._vectors(self.step, memory)
         if self.start is None:
             return bars, rows
         memory = self._linear_memory(self.start, self._start_constants, bars)
-        _run(self.start.back, memory, 1, 1, self._start_tape)
+        run_passes(self.start.back, memory, 1, 1, self._start_tape)
         return self._vectors(self.start, memory), rows
 
     def last_slope(self, seed: Array) -> float:
         """The cotangent of h of the last step, from that of x after it."""
         memory = self._linear_memory(self.step, self._constants, {"x": seed})
-        _, _, tape = next(self.recorded(backwards=True))
+        _, _, tape = next(self.tape.recorded(backwards=True))
         row = self.step.back.run(memory, 1, 1, tape[-1:, : self.step.back.program.feed_width]).rows[0]
         return float(row[self.step.passes.varied.index("h")])
 
@@ -192,7 +163,7 @@ class MotionRun:
         m, width = len(self.x), back.program.feed_width
         states, tangents = [self.begin[None]], [back.read(memory, names["x"])[None].copy()]
         changes = set((np.flatnonzero((np.diff(lengths, axis=0) != 0.0).any(axis=1)) + 1).tolist())
-        for first, last, tape in self.recorded(backwards=False):
+        for first, last, tape in self.tape.recorded(backwards=False):
             states.append(tape[:, -m:])
             for begin, end in itertools.pairwise([first, *[k for k in range(first + 1, last) if k in changes], last]):
                 if len(lengths):
@@ -210,15 +181,15 @@ class MotionRun:
         return _memory(along.back, {**constants, **placed}, max(many, default=0))
 
     def _vectors(self, along: Along, memory: Array) -> dict[str, Array]:
-        if np.any(along.back.read(memory, UNSOLVED)):
+        if np.any(along.back.read(memory, along.linear.unsolved)):
             raise MotionError("the equations of a step's derivative were not solved: the step is too long")
         return {name: along.back.read(memory, register).copy() for name, register in along.linear.vectors.items()}
 
 
 def _run_all(ready: Runner, memories: Array, feed: Array) -> Array:
     """The rows (passes, width, k) of k memories that are fed the same: side by side, unless the passes branch."""
-    if branch_free(ready):
-        return _run(ready, memories, len(feed), 1, feed).rows
+    if not ready.program.branches:
+        return run_passes(ready, memories, len(feed), 1, feed).rows
     rows = np.empty((len(feed), ready.program.width, memories.shape[1]))
     for k in range(memories.shape[1]):
         memory = memories[:, k].copy()
@@ -238,14 +209,12 @@ def _memory(ready: Runner, values: Mapping[str, Array], many: int) -> Array:
     return ready.memory(wide, many)
 
 
-def _run(ready: Runner, memory: Array, passes: int, every: int, feed: Array) -> Record:
-    """Passes of one memory, or of many side by side."""
-    if memory.ndim == 1:
-        return ready.run(memory, passes, every, feed)
-    with np.errstate(all="ignore"):
-        return ready.run_many(memory, passes, every, feed if feed.ndim == 3 else feed[:, :, None])
-
-
-def branch_free(ready: Runner) -> bool:
-    """Whether many memories can run side by side."""
-    return not any(isinstance(each, While | Factor | Solve) for each in ready.program.statements())
+def _fed(motion: MotionOf, first: int, last: int) -> Array:
+    """What the steps first .. last - 1 are fed."""
+    part = slice(first, last)
+    columns = np.stack([motion.t[:-1][part], motion.h[part]], axis=1)
+    if not motion.each_step:
+        return columns
+    tau = motion.tau[part]
+    wide = np.broadcast_to(columns[..., None], (*columns.shape, motion.many)) if motion.many else columns
+    return np.concatenate([wide, tau], axis=1)

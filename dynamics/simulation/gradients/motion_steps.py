@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Call, Statement
+from cgraph.extend import STATEMENTS, Call, Linearization, Program, Statement
 
 from ...integrators import Method, Problem
 from ...integrators.explicit import registers
 from ...systems.arguments import TIME, new_variables
-from .linearization import Linearization
 from .motion_equations import PARAMETERS, MotionEquations
-from .products import Products
 
 LOSS = "loss"  # register: the running loss so far
 
@@ -64,18 +64,29 @@ def motion_steps(
     fed = ("t", "h", "tau") if each_step else ("t", "h")
     make = partial(
         Linearization,
-        lengths=lengths,
-        fixed=(*made.fixed, "evaluations", "nonfinite"),
-        renamed={"p": PARAMETERS},
-        products=Products({key: pullback for key, pullback in pullbacks.items() if pullback is not None}),
+        constant=(*made.fixed, "evaluations", "nonfinite"),
+        rules={key: pullback for key, pullback in pullbacks.items() if pullback is not None},
     )
-    inputs_of_step, varied = [name for name in wrt if name not in fed], [name for name in wrt if name in fed]
-    step = make(body, fed=fed, inputs=inputs_of_step, varied=varied, carried=carried)
+    step = make(Program(lengths, _separate(body), record=(), feed=fed), carried, wrt)
     read = [name for name in (*step.handed, *step.constants) if name not in (*PARAMETERS, "t")]
-    begin = [*_normalized(problem, TIME), *made.start]
-    inputs_of_start = [name for name in wrt if name != "h"]
-    start = make(begin, fed=(), inputs=inputs_of_start, varied=(), carried=read) if begin else None
+    begin = _separate([*_normalized(problem, TIME), *made.start])
+    start = make(Program(lengths, begin, record=()), read, [name for name in wrt if name != "h"]) if begin else None
     return MotionSteps(start, step, made.failed)
+
+
+def _separate(statements: Sequence[Statement]) -> list[Statement]:
+    """The statements, whose parameters p, end to end, are in several registers."""
+    result: list[Statement] = []
+    for statement in statements:
+        row = STATEMENTS[type(statement)]
+        changed: dict[str, Any] = {name: tuple(_separate(getattr(statement, name))) for name in row.bodies}
+        for name in row.reads:
+            registers: str | tuple[str, ...] = getattr(statement, name)
+            if "p" in registers and not isinstance(registers, str):
+                parts = [PARAMETERS if each == "p" else (each,) for each in registers]
+                changed[name] = tuple([each for part in parts for each in part])
+        result.append(replace(statement, **changed) if changed else statement)  # type: ignore[type-var]
+    return result
 
 
 def _sharing(body: list[Statement], equations: MotionEquations, lengths: dict[str, int]) -> list[Statement]:

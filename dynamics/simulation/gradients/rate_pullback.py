@@ -40,6 +40,11 @@ class RatePullback:
     q_dot: Sequence[Node]
     shared: Mapping[Node, Node] = field(default_factory=dict)
 
+    @property
+    def residuals(self) -> int:
+        """How many of the last outputs of the rate are there for this rule alone."""
+        return len(self.shared)
+
     def __call__(self, wrt: Sequence[Node]) -> Graph:
         """The graph for these inputs."""
         build = Builder()

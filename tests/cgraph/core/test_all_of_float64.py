@@ -103,6 +103,7 @@ ENTROPIES = {
     "x log2 x": lambda m, x, y: x * (m.log2(x) if m is cg else m.log(x, 2)),
     "x log10 x": lambda m, x, y: x * m.log10(x),
     "x log x / y": lambda m, x, y: x * m.log(x) / y,
+    "x log(x / y)": lambda m, x, y: x * m.log(x / y),
     "a sum": lambda m, x, y: x * m.log(x) + y * m.log(y),
 }
 

@@ -255,3 +255,20 @@ def test_symplectic_methods_step_the_state_of_what_is_held_or_say_that_they_cann
     for method in ("verlet", "symplectic_euler"):
         with pytest.raises(ValueError, match="constraint 'blade' holds both: take 'midpoint', 'gauss4' or 'dop853'"):
             dyn.simulate(sleigh(), [0.0] * 3, [0.0] * 3, 0.1, method)
+
+
+@pytest.mark.parametrize("unit", [1.0, 2.0**-9, 2.0**9])
+def test_velocities_that_are_moved_by_rounding_alone_are_no_warning(unit: float) -> None:
+    """A rod that turns: a second time its velocity is moved by its last bits, in any units; one of its own is said."""
+    rod = dyn.System(
+        lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2),
+        "x y",
+        constraints=lambda q, t: {"rod": q[0] ** 2 + q[1] ** 2 - unit**2},
+    )
+    with pytest.warns(dyn.ConstraintWarning, match="velocities do not meet the constraints"):
+        q, qd = dyn.consistent_state(rod, [3.0 * unit, 4.0 * unit], [unit, 0.0])
+    again = dyn.consistent_state(rod, q, qd)  # no warning
+    assert np.abs(again[1] - qd).max() <= 1e-14 * unit
+    dyn.consistent_state(rod, q, [0.0, 0.0])
+    with pytest.warns(dyn.ConstraintWarning, match="velocities do not meet the constraints"):
+        dyn.consistent_state(rod, q, qd * [1.0, 1.0 + 1e-6])

@@ -11,6 +11,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics.equations.consistent_state import nearest_state
 from dynamics.equations.evaluate_at import Array, evaluate_at
 from tests.dynamics.linkages import four_bar, scaled_four_bar
 from tests.dynamics.mechanisms import random_body
@@ -50,7 +51,7 @@ def test_a_mass_on_a_rod_is_a_pendulum() -> None:
 def test_a_four_bar_is_its_differences_along_the_loop() -> None:
     model = four_bar()
     system, tau, accelerations = model.system, [0.4, 0.0, -0.2], dyn.forward_dynamics(model)
-    q, qd = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    q, qd = nearest_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
     reduced = dyn.reduced_linearization(model, q, qd, tau)
     assert reduced.A.shape == (2, 2)
     names = [f"{kind}.{name}" for kind in ("q", "qd") for name in system.velocities]
@@ -61,7 +62,7 @@ def test_a_four_bar_is_its_differences_along_the_loop() -> None:
         return np.concatenate([state[3:], qdd])
 
     def along(column: Array) -> tuple[Array, Array]:
-        ends = [np.concatenate(dyn.consistent_state(model, *np.split(x + s * column, 2))) for s in (-1e-4, 1e-4)]
+        ends = [np.concatenate(nearest_state(model, *np.split(x + s * column, 2))) for s in (-1e-4, 1e-4)]
         return ends[1] - ends[0], rate(ends[1]) - rate(ends[0])
 
     moved, rates = (np.array(part)[:, chosen].T for part in zip(*map(along, reduced.displacements.T), strict=True))
@@ -150,7 +151,7 @@ def test_a_free_body_that_is_pinned_at_a_point_is_a_ball_joint() -> None:
     pinned = dyn.Mechanism([body], loops=[dyn.Loop("point", "body", at=(0, 0, 0.5), to_at=(0, 0, 0.5))])
     joint = dyn.Joint("ball", position=(0.0, 0.0, 0.5))
     ball = dyn.Mechanism([dyn.Body("body", joint, center=(0.1, 0.0, -0.7), **numbers)])
-    q, qd = dyn.consistent_state(pinned, pinned.system.kinematics.neutral, [0.0, 0.0, 0.0, 0.3, 0.2, 0.1])
+    q, qd = nearest_state(pinned, pinned.system.kinematics.neutral, [0.0, 0.0, 0.0, 0.3, 0.2, 0.1])
     reduced = dyn.reduced_linearization(pinned, q, qd)
     assert reduced.states == tuple([f"{kind}.body.w{axis}" for kind in ("q", "qd") for axis in "xyz"])
     assert pytest.approx(dyn.linearize(ball, [1.0, 0.0, 0.0, 0.0], qd[3:])[0], abs=1e-12) == reduced.A
@@ -169,7 +170,7 @@ def test_without_constraints_it_is_linearize() -> None:
 def test_the_modes_have_no_units(length: float, mass: float) -> None:
     found = []
     for model in (scaled_four_bar(1, 1), scaled_four_bar(length, mass)):
-        state = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+        state = nearest_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
         found.append(dyn.reduced_linearization(model, *state).A)
     assert found[1] == pytest.approx(found[0], rel=1e-10)
 

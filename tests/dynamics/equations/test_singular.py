@@ -271,3 +271,19 @@ def test_a_massless_body_on_a_joint_that_the_next_one_repeats_is_refused(kinds: 
     bodies = [first, dyn.Body("second", second, "first", 1.0, (0.1, 0.2, 0.3), (0.1, 0.2, 0.25))]
     with pytest.raises(SingularMassMatrixError, match=r"a motion of .*'first.* has no inertia"):
         forward_dynamics(dyn.Mechanism(bodies))
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_a_force_that_overflows_is_no_singular_mass_matrix(held: bool) -> None:
+    """At all states that are tried; the one of interest is another."""
+
+    def steep(q: list[cg.Node], qd: list[cg.Node], t: cg.Node) -> cg.Node:
+        inertia = 0.5 * (1.0 + q[0] ** 2) * qd[0] ** 2 + 0.5 * qd[1] ** 2 + 0.1 * qd[0] * qd[1] * cg.cos(q[1])
+        return inertia - 1e-9 * cg.exp(1e9 * q[0]) - 1e-9 * cg.exp(1e9 * q[1])
+
+    rows = {"constraints": lambda q, t: {"equal": q[0] - q[1]}} if held else {}
+    steep_system = dyn.System(steep, ["x", "y"], **rows)
+    at = dict.fromkeys(dyn.forward_dynamics(steep_system).input_names, 0.0)
+    found = dyn.forward_dynamics(steep_system).evaluate(at)
+    # M = [[1, 0.1], [0.1, 1]], and the force is 1 in both directions, down
+    assert [found["qdd0"], found["qdd1"]] == pytest.approx([-1.0 / 1.1] * 2, rel=1e-14)

@@ -9,6 +9,7 @@ from pytest import approx, importorskip, mark, param, raises, warns
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics.equations.consistent_state import nearest_state
 from dynamics.multibody.mechanism import Mechanism, MechanismError
 from tests.slow import slow
 
@@ -85,7 +86,7 @@ def test_rows_and_accelerations_are_mujoco_s_but_exact(what: str) -> None:
     model, loaded, rng = mujoco.MjModel.from_xml_string(text), dyn.load_mjcf(text), np.random.default_rng(0)
     model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     start = model.qpos0 + 0.2 * rng.uniform(-1.0, 1.0, model.nq)
-    q, u = dyn.consistent_state(loaded, start, rng.uniform(-1.0, 1.0, model.nv))
+    q, u = nearest_state(loaded, start, rng.uniform(-1.0, 1.0, model.nv))
     phi, slopes = rows(model, mujoco.MjData(model), q)
     assert np.abs(phi).max() <= CLOSED
     assert np.abs(slopes @ u).max() <= CLOSED

@@ -12,6 +12,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics.equations.consistent_state import nearest_state
 from dynamics.equations.constraint_rank import independent_rows
 from dynamics.multibody.spatial import rotation
 from tests.slow import slow
@@ -211,7 +212,7 @@ def residuals(model: dyn.Mechanism, run: dyn.Trajectory) -> tuple[float, float]:
 @pytest.mark.parametrize(("method", "options"), [("dop853", {"rtol": 1e-9}), ("rk4", {})])
 def test_a_motion_of_50_s_stays_on_its_constraints(method: str, options: dict[str, float]) -> None:
     model = four_bar()
-    q, qd = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    q, qd = nearest_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
     times = np.linspace(0.0, 50.0, 301)  # between steps, too
     run = dyn.simulate(model, q, qd, 50.0, method, t_eval=times, **options)  # type: ignore[arg-type]
     position, velocity = residuals(model, run)
@@ -223,7 +224,7 @@ def test_a_motion_of_50_s_stays_on_its_constraints(method: str, options: dict[st
 def test_a_trajectory_has_the_forces_of_its_loops_by_name() -> None:
     """Those of forward dynamics at the rows, under a held force and with parameters, too; and of a mass on a rod."""
     model = four_bar()
-    q, qd = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    q, qd = nearest_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
     servo = dyn.SampledController(lambda q, qd, t: [0.3 - 0.1 * qd[0], 0.0, 0.0], 0.05)
     run = dyn.simulate(model, q, qd, 0.2, tau=servo)
     state = {f"q{i}": x for i, x in enumerate(run.q.T)} | {f"qd{i}": x for i, x in enumerate(run.qd.T)}
@@ -237,10 +238,10 @@ def test_a_trajectory_has_the_forces_of_its_loops_by_name() -> None:
 
 def test_a_loop_cut_elsewhere_moves_alike() -> None:
     one, other = four_bar(), four_bar(cut=4)
-    q, qd = dyn.consistent_state(one, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    q, qd = nearest_state(one, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
     relative = [*q[:2], q[2] - q[0] - q[1]], [*qd[:2], qd[2] - qd[0] - qd[1]]
     first = dyn.simulate(one, q, qd, 2.0, rtol=1e-11, t_eval=[2.0])
-    second = dyn.simulate(other, *dyn.consistent_state(other, *relative), 2.0, rtol=1e-11, t_eval=[2.0])
+    second = dyn.simulate(other, *nearest_state(other, *relative), 2.0, rtol=1e-11, t_eval=[2.0])
     assert second.q[0, :2] == pytest.approx(first.q[0, :2], abs=1e-8)
     assert second.q[0].sum() == pytest.approx(first.q[0, 2], abs=1e-8)
 
@@ -307,7 +308,7 @@ def test_a_planar_loop_in_any_plane_moves_alike(kind: str) -> None:
         warnings.simplefilter("ignore", dyn.ConstraintWarning)
         tilted = dyn.Mechanism(bars, turn @ np.array(flat.gravity), loops=flat.loops)
         graph = dyn.forward_dynamics(tilted)
-    q, qd = dyn.consistent_state(flat, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    q, qd = nearest_state(flat, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
     at = {f"q{i}": x for i, x in enumerate(q)} | {f"qd{i}": x for i, x in enumerate(qd)}
     at |= {f"tau{i}": 0.3 * i for i in range(3)}
     expected, found = (each.evaluate(at) for each in (dyn.forward_dynamics(flat), graph))
@@ -339,7 +340,7 @@ def test_a_loop_that_cannot_close_is_named() -> None:
 
 def test_a_start_off_the_constraints_is_moved_and_said_to_be() -> None:
     model = four_bar()
-    q, qd = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    q, qd = nearest_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
     with pytest.warns(dyn.ConstraintWarning, match="was moved onto them: coordinate 'coupler' by 0.00"):
         run = dyn.simulate(model, q + 1e-3, qd, 0.01)
     assert residuals(model, run)[0] < 1e-15
@@ -347,7 +348,7 @@ def test_a_start_off_the_constraints_is_moved_and_said_to_be() -> None:
 
 def test_a_loop_among_locked_joints_is_a_weld() -> None:
     model = four_bar()
-    q, _ = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    q, _ = nearest_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
     free = bar("load", "coupler", 0.2, (0.4, 0, 0))
     loaded = dyn.Mechanism([*model.bodies, free], model.gravity, loops=model.loops)
     stiff = loaded
@@ -368,7 +369,7 @@ def test_a_body_taken_off_takes_its_loops_along_and_brings_them_back() -> None:
     assert dyn.forward_dynamics(back).evaluate(at) == dyn.forward_dynamics(model).evaluate(at)
     with pytest.raises(dyn.MechanismError, match="there is a loop on the unknown body 'coupler'"):
         model.detach("rocker").detach("coupler").attach(taken)
-    q, qd = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    q, qd = nearest_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
     let = dyn.release(model, q, qd, "rocker")
     assert let.mechanism.loops == ()
     assert (let.q.tolist(), let.qd.tolist()) == (q[:2].tolist(), qd[:2].tolist())
@@ -378,7 +379,7 @@ def test_a_body_taken_off_takes_its_loops_along_and_brings_them_back() -> None:
 def test_a_linkage_that_is_locked_stands(method: str) -> None:
     """Accelerations are rounding alone there, by which no steps can be chosen."""
     model = four_bar()
-    q, _ = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    q, _ = nearest_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
     run = dyn.simulate(model.lock("crank", q[0]), q[1:], [0.0, 0.0], 1.0, method, max_steps=2000)
     assert run.success
     assert np.abs(run.q - q[1:]).max() < 1e-15
@@ -388,7 +389,7 @@ def test_a_linkage_that_is_locked_stands(method: str) -> None:
 def test_a_body_caught_by_a_closed_chain_leaves_it_closed() -> None:
     """Impulses of the loop are J^T s: M qd+ - p does no work on a motion that the loop lets through."""
     model = four_bar()
-    q, qd = dyn.consistent_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    q, qd = nearest_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
     load = dyn.Body("load", dyn.Joint("fixed", position=(0.4, 0.0, 0.1)), "coupler", 0.7, inertia=(0.01, 0.02, 0.01))
     caught = dyn.attach_with_impact(model, q, qd, load, velocity=(1.0, 0.0, -2.0))
     assert len(caught.mechanism.loops) == 1
@@ -421,7 +422,7 @@ def test_a_loop_has_no_units(length: float, mass: float) -> None:
 def test_peaucelliers_linkage_draws_a_straight_line() -> None:
     """One freedom of seven bars, and no row too many."""
     model = peaucellier()
-    q, qd = dyn.consistent_state(model, [-0.35, 0.7, 0.35, -0.7, 0.1, -0.6, 0.4], [0.3] * 7)
+    q, qd = nearest_state(model, [-0.35, 0.7, 0.35, -0.7, 0.1, -0.6, 0.4], [0.3] * 7)
     run = dyn.simulate(model, q, qd, 0.2, rtol=1e-10)
     tip = model.position("side 1", (0.2, 0.0, 0.0))
     state = {f"q{i}": column for i, column in enumerate(run.q.T)}
@@ -436,7 +437,7 @@ def test_a_stewart_platform_obeys_the_defining_equations() -> None:
     tree = dyn.Mechanism(model.bodies, model.gravity)
     start = np.zeros(model.system.nq)
     start[[0, 1, 2, 3]] = 0.02, 0.01, 0.0, 1.0
-    q, u = dyn.consistent_state(model, start, np.random.default_rng(0).normal(size=model.system.n))
+    q, u = nearest_state(model, start, np.random.default_rng(0).normal(size=model.system.n))
     at = {f"q{i}": x for i, x in enumerate(q.tolist())} | {f"qd{i}": x for i, x in enumerate(u.tolist())}
     at |= {f"tau{i}": 0.1 * i for i in range(model.system.n)}
     rates = [velocity_rows(tree, loop).outputs for loop in model.loops]
@@ -455,7 +456,7 @@ def test_a_weld_turns_a_body_to_its_place_from_nearly_half_a_turn_away(angle: fl
     orientation = rotation(axis, angle)
     body = dyn.Body("b", dyn.Joint("free"), "world", 1.0, inertia=(1.0, 1.0, 1.0))
     model = dyn.Mechanism([body], loops=[dyn.Loop("weld", "b", orientation=orientation)])
-    q, u = dyn.consistent_state(model, [0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0], np.ones(6))
+    q, u = nearest_state(model, [0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0], np.ones(6))
     quaternion = [np.cos(angle / 2.0), *(np.sin(angle / 2.0) * axis)]
     assert q == pytest.approx([0.0, 0.0, 0.0, *quaternion], abs=1e-15)
     assert np.abs(u).max() < 1e-15

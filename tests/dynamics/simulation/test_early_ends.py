@@ -17,7 +17,7 @@ from tests.slow import slow
 
 USUAL = "dop853 radau rk4 verlet".split()
 FORMS = ("velocity", "momentum")
-EARLY = r"(\d+ of \d+ trajectories: of \d+, )?the run stopped at t = [\d.e-]+ s.* \S"
+EARLY = r"(the run stopped|\d+ of \d+ trajectories stopped early: trajectory \d+) at t = [\d.e-]+ s.* \S"
 
 
 def falling(metre: float) -> dyn.System:
@@ -35,6 +35,12 @@ def early(run: Callable[[], Any]) -> tuple[Any, list[str]]:
     return result, [text for each in caught if re.match(EARLY, text := str(each.message))]
 
 
+def which(many: dyn.Ensemble, k: int) -> str:
+    """A trajectory, and where it stopped."""
+    assert many.stats.message[k].startswith("stopped at t = ")
+    return f"trajectory {k}{many.stats.message[k].removeprefix('stopped')}"
+
+
 @mark.parametrize("metre", [1.0, *slow(1e-6, 1e6)])
 @mark.parametrize("form", FORMS)
 @mark.parametrize("method", [*USUAL, *slow(*[name for name in METHODS if name not in USUAL])])
@@ -47,7 +53,7 @@ def test_a_run_into_a_centre_of_force_is_heard(method: str, form: str, metre: fl
     assert not (METHODS[method].adaptive and run.success)
     assert said == ([] if run.success else [f"the run {run.message}"])
     many, said = early(lambda: dyn.simulate_many(model, [[1.0 / metre]], [0.0], 2.0, t_eval=times, **given))
-    assert said == ([] if many.stats.success[0] else [f"1 of 1 trajectories: of 0, the run {many.stats.message[0]}"])
+    assert said == ([] if many.stats.success[0] else ["1 of 1 trajectories stopped early: " + which(many, 0)])
 
 
 @mark.parametrize("method", ["dop853", "rk4"])
@@ -66,7 +72,7 @@ def test_runs_of_random_systems_are_whole_or_heard(seed: int, method: str) -> No
     assert [said for _, said in runs] == [[] if run.success else [f"the run {run.message}"] for run, _ in runs]
     many, said = early(lambda: dyn.simulate_many(model, starts, None, 10.0, t_eval=[10.0], **given))
     stopped = np.flatnonzero(~many.stats.success)
-    assert said == [f"{len(stopped)} of 3 trajectories: of {k}, the run {many.stats.message[k]}" for k in stopped[:1]]
+    assert said == [f"{len(stopped)} of 3 trajectories stopped early: " + which(many, k) for k in stopped[:1]]
     assert many.stats.success.tolist() == [run.success for run, _ in runs]
 
 
@@ -105,3 +111,23 @@ def test_a_method_that_stops_is_not_advised() -> None:
     assert (len(said), len(run.stats.warnings)) == (1, 1)
     assert "the system is stiff" in run.stats.warnings[0]
     assert "try" not in run.stats.warnings[0]
+
+
+STEEP: dict[str, tuple[dyn.OdeSystem, str]] = {
+    "rodas": (dyn.OdeSystem(lambda x, t: [cg.sqrt(t) - x[0]], ["x"]), "by the time"),
+    "radau": (dyn.OdeSystem(lambda x, t: [1.0 + cg.sqrt(x[0])], ["x"]), "by state 'x'"),
+}
+
+
+@mark.parametrize("watched", [False, True])
+@mark.parametrize("method", STEEP)
+def test_a_derivative_that_a_method_lacks_is_named_with_a_method_that_takes_none(method: str, watched: bool) -> None:
+    model, by = STEEP[method]
+    events = dyn.Event("never", lambda x, t: x[0] + 1.0) if watched else ()
+    run, said = early(lambda: dyn.simulate(model, [0.0], None, 1.0, method, events=events))
+    assert said == [f"the run {run.message}"]
+    assert f"stopped at t = 0 s: the derivative of the rate of state 'x' {by} is not finite" in run.message
+    found = re.search(r"; try method='(\w+)', which comes to t = 1 s in (\d+) steps$", run.message)
+    assert found is not None
+    other = dyn.simulate(model, [0.0], None, 1.0, found[1], events=events)
+    assert (other.success, other.stats.steps) == (True, int(found[2]))

@@ -124,7 +124,9 @@ def test_what_is_warned_of_is_what_was_asked_for() -> None:
     dyn.simulate(spring(), [1.0], [0.0], 1.0, "rk4", dt=0.1, rtol=1e-8, atol=[1e-5, 1e-5])
     with warns(dyn.SimulationWarning, match="coordinate 'x'"):
         dyn.simulate(spring(), [1.0], [0.0], 1.0, "rk4", dt=0.1, rtol=1e-8, atol=[0.0, 1e-5])
-    with warns(dyn.SimulationWarning, match="1 of 2 trajectories: of 1, the state is off by an estimated"):
+    with warns(
+        dyn.SimulationWarning, match="1 of 2 trajectories has a warning: trajectory 1: the state is off by an estimated"
+    ):
         many = dyn.simulate_many(
             spring(), [[1e-3], [1.0]], [0.0], 1.0, "rk4", dt=0.1, rtol=1e-12, atol=1e-7, backend="python"
         )
@@ -233,6 +235,62 @@ def test_no_order_is_taken_for_granted_across_kinks(method: str, dt: float) -> N
     assert 0.1 * true <= run.stats.error <= 100.0 * true
     many = dyn.simulate_many(bent, [[1.0]], [0.0], 20.0, method, dt=dt, rtol=LOOSE)
     assert many.stats.error[0] == approx(run.stats.error, rel=1e-6)
+
+
+WEDGES: list[Any] = [
+    cg.abs,
+    lambda x: cg.maximum(x, -x),
+    lambda x: -cg.minimum(x, -x),
+    lambda x: x * cg.sign(x),
+    lambda x: cg.where(x < 0.0, -x, x),
+    lambda x: x * (2.0 * (x > 0.0) - 1.0),
+    lambda x: x + 2.0 * cg.maximum(-x, 0.0),
+]
+
+
+@mark.parametrize("wedge", WEDGES[:1] + slow(*WEDGES[1:]))
+@mark.parametrize("method", ["midpoint", *slow("verlet", "gauss4", "gauss8", "yoshida6", "rk4")])
+@mark.parametrize("dt", [0.07, *slow(0.05, 0.013)])
+def test_steps_that_agree_across_a_kink_are_not_taken_for_exact(wedge: Any, method: str, dt: float) -> None:
+    """Steps of h, 2h and 4h turn round together, where the speed is a whole number of all of them."""
+    run = in_silence(
+        of(lambda q, qd, t: 0.5 * qd[0] ** 2 - wedge(q[0])), [1.0], [0.0], 7.0 * math.sqrt(2.0), method, dt=dt
+    )
+    quarter = math.sqrt(2.0)
+    turn = np.mod(run.t + quarter, 4.0 * quarter) - quarter
+    after = turn - 2.0 * quarter
+    true = np.abs(run.q[:, 0] - np.where(turn < quarter, 1.0 - 0.5 * turn**2, 0.5 * after**2 - 1.0)).max()
+    assert 0.1 * true <= run.stats.error <= 1e3 * true
+
+
+def test_a_parameter_may_have_any_name() -> None:
+    """Also that of a number by which the two sides of a kink are told apart."""
+    names = ["branch0", "branch_", "phase0"]
+    bent = dyn.System(
+        lambda q, qd, t, p: (
+            0.5 * qd[0] ** 2 - p["branch0"] * cg.abs(q[0]) + p["branch_"] * q[0] * cg.sin(p["phase0"] * t)
+        ),
+        ["x"],
+        parameters=dict.fromkeys(names, 1.0),
+    )
+    assert in_silence(bent, [1.0], [0.0], 5.0, "midpoint", dt=0.01).stats.error > 1e-6
+
+
+@mark.parametrize("method", ["midpoint", *slow("rk4", "verlet", "gauss4")])
+def test_a_kink_that_steps_do_not_miss_is_no_error(method: str) -> None:
+    """One that is never passed, at which a coordinate is at rest, or where steps end, also all of those beside."""
+    options: dict[str, Any] = {"dt": 0.01, "rtol": LOOSE}
+    plain = dyn.simulate(spring(), [1.0], [0.0], 10.0, method, **options).stats.error
+    aside = of(lambda q, qd, t: 0.5 * qd[0] ** 2 - 0.5 * cg.abs(q[0] + 2.0) * q[0] ** 2 / (q[0] + 2.0))
+    assert dyn.simulate(aside, [1.0], [0.0], 10.0, method, **options).stats.error == approx(plain, rel=0.1)
+    two = dyn.System(
+        lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2) - 0.5 * q[0] ** 2 - cg.abs(q[1]), ["x", "at rest"]
+    )
+    assert dyn.simulate(two, [1.0, 0.0], [0.0, 0.0], 10.0, method, **options).stats.error == approx(plain, rel=0.1)
+    late = of(lambda q, qd, t: 0.5 * qd[0] ** 2 - q[0] * cg.maximum(t - 0.64, 0.0))
+    run = dyn.simulate(late, [1.0], [0.0], 1.28, method, dt=2.0**-4 * 0.16, rtol=LOOSE)
+    true = np.abs(run.q[:, 0] - 1.0 + np.maximum(run.t - 0.64, 0.0) ** 3 / 6.0).max()
+    assert run.stats.error <= 1e3 * (true + 1e-13)
 
 
 @mark.parametrize(("dt", "aside"), [(0.1, 1e-10), *slow((0.05, 1e-8), (0.05, 1e-10), (0.1, 1e-8), (0.1, 1e-11))])

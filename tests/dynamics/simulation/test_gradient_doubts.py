@@ -194,7 +194,7 @@ def test_a_loss_that_is_no_number_is_said() -> None:
         assert (result.value, words) == (0.0, ["the loss is 0, and its gradient by 'qd' is not finite"])
         many, words = said(partial(dyn.gradient_many, SPRING, root, [[0.5], [-0.5], [-0.6]], [0.0], **given))
         assert np.isnan(many.value).tolist() == [False, True, True]
-        assert words == ["2 of 3 motions: of 1, the loss is nan of a motion that is finite"]
+        assert words == ["2 of 3 motions doubtful: motion 1: the loss is nan of a motion that is finite"]
 
 
 def test_a_motion_that_does_not_arrive_is_told_with_time_and_coordinate(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -218,7 +218,7 @@ def test_a_motion_that_does_not_arrive_is_told_with_time_and_coordinate(monkeypa
         starts = [[0.1, 0.0], [1.0, 0.0], [0.2, 0.0], [2.0, 0.0]]
         many, words = said(partial(dyn.gradient_many, model, end, starts, None, 2.0, method, **given))
         assert len(words) == 1
-        assert words[0].startswith("2 of 4 motions: of 1, the motion ")
+        assert words[0].startswith("2 of 4 motions stopped early: motion 1: the motion ")
         assert "stopped at t = " in words[0]
         for k in (0, 2):
             alone = dyn.gradient(model, end, starts[k], None, 2.0, method, **given)
@@ -239,6 +239,22 @@ def test_ctrl_c_is_a_keyboard_interrupt(method: str, derive: Any, monkeypatch: p
     loss = [] if derive is dyn.sensitivities else [lambda q, qd, t: q[0]]
     events = {} if derive is dyn.gradient_many else {"events": dyn.Event("half", lambda q, qd, t: q[0] - 0.5)}
     if derive is dyn.gradient_many and method == "rk4":
-        monkeypatch.setattr("dynamics.simulation.gradients.motion_run._run", advance)
+        monkeypatch.setattr("cgraph.program.derivatives.tape.run_passes", advance)
     with raises(KeyboardInterrupt):
         derive(ball, *loss, [[1.0]] if derive is dyn.gradient_many else [1.0], [0.0], 0.4, method, **events)
+
+
+@mark.parametrize("given", [{}, {"method": "rk4", "dt": 1e-3, "estimate_error": False}])
+def test_a_gradient_that_grew_beyond_all_tolerances_is_said(given: dict[str, Any]) -> None:
+    """Lorenz's equations for 60 s, of which no number is known; not for 3 s, nor a harmonic motion of any length."""
+    rate = lambda x, t: [10.0 * (x[1] - x[0]), x[0] * (28.0 - x[2]) - x[1], x[0] * x[1] - 8.0 / 3.0 * x[2]]  # noqa: E731
+    lorenz, loss, start = dyn.OdeSystem(rate, ["x", "y", "z"]), (lambda x, t: x[0]), [1.0, 1.0, 1.0]
+    for t_end, chaotic in ((3.0, False), (60.0, True)):
+        result, texts = said(lambda t_end=t_end: dyn.gradient(lorenz, loss, start, None, t_end, **given))
+        assert any("the motion is chaotic, or nearly so" in text for text in texts) == chaotic
+        assert (np.abs(result["q"]).max() > 1e12) == chaotic
+        _, texts = said(lambda t_end=t_end: dyn.gradient_many(lorenz, loss, [start], None, t_end, **given))
+        assert any("the motion is chaotic, or nearly so" in text for text in texts) == chaotic
+    spring = dyn.OdeSystem(lambda x, t: [x[1], -x[0]], ["x", "v"])
+    for running in (None, lambda x, t: x[0] ** 2):
+        assert said(lambda r=running: dyn.gradient(spring, loss, [1e-6, 0.0], None, 60.0, running=r, **given))[1] == []

@@ -9,6 +9,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics.equations.consistent_state import nearest_state
 from dynamics.systems.model import as_system
 from tests.early_end import stops
 
@@ -221,7 +222,7 @@ def test_what_the_momentum_form_has_not_is_said() -> None:
     for run in (dyn.simulate, dyn.simulate_many):
         with pytest.raises(ValueError, match="first order"):
             run(first_order, [[1.0]] if run is dyn.simulate_many else [1.0], None, 1.0, t_eval=[1.0], form="momentum")
-    q, qd = dyn.consistent_state(four_bar(), [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
+    q, qd = nearest_state(four_bar(), [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
     with pytest.raises(dyn.ConstraintError, match="holds the momenta"):
         dyn.simulate(four_bar(), q, qd, 1.0, form="momentum")
 
@@ -238,7 +239,7 @@ def test_velocities_that_momenta_do_not_have_are_no_silent_result(model: Any, t_
     with pytest.warns(dyn.SimulationWarning, match=said) as record:
         run = dyn.simulate(model, [0.0], [0.9], **how)
     assert run.stats.warnings == tuple([str(each.message) for each in record])
-    with pytest.warns(dyn.SimulationWarning, match=f"1 of 2 trajectories: of 1, .*{said}"):
+    with pytest.warns(dyn.SimulationWarning, match=f"1 of 2 trajectories has a warning: trajectory 1: .*{said}"):
         fan = dyn.simulate_many(model, [0.0], [[-2.0 if model is BOUNDED else 0.0], [0.9]], **how)
     assert [len(texts) for texts in fan.stats.warnings] == [0, len(run.stats.warnings)]
 
@@ -246,7 +247,7 @@ def test_velocities_that_momenta_do_not_have_are_no_silent_result(model: Any, t_
 @pytest.mark.parametrize("derive", [dyn.gradient_many, *slow(dyn.gradient, dyn.sensitivities)])
 def test_nor_are_their_derivatives(derive: Any) -> None:
     where = [] if derive is dyn.sensitivities else [lambda q, qd, t: q[0]]
-    qd, number = ([[0.0], [0.9]], "1 of 2 motions: of 1, ") if derive is dyn.gradient_many else ([0.9], "")
+    qd, number = ([[0.0], [0.9]], "1 of 2 motions doubtful: motion 1: ") if derive is dyn.gradient_many else ([0.9], "")
     given = {"form": "momentum", "wrt": "q", "backend": "python", "estimate_error": False}
     with pytest.warns(dyn.SimulationWarning, match=f"{number}the momenta of the start .*0.1.* in place of 0.9"):
         derive(FOLDED, *where, [0.0], qd, 0.1, "euler", dt=0.1, **given)

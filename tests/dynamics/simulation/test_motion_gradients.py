@@ -12,6 +12,7 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics.equations.consistent_state import nearest_state
 from dynamics.integrators import METHODS, Tableau, derive, runge_kutta
 from dynamics.simulation.gradients import motion_run
 from dynamics.simulation.gradients.motion_equations import motion_equations
@@ -261,7 +262,7 @@ def test_quaternions_and_loops_by_displacements_and_through_projections(make: An
     rng = np.random.default_rng(1)
     nq, n = len(model.coordinates), len(model.velocities)
     if nq == n:
-        q, qd = dyn.consistent_state(model, [0.3, 0.8, 0.2], [0.1, 0.2, 0.3])
+        q, qd = nearest_state(model, [0.3, 0.8, 0.2], [0.1, 0.2, 0.3])
     else:
         q, qd = rng.normal(size=nq), rng.normal(size=n)
         q[3:7] /= np.linalg.norm(q[3:7])

@@ -111,6 +111,13 @@ def test_a_wrong_rule_of_differentiation_is_found() -> None:
     assert "energy: dE/dqd = M qd" not in found
 
 
+@pytest.mark.parametrize("seed", [0, 8, 12])
+def test_what_does_not_turn_at_a_state_is_measured_by_others(seed: int) -> None:
+    """A disk, whose mass is a sum of squares of sines and cosines, at states where little else changes."""
+    (skew,) = [each for each in dyn.certify(disk(), 20, seed, speed=0.5).residuals if "skew" in each.equation]
+    assert skew.value < 0.5 * skew.bound.value
+
+
 @pytest.mark.parametrize(
     ("function", "found"),
     [

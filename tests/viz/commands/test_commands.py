@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -447,3 +448,15 @@ def test_a_point_keeps_parameters_and_is_always_the_same():
     assert (at["I"], at["k"], at["dt"], at["qdd0"]) == (1.0, 1.0, 1e-3, 2.0)
     assert -1.0 <= at["q0_old"] <= 1.0
     assert np.isfinite(list(graph.evaluate(at).values())).all()
+
+
+def test_one_node_is_no_plural(tmp_path, capsys):
+    model = tmp_path / "free.py"
+    model.write_text(
+        "import dynamics as dyn\n\n\ndef model():\n    return dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2, ['x'])\n"
+    )
+    for command in (["compare", f"{model}:model"], ["draw", f"{model}:model", "--out", str(tmp_path / "free.dot")]):
+        cli.main(command)
+        printed = capsys.readouterr().out
+        assert " 1 node" in printed
+        assert not re.search(r"\b1 (nodes|edges|steps)", printed)

@@ -16,6 +16,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 import viz
+from dynamics.equations.consistent_state import nearest_state
 from dynamics.scenes.inspection import FORMULATIONS, inspection
 from tests.hostile_texts import HOSTILE, hostile_page
 from viz import cli
@@ -212,7 +213,7 @@ def test_a_page_of_loops_shows_where_they_close_and_does_not_promise_torques_of_
     first = dyn.Body("a", dyn.Joint("revolute", (0, 1, 0)), **rod)
     bars = [first, dyn.Body("b", dyn.Joint("revolute", (0, 1, 0), (1.0, 0, 0)), "a", **rod)]
     pin = dyn.Loop("point", "b", "world", at=(1.0, 0, 0), to_at=(1.0, 0, 0))
-    q, qd = dyn.consistent_state(model := dyn.Mechanism(bars, loops=[pin]), [0.5, 1.0], [1.0, 0.0])
+    q, qd = nearest_state(model := dyn.Mechanism(bars, loops=[pin]), [0.5, 1.0], [1.0, 0.0])
     found = inspection(dyn.scenes.Scene("truss", "", model, tuple(q), tuple(qd), 0.1))
     assert "should be 0" not in found.versions[-1].about
     assert "constraints" in found.versions[-1].about

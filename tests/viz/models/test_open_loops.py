@@ -6,6 +6,7 @@ import re
 import pytest
 
 import dynamics as dyn
+from dynamics.equations.consistent_state import nearest_state
 from dynamics.scenes.inspection import inspection
 from tests.dynamics.linkages import four_bar
 from viz import cli
@@ -15,8 +16,9 @@ from viz.models.open_loops import tree_alone
 SCENE = """
 from tests.dynamics.linkages import four_bar
 import dynamics as dyn
+from dynamics.equations.consistent_state import nearest_state
 model = four_bar()
-q, qd = dyn.consistent_state(model, [0.9, 0.3, 1.4], [1.0, 0.0, 0.0])
+q, qd = nearest_state(model, [0.9, 0.3, 1.4], [1.0, 0.0, 0.0])
 linkage = dyn.scenes.Scene("linkage", "", model, tuple(q), tuple(qd), 0.1)
 """
 
@@ -34,7 +36,7 @@ def test_a_tree_needs_no_word_and_constraints_of_a_lagrangian_do():
 def test_the_page_and_the_commands_say_so(tmp_path, capsys):
     path = tmp_path / "model.py"
     path.write_text(SCENE)
-    q, qd = dyn.consistent_state(four_bar(), [0.9, 0.3, 1.4], [1.0, 0.0, 0.0])
+    q, qd = nearest_state(four_bar(), [0.9, 0.3, 1.4], [1.0, 0.0, 0.0])
     scene = dyn.scenes.Scene("linkage", "", four_bar(), tuple(q), tuple(qd), 0.1)
     said = tree_alone(scene)
     assert "the loop coupler to rocker:" in said

@@ -40,6 +40,20 @@ def solve(a: Array, pivots: Array, b: Array) -> None:
             b[:k] -= a[:k, k] * b[k]
 
 
+def solve_transposed(a: Array, pivots: Array, b: Array) -> None:
+    """The solution of A^T x = b in place of b (n,): A^T = U^T L^T P."""
+    n = len(a)
+    with np.errstate(all="ignore"):
+        for k in range(n):  # U^T y = b
+            b[k] /= a[k, k]
+            b[k + 1 :] -= a[k, k + 1 :] * b[k]
+        for k in reversed(range(n)):  # L^T z = y
+            b[:k] -= a[k, :k] * b[k]
+        for k in reversed(range(n)):  # x = P^T z
+            row = int(pivots[k])
+            b[k], b[row] = b[row], b[k]
+
+
 class _FunctionWriter:
     """Lines of one function over doubles in memory, with loops; every value has a new name."""
 
@@ -155,3 +169,26 @@ def solve_text(flags: str) -> list[str]:
         with ir.loop("0", k) as i:
             ir.subtract_product(ir.at("%b", i), ir.load(ir.element(i, k)), value)
     return ir.function("lu.solve", "ptr %a, ptr %p, ptr %b, i64 %n")
+
+
+def solve_transposed_text(flags: str) -> list[str]:
+    """`void lu.solve.transposed(double *a, double *p, double *b, int64_t n)`, as `solve_transposed`."""
+    ir = _FunctionWriter(flags)
+    # U^T y = b:  b[k] /= a[k, k], b[i] -= a[k, i] b[k] for i > k, k = 0 .. n - 1
+    with ir.loop("0", "%n") as k:
+        value = ir.value(f"fdiv {ir.flags}double {ir.load(ir.at('%b', k))}, {ir.load(ir.element(k, k))}")
+        ir.do(f"store double {value}, ptr {ir.at('%b', k)}")
+        with ir.loop(ir.value(f"add i64 {k}, 1"), "%n") as i:
+            ir.subtract_product(ir.at("%b", i), ir.load(ir.element(k, i)), value)
+    # L^T z = y:  b[i] -= a[k, i] b[k] for i < k, k = n - 1 .. 0
+    with ir.loop("0", "%n") as back:
+        k = ir.value(f"sub i64 {ir.value('sub i64 %n, 1')}, {back}")
+        value = ir.load(ir.at("%b", k))
+        with ir.loop("0", k) as i:
+            ir.subtract_product(ir.at("%b", i), ir.load(ir.element(k, i)), value)
+    # x = P^T z
+    with ir.loop("0", "%n") as back:
+        k = ir.value(f"sub i64 {ir.value('sub i64 %n, 1')}, {back}")
+        row = ir.value(f"fptosi double {ir.load(ir.at('%p', k))} to i64")
+        ir.swap(ir.at("%b", k), ir.at("%b", row))
+    return ir.function("lu.solve.transposed", "ptr %a, ptr %p, ptr %b, i64 %n")

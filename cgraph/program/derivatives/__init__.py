@@ -1,0 +1,1 @@
+"""Derivatives of programs: forward and reverse mode over statements."""

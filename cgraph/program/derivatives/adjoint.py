@@ -1,0 +1,159 @@
+"""Adjoint: reverse mode over statements, from cotangents of what they end with to those of what they begin with."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from ..statement import Names, Statement, effects, needed, reads_and_writes, row_of
+from ..statements.call import Call, Map, added, zeroed
+from .products import Products
+from .single_assignment import Assignment, Registers, flat
+
+HEAVY = 8  # nodes of a graph for each of its outputs, from which on these are kept and not computed again
+
+
+class Replayed(NamedTuple):
+    """How values come back that statements backwards read.
+
+    Attributes
+    ----------
+    again : list of Statement
+        What computes those that are cheap.
+    tape : tuple of str
+        Registers to be recorded: results of heavy statements.
+    wanted : set of str
+        Registers that both need from before the assignments.
+    """
+
+    again: list[Statement]
+    tape: Names
+    wanted: set[str]
+
+
+class Adjoint(Registers):
+    """The statements that pull cotangents back through assignments.
+
+    Attributes
+    ----------
+    bars : dict of str to str
+        {register: the one that has its cotangent}, of what comes after; the rules extend it.
+    active : set of str
+        Registers that depend on what moves.
+    lengths : dict of str to int
+        Of all registers; grows.
+    products : Products
+        Graphs of J^T y_bar.
+    turns : int
+        For how many turns a loop inside has a stack.
+    statements : list of Statement
+        What has been added.
+    """
+
+    def __init__(
+        self,
+        bars: Mapping[str, str],
+        active: Collection[str],
+        lengths: dict[str, int],
+        products: Products,
+        kept: Iterable[str],
+        turns: int,
+        recording: dict[Assignment, Assignment] | None = None,
+    ) -> None:
+        super().__init__(lengths)
+        self.bars, self.active, self.products, self.turns = dict(bars), active, products, turns
+        self.statements: list[Statement] = []
+        self._kept = set(kept)  # registers of cotangents that must stay as they are
+        self.recording = {} if recording is None else recording  # {assignment: the one that records}
+
+    def inner(self, bars: Mapping[str, str]) -> Adjoint:
+        """Of a body, from cotangents of its end, which stay as they are."""
+        return Adjoint(bars, self.active, self.lengths, self.products, bars.values(), self.turns, self.recording)
+
+    def pull(self, assignments: Sequence[Assignment]) -> None:
+        """Through these assignments, the last first."""
+        for assignment in reversed(assignments):
+            row = row_of(assignment.statement)
+            if row.transpose is None:
+                raise TypeError(f"a {row.kind.__name__} has no cotangents: its row has no `transpose`")
+            row.transpose(assignment, self)
+
+    def add(self, *statements: Statement) -> None:
+        """Statements after those that are there."""
+        self.statements += statements
+
+    def collect(self, register: str, bar: str) -> None:
+        """One more term of a register's cotangent."""
+        if register not in self.bars:
+            self.bars[register] = bar
+            return
+        before = self.bars[register]
+        after = self.bar(register) if before in self._kept else before
+        self.add(added(before, bar, after))
+        self.bars[register] = after
+
+    def bar(self, register: str) -> str:
+        """A new register for a cotangent of one."""
+        return self.fresh(f"{register}_bar", self.lengths[register])
+
+    def bar_or_zero(self, register: str) -> str:
+        """The cotangent of a register; a register of zeros where there is none."""
+        if register in self.bars:
+            return self.bars[register]
+        zero = self.bar(register)
+        self.add(zeroed(zero))
+        return zero
+
+    def seeded(self, outputs: Sequence[str]) -> tuple[int, ...]:
+        """Which of some registers have cotangents."""
+        return tuple([k for k, name in enumerate(outputs) if name in self.bars])
+
+    def wanted(self, inputs: Sequence[str]) -> tuple[int, ...]:
+        """Of which of some registers cotangents matter."""
+        return tuple([k for k, name in enumerate(inputs) if name in self.active and self.lengths[name]])
+
+    def recorded(self, assignment: Assignment, statement: Statement, copies: Sequence[Map]) -> None:
+        """The statement records for its way back: this is what is run forward."""
+        parts = tuple([tuple(self.forward(part)) for part in assignment.parts])
+        self.recording[assignment] = replace(assignment, statement=statement, copies=tuple(copies), parts=parts)
+
+    def flat(self, part: Sequence[Assignment]) -> list[Statement]:
+        """The statements of assignments, copies included, recording where there is a way back."""
+        return [*flat(self.forward(part))]
+
+    def forward(self, part: Sequence[Assignment]) -> list[Assignment]:
+        """The assignments as they are run forward."""
+        return [self.recording.get(each, each) for each in part]
+
+    def replayed(self, part: Sequence[Assignment], statements: Sequence[Statement]) -> Replayed:
+        """How the values come back that statements read of assignments before them."""
+        return replayed(self.forward(part), effects(statements)[0])
+
+
+def replayed(assignments: Sequence[Assignment], values: Iterable[str]) -> Replayed:
+    """How values come back that assignments computed: those of heavy statements are recorded, others made again."""
+    wanted, tape = set(values), dict[str, None]()
+    again: list[Statement] = []
+    for assignment in reversed(assignments):
+        outputs = set(reads_and_writes(assignment.statement)[1])
+        for part in [] if row_of(assignment.statement).reruns else assignment.parts:  # a loop's come turn by turn
+            if outputs.issuperset(effects(flat(part))[1]):
+                inner = replayed(part, wanted)
+                again, wanted, tape = [*inner.again, *again], inner.wanted, tape | dict.fromkeys(inner.tape)
+            elif turn := needed([*flat(part)], wanted):  # of an iteration, one more than was run
+                again, wanted = [*turn, *again], wanted | set(effects(turn)[0])
+        here = [name for name in reads_and_writes(assignment.statement)[1] if name in wanted]
+        if here and _heavy(assignment.statement):
+            tape |= dict.fromkeys(here)
+            wanted -= set(here)
+        elif here:
+            again = [*assignment.statements, *again]
+            wanted |= set(effects(assignment.statements)[0])
+    return Replayed(again, tuple(tape), wanted)
+
+
+def _heavy(statement: Statement) -> bool:
+    if row_of(statement).bodies:
+        return True
+    return isinstance(statement, Call) and len(statement.graph.nodes) > HEAVY * len(statement.graph.outputs)

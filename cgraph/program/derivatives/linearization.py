@@ -1,0 +1,261 @@
+"""Linearization of a program: its passes, and programs that pull cotangents back through them, or push tangents on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from ...util.require import require_mapping, require_sequence, require_whole
+from ..program import Program
+from ..statement import Statement, effects, length_of, needed, reads_and_writes
+from ..statements.call import added, copied, zeroed
+from .adjoint import Adjoint, replayed
+from .fixed_point_rules import UNSOLVED
+from .products import Products, Pullback
+from .single_assignment import Assigned, Assignment, flat
+from .tangent import Tangent
+
+TURNS = 64  # of a loop that its stack has room for, unless more are asked for
+
+
+class Linearized(NamedTuple):
+    """A program that goes along recorded passes, and the registers of its vectors.
+
+    Attributes
+    ----------
+    program : Program
+        Its feed is what was recorded of a pass.
+    vectors : dict of str to str
+        {register of a value: that of its cotangent or tangent, before and after a pass}.
+    unsolved : str
+        A register that is not 0 after passes in which equations of a `FixedPoint` were not solved.
+
+    Examples
+    --------
+    >>> from cgraph.extend import Program, program_jvp
+    >>> linear = program_jvp(Program({"x": 1}, [], record=["x"]))
+    >>> dict(linear.vectors)
+    {'x': 'x:dot'}
+    """
+
+    program: Program
+    vectors: Mapping[str, str]
+    unsolved: str = UNSOLVED
+
+
+class Linearization:
+    """A program in single assignment: what it records, and its derivatives.
+
+    Parameters
+    ----------
+    program : Program
+        Whose `feed` is new in every pass; what it records does not matter.
+    of : sequence of str
+        Registers whose values after a pass matter.
+    wrt : sequence of str
+        Registers by which derivatives are taken, besides those that a pass hands on.
+    constant : sequence of str
+        Registers whose values have no derivatives.
+    rules : mapping of int to Pullback
+        {id of a graph: its own rule for J^T y_bar}.
+    turns : int
+        For how many turns of a `While` its way back has room.
+
+    Attributes
+    ----------
+    handed : dict of str to str
+        {register that a pass hands on to the next: the one that has its value after the pass}.
+    wrt : tuple of str
+        Registers by which derivatives are taken, besides what is handed on: first those that stay the same, `inputs`,
+        then those of the feed, `varied`.
+    constants : tuple of str
+        Registers that passes read and never write.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Call, Linearization, Program
+    >>> x, p = cg.variables("x p")
+    >>> step = Call(cg.Graph([x, p], {"x": p * x}), ("x", "p"), ("x",))
+    >>> passes = Linearization(Program({"x": 1, "p": 1}, [step], record=()), ["x"], ["p"])
+    >>> passes.handed, passes.constants
+    ({'x': 'x@2'}, ('p',))
+    >>> back = passes.adjoint(["x"])
+    >>> dict(back.vectors), back.program.feed
+    ({'x': 'x:bar', 'p': 'p:sum'}, ['x'])
+    """
+
+    def __init__(
+        self,
+        program: Program,
+        of: Sequence[str],
+        wrt: Sequence[str],
+        *,
+        constant: Sequence[str] = (),
+        rules: Mapping[int, Pullback] | None = None,
+        turns: int = TURNS,
+    ) -> None:
+        require_program(program)
+        for what, names in (("of", of), ("wrt", wrt), ("constant", constant)):
+            for name in require_sequence(what, names, "registers", str):
+                length_of(program.registers, what, name)
+        if texts := [each for each in (of, wrt) if isinstance(each, str)]:
+            raise TypeError(f"of and wrt must be sequences of registers, got the text {texts[0]!r:.60}")
+        self._products = Products({} if rules is None else require_mapping("rules", rules, "id of a graph: rule"))
+        self._lengths, self.fed = dict(program.registers), tuple(program.feed)
+        self._turns = require_whole("turns", turns, 1)
+        self.inputs = tuple([name for name in wrt if name not in self.fed])
+        self.varied = tuple([name for name in wrt if name in self.fed])
+        written = effects(program.body)[1]
+        assigned = Assigned(self._lengths)
+        kept = [copied(name, name) for name in of if name not in written]
+        self._plain = [assigned.assignment(each) for each in [*program.body, *kept]]
+        self._recording: dict[Assignment, Assignment] = {}
+        reads, _ = effects(flat(self._plain))
+        handed = [name for name in dict.fromkeys((*of, *reads)) if name in assigned.current and name not in self.fed]
+        self.handed = {name: assigned.now(name) for name in handed}
+        self.inputs = tuple([name for name in self.inputs if name not in self.handed])
+        self.constants = tuple([name for name in reads if name not in self.handed and name not in self.fed])
+        moving = {*self.inputs, *self.varied, *[name for name in self.handed if name not in constant]}
+        self.wrt = (*self.inputs, *self.varied)
+        self._active = _active(self._plain, moving, frozenset(constant))
+
+    def forward(self, tape: Sequence[str], results: Sequence[str] = ()) -> Program:
+        """The passes themselves, with what they record for their way back.
+
+        A pass begins with what the one before handed on, in the registers of `handed` after it: the start is put there.
+        tape: what is recorded, the feed of a linearized program and more.  results: what is read when all are done.
+        """
+        ends = [self.handed.get(name, name) for name in results]
+        assignments = [self._recording.get(each, each) for each in self._plain]
+        body = needed([*flat(assignments)], {*self.handed.values(), *ends, *tape})
+        used = _names(body)
+        lengths = {name: self._lengths[name] for name in self._lengths if "@" not in name or name in used}
+        copies = [copied(after, before) for before, after in self.handed.items() if self._lengths[before]]
+        return Program(lengths, [*copies, *body], record=list(tape), feed=self.fed)
+
+    def adjoint(self, seeds: Sequence[str]) -> Linearized:
+        """A pass that pulls cotangents back, of what it hands on, `seeds` and more, and of its inputs.
+
+        It is fed what was recorded, the last pass first, and records the cotangents of `varied`.
+        """
+        wanted = list(seeds)
+        while True:
+            lengths = dict(self._lengths)
+            ends = {name: f"{name}:bar" for name in wanted} | {name: f"{name}:sum" for name in self.inputs}
+            lengths |= {bar: lengths[name] for name, bar in ends.items()}
+            lengths[UNSOLVED] = 1
+            bars = {self.handed[name]: ends[name] for name in wanted}
+            pulled = Adjoint(bars, self._active, lengths, self._products, ends.values(), self._turns)
+            pulled.pull(self._plain)
+            more = [name for name in self.handed if name in pulled.bars and name not in wanted and name in self._active]
+            if not more:
+                break
+            wanted += more
+        self._recording = pulled.recording
+        for recording in pulled.recording.values():
+            self._lengths |= {name: lengths[name] for name in _names(recording.statements)}
+        after = [added(ends[name], pulled.bars[name], ends[name]) for name in self.inputs if name in pulled.bars]
+        rows = {name: f"{name}:row" for name in self.varied}
+        lengths |= {row: lengths[name] for name, row in rows.items()}
+        for name, end in [*[(name, ends[name]) for name in wanted], *rows.items()]:
+            bar = pulled.bars.get(name)
+            after.append(zeroed(end) if bar is None else copied(bar, end))
+        results = {*ends.values(), *rows.values(), UNSOLVED}
+        return self._program(lengths, [*pulled.statements, *after], results, ends, list(rows.values()))
+
+    def tangent(self, directions: Sequence[str], record: Sequence[str], then: Sequence[Statement] = ()) -> Linearized:
+        """A pass that pushes tangents on, of what it hands on and of `directions`, inputs or varied registers.
+
+        It is fed what was recorded, and records the tangents of `record` after a pass.  then: what else it does with
+        the tangents, {name}:dot.
+        """
+        lengths = {**self._lengths, UNSOLVED: 1}
+        moving = [name for name in self.handed if name in self._active]
+        dots = {name: f"{name}:dot" for name in (*moving, *directions)}
+        lengths |= {dot: lengths[name] for name, dot in dots.items()}
+        pushed = Tangent(dots, self._active, lengths, self._products)
+        pushed.push(self._plain)
+        after = self._dots_after(pushed, dots, moving)
+        results = {*dots.values(), UNSOLVED}
+        return self._program(
+            lengths, [*pushed.statements, *after, *then], results, dots, [dots[name] for name in record]
+        )
+
+    def beside(self, directions: Sequence[str], record: Sequence[str]) -> Linearized:
+        """The passes with the tangents beside their values: no tape.
+
+        What is handed on begins, and ends, in the registers of the program itself.
+        record: what is recorded after a pass, and then its tangents.
+        """
+        lengths = {**self._lengths, UNSOLVED: 1}
+        moving = [name for name in self.handed if name in self._active]
+        dots = {name: f"{name}:dot" for name in (*moving, *directions)}
+        lengths |= {dot: lengths[name] for name, dot in dots.items()}
+        pushed = Tangent(dots, self._active, lengths, self._products, values=True)
+        pushed.push(self._plain)
+        copies = [copied(after, before) for before, after in self.handed.items() if lengths[before]]
+        body = [*pushed.statements, *self._dots_after(pushed, dots, moving), *copies]
+        rows = [*record, *[dots[name] for name in record if name in dots]]
+        used = {*_names(body), *rows, *dots.values(), *self.fed, UNSOLVED}
+        kept = {name: length for name, length in lengths.items() if "@" not in name or name in used}
+        return Linearized(Program(kept, body, record=rows, feed=self.fed), dots)
+
+    def _dots_after(self, pushed: Tangent, dots: Mapping[str, str], moving: Sequence[str]) -> list[Statement]:
+        """Tangents of what a pass hands on, where the next one reads them."""
+        after: list[Statement] = []
+        for name in moving:
+            dot = pushed.dots.get(self.handed[name])
+            after.append(zeroed(dots[name]) if dot is None else copied(dot, dots[name]))
+        return after
+
+    def _program(
+        self,
+        lengths: dict[str, int],
+        statements: Sequence[Statement],
+        results: set[str],
+        vectors: Mapping[str, str],
+        record: list[str],
+    ) -> Linearized:
+        """The statements, after those that compute what they need of a pass from what was recorded of it."""
+        linear = needed(statements, results)
+        assignments = [self._recording.get(each, each) for each in self._plain]
+        values = replayed(assignments, effects(linear)[0])
+        starts = [name for name in (*self.fed, *self.handed) if name in values.wanted]
+        body = [*values.again, *linear]
+        fed = list(dict.fromkeys([*starts, *values.tape]))
+        used = {*_names(body), *fed, *record, *vectors.values(), *self.constants, UNSOLVED}
+        kept = {name: length for name, length in lengths.items() if name in used}
+        return Linearized(Program(kept, body, record=record, feed=fed), vectors)
+
+
+def require_program(program: Program) -> None:
+    """Raises TypeError for what is no program."""
+    if not isinstance(program, Program):
+        raise TypeError(f"program must be a Program, got {type(program).__name__}: {program!r:.60}")
+
+
+def _names(statements: Sequence[Statement]) -> set[str]:
+    return {name for statement in statements for names in reads_and_writes(statement) for name in names}
+
+
+def _active(assignments: Sequence[Assignment], moving: set[str], constant: frozenset[str]) -> set[str]:
+    """Registers that depend on those that move."""
+    active = set(moving)
+    for assignment in assignments:
+        outputs = {name for name in reads_and_writes(assignment.statement)[1] if name.partition("@")[0] not in constant}
+        if assignment.carried:  # of an iteration, whose solution depends on what it reads and not on where it began
+            outside = set(effects(flat(assignment.parts[0]))[0])
+            if active & (outside - set(assignment.carried)):
+                active |= outputs
+                active = _active(assignment.parts[0], active, constant)
+            continue
+        inputs = {name for statement in assignment.statements for name in reads_and_writes(statement)[0]}
+        for copy in assignment.copies:
+            if copy.inputs[0] in active:
+                active |= {name for name in copy.outputs if name.partition("@")[0] not in constant}
+        if active & inputs:
+            active |= outputs
+            for part in assignment.parts:
+                active = _active(part, active, constant)
+    return active

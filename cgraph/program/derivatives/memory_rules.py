@@ -1,0 +1,92 @@
+"""Derivatives of Take, Push, Pop: numbers go where their values came from."""
+
+from __future__ import annotations
+
+from ...core.graph import Graph
+from ...core.node import Node, constant
+from ...writing.naming import variables
+from ..statements.call import Call, copied, zeroed
+from ..statements.memory import Pop, Push, Take
+from .adjoint import Adjoint
+from .single_assignment import Assignment
+from .tangent import Tangent
+
+
+def push_take(assignment: Assignment, tangent: Tangent) -> None:
+    """target_dot[i] = source_dot[table[i]]."""
+    take = assignment.statement
+    assert isinstance(take, Take)
+    if take.source in tangent.dots and take.target in tangent.active:
+        source = tangent.dots[take.source]
+        tangent.add(Take(source, tangent.dot(take.target), take.table))
+
+
+def pull_take(assignment: Assignment, adjoint: Adjoint) -> None:
+    """source_bar[j] = the sum of target_bar[i] over all i with table[i] = j."""
+    take = assignment.statement
+    assert isinstance(take, Take)
+    if take.target not in adjoint.bars or take.source not in adjoint.active:
+        return
+    bars = variables([f"b{k}" for k in range(len(take.table))])
+    totals: dict[int, Node] = {}
+    for place, bar in zip(take.table, bars, strict=True):
+        totals[place] = totals[place] + bar if place in totals else bar
+    size, source = adjoint.lengths[take.source], adjoint.bar(take.source)
+    graph = Graph(bars, {f"{k}": totals.get(k, constant(0.0)) for k in range(size)})
+    adjoint.add(Call(graph, (adjoint.bars[take.target],), (source,)))
+    adjoint.collect(take.source, source)
+
+
+# The tangent of a stack is a stack of tangents with a count of its own, and what is put on one comes off the other.
+
+
+def push_push(assignment: Assignment, tangent: Tangent) -> None:
+    """The tangents of the row go onto the stack of tangents."""
+    push = assignment.statement
+    assert isinstance(push, Push)
+    if push.stack not in tangent.active:
+        return
+    stack, count = assignment.sources[:2]
+    dot, work = tangent.dot(push.stack), tangent.fresh("count", 1)
+    tangent.copy_or_zero(stack, dot)
+    tangent.add(copied(count, work), Push(dot, work, tuple([tangent.dot_or_zero(name) for name in push.rows])))
+
+
+def push_pop(assignment: Assignment, tangent: Tangent) -> None:
+    """The tangents of the row come off the stack of tangents."""
+    pop = assignment.statement
+    assert isinstance(pop, Pop)
+    if pop.stack not in tangent.dots:
+        return
+    work = tangent.fresh("count", 1)
+    tangent.add(copied(assignment.sources[0], work))
+    tangent.add(Pop(tangent.dots[pop.stack], work, tuple([tangent.dot(name) for name in pop.rows])))
+
+
+def pull_push(assignment: Assignment, adjoint: Adjoint) -> None:
+    """What the row put on the stack has as its cotangent comes off the stack of cotangents, whose row then is 0."""
+    push = assignment.statement
+    assert isinstance(push, Push)
+    if push.stack not in adjoint.bars:
+        return
+    stack = assignment.sources[0]
+    work, left = adjoint.bar(push.stack), adjoint.fresh("count", 1)
+    bars = tuple([adjoint.bar(name) for name in push.rows])
+    none = tuple([adjoint.bar(name) for name in push.rows])
+    adjoint.add(copied(adjoint.bars[push.stack], work), copied(push.count, left), Pop(work, left, bars))
+    adjoint.add(*[zeroed(name) for name in none], Push(work, left, none))
+    adjoint.collect(stack, work)
+    for name, bar in zip(push.rows, bars, strict=True):
+        if name in adjoint.active:
+            adjoint.collect(name, bar)
+
+
+def pull_pop(assignment: Assignment, adjoint: Adjoint) -> None:
+    """The cotangents of the row go onto a stack that is 0 elsewhere."""
+    pop = assignment.statement
+    assert isinstance(pop, Pop)
+    if adjoint.seeded(pop.rows) and pop.stack in adjoint.active:
+        bar, left = adjoint.bar(pop.stack), adjoint.fresh("count", 1)
+        adjoint.add(zeroed(bar), copied(pop.count, left))
+        adjoint.add(Push(bar, left, tuple([adjoint.bar_or_zero(name) for name in pop.rows])))
+        adjoint.collect(pop.stack, bar)

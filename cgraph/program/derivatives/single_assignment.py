@@ -1,0 +1,136 @@
+"""Single assignment: statements written anew so that every value has a register of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from ..statement import Names, Statement, bodies_of, names_in, row_of, with_names
+from ..statements.call import Map, copied
+
+
+@dataclass(frozen=True, eq=False)
+class Assignment:
+    """A statement whose outputs no other one writes; what it changes in place is copied first.
+
+    Attributes
+    ----------
+    statement : Statement
+        The statement, over registers of the program in single assignment.
+    copies : tuple of Map
+        What stands before it.
+    parts : tuple of tuple of Assignment
+        Of a statement with bodies, each body in single assignment.
+    after : tuple of dict
+        For each part, {register that the statement writes: the one that has its value at the end of the part}.
+    carried : tuple of str
+        Of an iteration, the registers that a turn reads before it writes them.
+    """
+
+    statement: Statement
+    copies: tuple[Map, ...] = ()
+    parts: tuple[tuple[Assignment, ...], ...] = ()
+    after: tuple[Mapping[str, str], ...] = ()
+    carried: Names = ()
+
+    @property
+    def statements(self) -> tuple[Statement, ...]:
+        """The statement after its copies."""
+        return (*self.copies, self.statement)
+
+    @property
+    def sources(self) -> Names:
+        """The registers that its copies are of: the values before, of what it changes in place."""
+        return tuple([copy.inputs[0] for copy in self.copies])
+
+    def flat_parts(self) -> list[Statement]:
+        """The statements of all its parts."""
+        return [statement for part in self.parts for statement in flat(part)]
+
+
+@dataclass
+class Registers:
+    """Registers by name; new ones are made with `fresh`.
+
+    Attributes
+    ----------
+    lengths : dict of str to int
+        Their lengths.
+    """
+
+    lengths: dict[str, int]
+
+    def fresh(self, name: str, length: int) -> str:
+        """A new register, called after another."""
+        new = f"{name.partition('@')[0]}@{len(self.lengths)}"
+        self.lengths[new] = length
+        return new
+
+    def of(self, names: Iterable[str]) -> tuple[int, ...]:
+        """Lengths of registers."""
+        return tuple([self.lengths[name] for name in names])
+
+
+@dataclass
+class Assigned(Registers):
+    """Statements in single assignment, one after another.
+
+    Attributes
+    ----------
+    current : dict of str to str
+        {register of the program: the one that has its value now}, where that is another.
+    """
+
+    current: dict[str, str] = field(default_factory=dict)
+
+    def now(self, name: str) -> str:
+        """The register that has the value of `name`."""
+        return self.current.get(name, name)
+
+    def write(self, name: str) -> str:
+        """A register for a new value of `name`."""
+        self.current[name] = new = self.fresh(name, self.lengths[name])
+        return new
+
+    def assignment(self, statement: Statement) -> Assignment:
+        """The statement in single assignment, after those before it."""
+        row = row_of(statement)
+        if row.assign is not None:
+            made: Assignment = row.assign(statement, self)
+            return made
+        if row.bodies:
+            raise TypeError(f"a {type(statement).__name__} has no derivatives: its row has no `assign`")
+        before = {name: self.now(name) for name in names_in(statement, row.reads)}
+        new = with_names(statement, [each for each in row.reads if each not in row.writes], self.now)
+        new = with_names(new, row.writes, self.write)
+        changed = names_in(statement, [each for each in row.writes if each in row.reads])
+        return Assignment(new, tuple([copied(before[name], self.now(name)) for name in changed]))
+
+    def in_place(self, statement: Statement) -> Statement:
+        """With the registers of now, which it also writes. Raises TypeError for one with bodies."""
+        if bodies_of(statement):
+            raise TypeError(f"an iteration cannot have a statement of the type {type(statement).__name__}")
+        row = row_of(statement)
+        return with_names(statement, dict.fromkeys((*row.reads, *row.writes)), self.now)
+
+    def flat(self, part: Sequence[Assignment]) -> list[Statement]:
+        """The statements of assignments, copies included."""
+        return [*flat(part)]
+
+    def made(
+        self,
+        statement: Statement,
+        copies: tuple[Map, ...] = (),
+        *,
+        parts: tuple[tuple[Assignment, ...], ...],
+        after: tuple[Mapping[str, str], ...],
+        carried: Names = (),
+    ) -> Assignment:
+        """The assignment of a statement with bodies, see `Assignment`."""
+        return Assignment(statement, copies, parts, after, carried)
+
+
+def flat(assignments: Sequence[Assignment]) -> Iterator[Statement]:
+    """The statements of assignments, copies included."""
+    for assignment in assignments:
+        yield from assignment.statements

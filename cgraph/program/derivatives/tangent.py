@@ -1,0 +1,90 @@
+"""Tangent: forward mode over statements, from tangents of what they begin with to those of what they end with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence, Set
+
+from ..statement import Statement, reads_and_writes, row_of
+from ..statements.call import copied, zeroed
+from .products import Products
+from .single_assignment import Assignment, Registers, flat
+
+
+class Tangent(Registers):
+    """The statements that push tangents on through assignments.
+
+    Attributes
+    ----------
+    dots : dict of str to str
+        {register: the one that has its tangent}; the rules extend it.
+    active : set of str
+        Registers that depend on what moves.
+    lengths : dict of str to int
+        Of all registers; grows.
+    products : Products
+        Graphs of J x_dot.
+    values : bool
+        Whether the statements themselves are among `statements`, each before its tangents.
+    statements : list of Statement
+        What has been added.
+    """
+
+    def __init__(
+        self,
+        dots: Mapping[str, str],
+        active: Set[str],
+        lengths: dict[str, int],
+        products: Products,
+        *,
+        values: bool = False,
+    ) -> None:
+        super().__init__(lengths)
+        self.dots, self.active, self.products, self.values = dict(dots), active, products, values
+        self.statements: list[Statement] = []
+
+    def inner(self, more: Mapping[str, str] | None = None, *, values: bool = False) -> Tangent:
+        """Of a body: what has tangents here has them there, and more registers."""
+        dots = {**self.dots, **(more or {})}
+        return Tangent(dots, self.active, self.lengths, self.products, values=self.values or values)
+
+    def push(self, assignments: Sequence[Assignment]) -> None:
+        """Through these assignments, the first first."""
+        for assignment in assignments:
+            row = row_of(assignment.statement)
+            if row.jvp is None:
+                raise TypeError(f"a {row.kind.__name__} has no tangents: its row has no `jvp`")
+            if self.values and not row.reruns:
+                self.add(*assignment.statements)
+            row.jvp(assignment, self)
+            for name in set(reads_and_writes(assignment.statement)[1]) - set(self.active):
+                self.dots.pop(name, None)
+
+    def add(self, *statements: Statement) -> None:
+        """Statements after those that are there."""
+        self.statements += statements
+
+    def flat(self, part: Sequence[Assignment]) -> list[Statement]:
+        """The statements of assignments, copies included."""
+        return [*flat(part)]
+
+    def dot(self, register: str) -> str:
+        """A new register for the tangent of one."""
+        dot = self.fresh(f"{register}_dot", self.lengths[register])
+        self.dots[register] = dot
+        return dot
+
+    def dot_or_zero(self, register: str) -> str:
+        """The tangent of a register; a register of zeros where it does not move."""
+        if register in self.dots:
+            return self.dots[register]
+        zero = self.fresh(f"{register}_dot", self.lengths[register])
+        self.add(zeroed(zero))
+        return zero
+
+    def copy_or_zero(self, register: str, dot: str) -> None:
+        """dot = the tangent of a register."""
+        self.add(copied(self.dots[register], dot) if register in self.dots else zeroed(dot))
+
+    def moving(self, inputs: Sequence[str]) -> tuple[int, ...]:
+        """Which of some registers have tangents."""
+        return tuple([k for k, name in enumerate(inputs) if name in self.dots and self.lengths[name]])

@@ -1,0 +1,218 @@
+"""Statement: what a program does at a time; and the table of the kinds of statements, a row each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+from ..core.checks import GraphError
+
+Lengths = Mapping[str, int]  # of registers, by name
+Names = tuple[str, ...]
+Rule = Callable[..., None]  # of the statement, or its assignment, and of what it is written or run with
+
+
+class Statement:
+    """What a program does at a time: the base of the kinds, each of which is a frozen dataclass and a `StatementRow`.
+
+    Examples
+    --------
+    >>> from cgraph.extend import Factor, Statement
+    >>> isinstance(Factor("A", "pivots"), Statement)
+    True
+    """
+
+
+@dataclass(frozen=True, eq=False)
+class StatementRow:
+    """One row of the table of statements: all that the library knows of a kind of statement.
+
+    Parameters
+    ----------
+    kind : type
+        A frozen dataclass over `Statement`.
+    reads, writes : tuple of str
+        Its fields that name registers, each a name or a tuple of names. A field in both is changed in place.
+    run : callable
+        (statement, state, execution): its effect on `state`, {register: list of float}. `execution.values(graph, x)`
+        are the outputs of a graph, `execution.run(statements, state)` runs others.
+    check : callable, optional
+        (statement, lengths): raises GraphError where registers do not fit; `require_length` helps. That their names are
+        known is checked without it.
+    bodies : tuple of str
+        Its fields that are statements, run as often as registers say.
+    graph : str
+        Its field that is a graph. Default: it has none.
+    text : callable, optional
+        (statement, writer): LLVM's text, see `writer`'s methods. Default: programs with it run in Python.
+    beside : callable, optional
+        As `run`, of N memories: `state` is {register: array (length, N)}. Default: it depends on numbers what is done,
+        so that memories cannot run side by side.
+    assign : callable, optional
+        (statement, assigned): the assignment of registers that no other statement writes. Default: by `reads` and
+        `writes`; a kind with bodies needs it to have derivatives.
+    jvp, transpose : callable, optional
+        (assignment, tangent) and (assignment, adjoint): add the statements that push tangents on, or pull cotangents
+        back, see docs/extending.md. Default: no derivative.
+    reruns : bool
+        Whether what `jvp` adds computes the values too.
+
+    Examples
+    --------
+    >>> from cgraph.extend import STATEMENTS, Solve
+    >>> STATEMENTS[Solve].reads, STATEMENTS[Solve].writes
+    (('matrix', 'pivots', 'vector'), ('vector',))
+    """
+
+    kind: type[Statement]
+    reads: Names
+    writes: Names
+    run: Rule
+    check: Rule | None = None
+    bodies: Names = ()
+    graph: str = ""
+    text: Rule | None = None
+    beside: Rule | None = None
+    assign: Callable[..., Any] | None = None
+    jvp: Rule | None = None
+    transpose: Rule | None = None
+    reruns: bool = False
+
+
+STATEMENTS: dict[type[Statement], StatementRow] = {}  # filled by table.py
+
+
+def register_statement(row: StatementRow) -> None:
+    """Add a row to the table of statements: from then on programs may have statements of its kind.
+
+    Parameters
+    ----------
+    row : StatementRow
+        The row.
+
+    Raises
+    ------
+    TypeError
+        For what is no row, or where its kind is no class over `Statement`.
+    ValueError
+        When the kind is in the table already, or has no field of a name in `reads`, `writes`, `bodies`, `graph`.
+
+    Examples
+    --------
+    >>> from cgraph.extend import STATEMENTS, Call, register_statement
+    >>> register_statement(STATEMENTS[Call])
+    Traceback (most recent call last):
+    ValueError: statement Call is in the table already
+    """
+    if not isinstance(row, StatementRow):
+        raise TypeError(f"register_statement takes a StatementRow, got {type(row).__name__}: {row!r:.60}")
+    if not (isinstance(row.kind, type) and issubclass(row.kind, Statement)):
+        raise TypeError(f"a kind of statement must be a class over Statement, got {row.kind!r:.60}")
+    name = row.kind.__name__
+    if row.kind in STATEMENTS:
+        raise ValueError(f"statement {name} is in the table already")
+    for column in ("reads", "writes", "bodies"):
+        if not isinstance(getattr(row, column), tuple):
+            raise TypeError(f"statement {name}: {column} must be a tuple of fields, got {getattr(row, column)!r:.60}")
+    fields = getattr(row.kind, "__dataclass_fields__", {})
+    wanted = (*row.reads, *row.writes, *row.bodies, *([row.graph] if row.graph else []))
+    if unknown := [field for field in wanted if field not in fields]:
+        raise ValueError(f"statement {name} has no field {unknown[0]!r} (it has {', '.join(fields) or 'none'})")
+    STATEMENTS[row.kind] = row
+
+
+def row_of(statement: Statement) -> StatementRow:
+    """Its row. Raises TypeError for what is no statement of the table."""
+    try:
+        return STATEMENTS[type(statement)]
+    except KeyError:
+        raise TypeError(f"{statement!r:.60} is no statement of the table, see register_statement") from None
+
+
+def names_in(statement: Statement, fields: Iterable[str]) -> Names:
+    """The registers that some fields name."""
+    names: list[str] = []
+    for field in fields:
+        value = getattr(statement, field)
+        names += [value] if isinstance(value, str) else value
+    return tuple(names)
+
+
+S = TypeVar("S", bound=Statement)
+
+
+def with_names(statement: S, fields: Iterable[str], new: Callable[[str], str]) -> S:
+    """The statement with other registers in some fields."""
+    values = {field: getattr(statement, field) for field in fields}
+    changed: dict[str, Any] = {
+        field: new(value) if isinstance(value, str) else tuple([new(name) for name in value])
+        for field, value in values.items()
+    }
+    return replace(statement, **changed)  # type: ignore[type-var]
+
+
+def bodies_of(statement: Statement) -> tuple[Sequence[Statement], ...]:
+    """The statements that it runs itself."""
+    return tuple([getattr(statement, field) for field in row_of(statement).bodies])
+
+
+def reads_and_writes(statement: Statement) -> tuple[Names, Names]:
+    """The registers that a statement reads, and those that it writes, with what its bodies do."""
+    row = row_of(statement)
+    reads, writes = names_in(statement, row.reads), names_in(statement, row.writes)
+    for body in bodies_of(statement):
+        first, last = effects(body)
+        reads, writes = (*reads, *first), (*writes, *last)
+    return reads, tuple(dict.fromkeys(writes))
+
+
+def effects(statements: Iterable[Statement]) -> tuple[dict[str, None], dict[str, None]]:
+    """The registers that are read before they are written, and those that are written, in order."""
+    reads: dict[str, None] = {}
+    writes: dict[str, None] = {}
+    for statement in statements:
+        before, after = reads_and_writes(statement)
+        reads |= {name: None for name in before if name not in writes}
+        writes |= dict.fromkeys(after)
+    return reads, writes
+
+
+def needed(statements: Sequence[Statement], results: Iterable[str]) -> list[Statement]:
+    """The statements that results depend on, in their order; one with bodies is whole or not there."""
+    wanted, kept = set(results), []
+    for statement in reversed(statements):
+        reads, writes = reads_and_writes(statement)
+        if wanted & set(writes):
+            if not row_of(statement).bodies:  # which may run no time at all
+                wanted -= set(writes)
+            wanted |= set(reads)
+            kept.append(statement)
+    return kept[::-1]
+
+
+def length_of(lengths: Lengths, where: str, name: str) -> int:
+    """Of a register. Raises GraphError for an unknown one, which `where` names."""
+    if not isinstance(name, str) or name not in lengths:
+        raise GraphError(f"{where} names register {name!r}, not among {', '.join(lengths) or 'none'}")
+    return lengths[name]
+
+
+def require_length(lengths: Lengths, where: str, name: str, length: int) -> None:
+    """Raises GraphError if a register of that name is unknown or has another length; for the `check` of a row.
+
+    Examples
+    --------
+    >>> from cgraph.extend import require_length
+    >>> require_length({"a": 2}, "Sort", "a", 3)
+    Traceback (most recent call last):
+    cgraph.core.checks.GraphError: Sort needs register 'a' to have length 3, got 2
+    """
+    if (actual := length_of(lengths, where, name)) != length:
+        raise GraphError(f"{where} needs register {name!r} to have length {length}, got {actual}")
+
+
+def require_once(where: str, names: Sequence[str]) -> None:
+    """Raises GraphError if a register is written twice by one statement."""
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise GraphError(f"{where} writes register {twice[0]!r} twice")

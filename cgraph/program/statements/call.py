@@ -1,0 +1,287 @@
+"""Call, Map, Sum: a graph once, for every element of registers, and summed over them."""
+
+from __future__ import annotations
+
+import functools
+import operator
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...core.checks import GraphError
+from ...core.evaluation import Array
+from ...core.graph import Graph
+from ...writing.naming import variables
+from ..statement import (
+    Lengths,
+    Names,
+    Statement,
+    length_of,
+    require_length,
+    require_once,
+)
+
+if TYPE_CHECKING:
+    from ..execution import Execution
+    from ..writer import Writer
+
+State = dict[str, list[float]]
+
+
+@dataclass(frozen=True)
+class Call(Statement):
+    """outputs = graph(inputs).
+
+    Attributes
+    ----------
+    graph : Graph
+        The function.
+    inputs, outputs : tuple of str
+        Registers which, end to end, are the graph's inputs and outputs in order.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Call
+    >>> a, b = cg.variables("a b")
+    >>> swap = Call(cg.Graph([a, b], {"first": b, "second": a}), ("pair",), ("pair",))
+    """
+
+    graph: Graph
+    inputs: Names
+    outputs: Names
+
+
+@dataclass(frozen=True)
+class Map(Statement):
+    """outputs[i] = graph(shared, inputs[i]) for every element i.
+
+    Attributes
+    ----------
+    graph : Graph
+        The function of one element.
+    inputs, outputs : tuple of str
+        A register for each input and each output of the graph, of one common length; an input of length 1 has the same
+        value for every element.
+    shared : tuple of str
+        Registers which, end to end, are the graph's first inputs, before those of `inputs`: the same for every element.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Map
+    >>> x, h = cg.variables("x h")
+    >>> scale = Map(cg.Graph([x, h], {"y": x * h}), ("values", "step"), ("values",))
+    """
+
+    graph: Graph
+    inputs: Names
+    outputs: Names
+    shared: Names = ()
+
+
+@dataclass(frozen=True, init=False)
+class Sum(Statement):
+    """outputs = sum over i of graph(shared, inputs[i]), from the first element to the last.
+
+    Attributes
+    ----------
+    graph : Graph
+        The function of one element.
+    inputs : tuple of str
+        A register for each input of the graph, of one common length or of length 1.
+    outputs : str or tuple of str
+        Registers which, end to end, are the sums of the graph's outputs.
+    shared : tuple of str
+        As of `Map`.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Sum
+    >>> x = cg.variable("x")
+    >>> norm = Sum(cg.Graph([x], {"square": x * x}), ("values",), "total")
+    """
+
+    graph: Graph
+    inputs: Names
+    outputs: Names
+    shared: Names = ()
+
+    def __init__(self, graph: Graph, inputs: Names, outputs: str | Names, shared: Names = ()) -> None:
+        values = (graph, inputs, (outputs,) if isinstance(outputs, str) else outputs, shared)
+        for name, value in zip(("graph", "inputs", "outputs", "shared"), values, strict=True):
+            object.__setattr__(self, name, value)
+
+
+def elements(statement: Map | Sum, lengths: Lengths) -> int:
+    """The number of elements that a statement runs over."""
+    names = statement.outputs if isinstance(statement, Map) else statement.inputs
+    return max([lengths[name] for name in names], default=1)
+
+
+def copied(source: str, target: str) -> Map:
+    """target = source."""
+    return Map(SAME, (source,), (target,))
+
+
+def zeroed(register: str) -> Map:
+    """register = 0."""
+    return Map(_ZERO, (register,), (register,))
+
+
+def added(total: str, term: str, result: str) -> Map:
+    """result = total + term."""
+    return Map(_ADDED, (total, term), (result,))
+
+
+_A, _B = variables("a b")
+SAME = Graph([_A], {"a": _A})
+_ZERO = Graph([_A], {"zero": 0.0})
+_ADDED = Graph([_A, _B], {"sum": _A + _B})
+
+
+# what registers must fit
+
+
+def check_call(call: Call, lengths: Lengths) -> None:
+    """Raises GraphError if the registers do not hold as many numbers as the graph has inputs and outputs."""
+    where = f"Call of {call.graph!r}"
+    sides = (("inputs", call.inputs, len(call.graph.inputs)), ("outputs", call.outputs, len(call.graph.outputs)))
+    for what, names, wanted in sides:
+        if (total := sum([length_of(lengths, where, name) for name in names])) != wanted:
+            raise GraphError(f"{where} needs {wanted} {what}, the registers {', '.join(names)} hold {total}")
+    require_once(where, call.outputs)
+
+
+def check_elements(statement: Map | Sum, lengths: Lengths) -> None:
+    """Raises GraphError if registers have neither one length nor length 1, or are too many or too few."""
+    where, graph, outputs = f"{type(statement).__name__} of {statement.graph!r}", statement.graph, statement.outputs
+    known = sum([length_of(lengths, where, name) for name in statement.shared])
+    if known > len(graph.inputs):
+        raise GraphError(f"{where} has {len(graph.inputs)} inputs, the shared registers hold {known}")
+    registers = [(statement.inputs, len(graph.inputs) - known)]
+    if isinstance(statement, Map):
+        registers.append((outputs, len(graph.outputs)))
+    for names, wanted in registers:
+        if len(names) != wanted:
+            raise GraphError(f"{where} needs {wanted} registers, got {len(names)}: {', '.join(names)}")
+    for name in (*statement.inputs, *outputs):
+        length_of(lengths, where, name)
+    count = elements(statement, lengths)
+    for name in statement.inputs:
+        if lengths[name] not in (1, count):
+            raise GraphError(f"{where}: register {name!r} needs length {count} or 1, got {lengths[name]}")
+    if isinstance(statement, Map):
+        for name in outputs:
+            require_length(lengths, where, name, count)
+    elif len(outputs) == len(graph.outputs) == 1:
+        require_length(lengths, where, outputs[0], 1)
+    elif (total := sum([lengths[name] for name in outputs])) != len(graph.outputs):
+        raise GraphError(f"{where} needs {len(graph.outputs)} outputs, the registers {', '.join(outputs)} hold {total}")
+    require_once(where, outputs)
+
+
+# in Python: of one memory, and of many
+
+
+def run_call(call: Call, state: State, execution: Execution) -> None:
+    """In Python."""
+    _split(execution.values(call.graph, _joined(state, call.inputs)), call.outputs, state)
+
+
+def run_map(statement: Map, state: State, execution: Execution) -> None:
+    """In Python, element by element."""
+    columns = _rows(statement, state, execution)
+    for slot, name in enumerate(statement.outputs):
+        state[name] = [values[slot] for values in columns]
+
+
+def run_sum(statement: Sum, state: State, execution: Execution) -> None:
+    """In Python, added up in order."""
+    rows = _rows(statement, state, execution)
+    columns = zip(*rows, strict=True) if rows else [()] * len(statement.graph.outputs)
+    totals = [functools.reduce(operator.add, terms, 0.0) for terms in columns]  # sum() compensates
+    _split(totals, statement.outputs, state)
+
+
+def _rows(statement: Map | Sum, state: State, execution: Execution) -> list[Sequence[float]]:
+    """The outputs for every element."""
+    count = elements(statement, execution.lengths)
+    inputs = [[value] * count for value in _joined(state, statement.shared)]
+    inputs += [state[name] if len(state[name]) == count else state[name] * count for name in statement.inputs]
+    return (
+        [execution.values(statement.graph, values) for values in zip(*inputs, strict=True)]
+        if inputs
+        else [execution.values(statement.graph, ()) for _ in range(count)]
+    )
+
+
+def _joined(state: Mapping[str, list[float]], names: Sequence[str]) -> list[float]:
+    return [value for name in names for value in state[name]]
+
+
+def _split(values: Sequence[float], names: Sequence[str], state: State) -> None:
+    """Into the registers, end to end."""
+    at = 0
+    for name in names:
+        length = len(state[name])
+        state[name] = list(values[at : at + length])
+        at += length
+
+
+def call_beside(call: Call, state: dict[str, Array], execution: Execution) -> None:
+    """Of many memories: a batch."""
+    points = np.concatenate([state[name] for name in call.inputs]) if call.inputs else np.empty((0, execution.many))
+    _split_rows(execution.batch(call.graph, points), call.outputs, state)
+
+
+def elements_beside(statement: Map | Sum, state: dict[str, Array], execution: Execution) -> None:
+    """Of many memories: all elements as one batch."""
+    # All elements of all N states are points of one batch: (inputs, elements * N) -> (outputs, elements, N).
+    shape = (elements(statement, execution.lengths), execution.many)
+    rows = [row for name in statement.shared for row in state[name]]
+    rows += [state[name] for name in statement.inputs]
+    inputs = np.array([np.broadcast_to(row, shape) for row in rows]).reshape(len(rows), shape[0] * shape[1])
+    results = execution.batch(statement.graph, inputs).reshape(-1, *shape)
+    if isinstance(statement, Map):
+        state.update(zip(statement.outputs, results, strict=True))
+        return
+    totals = np.add.accumulate(results, axis=1)[:, -1] if shape[0] else np.zeros((len(results), shape[1]))
+    _split_rows(totals, statement.outputs, state)
+
+
+def _split_rows(rows: Array, names: Sequence[str], state: dict[str, Array]) -> None:
+    at = 0
+    for name in names:
+        length = len(state[name])
+        state[name] = rows[at : at + length]
+        at += length
+
+
+# as machine code
+
+
+def call_text(call: Call, writer: Writer) -> None:
+    """As machine code."""
+    name = writer.functions.call(call.graph, writer.lengths(call.inputs), writer.lengths(call.outputs))
+    writer.calls(name, call.inputs, call.outputs)
+
+
+def map_text(statement: Map, writer: Writer) -> None:
+    """As machine code, in vectors of elements."""
+    if count := elements(statement, writer.registers):
+        shared = writer.lengths(statement.shared)
+        name = writer.functions.map(statement.graph, writer.lengths(statement.inputs), count, shared)
+        writer.calls(name, (*statement.shared, *statement.inputs), statement.outputs)
+
+
+def sum_text(statement: Sum, writer: Writer) -> None:
+    """As machine code, added up in order."""
+    count, of = elements(statement, writer.registers), writer.lengths
+    name = writer.functions.sum(
+        statement.graph, of(statement.inputs), count, of(statement.shared), of(statement.outputs)
+    )
+    writer.calls(name, (*statement.shared, *statement.inputs), statement.outputs)

@@ -1,0 +1,128 @@
+"""If, While, FixedPoint: statements that others are inside of, run as often as a register says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ..statement import Lengths, Statement, require_length
+
+if TYPE_CHECKING:
+    from ..execution import Execution
+    from ..writer import Writer
+
+State = dict[str, list[float]]
+
+
+@dataclass(frozen=True)
+class While(Statement):
+    """while (register > 0) body.
+
+    Attributes
+    ----------
+    register : str
+        A register of length 1; NaN is not positive.
+    body : tuple of Statement
+        What is repeated.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Call, While
+    >>> n = cg.variable("n")
+    >>> countdown = While("n", (Call(cg.Graph([n], {"less": n - 1.0}), ("n",), ("n",)),))
+    """
+
+    register: str
+    body: tuple[Statement, ...]
+
+
+@dataclass(frozen=True)
+class If(Statement):
+    """if (register > 0) body else otherwise.
+
+    Attributes
+    ----------
+    register : str
+        A register of length 1; NaN is not positive.
+    body, otherwise : tuple of Statement
+        What is run in either case.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Call, If
+    >>> n = cg.variable("n")
+    >>> not_below_zero = If("n", (), (Call(cg.Graph([], {"zero": 0.0}), (), ("n",)),))
+    """
+
+    register: str
+    body: tuple[Statement, ...]
+    otherwise: tuple[Statement, ...] = ()
+
+
+@dataclass(frozen=True)
+class FixedPoint(Statement):
+    """while (register > 0) body, which ends at v = body(v, e), v the registers that a turn hands on to the next.
+
+    It runs as `While` does. Its derivative is that of v in terms of e, v' = (dT/dv) v' + (dT/de) e', which is solved by
+    the same iteration, and knows nothing of how many turns v took, nor from where.
+
+    Attributes
+    ----------
+    register : str
+        A register of length 1; NaN is not positive.
+    body : tuple of Statement
+        A turn, without `If`, `While` and `Factor`.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Call, FixedPoint
+    >>> v, turns = cg.variables("v turns")
+    >>> turn = cg.Graph([v, turns], {"v": cg.cos(v), "turns": turns - 1.0})
+    >>> dottie = FixedPoint("turns", (Call(turn, ("v", "turns"), ("v", "turns")),))
+    """
+
+    register: str
+    body: tuple[Statement, ...]
+
+
+def check_control(statement: While | If | FixedPoint, lengths: Lengths) -> None:
+    """Raises GraphError if what decides is no single number."""
+    require_length(lengths, type(statement).__name__, statement.register, 1)
+
+
+def run_while(statement: While | FixedPoint, state: State, execution: Execution) -> None:
+    """In Python."""
+    while state[statement.register][0] > 0.0:
+        execution.run(statement.body, state)
+
+
+def run_if(statement: If, state: State, execution: Execution) -> None:
+    """In Python."""
+    positive = state[statement.register][0] > 0.0
+    execution.run(statement.body if positive else statement.otherwise, state)
+
+
+def while_text(statement: While | FixedPoint, writer: Writer) -> None:
+    """As machine code."""
+    label = writer.label("while")
+    writer.jump(label)
+    writer.block(label)
+    writer.branch(statement.register, f"{label}.body", f"{label}.end")
+    writer.block(f"{label}.body")
+    writer.run(statement.body)
+    writer.jump(label)
+    writer.block(f"{label}.end")
+
+
+def if_text(statement: If, writer: Writer) -> None:
+    """As machine code."""
+    label = writer.label("if")
+    writer.branch(statement.register, f"{label}.yes", f"{label}.no")
+    for way, body in (("yes", statement.body), ("no", statement.otherwise)):
+        writer.block(f"{label}.{way}")
+        writer.run(body)
+        writer.jump(f"{label}.end")
+    writer.block(f"{label}.end")

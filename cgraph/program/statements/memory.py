@@ -1,0 +1,213 @@
+"""Take, Push, Pop: numbers of registers gathered into others, and kept on a stack."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ...core.checks import GraphError
+from ...core.evaluation import Array
+from ..statement import (
+    Lengths,
+    Names,
+    Statement,
+    length_of,
+    require_length,
+    require_once,
+)
+
+if TYPE_CHECKING:
+    from ..execution import Execution
+    from ..writer import Writer
+
+State = dict[str, list[float]]
+
+
+@dataclass(frozen=True)
+class Take(Statement):
+    """target[i] = source[table[i]].
+
+    Attributes
+    ----------
+    source, target : str
+        Registers.
+    table : tuple of int
+        For each number of the target its place in the source.
+
+    Examples
+    --------
+    >>> from cgraph.extend import Program, Take, runner
+    >>> run = runner(Program({"a": 3, "b": 2}, [Take("a", "b", (2, 0))], record=["b"]))
+    >>> run.run(run.memory({"a": [5.0, 6.0, 7.0]}), passes=1).rows.tolist()
+    [[7.0, 5.0]]
+    """
+
+    source: str
+    target: str
+    table: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Push(Statement):
+    """Numbers of registers, end to end, as one more row of a stack; a full one gets none, and its count is NaN.
+
+    Attributes
+    ----------
+    stack : str
+        A register whose length is a multiple of that of a row.
+    count : str
+        A register of length 1: how many rows there are.
+    rows : tuple of str
+        The registers.
+
+    Examples
+    --------
+    >>> from cgraph.extend import Program, Push, runner
+    >>> run = runner(Program({"x": 1, "stack": 2, "count": 1}, [Push("stack", "count", ("x",))], record=["count"]))
+    >>> run.run(run.memory({"x": 8.0}), passes=3).rows.ravel().tolist()
+    [1.0, 2.0, nan]
+    """
+
+    stack: str
+    count: str
+    rows: Names
+
+
+@dataclass(frozen=True)
+class Pop(Statement):
+    """The last row of a stack, taken off it into registers; NaN, and the count NaN, of one that has none.
+
+    Attributes
+    ----------
+    stack, count : str
+        As of `Push`.
+    rows : tuple of str
+        The registers.
+
+    Examples
+    --------
+    >>> from cgraph.extend import Pop, Program, runner
+    >>> run = runner(Program({"x": 1, "stack": 2, "count": 1}, [Pop("stack", "count", ("x",))], record=["x"]))
+    >>> run.run(run.memory({"stack": [4.0, 5.0], "count": 2.0}), passes=3).rows.ravel().tolist()
+    [5.0, 4.0, nan]
+    """
+
+    stack: str
+    count: str
+    rows: Names
+
+
+def check_take(take: Take, lengths: Lengths) -> None:
+    """Raises GraphError if a place is not in the source, or there are not as many as the target has numbers."""
+    size = length_of(lengths, "Take", take.source)
+    require_length(lengths, "Take", take.target, len(take.table))
+    if outside := [place for place in take.table if not (isinstance(place, int) and 0 <= place < size)]:
+        raise GraphError(f"Take needs places from 0 to {size - 1} of register {take.source!r}, got {outside[0]!r:.60}")
+
+
+def check_stack(statement: Push | Pop, lengths: Lengths) -> None:
+    """Raises GraphError if the stack does not hold whole rows."""
+    where = type(statement).__name__
+    size = length_of(lengths, where, statement.stack)
+    require_length(lengths, where, statement.count, 1)
+    width = sum([length_of(lengths, where, name) for name in statement.rows])
+    if width and size % width:
+        raise GraphError(f"{where} needs a stack of rows of {width} numbers, register {statement.stack!r} holds {size}")
+    if isinstance(statement, Pop):
+        require_once(where, statement.rows)
+
+
+def run_take(take: Take, state: State, _: Execution) -> None:
+    """In Python."""
+    source = state[take.source]
+    state[take.target] = [source[place] for place in take.table]
+
+
+def take_beside(take: Take, state: dict[str, Array], _: Execution) -> None:
+    """Of many memories."""
+    state[take.target] = state[take.source][list(take.table)]
+
+
+def run_push(push: Push, state: State, _: Execution) -> None:
+    """In Python."""
+    row = [value for name in push.rows for value in state[name]]
+    stack, count = state[push.stack], state[push.count][0]
+    if count * len(row) < len(stack) or (not row and count >= 0.0):
+        at = int(count) * len(row)
+        state[push.stack] = [*stack[:at], *row, *stack[at + len(row) :]]
+        state[push.count] = [count + 1.0]
+    else:
+        state[push.count] = [math.nan]
+
+
+def run_pop(pop: Pop, state: State, _: Execution) -> None:
+    """In Python."""
+    width, count = sum([len(state[name]) for name in pop.rows]), state[pop.count][0]
+    row, after = [math.nan] * width, math.nan
+    if count > 0.0:
+        at, after = (int(count) - 1) * width, count - 1.0
+        row = state[pop.stack][at : at + width]
+    state[pop.count] = [after]
+    for name in pop.rows:
+        length = len(state[name])
+        state[name], row = row[:length], row[length:]
+
+
+def take_text(take: Take, writer: Writer) -> None:
+    """As machine code."""
+    name = writer.functions.take(take.table)
+    writer.calls(name, (take.source,), (take.target,))
+
+
+def push_text(push: Push, writer: Writer) -> None:
+    """if (count < most) { stack[count] = row; count += 1 } else count = NaN."""
+    label, at = writer.label("push"), _Places(writer, push.rows)
+    most = writer.registers[push.stack] // at.width if at.width else math.inf
+    count = writer.load(push.count)
+    fits = writer.value(f"fcmp olt double {count}, {writer.number(float(most))}")
+    writer.branch_on(fits, f"{label}.fits", f"{label}.full")
+    writer.block(f"{label}.fits")
+    for pointer, name in at.row(push.stack, count):
+        writer.copy(pointer, writer.pointer(name), writer.registers[name])
+    writer.store(writer.value(f"fadd double {count}, 1.0"), push.count)
+    writer.jump(f"{label}.end")
+    writer.block(f"{label}.full")
+    writer.store(writer.number(math.nan), push.count)
+    writer.jump(f"{label}.end")
+    writer.block(f"{label}.end")
+
+
+def pop_text(pop: Pop, writer: Writer) -> None:
+    """if (count > 0) { count -= 1; row = stack[count] } else row = count = NaN."""
+    label, at = writer.label("pop"), _Places(writer, pop.rows)
+    count = writer.load(pop.count)
+    writer.branch(pop.count, f"{label}.some", f"{label}.none")
+    writer.block(f"{label}.some")
+    left = writer.value(f"fsub double {count}, 1.0")
+    for pointer, name in at.row(pop.stack, left):
+        writer.copy(writer.pointer(name), pointer, writer.registers[name])
+    writer.store(left, pop.count)
+    writer.jump(f"{label}.end")
+    writer.block(f"{label}.none")
+    for name in (pop.count, *pop.rows):
+        writer.fill_with_nan(name)
+    writer.jump(f"{label}.end")
+    writer.block(f"{label}.end")
+
+
+class _Places:
+    """Where the registers of a row lie in a stack."""
+
+    def __init__(self, writer: Writer, names: Names) -> None:
+        self._writer, self._names = writer, names
+        self.width = sum(writer.lengths(names))
+
+    def row(self, stack: str, number: str) -> list[tuple[str, str]]:
+        """(address, register) of the parts of the row of that number, a double."""
+        writer, places = self._writer, []
+        start = writer.value(f"mul i64 {writer.value(f'fptosi double {number} to i64')}, {self.width}")
+        for name in self._names:
+            places.append((writer.value(f"getelementptr double, ptr {writer.pointer(stack)}, i64 {start}"), name))
+            start = writer.value(f"add i64 {start}, {writer.registers[name]}")
+        return places

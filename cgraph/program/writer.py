@@ -1,0 +1,139 @@
+"""Writer: what the rules of statements write LLVM's text with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .llvm_functions import Functions, Lengths
+from .statement import Lengths as Registers, Statement, row_of
+
+
+class Writer:
+    """The statements of a function over registers.
+
+    Attributes
+    ----------
+    registers : mapping of str to int
+        Their lengths.
+    functions : Functions
+        Those of the module, which statements call.
+    type : str
+        Of a number in a register.
+    size : int
+        Of a number, in bytes.
+    pointers : dict of str to str
+        {register: its address}.
+    written : list of str
+        Lines of the statements so far.
+    scratch : list of str
+        Allocations, which stand once at the start.
+    """
+
+    def __init__(self, registers: Registers, functions: Functions) -> None:
+        self.registers, self.functions = registers, functions
+        self.type, self.size = functions.arithmetic.type, 8 * functions.arithmetic.lanes
+        self.pointers = {name: f"%r{number}" for number, name in enumerate(registers)}
+        self.written: list[str] = []
+        self.scratch: list[str] = []
+        self._count = self._values = 0  # of statements so far, and of values, for names
+
+    def run(self, statements: Sequence[Statement]) -> None:
+        """Statements, one after another."""
+        for statement in statements:
+            self._count += 1
+            text = row_of(statement).text
+            assert text is not None, "require_texts has been asked"
+            text(statement, self)
+
+    def line(self, instruction: str) -> None:
+        """An instruction without a value."""
+        self.written.append(f"  {instruction}")
+
+    def value(self, instruction: str) -> str:
+        """An instruction; the name of its value."""
+        self._values += 1
+        self.line(f"%v{self._values} = {instruction}")
+        return f"%v{self._values}"
+
+    def number(self, value: float) -> str:
+        """A number in the text."""
+        return self.functions.arithmetic.number(value)
+
+    def pointer(self, register: str) -> str:
+        """The address of a register."""
+        return self.pointers[register]
+
+    def load(self, register: str) -> str:
+        """The one number of a register."""
+        return self.value(f"load double, ptr {self.pointer(register)}, align 8")
+
+    def store(self, value: str, register: str) -> None:
+        """register = value, a number."""
+        self.line(f"store double {value}, ptr {self.pointer(register)}, align 8")
+
+    def copy(self, target: str, source: str, count: int) -> None:
+        """So many numbers from one address to another."""
+        self.written.append(copy_text(target, source, count * self.size))
+
+    def fill_with_nan(self, register: str) -> None:
+        """register = NaN, every number of it: all bits are 1."""
+        size = self.registers[register] * self.size
+        self.line(f"call void @llvm.memset.p0.i64(ptr {self.pointer(register)}, i8 -1, i64 {size}, i1 false)")
+
+    def label(self, kind: str) -> str:
+        """A name for the blocks of the statement that is being written."""
+        return f"{kind}{self._count}"
+
+    def block(self, label: str) -> None:
+        """What follows is a block of that name."""
+        self.written.append(f"{label}:")
+
+    def jump(self, label: str) -> None:
+        """Go on there."""
+        self.line(f"br label %{label}")
+
+    def branch_on(self, condition: str, yes: str, no: str) -> None:
+        """Go on at one of two blocks."""
+        self.line(f"br i1 {condition}, label %{yes}, label %{no}")
+
+    def branch(self, register: str, yes: str, no: str) -> None:
+        """Go on where register > 0, where NaN is not, and where it is not."""
+        self.written += self.positive(f"%{yes}.on", register)
+        self.branch_on(f"%{yes}.on", yes, no)
+
+    def arguments(self, *names: str) -> str:
+        """Pointers to registers, as arguments of a call."""
+        return ", ".join(f"ptr {self.pointer(name)}" for name in names)
+
+    def calls(self, name: str, inputs: Sequence[str], outputs: Sequence[str]) -> None:
+        """Call a function of registers, whose arguments must not overlap.
+
+        A register that it both reads and writes is written to scratch memory, and copied after the call.
+        """
+        targets, copies = [], []
+        for k, output in enumerate(outputs):
+            target, length = self.pointer(output), self.registers[output]
+            if output in inputs:
+                scratch = f"%beside{self._count}.{k}"
+                self.scratch.append(f"  {scratch} = alloca {self.type}, i64 {length + self.functions.width}, align 64")
+                copies.append(copy_text(target, scratch, length * self.size))
+                target = scratch
+            targets.append(target)
+        pointers = [*(self.pointer(register) for register in inputs), *targets]
+        self.written += [f"  call void @{name}({', '.join(f'ptr {pointer}' for pointer in pointers)})", *copies]
+
+    def lengths(self, names: Sequence[str]) -> Lengths:
+        """Of registers."""
+        return tuple([self.registers[name] for name in names])
+
+    def positive(self, result: str, register: str) -> list[str]:
+        """result = register > 0, where NaN is not."""
+        return [
+            f"  {result}.value = load double, ptr {self.pointers[register]}, align 8",
+            f"  {result} = fcmp ogt double {result}.value, 0.0",
+        ]
+
+
+def copy_text(target: str, source: str, size: int) -> str:
+    """So many bytes from one address to another."""
+    return f"  call void @llvm.memcpy.p0.p0.i64(ptr {target}, ptr {source}, i64 {size}, i1 false)"

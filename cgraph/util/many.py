@@ -1,0 +1,31 @@
+"""Numbers of things in words."""
+
+from __future__ import annotations
+
+from .explain_failure import explain_failure
+from .require import require_whole
+
+
+@explain_failure
+def many(number: int, noun: str) -> str:
+    """The number and the noun, in the plural of all but 1.
+
+    Parameters
+    ----------
+    number : int
+        How many, at least 0.
+    noun : str
+        One of them.
+
+    Returns
+    -------
+    str
+        `1 node`, `2 nodes`.
+
+    Examples
+    --------
+    >>> from cgraph.extend import many
+    >>> many(1, "node"), many(2, "node")
+    ('1 node', '2 nodes')
+    """
+    return f"{require_whole('number', number)} {noun}{'' if number == 1 else 's'}"

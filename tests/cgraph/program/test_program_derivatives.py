@@ -1,0 +1,345 @@
+"""Derivatives of programs: laws on random programs with loops, branches, solves, gathers and stacks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import cgraph as cg
+from cgraph.extend import (
+    Array,
+    Call,
+    Factor,
+    FixedPoint,
+    If,
+    Linearization,
+    Map,
+    Pop,
+    Program,
+    Push,
+    Solve,
+    Statement,
+    Sum,
+    Take,
+    While,
+    program_jvp,
+    program_vjp,
+    runner,
+)
+from tests.slow import slow
+from tests.tolerances import CONDITIONED, EQUATIONS, LONG_SUM
+
+N = 3
+LENGTHS = {
+    "x": N,
+    "y": N,
+    "z": N,
+    "s": 1,
+    "p": 2,
+    "f": 1,
+    "A": N * N,
+    "pivots": N,
+    "n": 1,
+    "left": 1,
+    "v": N,
+    "turns": 1,
+}
+LENGTHS |= {"stack": 4 * N, "count": 1, "test": 1}
+VECTORS, NUMBERS = ("x", "y", "z"), ("s", "f")
+
+
+class RandomProgram:
+    """Statements of every kind over vectors x, y, z, a number s, parameters p and a fed number f."""
+
+    def __init__(self, seed: int) -> None:
+        self.rng = np.random.default_rng(seed)
+        kinds = [
+            self.call,
+            self.map,
+            self.shared,
+            self.total,
+            self.totals,
+            self.solve,
+            self.take,
+            self.loop,
+            self.branch,
+        ]
+        self.kinds: list[Callable[[int], list[Statement]]] = [*kinds, self.fixed_point, self.stack]
+        body = [each for _ in range(self.rng.integers(3, 6)) for each in self.any(0)]
+        self.program = Program(LENGTHS, body, record=["x", "y", "z", "s"], feed=["f"])
+
+    def any(self, depth: int) -> list[Statement]:
+        kinds = self.kinds if depth < 2 else self.kinds[:7]
+        return kinds[self.rng.integers(len(kinds))](depth)
+
+    def vector(self) -> str:
+        return str(self.rng.choice(VECTORS))
+
+    def formula(self, nodes: list[cg.Node]) -> cg.Node:
+        """Bounded, smooth, and of all the nodes."""
+        c = self.rng.uniform(0.3, 0.9, len(nodes) + 1)
+        total = sum([float(a) * node for a, node in zip(c, nodes, strict=False)], cg.constant(0.0))
+        return [cg.sin(total + float(c[-1])), total / cg.sqrt(1.0 + total * total), 0.5 * cg.cos(total) * nodes[0]][
+            self.rng.integers(3)
+        ]
+
+    def call(self, depth: int) -> list[Statement]:
+        a, b, target = self.vector(), self.vector(), self.vector()
+        nodes = cg.variables([f"i{k}" for k in range(2 * N + 3)])
+        outputs = {f"o{k}": self.formula([nodes[k], nodes[-1 - k], nodes[N]]) for k in range(N)}
+        return [Call(cg.Graph(nodes, outputs), (a, b, "p", "f"), (target,))]
+
+    def map(self, depth: int) -> list[Statement]:
+        u, v, s = cg.variables("u v s")
+        one, two = self.rng.choice(VECTORS, 2, replace=False)
+        graph = cg.Graph([u, v, s], {"a": self.formula([u, v, s]), "b": self.formula([v, u])})
+        return [Map(graph, (self.vector(), self.vector(), "s"), (str(one), str(two)))]
+
+    def shared(self, depth: int) -> list[Statement]:
+        p, q, s, u = cg.variables("p q s u")
+        graph = cg.Graph([p, q, s, u], {"a": self.formula([u, p, s]) * q})
+        return [Map(graph, (self.vector(),), (self.vector(),), shared=("p", "s"))]
+
+    def total(self, depth: int) -> list[Statement]:
+        u, v = cg.variables("u v")
+        return [Sum(cg.Graph([u, v], {"a": 0.5 * self.formula([u, v])}), (self.vector(), "f"), "s")]
+
+    def totals(self, depth: int) -> list[Statement]:
+        p, q, u = cg.variables("p q u")
+        outputs = {f"{k}": self.formula([u, p, q]) for k in range(N)}
+        return [Sum(cg.Graph([p, q, u], outputs), (self.vector(),), (self.vector(),), shared=("p",))]
+
+    def solve(self, depth: int) -> list[Statement]:
+        nodes = cg.variables([f"i{k}" for k in range(N + 2)])
+        rows = {
+            f"{i}{j}": 3.0 * (i == (j + 1) % N) + 0.3 * self.formula([nodes[i], nodes[-1]])
+            for i in range(N)
+            for j in range(N)
+        }
+        matrix = Call(cg.Graph(nodes, rows), (self.vector(), "p"), ("A",))
+        more = [Solve("A", "pivots", self.vector(), bool(self.rng.integers(2))) for _ in range(2)]
+        return [matrix, Factor("A", "pivots"), *more]
+
+    def take(self, depth: int) -> list[Statement]:
+        return [Take(self.vector(), self.vector(), tuple(self.rng.integers(0, N, N).tolist()))]
+
+    def loop(self, depth: int) -> list[Statement]:
+        n, s = cg.variables("n s")
+        name = f"left{depth}"
+        LENGTHS.setdefault(name, 1)
+        begin = Call(cg.Graph([s], {"n": 1.5 + cg.floor(2.0 * cg.abs(s))}), ("s",), (name,))
+        body = [each for _ in range(2) for each in self.any(depth + 1)]
+        count = Call(cg.Graph([n], {"n": n - 1.0}), (name,), (name,))
+        return [begin, While(name, (*body, count))]
+
+    def branch(self, depth: int) -> list[Statement]:
+        s = cg.variable("s")
+        ways = [tuple(each for _ in range(self.rng.integers(0, 3)) for each in self.any(depth + 1)) for _ in range(2)]
+        x = cg.variables("x0 x1 x2")
+        name = f"test{depth}"
+        LENGTHS.setdefault(name, 1)
+        return [Call(cg.Graph([*x, s], {"t": x[0] - x[1] + s}), (self.vector(), "s"), (name,)), If(name, *ways)]
+
+    def fixed_point(self, depth: int) -> list[Statement]:
+        v, y, turns, p, q = cg.variables("v y turns p q")
+        turn = Map(cg.Graph([p, q, v, y], {"v": 0.4 * cg.sin(v) * p + y}), ("v", self.vector()), ("v",), shared=("p",))
+        count = Call(cg.Graph([turns], {"t": turns - 1.0}), ("turns",), ("turns",))
+        begin = Call(cg.Graph([], {"t": 80.0}), (), ("turns",))
+        same = cg.variable("a")
+        return [
+            begin,
+            FixedPoint("turns", (turn, count)),
+            Map(cg.Graph([same], {"a": 1.0 * same}), ("v",), (self.vector(),)),
+        ]
+
+    def stack(self, depth: int) -> list[Statement]:
+        inside = self.any(2)
+        begin = Call(cg.Graph([], {"t": 0.0}), (), ("count",))
+        push = [Push("stack", "count", (self.vector(),)) for _ in range(2)]
+        return [
+            begin,
+            push[0],
+            *inside,
+            push[1],
+            Pop("stack", "count", (self.vector(),)),
+            Pop("stack", "count", (self.vector(),)),
+        ]
+
+
+def complex_run(program: Program, state: dict[str, Array], feed: Array) -> dict[str, Array]:
+    """The passes over complex numbers, written for this test: what decides looks at real parts."""
+    state = {name: np.zeros(length, complex) for name, length in program.registers.items()} | {
+        name: np.array(value, complex) for name, value in state.items()
+    }
+
+    def graph_at(graph: cg.Graph, x: Array) -> Array:
+        values = dict(zip(graph.inputs, x, strict=True))
+        for node in graph.nodes:
+            if node.args:
+                of = [values[arg] for arg in node.args]
+                real = node.op.name in ("floor", "abs", "less")
+                values[node] = node.op.array(*[value.real if real else value for value in of])
+            elif node not in values:
+                values[node] = complex(node.value)
+        return np.array([values[node] for node in graph.outputs.values()], complex)
+
+    def spread(values: Array, names: tuple[str, ...]) -> None:
+        for name in names:
+            length = len(state[name])
+            state[name], values = values[:length], values[length:]
+
+    def joined(names: tuple[str, ...]) -> Array:
+        return np.concatenate([np.empty(0, complex), *[state[name] for name in names]])
+
+    def run(statements: tuple[Statement, ...]) -> None:
+        for each in statements:
+            match each:
+                case Call():
+                    spread(graph_at(each.graph, joined(each.inputs)), each.outputs)
+                case Map() | Sum():
+                    shared, inputs = joined(each.shared), [np.resize(state[name], N) for name in each.inputs]
+                    rows = np.array(
+                        [graph_at(each.graph, np.concatenate([shared, row])) for row in zip(*inputs, strict=True)]
+                    )
+                    if isinstance(each, Sum):
+                        spread(rows.sum(axis=0), each.outputs)
+                    else:
+                        state.update(zip(each.outputs, rows.T, strict=True))
+                case If():
+                    run(each.body if state[each.register][0].real > 0.0 else each.otherwise)
+                case While() | FixedPoint():
+                    while state[each.register][0].real > 0.0:
+                        run(each.body)
+                case Factor():
+                    pass  # numpy solves with the matrix itself
+                case Solve():
+                    matrix = state[each.matrix].reshape(N, N)
+                    state[each.vector] = np.linalg.solve(matrix.T if each.transposed else matrix, state[each.vector])
+                case Take():
+                    state[each.target] = state[each.source][list(each.table)]
+                case Push():
+                    at = int(state[each.count][0].real) * N
+                    stack = state[each.stack].copy()
+                    stack[at : at + N] = joined(each.rows)
+                    state[each.stack], state[each.count] = stack, state[each.count] + 1.0
+                case Pop():
+                    state[each.count] = state[each.count] - 1.0
+                    at = int(state[each.count][0].real) * N
+                    spread(state[each.stack][at : at + N], each.rows)
+
+    for row in feed:
+        state["f"] = row.copy()
+        run(tuple(program.body))
+    return state
+
+
+PASSES, START = 2, ("x", "y", "z", "s", "p")
+
+
+def case(seed: int) -> tuple[Program, dict[str, Array], Array, dict[str, Array], Array, dict[str, Array]]:
+    """A program, where it starts, its feed, directions of both, and weights of what it ends with."""
+    program, rng = RandomProgram(seed).program, np.random.default_rng(1000 + seed)
+    start = {name: rng.uniform(0.3, 0.9, LENGTHS[name]) for name in START}
+    along = {name: rng.normal(size=LENGTHS[name]) for name in START}
+    weights = {name: rng.normal(size=LENGTHS[name]) for name in ("x", "y", "z", "s")}
+    return program, start, rng.uniform(0.3, 0.9, (PASSES, 1)), along, rng.normal(size=(PASSES, 1)), weights
+
+
+@pytest.mark.parametrize("seed", [*range(40), *slow(*range(40, 1500))])
+def test_derivatives_are_those_of_the_numbers(seed: int) -> None:
+    """J x_dot beside a complex step, and w . J x_dot = J^T w . x_dot."""
+    program, start, feed, along, feed_along, weights = case(seed)
+    ends = complex_run(
+        program, {name: start[name] + 1e-200j * along[name] for name in START}, feed + 1e-200j * feed_along
+    )
+    wanted = np.concatenate([ends[name].imag / 1e-200 for name in weights])
+    values = np.concatenate([ends[name].real for name in weights])
+
+    backend = "python" if seed % 8 else "auto"
+    moved = program_jvp(program, [*START, "f"], constant=["turns", "count"])
+    forward = runner(moved.program, backend)
+    known = {**start, **{moved.vectors[name]: along[name] for name in START if name in moved.vectors}}
+    memory = forward.memory(known)
+    dots = []
+    for k in range(PASSES):
+        forward.write(memory, moved.vectors["f"], feed_along[k])
+        dots.append(forward.run(memory, 1, 1, feed[k : k + 1]).rows[0])
+    size = len(values)
+    names = [name for name in weights if name in moved.vectors]
+    assert dots[-1][:size] == pytest.approx(values, rel=CONDITIONED, abs=LONG_SUM)
+    tangents = dict.fromkeys(weights, 0.0) | dict(
+        zip(names, np.split(dots[-1][size:], np.cumsum([LENGTHS[name] for name in names])[:-1]), strict=True)
+    )
+    got = np.concatenate([np.broadcast_to(tangents[name], LENGTHS[name]) for name in weights])
+    scale = 1.0 + np.abs(wanted).max()
+    assert got / scale == pytest.approx(wanted / scale, abs=EQUATIONS)
+
+    pulled = program_vjp(
+        program, list(weights), [*START, "f"], constant=["turns", "count"], checkpoints=seed % 2, backend=backend
+    )(start, PASSES, weights, feed)
+    left = sum(float(weights[name] @ np.broadcast_to(tangents[name], LENGTHS[name])) for name in weights)
+    right = sum(float(pulled.bars[name] @ along[name]) for name in START if name in pulled.bars)
+    right += float(np.sum(pulled.rows["f"] * feed_along))
+    assert left / scale == pytest.approx(right / scale, abs=EQUATIONS)
+
+
+@pytest.mark.parametrize("seed", [*range(20), *slow(*range(20, 300))])
+def test_tangents_along_a_tape_are_those_beside_the_values(seed: int) -> None:
+    program, start, feed, along, feed_along, _ = case(seed)
+    passes = Linearization(program, program.record, [*START, "f"], constant=["turns", "count"])
+    names = [name for name in program.record if name in passes.handed]
+    linear = passes.tangent(passes.wrt, names)
+    forward, back = runner(passes.forward(linear.program.feed), "python"), runner(linear.program, "python")
+    memory = forward.memory({passes.handed.get(name, name): value for name, value in start.items()})
+    tape = forward.run(memory, PASSES, 1, feed).rows
+    known = {name: forward.read(memory, name) for name in passes.constants if name in linear.program.registers}
+    known |= {linear.vectors[name]: along[name] for name in START if name in linear.vectors}
+    memory = back.memory(known)
+    for k in range(PASSES):
+        back.write(memory, linear.vectors["f"], feed_along[k])
+        dots = back.run(memory, 1, 1, tape[k : k + 1]).rows[0]
+    moved = program_jvp(program, [*START, "f"], constant=["turns", "count"])
+    beside = runner(moved.program, "python")
+    memory = beside.memory({**start, **{moved.vectors[name]: along[name] for name in START if name in moved.vectors}})
+    for k in range(PASSES):
+        beside.write(memory, moved.vectors["f"], feed_along[k])
+        beside.run(memory, 1, 1, feed[k : k + 1])
+    wanted = np.concatenate([beside.read(memory, moved.vectors[name]) for name in names])
+    assert dots == pytest.approx(wanted, rel=EQUATIONS, abs=EQUATIONS)
+
+
+def test_a_loop_of_more_turns_than_its_stack_has_room_for_has_no_numbers() -> None:
+    x, n = cg.variables("x n")
+    turn = Call(cg.Graph([x, n], {"x": cg.sin(x), "n": n - 1.0}), ("x", "n"), ("x", "n"))
+    program = Program({"x": 1, "n": 1}, [While("n", (turn,))], record=["x"])
+    for turns, right in ((5, True), (4, False)):
+        pulled = program_vjp(program, ["x"], turns=turns)({"x": 0.5, "n": 5.0}, 1, {"x": 1.0})
+        assert np.isfinite(pulled.bars["x"]).all() == right
+
+
+def test_an_iteration_has_the_slope_of_its_equations_from_wherever_it_begins() -> None:
+    """v = cos(a v): v' = -v sin(a v) / (1 + a sin(a v))."""
+    v, a, left = cg.variables("v a left")
+    turn = Call(cg.Graph([v, a, left], {"v": cg.cos(a * v), "left": left - 1.0}), ("v", "a", "left"), ("v", "left"))
+    program = Program({"v": 1, "a": 1, "left": 1}, [FixedPoint("left", (turn,))], record=["v"])
+    for start in (0.1, 0.9):
+        values = {"v": start, "a": 0.7, "left": 200.0}
+        pulled = program_vjp(program, ["v"], ["a"], constant=["left"])(values, 1, {"v": 1.0})
+        end = float(pulled.values["v"][0])
+        slope = -end * np.sin(0.7 * end) / (1.0 + 0.7 * np.sin(0.7 * end))
+        assert pulled.bars["a"] == pytest.approx([slope], rel=EQUATIONS)
+
+
+def test_wrong_registers_are_told() -> None:
+    program = Program({"x": 1}, [], record=["x"], stop="x")
+    with pytest.raises(cg.GraphError, match="of names register 'y', not among x"):
+        program_vjp(Program({"x": 1}, [], record=["x"]), ["y"])
+    with pytest.raises(cg.GraphError, match="no stop"):
+        program_jvp(program)
+    with pytest.raises(TypeError, match="program must be a Program, got int"):
+        program_vjp(3, ["x"])  # type: ignore[arg-type]
+    whole = program_vjp(Program({"x": 1}, [], record=["x"]), ["x"])
+    with pytest.raises(cg.GraphError, match="seeds must be among x, got 'y'"):
+        whole({"x": 1.0}, 1, {"y": 1.0})
