@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import Any
+from functools import partial
 
 import numpy as np
 
@@ -63,11 +63,11 @@ def result(case: StabilityCase, method: str) -> CaseResult:
 
 def trajectory(case: StabilityCase, method: str) -> Trajectory:
     """The run of a case."""
-    options: dict[str, Any] = {"rtol": RTOL, "atol": case.atol}
-    if not (method.startswith(SCIPY) or METHODS[method].adaptive):
-        options = {"dt": EQUAL_STEPS.get(case.name, {}).get(method), "estimate_error": False}  # the error is measured
-    options |= {"max_steps": MOST_STEPS, "progress": False}
-    return simulate(case.model, case.q, case.qd or None, case.t_end, method, **options)
+    start = case.model, case.q, case.qd or None
+    run = partial(simulate, *start, case.t_end, method, max_steps=MOST_STEPS, progress=False)
+    if method.startswith(SCIPY) or METHODS[method].adaptive:
+        return run(rtol=RTOL, atol=case.atol)
+    return run(dt=EQUAL_STEPS.get(case.name, {}).get(method), estimate_error=False)  # the error is measured
 
 
 def errors(case: StabilityCase, run: Trajectory, solution: Reference) -> dict[str, float]:

@@ -57,8 +57,8 @@ class _Start:
 
 def _ours(setting: Setting, method: str | None = None) -> None:
     method = method or ("radau" if setting.stiff else "dop853")
-    tolerances: dict[str, Any] = {"rtol": RTOL, "atol": RTOL}
-    run = simulate(setting.model, setting.q, setting.qd or None, setting.t_end, method, progress=False, **tolerances)
+    start = setting.q, setting.qd or None
+    run = simulate(setting.model, *start, setting.t_end, method, rtol=RTOL, atol=RTOL, progress=False)
     if not run.stats.success:
         raise RuntimeError(run.stats.message)
 

@@ -258,8 +258,8 @@ def energy(folder: str, steps: int = STEPS, starts: int = STARTS) -> Iterator[st
     q = np.array([0.4, 0.2, 0.1]) * np.random.default_rng(1).uniform(0.5, 1.5, (starts, 3))
     rows = []
     for method in (*SYMPLECTIC, "rk4"):
-        equal: dict[str, Any] = {"dt": STEP, "estimate_error": False, "progress": False}
-        runs = [simulate(arm, start, [0.0] * 3, STEP * steps, method, **equal) for start in q]
+        equal = partial(simulate, arm, method=method, dt=STEP, estimate_error=False, progress=False)
+        runs = [equal(q=start, qd=[0.0] * 3, t_end=STEP * steps) for start in q]
         drifts = [drift(run.energy, float(run.energy[0] - hanging)) for run in runs]
         slopes = np.array([each.drift for each in drifts])
         mean, deviation = slopes.mean(), slopes.std(ddof=1) / np.sqrt(starts)
