@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import cgraph as cg
 from cgraph import Graph, Node
@@ -133,7 +133,7 @@ def _letters(names: Mapping[str, str]) -> Letters:
     return lambda name: shown.get(name) or theme.pretty(name)
 
 
-def _graph(graph: Graph, letters: Letters) -> dict[str, Any]:
+def _graph(graph: Graph, letters: Letters) -> dict[str, Json]:
     number = {node: i for i, node in enumerate(graph.nodes)}
     return {
         "ops": [node.op.name for node in graph.nodes],
@@ -141,7 +141,7 @@ def _graph(graph: Graph, letters: Letters) -> dict[str, Any]:
             _number(node.value) if node.value is not None else [number[arg] for arg in node.args]
             for node in graph.nodes
         ],
-        "names": {i: [node.name, letters(node.name)] for node, i in number.items() if node.name},
+        "names": {str(i): [node.name, letters(node.name)] for node, i in number.items() if node.name},
         "inputs": [[name, number.get(node, -1)] for name, node in zip(graph.input_names, graph.inputs, strict=True)],
         "outputs": [[name, letters(name), number[node]] for name, node in graph.outputs.items()],
     }
