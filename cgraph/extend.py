@@ -30,7 +30,8 @@ label may have. `certain_digits` says what rounding leaves of the outputs.
 `thread_count` reads `threads=`, `share` gives work to threads, `atomic_write` writes a file whole or not at all,
 `write_files` several, and `check_writable` looks beforehand; `many` is a number with its noun; `html_table`,
 `html_text`, `html_lines` and `picture` are what a notebook shows of a result; `install` ends an error about a missing
-package, `scipy_integrate` gives SciPy's module or raises it. `Array` is the type of an array of float64.
+package, `scipy_integrate` gives SciPy's module or raises it. `memo` and `kept_by_first` make a
+function keep its results. `Array` is the type of an array of float64, `Json` of what JSON can hold.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, building, cotangents
@@ -83,9 +84,11 @@ if TYPE_CHECKING:
     from .simplification.polynomial import Polynomial, expand, format_polynomial
     from .simplification.reciprocals import with_reciprocals
     from .util.atomic_write import atomic_write, check_writable, write_files
+    from .util.caches import kept_by_first, memo
     from .util.doors import doors
     from .util.extras import install
     from .util.html_text import html_lines, html_table, html_text, picture
+    from .util.json_type import Json
     from .util.many import many
     from .util.nearest import nearest, or_nearest
     from .util.real_arrays import is_finite, real_array, real_number
@@ -119,6 +122,7 @@ __all__ = [
     "Formulas",
     "If",
     "Jets",
+    "Json",
     "Linearization",
     "Linearized",
     "Map",
@@ -164,9 +168,11 @@ __all__ = [
     "install",
     "is_finite",
     "jets",
+    "kept_by_first",
     "ldl_elimination",
     "ldl_solve",
     "many",
+    "memo",
     "nearest",
     "or_nearest",
     "picture",

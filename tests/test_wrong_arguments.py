@@ -464,15 +464,16 @@ RECORDS = """
     extend.CompressedJacobian extend.Jets extend.Linearized extend.MathML extend.Pulled extend.Statement
     extend.StatementRow extend.Notation extend.Op extend.Record
 """
-# Nothing to give; types; what a mechanism calls; what empties the user's cache; the fast way into compiled code, which
-# looks at nothing, and into the names of nodes.
-LEFT_OUT = """cg.recording_lines cg.clear_cache cg.Compiled.bind cg.Compiled.values cg.Graph.check cg.Graph.counts
-    cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.bias_forces dyn.System.require_values
-    dyn.System.momentum_rates
+# Nothing to give; types; decorators; what a mechanism calls; what empties the user's caches; the fast way into compiled
+# code, which looks at nothing, and into the names of nodes.
+LEFT_OUT = """cg.recording_lines cg.clear_cache cg.clear_caches cg.Compiled.bind cg.Compiled.values cg.Graph.check
+    cg.Graph.counts cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.bias_forces
+    dyn.System.require_values dyn.System.momentum_rates
     dyn.System.momentum_derivatives dyn.System.torque_derivatives
     dyn.JointForce.along dyn.JointForce.check dyn.JointLimit.along dyn.JointLimit.check dyn.JointFriction.along
     dyn.JointFriction.check dyn.Actuator.along dyn.Actuator.check
     extend.Array extend.columns extend.doors extend.Order extend.Polynomial extend.Builder extend.Runner
+    extend.kept_by_first extend.memo
     extend.ProgramVjp extend.Tape extend.Tape.run extend.Tape.recorded extend.run_passes extend.Linearization.adjoint
     extend.Linearization.beside extend.Linearization.forward extend.Linearization.tangent extend.require_length
     extend.Runner.read extend.Runner.write

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 from ..core.checks import GraphError
 from ..core.graph import Edge, Graph
@@ -20,6 +20,9 @@ from .edge_partials import Point, edge_slopes
 from .names import Name, Names
 from .paths import best_paths, by_target, path_count
 from .reachability import between
+
+if TYPE_CHECKING:
+    from ..util.json_type import Json
 
 EXACT = 10**15  # up to here a number of paths is printed digit by digit
 LENGTH = 90  # characters up to which a path is written out; a longer one is written by its tags
@@ -131,7 +134,7 @@ class Why:
         share = f" and carry {self.share:.1%} of the weight of all" if self.share is not None else ""
         return f"The {len(self.paths)} heaviest add up to {listed:.6g}{share}."
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Json]:
         """The same for JSON; nodes are numbered as in `graph.nodes`, an edge is (source, target, argument slot)."""
         number = {node: i for i, node in enumerate(self.graph.nodes)}
         return {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING
 
 from ..core.checks import GraphError
 from ..core.graph import Graph
@@ -14,6 +14,9 @@ from ..util.many import many
 from ..util.require import require_graph
 from .names import Name, Names, joined
 from .reachability import ancestors, descendants
+
+if TYPE_CHECKING:
+    from ..util.json_type import Json
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +81,7 @@ class WhyNot:
     def _repr_html_(self) -> str:
         return html_lines(str(self))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Json]:
         """The same for JSON; nodes are numbered as in `graph.nodes`."""
         nodes = self.graph.nodes
         return {

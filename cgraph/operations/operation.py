@@ -145,7 +145,7 @@ class Op(Row):
     # its function and texts
     arguments: str = ""
     about: str = ""
-    ufunc: Any = None
+    ufunc: np.ufunc | str | None = None
     symbol: str = ""
     infix: tuple[str, int] | None = None
     mathml: MathML | None = None
@@ -167,8 +167,8 @@ class Op(Row):
     c_helper: str = ""
     javascript: str = ""
     # values in other numbers than floats
-    operator: Callable[..., Any] | None = None
-    precise: Callable[..., Any] | None = None
+    operator: Callable[..., object] | None = None
+    precise: Callable[..., object] | None = None
     piece: Callable[[int], tuple[int | None, int]] | None = None
     jumps: Callable[..., Any] | None = None
     series: Callable[..., Any] | None = None
@@ -220,7 +220,7 @@ class Op(Row):
 
 
 OPS: dict[str, Op] = {}  # the table; filled by table.py
-BY_UFUNC: dict[Any, Op] = {}  # {ufunc of NumPy, or the name of one: the operation that it makes of nodes}
+BY_UFUNC: dict[np.ufunc | str, Op] = {}  # {ufunc of NumPy, or the name of one: the operation that it makes of nodes}
 _LEAVES = {row.name: Op(row.name, 0, row.scalar, row.array, row.partials) for row in (VARIABLE, CONSTANT)}
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from ..systems.model import Model, as_system
 from ..systems.system import System
 from .blame import blame
 from .formulations import ONE, THROUGH_STEP, inverse_dynamics, torques
+
+if TYPE_CHECKING:
+    from cgraph.extend import Json
 
 STATES = 24  # tried where c does not fold to 0: a third of size 1, the rest of sizes from 1e-6 to 1e6
 WRITTEN = 200  # nodes of c that identities are tried on
@@ -177,7 +180,7 @@ class Verdict:
         what = "this edge" if len(edges) == 1 else f"these {len(edges)} edges"
         return f"There by mistake: {what}, {alone if count else 'and no node by itself'}: {texts}."
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Json]:
         """The same for JSON; nodes are numbered as in `graph.nodes`, an edge is [source, target, argument slot]."""
         number = {node: i for i, node in enumerate(self.graph.nodes)}
         return {

@@ -1,6 +1,8 @@
 """Integrators: methods for xdot = f(x, t), as programs over the graphs of a model."""
 
-from functools import cache, partial
+from functools import partial
+
+from cgraph.extend import memo
 
 from .composition import COMPOSITIONS
 from .dop853 import DOP853
@@ -56,7 +58,7 @@ class Methods(dict[str, Method]):
         return super().__contains__(name) or (isinstance(name, str) and _names_gauss(name))
 
 
-@cache
+@memo(MOST_STAGES)
 def _gauss(stages: int) -> Method:
     return _symplectic(gauss(stages))
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import cgraph as cg
 from cgraph import Graph
@@ -19,7 +18,7 @@ from .switched_effects import EFFECTS as EFFECTS, absent_parts, has_effect, with
 GROUPS = ("q", "qd", "qdd", "tau")
 NEVER = "unobservable inertial numbers"
 
-Equations = Callable[[Any], Graph]
+Equations = Callable[[Model], Graph]
 
 
 @dataclass(frozen=True)
@@ -239,23 +238,23 @@ def _steps(
 ) -> list[_Step]:
     """From the model as given, one thing after another taken out."""
     steps = [_Step(model, {}, None)]
-
-    def take(what: str, why: str, **changes: Any) -> None:
-        steps.append(replace(steps[-1], what=what, why=why, **changes))
-
     for effect in EFFECTS:
         if effect not in kept and has_effect(steps[-1].model, effect):
-            take(effect, "switched off", model=without_effect(steps[-1].model, effect))
+            less = without_effect(steps[-1].model, effect)
+            steps.append(replace(steps[-1], what=effect, why="switched off", model=less))
     for body, at in lock.items():
         mechanism = as_mechanism(steps[-1].model)
         if mechanism is None:
             raise ValueError(f"a joint can be locked of a Mechanism, got {type(model).__name__}")
-        take(f"joint of {body}", f"locked at {at:g}", model=mechanism.lock(body, at))
+        locked = mechanism.lock(body, at)
+        steps.append(replace(steps[-1], what=f"joint of {body}", why=f"locked at {at:g}", model=locked))
     for name, value in values.items():
-        take(f"input {name}", f"is {value:g}", values={**steps[-1].values, name: value})
+        known = {**steps[-1].values, name: value}
+        steps.append(replace(steps[-1], what=f"input {name}", why=f"is {value:g}", values=known))
     if outputs is not None:
         outputs = list(require_sequence("outputs", outputs, "names", str))
-        take("other outputs", f"only {', '.join(outputs)} asked for", outputs=tuple(outputs))
+        why = f"only {', '.join(outputs)} asked for"
+        steps.append(replace(steps[-1], what="other outputs", why=why, outputs=tuple(outputs)))
     return steps
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -32,9 +31,9 @@ class ReferenceFailedError(ArithmeticError):
 def taylor(
     graph: Graph,
     states: Sequence[str],
-    start: Sequence[Any],
+    start: Sequence[object],
     times: Sequence[float],
-    values: Mapping[str, Any],
+    values: Mapping[str, object],
     digits: int,
 ) -> tuple[list[list[Number]], str]:
     """The states at `times` from `start` at t = 0, with a relative truncation error of 10^-digits a step.

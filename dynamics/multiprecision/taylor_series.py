@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from operator import mul
-from typing import Any
 
 from cgraph import Graph, Node
 from cgraph.extend import NoSeriesError, columns, jets, topological
@@ -27,7 +26,9 @@ class Series:
     tell, as just after a switch.
     """
 
-    def __init__(self, graph: Graph, states: Sequence[str], constants: Mapping[str, Any], number: Any) -> None:
+    def __init__(
+        self, graph: Graph, states: Sequence[str], constants: Mapping[str, object], number: Callable[..., Number]
+    ) -> None:
         self.number, self._m = number, len(states)
         try:
             self._jets = jets(graph, TIME, exact=True)
@@ -112,8 +113,8 @@ class _Evaluation:
     def __init__(
         self,
         graph: Graph,
-        constants: Mapping[str, Any],
-        number: Any,
+        constants: Mapping[str, object],
+        number: Callable[..., Number],
         value_of: Callable[[Node], Callable[..., Number]],
     ) -> None:
         self._numbers: list[Number] = []

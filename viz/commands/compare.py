@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING
 
 import cgraph as cg
 import dynamics as dyn
@@ -26,6 +26,9 @@ from .arguments import (
 from .command import Command
 from .point_arguments import filled
 from .sizes import size_data, size_table
+
+if TYPE_CHECKING:
+    from cgraph.extend import Json
 
 
 def add(parser: Command) -> None:
@@ -84,7 +87,7 @@ def run(options: argparse.Namespace) -> int:
     return 1 if any(only) else 0
 
 
-def _forms(scene: dyn.scenes.Scene, graphs: Mapping[str, cg.Graph]) -> tuple[dict[str, Any], str]:
+def _forms(scene: dyn.scenes.Scene, graphs: Mapping[str, cg.Graph]) -> tuple[dict[str, Json], str]:
     """Sizes of both forms, and how far they agree at a state, as data and as text."""
     sizes, apart = size_data(graphs), library.form_agreement(scene, graphs, filled(graphs[library.LAGRANGE], scene, {}))
     agreement = (

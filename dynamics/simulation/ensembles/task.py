@@ -6,11 +6,11 @@ import pickle
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 
-from cgraph.extend import Array, runner
+from cgraph.extend import Array, memo, runner
 
 from ..equal_steps import equal_steps
 from ..error_estimate import ErrorEstimate, Estimator
@@ -133,7 +133,7 @@ class Task:
 _lock = threading.Lock()  # threads that come at the same time wait for one to make the code
 
 
-@lru_cache(KEPT)
+@memo(KEPT)
 def _vector_code(pickled: bytes, backend: str) -> VectorCode:
     program: StepProgram = pickle.loads(pickled)  # noqa: S301  # it came with the task itself
     programs = branch_free(program)
@@ -146,12 +146,12 @@ def _vector_code(pickled: bytes, backend: str) -> VectorCode:
     return VectorCode(program, start, one_pass)
 
 
-@lru_cache(KEPT)
+@memo(KEPT)
 def _compiled(pickled: bytes, backend: str) -> CompiledSteps:
     return compile_steps(pickle.loads(pickled), backend)  # noqa: S301  # it came with the task itself
 
 
-@lru_cache(KEPT)
+@memo(KEPT)
 def _event_program(pickled: bytes) -> EventProgram:
     program: EventProgram = pickle.loads(pickled)  # noqa: S301  # it came with the task itself
     return program
