@@ -14,8 +14,8 @@ from collections.abc import Mapping
 import numpy as np
 
 import cgraph as cg
-from cgraph import Graph, Node
-from cgraph.extend import Array, Builder, building, certain_digits, folded, kept_by_first, solve_nodes
+from cgraph import Graph, Node, extend
+from cgraph.extend import Array, Builder, building, folded, kept_by_first, solve_nodes
 
 from ..systems.constraints import ConstraintError
 from ..systems.system import System
@@ -145,7 +145,7 @@ def _open_rows(system: System, x: Array, before: Array, t: float, parameters: Ma
     names, n = graph.input_names, len(x)
     point = {name: others[name] for name in names if name in others}
     point |= dict(zip([*names[:n], *names[-n:]], [*before.tolist(), *(x - before).tolist()], strict=True))
-    values, digits = graph.evaluate(point), certain_digits(graph, point)
+    values, digits = graph.evaluate(point), extend.certain_digits(graph, point)
     kept, left = independent_rows(system.constraints), set[int]()
     for name, value in values.items():
         k = int(name.removeprefix("phi").removeprefix("rate"))

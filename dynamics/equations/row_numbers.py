@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import cgraph as cg
-from cgraph import Graph
-from cgraph.extend import Array, Builder, building, certain_digits, cotangents, kept_by_first
+from cgraph import Graph, extend
+from cgraph.extend import Array, Builder, building, cotangents, kept_by_first
 
 from ..systems.constraints import ConstraintError, Constraints
 from ..systems.kinematics import ZERO
@@ -153,7 +153,7 @@ class RowNumbers:
         m = len(self.constraints)
         matrix = self.matrix(point)
         for k in range(m):
-            digits = certain_digits(self.columns, {**point, **{f"lambda{j}": float(j == k) for j in range(m)}})
+            digits = extend.certain_digits(self.columns, {**point, **{f"lambda{j}": float(j == k) for j in range(m)}})
             matrix[k] = np.where(np.array(list(digits.values())) >= 1.0, matrix[k], 0.0)
         return matrix
 
@@ -209,7 +209,7 @@ class RowNumbers:
         if self.landed is None:
             return np.zeros(0, dtype=np.intp)
         point = {**before, **dict(zip(self.steps, step.tolist(), strict=True))}
-        values, digits = self.landed.evaluate(point), certain_digits(self.landed, point)
+        values, digits = self.landed.evaluate(point), extend.certain_digits(self.landed, point)
         wrong = [x != 0.0 and not (digits[name] < most and np.isfinite(x)) for name, x in values.items()]
         return np.flatnonzero(wrong)
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cgraph import Edge, Graph, Node
-from cgraph.extend import Builder, Names, building, certain_digits, cotangents, folded, require_mapping, shortened
+from cgraph import Edge, Graph, Node, extend
+from cgraph.extend import Builder, Names, building, cotangents, folded, require_mapping, shortened
 
 from ..systems.display_names import display_names
 from ..systems.model import Model, as_system
@@ -134,7 +134,7 @@ class Verdict:
         if self.terms is None:
             return {}
         known = {name: given[name] for name in self.terms.input_names if name in given}
-        digits, values = certain_digits(self.terms, known), self.terms.evaluate(known)
+        digits, values = extend.certain_digits(self.terms, known), self.terms.evaluate(known)
         return {name: float(value) for name, value in values.items() if value and digits[name] >= 1.0}
 
     def __str__(self) -> str:
