@@ -156,4 +156,4 @@ def test_equal_steps_see_forces_that_change_between_them(name: str, monkeypatch:
             ("equal", {"dt": 2e-3, "estimate_error": False}),
         )
     ]
-    assert runs[1] == approx(runs[0], abs=1e-5)  # of a parabola; a slope from before the change is off by 1e-2
+    assert runs[1] == approx(runs[0], abs=1e-5)  # of a parabola; a slope from before the change is off by 1e-3
