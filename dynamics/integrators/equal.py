@@ -24,8 +24,8 @@ def registers(problem: Problem) -> dict[str, int]:
 def equal(step: Step, problem: Problem) -> Program:
     """One step a pass."""
     lengths = with_registers(step, registers(problem))
-    body = arriving([*step.prepare, *step.body, *step.kept])
-    body += _advance(rate_calls(problem, step.prepare, step.body))
+    body = arriving([*step.rates, *step.prepare, *step.body, *step.kept])
+    body += _advance(rate_calls(problem, step.rates, step.prepare, step.body))
     if step.failed:
         body.append(_judged(step.failed, "singular" in step.lengths))
     if step.start:

@@ -20,12 +20,12 @@ def explicit_step(tableau: Tableau, problem: Problem) -> Step:
     """The step; where the tableau has weights of an estimate, with it: the slope at its end is the next one's first."""
     m, stages = problem.size, len(tableau.b)
     lengths = {f"slope{k}": m for k in range(stages)} | {"at": m, "at_t": 1}
-    prepare = [Call(problem.rate, ("x", "t", "p"), ("slope0",))]
+    rates = [Call(problem.rate, ("x", "t", "p"), ("slope0",))]
     body: list[Statement] = []
     for k in range(1, stages):
         body += _stage(problem, k, tableau.c[k], tableau.a[k], ("at", "at_t"))
     if not tableau.error:
-        return Step(lengths, [*body, stage_state("x_new", tableau.b)], prepare)
+        return Step(lengths, [*body, stage_state("x_new", tableau.b)], rates)
     last, extra = f"slope{stages}", len(tableau.extra)
     degree, estimates = len(tableau.interpolant[0]), len(tableau.error)
     lengths |= {last: m, "rounding": m, "rounding_new": m, "lost": 1, "rise": 1, "reach": 1}
@@ -35,12 +35,12 @@ def explicit_step(tableau: Tableau, problem: Problem) -> Step:
     return Step(
         lengths,
         [*body, _arrival(tableau.b)],
-        prepare,
+        rates,
         kept=[Map(SAME, ("rounding_new",), ("rounding",))],
         fixed=("rounding", "rounding_new"),
         error=[*error, _whole(last), _estimate(estimates, m)],
         estimate=tableau.estimate,
-        prepared=[*_held(tableau), Map(SAME, (last,), ("slope0",))],
+        handed=[*_held(tableau), Map(SAME, (last,), ("slope0",))],
         dense=_dense(tableau, problem),
         dense_lengths={f"slope{stages + 1 + k}": m for k in range(extra)}
         | {f"dense{k + 1}": m for k in range(degree)}

@@ -86,8 +86,8 @@ def radau_step(problem: Problem) -> Step:
     return Step(
         lengths,
         body,
-        [*slopes, Call(problem.rate, ("x", "t", "p"), ("rate",))],
-        [identity(m), *[Call(zeros, (), (name,)) for name in (*powers, "size")]],
+        prepare=[*slopes, Call(problem.rate, ("x", "t", "p"), ("rate",))],
+        start=[identity(m), *[Call(zeros, (), (name,)) for name in (*powers, "size")]],
         kept=[*_combined(_POWERS, z, powers), Call(SAME, ("h",), ("h_old",))],
         fixed=("jacobian", "real", "complex", "size", "least", "rtol", "atol", "leap", *powers, *on_the_way, *controls),
         failed="failed",

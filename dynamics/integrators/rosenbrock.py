@@ -94,8 +94,8 @@ def rosenbrock_step(method: Rosenbrock, problem: Problem) -> Step:
     return Step(
         {**_lengths(method, problem), **on_the_way, "sum": 1, "lost": 1},
         [_matrix(method.gamma), Factor("matrix", "pivots"), *_stages(method, problem)],
-        [*now, *_time_slope(problem)],
-        [identity(m)],
+        prepare=[*now, *_time_slope(problem)],
+        start=[identity(m)],
         error=[*measured(last, m), lost("matrix", "lost"), Call(both, ("error", "lost"), ("error",))],
         estimate=method.order,
         dense=_dense(method),

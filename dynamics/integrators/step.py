@@ -28,12 +28,15 @@ class Step:
         Of the registers that it needs besides.
     body : sequence of Statement
         x_new of x, t, h, p and what comes before.
+    rates : sequence of Statement, optional
+        Before all else, from x, t and p.
     prepare : sequence of Statement, optional
-        Before the body, from x, t and p alone: done once for a state, however many lengths are tried from it.
+        Before the body, after `rates`: done once for a state, however many lengths are tried from it.
     start : sequence of Statement, optional
         Before the first step.
     kept : sequence of Statement, optional
-        After an accepted step, with x still the state before: what the next one reads, such as a guess.
+        After an accepted step, with x still the state before: what the next one reads, such as a guess. Its value must
+        not matter where a step starts anew: applied forces may change between two steps.
     fixed : tuple of str, optional
         Registers whose values have no derivatives: guesses, roundings, matrices of an iteration.
     failed : str, optional
@@ -44,8 +47,8 @@ class Step:
         `step_control.measured`. Without it steps cannot be chosen.
     estimate : int, optional
         q, where the estimate falls as h^q.
-    prepared : sequence of Statement, optional
-        After an accepted step that was chosen, in place of `prepare` before the next: the same from what `error` knows.
+    handed : sequence of Statement, optional
+        After an accepted step that was chosen, in place of `rates` before the next: the same from what `error` knows.
     dense : sequence of Statement, optional
         After an accepted step: registers dense1, dense2, .. (m), with x(t + s h) = x + sum_k dense_k s^k. Without it
         the cubic through states and rates at both ends.
@@ -73,7 +76,7 @@ class Step:
     ...         Map(mean, ("x", "h", "slope", "slope_at_end"), ("x_new",)),
     ...     ]
     ...     lengths = dict.fromkeys(("slope", "at", "slope_at_end"), problem.size) | {"end": 1}
-    ...     return Step(lengths, body, prepare=[Call(problem.rate, ("x", "t", "p"), ("slope",))])
+    ...     return Step(lengths, body, rates=[Call(problem.rate, ("x", "t", "p"), ("slope",))])
     >>> dyn.METHODS["heun"] = Method(2, heun)
     >>> decay = dyn.OdeSystem(lambda x, t: [-x[0]], ["x"])
     >>> dyn.simulate(decay, [1.0], None, 1.0, "heun", dt=0.01).q[-1].round(4)
@@ -83,6 +86,7 @@ class Step:
 
     lengths: Mapping[str, int]
     body: Sequence[Statement]
+    rates: Sequence[Statement] = ()
     prepare: Sequence[Statement] = ()
     start: Sequence[Statement] = ()
     kept: Sequence[Statement] = ()
@@ -90,7 +94,7 @@ class Step:
     failed: str = ""
     error: Sequence[Statement] = ()
     estimate: int = 0
-    prepared: Sequence[Statement] = ()
+    handed: Sequence[Statement] = ()
     dense: Sequence[Statement] = ()
     dense_lengths: Mapping[str, int] = field(default_factory=dict)
     smooth: Sequence[Statement] | None = None
@@ -98,7 +102,8 @@ class Step:
     @property
     def derived(self) -> list[Statement]:
         """The statements of a step whose derivatives are taken, from x to the new x."""
-        return arriving([*(self.prepare if self.smooth is None else self.smooth), *self.body, *self.kept])
+        prepare = self.prepare if self.smooth is None else self.smooth
+        return arriving([*self.rates, *prepare, *self.body, *self.kept])
 
     @property
     def branches(self) -> bool:
@@ -119,7 +124,7 @@ def with_registers(step: Step, own: Mapping[str, int]) -> dict[str, int]:
 
     Raises ValueError where one name has two meanings, and for a step that does not make x_new of x.
     """
-    written = set(_outputs([*step.prepare, *step.body, *step.kept]))
+    written = set(_outputs([*step.rates, *step.prepare, *step.body, *step.kept]))
     if "x_new" not in written or "x" in written:
         raise ValueError("a step has to write register 'x_new', and to leave 'x' as it is")
     twice = [name for name in (*step.lengths, *step.dense_lengths) if name in own and name not in SHARED]

@@ -127,11 +127,11 @@ def first_pass(*statements: Statement) -> If:
 def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bool) -> Program:
     """A trial of one step a pass. starts: whether the next step is at most what the derivatives at its start allow."""
     lengths = with_registers(step, registers(problem))
-    prepare = [*step.prepare, *_counted(problem, step.prepare)]
-    first = [*step.start, *(prepare if step.prepared else [])]
+    rates, prepare = ([*part, *_counted(problem, part)] for part in (step.rates, step.prepare))
+    first, again = ([*step.start, *rates], prepare) if step.handed else (step.start, [*rates, *prepare])
     body: list[Statement] = [first_pass(*first)] if first else []
-    if prepare and not step.prepared:
-        body.append(If("accepted", tuple(prepare)))
+    if again:
+        body.append(If("accepted", tuple(again)))
     body += [trial(), *step.body, *step.error]
     body.append(control(step.estimate, rate_calls(problem, step.body, step.error)))
     after: list[Statement] = []
@@ -139,7 +139,7 @@ def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bo
         polynomial, more = (step.dense, step.dense_lengths) if step.dense else _hermite(problem)
         after += [*polynomial, *_counted(problem, polynomial)]
         lengths |= {**dict.fromkeys([f"dense{k + 1}" for k in range(degree)], problem.size), **more}
-    body.append(accept_step(*after, *step.kept, *step.prepared))
+    body.append(accept_step(*after, *step.kept, *step.handed))
     if starts:
         body.append(If("accepted", (Call(Graph([], {"next": math.inf}), (), ("next",)),)))
     return Program(lengths, body, recorded(dense, degree), record_if="accepted", stop="status")

@@ -34,30 +34,27 @@ def taylor_step(order: int, problem: Problem) -> Step:
     series: list[Statement] = [Map(SAME, ("rate",), ("rates0",))]
     for k in orders:
         series += [If(f"takes{k}", tuple(_coefficients(k, graphs)))]
-    wanted = cg.variable("next")
-    share = Call(function("h unit", s=cg.variable("h") / cg.variable("unit")), ("h", "unit"), ("s",))
-    kept = [Map(SAME, (f"{name}_new",), (name,)) for name in ("rounding", "rate", "zeros")]
+    unit, h = cg.variables("unit h")
+    share = Call(function("h unit", s=h / unit), ("h", "unit"), ("s",))
+    at_all = Call(function("unit h", unit=cg.where(unit, unit, h)), ("unit", "h"), ("unit",))  # where nothing is wished
     names = [f"c{k}" for k in orders]
     lengths = dict.fromkeys([*names, "rates0", "rates1", "rate", "rate_new", "rounding", "rounding_new", "slope"], m)
     lengths |= {f"{side}{k}": graphs.sums for side in ("left", "right") for k in orders}
     lengths |= {"sums": graphs.sums, "none": graphs.sums, "zeros": graphs.zeros, "zeros_new": graphs.zeros}
     lengths |= {"next": 1, "rtol": 1, "atol": m}
-    single = ["unit", "s", "at_t", "last", "before", "highest"]
-    lengths |= dict.fromkeys([*single, *[f"{name}{k}" for name in ("order", "takes") for k in orders]], 1)
+    controls = ["unit", "last", "before", "highest", *[f"{name}{k}" for name in ("order", "takes") for k in orders]]
+    lengths |= dict.fromkeys(["s", "at_t", *controls], 1)
     return Step(
         lengths,
-        [share, _arrival(order), stage_time("at_t", 1.0), _rates(graphs, "x_new", "at_t", "_new"), count(1)],
-        [*series, _wish()],
-        [
-            _rates(graphs, "x", "t", ""),
-            count(1),
-            Call(numbers, (), tuple(numbers.outputs)),
-            _orders(order),
-            Call(function("next h", unit=cg.where(wanted, wanted, cg.variable("h"))), ("next", "h"), ("unit",)),
-        ],
-        kept=[*kept, Map(SAME, ("h",), ("unit",))],
-        error=_checked(m),
+        [share, _arrival(order)],
+        [_rates(graphs, "x", "t", ""), count(1)],
+        [at_all, *series, _wish()],
+        [Call(numbers, (), tuple(numbers.outputs)), _orders(order), Map(SAME, ("next",), ("unit",))],
+        kept=[Map(SAME, ("rounding_new",), ("rounding",)), Map(SAME, ("h",), ("unit",))],
+        fixed=("rounding", "rounding_new", "next", "rtol", "atol", *controls),
+        error=[stage_time("at_t", 1.0), _rates(graphs, "x_new", "at_t", "_new"), count(1), *_checked(m)],
         estimate=order,
+        handed=[Map(SAME, (f"{name}_new",), (name,)) for name in ("rate", "zeros")],
         dense=[_dense(order)],
         dense_lengths={f"dense{k}": m for k in orders},
     )
