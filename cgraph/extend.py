@@ -70,6 +70,7 @@ if TYPE_CHECKING:
     from .program.derivatives.linearization import Linearization, Linearized
     from .program.derivatives.tape import Tape, run_passes
     from .program.derivatives.transforms import ProgramVjp, Pulled, program_jvp, program_vjp
+    from .program.many import many
     from .program.program import Program
     from .program.runner import Record, Runner
     from .program.statement import STATEMENTS, Statement, StatementRow, register_statement, require_length
@@ -160,6 +161,7 @@ __all__ = [
     "is_finite",
     "ldl_elimination",
     "ldl_solve",
+    "many",
     "nearest",
     "or_nearest",
     "picture",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .derivatives import call_rules, control_rules, fixed_point_rules, matrix_rules, memory_rules
+from .masks import masked_if, masked_push, masked_while
 from .statement import StatementRow, register_statement
 from .statements import call, control, matrix, memory
 
@@ -41,6 +42,7 @@ ROWS = [
         run=matrix.run_factor,
         check=matrix.check_matrix,
         text=matrix.factor_text,
+        beside=matrix.factor_beside,
         jvp=matrix_rules.push_factor,
         transpose=matrix_rules.pull_factor,
     ),
@@ -51,6 +53,7 @@ ROWS = [
         run=matrix.run_solve,
         check=matrix.check_matrix,
         text=matrix.solve_text,
+        beside=matrix.solve_beside,
         jvp=matrix_rules.push_solve,
         transpose=matrix_rules.pull_solve,
     ),
@@ -62,6 +65,8 @@ ROWS = [
         check=control.check_control,
         bodies=("body", "otherwise"),
         text=control.if_text,
+        beside=control.if_beside,
+        masked=masked_if,
         assign=control_rules.assign_if,
         jvp=control_rules.push_if,
         transpose=control_rules.pull_if,
@@ -74,6 +79,8 @@ ROWS = [
         check=control.check_control,
         bodies=("body",),
         text=control.while_text,
+        beside=control.while_beside,
+        masked=masked_while,
         assign=control_rules.assign_while,
         jvp=control_rules.push_while,
         transpose=control_rules.pull_while,
@@ -87,6 +94,8 @@ ROWS = [
         check=control.check_control,
         bodies=("body",),
         text=control.while_text,
+        beside=control.while_beside,
+        masked=masked_while,
         assign=fixed_point_rules.assign_fixed_point,
         jvp=fixed_point_rules.push_fixed_point,
         transpose=fixed_point_rules.pull_fixed_point,
@@ -109,6 +118,8 @@ ROWS = [
         run=memory.run_push,
         check=memory.check_stack,
         text=memory.push_text,
+        beside=memory.push_beside,
+        masked=masked_push,
         jvp=memory_rules.push_push,
         transpose=memory_rules.pull_push,
     ),
@@ -119,6 +130,7 @@ ROWS = [
         run=memory.run_pop,
         check=memory.check_stack,
         text=memory.pop_text,
+        beside=memory.pop_beside,
         jvp=memory_rules.push_pop,
         transpose=memory_rules.pull_pop,
     ),

@@ -27,6 +27,6 @@ def branch_free(program: StepProgram) -> BranchFreeProgram | None:
     if isinstance(first, If) and first.register == "fresh" and not first.otherwise:
         start, body = replace(steps, body=first.body, stop=None), body[1:]
     one_pass = replace(steps, body=body, stop=None)
-    if one_pass.branches or (start is not None and start.branches):
+    if one_pass.alone or (start is not None and start.alone):
         return None
     return BranchFreeProgram(start, one_pass)

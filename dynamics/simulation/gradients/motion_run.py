@@ -197,7 +197,7 @@ class MotionRun:
 
 def _run_all(ready: Runner, memories: Array, feed: Array) -> Array:
     """The rows (passes, width, k) of k memories that are fed the same: side by side, unless the passes branch."""
-    if not ready.program.branches:
+    if not ready.program.alone:
         return run_passes(ready, memories, len(feed), 1, feed).rows
     rows = np.empty((len(feed), ready.program.width, memories.shape[1]))
     for k in range(memories.shape[1]):
