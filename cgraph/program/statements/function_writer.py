@@ -74,16 +74,13 @@ class FunctionWriter:
 
     def subtract_product(self, target: str, a: str, b: str) -> None:
         """*target -= a * b."""
-        t = self.type
-        product = self.value(f"fmul {self.flags}{t} {a}, {b}")
-        self.do(
-            f"store {t} {self.value(f'fsub {self.flags}{t} {self.load(target)}, {product}')}, ptr {target}, align 8"
-        )
+        product = self.value(f"fmul {self.flags}{self.type} {a}, {b}")
+        self.store(self.value(f"fsub {self.flags}{self.type} {self.load(target)}, {product}"), target)
 
     def divide(self, target: str, divisor: str) -> str:
         """*target /= divisor; the quotient."""
         quotient = self.value(f"fdiv {self.flags}{self.type} {self.load(target)}, {divisor}")
-        self.do(f"store {self.type} {quotient}, ptr {target}, align 8")
+        self.store(quotient, target)
         return quotient
 
     @contextmanager

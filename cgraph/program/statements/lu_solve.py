@@ -1,6 +1,6 @@
 """LU factorization with partial pivoting, as LLVM text and in NumPy: the same operations in the same order.
 
-Of many matrices side by side, lanes, each has pivots of its own.
+Arrays and memory may have an axis of lanes more, the last: many matrices side by side, each with pivots of its own.
 """
 
 from __future__ import annotations
@@ -16,22 +16,18 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def factor(a: Array, pivots: Array) -> None:
-    """LU = PA in place of N matrices a (n, n, N), L with a unit diagonal; pivots (n, N): the row exchanged with row k."""
-    n, lanes = len(a), np.arange(a.shape[2])
+    """LU = PA in place of a (n, n), L with a unit diagonal; pivots (n,) receives the row exchanged with row k."""
+    n = len(a)
     with np.errstate(all="ignore"):
         for k in range(n):
-            sizes = np.abs(a[k:, k])
-            lost = np.isnan(sizes)
-            sizes[lost] = -1.0  # a NaN must not win, here as in machine code, and none is larger than one in row k
-            sizes[0, lost[0]] = np.inf
-            pivots[k] = row = k + np.argmax(sizes, axis=0)
-            a[k], a[row, :, lanes] = a[row, :, lanes].T, a[k].T.copy()
+            pivots[k] = _largest(a, k)
+            _exchange(a, k, pivots)
             a[k + 1 :, k] /= a[k, k]  # column k of L; then the Schur complement
             a[k + 1 :, k + 1 :] -= a[k + 1 :, k, None] * a[k, k + 1 :]
 
 
 def solve(a: Array, pivots: Array, b: Array) -> None:
-    """The solution of A x = b in place of b (n, N)."""
+    """The solution of A x = b in place of b (n,)."""
     n = len(a)
     with np.errstate(all="ignore"):
         for k in range(n):  # b = P b
@@ -44,7 +40,7 @@ def solve(a: Array, pivots: Array, b: Array) -> None:
 
 
 def solve_transposed(a: Array, pivots: Array, b: Array) -> None:
-    """The solution of A^T x = b in place of b (n, N): A^T = U^T L^T P."""
+    """The solution of A^T x = b in place of b (n,): A^T = U^T L^T P."""
     n = len(a)
     with np.errstate(all="ignore"):
         for k in range(n):  # U^T y = b
@@ -56,28 +52,47 @@ def solve_transposed(a: Array, pivots: Array, b: Array) -> None:
             _exchange(b, k, pivots)
 
 
+def _largest(a: Array, k: int) -> Any:
+    """argmax over i >= k of |a[i, k]|, in every lane: not NumPy's, since a NaN must not win, as in machine code."""
+    row: Any = k
+    if a.ndim == 2:
+        for i in range(k + 1, len(a)):
+            if abs(a[i, k]) > abs(a[row, k]):
+                row = i
+        return row
+    best = np.abs(a[k, k])
+    for i in range(k + 1, len(a)):
+        size = np.abs(a[i, k])
+        row, best = np.where(size > best, i, row), np.where(size > best, size, best)
+    return row
+
+
 def _exchange(b: Array, k: int, pivots: Array) -> None:
-    """Row k and the one that `pivots` says; with itself where that is none, as in a lane that is not asked for."""
-    there = (pivots[k] >= 0.0) & (pivots[k] < len(b))
-    row, lanes = np.where(there, pivots[k], k).astype(int), np.arange(b.shape[1])
-    b[k], b[row, lanes] = b[row, lanes], b[k].copy()
+    """Rows k and pivots[k]; in a lane that is not asked for, where this is no row, row k with itself."""
+    if pivots.ndim == 1:
+        if (row := int(pivots[k])) != k:
+            b[[k, row]] = b[[row, k]]
+        return
+    lanes, there = np.arange(b.shape[-1]), (pivots[k] >= 0.0) & (pivots[k] < len(b))
+    rows = np.where(there, pivots[k], k).astype(int)
+    b[k], b[rows, ..., lanes] = np.moveaxis(b[rows, ..., lanes], 0, -1), np.moveaxis(b[k].copy(), -1, 0)
 
 
 def factor_text(arithmetic: Arithmetic) -> list[str]:
     """`void lu.factor(double *a, double *p, int64_t n)`, as `factor`."""
     ir = FunctionWriter(arithmetic)
-    best = ir.value(f"alloca {ir.type}, align 64")
+    best, chosen = (ir.value(f"alloca {ir.type}, align 64") for _ in range(2))
     with ir.loop("0", "%n") as k:
         # p[k] = argmax over i >= k of |a[i, k]|
         next_k = ir.value(f"add i64 {k}, 1")
-        chosen = ir.at("%p", k)
         ir.store(ir.absolute(ir.load(ir.element(k, k))), best)
         ir.store(ir.everywhere(k), chosen)
         with ir.loop(next_k, "%n") as i:
-            here = ir.absolute(ir.load(ir.element(i, k)))
-            larger = ir.above(here, ir.load(best))
+            here, before = ir.absolute(ir.load(ir.element(i, k))), ir.load(best)
+            larger = ir.above(here, before)
+            ir.store(ir.choose(larger, here, before), best)
             ir.store(ir.choose(larger, ir.everywhere(i), ir.load(chosen)), chosen)
-            ir.store(ir.choose(larger, here, ir.load(best)), best)
+        ir.store(ir.load(chosen), ir.at("%p", k))
         with ir.each_lane() as lane:  # exchange rows k and p[k]
             row = ir.pivot(k, lane)
             count = ir.value(f"select i1 {ir.value(f'icmp eq i64 {row}, {k}')}, i64 0, i64 %n")

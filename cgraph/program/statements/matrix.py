@@ -81,16 +81,16 @@ def check_matrix(statement: Factor | Solve, lengths: Lengths) -> None:
 def run_factor(statement: Factor, state: State, _: Execution) -> None:
     """In Python."""
     n = len(state[statement.pivots])
-    a, p = np.array(state[statement.matrix]).reshape(n, n, 1), np.empty((n, 1))
+    a, p = np.array(state[statement.matrix]).reshape(n, n), np.empty(n)
     lu_solve.factor(a, p)
-    state[statement.matrix], state[statement.pivots] = a.ravel().tolist(), p[:, 0].tolist()
+    state[statement.matrix], state[statement.pivots] = a.ravel().tolist(), p.tolist()
 
 
 def run_solve(statement: Solve, state: State, _: Execution) -> None:
     """In Python."""
     n = len(state[statement.pivots])
     a, p, b = np.array(state[statement.matrix]), np.array(state[statement.pivots]), np.array(state[statement.vector])
-    _solve(statement)(a.reshape(n, n, 1), p[:, None], b[:, None])
+    _solve(statement)(a.reshape(n, n), p, b)
     state[statement.vector] = b.tolist()
 
 
